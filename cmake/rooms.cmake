@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+# How every target of the project is made: the same warnings, sanitizers and checks everywhere.
+
+# palpate_target_options(TARGET): warnings, sanitizers, clang-tidy. Never leaves the build.
+function(palpate_target_options target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
+                         -Wno-sign-conversion -Wnon-virtual-dtor)
+  if(PALPATE_WERROR)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+  if(PALPATE_SANITIZE)
+    target_compile_options(${target} PRIVATE -fsanitize=${PALPATE_SANITIZE}
+                           -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_compile_definitions(${target} PRIVATE PALPATE_SANITIZED=1)
+    target_link_options(${target} PRIVATE -fsanitize=${PALPATE_SANITIZE})
+  endif()
+  if(PALPATE_FUZZ)
+    target_compile_options(${target} PRIVATE -fsanitize=fuzzer-no-link)
+  endif()
+  if(PALPATE_CLANG_TIDY)
+    find_program(PALPATE_CLANG_TIDY_PROGRAM NAMES clang-tidy-14 clang-tidy REQUIRED)
+    set_target_properties(${target} PROPERTIES CXX_CLANG_TIDY
+                          "${PALPATE_CLANG_TIDY_PROGRAM};--quiet;--warnings-as-errors=*")
+  endif()
+endfunction()
+
+# palpate_room(NAME LINKS <public libraries...> PRIVATE <private libraries...>)
+#
+# A library palpate_NAME, palpate::NAME to others, from all .cpp files of the current folder; its
+# headers are included by their path from the repository root, which is also where they install.
+function(palpate_room name)
+  cmake_parse_arguments(ARG "" "" "LINKS;PRIVATE" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS *.cpp)
+  file(GLOB headers CONFIGURE_DEPENDS *.hpp)
+  add_library(palpate_${name} ${sources} ${headers})
+  add_library(palpate::${name} ALIAS palpate_${name})
+  set_target_properties(palpate_${name} PROPERTIES EXPORT_NAME ${name})
+  target_compile_features(palpate_${name} PUBLIC cxx_std_20)
+  target_include_directories(palpate_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(palpate_${name} PUBLIC ${ARG_LINKS} PRIVATE ${ARG_PRIVATE})
+  palpate_target_options(palpate_${name})
+  file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+  if(folder MATCHES "^palpate/")
+    set_property(GLOBAL APPEND PROPERTY PALPATE_INSTALLED_ROOMS palpate_${name})
+    install(TARGETS palpate_${name} EXPORT palpate_targets)
+    install(FILES ${headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/${folder})
+  endif()
+endfunction()
+
+# palpate_test(NAME LINKS <libraries...>): all .cpp files of the current folder as one GoogleTest
+# program test_NAME, each TEST of it a ctest test.
+function(palpate_test name)
+  cmake_parse_arguments(ARG "" "" "LINKS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS *.cpp)
+  add_executable(test_${name} ${sources})
+  target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(test_${name} PRIVATE ${ARG_LINKS} GTest::gtest_main)
+  palpate_target_options(test_${name})
+  gtest_discover_tests(test_${name} DISCOVERY_TIMEOUT 60
+    TEST_PREFIX "${PALPATE_TEST_PREFIX}"
+    PROPERTIES TIMEOUT 300 ENVIRONMENT "PALPATE_DATA=${PALPATE_DATA}")
+endfunction()

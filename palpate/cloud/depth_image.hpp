@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "palpate/core/cloud.hpp"
+
+namespace palpate {
+
+/// A pinhole camera. Optical frame: x right, y down, z forward; pixel centres at whole numbers.
+struct Intrinsics {
+  int width = 0;   ///< [px]
+  int height = 0;  ///< [px]
+  double fx = 0.0, fy = 0.0;  ///< [px] focal lengths, > 0
+  double cx = 0.0, cy = 0.0;  ///< [px] principal point
+  /// Rational Brown-Conrady distortion (k1 k2 p1 p2 k3 k4 k5 k6, OpenCV's order); all zero: none.
+  std::array<double, 8> distortion{};
+
+  bool operator==(const Intrinsics&) const = default;
+  [[nodiscard]] bool distorted() const { return distortion != std::array<double, 8>{}; }
+};
+
+/// @throws Error if sizes are not in 1..16384 or focal lengths are not positive and finite.
+void validate(const Intrinsics& intrinsics);
+
+/// A camera's viewing rays, computed once and shared by all of its frames.
+///
+/// The ray of pixel (u, v) is (x, y, 1) in the optical frame: x depends on u alone and y on v alone
+/// unless the lens is distorted, when both are kept per pixel.
+class ViewingRays {
+ public:
+  /// @throws Error if the intrinsics do not validate, or the distortion cannot be inverted within
+  ///         the image.
+  explicit ViewingRays(const Intrinsics& intrinsics);
+
+  [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return intrinsics_; }
+  /// (x, y) of the ray through pixel (u, v), 0 <= u < width, 0 <= v < height.
+  [[nodiscard]] Eigen::Vector2d ray(int u, int v) const noexcept;
+
+  /// Pixels [u_begin, u_end) x [v_begin, v_end).
+  struct Window {
+    int u_begin = 0, u_end = 0, v_begin = 0, v_end = 0;
+    [[nodiscard]] bool empty() const noexcept { return u_begin >= u_end || v_begin >= v_end; }
+  };
+
+  /// The pixels whose rays can meet a ball at `centre` [m, optical frame]; the whole image where
+  /// the ball reaches behind the camera's plane. O(log(width + height)).
+  [[nodiscard]] Window window(const Vec3& centre, double radius) const noexcept;
+
+ private:
+  friend class DepthImage;
+  Intrinsics intrinsics_;
+  std::vector<double> x_, y_;  // per column and row; per pixel, row by row, if distorted
+  // Bounds of the rays in each column and row, made monotone: where a window can begin and end.
+  std::vector<double> column_min_, column_max_, row_min_, row_max_;
+};
+
+/// One capture of a depth camera: 16-bit depth as it came, touched in place.
+///
+/// Section 4.2: a depth image already sorts its points by direction, so the points near the proxy
+/// are found by projecting the sphere to a pixel window, and only that window is deprojected.
+/// Depth 0 and 65535 are holes.
+class DepthImage final : public Cloud {
+ public:
+  /// @param rays               the camera
+  /// @param depth              row by row, width*height values; depth along the optical axis
+  /// @param units_per_metre    e.g. 1000 for millimetres, 5000 for the TUM benchmark
+  /// @param world_from_camera  rigid pose of the optical frame
+  /// @throws Error if the size does not match, the units are not positive, or the pose is not
+  ///         rigid and finite.
+  DepthImage(std::shared_ptr<const ViewingRays> rays, std::vector<std::uint16_t> depth,
+             double units_per_metre,
+             const Eigen::Isometry3d& world_from_camera = Eigen::Isometry3d::Identity());
+
+  void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
+
+  [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return rays_->intrinsics(); }
+  [[nodiscard]] const ViewingRays& rays() const noexcept { return *rays_; }
+  [[nodiscard]] const std::vector<std::uint16_t>& depth() const noexcept { return depth_; }
+  [[nodiscard]] double units_per_metre() const noexcept { return units_per_metre_; }
+  [[nodiscard]] const Eigen::Isometry3d& world_from_camera() const noexcept {
+    return world_from_camera_;
+  }
+
+  /// The point that pixel (u, v) measured [m, world]; none for a hole or outside the image.
+  [[nodiscard]] std::optional<Vec3> deproject(int u, int v) const noexcept;
+  /// All measured points [m, world], row by row.
+  [[nodiscard]] std::vector<Vec3> points() const;
+
+ private:
+  std::shared_ptr<const ViewingRays> rays_;
+  std::vector<std::uint16_t> depth_;
+  double units_per_metre_;
+  double metres_per_unit_;
+  Eigen::Isometry3d world_from_camera_;
+};
+
+/// Is this depth reading a measurement? 0 is "none", 65535 "saturated".
+constexpr bool is_measured(std::uint16_t raw) noexcept { return raw != 0 && raw != 65535; }
+
+}  // namespace palpate

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "palpate/core/parameters.hpp"
+#include "palpate/core/patch.hpp"
+
+namespace palpate {
+
+/// Eq. (15): the vector from the proxy to the HIP, were the proxy moved on with the surface [m].
+///
+/// The surface moves along +n, so the proxy will be at P + (t - t_j) v n and u = HIP - P *loses*
+/// that much. The print adds it (docs/method.md, erratum 1); `as_printed` keeps the print's sign.
+/// @param u        [m] from the proxy to the HIP
+/// @param elapsed  [s] t - t_j, since the newest frame
+inline Vec3 extrapolated_u(const Vec3& u, double velocity, const Vec3& normal, double elapsed,
+                           bool as_printed) noexcept {
+  const Vec3 travel = elapsed * velocity * normal;
+  return as_printed ? Vec3(u + travel) : Vec3(u - travel);  // Eq. (15)
+}
+
+/// The force on the HIP and whether it was cut.
+struct CouplingForce {
+  Vec3 force;      ///< [N] world
+  bool saturated;  ///< the force asked for was longer than max_force
+};
+
+/// Eq. (16): the virtual spring-damper between HIP and proxy. Pushes only, and never harder than
+/// `coupling.max_force`.
+///
+/// The damper opposes the rate of change of the distance, so a HIP that moves away from the proxy
+/// feels more force; the print's minus before k_d feeds energy in (docs/method.md, erratum 2).
+/// @param u              [m] from the proxy to the HIP, extrapolated by (15)
+/// @param distance_rate  [m/s] d|u|/dt, the one-sided difference of (16)
+CouplingForce coupling_force(const Coupling& coupling, const Vec3& u, double distance_rate,
+                             double r_c, bool as_printed) noexcept;
+
+}  // namespace palpate

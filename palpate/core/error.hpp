@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace palpate {
+
+/// What went wrong at the door (opening, parsing, configuring); never thrown inside a tick.
+///
+/// `what()` reads `WHAT: WHY; REMEDY` on one line: the file or argument, what was wrong with it,
+/// and what to do. Programs print it behind their own name.
+class Error : public std::runtime_error {
+ public:
+  /// @param subject  the file, option or argument concerned
+  /// @param reason   what was wrong with it
+  /// @param remedy   what the user can do; may be empty
+  Error(const std::string& subject, const std::string& reason, const std::string& remedy = {})
+      : std::runtime_error(subject + ": " + reason + (remedy.empty() ? "" : "; " + remedy)) {}
+};
+
+}  // namespace palpate

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace palpate {
+
+/// Which variant of the method the renderer runs.
+enum class Method {
+  paper,             ///< sections 4.1-4.6 with the errata of docs/method.md corrected
+  paper_as_printed,  ///< the same to the letter: signs of (15) and (16), 1/f_c in (3) and (13)
+  fixed_step,        ///< the 2011 method [1]: every step 0.1 r_1, no velocity estimate
+};
+
+/// The proxy's regions and the constants of its movement. Section 4.1, 4.3, 4.4; Table 2.
+struct ProxyParameters {
+  double r_1 = 4.99e-3;         ///< [m] a point nearer than this entrenches the proxy
+  double r_2 = 5.01e-3;         ///< [m] a point nearer than this is in contact
+  double r_3 = 10.0e-3;         ///< [m] points nearer than this shape the normal
+  double theta = 1.745329e-3;   ///< [rad] convergence angle of (8)
+  double gamma = 0.3;           ///< [-] step scale of (11), closer than r_1 to the ideal position
+  double xi = 0.1;              ///< [-] step scale of (12), farther than r_1 from it
+  int step_budget = 64;         ///< [steps/tick] bound on the work of a tick
+
+  /// Contact radius r_c = (r_1 + r_2) / 2 [m]. Section 4.1.
+  [[nodiscard]] double r_c() const { return 0.5 * (r_1 + r_2); }
+};
+
+/// The virtual coupling between HIP and proxy. Section 4.6.
+struct Coupling {
+  double stiffness = 600.0;  ///< [N/m] k_s of (16)
+  double damping = 0.0;      ///< [N s/m] k_d of (16)
+  double max_force = 20.0;   ///< [N] a force is never longer; a device's own limit may be lower
+};
+
+/// What is assumed about time between frames. Section 4.5.
+struct MotionParameters {
+  double frame_rate = 30.0;        ///< [Hz] f_c: used as printed, and before two stamps are known
+  double max_extrapolation = 0.1;  ///< [s] longest time over which a velocity is trusted
+};
+
+/// Everything that can be set on a renderer. Defaults are the paper's Table 2.
+struct Parameters {
+  Method method = Method::paper;
+  ProxyParameters proxy;
+  Coupling coupling;
+  MotionParameters motion;
+};
+
+/// One row of the table that feeds help texts, configuration files and sliders.
+struct ParameterInfo {
+  std::string_view name;
+  std::string_view symbol;  ///< as in the paper, empty where it has none
+  std::string_view unit;
+  double default_value;
+  double min;  ///< smallest value allowed
+  double max;  ///< largest value allowed
+  std::string_view meaning;
+  std::string_view source;
+  double (*get)(const Parameters&);
+  void (*set)(Parameters&, double);
+};
+
+/// All numeric parameters, in the order in which they are shown.
+/// The row `r_c` is derived: setting it scales r_1, r_2 and r_3 together (section 5).
+std::span<const ParameterInfo> parameter_table();
+
+/// Sets one parameter by name.
+/// @throws Error for an unknown name (naming the nearest known one) or a value out of its range.
+void set_parameter(Parameters& parameters, std::string_view name, double value);
+
+/// Checks every range and that 0 < r_1 < r_2 < r_3.
+/// @throws Error naming the first parameter that does not hold.
+void validate(const Parameters& parameters);
+
+/// The method's name on the command line, such as `paper-as-printed`.
+std::string_view method_name(Method method);
+
+/// @throws Error for an unknown name, listing the known ones.
+Method method_from_name(std::string_view name);
+
+/// The candidate with the smallest edit distance to `word`, or empty if none is near enough to be
+/// what was meant.
+std::string_view nearest_name(std::string_view word, std::span<const std::string_view> candidates);
+
+}  // namespace palpate

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
-
-#include <Eigen/Geometry>
 
 #include "palpate/core/cloud.hpp"
 
@@ -15,8 +14,8 @@ namespace palpate {
 
 /// A pinhole camera. Optical frame: x right, y down, z forward; pixel centres at whole numbers.
 struct Intrinsics {
-  int width = 0;   ///< [px]
-  int height = 0;  ///< [px]
+  int width = 0;              ///< [px]
+  int height = 0;             ///< [px]
   double fx = 0.0, fy = 0.0;  ///< [px] focal lengths, > 0
   double cx = 0.0, cy = 0.0;  ///< [px] principal point
   /// Rational Brown-Conrady distortion (k1 k2 p1 p2 k3 k4 k5 k6, OpenCV's order); all zero: none.
@@ -35,12 +34,12 @@ void validate(const Intrinsics& intrinsics);
 /// unless the lens is distorted, when both are kept per pixel.
 class ViewingRays {
  public:
-  /// @throws Error if the intrinsics do not validate, or the distortion cannot be inverted within
-  ///         the image.
+  /// A pixel outside the lens's field, where the distortion has no inverse, gets no ray: what it
+  /// reads is a hole. @throws Error if the intrinsics do not validate.
   explicit ViewingRays(const Intrinsics& intrinsics);
 
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return intrinsics_; }
-  /// (x, y) of the ray through pixel (u, v), 0 <= u < width, 0 <= v < height.
+  /// (x, y) of the ray through pixel (u, v), 0 <= u < width, 0 <= v < height; NaN if it has none.
   [[nodiscard]] Eigen::Vector2d ray(int u, int v) const noexcept;
 
   /// Pixels [u_begin, u_end) x [v_begin, v_end).
@@ -102,6 +101,8 @@ class DepthImage final : public Cloud {
 };
 
 /// Is this depth reading a measurement? 0 is "none", 65535 "saturated".
-constexpr bool is_measured(std::uint16_t raw) noexcept { return raw != 0 && raw != 65535; }
+constexpr bool is_measured(std::uint16_t raw) noexcept {
+  return raw != 0 && raw != 65535;
+}
 
 }  // namespace palpate

@@ -20,7 +20,7 @@ class PointCloud final : public Cloud {
   /// @param viewpoint  [m] world: from where they were seen (PCD's VIEWPOINT), if known
   /// @param voxel      [m] edge; about the radius of a search is best. Widened if the cloud is so
   ///                   large that voxels could not be numbered.
-  /// @throws Error if `voxel` is not positive and finite.
+  /// @throws Error if `voxel` is not in 0.001 to 1 m.
   explicit PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoint = std::nullopt,
                       double voxel = 0.010);
 

@@ -16,13 +16,13 @@ enum class Method {
 
 /// The proxy's regions and the constants of its movement. Section 4.1, 4.3, 4.4; Table 2.
 struct ProxyParameters {
-  double r_1 = 4.99e-3;         ///< [m] a point nearer than this entrenches the proxy
-  double r_2 = 5.01e-3;         ///< [m] a point nearer than this is in contact
-  double r_3 = 10.0e-3;         ///< [m] points nearer than this shape the normal
-  double theta = 1.745329e-3;   ///< [rad] convergence angle of (8)
-  double gamma = 0.3;           ///< [-] step scale of (11), closer than r_1 to the ideal position
-  double xi = 0.1;              ///< [-] step scale of (12), farther than r_1 from it
-  int step_budget = 64;         ///< [steps/tick] bound on the work of a tick
+  double r_1 = 4.99e-3;  ///< [m] a point nearer than this entrenches the proxy
+  double r_2 = 5.01e-3;  ///< [m] a point nearer than this is in contact
+  double r_3 = 10.0e-3;  ///< [m] points nearer than this shape the normal
+  double theta = 0.1 * 3.14159265358979323846 / 180.0;  ///< [rad] convergence angle of (8)
+  double gamma = 0.3;    ///< [-] step scale of (11), closer than r_1 to the ideal position
+  double xi = 0.1;       ///< [-] step scale of (12), farther than r_1 from it
+  int step_budget = 64;  ///< [steps/tick] bound on the work of a tick
 
   /// Contact radius r_c = (r_1 + r_2) / 2 [m]. Section 4.1.
   [[nodiscard]] double r_c() const { return 0.5 * (r_1 + r_2); }

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
-
-#include <Eigen/Core>
 
 #include "palpate/core/parameters.hpp"
 
@@ -104,8 +103,7 @@ ContactSums contact_sums(const Patch& patch, const Vec3& at, const ProxyParamete
 ///
 /// Departs from the print in that only points ahead count: "the smallest magnitude" would let a
 /// point behind the proxy stop it.
-double clear_travel(const Patch& patch, const Vec3& at, const Vec3& direction,
-                    double r_c) noexcept;
+double clear_travel(const Patch& patch, const Vec3& at, const Vec3& direction, double r_c) noexcept;
 
 /// Eq. (10): how far a sphere at `at` must travel along the unit vector `direction` until no point
 /// that is within r_1 now is nearer than r_c [m]; 0 if none is.

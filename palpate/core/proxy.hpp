@@ -20,7 +20,8 @@ const char* to_string(ContactState state) noexcept;
 /// What one look at the patch tells: section 4.1's state and section 4.2's normal.
 struct Surroundings {
   ContactState state;
-  std::optional<Vec3> normal;  ///< [-] unit n of (1), away from the points; none if the sum vanishes
+  std::optional<Vec3>
+      normal;  ///< [-] unit n of (1), away from the points; none if the sum vanishes
 };
 
 /// State and normal of a proxy at `at` [m, world]. Eq. (1), (2). O(points).

@@ -87,7 +87,7 @@ class Renderer {
   struct Movement;
 
   Movement move_proxy(const Vec3& hip) noexcept;
-  bool cover(double travel) noexcept;
+  void cover(double travel) noexcept;
   Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;
 
   Parameters parameters_;
@@ -95,16 +95,16 @@ class Renderer {
   const Cloud* cloud_ = nullptr;
 
   // The proxy and its contact.
-  std::optional<Vec3> proxy_;       // P_k
-  std::optional<Vec3> normal_;      // the last n known while in contact
-  bool touching_ = false;           // the state after the last tick's steps
+  std::optional<Vec3> proxy_;   // P_k
+  std::optional<Vec3> normal_;  // the last n known while in contact
+  bool touching_ = false;       // the state after the last tick's steps
 
   // The surface's motion.
   std::int64_t frame_count_ = 0;
-  double stamp_ = 0.0;              // t_j
-  double interval_ = 0.0;           // t_j - t_(j-1)
-  double velocity_ = 0.0;           // v_j
-  bool patch_is_stale_ = true;      // a frame came since the patch was gathered
+  double stamp_ = 0.0;                // t_j
+  double interval_ = 0.0;             // t_j - t_(j-1)
+  double velocity_ = 0.0;             // v_j
+  bool patch_is_stale_ = true;        // a frame came since the patch was gathered
   bool velocity_update_due_ = false;  // (13) waits for the first step after (3)
   bool stamp_ok_ = true;
 

@@ -18,9 +18,9 @@ inline std::filesystem::path data_path(const std::filesystem::path& below) {
 }  // namespace palpate::test
 
 /// Sets `path` to recorded data, or skips the test, saying what is missing.
-#define PALPATE_DATA_OR_SKIP(path, below)                                               \
-  const std::filesystem::path path = palpate::test::data_path(below);                   \
-  if (path.empty() || !std::filesystem::exists(path)) {                                 \
+#define PALPATE_DATA_OR_SKIP(path, below)                                                   \
+  const std::filesystem::path path = palpate::test::data_path(below);                       \
+  if (path.empty() || !std::filesystem::exists(path)) {                                     \
     GTEST_SKIP() << "recorded data not found: " << (path.empty() ? (below) : path.string()) \
-                 << "; set PALPATE_DATA to the folder that holds it";                   \
+                 << "; set PALPATE_DATA to the folder that holds it";                       \
   }

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/core/parameters.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+void scale_radii(Parameters& p, double r_c) {
+  const double factor = r_c / p.proxy.r_c();
+  p.proxy.r_1 *= factor;
+  p.proxy.r_2 *= factor;
+  p.proxy.r_3 *= factor;
+}
+
+constexpr std::array table = {
+    ParameterInfo{"r_c", "r_c", "m", 5.0e-3, 1e-4, 0.05,
+                  "contact radius; setting it scales r_1, r_2 and r_3 together", "4.1, Table 2",
+                  [](const Parameters& p) { return p.proxy.r_c(); }, scale_radii},
+    ParameterInfo{"r_1", "r_1", "m", 4.99e-3, 1e-4, 0.05,
+                  "a point nearer than this entrenches the proxy", "4.1, Table 2",
+                  [](const Parameters& p) { return p.proxy.r_1; },
+                  [](Parameters& p, double v) { p.proxy.r_1 = v; }},
+    ParameterInfo{"r_2", "r_2", "m", 5.01e-3, 1e-4, 0.05,
+                  "a point nearer than this is in contact with the proxy", "4.1, Table 2",
+                  [](const Parameters& p) { return p.proxy.r_2; },
+                  [](Parameters& p, double v) { p.proxy.r_2 = v; }},
+    ParameterInfo{"r_3", "r_3", "m", 10.0e-3, 1e-4, 0.05,
+                  "points nearer than this shape the normal", "4.1, Table 2",
+                  [](const Parameters& p) { return p.proxy.r_3; },
+                  [](Parameters& p, double v) { p.proxy.r_3 = v; }},
+    ParameterInfo{"theta", "θ", "rad", 0.1 * pi / 180.0, 1e-6, 0.5,
+                  "angle between -u and n at which the proxy has converged", "(8), Table 2",
+                  [](const Parameters& p) { return p.proxy.theta; },
+                  [](Parameters& p, double v) { p.proxy.theta = v; }},
+    ParameterInfo{"gamma", "γ", "-", 0.3, 0.01, 1.0,
+                  "step scale in contact, closer than r_1 to the ideal position", "(11), Table 2",
+                  [](const Parameters& p) { return p.proxy.gamma; },
+                  [](Parameters& p, double v) { p.proxy.gamma = v; }},
+    ParameterInfo{"xi", "ξ", "-", 0.1, 0.001, 0.99,
+                  "step scale in contact, farther than r_1 from the ideal position",
+                  "(12), Table 2", [](const Parameters& p) { return p.proxy.xi; },
+                  [](Parameters& p, double v) { p.proxy.xi = v; }},
+    ParameterInfo{"step_budget", "", "steps/tick", 64, 1, 10000,
+                  "most proxy steps in a tick; the proxy goes on in the next", "4.6",
+                  [](const Parameters& p) { return double{1} * p.proxy.step_budget; },
+                  [](Parameters& p, double v) { p.proxy.step_budget = static_cast<int>(v); }},
+    ParameterInfo{"stiffness", "k_s", "N/m", 600.0, 0.0, 1e5, "spring of the virtual coupling",
+                  "(16), Table 2", [](const Parameters& p) { return p.coupling.stiffness; },
+                  [](Parameters& p, double v) { p.coupling.stiffness = v; }},
+    ParameterInfo{"damping", "k_d", "N s/m", 0.0, 0.0, 1e3, "damper of the virtual coupling",
+                  "(16), Table 2", [](const Parameters& p) { return p.coupling.damping; },
+                  [](Parameters& p, double v) { p.coupling.damping = v; }},
+    ParameterInfo{"max_force", "", "N", 20.0, 0.0, 1e3,
+                  "a force is never longer; a device's own limit may be lower", "ours",
+                  [](const Parameters& p) { return p.coupling.max_force; },
+                  [](Parameters& p, double v) { p.coupling.max_force = v; }},
+    ParameterInfo{"frame_rate", "f_c", "Hz", 30.0, 0.1, 1000.0,
+                  "assumed where the interval between two stamps is not known", "(3), (13)",
+                  [](const Parameters& p) { return p.motion.frame_rate; },
+                  [](Parameters& p, double v) { p.motion.frame_rate = v; }},
+    ParameterInfo{"max_extrapolation", "", "s", 0.1, 0.0, 10.0,
+                  "longest time over which a surface velocity is trusted", "ours",
+                  [](const Parameters& p) { return p.motion.max_extrapolation; },
+                  [](Parameters& p, double v) { p.motion.max_extrapolation = v; }},
+};
+
+struct MethodName {
+  Method method;
+  std::string_view name;
+};
+constexpr std::array method_names = {MethodName{Method::paper, "paper"},
+                                     MethodName{Method::paper_as_printed, "paper-as-printed"},
+                                     MethodName{Method::fixed_step, "fixed-step"}};
+
+std::string number(double value) {
+  std::string text = std::to_string(value);
+  if (value != 0.0 && std::abs(value) < 1e-3) {
+    std::array<char, 32> buffer{};
+    std::snprintf(buffer.data(), buffer.size(), "%g", value);
+    text = buffer.data();
+  }
+  return text;
+}
+
+void check_range(const ParameterInfo& row, double value) {
+  if (std::isfinite(value) && value >= row.min && value <= row.max) return;
+  const std::string unit = row.unit == "-" ? "" : " " + std::string(row.unit);
+  throw Error("parameter '" + std::string(row.name) + "'",
+              number(value) + unit + " is out of range",
+              "give a value from " + number(row.min) + " to " + number(row.max) + unit);
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t substitute = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substitute});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+std::span<const ParameterInfo> parameter_table() {
+  return table;
+}
+
+void set_parameter(Parameters& parameters, std::string_view name, double value) {
+  for (const ParameterInfo& row : table) {
+    if (row.name != name) continue;
+    check_range(row, value);
+    row.set(parameters, value);
+    return;
+  }
+  std::vector<std::string_view> names;
+  for (const ParameterInfo& row : table) names.push_back(row.name);
+  const std::string_view near = nearest_name(name, names);
+  throw Error("parameter '" + std::string(name) + "'", "there is no such parameter",
+              near.empty() ? "see 'palpate help parameters' for their names"
+                           : "did you mean '" + std::string(near) + "'?");
+}
+
+void validate(const Parameters& parameters) {
+  for (const ParameterInfo& row : table) check_range(row, row.get(parameters));
+  const ProxyParameters& proxy = parameters.proxy;
+  if (!(proxy.r_1 < proxy.r_2 && proxy.r_2 < proxy.r_3)) {
+    throw Error("parameters r_1, r_2, r_3",
+                "the radii " + number(proxy.r_1) + ", " + number(proxy.r_2) + " and " +
+                    number(proxy.r_3) + " m do not increase",
+                "give r_1 < r_2 < r_3, or set r_c to scale all three");
+  }
+}
+
+std::string_view method_name(Method method) {
+  for (const MethodName& row : method_names) {
+    if (row.method == method) return row.name;
+  }
+  return "unknown";
+}
+
+Method method_from_name(std::string_view name) {
+  std::string known;
+  for (const MethodName& row : method_names) {
+    if (row.name == name) return row.method;
+    known += (known.empty() ? "" : ", ") + std::string(row.name);
+  }
+  throw Error("method '" + std::string(name) + "'", "there is no such method",
+              "choose one of: " + known);
+}
+
+std::string_view nearest_name(std::string_view word, std::span<const std::string_view> candidates) {
+  std::string_view best;
+  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 2);
+  for (const std::string_view candidate : candidates) {
+    const std::size_t distance = edit_distance(word, candidate);
+    if (distance <= best_distance && (best.empty() || distance < best_distance)) {
+      best = candidate;
+      best_distance = distance;
+    }
+  }
+  return best;
+}
+
+}  // namespace palpate

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <random>
+#include <tuple>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/core/renderer.hpp"
+
+namespace palpate {
+namespace {
+
+using Point = std::tuple<float, float, float>;
+
+// What a gather finds, in an order that does not depend on how it searched.
+std::vector<Point> found(const Cloud& cloud, const Ball& ball) {
+  Patch patch;
+  gather(cloud, ball, patch);
+  std::vector<Point> points;
+  for (std::size_t i = 0; i < patch.size(); ++i)
+    points.emplace_back(patch.x()[i], patch.y()[i], patch.z()[i]);
+  std::sort(points.begin(), points.end());
+  return points;
+}
+
+// The two searches round differently (by nanometres), so sets are compared point by point.
+::testing::AssertionResult same_points(const std::vector<Point>& a, const std::vector<Point>& b) {
+  if (a.size() != b.size())
+    return ::testing::AssertionFailure() << a.size() << " points against " << b.size();
+  const auto near = [](const Point& p, const Point& q) {
+    constexpr float rounding = 2e-8F;
+    return std::abs(std::get<0>(p) - std::get<0>(q)) <= rounding &&
+           std::abs(std::get<1>(p) - std::get<1>(q)) <= rounding &&
+           std::abs(std::get<2>(p) - std::get<2>(q)) <= rounding;
+  };
+  std::vector<bool> used(b.size(), false);
+  for (const Point& p : a) {
+    bool matched = false;
+    for (std::size_t j = 0; j < b.size() && !matched; ++j) {
+      if (used[j] || !near(p, b[j])) continue;
+      used[j] = true;
+      matched = true;
+    }
+    if (!matched)
+      return ::testing::AssertionFailure() << "no partner for (" << std::get<0>(p) << ", "
+                                           << std::get<1>(p) << ", " << std::get<2>(p) << ")";
+  }
+  return ::testing::AssertionSuccess();
+}
+
+struct RandomScene {
+  std::mt19937 random;
+  explicit RandomScene(unsigned seed) : random(seed) {}
+
+  double uniform(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  }
+
+  Eigen::Isometry3d pose() {
+    const Eigen::Quaterniond q(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+    return Eigen::Translation3d(uniform(-2, 2), uniform(-2, 2), uniform(-2, 2)) * q.normalized();
+  }
+
+  Intrinsics intrinsics(bool distorted) {
+    Intrinsics k;
+    k.width = static_cast<int>(uniform(1, 120));
+    k.height = static_cast<int>(uniform(1, 90));
+    k.fx = uniform(40, 140);
+    k.fy = uniform(40, 140);
+    k.cx = uniform(-10, 130);
+    k.cy = uniform(-10, 100);
+    if (distorted)
+      k.distortion = {uniform(-0.2, 0.2), uniform(-0.05, 0.05), 1e-3, -1e-3, 0.01, 0, 0, 0};
+    return k;
+  }
+
+  // Waves with holes, saturated pixels, steps and noise, 0.05 to 1.5 m away.
+  DepthImage image(bool distorted) {
+    const Intrinsics k = intrinsics(distorted);
+    std::vector<std::uint16_t> depth;
+    const double base = uniform(0.05, 1.5);
+    for (int i = 0; i < k.width * k.height; ++i) {
+      const double z = base * (1.0 + 0.1 * std::sin(i * 0.05)) + (i % 37 < 11 ? 0.03 : 0.0) +
+                       uniform(-0.002, 0.002);
+      const double lot = uniform(0, 1);
+      depth.push_back(lot < 0.1    ? std::uint16_t{0}
+                      : lot < 0.12 ? std::uint16_t{65535}
+                                   : static_cast<std::uint16_t>(z * 5000.0));
+    }
+    return {std::make_shared<ViewingRays>(k), depth, 5000.0, pose()};
+  }
+
+  // Balls on measured points, at the image's border, around and behind the camera, and far off.
+  Ball ball(const DepthImage& image) {
+    const Intrinsics& k = image.intrinsics();
+    const auto p = image.deproject(static_cast<int>(uniform(0, k.width)),
+                                   static_cast<int>(uniform(0, k.height)));
+    const double radius = uniform(0.001, 0.05);
+    const double lot = uniform(0, 1);
+    if (p && lot < 0.7)
+      return {*p + Vec3(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)) * radius, radius};
+    if (lot < 0.9)
+      return {
+          image.world_from_camera() * (0.1 * Vec3(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1))),
+          radius};
+    return {Vec3(uniform(-5, 5), uniform(-5, 5), uniform(-5, 5)), radius};
+  }
+};
+
+class FastSearch : public ::testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(Lens, FastSearch, ::testing::Values(false, true));
+
+TEST_P(FastSearch, FindsExactlyWhatBruteForceFindsInADepthImage) {
+  std::size_t total = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    RandomScene scene(seed);
+    const DepthImage image = scene.image(GetParam());
+    const BruteForceCloud oracle(image.points());
+    for (int i = 0; i < 12; ++i) {
+      const Ball ball = scene.ball(image);
+      const auto expected = found(oracle, ball);
+      EXPECT_TRUE(same_points(found(image, ball), expected)) << "seed " << seed << ", ball " << i;
+      total += expected.size();
+    }
+  }
+  EXPECT_GT(total, 5000U) << "the property must not hold because nothing was found";
+}
+
+TEST(PointCloud, FindsExactlyWhatBruteForceFinds) {
+  std::size_t total = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    RandomScene scene(seed);
+    std::vector<Vec3> points;
+    const double size = std::exp(scene.uniform(-4, 1));
+    for (int i = 0; i < 2000; ++i)
+      points.push_back(size * Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1),
+                                   0.1 * std::round(scene.uniform(-3, 3))));
+    const PointCloud cloud(points, std::nullopt, std::exp(scene.uniform(-5, -1)));
+    const BruteForceCloud oracle(points);
+    for (int i = 0; i < 20; ++i) {
+      const double radius = scene.uniform(0.001, 0.2);
+      const Ball ball{
+          points[static_cast<std::size_t>(scene.uniform(0, 1999))] +
+              radius * Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1), scene.uniform(-1, 1)),
+          radius};
+      const auto expected = found(oracle, ball);
+      EXPECT_EQ(found(cloud, ball), expected) << "seed " << seed << ", ball " << i;
+      total += expected.size();
+    }
+  }
+  EXPECT_GT(total, 10000U);
+}
+
+TEST(PointCloud, LeavesOutAndCountsPointsThatAreNotFinite) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::array points = {Vec3(0, 0, 0), Vec3(nan, 0, 0),
+                             Vec3(0, std::numeric_limits<double>::infinity(), 0), Vec3(0.1, 0, 0)};
+  const PointCloud cloud(points);
+  EXPECT_EQ(cloud.size(), 2U);
+  EXPECT_EQ(cloud.non_finite(), 2U);
+}
+
+TEST(PointCloud, HoldsPointsSpreadOverTheRangeOfDoubles) {
+  const std::array points = {Vec3(-1e308, 0, 0), Vec3(1e308, 5, -1e300), Vec3(0.001, 0.002, 0.003)};
+  const PointCloud cloud(points);
+  EXPECT_EQ(found(cloud, {Vec3(0, 0, 0), 0.01}).size(), 1U);
+}
+
+TEST(PointCloud, FindsNothingWhenItIsEmpty) {
+  const PointCloud cloud(std::span<const Vec3>{});
+  EXPECT_TRUE(found(cloud, {Vec3(0, 0, 0), 1.0}).empty());
+}
+
+TEST(PointCloud, ThinsABallThatHoldsMoreThanAPatchAndSaysSo) {
+  RandomScene scene(1);
+  std::vector<Vec3> points;
+  for (int i = 0; i < 100000; ++i)
+    points.push_back(0.01 * Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1), scene.uniform(-1, 1)));
+  Patch patch;
+  gather(PointCloud(points), Ball{Vec3::Zero(), 0.02}, patch);
+  EXPECT_TRUE(patch.thinned());
+  EXPECT_GT(patch.size(), Patch::capacity / 3);
+  EXPECT_LE(patch.size(), Patch::capacity);
+  Vec3 mean = Vec3::Zero();
+  for (std::size_t i = 0; i < patch.size(); ++i)
+    mean += Vec3(patch.x()[i], patch.y()[i], patch.z()[i]) / static_cast<double>(patch.size());
+  EXPECT_LT(mean.norm(), 0.0005) << "thinned evenly, not cut off";
+}
+
+TEST(DepthImage, ThinsAWindowThatHoldsMoreThanAPatchAndSaysSo) {
+  const Intrinsics k{.width = 640, .height = 480, .fx = 600, .fy = 600, .cx = 320, .cy = 240};
+  const DepthImage image(std::make_shared<ViewingRays>(k),
+                         std::vector<std::uint16_t>(640 * 480, 500), 5000.0);
+  Patch patch;
+  gather(image, Ball{Vec3(0, 0, 0.1), 0.05}, patch);
+  EXPECT_TRUE(patch.thinned());
+  EXPECT_GT(patch.size(), Patch::capacity / 4);
+  float low = 0;
+  float high = 0;
+  for (std::size_t i = 0; i < patch.size(); ++i) {
+    low = std::min(low, patch.x()[i]);
+    high = std::max(high, patch.x()[i]);
+  }
+  EXPECT_NEAR(low, -0.05F, 1e-3F);
+  EXPECT_NEAR(high, 0.05F, 1e-3F);
+}
+
+TEST(DepthImage, SeesNothingBehindTheCameraOrOutsideTheImage) {
+  const Intrinsics k{.width = 64, .height = 48, .fx = 60, .fy = 60, .cx = 32, .cy = 24};
+  const DepthImage image(std::make_shared<ViewingRays>(k),
+                         std::vector<std::uint16_t>(64 * 48, 1000), 1000.0);
+  EXPECT_TRUE(found(image, {Vec3(0, 0, -1), 0.5}).empty());
+  EXPECT_TRUE(found(image, {Vec3(10, 0, 1), 0.5}).empty());
+  EXPECT_FALSE(found(image, {Vec3(0, 0, 1), 0.5}).empty());
+}
+
+TEST(DepthImage, RemembersFromWhereItsPointsWereSeen) {
+  RandomScene scene(5);
+  const DepthImage image = scene.image(false);
+  Patch patch;
+  gather(image, scene.ball(image), patch);
+  ASSERT_EQ(patch.view_count(), 1U);
+  EXPECT_EQ(patch.view(0).viewpoint, Vec3(image.world_from_camera().translation()));
+}
+
+TEST(CloudSet, GathersFromEveryCloudUnderItsOwnView) {
+  const std::vector<Vec3> left = {Vec3(-0.001, 0, 0)};
+  const std::vector<Vec3> right = {Vec3(0.001, 0, 0), Vec3(0.002, 0, 0)};
+  const CloudSet set({std::make_shared<PointCloud>(left, Vec3(-1, 0, 0)),
+                      std::make_shared<PointCloud>(right, Vec3(1, 0, 0))});
+  Patch patch;
+  gather(set, Ball{Vec3::Zero(), 0.01}, patch);
+  ASSERT_EQ(patch.size(), 3U);
+  ASSERT_EQ(patch.view_count(), 2U);
+  EXPECT_EQ(patch.view(1).begin, 1U);
+  EXPECT_EQ(patch.view(0).viewpoint, Vec3(-1, 0, 0));
+  EXPECT_EQ(patch.view(1).viewpoint, Vec3(1, 0, 0));
+}
+
+TEST(CloudSet, RefusesMoreCloudsThanAPatchTellsApart) {
+  const auto cloud = std::make_shared<BruteForceCloud>(std::vector<Vec3>{});
+  EXPECT_THROW(CloudSet({Patch::max_views + 1, cloud}), Error);
+  EXPECT_THROW(CloudSet({nullptr}), Error);
+}
+
+TEST(ViewingRays, InvertsTheLensDistortionOfARealAzureKinect) {
+  Intrinsics k{.width = 640, .height = 576, .fx = 504.6, .fy = 504.7, .cx = 332.8, .cy = 348.8};
+  k.distortion = {0.5479397773742676,     -0.020971370860934258, 2.0557534298859537e-05,
+                  -7.210415787994862e-05, -0.002652231603860855, 0.8896790742874146,
+                  0.08613020926713943,    -0.013910384848713875};
+  const ViewingRays rays(k);
+  // Far from the centre this lens squeezes the image: a ray lies farther out than a pinhole's.
+  const Eigen::Vector2d corner = rays.ray(560, 500);
+  EXPECT_GT(corner.norm(), Eigen::Vector2d((560 - k.cx) / k.fx, (500 - k.cy) / k.fy).norm());
+  // Put the ray through the distortion, written out here, and arrive at the pixel.
+  const double r2 = corner.squaredNorm();
+  const auto& d = k.distortion;
+  const double radial = (1 + d[0] * r2 + d[1] * r2 * r2 + d[4] * r2 * r2 * r2) /
+                        (1 + d[5] * r2 + d[6] * r2 * r2 + d[7] * r2 * r2 * r2);
+  const double x = corner.x() * radial + 2 * d[2] * corner.x() * corner.y() +
+                   d[3] * (r2 + 2 * corner.x() * corner.x());
+  EXPECT_NEAR(x * k.fx + k.cx, 560.0, 1e-6);
+}
+
+TEST(DepthImage, RefusesWhatCannotBeACamera) {
+  Intrinsics k{.width = 4, .height = 4, .fx = 60, .fy = 60, .cx = 2, .cy = 2};
+  const auto with = [&k](auto change) {
+    Intrinsics changed = k;
+    change(changed);
+    return [changed] { ViewingRays{changed}; };
+  };
+  EXPECT_THROW(with([](Intrinsics& i) { i.fx = 0; })(), Error);
+  EXPECT_THROW(with([](Intrinsics& i) { i.fy = -5; })(), Error);
+  EXPECT_THROW(with([](Intrinsics& i) { i.fx = std::nan(""); })(), Error);
+  EXPECT_THROW(with([](Intrinsics& i) { i.width = 0; })(), Error);
+  EXPECT_THROW(with([](Intrinsics& i) { i.height = 1 << 20; })(), Error);
+  const auto rays = std::make_shared<ViewingRays>(k);
+  EXPECT_THROW(DepthImage(rays, std::vector<std::uint16_t>(15), 1000.0), Error);
+  EXPECT_THROW(DepthImage(rays, std::vector<std::uint16_t>(16), 0.0), Error);
+  Eigen::Isometry3d sheared = Eigen::Isometry3d::Identity();
+  sheared.linear()(0, 1) = 0.1;
+  EXPECT_THROW(DepthImage(rays, std::vector<std::uint16_t>(16), 1000.0, sheared), Error);
+}
+
+TEST(Clouds, AllGiveTheSameProxyToRounding) {
+  // A wavy surface seen by a camera, pressed and stroked; then the same points in each container.
+  const Intrinsics k{.width = 320, .height = 240, .fx = 300, .fy = 300, .cx = 160, .cy = 120};
+  std::vector<std::uint16_t> depth;
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u)
+      depth.push_back(static_cast<std::uint16_t>(5000 * (0.5 + 0.01 * std::sin(u * 0.05))));
+  }
+  const DepthImage image(std::make_shared<ViewingRays>(k), depth, 10000.0);
+  const std::vector<Vec3> points = image.points();
+  const PointCloud hashed(points);
+  const BruteForceCloud oracle(points);
+  Renderer a;
+  Renderer b;
+  Renderer c;
+  a.frame(image, 0);
+  b.frame(hashed, 0);
+  c.frame(oracle, 0);
+  double largest = 0.0;
+  for (int i = 0; i < 400; ++i) {
+    const Vec3 hip(-0.02 + 1e-4 * i, 0.001, 0.23 + std::min(i, 100) * 2.5e-4);
+    const Tick x = a.tick(hip, i * 1e-3);
+    const Tick y = b.tick(hip, i * 1e-3);
+    const Tick z = c.tick(hip, i * 1e-3);
+    ASSERT_LT((x.proxy - z.proxy).norm(), 2e-4) << "tick " << i;
+    ASSERT_LT((y.proxy - z.proxy).norm(), 2e-4) << "tick " << i;
+    largest = std::max(largest, x.force.norm());
+  }
+  EXPECT_GT(largest, 1.0);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <vector>
+
+#include "palpate/core/error.hpp"
+#include "palpate/core/parameters.hpp"
+#include "palpate/sources/source.hpp"
+#include "palpate/sources/uri.hpp"
+
+namespace palpate {
+namespace {
+
+struct Scheme {
+  std::string_view name;
+  std::unique_ptr<Source> (*open)(const Uri&);
+};
+
+// One line for each kind of source.
+const std::vector<Scheme>& schemes() {
+  static const std::vector<Scheme> table{};
+  return table;
+}
+
+}  // namespace
+
+std::unique_ptr<Source> open_source(std::string_view text) {
+  const Uri uri(text);
+  std::vector<std::string_view> names;
+  for (const Scheme& scheme : schemes()) {
+    if (scheme.name == uri.scheme()) {
+      return scheme.open(uri);
+    }
+    names.push_back(scheme.name);
+  }
+  const std::string_view nearest = nearest_name(uri.scheme(), names);
+  std::string remedy =
+      nearest.empty() ? "known here:" : "did you mean '" + std::string(nearest) + ":'? known here:";
+  for (const std::string_view name : names) {
+    remedy += " " + std::string(name) + ":";
+  }
+  throw Error(uri.text(), "unknown kind of source '" + uri.scheme() + ":'", remedy);
+}
+
+}  // namespace palpate

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "palpate/core/patch.hpp"
+
+namespace palpate {
+
+/// Where the HIP is over time: given places, straight lines between them.
+class HipPath {
+ public:
+  struct Sample {
+    double t;  ///< [s]
+    Vec3 hip;  ///< [m] in whatever frame the path is meant: the world's in a CSV file
+  };
+
+  /// Reads a CSV file with a header that names at least the columns `t,x,y,z` (seconds, metres, in
+  /// any order; others are ignored) and a line for each sample. Empty lines are skipped.
+  /// @throws Error naming file and line: no file, no samples, a missing column or value, something
+  ///         that is not a finite number, times that do not increase, places beyond 1000 km or a
+  ///         path longer than 10^6 s (units that are not metres and seconds).
+  static HipPath read_csv(const std::filesystem::path& file);
+
+  /// @throws Error as `read_csv`, counting samples from 1.
+  explicit HipPath(std::vector<Sample> samples);
+
+  /// Where the HIP is at `t` [s]; before the first sample and after the last it rests there.
+  /// [servo] O(log samples), no allocation.
+  [[nodiscard]] Vec3 at(double t) const noexcept;
+
+  [[nodiscard]] double first_time() const noexcept { return samples_.front().t; }
+  [[nodiscard]] double last_time() const noexcept { return samples_.back().t; }
+  [[nodiscard]] const std::vector<Sample>& samples() const noexcept { return samples_; }
+
+ private:
+  std::vector<Sample> samples_;  // at least one, times increase
+};
+
+}  // namespace palpate

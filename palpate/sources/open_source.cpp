@@ -4,8 +4,8 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/parameters.hpp"
+#include "palpate/core/uri.hpp"
 #include "palpate/sources/source.hpp"
-#include "palpate/sources/uri.hpp"
 
 namespace palpate {
 namespace {

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/uri.hpp"
 #include "palpate/sources/source.hpp"
-#include "palpate/sources/uri.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/sources/uri.hpp"
+#include "palpate/core/uri.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "palpate/core/parameters.hpp"
+
+namespace palpate::app {
+
+/// The options that choose a method and its parameters, the same for every verb that renders.
+/// Order of precedence: defaults, --config, --method and --set.
+class MethodOptions {
+ public:
+  void add_to(CLI::App& command);
+
+  /// @throws Error for an unknown method, parameter or key, a value out of range, or a
+  ///         configuration file that cannot be read.
+  [[nodiscard]] Parameters parameters() const;
+
+ private:
+  std::optional<std::string> method_;
+  std::vector<std::string> assignments_;
+  std::optional<std::string> config_;
+};
+
+/// The number that `text` is, whole. @throws Error naming `subject`.
+double parse_number(const std::string& subject, const std::string& text);
+
+}  // namespace palpate::app

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/playback.hpp"
+
+#include <utility>
+
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::app {
+
+Playback::Playback(const std::vector<std::string>& uris) {
+  if (uris.empty())
+    throw Error("--camera", "no camera is given", "give one, such as --camera synthetic:desk");
+  if (uris.size() > Patch::max_views)
+    throw Error("--camera", std::to_string(uris.size()) + " cameras are too many",
+                "give at most " + std::to_string(Patch::max_views));
+  for (const std::string& uri : uris) {
+    Camera camera;
+    camera.source = open_source(uri);
+    camera.next = camera.source->next();
+    if (!camera.next) throw Error(uri, "it has no frames", "give a source with at least one");
+    cameras_.push_back(std::move(camera));
+  }
+}
+
+void Playback::adopt_until(double t, Renderer& renderer) {
+  for (;;) {
+    Camera* due = nullptr;
+    for (Camera& camera : cameras_) {
+      if (!camera.next || camera.next->stamp > t) continue;
+      if (due == nullptr || camera.next->stamp < due->next->stamp) due = &camera;
+    }
+    if (due == nullptr) return;
+    due->newest = std::move(*due->next);
+    due->next = due->source->next();
+
+    std::vector<std::shared_ptr<const Cloud>> clouds;
+    for (const Camera& camera : cameras_) {
+      if (camera.newest.cloud) clouds.push_back(camera.newest.cloud);
+    }
+    std::shared_ptr<const Cloud> cloud =
+        clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds));
+    renderer.frame(*cloud, due->newest.stamp);
+    in_use_ = std::move(cloud);  // only now may the frame before go
+    ++adopted_;
+  }
+}
+
+}  // namespace palpate::app

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/core/renderer.hpp"
+#include "palpate/sources/source.hpp"
+
+namespace palpate::app {
+
+/// Frames of one or several cameras in the order of their stamps, each adopted at the first tick at
+/// or after it. Several cameras are touched at once: each new frame replaces its camera's last.
+class Playback {
+ public:
+  /// @throws Error if a source cannot be opened, or there are none.
+  explicit Playback(const std::vector<std::string>& uris);
+
+  /// Hands every frame stamped at or before `t` [s] to the renderer, oldest first.
+  /// @throws Error if a frame cannot be read.
+  void adopt_until(double t, Renderer& renderer);
+
+  /// Frames handed over so far.
+  [[nodiscard]] std::size_t adopted() const { return adopted_; }
+  [[nodiscard]] std::size_t cameras() const { return cameras_.size(); }
+  [[nodiscard]] const Source& source(std::size_t camera) const { return *cameras_[camera].source; }
+  /// What a camera will show next; null after its last frame.
+  [[nodiscard]] const Cloud* upcoming(std::size_t camera) const {
+    return cameras_[camera].next ? cameras_[camera].next->cloud.get() : nullptr;
+  }
+  /// What a camera saw last; null before its first frame.
+  [[nodiscard]] const Cloud* newest(std::size_t camera) const {
+    return cameras_[camera].newest.cloud.get();
+  }
+
+ private:
+  struct Camera {
+    std::unique_ptr<Source> source;
+    std::optional<Frame> next;
+    Frame newest;
+  };
+  std::vector<Camera> cameras_;
+  std::shared_ptr<const Cloud> in_use_;
+  std::size_t adopted_ = 0;
+};
+
+}  // namespace palpate::app

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/verbs.hpp"
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/sources/source.hpp"
+
+namespace palpate::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct InfoOptions {
+  std::string uri;
+  bool json = false;
+};
+
+Json numbers(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+// What the points of a cloud span: count, corners of their box.
+Json extent(const std::vector<Vec3>& points) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 high = -low;
+  for (const Vec3& p : points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  Json json = {{"points", points.size()}};
+  if (!points.empty()) {
+    json["lowest_m"] = numbers(low);
+    json["highest_m"] = numbers(high);
+  }
+  return json;
+}
+
+Json describe(const DepthImage& image) {
+  const Intrinsics& k = image.intrinsics();
+  std::vector<std::uint16_t> measured;
+  for (const std::uint16_t raw : image.depth()) {
+    if (is_measured(raw)) measured.push_back(raw);
+  }
+  Json json = extent(image.points());
+  json["image"] = fmt::format("{}x{}", k.width, k.height);
+  json["focal_length_px"] = Json::array({k.fx, k.fy});
+  json["principal_point_px"] = Json::array({k.cx, k.cy});
+  json["distorted"] = k.distorted();
+  json["units_per_metre"] = image.units_per_metre();
+  json["measured_percent"] =
+      100.0 * static_cast<double>(measured.size()) / static_cast<double>(image.depth().size());
+  if (!measured.empty()) {
+    const auto middle = measured.begin() + static_cast<std::ptrdiff_t>(measured.size() / 2);
+    std::nth_element(measured.begin(), middle, measured.end());
+    json["median_depth_m"] = *middle / image.units_per_metre();
+  }
+  json["camera_at_m"] = numbers(image.world_from_camera().translation());
+  return json;
+}
+
+Json describe(const PointCloud& cloud) {
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < cloud.size(); ++i) points.push_back(cloud.point(i));
+  Json json = extent(points);
+  json["non_finite"] = cloud.non_finite();
+  if (cloud.viewpoint()) json["seen_from_m"] = numbers(*cloud.viewpoint());
+  return json;
+}
+
+int info(const InfoOptions& options) {
+  const std::unique_ptr<Source> source = open_source(options.uri);
+  const SourceInfo& about = source->info();
+  Json json = {{"uri", about.uri}, {"kind", about.kind}};
+  if (about.frames) json["frames"] = *about.frames;
+  if (about.frame_rate) json["frame_rate_hz"] = *about.frame_rate;
+  const auto frame = source->next();
+  if (!frame) throw Error(options.uri, "it has no frames", "give a source with at least one");
+  Json first = {{"stamp_s", frame->stamp}};
+  if (const auto* image = dynamic_cast<const DepthImage*>(frame->cloud.get())) {
+    first.update(describe(*image));
+  } else if (const auto* cloud = dynamic_cast<const PointCloud*>(frame->cloud.get())) {
+    first.update(describe(*cloud));
+  }
+  json["first_frame"] = first;
+
+  if (options.json) {
+    fmt::print("{}\n", json.dump(2));
+    return 0;
+  }
+  const auto print = [](const Json& object, const char* indent) {
+    for (const auto& [key, value] : object.items()) {
+      if (!value.is_object())
+        fmt::print("{}{}: {}\n", indent, key,
+                   value.is_string() ? value.get<std::string>() : value.dump());
+    }
+  };
+  print(json, "");
+  fmt::print("first_frame:\n");
+  print(json["first_frame"], "  ");
+  return 0;
+}
+
+}  // namespace
+
+Verb add_info(CLI::App& program) {
+  CLI::App* command = program.add_subcommand("info", "what is in a source");
+  const auto options = std::make_shared<InfoOptions>();
+  command->add_option("source", options->uri, "e.g. tum:DIR, pcd:FILE, synthetic:desk")->required();
+  command->add_flag("--json", options->json, "print a JSON object");
+  return {command, [options] { return info(*options); }};
+}
+
+}  // namespace palpate::app

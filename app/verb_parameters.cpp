@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "app/verbs.hpp"
+#include "palpate/core/parameters.hpp"
+
+namespace palpate::app {
+
+Verb add_parameters(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("parameters", "list what --set can set: default, range and meaning");
+  return {command, [] {
+            fmt::print("{:<18} {:<4} {:<11} {:>12} {:>9} {:>9}  {}\n", "name", "", "unit",
+                       "default", "min", "max", "meaning (source)");
+            for (const ParameterInfo& row : parameter_table()) {
+              // The width of a Greek letter is one column, but two bytes.
+              fmt::print("{:<18} {:<4} {:<11} {:>12.6g} {:>9g} {:>9g}  {} ({})\n", row.name,
+                         row.symbol, row.unit, row.default_value, row.min, row.max, row.meaning,
+                         row.source);
+            }
+            return 0;
+          }};
+}
+
+}  // namespace palpate::app

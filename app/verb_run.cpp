@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <unistd.h>
+
+#include <fmt/format.h>
+
+#include "app/options.hpp"
+#include "app/playback.hpp"
+#include "app/scripted_hand.hpp"
+#include "app/summary.hpp"
+#include "app/verbs.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::app {
+namespace {
+
+struct RunOptions {
+  std::vector<std::string> cameras{"synthetic:desk?noise=1mm"};
+  std::string device;
+  double duration = 10.0;
+  double rate = 1000.0;
+  bool headless = false;
+  bool json = false;
+  MethodOptions method;
+};
+
+// One line that is written over and over while a person watches.
+void show_status(const Tick& tick) {
+  fmt::print(stderr, "\rt {:7.2f} s  {:<12} proxy {:+.3f} {:+.3f} {:+.3f} m  force {:6.3f} N  ",
+             tick.t, to_string(tick.state), tick.proxy.x(), tick.proxy.y(), tick.proxy.z(),
+             tick.force.norm());
+  std::fflush(stderr);
+}
+
+HipPath open_hand(const RunOptions& options, const Playback& playback) {
+  constexpr std::string_view script = "script:";
+  if (!options.device.empty()) {
+    if (options.device.substr(0, script.size()) != script)
+      throw Error("--device " + options.device, "a headless run has no such hand",
+                  "give script:FILE.csv, or none for the built-in one");
+    return HipPath::read_csv(options.device.substr(script.size()));
+  }
+  const auto* image = dynamic_cast<const DepthImage*>(playback.upcoming(0));
+  if (image == nullptr)
+    throw Error("scripted hand", "it follows a depth image, and " + options.cameras.front() +
+                                     " has none",
+                "give a path with --device script:FILE.csv");
+  constexpr double press = 0.008;
+  return scripted_hand(*image, options.duration, press);
+}
+
+int run(const RunOptions& options) {
+  if (!options.headless)
+    throw Error("run", "the page in the browser is not part of this version",
+                "run with --headless");
+  if (!(options.rate >= 100.0 && options.rate <= 100000.0))
+    throw Error("--rate", fmt::format("{} Hz is not a servo rate", options.rate),
+                "give 100 to 100000");
+  if (!(options.duration >= 2.0 && options.duration <= 86400.0))
+    throw Error("--duration", fmt::format("{} s is too short or too long", options.duration),
+                "give 2 to 86400");
+  const Parameters parameters = options.method.parameters();
+  Playback playback(options.cameras);
+  const HipPath hand = open_hand(options, playback);
+  Renderer renderer(parameters);
+  renderer.seat(hand.at(hand.first_time()));
+  Summary summary;
+
+  const bool watched = isatty(STDERR_FILENO) == 1;
+  const auto ticks = static_cast<std::int64_t>(options.duration * options.rate);
+  const auto ticks_a_line = static_cast<std::int64_t>(options.rate / 10.0);
+  for (std::int64_t i = 0; i < ticks; ++i) {
+    const double t = hand.first_time() + static_cast<double>(i) / options.rate;
+    playback.adopt_until(t, renderer);
+    const Tick tick = renderer.tick(hand.at(t), t);
+    summary.count(tick, playback, parameters.proxy.r_c());
+    if (watched && i % ticks_a_line == 0) show_status(tick);
+  }
+  if (watched) fmt::print(stderr, "\n");
+  std::fputs(options.json ? summary.json().c_str() : summary.text().c_str(), stdout);
+  return 0;
+}
+
+}  // namespace
+
+Verb add_run(CLI::App& program) {
+  CLI::App* command = program.add_subcommand("run", "touch a scene");
+  const auto options = std::make_shared<RunOptions>();
+  command
+      ->add_option("--camera", options->cameras,
+                   "where frames come from (synthetic:desk?noise=1mm); may be given several times")
+      ->allow_extra_args(false);
+  command->add_option("--device", options->device,
+                      "the hand: script:FILE.csv; a built-in scripted one if none is given");
+  command->add_option("--duration", options->duration, "seconds of the session (10)");
+  command->add_option("--rate", options->rate, "ticks a second (1000)");
+  command->add_flag("--headless", options->headless,
+                    "no page: as fast as the machine can, with a status line and a summary");
+  command->add_flag("--json", options->json, "print the summary as a JSON object");
+  options->method.add_to(*command);
+  return {command, [options] { return run(*options); }};
+}
+
+}  // namespace palpate::app

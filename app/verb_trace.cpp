@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "app/options.hpp"
+#include "app/playback.hpp"
+#include "app/progress.hpp"
+#include "app/summary.hpp"
+#include "app/trace_csv.hpp"
+#include "app/verbs.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/devices/hip_path.hpp"
+
+namespace palpate::app {
+namespace {
+
+struct TraceOptions {
+  std::vector<std::string> cameras;
+  std::string path;
+  std::string out = "-";
+  double rate = 1000.0;
+  bool json = false;
+  MethodOptions method;
+};
+
+int trace(const TraceOptions& options) {
+  if (!(options.rate >= 1.0 && options.rate <= 100000.0))
+    throw Error("--rate", std::to_string(options.rate) + " Hz is not a tick rate",
+                "give 1 to 100000");
+  if (options.json && options.out == "-")
+    throw Error("--json", "the trace itself goes to standard output",
+                "name a file for it with --out");
+  const Parameters parameters = options.method.parameters();
+  const HipPath path = HipPath::read_csv(options.path);
+  Playback playback(options.cameras);
+  Renderer renderer(parameters);
+  renderer.seat(path.at(path.first_time()));
+  TraceWriter writer(options.out);
+  Summary summary;
+
+  const double duration = path.last_time() - path.first_time();
+  // A path of whole milliseconds has its last tick at its last time, whatever the rounding.
+  const auto ticks = static_cast<std::int64_t>(std::floor(duration * options.rate + 1e-6)) + 1;
+  Progress progress("trace", static_cast<std::size_t>(ticks));
+  for (std::int64_t i = 0; i < ticks; ++i) {
+    const double t = path.first_time() + static_cast<double>(i) / options.rate;
+    playback.adopt_until(t, renderer);
+    const Tick tick = renderer.tick(path.at(t), t);
+    writer.write(tick);
+    summary.count(tick, playback, parameters.proxy.r_c());
+    progress.advance();
+  }
+  writer.finish();
+  progress.finish();
+  if (options.json) {
+    std::fputs(summary.json().c_str(), stdout);
+  } else {
+    std::fputs(summary.text().c_str(), options.out == "-" ? stderr : stdout);
+  }
+  return 0;
+}
+
+}  // namespace
+
+Verb add_trace(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "trace", "a recording and a HIP path in, a CSV of ticks out; exactly repeatable");
+  const auto options = std::make_shared<TraceOptions>();
+  command
+      ->add_option("--camera", options->cameras,
+                   "where frames come from, e.g. tum:DIR; may be given several times")
+      ->required()
+      ->allow_extra_args(false);
+  command->add_option("--path", options->path, "CSV of the HIP's path: t,x,y,z in s and m, world")
+      ->required();
+  command->add_option("--out", options->out, "where the trace goes, - for standard output");
+  command->add_option("--rate", options->rate, "ticks a second (1000)");
+  command->add_flag("--json", options->json, "print the summary as a JSON object");
+  options->method.add_to(*command);
+  return {command, [options] { return trace(*options); }};
+}
+
+}  // namespace palpate::app

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+
+#include <CLI/CLI.hpp>
+
+namespace palpate::app {
+
+/// What a verb does once its arguments are parsed; the program's exit code. Throws palpate::Error
+/// for wrong usage or input (exit 2), anything else for a failure while running (exit 1).
+using Action = std::function<int()>;
+
+/// One word of the command line: adds itself to the program and says what to do.
+struct Verb {
+  CLI::App* command;
+  Action action;
+};
+
+Verb add_run(CLI::App& program);
+Verb add_trace(CLI::App& program);
+Verb add_info(CLI::App& program);
+Verb add_parameters(CLI::App& program);
+
+}  // namespace palpate::app

@@ -9,6 +9,7 @@
 
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/parameters.hpp"
 
 namespace palpate::app {
 namespace {

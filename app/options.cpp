@@ -59,8 +59,9 @@ double parse_number(const std::string& subject, const std::string& text) {
 
 void MethodOptions::add_to(CLI::App& command) {
   command.add_option("--method", method_, "paper (default), paper-as-printed or fixed-step");
-  command.add_option("--set", assignments_,
-                     "set a parameter, NAME=VALUE in SI units; see `palpate parameters`")
+  command
+      .add_option("--set", assignments_,
+                  "set a parameter, NAME=VALUE in SI units; see `palpate parameters`")
       ->allow_extra_args(false);
   command.add_option("--config", config_, "read the method and parameters from a TOML file");
 }
@@ -74,8 +75,7 @@ Parameters MethodOptions::parameters() const {
     if (equals == std::string::npos)
       throw Error("--set " + assignment, "there is no '='", "write --set NAME=VALUE");
     const std::string name = assignment.substr(0, equals);
-    set_parameter(parameters, name,
-                  parse_number("--set " + name, assignment.substr(equals + 1)));
+    set_parameter(parameters, name, parse_number("--set " + name, assignment.substr(equals + 1)));
   }
   validate(parameters);
   return parameters;

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <utility>
 
-#include <unistd.h>
-
 #include <fmt/format.h>
+#include <unistd.h>
 
 namespace palpate::app {
 

@@ -57,8 +57,8 @@ HipPath scripted_hand(const DepthImage& image, double duration, double press) {
         std::min({1.0, t / approach, (duration - t) / approach});  // 0 hovering, 1 pressing
     const double reach = smooth - hover + into * (hover + press);
     const Eigen::Vector2d ray = image.rays().ray(u, v);
-    samples.push_back({t, image.world_from_camera() *
-                              Vec3(reach * ray.x(), reach * ray.y(), reach)});
+    samples.push_back(
+        {t, image.world_from_camera() * Vec3(reach * ray.x(), reach * ray.y(), reach)});
   }
   return HipPath(std::move(samples));
 }

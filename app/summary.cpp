@@ -52,8 +52,8 @@ void Summary::count(const Tick& tick, const Playback& playback, double r_c) {
 }
 
 std::string Summary::text() const {
-  const double share = ticks_ == 0 ? 0.0 : 100.0 * static_cast<double>(contact_ticks_) /
-                                               static_cast<double>(ticks_);
+  const double share =
+      ticks_ == 0 ? 0.0 : 100.0 * static_cast<double>(contact_ticks_) / static_cast<double>(ticks_);
   const double steps =
       ticks_ == 0 ? 0.0 : static_cast<double>(steps_) / static_cast<double>(ticks_);
   std::string text = fmt::format(

@@ -24,7 +24,9 @@ struct InfoOptions {
   bool json = false;
 };
 
-Json numbers(const Vec3& v) { return Json::array({v.x(), v.y(), v.z()}); }
+Json numbers(const Vec3& v) {
+  return Json::array({v.x(), v.y(), v.z()});
+}
 
 // What the points of a cloud span: count, corners of their box.
 Json extent(const std::vector<Vec3>& points) {

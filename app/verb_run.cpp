@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
-#include <unistd.h>
-
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "app/options.hpp"
 #include "app/playback.hpp"
@@ -48,8 +47,8 @@ HipPath open_hand(const RunOptions& options, const Playback& playback) {
   }
   const auto* image = dynamic_cast<const DepthImage*>(playback.upcoming(0));
   if (image == nullptr)
-    throw Error("scripted hand", "it follows a depth image, and " + options.cameras.front() +
-                                     " has none",
+    throw Error("scripted hand",
+                "it follows a depth image, and " + options.cameras.front() + " has none",
                 "give a path with --device script:FILE.csv");
   constexpr double press = 0.008;
   return scripted_hand(*image, options.duration, press);

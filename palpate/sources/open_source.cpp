@@ -5,6 +5,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/core/parameters.hpp"
 #include "palpate/core/uri.hpp"
+#include "palpate/sources/point_file_source.hpp"
 #include "palpate/sources/source.hpp"
 
 namespace palpate {
@@ -17,7 +18,10 @@ struct Scheme {
 
 // One line for each kind of source.
 const std::vector<Scheme>& schemes() {
-  static const std::vector<Scheme> table{};
+  static const std::vector<Scheme> table{
+      {"pcd", open_point_files},
+      {"ply", open_point_files},
+  };
   return table;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -17,10 +18,11 @@ inline std::filesystem::path data_path(const std::filesystem::path& below) {
 
 }  // namespace palpate::test
 
-/// Sets `path` to recorded data, or skips the test, saying what is missing.
-#define PALPATE_DATA_OR_SKIP(path, below)                                                   \
-  const std::filesystem::path path = palpate::test::data_path(below);                       \
-  if (path.empty() || !std::filesystem::exists(path)) {                                     \
-    GTEST_SKIP() << "recorded data not found: " << (path.empty() ? (below) : path.string()) \
-                 << "; set PALPATE_DATA to the folder that holds it";                       \
+/// Sets `variable` to the path of recorded data, or skips the test, saying what is missing.
+#define PALPATE_DATA_OR_SKIP(variable, below)                                   \
+  const std::filesystem::path variable = palpate::test::data_path(below);       \
+  if (variable.empty() || !std::filesystem::exists(variable)) {                 \
+    GTEST_SKIP() << "recorded data not found: "                                 \
+                 << (variable.empty() ? std::string(below) : variable.string()) \
+                 << "; set PALPATE_DATA to the folder that holds it";           \
   }

@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <lzf.h>
+
+#include "palpate/core/error.hpp"
+#include "palpate/sources/point_file.hpp"
+#include "palpate/sources/point_file_detail.hpp"
+
+namespace palpate {
+namespace {
+
+using detail::Cursor;
+using detail::cut_short;
+using detail::Scalar;
+
+constexpr const char* not_pcd = "check that this is a PCD file";
+constexpr const char* correct_header = "correct the header";
+constexpr const char* write_anew = "write the file anew";
+
+// The values of each line of the header, by keyword.
+using Header = std::map<std::string_view, std::vector<std::string_view>>;
+
+struct Column {
+  PointField field;
+  Scalar type;
+  [[nodiscard]] std::size_t bytes() const { return detail::size_of(type) * field.count; }
+  [[nodiscard]] bool is_padding() const { return field.name == "_"; }
+};
+
+struct Layout {
+  std::vector<Column> columns;
+  std::array<std::size_t, 3> xyz{};  // which columns those are
+};
+
+std::string counted(std::uint64_t number, const std::string& noun) {
+  return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
+}
+
+Header read_header(Cursor& file) {
+  constexpr std::array<std::string_view, 10> keywords{"VERSION", "FIELDS", "SIZE",   "TYPE",
+                                                      "COUNT",   "WIDTH",  "HEIGHT", "VIEWPOINT",
+                                                      "POINTS",  "DATA"};
+  Header header;
+  while (const auto line = file.next_full_line()) {
+    std::string_view rest = *line;
+    std::string_view keyword = detail::next_token(rest);
+    if (keyword.starts_with('#')) {
+      continue;
+    }
+    if (keyword == "COLUMNS") {
+      keyword = "FIELDS";  // its name before version 0.5
+    }
+    if (std::find(keywords.begin(), keywords.end(), keyword) == keywords.end()) {
+      file.fail_in_line(detail::quoted(keyword) + " does not begin a line of a PCD header",
+                        not_pcd);
+    }
+    const auto [entry, is_new] = header.try_emplace(keyword);
+    if (!is_new) {
+      file.fail_in_line(std::string(keyword) + " is given twice", "remove one of them");
+    }
+    for (auto value = detail::next_token(rest); !value.empty(); value = detail::next_token(rest)) {
+      entry->second.push_back(value);
+    }
+    if (keyword == "DATA") {
+      return header;
+    }
+  }
+  file.fail("the header has no DATA line", not_pcd);
+}
+
+// The one value of a keyword; none if the header lacks it.
+std::optional<std::string_view> value_of(const Cursor& file, const Header& header,
+                                         std::string_view keyword) {
+  const auto entry = header.find(keyword);
+  if (entry == header.end()) {
+    return std::nullopt;
+  }
+  if (entry->second.size() != 1) {
+    file.fail(std::string(keyword) + " has " + counted(entry->second.size(), "value") +
+                  " where one belongs",
+              correct_header);
+  }
+  return entry->second.front();
+}
+
+std::optional<std::uint64_t> count_of(const Cursor& file, const Header& header,
+                                      std::string_view keyword) {
+  const auto value = value_of(file, header, keyword);
+  if (!value) {
+    return std::nullopt;
+  }
+  const auto count = detail::to_count(*value);
+  if (!count) {
+    file.fail(std::string(keyword) + " is " + detail::quoted(*value) + ", not a whole number",
+              correct_header);
+  }
+  return count;
+}
+
+Scalar type_of(const Cursor& file, std::string_view type, std::string_view size) {
+  constexpr std::array<std::pair<std::string_view, Scalar>, 10> types{{{"I1", Scalar::int8},
+                                                                       {"U1", Scalar::uint8},
+                                                                       {"I2", Scalar::int16},
+                                                                       {"U2", Scalar::uint16},
+                                                                       {"I4", Scalar::int32},
+                                                                       {"U4", Scalar::uint32},
+                                                                       {"I8", Scalar::int64},
+                                                                       {"U8", Scalar::uint64},
+                                                                       {"F4", Scalar::float32},
+                                                                       {"F8", Scalar::float64}}};
+  const std::string wanted = std::string(type) + std::string(size);
+  const auto* const found = std::find_if(types.begin(), types.end(),
+                                         [&](const auto& known) { return known.first == wanted; });
+  if (found == types.end()) {
+    file.fail(
+        "no field can have TYPE " + detail::quoted(type) + " and SIZE " + detail::quoted(size),
+        "types are I and U of 1, 2, 4, 8 bytes, and F of 4, 8");
+  }
+  return found->second;
+}
+
+Layout layout_of(const Cursor& file, const Header& header) {
+  const auto fields = header.find("FIELDS");
+  if (fields == header.end()) {
+    file.fail("the header has no FIELDS line", not_pcd);
+  }
+  const std::size_t size = fields->second.size();
+  const auto values = [&](std::string_view keyword, std::string_view otherwise) {
+    const auto entry = header.find(keyword);
+    if (entry == header.end()) {
+      return std::vector<std::string_view>(size, otherwise);
+    }
+    if (entry->second.size() != size) {
+      file.fail(std::string(keyword) + " has " + counted(entry->second.size(), "value") + " for " +
+                    counted(size, "field"),
+                correct_header);
+    }
+    return entry->second;
+  };
+  if (header.contains("SIZE") != header.contains("TYPE")) {
+    file.fail("the header has one of SIZE and TYPE without the other", correct_header);
+  }
+  const auto sizes = values("SIZE", "4");  // the oldest files have floats only
+  const auto types = values("TYPE", "F");
+  const auto counts = values("COUNT", "1");
+
+  Layout layout;
+  for (std::size_t i = 0; i < size; ++i) {
+    constexpr std::uint64_t largest_count = 1'000'000;  // keeps all products below in 64 bits
+    const auto count = detail::to_count(counts[i]);
+    if (!count || *count == 0 || *count > largest_count) {
+      file.fail(
+          "COUNT " + detail::quoted(counts[i]) + " is not in 1.." + std::to_string(largest_count),
+          correct_header);
+    }
+    const Scalar type = type_of(file, types[i], sizes[i]);
+    layout.columns.push_back(
+        {{std::string(fields->second[i]), std::string(detail::name_of(type)), *count}, type});
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const char name = "xyz"[axis];
+    std::size_t found = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+      if (layout.columns[i].field.name == std::string(1, name)) {
+        layout.xyz[axis] = i;
+        ++found;
+      }
+    }
+    if (found != 1 || layout.columns[layout.xyz[axis]].field.count != 1) {
+      file.fail("FIELDS must name " + std::string(1, name) + " once, with COUNT 1",
+                "give a file whose points have the fields x, y and z");
+    }
+  }
+  return layout;
+}
+
+// Sets the cloud's width and height. Old files have no WIDTH, some no POINTS.
+void read_extent(const Cursor& file, const Header& header, PointFile& cloud) {
+  const auto points = count_of(file, header, "POINTS");
+  const auto width = count_of(file, header, "WIDTH");
+  const auto height = count_of(file, header, "HEIGHT");
+  if (!width && (!points || height.value_or(1) != 1)) {
+    file.fail("the header has no WIDTH line", not_pcd);
+  }
+  cloud.width = width ? *width : *points;
+  cloud.height = height.value_or(1);
+  if (cloud.height != 0 && cloud.width > std::numeric_limits<std::size_t>::max() / cloud.height) {
+    file.fail("WIDTH times HEIGHT is beyond all bounds", correct_header);
+  }
+  if (points && *points != cloud.width * cloud.height) {
+    file.fail("WIDTH " + std::to_string(cloud.width) + " times HEIGHT " +
+                  std::to_string(cloud.height) + " is not POINTS " + std::to_string(*points),
+              correct_header);
+  }
+}
+
+std::optional<Vec3> viewpoint_of(const Cursor& file, const Header& header) {
+  const auto entry = header.find("VIEWPOINT");
+  if (entry == header.end()) {
+    return std::nullopt;
+  }
+  std::vector<double> numbers;
+  for (const std::string_view value : entry->second) {
+    numbers.push_back(detail::to_number(value).value_or(std::numeric_limits<double>::quiet_NaN()));
+  }
+  if (numbers.size() != 7 || !std::all_of(numbers.begin(), numbers.end(),
+                                          [](double value) { return std::isfinite(value); })) {
+    file.fail("VIEWPOINT is not seven numbers",
+              "give a position and a quaternion, or 0 0 0 1 0 0 0");
+  }
+  return Vec3(numbers[0], numbers[1], numbers[2]);
+}
+
+// Where x, y and z lie if each column takes up `size(column)`, and what all take together.
+struct Places {
+  std::array<std::size_t, 3> xyz{};
+  std::size_t all = 0;
+};
+
+template <class Size>
+Places places(const Layout& layout, const Size& size) {
+  Places result;
+  for (std::size_t i = 0; i < layout.columns.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (layout.xyz[axis] == i) {
+        result.xyz[axis] = result.all;
+      }
+    }
+    result.all += size(layout.columns[i]);
+  }
+  return result;
+}
+
+[[noreturn]] void fail_promise(const Cursor& file, std::size_t points) {
+  file.fail("the header promises " + counted(points, "point") + ", more than the " +
+                counted(file.left(), "byte") + " after it can hold",
+            cut_short);
+}
+
+std::vector<Vec3> read_ascii(Cursor& file, const Layout& layout, std::size_t size) {
+  const Places values = places(layout, [](const Column& column) { return column.field.count; });
+  // A value and what separates it take two bytes at least; the last line may lack its end.
+  if (size > (file.left() + 1) / (2 * values.all)) {
+    fail_promise(file, size);
+  }
+  std::vector<Vec3> points(size);
+  for (std::size_t k = 0; k < size; ++k) {
+    auto line = file.next_full_line();
+    if (!line) {
+      file.fail("ends after " + std::to_string(k) + " of " + counted(size, "point"), cut_short);
+    }
+    for (std::size_t i = 0; i < values.all; ++i) {
+      const std::string_view token = detail::next_token(*line);
+      if (token.empty()) {
+        file.fail_in_line(
+            "has " + counted(i, "value") + " where the FIELDS need " + std::to_string(values.all),
+            "complete the line, or correct the header");
+      }
+      for (int axis = 0; axis < 3; ++axis) {
+        if (values.xyz[axis] == i) {
+          const auto number = detail::to_number(token);
+          if (!number) {
+            file.fail_in_line(
+                std::string(1, "xyz"[axis]) + " is " + detail::quoted(token) + ", not a number",
+                "correct the line; nan marks a hole");
+          }
+          points[k][axis] = *number;
+        }
+      }
+    }
+    if (!detail::next_token(*line).empty()) {
+      file.fail_in_line("has more than the " + counted(values.all, "value") + " of the FIELDS",
+                        "shorten the line, or correct the header");
+    }
+  }
+  return points;
+}
+
+// Point after point, little endian: PCL writes what is in memory.
+std::vector<Vec3> read_binary(Cursor& file, const Layout& layout, std::size_t size) {
+  const Places bytes = places(layout, [](const Column& column) { return column.bytes(); });
+  if (size > file.left() / bytes.all) {
+    fail_promise(file, size);
+  }
+  std::vector<Vec3> points(size);
+  const std::byte* const first = file.take(size * bytes.all);
+  for (int axis = 0; axis < 3; ++axis) {
+    detail::load_column(first + bytes.xyz[axis], bytes.all, layout.columns[layout.xyz[axis]].type,
+                        std::endian::little, points, axis);
+  }
+  return points;
+}
+
+// Two 32-bit sizes, then LZF.
+std::vector<std::byte> decompress(Cursor& file) {
+  if (file.left() < 8) {
+    file.fail_at_offset("ends before the compressed data", cut_short);
+  }
+  const auto compressed = detail::load<std::uint32_t>(file.take(4), std::endian::little);
+  const auto size = detail::load<std::uint32_t>(file.take(4), std::endian::little);
+  if (compressed > file.left()) {
+    file.fail_at_offset("promises " + counted(compressed, "byte") + " of compressed data, but " +
+                            std::to_string(file.left()) + " are left",
+                        cut_short);
+  }
+  constexpr std::uint64_t best_ratio = 88;  // LZF: three bytes repeat at most 264
+  if (size > compressed * best_ratio) {
+    file.fail_at_offset(
+        counted(compressed, "byte") + " of compressed data cannot hold " + std::to_string(size),
+        write_anew);
+  }
+  std::vector<std::byte> data(size);
+  // lzf_decompress() would read a byte even where there is none.
+  if (compressed != 0 &&
+      lzf_decompress(file.take(compressed), compressed, data.data(), size) != size) {
+    file.fail_at_offset("the compressed data before this is corrupt", write_anew);
+  }
+  return data;
+}
+
+// All of the first field, then all of the second, and so on. PCL leaves padding out, others don't.
+std::vector<Vec3> read_compressed(Cursor& file, const Layout& layout, std::size_t size) {
+  const std::vector<std::byte> data = decompress(file);
+  for (const bool has_padding : {true, false}) {
+    const auto bytes_in_point = [&](const Column& column) {
+      return column.is_padding() && !has_padding ? 0 : column.bytes();
+    };
+    const std::size_t stride = places(layout, bytes_in_point).all;
+    if (data.size() % stride != 0 || data.size() / stride != size) {
+      continue;
+    }
+    const Places bytes =
+        places(layout, [&](const Column& column) { return bytes_in_point(column) * size; });
+    std::vector<Vec3> points(size);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Column& column = layout.columns[layout.xyz[axis]];
+      detail::load_column(data.data() + bytes.xyz[axis], column.bytes(), column.type,
+                          std::endian::little, points, axis);
+    }
+    return points;
+  }
+  file.fail("the header declares " + counted(size, "point") + ", which is not what the " +
+                counted(data.size(), "byte") + " of compressed data hold",
+            correct_header);
+}
+
+}  // namespace
+
+PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name) {
+  Cursor file(bytes, name);
+  const Header header = read_header(file);
+  const auto version = value_of(file, header, "VERSION");
+  constexpr std::array<std::string_view, 6> versions{".5", "0.5", ".6", "0.6", ".7", "0.7"};
+  if (version && std::find(versions.begin(), versions.end(), *version) == versions.end()) {
+    file.fail("PCD version " + detail::quoted(*version) + " is not known",
+              "write the file as version 0.7");
+  }
+  const Layout layout = layout_of(file, header);
+
+  PointFile cloud;
+  for (const Column& column : layout.columns) {
+    cloud.fields.push_back(column.field);
+  }
+  read_extent(file, header, cloud);
+  cloud.viewpoint = viewpoint_of(file, header);
+  cloud.encoding = value_of(file, header, "DATA").value();
+  const std::size_t size = cloud.width * cloud.height;
+  if (cloud.encoding == "ascii") {
+    cloud.points = read_ascii(file, layout, size);
+  } else if (cloud.encoding == "binary") {
+    cloud.points = read_binary(file, layout, size);
+  } else if (cloud.encoding == "binary_compressed") {
+    cloud.points = read_compressed(file, layout, size);
+  } else {
+    file.fail("DATA " + detail::quoted(cloud.encoding) + " is not known",
+              "it can be ascii, binary or binary_compressed");
+  }
+  cloud.non_finite = detail::count_non_finite(cloud.points);
+  cloud.bytes_unread = file.left_after_blanks();
+  return cloud;
+}
+
+PointFile read_pcd(const std::filesystem::path& path) {
+  return parse_pcd(detail::read_bytes(path), path.string());
+}
+
+}  // namespace palpate

@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/core/error.hpp"
+#include "palpate/sources/point_file.hpp"
+#include "palpate/sources/point_file_detail.hpp"
+
+namespace palpate {
+namespace {
+
+using detail::Cursor;
+using detail::cut_short;
+using detail::Scalar;
+
+constexpr const char* not_ply = "check that this is a PLY file";
+constexpr const char* correct_line = "correct the line";
+
+struct Property {
+  std::string_view name;
+  Scalar type;
+  std::optional<Scalar> length;  // the type of a list's length; none if this is no list
+
+  [[nodiscard]] std::size_t least_bytes() const { return detail::size_of(length.value_or(type)); }
+};
+
+struct Element {
+  std::string_view name;
+  std::uint64_t rows = 0;
+  std::vector<Property> properties;
+
+  [[nodiscard]] std::string text() const { return "element " + detail::quoted(name); }
+};
+
+struct Header {
+  std::string_view encoding;
+  std::vector<Element> elements;
+};
+
+// Which properties of an element are a point's coordinates.
+using Coordinates = std::array<std::size_t, 3>;
+
+Scalar type_of(const Cursor& file, std::string_view name) {
+  constexpr std::array<std::pair<std::string_view, Scalar>, 16> types{
+      {{"char", Scalar::int8},
+       {"int8", Scalar::int8},
+       {"uchar", Scalar::uint8},
+       {"uint8", Scalar::uint8},
+       {"short", Scalar::int16},
+       {"int16", Scalar::int16},
+       {"ushort", Scalar::uint16},
+       {"uint16", Scalar::uint16},
+       {"int", Scalar::int32},
+       {"int32", Scalar::int32},
+       {"uint", Scalar::uint32},
+       {"uint32", Scalar::uint32},
+       {"float", Scalar::float32},
+       {"float32", Scalar::float32},
+       {"double", Scalar::float64},
+       {"float64", Scalar::float64}}};
+  const auto* const found = std::find_if(types.begin(), types.end(),
+                                         [&](const auto& known) { return known.first == name; });
+  if (found == types.end()) {
+    file.fail_in_line(detail::quoted(name) + " is not a type of PLY",
+                      "types are char, uchar, short, ushort, int, uint, float and double");
+  }
+  return found->second;
+}
+
+Property read_property(const Cursor& file, std::string_view rest) {
+  Property property{};
+  std::string_view type = detail::next_token(rest);
+  if (type == "list") {
+    property.length = type_of(file, detail::next_token(rest));
+    if (*property.length == Scalar::float32 || *property.length == Scalar::float64) {
+      file.fail_in_line("a list's length cannot be a float", correct_line);
+    }
+    type = detail::next_token(rest);
+  }
+  property.type = type_of(file, type);
+  property.name = detail::next_token(rest);
+  if (property.name.empty() || !detail::next_token(rest).empty()) {
+    file.fail_in_line("a property is `property TYPE NAME` or `property list TYPE TYPE NAME`",
+                      correct_line);
+  }
+  return property;
+}
+
+Header read_header(Cursor& file) {
+  const std::string_view magic = file.next_line().value_or("");
+  if (magic != "ply") {
+    file.fail("does not begin with `ply`", not_ply);
+  }
+  Header header;
+  while (const auto line = file.next_full_line()) {
+    std::string_view rest = *line;
+    const std::string_view keyword = detail::next_token(rest);
+    if (keyword == "format") {
+      header.encoding = detail::next_token(rest);
+      const std::string_view version = detail::next_token(rest);
+      if (header.encoding != "ascii" && header.encoding != "binary_little_endian" &&
+          header.encoding != "binary_big_endian") {
+        file.fail_in_line("format " + detail::quoted(header.encoding) + " is not known",
+                          "it can be ascii, binary_little_endian or binary_big_endian");
+      }
+      if (version != "1.0") {
+        file.fail_in_line("PLY version " + detail::quoted(version) + " is not known",
+                          "write the file as version 1.0");
+      }
+    } else if (keyword == "element") {
+      Element element;
+      element.name = detail::next_token(rest);
+      const auto rows = detail::to_count(detail::next_token(rest));
+      if (!rows || !detail::next_token(rest).empty()) {
+        file.fail_in_line("an element is `element NAME COUNT`", correct_line);
+      }
+      element.rows = *rows;
+      header.elements.push_back(element);
+    } else if (keyword == "property") {
+      if (header.elements.empty()) {
+        file.fail_in_line("a property before any element", correct_line);
+      }
+      header.elements.back().properties.push_back(read_property(file, rest));
+    } else if (keyword == "end_header") {
+      if (header.encoding.empty()) {
+        file.fail("the header has no format line", not_ply);
+      }
+      return header;
+    } else if (keyword != "comment" && keyword != "obj_info") {
+      file.fail_in_line(detail::quoted(keyword) + " does not begin a line of a PLY header",
+                        not_ply);
+    }
+  }
+  file.fail("the header has no end_header line", cut_short);
+}
+
+// None unless the element has each of the names once, and not as a list.
+std::optional<Coordinates> find_coordinates(const Element& element,
+                                            const std::array<std::string_view, 3>& names) {
+  Coordinates found{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::size_t times = 0;
+    for (std::size_t i = 0; i < element.properties.size(); ++i) {
+      const Property& property = element.properties[i];
+      if (property.name == names[axis]) {
+        found[axis] = i;
+        times += property.length ? 2 : 1;
+      }
+    }
+    if (times != 1) {
+      return std::nullopt;
+    }
+  }
+  return found;
+}
+
+[[noreturn]] void fail_promise(const Cursor& file, const Element& element) {
+  file.fail_at_offset(element.text() + " promises " + std::to_string(element.rows) +
+                          " rows, more than the " + std::to_string(file.left()) +
+                          " bytes from here can hold",
+                      cut_short);
+}
+
+void read_ascii_row(Cursor& file, const Element& element, const Coordinates* coordinates,
+                    Vec3* point) {
+  auto line = file.next_full_line();
+  if (!line) {
+    file.fail("ends within " + element.text(), cut_short);
+  }
+  const auto next = [&] {
+    const std::string_view token = detail::next_token(*line);
+    if (token.empty()) {
+      file.fail_in_line("has too few values for " + element.text(),
+                        "complete the line, or correct the header");
+    }
+    return token;
+  };
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const std::string_view token = next();
+    if (element.properties[i].length) {
+      const auto length = detail::to_count(token);
+      if (!length) {
+        file.fail_in_line("a list's length is " + detail::quoted(token), correct_line);
+      }
+      for (std::uint64_t k = 0; k < *length; ++k) {
+        next();
+      }
+      continue;
+    }
+    for (int axis = 0; coordinates != nullptr && axis < 3; ++axis) {
+      if ((*coordinates)[axis] == i) {
+        const auto number = detail::to_number(token);
+        if (!number) {
+          file.fail_in_line(std::string(element.properties[i].name) + " is " +
+                                detail::quoted(token) + ", not a number",
+                            correct_line);
+        }
+        (*point)[axis] = *number;
+      }
+    }
+  }
+  if (!detail::next_token(*line).empty()) {
+    file.fail_in_line("has too many values for " + element.text(),
+                      "shorten the line, or correct the header");
+  }
+}
+
+void read_binary_row(Cursor& file, const Element& element, std::endian order,
+                     const Coordinates* coordinates, Vec3* point) {
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    const Property& property = element.properties[i];
+    if (file.left() < property.least_bytes()) {
+      file.fail_at_offset("ends within " + element.text(), cut_short);
+    }
+    const std::byte* const value = file.take(property.least_bytes());
+    if (property.length) {
+      const auto length = detail::visit_scalar(*property.length, [&](auto type) {
+        return static_cast<double>(detail::load<decltype(type)>(value, order));
+      });
+      const std::size_t size = detail::size_of(property.type);
+      if (length < 0.0 || length > static_cast<double>(file.left() / size)) {
+        file.fail_at_offset("a list of " + element.text() + " promises " +
+                                std::to_string(static_cast<std::int64_t>(length)) +
+                                " values, but " + std::to_string(file.left()) + " bytes are left",
+                            cut_short);
+      }
+      file.take(static_cast<std::size_t>(length) * size);
+      continue;
+    }
+    for (int axis = 0; coordinates != nullptr && axis < 3; ++axis) {
+      if ((*coordinates)[axis] == i) {
+        detail::load_column(value, 0, property.type, order, {point, 1}, axis);
+      }
+    }
+  }
+}
+
+// Reads all rows of an element; returns their coordinates, if any are asked for.
+std::vector<Vec3> read_element(Cursor& file, const Element& element, std::string_view encoding,
+                               const std::optional<Coordinates>& coordinates) {
+  const std::vector<Property>& properties = element.properties;
+  if (properties.empty()) {
+    return {};  // however many rows it promises, they take no space
+  }
+  const bool ascii = encoding == "ascii";
+  const std::endian order =
+      encoding == "binary_big_endian" ? std::endian::big : std::endian::little;
+  std::size_t least_bytes = 0;
+  bool has_lists = false;
+  for (const Property& property : properties) {
+    least_bytes += ascii ? 2 : property.least_bytes();  // in ascii a digit and what separates it
+    has_lists |= property.length.has_value();
+  }
+  // The last line of an ascii file may lack its end.
+  if (element.rows > (file.left() + (ascii ? 1 : 0)) / least_bytes) {
+    fail_promise(file, element);
+  }
+  std::vector<Vec3> points(coordinates ? element.rows : 0);
+  if (!ascii && !has_lists) {
+    const std::byte* const first = file.take(element.rows * least_bytes);
+    std::size_t offset = 0;
+    for (std::size_t i = 0; i < properties.size(); ++i) {
+      for (int axis = 0; coordinates && axis < 3; ++axis) {
+        if ((*coordinates)[axis] == i) {
+          detail::load_column(first + offset, least_bytes, properties[i].type, order, points, axis);
+        }
+      }
+      offset += properties[i].least_bytes();
+    }
+    return points;
+  }
+  for (std::size_t row = 0; row < element.rows; ++row) {
+    const Coordinates* const wanted = coordinates ? &*coordinates : nullptr;
+    Vec3* const point = coordinates ? &points[row] : nullptr;
+    if (ascii) {
+      read_ascii_row(file, element, wanted, point);
+    } else {
+      read_binary_row(file, element, order, wanted, point);
+    }
+  }
+  return points;
+}
+
+}  // namespace
+
+PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
+  Cursor file(bytes, name);
+  const Header header = read_header(file);
+  const auto is_vertex = [](const Element& element) { return element.name == "vertex"; };
+  if (std::count_if(header.elements.begin(), header.elements.end(), is_vertex) != 1) {
+    file.fail("the header does not declare one element vertex", "give a file that holds points");
+  }
+
+  PointFile cloud;
+  cloud.encoding = header.encoding;
+  for (const Element& element : header.elements) {
+    if (is_vertex(element)) {
+      const auto coordinates = find_coordinates(element, {"x", "y", "z"});
+      if (!coordinates) {
+        file.fail("element vertex does not have one x, one y and one z that are no lists",
+                  "give a file that holds points");
+      }
+      for (const Property& property : element.properties) {
+        cloud.fields.push_back(
+            {std::string(property.name),
+             (property.length ? "list of " : "") + std::string(name_of(property.type))});
+      }
+      cloud.points = read_element(file, element, header.encoding, coordinates);
+      continue;
+    }
+    const bool is_camera = element.name == "camera";
+    const auto coordinates =
+        is_camera ? find_coordinates(element, {"view_px", "view_py", "view_pz"}) : std::nullopt;
+    const auto positions = read_element(file, element, header.encoding, coordinates);
+    if (!positions.empty()) {
+      cloud.viewpoint = positions.front();
+    }
+  }
+  if (cloud.viewpoint && !cloud.viewpoint->allFinite()) {
+    file.fail("the camera's view_px, view_py, view_pz are not finite", "correct them");
+  }
+  cloud.width = cloud.points.size();
+  cloud.non_finite = detail::count_non_finite(cloud.points);
+  cloud.bytes_unread = file.left_after_blanks();
+  return cloud;
+}
+
+PointFile read_ply(const std::filesystem::path& path) {
+  return parse_ply(detail::read_bytes(path), path.string());
+}
+
+}  // namespace palpate

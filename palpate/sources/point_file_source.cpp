@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sources/point_file_source.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <system_error>
+#include <utility>
+
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/sources/natural_order.hpp"
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> files_in(const fs::path& folder, const std::string& extension) {
+  std::vector<fs::path> files;
+  try {
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+      std::string found = entry.path().extension().string();
+      std::transform(found.begin(), found.end(), found.begin(),
+                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+      if (found == extension && !entry.is_directory()) {
+        files.push_back(entry.path());
+      }
+    }
+  } catch (const fs::filesystem_error& error) {
+    throw Error(folder.string(), "cannot be listed: " + error.code().message(),
+                "check its permissions");
+  }
+  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+    return natural_less(a.filename().native(), b.filename().native());
+  });
+  return files;
+}
+
+}  // namespace
+
+PointFileSource::PointFileSource(std::vector<fs::path> files, Reader reader, const Options& options,
+                                 SourceInfo info)
+    : files_(std::move(files)), reader_(reader), options_(options), info_(std::move(info)) {}
+
+std::optional<Frame> PointFileSource::next() {
+  if (next_ == files_.size()) {
+    return std::nullopt;
+  }
+  const std::size_t k = next_++;  // before anything can throw: the next call goes on
+  PointFile file = reader_(files_[k]);
+  for (Vec3& point : file.points) {
+    point *= options_.scale;
+  }
+  if (file.viewpoint) {
+    *file.viewpoint *= options_.scale;
+  }
+  return Frame{static_cast<double>(k) / options_.fps,
+               std::make_shared<PointCloud>(file.points, file.viewpoint, options_.voxel)};
+}
+
+std::unique_ptr<Source> open_point_files(const Uri& uri) {
+  constexpr std::array<std::string_view, 3> known{"fps", "voxel", "scale"};
+  uri.allow_only(known);
+  const PointFileSource::Options options{
+      .fps = uri.number_option("fps", 30.0, 1e-3, 1e6, "Hz"),
+      .voxel = uri.number_option("voxel", 0.010, 1e-4, 10.0, "m"),
+      .scale = uri.number_option("scale", 1.0, 1e-9, 1e9, "m"),
+  };
+  const bool is_pcd = uri.scheme() == "pcd";
+  const std::string kind = is_pcd ? "PCD" : "PLY";
+
+  if (uri.path().empty()) {
+    throw Error(uri.text(), "names no file or folder",
+                "write " + uri.scheme() + ":FILE or " + uri.scheme() + ":DIR");
+  }
+  const fs::path path = uri.path();
+  std::error_code error;
+  std::vector<fs::path> files{path};
+  if (fs::is_directory(path, error)) {
+    files = files_in(path, "." + uri.scheme());
+    if (files.empty()) {
+      throw Error(path.string(), "holds no ." + uri.scheme() + " file",
+                  "name a folder of " + kind + " files, or one file");
+    }
+  } else if (!fs::exists(path, error)) {
+    throw Error(path.string(), "no such file or folder", "check the path");
+  }
+  SourceInfo info{.uri = uri.text(),
+                  .kind = kind + " files",
+                  .frames = files.size(),
+                  .frame_rate = options.fps};
+  return std::make_unique<PointFileSource>(std::move(files), is_pcd ? read_pcd : read_ply, options,
+                                           std::move(info));
+}
+
+}  // namespace palpate

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "palpate/core/uri.hpp"
+#include "palpate/sources/point_file.hpp"
+#include "palpate/sources/source.hpp"
+
+namespace palpate {
+
+/// PCD or PLY files as frames, each a PointCloud.
+///
+/// A folder's files (.pcd or .ply, in any case of letters) come in natural order of their names;
+/// frame k is stamped k / fps, also if a file before it could not be used.
+class PointFileSource final : public Source {
+ public:
+  struct Options {
+    double fps = 30.0;     ///< [Hz] > 0
+    double voxel = 0.010;  ///< [m] of the PointCloud, > 0
+    double scale = 1.0;    ///< [m] what 1 in the files is: 0.001 for files in millimetres; > 0
+  };
+  using Reader = PointFile (*)(const std::filesystem::path&);
+
+  /// @param files  in the order of capture
+  PointFileSource(std::vector<std::filesystem::path> files, Reader reader, const Options& options,
+                  SourceInfo info);
+
+  std::optional<Frame> next() override;
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+ private:
+  std::vector<std::filesystem::path> files_;
+  Reader reader_;
+  Options options_;
+  SourceInfo info_;
+  std::size_t next_ = 0;
+};
+
+/// Opens `pcd:FILE|DIR` or `ply:FILE|DIR`, with `?fps=30`, `voxel=10mm` and `scale=1mm` (what 1 in
+/// the files is).
+/// @throws Error if there is no such file or folder, the folder holds no such file, or an option
+///         is not known or out of range. The files themselves are read by `next`.
+std::unique_ptr<Source> open_point_files(const Uri& uri);
+
+}  // namespace palpate

@@ -1,0 +1,361 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
+#include <type_traits>
+
+#include "palpate/sources/point_file.hpp"
+
+#include "tests/support/data.hpp"
+#include "tests/support/errors.hpp"
+#include "tests/support/point_files.hpp"
+
+namespace palpate {
+namespace {
+
+using test::bytes_of;
+using test::fails_saying;
+
+PointFile parse(std::string_view text) {
+  return test::parse(parse_ply, text);
+}
+
+constexpr std::array<const char*, 3> encodings{"ascii", "binary_little_endian",
+                                               "binary_big_endian"};
+
+// Values written one after the other in one of the encodings.
+class Values {
+ public:
+  explicit Values(std::string encoding) : encoding_(std::move(encoding)) {}
+  template <class T>
+  Values& add(T value) {
+    if (encoding_ == "ascii") {
+      text_ += std::to_string(+value) + " ";
+    } else {
+      text_ += bytes_of(value,
+                        encoding_ == "binary_big_endian" ? std::endian::big : std::endian::little);
+    }
+    return *this;
+  }
+  Values& end_row() {
+    text_ += encoding_ == "ascii" ? "\n" : "";
+    return *this;
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+
+ private:
+  std::string encoding_, text_;
+};
+
+std::string header(const std::string& encoding, const std::string& elements) {
+  return "ply\nformat " + encoding + " 1.0\n" + elements + "end_header\n";
+}
+
+const std::string vertices = "property float x\nproperty float y\nproperty float z\n";
+
+// Three vertices among others' elements, with a list in the middle of each vertex.
+std::string valid_file(const std::string& encoding) {
+  Values values(encoding);
+  values.add(std::uint8_t{2}).add(std::int32_t{0}).add(std::int32_t{1}).end_row();
+  values.add(std::uint8_t{0}).end_row();
+  for (int k = 0; k < 3; ++k) {
+    values.add(std::int16_t{-1}).add(static_cast<float>(3 * k + 1));
+    values.add(static_cast<std::uint16_t>(k));
+    for (int i = 0; i < k; ++i) {
+      values.add(9.5);
+    }
+    values.add(static_cast<double>(3 * k + 3)).add(static_cast<std::int8_t>(3 * k + 2)).end_row();
+  }
+  values.add(0.5f).add(0.25f).add(0.125f).add(1.0f).end_row();
+  return header(encoding,
+                "comment made by a test\nobj_info made by a test\n"
+                "element face 2\nproperty list uchar int vertex_indices\n"
+                "element vertex 3\nproperty short a\nproperty float x\n"
+                "property list ushort double more\nproperty double z\nproperty char y\n"
+                "element camera 1\nproperty float view_px\nproperty float view_py\n"
+                "property float view_pz\nproperty float focal\n") +
+         values.text();
+}
+
+template <class T>
+constexpr std::array<const char*, 2> names_of() {
+  if constexpr (std::is_floating_point_v<T>) {
+    return sizeof(T) == 4 ? std::array{"float", "float32"} : std::array{"double", "float64"};
+  } else if constexpr (sizeof(T) == 1) {
+    return std::is_signed_v<T> ? std::array{"char", "int8"} : std::array{"uchar", "uint8"};
+  } else if constexpr (sizeof(T) == 2) {
+    return std::is_signed_v<T> ? std::array{"short", "int16"} : std::array{"ushort", "uint16"};
+  } else {
+    return std::is_signed_v<T> ? std::array{"int", "int32"} : std::array{"uint", "uint32"};
+  }
+}
+
+template <class T>
+class PlyOfType : public testing::Test {};
+using Types = testing::Types<std::int8_t, std::uint8_t, std::int16_t, std::uint16_t, std::int32_t,
+                             std::uint32_t, float, double>;
+TYPED_TEST_SUITE(PlyOfType, Types);
+
+TYPED_TEST(PlyOfType, GivesBackTheCoordinatesThatWereWrittenInEveryEncoding) {
+  using T = TypeParam;
+  const auto coordinate = [](int k, int axis) {
+    return static_cast<T>(std::is_signed_v<T> ? 10 * axis - 7 * k : 10 * axis + 7 * k);
+  };
+  constexpr int count = 12;
+  for (const std::string encoding : encodings) {
+    for (const std::string type : names_of<T>()) {
+      Values values(encoding);
+      for (int k = 0; k < count; ++k) {
+        values.add(coordinate(k, 0)).add(coordinate(k, 1)).add(coordinate(k, 2)).end_row();
+      }
+      const PointFile cloud =
+          parse(header(encoding, "element vertex 12\nproperty " + type + " x\nproperty " + type +
+                                     " y\nproperty " + type + " z\n") +
+                values.text());
+      EXPECT_EQ(cloud.encoding, encoding);
+      EXPECT_EQ(cloud.width, 12u);
+      EXPECT_EQ(cloud.height, 1u);
+      ASSERT_EQ(cloud.points.size(), 12u);
+      for (int k = 0; k < count; ++k) {
+        for (int axis = 0; axis < 3; ++axis) {
+          EXPECT_EQ(cloud.points[k][axis], static_cast<double>(coordinate(k, axis)));
+        }
+      }
+    }
+  }
+}
+
+TEST(Ply, FindsItsVerticesBetweenOtherElementsListsAndProperties) {
+  for (const char* encoding : encodings) {
+    SCOPED_TRACE(encoding);
+    const PointFile cloud = parse(valid_file(encoding));
+    ASSERT_EQ(cloud.points.size(), 3u);
+    EXPECT_EQ(cloud.points[0], Vec3(1, 2, 3));
+    EXPECT_EQ(cloud.points[1], Vec3(4, 5, 6));
+    EXPECT_EQ(cloud.points[2], Vec3(7, 8, 9));
+    ASSERT_EQ(cloud.fields.size(), 5u);
+    EXPECT_EQ(cloud.fields[0].name, "a");
+    EXPECT_EQ(cloud.fields[0].type, "int16");
+    EXPECT_EQ(cloud.fields[2].type, "list of float64");
+    EXPECT_EQ(cloud.bytes_unread, 0u);
+  }
+}
+
+TEST(Ply, RemembersFromWhereThePointsWereSeenIfPclWroteIt) {
+  const PointFile cloud = parse(valid_file("binary_big_endian"));
+  ASSERT_TRUE(cloud.viewpoint.has_value());
+  EXPECT_EQ(*cloud.viewpoint, Vec3(0.5, 0.25, 0.125));
+  EXPECT_FALSE(parse(header("ascii", "element vertex 0\n" + vertices)).viewpoint.has_value());
+  EXPECT_TRUE(fails_saying(
+      [] {
+        return parse(header("ascii", "element vertex 0\n" + vertices +
+                                         "element camera 1\nproperty float view_px\n"
+                                         "property float view_py\nproperty float view_pz\n") +
+                     "0 nan 0\n");
+      },
+      "view_py"));
+}
+
+TEST(Ply, AcceptsHeadersWithCarriageReturnsBeforeBinaryDataThatBeginsWithALineFeed) {
+  std::string head;
+  for (const char c : header("binary_little_endian",
+                             "element vertex 1\nproperty uchar x\n"
+                             "property uchar y\nproperty uchar z\n")) {
+    head += c == '\n' ? "\r\n" : std::string(1, c);
+  }
+  EXPECT_EQ(parse(head + "\n\r ").points.at(0), Vec3(10, 13, 32));
+}
+
+TEST(Ply, CountsPointsThatAreNotFinite) {
+  const PointFile cloud =
+      parse(header("ascii", "element vertex 3\n" + vertices) + "1 2 3\nnan 0 0\n0 0 -inf\n");
+  EXPECT_EQ(cloud.non_finite, 2u);
+  EXPECT_EQ(cloud.points.size(), 3u);
+}
+
+TEST(Ply, TellsOfBytesThatItsHeaderDoesNotAccountFor) {
+  EXPECT_EQ(parse(valid_file("ascii") + "\n \r\n").bytes_unread, 0u);
+  EXPECT_EQ(parse(valid_file("ascii") + "1 2 3").bytes_unread, 5u);
+  EXPECT_EQ(parse(valid_file("binary_big_endian") + std::string(100, '\0')).bytes_unread, 100u);
+}
+
+TEST(Ply, RejectsAHeaderThatPromisesMoreThanTheFileHolds) {
+  for (const std::string encoding : encodings) {
+    EXPECT_TRUE(fails_saying(
+        [&] {
+          return parse(header(encoding, "element vertex 1000000000000\n" + vertices) +
+                       "1 2 3 4 5 6\n");
+        },
+        "test file", "\"vertex\" promises 1000000000000 rows", "12 bytes"));
+    EXPECT_TRUE(fails_saying(
+        [&] {
+          return parse(header(encoding, "element vertex 18446744073709551615\n" + vertices +
+                                            "property list uchar int more\n") +
+                       "1 2 3 4 5 6 7 8\n");
+        },
+        "promises 18446744073709551615 rows"));
+  }
+  // A list's length, too, is a promise.
+  const std::string lists = "element vertex 0\n" + vertices +
+                            "element face 1\nproperty list uint double vertex_indices\n";
+  EXPECT_TRUE(fails_saying(
+      [&] {
+        return parse(header("binary_little_endian", lists) + bytes_of(std::uint32_t{4000000000}) +
+                     std::string(80, '?'));
+      },
+      "byte 175: ", "promises 4000000000 values, but 80 bytes are left"));
+  EXPECT_TRUE(
+      fails_saying([&] { return parse(header("ascii", lists) + "18446744073709551615 1 2 3\n"); },
+                   "line 10: has too few values"));
+  // Rows without properties take no space, so nothing needs to hold them.
+  EXPECT_EQ(parse(header("ascii", "element nothing 1000000000000\nelement vertex 1\n" + vertices) +
+                  "1 2 3\n")
+                .points.size(),
+            1u);
+}
+
+TEST(Ply, SaysWhatIsWrongWithAHeader) {
+  const std::string good = header("ascii", "element vertex 1\n" + vertices) + "1 2 3\n";
+  ASSERT_EQ(parse(good).points.size(), 1u);
+  struct Case {
+    std::string from, to, says;
+  };
+  const std::array cases{
+      Case{"ply\n", "plx\n", "does not begin with `ply`"},
+      Case{"ascii 1.0", "ascii 2.0", "line 2: PLY version \"2.0\""},
+      Case{"ascii", "text", "line 2: format \"text\""},
+      Case{"format ascii 1.0\n", "", "no format line"},
+      Case{"element vertex 1", "element vertex -1", "line 3: an element is"},
+      Case{"element vertex 1", "element vertex 99999999999999999999", "line 3: an element is"},
+      Case{"element vertex 1", "element vertex 1 2", "line 3: an element is"},
+      Case{"element vertex 1", "element point 1", "one element vertex"},
+      Case{"end_header", "element vertex 1\nend_header", "one element vertex"},
+      Case{"element vertex 1\n", "", "line 3: a property before any element"},
+      Case{"float y", "bool y", "line 5: \"bool\" is not a type"},
+      Case{"float y", "float", "line 5: a property is"},
+      Case{"float y", "float y y", "line 5: a property is"},
+      Case{"float y", "list float int y", "length cannot be a float"},
+      Case{"float y", "list uchar float y", "one x, one y and one z that are no lists"},
+      Case{"float y", "float x", "one x, one y and one z"},
+      Case{"float z", "float w", "one x, one y and one z"},
+      Case{"property float z", "proper float z", "line 6: \"proper\" does not begin"},
+      Case{"end_header\n1 2 3\n", "", "no end_header line"},
+  };
+  for (const Case& c : cases) {
+    std::string bad = good;
+    const std::size_t at = bad.find(c.from);
+    ASSERT_NE(at, std::string::npos) << c.from;
+    bad.replace(at, c.from.size(), c.to);
+    EXPECT_TRUE(fails_saying([&] { return parse(bad); }, "test file: ", c.says, "; "));
+  }
+  EXPECT_TRUE(fails_saying([] { return parse(""); }, "does not begin with `ply`"));
+}
+
+TEST(Ply, SaysInWhichLineOfTheDataItFailed) {
+  const std::string head = header("ascii", "element vertex 2\n" + vertices);
+  EXPECT_TRUE(
+      fails_saying([&] { return parse(head + "1.0 2.0 3.0\n4.0 5.0\n"); }, "line 9: has too few"));
+  EXPECT_TRUE(fails_saying([&] { return parse(head + "1 2 3 4\n5 6\n"); }, "line 8: has too many"));
+  EXPECT_TRUE(
+      fails_saying([&] { return parse(head + "1 2 3\n\n4 o 6\n"); }, "line 10: y is \"o\""));
+  EXPECT_TRUE(fails_saying([&] { return parse(head + "1 2 3\n        "); }, "ends within element"));
+  const std::string list = header(
+      "ascii", "element vertex 0\n" + vertices + "element face 1\nproperty list uchar int i\n");
+  EXPECT_TRUE(fails_saying([&] { return parse(list + "-1 2 3\n"); }, "line 10: a list's length"));
+  EXPECT_TRUE(fails_saying(
+      [&] {
+        return parse(header("binary_little_endian", "element vertex 0\n" + vertices +
+                                                        "element face 1\n"
+                                                        "property list char int i\n") +
+                     "\xff___________");
+      },
+      "promises -1 values"));
+}
+
+TEST(Ply, FailsCleanlyWhereverAFileIsCutShort) {
+  for (const std::string encoding : encodings) {
+    const std::string whole = valid_file(encoding);
+    // What is left of an ascii file may still be a number where its last one ends sooner.
+    const std::size_t last = encoding == "ascii" ? whole.rfind(" 1.0") + 1 : whole.size() - 1;
+    for (std::size_t size = 0; size < whole.size(); ++size) {
+      const std::string_view part = std::string_view(whole).substr(0, size);
+      if (size <= last) {
+        EXPECT_TRUE(fails_saying([&] { return parse(part); }, "test file")) << size;
+      } else {
+        EXPECT_EQ(parse(part).points.size(), 3u) << size;
+      }
+    }
+  }
+}
+
+TEST(Ply, DoesSomethingDefinedWithDamagedFiles) {
+  for (const char* encoding : encodings) {
+    test::expect_defined_on_damage(parse_ply, valid_file(encoding), 3000);
+  }
+}
+
+TEST(Ply, SaysWhichFileCannotBeRead) {
+  const test::TemporaryFolder folder;
+  EXPECT_TRUE(fails_saying([&] { return read_ply(folder.path() / "no.ply"); }, "no.ply: no such"));
+  EXPECT_TRUE(fails_saying([&] { return read_ply(folder.path()); }, "not a file"));
+  EXPECT_EQ(read_ply(folder.write("good.ply", valid_file("ascii"))).points[2], Vec3(7, 8, 9));
+}
+
+TEST(Ply, ReadsWhatOtherParsersReadAndRejectsWhatTheyReject) {
+  PALPATE_DATA_OR_SKIP(folder, "formats/ply");
+  // What each file holds, as counted and averaged by an independent reader.
+  struct Expected {
+    const char* file;
+    std::size_t points;
+    Vec3 mean;
+  };
+  const std::array accepted{
+      Expected{"assimp__cube_binary.ply", 8, {0.5, 0.5, 0.5}},
+      Expected{"assimp__cube_binary_header_with_RN_newline.ply", 8, {0.5, 0.5, 0.5}},
+      Expected{"assimp__cube_binary_starts_with_nl.ply", 8, {6.46753407, 0.5, 0.5}},
+      Expected{"assimp__float-color.ply", 3, {100, 66.6666667, 0}},
+      Expected{"assimp__points.ply", 4, {0, 0.5, 0.5}},
+      Expected{"happly__platonic_shelf.ply", 50, {1.81372228, -0.02773278, 0.00956212}},
+      Expected{"happly__platonic_shelf_ascii.ply", 50, {1.81372228, -0.02773278, 0.00956212}},
+      Expected{"happly__platonic_shelf_big_endian.ply", 50, {1.81372228, -0.02773278, 0.00956212}},
+      Expected{"pcl__cube.ply", 24, {0, 0, 0}},
+      Expected{"pyntcloud__diamond.ply", 6, {0.5, 0.5, 0.5}},
+      Expected{"pyntcloud__diamond_ascii.ply", 6, {0.5, 0.5, 0.5}},
+      Expected{"pyntcloud__voxelgrid.ply", 6, {0.449999997, 0.449999997, 0.449999997}},
+      Expected{"tinyply__elephant.ply", 19753, {-0.00612780005, -3.40451721, 4.9738905}},
+      Expected{"tinyply__icosahedron.ply", 12, {0, 0, 0}},
+      Expected{"tinyply__icosahedron_ascii.ply", 12, {0, 0, 0}},
+      Expected{"trimesh__cube_blender_uv_meshlab.ply", 24, {0, 0, 0}},
+      Expected{"trimesh__empty.ply", 0, {0, 0, 0}},
+      Expected{"trimesh__metadata.ply", 4, {0, 0, 0}},
+      Expected{"trimesh__multi.ply", 4, {0, 0, 0}},
+      Expected{"trimesh__ply_empty_bin.ply", 0, {0, 0, 0}},
+      Expected{"trimesh__ply_points_ascii.ply", 8, {0, 0, 0}},
+      Expected{"trimesh__ply_points_bin.ply", 8, {0, 0, 0}},
+      Expected{"trimesh__points_ascii.ply", 5, {-0.0636, 0.03637442, 0.04180716}},
+      Expected{"trimesh__points_ascii_with_lists.ply", 5, {-0.0636, 0.03637442, 0.04180716}},
+      Expected{"trimesh__points_bin.ply", 5, {-0.0635999992, 0.0363744199, 0.0418071605}},
+      // Holds a thirteenth line; the header's twelve count, as for other readers.
+      Expected{"trimesh__points_emptyascii.ply", 12, {-0.0100495833, -0.0138001667, 0.0382333333}},
+      Expected{"trimesh__tet.ply", 4, {0, 0, 0}},
+  };
+  const std::array<std::array<const char*, 2>, 3> rejected{{
+      {"assimp__crash-30d6d0f7c529b3b66b4131700b7a4580cd7082df.ply", "line 7"},
+      {"pyntcloud__diamond_with_bool.ply", "\"bool\" is not a type"},
+      {"trimesh__ply_empty_header.ply", "one element vertex"},
+  }};
+  for (const Expected& expected : accepted) {
+    SCOPED_TRACE(expected.file);
+    const PointFile cloud = read_ply(folder / expected.file);
+    EXPECT_EQ(cloud.points.size(), expected.points);
+    EXPECT_EQ(cloud.non_finite, 0u);
+    EXPECT_LT((test::mean_of(cloud) - expected.mean).norm(), 1e-6 * (1.0 + expected.mean.norm()));
+  }
+  for (const auto& [file, says] : rejected) {
+    EXPECT_TRUE(fails_saying([&] { return read_ply(folder / file); }, file, says));
+  }
+  const auto files = std::distance(std::filesystem::directory_iterator(folder), {});
+  EXPECT_EQ(static_cast<std::size_t>(files), accepted.size() + rejected.size());
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/sources/natural_order.hpp"
+#include "palpate/sources/source.hpp"
+
+#include "tests/support/errors.hpp"
+#include "tests/support/point_files.hpp"
+
+namespace palpate {
+namespace {
+
+using test::fails_saying;
+using test::TemporaryFolder;
+
+// A cloud of the one point (x, 0, 0).
+std::string pcd(int x) {
+  return "FIELDS x y z\nVIEWPOINT 100 200 300 1 0 0 0\nPOINTS 1\nDATA ascii\n" + std::to_string(x) +
+         " 0 0\n";
+}
+
+std::string ply(int x) {
+  return "ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\n"
+         "end_header\n" +
+         std::to_string(x) + " 0 0\n";
+}
+
+const PointCloud& cloud_of(const Frame& frame) {
+  return dynamic_cast<const PointCloud&>(*frame.cloud);
+}
+
+TEST(NaturalOrder, ComparesNumbersAsNumbersOfAnyLength) {
+  const std::vector<std::string> sorted{"",
+                                        "01",
+                                        "1",
+                                        "2",
+                                        "10",
+                                        "a",
+                                        "a1",
+                                        "a2b3",
+                                        "a2b10",
+                                        "a10b1",
+                                        "a99999999999999999999",
+                                        "a100000000000000000000",
+                                        "frame",
+                                        "frame_9.pcd",
+                                        "frame_10.pcd"};
+  for (std::size_t i = 0; i < sorted.size(); ++i) {
+    for (std::size_t j = 0; j < sorted.size(); ++j) {
+      EXPECT_EQ(natural_less(sorted[i], sorted[j]), i < j) << sorted[i] << " < " << sorted[j];
+    }
+  }
+}
+
+TEST(PointFiles, OfAFolderAreFramesInNaturalOrderStampedByTheirNumber) {
+  const TemporaryFolder folder;
+  for (const int k : {10, 9, 1, 100}) {
+    folder.write("cloud_" + std::to_string(k) + ".pcd", pcd(k));
+  }
+  folder.write("cloud_50.PCD", pcd(50));
+  folder.write("cloud_2.ply", ply(2));
+  folder.write("readme.txt", "not a cloud");
+  std::filesystem::create_directory(folder.path() / "cloud_3.pcd");
+
+  const auto source = open_source("pcd:" + folder.path().string() + "?fps=4");
+  EXPECT_EQ(source->info().frames, 5u);
+  EXPECT_EQ(source->info().frame_rate, 4.0);
+  EXPECT_EQ(source->info().kind, "PCD files");
+  double stamp = 0.0;
+  for (const double x : {1.0, 9.0, 10.0, 50.0, 100.0}) {
+    const auto frame = source->next();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_EQ(frame->stamp, stamp);
+    ASSERT_EQ(cloud_of(*frame).size(), 1u);
+    EXPECT_EQ(cloud_of(*frame).point(0), Vec3(x, 0, 0));
+    stamp += 0.25;
+  }
+  EXPECT_FALSE(source->next().has_value());
+  EXPECT_FALSE(source->next().has_value());
+}
+
+TEST(PointFiles, CanBeASingleFileOfAnyName) {
+  const TemporaryFolder folder;
+  const auto source = open_source("ply:" + folder.write("mesh.data", ply(3)).string());
+  EXPECT_EQ(source->info().frames, 1u);
+  const auto frame = source->next();
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_EQ(frame->stamp, 0.0);
+  EXPECT_EQ(cloud_of(*frame).point(0), Vec3(3, 0, 0));
+  EXPECT_FALSE(cloud_of(*frame).viewpoint().has_value());
+  EXPECT_FALSE(source->next().has_value());
+}
+
+TEST(PointFiles, AreScaledToMetresTogetherWithTheirViewpoint) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("mm.pcd", pcd(500)).string();
+  for (const std::string scale : {"1mm", "0.001"}) {
+    const auto frame = open_source("pcd:" + file + "?scale=" + scale)->next();
+    ASSERT_TRUE(frame.has_value());
+    EXPECT_TRUE(cloud_of(*frame).point(0).isApprox(Vec3(0.5, 0, 0)));
+    ASSERT_TRUE(cloud_of(*frame).viewpoint().has_value());
+    EXPECT_TRUE(cloud_of(*frame).viewpoint()->isApprox(Vec3(0.1, 0.2, 0.3)));
+  }
+}
+
+TEST(PointFiles, GoOnAfterAFileThatCannotBeUsed) {
+  const TemporaryFolder folder;
+  folder.write("0.pcd", pcd(0));
+  folder.write("1.pcd", "nonsense");
+  folder.write("2.pcd", pcd(2));
+  const auto source = open_source("pcd:" + folder.path().string() + "?fps=1");
+  EXPECT_EQ(source->next()->stamp, 0.0);
+  EXPECT_TRUE(fails_saying([&] { return source->next(); }, "1.pcd: line 1"));
+  const auto frame = source->next();
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_EQ(frame->stamp, 2.0);
+  EXPECT_EQ(cloud_of(*frame).point(0), Vec3(2, 0, 0));
+}
+
+TEST(PointFiles, ThatDoNotExistAreAnError) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path().string();
+  EXPECT_TRUE(fails_saying([&] { return open_source("pcd:" + path); }, path, "holds no .pcd file"));
+  EXPECT_TRUE(
+      fails_saying([&] { return open_source("ply:" + path + "/no"); }, "no such file or folder"));
+  EXPECT_TRUE(fails_saying([] { return open_source("pcd:"); }, "pcd:", "no file"));
+}
+
+TEST(PointFiles, TakeOnlyOptionsThatTheyKnow) {
+  const TemporaryFolder folder;
+  const std::string uri = "pcd:" + folder.write("a.pcd", pcd(1)).string();
+  EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?fsp=30"); }, "fsp", "fps"));
+  EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?fps=0"); }, "fps"));
+  EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?fps=30mm"); }, "fps"));
+  EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?voxel=0"); }, "voxel"));
+  EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?scale=-1"); }, "scale"));
+  EXPECT_TRUE(open_source(uri + "?fps=30hz&voxel=5mm&scale=1mm")->next().has_value());
+}
+
+}  // namespace
+}  // namespace palpate

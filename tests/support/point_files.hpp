@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <gtest/gtest.h>
+
+#include "palpate/core/error.hpp"
+#include "palpate/sources/point_file.hpp"
+
+namespace palpate::test {
+
+using Parse = PointFile (*)(std::span<const std::byte>, std::string_view);
+
+inline PointFile parse(Parse parser, std::string_view text) {
+  return parser(std::as_bytes(std::span(text)), "test file");
+}
+
+/// The bytes of `value` in the given order.
+template <class T>
+std::string bytes_of(T value, std::endian order = std::endian::little) {
+  std::string bytes(sizeof(T), '\0');
+  std::memcpy(bytes.data(), &value, sizeof(T));
+  if (order != std::endian::native) {
+    std::reverse(bytes.begin(), bytes.end());
+  }
+  return bytes;
+}
+
+/// What must hold of any bytes whatever: an Error of one line, or a consistent cloud.
+inline testing::AssertionResult is_error_or_consistent(Parse parser, std::string_view text) {
+  try {
+    const PointFile cloud = parse(parser, text);
+    if (cloud.points.size() != cloud.width * cloud.height ||
+        cloud.non_finite > cloud.points.size() || cloud.bytes_unread > text.size()) {
+      return testing::AssertionFailure() << "an inconsistent cloud";
+    }
+  } catch (const Error& error) {
+    if (std::string_view(error.what()).find_first_of("\r\n") != std::string_view::npos) {
+      return testing::AssertionFailure() << "more than one line: " << error.what();
+    }
+  }
+  return testing::AssertionSuccess();
+}
+
+/// Checks that on `count` variants of a valid file, each with a few bytes changed.
+inline void expect_defined_on_damage(Parse parser, const std::string& valid, int count) {
+  std::mt19937 random(17);
+  for (int i = 0; i < count; ++i) {
+    std::string damaged = valid;
+    for (auto changes = random() % 3 + 1; changes > 0; --changes) {
+      damaged[random() % damaged.size()] = static_cast<char>(random());
+    }
+    ASSERT_TRUE(is_error_or_consistent(parser, damaged)) << i;
+  }
+}
+
+/// The mean of a cloud's finite points.
+inline Vec3 mean_of(const PointFile& cloud) {
+  Vec3 sum = Vec3::Zero();
+  double count = 0.0;
+  for (const Vec3& point : cloud.points) {
+    if (point.allFinite()) {
+      sum += point;
+      count += 1.0;
+    }
+  }
+  return count == 0.0 ? sum : Vec3(sum / count);
+}
+
+/// A folder of the test's own, gone with it.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
+    path_ = std::filesystem::temp_directory_path() /
+            ("palpate_" + std::string(test->test_suite_name()) + "_" + test->name() + "_" +
+             std::to_string(std::random_device()()));
+    std::filesystem::create_directories(path_);
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path write(const std::string& name, std::string_view text) const {
+    std::ofstream(path_ / name, std::ios::binary) << text;
+    return path_ / name;
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace palpate::test

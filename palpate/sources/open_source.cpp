@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <vector>
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/parameters.hpp"
 #include "palpate/core/uri.hpp"
+#include "palpate/sources/depth_recording.hpp"
 #include "palpate/sources/point_file_source.hpp"
 #include "palpate/sources/source.hpp"
 
@@ -21,6 +21,8 @@ const std::vector<Scheme>& schemes() {
   static const std::vector<Scheme> table{
       {"pcd", open_point_files},
       {"ply", open_point_files},
+      {"tum", open_tum},
+      {"depth", open_depth},
   };
   return table;
 }

@@ -6,6 +6,7 @@
 #include <lzf.h>
 
 #include "palpate/core/error.hpp"
+#include "palpate/sources/files.hpp"
 #include "palpate/sources/point_file.hpp"
 #include "palpate/sources/point_file_detail.hpp"
 
@@ -384,7 +385,7 @@ PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name) {
 }
 
 PointFile read_pcd(const std::filesystem::path& path) {
-  return parse_pcd(detail::read_bytes(path), path.string());
+  return parse_pcd(read_file(path, detail::largest_file), path.string());
 }
 
 }  // namespace palpate

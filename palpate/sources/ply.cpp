@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/core/error.hpp"
+#include "palpate/sources/files.hpp"
 #include "palpate/sources/point_file.hpp"
 #include "palpate/sources/point_file_detail.hpp"
 
@@ -323,7 +324,7 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
 }
 
 PointFile read_ply(const std::filesystem::path& path) {
-  return parse_ply(detail::read_bytes(path), path.string());
+  return parse_ply(read_file(path, detail::largest_file), path.string());
 }
 
 }  // namespace palpate

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/sources/point_file_detail.hpp"
 
-#include <cerrno>
 #include <charconv>
-#include <fstream>
 #include <system_error>
 
 #include "palpate/core/error.hpp"
@@ -70,29 +68,6 @@ std::string quoted(std::string_view piece) {
 std::size_t count_non_finite(std::span<const Vec3> points) noexcept {
   return static_cast<std::size_t>(std::count_if(
       points.begin(), points.end(), [](const Vec3& point) { return !point.allFinite(); }));
-}
-
-std::vector<std::byte> read_bytes(const std::filesystem::path& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
-    throw Error(path.string(), "no such file", "check the path");
-  }
-  if (!std::filesystem::is_regular_file(status)) {
-    throw Error(path.string(), "not a file", "give a PCD or PLY file");
-  }
-  const std::uintmax_t size = std::filesystem::file_size(path, error);
-  std::ifstream file(path, std::ios::binary);
-  if (error || !file) {
-    throw Error(path.string(), "cannot be opened: " + std::generic_category().message(errno),
-                "check its permissions");
-  }
-  std::vector<std::byte> bytes(size);
-  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-  if (static_cast<std::uintmax_t>(file.gcount()) != size) {
-    throw Error(path.string(), "cannot be read to its end", "check the disk and try again");
-  }
-  return bytes;
 }
 
 std::size_t Cursor::left_after_blanks() const noexcept {

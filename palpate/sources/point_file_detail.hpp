@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,7 +15,7 @@
 
 #include "palpate/core/patch.hpp"
 
-/// What the readers of PCD and PLY share; not for use elsewhere.
+/// What the readers of files share; not for use outside this room.
 namespace palpate::detail {
 
 /// What to do about a file that ends too early.
@@ -97,8 +96,8 @@ void load_column(const std::byte* first, std::size_t stride, Scalar type, std::e
 
 [[nodiscard]] std::size_t count_non_finite(std::span<const Vec3> points) noexcept;
 
-/// @throws Error if it is not a file that can be read.
-std::vector<std::byte> read_bytes(const std::filesystem::path& path);
+/// PCD and PLY files larger than this are not read.
+inline constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 32;
 
 /// How far a parser has come in a file, and how it complains about it.
 class Cursor {

@@ -1,41 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/sources/point_file_source.hpp"
 
-#include <algorithm>
 #include <array>
-#include <cctype>
 #include <system_error>
 #include <utility>
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/sources/natural_order.hpp"
+#include "palpate/sources/files.hpp"
 
 namespace palpate {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::vector<fs::path> files_in(const fs::path& folder, const std::string& extension) {
-  std::vector<fs::path> files;
-  try {
-    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-      std::string found = entry.path().extension().string();
-      std::transform(found.begin(), found.end(), found.begin(),
-                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-      if (found == extension && !entry.is_directory()) {
-        files.push_back(entry.path());
-      }
-    }
-  } catch (const fs::filesystem_error& error) {
-    throw Error(folder.string(), "cannot be listed: " + error.code().message(),
-                "check its permissions");
-  }
-  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
-    return natural_less(a.filename().native(), b.filename().native());
-  });
-  return files;
-}
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "palpate/cloud/frame.hpp"
 
@@ -12,10 +13,12 @@ namespace palpate {
 
 /// What can be said of a source before, or without, reading all of it.
 struct SourceInfo {
-  std::string uri;                    ///< as it was opened
-  std::string kind;                   ///< e.g. "TUM RGB-D recording"
-  std::optional<std::size_t> frames;  ///< how many there are; none if endless
-  std::optional<double> frame_rate;   ///< [Hz] nominal, or the median of the stamps
+  std::string uri;                      ///< as it was opened
+  std::string kind;                     ///< e.g. "TUM RGB-D recording"
+  std::optional<std::size_t> frames{};  ///< how many there are; none if endless
+  std::optional<double> frame_rate{};   ///< [Hz] nominal, or the median of the stamps
+  double start_time = 0.0;              ///< [s] stamp 0 by the recording's own clock
+  std::vector<std::string> notes{};     ///< what a person should know, such as frames left out
 };
 
 /// Where frames come from: a camera, a simulation, a recording. Used on one thread, the camera's.

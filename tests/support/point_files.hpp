@@ -5,8 +5,6 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <random>
 #include <span>
 #include <string>
@@ -16,6 +14,8 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/sources/point_file.hpp"
+
+#include "tests/support/temporary_folder.hpp"
 
 namespace palpate::test {
 
@@ -76,29 +76,5 @@ inline Vec3 mean_of(const PointFile& cloud) {
   }
   return count == 0.0 ? sum : Vec3(sum / count);
 }
-
-/// A folder of the test's own, gone with it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    const auto* const test = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::temp_directory_path() /
-            ("palpate_" + std::string(test->test_suite_name()) + "_" + test->name() + "_" +
-             std::to_string(std::random_device()()));
-    std::filesystem::create_directories(path_);
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  std::filesystem::path write(const std::string& name, std::string_view text) const {
-    std::ofstream(path_ / name, std::ios::binary) << text;
-    return path_ / name;
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 }  // namespace palpate::test

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace palpate {
+
+/// A depth image as it lies in a file.
+struct DepthPng {
+  int width = 0;                     ///< [px]
+  int height = 0;                    ///< [px]
+  std::vector<std::uint16_t> depth;  ///< row by row, width*height raw values
+};
+
+/// Decodes a 16-bit grey PNG, interlaced or not; about 3 ms for 640x480.
+/// @param name  of the file, for messages
+/// @throws Error if it is no PNG, another kind of PNG, larger than 16384x16384, cut short or
+///         corrupt. What its header promises is held against its length before it is allocated.
+DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& name);
+
+/// @throws Error as parse_depth_png, or if the file cannot be read.
+DepthPng read_depth_png(const std::filesystem::path& path);
+
+/// Writes a 16-bit grey PNG, packed for speed rather than size.
+/// @param depth  row by row, width*height raw values
+/// @throws Error if the sizes do not match or the file cannot be written.
+void write_depth_png(const std::filesystem::path& path, int width, int height,
+                     std::span<const std::uint16_t> depth);
+
+}  // namespace palpate

@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sources/depth_recording.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/sources/depth_png.hpp"
+#include "palpate/sources/files.hpp"
+#include "palpate/sources/intrinsics_file.hpp"
+#include "palpate/sources/trajectory.hpp"
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t largest_text = std::uintmax_t{1} << 28;
+
+constexpr std::array<std::string_view, 8> distortion_options{"k1", "k2", "p1", "p2",
+                                                             "k3", "k4", "k5", "k6"};
+
+struct RecordedImage {
+  fs::path file;
+  double stamp = 0.0;  // [s]
+  Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
+};
+
+class DepthRecording final : public Source {
+ public:
+  DepthRecording(const RecordedCamera& camera, std::vector<RecordedImage> images, SourceInfo info)
+      : camera_(camera),
+        rays_(std::make_shared<const ViewingRays>(camera.intrinsics)),
+        images_(std::move(images)),
+        info_(std::move(info)) {}
+
+  std::optional<Frame> next() override {
+    if (next_ == images_.size()) return std::nullopt;
+    const RecordedImage& image = images_[next_++];  // before anything can throw
+    DepthPng png = read_depth_png(image.file);
+    const Intrinsics& k = camera_.intrinsics;
+    if (png.width != k.width || png.height != k.height) {
+      throw Error(image.file.string(),
+                  "is an image of " + std::to_string(png.width) + "x" + std::to_string(png.height) +
+                      " pixels, but the camera has " + std::to_string(k.width) + "x" +
+                      std::to_string(k.height),
+                  "write an intrinsics.json for this camera");
+    }
+    for (const std::uint16_t no_value : {camera_.invalid_value, camera_.saturated_value}) {
+      if (is_measured(no_value)) {
+        std::replace(png.depth.begin(), png.depth.end(), no_value, std::uint16_t{0});
+      }
+    }
+    return Frame{image.stamp,
+                 std::make_shared<DepthImage>(rays_, std::move(png.depth), camera_.units_per_metre,
+                                              image.world_from_camera)};
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+ private:
+  RecordedCamera camera_;
+  std::shared_ptr<const ViewingRays> rays_;
+  std::vector<RecordedImage> images_;
+  std::size_t next_ = 0;
+  SourceInfo info_;
+};
+
+std::string read_text(const fs::path& path) {
+  const std::vector<std::byte> bytes = read_file(path, largest_text);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+void allow_only(const Uri& uri, std::initializer_list<std::string_view> own) {
+  std::vector<std::string_view> known(own);
+  known.insert(known.end(), {"fx", "fy", "cx", "cy", "units", "start", "frames"});
+  known.insert(known.end(), distortion_options.begin(), distortion_options.end());
+  uri.allow_only(known);
+}
+
+void override_camera(const Uri& uri, RecordedCamera& camera) {
+  Intrinsics& k = camera.intrinsics;
+  k.fx = uri.number_option("fx", k.fx, 1e-3, 1e7, "px");
+  k.fy = uri.number_option("fy", k.fy, 1e-3, 1e7, "px");
+  k.cx = uri.number_option("cx", k.cx, -1e7, 1e7, "px");
+  k.cy = uri.number_option("cy", k.cy, -1e7, 1e7, "px");
+  for (std::size_t i = 0; i < k.distortion.size(); ++i) {
+    k.distortion[i] = uri.number_option(distortion_options[i], k.distortion[i], -1e6, 1e6, "px");
+  }
+  camera.units_per_metre = uri.number_option("units", camera.units_per_metre, 1e-3, 1e7, "px");
+}
+
+std::size_t count_option(const Uri& uri, std::string_view key, double fallback, double min) {
+  const double count = uri.number_option(key, fallback, min, 1e9, "px");
+  if (count != std::floor(count)) {
+    throw Error(uri.text(), "option '" + std::string(key) + "' is not a whole number",
+                "give a number of frames");
+  }
+  return static_cast<std::size_t>(count);
+}
+
+// Leaves out what `start` and `frames` say.
+void select(const Uri& uri, std::vector<RecordedImage>& images) {
+  const std::size_t start = count_option(uri, "start", 0.0, 0.0);
+  const std::size_t frames = count_option(uri, "frames", 1e9, 1.0);
+  if (start >= images.size()) {
+    throw Error(uri.text(),
+                "has " + std::to_string(images.size()) +
+                    " frames, none is left after start=" + std::to_string(start),
+                "start earlier");
+  }
+  images.erase(images.begin(), images.begin() + static_cast<std::ptrdiff_t>(start));
+  images.resize(std::min(images.size(), frames));
+}
+
+// Gives each image the pose at its stamp; those without one are left out, which a note says.
+void place(const Uri& uri, const Trajectory& trajectory, const std::string& trajectory_name,
+           std::vector<RecordedImage>& images, SourceInfo& info) {
+  const std::size_t all = images.size();
+  std::erase_if(images, [&](RecordedImage& image) {
+    const auto pose = trajectory.at(image.stamp);
+    if (pose) image.world_from_camera = *pose;
+    return !pose;
+  });
+  const std::size_t lost = all - images.size();
+  if (images.empty()) {
+    throw Error(uri.text(), "no frame has a pose in " + trajectory_name + " at its stamp",
+                "check that both use the same clock, or give poses=none");
+  }
+  if (lost > 0) {
+    info.notes.push_back(std::to_string(lost) + " of " + std::to_string(all) +
+                         " frames are left out: " + trajectory_name +
+                         " has no pose at their stamps");
+  }
+}
+
+// Counts stamps from the first image.
+void start_clock(std::vector<RecordedImage>& images, SourceInfo& info) {
+  info.start_time = images.front().stamp;
+  for (RecordedImage& image : images) image.stamp -= info.start_time;
+}
+
+double median_rate(const std::vector<RecordedImage>& images) {
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < images.size(); ++i) {
+    intervals.push_back(images[i].stamp - images[i - 1].stamp);
+  }
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  return 1.0 / *middle;
+}
+
+bool is_json(const fs::path& path) {
+  return path.extension() == ".json";
+}
+
+}  // namespace
+
+std::unique_ptr<Source> open_tum(const Uri& uri) {
+  allow_only(uri, {"poses", "stamps"});
+  const fs::path folder = uri.path();
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    throw Error(uri.text(), "is not a folder", "name the folder that holds depth.txt");
+  }
+  const fs::path list = folder / "depth.txt";
+  if (!fs::exists(list, error)) {
+    throw Error(
+        uri.text(), "has no depth.txt",
+        "name a recording of the TUM RGB-D layout, or write depth:DIR for a folder of PNGs");
+  }
+  const std::string stamps = uri.text_option("stamps", "relative");
+  if (stamps != "relative" && stamps != "absolute") {
+    throw Error(uri.text(), "option 'stamps' is '" + stamps + "'", "give relative or absolute");
+  }
+
+  RecordedCamera camera{
+      .intrinsics = {.width = 640, .height = 480, .fx = 525, .fy = 525, .cx = 319.5, .cy = 239.5},
+      .units_per_metre = 5000.0};
+  const fs::path intrinsics = folder / "intrinsics.json";
+  if (fs::exists(intrinsics, error)) camera = read_intrinsics(intrinsics);
+  override_camera(uri, camera);
+
+  SourceInfo info{.uri = uri.text(), .kind = "TUM RGB-D recording"};
+  std::vector<RecordedImage> images;
+  for (const StampedFile& listed : parse_image_list(read_text(list), list.string())) {
+    images.push_back({.file = folder / listed.file, .stamp = listed.stamp});
+  }
+  select(uri, images);
+  const std::string poses = uri.text_option("poses", "groundtruth.txt");
+  if (poses != "none") {
+    const fs::path file = folder / poses;
+    if (!fs::exists(file, error)) {
+      throw Error(uri.text(), "has no " + poses, "give poses=none for the camera's own frame");
+    }
+    place(uri, parse_trajectory(read_text(file), file.string()), poses, images, info);
+  }
+  if (images.size() > 1) info.frame_rate = median_rate(images);
+  if (stamps == "relative") start_clock(images, info);
+  info.frames = images.size();
+  return std::make_unique<DepthRecording>(camera, std::move(images), std::move(info));
+}
+
+std::unique_ptr<Source> open_depth(const Uri& uri) {
+  allow_only(uri, {"fps", "poses"});
+  const fs::path path = uri.path();
+  std::error_code error;
+  const bool is_folder = fs::is_directory(path, error);
+  if (!is_folder && !fs::exists(path, error)) {
+    throw Error(uri.text(), "no such file or folder", "check the path");
+  }
+  fs::path folder = is_folder ? path : path.parent_path();
+  std::vector<fs::path> files{path};
+  if (is_folder) {
+    if (fs::is_directory(folder / "depth", error)) folder /= "depth";
+    files = files_in(folder, ".png");
+    if (files.empty()) {
+      throw Error(folder.string(), "holds no PNG", "name a folder of 16-bit PNGs, or one file");
+    }
+  }
+
+  std::optional<RecordedCamera> camera;
+  for (const fs::path& place : {folder, folder / ".."}) {
+    const fs::path intrinsics = place / "intrinsics.json";
+    if (!camera && fs::exists(intrinsics, error)) camera = read_intrinsics(intrinsics);
+  }
+  if (!camera) {
+    for (const char* key : {"fx", "fy", "cx", "cy", "units"}) {
+      if (uri.has(key)) continue;
+      throw Error(uri.text(),
+                  "has no intrinsics.json beside its images or one folder above, nor an option '" +
+                      std::string(key) + "'",
+                  "give fx, fy, cx, cy [px] and units (raw values per metre)");
+    }
+    const DepthPng first = read_depth_png(files.front());
+    camera.emplace().intrinsics = {.width = first.width, .height = first.height};
+  }
+  override_camera(uri, *camera);
+  const double fps = uri.number_option("fps", camera->frame_rate.value_or(30.0), 1e-3, 1e6, "Hz");
+
+  SourceInfo info{.uri = uri.text(), .kind = is_folder ? "folder of depth images" : "depth image"};
+  std::vector<RecordedImage> images;
+  for (std::size_t k = 0; k < files.size(); ++k) {
+    images.push_back({.file = files[k], .stamp = static_cast<double>(k) / fps});
+  }
+  const std::string poses = uri.text_option("poses", "none");
+  const fs::path poses_file = (is_folder ? path : folder) / poses;
+  const bool matrices = poses != "none" && is_json(poses_file);
+  if (matrices) {
+    const auto world_from_camera = parse_pose_matrices(read_text(poses_file), poses_file.string());
+    if (world_from_camera.size() != images.size()) {
+      throw Error(poses_file.string(),
+                  "has " + std::to_string(world_from_camera.size()) + " poses for " +
+                      std::to_string(images.size()) + " images",
+                  "give one for each image");
+    }
+    for (std::size_t k = 0; k < images.size(); ++k) {
+      images[k].world_from_camera = world_from_camera[k];
+    }
+  }
+  select(uri, images);
+  if (poses != "none" && !matrices) {
+    place(uri, parse_trajectory(read_text(poses_file), poses_file.string()), poses, images, info);
+  }
+  start_clock(images, info);
+  info.frames = images.size();
+  if (is_folder) info.frame_rate = fps;
+  return std::make_unique<DepthRecording>(*camera, std::move(images), std::move(info));
+}
+
+}  // namespace palpate

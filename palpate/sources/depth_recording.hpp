@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "palpate/core/uri.hpp"
+#include "palpate/sources/source.hpp"
+
+namespace palpate {
+
+// Both kinds of recording take these options. The camera is described by `intrinsics.json`
+// (intrinsics_file.hpp), which options override:
+//   fx, fy, cx, cy                  [px] focal lengths and principal point
+//   k1, k2, p1, p2, k3, k4, k5, k6  Brown-Conrady distortion; what is not given stays
+//   units                           raw depth units per metre
+//   start, frames                   leave out that many frames; give at most that many
+// Raw values that mean "invalid" or "saturated" there become 0, a hole. An image that is missing,
+// damaged or not of the camera's size is an Error from next(), which goes on with the one after it.
+
+/// Opens `tum:DIR`, the layout of the TUM RGB-D benchmark: depth.txt lists the images,
+/// groundtruth.txt the poses of the optical frame in the world (trajectory.hpp).
+///
+/// Without intrinsics.json: 640x480, f = 525 px, centre (319.5, 239.5), 5000 units per metre.
+/// Stamps count from the first frame given; SourceInfo::start_time is when that was by the
+/// recording's clock. `stamps=absolute` gives the recording's own stamps.
+/// `poses=FILE` reads another trajectory, named relative to DIR; `poses=none` gives points in the
+/// camera's own frame. Frames of which the trajectory does not know the pose are left out, which
+/// SourceInfo::notes says.
+/// @throws Error if the lists, poses or intrinsics cannot be used, or no frame is left.
+std::unique_ptr<Source> open_tum(const Uri& uri);
+
+/// Opens `depth:DIR`, the PNG images of DIR/depth, or of DIR, in natural order of their names, or
+/// `depth:FILE.png`, one image.
+///
+/// intrinsics.json is looked for beside the images and one folder above. Without it, fx, fy, cx, cy
+/// and units must be given; the size is that of the first image.
+/// Stamps are k/fps of the k-th frame given: `fps=30`, or fps_nominal of intrinsics.json, or 30.
+/// Points are in the camera's own frame unless `poses=FILE`, named relative to DIR, says where the
+/// camera was: a .json of one matrix for each image of the folder (parse_pose_matrices), or a
+/// trajectory in the TUM benchmark's format whose stamps count from the first image of the folder.
+/// @throws Error if the folder, poses or intrinsics cannot be used, or no frame is left.
+std::unique_ptr<Source> open_depth(const Uri& uri);
+
+}  // namespace palpate

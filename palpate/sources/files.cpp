@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sources/files.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <fstream>
+#include <string>
+#include <system_error>
+
+#include "palpate/core/error.hpp"
+#include "palpate/sources/natural_order.hpp"
+
+namespace palpate {
+
+std::vector<std::byte> read_file(const std::filesystem::path& path, std::uintmax_t max_bytes) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) {
+    throw Error(path.string(), "no such file", "check the path");
+  }
+  // Opening a folder succeeds and a pipe may never end: neither is read.
+  if (!std::filesystem::is_regular_file(status)) {
+    throw Error(path.string(), "is not a file", "name a file");
+  }
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error) {
+    throw Error(path.string(), "cannot be read: " + error.message(), "check its permissions");
+  }
+  if (size > max_bytes) {
+    throw Error(path.string(),
+                "is " + std::to_string(size) + " bytes long, more than the " +
+                    std::to_string(max_bytes) + " that are read of such a file",
+                "check that it is the right file");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    throw Error(path.string(), "cannot be opened: " + std::generic_category().message(errno),
+                "check its permissions");
+  }
+  std::vector<std::byte> bytes(size);
+  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
+  if (static_cast<std::uintmax_t>(file.gcount()) != size) {
+    throw Error(path.string(), "cannot be read to its end", "check the disk and try again");
+  }
+  return bytes;
+}
+
+std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder,
+                                            std::string_view extension) {
+  std::vector<std::filesystem::path> files;
+  try {
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+      std::string found = entry.path().extension().string();
+      std::transform(found.begin(), found.end(), found.begin(),
+                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+      if (found == extension && !entry.is_directory()) files.push_back(entry.path());
+    }
+  } catch (const std::filesystem::filesystem_error& error) {
+    throw Error(folder.string(), "cannot be listed: " + error.code().message(),
+                "check the path and its permissions");
+  }
+  std::sort(files.begin(), files.end(),
+            [](const std::filesystem::path& a, const std::filesystem::path& b) {
+              return natural_less(a.filename().native(), b.filename().native());
+            });
+  return files;
+}
+
+}  // namespace palpate

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "palpate/core/renderer.hpp"
+#include "palpate/servo/device.hpp"
+#include "palpate/servo/histogram.hpp"
+#include "palpate/servo/mailbox.hpp"
+#include "palpate/servo/periodic_thread.hpp"
+#include "palpate/servo/safety.hpp"
+#include "palpate/servo/tick_ring.hpp"
+#include "palpate/servo/workspace.hpp"
+
+namespace palpate {
+
+/// What the loop asks of a method. `Renderer` has this shape; see `rendering_by`.
+class Rendering {
+ public:
+  virtual ~Rendering() = default;
+  virtual void seat(const Vec3& proxy) noexcept = 0;
+  virtual void frame(const Cloud& cloud, double stamp) noexcept = 0;
+  virtual Tick tick(const Vec3& hip, double t) noexcept = 0;
+  /// @throws Error if the method cannot use them; it then keeps the old ones.
+  virtual void set_parameters(const Parameters& parameters) = 0;
+};
+
+/// Any class with Renderer's four functions as a Rendering.
+template <class Method, class... Arguments>
+std::unique_ptr<Rendering> rendering_by(Arguments&&... arguments) {
+  struct By final : Rendering {
+    explicit By(Arguments&&... a) : method(std::forward<Arguments>(a)...) {}
+    void seat(const Vec3& proxy) noexcept override { method.seat(proxy); }
+    void frame(const Cloud& cloud, double stamp) noexcept override { method.frame(cloud, stamp); }
+    Tick tick(const Vec3& hip, double t) noexcept override { return method.tick(hip, t); }
+    void set_parameters(const Parameters& p) override { method.set_parameters(p); }
+    Method method;
+  };
+  return std::make_unique<By>(std::forward<Arguments>(arguments)...);
+}
+
+/// Everything that can be changed while the loop runs.
+struct ServoSettings {
+  Parameters rendering;
+  SafetyParameters safety;
+  Placement placement;
+};
+
+/// @throws Error if one of them does not validate.
+void validate(const ServoSettings& settings);
+
+/// All that happened in one cycle: what viewers and recorders read.
+struct ServoTick {
+  Tick tick;                   ///< the renderer's; `tick.force` is what it asked for
+  Vec3 force;                  ///< [N] world: what the device got
+  Vec3 position;               ///< [m] of the hand, device frame
+  double gain;                 ///< [-] of the safety chain
+  double frame_stamp;          ///< [s] of the frame in use; 0 before the first
+  double frame_age;            ///< [s] infinite before the first
+  std::uint64_t number;        ///< of the cycle, from 0
+  std::uint64_t frame_number;  ///< of the frame in use among those put, from 1; 0 before the first
+  std::uint32_t safety;        ///< SafetyFlag bits
+  std::uint32_t wake_up_ns;    ///< as in Wake
+  std::uint32_t previous_compute_ns;
+  std::uint32_t hand;  ///< 1 present, 2 clutched
+};
+
+/// What the cycles have done so far. The servo's thread writes, any may look.
+struct CycleStatistics {
+  std::atomic<std::uint64_t> ticks{0};
+  std::atomic<std::uint64_t> steps{0};  ///< of the proxy
+  std::atomic<std::uint64_t> contact_ticks{0};
+  std::atomic<std::uint64_t> frames_adopted{0};
+  std::atomic<std::uint64_t> frames_dropped{0};  ///< overtaken by a newer one before any tick
+  std::atomic<std::uint64_t> settings_refused{0};
+  std::atomic<double> max_force{0.0};  ///< [N] sent
+  Histogram frame_age;                 ///< [ns] at each tick that had a frame
+  Histogram hand_over;                 ///< [ns] from put_frame to the tick that uses the frame
+  std::array<std::atomic<std::uint64_t>, safety_flag_count> interventions{};
+};
+
+/// One cycle of the loop: device read, newest frame, renderer, safety chain, device write.
+///
+/// Knows no clock: a thread, a test or a free-running session calls `run` with the time. `run` is
+/// one thread's, the servo's; what comes from elsewhere goes through mailboxes and out by the ring,
+/// so that nothing outside can hold up a cycle.
+class Cycle {
+ public:
+  /// @param rendering  the method
+  /// @param device     must outlive this
+  /// @param ring       [ticks] that a reader can fall behind
+  /// @throws Error if the settings do not validate.
+  Cycle(std::unique_ptr<Rendering> rendering, Device& device, const ServoSettings& settings = {},
+        std::size_t ring = 8192);
+
+  /// [servo] No allocation, deallocation, lock, system call or exception (as far as the device
+  /// keeps its word). `wake.t` is on the clock of the frames' stamps.
+  void run(const Wake& wake) noexcept;
+
+  /// Hands a frame over; the newest wins. The camera's thread, one at a time.
+  /// Frames are released here or on destruction, never in a tick.
+  /// @param stamp  [s] when it was captured, on the loop's clock
+  /// @param now    [s] on the loop's clock: measures how long the hand-over takes
+  void put_frame(std::shared_ptr<const Cloud> cloud, double stamp, double now);
+
+  /// Takes effect in the next cycle. Any thread but the servo's.
+  /// @throws Error if they do not validate.
+  void set_settings(const ServoSettings& settings);
+
+  /// Sees every cycle from the next one on. Any thread.
+  [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return ring_.reader(); }
+  [[nodiscard]] const CycleStatistics& statistics() const { return statistics_; }
+  [[nodiscard]] const Device& device() const { return device_; }
+
+ private:
+  struct CapturedFrame {
+    std::shared_ptr<const Cloud> cloud;
+    double stamp = 0.0;
+    double put_at = 0.0;
+  };
+
+  void adopt_settings(const ServoSettings& settings) noexcept;
+  void adopt_frame(const CapturedFrame& frame, double t) noexcept;
+  [[nodiscard]] double frame_age(double t) const noexcept;
+  void keep_statistics(const ServoTick& record) noexcept;
+
+  std::unique_ptr<Rendering> rendering_;
+  Device& device_;
+  SafetyChain safety_;
+  Workspace workspace_;
+  double r_c_;
+  Patch patch_;  // for seating the proxy anew
+
+  std::mutex settings_writers_;  // keeps several of them apart; the servo never takes it
+  Mailbox<ServoSettings> settings_;
+  Mailbox<CapturedFrame> frames_;
+  TickRing<ServoTick> ring_;
+  CycleStatistics statistics_;
+
+  std::uint64_t number_ = 0;
+  Vec3 last_proxy_ = Vec3::Zero();
+  Vec3 last_normal_ = Vec3::Zero();
+  bool has_frame_ = false;
+  double last_stamp_ = 0.0;       // [s] of the frame in use
+  double fresh_stamp_ = 0.0;      // [s] of the newest frame whose stamp makes sense
+  double fresh_since_ = 0.0;      // [s] when that was adopted
+  double interval_ = 1.0 / 30.0;  // [s] between stamps
+};
+
+}  // namespace palpate

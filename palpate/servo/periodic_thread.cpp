@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/servo/periodic_thread.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <ctime>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr std::uint64_t second = 1'000'000'000;  // [ns]
+
+std::uint64_t nanoseconds(clockid_t clock) noexcept {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return static_cast<std::uint64_t>(now.tv_sec) * second + static_cast<std::uint64_t>(now.tv_nsec);
+}
+
+double seconds(std::uint64_t nanoseconds) noexcept {
+  return 1e-9 * static_cast<double>(nanoseconds);
+}
+
+std::uint32_t clipped(std::uint64_t nanoseconds) noexcept {
+  return static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(nanoseconds, std::numeric_limits<std::uint32_t>::max()));
+}
+
+void sleep_until(std::uint64_t deadline) noexcept {
+  const timespec at{.tv_sec = static_cast<time_t>(deadline / second),
+                    .tv_nsec = static_cast<long>(deadline % second)};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr) == EINTR) {
+  }
+}
+
+}  // namespace
+
+PeriodicThread::PeriodicThread(double rate, const RealtimeRequest& request,
+                               std::function<void(const Wake&)> cycle)
+    : cycle_(std::move(cycle)) {
+  if (!(rate >= 1.0 && rate <= 10'000.0)) {
+    throw Error("servo rate", std::to_string(rate) + " Hz is out of range",
+                "give a rate from 1 to 10000 Hz");
+  }
+  const auto period = static_cast<std::uint64_t>(std::llround(1e9 / rate));
+  std::promise<RealtimeReport> started;
+  std::future<RealtimeReport> report = started.get_future();
+  thread_ = std::thread(&PeriodicThread::run, this, period, request, std::move(started));
+  report_ = report.get();
+}
+
+PeriodicThread::~PeriodicThread() {
+  stop();
+}
+
+void PeriodicThread::stop() {
+  stopping_.store(true, std::memory_order_relaxed);
+  if (thread_.joinable()) thread_.join();
+}
+
+void PeriodicThread::run(std::uint64_t period, const RealtimeRequest& request,
+                         std::promise<RealtimeReport> started) {
+  const RealtimeThread realtime(request);
+  started.set_value(realtime.report());
+  std::uint64_t deadline = nanoseconds(CLOCK_MONOTONIC) + period;
+  std::uint64_t compute = 0;
+  while (!stopping_.load(std::memory_order_relaxed)) {
+    sleep_until(deadline);
+    const std::uint64_t awake = nanoseconds(CLOCK_MONOTONIC);
+    const std::uint64_t cpu = nanoseconds(CLOCK_THREAD_CPUTIME_ID);
+    cycle_({seconds(awake), clipped(awake - deadline), clipped(compute)});
+    compute = nanoseconds(CLOCK_THREAD_CPUTIME_ID) - cpu;
+    timing_.compute.add(compute);
+    timing_.wake_up.add(awake - deadline);
+    deadline += period;
+    const std::uint64_t done = nanoseconds(CLOCK_MONOTONIC);
+    if (done > deadline) {
+      const std::uint64_t passed = (done - deadline) / period + 1;
+      deadline += passed * period;
+      timing_.late_ticks.fetch_add(1, std::memory_order_relaxed);
+      timing_.skipped_deadlines.fetch_add(passed, std::memory_order_relaxed);
+    }
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/servo/realtime.hpp"
+
+#include <array>
+#include <cstdint>
+#include <ctime>
+
+#include <fcntl.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+namespace palpate {
+namespace {
+
+bool may_lock_all_that_is_to_come() {
+  // With a finite limit MCL_FUTURE makes some later allocation of the process fail.
+  rlimit limit{};
+  return geteuid() == 0 ||
+         (getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY);
+}
+
+// Touches the stack that ticks will use, so that it is there before the first.
+void touch_stack() {
+  std::array<volatile char, 256 * 1024> stack;
+  for (std::size_t i = 0; i < stack.size(); i += 1024) stack[i] = 0;
+}
+
+int last_core() {
+  cpu_set_t allowed;
+  CPU_ZERO(&allowed);
+  if (pthread_getaffinity_np(pthread_self(), sizeof(allowed), &allowed) != 0) return -1;
+  for (int core = CPU_SETSIZE - 1; core >= 0; --core) {
+    if (CPU_ISSET(core, &allowed)) return core;
+  }
+  return -1;
+}
+
+bool pin_to(int core) {
+  if (core < 0) return false;
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  CPU_SET(core, &set);
+  return pthread_setaffinity_np(pthread_self(), sizeof(set), &set) == 0;
+}
+
+}  // namespace
+
+RealtimeThread::RealtimeThread(const RealtimeRequest& request) {
+  prctl(PR_SET_TIMERSLACK, 1UL);  // without SCHED_FIFO the kernel may add 50 us to each sleep
+  if (!request.enabled) return;
+
+  const sched_param param{.sched_priority = request.priority};
+  report_.fifo = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param) == 0;
+  if (report_.fifo) {
+    report_.priority = request.priority;
+  } else {
+    report_.advice.emplace_back(
+        "SCHED_FIFO was refused: add '@realtime - rtprio 95' to /etc/security/limits.d/"
+        "realtime.conf, put yourself in the group 'realtime' and log in again");
+  }
+
+  if (request.lock_memory) {
+    report_.locked = may_lock_all_that_is_to_come() && mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+    touch_stack();
+    if (!report_.locked) {
+      report_.advice.emplace_back(
+          "locking memory was refused: add '@realtime - memlock unlimited' to "
+          "/etc/security/limits.d/realtime.conf, put yourself in the group 'realtime' and log in "
+          "again");
+    }
+  }
+
+  if (request.pin) {
+    const int core = last_core();
+    if (pin_to(core)) {
+      report_.core = core;
+    } else {
+      report_.advice.emplace_back("pinning to a core was refused: start it without a cpuset");
+    }
+  }
+
+  latency_file_ = open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);
+  const std::int32_t no_latency = 0;
+  report_.awake = latency_file_ >= 0 &&
+                  write(latency_file_, &no_latency, sizeof(no_latency)) == sizeof(no_latency);
+  if (!report_.awake) {
+    report_.advice.emplace_back(
+        "cores may sleep deeply between ticks: make /dev/cpu_dma_latency writable, or boot with "
+        "'cpuidle.off=1'");
+  }
+}
+
+RealtimeThread::~RealtimeThread() {
+  if (latency_file_ >= 0) close(latency_file_);
+}
+
+double monotonic_now() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+}  // namespace palpate

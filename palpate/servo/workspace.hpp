@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "palpate/servo/device.hpp"
+
+namespace palpate {
+
+/// How a device's workspace lies in the scene.
+struct Placement {
+  Eigen::Isometry3d world_from_device = Eigen::Isometry3d::Identity();
+  /// [-] scene metres per device metre. Forces are not scaled, so the hand feels the coupling's
+  /// stiffness times this: scale up and the limit of stability comes nearer.
+  double workspace_scale = 1.0;
+};
+
+/// @throws Error if the pose is not rigid and finite or the scale is not in 0.001 to 1000.
+void validate(const Placement& placement);
+
+/// Brings hands into the world and forces back, and remembers what the clutch has shifted. [servo]
+class Workspace {
+ public:
+  explicit Workspace(const Placement& placement = {}) : placement_(placement) {}
+
+  void place(const Placement& placement) noexcept { placement_ = placement; }
+
+  /// The HIP [m, world]. While the hand is clutched the HIP stays, and goes on from there after.
+  Vec3 hip_in_world(const HandState& hand) noexcept {
+    if (hand.clutched) {
+      shift_ = held_ - hand.position;
+    } else {
+      held_ = hand.position + shift_;
+    }
+    return placement_.world_from_device * Vec3(placement_.workspace_scale * held_);
+  }
+
+  [[nodiscard]] Vec3 force_in_device(const Vec3& force_in_world) const noexcept {
+    return placement_.world_from_device.linear().transpose() * force_in_world;
+  }
+
+ private:
+  Placement placement_;
+  Vec3 shift_ = Vec3::Zero();  // [m, device] what clutching has added to the hand's position
+  Vec3 held_ = Vec3::Zero();   // [m, device] the position that counts
+};
+
+}  // namespace palpate

@@ -1,0 +1,442 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/core/error.hpp"
+#include "palpate/servo/safety.hpp"
+
+#include "tests/support/errors.hpp"
+
+namespace palpate {
+namespace {
+
+using test::fails_saying;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double inf = std::numeric_limits<double>::infinity();
+constexpr double ms = 1e-3;
+constexpr std::uint32_t all = SafetyChain::all_links;
+
+// A hand at rest in contact with a floor, under a camera at 30 Hz; each test changes what it is
+// about and looks at what the device gets.
+struct Session {
+  explicit Session(std::uint32_t links = all, const DeviceLimits& device = {},
+                   const SafetyParameters& parameters = {})
+      : chain(device, parameters, links) {}
+
+  SafetyOutput run(double newtons, double dt = ms) {
+    input.t += dt;
+    input.force = newtons * Vec3::UnitZ();
+    return chain.run(input);
+  }
+  SafetyOutput run_for(double seconds, double newtons) {
+    SafetyOutput output{};
+    for (int i = 0; i < std::lround(seconds / ms); ++i) output = run(newtons);
+    return output;
+  }
+  // Passes the gate and the ramp.
+  Session& engage() {
+    run_for(2.0, 0.0);
+    return *this;
+  }
+
+  SafetyChain chain;
+  SafetyInput input{.t = 100.0,
+                    .force = Vec3::Zero(),
+                    .hip = {0, 0, -0.01},
+                    .proxy = {0, 0, 0.005},
+                    .normal = {0, 0, 1},
+                    .position = Vec3::Zero(),
+                    .hand = true,
+                    .frame_age = 0.01,
+                    .frame_interval = 1.0 / 30.0};
+};
+
+// The session behind the gate, with some links left out.
+Session engaged_without(std::uint32_t links, const DeviceLimits& device = {}) {
+  Session session(all & ~links, device);
+  session.engage();
+  return session;
+}
+
+constexpr DeviceLimits never_hot{.max_force = 3.3, .continuous_force = 3.3};
+
+TEST(SafetyChain, PassesAModestForceOnceEngaged) {
+  Session session = engaged_without(0);
+  const SafetyOutput output = session.run_for(0.1, 0.8);
+  EXPECT_NEAR(output.force.z(), 0.8, 1e-12);
+  EXPECT_EQ(output.flags, 0U);
+  EXPECT_EQ(output.gain, 1.0);
+}
+
+TEST(SafetyChain, AnswersWhatIsNotFiniteWithNoForce) {
+  const auto worst = [](std::uint32_t links, auto spoil) {
+    Session session = engaged_without(links);
+    session.run_for(0.1, 0.8);
+    const SafetyInput before = session.input;
+    bool finite = true;
+    double force = 0.0;
+    for (int i = 0; i < 5; ++i) {
+      session.input.t = before.t + (i + 1) * ms;
+      spoil(session.input);
+      const SafetyOutput output = session.chain.run(session.input);
+      finite = finite && output.force.allFinite();
+      force = output.force.norm();
+      EXPECT_EQ((output.flags & input_refused) != 0, links == 0);
+    }
+    return finite ? force : inf;
+  };
+  const auto spoil_force = [](SafetyInput& input) { input.force.x() = nan; };
+  EXPECT_EQ(worst(0, spoil_force), 0.0);
+  EXPECT_EQ(worst(input_refused, spoil_force), inf);
+  EXPECT_EQ(worst(0, [](SafetyInput& input) { input.force.y() = inf; }), 0.0);
+  EXPECT_EQ(worst(0, [](SafetyInput& input) { input.force.y() = 1e308; }), 0.0);
+  EXPECT_EQ(worst(0, [](SafetyInput& input) { input.hip.y() = nan; }), 0.0);
+  EXPECT_EQ(worst(0, [](SafetyInput& input) { input.proxy.y() = -inf; }), 0.0);
+  EXPECT_EQ(worst(0, [](SafetyInput& input) { input.normal.y() = nan; }), 0.0);
+  EXPECT_EQ(worst(0, [](SafetyInput& input) { input.position.y() = 1e200; }), 0.0);
+  EXPECT_EQ(worst(0, [](SafetyInput& input) { input.t = nan; }), 0.0);
+  EXPECT_EQ(worst(0, [](SafetyInput& input) { input.t = inf; }), 0.0);
+}
+
+TEST(SafetyChain, TakesTheForceOffWhenTimeRunsBackwards) {
+  Session session = engaged_without(0);
+  session.run_for(0.1, 0.8);
+  EXPECT_TRUE(session.run(0.8, -10.0).flags & input_refused);
+  EXPECT_EQ(session.run(0.8).force.norm() < 0.01, true) << "and it ramps from there";
+}
+
+TEST(SafetyChain, OnlyPushesAndLeavesWhatIsAlongTheSurface) {
+  const auto pulled = [](std::uint32_t links) {
+    Session session = engaged_without(links);
+    session.input.force = {0.3, 0, -0.5};
+    for (int i = 0; i < 20; ++i) {
+      session.input.t += ms;
+      const SafetyOutput output = session.chain.run(session.input);
+      EXPECT_EQ((output.flags & pull_removed) != 0, links == 0);
+      if (i == 19) return output.force;
+    }
+    return Vec3(nan, nan, nan);
+  };
+  EXPECT_LT((pulled(0) - Vec3(0.3, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((pulled(pull_removed) - Vec3(0.3, 0, -0.5)).norm(), 1e-12);
+}
+
+TEST(SafetyChain, TellsAPushFromAPullByTheProxyWhereThereIsNoNormal) {
+  Session session = engaged_without(0);
+  session.input.normal = Vec3::Zero();
+  EXPECT_NEAR(session.run_for(0.02, 0.5).force.z(), 0.5, 1e-12);
+  EXPECT_EQ(session.run_for(0.02, -0.5).force.z(), 0.0);
+  session.input.hip = session.input.proxy;
+  EXPECT_EQ(session.run_for(0.02, 0.5).force.z(), 0.0) << "neither is known: no force";
+}
+
+TEST(SafetyChain, CutsTheForceToTheLowerOfTheDevicesAndTheUsersLimit) {
+  EXPECT_NEAR(engaged_without(0, never_hot).run_for(0.1, 10.0).force.norm(), 3.3, 1e-9);
+  EXPECT_NEAR(engaged_without(force_cut, never_hot).run_for(0.1, 10.0).force.norm(), 10.0, 1e-9);
+  Session user(all, {.max_force = 20.0, .continuous_force = 20.0}, {.max_force = 2.0});
+  EXPECT_NEAR(user.engage().run_for(0.1, 10.0).force.norm(), 2.0, 1e-9);
+}
+
+TEST(SafetyChain, ComesDownToTheContinuousForceBeforeTheMotorsAreHot) {
+  const auto press = [](std::uint32_t links) {
+    Session session = engaged_without(links);
+    double heat = 0.0;  // own integration of the mean square
+    double hottest = 0.0;
+    double first = 0.0;
+    double last = 0.0;
+    for (int i = 0; i < 60'000; ++i) {
+      last = session.run(3.3).force.norm();
+      if (i == 500) first = last;
+      heat += ms / 20.0 * (last * last - heat);
+      hottest = std::max(hottest, heat);
+    }
+    EXPECT_NEAR(first, 3.3, 1e-9) << "a moment's push is not cut";
+    return std::pair(last, std::sqrt(hottest));
+  };
+  const auto [last, hottest] = press(0);
+  EXPECT_NEAR(last, 0.88, 0.01);
+  EXPECT_LE(hottest, 0.88 * 1.001);
+  EXPECT_NEAR(press(continuous_cut).first, 3.3, 1e-9);
+}
+
+TEST(SafetyChain, RisesNoFasterThanItsSlewLimitAndFallsFaster) {
+  const auto steps = [](std::uint32_t links) {
+    Session session = engaged_without(links, never_hot);
+    std::vector<double> forces;
+    for (int i = 0; i < 10; ++i) forces.push_back(session.run(3.0).force.z());
+    for (int i = 0; i < 4; ++i) forces.push_back(session.run(0.0).force.z());
+    return forces;
+  };
+  const std::vector<double> limited = steps(0);
+  EXPECT_NEAR(limited[0], 0.5, 1e-9);
+  EXPECT_NEAR(limited[1], 1.0, 1e-9);
+  EXPECT_NEAR(limited[9], 3.0, 1e-9);
+  EXPECT_NEAR(limited[10], 1.0, 1e-9) << "2 N/ms towards zero";
+  EXPECT_EQ(limited[11], 0.0);
+  EXPECT_NEAR(steps(slew_cut)[0], 3.0, 1e-9);
+}
+
+TEST(SafetyChain, TurnsTheForceRoundThroughZeroAndNoFaster) {
+  Session session = engaged_without(pull_removed, never_hot);
+  session.run_for(0.1, 3.0);
+  EXPECT_NEAR(session.run(-3.0).force.z(), 1.0, 1e-9);
+  EXPECT_NEAR(session.run(-3.0).force.z(), -0.5, 1e-9);
+  EXPECT_NEAR(session.run(-3.0).force.z(), -1.0, 1e-9);
+}
+
+// The largest difference of the force in the last of four seconds of a square wave.
+double swing_left(std::uint32_t links, double hertz) {
+  Session session = engaged_without(links, never_hot);
+  double low = inf;
+  double high = -inf;
+  for (int i = 0; i < 4000; ++i) {
+    const bool up = std::fmod(i * ms * hertz, 1.0) < 0.5;
+    const double force = session.run(up ? 2.8 : 0.3).force.z();
+    if (i < 3000) continue;
+    low = std::min(low, force);
+    high = std::max(high, force);
+  }
+  return high - low;
+}
+
+TEST(SafetyChain, WeakensAFastOscillationAndNotASlowOne) {
+  EXPECT_LE(swing_left(0, 50.0), 0.7);  // what is no oscillation, and a little while it recovers
+  EXPECT_NEAR(swing_left(oscillation_cut, 50.0), 2.5, 1e-6);
+  EXPECT_NEAR(swing_left(0, 3.0), 2.5, 1e-6);
+}
+
+TEST(SafetyChain, GivesTheForceBackWhenAnOscillationHasStopped) {
+  Session session = engaged_without(0, never_hot);
+  for (int i = 0; i < 500; ++i) session.run((i / 10) % 2 == 0 ? 2.8 : 0.3);
+  EXPECT_LT(session.run_for(0.2, 2.0).force.z(), 1.1);
+  EXPECT_NEAR(session.run_for(3.0, 2.0).force.z(), 2.0, 1e-9);
+}
+
+TEST(SafetyChain, EngagesOnlyAfterTheHandFeltNextToNothing) {
+  const auto force_after_a_second = [](std::uint32_t links) {
+    Session session(all & ~links, never_hot);
+    return session.run_for(1.0, 2.0).force.norm();
+  };
+  EXPECT_EQ(force_after_a_second(0), 0.0) << "a start inside a wall must not kick";
+  EXPECT_GT(force_after_a_second(disengaged), 1.0);
+
+  Session session(all, never_hot);
+  for (int i = 0; i < 9; ++i) session.run(0.19);
+  session.run(0.21);
+  EXPECT_EQ(session.run_for(0.5, 2.0).force.norm(), 0.0) << "9 quiet ticks are not 10";
+  for (int i = 0; i < 10; ++i) session.run(0.19);
+  EXPECT_GT(session.run_for(0.5, 2.0).force.norm(), 0.5);
+}
+
+TEST(SafetyChain, RampsTheForceUpAfterEngaging) {
+  const auto force_at = [](std::uint32_t links, double seconds) {
+    Session session(all & ~links, never_hot);
+    for (int i = 0; i < 10; ++i) session.run(0.0);
+    return session.run_for(seconds, 2.0).force.norm();
+  };
+  EXPECT_NEAR(force_at(0, 0.75), 1.0, 0.01);
+  EXPECT_NEAR(force_at(0, 1.6), 2.0, 1e-9);
+  EXPECT_NEAR(force_at(ramping, 0.01), 2.0, 1e-9);
+}
+
+TEST(SafetyChain, LetsGoOfAHandThatIsGoneAndEngagesAnewWhenItIsBack) {
+  Session session = engaged_without(0, never_hot);
+  session.run_for(0.1, 2.0);
+  session.input.hand = false;
+  EXPECT_EQ(session.run_for(0.01, 2.0).force.norm(), 0.0);
+  session.input.hand = true;
+  EXPECT_EQ(session.run_for(1.0, 2.0).force.norm(), 0.0);
+}
+
+TEST(SafetyChain, LetsTheForceOnlyFallOnceAFrameIsLate) {
+  const auto extrapolated = [](std::uint32_t links) {
+    Session session = engaged_without(links, never_hot);
+    session.input.frame_interval = 0.01;
+    session.run_for(0.1, 1.0);
+    session.input.frame_age = 0.05;
+    EXPECT_NEAR(session.run_for(0.01, 0.9).force.z(), 0.9, 1e-9);
+    return session.run_for(0.01, 2.0).force.z();
+  };
+  EXPECT_NEAR(extrapolated(0), 1.0, 1e-9);
+  EXPECT_NEAR(extrapolated(frame_late), 2.0, 1e-9);
+}
+
+TEST(SafetyChain, FadesTheForceAsTheFrameGrowsOld) {
+  const auto at_age = [](std::uint32_t links, double age) {
+    Session session = engaged_without(links, never_hot);
+    session.run_for(0.1, 2.0);
+    session.input.frame_age = age;
+    return session.run_for(0.01, 2.0).force.z();
+  };
+  EXPECT_NEAR(at_age(0, 0.1), 2.0, 1e-9);
+  EXPECT_NEAR(at_age(0, 0.3), 1.0, 1e-9);
+  EXPECT_NEAR(at_age(0, 0.499), 0.005, 1e-3);
+  EXPECT_NEAR(at_age(frame_fading, 0.3), 2.0, 1e-9);
+}
+
+TEST(SafetyChain, DisengagesWhenFramesStayAwayAndIsNotFooledByTheirReturn) {
+  const auto after_a_gap = [](std::uint32_t links) {
+    Session session = engaged_without(links, never_hot);
+    session.run_for(0.1, 2.0);
+    session.input.frame_age = 0.6;
+    EXPECT_EQ(session.run_for(0.01, 2.0).force.z(), 0.0);
+    session.input.frame_age = 0.01;
+    return session.run_for(2.0, 2.0).force.z();
+  };
+  EXPECT_EQ(after_a_gap(0), 0.0);
+  EXPECT_NEAR(after_a_gap(frame_lost), 2.0, 1e-9);
+}
+
+TEST(SafetyChain, GivesNoForceBeforeTheFirstFrameOrForAnAgeThatIsNone) {
+  for (const double age : {inf, nan}) {
+    Session session(all & ~frame_fading);
+    session.input.frame_age = age;
+    session.run_for(0.1, 0.0);
+    const SafetyOutput output = session.run_for(2.0, 2.0);
+    EXPECT_EQ(output.force.norm(), 0.0);
+    EXPECT_TRUE(output.flags & frame_lost);
+  }
+}
+
+TEST(SafetyChain, TakesTheForceOffAHandThatIsTooFast) {
+  const auto moving_at = [](std::uint32_t links, double speed) {
+    Session session = engaged_without(links, never_hot);
+    session.run_for(0.1, 2.0);
+    double least = inf;
+    for (int i = 0; i < 100; ++i) {
+      session.input.position.x() += speed * ms;
+      least = std::min(least, session.run(2.0).force.z());
+    }
+    return least;
+  };
+  EXPECT_EQ(moving_at(0, 2.0), 0.0);
+  EXPECT_NEAR(moving_at(0, 1.0), 2.0, 1e-9);
+  EXPECT_NEAR(moving_at(hand_too_fast, 2.0), 2.0, 1e-9);
+}
+
+TEST(SafetyChain, TakesAJumpOfTheHandForTooFast) {
+  Session session = engaged_without(0, never_hot);
+  session.run_for(0.1, 2.0);
+  session.input.position.y() += 0.05;
+  EXPECT_TRUE(session.run(2.0).flags & hand_too_fast);
+  EXPECT_LT(session.run_for(0.003, 2.0).force.z(), 0.01);
+}
+
+TEST(SafetyChain, RampsFromNothingAfterAStalledTick) {
+  const auto after_stall = [](std::uint32_t links) {
+    Session session = engaged_without(links, never_hot);
+    session.run_for(0.1, 2.0);
+    EXPECT_EQ(session.chain.stalls_at(session.input.t + 0.02), links == 0);
+    EXPECT_FALSE(session.chain.stalls_at(session.input.t + 0.004));
+    session.run(2.0, 0.02);
+    return session.run(2.0).force.z();
+  };
+  EXPECT_LT(after_stall(0), 0.01);
+  EXPECT_NEAR(after_stall(stalled), 2.0, 1e-9);
+}
+
+TEST(SafetyChain, CountsHowOftenEachLinkStepsIn) {
+  Session session = engaged_without(0, never_hot);
+  for (int i = 0; i < 3; ++i) {
+    session.run_for(0.05, 10.0);
+    session.run_for(0.05, 0.0);
+  }
+  EXPECT_EQ(session.chain.interventions()[2], 3U) << "force_cut is bit 2";
+  EXPECT_EQ(session.chain.interventions()[0], 0U);
+}
+
+TEST(SafetyChain, KeepsItsPromisesForAnyInput) {
+  std::mt19937_64 random(11);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  const auto vector = [&](double size) -> Vec3 {
+    switch (random() % 12) {
+      case 0:
+        return {nan, 0, 0};
+      case 1:
+        return {0, -inf, 0};
+      case 2:
+        return {0, 0, 1e308};
+      case 3:
+        return Vec3::Zero();
+      default:
+        return {uniform(-size, size), uniform(-size, size), uniform(-size, size)};
+    }
+  };
+  double strongest = 0.0;
+  for (int run = 0; run < 20; ++run) {
+    Session session(all, {}, {.ramp_time = 0.02});
+    SafetyInput& input = session.input;
+    Vec3 last = Vec3::Zero();
+    for (int i = 0; i < 5000; ++i) {
+      const double dt = random() % 300 == 0 ? uniform(-0.1, 0.1) : uniform(0.0, 2e-3);
+      const bool time_is_sound = random() % 300 != 0;
+      const double t = input.t + dt;
+      const bool wild = random() % 60 == 0;
+      SafetyInput now{.t = time_is_sound ? t : nan,
+                      .force = wild ? vector(50.0) : Vec3(0, 0, uniform(0.0, 5.0)),
+                      .hip = wild ? vector(1.0) : Vec3(0, 0, -0.01),
+                      .proxy = wild ? vector(1.0) : Vec3(0, 0, 0.005),
+                      .normal = wild ? vector(2.0) : Vec3(0, 0, 1),
+                      .position = wild ? vector(0.1) : Vec3(0, 0, 0),
+                      .hand = random() % 200 != 0,
+                      .frame_age = random() % 20 == 0 ? uniform(-1.0, 1.0) : 0.01,
+                      .frame_interval = random() % 20 == 0 ? nan : 0.03};
+      if (i % 1000 < 300) now = input, now.t = t, now.force = Vec3::Zero();  // let it engage
+      const SafetyOutput output = session.chain.run(now);
+      input.t = t;
+      ASSERT_TRUE(output.force.allFinite());
+      ASSERT_LE(output.force.norm(), 3.3 + 1e-9);
+      ASSERT_LE(output.force.norm() - last.norm(), 0.5 + 1e-9);
+      ASSERT_LE((output.force - last).norm(), 2.5 + 1e-9) << "2 N off and 0.5 N on";
+      last = output.force;
+      strongest = std::max(strongest, last.norm());
+    }
+  }
+  EXPECT_GT(strongest, 3.0) << "the chain was hardly ever engaged";
+}
+
+TEST(SafetyParameters, HaveATableThatKnowsEveryOneAndItsDefault) {
+  const SafetyParameters defaults;
+  std::set<std::string_view> names;
+  for (const SafetyParameterInfo& row : safety_parameter_table()) {
+    EXPECT_TRUE(names.insert(row.name).second) << row.name;
+    EXPECT_EQ(defaults.*row.member, row.default_value) << row.name;
+    EXPECT_LE(row.min, row.default_value) << row.name;
+    EXPECT_LE(row.default_value, row.max) << row.name;
+    EXPECT_FALSE(row.meaning.empty() || row.unit.empty()) << row.name;
+  }
+  EXPECT_EQ(names.size() * sizeof(double), sizeof(SafetyParameters));
+  EXPECT_NO_THROW(validate(defaults));
+  EXPECT_EQ(safety_flag_names().size(), safety_flag_count);
+}
+
+TEST(SafetyParameters, AreRefusedByNameAndRange) {
+  SafetyParameters parameters;
+  set_parameter(parameters, "ramp_time", 1.0);
+  EXPECT_EQ(parameters.ramp_time, 1.0);
+  const auto set = [&](std::string_view name, double value) {
+    return [&parameters, name, value] {
+      set_parameter(parameters, name, value);
+      return 0;
+    };
+  };
+  EXPECT_TRUE(fails_saying(set("ramp_tim", 1.0), "'ramp_tim'", "did you mean 'ramp_time'?"));
+  EXPECT_TRUE(fails_saying(set("rise_rate", -1.0), "'rise_rate'", "out of range"));
+  EXPECT_TRUE(fails_saying(set("rise_rate", nan), "'rise_rate'", "out of range"));
+  EXPECT_EQ(parameters.rise_rate, 500.0);
+  EXPECT_THROW(SafetyChain({}, {.fade_age = 0.5, .lost_age = 0.5}), Error);
+  EXPECT_THROW(SafetyChain({.max_force = 0.0}), Error);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program as a user meets it: exit codes, messages, files.
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string read(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+std::size_t lines_in(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+class Program : public ::testing::Test {
+ protected:
+  struct Outcome {
+    int code;
+    std::string out, err;
+  };
+
+  Program() {
+    std::string pattern = (fs::temp_directory_path() / "palpate_test_XXXXXX").string();
+    folder_ = mkdtemp(pattern.data());
+  }
+  ~Program() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] std::string path(const std::string& name) const {
+    return (folder_ / name).string();
+  }
+
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return path(name);
+  }
+
+  // Runs the program with arguments that need no quoting.
+  [[nodiscard]] Outcome run(const std::string& arguments) const {
+    const std::string command = std::string(PALPATE_PROGRAM) + " " + arguments + " >" +
+                                path("stdout") + " 2>" + path("stderr") + " </dev/null";
+    const int status = std::system(command.c_str());  // NOLINT(cert-env33-c): a shell is wanted
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(folder_ / "stdout"),
+            read(folder_ / "stderr")};
+  }
+
+  // Wrong usage or input: exit 2 and one line that says what, why and what to do.
+  void expect_refusal(const std::string& arguments, const std::vector<std::string>& words) const {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_EQ(outcome.err.substr(0, 9), "palpate: ") << arguments;
+    EXPECT_EQ(lines_in(outcome.err), 1U) << outcome.err;
+    for (const std::string& word : words)
+      EXPECT_NE(outcome.err.find(word), std::string::npos) << word << " is not in " << outcome.err;
+  }
+
+  // A press into the middle of the synthetic plane and a slide.
+  std::string press() const {
+    return write("press.csv", "t,x,y,z\n0,0,0,0.03\n0.3,0,0,-0.008\n1.0,0.02,0.01,-0.008\n");
+  }
+
+ private:
+  fs::path folder_;
+};
+
+constexpr const char* plane = "'synthetic:plane?noise=0.5mm&seed=3'";
+
+TEST_F(Program, TracesTheSameBytesEveryTime) {
+  const std::string arguments = std::string("trace --camera ") + plane + " --path " + press();
+  const Outcome first = run(arguments + " --out " + path("a.csv"));
+  const Outcome second = run(arguments + " --out " + path("b.csv"));
+  ASSERT_EQ(first.code, 0) << first.err;
+  ASSERT_EQ(second.code, 0) << second.err;
+  const std::string trace = read(path("a.csv"));
+  EXPECT_EQ(trace, read(path("b.csv")));
+  EXPECT_EQ(trace.substr(0, trace.find('\n')),
+            "t,hip_x,hip_y,hip_z,proxy_x,proxy_y,proxy_z,normal_x,normal_y,normal_z,"
+            "force_x,force_y,force_z,state,steps,surface_velocity,frame,flags");
+  EXPECT_EQ(lines_in(trace), 1002U) << "1001 ticks from 0 to 1 s, and the header";
+  EXPECT_NE(trace.find(",contact,"), std::string::npos);
+}
+
+TEST_F(Program, AdoptsAFrameAtTheFirstTickAtOrAfterItsStamp) {
+  const Outcome outcome = run(std::string("trace --camera ") + plane + " --path " + press());
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  std::istringstream lines(outcome.out);
+  std::string line;
+  std::getline(lines, line);
+  for (int tick = 0; std::getline(lines, line); ++tick) {
+    const std::size_t flags = line.rfind(',');
+    const std::size_t frame = line.rfind(',', flags - 1);
+    // Frame k is stamped k/30 s.
+    EXPECT_EQ(std::stoi(line.substr(frame + 1, flags - frame - 1)), tick * 30 / 1000)
+        << "tick " << tick;
+  }
+}
+
+TEST_F(Program, SummarisesATraceForPrograms) {
+  const Outcome outcome = run(std::string("trace --json --camera ") + plane + " --path " + press() +
+                              " --out " + path("t.csv"));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto summary = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(summary["ticks"], 1001);
+  EXPECT_EQ(summary["frames"], 31);
+  EXPECT_EQ(summary["pop_throughs"], 0);
+  EXPECT_GT(summary["max_force"], 1.0);
+}
+
+TEST_F(Program, SetsParametersFromAFileAndFromTheCommandLine) {
+  const std::string config = write("c.toml", "method = \"paper\"\n[parameters]\nstiffness = 100\n");
+  const std::string base = std::string("trace --json --camera ") + plane + " --path " + press() +
+                           " --out " + path("t.csv") + " --config " + config;
+  const auto soft = nlohmann::json::parse(run(base).out);
+  const auto hard = nlohmann::json::parse(run(base + " --set stiffness=400").out);
+  EXPECT_NEAR(hard["max_force"].get<double>() / soft["max_force"].get<double>(), 4.0, 1e-9);
+}
+
+TEST_F(Program, RunsHeadlessOnTheSyntheticDesk) {
+  const Outcome outcome = run("run --headless --json --duration 4");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto summary = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(summary["ticks"], 4000);
+  EXPECT_NEAR(summary["frames"].get<double>(), 120.0, 1.0);
+  EXPECT_GT(summary["contact_ticks"], 1000);
+  EXPECT_EQ(summary["pop_throughs"], 0);
+  for (const char* key : {"late_ticks", "max_force", "duration_s"})
+    EXPECT_TRUE(summary.contains(key)) << key;
+}
+
+TEST_F(Program, TellsWhatIsInASource) {
+  const Outcome outcome = run("info synthetic:plane --json");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto about = nlohmann::json::parse(outcome.out);
+  EXPECT_GT(about["first_frame"]["measured_percent"], 90.0);
+}
+
+TEST_F(Program, SuggestsTheWordThatWasMeant) {
+  expect_refusal("trcae", {"trcae", "did you mean 'trace'"});
+  expect_refusal(std::string("trace --camra x --path ") + press(), {"--camera"});
+  expect_refusal(
+      std::string("trace --camera ") + plane + " --path " + press() + " --set stifness=3",
+      {"stifness", "did you mean 'stiffness'"});
+  expect_refusal(std::string("trace --camera ") + plane + " --path " + press() + " --method papr",
+                 {"papr", "paper"});
+  expect_refusal("info sinthetic:plane", {"sinthetic", "synthetic"});
+  expect_refusal("info 'synthetic:plan'", {"plan"});
+  expect_refusal("info 'synthetic:plane?nois=1mm'", {"nois", "noise"});
+}
+
+TEST_F(Program, RefusesBadInputInOneLineThatNamesIt) {
+  const std::string camera = std::string("trace --camera ") + plane + " --path ";
+  expect_refusal(camera + path("missing.csv"), {"missing.csv"});
+  expect_refusal(camera + write("empty.csv", ""), {"empty.csv"});
+  expect_refusal(camera + write("header.csv", "t,x,y,z\n"), {"header.csv"});
+  expect_refusal(camera + write("columns.csv", "t,x,y\n0,0,0\n"), {"columns.csv", "z"});
+  expect_refusal(camera + write("nan.csv", "t,x,y,z\n0,0,nan,0\n"), {"nan.csv:2"});
+  expect_refusal(camera + write("unsorted.csv", "t,x,y,z\n1,0,0,0\n0,0,0,0\n"), {"unsorted.csv:3"});
+  expect_refusal(camera + press() + " --rate 0", {"--rate"});
+  expect_refusal(camera + press() + " --set r_1=0.006", {"r_1"});
+  expect_refusal(camera + press() + " --set r_1", {"r_1", "="});
+  expect_refusal(camera + press() + " --set theta=abc", {"theta", "abc"});
+  expect_refusal(camera + press() + " --json", {"--out"});
+  expect_refusal(camera + press() + " --out " + path("no/such/folder/t.csv"), {"no/such/folder"});
+  expect_refusal(camera + press() + " --config " + path("missing.toml"), {"missing.toml"});
+  expect_refusal(camera + press() + " --config " + write("bad.toml", "a = = 3\n"), {"bad.toml:1"});
+  expect_refusal(camera + press() + " --config " + write("key.toml", "methd = \"paper\"\n"),
+                 {"key.toml", "method"});
+  expect_refusal("info tum:" + path("nowhere"), {"nowhere"});
+  expect_refusal("info pcd:" + write("not.pcd", "hello\n"), {"not.pcd"});
+  expect_refusal("trace", {"--camera"});
+  expect_refusal("run --headless --duration -1", {"--duration"});
+}
+
+TEST_F(Program, FailsWithOneWhenTheDiskIsFull) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
+  const Outcome outcome =
+      run(std::string("trace --camera ") + plane + " --path " + press() + " --out /dev/full");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_NE(outcome.err.find("/dev/full"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace palpate

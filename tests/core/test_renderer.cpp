@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -6,7 +7,6 @@
 #include <random>
 #include <vector>
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include "palpate/cloud/point_cloud.hpp"

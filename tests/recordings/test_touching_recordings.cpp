@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The paper's method on real depth data: pressing and sliding on what a camera measured.
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/audit.hpp"
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/renderer.hpp"
@@ -21,10 +23,10 @@ namespace {
 
 constexpr double r_c = 5e-3;
 
-// A place on a surface, and from where it was seen.
+// A place on a surface and the surface's normal there, towards the camera.
 struct Place {
   Vec3 point;
-  Vec3 sightline;  // unit, from the camera to the point
+  Vec3 normal;
 };
 
 // How many points a gather finds within r_3 of a place.
@@ -34,47 +36,55 @@ std::size_t density(const Cloud& cloud, const Vec3& at) {
   return patch.size();
 }
 
-// Is the surface about `place` whole, wide and of one layer? Every point within 30 mm has to lie
-// within 15 mm of it along the sightline, and points have to be at most about r_c / 2 apart.
-bool is_dense_and_smooth(const Cloud& cloud, const Place& place) {
-  if (density(cloud, place.point) < 50) return false;
+// The surface about `point`, if it is one: points at most about 2.8 mm apart (a proxy needs that
+// many under it to rest on noise) and within 5 mm of a
+// plane, as far as the hand will slide, seen at less than 65 degrees from its normal.
+std::optional<Place> smooth_place(const Cloud& cloud, const Vec3& point, const Vec3& eye) {
   Patch patch;
-  gather(cloud, Ball{place.point, 0.03}, patch);
-  double lowest = 0.0;
-  double highest = 0.0;
-  for (std::size_t i = 0; i < patch.size(); ++i) {
-    const double along = place.sightline.dot(Vec3(patch.x()[i], patch.y()[i], patch.z()[i]));
-    lowest = std::min(lowest, along);
-    highest = std::max(highest, along);
+  gather(cloud, Ball{point, 0.035}, patch);
+  if (patch.size() < 300) return std::nullopt;
+  Eigen::Matrix3Xd points(3, patch.size());
+  for (std::size_t i = 0; i < patch.size(); ++i)
+    points.col(static_cast<Eigen::Index>(i)) = Vec3(patch.x()[i], patch.y()[i], patch.z()[i]);
+  const Vec3 mean = points.rowwise().mean();
+  const Eigen::Matrix3Xd centred = points.colwise() - mean;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(centred * centred.transpose());
+  Vec3 normal = axes.eigenvectors().col(0);
+  const Vec3 sightline = (point - eye).normalized();
+  if (normal.dot(sightline) > 0.0) normal = -normal;
+  if (normal.dot(sightline) > -0.42) return std::nullopt;
+  if ((normal.transpose() * centred).cwiseAbs().maxCoeff() > r_c) return std::nullopt;
+  const Vec3 middle = point + normal * normal.dot(mean);
+  const Vec3 side = normal.unitOrthogonal();
+  for (int i = 0; i < 12; ++i) {  // no hole or edge where the hand will slide
+    for (const double radius : {0.012, 0.025}) {
+      if (density(cloud, middle + radius * (Eigen::AngleAxisd(i * 0.5236, normal) * side)) < 40)
+        return std::nullopt;
+    }
   }
-  if (highest - lowest > 0.015) return false;
-  for (int i = 0; i < 12; ++i) {  // no hole where the hand will slide
-    const Vec3 side = place.sightline.unitOrthogonal();
-    const Vec3 around = Eigen::AngleAxisd(i * 0.5236, place.sightline) * side;
-    if (density(cloud, place.point + 0.015 * around) < 40) return false;
-  }
-  return true;
+  return Place{middle, normal};
 }
 
 std::vector<Place> places_on(const Cloud& cloud, std::size_t most) {
-  std::vector<Place> candidates;
+  std::vector<Vec3> candidates;
+  Vec3 eye = Vec3::Zero();
   if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
-    const Vec3 eye = image->world_from_camera().translation();
+    eye = image->world_from_camera().translation();
     const Intrinsics& k = image->intrinsics();
-    for (int v = k.height / 12; v < k.height; v += k.height / 12) {
-      for (int u = k.width / 16; u < k.width; u += k.width / 16) {
-        if (const auto p = image->deproject(u, v))
-          candidates.push_back({*p, (*p - eye).normalized()});
+    for (int v = k.height / 24; v < k.height; v += k.height / 24) {
+      for (int u = k.width / 32; u < k.width; u += k.width / 32) {
+        if (const auto p = image->deproject(u, v)) candidates.push_back(*p);
       }
     }
   } else if (const auto* points = dynamic_cast<const PointCloud*>(&cloud)) {
-    const Vec3 eye = points->viewpoint().value_or(Vec3::Zero());
-    for (std::size_t i = 0; i < points->size(); i += std::max<std::size_t>(points->size() / 300, 1))
-      candidates.push_back({points->point(i), (points->point(i) - eye).normalized()});
+    eye = points->viewpoint().value_or(eye);
+    for (std::size_t i = 0; i < points->size(); i += std::max<std::size_t>(points->size() / 700, 1))
+      candidates.push_back(points->point(i));
   }
   std::vector<Place> places;
-  for (const Place& place : candidates) {
-    if (places.size() < most && is_dense_and_smooth(cloud, place)) places.push_back(place);
+  for (const Vec3& point : candidates) {
+    if (places.size() == most) break;
+    if (const auto place = smooth_place(cloud, point, eye)) places.push_back(*place);
   }
   return places;
 }
@@ -98,17 +108,17 @@ INSTANTIATE_TEST_SUITE_P(
         Recording{"tum:", "seq_tum_fr1_xyz", "", 5},
         Recording{"tum:", "seq_tum_fr1_xyz", "?poses=none", 5},
         Recording{"depth:", "seq_visp_tabletop_known_objects", "", 5},
-        Recording{"depth:", "seq_aims_d435_robot_floor", "", 1},
-        Recording{"depth:", "pairs_dynamic_nvblox", "", 0},
+        Recording{"depth:", "seq_aims_d435_robot_floor", "", 5},
+        Recording{"depth:", "pairs_dynamic_nvblox", "", 5},
         Recording{"depth:", "rec_azure_kinect_mkv", "", 5},
-        Recording{"depth:", "rec_realsense_bag", "", 0},
+        Recording{"depth:", "rec_realsense_bag", "", 5},
         Recording{"depth:", "single_boofcv_basket/basket_depth.png",
                   "?fx=529.74&fy=529.57&cx=312.57&cy=257.05&units=1000", 5},
         Recording{"pcd:", "single_pcl_kinect_scenes/mOSD_learn0.pcd", "", 5},
         Recording{"pcd:", "single_pcl_kinect_scenes/mOSD_learn33.pcd", "", 5},
         Recording{"pcd:", "single_pcl_kinect_scenes/milk_cartoon_all_small_clorox.pcd", "", 5},
         Recording{"pcd:", "single_pcl_kinect_scenes/table_scene_mug_stereo_textured.pcd", "", 5},
-        Recording{"pcd:", "seq_pcl_grabber_3frames/pcd", "", 1}));
+        Recording{"pcd:", "seq_pcl_grabber_3frames/pcd", "", 5}));
 
 TEST_P(Touching, PressesAndSlidesOnARestingSurfaceWithoutPoppingThrough) {
   const Recording& recording = GetParam();
@@ -121,64 +131,91 @@ TEST_P(Touching, PressesAndSlidesOnARestingSurfaceWithoutPoppingThrough) {
 
   for (const Place& place : places) {
     Renderer renderer;
-    const Vec3 side = place.sightline.unitOrthogonal();
-    renderer.seat(place.point - 0.03 * place.sightline);
+    const Vec3 side = place.normal.unitOrthogonal();
+    renderer.seat(place.point + 0.03 * place.normal);
     renderer.frame(*frame->cloud, 0.0);
     double largest = 0.0;
-    for (int i = 0; i <= 900; ++i) {  // in 8 mm deep within 0.3 s, then 10 mm sideways and back
-      const double depth = std::min(-0.03 + i * (0.038 / 300), 0.008);
+    for (int i = 0; i <= 900; ++i) {  // 10 mm deep within 0.3 s, then 10 mm sideways and back
+      const double height = std::max(0.03 - i * (0.04 / 300), -0.01);
       const double slide = i < 300 ? 0.0 : 0.010 * std::sin((i - 300) * 0.0104719755);
       if (i % 33 == 32) renderer.frame(*frame->cloud, i * 1e-3);
-      const Tick tick =
-          renderer.tick(place.point + depth * place.sightline + slide * side, i * 1e-3);
+      const Tick tick = renderer.tick(place.point + height * place.normal + slide * side, i * 1e-3);
       ASSERT_TRUE(tick.force.allFinite() && tick.proxy.allFinite());
       ASSERT_LE(tick.force.norm(), 20.0);
       largest = std::max(largest, tick.force.norm());
-      // The hand is 8 mm behind the surface and the surface 15 mm rough at most: a proxy that came
-      // through would be with the hand.
-      if (i >= 300) {
-        ASSERT_LT((tick.proxy - place.point).dot(place.sightline), 0.008)
-            << "popped through at tick " << i;
-      }
+      // Points lie within 5 mm of the plane, so a resting proxy is at most that far below r_c, and
+      // one that came through is with the hand.
+      ASSERT_GT((tick.proxy - place.point).dot(place.normal), -1e-3)
+          << "popped through at tick " << i;
     }
-    EXPECT_GT(largest, 1.0) << "the hand felt nothing";
+    EXPECT_GT(largest, 3.0) << "the hand felt too little, 10 mm deep";
   }
 }
 
-TEST(TouchingTum, HoldsARestingDeskForFourSecondsSeenByAMovingKinect) {
-  PALPATE_DATA_OR_SKIP(path, "seq_tum_fr1_xyz");
-  const auto source = open_source("tum:" + path.string());
+// Presses 10 mm into a place and stays there while `frames` come by; when the proxy was lost.
+struct Hold {
+  bool touched = false;
+  std::optional<double> lost_at;  // [s]
+};
+
+Hold hold(const std::vector<Frame>& frames, const Place& place) {
+  Hold result;
+  Renderer renderer;
+  renderer.seat(place.point + 0.02 * place.normal);
+  std::size_t next = 0;
+  const auto ticks = static_cast<int>(frames.back().stamp * 1000.0);
+  for (int i = 0; i <= ticks; ++i) {
+    const double t = i * 1e-3;
+    for (; next < frames.size() && frames[next].stamp <= t; ++next)
+      renderer.frame(*frames[next].cloud, frames[next].stamp);
+    const double height = std::max(0.02 - i * 2e-4, -0.01);
+    const Tick tick = renderer.tick(place.point + height * place.normal, t);
+    EXPECT_TRUE(tick.force.allFinite() && tick.proxy.allFinite());
+    EXPECT_LE(tick.force.norm(), 20.0);
+    result.touched = result.touched || tick.force.norm() > 0.5;
+    if (!result.lost_at && i > 200 && (tick.proxy - place.point).dot(place.normal) < -r_c)
+      result.lost_at = t;
+  }
+  return result;
+}
+
+std::vector<Frame> frames_of(const std::string& uri, std::size_t most) {
+  const auto source = open_source(uri);
   std::vector<Frame> frames;
-  while (auto frame = source->next()) frames.push_back(*frame);
-  ASSERT_EQ(frames.size(), 120U);
-  const std::vector<Place> places = places_on(*frames.front().cloud, 12);
+  while (frames.size() < most) {
+    auto frame = source->next();
+    if (!frame) break;
+    frames.push_back(std::move(*frame));
+  }
+  return frames;
+}
+
+TEST(TouchingNoise, HoldsWhatARestingRealSenseShowsForItsEightFramesAtRest) {
+  PALPATE_DATA_OR_SKIP(path, "seq_visp_tabletop_known_objects");
+  const std::vector<Frame> frames = frames_of("depth:" + path.string() + "?fps=30", 8);
+  const std::vector<Place> places = places_on(*frames.front().cloud, 40);
   ASSERT_GE(places.size(), 5U);
   std::size_t held = 0;
   for (const Place& place : places) {
-    Renderer renderer;
-    renderer.seat(place.point - 0.02 * place.sightline);
-    std::size_t next = 0;
-    bool lost = false;
-    for (int i = 0; i < 3900; ++i) {
-      const double t = i * 1e-3;
-      while (next < frames.size() && frames[next].stamp <= t) {
-        renderer.frame(*frames[next].cloud, frames[next].stamp);
-        ++next;
-      }
-      const double depth = std::min(-0.02 + i * 1e-4, 0.01);
-      const Tick tick = renderer.tick(place.point + depth * place.sightline, t);
-      ASSERT_TRUE(tick.force.allFinite());
-      ASSERT_LE(tick.force.norm(), 20.0);
-      const auto* image = dynamic_cast<const DepthImage*>(frames[next - 1].cloud.get());
-      const auto behind = distance_behind(*image, tick.proxy, r_c);
-      lost = lost || (i > 300 && behind && *behind > 2 * r_c);
-    }
-    held += lost ? 0 : 1;
+    const Hold result = hold(frames, place);
+    EXPECT_TRUE(result.touched);
+    held += result.lost_at ? 0 : 1;
   }
-  RecordProperty("places", static_cast<int>(places.size()));
-  RecordProperty("held", static_cast<int>(held));
-  std::printf("held %zu of %zu places\n", held, places.size());
-  EXPECT_GE(held, places.size() / 2);
+  EXPECT_GE(10 * held, 9 * places.size());
+}
+
+// A hand-held Kinect's poses and noise move the desk by millimetres from frame to frame; the
+// paper's method makes contact everywhere and loses it within seconds (docs/method.md).
+TEST(TouchingNoise, StaysFiniteAndBoundedWhileAHandHeldKinectMovesAboutADesk) {
+  PALPATE_DATA_OR_SKIP(path, "seq_tum_fr1_xyz");
+  const std::vector<Frame> frames = frames_of("tum:" + path.string(), 120);
+  ASSERT_EQ(frames.size(), 120U);
+  const std::vector<Place> places = places_on(*frames.front().cloud, 12);
+  ASSERT_GE(places.size(), 5U);
+  for (const Place& place : places) {
+    const Hold result = hold(frames, place);
+    EXPECT_TRUE(result.touched);
+  }
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ void deproject_row(const std::uint16_t* depth, const double* ray_x, const double
     out.x[i] = static_cast<float>(dx);
     out.y[i] = static_cast<float>(dy);
     out.z[i] = static_cast<float>(dz);
-    out.squared[i] = (raw != 0) & (raw != 65535) ? squared : hole;
+    out.squared[i] = ((raw != 0) & (raw != 65535)) ? squared : hole;
   }
 }
 

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include "palpate/core/cloud.hpp"
 

@@ -80,7 +80,7 @@ float smallest_travel(const float* x, const float* y, const float* z, std::size_
     d = d > 0.0F ? d : 0.0F;
     const bool ahead = along > 0.0F;
     const bool meets = under >= 0.0F;
-    d = ahead & meets ? d : unlimited;
+    d = (ahead & meets) ? d : unlimited;
     travel = d < travel ? d : travel;
   }
   return travel;

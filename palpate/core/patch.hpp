@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
+
+#include <Eigen/Core>
 
 #include "palpate/core/parameters.hpp"
 

@@ -141,8 +141,8 @@ TEST(PointCloud, FindsExactlyWhatBruteForceFinds) {
     std::vector<Vec3> points;
     const double size = std::exp(scene.uniform(-4, 1));
     for (int i = 0; i < 2000; ++i)
-      points.push_back(size * Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1),
-                                   0.1 * std::round(scene.uniform(-3, 3))));
+      points.emplace_back(size * Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1),
+                                      0.1 * std::round(scene.uniform(-3, 3))));
     const PointCloud cloud(points, std::nullopt, std::exp(scene.uniform(-5, -1)));
     const BruteForceCloud oracle(points);
     for (int i = 0; i < 20; ++i) {
@@ -183,7 +183,8 @@ TEST(PointCloud, ThinsABallThatHoldsMoreThanAPatchAndSaysSo) {
   RandomScene scene(1);
   std::vector<Vec3> points;
   for (int i = 0; i < 100000; ++i)
-    points.push_back(0.01 * Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1), scene.uniform(-1, 1)));
+    points.emplace_back(0.01 *
+                        Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1), scene.uniform(-1, 1)));
   Patch patch;
   gather(PointCloud(points), Ball{Vec3::Zero(), 0.02}, patch);
   EXPECT_TRUE(patch.thinned());

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of the repository's own text: `check.py rooms|text|format`, in the root.
+
+Prints one line for each fault, `FILE:LINE: WHAT`, and exits 1 if there is one.
+"""
+
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+# Who may know whom (docs/design.md): what is not listed is not allowed.
+KNOWS = {
+    "core": set(),
+    "cloud": {"core"},
+    "servo": {"core"},
+    "sources": {"core", "cloud"},
+    "devices": {"core", "servo"},
+    "record": {"core", "servo"},
+    "viewer": {"core", "servo"},
+    "lab": {"core", "cloud", "sources"},
+}
+KNOWS["app"] = set(KNOWS)
+
+# The method is pure: neither threads nor clocks nor files, and no library but Eigen.
+CORE_ALLOWS = re.compile(r"Eigen/|[a-z_]+$")
+CORE_FORBIDS = {
+    "atomic", "barrier", "chrono", "condition_variable", "cstdio", "ctime", "filesystem",
+    "fstream", "future", "iostream", "latch", "mutex", "random", "semaphore", "shared_mutex",
+    "stop_token", "thread",
+}
+
+IGNORED = re.compile(r"\.git$|\.cache$|build|out$|node_modules$|__pycache__$|dist$")
+CODE = re.compile(r"\.(cpp|hpp|py|ts|js|cmake|in|gp|sh)$|CMakeLists\.txt$|^scripts/\w+$|^\.ci/")
+TEXT = re.compile(CODE.pattern + r"|\.(md|json|toml|csv|html|css|yaml|yml)$")
+MACHINE_PATH = re.compile(r"/(?:home|root|work|tmp|Users)/\w")
+COLUMNS = 100
+
+
+def files(root, wanted):
+    """Paths below root, relative to it and sorted, whose name matches `wanted`."""
+    found = []
+    for folder, folders, names in os.walk(root):
+        folders[:] = [name for name in folders if not IGNORED.match(name)]
+        for name in names:
+            path = (pathlib.Path(folder) / name).relative_to(root).as_posix()
+            if wanted.search(path):
+                found.append(path)
+    return sorted(found)
+
+
+def lines(root, path):
+    """The file's lines, counted from 1."""
+    return enumerate((root / path).read_text(encoding="utf-8").splitlines(), 1)
+
+
+def room_of(path):
+    """The room that a path from the root belongs to, or None."""
+    parts = path.split("/")
+    if len(parts) > 1 and parts[0] in ("lab", "app"):
+        return parts[0]
+    return parts[1] if len(parts) > 2 and parts[0] == "palpate" else None
+
+
+def check_rooms(root):
+    """Includes and CMake links that point up or sideways."""
+    faults = []
+    for path in files(root, re.compile(r"^(palpate|lab|app)/.*(\.[ch]pp|CMakeLists\.txt)$")):
+        room = room_of(path)
+        if room is None:
+            continue
+        if room not in KNOWS:
+            faults.append(f"{path}:1: room {room} is not in docs/design.md's order of rooms")
+            continue
+        for number, line in lines(root, path):
+            if path.endswith("CMakeLists.txt"):
+                known = re.findall(r"\bpalpate::(\w+)", line.split("#")[0])
+            else:
+                include = re.match(r'\s*#\s*include\s*[<"]([^>"]+)[>"]', line)
+                if not include:
+                    continue
+                name = include.group(1)
+                other = room_of(name)
+                known = [other] if other else []
+                pure = CORE_ALLOWS.match(name) and name not in CORE_FORBIDS
+                if room == "core" and not other and not pure:
+                    faults.append(f"{path}:{number}: core includes {name}, but is to stay pure")
+            for other in known:
+                if other != room and other not in KNOWS[room]:
+                    faults.append(f"{path}:{number}: {room} must not know {other}")
+    return faults
+
+
+def anchors(text):
+    """The anchors that a Markdown text's headings get, as GitHub makes them."""
+    headings = re.findall(r"^#+\s+(.*?)\s*$", without_code(text), re.M)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def without_code(text):
+    """The text with its code blocks emptied; line numbers stay."""
+    return re.sub(r"^```.*?^```", lambda code: "\n" * code.group().count("\n"), text,
+                  flags=re.M | re.S)
+
+
+def check_text(root):
+    """SPDX lines, length of lines, machine paths, links, and the README's C++."""
+    faults = []
+    for path in files(root, TEXT):
+        is_code = CODE.search(path)
+        if is_code and not any("SPDX-License-Identifier: Apache-2.0" in line
+                               for number, line in lines(root, path) if number <= 3):
+            faults.append(f"{path}:1: no SPDX line")
+        for number, line in lines(root, path):
+            if is_code and len(line) > COLUMNS:
+                faults.append(f"{path}:{number}: {len(line)} columns, more than {COLUMNS}")
+            if MACHINE_PATH.search(line):
+                faults.append(f"{path}:{number}: a path of somebody's machine")
+    for path in files(root, re.compile(r"\.md$")):
+        text = (root / path).read_text(encoding="utf-8")
+        for link in re.finditer(r"\]\(([^)\s]+)\)", without_code(text)):
+            place, _, anchor = link.group(1).partition("#")
+            if re.match(r"[a-z]+:", place):
+                continue
+            number = without_code(text)[:link.start()].count("\n") + 1
+            target = (root / path).parent / place if place else root / path
+            if not target.exists():
+                faults.append(f"{path}:{number}: link to {place}, which is not there")
+            elif anchor and anchor not in anchors(target.read_text(encoding="utf-8")):
+                faults.append(f"{path}:{number}: {target.name} has no heading #{anchor}")
+    readme, example = root / "README.md", root / "examples/touch_a_plane.cpp"
+    if readme.exists():
+        quoted = re.findall(r"^```cpp\n(.*?)^```", readme.read_text(encoding="utf-8"), re.M | re.S)
+        code = example.read_text(encoding="utf-8").split("\n", 1)[1]  # without the SPDX line
+        if quoted != [code]:
+            faults.append("README.md:1: its C++ is not examples/touch_a_plane.cpp, to the letter")
+    return faults
+
+
+def check_format(root):
+    """clang-format's opinion."""
+    program = shutil.which("clang-format-14")
+    if program is None:
+        return ["clang-format-14: not found; run scripts/setup lint"]
+    found = files(root, re.compile(r"\.[ch]pp$"))
+    done = subprocess.run([program, "--dry-run", "-Werror", *found], cwd=root, check=False,
+                          capture_output=True, text=True)
+    return re.findall(r"^\S+: error: .*$", done.stderr, re.M) or \
+        ([done.stderr] if done.returncode else [])
+
+
+CHECKS = {"rooms": check_rooms, "text": check_text, "format": check_format}
+
+if __name__ == "__main__":
+    FAULTS = CHECKS[sys.argv[1]](pathlib.Path.cwd())
+    print("\n".join(FAULTS))
+    sys.exit(1 if FAULTS else 0)

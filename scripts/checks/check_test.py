@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Each check must find the faults that it is there for, in a made-up tree, and nothing else."""
+
+import pathlib
+import tempfile
+import unittest
+
+import check
+
+SPDX = "// SPDX-License-Identifier: Apache-2.0\n"
+
+
+class Tree(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+
+    def write(self, path, text):
+        (self.root / path).parent.mkdir(parents=True, exist_ok=True)
+        (self.root / path).write_text(text, encoding="utf-8")
+
+    def include(self, path, header):
+        self.write(path, f"{SPDX}#include {header}\n")
+
+
+class Rooms(Tree):
+    def test_an_arrow_down_is_fine(self):
+        self.include("palpate/cloud/a.hpp", '"palpate/core/patch.hpp"')
+        self.include("palpate/sources/a.cpp", "<palpate/core/patch.hpp>")
+        self.include("palpate/sources/b.cpp", '"palpate/sources/b.hpp"')
+        self.include("app/main.cpp", '"palpate/viewer/server.hpp"')
+        self.write("palpate/cloud/CMakeLists.txt", "palpate_room(cloud LINKS palpate::core)\n")
+        self.assertEqual(check.check_rooms(self.root), [])
+
+    def test_an_arrow_up_is_found(self):
+        self.include("palpate/core/a.cpp", '"palpate/cloud/depth_image.hpp"')
+        self.assertEqual(check.check_rooms(self.root),
+                         ["palpate/core/a.cpp:2: core must not know cloud"])
+
+    def test_an_arrow_sideways_is_found(self):
+        self.include("palpate/servo/a.hpp", "<palpate/cloud/frame.hpp>")
+        self.assertEqual(check.check_rooms(self.root),
+                         ["palpate/servo/a.hpp:2: servo must not know cloud"])
+
+    def test_the_library_does_not_know_the_program(self):
+        self.include("palpate/sources/a.cpp", '"app/options.hpp"')
+        self.include("palpate/cloud/a.cpp", '"lab/metrics.hpp"')
+        self.assertEqual(check.check_rooms(self.root),
+                         ["palpate/cloud/a.cpp:2: cloud must not know lab",
+                          "palpate/sources/a.cpp:2: sources must not know app"])
+
+    def test_a_link_up_is_found(self):
+        self.write("palpate/core/CMakeLists.txt", "palpate_room(core LINKS palpate::sources)\n")
+        self.assertEqual(check.check_rooms(self.root),
+                         ["palpate/core/CMakeLists.txt:1: core must not know sources"])
+
+    def test_core_is_pure(self):
+        self.include("palpate/core/a.cpp", "<Eigen/Core>")
+        self.include("palpate/core/b.cpp", "<cmath>")
+        self.include("palpate/core/c.cpp", "<thread>")
+        self.include("palpate/core/d.cpp", "<nlohmann/json.hpp>")
+        self.assertEqual([fault.split(",")[0] for fault in check.check_rooms(self.root)],
+                         ["palpate/core/c.cpp:2: core includes thread",
+                          "palpate/core/d.cpp:2: core includes nlohmann/json.hpp"])
+
+    def test_a_room_nobody_planned_is_found(self):
+        self.include("palpate/kitchen/a.cpp", "<cmath>")
+        self.assertEqual(len(check.check_rooms(self.root)), 1)
+
+
+class Text(Tree):
+    def faults(self):
+        return check.check_text(self.root)
+
+    def test_a_clean_tree_is_fine(self):
+        self.write("palpate/core/a.cpp", SPDX + "x" * check.COLUMNS + "\n")
+        self.write("docs/a.md", "# Some `title` here\n[b](b.md#part-2-more) [c](#some-title-here)"
+                                " [d](https://example.org)\n```\n[no](link.md)\n```\n")
+        self.write("docs/b.md", "## Part 2: more\n")
+        self.assertEqual(self.faults(), [])
+
+    def test_a_file_without_spdx_is_found(self):
+        self.write("scripts/run", "#!/bin/sh\n")
+        self.assertEqual(self.faults(), ["scripts/run:1: no SPDX line"])
+
+    def test_a_long_line_is_found(self):
+        self.write("a.hpp", SPDX + "x" * (check.COLUMNS + 1))
+        self.assertEqual(self.faults(), ["a.hpp:2: 101 columns, more than 100"])
+
+    def test_a_machine_path_is_found(self):
+        self.write("docs/a.md", "see /" + "home/me/data\n")
+        self.assertEqual(self.faults(), ["docs/a.md:1: a path of somebody's machine"])
+
+    def test_dead_links_are_found(self):
+        self.write("docs/a.md", "# A\n[b](b.md) [a](a.md#c)\n")
+        self.assertEqual(self.faults(), ["docs/a.md:2: link to b.md, which is not there",
+                                         "docs/a.md:2: a.md has no heading #c"])
+
+    def test_a_readme_that_left_its_example_behind_is_found(self):
+        self.write("examples/touch_a_plane.cpp", SPDX + "int main() {}\n")
+        self.write("README.md", "```cpp\nint main() {}\n```\n")
+        self.assertEqual(self.faults(), [])
+        self.write("README.md", "```cpp\nint main() { return 1; }\n```\n")
+        self.assertEqual(len(self.faults()), 1)
+
+
+class Format(Tree):
+    def test_bad_format_is_found(self):
+        self.write(".clang-format", "BasedOnStyle: Google\n")
+        self.write("a.cpp", "int main() {}\n")
+        self.assertEqual(check.check_format(self.root), [])
+        self.write("a.cpp", "int main( ){ }\n")
+        self.assertNotEqual(check.check_format(self.root), [])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -12,7 +12,7 @@ namespace palpate {
 /// How the loop runs.
 struct ServoOptions {
   double rate = 1000.0;  ///< [Hz] 500 to 10 000; a clean wall grows stiffer with it
-  RealtimeRequest realtime;
+  RealtimeRequest realtime{};
 };
 
 /// The live loop: cycles on a real-time thread of their own, from `start` to `stop`.

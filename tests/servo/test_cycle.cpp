@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/servo/cycle.hpp"
+#include "palpate/servo/free_side.hpp"
+
+#include "tests/servo/fake_device.hpp"
+#include "tests/support/allocations.hpp"
+#include "tests/support/grids.hpp"
+
+namespace palpate {
+namespace {
+
+using test::FakeDevice;
+using test::flat_grid;
+
+constexpr double ms = 1e-3;
+
+std::shared_ptr<const Cloud> plane_at(double z) {
+  return std::make_shared<PointCloud>(flat_grid(z, 1.5e-3, 30), Vec3(0, 0, 1));
+}
+
+// Cycles at 1 kHz on a clock of their own, under a camera that shows a plane at 30 Hz.
+struct Session {
+  explicit Session(const ServoSettings& settings = {})
+      : cycle(rendering_by<Renderer>(), device, settings), reader(cycle.reader()) {
+    device.hand.position = {0, 0, 0.02};
+  }
+
+  ServoTick run(double dt = ms) {
+    t += dt;
+    if (cloud && t >= next_frame) {
+      cycle.put_frame(cloud, t, t);
+      next_frame = t + 1.0 / 30.0;
+    }
+    cycle.run({.t = t});
+    ServoTick record{};
+    EXPECT_TRUE(reader.try_pop(record));
+    return record;
+  }
+  ServoTick run_for(double seconds) {
+    ServoTick record{};
+    for (int i = 0; i < std::lround(seconds / ms); ++i) record = run();
+    return record;
+  }
+  // Down to `z` at 0.05 m/s.
+  ServoTick press_to(double z) {
+    ServoTick record{};
+    while (device.hand.position.z() > z) {
+      device.hand.position.z() = std::max(device.hand.position.z() - 5e-5, z);
+      record = run();
+    }
+    return record;
+  }
+
+  FakeDevice device;
+  Cycle cycle;
+  TickRing<ServoTick>::Reader reader;
+  std::shared_ptr<const Cloud> cloud = plane_at(0.0);
+  double t = 10.0;
+  double next_frame = 0.0;
+};
+
+TEST(Cycle, GivesTheDeviceTheRenderersForceOnceTheHandIsEngaged) {
+  Session session;
+  session.run_for(2.0);
+  const ServoTick record = session.press_to(-0.001);
+  EXPECT_GT(record.force.z(), 0.5);
+  EXPECT_EQ(record.force, record.tick.force);
+  EXPECT_EQ(session.device.force, record.force);
+  EXPECT_EQ(record.safety, 0U);
+  EXPECT_EQ(record.hand, 1U);
+}
+
+TEST(Cycle, UsesAFrameInTheFirstCycleAfterItWasPut) {
+  Session session;
+  session.cloud = nullptr;
+  EXPECT_EQ(session.run().frame_number, 0U);
+  session.cycle.put_frame(plane_at(0.0), session.t, session.t);
+  session.cycle.put_frame(plane_at(0.001), session.t + 0.5 * ms, session.t);
+  const ServoTick record = session.run();
+  EXPECT_EQ(record.frame_number, 2U) << "and of two, the newer";
+  EXPECT_EQ(record.tick.frame, 0);
+  EXPECT_NEAR(record.frame_age, 0.5 * ms, 1e-9);
+  EXPECT_EQ(session.cycle.statistics().frames_adopted, 1U);
+  EXPECT_EQ(session.cycle.statistics().frames_dropped, 1U);
+  EXPECT_LE(session.cycle.statistics().hand_over.max(), 1'000'001U);
+}
+
+TEST(Cycle, TurnsHandAndForceBetweenDeviceAndWorld) {
+  // The device's y is the world's z, and 1 m on the device is 2 m in the scene.
+  ServoSettings settings;
+  settings.placement.world_from_device =
+      Eigen::Translation3d(0, 0, 0.04) * Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX());
+  settings.placement.workspace_scale = 2.0;
+  Session session(settings);
+  session.device.hand.position = {0.003, 0.0, 0.002};
+  EXPECT_LT((session.run().tick.hip - Vec3(0.006, -0.004, 0.04)).norm(), 1e-15);
+  session.run_for(2.0);
+  for (int i = 0; i < 1000; ++i) {
+    session.device.hand.position.y() -= 2.05e-5;
+    session.run();
+  }
+  const ServoTick record = session.run();
+  EXPECT_NEAR(record.tick.hip.z(), -0.001, 1e-9);
+  EXPECT_GT(record.force.z(), 0.5);
+  EXPECT_LT(
+      (session.device.force - Vec3(record.force.x(), record.force.z(), -record.force.y())).norm(),
+      1e-12);
+}
+
+TEST(Cycle, HoldsTheHipWhileTheHandIsClutchedAndGoesOnFromThere) {
+  Session session;
+  session.run_for(2.0);
+  session.device.hand.clutched = true;
+  session.device.hand.position = {0.1, 0, 0.3};
+  ServoTick record = session.run();
+  EXPECT_EQ(record.tick.hip, Vec3(0, 0, 0.02));
+  EXPECT_EQ(record.hand, 3U);
+  EXPECT_TRUE(record.safety & disengaged);
+  session.device.hand.clutched = false;
+  EXPECT_LT((session.run().tick.hip - Vec3(0, 0, 0.02)).norm(), 1e-15);
+  session.device.hand.position.z() -= 0.01;
+  EXPECT_LT((session.run().tick.hip - Vec3(0, 0, 0.01)).norm(), 1e-15);
+}
+
+TEST(Cycle, TakesTheForceOffWhenTheCameraRepeatsItselfOrStandsStill) {
+  const auto force_after = [](double seconds, auto feed) {
+    Session session;
+    session.run_for(2.0);
+    session.press_to(-0.001);
+    const double stamp = session.t;
+    const std::shared_ptr<const Cloud> cloud = session.cloud;
+    session.cloud = nullptr;
+    for (int i = 0; i < std::lround(seconds / ms); ++i) {
+      feed(session, cloud, stamp);
+      session.run();
+    }
+    return session.device.force.norm();
+  };
+  const auto nothing = [](Session&, const auto&, double) {};
+  EXPECT_GT(force_after(0.05, nothing), 0.5);
+  EXPECT_EQ(force_after(0.6, nothing), 0.0);
+  EXPECT_EQ(force_after(0.6, [](Session& s, const auto& cloud,
+                                double stamp) { s.cycle.put_frame(cloud, stamp, s.t); }),
+            0.0)
+      << "the same frame again and again";
+  EXPECT_EQ(force_after(0.6, [](Session& s, const auto& cloud,
+                                double) { s.cycle.put_frame(cloud, s.t + 1e6, s.t); }),
+            0.0)
+      << "stamps from another clock";
+  EXPECT_EQ(force_after(0.6,
+                        [](Session& s, const auto& cloud, double) {
+                          s.cycle.put_frame(cloud, std::numeric_limits<double>::quiet_NaN(), s.t);
+                        }),
+            0.0);
+  EXPECT_GT(force_after(0.6, [](Session& s, const auto& cloud,
+                                double) { s.cycle.put_frame(cloud, s.t, s.t); }),
+            0.5);
+}
+
+TEST(Cycle, SeatsTheProxyOnTheFreeSideAfterAStall) {
+  // While the loop stood still for 50 ms the surface rose by 30 mm, past the proxy.
+  Session session;
+  session.run_for(2.0);
+  session.press_to(-0.002);
+  session.cloud = plane_at(0.03);
+  session.next_frame = 0.0;
+  const ServoTick record = session.run(0.05);
+  EXPECT_TRUE(record.safety & stalled);
+  EXPECT_GT(record.tick.proxy.z(), 0.03 + 4.8e-3);
+  EXPECT_EQ(record.force.norm(), 0.0);
+  EXPECT_LT(session.run().force.norm(), 0.01) << "and the force ramps up";
+}
+
+TEST(FreeSide, IsBeyondAllThatIsSeenAlongTheSightline) {
+  Patch patch;
+  std::vector<Vec3> points = flat_grid(0.01, 1.5e-3, 20);
+  const std::vector<Vec3> upper = flat_grid(0.02, 1.5e-3, 20);
+  points.insert(points.end(), upper.begin(), upper.end());
+  const BruteForceCloud seen_from_above(points, Vec3(0, 0, 1));
+  EXPECT_NEAR(free_side(seen_from_above, {0, 0, 0}, Vec3::Zero(), 5e-3, patch).z(), 0.025, 1e-6);
+  const BruteForceCloud from_nowhere(points);
+  EXPECT_NEAR(free_side(from_nowhere, {0, 0, 0}, Vec3::UnitZ(), 5e-3, patch).z(), 0.025, 1e-6);
+  EXPECT_EQ(free_side(from_nowhere, {0, 0, 0}, Vec3::Zero(), 5e-3, patch), Vec3::Zero());
+  EXPECT_EQ(free_side(seen_from_above, {0, 0, 0.03}, Vec3::Zero(), 5e-3, patch), Vec3(0, 0, 0.03))
+      << "a proxy that is free stays";
+}
+
+TEST(Cycle, AdoptsSettingsInTheNextCycleAndRefusesBadOnesAtTheDoor) {
+  Session session;
+  session.run_for(2.0);
+  session.press_to(-0.003);
+  ServoSettings settings;
+  settings.rendering.coupling.stiffness = 100.0;
+  session.cycle.set_settings(settings);
+  const ServoTick record = session.run_for(0.1);
+  EXPECT_NEAR(record.force.z(), 0.3, 0.02);
+  settings.safety.max_force = -1.0;
+  EXPECT_THROW(session.cycle.set_settings(settings), Error);
+  settings = {};
+  settings.rendering.proxy.r_1 = 1.0;
+  EXPECT_THROW(session.cycle.set_settings(settings), Error);
+  settings = {};
+  settings.placement.workspace_scale = 0.0;
+  EXPECT_THROW(session.cycle.set_settings(settings), Error);
+  settings = {};
+  settings.placement.world_from_device.linear() *= 2.0;
+  EXPECT_THROW(session.cycle.set_settings(settings), Error);
+  EXPECT_NEAR(session.run().force.z(), 0.3, 0.02);
+}
+
+TEST(Cycle, KeepsGoingWithAMethodThatRefusesParameters) {
+  struct Stubborn {
+    void seat(const Vec3&) noexcept {}
+    void frame(const Cloud&, double) noexcept {}
+    Tick tick(const Vec3& hip, double t) noexcept {
+      Tick tick{};
+      tick.t = t;
+      tick.hip = tick.proxy = hip;
+      tick.normal = tick.force = Vec3::Zero();
+      return tick;
+    }
+    void set_parameters(const Parameters& p) {
+      if (p.coupling.stiffness > 1000.0) throw Error("stiffness", "too much");
+    }
+  };
+  FakeDevice device;
+  Cycle cycle(rendering_by<Stubborn>(), device);
+  ServoSettings settings;
+  settings.rendering.coupling.stiffness = 2000.0;
+  cycle.set_settings(settings);
+  cycle.run({.t = 1.0});
+  EXPECT_EQ(cycle.statistics().settings_refused, 1U);
+  EXPECT_EQ(device.writes, 1);
+}
+
+TEST(Cycle, RefusesAFrameWithoutACloud) {
+  Session session;
+  EXPECT_THROW(session.cycle.put_frame(nullptr, 0.0, 0.0), Error);
+}
+
+TEST(Cycle, CountsWhatItDid) {
+  Session session;
+  session.run_for(2.0);
+  session.press_to(-0.002);
+  const CycleStatistics& statistics = session.cycle.statistics();
+  EXPECT_EQ(statistics.ticks, static_cast<std::uint64_t>(session.device.writes));
+  EXPECT_GT(statistics.steps, 0U);
+  EXPECT_GT(statistics.contact_ticks, 0U);
+  EXPECT_LT(statistics.contact_ticks, statistics.ticks);
+  EXPECT_GT(statistics.max_force, 1.0);
+  EXPECT_LT(statistics.frame_age.max(), 40'000'000U);
+  EXPECT_EQ(statistics.interventions[6], 1U) << "disengaged once, at the start";
+}
+
+TEST(Cycle, NeitherAllocatesNorReleasesMemory) {
+  if (!test::memory_is_counted) GTEST_SKIP() << "sanitizers bring their own new and delete";
+  const test::MemoryCalls calls;
+  { const auto something = std::make_unique<int>(3); }
+  ASSERT_EQ(calls.count(), 2U) << "or else nothing is counted";
+
+  // A depth image, an unorganised cloud and a set of both, moving; settings change on the way.
+  auto rays = std::make_shared<const ViewingRays>(
+      Intrinsics{.width = 64, .height = 48, .fx = 60, .fy = 60, .cx = 31.5, .cy = 23.5});
+  Eigen::Isometry3d looking_down = Eigen::Isometry3d::Identity();
+  looking_down.linear() = Vec3(1, -1, -1).asDiagonal();
+  looking_down.translation() = Vec3(0, 0, 0.1);
+  const auto image = [&] {
+    return std::make_shared<const DepthImage>(rays, std::vector<std::uint16_t>(64 * 48, 100),
+                                              1000.0, looking_down);
+  };
+  Session session;
+  std::uint64_t inside = 0;
+  const auto measured = [&] {
+    const test::MemoryCalls calls_inside;
+    session.cycle.run({.t = session.t});
+    inside += calls_inside.count();
+  };
+  std::uint64_t contacts = 0;
+  for (int i = 0; i < 4000; ++i) {
+    session.t += i % 1000 == 999 ? 0.02 : ms;
+    if (i % 33 == 0) {
+      const double z = 0.002 * std::sin(i * ms);
+      switch ((i / 33) % 3) {
+        case 0:
+          session.cycle.put_frame(image(), session.t, session.t);
+          break;
+        case 1:
+          session.cycle.put_frame(plane_at(z), session.t, session.t);
+          break;
+        default:
+          session.cycle.put_frame(
+              std::make_shared<CloudSet>(
+                  std::vector<std::shared_ptr<const Cloud>>{image(), plane_at(z)}),
+              session.t, session.t);
+      }
+    }
+    if (i % 500 == 0) session.cycle.set_settings({});
+    session.device.hand.position = {0.01 * std::sin(3 * i * ms), 0, 0.01 * std::cos(i * ms)};
+    measured();
+    contacts = session.cycle.statistics().contact_ticks;
+  }
+  EXPECT_EQ(inside, 0U);
+  EXPECT_GT(contacts, 500U) << "it must have touched all of that";
+}
+
+}  // namespace
+}  // namespace palpate

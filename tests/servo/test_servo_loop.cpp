@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <atomic>
+#include <memory>
+#include <set>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/servo/servo_loop.hpp"
+
+#include "tests/servo/fake_device.hpp"
+#include "tests/support/grids.hpp"
+
+namespace palpate {
+namespace {
+
+using test::FakeDevice;
+
+TEST(Histogram, GivesQuantilesWithinItsBucketsWidth) {
+  Histogram histogram;
+  EXPECT_EQ(histogram.quantile(0.5), 0U);
+  for (std::uint64_t ns = 1; ns <= 100'000; ++ns) histogram.add(ns);
+  EXPECT_EQ(histogram.count(), 100'000U);
+  EXPECT_EQ(histogram.max(), 100'000U);
+  for (const double q : {0.001, 0.5, 0.99, 0.9999}) {
+    const auto value = static_cast<double>(histogram.quantile(q));
+    EXPECT_GE(value, q * 1e5) << q;
+    EXPECT_LE(value, q * 1e5 * 1.033) << q;
+  }
+  EXPECT_EQ(histogram.quantile(1.0), 100'000U);
+}
+
+TEST(Histogram, TakesZeroAndTheLongestTimes) {
+  Histogram histogram;
+  histogram.add(0);
+  EXPECT_EQ(histogram.quantile(1.0), 0U);
+  histogram.add(~0ULL);
+  EXPECT_EQ(histogram.max(), ~0ULL);
+  EXPECT_GT(histogram.quantile(1.0), 3'600'000'000'000U);
+}
+
+TEST(PeriodicThread, RefusesARateOutOfRange) {
+  const auto nothing = [](const Wake&) {};
+  EXPECT_THROW(PeriodicThread(0.0, {}, nothing), Error);
+  EXPECT_THROW(PeriodicThread(1e6, {}, nothing), Error);
+  FakeDevice device;
+  EXPECT_THROW(ServoLoop(rendering_by<Renderer>(), device, {}, {.rate = 100.0}), Error);
+}
+
+TEST(PeriodicThread, SaysWhatTheSystemGrantedAndHowToGetTheRest) {
+  std::atomic<int> cycles{0};
+  PeriodicThread thread(1000.0, {}, [&](const Wake&) { ++cycles; });
+  const RealtimeReport& report = thread.realtime();
+  const int refused = !report.fifo + !report.locked + (report.core < 0) + !report.awake;
+  EXPECT_EQ(report.advice.size(), static_cast<std::size_t>(refused));
+  EXPECT_EQ(report.priority > 0, report.fifo);
+  while (cycles < 3) std::this_thread::yield();
+}
+
+TEST(PeriodicThread, SkipsDeadlinesThatPassedAndDoesNotMakeThemUp) {
+  std::atomic<int> cycles{0};
+  double last = 0.0;
+  bool burst = false;
+  PeriodicThread thread(1000.0, {.enabled = false}, [&](const Wake& wake) {
+    if (cycles == 5) {  // works for 20 periods
+      while (monotonic_now() < wake.t + 0.02) {
+      }
+    }
+    if (cycles == 6) burst = wake.t - last < 0.02;
+    last = wake.t;
+    ++cycles;
+  });
+  while (cycles < 10) std::this_thread::yield();
+  thread.stop();
+  EXPECT_FALSE(burst);
+  EXPECT_GE(thread.timing().late_ticks, 1U);
+  EXPECT_GE(thread.timing().skipped_deadlines, 20U);
+  EXPECT_EQ(thread.timing().compute.count(), static_cast<std::uint64_t>(cycles.load()));
+  EXPECT_GE(thread.timing().compute.max(), 1'000'000U) << "by the thread's own CPU clock";
+}
+
+TEST(ServoLoop, TicksWhileACameraFloodsItAndViewersComeAndGo) {
+  FakeDevice device;
+  device.hand.position = {0, 0, 0.01};
+  ServoLoop loop(rendering_by<Renderer>(), device);
+  auto recorder = loop.reader();
+  loop.start();
+  std::atomic<bool> done{false};
+  std::thread camera([&] {
+    while (!done) {
+      loop.put_frame(std::make_shared<PointCloud>(test::flat_grid(0.0, 2e-3, 10)), monotonic_now());
+    }
+  });
+  std::thread viewer([&] {
+    double stiffness = 100.0;
+    while (!done) {
+      auto reader = loop.reader();
+      ServoTick record{};
+      while (!done && !reader.try_pop(record)) std::this_thread::yield();
+      ServoSettings settings;
+      settings.rendering.coupling.stiffness = stiffness = stiffness < 900.0 ? stiffness + 1.0 : 100;
+      loop.set_settings(settings);
+      static_cast<void>(loop.timing().wake_up.quantile(0.99));
+      static_cast<void>(loop.statistics().max_force.load());
+    }
+  });
+  std::uint64_t seen = 0;
+  ServoTick record{};
+  while (seen < 300) {
+    if (recorder.try_pop(record)) {
+      EXPECT_EQ(record.number, seen);
+      ++seen;
+    } else {
+      std::this_thread::yield();
+    }
+  }
+  done = true;
+  camera.join();
+  viewer.join();
+  loop.stop();
+  while (recorder.try_pop(record)) ++seen;
+  const CycleStatistics& statistics = loop.statistics();
+  EXPECT_EQ(recorder.lost(), 0U);
+  EXPECT_EQ(statistics.ticks, seen);
+  EXPECT_EQ(loop.timing().wake_up.count(), seen);
+  EXPECT_GT(statistics.frames_adopted, 0U);
+  EXPECT_EQ(record.frame_number, statistics.frames_adopted + statistics.frames_dropped);
+  EXPECT_EQ(device.writes, static_cast<int>(seen) + 1) << "and a last one without force";
+  EXPECT_TRUE(device.force.isZero());
+}
+
+TEST(ServoLoop, CanBeDestroyedBeforeItStartedAndStoppedTwice) {
+  FakeDevice device;
+  { const ServoLoop never_started(rendering_by<Renderer>(), device); }
+  EXPECT_EQ(device.writes, 0);
+  ServoLoop loop(rendering_by<Renderer>(), device);
+  loop.start();
+  loop.stop();
+  const int writes = device.writes;
+  loop.stop();
+  EXPECT_EQ(device.writes, writes);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -43,7 +43,10 @@ void for_each_stamped_line(std::string_view text, const std::string& name, std::
     const std::string where = name + ":" + std::to_string(number);
     const std::string remedy = std::string("a line is '") + form + "'";
     if (fields.size() != count) {
-      throw Error(where, "has " + std::to_string(fields.size()) + " fields", remedy);
+      throw Error(
+          where,
+          "fields: " + std::to_string(fields.size()) + " instead of " + std::to_string(count),
+          remedy);
     }
     const std::optional<double> stamp = to_finite(fields[0]);
     if (!stamp) throw Error(where, "the stamp is not a finite number", remedy);

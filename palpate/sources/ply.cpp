@@ -213,12 +213,11 @@ void read_binary_row(Cursor& file, const Element& element, std::endian order,
     const std::byte* const value = file.take(property.least_bytes());
     if (property.length) {
       const auto length = detail::visit_scalar(*property.length, [&](auto type) {
-        return static_cast<double>(detail::load<decltype(type)>(value, order));
+        return static_cast<std::int64_t>(detail::load<decltype(type)>(value, order));
       });
       const std::size_t size = detail::size_of(property.type);
-      if (length < 0.0 || length > static_cast<double>(file.left() / size)) {
-        file.fail_at_offset("a list of " + element.text() + " promises " +
-                                std::to_string(static_cast<std::int64_t>(length)) +
+      if (length < 0 || static_cast<std::uint64_t>(length) > file.left() / size) {
+        file.fail_at_offset("a list of " + element.text() + " promises " + std::to_string(length) +
                                 " values, but " + std::to_string(file.left()) + " bytes are left",
                             cut_short);
       }

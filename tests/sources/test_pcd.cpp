@@ -17,6 +17,7 @@ namespace {
 
 using test::bytes_of;
 using test::fails_saying;
+using test::Rejected;
 
 PointFile parse(std::string_view text) {
   return test::parse(parse_pcd, text);
@@ -95,15 +96,14 @@ TYPED_TEST(PcdOfType, GivesBackTheCoordinatesThatWereWrittenInEveryEncoding) {
       columns += bytes_of(coordinate(k, axis));
     }
   }
-  for (const std::string encoding : encodings) {
-    const std::string triple = size + " " + size + " " + size;
-    const PointFile cloud =
-        parse("VERSION .7\nFIELDS x y z\nSIZE " + triple + "\nTYPE " + type + " " + type + " " +
-              type + "\nCOUNT 1 1 1\nWIDTH 4\nHEIGHT 3\nPOINTS 12\nDATA " + encoding + "\n" +
-              (encoding == "ascii"    ? ascii
-               : encoding == "binary" ? binary
-                                      : compressed(columns)));
-    EXPECT_EQ(cloud.encoding, encoding);
+  const std::string head = "VERSION .7\nFIELDS x y z\nSIZE " + size + " " + size + " " + size +
+                           "\nTYPE " + type + " " + type + " " + type +
+                           "\nCOUNT 1 1 1\nWIDTH 4\nHEIGHT 3\nPOINTS 12\nDATA ";
+  const std::array files{head + "ascii\n" + ascii, head + "binary\n" + binary,
+                         head + "binary_compressed\n" + compressed(columns)};
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const PointFile cloud = parse(files[i]);
+    EXPECT_EQ(cloud.encoding, encodings[i]);
     EXPECT_EQ(cloud.width, 4u);
     EXPECT_EQ(cloud.height, 3u);
     ASSERT_EQ(cloud.points.size(), 12u);
@@ -234,9 +234,10 @@ TEST(Pcd, RejectsCompressedDataThatIsNotLzf) {
   };
   EXPECT_TRUE(fails_saying([&] { return parse(file(9, 12, "12345678")); }, "promises 9 bytes"));
   EXPECT_TRUE(fails_saying([&] { return parse(file(0, 12, "")); }, "cannot hold 12"));
-  // A back reference to before the beginning, a literal run past the end, an early end.
+  // A back reference to before the beginning, runs past either end, an early end.
   EXPECT_TRUE(fails_saying([&] { return parse(file(3, 12, "\xe0\x03\x05")); }, "corrupt"));
   EXPECT_TRUE(fails_saying([&] { return parse(file(3, 12, "\x1f??")); }, "corrupt"));
+  EXPECT_TRUE(fails_saying([&] { return parse(file(3, 12, "\x0b??")); }, "corrupt"));
   EXPECT_TRUE(fails_saying([&] { return parse(file(3, 12, "\x01??")); }, "corrupt"));
 }
 
@@ -253,8 +254,8 @@ TEST(Pcd, SaysWhatIsWrongWithAHeader) {
       Case{"FIELDS x y z", "FIELDS x y w", "FIELDS must name z"},
       Case{"FIELDS x y z", "FIELDS x x z", "FIELDS must name x"},
       Case{"FIELDS x y z\n", "", "no FIELDS"},
-      Case{"SIZE 4 4 4", "SIZE 4 4 3", "TYPE \"F\" and SIZE \"3\""},
-      Case{"SIZE 4 4 4", "SIZE 4 4 2", "TYPE \"F\" and SIZE \"2\""},
+      Case{"SIZE 4 4 4", "SIZE 4 4 3", R"(TYPE "F" and SIZE "3")"},
+      Case{"SIZE 4 4 4", "SIZE 4 4 2", R"(TYPE "F" and SIZE "2")"},
       Case{"SIZE 4 4 4\n", "", "one of SIZE and TYPE"},
       Case{"TYPE F F F", "TYPE F F G", "TYPE \"G\""},
       Case{"COUNT 1 1 1", "COUNT 1 1 0", "COUNT \"0\""},
@@ -368,20 +369,20 @@ TEST(Pcd, ReadsWhatOtherParsersReadAndRejectsWhatTheyReject) {
       Expected{"pcl__curve_close.pcd", 110, 1, 0, {0.468184734, 0.5, 0}},
       Expected{"pcl__octants.pcd", 8, 1, 0, {-0.125, -6, -6}},
   };
-  const std::array<std::array<const char*, 2>, 7> rejected{{
-      {"pcd-rs__corrupt_compressed.pcd", "promises 100 bytes"},
-      {"pcd-rs__mixed_types_compressed.pcd", "FIELDS must name z"},
-      {"pcd-rs__test_unsupported_version.pcd", "version \".4\""},
-      {"pcd-rs__test_v05_no_viewpoint.pcd", "FIELDS must name y"},
-      {"pcd-rs__test_v06_mixed_types.pcd", "FIELDS must name x"},
-      {"pcd-rs__test_v5_compressed.pcd", "ends before the compressed data"},
-      {"pcd-rs__test_v6_compressed.pcd", "ends before the compressed data"},
-  }};
+  const std::array rejected{
+      Rejected{"pcd-rs__corrupt_compressed.pcd", "promises 100 bytes"},
+      Rejected{"pcd-rs__mixed_types_compressed.pcd", "FIELDS must name z"},
+      Rejected{"pcd-rs__test_unsupported_version.pcd", "version \".4\""},
+      Rejected{"pcd-rs__test_v05_no_viewpoint.pcd", "FIELDS must name y"},
+      Rejected{"pcd-rs__test_v06_mixed_types.pcd", "FIELDS must name x"},
+      Rejected{"pcd-rs__test_v5_compressed.pcd", "ends before the compressed data"},
+      Rejected{"pcd-rs__test_v6_compressed.pcd", "ends before the compressed data"},
+  };
   for (const Expected& expected : accepted) {
     expect(folder, expected);
   }
-  for (const auto& [file, says] : rejected) {
-    EXPECT_TRUE(fails_saying([&] { return read_pcd(folder / file); }, file, says));
+  for (const Rejected& bad : rejected) {
+    EXPECT_TRUE(fails_saying([&] { return read_pcd(folder / bad.file); }, bad.file, bad.says));
   }
   const auto files = std::distance(std::filesystem::directory_iterator(folder), {});
   EXPECT_EQ(static_cast<std::size_t>(files), accepted.size() + rejected.size());

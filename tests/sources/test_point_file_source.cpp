@@ -98,9 +98,9 @@ TEST(PointFiles, CanBeASingleFileOfAnyName) {
 
 TEST(PointFiles, AreScaledToMetresTogetherWithTheirViewpoint) {
   const TemporaryFolder folder;
-  const auto file = folder.write("mm.pcd", pcd(500)).string();
-  for (const std::string scale : {"1mm", "0.001"}) {
-    const auto frame = open_source("pcd:" + file + "?scale=" + scale)->next();
+  const std::string uri = "pcd:" + folder.write("mm.pcd", pcd(500)).string();
+  for (const char* scale : {"?scale=1mm", "?scale=0.001"}) {
+    const auto frame = open_source(uri + scale)->next();
     ASSERT_TRUE(frame.has_value());
     EXPECT_TRUE(cloud_of(*frame).point(0).isApprox(Vec3(0.5, 0, 0)));
     ASSERT_TRUE(cloud_of(*frame).viewpoint().has_value());

@@ -19,10 +19,10 @@ inline std::filesystem::path data_path(const std::filesystem::path& below) {
 }  // namespace palpate::test
 
 /// Sets `variable` to the path of recorded data, or skips the test, saying what is missing.
-#define PALPATE_DATA_OR_SKIP(variable, below)                                   \
-  const std::filesystem::path variable = palpate::test::data_path(below);       \
-  if (variable.empty() || !std::filesystem::exists(variable)) {                 \
-    GTEST_SKIP() << "recorded data not found: "                                 \
-                 << (variable.empty() ? std::string(below) : variable.string()) \
-                 << "; set PALPATE_DATA to the folder that holds it";           \
+#define PALPATE_DATA_OR_SKIP(variable, below)                                       \
+  const std::filesystem::path variable = palpate::test::data_path(below);           \
+  if ((variable).empty() || !std::filesystem::exists(variable)) {                   \
+    GTEST_SKIP() << "recorded data not found: "                                     \
+                 << ((variable).empty() ? std::string(below) : (variable).string()) \
+                 << "; set PALPATE_DATA to the folder that holds it";               \
   }

@@ -64,6 +64,12 @@ inline void expect_defined_on_damage(Parse parser, const std::string& valid, int
   }
 }
 
+/// A file that must be rejected, and what the message says.
+struct Rejected {
+  const char* file;
+  const char* says;
+};
+
 /// The mean of a cloud's finite points.
 inline Vec3 mean_of(const PointFile& cloud) {
   Vec3 sum = Vec3::Zero();

@@ -82,28 +82,8 @@ function(palpate_test name)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(test_${name} PRIVATE ${ARG_LINKS} GTest::gtest_main)
   palpate_target_options(test_${name})
+  set_target_properties(test_${name} PROPERTIES CXX_CLANG_TIDY "")  # GoogleTest's macros cost it
   gtest_discover_tests(test_${name} DISCOVERY_TIMEOUT 60
     TEST_PREFIX "${PALPATE_TEST_PREFIX}"
     PROPERTIES TIMEOUT 300 ENVIRONMENT "PALPATE_DATA=${PALPATE_DATA}")
-endfunction()
-
-# palpate_fuzz(NAME LINKS <libraries...> SEEDS <folders...>): NAME.cpp of the current folder as a
-# libFuzzer program fuzz_NAME, and a short run of it, always the same, as a test.
-function(palpate_fuzz name)
-  if(NOT PALPATE_FUZZ)
-    return()
-  endif()
-  cmake_parse_arguments(ARG "" "" "LINKS;SEEDS" ${ARGN})
-  add_executable(fuzz_${name} ${name}.cpp)
-  target_include_directories(fuzz_${name} PRIVATE ${PROJECT_SOURCE_DIR})
-  target_link_libraries(fuzz_${name} PRIVATE ${ARG_LINKS})
-  target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
-  palpate_target_options(fuzz_${name})
-  # The first folder is where libFuzzer puts what it finds, so it must not be the seeds'.
-  set(found ${CMAKE_CURRENT_BINARY_DIR}/found_${name})
-  file(MAKE_DIRECTORY ${found})
-  add_test(NAME ${PALPATE_TEST_PREFIX}fuzz/${name}
-           COMMAND fuzz_${name} -runs=20000 -seed=1 -timeout=10 -rss_limit_mb=1024
-                   -artifact_prefix=${found}/ -print_final_stats=1 ${found} ${ARG_SEEDS})
-  set_tests_properties(${PALPATE_TEST_PREFIX}fuzz/${name} PROPERTIES TIMEOUT 300)
 endfunction()

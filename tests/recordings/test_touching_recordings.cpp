@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The paper's method on real depth data: pressing and sliding on what a camera measured.
-#include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -9,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include "palpate/cloud/depth_image.hpp"

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <random>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/servo/cycle.hpp"
+
+#include "tests/servo/fake_device.hpp"
+#include "tests/support/grids.hpp"
+
+namespace palpate::test {
+
+/// Everything that can go wrong around a cycle, at random and from a seed: hands that press, shake,
+/// jump and are no number; frames that move, flicker, are empty, come from another clock or not at
+/// all; a renderer that asks for nonsense now and then; ticks that stall, repeat and run backwards;
+/// settings that change. After each cycle it holds
+/// what the device got against the promises of the safety chain, by its own book-keeping.
+class Adversary {
+ public:
+  explicit Adversary(std::uint64_t seed)
+      : random_(seed), cycle_(rendering_by<SpoiledRenderer>(seed), device_) {
+    auto rays = std::make_shared<const ViewingRays>(
+        Intrinsics{.width = 80, .height = 60, .fx = 70, .fy = 70, .cx = 39.5, .cy = 29.5});
+    Eigen::Isometry3d looking_down = Eigen::Isometry3d::Identity();
+    looking_down.linear() = Vec3(1, -1, -1).asDiagonal();
+    looking_down.translation() = Vec3(0, 0, 0.15);
+    for (int i = 0; i < 24; ++i) {
+      std::vector<std::uint16_t> depth(80 * 60);
+      for (auto& reading : depth) {
+        const double z = 0.15 + 0.004 * std::sin(i) + between(-0.003, 0.003);
+        const int fate = i % 6 == 5 ? 0 : static_cast<int>(random_() % 50);
+        reading = fate == 0   ? std::uint16_t{0}
+                  : fate == 1 ? static_cast<std::uint16_t>(random_())
+                              : static_cast<std::uint16_t>(z * 10'000.0);
+      }
+      clouds_.push_back(std::make_shared<DepthImage>(rays, depth, 10'000.0, looking_down));
+    }
+    for (int i = 0; i < 8; ++i) {
+      std::vector<Vec3> points = flat_grid(0.002 * i - 0.006, 1.5e-3, 30);
+      points.emplace_back(nan, 0, 0);
+      for (int k = 0; k < 300; ++k) points.push_back(place(0.02));
+      clouds_.push_back(std::make_shared<PointCloud>(points, Vec3(0, 0, 1)));
+    }
+    clouds_.push_back(std::make_shared<PointCloud>(std::vector<Vec3>{}));
+    clouds_.push_back(std::make_shared<CloudSet>(
+        std::vector<std::shared_ptr<const Cloud>>{clouds_[0], clouds_[25], clouds_[26]}));
+    device_.hand.position = {0, 0, 0.02};
+  }
+
+  /// Runs one more cycle; empty if every promise was kept, else what was broken and when.
+  std::string step() {
+    if (ticks_ % 2048 == 0) choose();
+    ++ticks_;
+    move_hand();
+    const double previous = t_;
+    t_ += tick_interval();
+    feed();
+    if (random_() % 20'000 == 0) cycle_.set_settings(settings());
+    const double given = one_in(50'000) ? nan : t_;
+    cycle_.run({.t = given});
+    return verdict(given, given - previous);
+  }
+
+  [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
+  [[nodiscard]] double strongest() const { return strongest_; }
+  [[nodiscard]] std::uint64_t forceful_ticks() const { return forceful_ticks_; }
+  [[nodiscard]] const CycleStatistics& statistics() const { return cycle_.statistics(); }
+
+ private:
+  static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  static constexpr double inf = std::numeric_limits<double>::infinity();
+
+  // The renderer, but one force in a thousand is wrong.
+  class SpoiledRenderer {
+   public:
+    explicit SpoiledRenderer(std::uint64_t seed) : random_(seed + 1) {}
+    void seat(const Vec3& proxy) noexcept { renderer_.seat(proxy); }
+    void frame(const Cloud& cloud, double stamp) noexcept { renderer_.frame(cloud, stamp); }
+    void set_parameters(const Parameters& p) { renderer_.set_parameters(p); }
+    Tick tick(const Vec3& hip, double t) noexcept {
+      Tick tick = renderer_.tick(hip, t);
+      switch (random_() % 5000) {
+        case 0:
+          tick.force.x() = nan;
+          break;
+        case 1:
+          tick.force.y() = -inf;
+          break;
+        case 2:
+          tick.force *= -100.0;
+          break;
+        case 3:
+          tick.normal.z() = nan;
+          break;
+        case 4:
+          tick.force = Vec3::Constant(1e308);
+          break;
+        default:
+          break;
+      }
+      return tick;
+    }
+
+   private:
+    Renderer renderer_;
+    std::mt19937_64 random_;
+  };
+
+  double between(double low, double high) {
+    return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
+  }
+  Vec3 place(double size) {
+    return {between(-size, size), between(-size, size), between(-size, size)};
+  }
+  bool one_in(std::uint64_t n) { return random_() % n == 0; }
+
+  // How the next two seconds go: mostly a hand that touches a live surface, or nothing would be
+  // at stake.
+  void choose() {
+    hand_mode_ = !one_in(4) ? 0 : static_cast<int>(random_() % 6);
+    camera_mode_ = !one_in(4) ? 0 : static_cast<int>(random_() % 7);
+    time_mode_ = !one_in(4) ? 0 : static_cast<int>(random_() % 4);
+    aim_ = Vec3(between(-0.02, 0.02), between(-0.02, 0.02), between(-0.015, 0.015));
+  }
+
+  void move_hand() {
+    Vec3& hand = device_.hand.position;
+    if (!hand.allFinite() || hand.norm() > 1.0) hand = aim_;
+    switch (hand_mode_) {
+      case 0:
+        hand += 0.003 * (aim_ - hand);
+        break;  // presses
+      case 1:
+        hand += 2e-4 * place(1.0);
+        break;  // wanders
+      case 2:
+        hand = aim_ + 0.003 * place(1.0);
+        break;  // shakes
+      case 3:
+        if (one_in(50)) hand = place(0.05);
+        break;  // jumps
+      case 4:
+        hand += 4e-3 * (aim_ - hand).normalized();
+        break;  // 4 m/s
+      default:  // is no number
+        if (one_in(30)) hand = Vec3(one_in(2) ? nan : inf, one_in(2) ? 1e300 : 0.0, 0);
+    }
+    if (one_in(3000)) device_.hand.present = !device_.hand.present;
+    if (!device_.hand.present && one_in(100)) device_.hand.present = true;
+    if (one_in(5000)) device_.hand.clutched = !device_.hand.clutched;
+    if (device_.hand.clutched && one_in(100)) device_.hand.clutched = false;
+  }
+
+  double tick_interval() {
+    switch (time_mode_) {
+      case 1:
+        return between(0.0, 4e-3);
+      case 2:
+        return one_in(200) ? between(0.005, 0.2) : 1e-3;
+      case 3:
+        return one_in(200) ? 0.0 : one_in(400) ? between(-0.01, 0.0) : 1e-3;
+      default:
+        return 1e-3;
+    }
+  }
+
+  void feed() {
+    if (camera_mode_ == 1 || (camera_mode_ != 2 && t_ < next_frame_)) return;
+    next_frame_ = t_ + 1.0 / 30.0;
+    double stamp = t_ - between(0.0, 0.02);
+    if (camera_mode_ == 3 && one_in(3)) stamp = one_in(2) ? nan : inf;
+    if (camera_mode_ == 4) stamp = stuck_;
+    if (camera_mode_ == 5 && one_in(4)) stamp -= between(0.0, 2.0);
+    if (camera_mode_ == 6 && one_in(4)) stamp += between(1.0, 1e6);
+    stuck_ = stamp;
+    // A surface at rest for a while, or another at every frame.
+    if (one_in(3)) cloud_ = random_() % clouds_.size();
+    cycle_.put_frame(clouds_[cloud_], stamp, t_);
+    // The chain may not trust a stamp that repeats or runs backwards, or is from the future.
+    if ((!any_frame_ || stamp > last_stamp_) && stamp <= t_ + 1.0) {
+      fresh_at_ = t_;
+      fresh_stamp_ = stamp;
+    }
+    last_stamp_ = stamp;
+    any_frame_ = any_frame_ || std::isfinite(stamp);
+  }
+
+  ServoSettings settings() {
+    ServoSettings settings;
+    settings.rendering.coupling.stiffness = between(0.0, 1e4);
+    settings.rendering.coupling.damping = one_in(2) ? 0.0 : between(0.0, 50.0);
+    settings.rendering.coupling.max_force = between(0.0, 1000.0);
+    settings.rendering.proxy.step_budget = one_in(4) ? 2 : 64;
+    settings.safety.ramp_time = between(0.01, 0.3);
+    return settings;
+  }
+
+  std::string verdict(double t, double since_last) {
+    const Vec3& force = device_.force;
+    const double length = force.norm();
+    const double credit = std::min(std::isfinite(since_last) ? since_last : 0.0, 1e-3);
+    const double rise = 500.0 * std::max(credit, 0.0) + 1e-9;
+    const double fall = 2000.0 * 1e-3 + 1e-9;
+    const double age = std::max(t_ - fresh_at_, t_ - fresh_stamp_);
+    const bool allowed = any_frame_ && age <= 0.5 && device_.hand.present && !device_.hand.clutched;
+    const double elapsed = std::isfinite(since_last) ? std::max(since_last, 0.0) : 0.0;
+    heat_ += -std::expm1(-elapsed / 20.0) * (last_.squaredNorm() - heat_);
+
+    std::string broken;
+    if (!force.allFinite()) broken = "a force that is not finite";
+    if (length > 3.3 + 1e-9) broken = "a force above the limit";
+    if (length - last_.norm() > rise) broken = "a force that rises too fast";
+    if ((force - last_).norm() > rise + fall) broken = "a force that changes too fast";
+    if (heat_ > 0.88 * 0.88 * 1.001) broken = "more force than the motors bear for long";
+    // 3.3 N are gone in two milliseconds of time; ticks without time take none off.
+    idle_time_ = allowed ? 0.0 : idle_time_ + std::max(credit, 0.0);
+    if (!allowed && idle_time_ > 3e-3 && length > 0.0)
+      broken = "a force without fresh data or without a hand";
+    if (!broken.empty()) {
+      std::ostringstream text;
+      text << broken << " at tick " << ticks_ << ", t " << t << ": " << force.transpose()
+           << " N after " << last_.transpose() << " N; frame age " << age;
+      broken = text.str();
+    }
+    strongest_ = std::max(strongest_, length);
+    if (length > 0.0) ++forceful_ticks_;
+    last_ = force;
+    return broken;
+  }
+
+  std::mt19937_64 random_;
+  FakeDevice device_;
+  Cycle cycle_;
+  std::vector<std::shared_ptr<const Cloud>> clouds_;
+  int hand_mode_ = 0, camera_mode_ = 0, time_mode_ = 0;
+  Vec3 aim_ = Vec3::Zero();
+  double t_ = 100.0, next_frame_ = 0.0, stuck_ = 100.0;
+  std::size_t cloud_ = 0;
+  bool any_frame_ = false;
+  double last_stamp_ = 0.0, fresh_at_ = 0.0, fresh_stamp_ = 0.0;
+  std::uint64_t ticks_ = 0, forceful_ticks_ = 0;
+  Vec3 last_ = Vec3::Zero();
+  double heat_ = 0.0, idle_time_ = 0.0, strongest_ = 0.0;
+};
+
+}  // namespace palpate::test

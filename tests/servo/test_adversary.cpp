@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdint>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/servo/adversary.hpp"
+
+namespace palpate {
+namespace {
+
+#ifdef PALPATE_SANITIZED
+constexpr std::uint64_t ticks = 50'000;
+#else
+constexpr std::uint64_t ticks = 1'000'000;
+#endif
+
+// The same for longer: adversarial_ticks, beside this program.
+TEST(Adversary, GetsNoForceThatBreaksAPromise) {
+  test::Adversary adversary(1);
+  while (adversary.ticks() < ticks) {
+    const std::string broken = adversary.step();
+    ASSERT_TRUE(broken.empty()) << broken;
+  }
+  EXPECT_GT(adversary.strongest(), 3.0) << "nothing was at stake";
+  EXPECT_GT(adversary.forceful_ticks(), ticks / 50) << "nothing was at stake";
+}
+
+}  // namespace
+}  // namespace palpate

@@ -7,6 +7,7 @@
 #include "palpate/sources/depth_recording.hpp"
 #include "palpate/sources/point_file_source.hpp"
 #include "palpate/sources/source.hpp"
+#include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate {
 namespace {
@@ -19,6 +20,7 @@ struct Scheme {
 // One line for each kind of source.
 const std::vector<Scheme>& schemes() {
   static const std::vector<Scheme> table{
+      {"synthetic", open_synthetic},
       {"pcd", open_point_files},
       {"ply", open_point_files},
       {"tum", open_tum},

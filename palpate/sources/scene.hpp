@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Geometry>
 #include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include "palpate/core/uri.hpp"
 #include "palpate/sources/shapes.hpp"

@@ -20,10 +20,8 @@ struct Scheme {
 // One line for each kind of source.
 const std::vector<Scheme>& schemes() {
   static const std::vector<Scheme> table{
-      {"synthetic", open_synthetic},
-      {"pcd", open_point_files},
-      {"ply", open_point_files},
-      {"tum", open_tum},
+      {"synthetic", open_synthetic}, {"pcd", open_point_files},
+      {"ply", open_point_files},     {"tum", open_tum},
       {"depth", open_depth},
   };
   return table;

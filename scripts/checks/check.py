@@ -18,8 +18,8 @@ KNOWS = {
     "servo": {"core"},
     "sources": {"core", "cloud"},
     "devices": {"core", "servo"},
-    "record": {"core", "servo"},
-    "viewer": {"core", "servo"},
+    "record": {"core", "cloud", "servo"},
+    "viewer": {"core", "cloud", "servo"},
     "lab": {"core", "cloud", "sources"},
 }
 KNOWS["app"] = set(KNOWS)

@@ -33,7 +33,8 @@ CORE_FORBIDS = {
 }
 
 IGNORED = re.compile(r"\.git$|\.cache$|build|out$|node_modules$|__pycache__$|dist$")
-CODE = re.compile(r"\.(cpp|hpp|py|ts|js|cmake|in|gp|sh)$|CMakeLists\.txt$|^scripts/\w+$|^\.ci/")
+CODE = re.compile(r"\.(cpp|hpp|py|ts|js|cmake|in|gp|sh)$|CMakeLists\.txt$"
+                  r"|^scripts/(\w+/)*\w+$|^\.ci/")
 TEXT = re.compile(CODE.pattern + r"|\.(md|json|toml|csv|html|css|yaml|yml)$")
 MACHINE_PATH = re.compile(r"/(?:home|root|work|tmp|Users)/\w")
 COLUMNS = 100

@@ -85,6 +85,7 @@ int info(const InfoOptions& options) {
   const auto frame = source->next();
   if (!frame) throw Error(options.uri, "it has no frames", "give a source with at least one");
   Json first = {{"stamp_s", frame->stamp}};
+  if (!about.details.empty()) first["details"] = about.details;
   if (const auto* image = dynamic_cast<const DepthImage*>(frame->cloud.get())) {
     first.update(describe(*image));
   } else if (const auto* cloud = dynamic_cast<const PointCloud*>(frame->cloud.get())) {

@@ -14,6 +14,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// For example "640x480 points, binary, x float32, y float32, z float32, _ uint8 x 4".
+std::string details_of(const PointFile& file) {
+  std::string text =
+      std::to_string(file.width) + "x" + std::to_string(file.height) + " points, " + file.encoding;
+  for (const PointField& field : file.fields) {
+    text += ", " + field.name + " " + field.type;
+    if (field.count != 1) {
+      text += " x " + std::to_string(field.count);
+    }
+  }
+  if (file.bytes_unread != 0) {
+    text += "; " + std::to_string(file.bytes_unread) + " bytes after them not read";
+  }
+  return text;
+}
+
 }  // namespace
 
 PointFileSource::PointFileSource(std::vector<fs::path> files, Reader reader, const Options& options,
@@ -25,7 +41,9 @@ std::optional<Frame> PointFileSource::next() {
     return std::nullopt;
   }
   const std::size_t k = next_++;  // before anything can throw: the next call goes on
+  info_.details.clear();
   PointFile file = reader_(files_[k]);
+  info_.details = details_of(file);
   for (Vec3& point : file.points) {
     point *= options_.scale;
   }

@@ -19,6 +19,7 @@ struct SourceInfo {
   std::optional<double> frame_rate{};   ///< [Hz] nominal, or the median of the stamps
   double start_time = 0.0;              ///< [s] stamp 0 by the recording's own clock
   std::vector<std::string> notes{};     ///< what a person should know, such as frames left out
+  std::string details{};                ///< of the frame read last: its file's encoding, fields
 };
 
 /// Where frames come from: a camera, a simulation, a recording. Used on one thread, the camera's.

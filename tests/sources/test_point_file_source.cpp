@@ -96,6 +96,22 @@ TEST(PointFiles, CanBeASingleFileOfAnyName) {
   EXPECT_FALSE(source->next().has_value());
 }
 
+TEST(PointFiles, SayWhatTheFileReadLastHolds) {
+  const TemporaryFolder folder;
+  folder.write("0.pcd",
+               "FIELDS _ x y z\nSIZE 1 8 4 2\nTYPE U F F I\nCOUNT 2 1 1 1\nPOINTS 1\nDATA ascii\n"
+               "0 0 1 2 3\nmore\n");
+  folder.write("1.pcd", "nonsense");
+  const auto source = open_source("pcd:" + folder.path().string());
+  EXPECT_EQ(source->info().details, "");
+  source->next();
+  EXPECT_EQ(source->info().details,
+            "1x1 points, ascii, _ uint8 x 2, x float64, y float32, z int16; "
+            "5 bytes after them not read");
+  EXPECT_TRUE(fails_saying([&] { return source->next(); }, "1.pcd"));
+  EXPECT_EQ(source->info().details, "");
+}
+
 TEST(PointFiles, AreScaledToMetresTogetherWithTheirViewpoint) {
   const TemporaryFolder folder;
   const std::string uri = "pcd:" + folder.write("mm.pcd", pcd(500)).string();

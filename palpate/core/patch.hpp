@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 
@@ -30,6 +31,11 @@ class Patch {
   static constexpr std::size_t capacity = 16384;
   /// The most clouds that can contribute to one patch.
   static constexpr std::size_t max_views = 16;
+  /// Loops over a patch read whole blocks of points: the widest vector of floats there is.
+  static constexpr std::size_t block = 16;
+  /// Coordinate [m] of the points that fill the last block: farther than any point of a patch,
+  /// near enough for its square to be a float.
+  static constexpr float far = 1e9F;
 
   /// A run of points that came from one cloud.
   struct View {
@@ -59,10 +65,36 @@ class Patch {
       thinned_ = true;
       return;
     }
-    x_[size_] = x;
-    y_[size_] = y;
-    z_[size_] = z;
+    if (size_ % block == 0) fill_block();
+    points_->x[size_] = x;
+    points_->y[size_] = y;
+    points_->z[size_] = z;
     ++size_;
+  }
+
+  /// The same as a `push` of each point whose `keep` is 1 and not 0. `count` is a multiple of
+  /// `block`.
+  void append(const float* x, const float* y, const float* z, const std::int32_t* keep,
+              std::size_t count) noexcept {
+    std::size_t size = size_;
+    for (std::size_t begin = 0; begin < count; begin += block) {
+      std::int32_t kept = 0;
+      for (std::size_t i = begin; i < begin + block; ++i) kept += keep[i];
+      if (kept == 0) continue;
+      if (size + static_cast<std::size_t>(kept) > capacity) {
+        mark_thinned();
+        break;
+      }
+      // Without a branch for each point: what is not kept is overwritten by the next.
+      for (std::size_t i = begin; i < begin + block; ++i) {
+        points_->x[size] = x[i];
+        points_->y[size] = y[i];
+        points_->z[size] = z[i];
+        size += static_cast<std::size_t>(keep[i]);
+      }
+    }
+    size_ = size;
+    fill_block();
   }
 
   /// Says that a cloud left points out because they were too many.
@@ -73,12 +105,33 @@ class Patch {
   [[nodiscard]] bool thinned() const noexcept { return thinned_; }
   [[nodiscard]] std::size_t view_count() const noexcept { return view_count_; }
   [[nodiscard]] const View& view(std::size_t i) const noexcept { return views_[i]; }
-  [[nodiscard]] const float* x() const noexcept { return x_.get(); }
-  [[nodiscard]] const float* y() const noexcept { return y_.get(); }
-  [[nodiscard]] const float* z() const noexcept { return z_.get(); }
+  /// Coordinates relative to the ball's centre [m, world axes]: size() of them, then `far` ones up
+  /// to padded_size().
+  [[nodiscard]] const float* x() const noexcept { return points_->x.data(); }
+  [[nodiscard]] const float* y() const noexcept { return points_->y.data(); }
+  [[nodiscard]] const float* z() const noexcept { return points_->z.data(); }
+  /// size() rounded up to whole blocks.
+  [[nodiscard]] std::size_t padded_size() const noexcept {
+    return (size_ + block - 1) / block * block;
+  }
 
  private:
-  std::unique_ptr<float[]> x_, y_, z_;
+  // A block beyond the capacity, so that filling one never needs a bound.
+  using Coordinates = std::array<float, capacity + block>;
+  struct alignas(64) Points {
+    Coordinates x, y, z;
+  };
+
+  // Makes the points after the last one far.
+  void fill_block() noexcept {
+    for (std::size_t i = size_; i < size_ + block; ++i) {
+      points_->x[i] = far;
+      points_->y[i] = far;
+      points_->z[i] = far;
+    }
+  }
+
+  std::unique_ptr<Points> points_;
   std::size_t size_ = 0;
   std::size_t view_count_ = 0;
   std::array<View, max_views> views_{};

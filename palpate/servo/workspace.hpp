@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
+
 #include <Eigen/Geometry>
 
 #include "palpate/servo/device.hpp"
@@ -26,7 +28,11 @@ class Workspace {
   void place(const Placement& placement) noexcept { placement_ = placement; }
 
   /// The HIP [m, world]. While the hand is clutched the HIP stays, and goes on from there after.
+  /// A position that is not finite, or absurd, gives a HIP that is not finite and leaves no trace.
   Vec3 hip_in_world(const HandState& hand) noexcept {
+    constexpr double farthest = 1e6;  // [m]
+    if (!(hand.position.cwiseAbs().maxCoeff() <= farthest && hand.position.allFinite()))
+      return Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
     if (hand.clutched) {
       shift_ = held_ - hand.position;
     } else {

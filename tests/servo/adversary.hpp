@@ -62,13 +62,18 @@ class Adversary {
     if (ticks_ % 2048 == 0) choose();
     ++ticks_;
     move_hand();
-    const double previous = t_;
     t_ += tick_interval();
     feed();
     if (random_() % 20'000 == 0) cycle_.set_settings(settings());
     const double given = one_in(50'000) ? nan : t_;
     cycle_.run({.t = given});
-    return verdict(given, given - previous);
+    ServoTick record{};
+    if (!ticks_seen_.try_pop(record)) return "a tick that does not come out of the ring";
+    const Vec3 away = record.tick.hip - device_.hand.position;
+    if (away.allFinite() && away.norm() < 1e3) clutched_away_ = away;
+    const double since_last = given - last_given_;
+    if (std::isfinite(given)) last_given_ = given;
+    return verdict(given, since_last);
   }
 
   [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
@@ -135,22 +140,23 @@ class Adversary {
 
   void move_hand() {
     Vec3& hand = device_.hand.position;
-    if (!hand.allFinite() || hand.norm() > 1.0) hand = aim_;
+    const Vec3 aim = aim_ - clutched_away_;
+    if (!hand.allFinite() || (hand - aim).norm() > 1.0) hand = aim;
     switch (hand_mode_) {
       case 0:
-        hand += 0.003 * (aim_ - hand);
+        hand += 0.003 * (aim - hand);
         break;  // presses
       case 1:
         hand += 2e-4 * place(1.0);
         break;  // wanders
       case 2:
-        hand = aim_ + 0.003 * place(1.0);
+        hand = aim + 0.003 * place(1.0);
         break;  // shakes
       case 3:
-        if (one_in(50)) hand = place(0.05);
+        if (one_in(50)) hand = aim + place(0.05);
         break;  // jumps
       case 4:
-        hand += 4e-3 * (aim_ - hand).normalized();
+        hand += 4e-3 * (aim - hand).normalized();
         break;  // 4 m/s
       default:  // is no number
         if (one_in(30)) hand = Vec3(one_in(2) ? nan : inf, one_in(2) ? 1e300 : 0.0, 0);
@@ -226,6 +232,8 @@ class Adversary {
     idle_time_ = allowed ? 0.0 : idle_time_ + std::max(credit, 0.0);
     if (!allowed && idle_time_ > 3e-3 && length > 0.0)
       broken = "a force without fresh data or without a hand";
+    last_forceful_ = length > 0.0 ? ticks_ : last_forceful_;
+    if (ticks_ - last_forceful_ > 500'000) broken = "a loop that never recovers";
     if (!broken.empty()) {
       std::ostringstream text;
       text << broken << " at tick " << ticks_ << ", t " << t << ": " << force.transpose()
@@ -241,14 +249,17 @@ class Adversary {
   std::mt19937_64 random_;
   FakeDevice device_;
   Cycle cycle_;
+  TickRing<ServoTick>::Reader ticks_seen_ = cycle_.reader();
   std::vector<std::shared_ptr<const Cloud>> clouds_;
   int hand_mode_ = 0, camera_mode_ = 0, time_mode_ = 0;
   Vec3 aim_ = Vec3::Zero();
+  Vec3 clutched_away_ = Vec3::Zero();  // from the hand to the HIP
   double t_ = 100.0, next_frame_ = 0.0, stuck_ = 100.0;
   std::size_t cloud_ = 0;
+  double last_given_ = 100.0;  // [s] the time that a cycle was told last, if it was one
   bool any_frame_ = false;
   double last_stamp_ = 0.0, fresh_at_ = 0.0, fresh_stamp_ = 0.0;
-  std::uint64_t ticks_ = 0, forceful_ticks_ = 0;
+  std::uint64_t ticks_ = 0, forceful_ticks_ = 0, last_forceful_ = 0;
   Vec3 last_ = Vec3::Zero();
   double heat_ = 0.0, idle_time_ = 0.0, strongest_ = 0.0;
 };

@@ -133,6 +133,21 @@ TEST(Cycle, HoldsTheHipWhileTheHandIsClutchedAndGoesOnFromThere) {
   EXPECT_LT((session.run().tick.hip - Vec3(0, 0, 0.01)).norm(), 1e-15);
 }
 
+TEST(Cycle, ForgetsAHandThatWasNoNumberOnceItIsOneAgain) {
+  Session session;
+  session.run_for(0.1);
+  session.device.hand.clutched = true;
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), 1e300}) {
+    session.device.hand.position.x() = bad;
+    const ServoTick record = session.run();
+    EXPECT_TRUE(record.safety & input_refused);
+    EXPECT_TRUE(record.force.isZero());
+    session.device.hand.clutched = false;
+  }
+  session.device.hand.position.x() = 0.0;
+  EXPECT_EQ(session.run().tick.hip, Vec3(0, 0, 0.02));
+}
+
 TEST(Cycle, TakesTheForceOffWhenTheCameraRepeatsItselfOrStandsStill) {
   const auto force_after = [](double seconds, auto feed) {
     Session session;

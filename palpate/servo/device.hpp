@@ -13,6 +13,9 @@ struct DeviceLimits {
   double continuous_force = 0.88;  ///< [N] for ever, without growing hot
 };
 
+/// Of a hand that is only simulated: the peak of a Touch, for as long as one likes.
+constexpr DeviceLimits no_motors{.max_force = 3.3, .continuous_force = 3.3};
+
 /// What can be said of an open device.
 struct DeviceInfo {
   std::string uri;   ///< as it was opened

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/devices/devices.hpp"
+
+#include <array>
+#include <string>
+
+#include "palpate/core/error.hpp"
+#include "palpate/core/parameters.hpp"
+#include "palpate/core/uri.hpp"
+#include "palpate/devices/mouse_device.hpp"
+#include "palpate/devices/scripted_device.hpp"
+#include "palpate/devices/simulated_hand.hpp"
+
+namespace palpate {
+namespace {
+
+using Path = std::optional<HipPath>;
+
+HipPath path_of(const Uri& uri, const Path& path) {
+  if (!uri.path().empty()) return HipPath::read_csv(uri.path());
+  if (path) return *path;
+  throw Error(uri.text(), "there is no path to follow", "write " + uri.scheme() + ":FILE.csv");
+}
+
+std::unique_ptr<Device> open_script(const Uri& uri, const Path& path) {
+  constexpr std::array<std::string_view, 1> options{"repeat"};
+  uri.allow_only(options);
+  return std::make_unique<ScriptedDevice>(path_of(uri, path), uri.has("repeat"), uri.text());
+}
+
+std::unique_ptr<Device> open_hand(const Uri& uri, const Path& path) {
+  constexpr std::array<std::string_view, 5> options{"mass", "stiffness", "damping", "tremor",
+                                                    "seed"};
+  uri.allow_only(options);
+  HandModel model;
+  model.mass = uri.number_option("mass", model.mass, 0.01, 10.0, "kg");
+  model.stiffness = uri.number_option("stiffness", model.stiffness, 1.0, 1e4, "N/m");
+  model.damping = uri.number_option("damping", model.damping, 0.0, 1e3, "N s/m");
+  model.tremor = uri.number_option("tremor", model.tremor, 0.0, 0.01, "m");
+  model.seed = static_cast<std::uint64_t>(uri.number_option("seed", 1.0, 0.0, 1e9, "-"));
+  return std::make_unique<SimulatedHand>(path_of(uri, path), model, uri.text());
+}
+
+std::unique_ptr<Device> open_mouse(const Uri& uri, const Path& /*path*/) {
+  constexpr std::array<std::string_view, 5> options{"x", "y", "z", "response", "max_speed"};
+  uri.allow_only(options);
+  if (!uri.path().empty()) {
+    throw Error(uri.text(), "a mouse has no '" + uri.path() + "'", "write mouse: alone");
+  }
+  const auto coordinate = [&](std::string_view key) {
+    return uri.number_option(key, 0.0, -1e6, 1e6, "m");
+  };
+  const Vec3 start(coordinate("x"), coordinate("y"), coordinate("z"));
+  return std::make_unique<MouseDevice>(start, uri.number_option("response", 0.025, 1e-3, 1.0, "s"),
+                                       uri.number_option("max_speed", 1.0, 0.01, 10.0, "m/s"),
+                                       uri.text());
+}
+
+struct Scheme {
+  std::string_view name;
+  std::unique_ptr<Device> (*open)(const Uri&, const Path&);
+};
+// One line for each kind of device.
+constexpr std::array schemes{Scheme{"script", open_script}, Scheme{"hand", open_hand},
+                             Scheme{"mouse", open_mouse}};
+
+}  // namespace
+
+std::unique_ptr<Device> open_device(std::string_view text, const Path& path) {
+  const Uri uri(text);
+  std::array<std::string_view, schemes.size()> names;
+  std::string known;
+  for (std::size_t i = 0; i < schemes.size(); ++i) {
+    if (schemes[i].name == uri.scheme()) return schemes[i].open(uri, path);
+    names[i] = schemes[i].name;
+    known += " " + std::string(names[i]) + ":";
+  }
+  const std::string_view near = nearest_name(uri.scheme(), names);
+  throw Error(
+      uri.text(), "unknown kind of device '" + uri.scheme() + ":'",
+      (near.empty() ? "" : "did you mean '" + std::string(near) + ":'? ") + "known here:" + known);
+}
+
+}  // namespace palpate

@@ -82,9 +82,9 @@ class Scene {
 
 /// The scene that a URI's path names, with its options: `synthetic:sphere?radius=40mm&speed=0.1`.
 ///
-/// Every scene takes `start speed acceleration stroke frequency swing` for what moves in it
-/// (the whole surface, up; or as the table in docs says) and all but those with a desk `floor`,
-/// the depth of a plane beneath. Other options of the URI are not looked at.
+/// Besides its own options every scene takes those of Motion (start, speed, acceleration, stroke,
+/// frequency, swing) for the part that its summary names, or for all of it, and `floor`, the depth
+/// of a resting plane beneath [m]. Other options of the URI are not looked at (docs/synthetic.md).
 /// @throws Error for an unknown scene, naming the known ones, or a value out of range.
 Scene make_scene(const Uri& uri);
 

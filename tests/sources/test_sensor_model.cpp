@@ -32,7 +32,8 @@ Intrinsics camera() {
 }
 
 std::vector<float> wall(float depth) {
-  return std::vector<float>(pixels, depth);
+  std::vector<float> depths(pixels, depth);
+  return depths;
 }
 
 SensorModel fine() {
@@ -316,6 +317,15 @@ TEST(Sensor, GrazingSightlinesFindNothing) {
     }
   }
   EXPECT_GT(holes, 1000);
+}
+
+TEST(Sensor, AnEdgeSeenSquarelyIsNotGrazing) {
+  std::vector<float> step = wall(0.8F);
+  for (int v = 0; v < height; ++v) std::fill_n(step.begin() + v * width, 100, 0.6F);
+  SensorModel model;
+  model.grazing = 1.4;
+  const Readings readings = Sensor(model, camera()).measure(step, 0);
+  EXPECT_EQ(std::count(readings.begin(), readings.end(), 0), 0);
 }
 
 TEST(Sensor, RefusesValuesThatCannotBe) {

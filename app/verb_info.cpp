@@ -82,6 +82,8 @@ int info(const InfoOptions& options) {
   Json json = {{"uri", about.uri}, {"kind", about.kind}};
   if (about.frames) json["frames"] = *about.frames;
   if (about.frame_rate) json["frame_rate_hz"] = *about.frame_rate;
+  if (about.start_time != 0.0) json["start_time_s"] = about.start_time;
+  if (!about.notes.empty()) json["notes"] = about.notes;
   const auto frame = source->next();
   if (!frame) throw Error(options.uri, "it has no frames", "give a source with at least one");
   Json first = {{"stamp_s", frame->stamp}};

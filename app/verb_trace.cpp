@@ -36,6 +36,11 @@ int trace(const TraceOptions& options) {
   const Parameters parameters = options.method.parameters();
   const HipPath path = HipPath::read_csv(options.path);
   Playback playback(options.cameras);
+  for (std::size_t camera = 0; camera < playback.cameras(); ++camera) {
+    const SourceInfo& about = playback.source(camera).info();
+    for (const std::string& note : about.notes)
+      std::fprintf(stderr, "palpate: %s: %s\n", about.uri.c_str(), note.c_str());
+  }
   Renderer renderer(parameters);
   renderer.seat(path.at(path.first_time()));
   TraceWriter writer(options.out);

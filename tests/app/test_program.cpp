@@ -14,6 +14,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/support/depth_pngs.hpp"
+
 namespace palpate {
 namespace {
 
@@ -149,6 +151,25 @@ TEST_F(Program, TellsWhatIsInASource) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto about = nlohmann::json::parse(outcome.out);
   EXPECT_GT(about["first_frame"]["measured_percent"], 90.0);
+}
+
+TEST_F(Program, SaysWhichFramesOfARecordingItLeavesOut) {
+  fs::create_directory(path("tum"));
+  write("tum/0.png", test::png_of(1, 1, 16, test::grey, std::string("\0\x10\x00", 3)));
+  write("tum/intrinsics.json",
+        R"({"width": 1, "height": 1, "fx": 1, "fy": 1, "cx": 0, "cy": 0,
+            "depth_units_per_metre": 1000})");
+  write("tum/depth.txt", "100 0.png\n101 0.png\n");
+  write("tum/groundtruth.txt", "101 0 0 0 0 0 0 1\n");
+  const std::string note = "1 of 2 frames are left out";
+  const Outcome info = run("info --json tum:" + path("tum"));
+  ASSERT_EQ(info.code, 0) << info.err;
+  const auto about = nlohmann::json::parse(info.out);
+  EXPECT_EQ(about["start_time_s"], 101.0);
+  EXPECT_EQ(about["notes"][0].get<std::string>().substr(0, note.size()), note);
+  const Outcome trace = run("trace --camera tum:" + path("tum") + " --path " + press());
+  EXPECT_EQ(trace.code, 0);
+  EXPECT_NE(trace.err.find(": " + note), std::string::npos) << trace.err;
 }
 
 TEST_F(Program, SuggestsTheWordThatWasMeant) {

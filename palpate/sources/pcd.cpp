@@ -244,7 +244,6 @@ Places places(const Layout& layout, const Size& size) {
 std::vector<Vec3> read_ascii(Cursor& file, const Layout& layout, std::size_t size) {
   const Places values = places(layout, [](const Column& column) { return column.field.count; });
   // A value and what separates it take two bytes at least; the last line may lack its end.
-  // NOLINTNEXTLINE(clang-analyzer-core.DivideZero): x, y and z are among the columns.
   if (size > (file.left() + 1) / (2 * values.all)) {
     fail_promise(file, size);
   }
@@ -284,7 +283,6 @@ std::vector<Vec3> read_ascii(Cursor& file, const Layout& layout, std::size_t siz
 // Point after point, little endian: PCL writes what is in memory.
 std::vector<Vec3> read_binary(Cursor& file, const Layout& layout, std::size_t size) {
   const Places bytes = places(layout, [](const Column& column) { return column.bytes(); });
-  // NOLINTNEXTLINE(clang-analyzer-core.DivideZero): x, y and z are among the columns.
   if (size > file.left() / bytes.all) {
     fail_promise(file, size);
   }
@@ -332,7 +330,6 @@ std::vector<Vec3> read_compressed(Cursor& file, const Layout& layout, std::size_
       return column.is_padding() && !has_padding ? 0 : column.bytes();
     };
     const std::size_t stride = places(layout, bytes_in_point).all;
-    // NOLINTNEXTLINE(clang-analyzer-core.DivideZero): x, y and z are among the columns.
     if (data.size() % stride != 0 || data.size() / stride != size) {
       continue;
     }

@@ -20,6 +20,7 @@ struct Verb {
 Verb add_run(CLI::App& program);
 Verb add_trace(CLI::App& program);
 Verb add_info(CLI::App& program);
+Verb add_bench(CLI::App& program);
 Verb add_parameters(CLI::App& program);
 
 }  // namespace palpate::app

@@ -21,6 +21,7 @@ KNOWS = {
     "record": {"core", "cloud", "servo"},
     "viewer": {"core", "cloud", "servo"},
     "lab": {"core", "cloud", "sources"},
+    "bench": {"core", "cloud"},
 }
 KNOWS["app"] = set(KNOWS)
 
@@ -60,7 +61,7 @@ def lines(root, path):
 def room_of(path):
     """The room that a path from the root belongs to, or None."""
     parts = path.split("/")
-    if len(parts) > 1 and parts[0] in ("lab", "app"):
+    if len(parts) > 1 and parts[0] in ("lab", "bench", "app"):
         return parts[0]
     return parts[1] if len(parts) > 2 and parts[0] == "palpate" else None
 
@@ -68,7 +69,7 @@ def room_of(path):
 def check_rooms(root):
     """Includes and CMake links that point up or sideways."""
     faults = []
-    for path in files(root, re.compile(r"^(palpate|lab|app)/.*(\.[ch]pp|CMakeLists\.txt)$")):
+    for path in files(root, re.compile(r"^(palpate|lab|bench|app)/.*(\.[ch]pp|CMakeLists\.txt)$")):
         room = room_of(path)
         if room is None:
             continue

@@ -172,6 +172,34 @@ TEST_F(Program, SaysWhichFramesOfARecordingItLeavesOut) {
   EXPECT_NE(trace.err.find(": " + note), std::string::npos) << trace.err;
 }
 
+TEST_F(Program, MeasuresItselfBesideWhatOneCouldUseInstead) {
+  const Outcome outcome = run("bench --quick --json");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  for (const char* key : {"step_us_median", "tick_us_median", "tick_us_p999", "frame_us_median",
+                          "kdtree_query_us_median", "kdtree_build_us_median"})
+    EXPECT_GT(json.at(key).get<double>(), 0.0) << key;
+  for (const auto& scene : json.at("scenes")) {
+    const auto& search = scene.at("search");
+    ASSERT_EQ(search.size(), 4U);
+    // All search the same ball; on its rim they may round differently.
+    for (const auto& method : search)
+      EXPECT_NEAR(method.at("found").get<int>(), search[3].at("found").get<int>(), 2)
+          << method.at("method");
+    EXPECT_GT(search[0].at("found"), 0);
+    EXPECT_GT(scene.at("kernel").at("steps_per_tick"), 0.1) << "the hand does not touch";
+  }
+}
+
+TEST_F(Program, WritesHowATicksCostGrows) {
+  const Outcome outcome = run("bench --quick --growth --out " + path("growth"));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::string csv = read(path("growth/growth.csv"));
+  for (const char* series :
+       {"image_width,", "focal_length,", "cameras,", "frame_rate,", "depth_mm,", "unorganised,"})
+    EXPECT_NE(csv.find(series), std::string::npos) << series;
+}
+
 TEST_F(Program, SuggestsTheWordThatWasMeant) {
   expect_refusal("trcae", {"trcae", "did you mean 'trace'"});
   expect_refusal(std::string("trace --camra x --path ") + press(), {"--camera"});

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/costs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/renderer.hpp"
+
+#include "bench/kd_tree.hpp"
+#include "bench/limit.hpp"
+
+namespace palpate::bench {
+namespace {
+
+// Keeps the compiler from dropping a result.
+template <class T>
+void use(const T& value) {
+  asm volatile("" : : "r,m"(value) : "memory");
+}
+
+// How many calls go into a sample of something that takes a fraction of a microsecond.
+constexpr std::size_t many = 64;
+
+// A cloud that counts.
+class CountedCloud final : public Cloud {
+ public:
+  explicit CountedCloud(const Cloud& cloud) : cloud_(&cloud) {}
+  void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override {
+    ++gathers;
+    cloud_->gather(ball, max_points, patch);
+  }
+  mutable std::size_t gathers = 0;
+
+ private:
+  const Cloud* cloud_;
+};
+
+Vec3 hip_at(const Subject& subject, const Hand& hand, double t) {
+  // To and fro at constant speed.
+  const double lap = 4.0 * hand.amplitude / hand.speed;
+  const double phase = std::fmod(t, lap) / lap;
+  const double position = hand.amplitude * (1.0 - 4.0 * std::abs(phase - 0.5));
+  return subject.surface + hand.depth * subject.into + position * subject.along;
+}
+
+// The hand's session: comes down on the surface, then moves.
+class Session {
+ public:
+  Session(const Subject& subject, const Parameters& parameters, const Hand& hand)
+      : subject_(subject), hand_(hand), renderer(parameters) {
+    renderer.frame(*subject.frames.front(), 0.0);
+    const Vec3 start = hip_at(subject, hand, 0.0);
+    renderer.seat(start - (std::max(hand.depth, 0.0) + 0.03) * subject.into);
+    constexpr int settling = 200;
+    for (int i = 0; i < settling; ++i) renderer.tick(start, 0.0);
+  }
+
+  // Is there a new frame for the next tick?
+  [[nodiscard]] bool frame_is_due() const {
+    return static_cast<double>(frames_) <= (now() + 1.0 / hand_.tick_rate) * hand_.frame_rate;
+  }
+  void frame(const std::vector<const Cloud*>& clouds) {
+    renderer.frame(*clouds[frames_ % clouds.size()],
+                   static_cast<double>(frames_) / hand_.frame_rate);
+    ++frames_;
+  }
+  [[nodiscard]] Vec3 next_hip() const {
+    return hip_at(subject_, hand_, static_cast<double>(ticks_ + 1) / hand_.tick_rate);
+  }
+  Tick tick(const Vec3& hip) {
+    ++ticks_;
+    return renderer.tick(hip, now());
+  }
+  [[nodiscard]] double now() const { return static_cast<double>(ticks_) / hand_.tick_rate; }
+
+ private:
+  const Subject& subject_;
+  Hand hand_;
+  std::size_t ticks_ = 0;
+  std::size_t frames_ = 1;
+
+ public:
+  Renderer renderer;
+};
+
+void measure_ticks(const Subject& subject, const Parameters& parameters, const Hand& hand,
+                   double budget, KernelCosts& costs) {
+  std::vector<CountedCloud> counted;
+  counted.reserve(subject.frames.size());
+  std::vector<const Cloud*> clouds;
+  for (const auto& frame : subject.frames) clouds.push_back(&counted.emplace_back(*frame));
+
+  Session session(subject, parameters, hand);
+  constexpr std::size_t most = 200000;
+  std::vector<double> ticks;
+  std::vector<double> after_frame;
+  ticks.reserve(most);
+  after_frame.reserve(most);
+  double points = 0.0;
+  double steps = 0.0;
+  const double cost = clock_cost();
+  const double end = thread_time() + budget * 1e6;
+  const auto fewest = static_cast<std::size_t>(3.0 * hand.tick_rate / hand.frame_rate) + 20;
+  while (ticks.size() < most && (ticks.size() < fewest || thread_time() < end)) {
+    const bool new_frame = session.frame_is_due();
+    if (new_frame) session.frame(clouds);
+    const Vec3 hip = session.next_hip();
+    const double begin = thread_time();
+    const Tick tick = session.tick(hip);
+    const double taken = std::max(thread_time() - begin - cost, 0.0);
+    use(tick);
+    ticks.push_back(taken);
+    if (new_frame) after_frame.push_back(taken);
+    steps += tick.steps;
+    points += static_cast<double>(session.renderer.patch().size());
+  }
+  const auto count = static_cast<double>(ticks.size());
+  std::size_t gathers = 0;
+  for (const CountedCloud& cloud : counted) gathers += cloud.gathers;
+  costs.points = points / count;
+  costs.steps = steps / count;
+  costs.gathers = static_cast<double>(gathers) / count;
+  costs.tick = distribution(std::move(ticks), 1);
+  costs.tick_after_frame = distribution(std::move(after_frame), 1);
+}
+
+// The pixels that a gather has to look at.
+double measure_window(const Cloud& cloud, const Ball& ball, double budget) {
+  if (const auto* set = dynamic_cast<const CloudSet*>(&cloud)) {
+    double sum = 0.0;
+    for (const auto& each : set->clouds()) sum += measure_window(*each, ball, budget);
+    return sum;
+  }
+  const auto* image = dynamic_cast<const DepthImage*>(&cloud);
+  if (image == nullptr) return 0.0;
+  const Eigen::Isometry3d camera_from_world = image->world_from_camera().inverse();
+  const auto window = image->rays().window(camera_from_world * ball.centre, ball.radius);
+  if (window.empty()) return 0.0;
+  const auto row_length = static_cast<std::size_t>(image->intrinsics().width);
+  const auto columns = static_cast<std::size_t>(window.u_end - window.u_begin);
+  const auto rows = static_cast<std::size_t>(window.v_end - window.v_begin);
+  const std::uint16_t* first = image->depth().data() +
+                               static_cast<std::size_t>(window.v_begin) * row_length +
+                               static_cast<std::size_t>(window.u_begin);
+  return measure(budget, many, [&] { use(load_and_add(first, columns, rows, row_length)); }).median;
+}
+
+}  // namespace
+
+KernelCosts kernel_costs(const Subject& subject, const Parameters& parameters, const Hand& hand,
+                         double budget) {
+  KernelCosts costs;
+  measure_ticks(subject, parameters, hand, budget, costs);
+
+  Session session(subject, parameters, hand);
+  Renderer& renderer = session.renderer;
+  const Tick rest = renderer.tick(session.next_hip(), 0.0);
+  const Patch& patch = renderer.patch();
+  const ProxyParameters& proxy = parameters.proxy;
+  const Vec3 u = rest.hip - rest.proxy;
+  costs.step = measure(budget, many, [&] {
+    const Surroundings around = look_around(patch, rest.proxy, proxy);
+    use(proxy_step(patch, rest.proxy, around, around.normal.value_or(rest.normal), u, proxy.r_c(),
+                   0, proxy));
+  });
+  const Ball ball = patch.ball();
+  Patch scratch;
+  costs.gather = measure(budget, many, [&] { gather(*subject.frames.front(), ball, scratch); });
+  costs.limit_patch = measure(budget, many, [&] { use(load_and_add(scratch)); }).median;
+  costs.limit_gather = measure_window(*subject.frames.front(), ball, budget);
+  // A step reads the patch once to look around and, unless it slides, once more to see how far it
+  // can go; the last look finds that it has converged. Counted here: the looks.
+  costs.limit_tick = (costs.steps + 1.0) * costs.limit_patch + costs.gathers * costs.limit_gather;
+
+  std::size_t frames = 0;
+  costs.frame = measure(budget, many, [&] {
+    ++frames;
+    renderer.frame(*subject.frames[frames % subject.frames.size()],
+                   static_cast<double>(frames) / hand.frame_rate);
+  });
+  return costs;
+}
+
+std::vector<SearchCosts> search_costs(const Subject& subject, const Parameters& parameters,
+                                      double budget) {
+  const Cloud& frame = *subject.frames.front();
+  const std::vector<Vec3> points = points_of(frame);
+  // The ball that a tick gathers from: r_3 and the proxy's room, about a proxy at rest.
+  const ProxyParameters& proxy = parameters.proxy;
+  const Ball ball{subject.surface - proxy.r_c() * subject.into, proxy.r_3 + 0.2 * proxy.r_c()};
+  std::vector<SearchCosts> rows;
+  Patch patch;
+  const auto add = [&](const std::string& name, std::optional<Distribution> build,
+                       std::size_t batch, const std::function<std::size_t()>& query) {
+    SearchCosts& row = rows.emplace_back();
+    row.name = name;
+    row.build = build;
+    row.found = query();
+    row.query = measure(budget, batch, [&] { use(query()); });
+  };
+  const auto gathered = [&](const Cloud& cloud) {
+    gather(cloud, ball, patch);
+    return patch.size();
+  };
+
+  if (dynamic_cast<const PointCloud*>(&frame) == nullptr)
+    add("depth image", std::nullopt, many, [&] { return gathered(frame); });
+
+  std::optional<PointCloud> hash;
+  const Distribution hash_build = measure(budget, 1, [&] { hash.emplace(points); });
+  add("voxel hash", hash_build, many, [&] { return gathered(*hash); });
+
+  std::unique_ptr<KdTree> tree;
+  const Distribution tree_build =
+      measure(budget, 1, [&] { tree = std::make_unique<KdTree>(points); });
+  add("nanoflann", tree_build, many, [&] { return tree->search(ball); });
+
+  const BruteForceCloud all(points);
+  add("brute force", std::nullopt, 1, [&] { return gathered(all); });
+  return rows;
+}
+
+}  // namespace palpate::bench

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/core/parameters.hpp"
+
+#include "bench/subject.hpp"
+#include "bench/timing.hpp"
+
+namespace palpate::bench {
+
+/// How a hand moves while ticks are measured.
+struct Hand {
+  double depth = 0.005;       ///< [m] beyond the surface; negative: above it, in free motion
+  double speed = 0.1;         ///< [m/s] to and fro along the surface
+  double amplitude = 0.02;    ///< [m]
+  double frame_rate = 30.0;   ///< [Hz] of frames
+  double tick_rate = 1000.0;  ///< [Hz] of ticks
+};
+
+/// What the kernel costs on a subject.
+struct KernelCosts {
+  double points = 0.0;            ///< in the patch, mean over ticks
+  double steps = 0.0;             ///< per tick
+  double gathers = 0.0;           ///< per tick
+  Distribution tick;              ///< all that a cycle of haptic rendering does
+  Distribution tick_after_frame;  ///< those ticks that had a new frame to gather from
+  Distribution frame;             ///< handing a frame over
+  Distribution step;              ///< one look around and one step, at rest in contact
+  Distribution gather;            ///< of the patch where the proxy rests
+  double limit_patch = 0.0;       ///< [us] loading and adding that patch once
+  double limit_gather = 0.0;      ///< [us] loading and adding its pixel window; 0 if unorganised
+  double limit_tick = 0.0;        ///< [us] as many passes over patch and window as the ticks made
+};
+
+/// Runs the hand over the subject for about `budget` seconds a figure.
+KernelCosts kernel_costs(const Subject& subject, const Parameters& parameters, const Hand& hand,
+                         double budget);
+
+/// One way to find the points near a place.
+struct SearchCosts {
+  std::string name;
+  std::optional<Distribution> build;  ///< once a frame; none if there is nothing to build
+  Distribution query;
+  std::size_t found = 0;
+};
+
+/// The same ball searched in the subject's first frame by every method there is, ours first.
+std::vector<SearchCosts> search_costs(const Subject& subject, const Parameters& parameters,
+                                      double budget);
+
+}  // namespace palpate::bench

@@ -58,7 +58,7 @@ double parse_number(const std::string& subject, const std::string& text) {
 }
 
 void MethodOptions::add_to(CLI::App& command) {
-  command.add_option("--method", method_, "paper (default), paper-as-printed or fixed-step");
+  command.add_option("--method", method_, "paper (default), paper-as-printed, fixed-step or sight");
   command
       .add_option("--set", assignments_,
                   "set a parameter, NAME=VALUE in SI units; see `palpate parameters`")

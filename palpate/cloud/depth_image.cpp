@@ -125,6 +125,32 @@ void deproject_pixels(const Pixels& pixels, std::size_t size, const Reference& r
   }
 }
 
+// A SightCone in floats.
+struct Cone {
+  Eigen::Vector3f axis;
+  float reach, radius, widening;  // radius + widening * along
+};
+
+PALPATE_VECTORISED
+void keep_inside(const Cone& cone, std::size_t size, Points& points) noexcept {
+  const Eigen::Vector3f axis = cone.axis;
+  const float reach = cone.reach;
+  const float radius = cone.radius;
+  const float widening = cone.widening;
+  const std::size_t end = whole_blocks(size);
+#pragma omp simd
+  for (std::size_t i = 0; i < end; ++i) {
+    const float x = points.x[i];
+    const float y = points.y[i];
+    const float z = points.z[i];
+    const float along = x * axis.x() + (y * axis.y() + z * axis.z());
+    const float r = radius + widening * along;
+    const bool near = x * x + y * y + z * z - along * along <= r * r;
+    const bool keep = near & (r > 0.0F) & (along <= reach) & (-along <= reach);
+    points.inside[i] = keep ? points.inside[i] : 0;
+  }
+}
+
 // Part of a pixel window: `rows` of `columns`, every stride-th of each.
 struct Strip {
   const std::uint16_t* depth;  // its first pixel
@@ -149,7 +175,8 @@ void read_slopes(const double* rays, const Strip& strip, double reference, float
 }
 
 PALPATE_VECTORISED
-void gather_strip(const Strip& strip, const Reference& reference, Patch& patch) noexcept {
+void gather_strip(const Strip& strip, const Reference& reference, const Cone* cone,
+                  Patch& patch) noexcept {
   Pixels pixels;
   Points points;
   std::size_t size = 0;
@@ -160,6 +187,7 @@ void gather_strip(const Strip& strip, const Reference& reference, Patch& patch) 
       pixels.slope_x[i] = pixels.slope_y[i] = 0.0F;
     }
     deproject_pixels(pixels, size, reference, points);
+    if (cone != nullptr) keep_inside(*cone, size, points);
     patch.append(points.x.data(), points.y.data(), points.z.data(), points.inside.data(),
                  whole_blocks(size));
     size = 0;
@@ -325,6 +353,19 @@ DepthImage::DepthImage(std::shared_ptr<const ViewingRays> rays, std::vector<std:
 
 void DepthImage::gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept {
   patch.start_view(Vec3(world_from_camera_.translation()));
+  gather(ball, nullptr, max_points, patch);
+}
+
+void DepthImage::gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept {
+  const Vec3 viewpoint = world_from_camera_.translation();
+  patch.start_view(viewpoint);
+  const SightCone cone(beam, viewpoint);
+  gather(Ball{beam.through, beam.radius}, &cone, max_points, patch);
+}
+
+// The points within the ball; with a cone, those that the ball's pixels see within that.
+void DepthImage::gather(const Ball& ball, const SightCone* sight, std::size_t max_points,
+                        Patch& patch) const noexcept {
   const Vec3 centre =
       world_from_camera_.linear().transpose() * (ball.centre - world_from_camera_.translation());
   const ViewingRays::Window window = rays_->window(centre, ball.radius);
@@ -352,11 +393,21 @@ void DepthImage::gather(const Ball& ball, std::size_t max_points, Patch& patch) 
                             .raw = static_cast<std::int32_t>(raw),
                             .z = static_cast<float>(z),
                             .metres_per_unit = static_cast<float>(metres_per_unit_),
-                            .squared_radius = static_cast<float>(ball.radius * ball.radius),
+                            .squared_radius = sight == nullptr
+                                                  ? static_cast<float>(ball.radius * ball.radius)
+                                                  : std::numeric_limits<float>::max(),
                             .axis_x = rotation.col(0).cast<float>(),
                             .axis_y = rotation.col(1).cast<float>(),
                             .ray = (rotation * ray).cast<float>(),
                             .offset = (rotation * (z * ray - centre)).cast<float>()};
+
+  Cone cone{};
+  if (sight != nullptr) {
+    cone = {.axis = sight->axis().cast<float>(),
+            .reach = static_cast<float>(sight->reach()),
+            .radius = static_cast<float>(sight->radius_at(0.0)),
+            .widening = static_cast<float>(sight->radius_at(1.0) - sight->radius_at(0.0))};
+  }
 
   const bool per_pixel = rays_->intrinsics().distorted();
   const auto width = static_cast<std::size_t>(rays_->intrinsics().width);
@@ -376,7 +427,7 @@ void DepthImage::gather(const Ball& ball, std::size_t max_points, Patch& patch) 
          .stride = static_cast<std::size_t>(stride),
          .columns = std::min(strip_width, static_cast<std::size_t>(in_steps(window.u_end - u))),
          .rows = static_cast<std::size_t>(in_steps(window.v_end - first_v))},
-        reference, patch);
+        reference, sight == nullptr ? nullptr : &cone, patch);
   }
 }
 

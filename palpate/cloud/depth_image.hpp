@@ -79,6 +79,7 @@ class DepthImage final : public Cloud {
              const Eigen::Isometry3d& world_from_camera = Eigen::Isometry3d::Identity());
 
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
+  void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
 
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return rays_->intrinsics(); }
   [[nodiscard]] const ViewingRays& rays() const noexcept { return *rays_; }
@@ -94,6 +95,9 @@ class DepthImage final : public Cloud {
   [[nodiscard]] std::vector<Vec3> points() const;
 
  private:
+  void gather(const Ball& ball, const SightCone* sight, std::size_t max_points,
+              Patch& patch) const noexcept;
+
   std::shared_ptr<const ViewingRays> rays_;
   std::vector<std::uint16_t> depth_;
   double units_per_metre_;

@@ -25,11 +25,13 @@ std::size_t slot_of(std::uint64_t key, std::size_t slots) {
   return (key * 0x9E3779B97F4A7C15ULL) >> (64U - static_cast<unsigned>(std::bit_width(slots) - 1));
 }
 
+void push(const Vec3& p, Patch& patch) {
+  patch.push(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
+}
+
 void push_if_inside(const Vec3& point, const Ball& ball, Patch& patch) {
   const Vec3 p = point - ball.centre;
-  if (p.squaredNorm() <= ball.radius * ball.radius) {
-    patch.push(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
-  }
+  if (p.squaredNorm() <= ball.radius * ball.radius) push(p, patch);
 }
 
 }  // namespace
@@ -113,24 +115,67 @@ const PointCloud::Cell* PointCloud::find(std::uint64_t key) const noexcept {
   return nullptr;
 }
 
+// The cells that meet the box from `low` to `high` [m, world].
 template <class Visit>
-void PointCloud::for_each_cell(const Ball& ball, const Visit& visit) const noexcept {
-  const Vec3 centre = ball.centre - corner_;
-  Index low{};
-  Index high{};
+void PointCloud::for_each_cell(const Vec3& low, const Vec3& high,
+                               const Visit& visit) const noexcept {
+  Index first{};
+  Index last{};
   for (int axis = 0; axis < 3; ++axis) {
-    const double from = std::max(centre[axis] - ball.radius, 0.0);
-    const double to = std::min(centre[axis] + ball.radius, extent_[axis]);
+    const double from = std::max(low[axis] - corner_[axis], 0.0);
+    const double to = std::min(high[axis] - corner_[axis], extent_[axis]);
     if (!(from <= to)) return;
-    low[axis] = static_cast<std::int64_t>(from / voxel_);
-    high[axis] = static_cast<std::int64_t>(to / voxel_);
+    first[axis] = static_cast<std::int64_t>(from / voxel_);
+    last[axis] = static_cast<std::int64_t>(to / voxel_);
   }
-  for (std::int64_t k = low[2]; k <= high[2]; ++k) {
-    for (std::int64_t j = low[1]; j <= high[1]; ++j) {
-      for (std::int64_t i = low[0]; i <= high[0]; ++i) {
+  for (std::int64_t k = first[2]; k <= last[2]; ++k) {
+    for (std::int64_t j = first[1]; j <= last[1]; ++j) {
+      for (std::int64_t i = first[0]; i <= last[0]; ++i) {
         if (const Cell* cell = find(key_of(i, j, k))) visit(*cell);
       }
     }
+  }
+}
+
+template <class Visit>
+void PointCloud::for_each_cell(const Ball& ball, const Visit& visit) const noexcept {
+  const Vec3 half = Vec3::Constant(ball.radius);
+  for_each_cell(Vec3(ball.centre - half), Vec3(ball.centre + half), visit);
+}
+
+// Layer of voxels by layer of voxels along the axis that the beam follows most: in each, the cells
+// of the box around its piece of the beam. Layers are visited once, whatever the direction.
+template <class Visit>
+void PointCloud::for_each_cell(const Beam& beam, const SightCone& cone,
+                               const Visit& visit) const noexcept {
+  const Vec3& direction = cone.axis();
+  int along = 0;
+  direction.cwiseAbs().maxCoeff(&along);
+  const double slope = std::abs(direction[along]);
+  const double widest = std::max(cone.radius_at(cone.reach()), cone.radius_at(-cone.reach()));
+  const double half_length = cone.reach() * slope + widest;
+  const double centre = beam.through[along] - corner_[along];
+  const double from = std::max(centre - half_length, 0.0);
+  const double to = std::min(centre + half_length, extent_[along]);
+  if (!(from <= to)) return;
+  const auto last = static_cast<std::int64_t>(to / voxel_);
+  for (auto layer = static_cast<std::int64_t>(from / voxel_); layer <= last; ++layer) {
+    // Points of the cone whose coordinate `along` lies in this layer, give or take its radius.
+    const double middle = ((static_cast<double>(layer) + 0.5) * voxel_ - centre) / direction[along];
+    const double half_piece = (0.5 * voxel_ + widest) / slope;
+    const double radius =
+        std::max(cone.radius_at(middle - half_piece), cone.radius_at(middle + half_piece));
+    if (radius <= 0.0) continue;
+    const Vec3 at = beam.through + middle * direction;
+    // To the side, a cone that leans moves by at most half a piece times its lean.
+    Vec3 half = (direction.cwiseAbs() * half_piece).array() + radius;
+    half[along] = 0.0;
+    Vec3 low = at - half;
+    Vec3 high = at + half;
+    low[along] = high[along] = corner_[along] + (static_cast<double>(layer) + 0.5) * voxel_;
+    // The last layer's middle may lie beyond the last point.
+    low[along] = high[along] = std::min(low[along], corner_[along] + extent_[along]);
+    for_each_cell(low, high, visit);
   }
 }
 
@@ -148,10 +193,41 @@ void PointCloud::gather(const Ball& ball, std::size_t max_points, Patch& patch) 
   });
 }
 
+void PointCloud::gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept {
+  patch.start_view(viewpoint_);
+  if (x_.empty()) return;
+  const SightCone cone(beam, viewpoint_);
+  std::size_t inside = 0;
+  for_each_cell(beam, cone, [&](const Cell& cell) {
+    for (std::size_t i = cell.begin; i < cell.end; ++i) {
+      if (cone.holds(point(i) - beam.through)) ++inside;
+    }
+  });
+  const std::size_t stride = inside / std::max<std::size_t>(max_points, 1) + 1;
+  if (stride > 1) patch.mark_thinned();
+  std::size_t next = 0;
+  for_each_cell(beam, cone, [&](const Cell& cell) {
+    for (std::size_t i = cell.begin; i < cell.end; ++i) {
+      const Vec3 p = point(i) - beam.through;
+      if (cone.holds(p) && next++ % stride == 0) push(p, patch);
+    }
+  });
+}
+
 void BruteForceCloud::gather(const Ball& ball, std::size_t /*max_points*/,
                              Patch& patch) const noexcept {
   patch.start_view(viewpoint_);
   for (const Vec3& p : points_) push_if_inside(p, ball, patch);
+}
+
+void BruteForceCloud::gather(const Beam& beam, std::size_t /*max_points*/,
+                             Patch& patch) const noexcept {
+  patch.start_view(viewpoint_);
+  const SightCone cone(beam, viewpoint_);
+  for (const Vec3& point : points_) {
+    const Vec3 p = point - beam.through;
+    if (cone.holds(p)) push(p, patch);
+  }
 }
 
 CloudSet::CloudSet(std::vector<std::shared_ptr<const Cloud>> clouds) : clouds_(std::move(clouds)) {
@@ -167,6 +243,10 @@ CloudSet::CloudSet(std::vector<std::shared_ptr<const Cloud>> clouds) : clouds_(s
 
 void CloudSet::gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept {
   for (const auto& cloud : clouds_) cloud->gather(ball, max_points / clouds_.size(), patch);
+}
+
+void CloudSet::gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept {
+  for (const auto& cloud : clouds_) cloud->gather(beam, max_points / clouds_.size(), patch);
 }
 
 }  // namespace palpate

@@ -25,6 +25,7 @@ class PointCloud final : public Cloud {
                       double voxel = 0.010);
 
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
+  void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
 
   [[nodiscard]] std::size_t size() const noexcept { return x_.size(); }
   /// How many points were left out because a coordinate was not finite.
@@ -42,6 +43,10 @@ class PointCloud final : public Cloud {
   [[nodiscard]] const Cell* find(std::uint64_t key) const noexcept;
   template <class Visit>
   void for_each_cell(const Ball& ball, const Visit& visit) const noexcept;
+  template <class Visit>
+  void for_each_cell(const Vec3& low, const Vec3& high, const Visit& visit) const noexcept;
+  template <class Visit>
+  void for_each_cell(const Beam& beam, const SightCone& cone, const Visit& visit) const noexcept;
 
   std::vector<double> x_, y_, z_;  // sorted by voxel
   std::vector<Cell> cells_;        // open addressing, a power of two
@@ -59,6 +64,7 @@ class BruteForceCloud final : public Cloud {
       : points_(std::move(points)), viewpoint_(viewpoint) {}
 
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
+  void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
 
  private:
   std::vector<Vec3> points_;
@@ -73,6 +79,7 @@ class CloudSet final : public Cloud {
 
   /// Each cloud may fill an equal share of the patch.
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
+  void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
 
   [[nodiscard]] const std::vector<std::shared_ptr<const Cloud>>& clouds() const noexcept {
     return clouds_;

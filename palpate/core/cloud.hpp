@@ -1,9 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+#include <optional>
+
 #include "palpate/core/patch.hpp"
 
 namespace palpate {
+
+/// All that is seen along the lines of sight through a place: a narrow cone from the viewpoint.
+struct Beam {
+  Vec3 through;   ///< [m] world: a place on its axis
+  double radius;  ///< [m] of its cross-section there
+  double reach;   ///< [m] how far it extends to both sides of `through`, along the axis
+  /// [-] unit: the axis where a cloud does not know its viewpoint; the cone is a cylinder then.
+  Vec3 axis;
+};
 
 /// Whatever can be touched: it can gather the points near a place into a patch.
 ///
@@ -18,12 +30,61 @@ class Cloud {
   /// `max_points`, an evenly thinned part of them is added and the patch is marked thinned.
   /// `patch.ball()` must be `ball`, or a ball about the same centre.
   virtual void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept = 0;
+
+  /// Opens a view in `patch` and adds every point in the beam from the cloud's viewpoint.
+  ///
+  /// [servo] Bounded work, no allocation, no lock, no exception. If the beam holds more than
+  /// `max_points`, an evenly thinned part of them is added and the patch is marked thinned.
+  /// `patch.ball()` must be a ball about `beam.through`.
+  virtual void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept = 0;
+};
+
+/// A beam as one viewpoint sees it.
+class SightCone {
+ public:
+  SightCone(const Beam& beam, const std::optional<Vec3>& viewpoint) noexcept
+      : reach_(beam.reach), radius_(beam.radius) {
+    const Vec3 line = viewpoint ? Vec3(beam.through - *viewpoint) : Vec3::Zero();
+    const double distance = line.norm();
+    // A viewpoint at the place itself sees it along no line.
+    seen_ = distance > beam.radius;
+    axis_ = seen_ ? Vec3(line / distance) : beam.axis;
+    widening_ = seen_ ? 1.0 / distance : 0.0;
+  }
+
+  /// Is a point in it? @param p  [m] relative to `through`, world axes
+  [[nodiscard]] bool holds(const Vec3& p) const noexcept {
+    const double along = p.dot(axis_);
+    const double radius = radius_at(along);
+    return std::abs(along) <= reach_ && radius > 0.0 &&
+           p.squaredNorm() - along * along <= radius * radius;
+  }
+
+  /// [-] unit, away from the viewpoint where there is one.
+  [[nodiscard]] const Vec3& axis() const noexcept { return axis_; }
+  [[nodiscard]] double reach() const noexcept { return reach_; }
+  /// [m] of the cross-section `along` [m] beyond `through`.
+  [[nodiscard]] double radius_at(double along) const noexcept {
+    return radius_ * (1.0 + widening_ * along);
+  }
+
+ private:
+  Vec3 axis_;
+  double reach_, radius_, widening_;
+  bool seen_;
 };
 
 /// Empties `patch` and fills it with the points of `cloud` in `ball`. [servo]
 inline void gather(const Cloud& cloud, const Ball& ball, Patch& patch) noexcept {
   patch.start(ball);
   cloud.gather(ball, Patch::capacity, patch);
+}
+
+/// Empties `patch` and fills it with at most `max_points` points of `cloud` in `beam`. [servo]
+inline void gather(const Cloud& cloud, const Beam& beam, std::size_t max_points,
+                   Patch& patch) noexcept {
+  patch.start(Ball{beam.through, beam.reach});
+  cloud.gather(beam, max_points, patch);
 }
 
 }  // namespace palpate

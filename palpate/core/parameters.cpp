@@ -77,9 +77,9 @@ struct MethodName {
   Method method;
   std::string_view name;
 };
-constexpr std::array method_names = {MethodName{Method::paper, "paper"},
-                                     MethodName{Method::paper_as_printed, "paper-as-printed"},
-                                     MethodName{Method::fixed_step, "fixed-step"}};
+constexpr std::array method_names = {
+    MethodName{Method::paper, "paper"}, MethodName{Method::paper_as_printed, "paper-as-printed"},
+    MethodName{Method::fixed_step, "fixed-step"}, MethodName{Method::sight, "sight"}};
 
 std::string number(double value) {
   std::string text = std::to_string(value);

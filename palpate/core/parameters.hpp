@@ -12,6 +12,7 @@ enum class Method {
   paper,             ///< sections 4.1-4.6 with the errata of docs/method.md corrected
   paper_as_printed,  ///< the same to the letter: signs of (15) and (16), 1/f_c in (3) and (13)
   fixed_step,        ///< the 2011 method [1]: every step 0.1 r_1, no velocity estimate
+  sight,             ///< sightline tracking: docs/method.md, "Sight"
 };
 
 /// The proxy's regions and the constants of its movement. Section 4.1, 4.3, 4.4; Table 2.

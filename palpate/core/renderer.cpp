@@ -40,6 +40,7 @@ Renderer::Renderer(const Parameters& parameters) : parameters_(parameters) {
 
 void Renderer::set_parameters(const Parameters& parameters) {
   validate(parameters);
+  if (parameters.method != parameters_.method) sight_.forget();
   parameters_ = parameters;
   patch_is_stale_ = true;
 }
@@ -53,6 +54,10 @@ void Renderer::seat(const Vec3& proxy) noexcept {
   velocity_update_due_ = false;
   last_distance_.reset();
   patch_is_stale_ = true;
+  sight_.forget();
+  on_fit_ = false;
+  last_force_ = Vec3::Zero();
+  blend_offset_ = Vec3::Zero();
 }
 
 void Renderer::frame(const Cloud& cloud, double stamp) noexcept {
@@ -66,6 +71,10 @@ void Renderer::frame(const Cloud& cloud, double stamp) noexcept {
   patch_is_stale_ = true;
   velocity_update_due_ = false;
 
+  if (parameters_.method == Method::sight) {
+    frame_by_sight(cloud);
+    return;
+  }
   // Without contact there is no normal to move along and nothing to measure a velocity against:
   // the estimate starts again from 0 (the print leaves this open).
   if (parameters_.method == Method::fixed_step || !touching_ || !normal_ || !stamp_ok_) {
@@ -79,6 +88,73 @@ void Renderer::frame(const Cloud& cloud, double stamp) noexcept {
   }
   *proxy_ += frame_correction(velocity_, *normal_, interval_);  // Step 1, Eq. (3)
   velocity_update_due_ = true;
+}
+
+// A frame seen along the lines of sight: docs/method.md, "Sight".
+void Renderer::frame_by_sight(const Cloud& cloud) noexcept {
+  blend_due_ = true;
+  behind_ = false;
+  if (!proxy_) return;
+  if (!stamp_ok_) interval_ = 1.0 / parameters_.motion.frame_rate;
+  using Event = SightTracker::Event;
+  const Event event = sight_.frame(cloud, stamp_, interval_, *proxy_);
+  if (event != Event::followed && event != Event::jumped) return;
+  // Side repair: the proxy was on the surface's free side and has to be there still.
+  const SurfaceContact contact = sight_.contact(*proxy_, stamp_);
+  if (contact.distance < parameters_.proxy.r_c()) {
+    *proxy_ = contact.foot + parameters_.proxy.r_c() * contact.normal;
+  }
+}
+
+// Movement on the fitted surface where it describes the points well, on the points elsewhere.
+Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
+  // How far from the fitted surface the points' noise can stop a proxy.
+  constexpr double near = 10e-3;
+  constexpr int most_slides = 6;
+  const double r_c = parameters_.proxy.r_c();
+  if (!touching_) sight_.watch(*cloud_, *proxy_);
+
+  Movement movement;
+  int slides = 0;
+  const auto rest_on_fit = [&] {
+    while (sight_.smooth()) {
+      const SurfaceContact contact = sight_.contact(hip, t);
+      if (contact.distance > r_c + near + 4.0 * sight_.spread()) return false;
+      if (contact.at_limit && !sight_.holding()) {
+        if (slides == most_slides) movement.flags |= step_budget_hit;
+        if (slides++ < most_slides && sight_.slide(*cloud_, contact.foot)) continue;
+        if (!sight_.smooth()) return false;
+      }
+      ++movement.steps;
+      if (contact.distance >= r_c) {
+        proxy_ = hip;
+        movement.around = {ContactState::free_motion, contact.normal};
+      } else {
+        proxy_ = contact.foot + r_c * contact.normal;
+        movement.around = {ContactState::contact, contact.normal};
+        movement.touched = true;
+        normal_ = contact.normal;
+      }
+      return true;
+    }
+    return false;
+  };
+
+  const bool close = on_fit_ || (sight_.smooth() && sight_.contact(*proxy_, t).distance <=
+                                                        r_c + near + 4.0 * sight_.spread());
+  if (close && rest_on_fit()) {
+    on_fit_ = true;
+    patch_is_stale_ = true;
+    return movement;
+  }
+  on_fit_ = false;
+  const int steps = movement.steps + slides;
+  movement = move_proxy(hip);
+  movement.steps += steps;
+  if (!movement.touched || !normal_) return movement;
+  sight_.touch(*cloud_, *proxy_ - r_c * *normal_, *normal_);
+  if (rest_on_fit()) on_fit_ = true;
+  return movement;
 }
 
 // Gathers the points about the proxy unless the patch already holds all within r_3 of it.
@@ -148,8 +224,10 @@ Vec3 Renderer::render_force(const Vec3& hip, double t, std::uint32_t& flags) noe
   const bool as_printed = parameters_.method == Method::paper_as_printed;
   double elapsed = std::max(t - stamp_, 0.0);
   if (!as_printed) elapsed = std::min(elapsed, parameters_.motion.max_extrapolation);
-  const Vec3 u =
+  Vec3 u =
       extrapolated_u(hip - *proxy_, velocity_, normal_.value_or(Vec3::Zero()), elapsed, as_printed);
+  // On the fit the proxy moves with the surface already; on points it is where they were.
+  if (sight_.tracking() && !on_fit_) u -= sight_.travel(t) * sight_.up();
   const double distance = u.norm();
   const double dt = t - last_t_;
   const double rate = last_distance_ && dt > 0.0 ? (distance - *last_distance_) / dt : 0.0;
@@ -159,6 +237,34 @@ Vec3 Renderer::render_force(const Vec3& hip, double t, std::uint32_t& flags) noe
       coupling_force(parameters_.coupling, u, rate, parameters_.proxy.r_c(), as_printed);
   if (result.saturated) flags |= force_saturated;
   return result.force;
+}
+
+// What a frame corrected at once in the geometry reaches the hand over most of an interval, and a
+// surface that is no longer seen fades.
+Vec3 Renderer::blend_force(const Vec3& force, double t) noexcept {
+  constexpr double blend = 0.85;    // [intervals]
+  constexpr double hold = 0.4;      // [s] a hidden surface is felt in full for this long
+  constexpr double fade = 0.3;      // [s] and then less and less
+  const auto ease = [](double x) {  // from 1 to 0 with slopes 0
+    x = std::clamp(x, 0.0, 1.0);
+    return 1.0 - x * x * (3.0 - 2.0 * x);
+  };
+  if (blend_due_) {
+    blend_offset_ = last_force_ - force;
+    blend_start_ = t;
+    blend_due_ = false;
+  }
+  Vec3 blended = force + ease((t - blend_start_) / (blend * interval_)) * blend_offset_;
+  // The rest of an old force may push on, but nothing pulls.
+  const Vec3 normal = normal_.value_or(Vec3::Zero());
+  const double pull = blended.dot(normal);
+  if (pull < 0.0) blended -= pull * normal;
+  if (sight_.holding()) blended *= ease((t - sight_.held_since() - hold) / fade);
+  // A single frame is a scan, not a stream that stopped.
+  const double late = parameters_.motion.max_extrapolation;
+  if (frame_count_ > 1) blended *= ease((t - stamp_ - late) / late);
+  last_force_ = blended;
+  return blended;
 }
 
 Tick Renderer::tick(const Vec3& hip, double t) noexcept {
@@ -184,7 +290,8 @@ Tick Renderer::tick(const Vec3& hip, double t) noexcept {
   }
   if (!proxy_) proxy_ = hip;
 
-  const Movement movement = move_proxy(hip);
+  const bool by_sight = parameters_.method == Method::sight;
+  const Movement movement = by_sight ? move_by_sight(hip, t) : move_proxy(hip);
   tick.flags = movement.flags;
   // The contact shell is 0.02 mm thick, so a proxy that slides on noise leaves it for single steps.
   // What counts is where it came to rest; if it did not come to rest, whether it touched at all.
@@ -197,9 +304,12 @@ Tick Renderer::tick(const Vec3& hip, double t) noexcept {
   tick.proxy = *proxy_;
   tick.normal = movement.around.normal.value_or(normal_.value_or(Vec3::Zero()));
   tick.force = render_force(hip, t, tick.flags);
+  if (by_sight) tick.force = blend_force(tick.force, t);
   tick.state = movement.around.state;
   tick.steps = movement.steps;
-  tick.surface_velocity = velocity_;
+  tick.surface_velocity = by_sight && sight_.tracking() ? sight_.velocity() : velocity_;
+  if (by_sight && sight_.holding()) tick.flags |= surface_hidden;
+  if (by_sight && behind_) tick.flags |= pop_through_suspected;
   if (patch_.thinned()) tick.flags |= patch_thinned;
   if (!stamp_ok_) tick.flags |= stamp_not_increasing;
   if (t - stamp_ > parameters_.motion.max_extrapolation) tick.flags |= frame_stale;

@@ -7,6 +7,7 @@
 #include "palpate/core/cloud.hpp"
 #include "palpate/core/parameters.hpp"
 #include "palpate/core/proxy.hpp"
+#include "palpate/core/sight.hpp"
 
 namespace palpate {
 
@@ -31,6 +32,12 @@ enum TickFlag : std::uint32_t {
   frame_stale = 1u << 6,
   /// The points' directions cancel out, so there is no normal: the last one was used.
   normal_undefined = 1u << 7,
+  /// Method `sight`: the surface is out of sight, behind something or in a hole. The proxy rests on
+  /// what is remembered of it, and the force fades out if that lasts.
+  surface_hidden = 1u << 8,
+  /// Method `sight`: the newest frame shows the proxy behind the surface that it is on the free
+  /// side of, by more than noise explains. Set for as long as that frame is in use.
+  pop_through_suspected = 1u << 9,
 };
 
 /// One cycle of haptic rendering: what the hand did, where the proxy went, what the hand feels.
@@ -87,8 +94,11 @@ class Renderer {
   struct Movement;
 
   Movement move_proxy(const Vec3& hip) noexcept;
+  Movement move_by_sight(const Vec3& hip, double t) noexcept;
+  void frame_by_sight(const Cloud& cloud) noexcept;
   void cover(double travel) noexcept;
   Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;
+  Vec3 blend_force(const Vec3& force, double t) noexcept;
 
   Parameters parameters_;
   Patch patch_;
@@ -107,6 +117,15 @@ class Renderer {
   bool patch_is_stale_ = true;        // a frame came since the patch was gathered
   bool velocity_update_due_ = false;  // (13) waits for the first step after (3)
   bool stamp_ok_ = true;
+
+  // Method `sight`.
+  SightTracker sight_;
+  bool on_fit_ = false;     // the proxy rests on the fitted surface, not on points
+  bool behind_ = false;     // the monitor's verdict on the frame in use
+  bool blend_due_ = false;  // a frame came since the last force
+  Vec3 last_force_ = Vec3::Zero();
+  Vec3 blend_offset_ = Vec3::Zero();
+  double blend_start_ = 0.0;
 
   // The damper's memory.
   std::optional<double> last_distance_;  // |u_(l-1)|

@@ -6,6 +6,7 @@
 #include <memory>
 #include <random>
 #include <tuple>
+#include <variant>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -21,9 +22,13 @@ namespace {
 using Point = std::tuple<float, float, float>;
 
 // What a gather finds, in an order that does not depend on how it searched.
-std::vector<Point> found(const Cloud& cloud, const Ball& ball) {
+std::vector<Point> found(const Cloud& cloud, const std::variant<Ball, Beam>& where) {
   Patch patch;
-  gather(cloud, ball, patch);
+  if (const Ball* ball = std::get_if<Ball>(&where)) {
+    gather(cloud, *ball, patch);
+  } else {
+    gather(cloud, std::get<Beam>(where), Patch::capacity, patch);
+  }
   std::vector<Point> points;
   for (std::size_t i = 0; i < patch.size(); ++i)
     points.emplace_back(patch.x()[i], patch.y()[i], patch.z()[i]);
@@ -36,7 +41,7 @@ std::vector<Point> found(const Cloud& cloud, const Ball& ball) {
   if (a.size() != b.size())
     return ::testing::AssertionFailure() << a.size() << " points against " << b.size();
   const auto near = [](const Point& p, const Point& q) {
-    constexpr float rounding = 2e-8F;
+    constexpr float rounding = 6e-8F;  // of a float some 0.3 m away
     return std::abs(std::get<0>(p) - std::get<0>(q)) <= rounding &&
            std::abs(std::get<1>(p) - std::get<1>(q)) <= rounding &&
            std::abs(std::get<2>(p) - std::get<2>(q)) <= rounding;
@@ -159,6 +164,52 @@ TEST(PointCloud, FindsExactlyWhatBruteForceFinds) {
   EXPECT_GT(total, 10000U);
 }
 
+TEST_P(FastSearch, FindsInABeamWhatBruteForceFindsInADepthImage) {
+  std::size_t total = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    RandomScene scene(seed);
+    const DepthImage image = scene.image(GetParam());
+    const BruteForceCloud oracle(image.points(), Vec3(image.world_from_camera().translation()));
+    for (int i = 0; i < 12; ++i) {
+      const Ball ball = scene.ball(image);
+      const Beam beam{ball.centre, ball.radius, scene.uniform(0.01, 0.3), Vec3::UnitX()};
+      // A place nearer than the beam is wide is seen along no line.
+      if ((ball.centre - image.world_from_camera().translation()).norm() < 1.5 * ball.radius)
+        continue;
+      const auto expected = found(oracle, beam);
+      EXPECT_TRUE(same_points(found(image, beam), expected)) << "seed " << seed << ", beam " << i;
+      total += expected.size();
+    }
+  }
+  EXPECT_GT(total, 5000U);
+}
+
+TEST(PointCloud, FindsInABeamWhatBruteForceFinds) {
+  std::size_t total = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    RandomScene scene(seed);
+    std::vector<Vec3> points;
+    const double size = std::exp(scene.uniform(-3, 0));
+    for (int i = 0; i < 2000; ++i)
+      points.emplace_back(size * Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1),
+                                      0.1 * std::round(scene.uniform(-3, 3))));
+    std::optional<Vec3> viewpoint;
+    if (seed % 3 != 0)
+      viewpoint = 2.0 * Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1), scene.uniform(-1, 1));
+    const PointCloud cloud(points, viewpoint, std::exp(scene.uniform(-5, -1)));
+    const BruteForceCloud oracle(points, viewpoint);
+    for (int i = 0; i < 20; ++i) {
+      const Vec3 axis = Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1), scene.uniform(-1, 1));
+      const Beam beam{points[static_cast<std::size_t>(scene.uniform(0, 1999))],
+                      scene.uniform(0.001, 0.2), scene.uniform(0.01, 0.5), axis.normalized()};
+      const auto expected = found(oracle, beam);
+      EXPECT_EQ(found(cloud, beam), expected) << "seed " << seed << ", beam " << i;
+      total += expected.size();
+    }
+  }
+  EXPECT_GT(total, 10000U);
+}
+
 TEST(PointCloud, LeavesOutAndCountsPointsThatAreNotFinite) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const std::array points = {Vec3(0, 0, 0), Vec3(nan, 0, 0),
@@ -171,12 +222,12 @@ TEST(PointCloud, LeavesOutAndCountsPointsThatAreNotFinite) {
 TEST(PointCloud, HoldsPointsSpreadOverTheRangeOfDoubles) {
   const std::array points = {Vec3(-1e308, 0, 0), Vec3(1e308, 5, -1e300), Vec3(0.001, 0.002, 0.003)};
   const PointCloud cloud(points);
-  EXPECT_EQ(found(cloud, {Vec3(0, 0, 0), 0.01}).size(), 1U);
+  EXPECT_EQ(found(cloud, Ball{Vec3(0, 0, 0), 0.01}).size(), 1U);
 }
 
 TEST(PointCloud, FindsNothingWhenItIsEmpty) {
   const PointCloud cloud(std::span<const Vec3>{});
-  EXPECT_TRUE(found(cloud, {Vec3(0, 0, 0), 1.0}).empty());
+  EXPECT_TRUE(found(cloud, Ball{Vec3(0, 0, 0), 1.0}).empty());
 }
 
 TEST(PointCloud, ThinsABallThatHoldsMoreThanAPatchAndSaysSo) {
@@ -218,9 +269,9 @@ TEST(DepthImage, SeesNothingBehindTheCameraOrOutsideTheImage) {
   const Intrinsics k{.width = 64, .height = 48, .fx = 60, .fy = 60, .cx = 32, .cy = 24};
   const DepthImage image(std::make_shared<ViewingRays>(k),
                          std::vector<std::uint16_t>(64 * 48, 1000), 1000.0);
-  EXPECT_TRUE(found(image, {Vec3(0, 0, -1), 0.5}).empty());
-  EXPECT_TRUE(found(image, {Vec3(10, 0, 1), 0.5}).empty());
-  EXPECT_FALSE(found(image, {Vec3(0, 0, 1), 0.5}).empty());
+  EXPECT_TRUE(found(image, Ball{Vec3(0, 0, -1), 0.5}).empty());
+  EXPECT_TRUE(found(image, Ball{Vec3(10, 0, 1), 0.5}).empty());
+  EXPECT_FALSE(found(image, Ball{Vec3(0, 0, 1), 0.5}).empty());
 }
 
 TEST(DepthImage, RemembersFromWhereItsPointsWereSeen) {

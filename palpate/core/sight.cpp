@@ -1,0 +1,744 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/core/sight.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Cholesky>
+
+namespace palpate {
+namespace {
+
+using Vec5 = Eigen::Matrix<double, 5, 1>;
+
+// Along a line of sight a surface is looked for this far from where it is expected [m].
+constexpr double reach = 0.3;
+// A surface is where it is expected if this share of its disc is within the gate.
+constexpr double least_support = 0.3;
+constexpr double narrowest_gate = 12e-3;  // [m]
+constexpr double widest_gate = 60e-3;     // [m]
+// Layers along a line of sight are told apart by a gap of at least this [m].
+constexpr double layer_gap = 20e-3;
+constexpr std::size_t least_points = 8;
+constexpr std::size_t beam_points = 256;
+// What comes before a contact is looked for in all that `judge` looks at [m].
+constexpr double shadow_radius = 15e-3;
+constexpr std::size_t wide_beam_points = 768;
+constexpr std::size_t inner_points = 1024;
+constexpr std::size_t outer_points = 2048;
+constexpr std::size_t inner_rungs = 2;
+// A fit serves contacts within this of its centre [m].
+constexpr double serves = 1.5e-3;
+// While the surface is out of sight there is nothing to fit: what is remembered serves this far
+// [m].
+constexpr double serves_while_held = 15e-3;
+// Residuals this small are no structure, whatever the noise [m].
+constexpr double structure_floor = 50e-6;
+// Noise of a disc's height that is usual for a depth camera: this [m] at 1 m, growing with the
+// square of the distance, as stereo does. Serves until the noise has been measured.
+constexpr double usual_noise = 3e-3;
+// Spread of a surface's curvature coefficients x^2, xy, y^2 that is expected [1/m]: radii down to
+// some 30 mm are common, and noise must not invent them.
+constexpr double curvature_sd = 15.0;
+// A map of what is beside the contact [m].
+constexpr double beside_inner = 12e-3;
+constexpr std::array<double, 3> beside_bands = {40e-3, 80e-3, 140e-3};
+constexpr std::size_t beside_points = 768;
+constexpr float nothing = -1e3F;
+
+constexpr double squared(double x) {
+  return x * x;
+}
+
+// Value at time 0 of the least-squares line through heights at times t <= 0, and its slope.
+struct Line {
+  double value, slope;
+};
+
+Line line_through(std::span<const HeightSample> samples) {
+  const double now = samples.front().stamp;
+  const auto n = static_cast<double>(samples.size());
+  double t = 0.0, y = 0.0, tt = 0.0, ty = 0.0;
+  for (const HeightSample& s : samples) {
+    const double dt = s.stamp - now;
+    const double dy = s.height - samples.front().height;
+    t += dt;
+    y += dy;
+    tt += dt * dt;
+    ty += dt * dy;
+  }
+  const double determinant = n * tt - t * t;
+  if (!(determinant > 0.0)) return {samples.front().height, 0.0};
+  const double slope = (n * ty - t * y) / determinant;
+  return {samples.front().height + (y - slope * t) / n, slope};
+}
+
+// The parabola through three heights, `ahead` after the newest one.
+double parabola_ahead(std::span<const HeightSample> s, double ahead) {
+  const double t1 = s[1].stamp - s[0].stamp;
+  const double t2 = s[2].stamp - s[0].stamp;
+  const double d1 = (s[1].height - s[0].height) / t1;
+  const double d2 = (s[2].height - s[0].height) / t2;
+  const double a = (d2 - d1) / (t2 - t1);
+  const double v = d1 - a * t1;
+  return s[0].height + v * ahead + a * ahead * ahead;
+}
+
+double mean_height(std::span<const HeightSample> samples) {
+  double sum = 0.0;
+  for (const HeightSample& s : samples) sum += s.height - samples.front().height;
+  return samples.front().height + sum / static_cast<double>(samples.size());
+}
+
+struct Rule {
+  std::size_t samples;
+  int order;
+  double noise;  // of its velocity, in sd / interval
+};
+constexpr std::array<Rule, 4> moving_rules = {
+    {{2, 1, 1.414}, {4, 1, 0.447}, {8, 1, 0.154}, {3, 2, 4.06}}};
+
+double foretell(const Rule& rule, std::span<const HeightSample> past, double ahead) {
+  if (rule.order == 2) return parabola_ahead(past, ahead);
+  const Line line = line_through(past.first(rule.samples));
+  return line.value + line.slope * ahead;
+}
+
+// Where the sightlines of the view that sees most of the patch come from; none if it does not know.
+std::optional<Vec3> main_viewpoint(const Patch& patch) {
+  std::size_t most = 0;
+  std::optional<Vec3> viewpoint;
+  for (std::size_t i = 0; i < patch.view_count(); ++i) {
+    const std::size_t end = i + 1 < patch.view_count() ? patch.view(i + 1).begin : patch.size();
+    if (end - patch.view(i).begin <= most) continue;
+    most = end - patch.view(i).begin;
+    viewpoint = patch.view(i).viewpoint;
+  }
+  return viewpoint;
+}
+
+// Heights of a patch's points above its centre along `up`. Returns how many were written.
+std::size_t heights_along(const Patch& patch, const Vec3& up, std::span<float> heights) {
+  const Eigen::Vector3f u = up.cast<float>();
+  const std::size_t size = std::min(patch.size(), heights.size());
+  for (std::size_t i = 0; i < size; ++i) {
+    heights[i] = patch.x()[i] * u.x() + patch.y()[i] * u.y() + patch.z()[i] * u.z();
+  }
+  return size;
+}
+
+}  // namespace
+
+double foretold_velocity(std::span<const HeightSample> samples, double sd,
+                         double interval) noexcept {
+  if (samples.size() < 2 || !(interval > 0.0)) return 0.0;
+  // How well each rule would have foretold the last heights, the newest weighing most.
+  constexpr std::array<double, 4> weights = {1.0, 0.7, 0.5, 0.35};
+  const auto misses = [&](auto&& rule, std::size_t needs) {
+    double sum = 0.0;
+    double weight = 0.0;
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      if (samples.size() < i + 1 + needs) break;
+      const auto past = samples.subspan(i + 1);
+      const double miss = rule(past, samples[i].stamp - past.front().stamp) - samples[i].height;
+      sum += weights[i] * miss * miss;
+      weight += weights[i];
+    }
+    return weight > 0.0 ? sum / weight : std::numeric_limits<double>::infinity();
+  };
+  const auto at_rest = [](std::span<const HeightSample> past, double) {
+    return mean_height(past.first(std::min<std::size_t>(past.size(), 8)));
+  };
+  const double newest_miss = samples[0].height - at_rest(samples.subspan(1), 0.0);
+  double least = misses(at_rest, 1);
+  double velocity = 0.0;
+  // One frame that is far off already says that the surface left; a line is the least daring guess.
+  if (std::abs(newest_miss) > 5.0 * sd + 1e-6) {
+    velocity = (samples[0].height - samples[1].height) / (samples[0].stamp - samples[1].stamp);
+  }
+  for (const Rule& rule : moving_rules) {
+    if (samples.size() < rule.samples) continue;
+    const double miss = misses([&](std::span<const HeightSample> past,
+                                   double ahead) { return foretell(rule, past, ahead); },
+                               rule.samples);
+    if (!(miss < 0.8 * least)) continue;
+    // A parabola's velocity is that of its chord: rendering must not accelerate.
+    const double candidate =
+        rule.order == 2 ? (foretell(rule, samples, interval) - samples[0].height) / interval
+                        : line_through(samples.first(rule.samples)).slope;
+    const double uncertainty = rule.noise * sd / interval;
+    if (std::abs(candidate) <= 3.0 * uncertainty) continue;
+    least = miss;
+    velocity = candidate;
+  }
+  return velocity;
+}
+
+double agreed_height(std::span<const HeightSample> samples, double sd, double velocity,
+                     double confidence) noexcept {
+  const double now = samples.front().stamp;
+  const auto moved = [&](const HeightSample& s) { return s.height + velocity * (now - s.stamp); };
+  // Means over 1, 2, 4, ... and all heights.
+  std::array<double, 8> means{};
+  std::array<double, 8> counts{};
+  std::size_t levels = 0;
+  const double base = samples.front().height;
+  double sum = 0.0;
+  std::size_t next = 1;
+  for (std::size_t i = 0; i < samples.size() && levels < means.size(); ++i) {
+    sum += moved(samples[i]) - base;
+    if (i + 1 == next || i + 1 == samples.size()) {
+      means[levels] = base + sum / static_cast<double>(i + 1);
+      counts[levels] = static_cast<double>(i + 1);
+      ++levels;
+      next *= 2;
+    }
+  }
+  double height = means[levels - 1];
+  for (std::size_t level = levels - 1; level-- > 0;) {
+    const double slack =
+        confidence * sd * std::sqrt(1.0 / counts[level] - 1.0 / counts[levels - 1]);
+    height = std::clamp(height, means[level] - slack, means[level] + slack);
+  }
+  return height;
+}
+
+std::optional<Layer> first_layer(std::span<float> heights, double gap,
+                                 double least_share) noexcept {
+  if (heights.size() < least_points) return std::nullopt;
+  std::sort(heights.begin(), heights.end(), std::greater<>());
+  const auto total = static_cast<double>(heights.size());
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= heights.size(); ++i) {
+    if (i < heights.size() && heights[i - 1] - heights[i] < gap) continue;
+    const double share = static_cast<double>(i - begin) / total;
+    if (share >= least_share) return Layer{heights[begin + (i - begin) / 2], share};
+    begin = i;
+  }
+  return std::nullopt;
+}
+
+double SightTracker::height_sd() const noexcept {
+  return std::sqrt(variance(rung_));
+}
+
+// Of one frame's height in a disc [m^2]. Until a few frames have told, what is usual for a depth
+// camera; then what they told, with a margin for how few they were.
+double SightTracker::variance(std::size_t rung) const noexcept {
+  const Scatter& scatter = scatter_[rung];
+  const double usual = squared(usual_noise * squared(distance_)) + 0.1 * squared(spread_) + 1e-12;
+  if (scatter.samples < 1.0) return usual;
+  const double told = scatter.variance * (1.0 + 2.0 / scatter.samples) + 1e-12;
+  return scatter.samples < 4.0 ? std::max(usual, told) : told;
+}
+
+double SightTracker::gate() const noexcept {
+  return std::clamp(std::max(4.0 * spread_, 6.0 * height_sd()), narrowest_gate, widest_gate);
+}
+
+double SightTracker::travel(double t) const noexcept {
+  if (holding_ || velocity_ == 0.0) return 0.0;
+  // Beyond one and a half intervals the velocity fades over another, and the surface stays there.
+  const double elapsed = std::max(t - stamp_, 0.0) / interval_;
+  const double late = std::clamp(elapsed - 1.5, 0.0, 1.0);
+  return velocity_ * interval_ * (std::min(elapsed, 1.5) + late - 0.5 * late * late);
+}
+
+SurfaceContact SightTracker::contact(const Vec3& point, double t) const noexcept {
+  Vec3 local = frame_.local_from_world(point);
+  const double moved = travel(t);
+  local.z() -= moved;
+  const double limit = holding_ ? serves_while_held : serves;
+  const Vec2 at = surface_.nearest(local, local.head<2>(), centre_, limit);
+  const Vec3 foot(at.x(), at.y(), surface_.height(at));
+  const Vec3 normal = surface_.normal(at);
+  return {frame_.world_from_local(foot + Vec3(0, 0, moved)), frame_.direction_in_world(normal),
+          (local - foot).dot(normal), (at - centre_).norm() > 0.999 * limit};
+}
+
+SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double interval,
+                                        const Vec3& proxy) noexcept {
+  if (!tracking_) {
+    stamp_ = stamp;
+    interval_ = interval;
+    watch(cloud, proxy);
+    return tracking_ ? Event::followed : Event::none;
+  }
+  // Where the surface is expected: below the proxy, moved on.
+  const double expected = holding_ ? 0.0 : velocity_ * interval;
+  Vec2 foot =
+      surface_.nearest(frame_.local_from_world(proxy), frame_.local_from_world(proxy).head<2>(),
+                       centre_, holding_ ? serves_while_held : 2.0 * serves);
+  // Frames of one place can be compared cell by cell.
+  if ((foot - centre_).norm() < serves) foot = centre_;
+  const Vec3 place =
+      frame_.world_from_local(Vec3(foot.x(), foot.y(), surface_.height(foot) + expected));
+
+  gather(cloud, Beam{place, shadow_radius, reach, frame_.up}, wide_beam_points, patch_);
+  const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
+  if (viewpoint) distance_ = (*viewpoint - place).norm();
+  Vec3 line = viewpoint ? Vec3((*viewpoint - place).normalized()) : frame_.up;
+  const bool from_behind = line.dot(frame_.up) < 0.0;
+  std::array<float, wide_beam_points> heights;
+  std::size_t seen = 0;
+  std::size_t near = 0;
+  std::size_t before = 0;  // points between the viewpoint and the surface
+  const double wide = gate();
+  Quadric moved = surface_;
+  moved.c[0] += expected;
+  const SightCone inner({place, radii[0], reach, frame_.up}, viewpoint);
+  for (std::size_t i = 0; i < std::min(patch_.size(), wide_beam_points); ++i) {
+    const Vec3 p = Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]);
+    const Vec3 local = frame_.local_from_world(patch_.ball().centre + p);
+    const double above = local.z() - moved.height(local.head<2>());
+    if (above > wide) ++before;
+    if (!inner.holds(p)) continue;
+    if (std::abs(above) <= wide) ++near;
+    heights[seen++] = static_cast<float>(p.dot(line));
+  }
+
+  const double previous_stamp = stamp_;
+  stamp_ = stamp;
+  interval_ = interval;
+  Event event = Event::followed;
+  double jump = 0.0;  // [m] along up, from where it was expected
+  const bool there = near >= least_points &&
+                     static_cast<double>(near) >= least_support * static_cast<double>(seen);
+  if (!there) {
+    const std::optional<Layer> layer =
+        first_layer(std::span(heights.data(), seen), std::max(layer_gap, spread_), least_support);
+    const double lean = std::max(line.dot(frame_.up), 0.2);
+    if (layer && !from_behind) jump = layer->height / lean;
+    const bool nearer = jump > 0.0;
+    if (!layer || from_behind ||
+        (nearer && (holding_ || is_occluder(look_beside(cloud, place), jump + expected)))) {
+      if (from_behind && layer) {
+        // Touched from behind, the surface went out of reach: the points decide.
+        forget();
+        return Event::none;
+      }
+      if (!holding_) held_since_ = previous_stamp;
+      holding_ = true;
+      velocity_ = 0.0;
+      return Event::hidden;
+    }
+    event = Event::jumped;
+  }
+  const bool resumed = holding_;
+  holding_ = false;
+  surface_.c[0] += expected + jump;
+  if (resumed && event == Event::jumped) count_ = 0;
+  // Something that moves in before a contact that stays hides a part of it first. What is left of
+  // the disc looks like an edge, and is none.
+  const bool covered = before >= 3;
+  shadowed_ = covered && foot == centre_ && (shadowed_ || resumed || !covered_);
+  covered_ = covered;
+  if (!measure(cloud, foot, stamp, true, wide, event == Event::jumped)) {
+    surface_.c[0] -= expected + jump;
+    if (!holding_) held_since_ = previous_stamp;
+    holding_ = true;
+    velocity_ = 0.0;
+    return Event::hidden;
+  }
+  beside_ = look_beside(
+      cloud, frame_.world_from_local(Vec3(centre_.x(), centre_.y(), surface_.height(centre_))));
+  return event;
+}
+
+void SightTracker::watch(const Cloud& cloud, const Vec3& proxy) noexcept {
+  if (tracking_) {
+    if (holding_) return;
+    const Vec2 below = frame_.local_from_world(proxy).head<2>();
+    if ((below - centre_).norm() < 5e-3) return;
+  }
+  tracking_ = false;
+  gather(cloud, Beam{proxy, radii[0], reach, frame_.up}, beam_points, patch_);
+  const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
+  if (!viewpoint) return;  // no line of sight to follow
+  const Vec3 line = (*viewpoint - proxy).normalized();
+  distance_ = (*viewpoint - proxy).norm();
+  std::array<float, beam_points> heights;
+  const std::size_t seen = heights_along(patch_, line, heights);
+  const std::optional<Layer> layer =
+      first_layer(std::span(heights.data(), seen), layer_gap, least_support);
+  if (!layer || layer->height > 0.0) return;  // nothing, or the proxy is hidden behind it
+  if (!start(cloud, proxy + layer->height * line, line)) return;
+  beside_ = look_beside(
+      cloud, frame_.world_from_local(Vec3(centre_.x(), centre_.y(), surface_.height(centre_))));
+}
+
+bool SightTracker::slide(const Cloud& cloud, const Vec3& foot) noexcept {
+  if (!tracking_ || holding_) return false;
+  return measure(cloud, frame_.local_from_world(foot).head<2>(), stamp_, false, gate());
+}
+
+void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& normal) noexcept {
+  if (holding_) return;
+  if (tracking_) {
+    const Vec3 local = frame_.local_from_world(foot);
+    const double off = local.z() - surface_.height(local.head<2>());
+    const bool same_side = frame_.up.dot(normal) > 0.35;
+    if (same_side && std::abs(off) < 3e-3 + 4.0 * spread_ &&
+        (local.head<2>() - centre_).norm() < 12e-3) {
+      if ((local.head<2>() - centre_).norm() < serves) return;
+      if (measure(cloud, local.head<2>(), stamp_, false, gate())) return;
+    }
+  }
+  gather(cloud, Beam{foot, radii[0], narrowest_gate, normal}, beam_points, patch_);
+  const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
+  Vec3 up = normal;
+  if (viewpoint) {
+    const Vec3 line = (*viewpoint - foot).normalized();
+    distance_ = (*viewpoint - foot).norm();
+    if (std::abs(line.dot(normal)) > 0.5) up = line.dot(normal) > 0.0 ? line : Vec3(-line);
+  }
+  if (!start(cloud, foot, up)) return;
+  beside_ = look_beside(cloud, foot);
+}
+
+// Begins to follow the surface at `foot`. The past belongs to another one.
+bool SightTracker::start(const Cloud& cloud, const Vec3& foot, const Vec3& up) noexcept {
+  frame_ = LocalFrame::about(foot, up);
+  surface_ = {};
+  count_ = 0;
+  velocity_ = 0.0;
+  holding_ = false;
+  smooth_ = false;
+  shadowed_ = false;
+  covered_ = false;
+  tracking_ = measure(cloud, Vec2::Zero(), stamp_, true, narrowest_gate + 4.0 * spread_);
+  return tracking_;
+}
+
+// Shifts the expected surface by the median residual near `foot` and says beyond which residual a
+// point does not belong to it.
+bool SightTracker::recentre(const Vec2& foot, double wide, double& cut) noexcept {
+  std::array<float, inner_points> residuals;
+  std::size_t size = 0;
+  for (std::size_t i = 0; i < patch_.size() && size < residuals.size(); ++i) {
+    const Vec3 local = frame_.local_from_world(patch_.ball().centre +
+                                               Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
+    if ((local.head<2>() - foot).squaredNorm() > squared(radii[0])) continue;
+    const double r = local.z() - surface_.height(local.head<2>());
+    if (std::abs(r) <= wide) residuals[size++] = static_cast<float>(r);
+  }
+  if (size < least_points) return false;
+  const auto median = [&] {
+    auto* middle = residuals.data() + size / 2;
+    std::nth_element(residuals.data(), middle, residuals.data() + size);
+    return *middle;
+  };
+  const float centre = median();
+  for (std::size_t i = 0; i < size; ++i) residuals[i] = std::abs(residuals[i] - centre);
+  const double deviation = 1.4826 * median();
+  surface_.c[0] += centre;
+  // Quantised depth makes single deviations jump between the steps.
+  spread_ = count_ == 0 ? deviation : spread_ + 0.2 * (deviation - spread_);
+  cut = std::clamp(6.0 * std::max(deviation, spread_), 0.5e-3, wide);
+  return true;
+}
+
+// One frame's evidence about the surface around `foot`, and what follows from all of it.
+bool SightTracker::measure(const Cloud& cloud, const Vec2& foot, double stamp, bool new_frame,
+                           double wide, bool jumped) noexcept {
+  const Vec3 place = frame_.world_from_local(Vec3(foot.x(), foot.y(), surface_.height(foot)));
+  const double deep = wide + 2.0 * radii[1];
+  gather(cloud, Beam{place, radii[1] * 1.2, deep, frame_.up}, inner_points, patch_);
+  const Quadric before = surface_;
+  double cut = 0.0;
+  const bool first = count_ == 0;
+  // From nothing, the shape is found by fitting the disc a few times over.
+  for (int i = 0; i < (first ? 3 : 1); ++i) {
+    if (!recentre(foot, wide, cut)) {
+      surface_ = before;
+      return false;
+    }
+    if (!first) break;
+    Moments moments =
+        disc_moments(patch_, frame_, surface_, Disc{foot, 0.0, radii[1], std::max(cut, 2e-3)});
+    if (moments.xy[0] < 6.0) {
+      surface_ = before;
+      return false;
+    }
+    const Quadric correction = fit_quadric(moments, 0.1 * moments.xy[0]);
+    surface_.c += correction.c;
+  }
+
+  if (new_frame || count_ == 0) {
+    settled_ = count_ == 0 || jumped ? 1 : settled_ + 1;
+    newest_ = (newest_ + 1) % history;
+    count_ = std::min(count_ + 1, history);
+  }
+  Evidence& now = evidence(0);
+  now.stamp = stamp;
+  now.centre = foot;
+  now.whole = !shadowed_;
+  const auto add_ring = [&](std::size_t j) {
+    Moments moments = disc_moments(patch_, frame_, surface_,
+                                   Disc{foot, j == 0 ? 0.0 : radii[j - 1], radii[j], cut});
+    moments.raise(surface_);
+    if (j > 0) moments.add(now.disc[j - 1]);
+    now.disc[j] = moments;
+  };
+  for (std::size_t j = 0; j < inner_rungs; ++j) add_ring(j);
+  now.rungs = inner_rungs;
+
+  // Cells of residuals, kept to tell structure, which stays, from noise, which does not.
+  std::array<float, cells> sums{};
+  std::array<float, cells> numbers{};
+  constexpr double cell = 2.0 * 9e-3 / cells_per_side;
+  for (std::size_t i = 0; i < patch_.size(); ++i) {
+    const Vec3 local = frame_.local_from_world(patch_.ball().centre +
+                                               Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
+    const double r = local.z() - surface_.height(local.head<2>());
+    const int u = static_cast<int>(std::floor((local.x() - foot.x()) / cell)) + 2;
+    const int v = static_cast<int>(std::floor((local.y() - foot.y()) / cell)) + 2;
+    if (u < 0 || v < 0 || u >= 4 || v >= 4 || std::abs(r) > wide) continue;
+    const auto k = static_cast<std::size_t>(v * 4 + u);
+    sums[k] += static_cast<float>(r);
+    numbers[k] += 1.0F;
+  }
+  for (std::size_t k = 0; k < cells; ++k) {
+    now.residual[k] =
+        numbers[k] > 0.0F ? sums[k] / numbers[k] : std::numeric_limits<float>::quiet_NaN();
+  }
+
+  // Where there is noise to average away, look farther.
+  const bool noisy =
+      scatter_[1].samples >= 1.0 ? scatter_[1].variance > squared(20e-6) : spread_ > 0.1e-3;
+  if (noisy) {
+    gather(cloud, Beam{place, radii[rungs - 1] * 1.1, wide + radii[rungs - 1], frame_.up},
+           outer_points, patch_);
+    // A thinner patch weighs less: bring its rings to the density of the inner disc.
+    for (std::size_t j = inner_rungs; j < rungs; ++j) add_ring(j);
+    now.rungs = rungs;
+  }
+  for (std::size_t j = 0; j < now.rungs; ++j) {
+    const Moments& m = now.disc[j];
+    const Eigen::Matrix<double, 6, 6> a = m.normal_matrix();
+    const Vec6 b = m.right_side();
+    const double weight = std::max(a(0, 0), 1e-9);
+    const Vec5 column = a.block<5, 1>(1, 0);
+    now.shape[j] = {a.bottomRightCorner<5, 5>() - column * column.transpose() / weight,
+                    b.tail<5>() - column * (b[0] / weight), column / weight, b[0] / weight,
+                    a(0, 0)};
+  }
+  estimate(foot, new_frame);
+  if (!shadowed_) judge(foot);
+  centre_ = foot;
+  if (foot.norm() > 4e-3) move_origin(foot);
+  return true;
+}
+
+void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
+  Evidence& now = evidence(0);
+  const Vec2 at = foot / Moments::unit;
+  Vec5 basis;
+  basis << at.x(), at.y(), at.x() * at.x(), at.x() * at.y(), at.y() * at.y();
+  const double cm2 = squared(Moments::unit);
+
+  std::array<Vec5, rungs> shapes;
+  std::array<std::array<HeightSample, history>, rungs> heights;
+  std::array<std::size_t, rungs> frames{};
+  std::size_t chosen = 0;
+  for (std::size_t j = 0; j < now.rungs; ++j) {
+    // Evidence from frames whose disc overlaps this one's well.
+    Eigen::Matrix<double, 5, 5> matrix = Eigen::Matrix<double, 5, 5>::Zero();
+    Vec5 right_side = Vec5::Zero();
+    std::size_t n = 0;
+    for (; n < count_; ++n) {
+      const Evidence& e = evidence(n);
+      if (e.rungs <= j || (e.centre - foot).norm() > std::max(3e-3, 0.5 * radii[j])) break;
+      matrix += e.shape[j].matrix;
+      right_side += e.shape[j].right_side;
+    }
+    frames[j] = n;
+    const double points = std::max(now.shape[j].points, 1.0);
+    Scatter& scatter = scatter_[j];
+    // What one point weighs against the prior, whatever correlation does to it.
+    const double prior = variance(j) * points / cm2 / squared(curvature_sd * Moments::unit);
+    matrix.diagonal().array() += 1e-9;
+    matrix.diagonal().tail<3>().array() += prior;
+    shapes[j] = matrix.ldlt().solve(right_side);
+    const double above = shapes[j].dot(basis);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Evidence& e = evidence(i);
+      heights[j][i] = {
+          e.stamp, (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * Moments::unit};
+    }
+    if (new_frame && n >= 3) {
+      // Second differences do not see a steady motion; their variance is 6 times a height's.
+      const double second =
+          heights[j][0].height - 2.0 * heights[j][1].height + heights[j][2].height;
+      double change = second * second / 6.0;
+      // A single jump is no noise.
+      if (scatter.samples >= 3.0) change = std::min(change, 9.0 * scatter.variance + 1e-12);
+      scatter.samples = std::min(scatter.samples + 1.0, 40.0);
+      scatter.variance += (change - scatter.variance) / scatter.samples;
+    }
+  }
+  // Lepski: the widest disc that agrees with all narrower ones. Their differences, frame by frame,
+  // do not see the surface move, and tell their own noise.
+  for (std::size_t j = 1; j < now.rungs; ++j) {
+    bool agrees = frames[j] >= std::min<std::size_t>(frames[0], 2);
+    for (std::size_t i = 0; i < j && agrees; ++i) {
+      const std::size_t n = std::min(frames[i], frames[j]);
+      double sum = 0.0;
+      double squares = 0.0;
+      for (std::size_t k = 0; k < n; ++k) {
+        const double d = heights[j][k].height - heights[i][k].height;
+        sum += d;
+        squares += d * d;
+      }
+      const auto count = static_cast<double>(n);
+      const double mean = sum / count;
+      // Until there are frames to tell, what the heights' own noise suggests counts as two of them.
+      const double expected = 2.0 * (variance(i) + variance(j));
+      const double scattered =
+          (std::max(squares - count * mean * mean, 0.0) + (n < 4 ? expected : 0.0)) / count;
+      agrees = std::abs(mean) <= 2.5 * std::sqrt(scattered / count) + 2e-6;
+    }
+    if (!agrees) break;
+    if (variance(j) <= variance(chosen)) chosen = j;
+  }
+  rung_ = chosen;
+  const std::span<const HeightSample> past(heights[chosen].data(), frames[chosen]);
+  const double sd = height_sd();
+  if (new_frame) velocity_ = foretold_velocity(past, sd, interval_);
+  const double height = agreed_height(past.first(std::clamp<std::size_t>(settled_, 1, past.size())),
+                                      sd, velocity_, 2.5);
+  surface_.c.tail<5>() = shapes[chosen];
+  surface_.c.tail<3>() /= Moments::unit;
+  surface_.c[0] = height - shapes[chosen].dot(basis) * Moments::unit;
+}
+
+// Is the surface what its fit says, up to noise?
+void SightTracker::judge(const Vec2& foot) noexcept {
+  const Evidence& now = evidence(0);
+  // An edge shows as a disc whose points lie to one side, a gap as one without a middle.
+  const Shape& inner = now.shape[0];
+  const Vec2 middle(inner.means[0], inner.means[1]);
+  const Vec2 spread = Vec2(inner.means[2], inner.means[4]) - Vec2(middle.cwiseAbs2());
+  const double full = 0.25 * squared(radii[0] / Moments::unit);
+  const bool whole = (middle * Moments::unit - foot).norm() < 0.3 * radii[0] &&
+                     spread.minCoeff() > 0.65 * full && spread.maxCoeff() < 1.35 * full;
+  if (!whole) {
+    smooth_ = false;
+    return;
+  }
+  std::array<double, cells> sums{};
+  std::size_t frames = 0;
+  double change = 0.0;
+  double changes = 0.0;
+  bool empty = false;
+  for (std::size_t age = 0; age < count_ && frames < 8; ++age) {
+    const Evidence& e = evidence(age);
+    if ((e.centre - now.centre).norm() > 1e-3) break;
+    if (!e.whole) continue;
+    double mean = 0.0;
+    for (std::size_t k = 0; k < cells; ++k) {
+      const double r = e.residual[k];
+      if (std::isfinite(r)) {
+        mean += r / cells;
+      } else {
+        empty = true;
+      }
+    }
+    for (std::size_t k = 0; k < cells; ++k) {
+      const double r = std::isfinite(e.residual[k]) ? e.residual[k] - mean : 0.0;
+      sums[k] += r;
+      if (age == 1) {
+        const double newest = now.residual[k];
+        change += squared(newest - e.residual[k]) / 2.0;
+        changes += 1.0;
+      }
+    }
+    ++frames;
+  }
+  if (empty) {
+    smooth_ = false;
+    return;
+  }
+  if (changes > 0.0) {
+    cell_scatter_.samples = std::min(cell_scatter_.samples + 1.0, 30.0);
+    cell_scatter_.variance += (change / changes - cell_scatter_.variance) / cell_scatter_.samples;
+  }
+  double structure = 0.0;
+  const auto n = static_cast<double>(frames);
+  for (const double sum : sums) structure += squared(sum / n) / cells;
+  const double noise = cell_scatter_.samples > 0.0 ? cell_scatter_.variance / n : 0.0;
+  // Hysteresis, so that the way to rest does not change from frame to frame.
+  const double confidence = smooth_ ? 6.0 : 3.0;
+  smooth_ = structure <= squared(structure_floor) + confidence * noise;
+}
+
+// Keeps the local origin near the contact: sums of fourth powers lose digits far from it.
+void SightTracker::move_origin(const Vec2& foot) noexcept {
+  const Vec3 shift(foot.x(), foot.y(), surface_.height(foot));
+  const Vec2 gradient = surface_.gradient(foot);
+  frame_.origin = frame_.world_from_local(shift);
+  surface_.c[0] = 0.0;
+  surface_.c[1] = gradient.x();
+  surface_.c[2] = gradient.y();
+  centre_ -= foot;
+  for (std::size_t age = 0; age < count_; ++age) {
+    Evidence& e = evidence(age);
+    e.centre -= foot;
+    for (std::size_t j = 0; j < e.rungs; ++j) {
+      e.disc[j] = e.disc[j].moved(shift);
+      const Eigen::Matrix<double, 6, 6> a = e.disc[j].normal_matrix();
+      const Vec6 b = e.disc[j].right_side();
+      const double weight = std::max(a(0, 0), 1e-9);
+      const Vec5 column = a.block<5, 1>(1, 0);
+      e.shape[j] = {a.bottomRightCorner<5, 5>() - column * column.transpose() / weight,
+                    b.tail<5>() - column * (b[0] / weight), column / weight, b[0] / weight,
+                    a(0, 0)};
+    }
+  }
+}
+
+// Residuals of the nearest points beside the contact, by sector and band.
+SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& place) noexcept {
+  Ring ring;
+  ring.fill(nothing);
+  gather(cloud, Beam{place, beside_bands.back(), reach, frame_.up}, beside_points, patch_);
+  const Vec3 centre = frame_.local_from_world(place);
+  const Vec2 at = centre.head<2>();
+  const Vec2 slope = surface_.gradient(centre_);
+  const double base = surface_.height(centre_);
+  for (std::size_t i = 0; i < patch_.size(); ++i) {
+    const Vec3 local = frame_.local_from_world(patch_.ball().centre +
+                                               Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
+    const Vec2 d = local.head<2>() - at;
+    const double away = d.norm();
+    if (away < beside_inner || away >= beside_bands.back()) continue;
+    const std::size_t band = away < beside_bands[0] ? 0 : away < beside_bands[1] ? 1 : 2;
+    const double turn = std::atan2(d.y(), d.x()) / (2.0 * std::numbers::pi) + 0.5;
+    const auto sector =
+        std::min<std::size_t>(static_cast<std::size_t>(turn * sectors), sectors - 1);
+    const double r = local.z() - base - slope.dot(local.head<2>() - centre_);
+    float& cell = ring[band * sectors + sector];
+    cell = std::max(cell, static_cast<float>(r));
+  }
+  return ring;
+}
+
+// Did something come between the viewpoint and the surface, or did the surface itself come? Either
+// it was already to be seen beside the contact, or the surface still is.
+bool SightTracker::is_occluder(const Ring& now, double height) const noexcept {
+  const double tolerance = std::max(15e-3, 4.0 * spread_);
+  std::size_t same_before = 0;
+  std::size_t unchanged = 0;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    const double before = beside_[i];
+    if (before > std::max(25e-3, tolerance) && std::abs(before - height) < 30e-3) return true;
+    if (std::abs(before) < tolerance) {
+      ++same_before;
+      if (std::abs(now[i] - before) < std::min(tolerance, 0.3 * height)) ++unchanged;
+    }
+  }
+  return unchanged >= 3 && 4 * unchanged >= same_before;
+}
+
+}  // namespace palpate

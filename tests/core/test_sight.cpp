@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/renderer.hpp"
+#include "palpate/core/sight.hpp"
+
+#include "tests/support/grids.hpp"
+
+namespace palpate {
+namespace {
+
+using test::flat_grid;
+using test::grid;
+
+constexpr double r_c = 5e-3;
+constexpr double interval = 1.0 / 30.0;
+
+Renderer by_sight(const Vec3& seat) {
+  Parameters parameters;
+  parameters.method = Method::sight;
+  Renderer renderer(parameters);
+  renderer.seat(seat);
+  return renderer;
+}
+
+using HipPath = std::function<Vec3(double t)>;
+
+// One frame and its ticks; the last one.
+Tick live_through(Renderer& renderer, const Cloud& cloud, double stamp, const HipPath& hip) {
+  renderer.frame(cloud, stamp);
+  Tick tick{};
+  for (int i = 0; i < 33; ++i) tick = renderer.tick(hip(stamp + i * 1e-3), stamp + i * 1e-3);
+  return tick;
+}
+
+// A grid as one frame of a camera a metre above it sees it, each coordinate with noise.
+PointCloud seen_from_above(std::vector<Vec3> points, double sigma, std::mt19937& random) {
+  if (sigma > 0.0) {
+    std::normal_distribution<double> noise(0.0, sigma);
+    for (Vec3& p : points) p += Vec3(noise(random), noise(random), noise(random));
+  }
+  const double z = points.empty() ? 0.0 : points[points.size() / 2].z();
+  return PointCloud(points, Vec3(0, 0, z + 1.0));
+}
+
+// A camera 0.6 m above the plane z = 0, which reads the heights it is given.
+class Overhead {
+ public:
+  static constexpr double distance = 0.6;
+
+  Overhead() {
+    Intrinsics k;
+    k.width = 160;
+    k.height = 120;
+    k.fx = k.fy = 400.0;
+    k.cx = 79.5;
+    k.cy = 59.5;
+    rays_ = std::make_shared<ViewingRays>(k);
+    pose_.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
+    pose_.translation() = Vec3(0, 0, distance);
+  }
+
+  template <class Height>
+  [[nodiscard]] DepthImage shoot(const Height& height, double sigma, std::mt19937& random) const {
+    std::normal_distribution<double> noise(0.0, 1.0);
+    std::vector<std::uint16_t> depth;
+    for (int v = 0; v < 120; ++v) {
+      for (int u = 0; u < 160; ++u) {
+        const Eigen::Vector2d ray = rays_->ray(u, v);
+        double z = distance;
+        for (int i = 0; i < 4; ++i) z = distance - height(z * ray.x(), -z * ray.y());
+        depth.push_back(static_cast<std::uint16_t>((z + sigma * noise(random)) * 5e4 + 0.5));
+      }
+    }
+    return DepthImage(rays_, std::move(depth), 5e4, pose_);
+  }
+
+ private:
+  std::shared_ptr<const ViewingRays> rays_;
+  Eigen::Isometry3d pose_ = Eigen::Isometry3d::Identity();
+};
+
+TEST(SurfaceFit, FindsTheQuadricThatItsPointsLieOn) {
+  Quadric truth;
+  truth.c << 0.002, 0.1, -0.2, 5.0, -3.0, 8.0;
+  const auto points = grid(1e-3, 12, [&](double x, double y) { return truth.height(Vec2(x, y)); });
+  Patch patch;
+  gather(BruteForceCloud(points), Ball{Vec3(0, 0, 0.001), 0.03}, patch);
+  const Moments moments =
+      disc_moments(patch, LocalFrame{}, Quadric{}, Disc{Vec2::Zero(), 0.0, 0.011, 10.0});
+  const Quadric found = fit_quadric(moments, 0.0);
+  for (const Vec2& at : {Vec2(0, 0), Vec2(0.004, -0.003), Vec2(-0.01, 0.002)}) {
+    EXPECT_NEAR(found.height(at), truth.height(at), 1e-7);
+  }
+}
+
+TEST(SurfaceFit, SaysTheSameAboutAnotherOrigin) {
+  Quadric surface;
+  surface.c << 0.001, 0.05, 0.1, 3.0, 1.0, -2.0;
+  const auto points =
+      grid(1e-3, 10, [&](double x, double y) { return surface.height(Vec2(x, y)); });
+  Patch patch;
+  gather(BruteForceCloud(points), Ball{Vec3::Zero(), 0.02}, patch);
+  const Moments here =
+      disc_moments(patch, LocalFrame{}, Quadric{}, Disc{Vec2::Zero(), 0.0, 0.009, 10.0});
+  const Vec3 shift(0.003, -0.002, 0.004);
+  const Quadric there = fit_quadric(here.moved(shift), 0.0);
+  for (const Vec2& at : {Vec2(0, 0), Vec2(0.004, -0.003)}) {
+    EXPECT_NEAR(there.height(at), surface.height(at + shift.head<2>()) - shift.z(), 2e-7);
+  }
+}
+
+TEST(SurfaceFit, FindsTheNearestPointOfABowl) {
+  Quadric bowl;
+  bowl.c << 0, 0, 0, 10.0, 0, 10.0;  // radius of curvature 50 mm
+  const Vec3 point(0.004, 0.003, 0.02);
+  const Vec2 at = bowl.nearest(point, point.head<2>(), Vec2::Zero(), 1.0);
+  const Vec3 foot(at.x(), at.y(), bowl.height(at));
+  EXPECT_LT((point - foot).cross(bowl.normal(at)).norm(), 1e-9);
+}
+
+std::vector<HeightSample> heights_of(const std::vector<double>& oldest_first) {
+  std::vector<HeightSample> samples;
+  for (std::size_t i = oldest_first.size(); i-- > 0;) {
+    samples.push_back({static_cast<double>(i) * interval, oldest_first[i]});
+  }
+  return samples;
+}
+
+TEST(AgreedHeight, IsTheMeanOfASurfaceAtRest) {
+  const auto samples = heights_of({1e-3, -1e-3, 1e-3, -1e-3, 1e-3, -1e-3, 1e-3, -1e-3});
+  EXPECT_NEAR(agreed_height(samples, 1e-3, 0.0, 2.5), 0.0, 1e-12);
+}
+
+TEST(AgreedHeight, LetsGoOfThePastInOneFrameWhenTheSurfaceJumps) {
+  const auto samples = heights_of({0, 0, 0, 0, 0, 0, 0, 0.1});
+  EXPECT_NEAR(agreed_height(samples, 1e-4, 0.0, 2.5), 0.1, 2.5e-4);
+}
+
+TEST(ForetoldVelocity, IsNoneAtRestUnderNoiseAndExactInSteadyMotion) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0.0, 1e-3);
+  int moving = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    std::vector<double> heights;
+    for (int i = 0; i < 32; ++i) heights.push_back(noise(random));
+    if (foretold_velocity(heights_of(heights), 1e-3, interval) != 0.0) ++moving;
+  }
+  EXPECT_LE(moving, 4);
+  const auto rising = heights_of({0.000, 0.001, 0.002, 0.003, 0.004});
+  EXPECT_NEAR(foretold_velocity(rising, 1e-5, interval), 0.03, 1e-9);
+}
+
+TEST(FirstLayer, IsTheNearestOneThatEnoughPointsBelongTo) {
+  std::array<float, 20> heights;
+  for (std::size_t i = 0; i < 9; ++i) heights[i] = 0.10F + 1e-4F * static_cast<float>(i);
+  for (std::size_t i = 9; i < 19; ++i) heights[i] = -1e-4F * static_cast<float>(i);
+  heights[19] = 0.2F;  // a stray point
+  const auto layer = first_layer(heights, 0.02, 0.3);
+  ASSERT_TRUE(layer);
+  EXPECT_NEAR(layer->height, 0.1004, 1e-6);
+  EXPECT_FALSE(first_layer(std::span(heights.data(), 4), 0.02, 0.3));
+}
+
+TEST(Sight, RestsExactlyOneContactRadiusAboveAPlaneWithoutNoise) {
+  std::mt19937 random(1);
+  const PointCloud plane = seen_from_above(flat_grid(), 0.0, random);
+  Renderer renderer = by_sight({0, 0, 0.02});
+  Tick tick{};
+  for (int k = 0; k < 4; ++k) {
+    tick = live_through(renderer, plane, k * interval,
+                        [](double) { return Vec3(0.0003, 0.0004, -0.01); });
+    EXPECT_NEAR(tick.proxy.z(), r_c, 1e-6);
+  }
+  EXPECT_NEAR(tick.force.z(), 6.0, 1e-2);
+}
+
+TEST(Sight, FeelsAWedgeAndAGapAsPointsBecauseTheyAreNotSmooth) {
+  std::mt19937 random(1);
+  const PointCloud wedge =
+      seen_from_above(grid(1e-3, 60, [](double x, double) { return std::abs(x); }), 0.0, random);
+  Renderer renderer = by_sight({0, 0, 0.03});
+  Tick tick{};
+  for (int k = 0; k < 5; ++k) {
+    tick = live_through(renderer, wedge, k * interval, [](double) { return Vec3(0, 0, -0.01); });
+  }
+  EXPECT_NEAR(tick.proxy.z(), r_c * std::numbers::sqrt2, 0.2e-3);
+
+  std::vector<Vec3> rims;
+  for (const Vec3& p : flat_grid(0.0, 1e-3, 60)) {
+    if (std::abs(p.x()) >= 3e-3) rims.push_back(p);
+  }
+  const PointCloud gap = seen_from_above(rims, 0.0, random);
+  renderer = by_sight({0, 0, 0.03});
+  for (int k = 0; k < 5; ++k) {
+    tick = live_through(renderer, gap, k * interval, [](double) { return Vec3(0, 0, -0.02); });
+  }
+  EXPECT_NEAR(tick.proxy.z(), std::sqrt(r_c * r_c - 9e-6), 0.2e-3);
+}
+
+TEST(Sight, RestsOnASheetTouchedFromBehind) {
+  std::mt19937 random(2);
+  Renderer renderer = by_sight({0, 0, -0.03});
+  Tick tick{};
+  for (int k = 0; k < 10; ++k) {
+    const PointCloud sheet = seen_from_above(flat_grid(), 0.2e-3, random);
+    tick = live_through(renderer, sheet, k * interval, [](double) { return Vec3(0, 0, 0.01); });
+  }
+  EXPECT_NEAR(tick.proxy.z(), -r_c, 0.5e-3);
+  EXPECT_LT(tick.force.z(), -5.0);
+}
+
+struct Lift {
+  double acceleration, sigma;  // [m/s^2], [m]
+};
+
+// Section 5.2's experiment, on a smaller grid. True if the proxy is above the surface at its end.
+bool is_held(const Lift& lift, Method method, unsigned seed) {
+  std::mt19937 random(seed);
+  Parameters parameters;
+  parameters.method = method;
+  Renderer renderer(parameters);
+  renderer.seat({0, 0, 0});
+  const auto height = [&](double t) {
+    const double after = std::max(t - 0.5, 0.0);
+    return -0.05 + 0.1 * t + 0.5 * lift.acceleration * after * after;
+  };
+  for (int k = 0; k <= 26; ++k) {
+    const double t = k * interval;
+    const PointCloud cloud = seen_from_above(flat_grid(height(t), 1.5e-3, 40), lift.sigma, random);
+    const Tick tick = live_through(renderer, cloud, t, [&](double now) {
+      return Vec3(0, 0, now < 0.5 ? 0.0 : height(now) - 6 * r_c);
+    });
+    if (k > 15 && tick.proxy.z() < height(t)) return false;
+  }
+  return true;
+}
+
+TEST(Sight, HoldsLiftsThatThePapersMethodLoses) {
+  int lost_by_paper = 0;
+  unsigned seed = 1;
+  for (const Lift& lift :
+       {Lift{600 * r_c, 0.6 * r_c}, Lift{1400 * r_c, 0.0}, Lift{1400 * r_c, 3.0 * r_c},
+        Lift{1000 * r_c, 1.5 * r_c}, Lift{10000 * r_c, 0.2 * r_c}, Lift{18000 * r_c, 1.0 * r_c}}) {
+    EXPECT_TRUE(is_held(lift, Method::sight, seed)) << lift.acceleration << " " << lift.sigma;
+    if (!is_held(lift, Method::paper, seed)) ++lost_by_paper;
+    ++seed;
+  }
+  EXPECT_GE(lost_by_paper, 4);
+}
+
+TEST(Sight, MeetsASurfaceThatComesFromFreeSpaceAtAnySpeed) {
+  for (const double speed : {0.1, 0.2, 1.0, 5.0}) {
+    std::mt19937 random(5);
+    Renderer renderer = by_sight({0, 0, 0});
+    for (int k = 0; k < 40; ++k) {
+      const double z = -0.15 * std::max(1.0, speed) + 0.003 + speed * k * interval;
+      if (z > 0.1) break;
+      const PointCloud cloud = seen_from_above(flat_grid(z, 1.5e-3, 40), 1e-3, random);
+      const Tick tick =
+          live_through(renderer, cloud, k * interval, [](double) { return Vec3(0, 0, 0); });
+      if (z > 0) {
+        EXPECT_GT(tick.proxy.z(), z) << "at " << speed << " m/s";
+      }
+    }
+  }
+}
+
+TEST(Sight, HoldsTheContactWhileAHandPassesBeforeIt) {
+  const Overhead camera;
+  for (const double speed : {0.3, 0.9, 1.7}) {
+    std::mt19937 random(3);
+    Renderer renderer = by_sight({0, 0, 0.03});
+    bool hidden = false;
+    double lowest = 1.0;
+    double highest = 0.0;
+    for (int k = 0; k < 60; ++k) {
+      const double edge = -0.2 + speed * std::max(k - 20, 0) * interval;
+      const DepthImage image = camera.shoot(
+          [&](double x, double) { return std::abs(x - edge) < 0.04 ? 0.1 : 0.0; }, 1e-3, random);
+      const Tick tick =
+          live_through(renderer, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
+      hidden = hidden || (tick.flags & surface_hidden) != 0;
+      if (k < 10) continue;
+      lowest = std::min(lowest, tick.proxy.z());
+      highest = std::max(highest, tick.proxy.z());
+    }
+    EXPECT_TRUE(hidden) << speed;
+    EXPECT_GT(lowest, r_c - 0.5e-3) << speed;
+    EXPECT_LT(highest, r_c + 0.5e-3) << speed;
+  }
+}
+
+TEST(Sight, LetsTheForceFadeWhenTheSurfaceStaysHidden) {
+  const Overhead camera;
+  std::mt19937 random(3);
+  Renderer renderer = by_sight({0, 0, 0.03});
+  Tick tick{};
+  for (int k = 0; k < 60; ++k) {
+    const double edge =
+        -0.15 + 0.5 * std::clamp(k - 10, 0, 9) * interval;  // stops over the contact
+    const DepthImage image = camera.shoot(
+        [&](double x, double) { return std::abs(x - edge) < 0.04 ? 0.1 : 0.0; }, 0.0, random);
+    tick = live_through(renderer, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
+    if (k == 9) {
+      EXPECT_NEAR(tick.force.z(), 6.0, 0.1);
+    }
+  }
+  EXPECT_TRUE(tick.flags & surface_hidden);
+  EXPECT_NEAR(tick.force.norm(), 0.0, 1e-6);
+  EXPECT_NEAR(tick.proxy.z(), r_c, 0.1e-3);
+}
+
+TEST(Sight, AveragesTheNoiseOfASurfaceAtRestAway) {
+  const Overhead camera;
+  std::mt19937 random(4);
+  Renderer renderer = by_sight({0, 0, 0.03});
+  for (int k = 0; k < 30; ++k) {
+    const DepthImage image = camera.shoot([](double, double) { return 0.0; }, 1e-3, random);
+    const Tick tick =
+        live_through(renderer, image, k * interval, [](double) { return Vec3(0.0002, 0, -0.01); });
+    if (k >= 8) {
+      EXPECT_NEAR(tick.proxy.z(), r_c, 0.15e-3) << "frame " << k;
+      EXPECT_EQ(tick.surface_velocity, 0.0) << "frame " << k;
+    }
+  }
+}
+
+TEST(Sight, GivesTheSameTicksBitForBitOnEveryRun) {
+  const Overhead camera;
+  const auto run = [&] {
+    std::mt19937 random(9);
+    Renderer renderer = by_sight({0, 0, 0.02});
+    std::vector<double> out;
+    for (int k = 0; k < 12; ++k) {
+      const DepthImage image =
+          camera.shoot([](double x, double) { return 1e-3 * std::sin(300 * x); }, 0.5e-3, random);
+      const Tick tick = live_through(renderer, image, k * interval, [](double t) {
+        return Vec3(0.05 * t, 0.02 * t, 0.01 - 0.05 * t);
+      });
+      for (int i = 0; i < 3; ++i) out.push_back(tick.force[i]);
+      for (int i = 0; i < 3; ++i) out.push_back(tick.proxy[i]);
+    }
+    return out;
+  };
+  EXPECT_EQ(run(), run());
+}
+
+TEST(Sight, BearsEmptyFramesAndStampsThatStandStill) {
+  const PointCloud nothing({});
+  std::mt19937 random(1);
+  const PointCloud plane = seen_from_above(flat_grid(), 0.0, random);
+  Renderer renderer = by_sight({0, 0, 0.02});
+  const HipPath press = [](double) { return Vec3(0, 0, -0.01); };
+  live_through(renderer, plane, 0.0, press);
+  live_through(renderer, plane, 0.0, press);
+  const Tick hidden = live_through(renderer, nothing, 0.033, press);
+  EXPECT_TRUE(hidden.flags & surface_hidden);
+  EXPECT_NEAR(hidden.proxy.z(), r_c, 1e-4);
+  const Tick again = live_through(renderer, plane, 0.066, press);
+  EXPECT_FALSE(again.flags & surface_hidden);
+  EXPECT_NEAR(again.proxy.z(), r_c, 1e-4);
+}
+
+}  // namespace
+}  // namespace palpate

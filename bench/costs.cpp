@@ -32,6 +32,10 @@ class CountedCloud final : public Cloud {
     ++gathers;
     cloud_->gather(ball, max_points, patch);
   }
+  void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override {
+    ++gathers;
+    cloud_->gather(beam, max_points, patch);
+  }
   mutable std::size_t gathers = 0;
 
  private:

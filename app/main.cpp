@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "app/verbs.hpp"
+#include "lab/runner.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/parameters.hpp"
 
@@ -42,11 +43,13 @@ void refuse_extras(const CLI::App& command, const std::vector<std::string>& cand
 }
 
 int run_program(int argc, char** argv) {
+  const lab::Ranks ranks(&argc, &argv);
   CLI::App program("Feel what a depth camera sees.", "palpate");
   program.set_version_flag("--version", "palpate " PALPATE_VERSION);
   program.allow_extras();
 
-  const std::array adders = {add_run, add_trace, add_info, add_bench, add_parameters};
+  const std::array adders = {add_run,  add_trace, add_eval,
+                             add_info, add_bench, add_parameters};
   std::vector<Verb> verbs;
   std::vector<std::string> words;
   for (const auto& add : adders) {

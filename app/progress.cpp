@@ -14,8 +14,8 @@ Progress::Progress(std::string what, std::size_t total)
       total_(std::max<std::size_t>(total, 1)),
       watched_(isatty(STDERR_FILENO) == 1) {}
 
-void Progress::advance() {
-  ++done_;
+void Progress::set(std::size_t done) {
+  done_ = done;
   const int percent = static_cast<int>(100 * done_ / total_);
   if (!watched_ || percent == shown_percent_) return;
   shown_percent_ = percent;

@@ -11,7 +11,9 @@ class Progress {
  public:
   Progress(std::string what, std::size_t total);
 
-  void advance();
+  void advance() { set(done_ + 1); }
+  /// So many are done.
+  void set(std::size_t done);
   /// Clears the line.
   void finish();
 

@@ -19,6 +19,7 @@ struct Verb {
 
 Verb add_run(CLI::App& program);
 Verb add_trace(CLI::App& program);
+Verb add_eval(CLI::App& program);
 Verb add_info(CLI::App& program);
 Verb add_bench(CLI::App& program);
 Verb add_parameters(CLI::App& program);

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "app/options.hpp"
+#include "app/progress.hpp"
+#include "app/verbs.hpp"
+#include "lab/experiment.hpp"
+#include "lab/method.hpp"
+#include "lab/report.hpp"
+#include "lab/runner.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct EvalOptions {
+  std::string name;
+  std::string out = "eval";
+  std::vector<std::string> methods;
+  std::string grid;
+  std::string noise = "white";
+  std::int64_t seed = 1;
+  int jobs = 0;
+  bool resume = false;
+  bool list_methods = false;
+  bool list_experiments = false;
+  MethodOptions parameters;
+};
+
+std::pair<int, int> parse_grid(const std::string& text) {
+  const std::size_t cross = text.find('x');
+  const Error error("--grid " + text, "it is not NxM with N and M from 1 to 100000",
+                    "write for example --grid 76x71");
+  if (cross == std::string::npos) throw error;
+  const double n = parse_number("--grid " + text, text.substr(0, cross));
+  const double m = parse_number("--grid " + text, text.substr(cross + 1));
+  const auto whole = [](double v) { return v >= 1.0 && v <= 1e5 && v == static_cast<int>(v); };
+  if (!whole(n) || !whole(m)) throw error;
+  return {static_cast<int>(n), static_cast<int>(m)};
+}
+
+lab::ExperimentOptions experiment_options(const EvalOptions& options) {
+  lab::ExperimentOptions result;
+  result.parameters = options.parameters.parameters();
+  result.methods = options.methods;
+  if (options.seed < 0)
+    throw Error("--seed " + std::to_string(options.seed), "it is negative",
+                "give a whole number from 0 on");
+  result.seed = static_cast<std::uint64_t>(options.seed);
+  if (!options.grid.empty()) result.grid = parse_grid(options.grid);
+  if (options.noise == "correlated")
+    result.noise = lab::Noise::correlated;
+  else if (options.noise != "white")
+    throw Error("--noise " + options.noise, "there is no such noise", "choose white or correlated");
+  return result;
+}
+
+int list(const EvalOptions& options) {
+  if (options.list_methods) {
+    for (const lab::MethodInfo& method : lab::known_methods()) fmt::print("{}\n", method.name);
+    return 0;
+  }
+  for (const lab::Experiment& experiment : lab::known_experiments())
+    fmt::print("{:<14} {}\n", experiment.name, experiment.summary);
+  return 0;
+}
+
+int eval(const EvalOptions& options) {
+  if (options.list_methods || options.list_experiments) return list(options);
+  if (options.name.empty())
+    throw Error("eval", "no experiment is given", "see 'palpate eval --list' for their names");
+  const bool all = options.name == "all";
+  std::vector<const lab::Experiment*> experiments;
+  if (all) {
+    for (const lab::Experiment& experiment : lab::known_experiments())
+      experiments.push_back(&experiment);
+  } else {
+    experiments.push_back(&lab::find_experiment(options.name));
+  }
+  const lab::ExperimentOptions given = experiment_options(options);
+  if (!all && given.grid && !experiments.front()->has_grid)
+    throw Error("--grid", "the experiment '" + options.name + "' has no grid", "leave it out");
+  if (options.jobs < 0 || options.jobs > 1024)
+    throw Error("--jobs " + std::to_string(options.jobs), "that many threads make no sense",
+                "give 1 to 1024, or 0 for one a core");
+
+  std::error_code error;
+  fs::create_directories(options.out, error);
+  if (error)
+    throw Error("--out " + options.out, "the folder cannot be made: " + error.message(),
+                "give a folder that you may write to");
+  lab::RunnerOptions runner;
+  const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  // Under MPI a rank is a core.
+  runner.jobs = options.jobs > 0 ? options.jobs : lab::Ranks::size() > 1 ? 1 : cores;
+  runner.resume = options.resume;
+
+  std::vector<lab::Result> results;
+  for (const lab::Experiment* experiment : experiments) {
+    lab::ExperimentOptions fitting = given;
+    if (!experiment->has_grid) fitting.grid.reset();
+    std::unique_ptr<Progress> progress;
+    runner.progress = [&](std::size_t done, std::size_t total) {
+      if (!progress) progress = std::make_unique<Progress>(std::string(experiment->name), total);
+      progress->set(done);
+    };
+    const fs::path csv = fs::path(options.out) / (std::string(experiment->name) + ".csv");
+    const std::string text = lab::run_experiment(*experiment, fitting, runner, csv);
+    if (lab::Ranks::rank() != 0) continue;
+    if (progress) progress->finish();
+    results.push_back(lab::make_result(*experiment, fitting, text, options.out));
+    fmt::print("{}", lab::claims_as_text(results.back()));
+  }
+  if (lab::Ranks::rank() == 0) {
+    const fs::path page = lab::write_report(results, options.out);
+    fmt::print("wrote {}\n", page.string());
+  }
+  return 0;
+}
+
+}  // namespace
+
+Verb add_eval(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "eval", "experiments: the paper's figures and claims, and the bench for other methods");
+  const auto options = std::make_shared<EvalOptions>();
+  command->add_option("experiment", options->name, "its name, or all; see --list");
+  command->add_option("--out", options->out, "folder for CSV, plots and the report (eval)");
+  command
+      ->add_option("--methods", options->methods,
+                   "methods to compare, separated by commas; see --list-methods")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
+  command->add_option("--noise", options->noise, "white (default) or correlated");
+  command->add_option("--seed", options->seed, "of all noise (1)");
+  command->add_option("--jobs", options->jobs, "threads (one a core)");
+  command->add_flag("--resume", options->resume, "go on from an interrupted run's finished cells");
+  command->add_flag("--list", options->list_experiments, "list the experiments");
+  command->add_flag("--list-methods", options->list_methods, "list the methods, one a line");
+  options->parameters.add_to(*command);
+  return {command, [options] { return eval(*options); }};
+}
+
+}  // namespace palpate::app

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "lab/table.hpp"
+#include "palpate/core/parameters.hpp"
+
+namespace palpate::lab {
+
+enum class Noise { white, correlated };
+
+/// What an experiment is run with.
+struct ExperimentOptions {
+  std::vector<std::string> methods;         ///< empty: those that the experiment compares
+  std::uint64_t seed = 1;                   ///< of all noise
+  std::optional<std::pair<int, int>> grid;  ///< sizes of its two axes, where it has two
+  Noise noise = Noise::white;
+  Parameters parameters;  ///< Table 2 unless set
+};
+
+/// A piece of an experiment that needs no other: its rows of the CSV, each ended by a newline.
+using Cell = std::function<std::string()>;
+
+/// One sentence of the paper next to what we measured.
+struct Claim {
+  std::string where;    ///< section or figure
+  std::string words;    ///< what the paper says
+  std::string paper;    ///< its number
+  std::string ours;     ///< our number
+  std::string verdict;  ///< "reproduced", or "differs: " and why
+};
+
+/// An experiment that can be asked for by name. Deterministic: the same options give the same CSV,
+/// byte for byte, however its cells are spread over threads and machines.
+struct Experiment {
+  std::string_view name;
+  std::string_view summary;                       ///< one line, with the paper's section
+  std::string_view header;                        ///< of the CSV
+  std::vector<std::string_view> default_methods;  ///< empty: it compares none
+  bool has_grid;                                  ///< takes --grid
+  std::vector<Cell> (*cells)(const Experiment&, const ExperimentOptions&);
+  /// gnuplot commands that draw the figure from the file named by the variable `csv`.
+  std::string_view plot;
+  std::vector<Claim> (*claims)(const Table&);
+};
+
+/// All experiments, in the order of the report.
+const std::vector<Experiment>& known_experiments();
+
+/// @throws Error for an unknown name, naming the nearest and listing all.
+const Experiment& find_experiment(std::string_view name);
+
+/// The methods to run: those asked for, else the experiment's own.
+/// @throws Error for an unknown one.
+std::vector<std::string> methods_of(const Experiment& experiment, const ExperimentOptions& options);
+
+}  // namespace palpate::lab

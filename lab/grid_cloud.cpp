@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/grid_cloud.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include "palpate/sources/sensor_model.hpp"
+
+namespace palpate::lab {
+namespace {
+
+// Adds white noise smoothed by a Gaussian to the heights of a grid: marginal deviation sigma,
+// correlation exp(-(d / length)^2) at d points.
+void add_correlated_noise(std::vector<Vec3>& points, int columns, int rows, double sigma,
+                          double length, std::uint64_t key) {
+  // A kernel exp(-2 (d / length)^2), convolved with itself, gives that correlation.
+  const int half = static_cast<int>(std::ceil(1.5 * length));
+  std::vector<float> kernel;
+  float squares = 0.0F;
+  for (int d = -half; d <= half; ++d) {
+    const double at = d / length;
+    kernel.push_back(static_cast<float>(std::exp(-2.0 * at * at)));
+    squares += kernel.back() * kernel.back();
+  }
+  for (float& k : kernel) k /= std::sqrt(squares);
+
+  const int wide = columns + 2 * half;
+  const int tall = rows + 2 * half;
+  std::vector<float> white(static_cast<std::size_t>(wide) * tall);
+  fill_normal(key, white);
+  std::vector<float> smoothed(static_cast<std::size_t>(columns) * tall);
+  for (int v = 0; v < tall; ++v) {
+    for (int u = 0; u < columns; ++u) {
+      float sum = 0.0F;
+      for (int d = 0; d <= 2 * half; ++d)
+        sum +=
+            kernel[static_cast<std::size_t>(d)] * white[static_cast<std::size_t>(v) * wide + u + d];
+      smoothed[static_cast<std::size_t>(v) * columns + u] = sum;
+    }
+  }
+  for (int v = 0; v < rows; ++v) {
+    for (int u = 0; u < columns; ++u) {
+      float sum = 0.0F;
+      for (int d = 0; d <= 2 * half; ++d)
+        sum += kernel[static_cast<std::size_t>(d)] *
+               smoothed[static_cast<std::size_t>(v + d) * columns + u];
+      points[static_cast<std::size_t>(v) * columns + u].z() += sigma * double{sum};
+    }
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<PointCloud> GridCloud::capture(std::uint64_t frame, double lift) const {
+  // The grid is fixed in the world; what moves with the centre is which part of it is made.
+  const auto first = [this](double centre, double half) {
+    return static_cast<int>(std::ceil((centre - half) / spacing));
+  };
+  const auto count = [this](double half) { return static_cast<int>(2.0 * half / spacing) + 1; };
+  const int columns = count(half_x);
+  const int rows = count(half_y);
+  const int i0 = first(centre_x, half_x);
+  const int j0 = first(centre_y, half_y);
+  std::vector<Vec3> points;
+  points.reserve(static_cast<std::size_t>(columns) * rows);
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      const double x = (i0 + i) * spacing;
+      const double y = (j0 + j) * spacing;
+      points.emplace_back(x, y, height(x, y) + lift);
+    }
+  }
+  if (sigma > 0.0 && noise == Noise::white) add_point_noise(points, sigma, seed, frame);
+  if (sigma > 0.0 && noise == Noise::correlated)
+    add_correlated_noise(points, columns, rows, sigma, 5.0, seed * 0x9E3779B97F4A7C15ULL + frame);
+  return std::make_unique<PointCloud>(points, Vec3(centre_x, centre_y, 10.0));
+}
+
+}  // namespace palpate::lab

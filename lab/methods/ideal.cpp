@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/methods/ideal.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "palpate/core/coupling.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::lab {
+namespace {
+
+class Ideal final : public TouchMethod {
+ public:
+  explicit Ideal(const MethodSetup& setup) : truth_(setup.truth), parameters_(setup.parameters) {}
+
+  void seat(const Vec3& proxy) override { proxy_ = proxy; }
+  void frame(const Cloud& /*cloud*/, double /*stamp*/) override { ++frames_; }
+
+  Tick tick(const Vec3& hip, double t) override {
+    if (!proxy_) proxy_ = hip;
+    const double r_c = parameters_.proxy.r_c();
+    // Steps towards the HIP, each no longer than a tenth of the radius and followed by a push out
+    // of the surface along its normal, end where the way to the HIP is along the normal.
+    const double longest = 0.1 * r_c;
+    TruePoint under = truth_(*proxy_, t);
+    for (int i = 0; i < 200; ++i) {
+      const Vec3 before = *proxy_;
+      Vec3 step = hip - *proxy_;
+      if (under.distance <= r_c + 1e-9 && step.dot(under.normal) < 0.0)
+        step -= step.dot(under.normal) * under.normal;
+      else
+        step *= std::min(1.0, std::max(under.distance - r_c, 1e-6) / std::max(step.norm(), 1e-12));
+      if (under.distance <= r_c + 1e-9 && step.norm() > longest) step *= longest / step.norm();
+      *proxy_ += step;
+      under = truth_(*proxy_, t);
+      for (int j = 0; j < 4 && under.distance < r_c - 1e-10; ++j) {
+        *proxy_ += (r_c - under.distance) * under.normal;
+        under = truth_(*proxy_, t);
+      }
+      if ((*proxy_ - before).norm() < 1e-9) break;
+    }
+    const bool touching = under.distance <= r_c + 1e-7 && (hip - *proxy_).norm() > 1e-9;
+    const Vec3 force =
+        touching ? coupling_force(parameters_.coupling, hip - *proxy_, 0.0, r_c, false).force
+                 : Vec3(Vec3::Zero());
+    return {.t = t,
+            .hip = hip,
+            .proxy = *proxy_,
+            .normal = touching ? under.normal : Vec3(Vec3::Zero()),
+            .force = force,
+            .state = touching ? ContactState::contact : ContactState::free_motion,
+            .steps = 0,
+            .surface_velocity = 0.0,
+            .frame = frames_ - 1,
+            .flags = 0};
+  }
+
+ private:
+  Truth truth_;
+  Parameters parameters_;
+  std::optional<Vec3> proxy_;
+  std::int64_t frames_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<TouchMethod> make_ideal(const MethodSetup& setup) {
+  if (!setup.truth)
+    throw Error("method 'ideal'", "there is no analytic truth here",
+                "choose another method, or a synthetic scene");
+  return std::make_unique<Ideal>(setup);
+}
+
+}  // namespace palpate::lab

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "lab/method.hpp"
+
+namespace palpate::lab {
+
+/// What a method is put through: a camera and a hand, over time.
+struct Scenario {
+  double frame_rate = 30.0;   ///< [Hz] frame k is captured at k / frame_rate
+  double tick_rate = 1000.0;  ///< [Hz]
+  double duration = 1.0;      ///< [s]
+  std::function<std::unique_ptr<Cloud>(std::uint64_t frame, double t)> cloud;
+  std::function<Vec3(double t)> hip;  ///< [m] world
+};
+
+/// Plays a scenario to a method: every frame at the first tick at or after its stamp.
+/// @param on_tick  (const Tick&) -> bool, after each tick: go on?
+template <class OnTick>
+void play(TouchMethod& method, const Scenario& scenario, const OnTick& on_tick) {
+  std::unique_ptr<Cloud> in_use;
+  std::uint64_t next_frame = 0;
+  const auto ticks =
+      static_cast<std::int64_t>(std::llround(scenario.duration * scenario.tick_rate));
+  for (std::int64_t i = 0; i <= ticks; ++i) {
+    const double t = static_cast<double>(i) / scenario.tick_rate;
+    for (;;) {
+      const double stamp = static_cast<double>(next_frame) / scenario.frame_rate;
+      if (stamp > t + 1e-9) break;
+      std::unique_ptr<Cloud> cloud = scenario.cloud(next_frame, stamp);
+      method.frame(*cloud, stamp);
+      in_use = std::move(cloud);  // only now may the frame before go
+      ++next_frame;
+    }
+    if (!on_tick(method.tick(scenario.hip(t), t))) return;
+  }
+}
+
+}  // namespace palpate::lab

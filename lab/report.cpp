@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/report.hpp"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string command_line(const Experiment& experiment, const ExperimentOptions& options) {
+  std::string line = "palpate eval " + std::string(experiment.name);
+  if (!options.methods.empty()) {
+    line += " --methods ";
+    for (std::size_t i = 0; i < options.methods.size(); ++i)
+      line += (i == 0 ? "" : ",") + options.methods[i];
+  }
+  if (options.grid) line += fmt::format(" --grid {}x{}", options.grid->first, options.grid->second);
+  if (options.noise == Noise::correlated) line += " --noise correlated";
+  if (options.seed != 1) line += fmt::format(" --seed {}", options.seed);
+  return line;
+}
+
+// Quoted for gnuplot: single quotes take everything as it is, and double themselves.
+std::string in_quotes(const std::string& text) {
+  std::string result = "'";
+  for (const char c : text) result += c == '\'' ? std::string("''") : std::string(1, c);
+  return result + "'";
+}
+
+// Draws NAME.svg from NAME.csv; an empty path where there is no gnuplot.
+fs::path draw(const Experiment& experiment, const ExperimentOptions& options,
+              const fs::path& folder) {
+  const fs::path csv = folder / (std::string(experiment.name) + ".csv");
+  const fs::path figure = folder / (std::string(experiment.name) + ".svg");
+  std::string methods;
+  for (const std::string& name : methods_of(experiment, options))
+    methods += (methods.empty() ? "" : " ") + name;
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> gnuplot(
+      popen("gnuplot 2>/dev/null", "w"), pclose);  // NOLINT(cert-env33-c): gnuplot is the user's
+  if (!gnuplot) return {};
+  fs::remove(figure);
+  fmt::print(gnuplot.get(),
+             "set terminal svg size 860,480 font 'sans,13' background rgb 'white'\n"
+             "set output {}\ncsv = {}\nmethods = {}\nset datafile separator ','\n"
+             "set grid lc rgb '#dddddd'\n{}",
+             in_quotes(figure.string()), in_quotes(csv.string()), in_quotes(methods), experiment.plot);
+  return figure;
+}
+
+std::string escaped(std::string_view text) {
+  std::string result;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        result += "&amp;";
+        break;
+      case '<':
+        result += "&lt;";
+        break;
+      case '>':
+        result += "&gt;";
+        break;
+      case '"':
+        result += "&quot;";
+        break;
+      default:
+        result += c;
+    }
+  }
+  return result;
+}
+
+std::string read(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+void write(const fs::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out << text << std::flush;
+  if (!out)
+    throw Error(file.string(), std::string("cannot be written: ") + std::strerror(errno),
+                "give --out a folder that you may write to, with room on its disk");
+}
+
+constexpr std::string_view page_head = R"(<!doctype html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>palpate: the paper, reproduced</title>
+<style>
+:root { color-scheme: light dark; --ink: #1c2430; --paper: #fbfaf7; --line: #d9d5cb; --good: #1b7f4b; --bad: #b4441f; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e6e4de; --paper: #16191e; --line: #3a3f48; --good: #58c48c; --bad: #ef8a62; } }
+body { font: 16px/1.55 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 60rem; margin: 0 auto; padding: 2rem 1rem 5rem; }
+h1 { font-size: 2rem; margin: 0 0 .5rem; } h2 { margin: 3rem 0 .3rem; border-top: 1px solid var(--line); padding-top: 1.5rem; }
+figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; border-radius: 6px; }
+.wide { overflow-x: auto; } table { border-collapse: collapse; width: 100%; font-size: .92rem; }
+th, td { text-align: left; vertical-align: top; padding: .45rem .6rem; border-bottom: 1px solid var(--line); }
+code { font-size: .88em; } .good { color: var(--good); } .bad { color: var(--bad); }
+</style></head><body>
+<h1>The paper, reproduced</h1>
+<p>F. Rydén and H. J. Chizeck, <i>A Proxy Method for Real-Time 3-DOF Haptic Rendering of Streaming
+Point Cloud Data</i>, IEEE Transactions on Haptics, 2013: its figures and claims beside ours.
+Lengths are in units of r_c = 5 mm where the paper's are.</p>
+)";
+
+}  // namespace
+
+Result make_result(const Experiment& experiment, const ExperimentOptions& options,
+                   std::string_view csv, const fs::path& folder) {
+  const Table table(std::string(experiment.name) + ".csv", csv);
+  Result result{&experiment, command_line(experiment, options), experiment.claims(table),
+                draw(experiment, options, folder)};
+  std::error_code error;
+  if (fs::file_size(result.figure, error) == 0 || error) result.figure.clear();
+  return result;
+}
+
+std::string claims_as_text(const Result& result) {
+  std::string text = std::string(result.experiment->name) + "\n";
+  for (const Claim& claim : result.claims)
+    text += fmt::format("  {}: {}\n    paper: {}\n    ours:  {}\n    {}\n", claim.where,
+                        claim.words, claim.paper, claim.ours, claim.verdict);
+  return text;
+}
+
+fs::path write_report(const std::vector<Result>& results, const fs::path& folder) {
+  std::string page(page_head);
+  std::string notes =
+      "# The paper's claims beside ours\n\nMade by `palpate eval all`; not written by hand.\n\n"
+      "| where | the paper's words | its number | ours | | command |\n|---|---|---|---|---|---|\n";
+  for (const Result& result : results) {
+    page += fmt::format("<h2>{}</h2>\n<p>{}<br><code>{}</code></p>\n", result.experiment->name,
+                        escaped(result.experiment->summary), escaped(result.command));
+    if (!result.figure.empty()) {
+      const std::string svg = read(result.figure);
+      const std::size_t begin = svg.find("<svg");
+      page += "<figure>" + (begin == std::string::npos ? svg : svg.substr(begin)) + "</figure>\n";
+    }
+    if (result.claims.empty()) continue;
+    page +=
+        "<div class=\"wide\"><table><tr><th>where</th><th>the paper's words</th>"
+        "<th>its number</th><th>ours</th><th></th></tr>\n";
+    for (const Claim& claim : result.claims) {
+      const bool differs = claim.verdict.rfind("differs", 0) == 0;
+      page += fmt::format(
+          "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"{}\">{}</td></tr>\n",
+          escaped(claim.where), escaped(claim.words), escaped(claim.paper), escaped(claim.ours),
+          differs ? "bad" : "good", escaped(claim.verdict));
+      notes += fmt::format("| {} | {} | {} | {} | {} | `{}` |\n", claim.where, claim.words,
+                           claim.paper, claim.ours, claim.verdict, result.command);
+    }
+    page += "</table></div>\n";
+  }
+  page += "</body></html>\n";
+  write(folder / "report.html", page);
+  write(folder / "reproduction.md", notes);
+  return folder / "report.html";
+}
+
+}  // namespace palpate::lab

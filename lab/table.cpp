@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/table.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate::lab {
+namespace {
+
+std::vector<std::string> split(std::string_view text, char separator) {
+  std::vector<std::string> parts;
+  for (;;) {
+    const std::size_t at = text.find(separator);
+    parts.emplace_back(text.substr(0, at));
+    if (at == std::string_view::npos) return parts;
+    text.remove_prefix(at + 1);
+  }
+}
+
+}  // namespace
+
+Table::Table(std::string_view subject, std::string_view csv) : subject_(subject) {
+  for (const std::string& line : split(csv, '\n')) {
+    if (line.empty()) continue;
+    std::vector<std::string> fields = split(line, ',');
+    if (columns_.empty()) {
+      columns_ = std::move(fields);
+      continue;
+    }
+    if (fields.size() != columns_.size())
+      throw Error(subject_,
+                  "row " + std::to_string(rows_.size() + 1) + " has " +
+                      std::to_string(fields.size()) + " fields, not " +
+                      std::to_string(columns_.size()),
+                  "run the experiment again");
+    rows_.push_back(std::move(fields));
+  }
+}
+
+std::size_t Table::index(std::string_view column) const {
+  const auto found = std::find(columns_.begin(), columns_.end(), column);
+  if (found == columns_.end())
+    throw Error(subject_, "there is no column '" + std::string(column) + "'",
+                "run the experiment again");
+  return static_cast<std::size_t>(found - columns_.begin());
+}
+
+bool Table::has(std::string_view column) const {
+  return std::find(columns_.begin(), columns_.end(), column) != columns_.end();
+}
+
+const std::string& Table::text(std::size_t row, std::string_view column) const {
+  return rows_.at(row)[index(column)];
+}
+
+double Table::number(std::size_t row, std::string_view column) const {
+  const std::string& field = text(row, column);
+  double value = 0.0;
+  const auto [rest, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+  if (error != std::errc{} || rest != field.data() + field.size())
+    throw Error(subject_, "'" + field + "' in column '" + std::string(column) + "' is no number",
+                "run the experiment again");
+  return value;
+}
+
+Row& Row::add(std::string_view text) {
+  if (!line_.empty()) line_ += ',';
+  line_ += text;
+  return *this;
+}
+
+Row& Row::add(double number) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), number).ptr;
+  return add(std::string_view(text.data(), static_cast<std::size_t>(end - text.data())));
+}
+
+Row& Row::add(long long number) {
+  return add(std::string_view(std::to_string(number)));
+}
+
+}  // namespace palpate::lab

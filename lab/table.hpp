@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace palpate::lab {
+
+/// A CSV as read back, to make claims from.
+class Table {
+ public:
+  /// @throws Error naming `subject` if a row has not as many fields as the header.
+  Table(std::string_view subject, std::string_view csv);
+
+  [[nodiscard]] std::size_t rows() const { return rows_.size(); }
+  /// @throws Error if there is no such column.
+  [[nodiscard]] const std::string& text(std::size_t row, std::string_view column) const;
+  [[nodiscard]] double number(std::size_t row, std::string_view column) const;
+  [[nodiscard]] bool has(std::string_view column) const;
+
+  /// The numbers of a column in the rows that `keep(row)` is true for.
+  template <class Keep>
+  [[nodiscard]] std::vector<double> numbers(std::string_view column, const Keep& keep) const {
+    std::vector<double> values;
+    for (std::size_t row = 0; row < rows(); ++row) {
+      if (keep(row)) values.push_back(number(row, column));
+    }
+    return values;
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(std::string_view column) const;
+
+  std::string subject_;
+  std::vector<std::string> columns_;
+  std::vector<std::vector<std::string>> rows_;
+};
+
+/// One CSV row from its fields: numbers in the shortest form that reads back to the same value.
+class Row {
+ public:
+  Row& add(std::string_view text);
+  Row& add(const char* text) { return add(std::string_view(text)); }
+  Row& add(double number);
+  Row& add(long long number);
+  Row& add(int number) { return add(static_cast<long long>(number)); }
+  Row& add(std::uint64_t number) { return add(static_cast<long long>(number)); }
+  Row& add(bool yes) { return add(static_cast<long long>(yes)); }
+  /// The row with its newline.
+  [[nodiscard]] std::string done() const { return line_ + "\n"; }
+
+ private:
+  std::string line_;
+};
+
+}  // namespace palpate::lab

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+// The paper's figures at reduced size, and that an experiment is the same however it is run.
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "lab/experiment.hpp"
+#include "lab/method.hpp"
+#include "lab/report.hpp"
+#include "lab/runner.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+
+#include "tests/support/grids.hpp"
+
+namespace palpate::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Lab : public ::testing::Test {
+ protected:
+  Lab() {
+    std::string pattern = (fs::temp_directory_path() / "palpate_lab_XXXXXX").string();
+    folder_ = mkdtemp(pattern.data());
+  }
+  ~Lab() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] Table run(std::string_view name, const ExperimentOptions& options) const {
+    return {name, csv(name, options, 2)};
+  }
+
+  [[nodiscard]] std::string csv(std::string_view name, const ExperimentOptions& options, int jobs,
+                                bool resume = false) const {
+    RunnerOptions runner;
+    runner.jobs = jobs;
+    runner.resume = resume;
+    return run_experiment(find_experiment(name), options, runner, file(name));
+  }
+
+  [[nodiscard]] fs::path file(std::string_view name) const {
+    return folder_ / (std::string(name) + ".csv");
+  }
+
+ private:
+  fs::path folder_;
+};
+
+ExperimentOptions with(std::vector<std::string> methods) {
+  ExperimentOptions options;
+  options.methods = std::move(methods);
+  return options;
+}
+
+TEST_F(Lab, LosesNoQuietLiftBelow880AndHoldsNoneAbove920) {
+  ExperimentOptions options = with({"paper"});
+  options.grid = {1, 71};  // without noise, 0 to 1400 r_c/s^2 in steps of 20
+  const Table table = run("lift", options);
+  ASSERT_EQ(table.rows(), 71U);
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double a = table.number(row, "acceleration_rc");
+    if (a <= 880.0) EXPECT_EQ(table.number(row, "popped"), 0.0) << a;
+    if (a >= 920.0) EXPECT_EQ(table.number(row, "popped"), 1.0) << a;
+  }
+}
+
+TEST_F(Lab, HoldsMoreOfTheLiftsThanTheFixedStepMethod) {
+  ExperimentOptions options = with({"fixed-step", "paper"});
+  options.grid = {6, 8};
+  const Table table = run("lift", options);
+  const auto lost = [&](std::string_view method) {
+    double sum = 0.0;
+    for (const double p : table.numbers(
+             "popped", [&](std::size_t row) { return table.text(row, "method") == method; }))
+      sum += p;
+    return sum;
+  };
+  EXPECT_LT(lost("paper") + 8, lost("fixed-step"));
+  EXPECT_LT(lost("ideal"), 1.0);
+}
+
+TEST_F(Lab, RipplesByAHundredthOfARadiusOnAFlatGrid) {
+  const Table table = run("flat", with({"paper"}));
+  double low = 1.0;
+  double high = -1.0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double t = table.number(row, "t");
+    if (t < 1.2 || t > 3.9) continue;
+    low = std::min(low, table.number(row, "contact_y"));
+    high = std::max(high, table.number(row, "contact_y"));
+  }
+  // Between four points r_c - sqrt(r_c^2 - s^2/2) = 0.114 mm; half of it is 0.011 r_c.
+  EXPECT_NEAR(0.5 * (high - low) / 5e-3, 0.011, 0.003);
+}
+
+TEST_F(Lab, IsOnTheSurfaceInTheTickOfTheJump) {
+  const Table table = run("jump", with({"paper"}));
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    EXPECT_EQ(table.number(row, "ticks"), 1.0) << table.number(row, "jump_rc") << " r_c";
+}
+
+TEST_F(Lab, LosesASurfaceFromFreeSpaceAboveR1TimesTheFrameRate) {
+  const Table table = run("first-contact", with({"paper", "ideal"}));
+  double lost_slow = 0;
+  double held_fast = 0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double v = table.number(row, "speed");
+    const double popped = table.number(row, "popped");
+    if (table.text(row, "method") == "ideal") {
+      EXPECT_EQ(popped, 0.0) << "the ruler is never lost; " << v << " m/s";
+    } else if (v <= 0.1) {
+      lost_slow += popped;
+    } else if (v >= 0.5) {
+      held_fast += 1.0 - popped;
+    }
+  }
+  EXPECT_EQ(lost_slow, 0.0);
+  EXPECT_EQ(held_fast, 0.0);
+}
+
+TEST_F(Lab, FeelsTheErrorOfThePrintedSignOf15) {
+  const Table table = run("force", with({"paper", "paper-as-printed"}));
+  const auto error = [&](std::string_view method) {
+    double squares = 0.0;
+    for (std::size_t row = 0; row < table.rows(); ++row) {
+      if (table.text(row, "method") == method)
+        squares += std::pow(table.number(row, "force_n") - table.number(row, "ideal_n"), 2);
+    }
+    return squares;
+  };
+  EXPECT_LT(2.0 * error("paper"), error("paper-as-printed"));
+}
+
+TEST_F(Lab, LosesARestingPlaneUnderCorrelatedNoiseThatItHoldsUnderWhite) {
+  ExperimentOptions options = with({"paper"});
+  options.grid = {7, 4};  // up to 5 mm, four tries of two seconds
+  const Table table = run("hold", options);
+  double white = 0;
+  double correlated = 0;
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    (table.text(row, "noise") == "white" ? white : correlated) += table.number(row, "popped");
+  EXPECT_EQ(white, 0.0);
+  EXPECT_GT(correlated, 0.0);
+}
+
+TEST_F(Lab, TouchesCornersAsWellAsASphereCan) {
+  const Table table = run("corners", with({"paper", "ideal"}));
+  double squares = 0.0;
+  int count = 0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double gap = table.number(row, "gap");
+    if (table.text(row, "method") == "ideal") {
+      EXPECT_LT(std::abs(gap), 1e-5);
+    } else {
+      squares += gap * gap;
+      ++count;
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / count), 0.3e-3);
+}
+
+TEST_F(Lab, GivesTheSameBytesWithOneJobTwoJobsAndAfterAnInterruption) {
+  ExperimentOptions options = with({"paper"});
+  options.grid = {3, 4};
+  const std::string one = csv("lift", options, 1);
+  EXPECT_EQ(csv("lift", options, 2), one);
+  options.seed = 2;
+  EXPECT_NE(csv("lift", options, 2), one);
+  options.seed = 1;
+
+  // A run that was killed while it wrote its sixth cell: what the progress callback throws ends it.
+  RunnerOptions runner;
+  runner.progress = [](std::size_t done, std::size_t) {
+    if (done == 5) throw Error("test", "interrupted");
+  };
+  EXPECT_THROW(run_experiment(find_experiment("lift"), options, runner, file("lift")), Error);
+  std::ofstream(file("lift").string() + ".part", std::ios::app) << "5 400\npaper,46";
+  std::size_t first_done = 0;
+  runner.resume = true;
+  runner.progress = [&](std::size_t done, std::size_t) {
+    if (first_done == 0) first_done = done;
+  };
+  EXPECT_EQ(run_experiment(find_experiment("lift"), options, runner, file("lift")), one);
+  EXPECT_EQ(first_done, 6U) << "five cells were kept";
+  EXPECT_FALSE(fs::exists(file("lift").string() + ".part"));
+}
+
+TEST_F(Lab, RefusesToResumeARunWithOtherOptions) {
+  ExperimentOptions options = with({"paper"});
+  options.grid = {1, 3};
+  RunnerOptions runner;
+  runner.progress = [](std::size_t, std::size_t) { throw Error("test", "interrupted"); };
+  EXPECT_THROW(run_experiment(find_experiment("lift"), options, runner, file("lift")), Error);
+  options.seed = 7;
+  runner.resume = true;
+  runner.progress = nullptr;
+  EXPECT_THROW(run_experiment(find_experiment("lift"), options, runner, file("lift")), Error);
+}
+
+TEST_F(Lab, SharesItsCellsAmongTwoRanks) {
+  if (std::system("mpirun --version >/dev/null 2>&1") != 0)
+    GTEST_SKIP() << "mpirun is not installed";
+  const std::string out = file("ranks").parent_path().string();
+  const std::string arguments =
+      std::string(" ") + PALPATE_PROGRAM + " eval lift --methods paper --grid 3x4 --out " + out;
+  const int status = std::system(
+      ("mpirun --allow-run-as-root --oversubscribe -n 2" + arguments + " >" + out + "/log 2>&1")
+          .c_str());
+  std::ifstream log(out + "/log");
+  std::ostringstream said;
+  said << log.rdbuf();
+  ASSERT_EQ(status, 0) << said.str();
+  if (said.str().find("wrote") != said.str().rfind("wrote"))
+    GTEST_SKIP() << "this build has no MPI: both ranks ran everything";
+  std::ifstream in(file("lift"));
+  std::ostringstream two;
+  two << in.rdbuf();
+  ExperimentOptions options = with({"paper"});
+  options.grid = {3, 4};
+  EXPECT_EQ(csv("lift", options, 1), two.str());
+}
+
+TEST_F(Lab, MakesAPageAndATableOfEveryClaim) {
+  const Experiment& experiment = find_experiment("jump");
+  const std::string text = csv("jump", {}, 2);
+  const Result result = make_result(experiment, {}, text, file("jump").parent_path());
+  ASSERT_EQ(result.claims.size(), 1U);
+  EXPECT_EQ(result.claims[0].verdict.substr(0, 10), "reproduced");
+  const fs::path page = write_report({result}, file("jump").parent_path());
+  std::ifstream in(page);
+  std::ostringstream html;
+  html << in.rdbuf();
+  EXPECT_NE(html.str().find("less than 1 ms"), std::string::npos);
+  EXPECT_EQ(html.str().find("src="), std::string::npos) << "the page needs nothing beside it";
+}
+
+TEST(Methods, AreFoundByNameAndTheNearestIsSuggested) {
+  try {
+    static_cast<void>(make_method("papr", {}));
+    FAIL() << "there is no such method";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("did you mean 'paper'"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("ideal"), std::string::npos);
+  }
+  EXPECT_THROW(find_experiment("lifts!"), Error);
+  EXPECT_THROW(static_cast<void>(make_method("ideal", {})), Error) << "it needs the truth";
+}
+
+TEST(Ideal, RestsOnASphereWhereTheHipIs) {
+  constexpr double radius = 0.05;
+  const Truth sphere = [](const Vec3& p, double) {
+    return TruePoint{p.norm() - radius, p.normalized()};
+  };
+  const auto ideal = make_method("ideal", {Parameters{}, sphere});
+  ideal->seat({0, 0.02, 0.08});
+  const Vec3 direction = Vec3(0.3, -0.2, 1.0).normalized();
+  Tick tick{};
+  for (int i = 0; i < 200; ++i) tick = ideal->tick(0.04 * direction, i * 1e-3);
+  EXPECT_LT((tick.proxy - (radius + 5e-3) * direction).norm(), 1e-6);
+  EXPECT_LT((tick.force - 600.0 * 0.010 * direction).norm(), 1e-3);
+}
+
+TEST(Direct, PushesInProportionToTheDepthBelowAPlane) {
+  const PointCloud plane(test::flat_grid(), Vec3(0, 0, 1));
+  const auto direct = make_method("direct", {});
+  direct->frame(plane, 0.0);
+  EXPECT_NEAR(direct->tick({0, 0, -0.004}, 0.0).force.z(), 600.0 * 0.004, 1e-6);
+  EXPECT_NEAR(direct->tick({0, 0, -0.008}, 0.0).force.z(), 600.0 * 0.008, 1e-6);
+  EXPECT_TRUE(direct->tick({0, 0, 0.004}, 0.0).force.isZero());
+}
+
+TEST(Direct, LosesTheSideOnAThinPlate) {
+  // Seen from above only, the plate pushes a hand out upwards however far it came through.
+  const PointCloud plane(test::flat_grid(), Vec3(0, 0, 1));
+  const auto direct = make_method("direct", {});
+  direct->frame(plane, 0.0);
+  EXPECT_TRUE(direct->tick({0, 0, -0.04}, 0.0).force.isZero()) << "out of its radius: popped";
+}
+
+}  // namespace
+}  // namespace palpate::lab

@@ -37,10 +37,11 @@ Law lift_law(double r_c, double acceleration) {
           begin + 10.0 / f_c};
 }
 
-// The hand waits at the origin; once the surface has passed it, it keeps 6 r_c below the surface.
+// The hand waits at the origin; once the cloud has passed it, it keeps 6 r_c below the cloud as the
+// newest frame shows it (below the surface itself, it would overtake a proxy between two frames).
 double hand_height(const Law& law, double r_c, double t) {
-  const double surface = law.height(t);
-  return surface > 0.0 ? surface - 6.0 * r_c : 0.0;
+  const double shown = law.height(std::floor(t * f_c + 1e-6) / f_c);
+  return shown > 0.0 ? shown - 6.0 * r_c : 0.0;
 }
 
 struct Lifted {

@@ -16,6 +16,8 @@ const std::vector<MethodInfo>& known_methods() {
        make_kernel<Method::paper_as_printed>},
       {"fixed-step", "Rydén 2011 [1]: steps of 0.1 r_1, no velocity",
        make_kernel<Method::fixed_step>},
+      {"sight", "sightline tracking with remembered sides (docs/method.md)",
+       make_kernel<Method::sight>},
       {"direct", "penalty force on a moving-least-squares surface (2.1, [7])", make_direct},
       {"ideal", "the proxy on the true surface: the ruler", make_ideal},
   };

@@ -54,7 +54,8 @@ fs::path draw(const Experiment& experiment, const ExperimentOptions& options,
              "set terminal svg size 860,480 font 'sans,13' background rgb 'white'\n"
              "set output {}\ncsv = {}\nmethods = {}\nset datafile separator ','\n"
              "set grid lc rgb '#dddddd'\n{}",
-             in_quotes(figure.string()), in_quotes(csv.string()), in_quotes(methods), experiment.plot);
+             in_quotes(figure.string()), in_quotes(csv.string()), in_quotes(methods),
+             experiment.plot);
   return figure;
 }
 

@@ -66,7 +66,7 @@ FloatMoments sum_moments(const float* px, const float* py, const float* pz, std:
     const float dx = x - centre_x;
     const float dy = y - centre_y;
     const float away = dx * dx + dy * dy;
-    const float in_disc = (away >= inner_squared) & (away < outer_squared) ? 1.0F : 0.0F;
+    const float in_disc = ((away >= inner_squared) & (away < outer_squared)) ? 1.0F : 0.0F;
     float t = r * inverse_cut;
     t = t * t;
     t = t < 1.0F ? 1.0F - t : 0.0F;

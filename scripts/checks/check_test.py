@@ -85,8 +85,8 @@ class Text(Tree):
         self.assertEqual(self.faults(), ["scripts/run:1: no SPDX line"])
 
     def test_a_long_line_is_found(self):
-        self.write("a.hpp", SPDX + "x" * (check.COLUMNS + 1))
-        self.assertEqual(self.faults(), ["a.hpp:2: 101 columns, more than 100"])
+        self.write("a.py", SPDX + "x" * (check.COLUMNS + 1))
+        self.assertEqual(self.faults(), ["a.py:2: 101 columns, more than 100"])
 
     def test_a_machine_path_is_found(self):
         self.write("docs/a.md", "see /" + "home/me/data\n")

@@ -2,6 +2,7 @@
 #include "lab/experiments/surfaces.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -246,7 +247,42 @@ plot csv using (strcol(1) eq "paper" ? $5/r : NaN):($7/r) with points pt 7 ps 0.
      csv using (strcol(1) eq "paper" ? $5/r : NaN):($6/r) with lines lw 2 lc rgb "#1f77b4" title "paper"
 )gp";
 
-// 5.4: the HIP goes in a straight line at constant velocity, below a ramp and a box.
+// 5.4: over the desk's ramp, down behind it, onto its box and off again, at 0.05 m/s and 10 to 20
+// mm below the surface. x and z of the HIP; y stays in the middle of both.
+constexpr std::array<std::array<double, 2>, 10> scan_path = {{{-0.27, 0.010},
+                                                              {-0.27, -0.010},
+                                                              {-0.05, 0.055},
+                                                              {0.00, -0.012},
+                                                              {0.01, -0.012},
+                                                              {0.01, 0.090},
+                                                              {0.05, 0.090},
+                                                              {0.05, 0.055},
+                                                              {0.15, 0.055},
+                                                              {0.17, -0.010}}};
+constexpr double scan_y = 0.08;
+constexpr double scan_speed = 0.05;  // [m/s]
+
+double scan_length(std::size_t legs) {
+  double length = 0.0;
+  for (std::size_t i = 0; i < legs; ++i)
+    length +=
+        std::hypot(scan_path[i + 1][0] - scan_path[i][0], scan_path[i + 1][1] - scan_path[i][1]);
+  return length;
+}
+
+Vec3 scan_hip(double t) {
+  const double gone = scan_speed * t;
+  for (std::size_t i = 0; i + 1 < scan_path.size(); ++i) {
+    const double end = scan_length(i + 1);
+    if (gone > end && i + 2 < scan_path.size()) continue;
+    const double leg = end - scan_length(i);
+    const double share = std::min((gone - scan_length(i)) / leg, 1.0);
+    return {scan_path[i][0] + share * (scan_path[i + 1][0] - scan_path[i][0]), scan_y,
+            scan_path[i][1] + share * (scan_path[i + 1][1] - scan_path[i][1])};
+  }
+  return Vec3::Zero();
+}
+
 std::vector<Cell> scan_cells(const Experiment& experiment, const ExperimentOptions& options) {
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options)) {
@@ -255,18 +291,13 @@ std::vector<Cell> scan_cells(const Experiment& experiment, const ExperimentOptio
       const std::unique_ptr<SyntheticCamera> camera = open_synthetic_camera(uri);
       const auto scene = std::make_shared<const Scene>(camera->scene());
       const auto method = make_method(name, {options.parameters, truth_of(scene)});
-      const double r_c = options.parameters.proxy.r_c();
-      constexpr double from = -0.20;
-      constexpr double to = 0.20;
-      constexpr double speed = 0.05;  // [m/s]
-      constexpr double duration = (to - from) / speed;
+      const double duration = scan_length(scan_path.size() - 1) / scan_speed;
       const auto ground = [&](double x) {
-        const auto hit = scene->cast(Vec3(x, 0.0, 1.0), -Vec3::UnitZ(), 0.0);
+        const auto hit = scene->cast(Vec3(x, scan_y, 1.0), -Vec3::UnitZ(), 0.0);
         return hit ? 1.0 - *hit : 0.0;
       };
-      method->seat(Vec3(from, 0.0, ground(from) + 2.0 * r_c));
+      method->seat(scan_hip(0.0));
       std::string rows;
-      std::unique_ptr<Frame> frame;
       int i = 0;
       Frame in_use;
       for (std::uint64_t k = 0; k < static_cast<std::uint64_t>(duration * f_c); ++k) {
@@ -275,7 +306,7 @@ std::vector<Cell> scan_cells(const Experiment& experiment, const ExperimentOptio
         in_use = std::move(next);
         for (; i * 1e-3 < static_cast<double>(k + 1) / f_c; ++i) {
           const double t = i * 1e-3;
-          const Vec3 hip(from + speed * t, 0.0, -2.0 * r_c);
+          const Vec3 hip = scan_hip(t);
           const Tick tick = method->tick(hip, t);
           if (i % 4 == 0 && i > 100)
             rows += Row()

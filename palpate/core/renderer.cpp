@@ -100,10 +100,12 @@ void Renderer::frame_by_sight(const Cloud& cloud) noexcept {
   const Event event = sight_.frame(cloud, stamp_, interval_, *proxy_);
   if (event != Event::followed && event != Event::jumped) return;
   // Side repair: the proxy was on the surface's free side and has to be there still.
+  // One that will move over points has to be in front of this frame's, not only of the average.
   const SurfaceContact contact = sight_.contact(*proxy_, stamp_);
-  if (contact.distance < parameters_.proxy.r_c()) {
-    *proxy_ = contact.foot + parameters_.proxy.r_c() * contact.normal;
-  }
+  const double r_c = parameters_.proxy.r_c();
+  const double least = touching_ && !sight_.smooth() ? r_c + sight_.clearance() : r_c;
+  if (contact.distance < least) *proxy_ = contact.foot + least * contact.normal;
+  behind_ = sight_.shows_behind(cloud, *proxy_, parameters_.proxy.r_c());
 }
 
 // Movement on the fitted surface where it describes the points well, on the points elsewhere.
@@ -263,6 +265,10 @@ Vec3 Renderer::blend_force(const Vec3& force, double t) noexcept {
   // A single frame is a scan, not a stream that stopped.
   const double late = parameters_.motion.max_extrapolation;
   if (frame_count_ > 1) blended *= ease((t - stamp_ - late) / late);
+  const double force_now = blended.norm();
+  if (force_now > parameters_.coupling.max_force) {
+    blended *= parameters_.coupling.max_force / force_now;
+  }
   last_force_ = blended;
   return blended;
 }

@@ -24,9 +24,9 @@ constexpr std::size_t least_points = 8;
 constexpr std::size_t beam_points = 256;
 // What comes before a contact is looked for in all that `judge` looks at [m].
 constexpr double shadow_radius = 15e-3;
-constexpr std::size_t wide_beam_points = 768;
-constexpr std::size_t inner_points = 1024;
-constexpr std::size_t outer_points = 2048;
+constexpr std::size_t wide_beam_points = 512;
+constexpr std::size_t inner_points = 768;
+constexpr std::size_t outer_points = 1280;
 constexpr std::size_t inner_rungs = 2;
 // A fit serves contacts within this of its centre [m].
 constexpr double serves = 1.5e-3;
@@ -37,14 +37,14 @@ constexpr double serves_while_held = 15e-3;
 constexpr double structure_floor = 50e-6;
 // Noise of a disc's height that is usual for a depth camera: this [m] at 1 m, growing with the
 // square of the distance, as stereo does. Serves until the noise has been measured.
-constexpr double usual_noise = 3e-3;
+constexpr double usual_noise = 2e-3;
 // Spread of a surface's curvature coefficients x^2, xy, y^2 that is expected [1/m]: radii down to
 // some 30 mm are common, and noise must not invent them.
 constexpr double curvature_sd = 15.0;
 // A map of what is beside the contact [m].
 constexpr double beside_inner = 12e-3;
 constexpr std::array<double, 3> beside_bands = {40e-3, 80e-3, 140e-3};
-constexpr std::size_t beside_points = 768;
+constexpr std::size_t beside_points = 512;
 constexpr float nothing = -1e3F;
 
 constexpr double squared(double x) {
@@ -130,9 +130,8 @@ std::size_t heights_along(const Patch& patch, const Vec3& up, std::span<float> h
 
 }  // namespace
 
-double foretold_velocity(std::span<const HeightSample> samples, double sd,
-                         double interval) noexcept {
-  if (samples.size() < 2 || !(interval > 0.0)) return 0.0;
+Motion foretell_motion(std::span<const HeightSample> samples, double sd, double interval) noexcept {
+  if (samples.size() < 2 || !(interval > 0.0)) return {0.0, samples.size()};
   // How well each rule would have foretold the last heights, the newest weighing most.
   constexpr std::array<double, 4> weights = {1.0, 0.7, 0.5, 0.35};
   const auto misses = [&](auto&& rule, std::size_t needs) {
@@ -150,13 +149,8 @@ double foretold_velocity(std::span<const HeightSample> samples, double sd,
   const auto at_rest = [](std::span<const HeightSample> past, double) {
     return mean_height(past.first(std::min<std::size_t>(past.size(), 8)));
   };
-  const double newest_miss = samples[0].height - at_rest(samples.subspan(1), 0.0);
   double least = misses(at_rest, 1);
-  double velocity = 0.0;
-  // One frame that is far off already says that the surface left; a line is the least daring guess.
-  if (std::abs(newest_miss) > 5.0 * sd + 1e-6) {
-    velocity = (samples[0].height - samples[1].height) / (samples[0].stamp - samples[1].stamp);
-  }
+  Motion motion{0.0, samples.size()};
   for (const Rule& rule : moving_rules) {
     if (samples.size() < rule.samples) continue;
     const double miss = misses([&](std::span<const HeightSample> past,
@@ -168,11 +162,12 @@ double foretold_velocity(std::span<const HeightSample> samples, double sd,
         rule.order == 2 ? (foretell(rule, samples, interval) - samples[0].height) / interval
                         : line_through(samples.first(rule.samples)).slope;
     const double uncertainty = rule.noise * sd / interval;
-    if (std::abs(candidate) <= 3.0 * uncertainty) continue;
+    if (std::abs(candidate) <= 3.5 * uncertainty) continue;
     least = miss;
-    velocity = candidate;
+    // What a parabola says of the next frame's travel says nothing of the last ones'.
+    motion = {candidate, rule.order == 2 ? 1 : rule.samples};
   }
-  return velocity;
+  return motion;
 }
 
 double agreed_height(std::span<const HeightSample> samples, double sd, double velocity,
@@ -227,10 +222,10 @@ double SightTracker::height_sd() const noexcept {
 // camera; then what they told, with a margin for how few they were.
 double SightTracker::variance(std::size_t rung) const noexcept {
   const Scatter& scatter = scatter_[rung];
-  const double usual = squared(usual_noise * squared(distance_)) + 0.1 * squared(spread_) + 1e-12;
+  const double usual = squared(usual_noise * squared(distance_)) + 0.03 * squared(spread_) + 1e-12;
   if (scatter.samples < 1.0) return usual;
-  const double told = scatter.variance * (1.0 + 2.0 / scatter.samples) + 1e-12;
-  return scatter.samples < 4.0 ? std::max(usual, told) : told;
+  const double told = scatter.variance * (1.0 + 4.0 / scatter.samples) + 1e-12;
+  return scatter.samples < 6.0 ? std::max(usual, told) : told;
 }
 
 double SightTracker::gate() const noexcept {
@@ -368,6 +363,20 @@ void SightTracker::watch(const Cloud& cloud, const Vec3& proxy) noexcept {
       cloud, frame_.world_from_local(Vec3(centre_.x(), centre_.y(), surface_.height(centre_))));
 }
 
+bool SightTracker::shows_behind(const Cloud& cloud, const Vec3& proxy, double radius) noexcept {
+  if (!tracking_ || holding_ || covered_) return false;
+  gather(cloud, Beam{proxy, radius, reach, frame_.up}, beam_points, patch_);
+  const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
+  std::array<float, beam_points> heights;
+  if (!viewpoint || patch_.size() < least_points) return false;
+  const Vec3 line = (*viewpoint - proxy).normalized();
+  if (line.dot(frame_.up) < 0.0) return false;  // touched from behind: that is where it belongs
+  const std::size_t seen = heights_along(patch_, line, heights);
+  auto* middle = heights.data() + seen / 2;
+  std::nth_element(heights.data(), middle, heights.data() + seen);
+  return *middle > 1e-3 + 3.0 * height_sd();
+}
+
 bool SightTracker::slide(const Cloud& cloud, const Vec3& foot) noexcept {
   if (!tracking_ || holding_) return false;
   return measure(cloud, frame_.local_from_world(foot).head<2>(), stamp_, false, gate());
@@ -379,7 +388,7 @@ void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& norma
     const Vec3 local = frame_.local_from_world(foot);
     const double off = local.z() - surface_.height(local.head<2>());
     const bool same_side = frame_.up.dot(normal) > 0.35;
-    if (same_side && std::abs(off) < 3e-3 + 4.0 * spread_ &&
+    if (same_side && std::abs(off) < 3e-3 + 4.0 * (spread_ + height_sd()) &&
         (local.head<2>() - centre_).norm() < 12e-3) {
       if ((local.head<2>() - centre_).norm() < serves) return;
       if (measure(cloud, local.head<2>(), stamp_, false, gate())) return;
@@ -550,6 +559,8 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
     for (; n < count_; ++n) {
       const Evidence& e = evidence(n);
       if (e.rungs <= j || (e.centre - foot).norm() > std::max(3e-3, 0.5 * radii[j])) break;
+      // A disc that something covers in part tells the height, but hardly the slope.
+      if (!e.whole && n > 0) continue;
       matrix += e.shape[j].matrix;
       right_side += e.shape[j].right_side;
     }
@@ -558,22 +569,38 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
     Scatter& scatter = scatter_[j];
     // What one point weighs against the prior, whatever correlation does to it.
     const double prior = variance(j) * points / cm2 / squared(curvature_sd * Moments::unit);
-    matrix.diagonal().array() += 1e-9;
-    matrix.diagonal().tail<3>().array() += prior;
-    shapes[j] = matrix.ldlt().solve(right_side);
+    const auto fit_shape = [&](Eigen::Matrix<double, 5, 5> a, const Vec5& b) {
+      a.diagonal().array() += 1e-9;
+      a.diagonal().tail<3>().array() += prior;
+      shapes[j] = a.ldlt().solve(b);
+    };
+    fit_shape(matrix, right_side);
+    // A surface that turns is told by its newest slopes: then the older ones are no evidence.
+    if (n > 2 && now.whole && evidence(1).whole) {
+      matrix = now.shape[j].matrix + evidence(1).shape[j].matrix;
+      right_side = now.shape[j].right_side + evidence(1).shape[j].right_side;
+      const Vec5 off = right_side - matrix * shapes[j];
+      const double point_variance = variance(j) * points / cm2;
+      for (int axis = 0; axis < 2; ++axis) {
+        if (squared(off[axis]) <= 16.0 * point_variance * matrix(axis, axis)) continue;
+        fit_shape(matrix, right_side);
+        break;
+      }
+    }
     const double above = shapes[j].dot(basis);
     for (std::size_t i = 0; i < n; ++i) {
       const Evidence& e = evidence(i);
       heights[j][i] = {
           e.stamp, (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * Moments::unit};
     }
-    if (new_frame && n >= 3) {
-      // Second differences do not see a steady motion; their variance is 6 times a height's.
-      const double second =
-          heights[j][0].height - 2.0 * heights[j][1].height + heights[j][2].height;
-      double change = second * second / 6.0;
+    if (new_frame && n >= 5 && now.whole) {
+      // Fourth differences do not see a smooth motion; their variance is 70 times a height's.
+      const auto& h = heights[j];
+      const double fourth =
+          h[0].height - 4.0 * h[1].height + 6.0 * h[2].height - 4.0 * h[3].height + h[4].height;
+      double change = fourth * fourth / 70.0;
       // A single jump is no noise.
-      if (scatter.samples >= 3.0) change = std::min(change, 9.0 * scatter.variance + 1e-12);
+      if (scatter.samples >= 4.0) change = std::min(change, 9.0 * scatter.variance + 1e-12);
       scatter.samples = std::min(scatter.samples + 1.0, 40.0);
       scatter.variance += (change - scatter.variance) / scatter.samples;
     }
@@ -597,7 +624,7 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
       const double expected = 2.0 * (variance(i) + variance(j));
       const double scattered =
           (std::max(squares - count * mean * mean, 0.0) + (n < 4 ? expected : 0.0)) / count;
-      agrees = std::abs(mean) <= 2.5 * std::sqrt(scattered / count) + 2e-6;
+      agrees = std::abs(mean) <= (3.0 + 4.0 / count) * std::sqrt(scattered / count) + 2e-6;
     }
     if (!agrees) break;
     if (variance(j) <= variance(chosen)) chosen = j;
@@ -605,11 +632,16 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
   rung_ = chosen;
   const std::span<const HeightSample> past(heights[chosen].data(), frames[chosen]);
   const double sd = height_sd();
-  if (new_frame) velocity_ = foretold_velocity(past, sd, interval_);
+  if (new_frame) {
+    const Motion motion = foretell_motion(past, sd, interval_);
+    velocity_ = motion.velocity;
+    settled_ = std::min(settled_, motion.frames);
+  }
   const double height = agreed_height(past.first(std::clamp<std::size_t>(settled_, 1, past.size())),
-                                      sd, velocity_, 2.5);
+                                      sd, velocity_, velocity_ == 0.0 ? 3.0 : 1.5);
   surface_.c.tail<5>() = shapes[chosen];
   surface_.c.tail<3>() /= Moments::unit;
+  above_mean_ = past.front().height - height;
   surface_.c[0] = height - shapes[chosen].dot(basis) * Moments::unit;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -18,16 +19,20 @@ struct HeightSample {
   double height;  ///< [m]
 };
 
-/// The velocity [m/s] that leads to where the surface will be one frame later.
-///
+/// How a surface moves.
+struct Motion {
+  double velocity;     ///< [m/s] leads to where it will be one frame later
+  std::size_t frames;  ///< the newest so many heights belong to that motion
+};
+
 /// The rule (at rest; a line through the last 2, 4 or 8 heights; a parabola through 3) that
 /// foretold the last heights best foretells the next one; a velocity below its own uncertainty is
 /// 0.
 /// @param newest_first  heights measured
 /// @param sd            [m] standard deviation of one of them
 /// @param interval      [s] until the next frame
-double foretold_velocity(std::span<const HeightSample> newest_first, double sd,
-                         double interval) noexcept;
+Motion foretell_motion(std::span<const HeightSample> newest_first, double sd,
+                       double interval) noexcept;
 
 /// The height now [m], averaged over as much of the past as agrees with the present.
 ///
@@ -82,6 +87,10 @@ class SightTracker {
   /// @param normal  [-] unit, world, towards the proxy
   void touch(const Cloud& cloud, const Vec3& foot, const Vec3& normal) noexcept;
 
+  /// Does the frame show a proxy that ought to be in front of the surface behind it? An audit: the
+  /// median of what is measured on its line of sight, independent of the fit.
+  /// @param radius  [m] of the footprint
+  [[nodiscard]] bool shows_behind(const Cloud& cloud, const Vec3& proxy, double radius) noexcept;
   /// Fits the surface anew around `foot` [m, world], a place on it. False if it ends before there.
   bool slide(const Cloud& cloud, const Vec3& foot) noexcept;
 
@@ -104,6 +113,10 @@ class SightTracker {
   [[nodiscard]] double spread() const noexcept { return spread_; }
   /// Standard deviation of one frame's height of the surface [m], as measured.
   [[nodiscard]] double height_sd() const noexcept;
+  /// How far the newest frame's own points may lie above the averaged surface [m].
+  [[nodiscard]] double clearance() const noexcept {
+    return std::max(above_mean_, 0.0) + 3.0 * spread_;
+  }
   /// [m] over which the surface is averaged now.
   [[nodiscard]] double support_radius() const noexcept { return radii[rung_]; }
 
@@ -178,6 +191,7 @@ class SightTracker {
   std::size_t newest_ = 0;
   std::size_t count_ = 0;
   std::size_t settled_ = 0;  // frames since it jumped
+  double above_mean_ = 0.0;  // [m] the newest frame's height over the average
   double distance_ = 0.0;    // [m] from the viewpoint
   Ring beside_{};
 

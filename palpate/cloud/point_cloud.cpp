@@ -34,6 +34,44 @@ void push_if_inside(const Vec3& point, const Ball& ball, Patch& patch) {
   if (p.squaredNorm() <= ball.radius * ball.radius) push(p, patch);
 }
 
+// Numbers the voxels in the order in which they are met.
+class VoxelNumbers {
+ public:
+  std::uint32_t number_of(std::uint64_t key) {
+    // Neighbours in a file are neighbours in space, mostly.
+    if (!keys_.empty() && key == keys_[last_]) return last_;
+    if (2 * (keys_.size() + 1) > slots_.size()) grow();
+    std::size_t slot = slot_of(key, slots_.size());
+    while (slots_[slot] != none && keys_[slots_[slot]] != key)
+      slot = (slot + 1) & (slots_.size() - 1);
+    if (slots_[slot] == none) {
+      slots_[slot] = static_cast<std::uint32_t>(keys_.size());
+      keys_.push_back(key);
+    }
+    last_ = slots_[slot];
+    return last_;
+  }
+  [[nodiscard]] const std::vector<std::uint64_t>& keys() const { return keys_; }
+  /// For each slot of a table that is at most half full, the number of its voxel or `none`.
+  [[nodiscard]] const std::vector<std::uint32_t>& slots() const { return slots_; }
+
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+ private:
+  void grow() {
+    slots_.assign(2 * slots_.size(), none);
+    for (std::uint32_t number = 0; number < keys_.size(); ++number) {
+      std::size_t slot = slot_of(keys_[number], slots_.size());
+      while (slots_[slot] != none) slot = (slot + 1) & (slots_.size() - 1);
+      slots_[slot] = number;
+    }
+  }
+
+  std::vector<std::uint64_t> keys_;
+  std::vector<std::uint32_t> slots_ = std::vector<std::uint32_t>(16, none);
+  std::uint32_t last_ = 0;
+};
+
 }  // namespace
 
 PointCloud::PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoint, double voxel)
@@ -70,34 +108,35 @@ PointCloud::PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoi
                   static_cast<std::int64_t>(index.z()));
   };
 
-  // Count the points of each voxel, give each voxel its run, then put the points in their runs.
-  cells_.assign(std::bit_ceil(std::max<std::size_t>(2 * finite, 16)), Cell{0, 0, 0});
-  const std::size_t slots = cells_.size();
-  const auto cell_of = [this, slots](std::uint64_t key) -> Cell& {
-    std::size_t slot = slot_of(key, slots);
-    while (cells_[slot].end != 0 && cells_[slot].key != key) slot = (slot + 1) & (slots - 1);
-    cells_[slot].key = key;
-    return cells_[slot];
-  };
+  // Number the voxels, give each its run of points, then put the points in their runs.
+  VoxelNumbers voxels;
+  std::vector<std::uint32_t> voxel_of;
+  voxel_of.reserve(finite);
+  std::vector<std::uint32_t> next;  // per voxel: how many points; then where its next one goes
   for (const Vec3& p : points) {
-    if (p.allFinite()) ++cell_of(voxel_key(p)).end;
+    if (!p.allFinite()) continue;
+    const std::uint32_t number = voxels.number_of(voxel_key(p));
+    if (number == next.size()) next.push_back(0);
+    ++next[number];
+    voxel_of.push_back(number);
   }
+  cells_.assign(voxels.slots().size(), Cell{0, 0, 0});
   std::uint32_t total = 0;
-  for (Cell& cell : cells_) {
-    const std::uint32_t count = cell.end;
-    cell.begin = total;
+  for (std::size_t slot = 0; slot < cells_.size(); ++slot) {
+    const std::uint32_t number = voxels.slots()[slot];
+    if (number == VoxelNumbers::none) continue;
+    const std::uint32_t count = next[number];
+    cells_[slot] = {voxels.keys()[number], total, total + count};
+    next[number] = total;
     total += count;
-    cell.end = total;
   }
   x_.resize(finite);
   y_.resize(finite);
   z_.resize(finite);
-  std::vector<std::uint32_t> filled(cells_.size(), 0);
+  auto number = voxel_of.begin();
   for (const Vec3& p : points) {
     if (!p.allFinite()) continue;
-    const Cell* cell = find(voxel_key(p));
-    const auto slot = static_cast<std::size_t>(cell - cells_.data());
-    const std::size_t i = cell->begin + filled[slot]++;
+    const std::size_t i = next[*number++]++;
     x_[i] = p.x();
     y_[i] = p.y();
     z_[i] = p.z();

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "bench/costs.hpp"
+
+namespace palpate::bench {
+namespace {
+
+// Counts do not depend on the clock; how many ticks are run does, a little.
+constexpr double budget = 0.02;
+
+KernelCosts slide(const Subject& subject, double depth = 0.005) {
+  return kernel_costs(subject, Parameters{}, Hand{.depth = depth}, budget);
+}
+
+TEST(Cost, ASlideTakesFewStepsAndGathersNotMuchMoreThanOnceAFrame) {
+  const KernelCosts costs = slide(noisy_plane(640, 480, 525.0, 1.0));
+  EXPECT_LT(costs.steps, 16.0);
+  EXPECT_LT(costs.gathers, 0.5) << "a patch serves many ticks: 33 of them share a frame";
+  EXPECT_LT(costs.points, 250.0) << "a patch reaches little farther than r_3";
+}
+
+TEST(Cost, PointsOfAPatchDoNotDependOnTheSizeOfTheImage) {
+  const KernelCosts small = slide(noisy_plane(160, 120, 525.0, 1.0));
+  const KernelCosts large = slide(noisy_plane(1280, 960, 525.0, 1.0));
+  EXPECT_NEAR(large.points, small.points, 0.3 * small.points);
+}
+
+TEST(Cost, FreeMotionTakesOneStepATick) {
+  const KernelCosts costs = slide(noisy_plane(640, 480, 525.0, 1.0), -0.03);
+  EXPECT_LE(costs.steps, 1.01);
+}
+
+TEST(Cost, EveryMethodFindsTheSamePoints) {
+  const Subject subject = noisy_plane(320, 240, 262.5, 0.5);
+  const auto rows = search_costs(subject, Parameters{}, 0.0);
+  ASSERT_EQ(rows.size(), 4U);
+  EXPECT_GT(rows[0].found, 20U);
+  for (const SearchCosts& row : rows) EXPECT_EQ(row.found, rows[3].found) << row.name;
+}
+
+}  // namespace
+}  // namespace palpate::bench

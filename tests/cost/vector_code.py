@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Are the kernel's loops vector code, in each clone? `vector_code.py LIBRARY...`; 77: can't tell."""
+"""Are the kernel's loops vector code, in each clone? `vector_code.py LIBRARY...`; 77: unknown."""
 import platform
 import re
 import shutil

@@ -229,7 +229,9 @@ double SightTracker::variance(std::size_t rung) const noexcept {
 }
 
 double SightTracker::gate() const noexcept {
-  return std::clamp(std::max(4.0 * spread_, 6.0 * height_sd()), narrowest_gate, widest_gate);
+  // The beam is as wide as the narrowest disc, whose height is the noisiest.
+  return std::clamp(std::max(4.0 * spread_, 6.0 * std::sqrt(variance(0))), narrowest_gate,
+                    widest_gate);
 }
 
 double SightTracker::travel(double t) const noexcept {

@@ -140,14 +140,18 @@ std::string claims_as_text(const Result& result) {
 fs::path write_report(const std::vector<Result>& results, const fs::path& folder) {
   std::string page(page_head);
   std::string notes =
-      "# The paper's claims beside ours\n\nMade by `palpate eval all`; not written by hand.\n\n"
+      "# The paper's claims beside ours\n\nMade by `palpate eval all`; not written by hand. "
+      "[lab.md](lab.md) says what each experiment is.\n\n"
       "| where | the paper's words | its number | ours | | command |\n|---|---|---|---|---|---|\n";
+  std::string figures;
   for (const Result& result : results) {
     page += fmt::format("<h2>{}</h2>\n<p>{}<br><code>{}</code></p>\n", result.experiment->name,
                         escaped(result.experiment->summary), escaped(result.command));
     if (!result.figure.empty()) {
       const std::string svg = read(result.figure);
       const std::size_t begin = svg.find("<svg");
+      figures += fmt::format("\n## {0}\n\n{1}\n\n![{0}](images/{2})\n", result.experiment->name,
+                             result.experiment->summary, result.figure.filename().string());
       page += "<figure>" + (begin == std::string::npos ? svg : svg.substr(begin)) + "</figure>\n";
     }
     if (result.claims.empty()) continue;
@@ -167,7 +171,7 @@ fs::path write_report(const std::vector<Result>& results, const fs::path& folder
   }
   page += "</body></html>\n";
   write(folder / "report.html", page);
-  write(folder / "reproduction.md", notes);
+  write(folder / "reproduction.md", notes + figures);
   return folder / "report.html";
 }
 

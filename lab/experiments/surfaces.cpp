@@ -94,13 +94,13 @@ set multiplot layout 2,1
 set xlabel "time [s]"
 set ylabel "height y [m]"
 set key outside right top
-plot csv using (strcol(1) eq "paper" ? $2 : NaN):4 with lines lw 2 dt 2 lc rgb "#888888" title "HIP", \
-     csv using (strcol(1) eq "paper" ? $2 : NaN):6 with lines lw 2 lc rgb "#1f77b4" title "proxy"
+plot csv every 4 using (strcol(1) eq "paper" ? $2 : NaN):4 with lines lw 2 dt 2 lc rgb "#888888" title "HIP", \
+     csv every 4 using (strcol(1) eq "paper" ? $2 : NaN):6 with lines lw 2 lc rgb "#1f77b4" title "proxy"
 set ylabel "contact point y [mm]"
 set xrange [1.2:3.9]
 set yrange [-0.2:0.1]
-plot csv using (strcol(1) eq "paper" ? $2 : NaN):($7*1e3) with lines lw 2 lc rgb "#1f77b4" title "paper", \
-     csv using (strcol(1) eq "ideal" ? $2 : NaN):($7*1e3) with lines lw 1 lc rgb "#2ca02c" title "ideal"
+plot csv every 4 using (strcol(1) eq "paper" ? $2 : NaN):($7*1e3) with lines lw 2 lc rgb "#1f77b4" title "paper", \
+     csv every 4 using (strcol(1) eq "ideal" ? $2 : NaN):($7*1e3) with lines lw 1 lc rgb "#2ca02c" title "ideal"
 unset multiplot
 )gp";
 
@@ -242,9 +242,9 @@ set xlabel "x [r_c]"
 set ylabel "height [r_c]"
 set key outside right top
 r = 5e-3
-plot csv using (strcol(1) eq "paper" ? $5/r : NaN):($7/r) with points pt 7 ps 0.2 lc rgb "#bbbbbb" title "surface", \
-     csv using (strcol(1) eq "ideal" ? $5/r : NaN):($6/r) with lines lw 2 lc rgb "#2ca02c" title "best a sphere can do", \
-     csv using (strcol(1) eq "paper" ? $5/r : NaN):($6/r) with lines lw 2 lc rgb "#1f77b4" title "paper"
+plot csv every 4 using (strcol(1) eq "paper" ? $5/r : NaN):($7/r) with points pt 7 ps 0.2 lc rgb "#bbbbbb" title "surface", \
+     csv every 4 using (strcol(1) eq "ideal" ? $5/r : NaN):($6/r) with lines lw 2 lc rgb "#2ca02c" title "best a sphere can do", \
+     csv every 4 using (strcol(1) eq "paper" ? $5/r : NaN):($6/r) with lines lw 2 lc rgb "#1f77b4" title "paper"
 )gp";
 
 // 5.4: over the desk's ramp, down behind it, onto its box and off again, at 0.05 m/s and 10 to 20
@@ -352,13 +352,13 @@ set multiplot layout 2,1
 set key outside right top
 set xlabel "y [m]"
 set ylabel "z [m]"
-plot csv using (strcol(1) eq "paper" ? $5 : NaN):7 with lines lw 1 lc rgb "#bbbbbb" title "surface", \
-     csv using (strcol(1) eq "paper" ? $3 : NaN):4 with lines lw 2 dt 2 lc rgb "#888888" title "HIP", \
-     csv using (strcol(1) eq "ideal" ? $5 : NaN):6 with lines lw 1 lc rgb "#2ca02c" title "ideal", \
-     csv using (strcol(1) eq "paper" ? $5 : NaN):6 with lines lw 2 lc rgb "#1f77b4" title "paper"
+plot csv every 4 using (strcol(1) eq "paper" ? $5 : NaN):7 with lines lw 1 lc rgb "#bbbbbb" title "surface", \
+     csv every 4 using (strcol(1) eq "paper" ? $3 : NaN):4 with lines lw 2 dt 2 lc rgb "#888888" title "HIP", \
+     csv every 4 using (strcol(1) eq "ideal" ? $5 : NaN):6 with lines lw 1 lc rgb "#2ca02c" title "ideal", \
+     csv every 4 using (strcol(1) eq "paper" ? $5 : NaN):6 with lines lw 2 lc rgb "#1f77b4" title "paper"
 set ylabel "force [N]"
-plot csv using (strcol(1) eq "paper" ? $3 : NaN):8 with lines lw 2 lc rgb "#d62728" title "paper", \
-     csv using (strcol(1) eq "ideal" ? $3 : NaN):8 with lines lw 1 lc rgb "#2ca02c" title "ideal"
+plot csv every 4 using (strcol(1) eq "paper" ? $3 : NaN):8 with lines lw 2 lc rgb "#d62728" title "paper", \
+     csv every 4 using (strcol(1) eq "ideal" ? $3 : NaN):8 with lines lw 1 lc rgb "#2ca02c" title "ideal"
 unset multiplot
 )gp";
 

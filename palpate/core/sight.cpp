@@ -130,7 +130,8 @@ std::size_t heights_along(const Patch& patch, const Vec3& up, std::span<float> h
 
 }  // namespace
 
-Motion foretell_motion(std::span<const HeightSample> samples, double sd, double interval) noexcept {
+ForetoldMotion foretell_motion(std::span<const HeightSample> samples, double sd,
+                               double interval) noexcept {
   if (samples.size() < 2 || !(interval > 0.0)) return {0.0, samples.size()};
   // How well each rule would have foretold the last heights, the newest weighing most.
   constexpr std::array<double, 4> weights = {1.0, 0.7, 0.5, 0.35};
@@ -150,7 +151,7 @@ Motion foretell_motion(std::span<const HeightSample> samples, double sd, double 
     return mean_height(past.first(std::min<std::size_t>(past.size(), 8)));
   };
   double least = misses(at_rest, 1);
-  Motion motion{0.0, samples.size()};
+  ForetoldMotion motion{0.0, samples.size()};
   for (const Rule& rule : moving_rules) {
     if (samples.size() < rule.samples) continue;
     const double miss = misses([&](std::span<const HeightSample> past,
@@ -635,7 +636,7 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
   const std::span<const HeightSample> past(heights[chosen].data(), frames[chosen]);
   const double sd = height_sd();
   if (new_frame) {
-    const Motion motion = foretell_motion(past, sd, interval_);
+    const ForetoldMotion motion = foretell_motion(past, sd, interval_);
     velocity_ = motion.velocity;
     settled_ = std::min(settled_, motion.frames);
   }

@@ -20,7 +20,7 @@ struct HeightSample {
 };
 
 /// How a surface moves.
-struct Motion {
+struct ForetoldMotion {
   double velocity;     ///< [m/s] leads to where it will be one frame later
   std::size_t frames;  ///< the newest so many heights belong to that motion
 };
@@ -31,8 +31,8 @@ struct Motion {
 /// @param newest_first  heights measured
 /// @param sd            [m] standard deviation of one of them
 /// @param interval      [s] until the next frame
-Motion foretell_motion(std::span<const HeightSample> newest_first, double sd,
-                       double interval) noexcept;
+ForetoldMotion foretell_motion(std::span<const HeightSample> newest_first, double sd,
+                               double interval) noexcept;
 
 /// The height now [m], averaged over as much of the past as agrees with the present.
 ///

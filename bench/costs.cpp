@@ -162,18 +162,18 @@ KernelCosts kernel_costs(const Subject& subject, const Parameters& parameters, c
   Session session(subject, parameters, hand);
   Renderer& renderer = session.renderer;
   const Tick rest = renderer.tick(session.next_hip(), 0.0);
-  const Patch& patch = renderer.patch();
   const ProxyParameters& proxy = parameters.proxy;
   const Vec3 u = rest.hip - rest.proxy;
+  // What a slide gathers: r_3 and the least that the renderer leaves for the proxy to travel.
+  const Ball ball{rest.proxy, proxy.r_3 + 0.2 * proxy.r_c()};
+  Patch patch;
+  costs.gather = measure(budget, many, [&] { gather(*subject.frames.front(), ball, patch); });
   costs.step = measure(budget, many, [&] {
     const Surroundings around = look_around(patch, rest.proxy, proxy);
     use(proxy_step(patch, rest.proxy, around, around.normal.value_or(rest.normal), u, proxy.r_c(),
                    0, proxy));
   });
-  const Ball ball = patch.ball();
-  Patch scratch;
-  costs.gather = measure(budget, many, [&] { gather(*subject.frames.front(), ball, scratch); });
-  costs.limit_patch = measure(budget, many, [&] { use(load_and_add(scratch)); }).median;
+  costs.limit_patch = measure(budget, many, [&] { use(load_and_add(patch)); }).median;
   costs.limit_gather = measure_window(*subject.frames.front(), ball, budget);
   // A step reads the patch once to look around and, unless it slides, once more to see how far it
   // can go; the last look finds that it has converged. Counted here: the looks.

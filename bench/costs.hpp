@@ -30,7 +30,7 @@ struct KernelCosts {
   Distribution tick_after_frame;  ///< those ticks that had a new frame to gather from
   Distribution frame;             ///< handing a frame over
   Distribution step;              ///< one look around and one step, at rest in contact
-  Distribution gather;            ///< of the patch where the proxy rests
+  Distribution gather;            ///< of the points about the proxy at rest
   double limit_patch = 0.0;       ///< [us] loading and adding that patch once
   double limit_gather = 0.0;      ///< [us] loading and adding its pixel window; 0 if unorganised
   double limit_tick = 0.0;        ///< [us] as many passes over patch and window as the ticks made

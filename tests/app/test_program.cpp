@@ -220,7 +220,8 @@ TEST_F(Program, RefusesBadInputInOneLineThatNamesIt) {
   expect_refusal(camera + write("header.csv", "t,x,y,z\n"), {"header.csv"});
   expect_refusal(camera + write("columns.csv", "t,x,y\n0,0,0\n"), {"columns.csv", "z"});
   expect_refusal(camera + write("nan.csv", "t,x,y,z\n0,0,nan,0\n"), {"nan.csv: line 2"});
-  expect_refusal(camera + write("unsorted.csv", "t,x,y,z\n1,0,0,0\n0,0,0,0\n"), {"unsorted.csv: line 3"});
+  expect_refusal(camera + write("unsorted.csv", "t,x,y,z\n1,0,0,0\n0,0,0,0\n"),
+                 {"unsorted.csv: line 3"});
   expect_refusal(camera + press() + " --rate 0", {"--rate"});
   expect_refusal(camera + press() + " --set r_1=0.006", {"r_1"});
   expect_refusal(camera + press() + " --set r_1", {"r_1", "="});

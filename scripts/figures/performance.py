@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measures this machine and writes docs/performance.md and docs/images/growth.svg.
 
-  scripts/figures/performance BUILD [RESULTS]
+  scripts/figures/performance.py BUILD [RESULTS]
     BUILD    a Release build
     RESULTS  folder with bench.json and growth.csv of an earlier run, to be drawn again
 """
@@ -93,7 +93,7 @@ def page(result, rows, program, installed):
     tick = result["tick_us_median"]
     return f"""# What a tick costs
 
-Made by `scripts/figures/performance`: do not edit, run it again. All times are microseconds of the
+Made by `scripts/figures/performance.py`: do not edit, run it again. All times are microseconds of the
 thread's own processor time. Ticks are timed one by one, what is shorter in batches of 64. A noisy
 plane (1 mm, readings in millimetres) is pressed 5 mm deep and stroked at 0.1 m/s; Table 2's
 parameters; frames at 30 Hz, ticks at 1 kHz.

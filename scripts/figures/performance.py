@@ -93,7 +93,7 @@ def page(result, rows, program, installed):
     tick = result["tick_us_median"]
     return f"""# What a tick costs
 
-Made by `scripts/figures/performance.py`: do not edit, run it again. All times are microseconds of the
+Made by `scripts/figures/performance.py`: do not edit, run it again. Times are microseconds of the
 thread's own processor time. Ticks are timed one by one, what is shorter in batches of 64. A noisy
 plane (1 mm, readings in millimetres) is pressed 5 mm deep and stroked at 0.1 m/s; Table 2's
 parameters; frames at 30 Hz, ticks at 1 kHz.

@@ -18,8 +18,7 @@ void add(std::atomic<std::uint64_t>& counter, std::uint64_t n) noexcept {
 }
 
 std::uint64_t nanoseconds(double seconds) noexcept {
-  if (!(seconds > 0.0)) return 0;  // nor a NaN
-  return static_cast<std::uint64_t>(std::min(seconds, 1e6) * 1e9);
+  return static_cast<std::uint64_t>(std::clamp(seconds, 0.0, 1e6) * 1e9);
 }
 
 }  // namespace

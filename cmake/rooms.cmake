@@ -39,7 +39,9 @@ function(palpate_target_options target)
   if(CMAKE_CXX_COMPILER_ID MATCHES Clang AND (PALPATE_SANITIZE OR PALPATE_FUZZ))
     target_compile_options(${target} PRIVATE -Wno-pass-failed)  # they keep loops from SIMD
   endif()
-  if(PALPATE_CLANG_TIDY)
+  # The library's rooms; experiments, benchmarks and the program are left to the compilers
+  file(RELATIVE_PATH here ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+  if(PALPATE_CLANG_TIDY AND here MATCHES "^palpate/")
     find_program(PALPATE_CLANG_TIDY_PROGRAM NAMES clang-tidy-14 clang-tidy REQUIRED)
     set_target_properties(${target} PROPERTIES CXX_CLANG_TIDY
                           "${PALPATE_CLANG_TIDY_PROGRAM};--quiet;--warnings-as-errors=*")

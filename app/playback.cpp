@@ -21,6 +21,7 @@ Playback::Playback(const std::vector<std::string>& uris) {
     if (!camera.next) throw Error(uri, "it has no frames", "give a source with at least one");
     cameras_.push_back(std::move(camera));
   }
+  newest_.resize(cameras_.size());
 }
 
 void Playback::adopt_until(double t, Renderer& renderer) {
@@ -42,6 +43,7 @@ void Playback::adopt_until(double t, Renderer& renderer) {
         clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds));
     renderer.frame(*cloud, due->newest.stamp);
     in_use_ = std::move(cloud);  // only now may the frame before go
+    newest_[static_cast<std::size_t>(due - cameras_.data())] = due->newest.cloud.get();
     ++adopted_;
   }
 }

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -30,10 +31,8 @@ class Playback {
   [[nodiscard]] const Cloud* upcoming(std::size_t camera) const {
     return cameras_[camera].next ? cameras_[camera].next->cloud.get() : nullptr;
   }
-  /// What a camera saw last; null before its first frame.
-  [[nodiscard]] const Cloud* newest(std::size_t camera) const {
-    return cameras_[camera].newest.cloud.get();
-  }
+  /// What each camera saw last; null before its first frame. Valid until the next is adopted.
+  [[nodiscard]] std::span<const Cloud* const> newest() const { return newest_; }
 
  private:
   struct Camera {
@@ -42,6 +41,7 @@ class Playback {
     Frame newest;
   };
   std::vector<Camera> cameras_;
+  std::vector<const Cloud*> newest_;
   std::shared_ptr<const Cloud> in_use_;
   std::size_t adopted_ = 0;
 };

@@ -10,13 +10,12 @@
 #include "palpate/cloud/audit.hpp"
 
 namespace palpate::app {
-namespace {
 
-// How far the proxy is behind the surface for the camera that sees it least so [m].
-std::optional<double> least_behind(const Playback& playback, const Vec3& proxy, double r_c) {
+std::optional<double> least_behind(std::span<const Cloud* const> cameras, const Vec3& proxy,
+                                   double r_c) {
   std::optional<double> least;
-  for (std::size_t i = 0; i < playback.cameras(); ++i) {
-    const auto* image = dynamic_cast<const DepthImage*>(playback.newest(i));
+  for (const Cloud* cloud : cameras) {
+    const auto* image = dynamic_cast<const DepthImage*>(cloud);
     if (image == nullptr) continue;
     const std::optional<double> behind = distance_behind(*image, proxy, r_c);
     if (behind && (!least || *behind < *least)) least = behind;
@@ -24,20 +23,18 @@ std::optional<double> least_behind(const Playback& playback, const Vec3& proxy, 
   return least;
 }
 
-}  // namespace
-
-void Summary::count(const Tick& tick, const Playback& playback, double r_c) {
+void Summary::count(const Tick& tick, std::size_t frames, const std::optional<double>& behind,
+                    double r_c) {
   if (ticks_ == 0) first_t_ = tick.t;
   last_t_ = tick.t;
   ++ticks_;
   steps_ += static_cast<std::size_t>(tick.steps);
-  frames_ = playback.adopted();
+  frames_ = frames;
   contact_ticks_ += tick.state != ContactState::free_motion ? 1 : 0;
   budget_hits_ += (tick.flags & step_budget_hit) != 0 ? 1 : 0;
   thinned_ += (tick.flags & patch_thinned) != 0 ? 1 : 0;
   max_force_ = std::max(max_force_, tick.force.norm());
 
-  const std::optional<double> behind = least_behind(playback, tick.proxy, r_c);
   if (!behind) return;
   if (*behind < 0.0) {
     was_in_front_ = true;
@@ -60,6 +57,7 @@ std::string Summary::text() const {
       "{} ticks over {:.3f} s, {} frames, in contact {:.1f} % of the time, largest force {:.3f} N, "
       "{:.2f} steps a tick, suspected pop-throughs {}",
       ticks_, last_t_ - first_t_, frames_, share, max_force_, steps, pop_throughs_);
+  if (late_ticks_ > 0) text += fmt::format(", late ticks {}", late_ticks_);
   if (budget_hits_ > 0) text += fmt::format(", step budget spent in {} ticks", budget_hits_);
   if (thinned_ > 0) text += fmt::format(", points thinned in {} ticks", thinned_);
   return text + "\n";

@@ -2,18 +2,29 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
+#include <span>
 #include <string>
 
-#include "app/playback.hpp"
 #include "palpate/core/renderer.hpp"
 
 namespace palpate::app {
 
+/// How far the proxy is behind what was measured [m], by the camera that sees it least so; none if
+/// no camera with a depth image tells.
+std::optional<double> least_behind(std::span<const Cloud* const> cameras, const Vec3& proxy,
+                                   double r_c);
+
 /// What a run amounted to: counted tick by tick, printed for people or for programs.
 class Summary {
  public:
-  /// @param playback  to judge where the proxy is with respect to what the cameras measured
-  void count(const Tick& tick, const Playback& playback, double r_c);
+  /// @param frames  handed over so far
+  /// @param behind  as `least_behind` says, or none where nobody has looked
+  void count(const Tick& tick, std::size_t frames, const std::optional<double>& behind, double r_c);
+  /// How many ticks came too late, in all.
+  void set_late_ticks(std::size_t late_ticks) { late_ticks_ = late_ticks; }
+
+  [[nodiscard]] std::size_t pop_throughs() const { return pop_throughs_; }
 
   [[nodiscard]] std::string text() const;
   [[nodiscard]] std::string json() const;

@@ -55,7 +55,8 @@ int trace(const TraceOptions& options) {
     playback.adopt_until(t, renderer);
     const Tick tick = renderer.tick(path.at(t), t);
     writer.write(tick);
-    summary.count(tick, playback, parameters.proxy.r_c());
+    const double r_c = parameters.proxy.r_c();
+    summary.count(tick, playback.adopted(), least_behind(playback.newest(), tick.proxy, r_c), r_c);
     progress.advance();
   }
   writer.finish();

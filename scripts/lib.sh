@@ -15,3 +15,22 @@ build_in() {
   [[ -t 2 ]] || quiet=(--quiet)
   ninja -C "$folder" -k 0 -j "$(nproc)" "${quiet[@]}" >&2
 }
+
+# build_page: the viewer's page, web/dist, which becomes part of the program; only if something has
+# changed.
+build_page() {
+  local said lock=web/node_modules/.package-lock.json page=web/dist/index.html
+  if [[ ! -e $lock || web/package-lock.json -nt $lock ]]; then
+    said=$(cd web && npm ci 2>&1 && touch node_modules/.package-lock.json) || {
+      echo "$said" >&2
+      return 1
+    }
+  fi
+  if [[ -e $page && -z $(find web/src web/index.html web/*.ts "$lock" -newer "$page") ]]; then
+    return 0
+  fi
+  said=$(cd web && npm run build 2>&1) || {
+    echo "$said" >&2
+    return 1
+  }
+}

@@ -73,13 +73,13 @@ constexpr std::array table = {
                   [](Parameters& p, double v) { p.motion.max_extrapolation = v; }},
 };
 
-struct MethodName {
-  Method method;
-  std::string_view name;
-};
-constexpr std::array method_names = {
-    MethodName{Method::paper, "paper"}, MethodName{Method::paper_as_printed, "paper-as-printed"},
-    MethodName{Method::fixed_step, "fixed-step"}, MethodName{Method::sight, "sight"}};
+constexpr std::array methods = {
+    MethodInfo{Method::paper, "paper", "the paper's method with its errata corrected"},
+    MethodInfo{Method::paper_as_printed, "paper-as-printed", "the paper's method to the letter"},
+    MethodInfo{Method::fixed_step, "fixed-step",
+               "the method of 2011: every step 0.1 r_1, no velocity estimate"},
+    MethodInfo{Method::sight, "sight",
+               "tracks the surface along the camera's sightlines, also before contact"}};
 
 std::string number(double value) {
   std::string text = std::to_string(value);
@@ -146,8 +146,12 @@ void validate(const Parameters& parameters) {
   }
 }
 
+std::span<const MethodInfo> method_table() {
+  return methods;
+}
+
 std::string_view method_name(Method method) {
-  for (const MethodName& row : method_names) {
+  for (const MethodInfo& row : methods) {
     if (row.method == method) return row.name;
   }
   return "unknown";
@@ -155,7 +159,7 @@ std::string_view method_name(Method method) {
 
 Method method_from_name(std::string_view name) {
   std::string known;
-  for (const MethodName& row : method_names) {
+  for (const MethodInfo& row : methods) {
     if (row.name == name) return row.method;
     known += (known.empty() ? "" : ", ") + std::string(row.name);
   }

@@ -76,6 +76,16 @@ void set_parameter(Parameters& parameters, std::string_view name, double value);
 /// @throws Error naming the first parameter that does not hold.
 void validate(const Parameters& parameters);
 
+/// One row of the table of methods.
+struct MethodInfo {
+  Method method;
+  std::string_view name;     ///< on the command line, such as `paper-as-printed`
+  std::string_view meaning;  ///< what it is, in a sentence
+};
+
+/// All methods, in the order in which they are shown.
+std::span<const MethodInfo> method_table();
+
 /// The method's name on the command line, such as `paper-as-printed`.
 std::string_view method_name(Method method);
 

@@ -146,6 +146,28 @@ TEST_F(Program, RunsHeadlessOnTheSyntheticDesk) {
     EXPECT_TRUE(summary.contains(key)) << key;
 }
 
+// Live, so by the wall clock: what is told at the end is of the kind that a headless run tells.
+TEST_F(Program, RunsALiveSessionAndSaysWhereItsPageIs) {
+  const Outcome outcome =
+      run("run --json --duration 1.5 --port 0 --no-browser --device hand: "
+          "--camera synthetic:plane?size=160x120 --set stiffness=300");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("open http://127.0.0.1:"), std::string::npos) << outcome.err;
+  const auto summary = nlohmann::json::parse(outcome.out);
+  EXPECT_GT(summary["ticks"], 100);
+  EXPECT_GT(summary["frames"], 3);
+  for (const char* key : {"late_ticks", "pop_throughs", "max_force", "duration_s"})
+    EXPECT_TRUE(summary.contains(key)) << key;
+}
+
+TEST_F(Program, MakesATokenForOtherMachines) {
+  const Outcome outcome =
+      run("run --duration 0.2 --port 0 --no-browser --listen 0.0.0.0 "
+          "--camera synthetic:plane?size=160x120");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("/?token="), std::string::npos) << outcome.err;
+}
+
 TEST_F(Program, TellsWhatIsInASource) {
   const Outcome outcome = run("info synthetic:plane --json");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
@@ -236,6 +258,11 @@ TEST_F(Program, RefusesBadInputInOneLineThatNamesIt) {
   expect_refusal("info pcd:" + write("not.pcd", "hello\n"), {"not.pcd"});
   expect_refusal("trace", {"--camera"});
   expect_refusal("run --headless --duration -1", {"--duration"});
+  expect_refusal("run --duration -1", {"--duration"});
+  expect_refusal("run --listen nowhere", {"--listen nowhere"});
+  expect_refusal("run --listen 0.0.0.0 --token short", {"--token"});
+  expect_refusal("run --device mouze:", {"mouze", "mouse"});
+  expect_refusal("run --rate 10", {"10"});
 }
 
 TEST_F(Program, FailsWithOneWhenTheDiskIsFull) {

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/viewer/protocol.hpp"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+static_assert(std::endian::native == std::endian::little,
+              "depths and points are sent as they lie in memory");
+
+enum Kind : std::uint8_t { frame = 1, ticks = 2, rays = 3, hand = 16, shown = 17 };
+enum Format : std::uint8_t { depth = 0, depth_with_rays = 1, points = 2 };
+
+constexpr std::size_t frame_header_size = 96;
+constexpr std::size_t ticks_header_size = 88;
+constexpr std::size_t sample_size = 20;
+constexpr std::size_t hand_size = 32;
+constexpr std::size_t shown_size = 8;
+
+// Writes numbers one after the other, each aligned as docs/protocol.md says.
+class Writer {
+ public:
+  explicit Writer(std::vector<std::byte>& out) : out_(out) {}
+
+  template <class Number>
+  Writer& put(Number value) {
+    const std::size_t at = out_.size();
+    out_.resize(at + sizeof(Number));
+    std::memcpy(out_.data() + at, &value, sizeof(Number));
+    return *this;
+  }
+  Writer& put_float(double value) { return put(static_cast<float>(value)); }
+  Writer& put_vec3(const Vec3& v) { return put_float(v.x()).put_float(v.y()).put_float(v.z()); }
+  void pad_to(std::size_t size) { out_.resize(size); }
+
+ private:
+  std::vector<std::byte>& out_;
+};
+
+template <class Number>
+Number read(std::span<const std::byte> message, std::size_t at) {
+  Number value;
+  std::memcpy(&value, message.data() + at, sizeof(Number));
+  return value;
+}
+
+ViewerMessage frame_message(const FrameHeader& header, Format format,
+                            std::span<const std::byte> payload, std::shared_ptr<const void> owner) {
+  ViewerMessage message;
+  message.head.reserve(frame_header_size);
+  Writer writer(message.head);
+  writer.put(Kind::frame).put(header.camera).put(format).put(std::uint8_t{0});
+  writer.put(header.number).put(header.stamp).put(header.width).put(header.height);
+  writer.put_float(header.fx).put_float(header.fy).put_float(header.cx).put_float(header.cy);
+  writer.put_float(header.metres_per_unit);
+  const Eigen::Matrix4d pose = header.world_from_camera.matrix();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) writer.put_float(pose(row, column));
+  }
+  writer.pad_to(frame_header_size);
+  message.payload = payload;
+  message.owner = std::move(owner);
+  return message;
+}
+
+// The float arrays' bytes, owned by the message.
+std::pair<std::span<const std::byte>, std::shared_ptr<const void>> shared_bytes(
+    std::vector<float> values) {
+  const auto owner = std::make_shared<const std::vector<float>>(std::move(values));
+  return {std::as_bytes(std::span<const float>(*owner)), owner};
+}
+
+}  // namespace
+
+ViewerMessage depth_message(const FrameHeader& header, std::span<const std::uint16_t> depth,
+                            std::shared_ptr<const void> owner) {
+  if (depth.size() != std::size_t{header.width} * header.height)
+    throw Error("depth image for the viewer", "its size is not width x height");
+  return frame_message(header, header.has_rays ? Format::depth_with_rays : Format::depth,
+                       std::as_bytes(depth), std::move(owner));
+}
+
+ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz) {
+  if (xyz.size() != 3 * std::size_t{header.width} * header.height)
+    throw Error("points for the viewer", "there are not three numbers for each");
+  auto [bytes, owner] = shared_bytes(std::move(xyz));
+  return frame_message(header, Format::points, bytes, std::move(owner));
+}
+
+ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32_t height,
+                           std::vector<float> rays) {
+  if (rays.size() != 2 * std::size_t{width} * height)
+    throw Error("rays for the viewer", "there are not two numbers for each pixel");
+  ViewerMessage message;
+  Writer(message.head).put(Kind::rays).put(camera).put(std::uint16_t{0}).put(width).put(height);
+  std::tie(message.payload, message.owner) = shared_bytes(std::move(rays));
+  return message;
+}
+
+ViewerMessage ticks_message(const TickBatch& batch) {
+  const std::size_t count = std::min(batch.samples.size(), TickBatch::max_samples);
+  ViewerMessage message;
+  message.head.reserve(ticks_header_size + count * sample_size);
+  Writer writer(message.head);
+  writer.put(Kind::ticks).put(batch.state).put(static_cast<std::uint16_t>(count));
+  writer.put(batch.flags).put(batch.t).put(batch.safety).put(batch.steps);
+  writer.put_vec3(batch.hip).put_vec3(batch.proxy).put_vec3(batch.normal).put_vec3(batch.force);
+  writer.put_float(batch.surface_velocity).put(batch.frame);
+  writer.pad_to(ticks_header_size);
+  const std::span<const TickSample> samples(batch.samples);
+  for (const TickSample& sample : samples.last(count)) {
+    writer.put_float(batch.t - sample.t).put(sample.force).put(sample.penetration);
+    writer.put(sample.steps).put(sample.tick_time);
+  }
+  return message;
+}
+
+ViewerMessage text_message(const std::string& text) {
+  ViewerMessage message;
+  message.text = true;
+  const auto bytes = std::as_bytes(std::span(text));
+  message.head.assign(bytes.begin(), bytes.end());
+  return message;
+}
+
+std::optional<std::variant<HandMessage, ShownMessage>> parse_binary(
+    std::span<const std::byte> message) {
+  if (message.empty()) return std::nullopt;
+  const auto kind = read<std::uint8_t>(message, 0);
+  if (kind == Kind::hand && message.size() == hand_size) {
+    const auto held = read<std::uint8_t>(message, 1);
+    if (held > 1) return std::nullopt;
+    if (held == 0) return HandMessage{};
+    const Vec3 target(read<double>(message, 8), read<double>(message, 16),
+                      read<double>(message, 24));
+    // Also false for what is not a number.
+    if (!(target.cwiseAbs().maxCoeff() <= max_hand_distance) || !target.allFinite())
+      return std::nullopt;
+    return HandMessage{target};
+  }
+  if (kind == Kind::shown && message.size() == shown_size) {
+    const auto camera = read<std::uint8_t>(message, 1);
+    if (camera >= Patch::max_views) return std::nullopt;
+    return ShownMessage{camera, read<std::uint32_t>(message, 4)};
+  }
+  return std::nullopt;
+}
+
+std::optional<Command> parse_command(std::string_view message) {
+  if (message.size() > max_page_message) return std::nullopt;
+  const auto json = nlohmann::json::parse(message, nullptr, false);
+  if (!json.is_object() || json.size() != 1) return std::nullopt;
+  const std::string& verb = json.begin().key();
+  const nlohmann::json& what = json.begin().value();
+  if (verb == "set" || verb == "set_safety") {
+    if (!what.is_object() || what.size() != 2) return std::nullopt;
+    const auto name = what.find("name");
+    const auto value = what.find("value");
+    if (name == what.end() || value == what.end() || !name->is_string() || !value->is_number())
+      return std::nullopt;
+    if (verb == "set") return SetParameter{name->get<std::string>(), value->get<double>()};
+    return SetSafetyParameter{name->get<std::string>(), value->get<double>()};
+  }
+  if (verb == "method" && what.is_string()) return SetMethod{what.get<std::string>()};
+  if (verb == "record" && what.is_boolean()) return SetRecording{what.get<bool>()};
+  if (verb == "reset" && what == true) return ResetHand{};
+  return std::nullopt;
+}
+
+}  // namespace palpate

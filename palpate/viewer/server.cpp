@@ -1,0 +1,594 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/viewer/server.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <chrono>
+#include <deque>
+#include <mutex>
+#include <random>
+#include <thread>
+#include <utility>
+
+#include <boost/asio/ip/host_name.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <nlohmann/json.hpp>
+
+#include "palpate/core/error.hpp"
+#include "palpate/viewer/page.hpp"
+
+namespace palpate {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using asio::ip::tcp;
+using Clock = std::chrono::steady_clock;
+using Request = http::request<http::empty_body>;
+using SharedMessage = std::shared_ptr<const ViewerMessage>;
+
+constexpr std::chrono::milliseconds ticks_interval(33);
+constexpr int ticks_per_state = 6;
+constexpr std::chrono::seconds request_timeout(10);
+constexpr std::chrono::seconds idle_timeout(10);  // a ping goes out at half of it
+constexpr std::chrono::seconds hand_timeout(2);   // pages repeat a held hand several times a second
+constexpr int max_connections = 64;
+constexpr std::size_t max_viewers = 16;
+constexpr std::uint32_t max_header = 8192;
+constexpr std::size_t max_queue = 32;   // of small messages to one page
+constexpr std::uint32_t max_ahead = 2;  // frames sent that a page has not drawn yet
+
+// The part of `HOST:PORT` before the port, in lower case, without brackets.
+std::string host_of(std::string_view authority) {
+  if (!authority.empty() && authority.front() == '[') {
+    authority = authority.substr(1, authority.find(']') - 1);
+  } else {
+    authority = authority.substr(0, authority.rfind(':'));
+  }
+  std::string host(authority);
+  for (char& c : host) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return host;
+}
+
+bool is_loopback_name(const std::string& host) {
+  if (host == "localhost") return true;
+  boost::system::error_code error;
+  const auto address = asio::ip::make_address(host, error);
+  return !error && address.is_loopback();
+}
+
+// Takes the same time wherever two texts of the same length differ.
+bool equal_secrets(std::string_view a, std::string_view b) {
+  if (a.size() != b.size()) return false;
+  unsigned difference = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    difference |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
+  return difference == 0;
+}
+
+std::string_view token_of(std::string_view target) {
+  constexpr std::string_view key = "token=";
+  const std::size_t question = target.find('?');
+  if (question == std::string_view::npos) return {};
+  std::string_view query = target.substr(question + 1);
+  while (!query.empty()) {
+    const std::string_view option = query.substr(0, query.find('&'));
+    if (option.substr(0, key.size()) == key) return option.substr(key.size());
+    query.remove_prefix(std::min(option.size() + 1, query.size()));
+  }
+  return {};
+}
+
+std::string_view view(beast::string_view text) {
+  return {text.data(), text.size()};
+}
+
+class PageSession;
+
+// What sessions ask of the server they belong to.
+class Hub {
+ public:
+  virtual void joined(const std::shared_ptr<PageSession>& page) = 0;
+  virtual void left(PageSession& page) = 0;
+  virtual void moved_hand(PageSession& page, const HandMessage& hand) = 0;
+  virtual void commanded(PageSession& page, const Command& command) = 0;
+
+ protected:
+  ~Hub() = default;
+};
+
+// One page, from the WebSocket handshake on. All on the server's thread.
+class PageSession : public std::enable_shared_from_this<PageSession> {
+ public:
+  PageSession(Hub& hub, beast::tcp_stream stream) : hub_(hub), socket_(std::move(stream)) {}
+
+  void start(const Request& request) {
+    beast::get_lowest_layer(socket_).expires_never();
+    socket_.set_option(websocket::stream_base::timeout{request_timeout, idle_timeout, true});
+    socket_.read_message_max(max_page_message);
+    socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
+      if (error) return;
+      self->open_ = true;
+      self->hub_.joined(self->shared_from_this());
+      self->read();
+    });
+  }
+
+  // A message that must arrive, in order.
+  void send(SharedMessage message) {
+    if (queue_.size() >= max_queue) queue_.pop_front();  // a page that reads nothing
+    queue_.push_back(std::move(message));
+    pump();
+  }
+
+  // A camera's newest frame, which takes the place of one that has not been sent yet.
+  void offer(std::size_t camera, std::uint32_t number, SharedMessage frame) {
+    cameras_[camera].next = std::move(frame);
+    cameras_[camera].next_number = number;
+    pump();
+  }
+
+ private:
+  struct CameraFeed {
+    SharedMessage next;
+    std::uint32_t next_number = 0;
+    std::uint32_t ahead = 0;  // frames sent and not drawn yet
+  };
+
+  void read() {
+    socket_.async_read(buffer_, [self = shared_from_this()](beast::error_code error, std::size_t) {
+      if (error) return self->leave();
+      const bool understood = self->take_message();
+      self->buffer_.consume(self->buffer_.size());
+      if (understood) return self->read();
+      self->leave();
+      self->socket_.async_close(
+          {websocket::close_code::policy_error, "message not understood; see docs/protocol.md"},
+          [self](beast::error_code) {});
+    });
+  }
+
+  bool take_message() {
+    const auto* data = static_cast<const std::byte*>(buffer_.cdata().data());
+    const std::span<const std::byte> bytes(data, buffer_.size());
+    if (socket_.got_text()) {
+      const auto command =
+          parse_command({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+      if (command) hub_.commanded(*this, *command);
+      return command.has_value();
+    }
+    const auto message = parse_binary(bytes);
+    if (!message) return false;
+    if (const auto* hand = std::get_if<HandMessage>(&*message)) hub_.moved_hand(*this, *hand);
+    if (const auto* shown = std::get_if<ShownMessage>(&*message)) {
+      CameraFeed& feed = cameras_[shown->camera];
+      if (feed.ahead > 0) --feed.ahead;
+      pump();
+    }
+    return true;
+  }
+
+  void leave() {
+    if (!open_) return;
+    open_ = false;
+    hub_.left(*this);
+  }
+
+  // Sends what is due next, if nothing is on its way.
+  void pump() {
+    if (!open_ || writing_) return;
+    if (!queue_.empty()) {
+      writing_ = std::move(queue_.front());
+      queue_.pop_front();
+    } else {
+      for (std::size_t i = 0; i < cameras_.size() && !writing_; ++i) {
+        CameraFeed& feed = cameras_[next_camera_];
+        next_camera_ = (next_camera_ + 1) % cameras_.size();
+        if (!feed.next || feed.ahead >= max_ahead) continue;
+        ++feed.ahead;
+        writing_ = std::move(feed.next);
+        feed.next.reset();
+      }
+    }
+    if (!writing_) return;
+    socket_.text(writing_->text);
+    const std::array<asio::const_buffer, 2> buffers = {
+        asio::buffer(writing_->head.data(), writing_->head.size()),
+        asio::buffer(writing_->payload.data(), writing_->payload.size())};
+    socket_.async_write(buffers, [self = shared_from_this()](beast::error_code error, std::size_t) {
+      self->writing_.reset();
+      if (error) return self->leave();
+      self->pump();
+    });
+  }
+
+  Hub& hub_;
+  websocket::stream<beast::tcp_stream> socket_;
+  beast::flat_buffer buffer_;
+  std::deque<SharedMessage> queue_;
+  std::array<CameraFeed, Patch::max_views> cameras_;
+  std::size_t next_camera_ = 0;
+  SharedMessage writing_;
+  bool open_ = false;
+};
+
+}  // namespace
+
+class ViewerServer::Impl final : public Hub {
+ public:
+  Impl(const ViewerOptions& options, ViewerHost& host) : token_(options.token), host_(host) {
+    const auto well_formed = [](unsigned char c) {
+      return std::isalnum(c) || c == '-' || c == '_';
+    };
+    if (!std::all_of(token_.begin(), token_.end(), well_formed) || token_.size() > 128)
+      throw Error("--token", "it has other characters than letters, digits, - and _, or over 128",
+                  "give a simpler one");
+    boost::system::error_code error;
+    const auto address = asio::ip::make_address(options.listen, error);
+    if (error)
+      throw Error("--listen " + options.listen, "it is not an IP address",
+                  "give 127.0.0.1, or 0.0.0.0 for everybody who has the token");
+    beyond_loopback_ = !address.is_loopback();
+    if (beyond_loopback_ && token_.size() < 8)
+      throw Error("--token", "beyond this machine it must have at least 8 characters",
+                  "give a longer one, or none to have one made");
+    listen({address, options.port});
+    const std::string host_name = address.is_unspecified() ? asio::ip::host_name()
+                                  : address.is_v6()        ? "[" + address.to_string() + "]"
+                                                           : address.to_string();
+    url_ = "http://" + host_name + ":" + std::to_string(port()) + "/";
+    if (!token_.empty()) url_ += "?token=" + token_;
+    accept();
+    wait();
+    thread_ = std::thread([this] { context_.run(); });
+  }
+
+  ~Impl() {
+    context_.stop();
+    thread_.join();
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] const std::string& url() const { return url_; }
+  [[nodiscard]] std::size_t viewers() const { return viewers_.load(); }
+
+  void publish(std::uint8_t camera, ViewerMessage message, bool is_frame) {
+    if (camera >= Patch::max_views) return;
+    auto shared = std::make_shared<const ViewerMessage>(std::move(message));
+    const std::lock_guard lock(mutex_);
+    (is_frame ? arrived_[camera].frame : arrived_[camera].rays) = std::move(shared);
+    if (std::exchange(posted_, true)) return;  // the thread has not come to it yet
+    asio::post(context_, [this] { distribute(); });
+  }
+
+  // A request's refusal, or 0.
+  http::status judge(const Request& request) const {
+    if (request.method() != http::verb::get && request.method() != http::verb::head)
+      return http::status::method_not_allowed;
+    // A page of another site can make a browser come here under that site's name, or from it.
+    const std::string_view authority = view(request[http::field::host]);
+    if (!beyond_loopback_ && !is_loopback_name(host_of(authority))) return http::status::forbidden;
+    if (request.find(http::field::origin) != request.end()) {
+      const std::string_view origin = view(request[http::field::origin]);
+      const std::size_t slashes = origin.find("://");
+      if (slashes == std::string_view::npos || origin.substr(slashes + 3) != authority)
+        return http::status::forbidden;
+    }
+    if (websocket::is_upgrade(request)) {
+      const std::string_view target = view(request.target());
+      if (target.substr(0, target.find('?')) != "/session") return http::status::not_found;
+      if (!token_.empty() && !equal_secrets(token_of(target), token_))
+        return http::status::unauthorized;
+      if (pages_.size() >= max_viewers) return http::status::service_unavailable;
+    }
+    return http::status::ok;
+  }
+
+  void joined(const std::shared_ptr<PageSession>& page) override {
+    pages_.push_back(page);
+    viewers_ = pages_.size();
+    page->send(shared_text("{\"hello\":" + host_.hello() + "}"));
+    page->send(shared_text("{\"state\":" + host_.state() + "}"));
+    for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
+      if (cameras_[camera].rays) page->send(cameras_[camera].rays);
+      if (cameras_[camera].frame) page->offer(camera, 0, cameras_[camera].frame);
+    }
+    tell_presence();
+  }
+
+  void left(PageSession& page) override {
+    if (hand_owner_ == &page) release_hand();
+    std::erase_if(pages_, [&](const auto& other) { return other.get() == &page; });
+    viewers_ = pages_.size();
+    tell_presence();
+  }
+
+  void moved_hand(PageSession& page, const HandMessage& hand) override {
+    if (hand_owner_ != nullptr && hand_owner_ != &page) return;
+    if (!hand.target) {
+      if (hand_owner_ == nullptr) return;
+      release_hand();
+      return tell_presence();
+    }
+    hand_heard_ = Clock::now();
+    host_.hand(hand.target);
+    if (std::exchange(hand_owner_, &page) == nullptr) tell_presence();
+  }
+
+  void commanded(PageSession& page, const Command& command) override {
+    try {
+      host_.command(command);
+      const auto state = shared_text("{\"state\":" + host_.state() + "}");
+      for (const auto& other : pages_) other->send(state);
+    } catch (const std::exception& error) {
+      page.send(shared_text(nlohmann::json{{"error", error.what()}}.dump(
+          -1, ' ', false, nlohmann::json::error_handler_t::replace)));
+    }
+  }
+
+ private:
+  class HttpSession;
+  struct Camera {
+    SharedMessage rays, frame;
+  };
+
+  void listen(const tcp::endpoint& endpoint) {
+    const std::string subject =
+        "--listen " + endpoint.address().to_string() + " --port " + std::to_string(endpoint.port());
+    beast::error_code error;
+    acceptor_.open(endpoint.protocol(), error);
+    if (!error) acceptor_.set_option(asio::socket_base::reuse_address(true), error);
+    if (!error) acceptor_.bind(endpoint, error);
+    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
+    if (error == asio::error::address_in_use)
+      throw Error(subject, "another program listens there",
+                  "give another port, or --port 0 for any that is free");
+    if (error) throw Error(subject, error.message(), "give an address of this machine");
+    port_ = acceptor_.local_endpoint().port();
+  }
+
+  void accept();
+
+  // Every ticks_interval.
+  void wait() {
+    timer_.expires_after(ticks_interval);
+    timer_.async_wait([this](beast::error_code error) {
+      if (error) return;
+      beat();
+      wait();
+    });
+  }
+
+  void beat() {
+    if (hand_owner_ != nullptr && Clock::now() - hand_heard_ > hand_timeout) {
+      release_hand();
+      tell_presence();
+    }
+    const std::optional<TickBatch> batch = host_.ticks();  // also when nobody looks: it drains
+    if (pages_.empty()) return;
+    if (batch) {
+      const auto message = std::make_shared<const ViewerMessage>(ticks_message(*batch));
+      for (const auto& page : pages_) page->send(message);
+    }
+    if (++beats_ % ticks_per_state == 0) {
+      const auto message = shared_text("{\"state\":" + host_.state() + "}");
+      for (const auto& page : pages_) page->send(message);
+    }
+  }
+
+  void release_hand() {
+    hand_owner_ = nullptr;
+    host_.hand(std::nullopt);
+  }
+
+  void tell_presence() {
+    for (const auto& page : pages_) {
+      const char* hand = hand_owner_ == nullptr      ? "free"
+                         : hand_owner_ == page.get() ? "you"
+                                                     : "other";
+      const nlohmann::json presence = {{"hand", hand}, {"viewers", pages_.size()}};
+      page->send(shared_text(nlohmann::json{{"presence", presence}}.dump()));
+    }
+  }
+
+  // Brings what other threads have published to the pages.
+  void distribute() {
+    std::array<Camera, Patch::max_views> arrived;
+    {
+      const std::lock_guard lock(mutex_);
+      std::swap(arrived, arrived_);
+      posted_ = false;
+    }
+    for (std::size_t i = 0; i < arrived.size(); ++i) {
+      if (arrived[i].rays) {
+        cameras_[i].rays = arrived[i].rays;
+        for (const auto& page : pages_) page->send(arrived[i].rays);
+      }
+      if (arrived[i].frame) {
+        cameras_[i].frame = arrived[i].frame;
+        for (const auto& page : pages_) page->offer(i, 0, arrived[i].frame);
+      }
+    }
+  }
+
+  static SharedMessage shared_text(const std::string& text) {
+    return std::make_shared<const ViewerMessage>(text_message(text));
+  }
+
+  std::string token_;
+  ViewerHost& host_;
+  bool beyond_loopback_ = false;
+  std::string url_;
+  std::uint16_t port_ = 0;
+  std::atomic<std::size_t> viewers_{0};
+  int connections_ = 0;  // outlives the context, and so all sessions
+
+  std::mutex mutex_;
+  std::array<Camera, Patch::max_views> arrived_;  // guarded by mutex_
+  bool posted_ = false;                           // guarded by mutex_
+
+  asio::io_context context_{1};
+  tcp::acceptor acceptor_{context_};
+  asio::steady_timer timer_{context_};
+  asio::steady_timer accept_again_{context_};
+  std::vector<std::shared_ptr<PageSession>> pages_;
+  std::array<Camera, Patch::max_views> cameras_;  // what was shown last
+  PageSession* hand_owner_ = nullptr;
+  Clock::time_point hand_heard_;
+  int beats_ = 0;
+  std::thread thread_;
+};
+
+// One connection, until it becomes a page's session.
+class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<HttpSession> {
+ public:
+  HttpSession(Impl& server, tcp::socket socket) : server_(server), stream_(std::move(socket)) {
+    ++server_.connections_;
+  }
+  ~HttpSession() { --server_.connections_; }
+  HttpSession(const HttpSession&) = delete;
+  HttpSession& operator=(const HttpSession&) = delete;
+
+  void read() {
+    parser_.emplace();
+    parser_->header_limit(max_header);
+    parser_->body_limit(0);
+    stream_.expires_after(request_timeout);
+    http::async_read(stream_, buffer_, *parser_,
+                     [self = shared_from_this()](beast::error_code error, std::size_t) {
+                       if (!error) self->answer(self->parser_->release());
+                     });
+  }
+
+ private:
+  using Response = http::response<http::span_body<const char>>;
+
+  void answer(const Request& request) {
+    const http::status judgement = server_.judge(request);
+    if (judgement == http::status::ok && websocket::is_upgrade(request)) {
+      std::make_shared<PageSession>(server_, std::move(stream_))->start(request);
+      return;
+    }
+    std::string_view type = "text/plain; charset=utf-8";
+    std::string_view content;
+    http::status status = judgement;
+    if (status == http::status::ok) {
+      const std::string_view target = view(request.target());
+      const std::string_view path = target.substr(0, target.find('?'));
+      const auto files = page_files();
+      const auto file = std::find_if(files.begin(), files.end(),
+                                     [&](const PageFile& f) { return f.path == path; });
+      if (file == files.end()) {
+        status = http::status::not_found;
+      } else {
+        type = file->type;
+        content = file->content;
+      }
+    }
+    if (status != http::status::ok) content = explanation(status);
+    write(request, status, type, content);
+  }
+
+  static std::string_view explanation(http::status status) {
+    switch (status) {
+      case http::status::method_not_allowed:
+        return "Only GET and HEAD are answered.\n";
+      case http::status::forbidden:
+        return "Not from this host or origin.\n";
+      case http::status::unauthorized:
+        return "The token is missing or wrong.\n";
+      case http::status::service_unavailable:
+        return "Too many pages are open.\n";
+      default:
+        return "There is no such page.\n";
+    }
+  }
+
+  void write(const Request& request, http::status status, std::string_view type,
+             std::string_view content) {
+    response_.emplace(status, request.version());
+    Response& response = *response_;
+    response.set(http::field::content_type, {type.data(), type.size()});
+    response.set(http::field::cache_control, "no-store");
+    response.set("Content-Security-Policy",
+                 "default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
+                 "base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    response.set("X-Content-Type-Options", "nosniff");
+    response.set("Referrer-Policy", "no-referrer");  // the address holds the token
+    response.set("Cross-Origin-Resource-Policy", "same-origin");
+    response.keep_alive(request.keep_alive());
+    response.content_length(content.size());
+    if (request.method() != http::verb::head) response.body() = {content.data(), content.size()};
+    http::async_write(stream_, response,
+                      [self = shared_from_this()](beast::error_code error, std::size_t) {
+                        if (error) return;
+                        if (self->response_->keep_alive()) return self->read();
+                        self->stream_.socket().shutdown(tcp::socket::shutdown_send, error);
+                      });
+  }
+
+  Impl& server_;
+  beast::tcp_stream stream_;
+  beast::flat_buffer buffer_{max_header};
+  std::optional<http::request_parser<http::empty_body>> parser_;
+  std::optional<Response> response_;
+};
+
+void ViewerServer::Impl::accept() {
+  acceptor_.async_accept([this](beast::error_code error, tcp::socket socket) {
+    if (error == asio::error::operation_aborted) return;
+    if (error) {  // out of files, most likely: some may be closed in a while
+      accept_again_.expires_after(std::chrono::milliseconds(100));
+      accept_again_.async_wait([this](beast::error_code stopped) {
+        if (!stopped) accept();
+      });
+      return;
+    }
+    if (connections_ < max_connections) {
+      socket.set_option(tcp::no_delay(true), error);
+      std::make_shared<HttpSession>(*this, std::move(socket))->read();
+    }
+    accept();
+  });
+}
+
+ViewerServer::ViewerServer(const ViewerOptions& options, ViewerHost& host)
+    : impl_(std::make_unique<Impl>(options, host)) {}
+ViewerServer::~ViewerServer() = default;
+
+std::uint16_t ViewerServer::port() const {
+  return impl_->port();
+}
+std::string ViewerServer::url() const {
+  return impl_->url();
+}
+std::size_t ViewerServer::viewers() const {
+  return impl_->viewers();
+}
+void ViewerServer::show(std::uint8_t camera, ViewerMessage frame) {
+  impl_->publish(camera, std::move(frame), true);
+}
+void ViewerServer::describe(std::uint8_t camera, ViewerMessage rays) {
+  impl_->publish(camera, std::move(rays), false);
+}
+
+std::string make_token() {
+  constexpr std::string_view digits = "0123456789abcdef";
+  std::random_device random;  // the system's own generator on Linux
+  std::uniform_int_distribution<std::size_t> digit(0, digits.size() - 1);
+  std::string token(32, '0');
+  for (char& c : token) c = digits[digit(random)];
+  return token;
+}
+
+}  // namespace palpate

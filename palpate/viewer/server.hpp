@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "palpate/viewer/protocol.hpp"
+
+namespace palpate {
+
+/// What the pages show, and whom they talk to: the program's side.
+///
+/// All functions are called on the server's thread, never by two at a time.
+class ViewerHost {
+ public:
+  virtual ~ViewerHost() = default;
+
+  /// What a page is told once, as the JSON object of docs/protocol.md.
+  virtual std::string hello() = 0;
+  /// What pages are told a few times a second, likewise.
+  virtual std::string state() = 0;
+  /// What happened since the last call; none if there was no tick.
+  virtual std::optional<TickBatch> ticks() = 0;
+  /// The one hand moved [m, world], or was let go.
+  virtual void hand(const std::optional<Vec3>& target) = 0;
+  /// @throws Error to refuse: the page that asked shows it.
+  virtual void command(const Command& command) = 0;
+};
+
+struct ViewerOptions {
+  std::string listen = "127.0.0.1";  ///< an address of this machine
+  std::uint16_t port = 0;            ///< 0: any that is free
+  /// What a page must present; may be empty only on a loopback address. Letters, digits, - and _.
+  std::string token;
+};
+
+/// Serves the page and, by WebSocket, its sessions, on one thread of its own.
+///
+/// Several pages can look; the first that takes the hand has it until it lets go, falls silent for
+/// two seconds or is lost. A page that is slow gets fewer frames and never holds up anything.
+/// Requests for another host, from another origin or without the token are refused, malformed
+/// messages end their session.
+class ViewerServer {
+ public:
+  /// Listens at once. @param host  must outlive the server
+  /// @throws Error if the address cannot be listened on or the token does not do.
+  ViewerServer(const ViewerOptions& options, ViewerHost& host);
+  /// Ends all sessions and waits for the thread.
+  ~ViewerServer();
+  ViewerServer(const ViewerServer&) = delete;
+  ViewerServer& operator=(const ViewerServer&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const;
+  /// Where a browser finds the page, with the token.
+  [[nodiscard]] std::string url() const;
+  /// How many pages are connected. Any thread.
+  [[nodiscard]] std::size_t viewers() const;
+
+  /// A camera's newest frame, for all pages; they see the newest, not each. Any thread; takes a
+  /// lock, so not the servo's. Of a camera beyond Patch::max_views nothing is shown.
+  void show(std::uint8_t camera, ViewerMessage frame);
+  /// The rays of a camera's pixels, before its first frame if its lens is distorted. Any thread.
+  void describe(std::uint8_t camera, ViewerMessage rays);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A random token of 128 bits.
+std::string make_token();
+
+}  // namespace palpate

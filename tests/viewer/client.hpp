@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstring>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <nlohmann/json.hpp>
+#include <sys/socket.h>
+#include <sys/time.h>
+
+namespace palpate {
+
+namespace http = boost::beast::http;
+namespace websocket = boost::beast::websocket;
+
+// A connection on which nothing waits for longer than ten seconds.
+inline boost::asio::ip::tcp::socket connect_to(boost::asio::io_context& context,
+                                               std::uint16_t port) {
+  boost::asio::ip::tcp::socket socket(context);
+  socket.connect({boost::asio::ip::address_v4::loopback(), port});
+  const timeval patience{10, 0};
+  ::setsockopt(socket.native_handle(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  return socket;
+}
+
+/// What a server answers to one request.
+inline http::response<http::string_body> ask(std::uint16_t port, const std::string& target,
+                                             const std::string& host,
+                                             const std::string& origin = {},
+                                             http::verb method = http::verb::get,
+                                             bool upgrade = false) {
+  boost::asio::io_context context;
+  auto socket = connect_to(context, port);
+  http::request<http::empty_body> request(method, target, 11);
+  request.set(http::field::host, host);
+  if (!origin.empty()) request.set(http::field::origin, origin);
+  if (upgrade) {
+    request.set(http::field::connection, "Upgrade");
+    request.set(http::field::upgrade, "websocket");
+    request.set(http::field::sec_websocket_version, "13");
+    request.set(http::field::sec_websocket_key, "dGhlIHNhbXBsZSBub25jZQ==");
+  }
+  http::write(socket, request);
+  http::response_parser<http::string_body> parser;
+  parser.body_limit(16 << 20);
+  parser.skip(method == http::verb::head);
+  boost::beast::flat_buffer buffer;
+  http::read(socket, buffer, parser);
+  return parser.release();
+}
+
+/// A page, as the server sees one.
+class Page {
+ public:
+  explicit Page(std::uint16_t port, const std::string& target = "/session",
+                const std::string& host = "localhost", const std::string& origin = {})
+      : port_(port),
+        target_(target),
+        host_(host),
+        origin_(origin),
+        socket_(connect_to(context_, port)) {
+    socket_.set_option(websocket::stream_base::decorator([&](websocket::request_type& request) {
+      if (!origin.empty()) request.set(http::field::origin, origin);
+    }));
+    socket_.read_message_max(64 << 20);
+    socket_.handshake(host, target, error_);
+  }
+
+  [[nodiscard]] bool accepted() const { return !error_; }
+  /// What such a request is answered with; Beast 1.74 does not tell why a handshake failed.
+  [[nodiscard]] http::status refusal() const {
+    return ask(port_, target_, host_, origin_, http::verb::get, true).result();
+  }
+
+  void send_text(const std::string& text) {
+    socket_.text(true);
+    socket_.write(boost::asio::buffer(text));
+  }
+  void send_binary(const std::vector<std::byte>& bytes) {
+    socket_.binary(true);
+    socket_.write(boost::asio::buffer(bytes.data(), bytes.size()));
+  }
+  void move_hand(bool held, double x, double y, double z) {
+    std::vector<std::byte> bytes(32);
+    bytes[0] = std::byte{16};
+    bytes[1] = std::byte{held};
+    const double place[3] = {x, y, z};
+    std::memcpy(bytes.data() + 8, place, sizeof place);
+    send_binary(bytes);
+  }
+  void shown(std::uint8_t camera) {
+    send_binary({std::byte{17}, std::byte{camera}, {}, {}, {}, {}, {}, {}});
+  }
+
+  /// The next message; none when the session has ended.
+  std::optional<std::string> read() {
+    boost::beast::flat_buffer buffer;
+    socket_.read(buffer, error_);
+    if (error_) return std::nullopt;
+    return boost::beast::buffers_to_string(buffer.data());
+  }
+  [[nodiscard]] bool was_text() const { return socket_.got_text(); }
+  [[nodiscard]] unsigned close_code() const { return socket_.reason().code; }
+
+  /// Reads on until a text message of that verb; null when the session has ended.
+  nlohmann::json until(const std::string& verb) {
+    while (const auto message = read()) {
+      if (!was_text()) continue;
+      const auto json = nlohmann::json::parse(*message);
+      if (json.contains(verb)) return json[verb];
+    }
+    return nullptr;
+  }
+  /// Reads on until a binary message of that kind; empty when the session has ended.
+  std::string until_kind(char kind) {
+    while (const auto message = read()) {
+      if (!was_text() && !message->empty() && message->front() == kind) return *message;
+    }
+    return {};
+  }
+
+ private:
+  std::uint16_t port_;
+  std::string target_, host_, origin_;
+  boost::asio::io_context context_;
+  websocket::stream<boost::asio::ip::tcp::socket> socket_;
+  boost::beast::error_code error_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numeric>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "palpate/core/error.hpp"
+#include "palpate/viewer/protocol.hpp"
+
+namespace palpate {
+namespace {
+
+template <class Number>
+Number at(const std::vector<std::byte>& bytes, std::size_t offset) {
+  Number value;
+  EXPECT_LE(offset + sizeof value, bytes.size());
+  std::memcpy(&value, bytes.data() + offset, sizeof value);
+  return value;
+}
+
+std::vector<std::byte> hand_bytes(std::uint8_t held, const Vec3& target) {
+  std::vector<std::byte> bytes(32);
+  bytes[0] = std::byte{16};
+  bytes[1] = std::byte{held};
+  std::memcpy(bytes.data() + 8, target.data(), 24);
+  return bytes;
+}
+
+TEST(Protocol, SendsADepthImageAsItLiesInMemory) {
+  const auto depth = std::make_shared<const std::vector<std::uint16_t>>(
+      std::vector<std::uint16_t>{0, 700, 65535, 701, 702, 703});
+  FrameHeader header;
+  header.camera = 3;
+  header.number = 41;
+  header.stamp = 12.5;
+  header.width = 3;
+  header.height = 2;
+  header.fx = 525.0;
+  header.cy = 239.5;
+  header.metres_per_unit = 0.001;
+  header.world_from_camera.translation() = Vec3(1.0, 2.0, 3.0);
+  const ViewerMessage message = depth_message(header, *depth, depth);
+  ASSERT_EQ(message.head.size(), 96u);
+  EXPECT_FALSE(message.text);
+  EXPECT_EQ(at<std::uint8_t>(message.head, 0), 1);
+  EXPECT_EQ(at<std::uint8_t>(message.head, 1), 3);
+  EXPECT_EQ(at<std::uint8_t>(message.head, 2), 0);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 4), 41u);
+  EXPECT_EQ(at<double>(message.head, 8), 12.5);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 16), 3u);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 20), 2u);
+  EXPECT_EQ(at<float>(message.head, 24), 525.0F);
+  EXPECT_EQ(at<float>(message.head, 36), 239.5F);
+  EXPECT_EQ(at<float>(message.head, 40), 0.001F);
+  EXPECT_EQ(at<float>(message.head, 44), 1.0F);           // row 0: rotation ...
+  EXPECT_EQ(at<float>(message.head, 44 + 4 * 3), 1.0F);   // ... and translation
+  EXPECT_EQ(at<float>(message.head, 44 + 4 * 11), 3.0F);  // row 2
+  EXPECT_EQ(static_cast<const void*>(message.payload.data()), depth->data()) << "it was copied";
+  EXPECT_EQ(message.payload.size(), 12u);
+}
+
+TEST(Protocol, RefusesPayloadsOfAnotherSize) {
+  FrameHeader header;
+  header.width = 3;
+  header.height = 2;
+  const std::vector<std::uint16_t> depth(5);
+  EXPECT_THROW(depth_message(header, depth, nullptr), Error);
+  EXPECT_THROW(points_message(header, std::vector<float>(17)), Error);
+  EXPECT_THROW(rays_message(0, 3, 2, std::vector<float>(11)), Error);
+}
+
+TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
+  TickBatch batch;
+  batch.t = 100.0;
+  batch.state = 1;
+  batch.flags = 5;
+  batch.safety = 1u << 12;
+  batch.frame = -1;
+  batch.force = Vec3(0.0, 0.0, 2.5);
+  for (std::size_t i = 0; i < TickBatch::max_samples + 10; ++i)
+    batch.samples.push_back({100.0 - 0.001 * static_cast<double>(i), 1.0F, 0.5F, 2.0F, 3e-6F});
+  const ViewerMessage message = ticks_message(batch);
+  EXPECT_EQ(at<std::uint16_t>(message.head, 2), TickBatch::max_samples);
+  ASSERT_EQ(message.head.size(), 88 + 20 * TickBatch::max_samples);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 4), 5u);
+  EXPECT_EQ(at<double>(message.head, 8), 100.0);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 16), 1u << 12);
+  EXPECT_EQ(at<float>(message.head, 68), 2.5F);
+  EXPECT_EQ(at<std::int32_t>(message.head, 76), -1);
+  EXPECT_NEAR(at<float>(message.head, 88), 0.010, 1e-6) << "the first ten are the oldest";
+  EXPECT_EQ(at<float>(message.head, 88 + 16), 3e-6F);
+}
+
+TEST(Protocol, UnderstandsAHandThatIsHeldOrLetGo) {
+  const auto held = parse_binary(hand_bytes(1, {0.1, -0.2, 0.3}));
+  ASSERT_TRUE(held && std::holds_alternative<HandMessage>(*held));
+  EXPECT_EQ(std::get<HandMessage>(*held).target, Vec3(0.1, -0.2, 0.3));
+  const auto released = parse_binary(hand_bytes(0, {0.1, -0.2, 0.3}));
+  ASSERT_TRUE(released && std::holds_alternative<HandMessage>(*released));
+  EXPECT_FALSE(std::get<HandMessage>(*released).target);
+}
+
+TEST(Protocol, RefusesAHandThatIsNowhere) {
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  for (const double bad : {std::nan(""), inf, -inf, 1000.1, -1e300}) {
+    EXPECT_FALSE(parse_binary(hand_bytes(1, {0.0, bad, 0.0}))) << bad;
+    EXPECT_FALSE(parse_binary(hand_bytes(1, {0.0, 0.0, bad}))) << bad;
+  }
+  EXPECT_FALSE(parse_binary(hand_bytes(2, {0.0, 0.0, 0.0})));
+}
+
+TEST(Protocol, RefusesMessagesThatAreNotItsOwnToTheByte) {
+  std::vector<std::byte> bytes = hand_bytes(1, {0.0, 0.0, 0.0});
+  bytes.pop_back();
+  EXPECT_FALSE(parse_binary(bytes));
+  bytes.resize(33);
+  EXPECT_FALSE(parse_binary(bytes));
+  EXPECT_FALSE(parse_binary({}));
+  std::vector<std::byte> shown(8);
+  shown[0] = std::byte{17};
+  EXPECT_TRUE(parse_binary(shown));
+  shown[1] = std::byte{Patch::max_views};
+  EXPECT_FALSE(parse_binary(shown)) << "there is no such camera";
+  shown[0] = std::byte{1};
+  EXPECT_FALSE(parse_binary(shown)) << "only the program sends frames";
+}
+
+TEST(Protocol, UnderstandsEachCommand) {
+  const auto set = parse_command(R"({"set": {"name": "stiffness", "value": 500}})");
+  ASSERT_TRUE(set && std::holds_alternative<SetParameter>(*set));
+  EXPECT_EQ(std::get<SetParameter>(*set).name, "stiffness");
+  EXPECT_EQ(std::get<SetParameter>(*set).value, 500.0);
+  const auto limit = parse_command(R"({"set_safety": {"name": "max_force", "value": 2.5}})");
+  ASSERT_TRUE(limit && std::holds_alternative<SetSafetyParameter>(*limit));
+  const auto method = parse_command(R"({"method": "paper"})");
+  ASSERT_TRUE(method && std::holds_alternative<SetMethod>(*method));
+  const auto record = parse_command(R"({"record": false})");
+  ASSERT_TRUE(record && std::holds_alternative<SetRecording>(*record));
+  EXPECT_FALSE(std::get<SetRecording>(*record).on);
+  const auto reset = parse_command(R"({"reset": true})");
+  ASSERT_TRUE(reset && std::holds_alternative<ResetHand>(*reset));
+}
+
+TEST(Protocol, RefusesCommandsThatAreNotItsOwn) {
+  for (const char* text :
+       {"", "{}", "null", "[1]", "{", R"({"set": 1})", R"({"set": {"name": "x"}})",
+        R"({"set": {"name": 1, "value": 1}})", R"({"set": {"name": "x", "value": "1"}})",
+        R"({"set": {"name": "x", "value": 1, "more": 1}})", R"({"method": 1})",
+        R"({"record": "yes"})", R"({"reset": false})", R"({"quit": true})",
+        R"({"method": "paper", "reset": true})", "\xff\xfe", R"({"method": "\ud800"})"}) {
+    EXPECT_FALSE(parse_command(text)) << text;
+  }
+  std::string deep(max_page_message, '[');
+  EXPECT_FALSE(parse_command(deep));
+  std::string longer = R"({"method": ")" + std::string(max_page_message, 'x') + "\"}";
+  EXPECT_FALSE(parse_command(longer));
+}
+
+// A short stand-in for a fuzzer's run: bytes changed in messages that are right.
+TEST(Protocol, SurvivesAnyBytes) {
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int> byte(0, 255);
+  const std::string command = R"({"set": {"name": "stiffness", "value": 500}})";
+  for (int i = 0; i < 20000; ++i) {
+    std::vector<std::byte> binary = hand_bytes(1, {0.1, 0.2, 0.3});
+    binary.resize(static_cast<std::size_t>(byte(random)) % 40);
+    for (int change = 0; change < 3 && !binary.empty(); ++change)
+      binary[static_cast<std::size_t>(byte(random)) % binary.size()] =
+          static_cast<std::byte>(byte(random));
+    const auto message = parse_binary(binary);
+    if (message && std::holds_alternative<HandMessage>(*message)) {
+      const auto& target = std::get<HandMessage>(*message).target;
+      EXPECT_TRUE(!target || target->allFinite());
+    }
+    std::string text = command;
+    for (int change = 0; change < 3; ++change)
+      text[static_cast<std::size_t>(byte(random)) % text.size()] = static_cast<char>(byte(random));
+    parse_command(text);
+  }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <atomic>
+#include <condition_variable>
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "palpate/core/error.hpp"
+#include "palpate/viewer/page.hpp"
+#include "palpate/viewer/server.hpp"
+
+#include "tests/support/errors.hpp"
+#include "tests/viewer/client.hpp"
+
+namespace palpate {
+namespace {
+
+// Remembers what pages asked of it.
+class FakeHost final : public ViewerHost {
+ public:
+  std::string hello() override { return R"({"version":"test"})"; }
+  std::string state() override { return R"({"method":"paper"})"; }
+  std::optional<TickBatch> ticks() override {
+    TickBatch batch;
+    batch.t = ++beats_;
+    return batch;
+  }
+  void hand(const std::optional<Vec3>& target) override {
+    const std::lock_guard lock(mutex_);
+    hands_.push_back(target);
+    changed_.notify_all();
+  }
+  void command(const Command& command) override {
+    if (const auto* set = std::get_if<SetParameter>(&command); set != nullptr && set->value < 0.0)
+      throw Error("parameter '" + set->name + "'", "it is negative");
+    ++commands_;
+  }
+
+  // The hand's place when it has been told `count` times; waits for it.
+  std::optional<Vec3> hand_number(std::size_t count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::chrono::seconds(10), [&] { return hands_.size() >= count; });
+    return hands_.size() >= count ? hands_[count - 1] : Vec3(Vec3::Constant(1e9));
+  }
+  std::size_t hands() {
+    const std::lock_guard lock(mutex_);
+    return hands_.size();
+  }
+  [[nodiscard]] int commands() const { return commands_; }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::optional<Vec3>> hands_;
+  std::atomic<int> commands_{0};
+  double beats_ = 0.0;
+};
+
+class ViewerServerTest : public ::testing::Test {
+ protected:
+  FakeHost host;
+  ViewerServer server{{}, host};
+};
+
+ViewerMessage frame(std::uint32_t number, std::uint8_t camera = 0) {
+  const auto depth =
+      std::make_shared<const std::vector<std::uint16_t>>(640 * 480, std::uint16_t{700});
+  FrameHeader header;
+  header.camera = camera;
+  header.number = number;
+  header.width = 640;
+  header.height = 480;
+  return depth_message(header, *depth, depth);
+}
+
+std::uint32_t number_of(const std::string& message) {
+  std::uint32_t number = 0;
+  std::memcpy(&number, message.data() + 4, sizeof number);
+  return number;
+}
+
+TEST_F(ViewerServerTest, ServesThePageToThisMachine) {
+  for (const PageFile& file : page_files()) {
+    const auto answer = ask(server.port(), std::string(file.path), "localhost:1234");
+    EXPECT_EQ(answer.result(), http::status::ok) << file.path;
+    EXPECT_EQ(answer.body(), file.content) << file.path;
+    EXPECT_EQ(answer[http::field::content_type], std::string(file.type));
+    EXPECT_EQ(answer["X-Content-Type-Options"], "nosniff");
+    const auto head = ask(server.port(), std::string(file.path), "127.0.0.1", {}, http::verb::head);
+    EXPECT_EQ(head.result(), http::status::ok);
+    EXPECT_TRUE(head.body().empty());
+  }
+  EXPECT_EQ(ask(server.port(), "/?token=x", "[::1]:80").result(), http::status::ok);
+}
+
+TEST_F(ViewerServerTest, RefusesWhatItDoesNotServe) {
+  EXPECT_EQ(ask(server.port(), "/etc/passwd", "localhost").result(), http::status::not_found);
+  EXPECT_EQ(ask(server.port(), "/../../x", "localhost").result(), http::status::not_found);
+  EXPECT_EQ(ask(server.port(), "/", "localhost", {}, http::verb::post).result(),
+            http::status::method_not_allowed);
+  EXPECT_EQ(Page(server.port(), "/other").refusal(), http::status::not_found);
+}
+
+TEST_F(ViewerServerTest, RefusesHostsThatAreNotThisMachine) {
+  for (const char* name : {"example.com", "localhost.example.com", "10.0.0.1:80", "", "127.0.0.1.x",
+                           "[::2]:80", "localhost@example.com"}) {
+    EXPECT_EQ(ask(server.port(), "/", name).result(), http::status::forbidden) << name;
+    EXPECT_FALSE(Page(server.port(), "/session", *name == 0 ? "example.com" : name).accepted());
+  }
+}
+
+TEST_F(ViewerServerTest, RefusesPagesOfOtherOrigins) {
+  for (const char* origin : {"http://example.com", "https://localhost:8642", "null",
+                             "http://localhost", "http://localhost:86420", "localhost:8643"}) {
+    Page page(server.port(), "/session", "localhost:8643", origin);
+    EXPECT_FALSE(page.accepted()) << origin;
+    EXPECT_EQ(page.refusal(), http::status::forbidden) << origin;
+  }
+  EXPECT_TRUE(
+      Page(server.port(), "/session", "localhost:8643", "http://localhost:8643").accepted());
+}
+
+TEST(ViewerServer, AsksForItsToken) {
+  FakeHost host;
+  const ViewerServer server({"127.0.0.1", 0, "secret-123"}, host);
+  EXPECT_NE(server.url().find("/?token=secret-123"), std::string::npos);
+  for (const char* target : {"/session", "/session?token=", "/session?token=secret-12",
+                             "/session?token=secret-1234", "/session?xtoken=secret-123"}) {
+    Page page(server.port(), target);
+    EXPECT_FALSE(page.accepted()) << target;
+    EXPECT_EQ(page.refusal(), http::status::unauthorized) << target;
+  }
+  EXPECT_TRUE(Page(server.port(), "/session?token=secret-123").accepted());
+  EXPECT_TRUE(Page(server.port(), "/session?a=b&token=secret-123").accepted());
+}
+
+TEST(ViewerServer, ListensBeyondThisMachineOnlyWithAToken) {
+  FakeHost host;
+  const auto open = [&](const ViewerOptions& options) {
+    return [&host, options] { return ViewerServer(options, host).port(); };
+  };
+  EXPECT_TRUE(test::fails_saying(open({"0.0.0.0", 0, ""}), "--token"));
+  EXPECT_TRUE(test::fails_saying(open({"0.0.0.0", 0, "short"}), "--token"));
+  EXPECT_TRUE(test::fails_saying(open({"127.0.0.1", 0, "no spaces"}), "--token"));
+  EXPECT_TRUE(test::fails_saying(open({"nowhere", 0, ""}), "--listen nowhere"));
+  const ViewerServer server({"0.0.0.0", 0, make_token()}, host);
+  EXPECT_EQ(ask(server.port(), "/", "lab.example.com").result(), http::status::ok);
+  EXPECT_EQ(Page(server.port(), "/session", "lab.example.com").refusal(),
+            http::status::unauthorized);
+}
+
+TEST_F(ViewerServerTest, SaysThatItsPortIsTaken) {
+  const auto again = [&] { return ViewerServer({"127.0.0.1", server.port(), ""}, host).port(); };
+  EXPECT_TRUE(test::fails_saying(again, "another program"));
+}
+
+TEST(ViewerServer, MakesTokensThatDiffer) {
+  EXPECT_EQ(make_token().size(), 32u);
+  EXPECT_NE(make_token(), make_token());
+}
+
+TEST_F(ViewerServerTest, IntroducesItselfAndTellsOfTicks) {
+  Page page(server.port());
+  ASSERT_TRUE(page.accepted());
+  EXPECT_EQ(page.until("hello")["version"], "test");
+  EXPECT_EQ(page.until("state")["method"], "paper");
+  const auto presence = page.until("presence");
+  EXPECT_EQ(presence["hand"], "free");
+  EXPECT_EQ(presence["viewers"], 1);
+  const std::string first = page.until_kind(2);
+  const std::string second = page.until_kind(2);
+  ASSERT_EQ(first.size(), 88u);
+  EXPECT_NE(first, second);
+}
+
+TEST_F(ViewerServerTest, ShowsTheNewestFrameToWhoeverJoins) {
+  server.show(0, frame(7));
+  server.show(0, frame(8));
+  Page page(server.port());
+  const std::string message = page.until_kind(1);
+  EXPECT_EQ(message.size(), 96u + 2 * 640 * 480);
+  EXPECT_EQ(number_of(message), 8u);
+  server.show(200, frame(9));  // a camera that cannot be: nothing happens
+}
+
+TEST_F(ViewerServerTest, SendsRaysBeforeTheFrameThatNeedsThem) {
+  server.describe(2, rays_message(2, 2, 1, {0.0F, 0.1F, 0.2F, 0.3F}));
+  server.show(2, frame(0, 2));
+  Page page(server.port());
+  std::string kinds;
+  while (kinds.find('\1') == std::string::npos) {
+    const auto message = page.read();
+    ASSERT_TRUE(message);
+    if (!page.was_text()) kinds += message->front();
+  }
+  EXPECT_NE(kinds.find('\3'), std::string::npos);
+}
+
+TEST_F(ViewerServerTest, GivesASlowPageFewerFrames) {
+  Page page(server.port());
+  page.until("hello");
+  server.show(0, frame(0));
+  EXPECT_EQ(number_of(page.until_kind(1)), 0u);
+  server.show(0, frame(1));
+  EXPECT_EQ(number_of(page.until_kind(1)), 1u);
+  // Two are on the page and not drawn: of these only the last will do.
+  for (std::uint32_t number = 2; number < 50; ++number) server.show(0, frame(number));
+  for (int i = 0; i < 5; ++i) {
+    const auto message = page.read();
+    ASSERT_TRUE(message);
+    EXPECT_FALSE(!page.was_text() && message->front() == 1) << "a frame that was not asked for";
+  }
+  page.shown(0);
+  EXPECT_EQ(number_of(page.until_kind(1)), 49u);
+}
+
+TEST_F(ViewerServerTest, GivesTheOneHandToWhoComesFirst) {
+  Page first(server.port());
+  Page second(server.port());
+  first.move_hand(true, 0.1, 0.2, 0.3);
+  EXPECT_EQ(host.hand_number(1), Vec3(0.1, 0.2, 0.3));
+  while (first.until("presence")["hand"] != "you") {
+  }
+  while (second.until("presence")["hand"] != "other") {
+  }
+  second.move_hand(true, 9.0, 9.0, 9.0);
+  second.move_hand(false, 0.0, 0.0, 0.0);  // nor may it let go what it does not hold
+  second.send_text(R"({"reset": true})");
+  second.until("state");
+  EXPECT_EQ(host.hands(), 1u);
+  first.move_hand(false, 0.0, 0.0, 0.0);
+  EXPECT_FALSE(host.hand_number(2)) << "let go";
+  while (second.until("presence")["hand"] != "free") {
+  }
+  second.move_hand(true, 0.4, 0.5, 0.6);
+  EXPECT_EQ(host.hand_number(3), Vec3(0.4, 0.5, 0.6));
+}
+
+TEST_F(ViewerServerTest, LetsTheHandGoWhenItsPageIsLost) {
+  {
+    Page page(server.port());
+    page.move_hand(true, 0.1, 0.2, 0.3);
+    EXPECT_TRUE(host.hand_number(1));
+  }  // the socket closes without a word
+  EXPECT_FALSE(host.hand_number(2));
+}
+
+TEST_F(ViewerServerTest, LetsTheHandGoWhenItsPageFallsSilent) {
+  Page page(server.port());
+  page.move_hand(true, 0.1, 0.2, 0.3);
+  EXPECT_TRUE(host.hand_number(1));
+  EXPECT_FALSE(host.hand_number(2));
+  while (page.until("presence")["hand"] != "free") {
+  }
+}
+
+TEST_F(ViewerServerTest, PassesCommandsOnAndExplainsRefusals) {
+  Page page(server.port());
+  Page other(server.port());
+  page.send_text(R"({"set": {"name": "stiffness", "value": -1}})");
+  EXPECT_EQ(page.until("error"), "parameter 'stiffness': it is negative");
+  EXPECT_EQ(host.commands(), 0);
+  page.send_text(R"({"set": {"name": "stiffness", "value": 1}})");
+  page.until("state");
+  EXPECT_FALSE(other.until("state").is_null());
+}
+
+TEST_F(ViewerServerTest, EndsSessionsThatSendWhatIsNotUnderstood) {
+  for (const char* text : {"hello", "{}", "{\"quit\":true}"}) {
+    Page page(server.port());
+    page.send_text(text);
+    while (page.read()) {
+    }
+    EXPECT_EQ(page.close_code(), websocket::close_code::policy_error) << text;
+  }
+  Page page(server.port());
+  page.send_binary(std::vector<std::byte>(31, std::byte{16}));
+  while (page.read()) {
+  }
+  EXPECT_EQ(page.close_code(), websocket::close_code::policy_error);
+  Page flood(server.port());
+  flood.send_text(std::string(max_page_message + 1, ' '));
+  while (flood.read()) {
+  }
+  EXPECT_EQ(flood.close_code(), websocket::close_code::too_big);
+  EXPECT_TRUE(Page(server.port()).accepted()) << "others are not concerned";
+}
+
+TEST_F(ViewerServerTest, SurvivesBytesThatAreNotHttp) {
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int> byte(0, 255);
+  boost::asio::io_context context;
+  for (int i = 0; i < 40; ++i) {
+    auto socket = connect_to(context, server.port());
+    std::string bytes = i % 2 == 0 ? "" : "GET /session HTTP/1.1\r\nHost: localhost\r\nUpgrade: ";
+    for (int n = 0; n < 50 * i; ++n) bytes += static_cast<char>(byte(random));
+    boost::system::error_code ignored;
+    boost::asio::write(socket, boost::asio::buffer(bytes), ignored);
+  }
+  EXPECT_EQ(ask(server.port(), "/", "localhost").result(), http::status::ok);
+}
+
+TEST_F(ViewerServerTest, HasRoomForSixteenPages) {
+  std::vector<std::unique_ptr<Page>> pages;
+  for (int i = 0; i < 16; ++i) {
+    pages.push_back(std::make_unique<Page>(server.port()));
+    ASSERT_TRUE(pages.back()->accepted()) << i;
+    pages.back()->until("presence");
+  }
+  EXPECT_EQ(server.viewers(), 16u);
+  EXPECT_EQ(Page(server.port()).refusal(), http::status::service_unavailable);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page in a real browser, with the real program behind it.
+
+import type { Browser, Page } from "playwright-core";
+import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
+import { difference, distance, drawn, glimpse, launch, Program } from "./session";
+
+const DESK = ["--camera", "synthetic:desk?size=320x240"];
+const PLANE = ["--camera", "synthetic:plane?size=320x240"];
+const r_c = 0.005; // [m] the proxy's radius
+
+let browser: Browser;
+let program: Program | null = null;
+const faults: string[] = [];
+
+async function open(options: string[], width = 900, height = 600): Promise<Page> {
+  program ??= await Program.start(options);
+  const page = await browser.newPage({ viewport: { width, height } });
+  page.on("pageerror", (error) => faults.push(String(error)));
+  page.on("console", (message) => message.type() === "error" && faults.push(message.text()));
+  await page.goto(program.url);
+  await drawn(page);
+  return page;
+}
+
+const until = (page: Page, what: (seen: Awaited<ReturnType<typeof glimpse>>) => boolean) =>
+  expect.poll(async () => what(await glimpse(page)), { timeout: 30_000, interval: 100 }).toBe(true);
+
+beforeAll(async () => {
+  browser = await launch();
+});
+afterEach(async () => {
+  for (const context of browser.contexts()) await context.close();
+  await program?.stop();
+  program = null;
+  expect(faults.splice(0)).toEqual([]);
+});
+afterAll(() => browser.close());
+
+test("shows a scene that moves", async () => {
+  const page = await open(["--camera", "synthetic:moving?size=320x240"]);
+  expect(await page.locator("#connection").textContent()).toBe("connected");
+  expect(await page.locator("#camera").textContent()).toContain("synthetic:moving");
+  // Cameras, hand and sensor are without noise: what changes in the scene's middle is the slab.
+  const clip = { x: 150, y: 200, width: 400, height: 350 };
+  const first = await page.screenshot({ clip });
+  await expect
+    .poll(async () => difference(page, first, await page.screenshot({ clip })), { timeout: 30_000 })
+    .toBeGreaterThan(300);
+});
+
+test("a hand dragged into a surface leaves the proxy on it and shows the force", async () => {
+  const page = await open(PLANE);
+  const before = await glimpse(page);
+  expect(before.state).toBe(0);
+  const clearance = before.clearance!;
+  expect(clearance).toBeGreaterThan(0.03);
+
+  await page.mouse.move(350, 300);
+  await page.mouse.down();
+  await expect.poll(() => page.locator("#hand").textContent()).toContain("you have the hand");
+  // Down the picture is along the surface and into it.
+  await until(page, (seen) => seen.state === 0);
+  for (let y = 300; y < 560; y += 4) {
+    await page.mouse.move(350, y);
+    if ((await glimpse(page)).state !== 0) break;
+  }
+  for (let i = 0; i < 8; ++i) await page.mouse.wheel(0, -60);
+  await until(page, (seen) => seen.state !== 0 && seen.force > 0.5 && seen.arrow);
+
+  const pressed = await glimpse(page);
+  expect(distance(pressed.hip, pressed.proxy)).toBeGreaterThan(0.002);
+  // The surface is z = 0; between points the proxy may sink in a little.
+  expect(pressed.proxy[2]).toBeGreaterThan(0.8 * r_c);
+  expect(pressed.hip[2]).toBeLessThan(pressed.proxy[2]!);
+  expect(Number(await page.locator("#force").textContent())).toBeGreaterThan(0.5);
+  expect(await page.locator("#state").textContent()).toMatch(/contact|entrenched/);
+  const plotted = () => page.locator(".plot output").first().textContent();
+  await expect.poll(async () => parseFloat((await plotted()) ?? "")).toBeGreaterThan(0.5);
+
+  // Pressing on, the proxy stays where it is.
+  for (let i = 0; i < 8; ++i) await page.mouse.wheel(0, -60);
+  await until(page, (seen) => distance(seen.hip, seen.proxy) > 0.006);
+  expect(Math.abs((await glimpse(page)).proxy[2]! - pressed.proxy[2]!)).toBeLessThan(0.002);
+
+  await page.mouse.up();
+  await until(page, (seen) => seen.force === 0);
+  await expect.poll(() => page.locator("#hand").textContent()).toContain("hand free");
+});
+
+test("the keyboard alone moves the hand and the view", async () => {
+  const page = await open(DESK);
+  const start = (await glimpse(page)).proxy;
+  await page.keyboard.down("ArrowRight");
+  await until(page, (seen) => distance(seen.proxy, start) > 0.01);
+  await page.keyboard.up("ArrowRight");
+  await page.keyboard.down("KeyE");
+  await until(page, (seen) => seen.state !== 0);
+  await page.keyboard.up("KeyE");
+  await page.keyboard.press("Space");
+  await expect.poll(() => page.locator("#hand").textContent()).toContain("hand free");
+  const orbit = () => page.evaluate(() => (window as any).palpate.view.orbit.yaw as number);
+  const yaw = await orbit();
+  await page.keyboard.down("Shift");
+  await page.keyboard.down("ArrowLeft");
+  await expect.poll(orbit).not.toBeCloseTo(yaw, 2);
+  await page.keyboard.up("ArrowLeft");
+  await page.keyboard.up("Shift");
+  await page.keyboard.press("?");
+  expect(await page.locator("#help").isVisible()).toBe(true);
+  await page.keyboard.press("Escape");
+  expect(await page.locator("#help").isVisible()).toBe(false);
+});
+
+test("a lost connection is shown and heals", async () => {
+  const page = await open(DESK);
+  const port = program!.port;
+  await page.mouse.move(350, 300);
+  await page.mouse.down();
+  await expect.poll(() => page.locator("#hand").textContent()).toContain("you have the hand");
+  await program!.stop("SIGKILL");
+  await expect.poll(() => page.locator("#connection").textContent()).toBe("reconnecting");
+  expect(await page.locator("#toast").isVisible()).toBe(true);
+  program = await Program.start(DESK, port);
+  await expect
+    .poll(() => page.locator("#connection").textContent(), { timeout: 15_000 })
+    .toBe("connected");
+  expect(await page.locator("#toast").isVisible()).toBe(false);
+  await expect.poll(() => page.locator("#hand").textContent()).toContain("hand free");
+  const { drawings } = await glimpse(page);
+  await until(page, (seen) => seen.drawings > drawings + 3);
+  // What the browser itself says about a connection that was refused is no fault of the page.
+  faults.splice(0);
+});
+
+test("what one page sets, all pages show", async () => {
+  const page = await open(DESK);
+  const other = await open(DESK);
+  await expect.poll(() => other.locator("#hand").textContent()).toContain("2 viewers");
+  await page.getByRole("tab", { name: "Method" }).click();
+  await page.locator("#parameters-stiffness").evaluate((slider: HTMLInputElement) => {
+    slider.value = "0";
+    slider.dispatchEvent(new Event("input"));
+  });
+  await page.locator("#method-name").selectOption("fixed-step");
+  await other.getByRole("tab", { name: "Method" }).click();
+  await expect.poll(() => other.locator("#method-name").inputValue()).toBe("fixed-step");
+  await expect.poll(() => other.getByLabel("stiffness, N/m").inputValue()).toBe("0");
+});
+
+describe.each([
+  [360, 640],
+  [820, 1180],
+  [3840, 2160],
+])("at %i x %i", (width, height) => {
+  test("everything has room", async () => {
+    const page = await open(DESK, width, height);
+    const boxes = await page.evaluate(() => {
+      const of = (selector: string) => document.querySelector(selector)!.getBoundingClientRect();
+      const inside = (box: DOMRect) =>
+        box.left >= 0 && box.top >= 0 && box.right <= innerWidth && box.bottom <= innerHeight;
+      return {
+        scrolls: document.documentElement.scrollWidth > innerWidth,
+        view: of("#view").height,
+        inside: [".brand", ".actions", ".hud", ".panel", ".legend", "#connection"].map((selector) =>
+          inside(of(selector)),
+        ),
+        plots: [...document.querySelectorAll(".plot .canvas")].map(
+          (plot) => plot.getBoundingClientRect().width,
+        ),
+      };
+    });
+    expect(boxes.scrolls).toBe(false);
+    expect(boxes.view).toBeGreaterThan(height / 3);
+    expect(boxes.inside).toEqual([true, true, true, true, true, true]);
+    for (const plot of boxes.plots) expect(plot).toBeGreaterThan(200);
+  });
+});

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// A session of the program and a browser that looks at it, for tests and pictures.
+
+import { spawn, type ChildProcess } from "node:child_process";
+import { chromium, type Browser, type Page } from "playwright-core";
+
+/** The program with its page, until stopped. */
+export class Program {
+  private constructor(
+    private readonly child: ChildProcess,
+    readonly url: string,
+  ) {}
+
+  static async start(options: string[], port = 0): Promise<Program> {
+    const program = process.env.PALPATE;
+    if (!program) throw new Error("PALPATE must name the program");
+    const child = spawn(program, ["run", "--no-browser", "--port", String(port), ...options]);
+    let said = "";
+    const url = await new Promise<string>((resolve, reject) => {
+      child.stderr.on("data", (text: Buffer) => {
+        said += text.toString();
+        const found = /open (\S+) in a browser/.exec(said);
+        if (found) resolve(found[1]!);
+      });
+      child.on("exit", () => reject(new Error(`the program ended: ${said}`)));
+    });
+    return new Program(child, url);
+  }
+
+  get port(): number {
+    return Number(new URL(this.url).port);
+  }
+
+  stop(signal: NodeJS.Signals = "SIGINT"): Promise<void> {
+    return new Promise((resolve) => {
+      if (this.child.exitCode !== null || this.child.signalCode !== null) return resolve();
+      this.child.on("exit", () => resolve());
+      this.child.kill(signal);
+    });
+  }
+}
+
+export function launch(): Promise<Browser> {
+  return chromium.launch({
+    executablePath: process.env.CHROMIUM ?? "chromium",
+    // No graphics card is needed: WebGL in software. Root, who may run tests, has no sandbox.
+    args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+  });
+}
+
+/** What the page knows, as tests see it. */
+export interface Glimpse {
+  state: number;
+  hip: number[];
+  proxy: number[];
+  force: number;
+  frame: number;
+  clearance: number | null;
+  arrow: boolean;
+  points: number;
+  drawings: number;
+}
+
+export function glimpse(page: Page): Promise<Glimpse> {
+  return page.evaluate(() => {
+    const { view, newest } = (window as unknown as { palpate: any }).palpate;
+    const { tick } = newest();
+    return {
+      state: tick?.state ?? 0,
+      hip: tick?.hip ?? [],
+      proxy: tick?.proxy ?? [],
+      force: Math.hypot(...(tick?.force ?? [0])),
+      frame: tick?.frame ?? -1,
+      clearance: view.clearance(),
+      arrow: view.arrowShown,
+      points: view.drawnPoints,
+      drawings: view.drawings,
+    };
+  });
+}
+
+/** Waits until the session is drawn. */
+export async function drawn(page: Page): Promise<void> {
+  await page.waitForFunction(() => {
+    const { view, newest } = (window as unknown as { palpate: any }).palpate ?? {};
+    return view?.drawings > 3 && view.drawnPoints > 1000 && newest().state && newest().tick;
+  });
+}
+
+export function distance(a: readonly number[], b: readonly number[]): number {
+  return Math.hypot(...a.map((x, i) => x - b[i]!));
+}
+
+/** How many of a picture's pixels differ clearly from another's. */
+export function difference(page: Page, one: Buffer, other: Buffer): Promise<number> {
+  return page.evaluate(
+    async (pictures) => {
+      const pixels = await Promise.all(
+        pictures.map(async (base64) => {
+          const image = new Image();
+          image.src = `data:image/png;base64,${base64}`;
+          await image.decode();
+          const canvas = document.createElement("canvas");
+          canvas.width = image.width;
+          canvas.height = image.height;
+          const context = canvas.getContext("2d")!;
+          context.drawImage(image, 0, 0);
+          return context.getImageData(0, 0, image.width, image.height).data;
+        }),
+      );
+      const [a, b] = pixels as [Uint8ClampedArray, Uint8ClampedArray];
+      let count = 0;
+      for (let i = 0; i < a.length; i += 4) {
+        if (Math.abs(a[i]! - b[i]!) + Math.abs(a[i + 1]! - b[i + 1]!) > 40) ++count;
+      }
+      return count;
+    },
+    [one.toString("base64"), other.toString("base64")],
+  );
+}

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+import { defineConfig } from "vitest/config";
+
+export default defineConfig({
+  test: {
+    include: ["browser/*.spec.ts"],
+    testTimeout: 120_000, // a browser that draws in software, on a busy machine
+    hookTimeout: 60_000,
+    fileParallelism: false,
+  },
+});

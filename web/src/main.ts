@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+import "./style.css";
+import { Connection } from "./connection";
+import { HandInput, isForForm } from "./hand";
+import { length } from "./camera_math";
+import { Panel } from "./panel";
+import { Plots } from "./plots";
+import { encodeHand, encodeShown, type Frame, type State, type Ticks } from "./protocol";
+import { SceneView, type Palette } from "./scene";
+
+const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
+const DISENGAGED = 1 << 6; // SafetyFlag
+const STATES = ["free", "contact", "entrenched"] as const;
+
+const plots = new Plots(get("plots"));
+let state: State | null = null;
+let tick: Ticks | null = null;
+let announced = "";
+const arrived = new Map<number, Frame>();
+
+function toast(text: string, lasts = 6000): void {
+  const box = get("toast");
+  box.textContent = text;
+  box.hidden = false;
+  clearTimeout(Number(box.dataset.timer));
+  box.dataset.timer = String(lasts > 0 ? setTimeout(() => (box.hidden = true), lasts) : 0);
+}
+
+function makeView(): SceneView {
+  try {
+    return new SceneView(get<HTMLCanvasElement>("view"));
+  } catch (error) {
+    toast(`The scene cannot be drawn: ${(error as Error).message}.`, 0);
+    throw error;
+  }
+}
+const view = makeView();
+
+const panel = new Panel({
+  setParameter: (name, value) => connection.ask({ set: { name, value } }),
+  setLimit: (name, value) => connection.ask({ set_safety: { name, value } }),
+  setMethod: (name) => connection.ask({ method: name }),
+});
+
+const connection = new Connection({
+  opened() {
+    get("connection").dataset.state = "live";
+    get("connection").textContent = "connected";
+    get("toast").hidden = true;
+  },
+  lost() {
+    arrived.clear();
+    hand.letGo();
+    get("connection").dataset.state = "lost";
+    get("connection").textContent = "reconnecting";
+    toast("The connection to the program is lost. The hand is released; trying again.", 0);
+  },
+  hello: (hello) => panel.introduce(hello),
+  state(newest) {
+    state = newest;
+    panel.update(newest);
+    const { r_c, r_1, r_3 } = newest.parameters;
+    view.setRadii({ r_c: r_c ?? 0.005, r_1: r_1 ?? 0.005, r_3: r_3 ?? 0.01 });
+    const troubled = newest.cameras.find((camera) => camera.state !== "live");
+    const first = newest.cameras[0];
+    get("camera").textContent = troubled
+      ? `camera ${troubled.state}`
+      : first
+        ? `${first.uri} · ${first.rate.toFixed(0)} Hz`
+        : "no camera";
+    const record = get<HTMLButtonElement>("record");
+    record.disabled = !newest.recording.possible;
+    record.title = newest.recording.path ?? newest.recording.message;
+    record.setAttribute("aria-pressed", String(newest.recording.path !== null));
+  },
+  presence({ hand: whose, viewers }) {
+    const chip = get("hand");
+    chip.dataset.state = whose;
+    const texts = {
+      you: "you have the hand",
+      other: "another page has the hand",
+      free: "hand free",
+    };
+    chip.textContent = texts[whose] + (viewers > 1 ? ` · ${viewers} viewers` : "");
+  },
+  refused: (reason) => toast(reason),
+  message(message) {
+    if (message.kind === "frame") arrived.set(message.camera, message);
+    else if (message.kind === "rays") view.setRays(message);
+    else {
+      tick = message;
+      plots.add(message.samples);
+      view.showTick(message);
+    }
+  },
+});
+
+const hand = new HandInput(get<HTMLCanvasElement>("view"), view, {
+  proxy: () => (tick ? { at: tick.proxy, touching: tick.state !== 0 } : null),
+  takesHand: () => state?.device.takes_hand ?? false,
+  moved(held, target) {
+    connection.send(encodeHand(held, target));
+    get("hint").classList.add("gone");
+  },
+});
+
+function showTick(now: number): void {
+  if (!tick) return;
+  const newtons = length(tick.force);
+  get("force").textContent = newtons.toFixed(2);
+  const word = STATES[tick.state] ?? "";
+  get("state").textContent = word;
+  get("state").dataset.state = String(tick.state);
+  const inside = 1e3 * Math.hypot(...tick.hip.map((x, i) => x - tick!.proxy[i]!));
+  const waits = tick.state !== 0 && (tick.safety & DISENGAGED) !== 0 && hand.isHeld;
+  const clearance = view.clearance();
+  get("detail").textContent = waits
+    ? "pull back, then push in again"
+    : tick.state !== 0
+      ? `hand ${inside.toFixed(1)} mm inside`
+      : clearance !== null && clearance > 0
+        ? `${(1e3 * clearance).toFixed(0)} mm from the surface`
+        : "";
+  panel.showSafety(tick.safety, now);
+  const said = tick.state === 0 ? "free" : "touching";
+  if (said !== announced) get("announce").textContent = announced = said;
+  const range = view.depthRange();
+  if (range) {
+    get("legend-near").textContent = `${range[0].toFixed(2)} m`;
+    get("legend-far").textContent = `${range[1].toFixed(2)} m`;
+  }
+}
+
+function loop(now: number): void {
+  for (const [camera, frame] of arrived) {
+    view.showFrame(frame);
+    connection.send(encodeShown(camera, frame.number));
+  }
+  arrived.clear();
+  view.draw(now);
+  showTick(now);
+  plots.draw(now, 3000 * (view.thinning.frameTime ?? 0));
+  requestAnimationFrame(loop);
+}
+
+// Buttons and their keys.
+let following = false;
+function follow(): void {
+  following = !following;
+  view.setFollowing(following);
+  get("follow").setAttribute("aria-pressed", String(following));
+}
+function record(): void {
+  if (state?.recording.possible) connection.ask({ record: state.recording.path === null });
+}
+function help(): void {
+  const dialog = get<HTMLDialogElement>("help");
+  if (!dialog.open) dialog.showModal();
+}
+
+function applyTheme(theme: string): void {
+  document.documentElement.dataset.theme = theme;
+  const style = getComputedStyle(document.documentElement);
+  const names = ["near", "middle", "far", "force", "hip", "proxy", "calm", "text"] as const;
+  view.setPalette(
+    Object.fromEntries(
+      names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]),
+    ) as unknown as Palette,
+  );
+  plots.recolour();
+}
+const systemTheme = matchMedia("(prefers-color-scheme: light)");
+const chosenTheme = () => localStorage.getItem("theme") ?? (systemTheme.matches ? "light" : "dark");
+function switchTheme(): void {
+  localStorage.setItem("theme", chosenTheme() === "light" ? "dark" : "light");
+  applyTheme(chosenTheme());
+}
+systemTheme.addEventListener("change", () => applyTheme(chosenTheme()));
+applyTheme(chosenTheme());
+
+get("follow").addEventListener("click", follow);
+get("record").addEventListener("click", record);
+get("reset").addEventListener("click", () => view.resetView());
+get("theme").addEventListener("click", switchTheme);
+get("ask").addEventListener("click", help);
+for (const [id, share] of [
+  ["push", 0.006],
+  ["pull", -0.006],
+] as const) {
+  let timer = 0;
+  const button = get(id);
+  button.addEventListener("pointerdown", () => {
+    timer = window.setInterval(() => hand.push(share), 50);
+  });
+  for (const end of ["pointerup", "pointercancel", "pointerleave"])
+    button.addEventListener(end, () => clearInterval(timer));
+  button.addEventListener("click", () => hand.push(share));
+}
+addEventListener("keydown", (event) => {
+  if (isForForm(event) || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.key === "?") help();
+  if (event.code === "KeyF") follow();
+  if (event.code === "KeyV") view.resetView();
+  if (event.code === "KeyR") record();
+  if (event.code === "KeyT") switchTheme();
+});
+
+requestAnimationFrame(loop);
+
+// For the tests that look at the page from outside.
+Object.assign(window, { palpate: { view, newest: () => ({ tick, state }) } });

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+// Method, parameters, safety and session: what the program says of itself, and what can be set.
+
+import type { Hello, ParameterRow, State } from "./protocol";
+
+/** How a unit of the table is shown: small lengths in mm, angles in degrees. */
+export function shownUnit(row: Pick<ParameterRow, "unit" | "max">): {
+  unit: string;
+  factor: number;
+} {
+  if (row.unit === "m" && row.max <= 1) return { unit: "mm", factor: 1e3 };
+  if (row.unit === "rad") return { unit: "°", factor: 180 / Math.PI };
+  return { unit: row.unit === "-" ? "" : row.unit, factor: 1 };
+}
+
+/** A slider of 1000 steps is logarithmic where a table's range spans more than two decades. */
+export function sliderFromValue(row: Pick<ParameterRow, "min" | "max">, value: number): number {
+  const [at, from, to] = isLogarithmic(row)
+    ? [Math.log(Math.max(value, row.min)), Math.log(row.min), Math.log(row.max)]
+    : [value, row.min, row.max];
+  return Math.round((1000 * (at - from)) / (to - from));
+}
+
+export function valueFromSlider(row: Pick<ParameterRow, "min" | "max">, slider: number): number {
+  if (slider <= 0) return row.min;
+  if (slider >= 1000) return row.max;
+  const share = slider / 1000;
+  const value = isLogarithmic(row)
+    ? row.min * (row.max / row.min) ** share
+    : row.min + share * (row.max - row.min);
+  return Number(value.toPrecision(3));
+}
+
+function isLogarithmic(row: Pick<ParameterRow, "min" | "max">): boolean {
+  return row.min > 0 && row.max / row.min > 100;
+}
+
+export function shortNumber(value: number): string {
+  return String(Number(value.toPrecision(4)));
+}
+
+function element<Tag extends keyof HTMLElementTagNameMap>(
+  tag: Tag,
+  properties: Partial<HTMLElementTagNameMap[Tag]> = {},
+  ...children: (Node | string)[]
+): HTMLElementTagNameMap[Tag] {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}
+
+const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
+
+/** One parameter: a slider, a number and the way back to the default. */
+class Row {
+  private readonly slider: HTMLInputElement;
+  private readonly number: HTMLInputElement;
+  private readonly root: HTMLElement;
+  private readonly factor: number;
+  private held = 0;
+
+  constructor(
+    parent: HTMLElement,
+    private readonly row: ParameterRow,
+    prefix: string,
+    private readonly set: (value: number) => void,
+  ) {
+    const { unit, factor } = shownUnit(row);
+    this.factor = factor;
+    const id = `${prefix}-${row.name}`;
+    const name = row.name.replaceAll("_", " ");
+    this.slider = element("input", {
+      type: "range",
+      id,
+      min: "0",
+      max: "1000",
+      title: row.meaning,
+    });
+    this.number = element("input", { type: "number", step: "any", title: row.meaning });
+    this.number.setAttribute("aria-label", `${name}, ${unit}`);
+    const back = element("button", { className: "back", title: "back to the default" }, "↺");
+    back.setAttribute(
+      "aria-label",
+      `${name}: back to ${shortNumber(row.default * factor)} ${unit}`,
+    );
+    const label = element("label", { htmlFor: id }, /^r_\d|^r_c/.test(row.name) ? "" : name);
+    if (row.symbol) label.prepend(symbol(row.symbol));
+    const meaning =
+      row.source === "ours" || !row.source ? row.meaning : `${row.meaning} · ${row.source}`;
+    this.root = element(
+      "div",
+      { className: "row" },
+      label,
+      element("span", { className: "value" }, back, this.number, unit),
+      this.slider,
+      element("small", {}, meaning),
+    );
+    parent.append(this.root);
+    this.slider.addEventListener("input", () =>
+      this.change(valueFromSlider(row, +this.slider.value)),
+    );
+    this.number.addEventListener("change", () => this.change(+this.number.value / factor));
+    back.addEventListener("click", () => this.change(row.default));
+  }
+
+  show(value: number): void {
+    const mine = document.activeElement;
+    if (mine === this.number || performance.now() - this.held < 500) return; // being set
+    this.slider.value = String(sliderFromValue(this.row, value));
+    this.number.value = shortNumber(value * this.factor);
+    const { default: standard } = this.row;
+    this.root.classList.toggle("changed", Math.abs(value - standard) > 1e-9 * Math.abs(standard));
+  }
+
+  private change(value: number): void {
+    this.held = performance.now();
+    this.number.value = shortNumber(value * this.factor);
+    this.slider.value = String(sliderFromValue(this.row, value));
+    this.set(value);
+  }
+}
+
+// r_c as r with a small c
+function symbol(text: string): HTMLElement {
+  const [base, small] = text.split("_");
+  const made = element("i", {}, base!);
+  if (small) made.append(element("sub", {}, small));
+  return made;
+}
+
+export interface PanelActions {
+  setParameter(name: string, value: number): void;
+  setLimit(name: string, value: number): void;
+  setMethod(name: string): void;
+}
+
+export class Panel {
+  private readonly root = get("panel");
+  private readonly method = get<HTMLSelectElement>("method-name");
+  private rows = new Map<string, Row>();
+  private limits = new Map<string, Row>();
+  private hello: Hello | null = null;
+  private safetyNow = 0;
+  private safetySeen = 0;
+
+  constructor(private readonly actions: PanelActions) {
+    const tabs = [...this.root.querySelectorAll<HTMLButtonElement>("[role=tab]")];
+    tabs.forEach((tab, i) => {
+      tab.addEventListener("click", () => this.open(tab.dataset.tab!));
+      tab.addEventListener("keydown", (event) => {
+        const step = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+        if (step === 0) return;
+        const next = tabs[(i + step + tabs.length) % tabs.length]!;
+        next.focus();
+        this.open(next.dataset.tab!);
+      });
+    });
+    this.open("touch");
+    this.method.addEventListener("change", () => this.actions.setMethod(this.method.value));
+  }
+
+  open(tab: string): void {
+    this.root.dataset.tab = tab;
+    for (const button of this.root.querySelectorAll<HTMLButtonElement>("[role=tab]")) {
+      const selected = button.dataset.tab === tab;
+      button.setAttribute("aria-selected", String(selected));
+      button.tabIndex = selected ? 0 : -1;
+    }
+  }
+
+  introduce(hello: Hello): void {
+    this.hello = hello;
+    this.method.replaceChildren(
+      ...hello.methods.map(({ name }) =>
+        element("option", { value: name }, name.replaceAll("-", " ")),
+      ),
+    );
+    const build = (
+      id: string,
+      table: ParameterRow[],
+      set: (name: string, value: number) => void,
+    ) => {
+      const parent = get(id);
+      parent.replaceChildren();
+      return new Map(
+        table.map((row) => [row.name, new Row(parent, row, id, (value) => set(row.name, value))]),
+      );
+    };
+    this.rows = build("parameters", hello.parameters, this.actions.setParameter);
+    this.limits = build("limits", hello.safety, this.actions.setLimit);
+    const tally = (id: string, flags: Hello["flags"]) =>
+      get(id).replaceChildren(
+        ...flags.map(({ name, meaning }) =>
+          element("li", { title: meaning }, name.replaceAll("_", " "), element("output", {}, "0")),
+        ),
+      );
+    tally("flags", hello.flags);
+    tally("interventions", hello.safety_flags);
+  }
+
+  /** @param safety SafetyFlag bits of the newest ticks */
+  showSafety(safety: number, now: number): void {
+    if (safety === this.safetyNow && now - this.safetySeen < 200) return;
+    this.safetyNow = safety;
+    this.safetySeen = now;
+    [...get("interventions").children].forEach((item, i) =>
+      item.classList.toggle("now", (safety & (1 << i)) !== 0),
+    );
+  }
+
+  update(state: State): void {
+    if (document.activeElement !== this.method) this.method.value = state.method;
+    get("method-meaning").textContent =
+      this.hello?.methods.find(({ name }) => name === state.method)?.meaning ?? "";
+    for (const [name, row] of this.rows) row.show(state.parameters[name] ?? Number.NaN);
+    for (const [name, row] of this.limits) row.show(state.safety[name] ?? Number.NaN);
+    const count = (id: string, counts: readonly number[]) =>
+      [...get(id).children].forEach((item, i) => {
+        item.lastElementChild!.textContent = (counts[i] ?? 0).toLocaleString("en");
+        item.classList.toggle("some", (counts[i] ?? 0) > 0);
+      });
+    count("flags", state.flag_ticks);
+    count("interventions", state.interventions);
+    const total = state.interventions.reduce((sum, n) => sum + n, 0);
+    get("safety-lead").textContent =
+      `${total.toLocaleString("en")} interventions of the safety chain; suspected pop-throughs: ` +
+      `${state.pop_throughs}.`;
+    this.showFacts(state);
+  }
+
+  private showFacts(state: State): void {
+    const { servo } = state;
+    const microseconds = (seconds: number) => `${(1e6 * seconds).toFixed(1)} µs`;
+    const facts: [string, string][] = [
+      ...state.cameras.map(({ uri, kind, rate, state: how }, i): [string, string] => [
+        state.cameras.length > 1 ? `Camera ${i + 1}` : "Camera",
+        `${uri} · ${kind}${how === "live" ? `, ${rate.toFixed(1)} Hz` : ` · ${how}`}`,
+      ]),
+      ["Hand", `${state.device.uri} · ${state.device.kind}`],
+      ["Servo", `${servo.rate.toLocaleString("en")} Hz · ${servo.realtime}`],
+      ["Ticks", servo.ticks.toLocaleString("en")],
+      ["Late ticks", servo.late_ticks.toLocaleString("en")],
+      ["Tick time, 99 %", microseconds(servo.compute_p99)],
+      ["Wake-up, 99 %", microseconds(servo.wake_up_p99)],
+      ["Frames used", servo.frames_adopted.toLocaleString("en")],
+      ["Frames overtaken", servo.frames_dropped.toLocaleString("en")],
+      ["Pop-throughs", `${state.pop_throughs} suspected`],
+      ["Recording", state.recording.path ?? (state.recording.message || "off")],
+      ["Version", this.hello?.version ?? ""],
+    ];
+    const list = get("facts");
+    const texts = facts.flat();
+    if (list.children.length !== texts.length)
+      list.replaceChildren(...texts.map((_, i) => element(i % 2 === 0 ? "dt" : "dd")));
+    texts.forEach((text, i) => {
+      const item = list.children[i]!;
+      if (item.textContent !== text) item.textContent = text;
+    });
+  }
+}

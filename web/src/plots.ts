@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
+import type { Sample } from "./protocol";
+
+const SPAN = 10; // [s] shown
+const INTERVAL = 66; // [ms] between drawings
+const GAP = 0.25; // [s] without samples: no line is drawn across
+
+interface Quantity {
+  title: string;
+  unit: string;
+  colour: string; // a CSS variable
+  of(sample: Sample): number;
+  digits: number;
+  /** what the axis shows at least */
+  least: number;
+}
+
+const QUANTITIES: readonly Quantity[] = [
+  { title: "Force", unit: "N", colour: "--force", of: (s) => s.force, digits: 2, least: 1 },
+  {
+    title: "Penetration of the hand",
+    unit: "mm",
+    colour: "--hip",
+    of: (s) => 1e3 * s.penetration,
+    digits: 1,
+    least: 2,
+  },
+  { title: "Steps a tick", unit: "", colour: "--calm", of: (s) => s.steps, digits: 0, least: 4 },
+  {
+    title: "Tick time",
+    unit: "µs",
+    colour: "--time",
+    of: (s) => 1e6 * s.tickTime,
+    digits: 1,
+    least: 10,
+  },
+];
+
+interface Plot {
+  quantity: Quantity;
+  chart: uPlot;
+  value: HTMLOutputElement;
+  host: HTMLElement;
+}
+
+/** The last seconds of what the ticks said, one chart a quantity. */
+export class Plots {
+  private samples: (Sample & { gap?: boolean })[] = [];
+  private plots: Plot[] = [];
+  private drawn = 0;
+
+  constructor(private readonly parent: HTMLElement) {
+    this.build();
+    new ResizeObserver(() => this.fit()).observe(parent);
+  }
+
+  add(samples: readonly Sample[]): void {
+    const newest = samples[samples.length - 1];
+    if (!newest) return;
+    // The program was started anew: its clock may have gone back.
+    if (this.samples.length > 0 && newest.t < this.samples[this.samples.length - 1]!.t)
+      this.samples = [];
+    const last = this.samples[this.samples.length - 1];
+    if (last && samples[0]!.t - last.t > GAP)
+      this.samples.push({ ...last, t: last.t + 1e-3, gap: true });
+    this.samples.push(...samples);
+    const first = this.samples.findIndex((sample) => sample.t >= newest.t - SPAN);
+    if (first > 0) this.samples.splice(0, first);
+  }
+
+  /** @param pause [ms] between drawings where drawing is slow */
+  draw(now: number, pause: number): void {
+    if (now - this.drawn < Math.max(INTERVAL, pause) || this.parent.offsetParent === null) return;
+    this.drawn = now;
+    const newest = this.samples[this.samples.length - 1];
+    if (!newest) return;
+    const times = this.samples.map((sample) => sample.t - newest.t);
+    for (const { quantity, chart, value, host } of this.plots) {
+      const values = this.samples.map((sample) => (sample.gap ? null : quantity.of(sample)));
+      chart.setData([times, values]);
+      const text = `${values[values.length - 1]!.toFixed(quantity.digits)} ${quantity.unit}`.trim();
+      value.textContent = text;
+      host.setAttribute("aria-label", `${quantity.title}, last ${SPAN} seconds; now ${text}`);
+    }
+  }
+
+  /** Takes the colours of the page's theme. */
+  recolour(): void {
+    for (const plot of this.plots) plot.chart.destroy();
+    this.build();
+    this.drawn = 0;
+  }
+
+  private build(): void {
+    this.parent.replaceChildren();
+    const style = getComputedStyle(document.documentElement);
+    const css = (name: string) => style.getPropertyValue(name).trim();
+    this.plots = QUANTITIES.map((quantity, i) => {
+      const article = document.createElement("article");
+      article.className = "plot";
+      const header = document.createElement("header");
+      const title = document.createElement("b");
+      title.textContent = quantity.title;
+      const value = document.createElement("output");
+      header.append(title, value);
+      const host = document.createElement("div");
+      host.className = "canvas";
+      host.setAttribute("role", "img");
+      article.append(header, host);
+      this.parent.append(article);
+      const last = i === QUANTITIES.length - 1;
+      const axis = {
+        stroke: css("--muted"),
+        font: `11px ${style.fontFamily}`,
+        grid: { stroke: css("--line"), width: 1 },
+        ticks: { show: false },
+      };
+      const chart = new uPlot(
+        {
+          width: 300,
+          height: 80,
+          padding: [6, 14, last ? 0 : 4, 0],
+          cursor: { show: false },
+          legend: { show: false },
+          scales: {
+            x: { time: false, range: [-SPAN, 0] },
+            y: {
+              range: (_, __, max) => [0, 1.08 * Math.max(max ?? 0, quantity.least)],
+            },
+          },
+          axes: [
+            { ...axis, show: last, size: 22, values: (_, v) => v.map((t) => `${t} s`) },
+            { ...axis, size: 36, space: 24 },
+          ],
+          series: [
+            {},
+            {
+              stroke: css(quantity.colour),
+              width: 1.6,
+              fill: `color-mix(in srgb, ${css(quantity.colour)} 14%, transparent)`,
+              points: { show: false },
+            },
+          ],
+        },
+        [[], []],
+        host,
+      );
+      return { quantity, chart, value, host };
+    });
+    this.fit();
+  }
+
+  private fit(): void {
+    for (const { chart, host } of this.plots) {
+      const { clientWidth: width, clientHeight: height } = host;
+      if (width > 0 && (width !== chart.width || height !== chart.height))
+        chart.setSize({ width, height });
+    }
+  }
+}

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+// The messages of docs/protocol.md, as the page sees them. All numbers are little-endian.
+
+export type Vec3 = readonly [number, number, number];
+
+const Kind = { frame: 1, ticks: 2, rays: 3, hand: 16, shown: 17 } as const;
+const Format = { depth: 0, depthWithRays: 1, points: 2 } as const;
+
+const FRAME_HEADER = 96;
+const TICKS_HEADER = 88;
+const SAMPLE_FLOATS = 5;
+const RAYS_HEADER = 12;
+const HAND_BYTES = 32;
+const SHOWN_BYTES = 8;
+
+/** One capture of a camera: raw depth as it came, or points that have no image. */
+export interface Frame {
+  kind: "frame";
+  camera: number;
+  number: number;
+  /** [s] */
+  stamp: number;
+  width: number;
+  height: number;
+  /** [px] fx, fy, cx, cy; pixel centres at whole numbers */
+  intrinsics: readonly [number, number, number, number];
+  metresPerUnit: number;
+  /** 3 x 4, row by row */
+  worldFromCamera: Float32Array;
+  /** the pixels' rays come in a message of their own */
+  hasRays: boolean;
+  depth: Uint16Array | null;
+  /** x y z [m, camera], `width` times */
+  points: Float32Array | null;
+}
+
+/** The newest tick and what the plots need of those since the message before. */
+export interface Ticks {
+  kind: "ticks";
+  state: number;
+  /** TickFlag and SafetyFlag bits that occurred since the message before */
+  flags: number;
+  safety: number;
+  /** [s] of the newest tick */
+  t: number;
+  steps: number;
+  frame: number;
+  hip: Vec3;
+  proxy: Vec3;
+  normal: Vec3;
+  force: Vec3;
+  /** [m/s] */
+  surfaceVelocity: number;
+  samples: Sample[];
+}
+
+/** A few ticks in one: the extremes of what matters. */
+export interface Sample {
+  /** [s] */
+  t: number;
+  /** [N] */
+  force: number;
+  /** [m] */
+  penetration: number;
+  steps: number;
+  /** [s] of the servo thread's own time for a tick */
+  tickTime: number;
+}
+
+/** Where a distorted lens's pixels look: (x, y) of the ray (x, y, 1), NaN for none. */
+export interface Rays {
+  kind: "rays";
+  camera: number;
+  width: number;
+  height: number;
+  rays: Float32Array;
+}
+
+export type Message = Frame | Ticks | Rays;
+
+function vec3(view: DataView, at: number): Vec3 {
+  return [view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)];
+}
+
+function need(condition: boolean, what: string): asserts condition {
+  if (!condition) throw new Error(`message: ${what}`);
+}
+
+function decodeFrame(buffer: ArrayBuffer, view: DataView): Frame {
+  need(buffer.byteLength >= FRAME_HEADER, "a frame without its header");
+  const format = view.getUint8(2);
+  const width = view.getUint32(16, true);
+  const height = view.getUint32(20, true);
+  const count = width * height;
+  const isPoints = format === Format.points;
+  need(format <= Format.points, `frame format ${format}`);
+  need(buffer.byteLength === FRAME_HEADER + count * (isPoints ? 12 : 2), "a frame cut short");
+  return {
+    kind: "frame",
+    camera: view.getUint8(1),
+    number: view.getUint32(4, true),
+    stamp: view.getFloat64(8, true),
+    width,
+    height,
+    intrinsics: [24, 28, 32, 36].map((at) =>
+      view.getFloat32(at, true),
+    ) as unknown as Frame["intrinsics"],
+    metresPerUnit: view.getFloat32(40, true),
+    worldFromCamera: new Float32Array(buffer.slice(44, 92)),
+    hasRays: format === Format.depthWithRays,
+    depth: isPoints ? null : new Uint16Array(buffer, FRAME_HEADER, count),
+    points: isPoints ? new Float32Array(buffer, FRAME_HEADER, 3 * count) : null,
+  };
+}
+
+function decodeTicks(buffer: ArrayBuffer, view: DataView): Ticks {
+  need(buffer.byteLength >= TICKS_HEADER, "ticks without their header");
+  const count = view.getUint16(2, true);
+  need(buffer.byteLength === TICKS_HEADER + count * 4 * SAMPLE_FLOATS, "ticks cut short");
+  const t = view.getFloat64(8, true);
+  const values = new Float32Array(buffer, TICKS_HEADER);
+  const samples: Sample[] = [];
+  for (let i = 0; i < values.length; i += SAMPLE_FLOATS) {
+    const [before, force, penetration, steps, tickTime] = values.subarray(i, i + SAMPLE_FLOATS);
+    samples.push({
+      t: t - before!,
+      force: force!,
+      penetration: penetration!,
+      steps: steps!,
+      tickTime: tickTime!,
+    });
+  }
+  return {
+    kind: "ticks",
+    state: view.getUint8(1),
+    flags: view.getUint32(4, true),
+    t,
+    safety: view.getUint32(16, true),
+    steps: view.getUint32(20, true),
+    hip: vec3(view, 24),
+    proxy: vec3(view, 36),
+    normal: vec3(view, 48),
+    force: vec3(view, 60),
+    surfaceVelocity: view.getFloat32(72, true),
+    frame: view.getInt32(76, true),
+    samples,
+  };
+}
+
+function decodeRays(buffer: ArrayBuffer, view: DataView): Rays {
+  need(buffer.byteLength >= RAYS_HEADER, "rays without their header");
+  const width = view.getUint32(4, true);
+  const height = view.getUint32(8, true);
+  need(buffer.byteLength === RAYS_HEADER + 8 * width * height, "rays cut short");
+  const rays = new Float32Array(buffer, RAYS_HEADER);
+  return { kind: "rays", camera: view.getUint8(1), width, height, rays };
+}
+
+/** Takes a binary message apart without copying its payload. Throws if it is malformed. */
+export function decode(buffer: ArrayBuffer): Message {
+  need(buffer.byteLength > 0, "empty");
+  const view = new DataView(buffer);
+  const kind = view.getUint8(0);
+  switch (kind) {
+    case Kind.frame:
+      return decodeFrame(buffer, view);
+    case Kind.ticks:
+      return decodeTicks(buffer, view);
+    case Kind.rays:
+      return decodeRays(buffer, view);
+    default:
+      throw new Error(`message: kind ${kind} is not known`);
+  }
+}
+
+/** Where the hand is to be [m, world]; not held: the hand is let go. */
+export function encodeHand(held: boolean, target: Vec3): ArrayBuffer {
+  const buffer = new ArrayBuffer(HAND_BYTES);
+  const view = new DataView(buffer);
+  view.setUint8(0, Kind.hand);
+  view.setUint8(1, held ? 1 : 0);
+  target.forEach((value, i) => view.setFloat64(8 + 8 * i, value, true));
+  return buffer;
+}
+
+/** Says that a frame has been drawn: the program sends the next. */
+export function encodeShown(camera: number, number: number): ArrayBuffer {
+  const buffer = new ArrayBuffer(SHOWN_BYTES);
+  const view = new DataView(buffer);
+  view.setUint8(0, Kind.shown);
+  view.setUint8(1, camera);
+  view.setUint32(4, number, true);
+  return buffer;
+}
+
+/** A row of the program's table of parameters. */
+export interface ParameterRow {
+  name: string;
+  symbol: string;
+  unit: string;
+  default: number;
+  min: number;
+  max: number;
+  meaning: string;
+  source: string;
+}
+
+/** Sent once, on connecting. */
+export interface Hello {
+  version: string;
+  methods: { name: string; meaning: string }[];
+  parameters: ParameterRow[];
+  safety: ParameterRow[];
+  /** names of the bits, in their order */
+  flags: { name: string; meaning: string }[];
+  safety_flags: { name: string; meaning: string }[];
+}
+
+export interface CameraState {
+  uri: string;
+  kind: string;
+  /** [Hz] as captured, lately */
+  rate: number;
+  /** live, ended, or what went wrong */
+  state: string;
+}
+
+/** Sent a few times a second. */
+export interface State {
+  method: string;
+  /** values of the rows, by name */
+  parameters: Record<string, number>;
+  safety: Record<string, number>;
+  hand: "you" | "other" | "free";
+  viewers: number;
+  cameras: CameraState[];
+  device: { uri: string; kind: string; takes_hand: boolean };
+  servo: {
+    /** [Hz] */
+    rate: number;
+    realtime: string;
+    ticks: number;
+    late_ticks: number;
+    /** [s] */
+    compute_p99: number;
+    wake_up_p99: number;
+    frames_adopted: number;
+    frames_dropped: number;
+  };
+  /** how often each safety flag was raised */
+  interventions: number[];
+  /** how many ticks had each flag */
+  flag_ticks: number[];
+  pop_throughs: number;
+  recording: { possible: boolean; path: string | null; message: string };
+}
+
+/** What the page can ask for in words. */
+export type Command =
+  | { set: { name: string; value: number } }
+  | { set_safety: { name: string; value: number } }
+  | { method: string }
+  | { record: boolean }
+  | { reset: true };

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+
+/** Every how many-th pixel can be drawn, along both axes. */
+const STRIDES = [1, 2, 3, 4, 6, 8] as const;
+const SLOW = 1 / 22;
+const FAST = 1 / 45;
+const PATIENCE = 45;
+
+/**
+ * Chooses how many points are drawn, from how long frames take: fewer at once when it is slow,
+ * more again only when it has been fast for long, and never back to what was slow a moment ago.
+ */
+export class Thinning {
+  private level = 0;
+  private average: number | null = null;
+  private fastFrames = 0;
+  private patience = PATIENCE;
+
+  get stride(): number {
+    return STRIDES[this.level]!;
+  }
+
+  /** [s] between drawn frames, smoothed; null before the first. */
+  get frameTime(): number | null {
+    return this.average;
+  }
+
+  /** @param seconds that the last frame took, from one drawing to the next */
+  measure(seconds: number): void {
+    if (!(seconds > 0) || seconds > 2) return; // a sleeping tab
+    this.average = this.average === null ? seconds : this.average + 0.3 * (seconds - this.average);
+    if (this.average > SLOW && this.level < STRIDES.length - 1) {
+      ++this.level;
+      this.average = null;
+      this.fastFrames = 0;
+      this.patience = Math.min(this.patience * 2, 60 * 60);
+    } else if (this.average < FAST && this.level > 0) {
+      if (++this.fastFrames < this.patience) return;
+      --this.level;
+      this.average = null;
+      this.fastFrames = 0;
+    } else {
+      this.fastFrames = 0;
+    }
+  }
+}

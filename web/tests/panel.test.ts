@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+import { expect, test } from "vitest";
+import { shownUnit, shortNumber, sliderFromValue, valueFromSlider } from "../src/panel";
+
+test("a slider's ends are the range's ends, to the bit", () => {
+  for (const row of [
+    { min: 1e-4, max: 0.05 },
+    { min: 0, max: 20 },
+    { min: 0.001, max: 0.99 },
+  ]) {
+    expect(valueFromSlider(row, 0)).toBe(row.min);
+    expect(valueFromSlider(row, 1000)).toBe(row.max);
+    expect(sliderFromValue(row, row.min)).toBe(0);
+    expect(sliderFromValue(row, row.max)).toBe(1000);
+  }
+});
+
+test("a wide range is divided by ratios", () => {
+  expect(valueFromSlider({ min: 0.01, max: 100 }, 500)).toBeCloseTo(1, 9);
+  expect(valueFromSlider({ min: 0, max: 10 }, 500)).toBeCloseTo(5, 9);
+});
+
+test("a value finds its place on the slider again", () => {
+  const row = { min: 1e-4, max: 0.05 };
+  for (const slider of [1, 250, 500, 999])
+    expect(Math.abs(sliderFromValue(row, valueFromSlider(row, slider)) - slider)).toBeLessThan(2);
+});
+
+test("millimetres and degrees are shown, not their thousandths", () => {
+  expect(shownUnit({ unit: "m", max: 0.05 })).toEqual({ unit: "mm", factor: 1000 });
+  expect(shownUnit({ unit: "rad", max: 0.5 }).unit).toBe("°");
+  expect(shownUnit({ unit: "-", max: 1 }).unit).toBe("");
+  expect(shownUnit({ unit: "N/m", max: 1e5 })).toEqual({ unit: "N/m", factor: 1 });
+  expect(shortNumber(5.0000000001)).toBe("5");
+});

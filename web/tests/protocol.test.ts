@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+import { describe, expect, test } from "vitest";
+import {
+  decode,
+  encodeHand,
+  encodeShown,
+  type Frame,
+  type Rays,
+  type Ticks,
+} from "../src/protocol";
+
+function frameMessage(
+  format: number,
+  payload: ArrayBuffer,
+  width: number,
+  height: number,
+): ArrayBuffer {
+  const bytes = new Uint8Array(96 + payload.byteLength);
+  const view = new DataView(bytes.buffer);
+  view.setUint8(0, 1);
+  view.setUint8(1, 2);
+  view.setUint8(2, format);
+  view.setUint32(4, 41, true);
+  view.setFloat64(8, 12.5, true);
+  view.setUint32(16, width, true);
+  view.setUint32(20, height, true);
+  [525, 526, 319.5, 239.5].forEach((value, i) => view.setFloat32(24 + 4 * i, value, true));
+  view.setFloat32(40, 0.001, true);
+  for (let i = 0; i < 12; ++i) view.setFloat32(44 + 4 * i, i, true);
+  bytes.set(new Uint8Array(payload), 96);
+  return bytes.buffer;
+}
+
+function ticksMessage(samples: number[][]): ArrayBuffer {
+  const buffer = new ArrayBuffer(88 + 20 * samples.length);
+  const view = new DataView(buffer);
+  view.setUint8(0, 2);
+  view.setUint8(1, 1);
+  view.setUint16(2, samples.length, true);
+  view.setUint32(4, 0x80000001, true);
+  view.setFloat64(8, 100, true);
+  view.setUint32(16, 64, true);
+  view.setUint32(20, 7, true);
+  for (let i = 0; i < 12; ++i) view.setFloat32(24 + 4 * i, i + 1, true);
+  view.setFloat32(72, 0.25, true);
+  view.setInt32(76, -1, true);
+  samples.flat().forEach((value, i) => view.setFloat32(88 + 4 * i, value, true));
+  return buffer;
+}
+
+describe("a frame", () => {
+  test("keeps the depths where they lie", () => {
+    const message = frameMessage(0, new Uint16Array([0, 700, 65535, 1, 2, 3]).buffer, 3, 2);
+    const frame = decode(message) as Frame;
+    expect(frame).toMatchObject({ camera: 2, number: 41, stamp: 12.5, width: 3, height: 2 });
+    expect(frame.intrinsics).toEqual([525, 526, 319.5, 239.5]);
+    expect(frame.metresPerUnit).toBeCloseTo(0.001);
+    expect([...frame.worldFromCamera]).toEqual([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+    expect([...frame.depth!]).toEqual([0, 700, 65535, 1, 2, 3]);
+    expect(frame.depth!.buffer).toBe(message);
+    expect(frame.points).toBeNull();
+    expect(frame.hasRays).toBe(false);
+  });
+
+  test("can be points", () => {
+    const frame = decode(
+      frameMessage(2, new Float32Array([1, 2, 3, 4, 5, 6]).buffer, 2, 1),
+    ) as Frame;
+    expect([...frame.points!]).toEqual([1, 2, 3, 4, 5, 6]);
+    expect(frame.depth).toBeNull();
+  });
+
+  test("is refused when it is cut short or its format is not known", () => {
+    expect(() => decode(frameMessage(0, new ArrayBuffer(11), 3, 2))).toThrow("cut short");
+    expect(() => decode(frameMessage(0, new ArrayBuffer(12), 3, 2).slice(0, 60))).toThrow("header");
+    expect(() => decode(frameMessage(3, new ArrayBuffer(12), 3, 2))).toThrow("format 3");
+  });
+});
+
+describe("ticks", () => {
+  test("carry the newest tick and samples with their times", () => {
+    const ticks = decode(
+      ticksMessage([
+        [0.01, 1, 2, 3, 4],
+        [0, 5, 6, 7, 8],
+      ]),
+    ) as Ticks;
+    expect(ticks).toMatchObject({ state: 1, flags: 0x80000001, safety: 64, steps: 7, t: 100 });
+    expect(ticks.hip).toEqual([1, 2, 3]);
+    expect(ticks.force).toEqual([10, 11, 12]);
+    expect(ticks.frame).toBe(-1);
+    expect(ticks.samples[0]!.t).toBeCloseTo(99.99);
+    expect(ticks.samples[1]).toEqual({ t: 100, force: 5, penetration: 6, steps: 7, tickTime: 8 });
+  });
+
+  test("are refused when they are cut short", () => {
+    expect(() => decode(ticksMessage([[1, 2, 3, 4, 5]]).slice(0, 100))).toThrow("cut short");
+  });
+});
+
+test("rays come as pairs for each pixel", () => {
+  const buffer = new ArrayBuffer(12 + 16);
+  const view = new DataView(buffer);
+  view.setUint8(0, 3);
+  view.setUint32(4, 2, true);
+  view.setUint32(8, 1, true);
+  view.setFloat32(24, 0.5, true);
+  const rays = decode(buffer) as Rays;
+  expect([rays.width, rays.height]).toEqual([2, 1]);
+  expect([...rays.rays]).toEqual([0, 0, 0, 0.5]);
+});
+
+test("what is not known is refused", () => {
+  expect(() => decode(new ArrayBuffer(0))).toThrow("empty");
+  expect(() => decode(new Uint8Array([99]).buffer)).toThrow("kind 99");
+});
+
+test("a hand is 32 bytes: held and where", () => {
+  const view = new DataView(encodeHand(true, [0.1, -0.2, 0.3]));
+  expect(view.byteLength).toBe(32);
+  expect([view.getUint8(0), view.getUint8(1)]).toEqual([16, 1]);
+  expect([8, 16, 24].map((at) => view.getFloat64(at, true))).toEqual([0.1, -0.2, 0.3]);
+  expect(new DataView(encodeHand(false, [0, 0, 0])).getUint8(1)).toBe(0);
+});
+
+test("a frame shown is 8 bytes: camera and number", () => {
+  const view = new DataView(encodeShown(3, 4_000_000_000));
+  expect(view.byteLength).toBe(8);
+  expect([view.getUint8(0), view.getUint8(1), view.getUint32(4, true)]).toEqual([17, 3, 4e9]);
+});

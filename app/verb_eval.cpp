@@ -119,7 +119,7 @@ int eval(const EvalOptions& options) {
     if (lab::Ranks::rank() != 0) continue;
     if (progress) progress->finish();
     results.push_back(lab::make_result(*experiment, fitting, text, options.out));
-    fmt::print("{}", lab::claims_as_text(results.back()));
+    fmt::print("{}", lab::result_as_text(results.back()));
   }
   if (lab::Ranks::rank() == 0) {
     const fs::path page = lab::write_report(results, options.out);

@@ -2,6 +2,7 @@
 #include "lab/experiment.hpp"
 
 #include "lab/experiments/feel.hpp"
+#include "lab/experiments/fidelity.hpp"
 #include "lab/experiments/lifts.hpp"
 #include "lab/experiments/surfaces.hpp"
 #include "lab/method.hpp"
@@ -11,9 +12,9 @@ namespace palpate::lab {
 
 const std::vector<Experiment>& known_experiments() {
   static const std::vector<Experiment> experiments = {
-      flat_experiment(),    jump_experiment(),          lift_experiment(), bound_experiment(),
-      speed_experiment(),   first_contact_experiment(), hold_experiment(), force_experiment(),
-      corners_experiment(), scan_experiment()};
+      flat_experiment(),    jump_experiment(),          lift_experiment(),    bound_experiment(),
+      speed_experiment(),   first_contact_experiment(), hold_experiment(),    force_experiment(),
+      corners_experiment(), scan_experiment(),          fidelity_experiment()};
   return experiments;
 }
 

@@ -37,6 +37,13 @@ struct Claim {
   std::string verdict;  ///< "reproduced", or "differs: " and why
 };
 
+/// What a bench comes to: a table in which methods stand side by side.
+struct Scores {
+  std::vector<std::string> columns;
+  std::vector<std::vector<std::string>> rows;  ///< each as long as `columns`
+  std::string note;                            ///< beneath it, one line
+};
+
 /// An experiment that can be asked for by name. Deterministic: the same options give the same CSV,
 /// byte for byte, however its cells are spread over threads and machines.
 struct Experiment {
@@ -49,6 +56,8 @@ struct Experiment {
   /// gnuplot commands that draw the figure from the file named by the variable `csv`.
   std::string_view plot;
   std::vector<Claim> (*claims)(const Table&);
+  /// A bench has scores; what redraws the paper has none.
+  Scores (*scores)(const Table&) = nullptr;
 };
 
 /// All experiments, in the order of the report.

@@ -8,6 +8,13 @@
 
 namespace palpate::lab {
 
+Truth truth_of(const std::shared_ptr<const Scene>& scene) {
+  return [scene](const Vec3& p, double t) {
+    const SurfacePoint nearest = scene->nearest(p, t);
+    return TruePoint{nearest.distance, nearest.normal};
+  };
+}
+
 const std::vector<MethodInfo>& known_methods() {
   // Adding a method: one file in lab/methods, one line here.
   static const std::vector<MethodInfo> methods = {

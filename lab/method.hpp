@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "palpate/core/renderer.hpp"
+#include "palpate/sources/scene.hpp"
 
 namespace palpate::lab {
 
@@ -19,6 +20,9 @@ struct TruePoint {
 
 /// What really is there: the surface nearest to a place [m, world] at a time [s].
 using Truth = std::function<TruePoint(const Vec3& point, double t)>;
+
+/// The truth of an analytic scene.
+Truth truth_of(const std::shared_ptr<const Scene>& scene);
 
 /// A method under test: what the lab knows of it. Frames and HIPs in, ticks out.
 ///

@@ -15,7 +15,7 @@ struct Scenario {
   double frame_rate = 30.0;   ///< [Hz] frame k is captured at k / frame_rate
   double tick_rate = 1000.0;  ///< [Hz]
   double duration = 1.0;      ///< [s]
-  std::function<std::unique_ptr<Cloud>(std::uint64_t frame, double t)> cloud;
+  std::function<std::shared_ptr<const Cloud>(std::uint64_t frame, double t)> cloud;
   std::function<Vec3(double t)> hip;  ///< [m] world
 };
 
@@ -23,7 +23,7 @@ struct Scenario {
 /// @param on_tick  (const Tick&) -> bool, after each tick: go on?
 template <class OnTick>
 void play(TouchMethod& method, const Scenario& scenario, const OnTick& on_tick) {
-  std::unique_ptr<Cloud> in_use;
+  std::shared_ptr<const Cloud> in_use;
   std::uint64_t next_frame = 0;
   const auto ticks =
       static_cast<std::int64_t>(std::llround(scenario.duration * scenario.tick_rate));
@@ -32,7 +32,7 @@ void play(TouchMethod& method, const Scenario& scenario, const OnTick& on_tick) 
     for (;;) {
       const double stamp = static_cast<double>(next_frame) / scenario.frame_rate;
       if (stamp > t + 1e-9) break;
-      std::unique_ptr<Cloud> cloud = scenario.cloud(next_frame, stamp);
+      std::shared_ptr<const Cloud> cloud = scenario.cloud(next_frame, stamp);
       method.frame(*cloud, stamp);
       in_use = std::move(cloud);  // only now may the frame before go
       ++next_frame;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/report.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -97,6 +98,46 @@ void write(const fs::path& file, const std::string& text) {
                 "give --out a folder that you may write to, with room on its disk");
 }
 
+std::string scores_as_text(const Scores& scores) {
+  std::vector<std::size_t> widths;
+  for (const std::string& column : scores.columns) widths.push_back(column.size());
+  for (const auto& row : scores.rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  const auto line = [&widths](const std::vector<std::string>& row) {
+    std::string text = " ";
+    for (std::size_t i = 0; i < row.size(); ++i) text += fmt::format(" {:<{}}", row[i], widths[i]);
+    return text.substr(0, text.find_last_not_of(' ') + 1) + "\n";
+  };
+  std::string text = line(scores.columns);
+  for (const auto& row : scores.rows) text += line(row);
+  return text + "  " + scores.note + "\n";
+}
+
+std::string scores_as_markdown(const Scores& scores) {
+  const auto line = [](const std::vector<std::string>& row) {
+    std::string text = "|";
+    for (const std::string& field : row) text += " " + field + " |";
+    return text + "\n";
+  };
+  std::string text = line(scores.columns) + "|";
+  for (std::size_t i = 0; i < scores.columns.size(); ++i) text += "---|";
+  text += "\n";
+  for (const auto& row : scores.rows) text += line(row);
+  return text + "\n" + scores.note + "\n";
+}
+
+std::string scores_as_html(const Scores& scores) {
+  const auto line = [](const std::vector<std::string>& row, std::string_view tag) {
+    std::string text = "<tr>";
+    for (const std::string& field : row) text += fmt::format("<{0}>{1}</{0}>", tag, escaped(field));
+    return text + "</tr>\n";
+  };
+  std::string text = "<div class=\"wide\"><table>" + line(scores.columns, "th");
+  for (const auto& row : scores.rows) text += line(row, "td");
+  return text + "</table></div>\n<p>" + escaped(scores.note) + "</p>\n";
+}
+
 constexpr std::string_view page_head = R"(<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
@@ -123,17 +164,19 @@ Result make_result(const Experiment& experiment, const ExperimentOptions& option
                    std::string_view csv, const fs::path& folder) {
   const Table table(std::string(experiment.name) + ".csv", csv);
   Result result{&experiment, command_line(experiment, options), experiment.claims(table),
-                draw(experiment, options, folder)};
+                draw(experiment, options, folder), std::nullopt};
+  if (experiment.scores != nullptr) result.scores = experiment.scores(table);
   std::error_code error;
   if (fs::file_size(result.figure, error) == 0 || error) result.figure.clear();
   return result;
 }
 
-std::string claims_as_text(const Result& result) {
+std::string result_as_text(const Result& result) {
   std::string text = std::string(result.experiment->name) + "\n";
   for (const Claim& claim : result.claims)
     text += fmt::format("  {}: {}\n    paper: {}\n    ours:  {}\n    {}\n", claim.where,
                         claim.words, claim.paper, claim.ours, claim.verdict);
+  if (result.scores) text += scores_as_text(*result.scores);
   return text;
 }
 
@@ -144,15 +187,26 @@ fs::path write_report(const std::vector<Result>& results, const fs::path& folder
       "[lab.md](lab.md) says what each experiment is.\n\n"
       "| where | the paper's words | its number | ours | | command |\n|---|---|---|---|---|---|\n";
   std::string figures;
+  std::string bench;
   for (const Result& result : results) {
     page += fmt::format("<h2>{}</h2>\n<p>{}<br><code>{}</code></p>\n", result.experiment->name,
                         escaped(result.experiment->summary), escaped(result.command));
+    std::string image;
     if (!result.figure.empty()) {
       const std::string svg = read(result.figure);
       const std::size_t begin = svg.find("<svg");
-      figures += fmt::format("\n## {0}\n\n{1}\n\n![{0}](images/{2})\n", result.experiment->name,
-                             result.experiment->summary, result.figure.filename().string());
+      image = fmt::format("\n![{}](images/{})\n", result.experiment->name,
+                          result.figure.filename().string());
       page += "<figure>" + (begin == std::string::npos ? svg : svg.substr(begin)) + "</figure>\n";
+    }
+    if (result.scores) {
+      page += scores_as_html(*result.scores);
+      bench += fmt::format("## {}\n\n{}: `{}`\n\n{}{}\n", result.experiment->name,
+                           result.experiment->summary, result.command,
+                           scores_as_markdown(*result.scores), image);
+    } else if (!image.empty()) {
+      figures += fmt::format("\n## {}\n\n{}\n{}", result.experiment->name,
+                             result.experiment->summary, image);
     }
     if (result.claims.empty()) continue;
     page +=
@@ -172,6 +226,7 @@ fs::path write_report(const std::vector<Result>& results, const fs::path& folder
   page += "</body></html>\n";
   write(folder / "report.html", page);
   write(folder / "reproduction.md", notes + figures);
+  if (!bench.empty()) write(folder / "bench.md", bench);
   return folder / "report.html";
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@ struct Result {
   std::string command;  ///< that gives this result
   std::vector<Claim> claims;
   std::filesystem::path figure;  ///< SVG; empty where gnuplot is not installed
+  std::optional<Scores> scores;  ///< of a bench
 };
 
 /// Makes the claims from the CSV and draws the figure from the file next to it.
@@ -22,10 +24,11 @@ struct Result {
 Result make_result(const Experiment& experiment, const ExperimentOptions& options,
                    std::string_view csv, const std::filesystem::path& folder);
 
-/// The claims, for a terminal.
-std::string claims_as_text(const Result& result);
+/// The claims and the scores, for a terminal.
+std::string result_as_text(const Result& result);
 
-/// Writes report.html, one self-contained page, and reproduction.md into the folder.
+/// Writes report.html, one self-contained page, into the folder, and as tables for the
+/// documentation reproduction.md (what redraws the paper) and bench.md (benches).
 /// @return  the page. @throws Error if they cannot be written.
 std::filesystem::path write_report(const std::vector<Result>& results,
                                    const std::filesystem::path& folder);

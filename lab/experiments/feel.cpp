@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -12,39 +11,13 @@
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
+#include "lab/signal.hpp"
 
 namespace palpate::lab {
 namespace {
 
 constexpr double f_c = 30.0;  // [Hz] Table 2
 constexpr double pi = std::numbers::pi;
-
-double rms(const std::vector<double>& values) {
-  double squares = 0.0;
-  for (const double v : values) squares += v * v;
-  return values.empty() ? 0.0 : std::sqrt(squares / static_cast<double>(values.size()));
-}
-
-// The part of a signal sampled at 1 kHz that lies in 20 to 400 Hz, rms: what a finger is most
-// sensitive to. By direct Fourier sums over blocks of one second.
-double felt_rms(const std::vector<double>& signal) {
-  constexpr std::size_t block = 1000;
-  double power = 0.0;
-  std::size_t blocks = 0;
-  for (std::size_t begin = 0; begin + block <= signal.size(); begin += block, ++blocks) {
-    for (int f = 20; f <= 400; ++f) {
-      const std::complex<double> turn = std::polar(1.0, -2.0 * pi * f / double{block});
-      std::complex<double> phase = 1.0;
-      std::complex<double> sum = 0.0;
-      for (std::size_t i = 0; i < block; ++i) {
-        sum += signal[begin + i] * phase;
-        phase *= turn;
-      }
-      power += 2.0 * std::norm(sum) / (double{block} * double{block});
-    }
-  }
-  return blocks == 0 ? 0.0 : std::sqrt(power / static_cast<double>(blocks));
-}
 
 constexpr std::array hold_levels = {0.0, 0.5, 1.0, 1.5, 2.5, 3.5, 5.0};  // [mm]
 

@@ -19,13 +19,6 @@ namespace {
 
 constexpr double f_c = 30.0;  // [Hz] Table 2
 
-Truth truth_of(const std::shared_ptr<const Scene>& scene) {
-  return [scene](const Vec3& p, double t) {
-    const SurfacePoint nearest = scene->nearest(p, t);
-    return TruePoint{nearest.distance, nearest.normal};
-  };
-}
-
 Truth flat_truth() {
   return [](const Vec3& p, double) { return TruePoint{p.z(), Vec3::UnitZ()}; };
 }

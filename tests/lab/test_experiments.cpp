@@ -168,6 +168,40 @@ TEST_F(Lab, TouchesCornersAsWellAsASphereCan) {
   EXPECT_LT(std::sqrt(squares / count), 0.3e-3);
 }
 
+TEST_F(Lab, MeasuresNoErrorOfTheRulerAndThePaperLostInARealCamerasNoise) {
+  ExperimentOptions options = with({"paper", "ideal"});
+  options.grid = {2, 2};
+  const Table table = run("fidelity", options);
+  const auto value = [&](std::string_view method, std::string_view scene,
+                         std::string_view measure) {
+    const std::vector<double> values = table.numbers("value", [&](std::size_t row) {
+      return table.text(row, "method") == method && table.text(row, "scene") == scene &&
+             table.text(row, "measure") == measure;
+    });
+    return values.empty() ? -1.0 : values.front();
+  };
+  int measured = 0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (table.text(row, "method") != "ideal") continue;
+    ++measured;
+    // The ruler steps to within a few micrometres of where a relief is steepest.
+    EXPECT_LT(table.number(row, "value"), 1e-5)
+        << table.text(row, "scene") << ' ' << table.text(row, "measure");
+  }
+  EXPECT_EQ(measured, 26);
+  // 2.1 of the noise's extremes: the paper's proxy rests on them.
+  EXPECT_GT(value("paper", "white-1mm", "bias"), 0.5);
+  EXPECT_EQ(value("paper", "white-1mm", "lost"), 0.0);
+  EXPECT_EQ(value("paper", "real-0.95m", "lost"), 100.0);
+  EXPECT_EQ(value("paper", "real-0.95m", "rms"), -1.0) << "nothing is known of what was lost";
+  // The sphere between four points of a grid, as in Fig. 11.
+  EXPECT_NEAR(value("paper", "quiet-plane", "largest"), 0.114, 0.03);
+
+  const Scores scores = find_experiment("fidelity").scores(table);
+  EXPECT_EQ(scores.rows.back().back(), "24") << "aims met by the ruler";
+  EXPECT_LT(std::stoi(scores.rows.back()[3]), 8) << "and by the paper";
+}
+
 TEST_F(Lab, GivesTheSameBytesWithOneJobTwoJobsAndAfterAnInterruption) {
   ExperimentOptions options = with({"paper"});
   options.grid = {3, 4};
@@ -240,6 +274,7 @@ TEST_F(Lab, MakesAPageAndATableOfEveryClaim) {
   std::ostringstream html;
   html << in.rdbuf();
   EXPECT_NE(html.str().find("less than 1 ms"), std::string::npos);
+  EXPECT_FALSE(fs::exists(page.parent_path() / "bench.md")) << "no bench was run";
   EXPECT_EQ(html.str().find("src="), std::string::npos) << "the page needs nothing beside it";
 }
 

@@ -1,0 +1,449 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/experiments/fidelity.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "lab/grid_cloud.hpp"
+#include "lab/method.hpp"
+#include "lab/play.hpp"
+#include "lab/signal.hpp"
+#include "palpate/sources/synthetic_camera.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr double f_c = 30.0;     // [Hz]
+constexpr double press = 0.010;  // [m] the hand is that far below the true surface
+
+// How often a scene is repeated with other noise: --grid NxM, white and the camera's.
+std::pair<int, int> repeats_of(const ExperimentOptions& options) {
+  return options.grid.value_or(std::pair{20, 20});
+}
+
+// What is measured in which scene, and what it should be at most.
+struct Measure {
+  std::string_view scene;
+  std::string_view name;
+  std::string_view unit;
+  std::optional<double> aim;
+};
+constexpr std::array measures = {
+    Measure{"white-1mm", "rms", "mm", 0.05},
+    Measure{"white-1mm", "bias", "mm", 0.02},
+    Measure{"white-1mm", "normal", "deg", 0.5},
+    Measure{"white-1mm", "lost", "%", 0.0},
+    Measure{"correlated-1mm", "rms", "mm", 0.15},
+    Measure{"correlated-1mm", "lost", "%", 0.0},
+    Measure{"real-0.45m", "rms", "mm", 0.15},
+    Measure{"real-0.45m", "felt", "N", 0.02},
+    Measure{"real-0.45m", "lost", "%", 0.0},
+    Measure{"real-0.7m", "rms", "mm", 0.3},
+    Measure{"real-0.7m", "felt", "N", 0.02},
+    Measure{"real-0.7m", "lost", "%", 0.0},
+    Measure{"real-0.95m", "rms", "mm", 0.6},
+    Measure{"real-0.95m", "felt", "N", 0.02},
+    Measure{"real-0.95m", "lost", "%", 0.0},
+    Measure{"moving-0.95m", "rms", "mm", 6.0},
+    Measure{"moving-0.95m", "lag", "frames", 2.0},
+    Measure{"moving-0.95m", "lost", "%", 0.0},
+    Measure{"sphere-0.45m", "rms", "mm", std::nullopt},
+    Measure{"sphere-0.45m", "lost", "%", 0.0},
+    Measure{"sphere-0.7m", "rms", "mm", std::nullopt},
+    Measure{"sphere-0.7m", "lost", "%", 0.0},
+    Measure{"quiet-plane", "largest", "mm", 0.005},
+    Measure{"quiet-relief", "rms", "mm", 0.1},
+    Measure{"sine", "rms", "N", 0.05},
+    Measure{"sine", "step", "N/ms", 0.03},
+};
+
+// Rows of the CSV for a scene, one a measure.
+std::string rows_of(std::string_view method, std::string_view scene,
+                    const std::vector<std::pair<std::string_view, double>>& values) {
+  std::string rows;
+  for (const Measure& measure : measures) {
+    if (measure.scene != scene) continue;
+    for (const auto& [name, value] : values) {
+      if (name != measure.name) continue;
+      Row row;
+      row.add(method).add(scene).add(measure.name).add(measure.unit);
+      if (measure.aim)
+        row.add(*measure.aim);
+      else
+        row.add("-");
+      rows += row.add(value).done();
+    }
+  }
+  return rows;
+}
+
+// What the contact was like, over all repeats of a scene.
+struct Watched {
+  std::vector<double> error;   // [m] from the true surface to the contact, along its normal
+  std::vector<double> normal;  // [rad] between the tick's normal and the true one
+  double felt = 0.0;           // [N] sum over the repeats
+  int lost = 0;
+  int repeats = 0;
+};
+
+// Behind the true surface for longer than this [s] in one go, it is lost.
+constexpr double patience = 0.5;
+
+// Plays a scenario from free space into contact and watches the seconds from `from` on. A surface
+// is lost where the proxy's centre stays behind it; that ends the repeat, and what was seen of it
+// before it went behind counts.
+void watch(TouchMethod& method, const Scenario& scenario, const Truth& truth, double r_c,
+           double from, Watched& watched) {
+  std::vector<double> force;
+  int behind = 0;
+  std::size_t before = watched.error.size();  // what was seen when it last was in front
+  bool lost = false;
+  play(method, scenario, [&](const Tick& tick) {
+    const TruePoint under = truth(tick.proxy, tick.t);
+    behind = under.distance < 0.0 ? behind + 1 : 0;
+    if (behind == 0) before = watched.error.size();
+    lost = behind > patience * scenario.tick_rate;
+    if (lost) return false;
+    if (tick.t < from) return true;
+    watched.error.push_back(under.distance - r_c);
+    if (tick.normal.norm() > 0.5)
+      watched.normal.push_back(std::acos(std::clamp(tick.normal.dot(under.normal), -1.0, 1.0)));
+    force.push_back(tick.force.dot(under.normal));
+    return true;
+  });
+  ++watched.repeats;
+  if (lost) {
+    ++watched.lost;
+    watched.error.resize(before);
+  } else {
+    watched.felt += felt_rms(force);
+  }
+}
+
+double mean(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double v : values) sum += v;
+  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
+}
+
+// Of what was lost in every repeat nothing is known but that.
+std::vector<std::pair<std::string_view, double>> summary(const Watched& watched) {
+  const int held = watched.repeats - watched.lost;
+  std::vector<std::pair<std::string_view, double>> values = {
+      {"lost", 100.0 * watched.lost / watched.repeats}};
+  if (held == 0) return values;
+  values.emplace_back("rms", 1e3 * rms(watched.error));
+  values.emplace_back("bias", 1e3 * std::abs(mean(watched.error)));
+  values.emplace_back("normal", mean(watched.normal) * 180.0 / std::numbers::pi);
+  values.emplace_back("felt", watched.felt / held);
+  return values;
+}
+
+Truth flat(const std::function<double(double)>& height) {
+  return [height](const Vec3& p, double t) { return TruePoint{p.z() - height(t), Vec3::UnitZ()}; };
+}
+
+// A resting plane of points under 1 mm of noise, watched for a second after 0.2 s.
+std::string rest_on_grid(const std::string& name, const ExperimentOptions& options,
+                         std::string_view scene, Noise noise) {
+  const int repeats = repeats_of(options).first;
+  const double r_c = options.parameters.proxy.r_c();
+  Watched watched;
+  for (int k = 0; k < repeats; ++k) {
+    GridCloud grid;
+    grid.spacing = 0.3 * r_c;
+    grid.sigma = 1e-3;
+    grid.noise = noise;
+    grid.seed = options.seed * 1000 + static_cast<std::uint64_t>(k);
+    const Truth truth = flat([](double) { return 0.0; });
+    const auto method = make_method(name, {options.parameters, truth});
+    const Vec3 hip(0.1 * r_c, 0.1 * r_c, -press);
+    method->seat(Vec3(hip.x(), hip.y(), 4.0 * r_c));
+    watch(*method,
+          {.frame_rate = f_c,
+           .duration = 1.2,
+           .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
+           .hip = [&](double) { return hip; }},
+          truth, r_c, 0.2, watched);
+  }
+  return rows_of(name, scene, summary(watched));
+}
+
+// A D4xx straight above what is touched, with its focal length but only as many pixels as matter.
+CameraSetup d4xx_above(double distance) {
+  CameraSetup setup;
+  const int pixels = std::min(320, static_cast<int>(0.3 * 589.0 / distance));
+  setup.intrinsics = pinhole(pixels, pixels, 2.0 * std::atan(0.5 * pixels / 589.0));
+  setup.world_from_camera = looking_at_origin(distance, 0.0, 0.0);
+  setup.frame_rate = f_c;
+  return setup;
+}
+
+SyntheticCamera look_at(const Scene& scene, double distance, std::uint64_t seed) {
+  SensorModel sensor = SensorModel::named("d4xx");
+  sensor.seed = seed;
+  return {scene, d4xx_above(distance), sensor};
+}
+
+// How far above the surface a hand is that comes down to it at 0.15 m/s: in contact after 0.4 s.
+constexpr double contact_time = 0.4;  // [s]
+double coming_down(double t) {
+  return std::max(0.15 * (contact_time - t), -press);
+}
+
+// Something at rest under a real camera's noise, watched for a second after a second of contact.
+std::string rest_in_sight(const std::string& name, const ExperimentOptions& options,
+                          std::string_view scene_name, const std::string& uri, double distance) {
+  const int repeats = repeats_of(options).second;
+  const double r_c = options.parameters.proxy.r_c();
+  const auto scene = std::make_shared<const Scene>(make_scene(Uri(uri)));
+  const Truth truth = truth_of(scene);
+  Watched watched;
+  for (int k = 0; k < repeats; ++k) {
+    SyntheticCamera camera =
+        look_at(*scene, distance, options.seed * 1000 + static_cast<std::uint64_t>(k));
+    const auto method = make_method(name, {options.parameters, truth});
+    watch(*method,
+          {.frame_rate = f_c,
+           .duration = contact_time + 2.0,
+           .cloud = [&](std::uint64_t f, double t) { return camera.capture(t, f).cloud; },
+           .hip = [&](double t) { return Vec3(0.0, 0.0, coming_down(t)); }},
+          truth, r_c, contact_time + 1.0, watched);
+  }
+  return rows_of(name, scene_name, summary(watched));
+}
+
+// A plane at 0.95 m that rests for 1.5 s and then comes or goes at 0.1 m/s; half of the repeats
+// each.
+std::string move_in_sight(const std::string& name, const ExperimentOptions& options,
+                          std::string_view scene_name) {
+  const int repeats = 2 * repeats_of(options).second;
+  constexpr double duration = 2.2;
+  const double r_c = options.parameters.proxy.r_c();
+  Watched watched;
+  const auto ticks = static_cast<std::size_t>(duration * 1000.0);
+  std::vector<double> lag(ticks, 0.0);  // [frames] summed, by time since the onset
+  std::vector<int> counted(ticks, 0);
+  for (int k = 0; k < repeats; ++k) {
+    const double speed = k % 2 == 0 ? 0.1 : -0.1;
+    // Another phase of the frames each time.
+    const double start = 1.5 + k / (repeats * f_c);
+    const auto scene = std::make_shared<const Scene>(
+        make_scene(Uri(fmt::format("synthetic:plane?start={}&speed={}", start, speed))));
+    const Truth truth = truth_of(scene);
+    const auto height = [&](double t) { return speed * std::max(t - start, 0.0); };
+    SyntheticCamera camera =
+        look_at(*scene, 0.95, options.seed * 1000 + static_cast<std::uint64_t>(k));
+    const auto method = make_method(name, {options.parameters, truth});
+    const std::size_t before = watched.error.size();
+    watch(*method,
+          {.frame_rate = f_c,
+           .duration = duration,
+           .cloud = [&](std::uint64_t f, double t) { return camera.capture(t, f).cloud; },
+           .hip = [&](double t) { return Vec3(0.0, 0.0, height(t) + coming_down(t)); }},
+          truth, r_c, start, watched);
+    for (std::size_t i = before; i < watched.error.size(); ++i) {
+      lag[i - before] -= watched.error[i] / speed * f_c;
+      ++counted[i - before];
+    }
+  }
+  // The noise of single repeats does not count as lag: means over all, and over a frame.
+  std::vector<double> means;
+  for (std::size_t i = 0; i < ticks && counted[i] == repeats - watched.lost && counted[i] > 0; ++i)
+    means.push_back(lag[i] / counted[i]);
+  const auto frame = static_cast<std::size_t>(std::lround(1000.0 / f_c));
+  double largest = 0.0;
+  for (std::size_t i = 0; i + frame <= means.size(); i += frame) {
+    double sum = 0.0;
+    for (std::size_t j = i; j < i + frame; ++j) sum += means[j];
+    largest = std::max(largest, sum / static_cast<double>(frame));
+  }
+  std::vector<std::pair<std::string_view, double>> values = summary(watched);
+  // Nothing held, nothing known of its lag.
+  if (!means.empty()) values.emplace_back("lag", largest);
+  return rows_of(name, scene_name, values);
+}
+
+// Along a plane without noise, at 0.05 m/s for two seconds, askew to its grid.
+std::string slide_on_plane(const std::string& name, const ExperimentOptions& options,
+                           std::string_view scene) {
+  const double r_c = options.parameters.proxy.r_c();
+  GridCloud grid;
+  grid.spacing = 0.3 * r_c;
+  grid.half_x = grid.half_y = 0.12;
+  const Truth truth = flat([](double) { return 0.0; });
+  const auto method = make_method(name, {options.parameters, truth});
+  const auto hip = [&](double t) {
+    const double x = 0.05 * (t - 1.0);
+    return Vec3(x, 0.1 * x + 0.1 * r_c, -press);
+  };
+  method->seat(hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
+  Watched watched;
+  watch(*method,
+        {.frame_rate = f_c,
+         .duration = 2.0,
+         .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
+         .hip = hip},
+        truth, r_c, 0.5, watched);
+  double largest = 0.0;
+  for (const double e : watched.error) largest = std::max(largest, std::abs(e));
+  return rows_of(name, scene, {{"largest", 1e3 * largest}});
+}
+
+// Over sine waves 3 mm high and 10 mm long without noise, across them at 0.02 m/s.
+std::string slide_on_relief(const std::string& name, const ExperimentOptions& options,
+                            std::string_view scene_name) {
+  const double r_c = options.parameters.proxy.r_c();
+  const auto scene = std::make_shared<const Scene>(make_scene(Uri("synthetic:relief")));
+  const Truth truth = truth_of(scene);
+  GridCloud grid;
+  grid.spacing = 0.3 * r_c;
+  grid.half_x = grid.half_y = 0.08;
+  grid.height = [](double x, double) { return 1.5e-3 * std::sin(200.0 * std::numbers::pi * x); };
+  const auto method = make_method(name, {options.parameters, truth});
+  const auto hip = [&](double t) { return Vec3(0.02 * (t - 1.5), 0.1 * r_c, -press); };
+  method->seat(hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
+  Watched watched;
+  watch(*method,
+        {.frame_rate = f_c,
+         .duration = 3.0,
+         .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
+         .hip = hip},
+        truth, r_c, 0.5, watched);
+  return rows_of(name, scene_name, summary(watched));
+}
+
+// A plane without noise that goes up and down by 20 mm once a second. The largest step is that of
+// the force's error: the true force itself changes by up to 0.038 N/ms.
+std::string push_by_sine(const std::string& name, const ExperimentOptions& options,
+                         std::string_view scene) {
+  const double r_c = options.parameters.proxy.r_c();
+  constexpr double stroke = 0.020;
+  const auto height = [](double t) {
+    return 0.5 * stroke * (1.0 - std::cos(2.0 * std::numbers::pi * t));
+  };
+  Parameters parameters = options.parameters;
+  parameters.coupling.max_force = 100.0;
+  GridCloud grid;
+  grid.spacing = 0.3 * r_c;
+  const Truth truth = flat(height);
+  const auto method = make_method(name, {parameters, truth});
+  const Vec3 hip(0.1 * r_c, 0.1 * r_c, -0.005);
+  method->seat(Vec3(hip.x(), hip.y(), 4.0 * r_c));
+  std::vector<double> error;
+  double largest = 0.0;
+  play(*method,
+       {.frame_rate = f_c,
+        .duration = 4.0,
+        .cloud = [&](std::uint64_t f, double t) { return grid.capture(f, height(t)); },
+        .hip = [&](double) { return hip; }},
+       [&](const Tick& tick) {
+         if (tick.t < 1.0) return true;
+         const double truly = parameters.coupling.stiffness * (height(tick.t) - hip.z());
+         error.push_back(tick.force.z() - truly);
+         if (error.size() > 1)
+           largest = std::max(largest, std::abs(error.back() - error[error.size() - 2]));
+         return true;
+       });
+  return rows_of(name, scene, {{"rms", rms(error)}, {"step", largest}});
+}
+
+std::vector<Cell> fidelity_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  std::vector<Cell> cells;
+  for (const std::string& name : methods_of(experiment, options)) {
+    cells.emplace_back([=] { return rest_on_grid(name, options, "white-1mm", Noise::white); });
+    cells.emplace_back(
+        [=] { return rest_on_grid(name, options, "correlated-1mm", Noise::correlated); });
+    const std::string plane = "synthetic:plane";
+    const std::string sphere = "synthetic:sphere?radius=40mm&floor=80mm";
+    cells.emplace_back([=] { return rest_in_sight(name, options, "real-0.45m", plane, 0.45); });
+    cells.emplace_back([=] { return rest_in_sight(name, options, "real-0.7m", plane, 0.7); });
+    cells.emplace_back([=] { return rest_in_sight(name, options, "real-0.95m", plane, 0.95); });
+    cells.emplace_back([=] { return move_in_sight(name, options, "moving-0.95m"); });
+    cells.emplace_back([=] { return rest_in_sight(name, options, "sphere-0.45m", sphere, 0.45); });
+    cells.emplace_back([=] { return rest_in_sight(name, options, "sphere-0.7m", sphere, 0.7); });
+    cells.emplace_back([=] { return slide_on_plane(name, options, "quiet-plane"); });
+    cells.emplace_back([=] { return slide_on_relief(name, options, "quiet-relief"); });
+    cells.emplace_back([=] { return push_by_sine(name, options, "sine"); });
+  }
+  return cells;
+}
+
+std::vector<Claim> no_claims(const Table& /*table*/) {
+  return {};
+}
+
+// A row a measure, a column a method; what misses the aim is marked.
+Scores fidelity_scores(const Table& table) {
+  Scores scores;
+  scores.columns = {"scene", "measure", "aim"};
+  std::vector<std::string> methods;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string& method = table.text(row, "method");
+    if (std::find(methods.begin(), methods.end(), method) == methods.end())
+      methods.push_back(method);
+  }
+  scores.columns.insert(scores.columns.end(), methods.begin(), methods.end());
+  std::vector<int> met(methods.size(), 0);
+  int aims = 0;
+  for (const Measure& measure : measures) {
+    std::vector<std::string> line = {
+        std::string(measure.scene), fmt::format("{} [{}]", measure.name, measure.unit),
+        measure.aim ? fmt::format("<= {:g}", *measure.aim) : std::string("-")};
+    aims += measure.aim ? 1 : 0;
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+      const std::vector<double> values = table.numbers("value", [&](std::size_t row) {
+        return table.text(row, "method") == methods[m] &&
+               table.text(row, "scene") == measure.scene &&
+               table.text(row, "measure") == measure.name;
+      });
+      if (values.empty()) {
+        line.emplace_back(measure.aim ? "- *" : "-");
+        continue;
+      }
+      const bool missed = measure.aim && values.front() > *measure.aim;
+      met[m] += measure.aim && !missed ? 1 : 0;
+      line.push_back(fmt::format("{:.3g}{}", values.front(), missed ? " *" : ""));
+    }
+    scores.rows.push_back(std::move(line));
+  }
+  std::vector<std::string> line = {"aims met", "", fmt::format("{}", aims)};
+  for (const int count : met) line.push_back(fmt::format("{}", count));
+  scores.rows.push_back(std::move(line));
+  scores.note =
+      "* misses the aim; - was lost in every repeat. What is measured and how: docs/pop.md.";
+  return scores;
+}
+
+constexpr std::string_view fidelity_plot = R"gp(
+set ylabel "measured / aim"
+set logscale y
+set yrange [0.001:1000]
+set xtics rotate by -40 noenhanced
+set key outside right top
+set bmargin 9
+set arrow from graph 0, first 1 to graph 1, first 1 nohead lw 2 lc rgb "#444444"
+plot for [m in methods] csv using (strcol(1) eq m && $5 > 0 ? column(0) : NaN):($6/$5):xtic(strcol(1) eq word(methods,1) ? strcol(2)." ".strcol(3) : "") with points pt 7 title m
+)gp";
+
+}  // namespace
+
+Experiment fidelity_experiment() {
+  return {"fidelity",
+          "how near the contact and the force are to the true ones, beside the aims",
+          "method,scene,measure,unit,aim,value",
+          {"paper", "sight"},
+          true,
+          fidelity_cells,
+          fidelity_plot,
+          no_claims,
+          fidelity_scores};
+}
+
+}  // namespace palpate::lab

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+namespace palpate::lab {
+
+/// Root of the mean of the squares; 0 of nothing.
+double rms(const std::vector<double>& values);
+
+/// The part of a signal sampled at 1 kHz that lies in 20 to 400 Hz, rms: what a finger is most
+/// sensitive to. Over whole seconds of it; what is left over is not looked at.
+double felt_rms(const std::vector<double>& signal);
+
+}  // namespace palpate::lab

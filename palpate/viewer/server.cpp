@@ -96,13 +96,11 @@ class PageSession;
 // What sessions ask of the server they belong to.
 class Hub {
  public:
+  virtual ~Hub() = default;
   virtual void joined(const std::shared_ptr<PageSession>& page) = 0;
   virtual void left(PageSession& page) = 0;
   virtual void moved_hand(PageSession& page, const HandMessage& hand) = 0;
   virtual void commanded(PageSession& page, const Command& command) = 0;
-
- protected:
-  ~Hub() = default;
 };
 
 // One page, from the WebSocket handshake on. All on the server's thread.
@@ -251,7 +249,7 @@ class ViewerServer::Impl final : public Hub {
     thread_ = std::thread([this] { context_.run(); });
   }
 
-  ~Impl() {
+  ~Impl() override {
     context_.stop();
     thread_.join();
   }

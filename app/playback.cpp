@@ -45,6 +45,11 @@ void Playback::adopt_until(double t, Renderer& renderer) {
     in_use_ = std::move(cloud);  // only now may the frame before go
     newest_[static_cast<std::size_t>(due - cameras_.data())] = due->newest.cloud.get();
     ++adopted_;
+    if (watcher_) {
+      std::vector<std::shared_ptr<const Cloud>> seen;
+      for (const Camera& camera : cameras_) seen.push_back(camera.newest.cloud);
+      watcher_(due->newest.stamp, seen);
+    }
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -23,6 +24,10 @@ class Playback {
   /// @throws Error if a frame cannot be read.
   void adopt_until(double t, Renderer& renderer);
 
+  /// Is told of each frame that is adopted: its stamp, and what each camera saw last.
+  using Watcher = std::function<void(double, std::span<const std::shared_ptr<const Cloud>>)>;
+  void watch(Watcher watcher) { watcher_ = std::move(watcher); }
+
   /// Frames handed over so far.
   [[nodiscard]] std::size_t adopted() const { return adopted_; }
   [[nodiscard]] std::size_t cameras() const { return cameras_.size(); }
@@ -42,6 +47,7 @@ class Playback {
   };
   std::vector<Camera> cameras_;
   std::vector<const Cloud*> newest_;
+  Watcher watcher_;
   std::shared_ptr<const Cloud> in_use_;
   std::size_t adopted_ = 0;
 };

@@ -13,6 +13,7 @@
 #include "app/live_session.hpp"
 #include "app/options.hpp"
 #include "app/playback.hpp"
+#include "app/run_recording.hpp"
 #include "app/scripted_hand.hpp"
 #include "app/summary.hpp"
 #include "app/verbs.hpp"
@@ -32,6 +33,7 @@ struct RunOptions {
   std::optional<std::uint16_t> port;
   std::string token;
   bool no_browser = false;
+  std::string record;
   MethodOptions method;
 };
 
@@ -99,8 +101,13 @@ int run_headless(const RunOptions& options) {
   Playback playback(options.cameras);
   const HipPath hand = open_hand(options, playback);
   Renderer renderer(parameters);
-  renderer.seat(hand.at(hand.first_time()));
+  const Vec3 seat = hand.at(hand.first_time());
+  renderer.seat(seat);
   Summary summary;
+  RunRecording recording(options.record,
+                         {.cameras = options.cameras, .device = options.device, .seat = seat},
+                         parameters, hand.first_time());
+  playback.watch([&recording](double stamp, auto cameras) { recording.frame(stamp, cameras); });
 
   const bool watched = isatty(STDERR_FILENO) == 1;
   const auto ticks = static_cast<std::int64_t>(duration * options.rate);
@@ -109,13 +116,14 @@ int run_headless(const RunOptions& options) {
     const double t = hand.first_time() + static_cast<double>(i) / options.rate;
     playback.adopt_until(t, renderer);
     const Tick tick = renderer.tick(hand.at(t), t);
+    recording.tick(tick);
     const double r_c = parameters.proxy.r_c();
     summary.count(tick, playback.adopted(), least_behind(playback.newest(), tick.proxy, r_c), r_c);
     if (watched && i % ticks_a_line == 0) show_status(tick);
   }
   if (watched) fmt::print(stderr, "\n");
   std::fputs(options.json ? summary.json().c_str() : summary.text().c_str(), stdout);
-  return 0;
+  return recording.finish() ? 0 : 1;
 }
 
 int run(const RunOptions& options) {
@@ -144,6 +152,8 @@ Verb add_run(CLI::App& program) {
   command->add_option("--token", options->token,
                       "what a page must know; made up if --listen lets other machines in");
   command->add_flag("--no-browser", options->no_browser, "only say where the page is");
+  command->add_option("--record", options->record,
+                      "write the session into this folder, a ROS 2 bag; palpate replay checks it");
   command->add_flag("--headless", options->headless,
                     "no page: as fast as the machine can, with a status line and a summary");
   command->add_flag("--json", options->json, "print the summary as a JSON object");

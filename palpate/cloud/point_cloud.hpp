@@ -31,6 +31,8 @@ class PointCloud final : public Cloud {
   /// How many points were left out because a coordinate was not finite.
   [[nodiscard]] std::size_t non_finite() const noexcept { return non_finite_; }
   [[nodiscard]] Vec3 point(std::size_t i) const noexcept { return {x_[i], y_[i], z_[i]}; }
+  /// [m] the edge of a voxel.
+  [[nodiscard]] double voxel() const noexcept { return voxel_; }
   [[nodiscard]] const std::optional<Vec3>& viewpoint() const noexcept { return viewpoint_; }
 
  private:

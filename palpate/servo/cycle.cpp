@@ -94,7 +94,9 @@ void Cycle::run(const Wake& wake) noexcept {
   if (const CapturedFrame* frame = frames_.take()) adopt_frame(*frame, t);
 
   const Vec3 hip = workspace_.hip_in_world(hand);
+  bool reseated = false;
   if (const auto& frame = frames_.taken_last(); frame.cloud && safety_.stalls_at(t)) {
+    reseated = true;
     rendering_->seat(free_side(*frame.cloud, last_proxy_, last_normal_, r_c_, patch_));
   }
   const Tick tick = rendering_->tick(hip, t);
@@ -121,10 +123,13 @@ void Cycle::run(const Wake& wake) noexcept {
                          .frame_age = age,
                          .number = number_++,
                          .frame_number = frames_.number(),
+                         .settings_number = settings_.number(),
                          .safety = safe.flags,
                          .wake_up_ns = wake.wake_up_ns,
                          .previous_compute_ns = wake.previous_compute_ns,
-                         .hand = (hand.present ? 1U : 0U) | (hand.clutched ? 2U : 0U)};
+                         .hand = (hand.present ? hand_present : 0U) |
+                                 (hand.clutched ? hand_clutched : 0U) |
+                                 (reseated ? proxy_reseated : 0U)};
   ring_.push(record);
   keep_statistics(record);
 }

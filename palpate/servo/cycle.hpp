@@ -54,6 +54,14 @@ struct ServoSettings {
 /// @throws Error if one of them does not validate.
 void validate(const ServoSettings& settings);
 
+/// What was done with the hand in a cycle; bits of `ServoTick::hand`.
+enum HandFlag : std::uint32_t {
+  hand_present = 1u << 0,
+  hand_clutched = 1u << 1,
+  /// The proxy was seated on the surface's free side before the tick, as ticks were missed.
+  proxy_reseated = 1u << 2,
+};
+
 /// All that happened in one cycle: what viewers and recorders read.
 struct ServoTick {
   Tick tick;                   ///< the renderer's; `tick.force` is what it asked for
@@ -64,10 +72,11 @@ struct ServoTick {
   double frame_age;            ///< [s] infinite before the first
   std::uint64_t number;        ///< of the cycle, from 0
   std::uint64_t frame_number;  ///< of the frame in use among those put, from 1; 0 before the first
-  std::uint32_t safety;        ///< SafetyFlag bits
-  std::uint32_t wake_up_ns;    ///< as in Wake
+  std::uint64_t settings_number;  ///< of those in use among those set, from 1; 0: the first ones
+  std::uint32_t safety;           ///< SafetyFlag bits
+  std::uint32_t wake_up_ns;       ///< as in Wake
   std::uint32_t previous_compute_ns;
-  std::uint32_t hand;  ///< 1 present, 2 clutched
+  std::uint32_t hand;  ///< HandFlag bits
 };
 
 /// What the cycles have done so far. The servo's thread writes, any may look.

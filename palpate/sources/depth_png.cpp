@@ -106,7 +106,17 @@ const char* colour_name(int colour) {
   }
 }
 
-bool write_rows(std::FILE* file, Failure& failure, png_uint_32 width, png_uint_32 height,
+void append(png_structp png, png_bytep from, std::size_t count) {
+  auto* to = static_cast<std::vector<std::byte>*>(png_get_io_ptr(png));
+  const auto* bytes = reinterpret_cast<const std::byte*>(from);
+  try {
+    to->insert(to->end(), bytes, bytes + count);
+  } catch (const std::bad_alloc&) {
+    png_error(png, "no memory");
+  }
+}
+
+bool write_rows(std::vector<std::byte>& to, Failure& failure, png_uint_32 width, png_uint_32 height,
                 png_bytepp rows) noexcept {
   png_structp png =
       png_create_write_struct(PNG_LIBPNG_VER_STRING, &failure, Failure::keep, Failure::ignore);
@@ -115,7 +125,7 @@ bool write_rows(std::FILE* file, Failure& failure, png_uint_32 width, png_uint_3
     png_destroy_write_struct(&png, &info);
     return false;
   }
-  png_init_io(png, file);
+  png_set_write_fn(png, &to, append, nullptr);
   png_set_compression_level(png, 1);  // 5.6 ms for 640x480; level 6 takes 54 ms to save 13 %
   png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);
   png_set_IHDR(png, info, width, height, 16, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
@@ -126,6 +136,30 @@ bool write_rows(std::FILE* file, Failure& failure, png_uint_32 width, png_uint_3
   png_write_end(png, nullptr);
   png_destroy_write_struct(&png, &info);
   return true;
+}
+
+std::vector<std::byte> encode(int width, int height, std::span<const std::uint16_t> depth,
+                              const std::string& name) {
+  constexpr auto largest = static_cast<int>(largest_side);
+  if (width < 1 || height < 1 || width > largest || height > largest ||
+      depth.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+    throw Error(name,
+                std::to_string(depth.size()) + " values do not make an image of " +
+                    std::to_string(width) + "x" + std::to_string(height),
+                "give width*height values, sides up to 16384");
+  }
+  std::vector<png_bytep> rows(static_cast<std::size_t>(height));
+  for (std::size_t v = 0; v < rows.size(); ++v) {
+    // libpng only reads them, but its interface does not say so.
+    rows[v] = reinterpret_cast<png_bytep>(
+        const_cast<std::uint16_t*>(depth.data() + v * static_cast<std::size_t>(width)));
+  }
+  std::vector<std::byte> bytes;
+  Failure failure;
+  if (!write_rows(bytes, failure, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height),
+                  rows.data()))
+    throw Error(name, "cannot be packed: " + std::string(failure.text.data()));
+  return bytes;
 }
 
 }  // namespace
@@ -179,32 +213,21 @@ DepthPng read_depth_png(const std::filesystem::path& path) {
   return parse_depth_png(read_file(path, largest_file), path.string());
 }
 
+std::vector<std::byte> encode_depth_png(int width, int height,
+                                        std::span<const std::uint16_t> depth) {
+  return encode(width, height, depth, "depth image");
+}
+
 void write_depth_png(const std::filesystem::path& path, int width, int height,
                      std::span<const std::uint16_t> depth) {
-  constexpr auto largest = static_cast<int>(largest_side);
-  if (width < 1 || height < 1 || width > largest || height > largest ||
-      depth.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
-    throw Error(path.string(),
-                std::to_string(depth.size()) + " values do not make an image of " +
-                    std::to_string(width) + "x" + std::to_string(height),
-                "give width*height values, sides up to 16384");
-  }
-  std::vector<png_bytep> rows(static_cast<std::size_t>(height));
-  for (std::size_t v = 0; v < rows.size(); ++v) {
-    // libpng only reads them, but its interface does not say so.
-    rows[v] = reinterpret_cast<png_bytep>(
-        const_cast<std::uint16_t*>(depth.data() + v * static_cast<std::size_t>(width)));
-  }
+  const std::vector<std::byte> bytes = encode(width, height, depth, path.string());
   errno = 0;
   std::FILE* file = std::fopen(path.c_str(), "wb");
-  Failure failure;
-  const bool written = file != nullptr && write_rows(file, failure, static_cast<png_uint_32>(width),
-                                                     static_cast<png_uint_32>(height), rows.data());
+  const bool written =
+      file != nullptr && std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
   const bool closed = file != nullptr && std::fclose(file) == 0;
   if (!written || !closed) {
-    const std::string reason =
-        errno != 0 ? std::generic_category().message(errno) : std::string(failure.text.data());
-    throw Error(path.string(), "cannot be written: " + reason,
+    throw Error(path.string(), "cannot be written: " + std::generic_category().message(errno),
                 "check the folder, its permissions and the space on the disk");
   }
 }

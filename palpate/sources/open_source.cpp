@@ -6,6 +6,7 @@
 #include "palpate/core/uri.hpp"
 #include "palpate/sources/depth_recording.hpp"
 #include "palpate/sources/point_file_source.hpp"
+#include "palpate/sources/recording.hpp"
 #include "palpate/sources/source.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 
@@ -22,7 +23,7 @@ const std::vector<Scheme>& schemes() {
   static const std::vector<Scheme> table{
       {"synthetic", open_synthetic}, {"pcd", open_point_files},
       {"ply", open_point_files},     {"tum", open_tum},
-      {"depth", open_depth},
+      {"depth", open_depth},         {"recording", open_recording},
   };
   return table;
 }

@@ -36,7 +36,8 @@ class Source {
   [[nodiscard]] virtual const SourceInfo& info() const = 0;
 };
 
-/// Opens `synthetic:SCENE?...`, `tum:DIR`, `depth:DIR`, `pcd:FILE|DIR`, `ply:FILE|DIR`.
+/// Opens `synthetic:SCENE?...`, `tum:DIR`, `depth:DIR`, `pcd:FILE|DIR`, `ply:FILE|DIR`,
+/// `recording:BAG`.
 /// @throws Error for an unknown scheme or option (naming the nearest known one), or input that
 ///         cannot be used.
 std::unique_ptr<Source> open_source(std::string_view uri);

@@ -54,10 +54,10 @@ class Program : public ::testing::Test {
     return path(name);
   }
 
-  // Runs the program with arguments that need no quoting.
-  [[nodiscard]] Outcome run(const std::string& arguments) const {
-    const std::string command = std::string(PALPATE_PROGRAM) + " " + arguments + " >" +
-                                path("stdout") + " 2>" + path("stderr") + " </dev/null";
+  // Runs the program with arguments that need no quoting, after `before` in the same shell.
+  [[nodiscard]] Outcome run(const std::string& arguments, const std::string& before = "") const {
+    const std::string command = before + PALPATE_PROGRAM + " " + arguments + " >" + path("stdout") +
+                                " 2>" + path("stderr") + " </dev/null";
     const int status = std::system(command.c_str());  // NOLINT(cert-env33-c): a shell is wanted
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(folder_ / "stdout"),
             read(folder_ / "stderr")};
@@ -271,6 +271,83 @@ TEST_F(Program, FailsWithOneWhenTheDiskIsFull) {
       run(std::string("trace --camera ") + plane + " --path " + press() + " --out /dev/full");
   EXPECT_EQ(outcome.code, 1);
   EXPECT_NE(outcome.err.find("/dev/full"), std::string::npos);
+}
+
+TEST_F(Program, ReplaysWhatItRecordedBitForBit) {
+  const std::vector<std::string> sessions = {
+      "--method paper", "--method paper-as-printed", "--method fixed-step",
+      "--method sight --camera synthetic:moving?noise=1mm&size=160x120",
+      "--method sight --set damping=1.5 --camera synthetic:desk?size=160x120 "
+      "--camera synthetic:plane?size=80x60"};
+  for (std::size_t i = 0; i < sessions.size(); ++i) {
+    const std::string bag = path("bag" + std::to_string(i));
+    std::string options = sessions[i];
+    if (options.find("--camera") == std::string::npos)
+      options += " --camera synthetic:desk?noise=1mm&size=160x120";
+    for (std::size_t at = 0; (at = options.find('&', at)) != std::string::npos; at += 2)
+      options.insert(at, "\\");
+    const Outcome session = run("run --headless --duration 2.5 --record " + bag + " " + options);
+    ASSERT_EQ(session.code, 0) << session.err;
+    const Outcome replay = run("replay --json " + bag);
+    EXPECT_EQ(replay.code, 0) << options << "\n" << replay.out << replay.err;
+    const auto report = nlohmann::json::parse(replay.out);
+    EXPECT_EQ(report["identical"], true);
+    EXPECT_EQ(report["ticks"], 2500);
+    EXPECT_GT(report["frames"], 70);
+  }
+}
+
+TEST_F(Program, TouchesARecordingAsItTouchedTheCamera) {
+  ASSERT_EQ(run(std::string("run --headless --duration 2 --device script:") + press() +
+                " --record " + path("bag") + " --camera " + plane)
+                .code,
+            0);
+  const std::string trace = "trace --path " + press() + " --out ";
+  ASSERT_EQ(run(trace + path("camera.csv") + " --camera " + plane).code, 0);
+  const Outcome outcome = run(trace + path("recording.csv") + " --camera recording:" + path("bag"));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(read(path("recording.csv")), read(path("camera.csv")));
+}
+
+TEST_F(Program, GoesOnWithoutItsRecordingWhenTheDiskIsFull) {
+  const Outcome outcome = run("run --headless --json --duration 4 --record " + path("bag"),
+                              "trap '' XFSZ; ulimit -f 8000; ");
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_EQ(nlohmann::json::parse(outcome.out)["ticks"], 4000);
+  EXPECT_EQ(lines_in(outcome.err), 1U) << outcome.err;
+  EXPECT_NE(outcome.err.find("the recording stops here"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("disk"), std::string::npos) << outcome.err;
+  // What was committed is a session as any other.
+  const auto report = nlohmann::json::parse(run("replay --json " + path("bag")).out);
+  EXPECT_EQ(report["different_ticks"], 0);
+}
+
+TEST_F(Program, FailsWithOneWhenAReplayDiffers) {
+  ASSERT_EQ(run("run --headless --duration 2 --record " + path("bag") +
+                " --camera synthetic:desk?size=160x120")
+                .code,
+            0);
+  // The lowest bit of one HIP's z: the fourth number behind 36 bytes of layout.
+  const std::string change =
+      "/usr/bin/python3 -B -c \"import sqlite3; b = sqlite3.connect('" + path("bag/bag_0.db3") +
+      "'); i, d = b.execute('select messages.id, data from messages join topics on topics.id = "
+      "topic_id where name = \\\"/palpate/tick\\\" order by messages.id limit 1 offset "
+      "1500').fetchone(); n = 36 + 8 * 3; b.execute('update messages set data = ? "
+      "where id = ?', (d[:n] + bytes([d[n] ^ 1]) + d[n + 1:], i)); b.commit()\"";
+  if (std::system(change.c_str()) != 0) GTEST_SKIP() << "there is no /usr/bin/python3";
+  const Outcome outcome = run("replay --json " + path("bag"));
+  EXPECT_EQ(outcome.code, 1);
+  const auto report = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(report["identical"], false);
+  EXPECT_EQ(report["first_difference"], 1500);
+  EXPECT_NE(run("replay " + path("bag")).out.find("tick 1500"), std::string::npos);
+}
+
+TEST_F(Program, RefusesWhatIsNoRecording) {
+  expect_refusal("replay " + path("none"), {"none", "no such bag"});
+  expect_refusal("run --headless --record " + path("."), {"is there already"});
+  expect_refusal("info recording:" + write("x.db3", "text"), {"x.db3", "not a database"});
+  expect_refusal("info recording:" + write("x.mcap", "text"), {"MCAP"});
 }
 
 }  // namespace

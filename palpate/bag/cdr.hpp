@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace palpate {
+
+/// Writes a message as ROS 2 does: OMG CDR, version 1, little-endian, behind the four bytes that
+/// say so. A number lies at a multiple of its size, counted from behind those four bytes.
+class CdrWriter {
+ public:
+  CdrWriter() : bytes_{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}} {}
+
+  template <class T>
+  void put(T value) {
+    static_assert(std::is_arithmetic_v<T>);
+    align(sizeof(T));
+    append(&value, 1);
+  }
+  template <class T>
+  void put_array(std::span<const T> values) {
+    static_assert(std::is_arithmetic_v<T>);
+    if (values.empty()) return;
+    align(sizeof(T));
+    append(values.data(), values.size());
+  }
+  /// A sequence: how many, then the elements.
+  template <class T>
+  void put_sequence(std::span<const T> values) {
+    put(static_cast<std::uint32_t>(values.size()));
+    put_array(values);
+  }
+  /// Without a NUL within; one is put behind it.
+  void put_string(std::string_view text) {
+    put(static_cast<std::uint32_t>(text.size() + 1));
+    append(text.data(), text.size());
+    bytes_.push_back(std::byte{0});
+  }
+
+  [[nodiscard]] std::vector<std::byte> take() { return std::move(bytes_); }
+
+ private:
+  static constexpr std::size_t header = 4;
+
+  void align(std::size_t size) {
+    const std::size_t past = (bytes_.size() - header) % size;
+    if (past != 0) bytes_.resize(bytes_.size() + size - past);
+  }
+  template <class T>
+  void append(const T* values, std::size_t count) {
+    static_assert(std::endian::native == std::endian::little, "CDR is written as it lies in RAM");
+    const std::size_t at = bytes_.size();
+    bytes_.resize(at + count * sizeof(T));
+    if (count > 0) std::memcpy(bytes_.data() + at, values, count * sizeof(T));
+  }
+
+  std::vector<std::byte> bytes_;
+};
+
+/// Reads what CdrWriter and ROS 2 write, in either byte order. What a message promises is held
+/// against its length before anything is allocated.
+class CdrReader {
+ public:
+  /// @param message  must outlive this
+  /// @param name     of the message, for errors
+  /// @throws Error if it is not plain CDR.
+  CdrReader(std::span<const std::byte> message, std::string name);
+
+  /// @throws Error if the message ends before.
+  template <class T>
+  T get() {
+    static_assert(std::is_arithmetic_v<T>);
+    align(sizeof(T));
+    const std::span<const std::byte> bytes = take(sizeof(T));
+    std::array<std::byte, sizeof(T)> ordered{};
+    std::copy(bytes.begin(), bytes.end(), ordered.begin());
+    if (swapped_) std::reverse(ordered.begin(), ordered.end());
+    return std::bit_cast<T>(ordered);
+  }
+  template <class T>
+  std::vector<T> get_sequence() {
+    std::vector<T> values(get_count(sizeof(T)));
+    for (T& value : values) value = get<T>();
+    return values;
+  }
+  /// A sequence of bytes, as it lies in the message.
+  std::span<const std::byte> get_bytes() { return take(get_count(1)); }
+  std::string get_string();
+  /// How many elements of at least `size` bytes follow.
+  std::size_t get_count(std::size_t size);
+
+ private:
+  void align(std::size_t size);
+  std::span<const std::byte> take(std::size_t count);
+
+  std::span<const std::byte> body_;
+  std::string name_;
+  std::size_t at_ = 0;
+  bool swapped_ = false;
+};
+
+}  // namespace palpate

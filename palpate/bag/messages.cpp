@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/bag/messages.hpp"
+
+#include "palpate/bag/cdr.hpp"
+
+namespace palpate::ros {
+namespace {
+
+// One walk over a message's fields serves both ways: `Fields` writes them, or reads them.
+class Put {
+ public:
+  template <class T>
+  void number(const T& value) {
+    out_.put(value);
+  }
+  void flag(const bool& value) { out_.put(static_cast<std::uint8_t>(value ? 1 : 0)); }
+  void text(const std::string& value) { out_.put_string(value); }
+  void bytes(const std::vector<std::byte>& value) {
+    out_.put_sequence(std::span(reinterpret_cast<const std::uint8_t*>(value.data()), value.size()));
+  }
+  template <class T>
+  void numbers(const std::vector<T>& values) {
+    out_.put_sequence(std::span(values));
+  }
+  template <class T, std::size_t n>
+  void array(const std::array<T, n>& values) {
+    out_.put_array(std::span<const T>(values));
+  }
+  template <class T, class Each>
+  void sequence(const std::vector<T>& values, std::size_t /*least*/, const Each& each) {
+    out_.put(static_cast<std::uint32_t>(values.size()));
+    for (const T& value : values) each(value);
+  }
+  std::vector<std::byte> take() { return out_.take(); }
+
+ private:
+  CdrWriter out_;
+};
+
+class Get {
+ public:
+  Get(std::span<const std::byte> bytes, const std::string& name) : in_(bytes, name) {}
+
+  template <class T>
+  void number(T& value) {
+    value = in_.get<T>();
+  }
+  void flag(bool& value) { value = in_.get<std::uint8_t>() != 0; }
+  void text(std::string& value) { value = in_.get_string(); }
+  void bytes(std::vector<std::byte>& value) {
+    const std::span<const std::byte> bytes = in_.get_bytes();
+    value.assign(bytes.begin(), bytes.end());
+  }
+  template <class T>
+  void numbers(std::vector<T>& values) {
+    values = in_.get_sequence<T>();
+  }
+  template <class T, std::size_t n>
+  void array(std::array<T, n>& values) {
+    for (T& value : values) value = in_.get<T>();
+  }
+  template <class T, class Each>
+  void sequence(std::vector<T>& values, std::size_t least, const Each& each) {
+    values.resize(in_.get_count(least));
+    for (T& value : values) each(value);
+  }
+
+ private:
+  CdrReader in_;
+};
+
+template <class Way, class H>
+void walk_header(Way& way, H& header) {
+  way.number(header.stamp.sec);
+  way.number(header.stamp.nanosec);
+  way.text(header.frame_id);
+}
+
+template <class Way, class M>
+void walk_image(Way& way, M& m) {
+  walk_header(way, m.header);
+  way.number(m.height);
+  way.number(m.width);
+  way.text(m.encoding);
+  way.number(m.is_bigendian);
+  way.number(m.step);
+  way.bytes(m.data);
+}
+
+template <class Way, class M>
+void walk_compressed(Way& way, M& m) {
+  walk_header(way, m.header);
+  way.text(m.format);
+  way.bytes(m.data);
+}
+
+template <class Way, class M>
+void walk_camera(Way& way, M& m) {
+  walk_header(way, m.header);
+  way.number(m.height);
+  way.number(m.width);
+  way.text(m.distortion_model);
+  way.numbers(m.d);
+  way.array(m.k);
+  way.array(m.r);
+  way.array(m.p);
+  way.number(m.binning_x);
+  way.number(m.binning_y);
+  way.array(m.roi);
+  way.flag(m.do_rectify);
+}
+
+template <class Way, class M>
+void walk_points(Way& way, M& m) {
+  walk_header(way, m.header);
+  way.number(m.height);
+  way.number(m.width);
+  way.sequence(m.fields, 13, [&way](auto& field) {
+    way.text(field.name);
+    way.number(field.offset);
+    way.number(field.datatype);
+    way.number(field.count);
+  });
+  way.flag(m.is_bigendian);
+  way.number(m.point_step);
+  way.number(m.row_step);
+  way.bytes(m.data);
+  way.flag(m.is_dense);
+}
+
+template <class Way, class M>
+void walk_pose(Way& way, M& m) {
+  walk_header(way, m.header);
+  way.array(m.position);
+  way.array(m.orientation);
+}
+
+template <class Way, class M>
+void walk_wrench(Way& way, M& m) {
+  walk_header(way, m.header);
+  way.array(m.force);
+  way.array(m.torque);
+}
+
+template <class Way, class M>
+void walk_transforms(Way& way, M& m) {
+  way.sequence(m.transforms, 72, [&way](auto& transform) {
+    walk_header(way, transform.header);
+    way.text(transform.child_frame_id);
+    way.array(transform.translation);
+    way.array(transform.rotation);
+  });
+}
+
+template <class Message, class Walk>
+std::vector<std::byte> encode_by(const Message& message, const Walk& walk) {
+  Put put;
+  walk(put, message);
+  return put.take();
+}
+
+template <class Message, class Walk>
+Message decode_by(std::span<const std::byte> bytes, const std::string& name, const Walk& walk) {
+  Get get(bytes, name);
+  Message message;
+  walk(get, message);
+  return message;
+}
+
+constexpr auto image = [](auto& way, auto& m) { walk_image(way, m); };
+constexpr auto compressed = [](auto& way, auto& m) { walk_compressed(way, m); };
+constexpr auto camera = [](auto& way, auto& m) { walk_camera(way, m); };
+constexpr auto points = [](auto& way, auto& m) { walk_points(way, m); };
+constexpr auto pose = [](auto& way, auto& m) { walk_pose(way, m); };
+constexpr auto wrench = [](auto& way, auto& m) { walk_wrench(way, m); };
+constexpr auto transforms = [](auto& way, auto& m) { walk_transforms(way, m); };
+constexpr auto string = [](auto& way, auto& m) { way.text(m.data); };
+
+}  // namespace
+
+Time Time::at(std::int64_t nanoseconds) {
+  constexpr std::int64_t second = 1'000'000'000;
+  std::int64_t sec = nanoseconds / second;
+  std::int64_t rest = nanoseconds % second;
+  if (rest < 0) {
+    rest += second;
+    --sec;
+  }
+  return {static_cast<std::int32_t>(sec), static_cast<std::uint32_t>(rest)};
+}
+
+std::vector<std::byte> encode(const Image& message) {
+  return encode_by(message, image);
+}
+std::vector<std::byte> encode(const CompressedImage& message) {
+  return encode_by(message, compressed);
+}
+std::vector<std::byte> encode(const CameraInfo& message) {
+  return encode_by(message, camera);
+}
+std::vector<std::byte> encode(const PointCloud2& message) {
+  return encode_by(message, points);
+}
+std::vector<std::byte> encode(const PoseStamped& message) {
+  return encode_by(message, pose);
+}
+std::vector<std::byte> encode(const WrenchStamped& message) {
+  return encode_by(message, wrench);
+}
+std::vector<std::byte> encode(const TFMessage& message) {
+  return encode_by(message, transforms);
+}
+std::vector<std::byte> encode(const String& message) {
+  return encode_by(message, string);
+}
+
+std::vector<std::byte> encode(const Float64MultiArray& message) {
+  CdrWriter out;
+  const auto size = static_cast<std::uint32_t>(message.data.size());
+  out.put(std::uint32_t{1});  // layout.dim
+  out.put_string(message.label);
+  out.put(size);              // size
+  out.put(size);              // stride
+  out.put(std::uint32_t{0});  // layout.data_offset
+  out.put_sequence(std::span(message.data));
+  return out.take();
+}
+
+template <>
+Image decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<Image>(bytes, name, image);
+}
+template <>
+CompressedImage decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<CompressedImage>(bytes, name, compressed);
+}
+template <>
+CameraInfo decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<CameraInfo>(bytes, name, camera);
+}
+template <>
+PointCloud2 decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<PointCloud2>(bytes, name, points);
+}
+template <>
+PoseStamped decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<PoseStamped>(bytes, name, pose);
+}
+template <>
+WrenchStamped decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<WrenchStamped>(bytes, name, wrench);
+}
+template <>
+TFMessage decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<TFMessage>(bytes, name, transforms);
+}
+template <>
+String decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<String>(bytes, name, string);
+}
+
+template <>
+Float64MultiArray decode(std::span<const std::byte> bytes, const std::string& name) {
+  CdrReader in(bytes, name);
+  Float64MultiArray message;
+  const std::size_t dimensions = in.get_count(12);
+  for (std::size_t i = 0; i < dimensions; ++i) {
+    const std::string label = in.get_string();
+    if (i == 0) message.label = label;
+    static_cast<void>(in.get<std::uint32_t>());
+    static_cast<void>(in.get<std::uint32_t>());
+  }
+  static_cast<void>(in.get<std::uint32_t>());
+  message.data = in.get_sequence<double>();
+  return message;
+}
+
+}  // namespace palpate::ros

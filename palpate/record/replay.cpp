@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/record/replay.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "palpate/core/error.hpp"
+#include "palpate/servo/free_side.hpp"
+
+namespace palpate {
+namespace {
+
+bool same(double a, double b) {
+  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+bool same(const Vec3& a, const Vec3& b) {
+  return same(a.x(), b.x()) && same(a.y(), b.y()) && same(a.z(), b.z());
+}
+
+// The field in which two ticks differ; empty if there is none. A recording that begins in the midst
+// of a session has other numbers for its frames.
+std::string difference(const Tick& a, const Tick& b) {
+  if (!same(a.force, b.force)) return "force";
+  if (!same(a.proxy, b.proxy)) return "proxy";
+  if (!same(a.normal, b.normal)) return "normal";
+  if (!same(a.surface_velocity, b.surface_velocity)) return "surface_velocity";
+  if (a.state != b.state) return "state";
+  if (a.steps != b.steps) return "steps";
+  if (a.flags != b.flags) return "flags";
+  return {};
+}
+
+// The renderer of a session, given again what it was given then.
+class Rerun {
+ public:
+  Rerun(SessionReader& session, const ServoTick& first)
+      : session_(session),
+        settings_number_(first.settings_number),
+        settings_(session.settings(settings_number_)),
+        renderer_(settings_.rendering) {
+    if (session.info().seat) renderer_.seat(*session.info().seat);
+  }
+
+  Tick tick(const ServoTick& recorded) {
+    if (recorded.settings_number != settings_number_) {
+      settings_number_ = recorded.settings_number;
+      settings_ = session_.settings(settings_number_);
+      renderer_.set_parameters(settings_.rendering);
+    }
+    adopt(recorded.frame_number);
+    if ((recorded.hand & proxy_reseated) != 0 && cloud_) {
+      renderer_.seat(
+          free_side(*cloud_, last_proxy_, last_normal_, settings_.rendering.proxy.r_c(), patch_));
+    }
+    const Tick tick = renderer_.tick(recorded.tick.hip, recorded.tick.t);
+    last_proxy_ = tick.proxy;
+    last_normal_ = tick.normal;
+    return tick;
+  }
+
+  [[nodiscard]] std::uint64_t frames() const { return frames_; }
+
+ private:
+  void adopt(std::uint64_t number) {
+    if (number == frame_number_) return;
+    const auto& put = session_.frames();
+    const auto last = put.find(number);
+    if (last == put.end() || number < frame_number_)
+      throw Error("recording", "lacks frame " + std::to_string(number),
+                  "the disk was too slow, or the recording is damaged");
+    auto frame = last;
+    if (session_.info().kind == SessionInfo::Kind::headless) frame = put.upper_bound(frame_number_);
+    for (; frame != std::next(last); ++frame) {
+      std::shared_ptr<const Cloud> cloud = session_.cloud(frame->second);
+      renderer_.frame(*cloud, frame->second.stamp);
+      cloud_ = std::move(cloud);  // only now may the one before go
+      ++frames_;
+    }
+    frame_number_ = number;
+  }
+
+  SessionReader& session_;
+  std::uint64_t settings_number_;
+  ServoSettings settings_;
+  Renderer renderer_;
+  std::uint64_t frame_number_ = 0;
+  std::shared_ptr<const Cloud> cloud_;
+  Patch patch_;
+  Vec3 last_proxy_ = Vec3::Zero();
+  Vec3 last_normal_ = Vec3::Zero();
+  std::uint64_t frames_ = 0;
+};
+
+}  // namespace
+
+ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress) {
+  constexpr std::size_t ticks_a_report = 1000;
+  ReplayReport report;
+  if (session.ticks() == 0) {
+    report.broken_off = "the recording has no ticks";
+    return report;
+  }
+  ServoTick recorded = session.tick(0);
+  Rerun rerun(session, recorded);
+  for (std::size_t i = 0; i < session.ticks(); ++i) {
+    if (i > 0) {
+      const std::uint64_t expected = recorded.number + 1;
+      recorded = session.tick(i);
+      if (recorded.number != expected) {
+        report.broken_off = "ticks " + std::to_string(expected) + " to " +
+                            std::to_string(recorded.number - 1) + " are missing";
+        break;
+      }
+    }
+    try {
+      const Tick again = rerun.tick(recorded);
+      const std::string field = difference(again, recorded.tick);
+      if (!field.empty()) {
+        ++report.different_ticks;
+        if (!report.first_difference) {
+          report.first_difference = recorded.number;
+          report.field = field;
+        }
+        const double distance = (again.force - recorded.tick.force).norm();
+        report.largest_difference = std::max(report.largest_difference, distance);
+      }
+    } catch (const Error& error) {
+      report.broken_off = "tick " + std::to_string(recorded.number) + ": " + error.what();
+      break;
+    }
+    ++report.ticks;
+    if (progress && i % ticks_a_report == 0) progress(i);
+  }
+  report.frames = rerun.frames();
+  return report;
+}
+
+}  // namespace palpate

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "palpate/record/session_reader.hpp"
+
+namespace palpate {
+
+/// What a replay found.
+struct ReplayReport {
+  std::uint64_t ticks = 0;            ///< replayed
+  std::uint64_t frames = 0;           ///< adopted
+  std::uint64_t different_ticks = 0;  ///< in which a bit differs
+  /// The first of those: its number, and the field that differs.
+  std::optional<std::uint64_t> first_difference;
+  std::string field;
+  double largest_difference = 0.0;  ///< [N] between two forces
+  /// Why it could not go on to the end, such as ticks that the recorder lost; empty if it could.
+  std::string broken_off;
+
+  [[nodiscard]] bool identical() const { return different_ticks == 0 && broken_off.empty(); }
+};
+
+/// Runs the renderer anew on a session's frames, HIPs and settings, each before the tick that it
+/// was used in, and compares each tick with the recorded one, bit for bit: the proxy, the normal,
+/// the force before the safety chain, the state and the flags.
+/// @param progress  called now and then with the number of ticks done; may be empty
+/// @throws Error if the recording is damaged.
+ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress = {});
+
+}  // namespace palpate

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/record/session.hpp"
+
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
+#include <nlohmann/json.hpp>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+// One walk over a tick's fields names, writes and reads them, so that the three cannot differ.
+template <class Way, class T>
+void walk(Way& way, T& record) {
+  auto& tick = record.tick;
+  way("t", tick.t);
+  way("hip", tick.hip);
+  way("proxy", tick.proxy);
+  way("normal", tick.normal);
+  way("rendered_force", tick.force);
+  way("state", tick.state);
+  way("steps", tick.steps);
+  way("surface_velocity", tick.surface_velocity);
+  way("frame", tick.frame);
+  way("flags", tick.flags);
+  way("force", record.force);
+  way("position", record.position);
+  way("gain", record.gain);
+  way("frame_stamp", record.frame_stamp);
+  way("frame_age", record.frame_age);
+  way("number", record.number);
+  way("frame_number", record.frame_number);
+  way("settings_number", record.settings_number);
+  way("safety", record.safety);
+  way("wake_up_ns", record.wake_up_ns);
+  way("previous_compute_ns", record.previous_compute_ns);
+  way("hand", record.hand);
+}
+
+class Names {
+ public:
+  template <class T>
+  void operator()(std::string_view name, const T& /*value*/) {
+    if constexpr (std::is_same_v<T, Vec3>) {
+      for (const char* axis : {"_x", "_y", "_z"}) names.push_back(std::string(name) + axis);
+    } else {
+      names.emplace_back(name);
+    }
+  }
+  std::vector<std::string> names;
+};
+
+class Put {
+ public:
+  template <class T>
+  void operator()(std::string_view /*name*/, const T& value) {
+    if constexpr (std::is_same_v<T, Vec3>) {
+      row.insert(row.end(), {value.x(), value.y(), value.z()});
+    } else {
+      row.push_back(static_cast<double>(value));  // whole numbers are far below 2^53
+    }
+  }
+  std::vector<double> row;
+};
+
+class Get {
+ public:
+  Get(std::span<const double> row, const std::string& name) : row_(row), name_(name) {}
+
+  template <class T>
+  void operator()(std::string_view field, T& value) {
+    if constexpr (std::is_same_v<T, Vec3>) {
+      for (int axis = 0; axis < 3; ++axis) value[axis] = row_[at_++];
+    } else if constexpr (std::is_same_v<T, double>) {
+      value = row_[at_++];
+    } else if constexpr (std::is_enum_v<T>) {
+      value = static_cast<T>(static_cast<int>(whole(field, 0.0, 2.0)));
+    } else {
+      constexpr double most = 9007199254740992.0;  // 2^53
+      using Limits = std::numeric_limits<T>;
+      value = static_cast<T>(whole(field, std::max(static_cast<double>(Limits::min()), -most),
+                                   std::min(static_cast<double>(Limits::max()), most)));
+    }
+  }
+
+ private:
+  double whole(std::string_view field, double least, double most) {
+    const double value = row_[at_++];
+    if (!(value >= least && value <= most && value == std::floor(value)))
+      throw Error(name_, "has a " + std::string(field) + " of " + std::to_string(value),
+                  "it may be damaged");
+    return value;
+  }
+
+  std::span<const double> row_;
+  const std::string& name_;
+  std::size_t at_ = 0;
+};
+
+json numbers(const Vec3& v) {
+  return json::array({v.x(), v.y(), v.z()});
+}
+
+Vec3 vec3_of(const json& array) {
+  return {array.at(0).get<double>(), array.at(1).get<double>(), array.at(2).get<double>()};
+}
+
+// Calls `read` with the JSON in `text`; whatever does not fit is an Error about `name`.
+template <class Read>
+auto parsed(const std::string& text, const std::string& name, const Read& read) {
+  try {
+    return read(json::parse(text));
+  } catch (const json::exception& error) {
+    throw Error(name, error.what(), "it may be damaged, or of another version of palpate");
+  }
+}
+
+}  // namespace
+
+const std::vector<std::string>& tick_columns() {
+  static const std::vector<std::string> columns = [] {
+    const ServoTick tick{};
+    Names names;
+    walk(names, tick);
+    return names.names;
+  }();
+  return columns;
+}
+
+std::vector<double> row_of(const ServoTick& tick) {
+  Put put;
+  put.row.reserve(tick_columns().size());
+  walk(put, tick);
+  return std::move(put.row);
+}
+
+ServoTick tick_of(std::span<const double> row, const std::string& name) {
+  if (row.size() != tick_columns().size())
+    throw Error(name,
+                "has " + std::to_string(row.size()) + " numbers instead of " +
+                    std::to_string(tick_columns().size()),
+                "it may be damaged, or of another version of palpate");
+  ServoTick tick{};
+  Get get(row, name);
+  walk(get, tick);
+  return tick;
+}
+
+std::string to_json(const SessionInfo& info) {
+  json object = {{"palpate", info.version},
+                 {"kind", info.kind == SessionInfo::Kind::live ? "live" : "headless"},
+                 {"cameras", info.cameras},
+                 {"device", info.device},
+                 {"epoch_ns", info.epoch},
+                 {"tick_columns", tick_columns()}};
+  if (info.seat) object["seat"] = numbers(*info.seat);
+  return object.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+SessionInfo session_from_json(const std::string& text, const std::string& name) {
+  return parsed(text, name, [&](const json& object) {
+    SessionInfo info;
+    info.kind = object.at("kind").get<std::string>() == "live" ? SessionInfo::Kind::live
+                                                               : SessionInfo::Kind::headless;
+    info.version = object.at("palpate").get<std::string>();
+    info.cameras = object.at("cameras").get<std::vector<std::string>>();
+    info.device = object.at("device").get<std::string>();
+    info.epoch = object.at("epoch_ns").get<std::int64_t>();
+    if (object.contains("seat")) info.seat = vec3_of(object.at("seat"));
+    return info;
+  });
+}
+
+std::string to_json(const NumberedSettings& settings) {
+  const ServoSettings& all = settings.settings;
+  json rendering;
+  json safety;
+  json pose = json::array();
+  for (const ParameterInfo& row : parameter_table()) rendering[row.name] = row.get(all.rendering);
+  for (const SafetyParameterInfo& row : safety_parameter_table())
+    safety[row.name] = all.safety.*row.member;
+  for (int i = 0; i < 12; ++i) pose.push_back(all.placement.world_from_device(i / 4, i % 4));
+  return json{{"number", settings.number}, {"method", method_name(all.rendering.method)},
+              {"parameters", rendering},   {"safety", safety},
+              {"world_from_device", pose}, {"workspace_scale", all.placement.workspace_scale}}
+      .dump();
+}
+
+NumberedSettings settings_from_json(const std::string& text, const std::string& name) {
+  return parsed(text, name, [&](const json& object) {
+    NumberedSettings settings;
+    ServoSettings& all = settings.settings;
+    settings.number = object.at("number").get<std::uint64_t>();
+    all.rendering.method = method_from_name(object.at("method").get<std::string>());
+    const json& parameters = object.at("parameters");
+    for (const ParameterInfo& row : parameter_table()) {
+      // r_c is derived: setting it would round the three radii that it scales.
+      if (row.name != "r_c")
+        set_parameter(all.rendering, row.name, parameters.at(row.name).get<double>());
+    }
+    for (const SafetyParameterInfo& row : safety_parameter_table())
+      set_parameter(all.safety, row.name, object.at("safety").at(row.name).get<double>());
+    const json& pose = object.at("world_from_device");
+    for (int i = 0; i < 12; ++i)
+      all.placement.world_from_device(i / 4, i % 4) =
+          pose.at(static_cast<std::size_t>(i)).get<double>();
+    all.placement.workspace_scale = object.at("workspace_scale").get<double>();
+    validate(all);
+    return settings;
+  });
+}
+
+}  // namespace palpate

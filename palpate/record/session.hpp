@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "palpate/servo/cycle.hpp"
+
+namespace palpate {
+
+/// What a recording says of its session as a whole.
+struct SessionInfo {
+  /// Who called the renderer: in a live loop a tick adopts the newest frame alone; a run as fast as
+  /// the machine can adopts each, in order.
+  enum class Kind { live, headless };
+
+  Kind kind = Kind::headless;
+  std::string version{};               ///< of palpate
+  std::vector<std::string> cameras{};  ///< URIs
+  std::string device{};                ///< URI
+  std::int64_t epoch = 0;              ///< [ns] since 1970: when the session's clock was 0
+  std::optional<Vec3> seat{};          ///< [m] where the proxy was put before the first tick
+};
+
+/// The topics of a session besides its cameras' (CameraTopics).
+namespace session_topic {
+constexpr std::string_view session = "/palpate/session";    ///< String, JSON: SessionInfo
+constexpr std::string_view settings = "/palpate/settings";  ///< String, JSON: each ServoSettings
+constexpr std::string_view frame = "/palpate/frame";        ///< Float64MultiArray: each frame put
+constexpr std::string_view tick = "/palpate/tick";          ///< Float64MultiArray: each ServoTick
+constexpr std::string_view hip = "/palpate/hip";            ///< PoseStamped, of each tick
+constexpr std::string_view proxy = "/palpate/proxy";        ///< PoseStamped
+constexpr std::string_view force = "/palpate/force";        ///< WrenchStamped: what the hand felt
+constexpr std::string_view transforms = "/tf";              ///< the cameras' places
+}  // namespace session_topic
+
+constexpr std::string_view world_frame = "world";
+
+/// The numbers of /palpate/tick, in their order: a ServoTick to the bit.
+const std::vector<std::string>& tick_columns();
+std::vector<double> row_of(const ServoTick& tick);
+/// @throws Error naming `name` if the numbers are not as many as tick_columns().
+ServoTick tick_of(std::span<const double> row, const std::string& name);
+
+std::string to_json(const SessionInfo& info);
+/// @throws Error naming `name` if it is damaged.
+SessionInfo session_from_json(const std::string& text, const std::string& name);
+
+struct NumberedSettings {
+  std::uint64_t number = 0;  ///< as ServoTick's
+  ServoSettings settings;
+};
+std::string to_json(const NumberedSettings& settings);
+/// @throws Error naming `name` if it is damaged or does not validate.
+NumberedSettings settings_from_json(const std::string& text, const std::string& name);
+
+}  // namespace palpate

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/record/session_reader.hpp"
+
+#include <cmath>
+#include <string>
+
+#include "palpate/bag/messages.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double most = 9007199254740992.0;  // 2^53
+
+std::uint64_t whole(double value, const std::string& name) {
+  if (!(value >= 0.0 && value <= most && value == std::floor(value)))
+    throw Error(name, "has a number of " + std::to_string(value), "it may be damaged");
+  return static_cast<std::uint64_t>(value);
+}
+
+}  // namespace
+
+template <class Message, class Take>
+void SessionReader::read_all(std::string_view topic, const Take& take) {
+  for (const BagReader::Place& place : bag_.places(topic)) {
+    const std::string name = bag_.name(topic, place);
+    take(ros::decode<Message>(bag_.read(place), name), name);
+  }
+}
+
+SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
+  const BagReader::Topic* session = bag_.find(session_topic::session);
+  if (session == nullptr || bag_.places(session_topic::session).empty())
+    throw Error(path.string(), "is not a session of palpate's",
+                "its frames may still be touched, with --camera recording:" + path.string());
+  read_all<ros::String>(session_topic::session, [&](const auto& message, const auto& name) {
+    info_ = session_from_json(message.data, name);
+  });
+  read_all<ros::String>(session_topic::settings, [&](const auto& message, const auto& name) {
+    const NumberedSettings settings = settings_from_json(message.data, name);
+    settings_[settings.number] = settings.settings;
+  });
+  read_all<ros::Float64MultiArray>(
+      session_topic::frame, [&](const auto& message, const auto& name) {
+        const std::vector<double>& row = message.data;
+        if (row.size() < 4 || row.size() % 2 != 0)
+          throw Error(name, "has " + std::to_string(row.size()) + " numbers", "it may be damaged");
+        PutFrame& frame = frames_[whole(row[0], name)];
+        frame.stamp = row[1];
+        for (std::size_t i = 2; i < row.size(); i += 2)
+          frame.parts.emplace_back(whole(row[i], name), whole(row[i + 1], name));
+      });
+  ticks_ = bag_.places(session_topic::tick);
+}
+
+ServoTick SessionReader::tick(std::size_t index) {
+  const BagReader::Place& place = ticks_.at(index);
+  const std::string name = bag_.name(session_topic::tick, place);
+  return tick_of(ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data, name);
+}
+
+const ServoSettings& SessionReader::settings(std::uint64_t number) const {
+  const auto found = settings_.find(number);
+  if (found == settings_.end())
+    throw Error("recording", "has no settings " + std::to_string(number), "it may be damaged");
+  return found->second;
+}
+
+std::shared_ptr<const Cloud> SessionReader::cloud(std::size_t camera, std::size_t number) {
+  Camera& entry = cameras_[camera];
+  if (entry.cloud && entry.number == number) return entry.cloud;
+  if (!entry.camera) {
+    const CameraTopics topics(camera);
+    entry.camera.emplace(bag_, bag_.find(topics.depth) != nullptr ? topics.depth : topics.points,
+                         BagCamera::Options{});
+  }
+  if (number >= entry.camera->frames())
+    throw Error("recording",
+                "has no frame " + std::to_string(number) + " on " + entry.camera->topic(),
+                "it may be damaged");
+  entry.cloud = entry.camera->frame(number).cloud;
+  entry.number = number;
+  return entry.cloud;
+}
+
+std::shared_ptr<const Cloud> SessionReader::cloud(const PutFrame& frame) {
+  std::vector<std::shared_ptr<const Cloud>> clouds;
+  for (const auto& [camera, number] : frame.parts) clouds.push_back(cloud(camera, number));
+  if (clouds.size() == 1) return clouds.front();
+  return std::make_shared<CloudSet>(std::move(clouds));
+}
+
+}  // namespace palpate

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "palpate/bag/bag_reader.hpp"
+#include "palpate/record/session.hpp"
+#include "palpate/sources/bag_camera.hpp"
+
+namespace palpate {
+
+/// Reads what SessionWriter wrote, also of a session that was killed. Used on one thread.
+class SessionReader {
+ public:
+  /// @throws Error if it is no bag, not of palpate's, or damaged.
+  explicit SessionReader(const std::filesystem::path& path);
+
+  [[nodiscard]] const SessionInfo& info() const { return info_; }
+  [[nodiscard]] std::size_t ticks() const { return ticks_.size(); }
+  /// @param index  from 0, in the order of the session  @throws Error if it is damaged.
+  [[nodiscard]] ServoTick tick(std::size_t index);
+  /// @throws Error if they are not in the recording.
+  [[nodiscard]] const ServoSettings& settings(std::uint64_t number) const;
+
+  /// A frame as the renderer got it.
+  struct PutFrame {
+    double stamp = 0.0;  ///< [s]
+    /// Which camera's which frame.
+    std::vector<std::pair<std::size_t, std::size_t>> parts;
+  };
+  /// By their number.
+  [[nodiscard]] const std::map<std::uint64_t, PutFrame>& frames() const { return frames_; }
+  /// What the cameras saw. @throws Error if it is damaged.
+  [[nodiscard]] std::shared_ptr<const Cloud> cloud(const PutFrame& frame);
+
+ private:
+  struct Camera {
+    std::optional<BagCamera> camera;
+    std::size_t number = 0;  // of `cloud`
+    std::shared_ptr<const Cloud> cloud;
+  };
+
+  std::shared_ptr<const Cloud> cloud(std::size_t camera, std::size_t number);
+  template <class Message, class Take>
+  void read_all(std::string_view topic, const Take& take);
+
+  BagReader bag_;
+  SessionInfo info_;
+  std::vector<BagReader::Place> ticks_;
+  std::map<std::uint64_t, ServoSettings> settings_;
+  std::map<std::uint64_t, PutFrame> frames_;
+  std::map<std::size_t, Camera> cameras_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/record/session_writer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "palpate/bag/messages.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/servo/realtime.hpp"
+#include "palpate/sources/bag_camera.hpp"
+#include "palpate/sources/depth_png.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double commit_interval = 1.0;  // [s]
+
+std::array<double, 3> array_of(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+ros::CameraInfo camera_info(const ros::Header& header, const Intrinsics& k) {
+  ros::CameraInfo info{.header = header,
+                       .height = static_cast<std::uint32_t>(k.height),
+                       .width = static_cast<std::uint32_t>(k.width),
+                       .distortion_model = k.distorted() ? "rational_polynomial" : "plumb_bob",
+                       .d = std::vector<double>(k.distorted() ? 8 : 5),
+                       .k = {k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0},
+                       .r = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
+                       .p = {k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0}};
+  if (k.distorted()) std::copy(k.distortion.begin(), k.distortion.end(), info.d.begin());
+  return info;
+}
+
+ros::TransformStamped transform(const ros::Header& header, const std::string& child,
+                                const Eigen::Isometry3d& parent_from_child) {
+  const Eigen::Quaterniond q(parent_from_child.linear());
+  return {.header = header,
+          .child_frame_id = child,
+          .translation = array_of(parent_from_child.translation()),
+          .rotation = {q.x(), q.y(), q.z(), q.w()}};
+}
+
+}  // namespace
+
+SessionWriter::SessionWriter(const std::filesystem::path& folder, const SessionInfo& info,
+                             std::optional<std::uint64_t> max_bytes)
+    : info_(info), bag_(folder, max_bytes), committed_at_(monotonic_now()) {
+  write(session_topic::session, info_.epoch, ros::String{to_json(info_)}, true);
+  bag_.commit();
+}
+
+template <class Message>
+void SessionWriter::write(std::string_view topic, std::int64_t nanoseconds, const Message& message,
+                          bool latched) {
+  bag_.write(bag_.topic(std::string(topic), Message::type, latched), nanoseconds,
+             ros::encode(message));
+}
+
+// On the clock of the wall, for whoever sorts messages by it; the exact time is in the message.
+std::int64_t SessionWriter::nanoseconds(double t) const {
+  constexpr double farthest = 1e9;  // [s]
+  if (!(std::abs(t) <= farthest)) return info_.epoch;
+  return info_.epoch + std::llround(1e9 * t);
+}
+
+void SessionWriter::settings(const NumberedSettings& settings, double t) {
+  write(session_topic::settings, nanoseconds(t), ros::String{to_json(settings)}, true);
+}
+
+void SessionWriter::frame(std::uint64_t number, double stamp,
+                          std::span<const std::shared_ptr<const Cloud>> cameras) {
+  if (cameras_.size() < cameras.size()) cameras_.resize(cameras.size());
+  // Number, stamp, and for each camera in use which one and which of its frames.
+  ros::Float64MultiArray row{.label = "number,stamp,camera,frame,...",
+                             .data = {static_cast<double>(number), stamp}};
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    if (!cameras[i]) continue;
+    Camera& camera = cameras_[i];
+    if (camera.newest != cameras[i]) {
+      if (const auto* image = dynamic_cast<const DepthImage*>(cameras[i].get())) {
+        depth(i, stamp, *image);
+      } else if (const auto* cloud = dynamic_cast<const PointCloud*>(cameras[i].get())) {
+        points(i, stamp, *cloud);
+      } else {
+        throw Error("frame " + std::to_string(number), "is of a kind that cannot be recorded",
+                    "record depth images or points");
+      }
+      camera.newest = cameras[i];
+      ++camera.frames;
+    }
+    row.data.push_back(static_cast<double>(i));
+    row.data.push_back(static_cast<double>(camera.frames - 1));
+  }
+  write(session_topic::frame, nanoseconds(stamp), row);
+  ++frames_;
+}
+
+void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& image) {
+  const CameraTopics topics(camera);
+  const Intrinsics& k = image.intrinsics();
+  const std::int64_t at = nanoseconds(stamp);
+  const ros::Header header{ros::Time::at(at), topics.optical_frame};
+
+  // compressed_depth_image_transport's header is of no meaning to whole numbers.
+  constexpr std::size_t config_header = 12;
+  ros::CompressedImage packed{.header = header, .format = "16UC1; compressedDepth png", .data = {}};
+  packed.data.resize(config_header);
+  const std::vector<std::byte> png = encode_depth_png(k.width, k.height, image.depth());
+  packed.data.insert(packed.data.end(), png.begin(), png.end());
+
+  ros::Float64MultiArray exact{.label = "stamp,units_per_metre,world_from_camera",
+                               .data = {stamp, image.units_per_metre()}};
+  for (int i = 0; i < 12; ++i) exact.data.push_back(image.world_from_camera()(i / 4, i % 4));
+
+  const ros::Header world{header.stamp, std::string(world_frame)};
+  write(topics.depth, at, packed);
+  write(topics.camera_info, at, camera_info(header, k));
+  write(topics.exact, at, exact);
+  write(session_topic::transforms, at,
+        ros::TFMessage{{transform(world, topics.optical_frame, image.world_from_camera())}});
+}
+
+void SessionWriter::points(std::size_t camera, double stamp, const PointCloud& cloud) {
+  const CameraTopics topics(camera);
+  const std::int64_t at = nanoseconds(stamp);
+  constexpr std::uint8_t float64 = 8;
+  constexpr std::uint32_t point_step = 24;
+  ros::PointCloud2 message{.header = {ros::Time::at(at), std::string(world_frame)},
+                           .width = static_cast<std::uint32_t>(cloud.size()),
+                           .fields = {{"x", 0, float64}, {"y", 8, float64}, {"z", 16, float64}},
+                           .point_step = point_step,
+                           .row_step = static_cast<std::uint32_t>(cloud.size()) * point_step,
+                           .data = std::vector<std::byte>(cloud.size() * point_step)};
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const std::array<double, 3> point = array_of(cloud.point(i));
+    std::memcpy(message.data.data() + i * point_step, point.data(), point_step);
+  }
+  // A voxel that was widened to fit is so again.
+  constexpr double widest = 1.0;  // [m]
+  const Vec3 viewpoint = cloud.viewpoint().value_or(Vec3::Zero());
+  const ros::Float64MultiArray exact{
+      .label = "stamp,voxel,has_viewpoint,viewpoint",
+      .data = {stamp, std::min(cloud.voxel(), widest), cloud.viewpoint() ? 1.0 : 0.0, viewpoint.x(),
+               viewpoint.y(), viewpoint.z()}};
+  write(topics.points, at, message);
+  write(topics.exact, at, exact);
+}
+
+void SessionWriter::tick(const ServoTick& tick) {
+  const std::int64_t at = nanoseconds(tick.tick.t);
+  const ros::Header header{ros::Time::at(at), std::string(world_frame)};
+  write(session_topic::tick, at, ros::Float64MultiArray{"tick", row_of(tick)});
+  write(session_topic::hip, at, ros::PoseStamped{header, array_of(tick.tick.hip)});
+  write(session_topic::proxy, at, ros::PoseStamped{header, array_of(tick.tick.proxy)});
+  write(session_topic::force, at, ros::WrenchStamped{header, array_of(tick.force), {}});
+  ++ticks_;
+}
+
+void SessionWriter::commit_if_due() {
+  const double now = monotonic_now();
+  if (now - committed_at_ < commit_interval) return;
+  bag_.commit();
+  committed_at_ = now;
+}
+
+}  // namespace palpate

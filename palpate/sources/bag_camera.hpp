@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/bag/bag_reader.hpp"
+#include "palpate/bag/messages.hpp"
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/frame.hpp"
+
+namespace palpate {
+
+/// What a recording of palpate's own calls the topics of camera `number`, from 0.
+struct CameraTopics {
+  explicit CameraTopics(std::size_t number);
+
+  std::string depth;  ///< CompressedImage, "16UC1; compressedDepth png": the camera's own bits
+  std::string camera_info;  ///< CameraInfo, one for each depth image
+  std::string points;       ///< PointCloud2 of float64, where the camera gives points
+  /// Float64MultiArray, one for each image or cloud: what the standard messages leave out or round.
+  /// Depth: stamp [s], units per metre, world_from_camera (3 x 4, row by row).
+  /// Points: stamp [s], voxel [m], 1 if a viewpoint follows, the viewpoint [m].
+  std::string exact;
+  std::string optical_frame;  ///< in TF
+};
+
+/// The frames of one topic of a bag: what palpate recorded, to the bit, or what others did.
+///
+/// Depth images of encoding 16UC1, mono16 [mm] and 32FC1 [m], raw or compressedDepth (PNG), with a
+/// CameraInfo beside them; PointCloud2 with x, y and z. Of others the points are in the camera's
+/// own frame.
+class BagCamera {
+ public:
+  struct Options {
+    std::optional<double> units;  ///< [1/m] of raw depth; for 32FC1, what it is rounded to
+    double voxel = 0.010;         ///< [m] of a PointCloud that palpate did not record
+  };
+
+  /// @param bag  must outlive this
+  /// @throws Error if the topic is not there, is none of a camera's, or has no CameraInfo.
+  BagCamera(BagReader& bag, const std::string& topic, const Options& options);
+
+  /// The topics that can be opened.
+  static std::vector<std::string> topics_of(const BagReader& bag);
+
+  [[nodiscard]] std::size_t frames() const { return places_.size(); }
+  [[nodiscard]] const std::string& topic() const { return topic_; }
+  /// By its own stamp: of palpate's the session's clock, else since 1970. @throws Error
+  [[nodiscard]] Frame frame(std::size_t number);
+  /// [Hz] the median, by when they were recorded; none of less than two frames.
+  [[nodiscard]] std::optional<double> frame_rate() const;
+  [[nodiscard]] bool is_ours() const { return !exact_places_.empty(); }
+  /// The encoding of the frame read last.
+  [[nodiscard]] const std::string& details() const { return details_; }
+
+ private:
+  Frame read_depth(std::size_t number, ros::Image image);
+  Frame read_points(std::size_t number, const ros::PointCloud2& message);
+  [[nodiscard]] std::vector<double> exact(std::size_t number, std::size_t size);
+  const std::shared_ptr<const ViewingRays>& rays(std::size_t number, const ros::Image& image);
+  [[nodiscard]] double stamp(std::size_t number, const ros::Header& header) const;
+  [[nodiscard]] std::string name(std::size_t number) const;
+
+  BagReader& bag_;
+  std::string topic_, type_, info_topic_, exact_topic_;
+  Options options_;
+  std::vector<BagReader::Place> places_, info_places_, exact_places_;
+  std::shared_ptr<const ViewingRays> rays_;  // of the frame read last
+  std::string details_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sources/recording.hpp"
+
+#include <array>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+#include "palpate/sources/bag_camera.hpp"
+
+namespace palpate {
+namespace {
+
+class Recording final : public Source {
+ public:
+  Recording(const std::string& path, const std::string& topic, const BagCamera::Options& options,
+            SourceInfo info)
+      : bag_(path), camera_(bag_, choose(topic, info), options), info_(std::move(info)) {
+    if (camera_.frames() == 0)
+      throw Error(info_.uri, "holds no frames on " + camera_.topic(),
+                  "name another topic with ?topic=");
+    info_.kind = camera_.is_ours() ? "recording of palpate's" : "ROS 2 bag";
+    info_.frames = camera_.frames();
+    info_.frame_rate = camera_.frame_rate();
+    first_ = camera_.frame(0).stamp;
+    info_.start_time = first_;
+  }
+
+  std::optional<Frame> next() override {
+    if (next_ == camera_.frames()) return std::nullopt;
+    Frame frame = camera_.frame(next_++);
+    frame.stamp -= first_;
+    info_.details = camera_.details();
+    return frame;
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+ private:
+  std::string choose(const std::string& wanted, SourceInfo& info) const {
+    const std::vector<std::string> topics = BagCamera::topics_of(bag_);
+    if (!wanted.empty()) return wanted;
+    if (topics.empty())
+      throw Error(info.uri, "has no topic of depth images or points",
+                  "record one, or name it with ?topic=");
+    std::string others;
+    for (std::size_t i = 1; i < topics.size(); ++i) others += " " + topics[i];
+    if (!others.empty())
+      info.notes.push_back(topics.front() + " is read; also there, by ?topic=:" + others);
+    return topics.front();
+  }
+
+  BagReader bag_;
+  BagCamera camera_;
+  SourceInfo info_;
+  double first_ = 0.0;
+  std::size_t next_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Source> open_recording(const Uri& uri) {
+  constexpr std::array<std::string_view, 3> known{"topic", "units", "voxel"};
+  uri.allow_only(known);
+  BagCamera::Options options;
+  if (uri.has("units")) options.units = uri.number_option("units", 1000.0, 1e-3, 1e7, "px");
+  options.voxel = uri.number_option("voxel", options.voxel, 1e-3, 1.0, "m");
+  return std::make_unique<Recording>(uri.path(), uri.text_option("topic", ""), options,
+                                     SourceInfo{.uri = uri.text(), .kind = {}});
+}
+
+}  // namespace palpate

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/record/session_reader.hpp"
+#include "palpate/record/session_writer.hpp"
+
+namespace palpate::test {
+
+/// A small camera that looks down on a wavy floor which rises from frame to frame, with doubles
+/// that no short decimal number holds.
+inline std::shared_ptr<const DepthImage> wavy_floor(int frame, bool distorted = false) {
+  Intrinsics k{.width = 32, .height = 24, .fx = 1000.0 / 9.0, .fy = 110.1, .cx = 15.7, .cy = 11.3};
+  if (distorted) k.distortion = {0.1 / 3.0, -0.01, 1e-3 / 7.0, 0, 0, 0, 0, 1e-5};
+  static const auto plain = std::make_shared<const ViewingRays>(k);
+  const auto rays = distorted ? std::make_shared<const ViewingRays>(k) : plain;
+  std::mt19937 random(static_cast<unsigned>(frame));
+  std::vector<std::uint16_t> depth;
+  for (int i = 0; i < k.width * k.height; ++i) {
+    const double wave = 20.0 * std::sin(0.3 * (i % k.width));
+    const auto noise = static_cast<double>(random() % 5);
+    depth.push_back(static_cast<std::uint16_t>(1000.0 + wave + noise - 3.0 * frame));
+  }
+  depth[5] = 0;
+  depth[6] = 65535;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.rotate(Eigen::AngleAxisd(std::acos(-1.0) - 0.1 / 3.0, Vec3::UnitX()));
+  pose.translation() = Vec3(0.1, -0.2, 1.0) / 3.0;
+  return std::make_shared<DepthImage>(rays, std::move(depth), 3000.0 / 1.1, pose);
+}
+
+/// Runs a hand through the floor and records it. @return the ticks as they were
+inline std::vector<ServoTick> record_press(SessionWriter& writer, const Parameters& parameters,
+                                           int ticks, bool close = true) {
+  const auto place = [](int i) { return Vec3(0.03 + 1e-5 * i, -0.05, -0.01 - 4e-4 * i); };
+  Renderer renderer(parameters);
+  renderer.seat(place(0));
+  writer.settings({.number = 0, .settings = {parameters, {}, {}}}, 0.0);
+  std::vector<ServoTick> recorded;
+  std::shared_ptr<const Cloud> cloud;
+  for (int i = 0; i < ticks; ++i) {
+    if (i % 33 == 0) {
+      const double stamp = i * 1e-3 - 1e-4 / 3.0;
+      const auto fresh = wavy_floor(i / 33);
+      renderer.frame(*fresh, stamp);
+      cloud = fresh;
+      writer.frame(static_cast<std::uint64_t>(i / 33 + 1), stamp, std::span(&cloud, 1));
+    }
+    ServoTick record{};
+    record.tick = renderer.tick(place(i), i * 1e-3);
+    record.force = 0.5 * record.tick.force;
+    record.number = static_cast<std::uint64_t>(i);
+    record.frame_number = static_cast<std::uint64_t>(i / 33 + 1);
+    writer.tick(record);
+    recorded.push_back(record);
+  }
+  if (close) writer.close();
+  return recorded;
+}
+
+inline SessionInfo press_info() {
+  return {.version = "test",
+          .cameras = {"synthetic:floor"},
+          .device = "script:",
+          .epoch = 1'700'000'000'000'000'000,
+          .seat = Vec3(0.03, -0.05, -0.01)};
+}
+
+}  // namespace palpate::test

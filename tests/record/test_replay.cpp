@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <functional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "palpate/bag/messages.hpp"
+#include "palpate/record/replay.hpp"
+
+#include "tests/record/sessions.hpp"
+#include "tests/support/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace palpate {
+namespace {
+
+using test::fails_saying;
+using test::press_info;
+using test::record_press;
+using test::TemporaryFolder;
+using test::wavy_floor;
+
+class Replay : public ::testing::TestWithParam<Method> {};
+
+TEST_P(Replay, GivesTheSameForcesBitForBit) {
+  const TemporaryFolder folder;
+  Parameters parameters;
+  parameters.method = GetParam();
+  parameters.coupling.damping = 1.0 / 3.0;
+  std::vector<ServoTick> ticks;
+  {
+    SessionWriter writer(folder.path() / "bag", press_info());
+    ticks = record_press(writer, parameters, 150);
+  }
+  double largest = 0.0;
+  for (const ServoTick& tick : ticks) largest = std::max(largest, tick.tick.force.norm());
+  ASSERT_GT(largest, 0.5);  // it touched
+  SessionReader reader(folder.path() / "bag");
+  const ReplayReport report = replay(reader);
+  EXPECT_TRUE(report.identical()) << report.field << report.broken_off;
+  EXPECT_EQ(report.ticks, 150U);
+  EXPECT_EQ(report.frames, 5U);
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, Replay,
+                         ::testing::Values(Method::paper, Method::paper_as_printed,
+                                           Method::fixed_step, Method::sight),
+                         [](const auto& each) {
+                           std::string name(method_name(each.param));
+                           for (char& c : name) c = c == '-' ? '_' : c;
+                           return name;
+                         });
+
+// Records anew what was recorded, with some of it changed.
+ReplayReport replay_changed(const std::function<bool(ServoTick&)>& change) {
+  const TemporaryFolder folder;
+  std::vector<ServoTick> ticks;
+  {
+    SessionWriter writer(folder.path() / "bag", press_info());
+    ticks = record_press(writer, {}, 120);
+  }
+  SessionReader reader(folder.path() / "bag");
+  {
+    SessionWriter writer(folder.path() / "changed", press_info());
+    writer.settings({}, 0.0);
+    for (const auto& [number, frame] : reader.frames()) {
+      if (number == 4) continue;  // of ticks 99 to 119
+      const auto cloud = reader.cloud(frame);
+      writer.frame(number, frame.stamp, std::span(&cloud, 1));
+    }
+    for (ServoTick& tick : ticks) {
+      if (change(tick)) writer.tick(tick);
+    }
+    writer.close();
+  }
+  SessionReader changed(folder.path() / "changed");
+  return replay(changed);
+}
+
+TEST(ReplayOf, AForceThatDiffersInItsLastBitIsFound) {
+  const ReplayReport report = replay_changed([](ServoTick& tick) {
+    if (tick.number == 42) tick.tick.force.z() = std::nextafter(tick.tick.force.z(), 1e9);
+    return tick.number < 99;
+  });
+  EXPECT_FALSE(report.identical());
+  EXPECT_EQ(report.different_ticks, 1U);
+  EXPECT_EQ(report.first_difference, 42U);
+  EXPECT_EQ(report.field, "force");
+  EXPECT_TRUE(report.broken_off.empty()) << report.broken_off;
+  EXPECT_EQ(report.ticks, 99U);
+}
+
+TEST(ReplayOf, TicksThatTheRecorderLostEndThere) {
+  const ReplayReport report =
+      replay_changed([](const ServoTick& tick) { return tick.number < 50 || tick.number > 60; });
+  EXPECT_EQ(report.ticks, 50U);
+  EXPECT_EQ(report.different_ticks, 0U);
+  EXPECT_FALSE(report.identical());
+  EXPECT_NE(report.broken_off.find("50 to 60"), std::string::npos) << report.broken_off;
+}
+
+TEST(ReplayOf, AFrameThatTheRecorderLostEndsThere) {
+  const ReplayReport report = replay_changed([](const ServoTick&) { return true; });
+  EXPECT_EQ(report.ticks, 99U);
+  EXPECT_FALSE(report.identical());
+  EXPECT_NE(report.broken_off.find("frame 4"), std::string::npos) << report.broken_off;
+}
+
+TEST(ReplayOf, AnEmptySessionIsNotCalledIdentical) {
+  const TemporaryFolder folder;
+  SessionWriter(folder.path() / "bag", press_info()).close();
+  SessionReader reader(folder.path() / "bag");
+  EXPECT_FALSE(replay(reader).identical());
+}
+
+TEST(ReplayOf, ABagOfOthersIsRefused) {
+  const TemporaryFolder folder;
+  {
+    BagWriter writer(folder.path() / "bag");
+    writer.write(writer.topic("/a", ros::String::type), 0, ros::encode(ros::String{"b"}));
+  }
+  EXPECT_TRUE(fails_saying([&] { return SessionReader(folder.path() / "bag"); },
+                           "not a session of palpate's", "recording:"));
+}
+
+}  // namespace
+}  // namespace palpate

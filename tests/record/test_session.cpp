@@ -1,0 +1,352 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <bit>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "palpate/record/replay.hpp"
+#include "palpate/sources/source.hpp"
+
+#include "tests/record/sessions.hpp"
+#include "tests/support/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+using test::fails_saying;
+using test::press_info;
+using test::record_press;
+using test::TemporaryFolder;
+using test::wavy_floor;
+
+std::uint64_t bits(double value) {
+  return std::bit_cast<std::uint64_t>(value);
+}
+
+TEST(Session, KeepsEachBitOfATick) {
+  const TemporaryFolder folder;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  ServoTick tick{};
+  tick.tick = {.t = 1.0 / 3.0,
+               .hip = {nan, -0.0, 5e-324},
+               .proxy = {1.0 / 7.0, -1e300, std::numeric_limits<double>::infinity()},
+               .normal = {0, 0, 1},
+               .force = {0.1, 0.2, 0.3},
+               .state = ContactState::entrenchment,
+               .steps = 63,
+               .surface_velocity = 1e-17,
+               .frame = -1,
+               .flags = 0xffffffffU};
+  tick.force = {-0.1, 1.0 / 9.0, 2};
+  tick.position = {4, 5, 6};
+  tick.gain = 1.0 / 11.0;
+  tick.frame_age = std::numeric_limits<double>::infinity();
+  tick.number = 1ULL << 52U;
+  tick.frame_number = 12345678901ULL;
+  tick.settings_number = 3;
+  tick.safety = 0x80000001U;
+  tick.wake_up_ns = 4294967295U;
+  tick.hand = 7;
+  {
+    SessionWriter writer(folder.path() / "bag", press_info());
+    writer.tick(tick);
+    writer.close();
+  }
+  SessionReader reader(folder.path() / "bag");
+  ASSERT_EQ(reader.ticks(), 1U);
+  const std::vector<double> wrote = row_of(tick);
+  const std::vector<double> read = row_of(reader.tick(0));
+  ASSERT_EQ(read.size(), tick_columns().size());
+  for (std::size_t i = 0; i < read.size(); ++i)
+    EXPECT_EQ(bits(read[i]), bits(wrote[i])) << tick_columns()[i];
+  EXPECT_EQ(reader.tick(0).number, tick.number);
+  EXPECT_EQ(reader.tick(0).tick.state, ContactState::entrenchment);
+}
+
+TEST(Session, KeepsEachBitOfADepthImage) {
+  const TemporaryFolder folder;
+  std::vector<std::shared_ptr<const Cloud>> cameras{wavy_floor(0), wavy_floor(1, true)};
+  {
+    SessionWriter writer(folder.path() / "bag", press_info());
+    writer.frame(4, 1.0 / 3.0, cameras);
+    cameras[1] = wavy_floor(2, true);
+    writer.frame(5, 2.0 / 3.0, cameras);
+    writer.close();
+  }
+  SessionReader reader(folder.path() / "bag");
+  ASSERT_EQ(reader.frames().size(), 2U);
+  const auto& frame = reader.frames().at(5);
+  EXPECT_EQ(frame.stamp, 2.0 / 3.0);
+  // The first camera's image was not written again.
+  using Parts = std::vector<std::pair<std::size_t, std::size_t>>;
+  EXPECT_EQ(frame.parts, (Parts{{0, 0}, {1, 1}}));
+  const auto cloud = reader.cloud(frame);
+  const auto* set = dynamic_cast<const CloudSet*>(cloud.get());
+  ASSERT_NE(set, nullptr);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto* read = dynamic_cast<const DepthImage*>(set->clouds()[i].get());
+    const auto& wrote = dynamic_cast<const DepthImage&>(*cameras[i]);
+    ASSERT_NE(read, nullptr);
+    EXPECT_EQ(read->depth(), wrote.depth());
+    EXPECT_EQ(read->intrinsics(), wrote.intrinsics());
+    EXPECT_EQ(read->units_per_metre(), wrote.units_per_metre());
+    EXPECT_EQ(read->world_from_camera().matrix(), wrote.world_from_camera().matrix());
+  }
+}
+
+TEST(Session, KeepsPointsInTheOrderInWhichTheyAreGathered) {
+  const TemporaryFolder folder;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(-0.05, 0.05);
+  std::vector<Vec3> points;
+  for (int i = 0; i < 5000; ++i) points.emplace_back(uniform(random), uniform(random), 0.1);
+  points.emplace_back(Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+  const auto cloud = std::make_shared<const PointCloud>(points, Vec3(0, 0, 1.0 / 3.0), 0.007);
+  const std::shared_ptr<const Cloud> seen = cloud;
+  {
+    SessionWriter writer(folder.path() / "bag", press_info());
+    writer.frame(1, 0.0, std::span(&seen, 1));
+    writer.close();
+  }
+  SessionReader reader(folder.path() / "bag");
+  const auto read = reader.cloud(reader.frames().at(1));
+  const auto patch_of = [](const Cloud& from) {
+    auto patch = std::make_unique<Patch>();
+    gather(from, Ball{Vec3(0.01, 0.0, 0.1), 0.02}, *patch);
+    return patch;
+  };
+  const auto a = patch_of(*cloud);
+  const auto b = patch_of(*read);
+  ASSERT_GT(a->size(), 100U);
+  ASSERT_EQ(a->size(), b->size());
+  for (std::size_t i = 0; i < a->size(); ++i) {
+    EXPECT_EQ(a->x()[i], b->x()[i]);
+    EXPECT_EQ(a->y()[i], b->y()[i]);
+    EXPECT_EQ(a->z()[i], b->z()[i]);
+  }
+  EXPECT_EQ(dynamic_cast<const PointCloud&>(*read).viewpoint(), cloud->viewpoint());
+}
+
+TEST(Session, KeepsEachBitOfTheSettings) {
+  NumberedSettings settings{.number = 9, .settings = {}};
+  ServoSettings& all = settings.settings;
+  all.rendering.method = Method::sight;
+  for (const ParameterInfo& row : parameter_table()) {
+    // Between the smallest and the default, with a long fraction where fractions are kept.
+    if (row.name != "r_c" && row.name != "step_budget")
+      row.set(all.rendering, row.min + (row.default_value - row.min) * (1.0 - 1e-3 / 7.0));
+  }
+  all.safety.max_force = 1.0 / 3.0;
+  all.safety.fade_age = 0.1 / 3.0;
+  all.placement.workspace_scale = 2.0 / 3.0;
+  all.placement.world_from_device.rotate(Eigen::AngleAxisd(0.1 / 3.0, Vec3::UnitY()));
+  const NumberedSettings back = settings_from_json(to_json(settings), "settings");
+  EXPECT_EQ(back.number, 9U);
+  EXPECT_EQ(back.settings.rendering.method, Method::sight);
+  for (const ParameterInfo& row : parameter_table())
+    EXPECT_EQ(bits(row.get(back.settings.rendering)), bits(row.get(all.rendering))) << row.name;
+  for (const SafetyParameterInfo& row : safety_parameter_table())
+    EXPECT_EQ(bits(back.settings.safety.*row.member), bits(all.safety.*row.member)) << row.name;
+  EXPECT_EQ(back.settings.placement.world_from_device.matrix(),
+            all.placement.world_from_device.matrix());
+  EXPECT_EQ(back.settings.placement.workspace_scale, all.placement.workspace_scale);
+}
+
+TEST(Session, WithDamagedSettingsIsRefused) {
+  std::string text = to_json(NumberedSettings{});
+  EXPECT_TRUE(fails_saying([&] { return settings_from_json(text.substr(9), "it"); }, "it"));
+  text.replace(text.find("\"paper\""), 7, "\"papier\"");
+  EXPECT_TRUE(fails_saying([&] { return settings_from_json(text, "it"); }, "papier"));
+  EXPECT_TRUE(fails_saying([&] { return settings_from_json("{}", "it"); }, "it"));
+  EXPECT_TRUE(fails_saying([&] { return session_from_json("[]", "it"); }, "it"));
+  std::vector<double> row = row_of(ServoTick{});
+  row[13] = 3.0;
+  EXPECT_TRUE(fails_saying([&] { return tick_of(row, "it"); }, "it", "state"));
+  row[13] = 1e300;
+  EXPECT_TRUE(fails_saying([&] { return tick_of(row, "it"); }, "it", "state"));
+  row.pop_back();
+  EXPECT_TRUE(fails_saying([&] { return tick_of(row, "it"); }, "it", "numbers"));
+}
+
+TEST(Session, IsThereUpToTheLastCommitWhenItsProgramIsKilled) {
+  const TemporaryFolder folder;
+  const fs::path bag = folder.path() / "bag";
+  const pid_t child = fork();
+  if (child == 0) {
+    SessionWriter writer(bag, press_info());
+    static_cast<void>(record_press(writer, {}, 100, false));
+    writer.commit();
+    ServoTick lost{};
+    lost.number = 100;
+    writer.tick(lost);
+    raise(SIGKILL);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  ASSERT_TRUE(fs::exists(bag / "metadata.yaml"));
+  SessionReader reader(bag);
+  EXPECT_EQ(reader.ticks(), 100U);
+  const ReplayReport report = replay(reader);
+  EXPECT_TRUE(report.identical()) << report.broken_off << report.field;
+  EXPECT_EQ(report.ticks, 100U);
+}
+
+TEST(Session, EndsWithAMessageWhereTheDiskIsFullAndKeepsWhatWasCommitted) {
+  const TemporaryFolder folder;
+  SessionWriter writer(folder.path() / "bag", press_info(), 400'000);
+  writer.settings({}, 0.0);
+  std::uint64_t committed = 0;
+  const auto fill = [&] {
+    for (std::uint64_t i = 0;; ++i) {
+      ServoTick tick{};
+      tick.number = i;
+      writer.tick(tick);
+      if (i % 100 != 99) continue;
+      writer.commit();
+      committed = i + 1;
+    }
+    return 0;
+  };
+  EXPECT_TRUE(fails_saying(fill, "bag_0.db3", "full", "make room on the disk"));
+  EXPECT_GE(committed, 100U);
+  SessionReader reader(folder.path() / "bag");
+  EXPECT_EQ(reader.ticks(), committed);
+}
+
+TEST(Session, OpensInPythonsOwnSqlite) {
+  if (!fs::exists("/usr/bin/python3")) GTEST_SKIP() << "there is no /usr/bin/python3";
+  const TemporaryFolder folder;
+  {
+    SessionWriter writer(folder.path() / "bag", press_info());
+    static_cast<void>(record_press(writer, {}, 40));
+  }
+  const fs::path script = folder.write("read.py", R"(
+import sqlite3, struct, sys, zlib
+bag = sqlite3.connect(f"file:{sys.argv[1]}?mode=ro", uri=True)
+def messages(topic):
+    return bag.execute("select timestamp, data from messages join topics on topics.id = topic_id"
+                       " where name = ? order by messages.id", (topic,)).fetchall()
+ticks = messages("/palpate/hip")
+assert len(ticks) == 40, len(ticks)
+stamp, data = ticks[39]
+assert stamp == 1_700_000_000_039_000_000, stamp
+assert data[:4] == bytes([0, 1, 0, 0])
+sec, nsec, length = struct.unpack_from("<iII", data, 4)
+assert (sec, nsec) == (1_700_000_000, 39_000_000)
+assert data[16:16 + length] == b"world\0"
+x, y, z = struct.unpack_from("<3d", data, 4 + 24)
+assert (x, y) == (0.03 + 1e-5 * 39, -0.05), (x, y)
+_, image = messages("/camera_0/depth/image_raw/compressedDepth")[0]
+png = image[image.index(b"\x89PNG"):]
+assert struct.unpack_from(">IIBB", png, 16) == (32, 24, 16, 0)
+at, packed = 8, b""
+while at < len(png):
+    size, kind = struct.unpack_from(">I4s", png, at)
+    if kind == b"IDAT":
+        packed += png[at + 8:at + 8 + size]
+    at += size + 12
+rows = zlib.decompress(packed)
+pixels, previous = [], bytes(64)
+for v in range(24):
+    kind, row = rows[65 * v], rows[65 * v + 1:65 * v + 65]
+    assert kind in (0, 2), kind
+    previous = bytes((a + b) & 255 for a, b in zip(row, previous)) if kind else row
+    pixels += struct.unpack(">32H", previous)
+assert pixels[5:7] == [0, 65535], pixels[:8]
+print(sum(pixels))
+)");
+  const std::string command = "/usr/bin/python3 -B " + script.string() + " " +
+                              (folder.path() / "bag/bag_0.db3").string() + " >" +
+                              (folder.path() / "out").string();
+  ASSERT_EQ(std::system(command.c_str()), 0);  // NOLINT(cert-env33-c): a shell is wanted
+  const auto floor = wavy_floor(0);
+  std::uint64_t sum = 0;
+  for (const std::uint16_t raw : floor->depth()) sum += raw;
+  std::uint64_t read = 0;
+  std::ifstream(folder.path() / "out") >> read;
+  EXPECT_EQ(read, sum);
+}
+
+TEST(Session, IsASourceOfItsFrames) {
+  const TemporaryFolder folder;
+  {
+    SessionWriter writer(folder.path() / "bag", press_info());
+    static_cast<void>(record_press(writer, {}, 100));
+  }
+  const auto source = open_source("recording:" + (folder.path() / "bag").string());
+  EXPECT_EQ(source->info().frames, 4U);
+  for (int i = 0; i < 4; ++i) {
+    const auto frame = source->next();
+    ASSERT_TRUE(frame);
+    const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
+    EXPECT_EQ(image.depth(), wavy_floor(i)->depth());
+    EXPECT_EQ(frame->stamp, (i * 33 * 1e-3 - 1e-4 / 3.0) - (0.0 - 1e-4 / 3.0));
+  }
+  EXPECT_FALSE(source->next());
+}
+
+// Everything that a reader of sessions does. @return false if it said that the bag is damaged
+bool read_all(const fs::path& file) {
+  bool whole = false;
+  try {
+    SessionReader reader(file);
+    for (const auto& [number, frame] : reader.frames()) static_cast<void>(reader.cloud(frame));
+    whole = replay(reader).broken_off.empty();
+    const auto source = open_source("recording:" + file.string());
+    while (source->next()) {
+    }
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string_view(error.what()).find_first_of("\r\n"), std::string_view::npos)
+        << error.what();
+    return false;
+  }
+  return whole;
+}
+
+class DamagedSession : public ::testing::Test {
+ protected:
+  DamagedSession() {
+    SessionWriter writer(folder_.path() / "bag", press_info());
+    static_cast<void>(record_press(writer, {}, 40));
+    std::ostringstream text;
+    text << std::ifstream(folder_.path() / "bag/bag_0.db3", std::ios::binary).rdbuf();
+    whole_ = text.str();
+  }
+
+  TemporaryFolder folder_;
+  std::string whole_;
+};
+
+TEST_F(DamagedSession, CutAnywhereIsAnErrorOfOneLine) {
+  ASSERT_TRUE(read_all(folder_.path() / "bag"));
+  std::size_t damaged_up_to = 0;
+  for (std::size_t size = 0; size < whole_.size(); size += 397) {
+    if (!read_all(folder_.write("cut.db3", whole_.substr(0, size)))) damaged_up_to = size;
+  }
+  // The last page may be one that nothing needs.
+  EXPECT_GT(damaged_up_to + 8192, whole_.size());
+}
+
+TEST_F(DamagedSession, WithBytesChangedIsReadOrAnErrorOfOneLine) {
+  std::mt19937 random(11);
+  int damaged = 0;
+  for (int i = 0; i < 400; ++i) {
+    std::string changed = whole_;
+    for (auto changes = random() % 20 + 1; changes > 0; --changes)
+      changed[random() % changed.size()] = static_cast<char>(random());
+    if (!read_all(folder_.write("changed.db3", changed))) ++damaged;
+  }
+  EXPECT_GT(damaged, 0);
+}
+
+}  // namespace
+}  // namespace palpate

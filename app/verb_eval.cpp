@@ -29,6 +29,7 @@ struct EvalOptions {
   std::vector<std::string> methods;
   std::string grid;
   std::string noise = "white";
+  std::string recording;
   std::int64_t seed = 1;
   int jobs = 0;
   bool resume = false;
@@ -62,6 +63,9 @@ lab::ExperimentOptions experiment_options(const EvalOptions& options) {
     result.noise = lab::Noise::correlated;
   else if (options.noise != "white")
     throw Error("--noise " + options.noise, "there is no such noise", "choose white or correlated");
+  result.recording = options.recording;
+  // Of what was recorded nobody knows the truth, so `ideal` has no place there.
+  if (!options.recording.empty() && options.methods.empty()) result.methods = {"paper", "sight"};
   return result;
 }
 
@@ -90,6 +94,9 @@ int eval(const EvalOptions& options) {
   const lab::ExperimentOptions given = experiment_options(options);
   if (!all && given.grid && !experiments.front()->has_grid)
     throw Error("--grid", "the experiment '" + options.name + "' has no grid", "leave it out");
+  if (!all && !given.recording.empty() && !experiments.front()->takes_recording)
+    throw Error("--recording", "the experiment '" + options.name + "' is a simulation",
+                "leave it out, or give it to scan");
   if (options.jobs < 0 || options.jobs > 1024)
     throw Error("--jobs " + std::to_string(options.jobs), "that many threads make no sense",
                 "give 1 to 1024, or 0 for one a core");
@@ -109,6 +116,10 @@ int eval(const EvalOptions& options) {
   for (const lab::Experiment* experiment : experiments) {
     lab::ExperimentOptions fitting = given;
     if (!experiment->has_grid) fitting.grid.reset();
+    if (!experiment->takes_recording) {
+      fitting.recording.clear();
+      fitting.methods = options.methods;
+    }
     std::unique_ptr<Progress> progress;
     runner.progress = [&](std::size_t done, std::size_t total) {
       if (!progress) progress = std::make_unique<Progress>(std::string(experiment->name), total);
@@ -143,6 +154,8 @@ Verb add_eval(CLI::App& program) {
       ->allow_extra_args(false);
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
   command->add_option("--noise", options->noise, "white (default) or correlated");
+  command->add_option("--recording", options->recording,
+                      "scan across a recording, e.g. tum:FOLDER, instead of the synthetic desk");
   command->add_option("--seed", options->seed, "of all noise (1)");
   command->add_option("--jobs", options->jobs, "threads (one a core)");
   command->add_flag("--resume", options->resume, "go on from an interrupted run's finished cells");

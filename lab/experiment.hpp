@@ -22,6 +22,7 @@ struct ExperimentOptions {
   std::uint64_t seed = 1;                   ///< of all noise
   std::optional<std::pair<int, int>> grid;  ///< sizes of its two axes, where it has two
   Noise noise = Noise::white;
+  std::string recording;  ///< a source's URI where an experiment takes one; empty: a simulation
   Parameters parameters;  ///< Table 2 unless set
 };
 
@@ -58,6 +59,7 @@ struct Experiment {
   std::vector<Claim> (*claims)(const Table&);
   /// A bench has scores; what redraws the paper has none.
   Scores (*scores)(const Table&) = nullptr;
+  bool takes_recording = false;  ///< takes --recording
 };
 
 /// All experiments, in the order of the report.

@@ -28,6 +28,7 @@ std::string command_line(const Experiment& experiment, const ExperimentOptions& 
   }
   if (options.grid) line += fmt::format(" --grid {}x{}", options.grid->first, options.grid->second);
   if (options.noise == Noise::correlated) line += " --noise correlated";
+  if (!options.recording.empty()) line += " --recording " + options.recording;
   if (options.seed != 1) line += fmt::format(" --seed {}", options.seed);
   return line;
 }

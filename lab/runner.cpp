@@ -35,6 +35,7 @@ std::string fingerprint(const Experiment& experiment, const ExperimentOptions& o
   text << "palpate experiment " << experiment.name << " seed " << options.seed << " noise "
        << static_cast<int>(options.noise);
   if (options.grid) text << " grid " << options.grid->first << 'x' << options.grid->second;
+  if (!options.recording.empty()) text << " recording " << options.recording;
   for (const std::string& name : methods_of(experiment, options)) text << ' ' << name;
   text.precision(17);
   for (const ParameterInfo& row : parameter_table()) text << ' ' << row.get(options.parameters);

@@ -2,7 +2,6 @@
 #include "lab/experiments/surfaces.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 
@@ -12,7 +11,6 @@
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 #include "palpate/sources/scene.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -240,121 +238,6 @@ plot csv every 4 using (strcol(1) eq "paper" ? $5/r : NaN):($7/r) with points pt
      csv every 4 using (strcol(1) eq "paper" ? $5/r : NaN):($6/r) with lines lw 2 lc rgb "#1f77b4" title "paper"
 )gp";
 
-// 5.4: over the desk's ramp, down behind it, onto its box and off again, at 0.05 m/s and 10 to 20
-// mm below the surface. x and z of the HIP; y stays in the middle of both.
-constexpr std::array<std::array<double, 2>, 10> scan_path = {{{-0.27, 0.010},
-                                                              {-0.27, -0.010},
-                                                              {-0.05, 0.055},
-                                                              {0.00, -0.012},
-                                                              {0.01, -0.012},
-                                                              {0.01, 0.090},
-                                                              {0.05, 0.090},
-                                                              {0.05, 0.055},
-                                                              {0.15, 0.055},
-                                                              {0.17, -0.010}}};
-constexpr double scan_y = 0.08;
-constexpr double scan_speed = 0.05;  // [m/s]
-
-double scan_length(std::size_t legs) {
-  double length = 0.0;
-  for (std::size_t i = 0; i < legs; ++i)
-    length +=
-        std::hypot(scan_path[i + 1][0] - scan_path[i][0], scan_path[i + 1][1] - scan_path[i][1]);
-  return length;
-}
-
-Vec3 scan_hip(double t) {
-  const double gone = scan_speed * t;
-  for (std::size_t i = 0; i + 1 < scan_path.size(); ++i) {
-    const double end = scan_length(i + 1);
-    if (gone > end && i + 2 < scan_path.size()) continue;
-    const double leg = end - scan_length(i);
-    const double share = std::min((gone - scan_length(i)) / leg, 1.0);
-    return {scan_path[i][0] + share * (scan_path[i + 1][0] - scan_path[i][0]), scan_y,
-            scan_path[i][1] + share * (scan_path[i + 1][1] - scan_path[i][1])};
-  }
-  return Vec3::Zero();
-}
-
-std::vector<Cell> scan_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  std::vector<Cell> cells;
-  for (const std::string& name : methods_of(experiment, options)) {
-    cells.emplace_back([=] {
-      const Uri uri("synthetic:desk?sensor=kinect&seed=" + std::to_string(options.seed));
-      const std::unique_ptr<SyntheticCamera> camera = open_synthetic_camera(uri);
-      const auto scene = std::make_shared<const Scene>(camera->scene());
-      const auto method = make_method(name, {options.parameters, truth_of(scene)});
-      const double duration = scan_length(scan_path.size() - 1) / scan_speed;
-      const auto ground = [&](double x) {
-        const auto hit = scene->cast(Vec3(x, scan_y, 1.0), -Vec3::UnitZ(), 0.0);
-        return hit ? 1.0 - *hit : 0.0;
-      };
-      method->seat(scan_hip(0.0));
-      std::string rows;
-      int i = 0;
-      Frame in_use;
-      for (std::uint64_t k = 0; k < static_cast<std::uint64_t>(duration * f_c); ++k) {
-        Frame next = camera->capture(static_cast<double>(k) / f_c, k);
-        method->frame(*next.cloud, next.stamp);
-        in_use = std::move(next);
-        for (; i * 1e-3 < static_cast<double>(k + 1) / f_c; ++i) {
-          const double t = i * 1e-3;
-          const Vec3 hip = scan_hip(t);
-          const Tick tick = method->tick(hip, t);
-          if (i % 4 == 0 && i > 100)
-            rows += Row()
-                        .add(name)
-                        .add(t)
-                        .add(hip.x())
-                        .add(hip.z())
-                        .add(tick.proxy.x())
-                        .add(tick.proxy.z())
-                        .add(ground(tick.proxy.x()))
-                        .add(tick.force.norm())
-                        .add(tick.steps)
-                        .add(tick.state != ContactState::free_motion)
-                        .done();
-        }
-      }
-      return rows;
-    });
-  }
-  return cells;
-}
-
-std::vector<Claim> scan_claims(const Table& table) {
-  std::vector<double> steps =
-      table.numbers("steps", [&](std::size_t row) { return table.text(row, "method") == "paper"; });
-  if (steps.empty()) return {};
-  std::sort(steps.begin(), steps.end());
-  const double median = steps[steps.size() / 2];
-  const double few = static_cast<double>(std::count_if(steps.begin(), steps.end(),
-                                                       [](double s) { return s <= 2; })) /
-                     static_cast<double>(steps.size());
-  return {
-      {"5.4", "typically converges in 1-2 proxy steps each time the haptic device moves",
-       "1-2 steps",
-       fmt::format("median {:g} steps a tick, {:.0f} % of ticks in at most 2", median, 100 * few),
-       median <= 2 ? "reproduced"
-                   : "differs: theta = 0.1 degrees and gamma = 3/10 need more where noise turns "
-                     "the normal from step to step"}};
-}
-
-constexpr std::string_view scan_plot = R"gp(
-set multiplot layout 2,1
-set key outside right top
-set xlabel "y [m]"
-set ylabel "z [m]"
-plot csv every 4 using (strcol(1) eq "paper" ? $5 : NaN):7 with lines lw 1 lc rgb "#bbbbbb" title "surface", \
-     csv every 4 using (strcol(1) eq "paper" ? $3 : NaN):4 with lines lw 2 dt 2 lc rgb "#888888" title "HIP", \
-     csv every 4 using (strcol(1) eq "ideal" ? $5 : NaN):6 with lines lw 1 lc rgb "#2ca02c" title "ideal", \
-     csv every 4 using (strcol(1) eq "paper" ? $5 : NaN):6 with lines lw 2 lc rgb "#1f77b4" title "paper"
-set ylabel "force [N]"
-plot csv every 4 using (strcol(1) eq "paper" ? $3 : NaN):8 with lines lw 2 lc rgb "#d62728" title "paper", \
-     csv every 4 using (strcol(1) eq "ideal" ? $3 : NaN):8 with lines lw 1 lc rgb "#2ca02c" title "ideal"
-unset multiplot
-)gp";
-
 }  // namespace
 
 Experiment flat_experiment() {
@@ -388,17 +271,6 @@ Experiment corners_experiment() {
           corners_cells,
           corners_plot,
           corners_claims};
-}
-
-Experiment scan_experiment() {
-  return {"scan",
-          "5.4, Fig. 16: over a ramp and a box that a synthetic Kinect sees",
-          "method,t,hip_y,hip_z,proxy_y,proxy_z,surface_z,force_n,steps,touching",
-          {"paper", "ideal"},
-          false,
-          scan_cells,
-          scan_plot,
-          scan_claims};
 }
 
 }  // namespace palpate::lab

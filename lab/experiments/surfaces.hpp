@@ -11,7 +11,5 @@ Experiment flat_experiment();
 Experiment jump_experiment();
 /// Section 5.3, Fig. 14: a triangle wave whose amplitude grows.
 Experiment corners_experiment();
-/// Section 5.4, Fig. 16: over a ramp and a box, as a Kinect sees them.
-Experiment scan_experiment();
 
 }  // namespace palpate::lab

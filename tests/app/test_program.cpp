@@ -257,6 +257,8 @@ TEST_F(Program, RefusesBadInputInOneLineThatNamesIt) {
   expect_refusal("info tum:" + path("nowhere"), {"nowhere"});
   expect_refusal("info pcd:" + write("not.pcd", "hello\n"), {"not.pcd"});
   expect_refusal("trace", {"--camera"});
+  expect_refusal("eval lift --recording tum:there", {"--recording", "lift"});
+  expect_refusal("eval scan --recording tum:nowhere", {"nowhere"});
   expect_refusal("run --headless --duration -1", {"--duration"});
   expect_refusal("run --duration -1", {"--duration"});
   expect_refusal("run --listen nowhere", {"--listen nowhere"});

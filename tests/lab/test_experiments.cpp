@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The paper's figures at reduced size, and that an experiment is the same however it is run.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -8,8 +9,6 @@
 #include <string>
 
 #include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "lab/experiment.hpp"
 #include "lab/method.hpp"
@@ -18,7 +17,9 @@
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 
+#include "tests/support/data.hpp"
 #include "tests/support/grids.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -27,12 +28,6 @@ namespace fs = std::filesystem;
 
 class Lab : public ::testing::Test {
  protected:
-  Lab() {
-    std::string pattern = (fs::temp_directory_path() / "palpate_lab_XXXXXX").string();
-    folder_ = mkdtemp(pattern.data());
-  }
-  ~Lab() override { fs::remove_all(folder_); }
-
   [[nodiscard]] Table run(std::string_view name, const ExperimentOptions& options) const {
     return {name, csv(name, options, 2)};
   }
@@ -46,11 +41,11 @@ class Lab : public ::testing::Test {
   }
 
   [[nodiscard]] fs::path file(std::string_view name) const {
-    return folder_ / (std::string(name) + ".csv");
+    return folder_.path() / (std::string(name) + ".csv");
   }
 
  private:
-  fs::path folder_;
+  test::TemporaryFolder folder_;
 };
 
 ExperimentOptions with(std::vector<std::string> methods) {
@@ -104,6 +99,42 @@ TEST_F(Lab, IsOnTheSurfaceInTheTickOfTheJump) {
   const Table table = run("jump", with({"paper"}));
   for (std::size_t row = 0; row < table.rows(); ++row)
     EXPECT_EQ(table.number(row, "ticks"), 1.0) << table.number(row, "jump_rc") << " r_c";
+}
+
+TEST_F(Lab, StaysAboveTheLiftOfFig12ThatTheFixedStepMethodLoses) {
+  const Table table = run("single-lift", with({"paper", "fixed-step"}));
+  double least = 1.0;
+  double last_of_fixed_step = 1.0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (table.number(row, "true_y") < 0.0) continue;
+    const double above = table.number(row, "proxy_y") - table.number(row, "cloud_y");
+    if (table.text(row, "method") == "paper") least = std::min(least, above);
+    if (table.text(row, "method") == "fixed-step") last_of_fixed_step = above;
+  }
+  EXPECT_GT(least, 0.0);
+  EXPECT_LT(last_of_fixed_step, 0.0);
+}
+
+TEST_F(Lab, ScansARealCamerasStreamWithoutLosingIt) {
+  PALPATE_DATA_OR_SKIP(recording, "seq_visp_tabletop_known_objects");
+  ExperimentOptions options = with({"paper"});
+  options.recording = "depth:" + recording.string() + "?frames=8";  // taken at rest
+  const Table table = run("scan", options);
+  int pressing = 0;
+  int touching = 0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (table.number(row, "t") < 0.6) continue;
+    ++pressing;
+    touching += table.number(row, "touching") != 0.0 ? 1 : 0;
+  }
+  ASSERT_GT(pressing, 300);
+  EXPECT_GT(touching, 0.97 * pressing);
+}
+
+TEST_F(Lab, KnowsNoTruthOfARecording) {
+  ExperimentOptions options = with({"ideal"});
+  options.recording = "synthetic:plane?frames=1";
+  EXPECT_THROW(csv("scan", options, 1), Error) << "ideal needs the truth";
 }
 
 TEST_F(Lab, LosesASurfaceFromFreeSpaceAboveR1TimesTheFrameRate) {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include <Eigen/Cholesky>
 
@@ -28,6 +27,7 @@ constexpr std::size_t wide_beam_points = 512;
 constexpr std::size_t inner_points = 768;
 constexpr std::size_t outer_points = 1280;
 constexpr std::size_t inner_rungs = 2;
+constexpr std::size_t median_points = 192;
 // A fit serves contacts within this of its centre [m].
 constexpr double serves = 1.5e-3;
 // While the surface is out of sight there is nothing to fit: what is remembered serves this far
@@ -51,58 +51,31 @@ constexpr double squared(double x) {
   return x * x;
 }
 
-// Value at time 0 of the least-squares line through heights at times t <= 0, and its slope.
-struct Line {
-  double value, slope;
+// What the newest 2, 4, 8, ... frames say of a shape: matrix * shape = right_side, in centimetres.
+constexpr std::size_t slope_windows = 4;
+struct SlopeWindow {
+  Eigen::Matrix<double, 5, 5> matrix;
+  Vec5 right_side;
 };
 
-Line line_through(std::span<const HeightSample> samples) {
-  const double now = samples.front().stamp;
-  const auto n = static_cast<double>(samples.size());
-  double t = 0.0, y = 0.0, tt = 0.0, ty = 0.0;
-  for (const HeightSample& s : samples) {
-    const double dt = s.stamp - now;
-    const double dy = s.height - samples.front().height;
-    t += dt;
-    y += dy;
-    tt += dt * dt;
-    ty += dt * dy;
+// Keeps the slopes of a shape that was summed over all frames within 4 standard deviations of what
+// each window of the newest ones says, the longest first: a surface that turns is never farther
+// off than their noise, and a false alarm costs no more than a little of the averaging.
+// @param point_variance  [cm^2] what one point weighs
+void confine_slopes(Vec5& shape, std::span<const SlopeWindow> windows, double point_variance) {
+  constexpr double confidence = 4.0;
+  for (std::size_t i = windows.size(); i-- > 0;) {
+    const Eigen::Matrix2d matrix = windows[i].matrix.topLeftCorner<2, 2>();
+    const double determinant = matrix.determinant();
+    if (!(determinant > 1e-6 * squared(matrix.trace()))) continue;
+    const Vec5 off = windows[i].right_side - windows[i].matrix * shape;
+    const Eigen::Matrix2d inverse = matrix.inverse();
+    const Vec2 change = inverse * off.head<2>();
+    for (int axis = 0; axis < 2; ++axis) {
+      const double slack = confidence * std::sqrt(point_variance * inverse(axis, axis));
+      shape[axis] += change[axis] - std::clamp(change[axis], -slack, slack);
+    }
   }
-  const double determinant = n * tt - t * t;
-  if (!(determinant > 0.0)) return {samples.front().height, 0.0};
-  const double slope = (n * ty - t * y) / determinant;
-  return {samples.front().height + (y - slope * t) / n, slope};
-}
-
-// The parabola through three heights, `ahead` after the newest one.
-double parabola_ahead(std::span<const HeightSample> s, double ahead) {
-  const double t1 = s[1].stamp - s[0].stamp;
-  const double t2 = s[2].stamp - s[0].stamp;
-  const double d1 = (s[1].height - s[0].height) / t1;
-  const double d2 = (s[2].height - s[0].height) / t2;
-  const double a = (d2 - d1) / (t2 - t1);
-  const double v = d1 - a * t1;
-  return s[0].height + v * ahead + a * ahead * ahead;
-}
-
-double mean_height(std::span<const HeightSample> samples) {
-  double sum = 0.0;
-  for (const HeightSample& s : samples) sum += s.height - samples.front().height;
-  return samples.front().height + sum / static_cast<double>(samples.size());
-}
-
-struct Rule {
-  std::size_t samples;
-  int order;
-  double noise;  // of its velocity, in sd / interval
-};
-constexpr std::array<Rule, 4> moving_rules = {
-    {{2, 1, 1.414}, {4, 1, 0.447}, {8, 1, 0.154}, {3, 2, 4.06}}};
-
-double foretell(const Rule& rule, std::span<const HeightSample> past, double ahead) {
-  if (rule.order == 2) return parabola_ahead(past, ahead);
-  const Line line = line_through(past.first(rule.samples));
-  return line.value + line.slope * ahead;
 }
 
 // Where the sightlines of the view that sees most of the patch come from; none if it does not know.
@@ -130,76 +103,6 @@ std::size_t heights_along(const Patch& patch, const Vec3& up, std::span<float> h
 
 }  // namespace
 
-ForetoldMotion foretell_motion(std::span<const HeightSample> samples, double sd,
-                               double interval) noexcept {
-  if (samples.size() < 2 || !(interval > 0.0)) return {0.0, samples.size()};
-  // How well each rule would have foretold the last heights, the newest weighing most.
-  constexpr std::array<double, 4> weights = {1.0, 0.7, 0.5, 0.35};
-  const auto misses = [&](auto&& rule, std::size_t needs) {
-    double sum = 0.0;
-    double weight = 0.0;
-    for (std::size_t i = 0; i < weights.size(); ++i) {
-      if (samples.size() < i + 1 + needs) break;
-      const auto past = samples.subspan(i + 1);
-      const double miss = rule(past, samples[i].stamp - past.front().stamp) - samples[i].height;
-      sum += weights[i] * miss * miss;
-      weight += weights[i];
-    }
-    return weight > 0.0 ? sum / weight : std::numeric_limits<double>::infinity();
-  };
-  const auto at_rest = [](std::span<const HeightSample> past, double) {
-    return mean_height(past.first(std::min<std::size_t>(past.size(), 8)));
-  };
-  double least = misses(at_rest, 1);
-  ForetoldMotion motion{0.0, samples.size()};
-  for (const Rule& rule : moving_rules) {
-    if (samples.size() < rule.samples) continue;
-    const double miss = misses([&](std::span<const HeightSample> past,
-                                   double ahead) { return foretell(rule, past, ahead); },
-                               rule.samples);
-    if (!(miss < 0.8 * least)) continue;
-    // A parabola's velocity is that of its chord: rendering must not accelerate.
-    const double candidate =
-        rule.order == 2 ? (foretell(rule, samples, interval) - samples[0].height) / interval
-                        : line_through(samples.first(rule.samples)).slope;
-    const double uncertainty = rule.noise * sd / interval;
-    if (std::abs(candidate) <= 3.5 * uncertainty) continue;
-    least = miss;
-    // What a parabola says of the next frame's travel says nothing of the last ones'.
-    motion = {candidate, rule.order == 2 ? 1 : rule.samples};
-  }
-  return motion;
-}
-
-double agreed_height(std::span<const HeightSample> samples, double sd, double velocity,
-                     double confidence) noexcept {
-  const double now = samples.front().stamp;
-  const auto moved = [&](const HeightSample& s) { return s.height + velocity * (now - s.stamp); };
-  // Means over 1, 2, 4, ... and all heights.
-  std::array<double, 8> means{};
-  std::array<double, 8> counts{};
-  std::size_t levels = 0;
-  const double base = samples.front().height;
-  double sum = 0.0;
-  std::size_t next = 1;
-  for (std::size_t i = 0; i < samples.size() && levels < means.size(); ++i) {
-    sum += moved(samples[i]) - base;
-    if (i + 1 == next || i + 1 == samples.size()) {
-      means[levels] = base + sum / static_cast<double>(i + 1);
-      counts[levels] = static_cast<double>(i + 1);
-      ++levels;
-      next *= 2;
-    }
-  }
-  double height = means[levels - 1];
-  for (std::size_t level = levels - 1; level-- > 0;) {
-    const double slack =
-        confidence * sd * std::sqrt(1.0 / counts[level] - 1.0 / counts[levels - 1]);
-    height = std::clamp(height, means[level] - slack, means[level] + slack);
-  }
-  return height;
-}
-
 std::optional<Layer> first_layer(std::span<float> heights, double gap,
                                  double least_share) noexcept {
   if (heights.size() < least_points) return std::nullopt;
@@ -216,7 +119,7 @@ std::optional<Layer> first_layer(std::span<float> heights, double gap,
 }
 
 double SightTracker::height_sd() const noexcept {
-  return std::sqrt(variance(rung_));
+  return std::sqrt(variance(mover_));
 }
 
 // Of one frame's height in a disc [m^2]. Until a few frames have told, what is usual for a depth
@@ -415,6 +318,7 @@ bool SightTracker::start(const Cloud& cloud, const Vec3& foot, const Vec3& up) n
   surface_ = {};
   count_ = 0;
   velocity_ = 0.0;
+  jumped_before_ = false;
   holding_ = false;
   smooth_ = false;
   shadowed_ = false;
@@ -423,31 +327,41 @@ bool SightTracker::start(const Cloud& cloud, const Vec3& foot, const Vec3& up) n
   return tracking_;
 }
 
-// Shifts the expected surface by the median residual near `foot` and says beyond which residual a
-// point does not belong to it.
-bool SightTracker::recentre(const Vec2& foot, double wide, double& cut) noexcept {
-  std::array<float, inner_points> residuals;
+// The residuals of a patch's points within `radius` of `foot`: their median, and how they spread
+// about it. Looks at an even part of them: a median of so many is
+// good enough to tell what belongs to a surface.
+std::optional<SightTracker::Residuals> SightTracker::residuals(const Vec2& foot, double radius,
+                                                               double wide) const noexcept {
+  std::array<float, median_points> values;
   std::size_t size = 0;
-  for (std::size_t i = 0; i < patch_.size() && size < residuals.size(); ++i) {
+  const std::size_t stride = 1 + patch_.size() / (values.size() + 1);
+  for (std::size_t i = 0; i < patch_.size() && size < values.size(); i += stride) {
     const Vec3 local = frame_.local_from_world(patch_.ball().centre +
                                                Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
-    if ((local.head<2>() - foot).squaredNorm() > squared(radii[0])) continue;
+    if ((local.head<2>() - foot).squaredNorm() > squared(radius)) continue;
     const double r = local.z() - surface_.height(local.head<2>());
-    if (std::abs(r) <= wide) residuals[size++] = static_cast<float>(r);
+    if (std::abs(r) <= wide) values[size++] = static_cast<float>(r);
   }
-  if (size < least_points) return false;
+  if (size < least_points) return std::nullopt;
   const auto median = [&] {
-    auto* middle = residuals.data() + size / 2;
-    std::nth_element(residuals.data(), middle, residuals.data() + size);
+    auto* middle = values.data() + size / 2;
+    std::nth_element(values.data(), middle, values.data() + size);
     return *middle;
   };
   const float centre = median();
-  for (std::size_t i = 0; i < size; ++i) residuals[i] = std::abs(residuals[i] - centre);
-  const double deviation = 1.4826 * median();
-  surface_.c[0] += centre;
+  for (std::size_t i = 0; i < size; ++i) values[i] = std::abs(values[i] - centre);
+  return Residuals{centre, 1.4826 * median()};
+}
+
+// Shifts the expected surface by the median residual near `foot` and says beyond which residual a
+// point does not belong to it.
+bool SightTracker::recentre(const Vec2& foot, double wide, double& cut) noexcept {
+  const std::optional<Residuals> near = residuals(foot, radii[0], wide);
+  if (!near) return false;
+  surface_.c[0] += near->median;
   // Quantised depth makes single deviations jump between the steps.
-  spread_ = count_ == 0 ? deviation : spread_ + 0.2 * (deviation - spread_);
-  cut = std::clamp(6.0 * std::max(deviation, spread_), 0.5e-3, wide);
+  spread_ = count_ == 0 ? near->deviation : spread_ + 0.2 * (near->deviation - spread_);
+  cut = std::clamp(6.0 * std::max(near->deviation, spread_), 0.5e-3, wide);
   return true;
 }
 
@@ -478,7 +392,12 @@ bool SightTracker::measure(const Cloud& cloud, const Vec2& foot, double stamp, b
   }
 
   if (new_frame || count_ == 0) {
-    settled_ = count_ == 0 || jumped ? 1 : settled_ + 1;
+    // Heights from before a jump belong to another surface, unless the next frame's jump says that
+    // it was a motion.
+    const bool goes_on = jumped && jumped_before_;
+    jumped_before_ = jumped;
+    if (count_ == 0 || (jumped && !goes_on)) settled_ = 0;
+    settled_ += goes_on && settled_ == 1 ? 2 : 1;
     newest_ = (newest_ + 1) % history;
     count_ = std::min(count_ + 1, history);
   }
@@ -522,7 +441,12 @@ bool SightTracker::measure(const Cloud& cloud, const Vec2& foot, double stamp, b
   if (noisy) {
     gather(cloud, Beam{place, radii[rungs - 1] * 1.1, wide + radii[rungs - 1], frame_.up},
            outer_points, patch_);
-    // A thinner patch weighs less: bring its rings to the density of the inner disc.
+    // Noise that is alike over the inner disc is not over the wide ones: what belongs to them is
+    // told by their own spread about their own middle.
+    if (const std::optional<Residuals> far = residuals(foot, radii[rungs - 1], wide)) {
+      surface_.c[0] += far->median;
+      cut = std::clamp(6.0 * far->deviation, cut, wide);
+    }
     for (std::size_t j = inner_rungs; j < rungs; ++j) add_ring(j);
     now.rungs = rungs;
   }
@@ -558,6 +482,9 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
     // Evidence from frames whose disc overlaps this one's well.
     Eigen::Matrix<double, 5, 5> matrix = Eigen::Matrix<double, 5, 5>::Zero();
     Vec5 right_side = Vec5::Zero();
+    std::array<SlopeWindow, slope_windows> windows;
+    std::size_t filled = 0;
+    std::size_t whole = 0;
     std::size_t n = 0;
     for (; n < count_; ++n) {
       const Evidence& e = evidence(n);
@@ -566,6 +493,9 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
       if (!e.whole && n > 0) continue;
       matrix += e.shape[j].matrix;
       right_side += e.shape[j].right_side;
+      if (++whole == std::size_t{2} << filled && filled < slope_windows) {
+        windows[filled++] = {matrix, right_side};
+      }
     }
     frames[j] = n;
     const double points = std::max(now.shape[j].points, 1.0);
@@ -578,18 +508,7 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
       shapes[j] = a.ldlt().solve(b);
     };
     fit_shape(matrix, right_side);
-    // A surface that turns is told by its newest slopes: then the older ones are no evidence.
-    if (n > 2 && now.whole && evidence(1).whole) {
-      matrix = now.shape[j].matrix + evidence(1).shape[j].matrix;
-      right_side = now.shape[j].right_side + evidence(1).shape[j].right_side;
-      const Vec5 off = right_side - matrix * shapes[j];
-      const double point_variance = variance(j) * points / cm2;
-      for (int axis = 0; axis < 2; ++axis) {
-        if (squared(off[axis]) <= 16.0 * point_variance * matrix(axis, axis)) continue;
-        fit_shape(matrix, right_side);
-        break;
-      }
-    }
+    confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / cm2);
     const double above = shapes[j].dot(basis);
     for (std::size_t i = 0; i < n; ++i) {
       const Evidence& e = evidence(i);
@@ -610,9 +529,13 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
   }
   // Lepski: the widest disc that agrees with all narrower ones. Their differences, frame by frame,
   // do not see the surface move, and tell their own noise.
+  // A disc may differ from the narrower ones, because the surface is not its quadric, and yet move
+  // with them: then it tells the motion, and they tell where the surface is.
+  std::size_t mover = 0;
+  bool agree = true;
   for (std::size_t j = 1; j < now.rungs; ++j) {
-    bool agrees = frames[j] >= std::min<std::size_t>(frames[0], 2);
-    for (std::size_t i = 0; i < j && agrees; ++i) {
+    bool moves_along = frames[j] >= std::min<std::size_t>(frames[0], 2);
+    for (std::size_t i = 0; i < j && moves_along; ++i) {
       const std::size_t n = std::min(frames[i], frames[j]);
       double sum = 0.0;
       double squares = 0.0;
@@ -627,24 +550,37 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
       const double expected = 2.0 * (variance(i) + variance(j));
       const double scattered =
           (std::max(squares - count * mean * mean, 0.0) + (n < 4 ? expected : 0.0)) / count;
-      agrees = std::abs(mean) <= (3.0 + 4.0 / count) * std::sqrt(scattered / count) + 2e-6;
+      // What was in use needs better evidence against it: a change is felt.
+      const double confidence = (j <= rung_ ? 4.5 : 3.0) + 4.0 / count;
+      agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + 2e-6;
+      const double newest = heights[j][0].height - heights[i][0].height;
+      moves_along =
+          agree || (n >= 4 && std::abs(newest - mean) <= 3.0 * std::sqrt(scattered) + 2e-6);
     }
-    if (!agrees) break;
-    if (variance(j) <= variance(chosen)) chosen = j;
+    if (!moves_along) break;
+    if (agree && variance(j) <= variance(chosen)) chosen = j;
+    if (variance(j) <= variance(mover)) mover = j;
   }
   rung_ = chosen;
-  const std::span<const HeightSample> past(heights[chosen].data(), frames[chosen]);
-  const double sd = height_sd();
-  if (new_frame) {
-    const ForetoldMotion motion = foretell_motion(past, sd, interval_);
-    velocity_ = motion.velocity;
-    settled_ = std::min(settled_, motion.frames);
+  mover_ = mover;
+  std::array<HeightSample, history>& past = heights[mover];
+  const std::size_t known = std::min(frames[chosen], frames[mover]);
+  if (mover != chosen) {
+    double difference = 0.0;
+    for (std::size_t k = 0; k < known; ++k) {
+      difference += (heights[chosen][k].height - past[k].height) / static_cast<double>(known);
+    }
+    for (std::size_t k = 0; k < frames[mover]; ++k) past[k].height += difference;
   }
-  const double height = agreed_height(past.first(std::clamp<std::size_t>(settled_, 1, past.size())),
-                                      sd, velocity_, velocity_ == 0.0 ? 3.0 : 1.5);
+  const std::span<const HeightSample> since(past.data(),
+                                            std::clamp<std::size_t>(settled_, 1, frames[mover]));
+  const double sd = height_sd();
+  const HeightTrack track = track_height(since, sd, interval_);
+  if (new_frame) velocity_ = track.velocity;
+  const double height = track.height;
   surface_.c.tail<5>() = shapes[chosen];
   surface_.c.tail<3>() /= Moments::unit;
-  above_mean_ = past.front().height - height;
+  above_mean_ = since.front().height - height;
   surface_.c[0] = height - shapes[chosen].dot(basis) * Moments::unit;
 }
 
@@ -749,9 +685,8 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
     const double away = d.norm();
     if (away < beside_inner || away >= beside_bands.back()) continue;
     const std::size_t band = away < beside_bands[0] ? 0 : away < beside_bands[1] ? 1 : 2;
-    const double turn = std::atan2(d.y(), d.x()) / (2.0 * std::numbers::pi) + 0.5;
-    const auto sector =
-        std::min<std::size_t>(static_cast<std::size_t>(turn * sectors), sectors - 1);
+    const std::size_t sector =
+        (d.x() > 0.0 ? 4 : 0) + (d.y() > 0.0 ? 2 : 0) + (std::abs(d.x()) > std::abs(d.y()) ? 1 : 0);
     const double r = local.z() - base - slope.dot(local.head<2>() - centre_);
     float& cell = ring[band * sectors + sector];
     cell = std::max(cell, static_cast<float>(r));

@@ -9,39 +9,10 @@
 #include <span>
 
 #include "palpate/core/cloud.hpp"
+#include "palpate/core/height_track.hpp"
 #include "palpate/core/surface_fit.hpp"
 
 namespace palpate {
-
-/// One frame's measurement of a surface's height at one place.
-struct HeightSample {
-  double stamp;   ///< [s]
-  double height;  ///< [m]
-};
-
-/// How a surface moves.
-struct ForetoldMotion {
-  double velocity;     ///< [m/s] leads to where it will be one frame later
-  std::size_t frames;  ///< the newest so many heights belong to that motion
-};
-
-/// The rule (at rest; a line through the last 2, 4 or 8 heights; a parabola through 3) that
-/// foretold the last heights best foretells the next one; a velocity below its own uncertainty is
-/// 0.
-/// @param newest_first  heights measured
-/// @param sd            [m] standard deviation of one of them
-/// @param interval      [s] until the next frame
-ForetoldMotion foretell_motion(std::span<const HeightSample> newest_first, double sd,
-                               double interval) noexcept;
-
-/// The height now [m], averaged over as much of the past as agrees with the present.
-///
-/// From the longest mean (all heights) to the newest height alone, each shorter mean confines the
-/// estimate to `confidence` standard deviations about itself. So a surface at rest gains the square
-/// root of the frames, and one that moves is left behind by no more than the noise of short means.
-/// @param velocity  [m/s] taken out first
-double agreed_height(std::span<const HeightSample> newest_first, double sd, double velocity,
-                     double confidence) noexcept;
 
 /// A layer of points along a beam.
 struct Layer {
@@ -120,11 +91,11 @@ class SightTracker {
   /// [m] over which the surface is averaged now.
   [[nodiscard]] double support_radius() const noexcept { return radii[rung_]; }
 
-  static constexpr std::size_t rungs = 5;
-  static constexpr std::array<double, rungs> radii = {7e-3, 11e-3, 17e-3, 27e-3, 42e-3};
+  static constexpr std::size_t rungs = 6;
+  static constexpr std::array<double, rungs> radii = {7e-3, 11e-3, 17e-3, 27e-3, 42e-3, 60e-3};
 
  private:
-  static constexpr std::size_t history = 32;
+  static constexpr std::size_t history = most_heights;
   static constexpr std::size_t cells_per_side = 4;
   static constexpr std::size_t cells = cells_per_side * cells_per_side;
   static constexpr std::size_t sectors = 8;
@@ -153,11 +124,17 @@ class SightTracker {
     double variance = 0.0;  // [m^2]
     double samples = 0.0;
   };
+  struct Residuals {
+    float median;      // [m]
+    double deviation;  // [m] as of a normal distribution
+  };
   using Ring = std::array<float, sectors * bands>;
 
   bool start(const Cloud& cloud, const Vec3& foot, const Vec3& up) noexcept;
   bool measure(const Cloud& cloud, const Vec2& foot, double stamp, bool new_frame, double gate,
                bool jumped = false) noexcept;
+  [[nodiscard]] std::optional<Residuals> residuals(const Vec2& foot, double radius,
+                                                   double wide) const noexcept;
   bool recentre(const Vec2& foot, double gate, double& cut) noexcept;
   void estimate(const Vec2& foot, bool new_frame) noexcept;
   void judge(const Vec2& foot) noexcept;
@@ -185,12 +162,14 @@ class SightTracker {
   double interval_ = 1.0 / 30.0;
   double velocity_ = 0.0;
   double spread_ = 0.0;
-  std::size_t rung_ = 0;
+  std::size_t rung_ = 0;   // whose disc tells the shape, and where the surface is
+  std::size_t mover_ = 0;  // whose disc tells how it moves
 
   std::array<Evidence, history> ring_;
   std::size_t newest_ = 0;
   std::size_t count_ = 0;
-  std::size_t settled_ = 0;  // frames since it jumped
+  std::size_t settled_ = 0;  // frames whose heights are this surface's
+  bool jumped_before_ = false;
   double above_mean_ = 0.0;  // [m] the newest frame's height over the average
   double distance_ = 0.0;    // [m] from the viewpoint
   Ring beside_{};

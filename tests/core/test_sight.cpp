@@ -140,26 +140,26 @@ std::vector<HeightSample> heights_of(const std::vector<double>& oldest_first) {
 
 TEST(AgreedHeight, IsTheMeanOfASurfaceAtRest) {
   const auto samples = heights_of({1e-3, -1e-3, 1e-3, -1e-3, 1e-3, -1e-3, 1e-3, -1e-3});
-  EXPECT_NEAR(agreed_height(samples, 1e-3, 0.0, 2.5), 0.0, 1e-12);
+  EXPECT_NEAR(agreed_height(samples, 1e-3, 2.5), 0.0, 1e-12);
 }
 
 TEST(AgreedHeight, LetsGoOfThePastInOneFrameWhenTheSurfaceJumps) {
   const auto samples = heights_of({0, 0, 0, 0, 0, 0, 0, 0.1});
-  EXPECT_NEAR(agreed_height(samples, 1e-4, 0.0, 2.5), 0.1, 2.5e-4);
+  EXPECT_NEAR(agreed_height(samples, 1e-4, 2.5), 0.1, 2.5e-4);
 }
 
-TEST(ForetellMotion, IsNoneAtRestUnderNoiseAndExactInSteadyMotion) {
+TEST(HeightTrack, HasNoVelocityAtRestUnderNoiseAndTheRightOneInSteadyMotion) {
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0.0, 1e-3);
   int moving = 0;
   for (int trial = 0; trial < 200; ++trial) {
     std::vector<double> heights;
     for (int i = 0; i < 32; ++i) heights.push_back(noise(random));
-    if (foretell_motion(heights_of(heights), 1e-3, interval).velocity != 0.0) ++moving;
+    if (track_height(heights_of(heights), 1e-3, interval).velocity != 0.0) ++moving;
   }
   EXPECT_LE(moving, 2);
   const auto rising = heights_of({0.000, 0.001, 0.002, 0.003, 0.004});
-  EXPECT_NEAR(foretell_motion(rising, 1e-5, interval).velocity, 0.03, 1e-9);
+  EXPECT_NEAR(track_height(rising, 1e-5, interval).velocity, 0.03, 1e-7);
 }
 
 TEST(FirstLayer, IsTheNearestOneThatEnoughPointsBelongTo) {
@@ -333,6 +333,24 @@ TEST(Sight, AveragesTheNoiseOfASurfaceAtRestAway) {
     if (k >= 8) {
       EXPECT_NEAR(tick.proxy.z(), r_c, 0.15e-3) << "frame " << k;
       EXPECT_EQ(tick.surface_velocity, 0.0) << "frame " << k;
+    }
+  }
+}
+
+TEST(Sight, KeepsItsNormalWhileTheSurfaceRests) {
+  const Overhead camera;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    std::mt19937 random(seed);
+    Renderer renderer = by_sight({0, 0, 0.03});
+    std::optional<Vec3> last;
+    for (int k = 0; k < 150; ++k) {
+      const DepthImage image = camera.shoot([](double, double) { return 0.0; }, 3e-3, random);
+      const Tick tick = live_through(renderer, image, k * interval,
+                                     [](double) { return Vec3(0.0002, 0, -0.01); });
+      if (last && k > 40) {
+        EXPECT_GT(tick.normal.dot(*last), std::cos(0.02)) << "seed " << seed << " frame " << k;
+      }
+      last = tick.normal;
     }
   }
 }

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/core/height_track.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace palpate {
+namespace {
+
+// How fast a surface's acceleration may change in each filter of the bank [m/s^3], from what a hand
+// moves slowly to what is struck (18 000 r_c/s^2 within one frame).
+constexpr std::array<double, 5> jerks = {1.0, 6.0, 40.0, 250.0, 3000.0};
+constexpr std::size_t filters = jerks.size();
+// What was before these many frames says little of a motion now.
+constexpr std::size_t motion_frames = 24;
+// What each frame leaves of the log-likelihoods: some seven frames count.
+constexpr double memory = 0.85;
+// How much likelier rest is than any of the other filters, before anything is known (logarithm).
+constexpr double rest_bonus = 2.5;
+// Standard deviations of a surface's velocity [m/s] and acceleration [m/s^2] before it is known.
+constexpr double first_velocity = 3.0;
+constexpr double first_acceleration = 10.0;
+
+// Kalman filters of height, velocity and acceleration, side by side: filter i in lane i.
+struct Bank {
+  using Lanes = std::array<double, filters>;
+  Lanes x{}, v{}, a{};
+  Lanes xx{}, xv{}, xa{}, vv{}, va{}, aa{};  // covariances
+  Lanes likelihood{};                        // its logarithm
+
+  Bank(double height, double variance) noexcept {
+    x.fill(height);
+    xx.fill(variance);
+    vv.fill(first_velocity * first_velocity);
+    aa.fill(first_acceleration * first_acceleration);
+  }
+
+  void step(double dt, double height, double variance) noexcept {
+    const double h = 0.5 * dt * dt;
+    for (std::size_t i = 0; i < filters; ++i) {
+      // What a change of acceleration at the interval's begin adds, and the state after it.
+      const double ga = jerks[i] * dt;
+      const double gv = ga * dt;
+      const double gx = ga * h;
+      x[i] += dt * v[i] + h * a[i];
+      v[i] += dt * a[i];
+      const double new_xa = xa[i] + dt * va[i] + h * aa[i];
+      const double new_va = va[i] + dt * aa[i];
+      const double new_xv = xv[i] + dt * (vv[i] + xa[i]) + (dt * dt + h) * va[i] + dt * h * aa[i];
+      const double new_vv = vv[i] + 2.0 * dt * va[i] + dt * dt * aa[i];
+      const double new_xx = xx[i] + 2.0 * dt * xv[i] + 2.0 * h * xa[i] + dt * dt * vv[i] +
+                            2.0 * dt * h * va[i] + h * h * aa[i];
+      xx[i] = new_xx + gx * gx;
+      xv[i] = new_xv + gx * gv;
+      xa[i] = new_xa + gx * ga;
+      vv[i] = new_vv + gv * gv;
+      va[i] = new_va + gv * ga;
+      aa[i] += ga * ga;
+      // What was measured.
+      const double expected = xx[i] + variance;
+      const double inverse = 1.0 / expected;
+      const double miss = height - x[i];
+      const double kx = xx[i] * inverse;
+      const double kv = xv[i] * inverse;
+      const double ka = xa[i] * inverse;
+      x[i] += kx * miss;
+      v[i] += kv * miss;
+      a[i] += ka * miss;
+      aa[i] -= ka * xa[i];
+      va[i] -= kv * xa[i];
+      vv[i] -= kv * xv[i];
+      xa[i] -= kx * xa[i];
+      xv[i] -= kx * xv[i];
+      xx[i] -= kx * xx[i];
+      likelihood[i] =
+          memory * likelihood[i] - 0.5 * (miss * miss * inverse + std::log(expected / variance));
+    }
+  }
+};
+
+// The same logarithm for a surface that rests: each height is foretold by the mean of those before.
+double likelihood_of_rest(std::span<const HeightSample> samples, std::size_t frames,
+                          double variance) noexcept {
+  double sum = 0.0;
+  double n = 0.0;
+  double likelihood = 0.0;
+  for (std::size_t i = samples.size(); i-- > 0;) {
+    const double height = samples[i].height - samples.front().height;
+    if (n > 0.0 && i + 1 < frames) {
+      const double miss = height - sum / n;
+      const double spread = 1.0 + 1.0 / n;
+      likelihood =
+          memory * likelihood - 0.5 * (miss * miss / (variance * spread) + std::log(spread));
+    }
+    sum += height;
+    n += 1.0;
+  }
+  return likelihood;
+}
+
+}  // namespace
+
+double agreed_height(std::span<const HeightSample> samples, double sd, double confidence) noexcept {
+  const std::size_t size = std::min(samples.size(), most_heights);
+  const double base = samples.front().height;
+  // Means over 1, 2, 4, ... and all heights.
+  std::array<double, 8> means{};
+  std::array<double, 8> counts{};
+  std::size_t levels = 0;
+  double sum = 0.0;
+  std::size_t next = 1;
+  for (std::size_t i = 0; i < size && levels < means.size(); ++i) {
+    sum += samples[i].height - base;
+    if (i + 1 == next || i + 1 == size) {
+      means[levels] = sum / static_cast<double>(i + 1);
+      counts[levels] = static_cast<double>(i + 1);
+      ++levels;
+      next *= 2;
+    }
+  }
+  double height = means[levels - 1];
+  for (std::size_t level = levels - 1; level-- > 0;) {
+    const double slack =
+        confidence * sd * std::sqrt(1.0 / counts[level] - 1.0 / counts[levels - 1]);
+    height = std::clamp(height, means[level] - slack, means[level] + slack);
+  }
+  return base + height;
+}
+
+HeightTrack track_height(std::span<const HeightSample> all, double sd, double interval) noexcept {
+  constexpr double confidence = 3.0;
+  const std::span<const HeightSample> samples = all.first(std::min(all.size(), most_heights));
+  const double resting = agreed_height(samples, sd, confidence);
+  const std::size_t frames = std::min(samples.size(), motion_frames);
+  if (frames < 2 || !(interval > 0.0)) return {resting, 0.0};
+
+  const double base = samples.front().height;
+  const double variance = std::max(sd * sd, 1e-14);
+  Bank bank(samples[frames - 1].height - base, variance);
+  for (std::size_t i = frames - 1; i-- > 0;) {
+    const double dt = std::max(samples[i].stamp - samples[i + 1].stamp, 0.0);
+    bank.step(dt, samples[i].height - base, variance);
+  }
+  const double rest = likelihood_of_rest(samples, frames, variance) + rest_bonus;
+  double most = rest;
+  for (const double l : bank.likelihood) most = std::max(most, l);
+  const double rest_share = std::exp(rest - most);
+  double shares = rest_share;
+  double height = rest_share * (resting - base);
+  double next = height;
+  for (std::size_t i = 0; i < filters; ++i) {
+    const double share = std::exp(bank.likelihood[i] - most);
+    shares += share;
+    height += share * bank.x[i];
+    next += share * (bank.x[i] + interval * (bank.v[i] + 0.5 * interval * bank.a[i]));
+  }
+  height /= shares;
+  next /= shares;
+  const double slack = confidence * sd;
+  const double confined = std::clamp(height, -slack, slack);
+  // A velocity is felt at once: it counts when the surface moves more likely than not.
+  const bool rests = rest_share > 0.5 * shares;
+  return {base + confined, rests ? 0.0 : (next - height) / interval};
+}
+
+}  // namespace palpate

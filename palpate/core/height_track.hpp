@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+namespace palpate {
+
+/// One frame's measurement of a surface's height at one place.
+struct HeightSample {
+  double stamp;   ///< [s]
+  double height;  ///< [m]
+};
+
+/// Where a surface is and how it moves.
+struct HeightTrack {
+  double height;    ///< [m] now
+  double velocity;  ///< [m/s] leads to where it will be one frame later; 0 while it rests
+};
+
+/// The most heights that are looked at; older ones are left out.
+inline constexpr std::size_t most_heights = 64;
+
+/// The height of a surface at rest [m], averaged over as much of the past as agrees with the
+/// present.
+///
+/// From the longest mean (all heights) to the newest height alone, each shorter mean confines the
+/// estimate to `confidence` standard deviations about itself. So a surface at rest gains the square
+/// root of the frames, and one that moves is left behind by no more than the noise of short means.
+/// @param newest_first  heights measured
+/// @param sd            [m] standard deviation of one of them
+double agreed_height(std::span<const HeightSample> newest_first, double sd,
+                     double confidence) noexcept;
+
+/// Height and motion that the heights tell of.
+///
+/// A bank of filters runs over the heights: one for a surface at rest, and Kalman filters for
+/// surfaces that jerk by little up to very much. Each counts by how likely it found the last
+/// heights to be before it saw them, rest being believed a little more. The height is the bank's,
+/// no farther than three standard deviations from the newest one. O(most_heights), no allocation.
+/// @param newest_first  heights measured; at least one
+/// @param sd            [m] standard deviation of one of them
+/// @param interval      [s] until the next frame
+HeightTrack track_height(std::span<const HeightSample> newest_first, double sd,
+                         double interval) noexcept;
+
+}  // namespace palpate

@@ -13,9 +13,10 @@ namespace palpate::lab {
 
 const std::vector<Experiment>& known_experiments() {
   static const std::vector<Experiment> experiments = {
-      flat_experiment(),  jump_experiment(),    single_lift_experiment(),   lift_experiment(),
-      bound_experiment(), speed_experiment(),   first_contact_experiment(), hold_experiment(),
-      force_experiment(), corners_experiment(), scan_experiment(),          fidelity_experiment()};
+      flat_experiment(),    jump_experiment(),    single_lift_experiment(),   lift_experiment(),
+      bound_experiment(),   speed_experiment(),   first_contact_experiment(), hold_experiment(),
+      force_experiment(),   damping_experiment(), corners_experiment(),       scan_experiment(),
+      fidelity_experiment()};
   return experiments;
 }
 

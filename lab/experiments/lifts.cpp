@@ -585,7 +585,7 @@ Experiment single_lift_experiment() {
 
 Experiment lift_experiment() {
   return {"lift",
-          "5.2, Fig. 12 and 13: lifts with acceleration and noise",
+          "5.2, Fig. 13: lifts with acceleration and noise",
           "method,acceleration_rc,noise_rc,seed,popped",
           {"fixed-step", "paper"},
           true,

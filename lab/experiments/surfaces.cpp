@@ -150,7 +150,7 @@ std::vector<Claim> jump_claims(const Table& table) {
 constexpr std::string_view jump_plot = R"gp(
 set xlabel "depth of the jump [r_c]"
 set ylabel "steps to the surface"
-set key top left
+set key center right
 set yrange [0:*]
 plot for [m in methods] csv using (strcol(1) eq m ? $2 : NaN):4 with linespoints pt 7 lw 2 title m
 )gp";

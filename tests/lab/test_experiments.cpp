@@ -171,6 +171,19 @@ TEST_F(Lab, FeelsTheErrorOfThePrintedSignOf15) {
   EXPECT_LT(2.0 * error("paper"), error("paper-as-printed"));
 }
 
+TEST_F(Lab, FeelsTheErrorOfThePrintedSignOf16) {
+  const Table table = run("damping", with({"paper", "paper-as-printed"}));
+  ASSERT_EQ(table.rows(), 10U);
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    // A cycle of x = A cos(wt) under -d dx/dt costs pi A^2 w d; Table 2's plain spring costs
+    // nothing.
+    const double sign = table.text(row, "method") == "paper" ? -1.0 : 1.0;
+    const double expected =
+        sign * 1e3 * M_PI * 0.0025 * 0.0025 * 2.0 * M_PI * 5.0 * table.number(row, "damping");
+    EXPECT_NEAR(table.number(row, "work_mj"), expected, 0.02 + 0.02 * std::abs(expected));
+  }
+}
+
 TEST_F(Lab, LosesARestingPlaneUnderCorrelatedNoiseThatItHoldsUnderWhite) {
   ExperimentOptions options = with({"paper"});
   options.grid = {7, 4};  // up to 5 mm, four tries of two seconds

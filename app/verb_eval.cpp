@@ -32,6 +32,10 @@ struct EvalOptions {
   std::string recording;
   std::int64_t seed = 1;
   int jobs = 0;
+  int cases = 0;
+  std::vector<std::string> families;
+  std::vector<std::string> fixed;
+  std::string case_text;
   bool resume = false;
   bool list_methods = false;
   bool list_experiments = false;
@@ -59,6 +63,13 @@ lab::ExperimentOptions experiment_options(const EvalOptions& options) {
                 "give a whole number from 0 on");
   result.seed = static_cast<std::uint64_t>(options.seed);
   if (!options.grid.empty()) result.grid = parse_grid(options.grid);
+  if (options.cases < 0 || options.cases > 10'000'000)
+    throw Error("--cases " + std::to_string(options.cases), "it is not from 1 to 10000000",
+                "write for example --cases 1000");
+  if (options.cases > 0) result.cases = options.cases;
+  result.families = options.families;
+  result.fixed = options.fixed;
+  result.case_text = options.case_text;
   if (options.noise == "correlated")
     result.noise = lab::Noise::correlated;
   else if (options.noise != "white")
@@ -153,6 +164,13 @@ Verb add_eval(CLI::App& program) {
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
+  command->add_option("--cases", options->cases, "pop: how many of each family (100)");
+  command->add_option("--families", options->families, "pop: which, separated by commas")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("--fix", options->fixed, "pop: KEY=VALUE instead of a value drawn by chance")
+      ->allow_extra_args(false);
+  command->add_option("--case", options->case_text, "pop: one case as a run printed it, pop:...");
   command->add_option("--noise", options->noise, "white (default) or correlated");
   command->add_option("--recording", options->recording,
                       "scan across a recording, e.g. tum:FOLDER, instead of the synthetic desk");

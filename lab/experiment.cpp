@@ -4,6 +4,7 @@
 #include "lab/experiments/feel.hpp"
 #include "lab/experiments/fidelity.hpp"
 #include "lab/experiments/lifts.hpp"
+#include "lab/experiments/pop.hpp"
 #include "lab/experiments/scan.hpp"
 #include "lab/experiments/surfaces.hpp"
 #include "lab/method.hpp"
@@ -13,10 +14,10 @@ namespace palpate::lab {
 
 const std::vector<Experiment>& known_experiments() {
   static const std::vector<Experiment> experiments = {
-      flat_experiment(),    jump_experiment(),    single_lift_experiment(),   lift_experiment(),
-      bound_experiment(),   speed_experiment(),   first_contact_experiment(), hold_experiment(),
-      force_experiment(),   damping_experiment(), corners_experiment(),       scan_experiment(),
-      fidelity_experiment()};
+      flat_experiment(),     jump_experiment(),    single_lift_experiment(),   lift_experiment(),
+      bound_experiment(),    speed_experiment(),   first_contact_experiment(), hold_experiment(),
+      force_experiment(),    damping_experiment(), corners_experiment(),       scan_experiment(),
+      fidelity_experiment(), pop_experiment()};
   return experiments;
 }
 

@@ -24,6 +24,12 @@ struct ExperimentOptions {
   Noise noise = Noise::white;
   std::string recording;  ///< a source's URI where an experiment takes one; empty: a simulation
   Parameters parameters;  ///< Table 2 unless set
+
+  // The bench `pop` alone.
+  std::optional<int> cases;           ///< how many of each family
+  std::vector<std::string> families;  ///< which; empty: all
+  std::vector<std::string> fixed;     ///< KEY=VALUE: not drawn by chance
+  std::string case_text;              ///< one case, as a run printed it, and nothing else
 };
 
 /// A piece of an experiment that needs no other: its rows of the CSV, each ended by a newline.
@@ -42,7 +48,7 @@ struct Claim {
 struct Scores {
   std::vector<std::string> columns;
   std::vector<std::vector<std::string>> rows;  ///< each as long as `columns`
-  std::string note;                            ///< beneath it, one line
+  std::string note;                            ///< beneath it, a sentence or a command a line
 };
 
 /// An experiment that can be asked for by name. Deterministic: the same options give the same CSV,

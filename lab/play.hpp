@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "lab/method.hpp"
 
@@ -17,9 +18,11 @@ struct Scenario {
   double duration = 1.0;      ///< [s]
   std::function<std::shared_ptr<const Cloud>(std::uint64_t frame, double t)> cloud;
   std::function<Vec3(double t)> hip;  ///< [m] world
+  /// [s] how long after its capture a frame arrives; none: it never does. Without it: at once.
+  std::function<std::optional<double>(std::uint64_t frame)> delay = nullptr;
 };
 
-/// Plays a scenario to a method: every frame at the first tick at or after its stamp.
+/// Plays a scenario to a method: every frame at the first tick at or after it arrives, in order.
 /// @param on_tick  (const Tick&) -> bool, after each tick: go on?
 template <class OnTick>
 void play(TouchMethod& method, const Scenario& scenario, const OnTick& on_tick) {
@@ -31,7 +34,12 @@ void play(TouchMethod& method, const Scenario& scenario, const OnTick& on_tick) 
     const double t = static_cast<double>(i) / scenario.tick_rate;
     for (;;) {
       const double stamp = static_cast<double>(next_frame) / scenario.frame_rate;
-      if (stamp > t + 1e-9) break;
+      const std::optional<double> delay = scenario.delay ? scenario.delay(next_frame) : 0.0;
+      if (stamp + delay.value_or(0.0) > t + 1e-9) break;
+      if (!delay) {
+        ++next_frame;
+        continue;
+      }
       std::shared_ptr<const Cloud> cloud = scenario.cloud(next_frame, stamp);
       method.frame(*cloud, stamp);
       in_use = std::move(cloud);  // only now may the frame before go

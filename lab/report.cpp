@@ -27,6 +27,11 @@ std::string command_line(const Experiment& experiment, const ExperimentOptions& 
       line += (i == 0 ? "" : ",") + options.methods[i];
   }
   if (options.grid) line += fmt::format(" --grid {}x{}", options.grid->first, options.grid->second);
+  if (options.cases) line += fmt::format(" --cases {}", *options.cases);
+  for (std::size_t i = 0; i < options.families.size(); ++i)
+    line += (i == 0 ? " --families " : ",") + options.families[i];
+  for (const std::string& value : options.fixed) line += " --fix " + value;
+  if (!options.case_text.empty()) line += " --case '" + options.case_text + "'";
   if (options.noise == Noise::correlated) line += " --noise correlated";
   if (!options.recording.empty()) line += " --recording " + options.recording;
   if (options.seed != 1) line += fmt::format(" --seed {}", options.seed);
@@ -99,6 +104,13 @@ void write(const fs::path& file, const std::string& text) {
                 "give --out a folder that you may write to, with room on its disk");
 }
 
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
 std::string scores_as_text(const Scores& scores) {
   std::vector<std::size_t> widths;
   for (const std::string& column : scores.columns) widths.push_back(column.size());
@@ -112,7 +124,8 @@ std::string scores_as_text(const Scores& scores) {
   };
   std::string text = line(scores.columns);
   for (const auto& row : scores.rows) text += line(row);
-  return text + "  " + scores.note + "\n";
+  for (const std::string& sentence : lines_of(scores.note)) text += "  " + sentence + "\n";
+  return text;
 }
 
 std::string scores_as_markdown(const Scores& scores) {
@@ -125,7 +138,9 @@ std::string scores_as_markdown(const Scores& scores) {
   for (std::size_t i = 0; i < scores.columns.size(); ++i) text += "---|";
   text += "\n";
   for (const auto& row : scores.rows) text += line(row);
-  return text + "\n" + scores.note + "\n";
+  text += "\n";
+  for (const std::string& sentence : lines_of(scores.note)) text += sentence + "  \n";
+  return text;
 }
 
 std::string scores_as_html(const Scores& scores) {
@@ -136,7 +151,7 @@ std::string scores_as_html(const Scores& scores) {
   };
   std::string text = "<div class=\"wide\"><table>" + line(scores.columns, "th");
   for (const auto& row : scores.rows) text += line(row, "td");
-  return text + "</table></div>\n<p>" + escaped(scores.note) + "</p>\n";
+  return text + "</table></div>\n<p class=\"note\">" + escaped(scores.note) + "</p>\n";
 }
 
 constexpr std::string_view page_head = R"(<!doctype html>
@@ -151,7 +166,7 @@ h1 { font-size: 2rem; margin: 0 0 .5rem; } h2 { margin: 3rem 0 .3rem; border-top
 figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; border-radius: 6px; }
 .wide { overflow-x: auto; } table { border-collapse: collapse; width: 100%; font-size: .92rem; }
 th, td { text-align: left; vertical-align: top; padding: .45rem .6rem; border-bottom: 1px solid var(--line); }
-code { font-size: .88em; } .good { color: var(--good); } .bad { color: var(--bad); }
+code { font-size: .88em; } .note { white-space: pre-line; overflow-wrap: anywhere; } .good { color: var(--good); } .bad { color: var(--bad); }
 </style></head><body>
 <h1>The paper, reproduced</h1>
 <p>F. Rydén and H. J. Chizeck, <i>A Proxy Method for Real-Time 3-DOF Haptic Rendering of Streaming

@@ -37,6 +37,10 @@ std::string fingerprint(const Experiment& experiment, const ExperimentOptions& o
   if (options.grid) text << " grid " << options.grid->first << 'x' << options.grid->second;
   if (!options.recording.empty()) text << " recording " << options.recording;
   for (const std::string& name : methods_of(experiment, options)) text << ' ' << name;
+  if (options.cases) text << " cases " << *options.cases;
+  for (const std::string& name : options.families) text << ' ' << name;
+  for (const std::string& value : options.fixed) text << ' ' << value;
+  text << ' ' << options.case_text;
   text.precision(17);
   for (const ParameterInfo& row : parameter_table()) text << ' ' << row.get(options.parameters);
   return text.str();

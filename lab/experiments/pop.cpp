@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/experiments/pop.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "lab/experiments/pop_cases.hpp"
+#include "lab/method.hpp"
+#include "lab/play.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr int usual_cases = 50;   // of each family
+constexpr int block = 50;         // cases a row
+constexpr double patience = 0.5;  // [s] behind for longer than this is lost
+
+struct Outcome {
+  bool lost = false;
+  int dips = 0;         // times that it was behind for more than a frame, and came back
+  double step = 0.0;    // [N] largest change of the force in a tick, from contact on
+  double change = 0.0;  // [N] between the largest and the smallest force while nothing moves
+};
+
+// The proxy is behind if its centre is inside a body, in truth now and as the newest frame showed
+// it (between frames nobody can know), while the ruler's is not.
+Outcome play_case(const std::string& method_name, const PopCase& c, const Parameters& parameters) {
+  const PopStage stage = find_pop_family(c.family).stage(c, parameters);
+  const auto method = make_method(method_name, {parameters, stage.truth});
+  const auto ruler = make_method("ideal", {parameters, stage.truth});
+  method->seat(stage.seat);
+  ruler->seat(stage.seat);
+  Outcome outcome;
+  int behind = 0;
+  bool touched = false;
+  double last_force = 0.0;
+  double least = 1e9;
+  double most = -1e9;
+  const double frame = stage.scenario.tick_rate / stage.scenario.frame_rate;
+  play(*method, stage.scenario, [&](const Tick& tick) {
+    const Tick truly = ruler->tick(tick.hip, tick.t);
+    const auto inside = [&](const Vec3& at) {
+      return stage.truth(at, tick.t).distance < 0.0 && stage.truth(at, *stage.shown).distance < 0.0;
+    };
+    if (inside(tick.proxy) && stage.truth(truly.proxy, tick.t).distance > 0.0) {
+      ++behind;
+    } else {
+      if (behind > frame) ++outcome.dips;
+      behind = 0;
+    }
+    const double force = tick.force.norm();
+    if (touched) outcome.step = std::max(outcome.step, std::abs(force - last_force));
+    touched = touched || truly.state != ContactState::free_motion;
+    last_force = force;
+    if (tick.t >= stage.steady_from) {
+      least = std::min(least, force);
+      most = std::max(most, force);
+    }
+    outcome.lost = behind > patience * stage.scenario.tick_rate;
+    return !outcome.lost;
+  });
+  if (stage.judged_at_end) {
+    // 5.2 ends with the last frame: whoever is behind then has no more time to come back.
+    outcome.lost = outcome.lost || behind > 0;
+  } else if (behind > frame && !outcome.lost) {
+    ++outcome.dips;
+  }
+  if (most > least) outcome.change = most - least;
+  return outcome;
+}
+
+// The simplest case that is still lost: each value in turn is made simple, or brought half way
+// there as often as it is still lost, until nothing more can be done. At most `most_tries` plays.
+PopCase shrink(const std::string& method, PopCase c, const Parameters& parameters) {
+  constexpr int most_tries = 60;
+  int tries = 0;
+  const auto still_lost = [&](const PopCase& simpler) {
+    return ++tries <= most_tries && play_case(method, simpler, parameters).lost;
+  };
+  for (bool simpler = true; simpler && tries < most_tries;) {
+    simpler = false;
+    for (const PopRange& range : find_pop_family(c.family).ranges) {
+      const double value = c[range.key];
+      if (value == range.simple) continue;
+      const bool whole = range.draw == PopRange::Draw::whole;
+      for (const double share : {1.0, 0.5}) {
+        if (whole && share != 1.0) break;
+        PopCase next = c;
+        const double shrunk = std::strtod(
+            fmt::format("{:.2g}", value + share * (range.simple - value)).c_str(), nullptr);
+        if (std::abs(shrunk - range.simple) >= std::abs(value - range.simple)) continue;
+        next.values.find(range.key)->second = shrunk;
+        if (!still_lost(next)) continue;
+        c = next;
+        // Halving goes on only while it gains something.
+        simpler = simpler || std::abs(shrunk - value) > 0.2 * std::abs(range.simple) + 1e-4;
+        break;
+      }
+    }
+  }
+  return c;
+}
+
+PopCase with_fixed(PopCase c, const std::vector<std::string>& fixed) {
+  if (fixed.empty()) return c;
+  // Through the text, so that the same limits hold.
+  std::string text = c.text();
+  for (const std::string& assignment : fixed) {
+    const std::string key = assignment.substr(0, assignment.find('='));
+    if (c.values.find(key) == c.values.end()) continue;
+    std::size_t at = text.find("?" + key + "=");
+    if (at == std::string::npos) at = text.find("&" + key + "=");
+    const std::size_t end = text.find('&', at + 1);
+    text = text.substr(0, at + 1) + assignment + (end == std::string::npos ? "" : text.substr(end));
+  }
+  return parse_pop_case(text);
+}
+
+std::string row_of(const std::string& method, const PopFamily& family, int from, int count,
+                   const std::function<PopCase(int)>& draw, const Parameters& parameters) {
+  int lost = 0;
+  int dipped = 0;
+  double step = 0.0;
+  double change = 0.0;
+  std::string first = "-";
+  std::string simplest = "-";
+  for (int i = from; i < from + count; ++i) {
+    const PopCase c = draw(i);
+    const Outcome outcome = play_case(method, c, parameters);
+    if (outcome.lost && lost == 0) {
+      first = c.text();
+      simplest = shrink(method, c, parameters).text();
+    }
+    lost += outcome.lost ? 1 : 0;
+    dipped += !outcome.lost && outcome.dips > 0 ? 1 : 0;
+    if (!outcome.lost) {
+      step = std::max(step, outcome.step);
+      change = std::max(change, outcome.change);
+    }
+  }
+  return Row()
+      .add(method)
+      .add(family.name)
+      .add(from)
+      .add(count)
+      .add(lost)
+      .add(dipped)
+      .add(step)
+      .add(change)
+      .add(first)
+      .add(simplest)
+      .done();
+}
+
+std::vector<const PopFamily*> families_of(const ExperimentOptions& options) {
+  std::vector<const PopFamily*> families;
+  for (const std::string& name : options.families) families.push_back(&find_pop_family(name));
+  if (families.empty()) {
+    for (const PopFamily& family : pop_families()) families.push_back(&family);
+  }
+  for (const std::string& fixed : options.fixed) {
+    const std::string key = fixed.substr(0, fixed.find('='));
+    const bool known = std::any_of(families.begin(), families.end(), [&](const PopFamily* family) {
+      return std::any_of(family->ranges.begin(), family->ranges.end(),
+                         [&](const PopRange& range) { return range.key == key; });
+    });
+    if (!known || fixed.find('=') == std::string::npos)
+      throw Error("--fix " + fixed, "no family that is run draws '" + key + "'",
+                  "write KEY=VALUE with a key of docs/pop.md");
+  }
+  return families;
+}
+
+std::vector<Cell> pop_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  std::vector<Cell> cells;
+  if (!options.case_text.empty()) {
+    const PopCase c = parse_pop_case(options.case_text);
+    for (const std::string& name : methods_of(experiment, options)) {
+      cells.emplace_back([=] {
+        return row_of(
+            name, find_pop_family(c.family), 0, 1, [c](int) { return c; }, options.parameters);
+      });
+    }
+    return cells;
+  }
+  const int cases = options.cases.value_or(usual_cases);
+  const std::vector<const PopFamily*> families = families_of(options);
+  for (const std::string& name : methods_of(experiment, options)) {
+    for (const PopFamily* family : families) {
+      for (int from = 0; from < cases; from += block) {
+        cells.emplace_back([=] {
+          return row_of(
+              name, *family, from, std::min(block, cases - from),
+              [&](int i) {
+                return with_fixed(
+                    draw_pop_case(*family, options.seed, static_cast<std::uint64_t>(i)),
+                    options.fixed);
+              },
+              options.parameters);
+        });
+      }
+    }
+  }
+  return cells;
+}
+
+std::vector<Claim> no_claims(const Table& /*table*/) {
+  return {};
+}
+
+// Two digits, rounded down: 100 means all.
+std::string percent_held(double held, double cases) {
+  return fmt::format("{:.2f}", std::floor(1e4 * held / cases) / 100.0);
+}
+
+struct Sum {
+  double cases = 0.0;
+  double lost = 0.0;
+  double dipped = 0.0;
+  double change = 0.0;
+  std::string simplest;
+};
+
+Scores pop_scores(const Table& table) {
+  std::vector<std::string> methods;
+  std::vector<std::string> families;
+  std::map<std::pair<std::string, std::string>, Sum> sums;
+  const auto add_once = [](std::vector<std::string>& names, const std::string& name) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string& method = table.text(row, "method");
+    const std::string& family = table.text(row, "family");
+    add_once(methods, method);
+    add_once(families, family);
+    Sum& sum = sums[{method, family}];
+    sum.cases += table.number(row, "cases");
+    sum.lost += table.number(row, "lost");
+    sum.dipped += table.number(row, "dipped");
+    sum.change = std::max(sum.change, table.number(row, "worst_change_n"));
+    if (sum.simplest.empty() && table.text(row, "simplest") != "-")
+      sum.simplest = table.text(row, "simplest");
+  }
+  Scores scores;
+  scores.columns = {"family", "cases"};
+  for (const std::string& method : methods) {
+    scores.columns.push_back(method + " held [%]");
+    scores.columns.push_back("dips [%]");
+  }
+  std::vector<double> held(methods.size(), 0.0);
+  scores.note =
+      "The score is the mean over the families of the share held; docs/pop.md has the rules.";
+  for (const std::string& family : families) {
+    std::vector<std::string> line = {family};
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+      const Sum& sum = sums[{methods[m], family}];
+      if (m == 0) line.push_back(fmt::format("{:g}", sum.cases));
+      line.push_back(percent_held(sum.cases - sum.lost, sum.cases));
+      line.push_back(fmt::format("{:.1f}", 100.0 * sum.dipped / sum.cases));
+      held[m] += (sum.cases - sum.lost) / sum.cases;
+      if (!sum.simplest.empty())
+        scores.note +=
+            fmt::format("\npalpate eval pop --methods {} --case '{}'", methods[m], sum.simplest);
+      if (sum.change > 0.0)
+        scores.note += fmt::format("\n{}, {}: the force of what was held changed by up to {:.3f} N",
+                                   methods[m], family, sum.change);
+    }
+    scores.rows.push_back(std::move(line));
+  }
+  std::vector<std::string> line = {"score", ""};
+  for (const double sum : held) {
+    line.push_back(percent_held(sum, static_cast<double>(families.size())));
+    line.emplace_back("");
+  }
+  scores.rows.push_back(std::move(line));
+  return scores;
+}
+
+constexpr std::string_view pop_plot = R"gp(
+set ylabel "held [%]"
+set yrange [0:105]
+set xtics rotate by -40 noenhanced
+set bmargin 7
+set key outside right top
+held(m) = sprintf("< awk -F, '$1==\"%s\" {if (!($2 in n)) order[++k]=$2; n[$2]+=$4; l[$2]+=$5} END {for (i=1;i<=k;i++) print order[i], 100*(n[order[i]]-l[order[i]])/n[order[i]]}' %s", m, csv)
+set datafile separator " "
+plot for [m in methods] held(m) using 0:2:xtic(1) with linespoints pt 7 lw 2 title m
+)gp";
+
+}  // namespace
+
+Experiment pop_experiment() {
+  return {"pop",
+          "is the surface ever lost? families of cases drawn by chance, failures shrunk",
+          "method,family,from,cases,lost,dipped,worst_step_n,worst_change_n,first_lost,simplest",
+          {"paper", "sight"},
+          false,
+          pop_cells,
+          pop_plot,
+          no_claims,
+          pop_scores};
+}
+
+}  // namespace palpate::lab

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "lab/experiment.hpp"
+
+namespace palpate::lab {
+
+/// Does a method keep the proxy on the right side? Families of cases drawn by chance, each failure
+/// shrunk to the simplest case that still fails. docs/pop.md has the rules.
+Experiment pop_experiment();
+
+}  // namespace palpate::lab

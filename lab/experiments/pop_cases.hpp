@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "lab/method.hpp"
+#include "lab/play.hpp"
+
+namespace palpate::lab {
+
+/// A value that a family of cases draws by chance.
+struct PopRange {
+  std::string_view key;
+  double simple;     ///< the simplest there is: what a failure is shrunk towards
+  double low, high;  ///< drawn evenly from here to there
+  enum class Draw { even, by_factor, whole } draw = Draw::even;  ///< by_factor: its logarithm is
+  double wide = 0.0;  ///< largest value that may be given by hand, if larger than `high`
+};
+
+/// One case of the bench: all that it depends on, in SI.
+struct PopCase {
+  std::string_view family;
+  std::map<std::string, double, std::less<>> values;
+  std::uint64_t seed = 0;
+
+  [[nodiscard]] double operator[](std::string_view key) const;
+  /// `pop:FAMILY?KEY=VALUE&...&seed=N`, which parse_pop_case reads back to the same.
+  [[nodiscard]] std::string text() const;
+};
+
+/// A case made ready to play.
+struct PopStage {
+  Scenario scenario;
+  Truth truth;
+  Vec3 seat = Vec3::Zero();
+  /// [s] stamp of the newest frame that was shown
+  std::shared_ptr<double> shown = std::make_shared<double>(0.0);
+  /// It counts where the proxy is when the scene ends (5.2), and not only what lasts.
+  bool judged_at_end = false;
+  double steady_from = 1e9;  ///< [s] from then on the true force does not change
+};
+
+/// A family of cases.
+struct PopFamily {
+  std::string_view name;
+  std::string_view summary;
+  std::span<const PopRange> ranges;
+  PopStage (*stage)(const PopCase&, const Parameters&);
+};
+
+/// All families, in the order of the tables.
+std::span<const PopFamily> pop_families();
+
+/// @throws Error for an unknown name, naming the nearest and listing all.
+const PopFamily& find_pop_family(std::string_view name);
+
+/// Case number `index` of a family: from seed, family and index alone.
+PopCase draw_pop_case(const PopFamily& family, std::uint64_t seed, std::uint64_t index);
+
+/// @throws Error for an unknown family or key, or a value that cannot be.
+PopCase parse_pop_case(const std::string& text);
+
+}  // namespace palpate::lab

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+// The bench itself: that the ruler passes, that what fails is found, shrunk and can be run again.
+#include <cmath>
+#include <filesystem>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "lab/experiment.hpp"
+#include "lab/experiments/pop_cases.hpp"
+#include "lab/runner.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Pop : public ::testing::Test {
+ protected:
+  Pop() {
+    std::string pattern = (fs::temp_directory_path() / "palpate_pop_XXXXXX").string();
+    folder_ = mkdtemp(pattern.data());
+  }
+  ~Pop() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] Table run(const ExperimentOptions& options) const {
+    RunnerOptions runner;
+    runner.jobs = 2;
+    return {"pop", run_experiment(find_experiment("pop"), options, runner, folder_ / "pop.csv")};
+  }
+
+ private:
+  fs::path folder_;
+};
+
+ExperimentOptions with(std::string method, int cases) {
+  ExperimentOptions options;
+  options.methods = {std::move(method)};
+  options.cases = cases;
+  return options;
+}
+
+TEST_F(Pop, TheRulerHoldsEveryCaseOfEveryFamily) {
+  const Table table = run(with("ideal", 1));
+  ASSERT_EQ(table.rows(), pop_families().size());
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    EXPECT_EQ(table.number(row, "lost"), 0.0) << table.text(row, "first_lost");
+    EXPECT_EQ(table.number(row, "dipped"), 0.0) << table.text(row, "family");
+  }
+  const Scores scores = find_experiment("pop").scores(table);
+  EXPECT_EQ(scores.rows.back()[2], "100.00");
+}
+
+TEST_F(Pop, ThePaperLosesEverySweepOfAnOccluderAndTheFailureIsShrunkAndRunsAgain) {
+  ExperimentOptions options = with("paper", 2);
+  options.families = {"occluder"};
+  const Table table = run(options);
+  ASSERT_EQ(table.rows(), 1U);
+  EXPECT_EQ(table.number(0, "lost"), 2.0);
+  const PopCase first = parse_pop_case(table.text(0, "first_lost"));
+  const PopCase simplest = parse_pop_case(table.text(0, "simplest"));
+  // All that has nothing to do with it is gone.
+  for (const char* key : {"sensor", "tilt"}) EXPECT_EQ(simplest[key], 0.0) << key;
+  EXPECT_EQ(simplest.seed, first.seed);
+
+  ExperimentOptions again = with("paper", 1);
+  again.case_text = table.text(0, "simplest");
+  const Table rerun = run(again);
+  ASSERT_EQ(rerun.rows(), 1U);
+  EXPECT_EQ(rerun.number(0, "lost"), 1.0);
+  EXPECT_EQ(rerun.text(0, "first_lost"), table.text(0, "simplest"));
+  EXPECT_EQ(find_experiment("pop").scores(rerun).rows.back()[2], "0.00");
+}
+
+TEST_F(Pop, AValueThatIsFixedIsNotDrawn) {
+  // Slower than r_1 f_c = 0.15 m/s the paper holds a surface from free space, faster it does not.
+  ExperimentOptions options = with("paper", 3);
+  options.families = {"first-contact"};
+  for (const auto& [speed, lost] : {std::pair{"speed=0.1", 0.0}, std::pair{"speed=2", 3.0}}) {
+    options.fixed = {speed};
+    EXPECT_EQ(run(options).number(0, "lost"), lost) << speed;
+  }
+  options.fixed = {"sped=2"};
+  EXPECT_THROW(run(options), Error);
+  options.fixed = {"speed=2000"};
+  EXPECT_THROW(run(options), Error) << "more than can be";
+}
+
+TEST(PopCase, IsDrawnFromSeedFamilyAndNumberAndReadsBack) {
+  std::set<std::string> texts;
+  for (const PopFamily& family : pop_families()) {
+    for (const std::uint64_t index : {0U, 1U}) {
+      const PopCase c = draw_pop_case(family, 1, index);
+      texts.insert(c.text());
+      EXPECT_EQ(draw_pop_case(family, 1, index).text(), c.text());
+      EXPECT_NE(draw_pop_case(family, 2, index).text(), c.text());
+      const PopCase back = parse_pop_case(c.text());
+      EXPECT_EQ(back.text(), c.text());
+      for (const PopRange& range : family.ranges) {
+        EXPECT_GE(c[range.key], range.low * (range.low > 0.0 ? 0.99 : 1.01)) << c.text();
+        EXPECT_LE(c[range.key], range.high * 1.01) << c.text();
+      }
+    }
+  }
+  EXPECT_EQ(texts.size(), 2 * pop_families().size());
+}
+
+TEST(PopCase, RefusesWhatCannotBe) {
+  EXPECT_THROW(parse_pop_case("synthetic:plane"), Error);
+  EXPECT_THROW(parse_pop_case("pop:spere?radius=0.04"), Error);
+  EXPECT_THROW(parse_pop_case("pop:sphere?radus=0.04"), Error);
+  EXPECT_THROW(parse_pop_case("pop:sphere?radius=-0.04"), Error);
+  EXPECT_THROW(parse_pop_case("pop:sphere?sensor=3"), Error);
+  // What is not given is simple.
+  EXPECT_EQ(parse_pop_case("pop:sphere?radius=30mm")["radius"], 0.03);
+  EXPECT_EQ(parse_pop_case("pop:sphere?radius=30mm")["sensor"], 0.0);
+}
+
+TEST(Play, DeliversFramesLateAndInOrderAndLeavesOutWhatIsDropped) {
+  class Recorder final : public TouchMethod {
+   public:
+    void seat(const Vec3& /*proxy*/) override {}
+    void frame(const Cloud& /*cloud*/, double stamp) override { stamps.push_back(stamp); }
+    Tick tick(const Vec3& hip, double t) override {
+      arrived.resize(stamps.size(), t);
+      return {.t = t,
+              .hip = hip,
+              .proxy = hip,
+              .normal = hip,
+              .force = hip,
+              .state = ContactState::free_motion,
+              .steps = 0,
+              .surface_velocity = 0.0,
+              .frame = 0,
+              .flags = 0};
+    }
+    std::vector<double> stamps, arrived;
+  };
+  Recorder recorder;
+  const PopStage stage =
+      find_pop_family("hold").stage(parse_pop_case("pop:hold?seed=1"), Parameters{});
+  Scenario scenario = stage.scenario;
+  scenario.frame_rate = 10.0;
+  scenario.duration = 0.45;
+  // The second comes after 150 ms, when the third is there already; the fourth never.
+  scenario.delay = [](std::uint64_t frame) -> std::optional<double> {
+    if (frame == 3) return std::nullopt;
+    return frame == 1 ? 0.15 : 0.0;
+  };
+  play(recorder, scenario, [](const Tick&) { return true; });
+  ASSERT_EQ(recorder.stamps.size(), 4U);
+  const double stamps[] = {0.0, 0.1, 0.2, 0.4};
+  const double arrived[] = {0.0, 0.25, 0.25, 0.4};
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(recorder.stamps[i], stamps[i], 1e-9);
+    EXPECT_NEAR(recorder.arrived[i], arrived[i], 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace palpate::lab

@@ -7,13 +7,14 @@
 
 #include <toml++/toml.h>
 
+#include "lab/method.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate::app {
 namespace {
 
 // A configuration file: `method = "paper"` and a table [parameters] with one line a parameter.
-void apply_config(const std::string& path, Parameters& parameters) {
+void apply_config(const std::string& path, std::string& method, Parameters& parameters) {
   toml::table config;
   try {
     config = toml::parse_file(path);
@@ -27,7 +28,7 @@ void apply_config(const std::string& path, Parameters& parameters) {
     if (key == "method") {
       const auto name = value.value<std::string>();
       if (!name) throw Error(path, "`method` is not a text", "write method = \"paper\"");
-      parameters.method = method_from_name(*name);
+      method = *name;
     } else if (key == "parameters" && value.is_table()) {
       for (const auto& [name, number] : *value.as_table()) {
         const auto given = number.value<double>();
@@ -57,8 +58,8 @@ double parse_number(const std::string& subject, const std::string& text) {
   return value;
 }
 
-void MethodOptions::add_to(CLI::App& command) {
-  command.add_option("--method", method_, "paper (default), paper-as-printed, fixed-step or sight");
+void MethodOptions::add_to(CLI::App& command, const std::string& methods) {
+  command.add_option("--method", method_, methods);
   command
       .add_option("--set", assignments_,
                   "set a parameter, NAME=VALUE in SI units; see `palpate parameters`")
@@ -66,19 +67,32 @@ void MethodOptions::add_to(CLI::App& command) {
   command.add_option("--config", config_, "read the method and parameters from a TOML file");
 }
 
-Parameters MethodOptions::parameters() const {
-  Parameters parameters;
-  if (config_) apply_config(*config_, parameters);
-  if (method_) parameters.method = method_from_name(*method_);
+MethodOptions::Any MethodOptions::read(void (*check)(const std::string& method)) const {
+  Any any{std::string(method_name(Method::paper)), {}};
+  if (config_) apply_config(*config_, any.method, any.parameters);
+  check(any.method);
+  if (method_) check(any.method = *method_);
   for (const std::string& assignment : assignments_) {
     const std::size_t equals = assignment.find('=');
     if (equals == std::string::npos)
       throw Error("--set " + assignment, "there is no '='", "write --set NAME=VALUE");
     const std::string name = assignment.substr(0, equals);
-    set_parameter(parameters, name, parse_number("--set " + name, assignment.substr(equals + 1)));
+    set_parameter(any.parameters, name,
+                  parse_number("--set " + name, assignment.substr(equals + 1)));
   }
-  validate(parameters);
-  return parameters;
+  for (const MethodInfo& known : method_table()) {
+    if (known.name == any.method) any.parameters.method = known.method;
+  }
+  validate(any.parameters);
+  return any;
+}
+
+Parameters MethodOptions::parameters() const {
+  return read([](const std::string& method) { method_from_name(method); }).parameters;
+}
+
+MethodOptions::Any MethodOptions::any_method() const {
+  return read([](const std::string& method) { lab::find_method(method); });
 }
 
 }  // namespace palpate::app

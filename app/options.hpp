@@ -15,13 +15,24 @@ namespace palpate::app {
 /// Order of precedence: defaults, --config, --method and --set.
 class MethodOptions {
  public:
-  void add_to(CLI::App& command);
+  /// @param methods  what --method can be, for the help text
+  void add_to(CLI::App& command, const std::string& methods =
+                                     "paper (default), paper-as-printed, fixed-step or sight");
 
   /// @throws Error for an unknown method, parameter or key, a value out of range, or a
   ///         configuration file that cannot be read.
   [[nodiscard]] Parameters parameters() const;
+  /// The same where any method of the lab will do: its name, and the parameters for it.
+  struct Any {
+    std::string method;
+    Parameters parameters;
+  };
+  /// @throws Error as parameters().
+  [[nodiscard]] Any any_method() const;
 
  private:
+  [[nodiscard]] Any read(void (*check)(const std::string& method)) const;
+
   std::optional<std::string> method_;
   std::vector<std::string> assignments_;
   std::optional<std::string> config_;

@@ -5,6 +5,7 @@
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate::app {
 
@@ -24,7 +25,7 @@ Playback::Playback(const std::vector<std::string>& uris) {
   newest_.resize(cameras_.size());
 }
 
-void Playback::adopt_until(double t, Renderer& renderer) {
+void Playback::adopt_until(double t, const std::function<void(const Cloud&, double)>& adopt) {
   for (;;) {
     Camera* due = nullptr;
     for (Camera& camera : cameras_) {
@@ -41,7 +42,7 @@ void Playback::adopt_until(double t, Renderer& renderer) {
     }
     std::shared_ptr<const Cloud> cloud =
         clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds));
-    renderer.frame(*cloud, due->newest.stamp);
+    adopt(*cloud, due->newest.stamp);
     in_use_ = std::move(cloud);  // only now may the frame before go
     newest_[static_cast<std::size_t>(due - cameras_.data())] = due->newest.cloud.get();
     ++adopted_;
@@ -51,6 +52,12 @@ void Playback::adopt_until(double t, Renderer& renderer) {
       watcher_(due->newest.stamp, seen);
     }
   }
+}
+
+lab::Truth truth_of(const Playback& playback) {
+  const auto* camera = dynamic_cast<const SyntheticCamera*>(&playback.source(0));
+  if (camera == nullptr || playback.cameras() != 1) return nullptr;
+  return lab::truth_of(std::make_shared<const Scene>(camera->scene()));
 }
 
 }  // namespace palpate::app

@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "palpate/core/renderer.hpp"
+#include "lab/method.hpp"
+#include "palpate/core/cloud.hpp"
 #include "palpate/sources/source.hpp"
 
 namespace palpate::app {
@@ -20,9 +21,10 @@ class Playback {
   /// @throws Error if a source cannot be opened, or there are none.
   explicit Playback(const std::vector<std::string>& uris);
 
-  /// Hands every frame stamped at or before `t` [s] to the renderer, oldest first.
+  /// Hands every frame stamped at or before `t` [s], and its stamp, to `adopt`, oldest first. A
+  /// frame lives until the next has been handed over.
   /// @throws Error if a frame cannot be read.
-  void adopt_until(double t, Renderer& renderer);
+  void adopt_until(double t, const std::function<void(const Cloud&, double)>& adopt);
 
   /// Is told of each frame that is adopted: its stamp, and what each camera saw last.
   using Watcher = std::function<void(double, std::span<const std::shared_ptr<const Cloud>>)>;
@@ -51,5 +53,12 @@ class Playback {
   std::shared_ptr<const Cloud> in_use_;
   std::size_t adopted_ = 0;
 };
+
+/// What is true of what the first camera sees: known of a synthetic one that is alone.
+lab::Truth truth_of(const Playback& playback);
+
+/// What --method can be where any method of the lab will do.
+constexpr const char* any_method_help =
+    "paper (default), sight, or any other of `palpate eval --list-methods`";
 
 }  // namespace palpate::app

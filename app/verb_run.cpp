@@ -17,6 +17,7 @@
 #include "app/scripted_hand.hpp"
 #include "app/summary.hpp"
 #include "app/verbs.hpp"
+#include "lab/method.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate::app {
@@ -97,12 +98,17 @@ int run_headless(const RunOptions& options) {
   if (!(duration >= 2.0 && duration <= 86400.0))
     throw Error("--duration", fmt::format("{} s is too short or too long", duration),
                 "give 2 to 86400");
-  const Parameters parameters = options.method.parameters();
+  const auto [name, parameters] = options.method.any_method();
+  if (!options.record.empty() && name != method_name(parameters.method))
+    throw Error("--record",
+                "a session is replayed by palpate's own methods, and '" + name + "' is not one",
+                "leave it out, or choose one of the first four");
   Playback playback(options.cameras);
   const HipPath hand = open_hand(options, playback);
-  Renderer renderer(parameters);
   const Vec3 seat = hand.at(hand.first_time());
-  renderer.seat(seat);
+  const std::unique_ptr<lab::TouchMethod> method =
+      lab::make_method(name, {parameters, truth_of(playback)});
+  method->seat(seat);
   Summary summary;
   RunRecording recording(options.record,
                          {.cameras = options.cameras, .device = options.device, .seat = seat},
@@ -114,8 +120,8 @@ int run_headless(const RunOptions& options) {
   const auto ticks_a_line = static_cast<std::int64_t>(options.rate / 10.0);
   for (std::int64_t i = 0; i < ticks; ++i) {
     const double t = hand.first_time() + static_cast<double>(i) / options.rate;
-    playback.adopt_until(t, renderer);
-    const Tick tick = renderer.tick(hand.at(t), t);
+    playback.adopt_until(t, [&](const Cloud& cloud, double stamp) { method->frame(cloud, stamp); });
+    const Tick tick = method->tick(hand.at(t), t);
     recording.tick(tick);
     const double r_c = parameters.proxy.r_c();
     summary.count(tick, playback.adopted(), least_behind(playback.newest(), tick.proxy, r_c), r_c);
@@ -157,7 +163,7 @@ Verb add_run(CLI::App& program) {
   command->add_flag("--headless", options->headless,
                     "no page: as fast as the machine can, with a status line and a summary");
   command->add_flag("--json", options->json, "print the summary as a JSON object");
-  options->method.add_to(*command);
+  options->method.add_to(*command, std::string(any_method_help) + "; in the page the first four");
   return {command, [options] { return run(*options); }};
 }
 

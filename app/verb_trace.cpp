@@ -11,6 +11,7 @@
 #include "app/summary.hpp"
 #include "app/trace_csv.hpp"
 #include "app/verbs.hpp"
+#include "lab/method.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/devices/hip_path.hpp"
 
@@ -33,7 +34,7 @@ int trace(const TraceOptions& options) {
   if (options.json && options.out == "-")
     throw Error("--json", "the trace itself goes to standard output",
                 "name a file for it with --out");
-  const Parameters parameters = options.method.parameters();
+  const auto [name, parameters] = options.method.any_method();
   const HipPath path = HipPath::read_csv(options.path);
   Playback playback(options.cameras);
   for (std::size_t camera = 0; camera < playback.cameras(); ++camera) {
@@ -41,8 +42,9 @@ int trace(const TraceOptions& options) {
     for (const std::string& note : about.notes)
       std::fprintf(stderr, "palpate: %s: %s\n", about.uri.c_str(), note.c_str());
   }
-  Renderer renderer(parameters);
-  renderer.seat(path.at(path.first_time()));
+  const std::unique_ptr<lab::TouchMethod> method =
+      lab::make_method(name, {parameters, truth_of(playback)});
+  method->seat(path.at(path.first_time()));
   TraceWriter writer(options.out);
   Summary summary;
 
@@ -52,8 +54,8 @@ int trace(const TraceOptions& options) {
   Progress progress("trace", static_cast<std::size_t>(ticks));
   for (std::int64_t i = 0; i < ticks; ++i) {
     const double t = path.first_time() + static_cast<double>(i) / options.rate;
-    playback.adopt_until(t, renderer);
-    const Tick tick = renderer.tick(path.at(t), t);
+    playback.adopt_until(t, [&](const Cloud& cloud, double stamp) { method->frame(cloud, stamp); });
+    const Tick tick = method->tick(path.at(t), t);
     writer.write(tick);
     const double r_c = parameters.proxy.r_c();
     summary.count(tick, playback.adopted(), least_behind(playback.newest(), tick.proxy, r_c), r_c);
@@ -85,7 +87,7 @@ Verb add_trace(CLI::App& program) {
   command->add_option("--out", options->out, "where the trace goes, - for standard output");
   command->add_option("--rate", options->rate, "ticks a second (1000)");
   command->add_flag("--json", options->json, "print the summary as a JSON object");
-  options->method.add_to(*command);
+  options->method.add_to(*command, any_method_help);
   return {command, [options] { return trace(*options); }};
 }
 

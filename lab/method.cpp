@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/method.hpp"
 
-#include "lab/methods/direct.hpp"
-#include "lab/methods/ideal.hpp"
-#include "lab/methods/kernel.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate::lab {
@@ -15,19 +12,28 @@ Truth truth_of(const std::shared_ptr<const Scene>& scene) {
   };
 }
 
+// The files of lab/methods, in the order in which tables show their methods. FILE.cpp defines
+// `std::vector<MethodInfo> FILE_methods()`. Adding a method: its file, and one line here.
+// clang-format off: one a line
+#define PALPATE_METHOD_FILES(file) \
+  file(kernel) file(direct) file(point_boxes) file(radial_fields) file(surfels) file(ideal)
+// clang-format on
+
+#define PALPATE_DECLARE(name) std::vector<MethodInfo> name##_methods();
+PALPATE_METHOD_FILES(PALPATE_DECLARE)
+#undef PALPATE_DECLARE
+
 const std::vector<MethodInfo>& known_methods() {
-  // Adding a method: one file in lab/methods, one line here.
-  static const std::vector<MethodInfo> methods = {
-      {"paper", "Rydén and Chizeck 2013, errata corrected", make_kernel<Method::paper>},
-      {"paper-as-printed", "Rydén and Chizeck 2013, to the letter",
-       make_kernel<Method::paper_as_printed>},
-      {"fixed-step", "Rydén 2011 [1]: steps of 0.1 r_1, no velocity",
-       make_kernel<Method::fixed_step>},
-      {"sight", "sightline tracking with remembered sides (docs/method.md)",
-       make_kernel<Method::sight>},
-      {"direct", "penalty force on a moving-least-squares surface (2.1, [7])", make_direct},
-      {"ideal", "the proxy on the true surface: the ruler", make_ideal},
-  };
+  static const std::vector<MethodInfo> methods = [] {
+    std::vector<MethodInfo> all;
+    const auto add = [&all](const std::vector<MethodInfo>& of_file) {
+      all.insert(all.end(), of_file.begin(), of_file.end());
+    };
+#define PALPATE_ADD(name) add(name##_methods());
+    PALPATE_METHOD_FILES(PALPATE_ADD)
+#undef PALPATE_ADD
+    return all;
+  }();
   return methods;
 }
 

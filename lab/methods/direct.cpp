@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/methods/direct.hpp"
-
+// The direct method of section 2.1 on the surface of [7]: a force in proportion to the depth of the
+// HIP below a moving-least-squares plane, no proxy and no memory.
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include <Eigen/Eigenvalues>
+
+#include "lab/method.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -88,10 +90,14 @@ class Direct final : public TouchMethod {
   std::int64_t frames_ = 0;
 };
 
+std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
+  return std::make_unique<Direct>(setup.parameters);
+}
+
 }  // namespace
 
-std::unique_ptr<TouchMethod> make_direct(const MethodSetup& setup) {
-  return std::make_unique<Direct>(setup.parameters);
+std::vector<MethodInfo> direct_methods() {
+  return {{"direct", "penalty force on a moving-least-squares surface (2.1, [7])", make}};
 }
 
 }  // namespace palpate::lab

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/methods/ideal.hpp"
-
+// The ruler: a sphere of radius r_c that rests on the true surface, followed continuously in time,
+// coupled to the HIP by (16).
 #include <algorithm>
 #include <optional>
 
+#include "lab/method.hpp"
 #include "palpate/core/coupling.hpp"
 #include "palpate/core/error.hpp"
 
@@ -63,13 +64,17 @@ class Ideal final : public TouchMethod {
   std::int64_t frames_ = 0;
 };
 
-}  // namespace
-
-std::unique_ptr<TouchMethod> make_ideal(const MethodSetup& setup) {
+std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
   if (!setup.truth)
     throw Error("method 'ideal'", "there is no analytic truth here",
                 "choose another method, or a synthetic scene");
   return std::make_unique<Ideal>(setup);
+}
+
+}  // namespace
+
+std::vector<MethodInfo> ideal_methods() {
+  return {{"ideal", "the proxy on the true surface: the ruler", make}};
 }
 
 }  // namespace palpate::lab

@@ -3,15 +3,19 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <mutex>
 #include <utility>
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <spawn.h>
@@ -26,6 +30,7 @@
 #include "palpate/core/uri.hpp"
 #include "palpate/devices/devices.hpp"
 #include "palpate/devices/mouse_device.hpp"
+#include "palpate/record/recorder.hpp"
 #include "palpate/servo/servo_loop.hpp"
 #include "palpate/viewer/tick_batcher.hpp"
 
@@ -142,6 +147,7 @@ class LiveSession final : public ViewerHost {
     loop_ = std::make_unique<ServoLoop>(rendering_by<Renderer>(options.parameters), *device_,
                                         settings_, ServoOptions{options.rate, {}});
     reader_.emplace(loop_->reader());
+    if (!options.record.empty()) open_recorder(options.record, {});
     loop_->start();  // before anybody asks how it does
     server_ = open_server(options, *this);
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
@@ -158,6 +164,7 @@ class LiveSession final : public ViewerHost {
     loop_->stop();
     if (!server_) return;
     server_.reset();
+    stop_recording();
     ticks();  // the last ones
     summary_.set_late_ticks(loop_->timing().late_ticks.load());
   }
@@ -166,6 +173,8 @@ class LiveSession final : public ViewerHost {
   [[nodiscard]] std::vector<std::string> advice() const { return loop_->realtime().advice; }
   /// After close().
   [[nodiscard]] const Summary& summary() const { return summary_; }
+  /// After close(): has a recording ended before its time?
+  [[nodiscard]] bool lost_recording() const { return lost_recording_; }
 
   std::string hello() override {
     json parameters = json::array();
@@ -228,8 +237,7 @@ class LiveSession final : public ViewerHost {
         {"interventions", interventions},
         {"flag_ticks", flag_ticks_},
         {"pop_throughs", summary_.pop_throughs()},
-        {"recording",
-         {{"possible", false}, {"path", nullptr}, {"message", "not part of this version"}}}}
+        {"recording", recording_state()}}
         .dump(-1, ' ', false, json::error_handler_t::replace);
   }
 
@@ -276,13 +284,16 @@ class LiveSession final : public ViewerHost {
       set_parameter(settings.safety, limit->name, limit->value);
     } else if (const auto* method = std::get_if<SetMethod>(&command)) {
       settings.rendering.method = method_from_name(method->name);
-    } else if (std::holds_alternative<SetRecording>(command)) {
-      throw Error("recording", "it is not part of this version");
+    } else if (const auto* record = std::get_if<SetRecording>(&command)) {
+      if (!record->on) stop_recording();
+      if (record->on && !recorder_) start_recording();
+      return;
     } else if (mouse_ != nullptr) {
       mouse_->aim({.position = target_ = start_, .present = false});
     }
-    loop_->set_settings(settings);
+    settings_number_ = loop_->set_settings(settings);
     settings_ = settings;
+    if (recorder_) recorder_->settings({settings_number_, settings_}, monotonic_now());
   }
 
  private:
@@ -296,9 +307,10 @@ class LiveSession final : public ViewerHost {
         if (cloud) clouds.push_back(cloud);
       }
       stamp_ = std::max(frame.stamp, stamp_ + 1e-6);  // of two cameras that are due at once
-      loop_->put_frame(
+      frame_number_ = loop_->put_frame(
           clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds)),
           stamp_);
+      if (recorder_) recorder_->frame(frame_number_, stamp_, newest_);
       ++frames_;
     }
     if (is_new) show(static_cast<std::uint8_t>(camera), frame);
@@ -349,6 +361,65 @@ class LiveSession final : public ViewerHost {
                                            static_cast<std::uint32_t>(k.height), std::move(xy)));
   }
 
+  // The server's thread, or before it runs and after.
+  void open_recorder(const std::string& folder, std::function<void()> renew) {
+    using std::chrono::nanoseconds;
+    SessionInfo info{.kind = SessionInfo::Kind::live, .version = PALPATE_VERSION};
+    for (const auto& camera : cameras_) info.cameras.push_back(camera->status().uri);
+    info.device = device_uri_;
+    info.epoch =
+        std::chrono::duration_cast<nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+            .count() -
+        std::llround(1e9 * monotonic_now());
+    auto recorder = std::make_unique<Recorder>(folder, info, loop_->reader(), std::move(renew));
+    recorder->settings({settings_number_, settings_}, monotonic_now());
+    const std::lock_guard lock(mutex_);
+    // The loop's first tick of the recording uses this frame, or one that is yet to come.
+    if (frame_number_ > 0) recorder->frame(frame_number_, stamp_, newest_);
+    recorder_ = std::move(recorder);
+  }
+
+  void start_recording() {
+    const std::time_t now = std::time(nullptr);
+    std::tm local{};
+    localtime_r(&now, &local);
+    open_recorder(fmt::format("palpate_{:%Y-%m-%d_%H-%M-%S}", local), [this] {
+      loop_->renew(rendering_by<Renderer>());  // gets the settings in use
+    });
+  }
+
+  void stop_recording() {
+    if (!recorder_) return;
+    std::unique_ptr<Recorder> recorder;
+    {
+      const std::lock_guard lock(mutex_);
+      recorder = std::move(recorder_);
+    }
+    recorder->stop();
+    const Recorder::Status status = recorder->status();
+    const std::string folder = status.folder.string();
+    if (!status.trouble.empty()) {
+      lost_recording_ = true;
+      recording_message_ = status.trouble;
+      fmt::print(stderr, "palpate: the recording has stopped: {}\n", status.trouble);
+    } else if (status.lost_ticks + status.lost_frames > 0) {
+      lost_recording_ = true;
+      recording_message_ = fmt::format("{}: the disk was too slow for {} ticks and {} frames",
+                                       folder, status.lost_ticks, status.lost_frames);
+      fmt::print(stderr, "palpate: {}\n", recording_message_);
+    } else {
+      recording_message_ =
+          fmt::format("{}: {} ticks, {} frames", folder, status.ticks, status.frames);
+    }
+  }
+
+  json recording_state() {
+    if (recorder_ && !recorder_->status().trouble.empty()) stop_recording();
+    json state = {{"possible", true}, {"path", nullptr}, {"message", recording_message_}};
+    if (recorder_) state["path"] = recorder_->status().folder.string();
+    return state;
+  }
+
   double rate_;
   std::string device_uri_;
   std::vector<std::unique_ptr<LiveCamera>> cameras_;
@@ -361,11 +432,17 @@ class LiveSession final : public ViewerHost {
   std::mutex mutex_;
   std::vector<std::shared_ptr<const Cloud>> newest_;  // guarded by mutex_
   double stamp_ = 0.0;                                // guarded by mutex_
+  std::uint64_t frame_number_ = 0;                    // guarded by mutex_
   std::size_t frames_ = 0;                            // guarded by mutex_
   std::vector<std::uint32_t> numbers_;                // each camera's own
 
   // The server's thread, and after it has ended the main one.
   ServoSettings settings_;
+  std::uint64_t settings_number_ = 0;  // as the loop counts them
+  // Set and reset under mutex_, for the cameras' threads; before the loop, which it reads, is gone.
+  std::unique_ptr<Recorder> recorder_;
+  std::string recording_message_;
+  bool lost_recording_ = false;
   Vec3 start_ = Vec3::Zero();   // [m] where the mouse's hand began
   Vec3 target_ = Vec3::Zero();  // [m] where it was sent last
   std::optional<TickRing<ServoTick>::Reader> reader_;
@@ -428,7 +505,7 @@ int run_live(const LiveOptions& options) {
   session.close();
   std::fputs(options.json ? session.summary().json().c_str() : session.summary().text().c_str(),
              stdout);
-  return 0;
+  return session.lost_recording() ? 1 : 0;
 }
 
 }  // namespace palpate::app

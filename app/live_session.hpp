@@ -20,6 +20,7 @@ struct LiveOptions {
   bool open_browser = true;       ///< where there is a desktop
   bool json = false;              ///< the summary as a JSON object
   Parameters parameters;
+  std::string record;  ///< folder of a recording from the start; empty for none
 };
 
 /// A session that a person watches and touches: cameras, servo loop and page, until the time is up

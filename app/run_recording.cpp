@@ -19,7 +19,7 @@ RunRecording::RunRecording(const std::string& folder, SessionInfo info,
   info.kind = SessionInfo::Kind::headless;
   info.version = PALPATE_VERSION;
   info.epoch = std::chrono::duration_cast<nanoseconds>(now).count() - std::llround(1e9 * start);
-  writer_ = std::make_unique<SessionWriter>(folder, info);
+  writer_ = std::make_unique<SessionWriter>(folder, info, start);
   writer_->settings({.number = 0, .settings = {parameters, {}, {}}}, start);
 }
 

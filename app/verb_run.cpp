@@ -87,6 +87,7 @@ int run_in_browser(const RunOptions& options) {
   live.open_browser = !options.no_browser;
   live.json = options.json;
   live.parameters = options.method.parameters();
+  live.record = options.record;
   return run_live(live);
 }
 

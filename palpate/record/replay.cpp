@@ -40,7 +40,9 @@ class Rerun {
         settings_number_(first.settings_number),
         settings_(session.settings(settings_number_)),
         renderer_(settings_.rendering) {
-    if (session.info().seat) renderer_.seat(*session.info().seat);
+    if (!session.info().seat) return;
+    last_proxy_ = *session.info().seat;
+    renderer_.seat(last_proxy_);
   }
 
   Tick tick(const ServoTick& recorded) {

@@ -44,11 +44,15 @@ ros::TransformStamped transform(const ros::Header& header, const std::string& ch
 
 }  // namespace
 
-SessionWriter::SessionWriter(const std::filesystem::path& folder, const SessionInfo& info,
+SessionWriter::SessionWriter(const std::filesystem::path& folder, const SessionInfo& info, double t,
                              std::optional<std::uint64_t> max_bytes)
-    : info_(info), bag_(folder, max_bytes), committed_at_(monotonic_now()) {
-  write(session_topic::session, info_.epoch, ros::String{to_json(info_)}, true);
+    : epoch_(info.epoch), bag_(folder, max_bytes), committed_at_(monotonic_now()) {
+  this->info(info, t);
   bag_.commit();
+}
+
+void SessionWriter::info(const SessionInfo& info, double t) {
+  write(session_topic::session, nanoseconds(t), ros::String{to_json(info)}, true);
 }
 
 template <class Message>
@@ -61,8 +65,8 @@ void SessionWriter::write(std::string_view topic, std::int64_t nanoseconds, cons
 // On the clock of the wall, for whoever sorts messages by it; the exact time is in the message.
 std::int64_t SessionWriter::nanoseconds(double t) const {
   constexpr double farthest = 1e9;  // [s]
-  if (!(std::abs(t) <= farthest)) return info_.epoch;
-  return info_.epoch + std::llround(1e9 * t);
+  if (!(std::abs(t) <= farthest)) return epoch_;
+  return epoch_ + std::llround(1e9 * t);
 }
 
 void SessionWriter::settings(const NumberedSettings& settings, double t) {

@@ -23,13 +23,17 @@ namespace palpate {
 class SessionWriter {
  public:
   /// @param folder     of the bag; must not be there yet
+  /// @param t          [s] on the session's clock: now
   /// @param max_bytes  as BagWriter's
   /// @throws Error if it is there, or cannot be made.
-  SessionWriter(const std::filesystem::path& folder, const SessionInfo& info,
+  SessionWriter(const std::filesystem::path& folder, const SessionInfo& info, double t,
                 std::optional<std::uint64_t> max_bytes = std::nullopt);
 
   // Each throws Error if the disk is full or fails; what was committed before stays.
 
+  /// Says anew what the session is: the last time counts. Its epoch stays.
+  /// @param t  [s] when it was that
+  void info(const SessionInfo& info, double t);
   /// Settings, before the first tick that uses them.
   /// @param t  [s] when they were set
   void settings(const NumberedSettings& settings, double t);
@@ -64,7 +68,7 @@ class SessionWriter {
   void depth(std::size_t camera, double stamp, const DepthImage& image);
   void points(std::size_t camera, double stamp, const PointCloud& cloud);
 
-  SessionInfo info_;
+  std::int64_t epoch_;  // [ns]
   BagWriter bag_;
   std::vector<Camera> cameras_;
   std::uint64_t ticks_ = 0, frames_ = 0;

@@ -32,31 +32,38 @@ void validate(const ServoSettings& settings) {
 
 Cycle::Cycle(std::unique_ptr<Rendering> rendering, Device& device, const ServoSettings& settings,
              std::size_t ring)
-    : rendering_(std::move(rendering)),
+    : first_rendering_(std::move(rendering)),
+      rendering_(first_rendering_.get()),
       device_(device),
       safety_(device.info().limits, settings.safety),
       workspace_(settings.placement),
-      r_c_(settings.rendering.proxy.r_c()),
+      parameters_(settings.rendering),
       ring_(ring) {
   validate(settings);
   rendering_->set_parameters(settings.rendering);
 }
 
-void Cycle::put_frame(std::shared_ptr<const Cloud> cloud, double stamp, double now) {
+std::uint64_t Cycle::put_frame(std::shared_ptr<const Cloud> cloud, double stamp, double now) {
   if (!cloud) throw Error("frame", "it has no cloud", "put only frames that hold something");
-  frames_.put({std::move(cloud), stamp, now});
+  return frames_.put({std::move(cloud), stamp, now});
 }
 
-void Cycle::set_settings(const ServoSettings& settings) {
+std::uint64_t Cycle::set_settings(const ServoSettings& settings) {
   validate(settings);
-  const std::lock_guard lock(settings_writers_);
-  settings_.put(settings);
+  const std::lock_guard lock(writers_);
+  return settings_.put(settings);
+}
+
+void Cycle::renew(std::shared_ptr<Rendering> rendering) {
+  if (!rendering) throw Error("renderer", "there is none", "give one");
+  const std::lock_guard lock(writers_);
+  renewals_.put(std::move(rendering));
 }
 
 void Cycle::adopt_settings(const ServoSettings& settings) noexcept {
   safety_.set_parameters(settings.safety);
   workspace_.place(settings.placement);
-  r_c_ = settings.rendering.proxy.r_c();
+  parameters_ = settings.rendering;
   try {
     rendering_->set_parameters(settings.rendering);
   } catch (const Error&) {  // validated, so only a method with limits of its own comes here
@@ -82,6 +89,21 @@ void Cycle::adopt_frame(const CapturedFrame& frame, double t) noexcept {
   statistics_.hand_over.add(nanoseconds(t - frame.put_at));
 }
 
+// The proxy is all that a new renderer is told of the one before.
+bool Cycle::adopt_rendering() noexcept {
+  const std::shared_ptr<Rendering>* renewal = renewals_.take();
+  if (renewal == nullptr) return false;
+  rendering_ = renewal->get();
+  try {
+    rendering_->set_parameters(parameters_);
+  } catch (const Error&) {
+    add(statistics_.settings_refused, 1);
+  }
+  if (number_ > 0) rendering_->seat(last_proxy_);
+  last_normal_ = Vec3::Zero();
+  return true;
+}
+
 double Cycle::frame_age(double t) const noexcept {
   return has_frame_ ? std::max(t - fresh_stamp_, t - fresh_since_)
                     : std::numeric_limits<double>::infinity();
@@ -91,13 +113,19 @@ void Cycle::run(const Wake& wake) noexcept {
   const double t = wake.t;
   const HandState hand = device_.read(t);
   if (const ServoSettings* settings = settings_.take()) adopt_settings(*settings);
-  if (const CapturedFrame* frame = frames_.take()) adopt_frame(*frame, t);
+  const bool renewed = adopt_rendering();
+  if (const CapturedFrame* frame = frames_.take()) {
+    adopt_frame(*frame, t);
+  } else if (const auto& in_use = frames_.taken_last(); renewed && in_use.cloud) {
+    rendering_->frame(*in_use.cloud, in_use.stamp);
+  }
 
   const Vec3 hip = workspace_.hip_in_world(hand);
   bool reseated = false;
   if (const auto& frame = frames_.taken_last(); frame.cloud && safety_.stalls_at(t)) {
     reseated = true;
-    rendering_->seat(free_side(*frame.cloud, last_proxy_, last_normal_, r_c_, patch_));
+    rendering_->seat(
+        free_side(*frame.cloud, last_proxy_, last_normal_, parameters_.proxy.r_c(), patch_));
   }
   const Tick tick = rendering_->tick(hip, t);
   last_proxy_ = tick.proxy;
@@ -115,21 +143,21 @@ void Cycle::run(const Wake& wake) noexcept {
                                          .frame_interval = interval_});
   device_.write(workspace_.force_in_device(safe.force), t);
 
-  const ServoTick record{.tick = tick,
-                         .force = safe.force,
-                         .position = hand.position,
-                         .gain = safe.gain,
-                         .frame_stamp = last_stamp_,
-                         .frame_age = age,
-                         .number = number_++,
-                         .frame_number = frames_.number(),
-                         .settings_number = settings_.number(),
-                         .safety = safe.flags,
-                         .wake_up_ns = wake.wake_up_ns,
-                         .previous_compute_ns = wake.previous_compute_ns,
-                         .hand = (hand.present ? hand_present : 0U) |
-                                 (hand.clutched ? hand_clutched : 0U) |
-                                 (reseated ? proxy_reseated : 0U)};
+  const ServoTick record{
+      .tick = tick,
+      .force = safe.force,
+      .position = hand.position,
+      .gain = safe.gain,
+      .frame_stamp = last_stamp_,
+      .frame_age = age,
+      .number = number_++,
+      .frame_number = frames_.number(),
+      .settings_number = settings_.number(),
+      .safety = safe.flags,
+      .wake_up_ns = wake.wake_up_ns,
+      .previous_compute_ns = wake.previous_compute_ns,
+      .hand = (hand.present ? hand_present : 0U) | (hand.clutched ? hand_clutched : 0U) |
+              (reseated ? proxy_reseated : 0U) | (renewed ? rendering_renewed : 0U)};
   ring_.push(record);
   keep_statistics(record);
 }

@@ -60,6 +60,8 @@ enum HandFlag : std::uint32_t {
   hand_clutched = 1u << 1,
   /// The proxy was seated on the surface's free side before the tick, as ticks were missed.
   proxy_reseated = 1u << 2,
+  /// A new renderer took over before the tick, with the proxy where it was; see Cycle::renew.
+  rendering_renewed = 1u << 3,
 };
 
 /// All that happened in one cycle: what viewers and recorders read.
@@ -115,11 +117,20 @@ class Cycle {
   /// Frames are released here or on destruction, never in a tick.
   /// @param stamp  [s] when it was captured, on the loop's clock
   /// @param now    [s] on the loop's clock: measures how long the hand-over takes
-  void put_frame(std::shared_ptr<const Cloud> cloud, double stamp, double now);
+  /// @return its number, as in ServoTick::frame_number
+  std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp, double now);
 
   /// Takes effect in the next cycle. Any thread but the servo's.
+  /// @return their number, as in ServoTick::settings_number
   /// @throws Error if they do not validate.
-  void set_settings(const ServoSettings& settings);
+  std::uint64_t set_settings(const ServoSettings& settings);
+
+  /// Puts another renderer, which remembers nothing, in the place of the one in use, in the next
+  /// cycle: it gets the settings, the frame and the proxy's place, and begins from there. From then
+  /// on what it does follows from what it is given, which is what a recording that begins in the
+  /// midst of a session needs. The hand may notice: method `sight` brings the force up over most of
+  /// a frame's interval, as it does what any frame changes. Any thread but the servo's.
+  void renew(std::shared_ptr<Rendering> rendering);
 
   /// Sees every cycle from the next one on. Any thread.
   [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return ring_.reader(); }
@@ -135,18 +146,21 @@ class Cycle {
 
   void adopt_settings(const ServoSettings& settings) noexcept;
   void adopt_frame(const CapturedFrame& frame, double t) noexcept;
+  bool adopt_rendering() noexcept;
   [[nodiscard]] double frame_age(double t) const noexcept;
   void keep_statistics(const ServoTick& record) noexcept;
 
-  std::unique_ptr<Rendering> rendering_;
+  std::unique_ptr<Rendering> first_rendering_;
+  Rendering* rendering_;  // that one, or one of renewals_
   Device& device_;
   SafetyChain safety_;
   Workspace workspace_;
-  double r_c_;
-  Patch patch_;  // for seating the proxy anew
+  Parameters parameters_;  // in use
+  Patch patch_;            // for seating the proxy anew
 
-  std::mutex settings_writers_;  // keeps several of them apart; the servo never takes it
+  std::mutex writers_;  // of settings and renewals, kept apart; the servo never takes it
   Mailbox<ServoSettings> settings_;
+  Mailbox<std::shared_ptr<Rendering>> renewals_;
   Mailbox<CapturedFrame> frames_;
   TickRing<ServoTick> ring_;
   CycleStatistics statistics_;

@@ -19,10 +19,12 @@ class Mailbox {
  public:
   /// Puts a value, and destroys one that is no longer in use. One thread at a time; wait-free
   /// apart from T's own assignment.
-  void put(T value) {
+  /// @return its number, from 1
+  std::uint64_t put(T value) {
     slots_[back_].value = std::move(value);
     slots_[back_].number = ++put_;
     back_ = middle_.exchange(back_ | unread, std::memory_order_acq_rel) & index_bits;
+    return put_;
   }
 
   /// The newest value if it was not taken yet, else null. One thread; wait-free. [servo]

@@ -34,10 +34,13 @@ class ServoLoop {
   void stop();
 
   /// As Cycle's.
-  void put_frame(std::shared_ptr<const Cloud> cloud, double stamp) {
-    cycle_.put_frame(std::move(cloud), stamp, monotonic_now());
+  std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp) {
+    return cycle_.put_frame(std::move(cloud), stamp, monotonic_now());
   }
-  void set_settings(const ServoSettings& settings) { cycle_.set_settings(settings); }
+  std::uint64_t set_settings(const ServoSettings& settings) {
+    return cycle_.set_settings(settings);
+  }
+  void renew(std::shared_ptr<Rendering> rendering) { cycle_.renew(std::move(rendering)); }
   [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return cycle_.reader(); }
   [[nodiscard]] const CycleStatistics& statistics() const { return cycle_.statistics(); }
 

@@ -299,6 +299,19 @@ TEST_F(Program, ReplaysWhatItRecordedBitForBit) {
   }
 }
 
+TEST_F(Program, ReplaysALiveSessionBitForBit) {
+  const Outcome session =
+      run("run --json --duration 2.5 --port 0 --no-browser --device hand: --method sight "
+          "--camera synthetic:desk?size=160x120 --camera synthetic:plane?size=80x60 --record " +
+          path("bag"));
+  ASSERT_EQ(session.code, 0) << session.err;
+  const Outcome replay = run("replay --json " + path("bag"));
+  EXPECT_EQ(replay.code, 0) << replay.out << replay.err;
+  const auto report = nlohmann::json::parse(replay.out);
+  EXPECT_EQ(report["identical"], true);
+  EXPECT_EQ(report["ticks"], nlohmann::json::parse(session.out)["ticks"]);
+}
+
 TEST_F(Program, TouchesARecordingAsItTouchedTheCamera) {
   ASSERT_EQ(run(std::string("run --headless --duration 2 --device script:") + press() +
                 " --record " + path("bag") + " --camera " + plane)

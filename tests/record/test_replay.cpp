@@ -29,7 +29,7 @@ TEST_P(Replay, GivesTheSameForcesBitForBit) {
   parameters.coupling.damping = 1.0 / 3.0;
   std::vector<ServoTick> ticks;
   {
-    SessionWriter writer(folder.path() / "bag", press_info());
+    SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
     ticks = record_press(writer, parameters, 150);
   }
   double largest = 0.0;
@@ -56,12 +56,12 @@ ReplayReport replay_changed(const std::function<bool(ServoTick&)>& change) {
   const TemporaryFolder folder;
   std::vector<ServoTick> ticks;
   {
-    SessionWriter writer(folder.path() / "bag", press_info());
+    SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
     ticks = record_press(writer, {}, 120);
   }
   SessionReader reader(folder.path() / "bag");
   {
-    SessionWriter writer(folder.path() / "changed", press_info());
+    SessionWriter writer(folder.path() / "changed", press_info(), 0.0);
     writer.settings({}, 0.0);
     for (const auto& [number, frame] : reader.frames()) {
       if (number == 4) continue;  // of ticks 99 to 119
@@ -108,7 +108,7 @@ TEST(ReplayOf, AFrameThatTheRecorderLostEndsThere) {
 
 TEST(ReplayOf, AnEmptySessionIsNotCalledIdentical) {
   const TemporaryFolder folder;
-  SessionWriter(folder.path() / "bag", press_info()).close();
+  SessionWriter(folder.path() / "bag", press_info(), 0.0).close();
   SessionReader reader(folder.path() / "bag");
   EXPECT_FALSE(replay(reader).identical());
 }

@@ -56,7 +56,7 @@ TEST(Session, KeepsEachBitOfATick) {
   tick.wake_up_ns = 4294967295U;
   tick.hand = 7;
   {
-    SessionWriter writer(folder.path() / "bag", press_info());
+    SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
     writer.tick(tick);
     writer.close();
   }
@@ -75,7 +75,7 @@ TEST(Session, KeepsEachBitOfADepthImage) {
   const TemporaryFolder folder;
   std::vector<std::shared_ptr<const Cloud>> cameras{wavy_floor(0), wavy_floor(1, true)};
   {
-    SessionWriter writer(folder.path() / "bag", press_info());
+    SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
     writer.frame(4, 1.0 / 3.0, cameras);
     cameras[1] = wavy_floor(2, true);
     writer.frame(5, 2.0 / 3.0, cameras);
@@ -112,7 +112,7 @@ TEST(Session, KeepsPointsInTheOrderInWhichTheyAreGathered) {
   const auto cloud = std::make_shared<const PointCloud>(points, Vec3(0, 0, 1.0 / 3.0), 0.007);
   const std::shared_ptr<const Cloud> seen = cloud;
   {
-    SessionWriter writer(folder.path() / "bag", press_info());
+    SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
     writer.frame(1, 0.0, std::span(&seen, 1));
     writer.close();
   }
@@ -181,7 +181,7 @@ TEST(Session, IsThereUpToTheLastCommitWhenItsProgramIsKilled) {
   const fs::path bag = folder.path() / "bag";
   const pid_t child = fork();
   if (child == 0) {
-    SessionWriter writer(bag, press_info());
+    SessionWriter writer(bag, press_info(), 0.0);
     static_cast<void>(record_press(writer, {}, 100, false));
     writer.commit();
     ServoTick lost{};
@@ -202,7 +202,7 @@ TEST(Session, IsThereUpToTheLastCommitWhenItsProgramIsKilled) {
 
 TEST(Session, EndsWithAMessageWhereTheDiskIsFullAndKeepsWhatWasCommitted) {
   const TemporaryFolder folder;
-  SessionWriter writer(folder.path() / "bag", press_info(), 400'000);
+  SessionWriter writer(folder.path() / "bag", press_info(), 0.0, 400'000);
   writer.settings({}, 0.0);
   std::uint64_t committed = 0;
   const auto fill = [&] {
@@ -226,7 +226,7 @@ TEST(Session, OpensInPythonsOwnSqlite) {
   if (!fs::exists("/usr/bin/python3")) GTEST_SKIP() << "there is no /usr/bin/python3";
   const TemporaryFolder folder;
   {
-    SessionWriter writer(folder.path() / "bag", press_info());
+    SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
     static_cast<void>(record_press(writer, {}, 40));
   }
   const fs::path script = folder.write("read.py", R"(
@@ -279,7 +279,7 @@ print(sum(pixels))
 TEST(Session, IsASourceOfItsFrames) {
   const TemporaryFolder folder;
   {
-    SessionWriter writer(folder.path() / "bag", press_info());
+    SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
     static_cast<void>(record_press(writer, {}, 100));
   }
   const auto source = open_source("recording:" + (folder.path() / "bag").string());
@@ -315,7 +315,7 @@ bool read_all(const fs::path& file) {
 class DamagedSession : public ::testing::Test {
  protected:
   DamagedSession() {
-    SessionWriter writer(folder_.path() / "bag", press_info());
+    SessionWriter writer(folder_.path() / "bag", press_info(), 0.0);
     static_cast<void>(record_press(writer, {}, 40));
     std::ostringstream text;
     text << std::ifstream(folder_.path() / "bag/bag_0.db3", std::ios::binary).rdbuf();

@@ -329,5 +329,26 @@ TEST(Cycle, NeitherAllocatesNorReleasesMemory) {
   EXPECT_GT(contacts, 500U) << "it must have touched all of that";
 }
 
+TEST(Cycle, GoesOnWithANewRendererWhereTheOldOneWas) {
+  Session session;
+  session.run_for(2.0);
+  const ServoTick before = session.press_to(-0.001);
+  const std::uint64_t settings = session.cycle.set_settings({});
+  session.cycle.renew(rendering_by<Renderer>());
+  const test::MemoryCalls calls;
+  session.cycle.run({.t = session.t += ms});
+  EXPECT_EQ(calls.count(), 0U);
+  ServoTick record{};
+  ASSERT_TRUE(session.reader.try_pop(record));
+  EXPECT_NE(record.hand & rendering_renewed, 0U);
+  EXPECT_EQ(record.settings_number, settings);
+  EXPECT_EQ(record.frame_number, before.frame_number);
+  EXPECT_EQ(record.tick.frame, 0);  // of the new one
+  EXPECT_EQ(record.tick.state, before.tick.state);
+  EXPECT_NEAR(record.tick.force.z(), before.tick.force.z(), 0.05);
+  EXPECT_LT((record.tick.proxy - before.tick.proxy).norm(), 1e-4);
+  EXPECT_EQ(session.run().hand & rendering_renewed, 0U);
+}
+
 }  // namespace
 }  // namespace palpate

@@ -70,7 +70,8 @@ const connection = new Connection({
         : "no camera";
     const record = get<HTMLButtonElement>("record");
     record.disabled = !newest.recording.possible;
-    record.title = newest.recording.path ?? newest.recording.message;
+    const { path, message } = newest.recording;
+    record.title = path ? `Recording ${path}; press to end (R)` : message || "Record (R)";
     record.setAttribute("aria-pressed", String(newest.recording.path !== null));
   },
   presence({ hand: whose, viewers }) {

@@ -11,6 +11,7 @@
 
 #include "bench/kd_tree.hpp"
 #include "bench/limit.hpp"
+#include "bench/pcl_searches.hpp"
 
 namespace palpate::bench {
 namespace {
@@ -221,6 +222,11 @@ std::vector<SearchCosts> search_costs(const Subject& subject, const Parameters& 
   const Distribution tree_build =
       measure(budget, 1, [&] { tree = std::make_unique<KdTree>(points); });
   add("nanoflann", tree_build, many, [&] { return tree->search(ball); });
+
+  for (const PclSearch& pcl : pcl_searches(frame, points)) {
+    const Distribution pcl_build = measure(budget, 1, pcl.build);
+    add(pcl.name, pcl_build, many, [&] { return pcl.search(ball); });
+  }
 
   const BruteForceCloud all(points);
   add("brute force", std::nullopt, 1, [&] { return gathered(all); });

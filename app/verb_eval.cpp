@@ -172,8 +172,9 @@ Verb add_eval(CLI::App& program) {
       ->allow_extra_args(false);
   command->add_option("--case", options->case_text, "pop: one case as a run printed it, pop:...");
   command->add_option("--noise", options->noise, "white (default) or correlated");
-  command->add_option("--recording", options->recording,
-                      "scan across a recording, e.g. tum:FOLDER, instead of the synthetic desk");
+  command->add_option(
+      "--recording", options->recording,
+      "scan, real: touch a recording, e.g. tum:FOLDER, instead of the synthetic desk");
   command->add_option("--seed", options->seed, "of all noise (1)");
   command->add_option("--jobs", options->jobs, "threads (one a core)");
   command->add_flag("--resume", options->resume, "go on from an interrupted run's finished cells");

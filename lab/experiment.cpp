@@ -5,6 +5,7 @@
 #include "lab/experiments/fidelity.hpp"
 #include "lab/experiments/lifts.hpp"
 #include "lab/experiments/pop.hpp"
+#include "lab/experiments/real.hpp"
 #include "lab/experiments/scan.hpp"
 #include "lab/experiments/surfaces.hpp"
 #include "lab/method.hpp"
@@ -17,7 +18,7 @@ const std::vector<Experiment>& known_experiments() {
       flat_experiment(),     jump_experiment(),    single_lift_experiment(),   lift_experiment(),
       bound_experiment(),    speed_experiment(),   first_contact_experiment(), hold_experiment(),
       force_experiment(),    damping_experiment(), corners_experiment(),       scan_experiment(),
-      fidelity_experiment(), pop_experiment()};
+      fidelity_experiment(), pop_experiment(),     real_experiment()};
   return experiments;
 }
 

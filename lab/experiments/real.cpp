@@ -1,0 +1,387 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/experiments/real.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <optional>
+
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+
+#include "lab/method.hpp"
+#include "lab/play.hpp"
+#include "lab/signal.hpp"
+#include "palpate/cloud/audit.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/sources/source.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr double patience = 0.5;       // [s] behind for longer than this is lost
+constexpr double press = 0.008;        // [m] how far below the surface the hand goes
+constexpr double contact_time = 0.4;   // [s]
+constexpr double flat_radius = 0.025;  // [m] a place is flat as far as that
+constexpr double patch_radius = 0.06;  // [m] of what is cut out and moved
+constexpr std::size_t most_places = 8;
+constexpr std::size_t most_frames = 60;
+// Where nothing is recorded: the desk before a D4xx, eight frames.
+constexpr std::string_view stand_in = "synthetic:desk?sensor=d4xx&frames=8";
+
+// A flat place on what was recorded, in the camera's frame.
+struct Place {
+  Vec3 at;      // [m]
+  Vec3 normal;  // [-] towards the camera
+};
+
+struct Recording {
+  std::vector<std::shared_ptr<const DepthImage>> frames;
+  double rate = 30.0;  // [Hz]
+  bool at_rest = true;
+  std::vector<Place> places;
+
+  // Forth and back.
+  [[nodiscard]] const DepthImage& frame(std::uint64_t k) const {
+    const std::size_t turn = std::max<std::size_t>(2 * frames.size() - 2, 1);
+    const std::size_t at = k % turn;
+    return *frames[at < frames.size() ? at : turn - at];
+  }
+};
+
+// The mean of all frames, pixel by pixel, in tenths of a millimetre and in the camera's frame.
+DepthImage mean_of(const std::vector<std::shared_ptr<const DepthImage>>& frames) {
+  const DepthImage& first = *frames.front();
+  const std::size_t pixels = first.depth().size();
+  std::vector<double> sum(pixels, 0.0);
+  std::vector<int> count(pixels, 0);
+  for (const auto& frame : frames) {
+    for (std::size_t i = 0; i < pixels; ++i) {
+      if (!is_measured(frame->depth()[i])) continue;
+      sum[i] += frame->depth()[i];
+      ++count[i];
+    }
+  }
+  constexpr double fine = 1e4;  // [1/m]
+  std::vector<std::uint16_t> depth(pixels, 0);
+  for (std::size_t i = 0; i < pixels; ++i) {
+    if (4 * count[i] < 3 * static_cast<int>(frames.size())) continue;
+    const double value = sum[i] / count[i] / first.units_per_metre() * fine;
+    if (value < 65534.0) depth[i] = static_cast<std::uint16_t>(std::lround(value));
+  }
+  return {std::make_shared<const ViewingRays>(first.intrinsics()), std::move(depth), fine};
+}
+
+// The plane about a point of the mean image, if it is flat, whole and seen at less than 60 degrees.
+std::optional<Place> flat_place(const DepthImage& image, const Vec3& point) {
+  Patch patch;
+  gather(image, Ball{point, flat_radius}, patch);
+  if (patch.size() < 50) return std::nullopt;
+  Eigen::Matrix3Xd points(3, static_cast<Eigen::Index>(patch.size()));
+  for (std::size_t i = 0; i < patch.size(); ++i)
+    points.col(static_cast<Eigen::Index>(i)) = Vec3(patch.x()[i], patch.y()[i], patch.z()[i]);
+  const Vec3 mean = points.rowwise().mean();
+  const Eigen::Matrix3Xd centred = points.colwise() - mean;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(centred * centred.transpose());
+  Vec3 normal = axes.eigenvectors().col(0);
+  if (normal.dot(point) > 0.0) normal = -normal;
+  const double cosine = -normal.dot(point.normalized());
+  const double spread = std::sqrt(axes.eigenvalues()[0] / static_cast<double>(patch.size()));
+  const double pixels =
+      std::numbers::pi * cosine * std::pow(flat_radius * image.intrinsics().fx / point.z(), 2);
+  if (cosine < 0.5 || spread > 2.5e-3 || static_cast<double>(patch.size()) < 0.8 * pixels)
+    return std::nullopt;
+  return Place{point + normal * normal.dot(mean), normal};
+}
+
+Recording open_recording(const std::string& uri) {
+  const std::unique_ptr<Source> source = open_source(uri);
+  Recording recording;
+  while (recording.frames.size() < most_frames) {
+    const std::optional<Frame> frame = source->next();
+    if (!frame) break;
+    auto image = std::dynamic_pointer_cast<const DepthImage>(frame->cloud);
+    if (!image)
+      throw Error(uri, "it has no depth images",
+                  "give a recording of depth images, such as tum:FOLDER or depth:FOLDER");
+    recording.frames.push_back(std::move(image));
+  }
+  if (recording.frames.empty()) throw Error(uri, "it has no frames", "give another recording");
+  recording.rate = source->info().frame_rate.value_or(30.0);
+  const DepthImage& first = *recording.frames.front();
+  const DepthImage mean =
+      recording.frames.size() < 2 ? mean_of({recording.frames.front()}) : mean_of(recording.frames);
+  // At rest: half of what the last frame measured is within 8 mm of what the first did.
+  const auto& a = first.depth();
+  const auto& b = recording.frames.back()->depth();
+  std::vector<int> change;
+  for (std::size_t i = 0; i < a.size(); i += 7) {
+    if (is_measured(a[i]) && is_measured(b[i])) change.push_back(std::abs(int{a[i]} - int{b[i]}));
+  }
+  if (change.empty())
+    throw Error(uri, "its frames have nothing in common", "give another recording");
+  std::nth_element(change.begin(), change.begin() + static_cast<std::ptrdiff_t>(change.size() / 2),
+                   change.end());
+  recording.at_rest = change[change.size() / 2] <= 0.008 * first.units_per_metre();
+
+  const DepthImage first_alone = mean_of({recording.frames.front()});
+  const DepthImage& image = recording.at_rest ? mean : first_alone;
+  std::vector<Place> all;
+  const Intrinsics& k = image.intrinsics();
+  for (int v = k.height / 8; v < 7 * k.height / 8; v += 20) {
+    for (int u = k.width / 8; u < 7 * k.width / 8; u += 20) {
+      const auto point = image.deproject(u, v);
+      if (!point || point->z() < 0.2 || point->z() > 1.5) continue;
+      if (const auto place = flat_place(image, *point)) all.push_back(*place);
+    }
+  }
+  if (all.empty())
+    throw Error(uri, "it shows nothing flat between 0.2 and 1.5 m",
+                "give a recording of a room or a table");
+  for (std::size_t i = 0; i < std::min(most_places, all.size()); ++i)
+    recording.places.push_back(all[i * all.size() / std::min(most_places, all.size())]);
+  return recording;
+}
+
+// What is done at a place, and what moves.
+enum class Action { hold, slide, moving, sweep };
+constexpr std::array action_names = {"hold", "slide", "moving", "sweep"};
+
+constexpr double onset = 0.9;     // [s] of what moves
+constexpr double stroke = 0.020;  // [m] of `moving`, at 0.5 Hz
+constexpr double nearer = 0.75;   // the sweeping patch's distance, as a share of the contact's
+
+double duration_of(Action action) {
+  return action == Action::hold ? contact_time + 2.5 : action == Action::slide ? 1.9 : 2.9;
+}
+
+// How far from the camera the place is, as a share of where it was recorded. Scaled about the
+// camera, every point stays on its line of sight.
+double scale_at(Action action, const Place& place, double t) {
+  if (action != Action::moving || t < onset) return 1.0;
+  const double shift = 0.5 * stroke * (1.0 - std::cos(std::numbers::pi * (t - onset)));
+  return 1.0 - shift / place.at.norm();
+}
+
+// A recorded frame with the patch about the place moved, or with a copy of it that sweeps by.
+std::shared_ptr<const DepthImage> composed(const DepthImage& frame, const Place& place,
+                                           Action action, double t) {
+  const Intrinsics& k = frame.intrinsics();
+  std::vector<std::uint16_t> depth = frame.depth();
+  const double cu = k.fx * place.at.x() / place.at.z() + k.cx;
+  const double cv = k.fy * place.at.y() / place.at.z() + k.cy;
+  const double radius = patch_radius * k.fx / place.at.z();  // [px]
+  const double scale = action == Action::sweep ? nearer : scale_at(action, place, t);
+  // From 0.25 m on one side to 0.25 m on the other in two seconds, at the patch's own distance.
+  const int by =
+      action == Action::sweep
+          ? static_cast<int>(std::lround(0.25 * (t - onset - 1.0) * k.fx / (nearer * place.at.z())))
+          : 0;
+  const int v_begin = std::max(static_cast<int>(cv - radius), 0);
+  const int v_end = std::min(static_cast<int>(cv + radius) + 1, k.height);
+  const int u_begin = std::max(static_cast<int>(cu - radius), 0);
+  const int u_end = std::min(static_cast<int>(cu + radius) + 1, k.width);
+  for (int v = v_begin; v < v_end; ++v) {
+    for (int u = u_begin; u < u_end; ++u) {
+      if ((u - cu) * (u - cu) + (v - cv) * (v - cv) > radius * radius) continue;
+      const std::uint16_t raw = frame.depth()[static_cast<std::size_t>(v) * k.width + u];
+      if (!is_measured(raw) || u + by < 0 || u + by >= k.width) continue;
+      depth[static_cast<std::size_t>(v) * k.width + u + by] =
+          static_cast<std::uint16_t>(std::lround(raw * scale));
+    }
+  }
+  return std::make_shared<const DepthImage>(std::make_shared<const ViewingRays>(k),
+                                            std::move(depth), frame.units_per_metre(),
+                                            frame.world_from_camera());
+}
+
+// What became of a contact.
+struct Outcome {
+  bool lost = false;
+  int suspected = 0;    // times that a proxy was seen behind what was measured for over a frame
+  double error = 0.0;   // [m] rms, of the contact against the plane
+  double felt = 0.0;    // [N]
+  double step = 0.0;    // [N] largest change in a tick
+  double change = 0.0;  // [N] between the largest and the smallest force
+};
+
+Outcome touch(const std::string& name, const ExperimentOptions& options, const Recording& recording,
+              const Place& place, Action action) {
+  const double r_c = options.parameters.proxy.r_c();
+  // Where the camera moves, the place stays where the first frame had it in the world.
+  const Eigen::Isometry3d world_from_camera = recording.frames.front()->world_from_camera();
+  const Vec3 normal = world_from_camera.linear() * place.normal;
+  const Vec3 slide_along = normal.unitOrthogonal();
+  const Vec3 eye = world_from_camera.translation();
+  const Vec3 arm = world_from_camera.linear() * place.at;
+  const Truth truth = [&](const Vec3& p, double t) {
+    return TruePoint{normal.dot(p - eye - scale_at(action, place, t) * arm), normal};
+  };
+  const auto method = make_method(name, {options.parameters, truth});
+  double shown = 0.0;
+  std::shared_ptr<const DepthImage> image;
+  const auto hip = [&](double t) {
+    const double above = std::max(0.15 * (contact_time - t), -press);
+    const double along = action == Action::slide ? 0.02 * std::clamp(t - onset, 0.0, 1.0) : 0.0;
+    return Vec3(eye + scale_at(action, place, shown) * arm + above * normal + along * slide_along);
+  };
+  const bool moves = action == Action::moving || action == Action::sweep;
+  const double watched_from = action == Action::hold ? contact_time + 0.5 : onset;
+  Outcome outcome;
+  int behind = 0;
+  int suspected = 0;
+  bool touched = false;
+  double last_force = 0.0;
+  std::vector<double> error;
+  std::vector<double> force;
+  const Scenario scenario{.frame_rate = recording.rate,
+                          .duration = duration_of(action),
+                          .cloud =
+                              [&](std::uint64_t k, double t) {
+                                const DepthImage& recorded = recording.frame(k);
+                                image = moves && t >= onset ? composed(recorded, place, action, t)
+                                                            : std::shared_ptr<const DepthImage>(
+                                                                  &recorded, [](const auto*) {});
+                                shown = t;
+                                return image;
+                              },
+                          .hip = hip};
+  const double frame = scenario.tick_rate / scenario.frame_rate;
+  play(*method, scenario, [&](const Tick& tick) {
+    const double now = truth(tick.proxy, tick.t).distance;
+    behind = now < 0.0 && truth(tick.proxy, shown).distance < 0.0 ? behind + 1 : 0;
+    if (behind > patience * scenario.tick_rate) outcome.lost = true;
+    // The audit knows nothing of the plane; an occluder before the contact means nothing.
+    const auto seen =
+        action == Action::sweep ? std::nullopt : distance_behind(*image, tick.proxy, r_c);
+    suspected = tick.t > contact_time && seen && *seen > r_c ? suspected + 1 : 0;
+    if (suspected == static_cast<int>(frame) + 1) ++outcome.suspected;
+    const double felt = tick.force.dot(normal);
+    if (touched) outcome.step = std::max(outcome.step, std::abs(felt - last_force));
+    touched = touched || tick.t > contact_time;
+    last_force = felt;
+    if (tick.t >= watched_from) {
+      error.push_back(now - r_c);
+      force.push_back(felt);
+    }
+    return !outcome.lost;
+  });
+  outcome.error = rms(error);
+  outcome.felt = felt_rms(force);
+  if (!force.empty()) {
+    const auto [least, most] = std::minmax_element(force.begin(), force.end());
+    outcome.change = *most - *least;
+  }
+  return outcome;
+}
+
+std::vector<Cell> real_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  const std::string uri = options.recording.empty() ? std::string(stand_in) : options.recording;
+  const auto recording = std::make_shared<const Recording>(open_recording(uri));
+  std::vector<Cell> cells;
+  for (const std::string& name : methods_of(experiment, options)) {
+    for (const Action action : {Action::hold, Action::slide, Action::moving, Action::sweep}) {
+      const bool moves = action == Action::moving || action == Action::sweep;
+      if (moves && !recording->at_rest) continue;  // then nobody knows what would be exact
+      for (std::size_t i = 0; i < recording->places.size(); ++i) {
+        cells.emplace_back([=] {
+          const Place& place = recording->places[i];
+          const Outcome outcome = touch(name, options, *recording, place, action);
+          return Row()
+              .add(name)
+              .add(action_names[static_cast<std::size_t>(action)])
+              .add(static_cast<long long>(i))
+              .add(place.at.z())
+              .add(outcome.lost)
+              .add(outcome.suspected)
+              .add(1e3 * outcome.error)
+              .add(outcome.felt)
+              .add(outcome.step)
+              .add(outcome.change)
+              .done();
+        });
+      }
+    }
+  }
+  return cells;
+}
+
+std::vector<Claim> no_claims(const Table& /*table*/) {
+  return {};
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+Scores real_scores(const Table& table) {
+  Scores scores;
+  scores.columns = {"action",     "method",   "places",           "lost",           "suspected",
+                    "error [mm]", "felt [N]", "largest step [N]", "force range [N]"};
+  for (const char* action : action_names) {
+    std::vector<std::string> methods;
+    for (std::size_t row = 0; row < table.rows(); ++row) {
+      const std::string& method = table.text(row, "method");
+      if (table.text(row, "action") == action &&
+          std::find(methods.begin(), methods.end(), method) == methods.end())
+        methods.push_back(method);
+    }
+    for (const std::string& method : methods) {
+      const auto all = [&](std::size_t row) {
+        return table.text(row, "method") == method && table.text(row, "action") == action;
+      };
+      const auto held = [&](std::size_t row) {
+        return all(row) && table.number(row, "lost") == 0.0;
+      };
+      const auto sum = [&](std::string_view column) {
+        double total = 0.0;
+        for (const double value : table.numbers(column, all)) total += value;
+        return total;
+      };
+      const auto of_held = [&](std::string_view column) {
+        const double value = median(table.numbers(column, held));
+        return std::isnan(value) ? std::string("-") : fmt::format("{:.3g}", value);
+      };
+      scores.rows.push_back({action, method, fmt::format("{}", table.numbers("lost", all).size()),
+                             fmt::format("{:g}", sum("lost")),
+                             fmt::format("{:g}", sum("suspected")), of_held("error_mm"),
+                             of_held("felt_n"), of_held("step_n"), of_held("range_n")});
+    }
+  }
+  scores.note = "Medians over the places that were held. What is done and measured: docs/pop.md.";
+  return scores;
+}
+
+constexpr std::string_view real_plot = R"gp(
+set xlabel "distance from the camera [m]"
+set ylabel "force in 20 to 400 Hz [N rms]"
+set logscale y
+set key outside right top
+plot for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "hold" && $5 == 0 ? $4 : NaN):8 with points pt 7 title m." held", \
+     for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "moving" && $5 == 0 ? $4 : NaN):8 with points pt 6 title m." moving", \
+     for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "hold" && $5 == 1 ? $4 : NaN):(5) with points pt 2 ps 1.5 title m." lost"
+)gp";
+
+}  // namespace
+
+Experiment real_experiment() {
+  Experiment experiment{
+      "real",
+      "on what a camera recorded, at rest and cut out and moved exactly",
+      "method,action,place,distance_m,lost,suspected,error_mm,felt_n,step_n,range_n",
+      {"paper", "sight"},
+      false,
+      real_cells,
+      real_plot,
+      no_claims,
+      real_scores};
+  experiment.takes_recording = true;
+  return experiment;
+}
+
+}  // namespace palpate::lab

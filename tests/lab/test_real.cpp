@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// Touching what was recorded: the ruler on moved patches, and methods on a real camera's frames.
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "lab/experiment.hpp"
+#include "lab/runner.hpp"
+#include "palpate/core/error.hpp"
+
+#include "tests/support/data.hpp"
+
+namespace palpate::lab {
+namespace {
+
+namespace fs = std::filesystem;
+
+Table touch(const std::string& method, const std::string& recording) {
+  std::string pattern = (fs::temp_directory_path() / "palpate_real_XXXXXX").string();
+  const fs::path folder = mkdtemp(pattern.data());
+  ExperimentOptions options;
+  options.methods = {method};
+  options.recording = recording;
+  const std::string csv = run_experiment(find_experiment("real"), options, {}, folder / "real.csv");
+  fs::remove_all(folder);
+  return {"real", csv};
+}
+
+double sum(const Table& table, std::string_view column, std::string_view action) {
+  double total = 0.0;
+  for (const double value :
+       table.numbers(column, [&](std::size_t row) { return table.text(row, "action") == action; }))
+    total += value;
+  return total;
+}
+
+TEST(Real, TheRulerFollowsWhatIsMovedExactly) {
+  const Table table = touch("ideal", "synthetic:desk?sensor=d4xx&frames=4");
+  ASSERT_EQ(table.rows(), 32U) << "four actions at eight places";
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    EXPECT_EQ(table.number(row, "lost"), 0.0) << row;
+    EXPECT_LT(table.number(row, "error_mm"), 1e-6) << row;
+  }
+}
+
+TEST(Real, ThePaperLosesWhatAnotherPatchSweepsOver) {
+  // No noise: what it loses, it loses to the sweep.
+  const Table table = touch("paper", "synthetic:plane?frames=2");
+  EXPECT_EQ(sum(table, "lost", "hold"), 0.0);
+  EXPECT_EQ(sum(table, "lost", "moving"), 0.0);
+  EXPECT_EQ(sum(table, "lost", "sweep"), 8.0);
+}
+
+TEST(Real, MovesNothingWhereTheCameraMoves) {
+  // A plane that comes nearer by 0.3 m/s is as good as a camera that does.
+  const Table table = touch("sight", "synthetic:plane?speed=0.3&frames=8");
+  ASSERT_GT(table.rows(), 0U);
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    EXPECT_TRUE(table.text(row, "action") == "hold" || table.text(row, "action") == "slide");
+  }
+}
+
+TEST(Real, SaysWhatIsMissing) {
+  EXPECT_THROW(touch("paper", "synthetic:plane?distance=3&frames=2"), Error) << "all too far";
+  EXPECT_THROW(touch("paper", "depth:/nowhere"), Error);
+}
+
+TEST(Real, SightHoldsMoreOfARealTableThanThePaper) {
+  PALPATE_DATA_OR_SKIP(folder, "seq_visp_tabletop_known_objects");
+  const std::string recording = "depth:" + folder.string() + "?frames=8";
+  const Table paper = touch("paper", recording);
+  const Table sight = touch("sight", recording);
+  for (const char* action : {"hold", "moving", "sweep"})
+    EXPECT_LT(sum(sight, "lost", action) + 2.0, sum(paper, "lost", action)) << action;
+}
+
+}  // namespace
+}  // namespace palpate::lab

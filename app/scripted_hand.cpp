@@ -34,7 +34,10 @@ std::optional<double> depth_at(const DepthImage& image, int u, int v) {
 HipPath scripted_hand(const DepthImage& image, double duration, double press) {
   const Intrinsics& k = image.intrinsics();
   constexpr double hover = 0.05;       // [m] in front of the surface, before and after
+  constexpr double clearance = 0.02;   // [m] in front of what it is lifted over
   constexpr double approach = 1.0;     // [s] to come down, and to go up
+  constexpr double lift = 0.3;         // [s] to be lifted, and as long before an edge
+  constexpr double edge = 0.004;       // [m] between two samples
   constexpr double interval = 0.01;    // [s] between samples
   constexpr double circle_time = 4.0;  // [s]
   const double radius = k.height / 6.0;
@@ -43,22 +46,46 @@ HipPath scripted_hand(const DepthImage& image, double duration, double press) {
   if (!depth)
     throw Error("scripted hand", "the middle of the first frame measures nothing to touch",
                 "give a path with --device script:FILE.csv");
-  double smooth = *depth;
-  std::vector<HipPath::Sample> samples;
+  struct Place {
+    Eigen::Vector2d ray;
+    double depth;
+    bool flat;  // measured, and no edge since the place before
+  };
+  std::vector<Place> places;
   for (int i = 0; i * interval <= duration; ++i) {
-    const double t = i * interval;
-    const double stroke = std::clamp(t - approach, 0.0, std::max(duration - 2 * approach, 0.0));
+    const double stroke =
+        std::clamp(i * interval - approach, 0.0, std::max(duration - 2 * approach, 0.0));
     const double angle = 2.0 * std::numbers::pi * stroke / circle_time;
     const int u = k.width / 2 + static_cast<int>(radius * std::sin(angle));
     const int v = k.height / 2 + static_cast<int>(radius * (std::cos(angle) - 1.0));
-    if (const auto measured = depth_at(image, u, v)) depth = measured;
-    smooth += 0.2 * (*depth - smooth);  // a hand does not jump at an edge
-    const double into =
-        std::min({1.0, t / approach, (duration - t) / approach});  // 0 hovering, 1 pressing
-    const double reach = smooth - hover + into * (hover + press);
-    const Eigen::Vector2d ray = image.rays().ray(u, v);
+    const std::optional<double> measured = depth_at(image, u, v);
+    const bool flat = measured && std::abs(*measured - *depth) < edge;
+    if (measured) depth = measured;
+    places.push_back({image.rays().ray(u, v), *depth, flat});
+  }
+
+  // Where a camera sees an edge there is often a shadow behind it, and nothing to touch.
+  const int ahead = static_cast<int>(lift / interval);
+  const int count = static_cast<int>(places.size());
+  std::vector<HipPath::Sample> samples;
+  double surface = places.front().depth;
+  double down = 1.0;  // 0 lifted, 1 pressing
+  for (int i = 0; i < count; ++i) {
+    double nearest = places[static_cast<std::size_t>(i)].depth;
+    bool flat = true;
+    for (int j = std::max(i - ahead, 0); j < std::min(i + 2 * ahead, count); ++j) {
+      nearest = std::min(nearest, places[static_cast<std::size_t>(j)].depth);
+      flat = flat && places[static_cast<std::size_t>(j)].flat;
+    }
+    const double target = flat ? places[static_cast<std::size_t>(i)].depth : nearest;
+    surface += 0.2 * (target - surface);  // a hand does not jump
+    down = std::clamp(down + (flat ? 1.0 : -1.0) * interval / lift, 0.0, 1.0);
+    const double t = i * interval;
+    const double into = std::min({1.0, t / approach, (duration - t) / approach});
+    const double reach = surface - hover + into * (hover - clearance + down * (clearance + press));
+    const Place& place = places[static_cast<std::size_t>(i)];
     samples.push_back(
-        {t, image.world_from_camera() * Vec3(reach * ray.x(), reach * ray.y(), reach)});
+        {t, image.world_from_camera() * (reach * Vec3(place.ray.x(), place.ray.y(), 1.0))});
   }
   return HipPath(std::move(samples));
 }

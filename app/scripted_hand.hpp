@@ -7,7 +7,8 @@
 namespace palpate::app {
 
 /// A hand that needs no person: it comes down on what `image` shows, presses into it and strokes it
-/// in circles, following its relief, and comes up again.
+/// in circles, following its relief, and comes up again. It is lifted over edges, behind which a
+/// camera sees nothing.
 ///
 /// Circles have a third of the image's height as diameter; one takes four seconds. The hand keeps
 /// `press` behind the measured surface along the camera's sightlines.

@@ -162,9 +162,9 @@ One ball of 11 mm on the same frame: what has to be built for each frame, and th
 
 {search_table(result['scenes'])}
 
-Queries at 1 m in units of our gather: {ratios}; and we have nothing to build. The trees are given
-their points, where a depth camera gives none; PCL's organised search, which needs no tree, needs the
-whole image deprojected.
+Queries at 1 m in units of our gather: {ratios}; and we have nothing to build. The trees are
+given their points, where a depth camera gives none; PCL's organised search, which needs no tree,
+needs the whole image deprojected.
 A whole tick, with its {one_metre['kernel']['steps_per_tick']:.1f} steps, takes
 {tick / tree:.1f} times one nanoflann query. Handing a frame over takes
 {1e3 * result['frame_us_median']:.1f} ns; building the tree takes

@@ -65,10 +65,7 @@ Database Database::open(const std::filesystem::path& file) {
 
 void Database::fail(int code) const {
   const bool is_its_own = sqlite3_extended_errcode(handle_.get()) == code;
-  std::string reason = is_its_own ? sqlite3_errmsg(handle_.get()) : sqlite3_errstr(code);
-  for (char& c : reason) {
-    if (c == '\n' || c == '\r') c = ' ';
-  }
+  const std::string reason = is_its_own ? sqlite3_errmsg(handle_.get()) : sqlite3_errstr(code);
   throw Error(file_.string(), reason, remedy_for(code));
 }
 

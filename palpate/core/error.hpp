@@ -9,14 +9,24 @@ namespace palpate {
 /// What went wrong at the door (opening, parsing, configuring); never thrown inside a tick.
 ///
 /// `what()` reads `WHAT: WHY; REMEDY` on one line: the file or argument, what was wrong with it,
-/// and what to do. Programs print it behind their own name.
+/// and what to do. Programs print it behind their own name. Parts may quote a damaged file: what
+/// controls a terminal becomes a space.
 class Error : public std::runtime_error {
  public:
   /// @param subject  the file, option or argument concerned
   /// @param reason   what was wrong with it
   /// @param remedy   what the user can do; may be empty
   Error(const std::string& subject, const std::string& reason, const std::string& remedy = {})
-      : std::runtime_error(subject + ": " + reason + (remedy.empty() ? "" : "; " + remedy)) {}
+      : std::runtime_error(
+            one_line(subject + ": " + reason + (remedy.empty() ? "" : "; " + remedy))) {}
+
+ private:
+  static std::string one_line(std::string text) {
+    for (char& c : text) {
+      if ((c >= '\0' && c < ' ') || c == '\x7f') c = ' ';
+    }
+    return text;
+  }
 };
 
 }  // namespace palpate

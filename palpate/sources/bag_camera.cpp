@@ -266,22 +266,23 @@ std::vector<double> BagCamera::exact(std::size_t number, std::size_t size) {
 const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
                                                           const ros::Image& image) {
   // Others' cameras do not change on the way.
-  if (rays_ && !is_ours()) return rays_;
   const std::size_t which = is_ours() ? number : 0;
   if (which >= info_places_.size())
     throw Error(name(number), "has no message on " + info_topic_, "the bag may be damaged");
-  const BagReader::Place& place = info_places_[which];
-  const std::string info_name = bag_.name(info_topic_, place);
-  const bool is_rectified = !is_ours() && topic_.find("rect") != std::string::npos;
-  const Intrinsics k = intrinsics_of(ros::decode<ros::CameraInfo>(bag_.read(place), info_name),
-                                     is_rectified, info_name);
+  if (!rays_ || is_ours()) {
+    const std::string info_name = bag_.name(info_topic_, info_places_[which]);
+    const bool is_rectified = !is_ours() && topic_.find("rect") != std::string::npos;
+    const auto info = ros::decode<ros::CameraInfo>(bag_.read(info_places_[which]), info_name);
+    const Intrinsics k = intrinsics_of(info, is_rectified, info_name);
+    if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
+  }
+  const Intrinsics& k = rays_->intrinsics();
   if (k.width != static_cast<int>(image.width) || k.height != static_cast<int>(image.height))
-    throw Error(info_name,
-                "is of a camera of " + std::to_string(k.width) + "x" + std::to_string(k.height) +
-                    " pixels, but the image has " + std::to_string(image.width) + "x" +
-                    std::to_string(image.height),
+    throw Error(name(number),
+                "is an image of " + std::to_string(image.width) + "x" +
+                    std::to_string(image.height) + " pixels, but its CameraInfo has " +
+                    std::to_string(k.width) + "x" + std::to_string(k.height),
                 "it may be damaged, or belong to another topic");
-  if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
   return rays_;
 }
 

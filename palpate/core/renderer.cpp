@@ -93,6 +93,9 @@ void Renderer::frame(const Cloud& cloud, double stamp) noexcept {
 // A frame seen along the lines of sight: docs/method.md, "Sight".
 void Renderer::frame_by_sight(const Cloud& cloud) noexcept {
   blend_due_ = true;
+  // What the surface's own motion adds to the force from the last tick on.
+  carried_rate_ =
+      sight_.tracking() ? (sight_.travel(last_t_) - sight_.travel(last_t_ - 1e-3)) / 1e-3 : 0.0;
   behind_ = false;
   if (!proxy_) return;
   if (!stamp_ok_) interval_ = 1.0 / parameters_.motion.frame_rate;
@@ -113,6 +116,8 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
   // How far from the fitted surface the points' noise can stop a proxy.
   constexpr double near = 10e-3;
   constexpr int most_slides = 6;
+  // A proxy does not touch the bottom of a trough much narrower than itself, but its flanks.
+  constexpr double deepest = 0.7;  // [-] r_c times curvature
   const double r_c = parameters_.proxy.r_c();
   if (!touching_) sight_.watch(*cloud_, *proxy_);
 
@@ -122,6 +127,7 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
     while (sight_.smooth()) {
       const SurfaceContact contact = sight_.contact(hip, t);
       if (contact.distance > r_c + near + 4.0 * sight_.spread()) return false;
+      if (contact.curvature * r_c > deepest) return false;
       if (contact.at_limit && !sight_.holding()) {
         if (slides == most_slides) movement.flags |= step_budget_hit;
         if (slides++ < most_slides && sight_.slide(*cloud_, contact.foot)) continue;
@@ -243,7 +249,7 @@ Vec3 Renderer::render_force(const Vec3& hip, double t, std::uint32_t& flags) noe
 
 // What a frame corrected at once in the geometry reaches the hand over most of an interval, and a
 // surface that is no longer seen fades.
-Vec3 Renderer::blend_force(const Vec3& force, double t) noexcept {
+Vec3 Renderer::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
   constexpr double blend = 0.85;    // [intervals]
   constexpr double hold = 0.4;      // [s] a hidden surface is felt in full for this long
   constexpr double fade = 0.3;      // [s] and then less and less
@@ -252,7 +258,16 @@ Vec3 Renderer::blend_force(const Vec3& force, double t) noexcept {
     return 1.0 - x * x * (3.0 - 2.0 * x);
   };
   if (blend_due_) {
-    blend_offset_ = last_force_ - force;
+    // The force goes on as it would have without the frame, then turns to what the frame says.
+    Vec3 carried = last_force_;
+    const double push = last_force_.norm();
+    if (push > 0.0) {
+      const Vec3 outwards = last_force_ / push;
+      const double deeper = carried_rate_ * (t - last_blend_t_) * sight_.up().dot(outwards) -
+                            (hip - last_hip_).dot(outwards);
+      carried += parameters_.coupling.stiffness * deeper * outwards;
+    }
+    blend_offset_ = carried - force;
     blend_start_ = t;
     blend_due_ = false;
   }
@@ -270,6 +285,8 @@ Vec3 Renderer::blend_force(const Vec3& force, double t) noexcept {
     blended *= parameters_.coupling.max_force / force_now;
   }
   last_force_ = blended;
+  last_hip_ = hip;
+  last_blend_t_ = t;
   return blended;
 }
 
@@ -310,7 +327,7 @@ Tick Renderer::tick(const Vec3& hip, double t) noexcept {
   tick.proxy = *proxy_;
   tick.normal = movement.around.normal.value_or(normal_.value_or(Vec3::Zero()));
   tick.force = render_force(hip, t, tick.flags);
-  if (by_sight) tick.force = blend_force(tick.force, t);
+  if (by_sight) tick.force = blend_force(tick.force, hip, t);
   tick.state = movement.around.state;
   tick.steps = movement.steps;
   tick.surface_velocity = by_sight && sight_.tracking() ? sight_.velocity() : velocity_;

@@ -98,7 +98,7 @@ class Renderer {
   void frame_by_sight(const Cloud& cloud) noexcept;
   void cover(double travel) noexcept;
   Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;
-  Vec3 blend_force(const Vec3& force, double t) noexcept;
+  Vec3 blend_force(const Vec3& force, const Vec3& hip, double t) noexcept;
 
   Parameters parameters_;
   Patch patch_;
@@ -124,6 +124,9 @@ class Renderer {
   bool behind_ = false;     // the monitor's verdict on the frame in use
   bool blend_due_ = false;  // a frame came since the last force
   Vec3 last_force_ = Vec3::Zero();
+  Vec3 last_hip_ = Vec3::Zero();
+  double last_blend_t_ = 0.0;
+  double carried_rate_ = 0.0;  // [m/s] of the surface, before the newest frame
   Vec3 blend_offset_ = Vec3::Zero();
   double blend_start_ = 0.0;
 

@@ -13,10 +13,13 @@ using Vec5 = Eigen::Matrix<double, 5, 1>;
 
 // Along a line of sight a surface is looked for this far from where it is expected [m].
 constexpr double reach = 0.3;
+// What comes before it is looked for this far [m]: an arm may be held high.
+constexpr double occluder_reach = 1.2;
 // A surface is where it is expected if this share of its disc is within the gate.
 constexpr double least_support = 0.3;
 constexpr double narrowest_gate = 12e-3;  // [m]
 constexpr double widest_gate = 60e-3;     // [m]
+constexpr double gate_after_hold = 5e-3;  // [m]
 // Layers along a line of sight are told apart by a gap of at least this [m].
 constexpr double layer_gap = 20e-3;
 constexpr std::size_t least_points = 8;
@@ -33,6 +36,8 @@ constexpr double serves = 1.5e-3;
 // While the surface is out of sight there is nothing to fit: what is remembered serves this far
 // [m].
 constexpr double serves_while_held = 15e-3;
+// Frames whose centres are this near [m] have seen the same cells.
+constexpr double same_place = 0.2e-3;
 // Residuals this small are no structure, whatever the noise [m].
 constexpr double structure_floor = 50e-6;
 // Noise of a disc's height that is usual for a depth camera: this [m] at 1 m, growing with the
@@ -43,8 +48,12 @@ constexpr double usual_noise = 2e-3;
 constexpr double curvature_sd = 15.0;
 // A map of what is beside the contact [m].
 constexpr double beside_inner = 12e-3;
-constexpr std::array<double, 3> beside_bands = {40e-3, 80e-3, 140e-3};
-constexpr std::size_t beside_points = 512;
+constexpr std::array<double, 5> beside_bands = {40e-3, 80e-3, 140e-3, 220e-3, 320e-3};
+constexpr std::size_t beside_points = 640;
+// No surface that is touched is struck harder [m/s^2]: 18 000 r_c/s^2.
+constexpr double hardest_strike = 90.0;
+// A surface that has been followed for so many frames is known not to jump on its own.
+constexpr std::size_t well_known = 4;
 constexpr float nothing = -1e3F;
 
 constexpr double squared(double x) {
@@ -155,7 +164,8 @@ SurfaceContact SightTracker::contact(const Vec3& point, double t) const noexcept
   const Vec3 foot(at.x(), at.y(), surface_.height(at));
   const Vec3 normal = surface_.normal(at);
   return {frame_.world_from_local(foot + Vec3(0, 0, moved)), frame_.direction_in_world(normal),
-          (local - foot).dot(normal), (at - centre_).norm() > 0.999 * limit};
+          (local - foot).dot(normal), (at - centre_).norm() > 0.999 * limit,
+          surface_.strongest_rise()};
 }
 
 SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double interval,
@@ -176,7 +186,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   const Vec3 place =
       frame_.world_from_local(Vec3(foot.x(), foot.y(), surface_.height(foot) + expected));
 
-  gather(cloud, Beam{place, shadow_radius, reach, frame_.up}, wide_beam_points, patch_);
+  gather(cloud, Beam{place, shadow_radius, occluder_reach, frame_.up}, wide_beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   if (viewpoint) distance_ = (*viewpoint - place).norm();
   Vec3 line = viewpoint ? Vec3((*viewpoint - place).normalized()) : frame_.up;
@@ -185,16 +195,17 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   std::size_t seen = 0;
   std::size_t near = 0;
   std::size_t before = 0;  // points between the viewpoint and the surface
-  const double wide = gate();
+  // What comes back into sight is where it was; what is left of an occluder may be near.
+  const double wide = holding_ ? std::max(gate_after_hold, 6.0 * height_sd()) : gate();
   Quadric moved = surface_;
   moved.c[0] += expected;
-  const SightCone inner({place, radii[0], reach, frame_.up}, viewpoint);
+  const SightCone inner({place, radii[0], occluder_reach, frame_.up}, viewpoint);
   for (std::size_t i = 0; i < std::min(patch_.size(), wide_beam_points); ++i) {
     const Vec3 p = Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]);
     const Vec3 local = frame_.local_from_world(patch_.ball().centre + p);
     const double above = local.z() - moved.height(local.head<2>());
     if (above > wide) ++before;
-    if (!inner.holds(p)) continue;
+    if (!inner.holds(p) || above < -reach) continue;
     if (std::abs(above) <= wide) ++near;
     heights[seen++] = static_cast<float>(p.dot(line));
   }
@@ -213,7 +224,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     if (layer && !from_behind) jump = layer->height / lean;
     const bool nearer = jump > 0.0;
     if (!layer || from_behind ||
-        (nearer && (holding_ || is_occluder(look_beside(cloud, place), jump + expected)))) {
+        (nearer && (holding_ || is_occluder(look_beside(cloud, place), jump + expected, jump)))) {
       if (from_behind && layer) {
         // Touched from behind, the surface went out of reach: the points decide.
         forget();
@@ -232,7 +243,9 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   if (resumed && event == Event::jumped) count_ = 0;
   // Something that moves in before a contact that stays hides a part of it first. What is left of
   // the disc looks like an edge, and is none.
-  const bool covered = before >= 3;
+  // Points that vanish without anything before them are a sensor's shadow beside an occluder.
+  if (foot != centre_ || near > near_usual_) near_usual_ = near;
+  const bool covered = before >= 3 || near < near_usual_ - near_usual_ / 4;
   shadowed_ = covered && foot == centre_ && (shadowed_ || resumed || !covered_);
   covered_ = covered;
   if (!measure(cloud, foot, stamp, true, wide, event == Event::jumped)) {
@@ -317,6 +330,7 @@ bool SightTracker::start(const Cloud& cloud, const Vec3& foot, const Vec3& up) n
   frame_ = LocalFrame::about(foot, up);
   surface_ = {};
   count_ = 0;
+  for (Cells& past : cells_) past.full = false;
   velocity_ = 0.0;
   jumped_before_ = false;
   holding_ = false;
@@ -415,25 +429,7 @@ bool SightTracker::measure(const Cloud& cloud, const Vec2& foot, double stamp, b
   for (std::size_t j = 0; j < inner_rungs; ++j) add_ring(j);
   now.rungs = inner_rungs;
 
-  // Cells of residuals, kept to tell structure, which stays, from noise, which does not.
-  std::array<float, cells> sums{};
-  std::array<float, cells> numbers{};
-  constexpr double cell = 2.0 * 9e-3 / cells_per_side;
-  for (std::size_t i = 0; i < patch_.size(); ++i) {
-    const Vec3 local = frame_.local_from_world(patch_.ball().centre +
-                                               Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
-    const double r = local.z() - surface_.height(local.head<2>());
-    const int u = static_cast<int>(std::floor((local.x() - foot.x()) / cell)) + 2;
-    const int v = static_cast<int>(std::floor((local.y() - foot.y()) / cell)) + 2;
-    if (u < 0 || v < 0 || u >= 4 || v >= 4 || std::abs(r) > wide) continue;
-    const auto k = static_cast<std::size_t>(v * 4 + u);
-    sums[k] += static_cast<float>(r);
-    numbers[k] += 1.0F;
-  }
-  for (std::size_t k = 0; k < cells; ++k) {
-    now.residual[k] =
-        numbers[k] > 0.0F ? sums[k] / numbers[k] : std::numeric_limits<float>::quiet_NaN();
-  }
+  look_at_cells(foot, wide, new_frame);
 
   // Where there is noise to average away, look farther.
   const bool noisy =
@@ -551,7 +547,7 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
       const double scattered =
           (std::max(squares - count * mean * mean, 0.0) + (n < 4 ? expected : 0.0)) / count;
       // What was in use needs better evidence against it: a change is felt.
-      const double confidence = (j <= rung_ ? 4.5 : 3.0) + 4.0 / count;
+      const double confidence = (j <= rung_ ? 4.5 : 3.5) + 4.0 / count;
       agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + 2e-6;
       const double newest = heights[j][0].height - heights[i][0].height;
       moves_along =
@@ -584,6 +580,65 @@ void SightTracker::estimate(const Vec2& foot, bool new_frame) noexcept {
   surface_.c[0] = height - shapes[chosen].dot(basis) * Moments::unit;
 }
 
+// Means of the inner patch's points in cells of a square about `foot`, kept to tell structure,
+// which stays, from noise, which does not.
+void SightTracker::look_at_cells(const Vec2& foot, double wide, bool new_frame) noexcept {
+  constexpr double cell = 2.0 * 9e-3 / cells_per_side;
+  constexpr double half = 0.5 * cells_per_side;
+  if (new_frame) newest_cells_ = (newest_cells_ + 1) % cell_frames;
+  Cells& now = cells_[newest_cells_];
+  now.centre = foot;
+  now.heights.fill(0.0F);
+  now.means.fill(Eigen::Matrix<float, 6, 1>::Zero());
+  for (std::size_t i = 0; i < patch_.size(); ++i) {
+    const Vec3 local = frame_.local_from_world(patch_.ball().centre +
+                                               Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
+    const double u = (local.x() - foot.x()) / cell + half;
+    const double v = (local.y() - foot.y()) / cell + half;
+    if (!(u >= 0.0 && v >= 0.0 && u < cells_per_side && v < cells_per_side)) continue;
+    const Vec6 basis = quadric_basis(local.head<2>());
+    if (std::abs(local.z() - surface_.c.dot(basis)) > wide) continue;
+    const std::size_t k =
+        static_cast<std::size_t>(v) * cells_per_side + static_cast<std::size_t>(u);
+    now.heights[k] += static_cast<float>(local.z());
+    now.means[k] += basis.cast<float>();
+  }
+  now.full = !shadowed_;
+  for (std::size_t k = 0; k < cells; ++k) {
+    const float count = now.means[k][0];
+    if (!(count > 0.0F)) {
+      now.full = false;
+      return;
+    }
+    now.heights[k] /= count;
+    now.means[k] /= count;
+  }
+}
+
+// Mean square of what no quadric explains in residuals of cells [m^2]: the fit's own errors, which
+// grow towards the corners, are no structure.
+double SightTracker::squared_structure(const Cells& frame,
+                                       const std::array<double, cells>& residuals) noexcept {
+  Eigen::Matrix<double, 6, 6> a = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
+  Vec6 b = Vec6::Zero();
+  const auto basis = [&](std::size_t k) {
+    Vec6 means = frame.means[k].cast<double>();
+    means.segment<2>(1) /= Moments::unit;
+    means.tail<3>() /= squared(Moments::unit);
+    return means;
+  };
+  for (std::size_t k = 0; k < cells; ++k) {
+    const Vec6 means = basis(k);
+    a += means * means.transpose();
+    b += residuals[k] * means;
+  }
+  const Vec6 c = a.ldlt().solve(b);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < cells; ++k) sum += squared(residuals[k] - c.dot(basis(k)));
+  constexpr double free = cells - 6;
+  return sum / free;
+}
+
 // Is the surface what its fit says, up to noise?
 void SightTracker::judge(const Vec2& foot) noexcept {
   const Evidence& now = evidence(0);
@@ -598,46 +653,42 @@ void SightTracker::judge(const Vec2& foot) noexcept {
     smooth_ = false;
     return;
   }
-  std::array<double, cells> sums{};
-  std::size_t frames = 0;
-  double change = 0.0;
-  double changes = 0.0;
-  bool empty = false;
-  for (std::size_t age = 0; age < count_ && frames < 8; ++age) {
-    const Evidence& e = evidence(age);
-    if ((e.centre - now.centre).norm() > 1e-3) break;
-    if (!e.whole) continue;
+  // Residuals over the surface as it is known now, less what all cells share.
+  const auto residuals_of = [this](const Cells& frame) {
+    std::array<double, cells> residuals;
     double mean = 0.0;
     for (std::size_t k = 0; k < cells; ++k) {
-      const double r = e.residual[k];
-      if (std::isfinite(r)) {
-        mean += r / cells;
-      } else {
-        empty = true;
-      }
+      const Vec6 means = frame.means[k].cast<double>();
+      residuals[k] = frame.heights[k] - surface_.c.dot(means);
+      mean += residuals[k] / cells;
     }
-    for (std::size_t k = 0; k < cells; ++k) {
-      const double r = std::isfinite(e.residual[k]) ? e.residual[k] - mean : 0.0;
-      sums[k] += r;
-      if (age == 1) {
-        const double newest = now.residual[k];
-        change += squared(newest - e.residual[k]) / 2.0;
-        changes += 1.0;
-      }
-    }
-    ++frames;
-  }
-  if (empty) {
+    for (double& r : residuals) r -= mean;
+    return residuals;
+  };
+  const Cells& newest = cells_[newest_cells_];
+  if (!newest.full) {
     smooth_ = false;
     return;
   }
-  if (changes > 0.0) {
-    cell_scatter_.samples = std::min(cell_scatter_.samples + 1.0, 30.0);
-    cell_scatter_.variance += (change / changes - cell_scatter_.variance) / cell_scatter_.samples;
+  std::array<double, cells> sums = residuals_of(newest);
+  const std::array<double, cells> residuals = sums;
+  std::size_t frames = 1;
+  for (; frames < cell_frames; ++frames) {
+    const Cells& past = cells_[(newest_cells_ + cell_frames - frames) % cell_frames];
+    if (!past.full || (past.centre - newest.centre).norm() > same_place) break;
+    const std::array<double, cells> older = residuals_of(past);
+    double change = 0.0;
+    for (std::size_t k = 0; k < cells; ++k) {
+      sums[k] += older[k];
+      change += squared(residuals[k] - older[k]) / (2.0 * cells);
+    }
+    if (frames == 1) {
+      cell_scatter_.samples = std::min(cell_scatter_.samples + 1.0, 30.0);
+      cell_scatter_.variance += (change - cell_scatter_.variance) / cell_scatter_.samples;
+    }
   }
-  double structure = 0.0;
   const auto n = static_cast<double>(frames);
-  for (const double sum : sums) structure += squared(sum / n) / cells;
+  const double structure = squared_structure(newest, sums) / squared(n);
   const double noise = cell_scatter_.samples > 0.0 ? cell_scatter_.variance / n : 0.0;
   // Hysteresis, so that the way to rest does not change from frame to frame.
   const double confidence = smooth_ ? 6.0 : 3.0;
@@ -653,6 +704,7 @@ void SightTracker::move_origin(const Vec2& foot) noexcept {
   surface_.c[1] = gradient.x();
   surface_.c[2] = gradient.y();
   centre_ -= foot;
+  for (Cells& past : cells_) past.full = false;
   for (std::size_t age = 0; age < count_; ++age) {
     Evidence& e = evidence(age);
     e.centre -= foot;
@@ -684,7 +736,8 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
     const Vec2 d = local.head<2>() - at;
     const double away = d.norm();
     if (away < beside_inner || away >= beside_bands.back()) continue;
-    const std::size_t band = away < beside_bands[0] ? 0 : away < beside_bands[1] ? 1 : 2;
+    std::size_t band = 0;
+    while (away >= beside_bands[band]) ++band;
     const std::size_t sector =
         (d.x() > 0.0 ? 4 : 0) + (d.y() > 0.0 ? 2 : 0) + (std::abs(d.x()) > std::abs(d.y()) ? 1 : 0);
     const double r = local.z() - base - slope.dot(local.head<2>() - centre_);
@@ -694,15 +747,24 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
   return ring;
 }
 
-// Did something come between the viewpoint and the surface, or did the surface itself come? Either
-// it was already to be seen beside the contact, or the surface still is.
-bool SightTracker::is_occluder(const Ring& now, double height) const noexcept {
-  const double tolerance = std::max(15e-3, 4.0 * spread_);
+// Did something come between the viewpoint and the surface, or did the surface itself come?
+// Something did if it was already to be seen beside the contact, if the surface still is, or if no
+// surface could have been struck so hard.
+// @param height  [m] of what is seen now, above where the surface was
+// @param jump    [m] above where it was expected
+bool SightTracker::is_occluder(const Ring& now, double height, double jump) const noexcept {
+  const double strike = 0.5 * hardest_strike * squared(interval_);
+  const double times = jumped_before_ ? 4.0 : velocity_ != 0.0 ? 2.0 : 1.0;
+  const double noise = std::max(spread_, height_sd());
+  if (settled_ >= well_known && jump > times * strike + 15e-3 + 4.0 * noise) return true;
+  const double tolerance = std::max(15e-3, 4.0 * noise);
+  // A cell keeps its nearest point, and that is the noise's farthest.
+  const double nearer = std::max(15e-3, 6.0 * noise);
   std::size_t same_before = 0;
   std::size_t unchanged = 0;
   for (std::size_t i = 0; i < now.size(); ++i) {
     const double before = beside_[i];
-    if (before > std::max(25e-3, tolerance) && std::abs(before - height) < 30e-3) return true;
+    if (before > nearer && std::abs(before - height) < std::min(30e-3, 0.6 * height)) return true;
     if (std::abs(before) < tolerance) {
       ++same_before;
       if (std::abs(now[i] - before) < std::min(tolerance, 0.3 * height)) ++unchanged;

@@ -31,6 +31,8 @@ struct SurfaceContact {
   Vec3 normal;      ///< [-] unit, world, towards the proxy's side
   double distance;  ///< [m] from the surface to that point, negative behind it
   bool at_limit;    ///< the surface is not known beyond `foot`: fit it there
+  double
+      curvature;  ///< [1/m] the strongest towards the proxy: a sphere of 1/curvature just fits in
 };
 
 /// Sightline tracking: what the Renderer remembers of the surface that the proxy touches, or that
@@ -99,7 +101,7 @@ class SightTracker {
   static constexpr std::size_t cells_per_side = 4;
   static constexpr std::size_t cells = cells_per_side * cells_per_side;
   static constexpr std::size_t sectors = 8;
-  static constexpr std::size_t bands = 3;
+  static constexpr std::size_t bands = 5;
 
   /// Moments with the height eliminated (Schur's complement): what is left tells of the shape.
   struct Shape {
@@ -117,8 +119,15 @@ class SightTracker {
     std::size_t rungs = 0;  // how many were measured
     std::array<Moments, SightTracker::rungs> disc;
     std::array<Shape, SightTracker::rungs> shape;
-    std::array<float, cells> residual;  // [m] mean over each cell; NaN without points
   };
+  /// Means over the points in each cell of a square about a frame's contact, local.
+  struct Cells {
+    bool full = false;  // no cell is without points, and nothing was before them
+    Vec2 centre = Vec2::Zero();
+    std::array<float, cells> heights;                     // [m]
+    std::array<Eigen::Matrix<float, 6, 1>, cells> means;  // of quadric_basis
+  };
+  static constexpr std::size_t cell_frames = 8;
   /// How a height scatters from frame to frame.
   struct Scatter {
     double variance = 0.0;  // [m^2]
@@ -137,13 +146,16 @@ class SightTracker {
                                                    double wide) const noexcept;
   bool recentre(const Vec2& foot, double gate, double& cut) noexcept;
   void estimate(const Vec2& foot, bool new_frame) noexcept;
+  void look_at_cells(const Vec2& foot, double wide, bool new_frame) noexcept;
+  static double squared_structure(const Cells& frame,
+                                  const std::array<double, cells>& residuals) noexcept;
   void judge(const Vec2& foot) noexcept;
   void move_origin(const Vec2& foot) noexcept;
   [[nodiscard]] Evidence& evidence(std::size_t age) noexcept {
     return ring_[(newest_ + history - age) % history];
   }
   [[nodiscard]] Ring look_beside(const Cloud& cloud, const Vec3& place) noexcept;
-  [[nodiscard]] bool is_occluder(const Ring& now, double height) const noexcept;
+  [[nodiscard]] bool is_occluder(const Ring& now, double height, double jump) const noexcept;
   [[nodiscard]] double gate() const noexcept;
   [[nodiscard]] double variance(std::size_t rung) const noexcept;
 
@@ -152,8 +164,9 @@ class SightTracker {
   bool smooth_ = false;
   bool holding_ = false;
   double held_since_ = 0.0;
-  bool covered_ = false;   // something was before a part of the disc
-  bool shadowed_ = false;  // and has come there since
+  bool covered_ = false;        // something was before a part of the disc
+  bool shadowed_ = false;       // and has come there since
+  std::size_t near_usual_ = 0;  // points of the surface in the beam, with nothing before them
 
   LocalFrame frame_;
   Quadric surface_;
@@ -166,6 +179,8 @@ class SightTracker {
   std::size_t mover_ = 0;  // whose disc tells how it moves
 
   std::array<Evidence, history> ring_;
+  std::array<Cells, cell_frames> cells_;
+  std::size_t newest_cells_ = 0;
   std::size_t newest_ = 0;
   std::size_t count_ = 0;
   std::size_t settled_ = 0;  // frames whose heights are this surface's

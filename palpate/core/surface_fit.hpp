@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include <Eigen/Core>
@@ -55,6 +56,10 @@ struct Quadric {
   [[nodiscard]] Vec3 normal(const Vec2& at) const noexcept {
     const Vec2 g = gradient(at);
     return Vec3(-g.x(), -g.y(), 1.0).normalized();
+  }
+  /// The largest second derivative in any direction [1/m]: how it curves up towards what is above.
+  [[nodiscard]] double strongest_rise() const noexcept {
+    return c[3] + c[5] + std::hypot(c[3] - c[5], c[4]);
   }
   /// Where the surface is nearest to `point` [m, local], by Newton's method from `start`, no
   /// farther than `reach` [m] from `centre`.

@@ -302,6 +302,68 @@ TEST(Sight, HoldsTheContactWhileAHandPassesBeforeIt) {
   }
 }
 
+TEST(Sight, HoldsTheContactWhenSomethingCoversAllThatIsSeenWithinAFrame) {
+  const Overhead camera;
+  std::mt19937 random(3);
+  Renderer renderer = by_sight({0, 0, 0.03});
+  for (int k = 0; k < 40; ++k) {
+    const double height = k >= 20 && k < 25 ? 0.1 : 0.0;
+    const DepthImage image = camera.shoot([&](double, double) { return height; }, 1e-3, random);
+    const Tick tick =
+        live_through(renderer, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
+    if (k < 15) continue;
+    EXPECT_EQ((tick.flags & surface_hidden) != 0, height > 0.0) << "frame " << k;
+    EXPECT_NEAR(tick.proxy.z(), r_c, 0.2e-3) << "frame " << k;
+    EXPECT_NEAR(tick.force.z(), 6.0, 0.2) << "frame " << k;
+  }
+}
+
+TEST(Sight, HoldsTheContactBesideAShadowWithoutPoints) {
+  // Stereo sees nothing beside an occluder: a hole comes over the contact, half of it first.
+  const Overhead camera;
+  std::mt19937 random(4);
+  Renderer renderer = by_sight({0, 0, 0.03});
+  for (int k = 0; k < 60; ++k) {
+    const double edge = -0.04 + 0.003 * std::max(k - 20, 0);
+    const DepthImage image = camera.shoot(
+        [&](double x, double) { return std::abs(x - edge) < 0.02 ? Overhead::distance : 0.0; }, 0.0,
+        random);
+    const Tick tick =
+        live_through(renderer, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
+    EXPECT_NEAR(tick.proxy.z(), r_c, 0.2e-3) << "frame " << k;
+  }
+}
+
+TEST(Sight, KeepsToTheFlanksOfReliefFinerThanTheProxy) {
+  // Sine waves 3 mm high and 10 mm long. The proxy's centre is where it touches without entering.
+  const Overhead camera;
+  std::mt19937 random(5);
+  const auto height = [](double x) { return 1.5e-3 * std::cos(200.0 * std::numbers::pi * x); };
+  const auto rest = [&](double x) {
+    double z = -1.0;
+    for (double d = -r_c; d <= r_c; d += 2e-5) {
+      z = std::max(z, height(x + d) + std::sqrt(std::max(r_c * r_c - d * d, 0.0)));
+    }
+    return z;
+  };
+  const DepthImage image = camera.shoot([&](double x, double) { return height(x); }, 0.0, random);
+  Renderer renderer = by_sight({-0.01, 0.0003, 0.03});
+  double squares = 0.0;
+  int ticks = 0;
+  for (int k = 0; k < 60; ++k) {
+    renderer.frame(image, k * interval);
+    for (int i = 0; i < 33; ++i) {
+      const double t = k * interval + i * 1e-3;
+      const Tick tick = renderer.tick(Vec3(-0.01 + 0.01 * t, 0.0003, -0.01), t);
+      if (k < 10) continue;
+      squares += std::pow(tick.proxy.z() - rest(tick.proxy.x()), 2);
+      ++ticks;
+    }
+  }
+  // Between points 1.5 mm apart a sphere sinks by up to 0.11 mm.
+  EXPECT_LT(std::sqrt(squares / ticks), 0.15e-3);
+}
+
 TEST(Sight, LetsTheForceFadeWhenTheSurfaceStaysHidden) {
   const Overhead camera;
   std::mt19937 random(3);

@@ -8,6 +8,7 @@
 #include "lab/experiments/real.hpp"
 #include "lab/experiments/scan.hpp"
 #include "lab/experiments/surfaces.hpp"
+#include "lab/experiments/tradeoff.hpp"
 #include "lab/method.hpp"
 #include "palpate/core/error.hpp"
 
@@ -15,10 +16,12 @@ namespace palpate::lab {
 
 const std::vector<Experiment>& known_experiments() {
   static const std::vector<Experiment> experiments = {
-      flat_experiment(),     jump_experiment(),    single_lift_experiment(),   lift_experiment(),
-      bound_experiment(),    speed_experiment(),   first_contact_experiment(), hold_experiment(),
-      force_experiment(),    damping_experiment(), corners_experiment(),       scan_experiment(),
-      fidelity_experiment(), pop_experiment(),     real_experiment()};
+      flat_experiment(),          jump_experiment(),    single_lift_experiment(),
+      lift_experiment(),          bound_experiment(),   speed_experiment(),
+      first_contact_experiment(), hold_experiment(),    force_experiment(),
+      damping_experiment(),       corners_experiment(), scan_experiment(),
+      fidelity_experiment(),      pop_experiment(),     real_experiment(),
+      tradeoff_experiment()};
   return experiments;
 }
 

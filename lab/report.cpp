@@ -242,7 +242,12 @@ fs::path write_report(const std::vector<Result>& results, const fs::path& folder
   page += "</body></html>\n";
   write(folder / "report.html", page);
   write(folder / "reproduction.md", notes + figures);
-  if (!bench.empty()) write(folder / "bench.md", bench);
+  if (!bench.empty())
+    write(
+        folder / "bench.md",
+        "# The bench, as run\n\nMade by `palpate eval`; not written by hand. [pop.md](pop.md) says "
+        "what each is, and the rules.\n\n" +
+            bench);
   return folder / "report.html";
 }
 

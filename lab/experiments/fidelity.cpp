@@ -425,11 +425,13 @@ constexpr std::string_view fidelity_plot = R"gp(
 set ylabel "measured / aim"
 set logscale y
 set yrange [0.001:1000]
-set xtics rotate by -40 noenhanced
+set xtics rotate by -55 noenhanced font ",10"
 set key outside right top
-set bmargin 9
+set bmargin 10
 set arrow from graph 0, first 1 to graph 1, first 1 nohead lw 2 lc rgb "#444444"
-plot for [m in methods] csv using (strcol(1) eq m && $5 > 0 ? column(0) : NaN):($6/$5):xtic(strcol(1) eq word(methods,1) ? strcol(2)." ".strcol(3) : "") with points pt 7 title m
+# One place for every measure that has an aim; what is exact or lost has no point.
+ratio(m) = sprintf("< awk -F, 'NR > 1 && $5 > 0 {k = $2 \" \" $3; if (!(k in at)) {at[k] = ++n; name[n] = k} if ($1 == \"%s\") r[at[k]] = $6 / $5} END {for (i = 1; i <= n; i++) print i \",\" name[i] \",\" (i in r && r[i] > 0 ? r[i] : \"NaN\")}' %s", m, csv)
+plot for [m in methods] ratio(m) using 1:3:xtic(2) with points pt 7 title m
 )gp";
 
 }  // namespace

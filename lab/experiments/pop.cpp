@@ -289,7 +289,7 @@ set bmargin 7
 set key outside right top
 held(m) = sprintf("< awk -F, '$1==\"%s\" {if (!($2 in n)) order[++k]=$2; n[$2]+=$4; l[$2]+=$5} END {for (i=1;i<=k;i++) print order[i], 100*(n[order[i]]-l[order[i]])/n[order[i]]}' %s", m, csv)
 set datafile separator " "
-plot for [m in methods] held(m) using 0:2:xtic(1) with linespoints pt 7 lw 2 title m
+plot for [m in methods] held(m) using 0:2:xtic(1) with points pt 7 ps 1.2 title m
 )gp";
 
 }  // namespace

@@ -246,6 +246,36 @@ TEST_F(Lab, MeasuresNoErrorOfTheRulerAndThePaperLostInARealCamerasNoise) {
   EXPECT_LT(std::stoi(scores.rows.back()[3]), 8) << "and by the paper";
 }
 
+TEST_F(Lab, PaysForStillnessWithLagWhereItTakesPlainMeans) {
+  ExperimentOptions options = with({"ideal"});
+  options.cases = 1;
+  const Table table = run("tradeoff", options);
+  ASSERT_EQ(table.rows(), 84U) << "three distances, four speeds, the ruler and six means";
+  double jitter_of_long = 0.0;
+  double jitter_of_short = 0.0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string& method = table.text(row, "method");
+    const double speed = table.number(row, "speed");
+    const double lag = table.number(row, "lag_frames");
+    EXPECT_EQ(table.number(row, "lost"), 0.0);
+    if (method == "ideal") {
+      EXPECT_LT(table.number(row, "jitter_mm"), 1e-6);
+      EXPECT_LT(lag, 1e-6);
+    }
+    if (method == "mean-1") jitter_of_short += table.number(row, "jitter_mm");
+    if (method == "mean-32") jitter_of_long += table.number(row, "jitter_mm");
+    // The newest frame alone is half an interval old on average; the mean of 16 lags
+    // by 8 frames, or until it is below the hand.
+    if (method == "mean-1" && speed == 0.2 && table.number(row, "distance_m") == 0.45) {
+      EXPECT_NEAR(lag, 0.5, 0.3);
+    }
+    if (method == "mean-16" && speed == 0.2) {
+      EXPECT_GT(lag, 2.0);
+    }
+  }
+  EXPECT_LT(3.0 * jitter_of_long, jitter_of_short);
+}
+
 TEST_F(Lab, GivesTheSameBytesWithOneJobTwoJobsAndAfterAnInterruption) {
   ExperimentOptions options = with({"paper"});
   options.grid = {3, 4};

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/grid_cloud.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "palpate/sources/sensor_model.hpp"
@@ -51,7 +53,7 @@ void add_correlated_noise(std::vector<Vec3>& points, int columns, int rows, doub
 
 }  // namespace
 
-std::unique_ptr<PointCloud> GridCloud::capture(std::uint64_t frame, double lift) const {
+std::unique_ptr<SurfaceCloud> GridCloud::capture(std::uint64_t frame, double lift) const {
   // The grid is fixed in the world; what moves with the centre is which part of it is made.
   const auto first = [this](double centre, double half) {
     return static_cast<int>(std::ceil((centre - half) / spacing));
@@ -61,7 +63,10 @@ std::unique_ptr<PointCloud> GridCloud::capture(std::uint64_t frame, double lift)
   const int rows = count(half_y);
   const int i0 = first(centre_x, half_x);
   const int j0 = first(centre_y, half_y);
-  std::vector<Vec3> points;
+  Surface surface;
+  surface.columns = columns;
+  surface.rows = rows;
+  std::vector<Vec3>& points = surface.points;
   points.reserve(static_cast<std::size_t>(columns) * rows);
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
@@ -70,10 +75,24 @@ std::unique_ptr<PointCloud> GridCloud::capture(std::uint64_t frame, double lift)
       points.emplace_back(x, y, height(x, y) + lift);
     }
   }
+  // From the differences to the neighbours, one-sided at the border.
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      const auto z = [&](int u, int v) {
+        return points[static_cast<std::size_t>(std::clamp(v, 0, rows - 1)) * columns +
+                      static_cast<std::size_t>(std::clamp(u, 0, columns - 1))];
+      };
+      const Vec3 along = z(i + 1, j) - z(i - 1, j);
+      const Vec3 up = z(i, j + 1) - z(i, j - 1);
+      const Vec3 normal = along.cross(up);
+      surface.normals.push_back(normal.norm() > 0.0 ? Vec3(normal.normalized())
+                                                    : Vec3(Vec3::UnitZ()));
+    }
+  }
   if (sigma > 0.0 && noise == Noise::white) add_point_noise(points, sigma, seed, frame);
   if (sigma > 0.0 && noise == Noise::correlated)
     add_correlated_noise(points, columns, rows, sigma, 5.0, seed * 0x9E3779B97F4A7C15ULL + frame);
-  return std::make_unique<PointCloud>(points, Vec3(centre_x, centre_y, 10.0));
+  return std::make_unique<SurfaceCloud>(std::move(surface), Vec3(centre_x, centre_y, 10.0));
 }
 
 }  // namespace palpate::lab

@@ -5,6 +5,8 @@
 
 #include <nanoflann.hpp>
 
+#include "lab/surface_cloud.hpp"
+
 namespace palpate::lab {
 namespace {
 
@@ -66,8 +68,22 @@ bool LocalPoints::cover(const Vec3& place) {
   if (!stale_ && (place - centre_).norm() <= reach_ / 3.0) return false;
   stale_ = false;
   centre_ = place;
-  gather(*cloud_, Ball{place, reach_}, patch_);
   newest_.clear();
+  normals_.clear();
+  const auto* given = dynamic_cast<const SurfaceCloud*>(cloud_);
+  if (window_ == 1 && given != nullptr && !given->surface().normals.empty()) {
+    const Surface& surface = given->surface();
+    viewpoint_ = given->viewpoint();
+    points_.clear();
+    for (std::size_t i = 0; i < surface.points.size(); ++i) {
+      if (!((surface.points[i] - place).norm() <= reach_)) continue;
+      points_.push_back(surface.points[i]);
+      normals_.push_back(surface.normals[i]);
+    }
+    tree_ = points_.empty() ? nullptr : std::make_unique<Tree>(points_);
+    return true;
+  }
+  gather(*cloud_, Ball{place, reach_}, patch_);
   for (std::size_t i = 0; i < patch_.size(); ++i)
     newest_.emplace_back(place + Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
   viewpoint_ = patch_.view_count() > 0 ? patch_.view(0).viewpoint : std::nullopt;

@@ -36,6 +36,8 @@ class LocalPoints {
   bool cover(const Vec3& place);
 
   [[nodiscard]] const std::vector<Vec3>& points() const { return points_; }  ///< [m] world
+  /// [-] of each point, where they came with normals (SurfaceCloud) and one frame counts; or none.
+  [[nodiscard]] const std::vector<Vec3>& normals() const { return normals_; }
   /// [m] world: from where the newest frame was seen, if known.
   [[nodiscard]] const std::optional<Vec3>& viewpoint() const { return viewpoint_; }
 
@@ -55,7 +57,7 @@ class LocalPoints {
   bool stale_ = true;
   std::vector<Vec3> newest_;
   std::deque<std::vector<Vec3>> before_;
-  std::vector<Vec3> points_;
+  std::vector<Vec3> points_, normals_;
   std::optional<Vec3> viewpoint_;
   std::unique_ptr<Tree> tree_;
 };

@@ -14,9 +14,18 @@ Truth truth_of(const std::shared_ptr<const Scene>& scene) {
 
 // The files of lab/methods, in the order in which tables show their methods. FILE.cpp defines
 // `std::vector<MethodInfo> FILE_methods()`. Adding a method: its file, and one line here.
-// clang-format off: one a line
+// clang-format off
 #define PALPATE_METHOD_FILES(file) \
-  file(kernel) file(direct) file(point_boxes) file(radial_fields) file(surfels) file(ideal)
+  file(kernel)                     \
+  file(virtual_coupling)           \
+  file(god_object)                 \
+  file(direct)                     \
+  file(point_boxes)                \
+  file(radial_fields)              \
+  file(surfels)                    \
+  file(image_features)             \
+  file(tsdf)                       \
+  file(ideal)
 // clang-format on
 
 #define PALPATE_DECLARE(name) std::vector<MethodInfo> name##_methods();

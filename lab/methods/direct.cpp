@@ -2,46 +2,13 @@
 // The direct method of section 2.1 on the surface of [7]: a force in proportion to the depth of the
 // HIP below a moving-least-squares plane, no proxy and no memory.
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
-#include <Eigen/Eigenvalues>
-
 #include "lab/method.hpp"
+#include "lab/plane_fit.hpp"
 
 namespace palpate::lab {
 namespace {
-
-// A plane through the points near the HIP: a = sum w x / sum w, n the eigenvector of their weighted
-// covariance with the smallest eigenvalue, towards where the points were seen from (else up).
-struct Plane {
-  Vec3 at;
-  Vec3 normal;
-};
-
-std::optional<Plane> fit_plane(const Patch& patch, double radius) {
-  double total = 0.0;
-  Vec3 mean = Vec3::Zero();
-  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < patch.size(); ++i) {
-    const Vec3 x(patch.x()[i], patch.y()[i], patch.z()[i]);
-    const double q = std::max(1.0 - x.norm() / radius, 0.0);
-    const double w = q * q * q * q * (4.0 * (1.0 - q) + 1.0);  // Wendland's C2 function
-    total += w;
-    mean += w * x;
-    second += w * x * x.transpose();
-  }
-  if (patch.size() < 6 || !(total > 1e-12)) return std::nullopt;
-  mean /= total;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(second / total -
-                                                            mean * mean.transpose());
-  Vec3 normal = axes.eigenvectors().col(0);
-  const Vec3 at = patch.ball().centre + mean;
-  const auto& seen_from = patch.view(0).viewpoint;
-  const Vec3 outward = seen_from ? Vec3(*seen_from - at) : Vec3(Vec3::UnitZ());
-  if (normal.dot(outward) < 0.0) normal = -normal;
-  return Plane{at, normal};
-}
 
 class Direct final : public TouchMethod {
  public:
@@ -70,10 +37,10 @@ class Direct final : public TouchMethod {
     // from there. Seven r_c is generous to the method.
     const double radius = 7.0 * parameters_.proxy.r_c();
     gather(*cloud_, Ball{hip, radius}, patch_);
-    const std::optional<Plane> plane = fit_plane(patch_, radius);
+    const std::optional<Contact> plane = fit_plane(patch_, radius);
     if (!plane) return tick;
     tick.normal = plane->normal;
-    const double distance = plane->normal.dot(hip - plane->at);
+    const double distance = plane->normal.dot(hip - plane->point);
     if (distance >= 0.0) return tick;
     const double magnitude =
         std::min(-parameters_.coupling.stiffness * distance, parameters_.coupling.max_force);

@@ -26,16 +26,19 @@ constexpr std::size_t a_few = 3;   // frames
 
 class Surfels final : public ImplicitMethod {
  public:
-  Surfels(const Parameters& parameters, std::size_t window)
+  Surfels(const Parameters& parameters, std::size_t window, bool given)
       : ImplicitMethod(parameters, stride, parameters.proxy.r_3),
         radius_(parameters.proxy.r_3),
+        given_(given),
         points_(0.03, window) {}
 
  private:
   void take(const Cloud& cloud, const Vec3& /*place*/) override { points_.frame(cloud); }
 
   void prepare(const Vec3& place) override {
-    if (points_.cover(place)) normals_.assign(points_.points().size(), Vec3::Zero());
+    if (!points_.cover(place)) return;
+    normals_.assign(points_.points().size(), Vec3::Zero());
+    if (given_ && !points_.normals().empty()) normals_ = points_.normals();
   }
 
   const Vec3& normal(std::uint32_t i) {
@@ -76,16 +79,21 @@ class Surfels final : public ImplicitMethod {
   }
 
   double radius_;  // [m] w is 0 beyond
+  bool given_;     // normals are taken as they came, where they did
   LocalPoints points_;
   std::vector<Vec3> normals_;  // of each point, zero until it is asked for
   std::vector<LocalPoints::Neighbour> near_, neighbours_;
 };
 
 std::unique_ptr<TouchMethod> of_one(const MethodSetup& setup) {
-  return std::make_unique<Surfels>(setup.parameters, 1);
+  return std::make_unique<Surfels>(setup.parameters, 1, false);
 }
 std::unique_ptr<TouchMethod> of_a_few(const MethodSetup& setup) {
-  return std::make_unique<Surfels>(setup.parameters, a_few);
+  return std::make_unique<Surfels>(setup.parameters, a_few, false);
+}
+
+std::unique_ptr<TouchMethod> of_given(const MethodSetup& setup) {
+  return std::make_unique<Surfels>(setup.parameters, 1, true);
 }
 
 }  // namespace
@@ -93,7 +101,8 @@ std::unique_ptr<TouchMethod> of_a_few(const MethodSetup& setup) {
 std::vector<MethodInfo> surfels_methods() {
   return {{"surfels", "implicit surface of total-least-squares normals ([13], second form, [16])",
            of_one},
-          {"surfels-3", "the same over the last three frames", of_a_few}};
+          {"surfels-3", "the same over the last three frames", of_a_few},
+          {"point-normals", "a point set that came with its normals ([6])", of_given}};
 }
 
 }  // namespace palpate::lab

@@ -7,8 +7,10 @@
 
 #include <gtest/gtest.h>
 
+#include "lab/coupling_limit.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
+#include "lab/surface_cloud.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 
 #include "tests/support/grids.hpp"
@@ -46,10 +48,23 @@ Vec3 contact(const Tick& tick) {
   return tick.proxy - r_c * tick.normal;
 }
 
+// The middle of an image that a camera a metre above takes of a height field.
+template <class Height>
+SurfaceCloud seen(const Height& height) {
+  Surface surface;
+  surface.points = test::grid(spacing, 40, height);
+  surface.columns = surface.rows = 81;
+  return SurfaceCloud(std::move(surface), camera);
+}
+
+double flat(double /*x*/, double /*y*/) {
+  return 0.0;
+}
+
 class EveryMethod : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(EveryMethod, PushesAHandOutOfAPlaneAndLeavesItAloneAbove) {
-  const PointCloud plane(test::flat_grid(), camera);
+  const SurfaceCloud plane = seen(flat);
   const auto method = make_method(GetParam(), with_flat_truth());
   const Tick pressed = press(*method, plane, {0.0002, 0.0003, -0.008});
   EXPECT_GT(pressed.force.normalized().z(), 0.99);
@@ -76,7 +91,7 @@ TEST_P(EveryMethod, StaysFiniteUnderFiveMillimetresOfNoise) {
   grid.half_x = grid.half_y = 0.05;
   grid.sigma = 5e-3;
   const auto method = make_method(GetParam(), with_flat_truth());
-  std::unique_ptr<PointCloud> in_use;
+  std::unique_ptr<Cloud> in_use;
   for (int frame = 0; frame < 10; ++frame) {
     auto cloud = grid.capture(static_cast<std::uint64_t>(frame), 0.0);
     method->frame(*cloud, frame / 30.0);
@@ -185,7 +200,7 @@ TEST(Surfels, OverThreeFramesJittersLessAtRestAndLagsBehindWhatMoves) {
       grid.sigma = moves ? 0.0 : 1e-3;
       const auto method = make_method(name, {});
       method->seat({0, 0, 0.01});
-      std::unique_ptr<PointCloud> in_use;
+      std::unique_ptr<Cloud> in_use;
       for (int k = 0; k < 40; ++k) {
         const double height = moves ? 0.001 * k : 0.0;
         auto cloud = grid.capture(static_cast<std::uint64_t>(k), height);
@@ -206,6 +221,236 @@ TEST(Surfels, OverThreeFramesJittersLessAtRestAndLagsBehindWhatMoves) {
   EXPECT_LT(few_jitter, 0.75 * one_jitter);
   EXPECT_NEAR(one_lag, 0.0, 1e-6);
   EXPECT_NEAR(few_lag, 0.001, 0.1e-3) << "the mean of three frames is one frame old";
+}
+
+TEST(GodObject, IsAsNearToTheHandAsAPlaneAllows) {
+  const auto tilted = [](double x, double y) { return 0.3 * x - 0.2 * y; };
+  const Vec3 normal = Vec3(-0.3, 0.2, 1.0).normalized();
+  const SurfaceCloud plane = seen(tilted);
+  const Vec3 foot(0.002, 0.001, tilted(0.002, 0.001));
+  for (const char* name : {"god-object", "sphere-proxy", "force-shading"}) {
+    const auto method = make_method(name, {});
+    press(*method, plane, foot - 0.002 * normal);
+    const Tick tick = go(*method, foot - 0.002 * normal, foot - 0.006 * normal);
+    EXPECT_LT((contact(tick) - foot).norm(), 1e-6) << name;
+    EXPECT_LT((tick.force - stiffness * 0.006 * normal).norm(), 1e-3) << name;
+  }
+}
+
+TEST(GodObject, RestsInTheCornerOfThreePlanes) {
+  // A room's corner as a mesh: floor z = 0 and walls x = 0, y = 0, open towards + + +.
+  Surface room;
+  const double big = 0.1;
+  room.points = {{0, 0, 0}, {big, 0, 0}, {0, big, 0}, {0, 0, big}};
+  room.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
+  const SurfaceCloud corner(std::move(room));
+  for (const char* name : {"god-object", "sphere-proxy"}) {
+    const double apart = std::string(name) == "sphere-proxy" ? r_c : 0.0;
+    const auto method = make_method(name, {});
+    method->seat({0.02, 0.02, 0.02});
+    method->frame(corner, 0.0);
+    const Vec3 hip(-0.004, -0.003, -0.002);
+    const Tick tick = go(*method, {0.02, 0.02, 0.02}, hip);
+    const Vec3 rest = Vec3::Constant(apart);
+    const Vec3 out = (rest - hip).normalized();
+    const Vec3 centre = apart > 0.0 ? tick.proxy : Vec3(tick.proxy - r_c * tick.normal);
+    EXPECT_LT((centre - rest).norm(), 1e-6) << name;
+    EXPECT_LT((tick.force.normalized() - out).norm(), 1e-5) << name;
+  }
+}
+
+TEST(GodObject, DoesNotPopThroughAThinPlate) {
+  // Its claim: it remembers the side. The direct method, which doesn't, lets go.
+  const SurfaceCloud plate = seen(flat);
+  for (const char* name : {"god-object", "sphere-proxy", "force-shading"}) {
+    const auto method = make_method(name, {});
+    EXPECT_NEAR(press(*method, plate, {0.0, 0.0, -0.025}).force.z(), stiffness * 0.025, 1e-2);
+  }
+  const auto direct = make_method("direct", {});
+  EXPECT_TRUE(press(*direct, plate, {0.0, 0.0, -0.04}).force.isZero());
+}
+
+TEST(SphereProxy, RollsOverAConvexEdgeAtItsRadius) {
+  const auto roof = [](double x, double) { return -std::abs(x); };
+  const SurfaceCloud edge = seen(roof);
+  const auto method = make_method("sphere-proxy", {});
+  const Tick tick = press(*method, edge, {0.0, 0.0, -0.01});
+  EXPECT_NEAR(tick.proxy.z(), r_c, 1e-6) << "on the edge, which is a line";
+  // A hand within the sphere turns it about the edge, as far as the faces let it.
+  Tick aside = go(*method, {0.0, 0.0, -0.01}, {0.001, 0.0, 0.002});
+  for (int i = 0; i < 50; ++i) aside = method->tick(aside.hip, aside.t + 1e-3);
+  EXPECT_LT((aside.proxy - r_c * Vec3(1.0, 0.0, 2.0).normalized()).norm(), 1e-5);
+}
+
+TEST(GodObject, IsLostWhereItIsKeptAndASurfaceRisesOverIt) {
+  for (const auto& [name, held] :
+       {std::pair{"god-object", true}, std::pair{"god-object-kept", false},
+        std::pair{"sphere-proxy", true}}) {
+    const SurfaceCloud low = seen(flat);
+    const SurfaceCloud high = seen([](double, double) { return 0.003; });
+    const auto method = make_method(name, {});
+    const Tick before = press(*method, low, {0.0003, 0.0002, -0.008});
+    method->frame(high, 1.0 / 30.0);
+    const Tick tick = method->tick(before.hip, 0.5);
+    EXPECT_EQ(tick.proxy.z() > 0.0, held) << name;
+    if (held) {
+      EXPECT_NEAR(contact(tick).z(), 0.003, 1e-6) << name;
+    }
+    // Further than r_c, and all are lost.
+    const SurfaceCloud higher = seen([](double, double) { return 0.020; });
+    method->frame(higher, 2.0 / 30.0);
+    EXPECT_TRUE(method->tick(before.hip, 0.6).force.isZero()) << name;
+  }
+}
+
+TEST(ForceShading, SmoothsTheFacetsOfABall) {
+  // A ball of 40 mm sampled every 6 mm: facets of some nine degrees.
+  Surface ball;
+  const auto height = [](double x, double y) { return std::sqrt(0.04 * 0.04 - x * x - y * y); };
+  ball.points = test::grid(6e-3, 4, height);
+  ball.columns = ball.rows = 9;
+  const SurfaceCloud cloud(std::move(ball), camera);
+  const auto worst = [&](const char* name) {
+    const auto method = make_method(name, {});
+    method->seat({0, 0, 0.06});
+    method->frame(cloud, 0.0);
+    go(*method, {0, 0, 0.06}, {0, 0, 0.035});
+    double largest = 0.0;
+    for (int i = 0; i <= 120; ++i) {
+      const double angle = 0.3 * i / 120.0;
+      const Vec3 out(std::sin(angle), 0.0, std::cos(angle));
+      const Tick tick = method->tick(0.035 * out, 1.0 + 1e-3 * i);
+      largest = std::max(largest, std::acos(std::min(1.0, tick.normal.dot(out))));
+    }
+    return largest;
+  };
+  EXPECT_LT(worst("force-shading"), 0.5 * worst("god-object"));
+}
+
+TEST(PointNormals, KeepsTheSideThatItsNormalsTell) {
+  // The same points with normals down, as of a ceiling: it is touched from beneath.
+  Surface ceiling;
+  ceiling.points = test::flat_grid();
+  ceiling.normals.assign(ceiling.points.size(), -Vec3::UnitZ());
+  const SurfaceCloud cloud(std::move(ceiling), camera);
+  const auto method = make_method("point-normals", {});
+  method->seat({0, 0, -0.02});
+  method->frame(cloud, 0.0);
+  const Tick tick = go(*method, {0, 0, -0.02}, {0, 0, 0.006});
+  EXPECT_NEAR(tick.force.z(), -stiffness * 0.006, 1e-3);
+}
+
+TEST(PointNormals, RendersTheGivenNormalsEvenWhereNoiseHidesThem) {
+  GridCloud grid;
+  grid.sigma = 1e-3;
+  const auto cloud = grid.capture(1, 0.0);
+  const auto off = [&](const char* name) {
+    const auto method = make_method(name, {});
+    return std::acos(std::min(1.0, press(*method, *cloud, {0, 0, -0.008}).normal.z()));
+  };
+  EXPECT_LT(off("point-normals"), 1e-6);
+  EXPECT_GT(off("surfels"), 0.01) << "which has to estimate them";
+}
+
+TEST(ImageFeatures, FeelsHeightAndBrightnessAtItsOwnPixel) {
+  Surface image;
+  image.points = test::flat_grid();
+  for (const Vec3& point : image.points) image.brightness.push_back(point.x() > 0.0 ? 1.0F : 0.0F);
+  const SurfaceCloud cloud(std::move(image), camera);
+  const auto method = make_method("image-features", {});
+  const double dark = press(*method, cloud, {-0.01, 0.0, -0.008}).force.z();
+  const double bright = method->tick({0.01, 0.0, -0.008}, 1.0).force.z();
+  EXPECT_NEAR(dark, stiffness * 0.008, 1e-3);
+  EXPECT_NEAR(bright - dark, stiffness * 0.5e-3, 1e-3);
+}
+
+TEST(ImageFeatures, PushesAHandThatIsBehindAnOccluder) {
+  // A hand over a table is under an arm: the image knows only the arm.
+  const SurfaceCloud arm = seen([](double, double) { return 0.02; });
+  const auto method = make_method("image-features", {});
+  method->frame(arm, 0.0);
+  EXPECT_GT(method->tick({0, 0, 0.0}, 0.0).force.z(), 10.0);
+}
+
+TEST(Tsdf, FindsAPlaneToATenthOfAVoxel) {
+  const SurfaceCloud plane = seen(flat);
+  const auto method = make_method("tsdf", {});
+  const Tick tick = press(*method, plane, {0.0003, 0.0002, -0.008});
+  EXPECT_NEAR(contact(tick).z(), 0.0, 0.15e-3);
+  EXPECT_GT(tick.normal.z(), 0.999);
+}
+
+TEST(Tsdf, SmoothsNoiseOverFramesAndLagsBehindWhatMoves) {
+  double noise = 0.0;
+  double lag = 0.0;
+  for (const bool moves : {false, true}) {
+    GridCloud grid;
+    grid.sigma = moves ? 0.0 : 1e-3;
+    const auto method = make_method("tsdf", {});
+    method->seat({0, 0, 0.01});
+    std::unique_ptr<Cloud> in_use;
+    for (int k = 0; k < 20; ++k) {
+      const double height = moves ? -0.0005 * k : 0.0;
+      auto cloud = grid.capture(static_cast<std::uint64_t>(k), height);
+      method->frame(*cloud, k / 30.0);
+      in_use = std::move(cloud);
+      Tick tick{};
+      for (int i = 0; i < 4; ++i) tick = method->tick({0, 0, height - 0.012}, (k + i / 4.0) / 30.0);
+      if (k < 10) continue;
+      (moves ? lag : noise) += std::abs(contact(tick).z() - height) / 10.0;
+    }
+  }
+  EXPECT_LT(noise, 0.5e-3);
+  EXPECT_GT(lag, 1e-3) << "a surface that sinks by 0.5 mm a frame stays where it was";
+}
+
+TEST(VirtualCoupling, SinksInBySpringsInSeries) {
+  const SurfaceCloud plane = seen(flat);
+  const auto method = make_method("virtual-coupling", {});
+  const Tick tick = press(*method, plane, {0.0, 0.0, -0.008});
+  // The ball's centre lies between its rest at r_c and the HIP, as 10 to 1.
+  EXPECT_NEAR(tick.proxy.z(), r_c - (r_c + 0.008) / 11.0, 1e-6);
+  EXPECT_NEAR(tick.force.z(), stiffness * (tick.proxy.z() + 0.008 - r_c), 1e-6);
+}
+
+// Energy [J] of a hand of 50 g that bounces on the coupling, in its fourth tenth of a second
+// against its first.
+double energy_kept(double stiffness_, double damping) {
+  const SurfaceCloud plane = seen(flat);
+  MethodSetup setup;
+  setup.parameters.coupling.stiffness = stiffness_;
+  setup.parameters.coupling.max_force = 1e3;
+  const auto method = make_method("virtual-coupling", setup);
+  method->frame(plane, 0.0);
+  const double mass = 0.05;
+  const double weight = 2.0;  // [N] holds the hand on the surface
+  double z = -0.001 - weight / stiffness_;
+  double velocity = 0.0;
+  const auto swing = [&](int from, int to) {
+    double largest = 0.0;
+    for (int i = from; i < to; ++i) {
+      const double force = method->tick({0, 0, z}, 1e-3 * i).force.z();
+      for (int j = 0; j < 100; ++j) {  // the hand between two ticks
+        velocity += 1e-5 * (force - weight - damping * velocity) / mass;
+        z += 1e-5 * velocity;
+      }
+      largest = std::max(largest, std::abs(velocity));
+    }
+    return largest;
+  };
+  const double before = swing(0, 100);
+  swing(100, 300);
+  const double after = swing(300, 400);
+  return after * after / (before * before);
+}
+
+TEST(VirtualCoupling, IsPassiveWithinItsLimitAndNotBeyond) {
+  EXPECT_DOUBLE_EQ(passive_stiffness(0.3, 0.0, 1e-3), 600.0);
+  EXPECT_DOUBLE_EQ(passive_stiffness(0.5, 0.2, 1e-3), 600.0);
+  EXPECT_EQ(passive_stiffness(0.1, 0.2, 1e-3), 0.0);
+  // K = 500 N/m needs 0.25 N s/m; in series with the scene's spring it is 455 N/m.
+  EXPECT_LT(energy_kept(500.0, 0.30), 1.0);
+  EXPECT_GT(energy_kept(500.0, 0.15), 1.0);
 }
 
 }  // namespace

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+// The god-object [3] and the sphere proxy [4] on polygons: on a mesh, or on each depth image
+// tessellated [10], [11].
+//
+// The point (the sphere's centre) moves towards the place nearest to the HIP that at most three
+// planes allow. Each triangle that it meets on the way adds its plane; a sphere adds the plane
+// across its contact, which on edges and corners is no triangle's.
+//
+// A new frame: the publications are about recordings whose frames replace one another. Kept in
+// world space (`-kept`) the point is behind a surface that rises over it. Lifted, the default here
+// as it favours the method, it is put upon the new surface if that has come no more than r_c over
+// it along its line of sight (of a mesh: along the last normal). Triangles hold from the front only,
+// so that a hand that was lost can come back.
+//
+// `force-shading` turns the god-object's force to the normal interpolated between the corners.
+#include <array>
+#include <cmath>
+
+#include "lab/method.hpp"
+#include "lab/polygons.hpp"
+#include "lab/ticks.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr int most_moves = 16;  // a tick
+
+struct Plane {
+  Vec3 normal;
+  Vec3 at;
+};
+
+// The place nearest to `hip` that is behind none of the (at most three) planes: of all subsets, the
+// nearest projection onto one that satisfies the others.
+Vec3 nearest_allowed(const std::vector<Plane>& planes, const Vec3& hip) {
+  Vec3 best = hip;
+  double least = std::numeric_limits<double>::infinity();
+  for (unsigned subset = 0; subset < 1U << planes.size(); ++subset) {
+    Eigen::Matrix3d rows = Eigen::Matrix3d::Zero();
+    Vec3 behind = Vec3::Zero();
+    for (std::size_t i = 0; i < planes.size(); ++i) {
+      if ((subset >> i & 1U) == 0) continue;
+      rows.row(static_cast<Eigen::Index>(i)) = planes[i].normal;
+      behind[static_cast<Eigen::Index>(i)] = planes[i].normal.dot(planes[i].at - hip);
+    }
+    // Least squares where planes are nearly parallel; a zero row asks for nothing.
+    const Vec3 place =
+        hip + rows.jacobiSvd(Eigen::ComputeFullU | Eigen::ComputeFullV).solve(behind);
+    bool allowed = true;
+    for (const Plane& plane : planes)
+      allowed = allowed && plane.normal.dot(place - plane.at) > -1e-9;
+    if (!allowed || (place - hip).norm() >= least) continue;
+    least = (place - hip).norm();
+    best = place;
+  }
+  return std::isfinite(least) ? best : planes.back().at;
+}
+
+class Constrained final : public TouchMethod {
+ public:
+  struct Kind {
+    bool sphere = false;
+    bool lifted = true;
+    bool shaded = false;
+  };
+
+  Constrained(const Parameters& parameters, Kind kind)
+      : parameters_(parameters), kind_(kind), radius_(kind.sphere ? parameters.proxy.r_c() : 0.0) {}
+
+  void seat(const Vec3& proxy) override {
+    centre_ = proxy;
+    normal_.reset();
+  }
+
+  void frame(const Cloud& cloud, double /*stamp*/) override {
+    polygons_.frame(cloud);
+    new_frame_ = true;
+    ++frames_;
+  }
+
+  Tick tick(const Vec3& hip, double t) override {
+    if (!centre_) centre_ = hip;
+    polygons_.cover(*centre_);
+    if (new_frame_ && kind_.lifted && normal_) lift();
+    new_frame_ = false;
+    const auto triangle = follow(hip);
+    if (!triangle) return free_tick(hip, t, frames_ - 1);
+    const Vec3 point = *centre_ - radius_ * *normal_;
+    Vec3 normal = *normal_;
+    if (kind_.shaded) normal = polygons_.shaded_normal(*triangle, point);
+    Tick tick = contact_tick(parameters_, hip, {point, normal}, t, frames_ - 1);
+    if (kind_.sphere) {
+      // The spring of a sphere ends at its centre, and is slack at r_c: (16).
+      tick.proxy = *centre_;
+      const double length = (*centre_ - hip).norm();
+      tick.force = std::min(parameters_.coupling.stiffness * std::max(length - radius_, 0.0),
+                            parameters_.coupling.max_force) *
+                   *normal_;
+    }
+    if (kind_.shaded) tick.force = tick.force.norm() * normal;
+    tick.steps = moves_;
+    return tick;
+  }
+
+ private:
+  // Onto a new surface that has come over it by no more than r_c; then out of what the sphere
+  // reaches into.
+  void lift() {
+    const Vec3 up = polygons_.towards_camera(*centre_).value_or(*normal_);
+    const double high = parameters_.proxy.r_c();
+    const double low = radius_ + 1e-6;
+    const Vec3 from = *centre_ + high * up;
+    if (const auto hit = polygons_.sweep(from, -(high + low) * up, 0.0))
+      centre_ = from + (radius_ + 1e-8 - hit->share * (high + low)) * up;
+    for (int i = 0; i < 8 && radius_ > 0.0; ++i) {
+      const auto near = polygons_.nearest(*centre_, radius_);
+      if (!near || (*centre_ - *near).norm() < 1e-9) return;
+      centre_ = *near + (radius_ + 1e-8) * (*centre_ - *near).normalized();
+    }
+  }
+
+  // The triangle that holds it, if any.
+  std::optional<std::uint32_t> follow(const Vec3& hip) {
+    std::vector<Plane> planes;
+    std::optional<std::uint32_t> held;
+    moves_ = 0;
+    while (moves_ < most_moves) {
+      ++moves_;
+      const Vec3 goal = nearest_allowed(planes, hip);
+      const Vec3 way = goal - *centre_;
+      if (way.norm() < 1e-9) break;
+      const auto hit = polygons_.sweep(*centre_, way, radius_);
+      if (!hit) {
+        centre_ = goal;
+        break;
+      }
+      *centre_ += hit->share * way + 1e-8 * hit->normal;
+      planes.push_back({hit->normal, *centre_});
+      if (planes.size() > 3) planes.erase(planes.begin());
+      held = hit->triangle;
+    }
+    const Vec3 pull = *centre_ - hip;
+    if (planes.empty() || pull.norm() < 1e-7) {
+      if (planes.empty()) normal_.reset();
+      return std::nullopt;
+    }
+    normal_ = pull.normalized();
+    return held;
+  }
+
+  Parameters parameters_;
+  Kind kind_;
+  double radius_;  // [m] 0 of a god-object
+  Polygons polygons_{0.03};
+  std::optional<Vec3> centre_;
+  std::optional<Vec3> normal_;  // while it is held
+  bool new_frame_ = false;
+  int moves_ = 0;
+  std::int64_t frames_ = 0;
+};
+
+template <bool sphere, bool lifted, bool shaded>
+std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
+  return std::make_unique<Constrained>(setup.parameters, Constrained::Kind{sphere, lifted, shaded});
+}
+
+}  // namespace
+
+std::vector<MethodInfo> god_object_methods() {
+  return {{"god-object", "a point held by polygons ([3]; depth images tessellated: [10], [11])",
+           make<false, true, false>},
+          {"god-object-kept", "the same, kept in world space when a frame arrives",
+           make<false, false, false>},
+          {"sphere-proxy", "a sphere held by polygons ([4]; depth images tessellated)",
+           make<true, true, false>},
+          {"sphere-proxy-kept", "the same, kept in world space when a frame arrives",
+           make<true, false, false>},
+          {"force-shading", "god-object whose force has the normal interpolated between corners",
+           make<false, true, true>}};
+}
+
+}  // namespace palpate::lab

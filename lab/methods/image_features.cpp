@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// [14]: an image augmented with haptic features. Nothing is made a surface: the height is that of
+// the depth map at the HIP's own pixel, the slope that of its neighbours, the texture the
+// brightness of the image there.
+//
+// Left open by the publication: how many neighbours. A plane through those within 4 mm of the HIP's
+// line of sight favours it over single pixels. Half a millimetre of height is white against black,
+// where a frame has an image (`Surface::brightness`); depth cameras' frames here have none.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Dense>
+
+#include "lab/method.hpp"
+#include "lab/surface_cloud.hpp"
+#include "lab/ticks.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr double around = 0.004;           // [m]
+constexpr double reach = 0.3;              // [m] along the line of sight
+constexpr double texture_height = 0.5e-3;  // [m] of white
+
+class ImageFeatures final : public TouchMethod {
+ public:
+  explicit ImageFeatures(const Parameters& parameters) : parameters_(parameters) {}
+
+  void seat(const Vec3& /*proxy*/) override {}
+
+  void frame(const Cloud& cloud, double /*stamp*/) override {
+    cloud_ = &cloud;
+    ++frames_;
+  }
+
+  Tick tick(const Vec3& hip, double t) override {
+    const Tick nothing = free_tick(hip, t, frames_ - 1);
+    if (cloud_ == nullptr) return nothing;
+    const Beam beam{hip, around, reach, -Vec3::UnitZ()};
+    gather(*cloud_, beam, Patch::capacity, patch_);
+    if (patch_.size() < 3) return nothing;
+    const SightCone cone(beam, patch_.view(0).viewpoint);
+    const Vec3 away = cone.axis();
+    const Vec3 right = away.unitOrthogonal();
+    const Vec3 down = away.cross(right);
+
+    // Depth beyond the HIP = c0 + c1 right + c2 down, over the pixels about it. Of what lies one
+    // behind the other the image sees the nearest only, and so do these.
+    Eigen::Matrix3d squares = Eigen::Matrix3d::Identity() * 1e-12;
+    Vec3 sums = Vec3::Zero();
+    for (std::size_t i = 0; i < patch_.size(); ++i) {
+      const Vec3 x(patch_.x()[i], patch_.y()[i], patch_.z()[i]);
+      const Vec3 row(1.0, x.dot(right) / around, x.dot(down) / around);
+      squares += row * row.transpose();
+      sums += x.dot(away) * row;
+    }
+    const Vec3 plane = squares.ldlt().solve(sums);
+    const Vec3 normal = (plane[1] / around * right + plane[2] / around * down - away).normalized();
+    const Vec3 seen = hip + plane[0] * away + texture(hip, away) * normal;
+    const double depth = normal.dot(seen - hip);
+    if (!(depth > 0.0)) return nothing;
+    return contact_tick(parameters_, hip, {hip + depth * normal, normal}, t, frames_ - 1);
+  }
+
+ private:
+  // [m] Of the point that is nearest to the line of sight.
+  [[nodiscard]] double texture(const Vec3& hip, const Vec3& away) const {
+    const auto* image = dynamic_cast<const SurfaceCloud*>(cloud_);
+    if (image == nullptr || image->surface().brightness.empty()) return 0.0;
+    double least = std::numeric_limits<double>::infinity();
+    double height = 0.0;
+    for (std::size_t i = 0; i < image->surface().points.size(); ++i) {
+      const double aside = (image->surface().points[i] - hip).cross(away).squaredNorm();
+      if (aside >= least) continue;
+      least = aside;
+      height = texture_height * double{image->surface().brightness[i]};
+    }
+    return height;
+  }
+
+  Parameters parameters_;
+  Patch patch_;
+  const Cloud* cloud_ = nullptr;
+  std::int64_t frames_ = 0;
+};
+
+std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
+  return std::make_unique<ImageFeatures>(setup.parameters);
+}
+
+}  // namespace
+
+std::vector<MethodInfo> image_features_methods() {
+  return {
+      {"image-features", "height and texture of the image at the HIP's own pixel ([14])", make}};
+}
+
+}  // namespace palpate::lab

@@ -48,8 +48,8 @@ int run_program(int argc, char** argv) {
   program.set_version_flag("--version", "palpate " PALPATE_VERSION);
   program.allow_extras();
 
-  const std::array adders = {add_run,  add_trace, add_replay,    add_eval,
-                             add_info, add_bench, add_parameters};
+  const std::array adders = {add_run,  add_trace, add_replay,     add_eval,
+                             add_info, add_bench, add_parameters, add_doctor};
   std::vector<Verb> verbs;
   std::vector<std::string> words;
   for (const auto& add : adders) {

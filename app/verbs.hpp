@@ -23,6 +23,7 @@ Verb add_eval(CLI::App& program);
 Verb add_info(CLI::App& program);
 Verb add_bench(CLI::App& program);
 Verb add_replay(CLI::App& program);
+Verb add_doctor(CLI::App& program);
 Verb add_parameters(CLI::App& program);
 
 }  // namespace palpate::app

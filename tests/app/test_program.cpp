@@ -358,6 +358,27 @@ TEST_F(Program, FailsWithOneWhenAReplayDiffers) {
   EXPECT_NE(run("replay " + path("bag")).out.find("tick 1500"), std::string::npos);
 }
 
+TEST_F(Program, LooksAtTheMachineAndSaysWhatToDo) {
+  const Outcome outcome = run("doctor --json --seconds 0.2");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto report = nlohmann::json::parse(outcome.out);
+  EXPECT_GT(report["realtime"]["ticks"], 0);
+  EXPECT_GE(report["realtime"]["wake_up_max_s"], report["realtime"]["wake_up_p50_s"]);
+  EXPECT_TRUE(report["fit"].is_boolean());
+  EXPECT_TRUE(report["devices"].is_array());
+  EXPECT_GE(report["machine"]["cores"], 1);
+  EXPECT_NE(report["versions"]["sqlite"], "");
+  // What is refused comes with what to do about it.
+  for (const char* right : {"memory_locked", "kept_awake"}) {
+    EXPECT_TRUE(report["realtime"][right].get<bool>() || !report["advice"].empty()) << right;
+  }
+  const std::string text = run("doctor --seconds 0.2").out;
+  for (const char* part :
+       {"for haptics at 1000 Hz", "woke up late by", "Cameras and haptic", "Versions"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << " is not in\n" << text;
+  expect_refusal("doctor --seconds 0", {"--seconds"});
+}
+
 TEST_F(Program, RefusesWhatIsNoRecording) {
   expect_refusal("replay " + path("none"), {"none", "no such bag"});
   expect_refusal("run --headless --record " + path("."), {"is there already"});

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace palpate::app {
+
+/// A camera or haptic device that the system shows.
+struct FoundDevice {
+  std::string where;  ///< such as /dev/video0 or usb 8086:0b07
+  std::string name;
+  std::string kind;  ///< "camera" or "haptic device"
+};
+
+/// What a machine says of itself; empty where it does not.
+struct Machine {
+  std::string processor;
+  std::string kernel;                  ///< release
+  std::string preemption;              ///< such as PREEMPT_RT
+  std::vector<std::string> governors;  ///< of the cores' clocks, each once
+  std::string isolated_cores;          ///< such as 2-3
+  double fifo_share = 1.0;             ///< [-] of the time that real-time threads may take
+  bool is_virtual = false;
+  std::vector<FoundDevice> devices;
+};
+
+/// Looks below `root` as at a system's own folders: dev, proc, sys. Never throws for what is
+/// missing.
+Machine look_at_machine(const std::filesystem::path& root = "/");
+
+}  // namespace palpate::app

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <Eigen/Core>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <png.h>
+#include <sqlite3.h>
+#include <unistd.h>
+
+#include "app/machine.hpp"
+#include "app/verbs.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/servo/periodic_thread.hpp"
+#include "palpate/viewer/page.hpp"
+
+namespace palpate::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct DoctorOptions {
+  double seconds = 3.0;
+  double rate = 1000.0;
+  bool json = false;
+};
+
+// Fit for haptics: what a hand does not feel. A wake-up half a tick late at 1 kHz is still in time.
+constexpr double most_late = 0.5e-3;        // [s] 99.9 % of the wake-ups
+constexpr double most_late_ticks = 1.0e-3;  // [-] share of ticks that are not done when due
+
+// A loop that does nothing: what is late in it is the machine's doing.
+Json look_at_time(const DoctorOptions& options, std::vector<std::string>& advice) {
+  PeriodicThread thread(options.rate, RealtimeRequest{}, [](const Wake&) {});
+  std::this_thread::sleep_for(std::chrono::duration<double>(options.seconds));
+  thread.stop();
+  const Histogram& wake_up = thread.timing().wake_up;
+  const RealtimeReport& granted = thread.realtime();
+  const auto late = thread.timing().late_ticks.load();
+  const auto seconds = [&](double share) {
+    return 1e-9 * static_cast<double>(wake_up.quantile(share));
+  };
+  const double late_share =
+      static_cast<double>(late) / static_cast<double>(std::max<std::uint64_t>(wake_up.count(), 1));
+  const bool fit = seconds(0.999) <= most_late && late_share <= most_late_ticks;
+  if (!fit)
+    advice.push_back(
+        fmt::format("ticks come late ({:.0f} us at 99.9 %, {} of {} not in time): end other "
+                    "programs, take what "
+                    "is refused above, or a kernel with PREEMPT_RT",
+                    1e6 * seconds(0.999), late, wake_up.count()));
+  advice.insert(advice.begin(), granted.advice.begin(), granted.advice.end());
+  return {{"fit", fit},
+          {"rate_hz", options.rate},
+          {"ticks", wake_up.count()},
+          {"late_ticks", late},
+          {"wake_up_p50_s", seconds(0.5)},
+          {"wake_up_p99_s", seconds(0.99)},
+          {"wake_up_p999_s", seconds(0.999)},
+          {"wake_up_max_s", 1e-9 * static_cast<double>(wake_up.max())},
+          {"fifo_priority", granted.priority},
+          {"memory_locked", granted.locked},
+          {"core", granted.core},
+          {"kept_awake", granted.awake}};
+}
+
+std::string vector_instructions() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f") != 0) return "AVX-512";
+  if (__builtin_cpu_supports("avx2") != 0) return "AVX2";
+  return "SSE2";
+#else
+  return "those of the build";
+#endif
+}
+
+Json look_at_processor(const Machine& machine, std::vector<std::string>& advice) {
+  for (const std::string& governor : machine.governors) {
+    if (governor == "performance") continue;
+    advice.push_back("the cores' clocks follow the governor '" + governor +
+                     "': choose 'performance', with cpupower frequency-set -g performance");
+  }
+  if (std::thread::hardware_concurrency() < 2)
+    advice.emplace_back("there is one core: cameras and page will delay the servo loop");
+  if (machine.is_virtual)
+    advice.emplace_back(
+        "this is a virtual machine, whose host may hold up any tick: use a machine of its own for "
+        "hands");
+  return {{"processor", machine.processor},
+          {"cores", std::thread::hardware_concurrency()},
+          {"vector_instructions", vector_instructions()},
+          {"governors", machine.governors},
+          {"isolated_cores", machine.isolated_cores},
+          {"virtual", machine.is_virtual},
+          {"kernel", machine.kernel},
+          {"preemption", machine.preemption},
+          {"share_for_realtime_threads", machine.fifo_share}};
+}
+
+Json look_at_devices(const Machine& machine, std::vector<std::string>& advice) {
+  Json found = Json::array();
+  bool camera = false;
+  bool haptic = false;
+  for (const FoundDevice& device : machine.devices) {
+    found.push_back({{"where", device.where},
+                     {"name", device.name},
+                     {"kind", device.kind},
+                     {"supported", false}});
+    (device.kind == "camera" ? camera : haptic) = true;
+  }
+  if (camera)
+    advice.emplace_back(
+        "this version has no driver for cameras: record a ROS 2 bag of depth and touch it with "
+        "--camera recording:BAG, or a folder with tum: or depth:");
+  if (haptic)
+    advice.emplace_back(
+        "this version has no driver for haptic devices: use --device mouse:, script: or hand:");
+  return found;
+}
+
+Json versions() {
+  const bool has_page = page_files().size() > 1;
+  return {{"palpate", PALPATE_VERSION},
+          {"page", has_page ? "built in" : "not built in"},
+          {"compiler", __VERSION__},
+          {"eigen",
+           fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+          {"libpng", png_get_libpng_ver(nullptr)},
+          {"sqlite", sqlite3_libversion()},
+          {"fmt", fmt::format("{}.{}.{}", FMT_VERSION / 10000, FMT_VERSION / 100 % 100,
+                              FMT_VERSION % 100)},
+          {"nlohmann_json", fmt::format("{}.{}.{}", NLOHMANN_JSON_VERSION_MAJOR,
+                                        NLOHMANN_JSON_VERSION_MINOR, NLOHMANN_JSON_VERSION_PATCH)},
+          {"cli11", CLI11_VERSION}};
+}
+
+std::string listed(const Json& object) {
+  std::string text;
+  for (const auto& [key, value] : object.items()) {
+    const bool is_text = value.is_string();
+    if (is_text && value.get<std::string>().empty()) continue;
+    if (value.is_array() && value.empty()) continue;
+    text += fmt::format("  {}: {}\n", key, is_text ? value.get<std::string>() : value.dump());
+  }
+  return text;
+}
+
+std::string text_of(const Json& report) {
+  const Json& time = report["realtime"];
+  const auto microseconds = [&](const char* key) { return 1e6 * time[key].get<double>(); };
+  std::string text = fmt::format(
+      "{} for haptics at {} Hz\n\nA loop that does nothing, {} ticks\n"
+      "  woke up late by {:.0f} us at 50 %, {:.0f} at 99 %, {:.0f} at 99.9 %, {:.0f} at most; "
+      "{} ticks late\n"
+      "  real-time {}, memory {}, core {}, cores {}\n",
+      report["fit"].get<bool>() ? "Fit" : "Not fit", time["rate_hz"].get<double>(),
+      time["ticks"].get<std::uint64_t>(), microseconds("wake_up_p50_s"),
+      microseconds("wake_up_p99_s"), microseconds("wake_up_p999_s"), microseconds("wake_up_max_s"),
+      time["late_ticks"].get<std::uint64_t>(),
+      time["fifo_priority"] == 0 ? "refused"
+                                 : "priority " + std::to_string(time["fifo_priority"].get<int>()),
+      time["memory_locked"].get<bool>() ? "locked" : "not locked",
+      time["core"] == -1 ? "not pinned" : std::to_string(time["core"].get<int>()),
+      time["kept_awake"].get<bool>() ? "kept awake" : "may sleep");
+  text += "\nMachine\n" + listed(report["machine"]) + "\nCameras and haptic devices\n";
+  for (const Json& device : report["devices"])
+    text += fmt::format("  {}: {} ({}), not supported by this version\n",
+                        device["where"].get<std::string>(), device["name"].get<std::string>(),
+                        device["kind"].get<std::string>());
+  if (report["devices"].empty()) text += "  none was found\n";
+  text += "\nVersions\n" + listed(report["versions"]);
+  if (!report["advice"].empty()) text += "\nWhat can be done\n";
+  for (const Json& line : report["advice"])
+    text += fmt::format("  - {}\n", line.get<std::string>());
+  return text;
+}
+
+int run(const DoctorOptions& options) {
+  if (!(options.seconds >= 0.1 && options.seconds <= 3600.0))
+    throw Error("--seconds", fmt::format("{} s is too short or too long", options.seconds),
+                "give 0.1 to 3600");
+  if (!(options.rate >= 100.0 && options.rate <= 10'000.0))
+    throw Error("--rate", fmt::format("{} Hz is not a servo rate", options.rate),
+                "give 100 to 10000");
+  if (isatty(STDERR_FILENO) == 1)
+    fmt::print(stderr, "palpate: measuring for {} s\n", options.seconds);
+  const Machine machine = look_at_machine();
+  std::vector<std::string> advice;
+  Json report;
+  report["realtime"] = look_at_time(options, advice);
+  report["fit"] = report["realtime"]["fit"];
+  report["machine"] = look_at_processor(machine, advice);
+  report["devices"] = look_at_devices(machine, advice);
+  report["versions"] = versions();
+  report["advice"] = advice;
+  const std::string text = options.json
+                               ? report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
+                               : text_of(report);
+  std::fputs(text.c_str(), stdout);
+  return 0;
+}
+
+}  // namespace
+
+Verb add_doctor(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "doctor", "is this machine fit for haptics, what is plugged in, and what to do");
+  const auto options = std::make_shared<DoctorOptions>();
+  command->add_option("--seconds", options->seconds, "how long to measure (3)");
+  command->add_option("--rate", options->rate, "ticks a second (1000)");
+  command->add_flag("--json", options->json, "print a JSON object");
+  return {command, [options] { return run(*options); }};
+}
+
+}  // namespace palpate::app

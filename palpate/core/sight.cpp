@@ -21,6 +21,7 @@ constexpr double narrowest_gate = 12e-3;  // [m]
 constexpr double widest_gate = 60e-3;     // [m]
 constexpr double gate_after_hold = 5e-3;  // [m]
 // Layers along a line of sight are told apart by a gap of at least this [m].
+constexpr double longest_gap = 0.25;  // [s] between frames that can tell a motion
 constexpr double layer_gap = 20e-3;
 constexpr std::size_t least_points = 8;
 constexpr std::size_t beam_points = 256;
@@ -177,7 +178,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     return tracking_ ? Event::followed : Event::none;
   }
   // Where the surface is expected: below the proxy, moved on.
-  const double expected = holding_ ? 0.0 : velocity_ * interval;
+  const double expected = holding_ ? 0.0 : velocity_ * std::min(interval, longest_gap);
   Vec2 foot =
       surface_.nearest(frame_.local_from_world(proxy), frame_.local_from_world(proxy).head<2>(),
                        centre_, holding_ ? serves_while_held : 2.0 * serves);
@@ -211,6 +212,10 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   }
 
   const double previous_stamp = stamp_;
+  if (!(stamp > previous_stamp && stamp - previous_stamp <= longest_gap)) {
+    velocity_ = 0.0;
+    settled_ = 0;
+  }
   stamp_ = stamp;
   interval_ = interval;
   Event event = Event::followed;

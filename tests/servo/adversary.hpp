@@ -69,6 +69,7 @@ class Adversary {
     cycle_.run({.t = given});
     ServoTick record{};
     if (!ticks_seen_.try_pop(record)) return "a tick that does not come out of the ring";
+    if (!record.tick.proxy.allFinite()) return "a proxy that is nowhere";
     const Vec3 away = record.tick.hip - device_.hand.position;
     if (away.allFinite() && away.norm() < 1e3) clutched_away_ = away;
     const double since_last = given - last_given_;
@@ -208,6 +209,8 @@ class Adversary {
     settings.rendering.coupling.max_force = between(0.0, 1000.0);
     settings.rendering.proxy.step_budget = one_in(4) ? 2 : 64;
     settings.safety.ramp_time = between(0.01, 0.3);
+    const auto methods = method_table();
+    settings.rendering.method = methods[random_() % methods.size()].method;
     return settings;
   }
 

@@ -42,12 +42,11 @@ Surroundings look_around(const Patch& patch, const Vec3& at,
   return around;
 }
 
-bool has_converged(const Surroundings& around, const Vec3& u,
-                   const ProxyParameters& proxy) noexcept {
+bool has_converged(const Surroundings& around, const Vec3& u, double cos_theta) noexcept {
   const double distance = u.norm();
   if (distance <= at_hip) return around.state != ContactState::entrenchment;
   if (around.state != ContactState::contact || !around.normal) return false;
-  return -u.dot(*around.normal) > std::cos(proxy.theta) * distance;  // Eq. (8)
+  return -u.dot(*around.normal) > cos_theta * distance;  // Eq. (8)
 }
 
 double gamma_schedule(double gamma, int contact_steps) noexcept {

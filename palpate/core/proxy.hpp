@@ -31,9 +31,9 @@ Surroundings look_around(const Patch& patch, const Vec3& at, const ProxyParamete
 ///
 /// In contact, when the angle between -u and n is below theta; in free motion, when it has reached
 /// the HIP; never while entrenched.
-/// @param u  [m] from the proxy to the HIP
-bool has_converged(const Surroundings& around, const Vec3& u,
-                   const ProxyParameters& proxy) noexcept;
+/// @param u          [m] from the proxy to the HIP
+/// @param cos_theta  [-] cosine of ProxyParameters::theta, which every step asks for
+bool has_converged(const Surroundings& around, const Vec3& u, double cos_theta) noexcept;
 
 /// One proxy step s_k [m]: movement steps 3 to 6 of section 4.3 with the sizes (9) to (12).
 ///

@@ -34,7 +34,8 @@ struct Renderer::Movement {
   std::uint32_t flags = 0;
 };
 
-Renderer::Renderer(const Parameters& parameters) : parameters_(parameters) {
+Renderer::Renderer(const Parameters& parameters)
+    : parameters_(parameters), cos_theta_(std::cos(parameters.proxy.theta)) {
   validate(parameters_);
 }
 
@@ -42,6 +43,7 @@ void Renderer::set_parameters(const Parameters& parameters) {
   validate(parameters);
   if (parameters.method != parameters_.method) sight_.forget();
   parameters_ = parameters;
+  cos_theta_ = std::cos(parameters.proxy.theta);
   patch_is_stale_ = true;
 }
 
@@ -99,8 +101,14 @@ void Renderer::frame_by_sight(const Cloud& cloud) noexcept {
   behind_ = false;
   if (!proxy_) return;
   if (!stamp_ok_) interval_ = 1.0 / parameters_.motion.frame_rate;
+  // What was hidden is remembered for a hand that is at it, or may be soon again.
+  constexpr double leaves = 20e-3;  // [m]
+  if (sight_.holding() && !touching_ &&
+      sight_.contact(*proxy_, stamp_).distance > parameters_.proxy.r_c() + leaves) {
+    sight_.forget();
+  }
   using Event = SightTracker::Event;
-  const Event event = sight_.frame(cloud, stamp_, interval_, *proxy_);
+  const Event event = sight_.frame(cloud, stamp_, interval_, *proxy_, touching_);
   if (event != Event::followed && event != Event::jumped) return;
   // Side repair: the proxy was on the surface's free side and has to be there still.
   // One that will move over points has to be in front of this frame's, not only of the average.
@@ -198,7 +206,7 @@ Renderer::Movement Renderer::move_proxy(const Vec3& hip) noexcept {
         movement.flags |= normal_undefined;
       }
     }
-    if (has_converged(around, u, parameters)) break;  // Step 7, Eq. (8)
+    if (has_converged(around, u, cos_theta_)) break;  // Step 7, Eq. (8)
     if (movement.steps == parameters.step_budget) {
       movement.flags |= step_budget_hit;
       break;
@@ -282,7 +290,7 @@ Vec3 Renderer::blend_force(const Vec3& force, const Vec3& hip, double t) noexcep
   if (frame_count_ > 1) blended *= ease((t - stamp_ - late) / late);
   const double force_now = blended.norm();
   if (force_now > parameters_.coupling.max_force) {
-    blended *= parameters_.coupling.max_force / force_now;
+    blended *= (1.0 - 1e-15) * parameters_.coupling.max_force / force_now;  // after rounding, too
   }
   last_force_ = blended;
   last_hip_ = hip;

@@ -101,6 +101,7 @@ class Renderer {
   Vec3 blend_force(const Vec3& force, const Vec3& hip, double t) noexcept;
 
   Parameters parameters_;
+  double cos_theta_;
   Patch patch_;
   const Cloud* cloud_ = nullptr;
 

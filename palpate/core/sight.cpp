@@ -104,9 +104,11 @@ std::optional<Vec3> main_viewpoint(const Patch& patch) {
 // Heights of a patch's points above its centre along `up`. Returns how many were written.
 std::size_t heights_along(const Patch& patch, const Vec3& up, std::span<float> heights) {
   const Eigen::Vector3f u = up.cast<float>();
-  const std::size_t size = std::min(patch.size(), heights.size());
-  for (std::size_t i = 0; i < size; ++i) {
-    heights[i] = patch.x()[i] * u.x() + patch.y()[i] * u.y() + patch.z()[i] * u.z();
+  const std::size_t most = std::min(patch.size(), heights.size());
+  std::size_t size = 0;
+  for (std::size_t i = 0; i < most; ++i) {
+    const float height = patch.x()[i] * u.x() + patch.y()[i] * u.y() + patch.z()[i] * u.z();
+    if (std::isfinite(height)) heights[size++] = height;
   }
   return size;
 }
@@ -170,7 +172,8 @@ SurfaceContact SightTracker::contact(const Vec3& point, double t) const noexcept
 }
 
 SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double interval,
-                                        const Vec3& proxy) noexcept {
+                                        const Vec3& proxy, bool touched) noexcept {
+  touched_ = touched;
   if (!tracking_) {
     stamp_ = stamp;
     interval_ = interval;
@@ -206,7 +209,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     const Vec3 local = frame_.local_from_world(patch_.ball().centre + p);
     const double above = local.z() - moved.height(local.head<2>());
     if (above > wide) ++before;
-    if (!inner.holds(p) || above < -reach) continue;
+    if (!inner.holds(p) || !(std::abs(above) <= occluder_reach) || above < -reach) continue;
     if (std::abs(above) <= wide) ++near;
     heights[seen++] = static_cast<float>(p.dot(line));
   }
@@ -602,7 +605,7 @@ void SightTracker::look_at_cells(const Vec2& foot, double wide, bool new_frame) 
     const double v = (local.y() - foot.y()) / cell + half;
     if (!(u >= 0.0 && v >= 0.0 && u < cells_per_side && v < cells_per_side)) continue;
     const Vec6 basis = quadric_basis(local.head<2>());
-    if (std::abs(local.z() - surface_.c.dot(basis)) > wide) continue;
+    if (!(std::abs(local.z() - surface_.c.dot(basis)) <= wide)) continue;
     const std::size_t k =
         static_cast<std::size_t>(v) * cells_per_side + static_cast<std::size_t>(u);
     now.heights[k] += static_cast<float>(local.z());
@@ -761,7 +764,8 @@ bool SightTracker::is_occluder(const Ring& now, double height, double jump) cons
   const double strike = 0.5 * hardest_strike * squared(interval_);
   const double times = jumped_before_ ? 4.0 : velocity_ != 0.0 ? 2.0 : 1.0;
   const double noise = std::max(spread_, height_sd());
-  if (settled_ >= well_known && jump > times * strike + 15e-3 + 4.0 * noise) return true;
+  if (touched_ && settled_ >= well_known && jump > times * strike + 15e-3 + 4.0 * noise)
+    return true;
   const double tolerance = std::max(15e-3, 4.0 * noise);
   // A cell keeps its nearest point, and that is the noise's farthest.
   const double nearer = std::max(15e-3, 6.0 * noise);

@@ -56,9 +56,14 @@ FloatMoments sum_moments(const float* px, const float* py, const float* pz, std:
 #pragma omp simd reduction(+ : points, s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, \
                                s14, z0, z1, z2, z3, z4, z5, zz)
   for (std::size_t i = 0; i < size; ++i) {
-    const float x = rows.x[0] * px[i] + rows.x[1] * py[i] + rows.x[2] * pz[i] + rows.offset[0];
-    const float y = rows.y[0] * px[i] + rows.y[1] * py[i] + rows.y[2] * pz[i] + rows.offset[1];
-    const float z = rows.z[0] * px[i] + rows.z[1] * py[i] + rows.z[2] * pz[i] + rows.offset[2];
+    float x = rows.x[0] * px[i] + rows.x[1] * py[i] + rows.x[2] * pz[i] + rows.offset[0];
+    float y = rows.y[0] * px[i] + rows.y[1] * py[i] + rows.y[2] * pz[i] + rows.offset[1];
+    float z = rows.z[0] * px[i] + rows.z[1] * py[i] + rows.z[2] * pz[i] + rows.offset[2];
+    // A weight of 0 does not make a point harmless that is no number.
+    const bool sound = std::abs(x) + std::abs(y) + std::abs(z) < 1e6F;
+    x = sound ? x : 1e6F;
+    y = sound ? y : 0.0F;
+    z = sound ? z : 0.0F;
     const float xx = x * x;
     const float xy = x * y;
     const float yy = y * y;

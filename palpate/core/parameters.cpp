@@ -71,6 +71,18 @@ constexpr std::array table = {
                   "longest time over which a surface velocity is trusted", "ours",
                   [](const Parameters& p) { return p.motion.max_extrapolation; },
                   [](Parameters& p, double v) { p.motion.max_extrapolation = v; }},
+    ParameterInfo{"hidden_hold", "", "s", 0.4, 0.0, 10.0,
+                  "a surface that something hides is felt in full for this long", "ours (sight)",
+                  [](const Parameters& p) { return p.sight.hidden_hold; },
+                  [](Parameters& p, double v) { p.sight.hidden_hold = v; }},
+    ParameterInfo{"hidden_fade", "", "s", 0.3, 0.01, 10.0,
+                  "time over which the force of a hidden surface then fades", "ours (sight)",
+                  [](const Parameters& p) { return p.sight.hidden_fade; },
+                  [](Parameters& p, double v) { p.sight.hidden_fade = v; }},
+    ParameterInfo{"hardest_strike", "", "m/s^2", 90.0, 1.0, 1e4,
+                  "a touched surface that would have to be struck harder is taken to be hidden",
+                  "ours (sight)", [](const Parameters& p) { return p.sight.hardest_strike; },
+                  [](Parameters& p, double v) { p.sight.hardest_strike = v; }},
 };
 
 constexpr std::array methods = {

@@ -42,12 +42,20 @@ struct MotionParameters {
   double max_extrapolation = 0.1;  ///< [s] longest time over which a velocity is trusted
 };
 
+/// What sightline tracking assumes. docs/method.md, "Sight".
+struct SightParameters {
+  double hidden_hold = 0.4;  ///< [s] a surface that something hides is felt in full for this long
+  double hidden_fade = 0.3;  ///< [s] and then less and less over this
+  double hardest_strike = 90.0;  ///< [m/s^2] what jumps harder than that is no touched surface
+};
+
 /// Everything that can be set on a renderer. Defaults are the paper's Table 2.
 struct Parameters {
   Method method = Method::paper;
   ProxyParameters proxy;
   Coupling coupling;
   MotionParameters motion;
+  SightParameters sight;
 };
 
 /// One row of the table that feeds help texts, configuration files and sliders.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "palpate/core/coupling.hpp"
 #include "palpate/core/motion.hpp"
@@ -107,8 +108,10 @@ void Renderer::frame_by_sight(const Cloud& cloud) noexcept {
       sight_.contact(*proxy_, stamp_).distance > parameters_.proxy.r_c() + leaves) {
     sight_.forget();
   }
+  constexpr double infinite = std::numeric_limits<double>::infinity();
   using Event = SightTracker::Event;
-  const Event event = sight_.frame(cloud, stamp_, interval_, *proxy_, touching_);
+  const Event event = sight_.frame(cloud, stamp_, interval_, *proxy_,
+                                   touching_ ? parameters_.sight.hardest_strike : infinite);
   if (event != Event::followed && event != Event::jumped) return;
   // Side repair: the proxy was on the surface's free side and has to be there still.
   // One that will move over points has to be in front of this frame's, not only of the average.
@@ -259,8 +262,6 @@ Vec3 Renderer::render_force(const Vec3& hip, double t, std::uint32_t& flags) noe
 // surface that is no longer seen fades.
 Vec3 Renderer::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
   constexpr double blend = 0.85;    // [intervals]
-  constexpr double hold = 0.4;      // [s] a hidden surface is felt in full for this long
-  constexpr double fade = 0.3;      // [s] and then less and less
   const auto ease = [](double x) {  // from 1 to 0 with slopes 0
     x = std::clamp(x, 0.0, 1.0);
     return 1.0 - x * x * (3.0 - 2.0 * x);
@@ -284,7 +285,10 @@ Vec3 Renderer::blend_force(const Vec3& force, const Vec3& hip, double t) noexcep
   const Vec3 normal = normal_.value_or(Vec3::Zero());
   const double pull = blended.dot(normal);
   if (pull < 0.0) blended -= pull * normal;
-  if (sight_.holding()) blended *= ease((t - sight_.held_since() - hold) / fade);
+  if (sight_.holding()) {
+    const SightParameters& sight = parameters_.sight;
+    blended *= ease((t - sight_.held_since() - sight.hidden_hold) / sight.hidden_fade);
+  }
   // A single frame is a scan, not a stream that stopped.
   const double late = parameters_.motion.max_extrapolation;
   if (frame_count_ > 1) blended *= ease((t - stamp_ - late) / late);

@@ -20,8 +20,8 @@ constexpr double least_support = 0.3;
 constexpr double narrowest_gate = 12e-3;  // [m]
 constexpr double widest_gate = 60e-3;     // [m]
 constexpr double gate_after_hold = 5e-3;  // [m]
+constexpr double longest_gap = 0.25;      // [s] between frames that can tell a motion
 // Layers along a line of sight are told apart by a gap of at least this [m].
-constexpr double longest_gap = 0.25;  // [s] between frames that can tell a motion
 constexpr double layer_gap = 20e-3;
 constexpr std::size_t least_points = 8;
 constexpr std::size_t beam_points = 256;
@@ -51,8 +51,6 @@ constexpr double curvature_sd = 15.0;
 constexpr double beside_inner = 12e-3;
 constexpr std::array<double, 5> beside_bands = {40e-3, 80e-3, 140e-3, 220e-3, 320e-3};
 constexpr std::size_t beside_points = 640;
-// No surface that is touched is struck harder [m/s^2]: 18 000 r_c/s^2.
-constexpr double hardest_strike = 90.0;
 // A surface that has been followed for so many frames is known not to jump on its own.
 constexpr std::size_t well_known = 4;
 constexpr float nothing = -1e3F;
@@ -172,8 +170,7 @@ SurfaceContact SightTracker::contact(const Vec3& point, double t) const noexcept
 }
 
 SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double interval,
-                                        const Vec3& proxy, bool touched) noexcept {
-  touched_ = touched;
+                                        const Vec3& proxy, double hardest_strike) noexcept {
   if (!tracking_) {
     stamp_ = stamp;
     interval_ = interval;
@@ -232,7 +229,8 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     if (layer && !from_behind) jump = layer->height / lean;
     const bool nearer = jump > 0.0;
     if (!layer || from_behind ||
-        (nearer && (holding_ || is_occluder(look_beside(cloud, place), jump + expected, jump)))) {
+        (nearer && (holding_ || is_occluder(look_beside(cloud, place), jump + expected, jump,
+                                            hardest_strike)))) {
       if (from_behind && layer) {
         // Touched from behind, the surface went out of reach: the points decide.
         forget();
@@ -760,12 +758,12 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
 // surface could have been struck so hard.
 // @param height  [m] of what is seen now, above where the surface was
 // @param jump    [m] above where it was expected
-bool SightTracker::is_occluder(const Ring& now, double height, double jump) const noexcept {
+bool SightTracker::is_occluder(const Ring& now, double height, double jump,
+                               double hardest_strike) const noexcept {
   const double strike = 0.5 * hardest_strike * squared(interval_);
   const double times = jumped_before_ ? 4.0 : velocity_ != 0.0 ? 2.0 : 1.0;
   const double noise = std::max(spread_, height_sd());
-  if (touched_ && settled_ >= well_known && jump > times * strike + 15e-3 + 4.0 * noise)
-    return true;
+  if (settled_ >= well_known && jump > times * strike + 15e-3 + 4.0 * noise) return true;
   const double tolerance = std::max(15e-3, 4.0 * noise);
   // A cell keeps its nearest point, and that is the noise's farthest.
   const double nearer = std::max(15e-3, 6.0 * noise);

@@ -52,10 +52,10 @@ class SightTracker {
   void forget() noexcept { tracking_ = false; }
 
   /// Takes a new frame into use. @param proxy  [m] world
-  /// @param touched  does the proxy touch the surface? Then no surface jumps as far as an occluder
-  ///                 may; one that is only watched is believed.
+  /// @param hardest_strike  [m/s^2] what jumps harder than that came between; infinite for a
+  ///                        surface that is only watched, which is believed
   Event frame(const Cloud& cloud, double stamp, double interval, const Vec3& proxy,
-              bool touched) noexcept;
+              double hardest_strike) noexcept;
   /// Looks for a surface to follow behind a proxy in free space, unless one is followed there.
   void watch(const Cloud& cloud, const Vec3& proxy) noexcept;
   /// Follows the surface at a contact that was made with its points.
@@ -158,7 +158,8 @@ class SightTracker {
     return ring_[(newest_ + history - age) % history];
   }
   [[nodiscard]] Ring look_beside(const Cloud& cloud, const Vec3& place) noexcept;
-  [[nodiscard]] bool is_occluder(const Ring& now, double height, double jump) const noexcept;
+  [[nodiscard]] bool is_occluder(const Ring& now, double height, double jump,
+                                 double hardest_strike) const noexcept;
   [[nodiscard]] double gate() const noexcept;
   [[nodiscard]] double variance(std::size_t rung) const noexcept;
 
@@ -167,7 +168,6 @@ class SightTracker {
   bool smooth_ = false;
   bool holding_ = false;
   double held_since_ = 0.0;
-  bool touched_ = false;
   bool covered_ = false;        // something was before a part of the disc
   bool shadowed_ = false;       // and has come there since
   std::size_t near_usual_ = 0;  // points of the surface in the beam, with nothing before them

@@ -48,6 +48,7 @@ void Recorder::frame(std::uint64_t number, double stamp,
                      std::vector<std::shared_ptr<const Cloud>> cameras) {
   const std::lock_guard lock(mutex_);
   if (stopping_) return;
+  frame_handed_ = number;
   if (items_.size() >= most_items) {
     ++status_.lost_frames;
     return;
@@ -57,7 +58,9 @@ void Recorder::frame(std::uint64_t number, double stamp,
 
 void Recorder::settings(const NumberedSettings& settings, double t) {
   const std::lock_guard lock(mutex_);
-  if (!stopping_) items_.emplace_back(SetSettings{settings, t});
+  if (stopping_) return;
+  settings_handed_ = settings.number;
+  items_.emplace_back(SetSettings{settings, t});
 }
 
 void Recorder::flush() {
@@ -104,8 +107,14 @@ void Recorder::run() {
   done_.notify_all();
 }
 
+bool Recorder::knows_what_it_used(const ServoTick& tick) const {
+  const std::lock_guard lock(mutex_);
+  return tick.frame_number <= frame_handed_ && tick.settings_number <= settings_handed_;
+}
+
 void Recorder::write_ticks() {
-  for (ServoTick tick{}; ticks_.try_pop(tick);) {
+  for (ServoTick tick{}; waiting_ || ticks_.try_pop(tick);) {
+    if (waiting_) tick = *std::exchange(waiting_, std::nullopt);
     if (!begun_) {
       const bool first = (tick.hand & rendering_renewed) != 0;
       if (!first) {
@@ -117,6 +126,10 @@ void Recorder::write_ticks() {
       begun_ = true;
       info_.seat = proxy_;
       writer_.info(info_, tick.tick.t);
+    }
+    if (!knows_what_it_used(tick)) {
+      waiting_ = tick;
+      break;
     }
     writer_.tick(tick);
     frame_used_ = tick.frame_number;

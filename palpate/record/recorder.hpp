@@ -54,7 +54,8 @@ class Recorder {
   /// Returns when what has come so far is written and committed, or the recording has ended. Waits
   /// for the disk: not for the servo's thread or a camera's.
   void flush();
-  /// Records what has come so far and closes the bag. Not from `renew`.
+  /// Records what has come so far and closes the bag. Ticks that use a frame or settings that this
+  /// was not handed any more are left out. Not from `renew`.
   void stop();
   /// Any thread.
   [[nodiscard]] Status status() const;
@@ -74,12 +75,14 @@ class Recorder {
   void run();
   void write_items();
   void write_ticks();
+  [[nodiscard]] bool knows_what_it_used(const ServoTick& tick) const;
 
   // The recorder's thread.
   SessionInfo info_;
   SessionWriter writer_;
   TickRing<ServoTick>::Reader ticks_;
   std::function<void()> renew_;
+  std::optional<ServoTick> waiting_;  // for its frame or settings
   bool begun_ = false;
   std::optional<Vec3> proxy_;  // [m] in the tick before the first recorded one
   std::uint64_t frame_used_ = 0, frame_written_ = 0;  // their numbers
@@ -87,10 +90,11 @@ class Recorder {
 
   mutable std::mutex mutex_;
   std::condition_variable asked_, done_;
-  std::deque<Item> items_;                              // guarded by mutex_
-  Status status_;                                       // guarded by mutex_
-  bool stopping_ = false;                               // guarded by mutex_
-  std::uint64_t flushes_asked_ = 0, flushes_done_ = 0;  // guarded by mutex_
+  std::deque<Item> items_;                                // guarded by mutex_
+  Status status_;                                         // guarded by mutex_
+  std::uint64_t frame_handed_ = 0, settings_handed_ = 0;  // their numbers; guarded by mutex_
+  bool stopping_ = false;                                 // guarded by mutex_
+  std::uint64_t flushes_asked_ = 0, flushes_done_ = 0;    // guarded by mutex_
   std::thread thread_;
 };
 

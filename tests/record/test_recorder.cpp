@@ -44,7 +44,7 @@ class LoopSession {
         cloud_ = wavy_floor(tick_ / 33 % 10);
         stamp_ = now() - 1e-4 / 3.0;
         frame_ = cycle_->put_frame(cloud_, stamp_, now());
-        if (recorder_) recorder_->frame(frame_, stamp_, {cloud_});
+        if (recorder_ && handing_) recorder_->frame(frame_, stamp_, {cloud_});
       }
       if (tick_ % 70 == 69) {
         settings_.rendering.coupling.stiffness += 100.0 / 3.0;  // a few times
@@ -56,6 +56,7 @@ class LoopSession {
     }
   }
 
+  void hand_no_more_frames() { handing_ = false; }
   [[nodiscard]] Recorder& recorder() { return *recorder_; }
 
  private:
@@ -71,6 +72,7 @@ class LoopSession {
   double stamp_ = 0.0;
   std::uint64_t frame_ = 0;
   int tick_ = 0;
+  bool handing_ = true;
   std::unique_ptr<Recorder> recorder_;  // before the cycle, which it reads
 };
 
@@ -118,6 +120,20 @@ TEST_P(RecorderOf, ASessionInItsMidstIsReplayedBitForBit) {
 
 INSTANTIATE_TEST_SUITE_P(Methods, RecorderOf, ::testing::Values(Method::paper, Method::sight),
                          [](const auto& each) { return std::string(method_name(each.param)); });
+
+TEST(Recorder, EndsWithTheLastTickWhoseFrameItKnows) {
+  const TemporaryFolder folder;
+  LoopSession session(Method::paper);
+  session.record(folder.path() / "bag");
+  session.run(120);
+  session.hand_no_more_frames();
+  session.run(100);  // the next frame comes with tick 132
+  session.recorder().stop();
+  SessionReader reader(folder.path() / "bag");
+  const ReplayReport report = replay(reader);
+  EXPECT_TRUE(report.identical()) << report.broken_off;
+  EXPECT_EQ(report.ticks, 132U);
+}
 
 TEST(Recorder, EndsWithAMessageWhereItsFolderIsTakenAwayAndTheLoopGoesOn) {
   const TemporaryFolder folder;

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page in a real browser, with the real program behind it.
 
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readdirSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
 import { difference, distance, drawn, glimpse, launch, Program } from "./session";
@@ -175,4 +179,30 @@ describe.each([
     expect(boxes.inside).toEqual([true, true, true, true, true, true]);
     for (const plot of boxes.plots) expect(plot).toBeGreaterThan(200);
   });
+});
+
+test("the record button records what a replay gives again, bit for bit", async () => {
+  const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
+  try {
+    // A hand of the program's own, which touches all the time.
+    program = await Program.start([...DESK, "--device", "hand:"], 0, folder);
+    const page = await open([]);
+    const pressed = () => page.locator("#record").getAttribute("aria-pressed");
+    await until(page, (seen) => seen.state !== 0);
+    expect(await pressed()).toBe("false");
+    await page.click("#record");
+    await expect.poll(pressed).toBe("true");
+    expect(await page.locator("#record").getAttribute("title")).toContain("Recording palpate_");
+    const { frame } = await glimpse(page);
+    await until(page, (seen) => seen.frame > frame + 20);
+    await page.click("#record");
+    await expect.poll(pressed).toBe("false");
+    expect(await page.locator("#record").getAttribute("title")).toMatch(/\d+ ticks, \d+ frames/);
+    const [bag] = readdirSync(folder);
+    const said = execFileSync(process.env.PALPATE!, ["replay", "--json", join(folder, bag!)]);
+    expect(JSON.parse(said.toString())).toMatchObject({ identical: true });
+    expect(JSON.parse(said.toString()).ticks).toBeGreaterThan(100);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
 });

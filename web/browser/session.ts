@@ -11,10 +11,11 @@ export class Program {
     readonly url: string,
   ) {}
 
-  static async start(options: string[], port = 0): Promise<Program> {
+  /** @param cwd  where its recordings go */
+  static async start(options: string[], port = 0, cwd?: string): Promise<Program> {
     const program = process.env.PALPATE;
     if (!program) throw new Error("PALPATE must name the program");
-    const child = spawn(program, ["run", "--no-browser", "--port", String(port), ...options]);
+    const child = spawn(program, ["run", "--no-browser", "--port", String(port), ...options], { cwd });
     let said = "";
     const url = await new Promise<string>((resolve, reject) => {
       child.stderr.on("data", (text: Buffer) => {

@@ -59,7 +59,8 @@ double parse_number(const std::string& subject, const std::string& text) {
 }
 
 void MethodOptions::add_to(CLI::App& command, const std::string& methods) {
-  command.add_option("--method", method_, methods);
+  command.add_option("--method", method_,
+                     methods + "; without it " + std::string(method_name(usual_)));
   command
       .add_option("--set", assignments_,
                   "set a parameter, NAME=VALUE in SI units; see `palpate parameters`")
@@ -68,7 +69,7 @@ void MethodOptions::add_to(CLI::App& command, const std::string& methods) {
 }
 
 MethodOptions::Any MethodOptions::read(void (*check)(const std::string& method)) const {
-  Any any{std::string(method_name(Method::paper)), {}};
+  Any any{std::string(method_name(usual_)), {}};
   if (config_) apply_config(*config_, any.method, any.parameters);
   check(any.method);
   if (method_) check(any.method = *method_);

@@ -15,9 +15,13 @@ namespace palpate::app {
 /// Order of precedence: defaults, --config, --method and --set.
 class MethodOptions {
  public:
-  /// @param methods  what --method can be, for the help text
-  void add_to(CLI::App& command, const std::string& methods =
-                                     "paper (default), paper-as-printed, fixed-step or sight");
+  MethodOptions() = default;
+  /// @param usual  the method where none is asked for
+  explicit MethodOptions(Method usual) : usual_(usual) {}
+
+  /// @param methods  what --method can be, for the help text; the usual one is added
+  void add_to(CLI::App& command,
+              const std::string& methods = "sight, paper, paper-as-printed or fixed-step");
 
   /// @throws Error for an unknown method, parameter or key, a value out of range, or a
   ///         configuration file that cannot be read.
@@ -33,6 +37,7 @@ class MethodOptions {
  private:
   [[nodiscard]] Any read(void (*check)(const std::string& method)) const;
 
+  Method usual_ = Method::sight;
   std::optional<std::string> method_;
   std::vector<std::string> assignments_;
   std::optional<std::string> config_;

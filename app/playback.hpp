@@ -59,6 +59,6 @@ lab::Truth truth_of(const Playback& playback);
 
 /// What --method can be where any method of the lab will do.
 constexpr const char* any_method_help =
-    "paper (default), sight, or any other of `palpate eval --list-methods`";
+    "sight, paper, or any other of `palpate eval --list-methods`";
 
 }  // namespace palpate::app

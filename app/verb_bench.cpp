@@ -34,7 +34,7 @@ constexpr double summary_distance = 1.0;
 constexpr double focal_length = 525.0;  // [px] of a 640x480 image, as a Kinect has it
 
 struct BenchOptions {
-  MethodOptions method;
+  MethodOptions method{Method::paper};
   std::optional<std::string> camera;
   bool json = false;
   bool quick = false;

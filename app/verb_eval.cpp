@@ -39,7 +39,7 @@ struct EvalOptions {
   bool resume = false;
   bool list_methods = false;
   bool list_experiments = false;
-  MethodOptions parameters;
+  MethodOptions parameters{Method::paper};
 };
 
 std::pair<int, int> parse_grid(const std::string& text) {

@@ -4,6 +4,7 @@
 #include "lab/experiments/feel.hpp"
 #include "lab/experiments/fidelity.hpp"
 #include "lab/experiments/lifts.hpp"
+#include "lab/experiments/methods.hpp"
 #include "lab/experiments/pop.hpp"
 #include "lab/experiments/real.hpp"
 #include "lab/experiments/scan.hpp"
@@ -21,7 +22,7 @@ const std::vector<Experiment>& known_experiments() {
       first_contact_experiment(), hold_experiment(),    force_experiment(),
       damping_experiment(),       corners_experiment(), scan_experiment(),
       fidelity_experiment(),      pop_experiment(),     real_experiment(),
-      tradeoff_experiment()};
+      tradeoff_experiment(),      methods_experiment()};
   return experiments;
 }
 

@@ -294,6 +294,10 @@ plot for [m in methods] held(m) using 0:2:xtic(1) with points pt 7 ps 1.2 title 
 
 }  // namespace
 
+bool is_lost(const std::string& method, const PopCase& c, const Parameters& parameters) {
+  return play_case(method, c, parameters).lost;
+}
+
 Experiment pop_experiment() {
   return {"pop",
           "is the surface ever lost? families of cases drawn by chance, failures shrunk",

@@ -199,8 +199,9 @@ NumberedSettings settings_from_json(const std::string& text, const std::string& 
     all.rendering.method = method_from_name(object.at("method").get<std::string>());
     const json& parameters = object.at("parameters");
     for (const ParameterInfo& row : parameter_table()) {
-      // r_c is derived: setting it would round the three radii that it scales.
-      if (row.name != "r_c")
+      // r_c is derived: setting it would round the three radii that it scales. What an older
+      // version did not have yet stays at its default.
+      if (row.name != "r_c" && parameters.contains(row.name))
         set_parameter(all.rendering, row.name, parameters.at(row.name).get<double>());
     }
     for (const SafetyParameterInfo& row : safety_parameter_table())

@@ -15,7 +15,8 @@ export class Program {
   static async start(options: string[], port = 0, cwd?: string): Promise<Program> {
     const program = process.env.PALPATE;
     if (!program) throw new Error("PALPATE must name the program");
-    const child = spawn(program, ["run", "--no-browser", "--port", String(port), ...options], { cwd });
+    const words = ["run", "--no-browser", "--port", String(port), ...options];
+    const child = spawn(program, words, { cwd });
     let said = "";
     const url = await new Promise<string>((resolve, reject) => {
       child.stderr.on("data", (text: Buffer) => {

@@ -9,8 +9,8 @@
 // A new frame: the publications are about recordings whose frames replace one another. Kept in
 // world space (`-kept`) the point is behind a surface that rises over it. Lifted, the default here
 // as it favours the method, it is put upon the new surface if that has come no more than r_c over
-// it along its line of sight (of a mesh: along the last normal). Triangles hold from the front only,
-// so that a hand that was lost can come back.
+// it along its line of sight (of a mesh: along the last normal). Triangles hold from the front
+// only, so that a hand that was lost can come back.
 //
 // `force-shading` turns the god-object's force to the normal interpolated between the corners.
 #include <array>

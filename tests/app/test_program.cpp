@@ -203,10 +203,10 @@ TEST_F(Program, MeasuresItselfBesideWhatOneCouldUseInstead) {
     EXPECT_GT(json.at(key).get<double>(), 0.0) << key;
   for (const auto& scene : json.at("scenes")) {
     const auto& search = scene.at("search");
-    ASSERT_EQ(search.size(), 4U);
+    ASSERT_GE(search.size(), 4U);  // and PCL's, where it is installed
     // All search the same ball; on its rim they may round differently.
     for (const auto& method : search)
-      EXPECT_NEAR(method.at("found").get<int>(), search[3].at("found").get<int>(), 2)
+      EXPECT_NEAR(method.at("found").get<int>(), search.back().at("found").get<int>(), 2)
           << method.at("method");
     EXPECT_GT(search[0].at("found"), 0);
     EXPECT_GT(scene.at("kernel").at("steps_per_tick"), 0.1) << "the hand does not touch";

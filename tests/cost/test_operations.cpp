@@ -34,9 +34,14 @@ TEST(Cost, FreeMotionTakesOneStepATick) {
 TEST(Cost, EveryMethodFindsTheSamePoints) {
   const Subject subject = noisy_plane(320, 240, 262.5, 0.5);
   const auto rows = search_costs(subject, Parameters{}, 0.0);
-  ASSERT_EQ(rows.size(), 4U);
+  ASSERT_GE(rows.size(), 4U);  // and PCL's, where it is installed
   EXPECT_GT(rows[0].found, 20U);
-  for (const SearchCosts& row : rows) EXPECT_EQ(row.found, rows[3].found) << row.name;
+  // PCL calculates in float: on the rim it may round differently.
+  for (const SearchCosts& row : rows) {
+    const double slack = row.name.starts_with("PCL") ? 2.0 : 0.0;
+    EXPECT_NEAR(static_cast<double>(row.found), static_cast<double>(rows.back().found), slack)
+        << row.name;
+  }
 }
 
 }  // namespace

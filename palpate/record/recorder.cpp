@@ -19,7 +19,7 @@ Recorder::Recorder(const std::filesystem::path& folder, const SessionInfo& info,
                    TickRing<ServoTick>::Reader ticks, std::function<void()> renew)
     : info_(info),
       writer_(folder, info, monotonic_now()),
-      ticks_(std::move(ticks)),
+      ticks_(ticks),
       renew_(std::move(renew)),
       begun_(!renew_) {
   status_.folder = writer_.folder();

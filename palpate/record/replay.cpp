@@ -56,7 +56,7 @@ class Rerun {
       renderer_.seat(
           free_side(*cloud_, last_proxy_, last_normal_, settings_.rendering.proxy.r_c(), patch_));
     }
-    const Tick tick = renderer_.tick(recorded.tick.hip, recorded.tick.t);
+    Tick tick = renderer_.tick(recorded.tick.hip, recorded.tick.t);
     last_proxy_ = tick.proxy;
     last_normal_ = tick.normal;
     return tick;

@@ -6,6 +6,7 @@
 
 #include "lab/method.hpp"
 #include "lab/plane_fit.hpp"
+#include "lab/ticks.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -22,16 +23,7 @@ class Direct final : public TouchMethod {
   }
 
   Tick tick(const Vec3& hip, double t) override {
-    Tick tick{.t = t,
-              .hip = hip,
-              .proxy = hip,
-              .normal = Vec3::Zero(),
-              .force = Vec3::Zero(),
-              .state = ContactState::free_motion,
-              .steps = 0,
-              .surface_velocity = 0.0,
-              .frame = frames_ - 1,
-              .flags = 0};
+    Tick tick = free_tick(hip, t, frames_ - 1);
     if (cloud_ == nullptr) return tick;
     // The HIP is deep in the surface when a hand presses hard: the radius has to reach the surface
     // from there. Seven r_c is generous to the method.

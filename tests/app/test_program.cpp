@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "tests/support/depth_pngs.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
 namespace {
@@ -39,19 +40,12 @@ class Program : public ::testing::Test {
     std::string out, err;
   };
 
-  Program() {
-    std::string pattern = (fs::temp_directory_path() / "palpate_test_XXXXXX").string();
-    folder_ = mkdtemp(pattern.data());
-  }
-  ~Program() override { fs::remove_all(folder_); }
-
   [[nodiscard]] std::string path(const std::string& name) const {
-    return (folder_ / name).string();
+    return (folder_.path() / name).string();
   }
 
   std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-    return path(name);
+    return folder_.write(name, text).string();
   }
 
   // Runs the program with arguments that need no quoting, after `before` in the same shell.
@@ -59,8 +53,8 @@ class Program : public ::testing::Test {
     const std::string command = before + PALPATE_PROGRAM + " " + arguments + " >" + path("stdout") +
                                 " 2>" + path("stderr") + " </dev/null";
     const int status = std::system(command.c_str());  // NOLINT(cert-env33-c): a shell is wanted
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(folder_ / "stdout"),
-            read(folder_ / "stderr")};
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(folder_.path() / "stdout"),
+            read(folder_.path() / "stderr")};
   }
 
   // Wrong usage or input: exit 2 and one line that says what, why and what to do.
@@ -79,7 +73,7 @@ class Program : public ::testing::Test {
   }
 
  private:
-  fs::path folder_;
+  test::TemporaryFolder folder_;
 };
 
 constexpr const char* plane = "'synthetic:plane?noise=0.5mm&seed=3'";

@@ -1,39 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 // The bench itself: that the ruler passes, that what fails is found, shrunk and can be run again.
 #include <cmath>
-#include <filesystem>
 #include <set>
 #include <string>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "lab/experiment.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/runner.hpp"
 #include "palpate/core/error.hpp"
 
+#include "tests/support/temporary_folder.hpp"
+
 namespace palpate::lab {
 namespace {
 
-namespace fs = std::filesystem;
-
 class Pop : public ::testing::Test {
  protected:
-  Pop() {
-    std::string pattern = (fs::temp_directory_path() / "palpate_pop_XXXXXX").string();
-    folder_ = mkdtemp(pattern.data());
-  }
-  ~Pop() override { fs::remove_all(folder_); }
-
   [[nodiscard]] Table run(const ExperimentOptions& options) const {
     RunnerOptions runner;
     runner.jobs = 2;
-    return {"pop", run_experiment(find_experiment("pop"), options, runner, folder_ / "pop.csv")};
+    return {"pop",
+            run_experiment(find_experiment("pop"), options, runner, folder_.path() / "pop.csv")};
   }
 
  private:
-  fs::path folder_;
+  test::TemporaryFolder folder_;
 };
 
 ExperimentOptions with(std::string method, int cases) {

@@ -1,30 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 // Touching what was recorded: the ruler on moved patches, and methods on a real camera's frames.
-#include <filesystem>
 #include <string>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "lab/experiment.hpp"
 #include "lab/runner.hpp"
 #include "palpate/core/error.hpp"
 
 #include "tests/support/data.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
 namespace {
 
-namespace fs = std::filesystem;
-
 Table touch(const std::string& method, const std::string& recording) {
-  std::string pattern = (fs::temp_directory_path() / "palpate_real_XXXXXX").string();
-  const fs::path folder = mkdtemp(pattern.data());
+  const test::TemporaryFolder folder;
   ExperimentOptions options;
   options.methods = {method};
   options.recording = recording;
-  const std::string csv = run_experiment(find_experiment("real"), options, {}, folder / "real.csv");
-  fs::remove_all(folder);
+  const std::string csv =
+      run_experiment(find_experiment("real"), options, {}, folder.path() / "real.csv");
   return {"real", csv};
 }
 

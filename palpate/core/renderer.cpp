@@ -98,7 +98,9 @@ void Renderer::frame_by_sight(const Cloud& cloud) noexcept {
   blend_due_ = true;
   // What the surface's own motion adds to the force from the last tick on.
   carried_rate_ =
-      sight_.tracking() ? (sight_.travel(last_t_) - sight_.travel(last_t_ - 1e-3)) / 1e-3 : 0.0;
+      sight_.tracking()
+          ? (sight_.surface().travel(last_t_) - sight_.surface().travel(last_t_ - 1e-3)) / 1e-3
+          : 0.0;
   behind_ = false;
   if (!proxy_) return;
   if (!stamp_ok_) interval_ = 1.0 / parameters_.motion.frame_rate;
@@ -117,7 +119,7 @@ void Renderer::frame_by_sight(const Cloud& cloud) noexcept {
   // One that will move over points has to be in front of this frame's, not only of the average.
   const SurfaceContact contact = sight_.contact(*proxy_, stamp_);
   const double r_c = parameters_.proxy.r_c();
-  const double least = touching_ && !sight_.smooth() ? r_c + sight_.clearance() : r_c;
+  const double least = touching_ && !sight_.smooth() ? r_c + sight_.surface().clearance() : r_c;
   if (contact.distance < least) *proxy_ = contact.foot + least * contact.normal;
   behind_ = sight_.shows_behind(cloud, *proxy_, parameters_.proxy.r_c());
 }
@@ -137,7 +139,7 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
   const auto rest_on_fit = [&] {
     while (sight_.smooth()) {
       const SurfaceContact contact = sight_.contact(hip, t);
-      if (contact.distance > r_c + near + 4.0 * sight_.spread()) return false;
+      if (contact.distance > r_c + near + 4.0 * sight_.surface().spread()) return false;
       if (contact.curvature * r_c > deepest) return false;
       if (contact.at_limit && !sight_.holding()) {
         if (slides == most_slides) movement.flags |= step_budget_hit;
@@ -159,8 +161,9 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
     return false;
   };
 
-  const bool close = on_fit_ || (sight_.smooth() && sight_.contact(*proxy_, t).distance <=
-                                                        r_c + near + 4.0 * sight_.spread());
+  const bool close =
+      on_fit_ || (sight_.smooth() && sight_.contact(*proxy_, t).distance <=
+                                         r_c + near + 4.0 * sight_.surface().spread());
   if (close && rest_on_fit()) {
     on_fit_ = true;
     patch_is_stale_ = true;
@@ -246,7 +249,7 @@ Vec3 Renderer::render_force(const Vec3& hip, double t, std::uint32_t& flags) noe
   Vec3 u =
       extrapolated_u(hip - *proxy_, velocity_, normal_.value_or(Vec3::Zero()), elapsed, as_printed);
   // On the fit the proxy moves with the surface already; on points it is where they were.
-  if (sight_.tracking() && !on_fit_) u -= sight_.travel(t) * sight_.up();
+  if (sight_.tracking() && !on_fit_) u -= sight_.surface().travel(t) * sight_.surface().frame().up;
   const double distance = u.norm();
   const double dt = t - last_t_;
   const double rate = last_distance_ && dt > 0.0 ? (distance - *last_distance_) / dt : 0.0;
@@ -272,8 +275,9 @@ Vec3 Renderer::blend_force(const Vec3& force, const Vec3& hip, double t) noexcep
     const double push = last_force_.norm();
     if (push > 0.0) {
       const Vec3 outwards = last_force_ / push;
-      const double deeper = carried_rate_ * (t - last_blend_t_) * sight_.up().dot(outwards) -
-                            (hip - last_hip_).dot(outwards);
+      const double deeper =
+          carried_rate_ * (t - last_blend_t_) * sight_.surface().frame().up.dot(outwards) -
+          (hip - last_hip_).dot(outwards);
       carried += parameters_.coupling.stiffness * deeper * outwards;
     }
     blend_offset_ = carried - force;
@@ -342,7 +346,7 @@ Tick Renderer::tick(const Vec3& hip, double t) noexcept {
   if (by_sight) tick.force = blend_force(tick.force, hip, t);
   tick.state = movement.around.state;
   tick.steps = movement.steps;
-  tick.surface_velocity = by_sight && sight_.tracking() ? sight_.velocity() : velocity_;
+  tick.surface_velocity = by_sight && sight_.tracking() ? sight_.surface().velocity() : velocity_;
   if (by_sight && sight_.holding()) tick.flags |= surface_hidden;
   if (by_sight && behind_) tick.flags |= pop_through_suspected;
   if (patch_.thinned()) tick.flags |= patch_thinned;

@@ -1,0 +1,500 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/core/surface_estimate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include <Eigen/Cholesky>
+
+namespace palpate {
+namespace {
+
+using Vec5 = Eigen::Matrix<double, 5, 1>;
+
+constexpr double widest_gate = 60e-3;  // [m]
+constexpr std::size_t inner_points = 768;
+constexpr std::size_t outer_points = 1280;
+constexpr std::size_t inner_rungs = 2;
+constexpr std::size_t median_points = 192;
+// Frames whose centres are this near [m] have seen the same cells.
+constexpr double same_place = 0.2e-3;
+// Residuals this small are no structure, whatever the noise [m].
+constexpr double structure_floor = 50e-6;
+// Noise of a disc's height that is usual for a depth camera: this [m] at 1 m, growing with the
+// square of the distance, as stereo does. Serves until the noise has been measured.
+constexpr double usual_noise = 2e-3;
+// Spread of a surface's curvature coefficients x^2, xy, y^2 that is expected [1/m]: radii down to
+// some 30 mm are common, and noise must not invent them.
+constexpr double curvature_sd = 15.0;
+
+constexpr double squared(double x) {
+  return x * x;
+}
+
+// What the newest 2, 4, 8, ... frames say of a shape: matrix * shape = right_side, in centimetres.
+constexpr std::size_t slope_windows = 4;
+struct SlopeWindow {
+  Eigen::Matrix<double, 5, 5> matrix;
+  Vec5 right_side;
+};
+
+// Keeps the slopes of a shape that was summed over all frames within 4 standard deviations of what
+// each window of the newest ones says, the longest first: a surface that turns is never farther
+// off than their noise, and a false alarm costs no more than a little of the averaging.
+// @param point_variance  [cm^2] what one point weighs
+void confine_slopes(Vec5& shape, std::span<const SlopeWindow> windows, double point_variance) {
+  constexpr double confidence = 4.0;
+  for (std::size_t i = windows.size(); i-- > 0;) {
+    const Eigen::Matrix2d matrix = windows[i].matrix.topLeftCorner<2, 2>();
+    const double determinant = matrix.determinant();
+    if (!(determinant > 1e-6 * squared(matrix.trace()))) continue;
+    const Vec5 off = windows[i].right_side - windows[i].matrix * shape;
+    const Eigen::Matrix2d inverse = matrix.inverse();
+    const Vec2 change = inverse * off.head<2>();
+    for (int axis = 0; axis < 2; ++axis) {
+      const double slack = confidence * std::sqrt(point_variance * inverse(axis, axis));
+      shape[axis] += change[axis] - std::clamp(change[axis], -slack, slack);
+    }
+  }
+}
+
+}  // namespace
+
+double SurfaceEstimate::height_sd() const noexcept {
+  return std::sqrt(variance(mover_));
+}
+
+// Of one frame's height in a disc [m^2]. Until a few frames have told, what is usual for a depth
+// camera; then what they told, with a margin for how few they were.
+double SurfaceEstimate::variance(std::size_t rung) const noexcept {
+  const Scatter& scatter = scatter_[rung];
+  const double usual = squared(usual_noise * squared(distance_)) + 0.03 * squared(spread_) + 1e-12;
+  if (scatter.samples < 1.0) return usual;
+  const double told = scatter.variance * (1.0 + 4.0 / scatter.samples) + 1e-12;
+  return scatter.samples < 6.0 ? std::max(usual, told) : told;
+}
+
+double SurfaceEstimate::gate() const noexcept {
+  // The beam is as wide as the narrowest disc, whose height is the noisiest.
+  return std::clamp(std::max(4.0 * spread_, 6.0 * std::sqrt(variance(0))), narrowest_gate,
+                    widest_gate);
+}
+
+double SurfaceEstimate::travel(double t) const noexcept {
+  if (velocity_ == 0.0) return 0.0;
+  // Beyond one and a half intervals the velocity fades over another, and the surface stays there.
+  const double elapsed = std::max(t - stamp_, 0.0) / interval_;
+  const double late = std::clamp(elapsed - 1.5, 0.0, 1.0);
+  return velocity_ * interval_ * (std::min(elapsed, 1.5) + late - 0.5 * late * late);
+}
+
+SurfaceContact SurfaceEstimate::contact(const Vec3& point, double t, double reach) const noexcept {
+  Vec3 local = frame_.local_from_world(point);
+  const double moved = travel(t);
+  local.z() -= moved;
+  const Vec2 at = surface_.nearest(local, local.head<2>(), centre_, reach);
+  const Vec3 foot(at.x(), at.y(), surface_.height(at));
+  const Vec3 normal = surface_.normal(at);
+  return {frame_.world_from_local(foot + Vec3(0, 0, moved)), frame_.direction_in_world(normal),
+          (local - foot).dot(normal), (at - centre_).norm() > 0.999 * reach,
+          surface_.strongest_rise()};
+}
+
+void SurfaceEstimate::start_frame(double stamp, double interval) noexcept {
+  if (!(stamp > stamp_ && stamp - stamp_ <= longest_gap)) {
+    velocity_ = 0.0;
+    settled_ = 0;
+  }
+  stamp_ = stamp;
+  interval_ = interval;
+}
+
+bool SurfaceEstimate::start(const Cloud& cloud, const Vec3& foot, const Vec3& up) noexcept {
+  frame_ = LocalFrame::about(foot, up);
+  surface_ = {};
+  count_ = 0;
+  for (Cells& past : cells_) past.full = false;
+  velocity_ = 0.0;
+  jumped_ = false;
+  smooth_ = false;
+  return measure(cloud, Vec2::Zero(), Look{narrowest_gate + 4.0 * spread_}, true);
+}
+
+SurfaceEstimate::Shape SurfaceEstimate::Shape::of(const Moments& disc) noexcept {
+  const Eigen::Matrix<double, 6, 6> a = disc.normal_matrix();
+  const Vec6 b = disc.right_side();
+  const double weight = std::max(a(0, 0), 1e-9);
+  const Vec5 column = a.block<5, 1>(1, 0);
+  return {a.bottomRightCorner<5, 5>() - column * column.transpose() / weight,
+          b.tail<5>() - column * (b[0] / weight), column / weight, b[0] / weight, a(0, 0)};
+}
+
+// The residuals of a patch's points within `radius` of `foot`: their median, and how they spread
+// about it. Looks at an even part of them: a median of so many is
+// good enough to tell what belongs to a surface.
+std::optional<SurfaceEstimate::Residuals> SurfaceEstimate::residuals(const Vec2& foot,
+                                                                     double radius,
+                                                                     double wide) const noexcept {
+  std::array<float, median_points> values;
+  std::size_t size = 0;
+  const std::size_t stride = 1 + patch_.size() / (values.size() + 1);
+  for (std::size_t i = 0; i < patch_.size() && size < values.size(); i += stride) {
+    const Vec3 local = frame_.local_from_world(patch_.ball().centre +
+                                               Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
+    if ((local.head<2>() - foot).squaredNorm() > squared(radius)) continue;
+    const double r = local.z() - surface_.height(local.head<2>());
+    if (std::abs(r) <= wide) values[size++] = static_cast<float>(r);
+  }
+  if (size < least_points) return std::nullopt;
+  const auto median = [&] {
+    auto* middle = values.data() + size / 2;
+    std::nth_element(values.data(), middle, values.data() + size);
+    return *middle;
+  };
+  const float centre = median();
+  for (std::size_t i = 0; i < size; ++i) values[i] = std::abs(values[i] - centre);
+  return Residuals{centre, 1.4826 * median()};
+}
+
+// Shifts the expected surface by the median residual near `foot` and says beyond which residual a
+// point does not belong to it.
+bool SurfaceEstimate::recentre(const Vec2& foot, double wide, double& cut) noexcept {
+  const std::optional<Residuals> near = residuals(foot, radii[0], wide);
+  if (!near) return false;
+  surface_.c[0] += near->median;
+  // Quantised depth makes single deviations jump between the steps.
+  spread_ = count_ == 0 ? near->deviation : spread_ + 0.2 * (near->deviation - spread_);
+  cut = std::clamp(6.0 * std::max(near->deviation, spread_), 0.5e-3, wide);
+  return true;
+}
+
+// One frame's evidence about the surface around `foot`, and what follows from all of it.
+bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& look,
+                              bool new_frame) noexcept {
+  const double wide = look.gate;
+  const Vec3 place = frame_.world_from_local(Vec3(foot.x(), foot.y(), surface_.height(foot)));
+  const double deep = wide + 2.0 * radii[1];
+  gather(cloud, Beam{place, radii[1] * 1.2, deep, frame_.up}, inner_points, patch_);
+  const Quadric before = surface_;
+  double cut = 0.0;
+  const bool first = count_ == 0;
+  // From nothing, the shape is found by fitting the disc a few times over.
+  for (int i = 0; i < (first ? 3 : 1); ++i) {
+    if (!recentre(foot, wide, cut)) {
+      surface_ = before;
+      return false;
+    }
+    if (!first) break;
+    Moments moments =
+        disc_moments(patch_, frame_, surface_, Disc{foot, 0.0, radii[1], std::max(cut, 2e-3)});
+    if (moments.xy[0] < 6.0) {
+      surface_ = before;
+      return false;
+    }
+    const Quadric correction = fit_quadric(moments, 0.1 * moments.xy[0]);
+    surface_.c += correction.c;
+  }
+
+  if (new_frame || count_ == 0) {
+    // Heights from before a jump belong to another surface, unless the next frame's jump says that
+    // it was a motion.
+    const bool goes_on = look.jumped && jumped_;
+    jumped_ = look.jumped;
+    if (count_ == 0 || (look.jumped && !goes_on)) settled_ = 0;
+    settled_ += goes_on && settled_ == 1 ? 2 : 1;
+    newest_ = (newest_ + 1) % history;
+    count_ = std::min(count_ + 1, history);
+  }
+  Evidence& now = evidence(0);
+  now.stamp = stamp_;
+  now.centre = foot;
+  now.whole = !look.partial;
+  const auto add_ring = [&](std::size_t j) {
+    Moments moments = disc_moments(patch_, frame_, surface_,
+                                   Disc{foot, j == 0 ? 0.0 : radii[j - 1], radii[j], cut});
+    moments.raise(surface_);
+    if (j > 0) moments.add(now.disc[j - 1]);
+    now.disc[j] = moments;
+  };
+  for (std::size_t j = 0; j < inner_rungs; ++j) add_ring(j);
+  now.rungs = inner_rungs;
+
+  look_at_cells(foot, look, new_frame);
+
+  // Where there is noise to average away, look farther.
+  const bool noisy =
+      scatter_[1].samples >= 1.0 ? scatter_[1].variance > squared(20e-6) : spread_ > 0.1e-3;
+  if (noisy) {
+    gather(cloud, Beam{place, radii[rungs - 1] * 1.1, wide + radii[rungs - 1], frame_.up},
+           outer_points, patch_);
+    // Noise that is alike over the inner disc is not over the wide ones: what belongs to them is
+    // told by their own spread about their own middle.
+    if (const std::optional<Residuals> far = residuals(foot, radii[rungs - 1], wide)) {
+      surface_.c[0] += far->median;
+      cut = std::clamp(6.0 * far->deviation, cut, wide);
+    }
+    for (std::size_t j = inner_rungs; j < rungs; ++j) add_ring(j);
+    now.rungs = rungs;
+  }
+  for (std::size_t j = 0; j < now.rungs; ++j) now.shape[j] = Shape::of(now.disc[j]);
+  estimate(foot, new_frame);
+  if (!look.partial) judge(foot);
+  centre_ = foot;
+  if (foot.norm() > 4e-3) move_origin(foot);
+  return true;
+}
+
+void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
+  Evidence& now = evidence(0);
+  const Vec2 at = foot / Moments::unit;
+  Vec5 basis;
+  basis << at.x(), at.y(), at.x() * at.x(), at.x() * at.y(), at.y() * at.y();
+  const double cm2 = squared(Moments::unit);
+
+  std::array<Vec5, rungs> shapes;
+  std::array<std::array<HeightSample, history>, rungs> heights;
+  std::array<std::size_t, rungs> frames{};
+  std::size_t chosen = 0;
+  for (std::size_t j = 0; j < now.rungs; ++j) {
+    // Evidence from frames whose disc overlaps this one's well.
+    Eigen::Matrix<double, 5, 5> matrix = Eigen::Matrix<double, 5, 5>::Zero();
+    Vec5 right_side = Vec5::Zero();
+    std::array<SlopeWindow, slope_windows> windows;
+    std::size_t filled = 0;
+    std::size_t whole = 0;
+    std::size_t n = 0;
+    for (; n < count_; ++n) {
+      const Evidence& e = evidence(n);
+      if (e.rungs <= j || (e.centre - foot).norm() > std::max(3e-3, 0.5 * radii[j])) break;
+      // A disc that something covers in part tells the height, but hardly the slope.
+      if (!e.whole && n > 0) continue;
+      matrix += e.shape[j].matrix;
+      right_side += e.shape[j].right_side;
+      if (++whole == std::size_t{2} << filled && filled < slope_windows) {
+        windows[filled++] = {matrix, right_side};
+      }
+    }
+    frames[j] = n;
+    const double points = std::max(now.shape[j].points, 1.0);
+    Scatter& scatter = scatter_[j];
+    // What one point weighs against the prior, whatever correlation does to it.
+    const double prior = variance(j) * points / cm2 / squared(curvature_sd * Moments::unit);
+    const auto fit_shape = [&](Eigen::Matrix<double, 5, 5> a, const Vec5& b) {
+      a.diagonal().array() += 1e-9;
+      a.diagonal().tail<3>().array() += prior;
+      shapes[j] = a.ldlt().solve(b);
+    };
+    fit_shape(matrix, right_side);
+    confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / cm2);
+    const double above = shapes[j].dot(basis);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Evidence& e = evidence(i);
+      heights[j][i] = {
+          e.stamp, (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * Moments::unit};
+    }
+    if (new_frame && n >= 5 && now.whole) {
+      // Fourth differences do not see a smooth motion; their variance is 70 times a height's.
+      const auto& h = heights[j];
+      const double fourth =
+          h[0].height - 4.0 * h[1].height + 6.0 * h[2].height - 4.0 * h[3].height + h[4].height;
+      double change = fourth * fourth / 70.0;
+      // A single jump is no noise.
+      if (scatter.samples >= 4.0) change = std::min(change, 9.0 * scatter.variance + 1e-12);
+      scatter.samples = std::min(scatter.samples + 1.0, 40.0);
+      scatter.variance += (change - scatter.variance) / scatter.samples;
+    }
+  }
+  // Lepski: the widest disc that agrees with all narrower ones. Their differences, frame by frame,
+  // do not see the surface move, and tell their own noise.
+  // A disc may differ from the narrower ones, because the surface is not its quadric, and yet move
+  // with them: then it tells the motion, and they tell where the surface is.
+  std::size_t mover = 0;
+  bool agree = true;
+  for (std::size_t j = 1; j < now.rungs; ++j) {
+    bool moves_along = frames[j] >= std::min<std::size_t>(frames[0], 2);
+    for (std::size_t i = 0; i < j && moves_along; ++i) {
+      const std::size_t n = std::min(frames[i], frames[j]);
+      double sum = 0.0;
+      double squares = 0.0;
+      for (std::size_t k = 0; k < n; ++k) {
+        const double d = heights[j][k].height - heights[i][k].height;
+        sum += d;
+        squares += d * d;
+      }
+      const auto count = static_cast<double>(n);
+      const double mean = sum / count;
+      // Until there are frames to tell, what the heights' own noise suggests counts as two of them.
+      const double expected = 2.0 * (variance(i) + variance(j));
+      const double scattered =
+          (std::max(squares - count * mean * mean, 0.0) + (n < 4 ? expected : 0.0)) / count;
+      // What was in use needs better evidence against it: a change is felt.
+      const double confidence = (j <= rung_ ? 4.5 : 3.5) + 4.0 / count;
+      agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + 2e-6;
+      const double newest = heights[j][0].height - heights[i][0].height;
+      moves_along =
+          agree || (n >= 4 && std::abs(newest - mean) <= 3.0 * std::sqrt(scattered) + 2e-6);
+    }
+    if (!moves_along) break;
+    if (agree && variance(j) <= variance(chosen)) chosen = j;
+    if (variance(j) <= variance(mover)) mover = j;
+  }
+  rung_ = chosen;
+  mover_ = mover;
+  std::array<HeightSample, history>& past = heights[mover];
+  const std::size_t known = std::min(frames[chosen], frames[mover]);
+  if (mover != chosen) {
+    double difference = 0.0;
+    for (std::size_t k = 0; k < known; ++k) {
+      difference += (heights[chosen][k].height - past[k].height) / static_cast<double>(known);
+    }
+    for (std::size_t k = 0; k < frames[mover]; ++k) past[k].height += difference;
+  }
+  const std::span<const HeightSample> since(past.data(),
+                                            std::clamp<std::size_t>(settled_, 1, frames[mover]));
+  const double sd = height_sd();
+  const HeightTrack track = track_height(since, sd, interval_);
+  if (new_frame) velocity_ = track.velocity;
+  const double height = track.height;
+  surface_.c.tail<5>() = shapes[chosen];
+  surface_.c.tail<3>() /= Moments::unit;
+  above_mean_ = since.front().height - height;
+  surface_.c[0] = height - shapes[chosen].dot(basis) * Moments::unit;
+}
+
+// Means of the inner patch's points in cells of a square about `foot`, kept to tell structure,
+// which stays, from noise, which does not.
+void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept {
+  constexpr double cell = 2.0 * 9e-3 / cells_per_side;
+  constexpr double half = 0.5 * cells_per_side;
+  if (new_frame) newest_cells_ = (newest_cells_ + 1) % cell_frames;
+  Cells& now = cells_[newest_cells_];
+  now.centre = foot;
+  now.heights.fill(0.0F);
+  now.means.fill(Eigen::Matrix<float, 6, 1>::Zero());
+  for (std::size_t i = 0; i < patch_.size(); ++i) {
+    const Vec3 local = frame_.local_from_world(patch_.ball().centre +
+                                               Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
+    const double u = (local.x() - foot.x()) / cell + half;
+    const double v = (local.y() - foot.y()) / cell + half;
+    if (!(u >= 0.0 && v >= 0.0 && u < cells_per_side && v < cells_per_side)) continue;
+    const Vec6 basis = quadric_basis(local.head<2>());
+    if (!(std::abs(local.z() - surface_.c.dot(basis)) <= look.gate)) continue;
+    const std::size_t k =
+        static_cast<std::size_t>(v) * cells_per_side + static_cast<std::size_t>(u);
+    now.heights[k] += static_cast<float>(local.z());
+    now.means[k] += basis.cast<float>();
+  }
+  now.full = !look.partial;
+  for (std::size_t k = 0; k < cells; ++k) {
+    const float count = now.means[k][0];
+    if (!(count > 0.0F)) {
+      now.full = false;
+      return;
+    }
+    now.heights[k] /= count;
+    now.means[k] /= count;
+  }
+}
+
+// Mean square of what no quadric explains in residuals of cells [m^2]: the fit's own errors, which
+// grow towards the corners, are no structure.
+double SurfaceEstimate::squared_structure(const Cells& frame,
+                                          const std::array<double, cells>& residuals) noexcept {
+  Eigen::Matrix<double, 6, 6> a = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
+  Vec6 b = Vec6::Zero();
+  const auto basis = [&](std::size_t k) {
+    Vec6 means = frame.means[k].cast<double>();
+    means.segment<2>(1) /= Moments::unit;
+    means.tail<3>() /= squared(Moments::unit);
+    return means;
+  };
+  for (std::size_t k = 0; k < cells; ++k) {
+    const Vec6 means = basis(k);
+    a += means * means.transpose();
+    b += residuals[k] * means;
+  }
+  const Vec6 c = a.ldlt().solve(b);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < cells; ++k) sum += squared(residuals[k] - c.dot(basis(k)));
+  constexpr double free = cells - 6;
+  return sum / free;
+}
+
+// Is the surface what its fit says, up to noise?
+void SurfaceEstimate::judge(const Vec2& foot) noexcept {
+  const Evidence& now = evidence(0);
+  // An edge shows as a disc whose points lie to one side, a gap as one without a middle.
+  const Shape& inner = now.shape[0];
+  const Vec2 middle(inner.means[0], inner.means[1]);
+  const Vec2 spread = Vec2(inner.means[2], inner.means[4]) - Vec2(middle.cwiseAbs2());
+  const double full = 0.25 * squared(radii[0] / Moments::unit);
+  const bool whole = (middle * Moments::unit - foot).norm() < 0.3 * radii[0] &&
+                     spread.minCoeff() > 0.65 * full && spread.maxCoeff() < 1.35 * full;
+  if (!whole) {
+    smooth_ = false;
+    return;
+  }
+  // Residuals over the surface as it is known now, less what all cells share.
+  const auto residuals_of = [this](const Cells& frame) {
+    std::array<double, cells> residuals;
+    double mean = 0.0;
+    for (std::size_t k = 0; k < cells; ++k) {
+      const Vec6 means = frame.means[k].cast<double>();
+      residuals[k] = frame.heights[k] - surface_.c.dot(means);
+      mean += residuals[k] / cells;
+    }
+    for (double& r : residuals) r -= mean;
+    return residuals;
+  };
+  const Cells& newest = cells_[newest_cells_];
+  if (!newest.full) {
+    smooth_ = false;
+    return;
+  }
+  std::array<double, cells> sums = residuals_of(newest);
+  const std::array<double, cells> residuals = sums;
+  std::size_t frames = 1;
+  for (; frames < cell_frames; ++frames) {
+    const Cells& past = cells_[(newest_cells_ + cell_frames - frames) % cell_frames];
+    if (!past.full || (past.centre - newest.centre).norm() > same_place) break;
+    const std::array<double, cells> older = residuals_of(past);
+    double change = 0.0;
+    for (std::size_t k = 0; k < cells; ++k) {
+      sums[k] += older[k];
+      change += squared(residuals[k] - older[k]) / (2.0 * cells);
+    }
+    if (frames == 1) {
+      cell_scatter_.samples = std::min(cell_scatter_.samples + 1.0, 30.0);
+      cell_scatter_.variance += (change - cell_scatter_.variance) / cell_scatter_.samples;
+    }
+  }
+  const auto n = static_cast<double>(frames);
+  const double structure = squared_structure(newest, sums) / squared(n);
+  const double noise = cell_scatter_.samples > 0.0 ? cell_scatter_.variance / n : 0.0;
+  // Hysteresis, so that the way to rest does not change from frame to frame.
+  const double confidence = smooth_ ? 6.0 : 3.0;
+  smooth_ = structure <= squared(structure_floor) + confidence * noise;
+}
+
+// Keeps the local origin near the contact: sums of fourth powers lose digits far from it.
+void SurfaceEstimate::move_origin(const Vec2& foot) noexcept {
+  const Vec3 shift(foot.x(), foot.y(), surface_.height(foot));
+  const Vec2 gradient = surface_.gradient(foot);
+  frame_.origin = frame_.world_from_local(shift);
+  surface_.c[0] = 0.0;
+  surface_.c[1] = gradient.x();
+  surface_.c[2] = gradient.y();
+  centre_ -= foot;
+  for (Cells& past : cells_) past.full = false;
+  for (std::size_t age = 0; age < count_; ++age) {
+    Evidence& e = evidence(age);
+    e.centre -= foot;
+    for (std::size_t j = 0; j < e.rungs; ++j) {
+      e.disc[j] = e.disc[j].moved(shift);
+      e.shape[j] = Shape::of(e.disc[j]);
+    }
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include "palpate/core/cloud.hpp"
+#include "palpate/core/height_track.hpp"
+#include "palpate/core/surface_fit.hpp"
+
+namespace palpate {
+
+/// A sphere on the surface that is followed.
+struct SurfaceContact {
+  Vec3 foot;        ///< [m] world: the surface's point nearest to the point asked about
+  Vec3 normal;      ///< [-] unit, world, towards the proxy's side
+  double distance;  ///< [m] from the surface to that point, negative behind it
+  bool at_limit;    ///< the surface is not known beyond `foot`: fit it there
+  double
+      curvature;  ///< [1/m] the strongest towards the proxy: a sphere of 1/curvature just fits in
+};
+
+/// One surface around one place, as the frames so far tell of it: its shape, where it is, how it
+/// moves, and how far noise reaches. docs/method.md, "Sight", 3 to 5. Which points of a frame are
+/// this surface's is for the SightTracker to say.
+///
+/// [servo] Nothing here allocates, locks or throws after construction.
+class SurfaceEstimate {
+ public:
+  /// How a frame's points are taken.
+  struct Look {
+    double gate;           ///< [m] points farther from the surface than this are not its own
+    bool jumped = false;   ///< it was found elsewhere than expected
+    bool partial = false;  ///< something hides a part of it: where points end is no edge
+  };
+
+  /// A frame at `stamp` [s], `interval` [s] after the one before, will be measured.
+  void start_frame(double stamp, double interval) noexcept;
+  /// Begins with the surface at `foot` [m, world], `up` [-] the way it faces or is seen from. What
+  /// was before belongs to another one. False if there are too few points.
+  bool start(const Cloud& cloud, const Vec3& foot, const Vec3& up) noexcept;
+  /// Takes a new frame's points about `foot` [m, local] in. False, and nothing has changed, if
+  /// there are too few.
+  bool add(const Cloud& cloud, const Vec2& foot, const Look& look) noexcept {
+    return measure(cloud, foot, look, true);
+  }
+  /// Fits the newest frame anew about another `foot` [m, local]. False as `add`.
+  bool move_to(const Cloud& cloud, const Vec2& foot, const Look& look) noexcept {
+    return measure(cloud, foot, look, false);
+  }
+  /// Moves the surface along `up` by `height` [m].
+  void shift(double height) noexcept { surface_.c[0] += height; }
+  /// It is held where it is.
+  void stop() noexcept { velocity_ = 0.0; }
+  /// It may be another one from here on: earlier frames no longer count.
+  void forget_frames() noexcept { count_ = 0; }
+  /// How far the sensor is [m]: its noise, until that has been measured, depends on it.
+  void set_distance(double distance) noexcept { distance_ = distance; }
+
+  [[nodiscard]] const LocalFrame& frame() const noexcept { return frame_; }
+  [[nodiscard]] const Quadric& surface() const noexcept { return surface_; }
+  [[nodiscard]] const Vec2& centre() const noexcept { return centre_; }  ///< [m] local, of the fit
+  /// [m] world: the surface at the centre of the fit.
+  [[nodiscard]] Vec3 place() const noexcept {
+    return frame_.world_from_local(Vec3(centre_.x(), centre_.y(), surface_.height(centre_)));
+  }
+  /// The point of the surface nearest to `point` [m, world] at time t [s], within `reach` [m] of
+  /// the centre of the fit.
+  [[nodiscard]] SurfaceContact contact(const Vec3& point, double t, double reach) const noexcept;
+  /// [m/s] along `up`.
+  [[nodiscard]] double velocity() const noexcept { return velocity_; }
+  [[nodiscard]] double stamp() const noexcept { return stamp_; }        ///< [s]
+  [[nodiscard]] double interval() const noexcept { return interval_; }  ///< [s]
+  /// How far the surface has moved along `up` at time t [s] since its frame [m].
+  [[nodiscard]] double travel(double t) const noexcept;
+  /// Is the surface what its fit says, up to noise?
+  [[nodiscard]] bool smooth() const noexcept { return smooth_; }
+  /// Frames whose heights are this surface's.
+  [[nodiscard]] std::size_t settled() const noexcept { return settled_; }
+  /// Was it elsewhere than expected in the newest frame?
+  [[nodiscard]] bool jumped() const noexcept { return jumped_; }
+  /// Spread of the measured points about the surface [m]: how far noise can reach.
+  [[nodiscard]] double spread() const noexcept { return spread_; }
+  /// Standard deviation of one frame's height of the surface [m], as measured.
+  [[nodiscard]] double height_sd() const noexcept;
+  /// How far the newest frame's own points may lie above the averaged surface [m].
+  [[nodiscard]] double clearance() const noexcept {
+    return std::max(above_mean_, 0.0) + 3.0 * spread_;
+  }
+  /// Points within this [m] of where the surface is expected are its own.
+  [[nodiscard]] double gate() const noexcept;
+
+  static constexpr std::size_t rungs = 6;
+  /// Of the discs that a fit may be averaged over [m].
+  static constexpr std::array<double, rungs> radii = {7e-3, 11e-3, 17e-3, 27e-3, 42e-3, 60e-3};
+  static constexpr double narrowest_gate = 12e-3;  ///< [m]
+  static constexpr double longest_gap = 0.25;      ///< [s] between frames that can tell a motion
+  static constexpr std::size_t least_points = 8;
+
+ private:
+  static constexpr std::size_t history = most_heights;
+  static constexpr std::size_t cells_per_side = 4;
+  static constexpr std::size_t cells = cells_per_side * cells_per_side;
+
+  /// Moments with the height eliminated (Schur's complement): what is left tells of the shape.
+  struct Shape {
+    Eigen::Matrix<double, 5, 5> matrix;
+    Eigen::Matrix<double, 5, 1> right_side;
+    Eigen::Matrix<double, 5, 1> means;  // of x, y, xx, xy, yy
+    double height;                      // mean z [cm]
+    double points;
+
+    static Shape of(const Moments& disc) noexcept;
+  };
+  /// What one frame said.
+  struct Evidence {
+    double stamp = 0.0;
+    Vec2 centre = Vec2::Zero();
+    bool whole = true;      // nothing was before a part of it
+    std::size_t rungs = 0;  // how many were measured
+    std::array<Moments, SurfaceEstimate::rungs> disc;
+    std::array<Shape, SurfaceEstimate::rungs> shape;
+  };
+  /// Means over the points in each cell of a square about a frame's contact, local.
+  struct Cells {
+    bool full = false;  // no cell is without points, and nothing was before them
+    Vec2 centre = Vec2::Zero();
+    std::array<float, cells> heights;                     // [m]
+    std::array<Eigen::Matrix<float, 6, 1>, cells> means;  // of quadric_basis
+  };
+  static constexpr std::size_t cell_frames = 8;
+  /// How a height scatters from frame to frame.
+  struct Scatter {
+    double variance = 0.0;  // [m^2]
+    double samples = 0.0;
+  };
+  struct Residuals {
+    float median;      // [m]
+    double deviation;  // [m] as of a normal distribution
+  };
+
+  bool measure(const Cloud& cloud, const Vec2& foot, const Look& look, bool new_frame) noexcept;
+  [[nodiscard]] std::optional<Residuals> residuals(const Vec2& foot, double radius,
+                                                   double gate) const noexcept;
+  bool recentre(const Vec2& foot, double gate, double& cut) noexcept;
+  void estimate(const Vec2& foot, bool new_frame) noexcept;
+  void look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept;
+  static double squared_structure(const Cells& frame,
+                                  const std::array<double, cells>& residuals) noexcept;
+  void judge(const Vec2& foot) noexcept;
+  void move_origin(const Vec2& foot) noexcept;
+  [[nodiscard]] Evidence& evidence(std::size_t age) noexcept {
+    return ring_[(newest_ + history - age) % history];
+  }
+  [[nodiscard]] double variance(std::size_t rung) const noexcept;
+
+  Patch patch_;
+  LocalFrame frame_;
+  Quadric surface_;
+  Vec2 centre_ = Vec2::Zero();
+  double stamp_ = 0.0;
+  double interval_ = 1.0 / 30.0;
+  double velocity_ = 0.0;
+  double spread_ = 0.0;
+  std::size_t rung_ = 0;   // whose disc tells the shape, and where the surface is
+  std::size_t mover_ = 0;  // whose disc tells how it moves
+
+  std::array<Evidence, history> ring_;
+  std::array<Cells, cell_frames> cells_;
+  std::size_t newest_cells_ = 0;
+  std::size_t newest_ = 0;
+  std::size_t count_ = 0;
+  std::size_t settled_ = 0;
+  bool jumped_ = false;
+  bool smooth_ = false;
+  double above_mean_ = 0.0;  // [m] the newest frame's height over the average
+  double distance_ = 0.0;    // [m] from the viewpoint
+
+  // The sensor's noise outlives a contact.
+  std::array<Scatter, rungs> scatter_;
+  Scatter cell_scatter_;
+};
+
+}  // namespace palpate

@@ -56,6 +56,7 @@ Json describe(const DepthImage& image) {
   json["principal_point_px"] = Json::array({k.cx, k.cy});
   json["distorted"] = k.distorted();
   json["units_per_metre"] = image.units_per_metre();
+  json["brightness"] = !image.brightness().empty();
   json["measured_percent"] =
       100.0 * static_cast<double>(measured.size()) / static_cast<double>(image.depth().size());
   if (!measured.empty()) {
@@ -73,6 +74,13 @@ Json describe(const PointCloud& cloud) {
   Json json = extent(points);
   json["non_finite"] = cloud.non_finite();
   if (cloud.viewpoint()) json["seen_from_m"] = numbers(*cloud.viewpoint());
+  if (const Surface* surface = cloud.surface()) {
+    if (surface->columns > 0) json["image"] = fmt::format("{}x{}", surface->columns, surface->rows);
+    if (!surface->triangles.empty()) json["triangles"] = surface->triangles.size();
+    if (!surface->normals.empty())
+      json["normals"] = std::count_if(surface->normals.begin(), surface->normals.end(),
+                                      [](const Vec3& normal) { return !normal.isZero(); });
+  }
   return json;
 }
 

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "lab/experiment.hpp"
-#include "lab/surface_cloud.hpp"
+#include "palpate/cloud/point_cloud.hpp"
 
 namespace palpate::lab {
 
@@ -27,7 +27,7 @@ struct GridCloud {
   /// Frame number `frame`; the number picks the noise. Rows and columns are told, and the normals
   /// of the surface without noise.
   /// @param lift  [m] added to the height
-  [[nodiscard]] std::unique_ptr<SurfaceCloud> capture(std::uint64_t frame, double lift) const;
+  [[nodiscard]] std::unique_ptr<PointCloud> capture(std::uint64_t frame, double lift) const;
 };
 
 }  // namespace palpate::lab

@@ -5,7 +5,7 @@
 
 #include <nanoflann.hpp>
 
-#include "lab/surface_cloud.hpp"
+#include "palpate/cloud/point_cloud.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -70,9 +70,10 @@ bool LocalPoints::cover(const Vec3& place) {
   centre_ = place;
   newest_.clear();
   normals_.clear();
-  const auto* given = dynamic_cast<const SurfaceCloud*>(cloud_);
-  if (window_ == 1 && given != nullptr && !given->surface().normals.empty()) {
-    const Surface& surface = given->surface();
+  const auto* given = dynamic_cast<const PointCloud*>(cloud_);
+  if (window_ == 1 && given != nullptr && given->surface() != nullptr &&
+      !given->surface()->normals.empty()) {
+    const Surface& surface = *given->surface();
     viewpoint_ = given->viewpoint();
     points_.clear();
     for (std::size_t i = 0; i < surface.points.size(); ++i) {

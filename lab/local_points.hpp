@@ -36,7 +36,8 @@ class LocalPoints {
   bool cover(const Vec3& place);
 
   [[nodiscard]] const std::vector<Vec3>& points() const { return points_; }  ///< [m] world
-  /// [-] of each point, where they came with normals (SurfaceCloud) and one frame counts; or none.
+  /// [-] of each point, where they came with normals (Surface) and one frame counts; or none. Zero
+  /// where a point has none.
   [[nodiscard]] const std::vector<Vec3>& normals() const { return normals_; }
   /// [m] world: from where the newest frame was seen, if known.
   [[nodiscard]] const std::optional<Vec3>& viewpoint() const { return viewpoint_; }

@@ -6,8 +6,9 @@
 #include <limits>
 
 #include "lab/local_points.hpp"
-#include "lab/surface_cloud.hpp"
 #include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -22,18 +23,26 @@ constexpr double touch = 1e-7;  // [m] nearer than this is contact
 template <class Visit>
 struct InBox {
   const Box& box;
+  const std::vector<Box>& boxes;
   const Visit& visit;
   bool intersectVolume(const Box& volume) const { return volume.intersects(box); }
   bool intersectObject(std::uint32_t triangle) const {
-    visit(triangle);
+    if (boxes[triangle].intersects(box)) visit(triangle);
     return false;
   }
 };
 
-template <class Tree, class Visit>
-void for_each_in(const Tree& tree, const Box& box, const Visit& visit) {
-  InBox<Visit> query{box, visit};
-  Eigen::BVIntersect(tree, query);
+// Refuses what triangles cannot be made of.
+void check(const Cloud& cloud) {
+  if (const auto* set = dynamic_cast<const CloudSet*>(&cloud)) {
+    for (const auto& member : set->clouds()) check(*member);
+  } else if (const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+             points != nullptr && points->size() > 0) {
+    const Surface* surface = points->surface();
+    if (surface != nullptr && (!surface->triangles.empty() || surface->columns > 0)) return;
+    throw Error("frame", "it is of points alone, and the method touches polygons",
+                "give a PLY with faces, an organised PCD or a depth camera");
+  }
 }
 
 // The place nearest to p on the triangle a b c (Ericson, Real-Time Collision Detection, 5.1.5).
@@ -89,8 +98,15 @@ std::optional<double> meets_line(const Vec3& from, const Vec3& way, double radiu
 }  // namespace
 
 void Polygons::frame(const Cloud& cloud) {
+  check(cloud);
   cloud_ = &cloud;
   stale_ = true;
+}
+
+template <class Visit>
+void Polygons::for_each_in(const Box& box, const Visit& visit) const {
+  InBox<Visit> query{box, boxes_, visit};
+  Eigen::BVIntersect(tree_, query);
 }
 
 void Polygons::add_grid(const std::vector<Vec3>& points, int columns, int rows,
@@ -110,7 +126,6 @@ void Polygons::add_grid(const std::vector<Vec3>& points, int columns, int rows,
       if (*high - *low > jump * *low) return;
     }
     const Vec3 across = (q - p).cross(r - p);
-    if (!(across.norm() > 1e-14)) return;
     const bool faces = across.dot(towards_viewer(viewpoint, p)) > 0.0;
     triangles_.push_back({first + static_cast<std::uint32_t>(a),
                           first + static_cast<std::uint32_t>(faces ? b : c),
@@ -123,6 +138,15 @@ void Polygons::add_grid(const std::vector<Vec3>& points, int columns, int rows,
       join(a + 1, a + columns + 1, a + columns);
     }
   }
+}
+
+void Polygons::add_mesh(const Surface& mesh) {
+  const auto first = static_cast<std::uint32_t>(vertices_.size());
+  vertices_.insert(vertices_.end(), mesh.points.begin(), mesh.points.end());
+  vertex_normals_.resize(first, Vec3::Zero());
+  vertex_normals_.insert(vertex_normals_.end(), mesh.normals.begin(), mesh.normals.end());
+  for (const Corners& t : mesh.triangles)
+    triangles_.push_back({first + t[0], first + t[1], first + t[2]});
 }
 
 void Polygons::add(const Cloud& cloud, const Vec3& place) {
@@ -143,15 +167,10 @@ void Polygons::add(const Cloud& cloud, const Vec3& place) {
     if (!window.empty())
       add_grid(points, window.u_end - window.u_begin, window.v_end - window.v_begin,
                world_from_camera.translation());
-  } else if (const auto* given = dynamic_cast<const SurfaceCloud*>(&cloud)) {
-    const Surface& surface = given->surface();
-    if (!surface.triangles.empty()) {
-      const auto first = static_cast<std::uint32_t>(vertices_.size());
-      vertices_.insert(vertices_.end(), surface.points.begin(), surface.points.end());
-      for (const Corners& t : surface.triangles)
-        triangles_.push_back({first + t[0], first + t[1], first + t[2]});
-      return;
-    }
+  } else if (const auto* points = dynamic_cast<const PointCloud*>(&cloud)) {
+    if (points->surface() == nullptr) return;
+    const Surface& surface = *points->surface();
+    if (!surface.triangles.empty()) return add_mesh(surface);
     int u_low = surface.columns;
     int u_high = -1;
     int v_low = surface.rows;
@@ -163,44 +182,55 @@ void Polygons::add(const Cloud& cloud, const Vec3& place) {
       v_low = std::min(v_low, i / surface.columns);
       v_high = std::max(v_high, i / surface.columns);
     }
-    std::vector<Vec3> points;
+    std::vector<Vec3> near;
     for (int v = v_low; v <= v_high; ++v) {
       for (int u = u_low; u <= u_high; ++u)
-        points.push_back(surface.points[static_cast<std::size_t>(v * surface.columns + u)]);
+        near.push_back(surface.points[static_cast<std::size_t>(v * surface.columns + u)]);
     }
     if (u_high >= u_low)
-      add_grid(points, u_high - u_low + 1, v_high - v_low + 1, given->viewpoint());
+      add_grid(near, u_high - u_low + 1, v_high - v_low + 1, points->viewpoint());
   }
 }
 
 void Polygons::cover(const Vec3& place) {
   if (cloud_ == nullptr) return;
   if (!stale_ && (place - centre_).norm() <= reach_ / 3.0) return;
-  const auto* given = dynamic_cast<const SurfaceCloud*>(cloud_);
-  const bool whole = given != nullptr && !given->surface().triangles.empty();
-  if (!stale_ && whole) return;  // a mesh is all here
+  const auto* points = dynamic_cast<const PointCloud*>(cloud_);
+  const bool is_mesh =
+      points != nullptr && points->surface() != nullptr && !points->surface()->triangles.empty();
+  if (!stale_ && is_mesh) return;  // all of it is here
   stale_ = false;
   centre_ = place;
   vertices_.clear();
+  vertex_normals_.clear();
   triangles_.clear();
   viewpoint_.reset();
   add(*cloud_, place);
-  vertex_normals_.assign(vertices_.size(), Vec3::Zero());
+  vertex_normals_.resize(vertices_.size(), Vec3::Zero());
+
+  normals_.clear();
+  boxes_.clear();
   std::vector<std::uint32_t> indices;
-  std::vector<Box> boxes;
-  for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
-    const Corners& t = triangles_[i];
+  std::vector<Vec3> sums(vertices_.size(), Vec3::Zero());
+  std::erase_if(triangles_, [&](const Corners& t) {
     const Vec3 across =
         (vertices_[t[1]] - vertices_[t[0]]).cross(vertices_[t[2]] - vertices_[t[0]]);
+    // A line faces nowhere, and what has a corner that is not finite is no triangle.
+    if (!(across.norm() > 1e-14) || !across.allFinite()) return true;
     Box box(vertices_[t[0]]);
     for (const std::uint32_t corner : t) {
-      vertex_normals_[corner] += across;
+      sums[corner] += across;
       box.extend(vertices_[corner]);
     }
-    indices.push_back(i);
-    boxes.push_back(box);
+    indices.push_back(static_cast<std::uint32_t>(indices.size()));
+    normals_.emplace_back(across.normalized());
+    boxes_.push_back(box);
+    return false;
+  });
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    if (vertex_normals_[i].isZero()) vertex_normals_[i] = sums[i].normalized();
   }
-  tree_.init(indices.begin(), indices.end(), boxes.begin(), boxes.end());
+  tree_.init(indices.begin(), indices.end(), boxes_.begin(), boxes_.end());
 }
 
 std::optional<Vec3> Polygons::towards_camera(const Vec3& at) const {
@@ -208,20 +238,15 @@ std::optional<Vec3> Polygons::towards_camera(const Vec3& at) const {
   return (*viewpoint_ - at).normalized();
 }
 
-Vec3 Polygons::normal(std::uint32_t triangle) const {
-  const Corners& t = triangles_[triangle];
-  return (vertices_[t[1]] - vertices_[t[0]]).cross(vertices_[t[2]] - vertices_[t[0]]).normalized();
-}
-
 Vec3 Polygons::shaded_normal(std::uint32_t triangle, const Vec3& at) const {
   const Corners& t = triangles_[triangle];
-  const Vec3 flat = normal(triangle);
+  const Vec3& flat = normal(triangle);
   Vec3 sum = Vec3::Zero();
   for (std::size_t i = 0; i < 3; ++i) {
     // The share of a corner is the area of the triangle opposite to it.
     const Vec3& b = vertices_[t[(i + 1) % 3]];
     const Vec3& c = vertices_[t[(i + 2) % 3]];
-    sum += std::max(flat.dot((b - at).cross(c - at)), 0.0) * vertex_normals_[t[i]].normalized();
+    sum += std::max(flat.dot((b - at).cross(c - at)), 0.0) * vertex_normals_[t[i]];
   }
   return sum.norm() > 1e-15 ? Vec3(sum.normalized()) : flat;
 }
@@ -233,16 +258,29 @@ std::optional<Polygons::Hit> Polygons::sweep(const Vec3& from, const Vec3& way,
   box.min().array() -= radius + touch;
   box.max().array() += radius + touch;
   std::optional<Hit> first;
-  for_each_in(tree_, box, [&](std::uint32_t index) {
+  for_each_in(box, [&](std::uint32_t index) {
     const Corners& t = triangles_[index];
     const Vec3& a = vertices_[t[0]];
-    const Vec3 n = normal(index);
+    const Vec3& n = normal(index);
     const double height = n.dot(from - a);
     if (height < -touch) return;  // from behind it may pass
+    const double speed = n.dot(way);
+    // Of the way, at least this lies before the ball touches the triangle's plane.
+    const double before = height - radius - touch;
+    if (before > (first ? first->share : 1.0) * std::max(0.0, -speed)) return;
+    // The ball cuts a disc out of that plane at most; does its path there come near the triangle?
+    const Vec3 along = way - speed * n;
+    Vec3 off = boxes_[index].center() - from;
+    off -= off.dot(n) * n;
+    if (along.squaredNorm() > 0.0)
+      off -= std::clamp(off.dot(along) / along.squaredNorm(), 0.0, 1.0) * along;
+    const double lowest = std::max(0.0, std::min(height, height + speed));
+    const double disc = (radius + touch) * (radius + touch) - lowest * lowest;
+    const double near = std::sqrt(std::max(0.0, disc)) + 0.5 * boxes_[index].diagonal().norm();
+    if (off.squaredNorm() > (near + touch) * (near + touch)) return;
     const auto consider = [&](double share, const Vec3& direction) {
       if (!first || share < first->share) first = Hit{share, direction, index};
     };
-    const double speed = n.dot(way);
     if (speed < 0.0) {
       const double share = std::max(0.0, (height - radius) / -speed);
       if (share <= 1.0) {
@@ -274,7 +312,7 @@ std::optional<Polygons::Hit> Polygons::sweep(const Vec3& from, const Vec3& way,
 std::optional<Vec3> Polygons::nearest(const Vec3& at, double within) const {
   std::optional<Vec3> best;
   const Box box(Vec3(at.array() - within), Vec3(at.array() + within));
-  for_each_in(tree_, box, [&](std::uint32_t index) {
+  for_each_in(box, [&](std::uint32_t index) {
     const Corners& t = triangles_[index];
     if (normal(index).dot(at - vertices_[t[0]]) < 0.0) return;
     const Vec3 place = nearest_on(vertices_[t[0]], vertices_[t[1]], vertices_[t[2]], at);

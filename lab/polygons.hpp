@@ -9,18 +9,19 @@
 #include <Eigen/Geometry>
 #include <unsupported/Eigen/BVH>
 
-#include "palpate/core/cloud.hpp"
+#include "palpate/cloud/point_cloud.hpp"
 
 namespace palpate::lab {
 
 /// A surface of triangles near a place, with a tree of boxes over them: a mesh that came with the
-/// cloud, or a depth image (or a grid of points) of which every four neighbours make two triangles.
+/// cloud, or a depth image (or organised points) of which every four neighbours make two triangles.
 class Polygons {
  public:
   /// @param reach  [m] of an image, what is farther than this from the place is left out
   explicit Polygons(double reach) : reach_(reach) {}
 
   /// Takes a new frame into use. The cloud must live until the next call.
+  /// @throws Error if it has points, but neither faces nor an image to make them of.
   void frame(const Cloud& cloud);
   /// Sees to it that all triangles within 2/3 of the reach of `place` are here.
   void cover(const Vec3& place);
@@ -39,8 +40,9 @@ class Polygons {
   /// [-] from `at` to where an image was seen from; none of a mesh.
   [[nodiscard]] std::optional<Vec3> towards_camera(const Vec3& at) const;
   /// [-] of a triangle, outward.
-  [[nodiscard]] Vec3 normal(std::uint32_t triangle) const;
-  /// [-] at a place on a triangle, interpolated between the normals of its corners.
+  [[nodiscard]] const Vec3& normal(std::uint32_t triangle) const { return normals_[triangle]; }
+  /// [-] at a place on a triangle, interpolated between the normals of its corners: those that a
+  /// mesh came with, or means of the triangles about them, weighted by area.
   [[nodiscard]] Vec3 shaded_normal(std::uint32_t triangle, const Vec3& at) const;
   [[nodiscard]] std::size_t size() const { return triangles_.size(); }
 
@@ -49,7 +51,10 @@ class Polygons {
 
   void add_grid(const std::vector<Vec3>& points, int columns, int rows,
                 const std::optional<Vec3>& viewpoint);
+  void add_mesh(const Surface& mesh);
   void add(const Cloud& cloud, const Vec3& place);
+  template <class Visit>
+  void for_each_in(const Eigen::AlignedBox3d& box, const Visit& visit) const;
 
   double reach_;
   const Cloud* cloud_ = nullptr;
@@ -57,6 +62,8 @@ class Polygons {
   Vec3 centre_ = Vec3::Zero();
   std::vector<Vec3> vertices_, vertex_normals_;
   std::vector<Corners> triangles_;
+  std::vector<Vec3> normals_;  // of the triangles
+  std::vector<Eigen::AlignedBox3d> boxes_;
   std::optional<Vec3> viewpoint_;  // [m] of the image that was added last
   Eigen::KdBVH<double, 3, std::uint32_t> tree_;
 };

@@ -15,6 +15,8 @@
 // `force-shading` turns the god-object's force to the normal interpolated between the corners.
 #include <array>
 #include <cmath>
+#include <optional>
+#include <tuple>
 
 #include "lab/method.hpp"
 #include "lab/polygons.hpp"
@@ -23,37 +25,48 @@
 namespace palpate::lab {
 namespace {
 
-constexpr int most_moves = 16;  // a tick
+constexpr int most_moves = 16;    // a tick
+constexpr double at_rest = 1e-7;  // [m] more than it is kept off the triangles
 
 struct Plane {
   Vec3 normal;
   Vec3 at;
 };
 
-// The place nearest to `hip` that is behind none of the (at most three) planes: of all subsets, the
-// nearest projection onto one that satisfies the others.
+// The place nearest to `hip` that is behind none of the (at most three) planes: of the feet of
+// `hip` on each plane, on the lines where two meet and on the point where three do, the nearest
+// that the others allow.
 Vec3 nearest_allowed(const std::vector<Plane>& planes, const Vec3& hip) {
-  Vec3 best = hip;
-  double least = std::numeric_limits<double>::infinity();
-  for (unsigned subset = 0; subset < 1U << planes.size(); ++subset) {
-    Eigen::Matrix3d rows = Eigen::Matrix3d::Zero();
-    Vec3 behind = Vec3::Zero();
+  std::array<double, 3> behind{};  // [m] how far the hip is
+  for (std::size_t i = 0; i < planes.size(); ++i)
+    behind[i] = planes[i].normal.dot(planes[i].at - hip);
+  std::optional<Vec3> best;
+  const auto consider = [&](const Vec3& way) {
+    if (best && way.squaredNorm() >= (*best - hip).squaredNorm()) return;
     for (std::size_t i = 0; i < planes.size(); ++i) {
-      if ((subset >> i & 1U) == 0) continue;
-      rows.row(static_cast<Eigen::Index>(i)) = planes[i].normal;
-      behind[static_cast<Eigen::Index>(i)] = planes[i].normal.dot(planes[i].at - hip);
+      if (!(planes[i].normal.dot(way) - behind[i] > -1e-9)) return;
     }
-    // Least squares where planes are nearly parallel; a zero row asks for nothing.
-    const Vec3 place =
-        hip + rows.jacobiSvd(Eigen::ComputeFullU | Eigen::ComputeFullV).solve(behind);
-    bool allowed = true;
-    for (const Plane& plane : planes)
-      allowed = allowed && plane.normal.dot(place - plane.at) > -1e-9;
-    if (!allowed || (place - hip).norm() >= least) continue;
-    least = (place - hip).norm();
-    best = place;
+    best = hip + way;
+  };
+  consider(Vec3::Zero());
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const Vec3& n = planes[i].normal;
+    consider(behind[i] * n);
+    for (std::size_t j = 0; j < i; ++j) {
+      const Vec3& m = planes[j].normal;
+      const double c = n.dot(m);
+      const double rest = 1.0 - c * c;
+      if (rest < 1e-12) continue;  // parallel
+      consider(((behind[i] - c * behind[j]) * n + (behind[j] - c * behind[i]) * m) / rest);
+    }
   }
-  return std::isfinite(least) ? best : planes.back().at;
+  if (planes.size() == 3) {
+    const auto& [a, b, c] = std::tie(planes[0].normal, planes[1].normal, planes[2].normal);
+    const double volume = a.dot(b.cross(c));
+    if (std::abs(volume) > 1e-12)
+      consider((behind[0] * b.cross(c) + behind[1] * c.cross(a) + behind[2] * a.cross(b)) / volume);
+  }
+  return best.value_or(planes.empty() ? hip : planes.back().at);
 }
 
 class Constrained final : public TouchMethod {
@@ -128,7 +141,7 @@ class Constrained final : public TouchMethod {
       ++moves_;
       const Vec3 goal = nearest_allowed(planes, hip);
       const Vec3 way = goal - *centre_;
-      if (way.norm() < 1e-9) break;
+      if (way.norm() < at_rest) break;
       const auto hit = polygons_.sweep(*centre_, way, radius_);
       if (!hit) {
         centre_ = goal;

@@ -5,7 +5,7 @@
 //
 // Left open by the publication: how many neighbours. A plane through those within 4 mm of the HIP's
 // line of sight favours it over single pixels. Half a millimetre of height is white against black,
-// where a frame has an image (`Surface::brightness`); depth cameras' frames here have none.
+// where a frame came with its brightness.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,8 +13,8 @@
 #include <Eigen/Dense>
 
 #include "lab/method.hpp"
-#include "lab/surface_cloud.hpp"
 #include "lab/ticks.hpp"
+#include "palpate/cloud/depth_image.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -57,24 +57,29 @@ class ImageFeatures final : public TouchMethod {
     }
     const Vec3 plane = squares.ldlt().solve(sums);
     const Vec3 normal = (plane[1] / around * right + plane[2] / around * down - away).normalized();
-    const Vec3 seen = hip + plane[0] * away + texture(hip, away) * normal;
+    const Vec3 seen = hip + plane[0] * away + texture(hip) * normal;
     const double depth = normal.dot(seen - hip);
     if (!(depth > 0.0)) return nothing;
     return contact_tick(parameters_, hip, {hip + depth * normal, normal}, t, frames_ - 1);
   }
 
  private:
-  // [m] Of the point that is nearest to the line of sight.
-  [[nodiscard]] double texture(const Vec3& hip, const Vec3& away) const {
-    const auto* image = dynamic_cast<const SurfaceCloud*>(cloud_);
-    if (image == nullptr || image->surface().brightness.empty()) return 0.0;
+  // [m] Of the pixel that sees the HIP.
+  [[nodiscard]] double texture(const Vec3& hip) const {
+    const auto* image = dynamic_cast<const DepthImage*>(cloud_);
+    if (image == nullptr || image->brightness().empty()) return 0.0;
+    const Vec3 seen = image->world_from_camera().inverse() * hip;
+    const auto window = image->rays().window(seen, around);
     double least = std::numeric_limits<double>::infinity();
     double height = 0.0;
-    for (std::size_t i = 0; i < image->surface().points.size(); ++i) {
-      const double aside = (image->surface().points[i] - hip).cross(away).squaredNorm();
-      if (aside >= least) continue;
-      least = aside;
-      height = texture_height * double{image->surface().brightness[i]};
+    for (int v = window.v_begin; v < window.v_end; ++v) {
+      for (int u = window.u_begin; u < window.u_end; ++u) {
+        const double off = (image->rays().ray(u, v) - seen.hnormalized()).squaredNorm();
+        if (!(off < least)) continue;
+        least = off;
+        const auto pixel = static_cast<std::size_t>(v) * image->intrinsics().width + u;
+        height = texture_height * image->brightness()[pixel] / 255.0;
+      }
     }
     return height;
   }

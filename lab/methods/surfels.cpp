@@ -68,7 +68,8 @@ class Surfels final : public ImplicitMethod {
     Vec3 direction = Vec3::Zero();
     for (const auto& [index, squared] : near_) {
       const double q = std::sqrt(squared) / radius_;
-      const double w = std::pow(1.0 - q, 4) * (4.0 * q + 1.0);
+      const double square = (1.0 - q) * (1.0 - q);
+      const double w = square * square * (4.0 * q + 1.0);
       total += w;
       mean += w * points_.points()[index];
       direction += w * normal(index);

@@ -323,12 +323,14 @@ ViewingRays::Window ViewingRays::window(const Vec3& centre, double radius) const
 }
 
 DepthImage::DepthImage(std::shared_ptr<const ViewingRays> rays, std::vector<std::uint16_t> depth,
-                       double units_per_metre, const Eigen::Isometry3d& world_from_camera)
+                       double units_per_metre, const Eigen::Isometry3d& world_from_camera,
+                       std::vector<std::uint8_t> brightness)
     : rays_(std::move(rays)),
       depth_(std::move(depth)),
       units_per_metre_(units_per_metre),
       metres_per_unit_(1.0 / units_per_metre),
-      world_from_camera_(world_from_camera) {
+      world_from_camera_(world_from_camera),
+      brightness_(std::move(brightness)) {
   if (!rays_) throw Error("depth image", "it has no camera", "give its viewing rays");
   const Intrinsics& k = rays_->intrinsics();
   if (depth_.size() != static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height)) {
@@ -336,6 +338,12 @@ DepthImage::DepthImage(std::shared_ptr<const ViewingRays> rays, std::vector<std:
                 std::to_string(depth_.size()) + " readings do not fill " + std::to_string(k.width) +
                     "x" + std::to_string(k.height) + " pixels",
                 "give an image of the size that the intrinsics are for");
+  }
+  if (!brightness_.empty() && brightness_.size() != depth_.size()) {
+    throw Error("depth image",
+                std::to_string(brightness_.size()) + " values of brightness for " +
+                    std::to_string(depth_.size()) + " pixels",
+                "give one for each pixel, or none");
   }
   if (!(std::isfinite(units_per_metre_) && units_per_metre_ > 0.0)) {
     throw Error("depth image", "units per metre must be positive",

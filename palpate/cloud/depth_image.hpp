@@ -72,11 +72,13 @@ class DepthImage final : public Cloud {
   /// @param depth              row by row, width*height values; depth along the optical axis
   /// @param units_per_metre    e.g. 1000 for millimetres, 5000 for the TUM benchmark
   /// @param world_from_camera  rigid pose of the optical frame
+  /// @param brightness         0 to 255 of each pixel, row by row; empty if it is not known
   /// @throws Error if the size does not match, the units are not positive, or the pose is not
   ///         rigid and finite.
   DepthImage(std::shared_ptr<const ViewingRays> rays, std::vector<std::uint16_t> depth,
              double units_per_metre,
-             const Eigen::Isometry3d& world_from_camera = Eigen::Isometry3d::Identity());
+             const Eigen::Isometry3d& world_from_camera = Eigen::Isometry3d::Identity(),
+             std::vector<std::uint8_t> brightness = {});
 
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
   void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
@@ -84,6 +86,8 @@ class DepthImage final : public Cloud {
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return rays_->intrinsics(); }
   [[nodiscard]] const ViewingRays& rays() const noexcept { return *rays_; }
   [[nodiscard]] const std::vector<std::uint16_t>& depth() const noexcept { return depth_; }
+  /// As given: the kernel does not look at it.
+  [[nodiscard]] const std::vector<std::uint8_t>& brightness() const noexcept { return brightness_; }
   [[nodiscard]] double units_per_metre() const noexcept { return units_per_metre_; }
   [[nodiscard]] const Eigen::Isometry3d& world_from_camera() const noexcept {
     return world_from_camera_;
@@ -103,6 +107,7 @@ class DepthImage final : public Cloud {
   double units_per_metre_;
   double metres_per_unit_;
   Eigen::Isometry3d world_from_camera_;
+  std::vector<std::uint8_t> brightness_;
 };
 
 /// Is this depth reading a measurement? 0 is "none", 65535 "saturated".

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "palpate/core/error.hpp"
 
@@ -141,6 +142,21 @@ PointCloud::PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoi
     y_[i] = p.y();
     z_[i] = p.z();
   }
+}
+
+PointCloud::PointCloud(Surface surface, std::optional<Vec3> viewpoint, double voxel)
+    : PointCloud(std::span<const Vec3>(surface.points), viewpoint, voxel) {
+  const std::size_t count = surface.points.size();
+  if (!surface.normals.empty() && surface.normals.size() != count)
+    throw Error("surface", "its normals are not as many as its points", "give one for each");
+  const auto image = static_cast<std::int64_t>(surface.columns) * surface.rows;
+  if (image != 0 && image != static_cast<std::int64_t>(count))
+    throw Error("surface", "its points are not columns times rows", "give each place one, or NaN");
+  for (const auto& triangle : surface.triangles) {
+    if (*std::max_element(triangle.begin(), triangle.end()) >= count)
+      throw Error("surface", "a triangle's corner is none of its points", "number them from 0");
+  }
+  surface_ = std::make_shared<const Surface>(std::move(surface));
 }
 
 const PointCloud::Cell* PointCloud::find(std::uint64_t key) const noexcept {

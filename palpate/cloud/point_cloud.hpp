@@ -12,6 +12,14 @@
 
 namespace palpate {
 
+/// What else may be known of points; what is empty is not known. The kernel touches points alone.
+struct Surface {
+  std::vector<Vec3> points{};                             ///< [m] world
+  int columns = 0, rows = 0;                              ///< of points in the order of an image
+  std::vector<Vec3> normals{};                            ///< [-] of each point, outward; or zero
+  std::vector<std::array<std::uint32_t, 3>> triangles{};  ///< counter-clockwise from outside
+};
+
 /// Points in no particular order, sorted once into a hash of voxels on the camera's thread.
 class PointCloud final : public Cloud {
  public:
@@ -23,9 +31,16 @@ class PointCloud final : public Cloud {
   /// @throws Error if `voxel` is not in 0.001 to 1 m.
   explicit PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoint = std::nullopt,
                       double voxel = 0.010);
+  /// The same, with what else is known kept beside it.
+  /// @throws Error also if normals, image or triangles do not fit the points.
+  explicit PointCloud(Surface surface, std::optional<Vec3> viewpoint = std::nullopt,
+                      double voxel = 0.010);
 
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
   void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
+
+  /// All points as they came, non-finite ones included, and what else is known of them; or null.
+  [[nodiscard]] const Surface* surface() const noexcept { return surface_.get(); }
 
   [[nodiscard]] std::size_t size() const noexcept { return x_.size(); }
   /// How many points were left out because a coordinate was not finite.
@@ -57,6 +72,7 @@ class PointCloud final : public Cloud {
   double voxel_;
   std::optional<Vec3> viewpoint_;
   std::size_t non_finite_ = 0;
+  std::shared_ptr<const Surface> surface_;
 };
 
 /// Every point looked at, every time: the oracle that the fast searches are tested against.

@@ -67,6 +67,18 @@ class PngReader {
     return true;
   }
 
+  // Of the rows to come.
+  bool turn_grey(const Header& header) noexcept {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;
+    png_set_expand(png_);
+    png_set_scale_16(png_);
+    png_set_strip_alpha(png_);
+    if ((header.colour & PNG_COLOR_MASK_COLOR) != 0)
+      png_set_rgb_to_gray_fixed(png_, PNG_ERROR_ACTION_NONE, PNG_RGB_TO_GRAY_DEFAULT,
+                                PNG_RGB_TO_GRAY_DEFAULT);
+    return true;
+  }
+
   bool read_rows(png_bytepp rows) noexcept {
     if (setjmp(png_jmpbuf(png_)) != 0) return false;
     if constexpr (std::endian::native == std::endian::little) png_set_swap(png_);
@@ -162,13 +174,14 @@ std::vector<std::byte> encode(int width, int height, std::span<const std::uint16
   return bytes;
 }
 
-}  // namespace
-
-DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& name) {
+// The pixels of an image; `set_up` judges its header and says how it is to be read, false where
+// libpng fails.
+template <class Value, class SetUp>
+std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& name,
+                          const char* needed, int& width, int& height, const SetUp& set_up) {
   const auto* signature = reinterpret_cast<png_const_bytep>(bytes.data());
   if (bytes.size() < signature_size || png_sig_cmp(signature, 0, signature_size) != 0) {
-    throw Error(name, bytes.empty() ? "is empty" : "is not a PNG image",
-                "a 16-bit grey PNG is needed");
+    throw Error(name, bytes.empty() ? "is empty" : "is not a PNG image", needed);
   }
   PngReader reader(bytes);
   PngReader::Header header;
@@ -176,14 +189,8 @@ DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& na
     return Error(name, "is a damaged PNG: " + reader.message(),
                  "copy or record it again, it may have been cut short");
   };
-  if (!reader.read_header(header)) throw damaged();
+  if (!reader.read_header(header) || !set_up(reader, header)) throw damaged();
   const std::string size = std::to_string(header.width) + "x" + std::to_string(header.height);
-  if (header.bits != 16 || header.colour != PNG_COLOR_TYPE_GRAY) {
-    throw Error(name,
-                "is a PNG of " + std::to_string(header.bits) + "-bit " +
-                    colour_name(header.colour) + ", not of depth",
-                "a 16-bit grey PNG is needed");
-  }
   if (header.width > largest_side || header.height > largest_side) {
     throw Error(name, "is an image of " + size + " pixels",
                 "images up to 16384x16384 can be read; it may be damaged");
@@ -191,26 +198,52 @@ DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& na
   // Deflate shrinks by 1032 at most; what is promised beyond that cannot be there.
   constexpr std::size_t best_ratio = 1032;
   const std::size_t pixels = std::size_t{header.width} * header.height;
-  if (pixels * sizeof(std::uint16_t) / best_ratio > bytes.size()) {
+  if (pixels * static_cast<std::size_t>(header.bits) / 8 / best_ratio > bytes.size()) {
     throw Error(name,
                 "promises " + size + " pixels, more than its " + std::to_string(bytes.size()) +
                     " bytes can hold",
                 "copy or record it again, it may have been cut short");
   }
-
-  DepthPng image{.width = static_cast<int>(header.width),
-                 .height = static_cast<int>(header.height),
-                 .depth = std::vector<std::uint16_t>(pixels)};
+  width = static_cast<int>(header.width);
+  height = static_cast<int>(header.height);
+  std::vector<Value> values(pixels);
   std::vector<png_bytep> rows(header.height);
   for (std::size_t v = 0; v < rows.size(); ++v) {
-    rows[v] = reinterpret_cast<png_bytep>(image.depth.data() + v * header.width);
+    rows[v] = reinterpret_cast<png_bytep>(values.data() + v * header.width);
   }
   if (!reader.read_rows(rows.data())) throw damaged();
+  return values;
+}
+
+}  // namespace
+
+DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& name) {
+  const char* const needed = "a 16-bit grey PNG is needed";
+  DepthPng image;
+  image.depth =
+      decode<std::uint16_t>(bytes, name, needed, image.width, image.height,
+                            [&](PngReader& /*reader*/, const PngReader::Header& header) {
+                              if (header.bits != 16 || header.colour != PNG_COLOR_TYPE_GRAY) {
+                                throw Error(name,
+                                            "is a PNG of " + std::to_string(header.bits) + "-bit " +
+                                                colour_name(header.colour) + ", not of depth",
+                                            needed);
+                              }
+                              return true;
+                            });
   return image;
 }
 
 DepthPng read_depth_png(const std::filesystem::path& path) {
   return parse_depth_png(read_file(path, largest_file), path.string());
+}
+
+GreyPng read_grey_png(const std::filesystem::path& path) {
+  GreyPng image;
+  image.brightness = decode<std::uint8_t>(
+      read_file(path, largest_file), path.string(), "a PNG is needed", image.width, image.height,
+      [](PngReader& reader, const auto& header) { return reader.turn_grey(header); });
+  return image;
 }
 
 std::vector<std::byte> encode_depth_png(int width, int height,

@@ -26,6 +26,18 @@ DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& na
 /// @throws Error as parse_depth_png, or if the file cannot be read.
 DepthPng read_depth_png(const std::filesystem::path& path);
 
+/// An image of what a camera saw in visible light.
+struct GreyPng {
+  int width = 0;                         ///< [px]
+  int height = 0;                        ///< [px]
+  std::vector<std::uint8_t> brightness;  ///< row by row, width*height; 255 is white
+};
+
+/// Decodes any PNG to 8-bit grey: colours are weighted as the eye does, what is transparent is as
+/// if it were not.
+/// @throws Error as read_depth_png, but for its kind.
+GreyPng read_grey_png(const std::filesystem::path& path);
+
 /// A 16-bit grey PNG in memory, packed for speed rather than size; about 6 ms for 640x480.
 /// @param depth  row by row, width*height raw values
 /// @throws Error if the sizes do not match.

@@ -29,6 +29,7 @@ struct RecordedImage {
   fs::path file;
   double stamp = 0.0;  // [s]
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
+  fs::path brightness{};  // empty if none is wanted, or there is none
 };
 
 class DepthRecording final : public Source {
@@ -43,13 +44,11 @@ class DepthRecording final : public Source {
     if (next_ == images_.size()) return std::nullopt;
     const RecordedImage& image = images_[next_++];  // before anything can throw
     DepthPng png = read_depth_png(image.file);
-    const Intrinsics& k = camera_.intrinsics;
-    if (png.width != k.width || png.height != k.height) {
-      throw Error(image.file.string(),
-                  "is an image of " + std::to_string(png.width) + "x" + std::to_string(png.height) +
-                      " pixels, but the camera has " + std::to_string(k.width) + "x" +
-                      std::to_string(k.height),
-                  "write an intrinsics.json for this camera");
+    check_size(image.file, png.width, png.height);
+    GreyPng grey;
+    if (!image.brightness.empty()) {
+      grey = read_grey_png(image.brightness);
+      check_size(image.brightness, grey.width, grey.height);
     }
     for (const std::uint16_t no_value : {camera_.invalid_value, camera_.saturated_value}) {
       if (is_measured(no_value)) {
@@ -58,12 +57,22 @@ class DepthRecording final : public Source {
     }
     return Frame{image.stamp,
                  std::make_shared<DepthImage>(rays_, std::move(png.depth), camera_.units_per_metre,
-                                              image.world_from_camera)};
+                                              image.world_from_camera, std::move(grey.brightness))};
   }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
  private:
+  void check_size(const fs::path& file, int width, int height) const {
+    const Intrinsics& k = camera_.intrinsics;
+    if (width == k.width && height == k.height) return;
+    throw Error(file.string(),
+                "is an image of " + std::to_string(width) + "x" + std::to_string(height) +
+                    " pixels, but the camera has " + std::to_string(k.width) + "x" +
+                    std::to_string(k.height),
+                "write an intrinsics.json for this camera");
+  }
+
   RecordedCamera camera_;
   std::shared_ptr<const ViewingRays> rays_;
   std::vector<RecordedImage> images_;
@@ -139,6 +148,29 @@ void place(const Uri& uri, const Trajectory& trajectory, const std::string& traj
   }
 }
 
+// Gives each depth image the visible one that was taken nearest to it in time; a note says how many
+// have none.
+void brighten(const fs::path& list, std::vector<RecordedImage>& images, SourceInfo& info) {
+  constexpr double apart = 0.02;  // [s] at most, as the benchmark's own scripts have it
+  const std::vector<StampedFile> listed = parse_image_list(read_text(list), list.string());
+  std::size_t without = 0;
+  for (RecordedImage& image : images) {
+    const auto off = [&](const StampedFile& file) { return std::abs(file.stamp - image.stamp); };
+    const auto nearest =
+        std::min_element(listed.begin(), listed.end(),
+                         [&](const auto& a, const auto& b) { return off(a) < off(b); });
+    if (nearest != listed.end() && off(*nearest) <= apart)
+      image.brightness = list.parent_path() / nearest->file;
+    else
+      ++without;
+  }
+  if (without > 0) {
+    info.notes.push_back(std::to_string(without) + " of " + std::to_string(images.size()) +
+                         " frames have no brightness: " + list.filename().string() +
+                         " has no image within 20 ms");
+  }
+}
+
 // Counts stamps from the first image.
 void start_clock(std::vector<RecordedImage>& images, SourceInfo& info) {
   info.start_time = images.front().stamp;
@@ -162,7 +194,7 @@ bool is_json(const fs::path& path) {
 }  // namespace
 
 std::unique_ptr<Source> open_tum(const Uri& uri) {
-  allow_only(uri, {"poses", "stamps"});
+  allow_only(uri, {"poses", "stamps", "brightness"});
   const fs::path folder = uri.path();
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
@@ -199,6 +231,14 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
       throw Error(uri.text(), "has no " + poses, "give poses=none for the camera's own frame");
     }
     place(uri, parse_trajectory(read_text(file), file.string()), poses, images, info);
+  }
+  if (uri.has("brightness")) {
+    const fs::path file = folder / uri.text_option("brightness", "");
+    if (!fs::is_regular_file(file, error)) {
+      throw Error(uri.text(), "has no list of images " + file.filename().string(),
+                  "name one as depth.txt is, such as brightness=rgb.txt");
+    }
+    brighten(file, images, info);
   }
   if (images.size() > 1) info.frame_rate = median_rate(images);
   if (stamps == "relative") start_clock(images, info);

@@ -25,7 +25,8 @@ namespace palpate {
 /// recording's clock. `stamps=absolute` gives the recording's own stamps.
 /// `poses=FILE` reads another trajectory, named relative to DIR; `poses=none` gives points in the
 /// camera's own frame. Frames of which the trajectory does not know the pose are left out, which
-/// SourceInfo::notes says.
+/// SourceInfo::notes says. `brightness=rgb.txt` reads that list of images in visible light, of the
+/// same camera and size, and gives each frame the one within 20 ms of it, if any.
 /// @throws Error if the lists, poses or intrinsics cannot be used, or no frame is left.
 std::unique_ptr<Source> open_tum(const Uri& uri);
 

@@ -18,6 +18,10 @@ struct Property {
   std::string_view name;
   Scalar type;
   std::optional<Scalar> length;  // the type of a list's length; none if this is no list
+  // Where its values go; what is asked for by nobody is checked and passed over.
+  std::vector<Vec3>* into = nullptr;
+  int axis = 0;
+  bool corners = false;  // a list of vertices
 
   [[nodiscard]] std::size_t least_bytes() const { return detail::size_of(length.value_or(type)); }
 };
@@ -30,13 +34,18 @@ struct Element {
   [[nodiscard]] std::string text() const { return "element " + detail::quoted(name); }
 };
 
+// Triangles, made of the lists of an element's rows.
+struct Faces {
+  std::uint64_t vertices = 0;  // as many as the header declares
+  bool strips = false;         // every three neighbours of a list are a triangle; -1 begins anew
+  std::vector<std::array<std::uint32_t, 3>> triangles{};
+  std::vector<std::int64_t> corners{};  // the list being read
+};
+
 struct Header {
   std::string_view encoding;
   std::vector<Element> elements;
 };
-
-// Which properties of an element are a point's coordinates.
-using Coordinates = std::array<std::size_t, 3>;
 
 Scalar type_of(const Cursor& file, std::string_view name) {
   constexpr std::array<std::pair<std::string_view, Scalar>, 16> types{
@@ -132,24 +141,68 @@ Header read_header(Cursor& file) {
   file.fail("the header has no end_header line", cut_short);
 }
 
-// None unless the element has each of the names once, and not as a list.
-std::optional<Coordinates> find_coordinates(const Element& element,
-                                            const std::array<std::string_view, 3>& names) {
-  Coordinates found{};
+// Asks for three properties as coordinates. False unless the element has each of the names once,
+// and not as a list.
+bool ask_for(const std::array<std::string_view, 3>& names, Element& element,
+             std::vector<Vec3>& into) {
+  std::array<Property*, 3> found{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::size_t times = 0;
-    for (std::size_t i = 0; i < element.properties.size(); ++i) {
-      const Property& property = element.properties[i];
-      if (property.name == names[axis]) {
-        found[axis] = i;
-        times += property.length ? 2 : 1;
-      }
+    for (Property& property : element.properties) {
+      if (property.name != names[axis]) continue;
+      if (found[axis] != nullptr || property.length) return false;
+      found[axis] = &property;
     }
-    if (times != 1) {
-      return std::nullopt;
+    if (found[axis] == nullptr) return false;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    found[axis]->into = &into;
+    found[axis]->axis = axis;
+  }
+  return true;
+}
+
+// Asks for the lists of corners, if the element has them.
+void ask_for_corners(const Cursor& file, Element& element) {
+  for (Property& property : element.properties) {
+    if (property.name != "vertex_indices" && property.name != "vertex_index") continue;
+    if (!property.length || property.type == Scalar::float32 || property.type == Scalar::float64) {
+      file.fail(
+          element.text() + ": " + std::string(property.name) + " is not a list of whole numbers",
+          "write it as `property list uchar int vertex_indices`");
+    }
+    property.corners = true;
+    return;
+  }
+}
+
+// @throws Error by `fail(reason)` where a corner is no vertex.
+template <class Fail>
+void add_triangles(const Element& element, Faces& faces, const Fail& fail) {
+  const std::vector<std::int64_t>& corners = faces.corners;
+  for (const std::int64_t corner : corners) {
+    if (faces.strips && corner == -1) continue;
+    if (corner < 0 || static_cast<std::uint64_t>(corner) >= faces.vertices) {
+      fail(element.text() + " names vertex " + std::to_string(corner) + ", but there are " +
+           std::to_string(faces.vertices) + ", counted from 0");
     }
   }
-  return found;
+  const auto add = [&](std::size_t a, std::size_t b, std::size_t c) {
+    faces.triangles.push_back({static_cast<std::uint32_t>(corners[a]),
+                               static_cast<std::uint32_t>(corners[b]),
+                               static_cast<std::uint32_t>(corners[c])});
+  };
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (faces.strips && corners[i] == -1) begin = i + 1;
+    if (i < begin + 2) continue;
+    if (!faces.strips) {
+      add(begin, i - 1, i);  // a fan
+    } else if ((i - begin) % 2 == 0) {
+      add(i - 2, i - 1, i);
+    } else {
+      add(i - 1, i - 2, i);
+    }
+  }
 }
 
 [[noreturn]] void fail_promise(const Cursor& file, const Element& element) {
@@ -159,8 +212,7 @@ std::optional<Coordinates> find_coordinates(const Element& element,
                       cut_short);
 }
 
-void read_ascii_row(Cursor& file, const Element& element, const Coordinates* coordinates,
-                    Vec3* point) {
+void read_ascii_row(Cursor& file, const Element& element, std::size_t row, Faces& faces) {
   auto line = file.next_full_line();
   if (!line) {
     file.fail("ends within " + element.text(), cut_short);
@@ -173,28 +225,37 @@ void read_ascii_row(Cursor& file, const Element& element, const Coordinates* coo
     }
     return token;
   };
-  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+  for (const Property& property : element.properties) {
     const std::string_view token = next();
-    if (element.properties[i].length) {
+    if (property.length) {
       const auto length = detail::to_count(token);
       if (!length) {
         file.fail_in_line("a list's length is " + detail::quoted(token), correct_line);
       }
+      faces.corners.clear();
       for (std::uint64_t k = 0; k < *length; ++k) {
-        next();
-      }
-      continue;
-    }
-    for (int axis = 0; coordinates != nullptr && axis < 3; ++axis) {
-      if ((*coordinates)[axis] == i) {
-        const auto number = detail::to_number(token);
-        if (!number) {
-          file.fail_in_line(std::string(element.properties[i].name) + " is " +
-                                detail::quoted(token) + ", not a number",
+        const std::string_view value = next();
+        if (!property.corners) continue;
+        const auto corner = detail::to_index(value);
+        if (!corner) {
+          file.fail_in_line("a vertex of " + element.text() + " is " + detail::quoted(value) +
+                                ", not a whole number",
                             correct_line);
         }
-        (*point)[axis] = *number;
+        faces.corners.push_back(*corner);
       }
+      if (property.corners) {
+        add_triangles(element, faces,
+                      [&](const std::string& reason) { file.fail_in_line(reason, correct_line); });
+      }
+    } else if (property.into != nullptr) {
+      const auto number = detail::to_number(token);
+      if (!number) {
+        file.fail_in_line(
+            std::string(property.name) + " is " + detail::quoted(token) + ", not a number",
+            correct_line);
+      }
+      (*property.into)[row][property.axis] = *number;
     }
   }
   if (!detail::next_token(*line).empty()) {
@@ -203,41 +264,48 @@ void read_ascii_row(Cursor& file, const Element& element, const Coordinates* coo
   }
 }
 
-void read_binary_row(Cursor& file, const Element& element, std::endian order,
-                     const Coordinates* coordinates, Vec3* point) {
-  for (std::size_t i = 0; i < element.properties.size(); ++i) {
-    const Property& property = element.properties[i];
+void read_binary_row(Cursor& file, const Element& element, std::endian order, std::size_t row,
+                     Faces& faces) {
+  const auto integer = [order](Scalar type, const std::byte* value) {
+    return detail::visit_scalar(type, [&](auto kind) {
+      return static_cast<std::int64_t>(detail::load<decltype(kind)>(value, order));
+    });
+  };
+  for (const Property& property : element.properties) {
     if (file.left() < property.least_bytes()) {
       file.fail_at_offset("ends within " + element.text(), cut_short);
     }
     const std::byte* const value = file.take(property.least_bytes());
     if (property.length) {
-      const auto length = detail::visit_scalar(*property.length, [&](auto type) {
-        return static_cast<std::int64_t>(detail::load<decltype(type)>(value, order));
-      });
+      const std::int64_t length = integer(*property.length, value);
       const std::size_t size = detail::size_of(property.type);
       if (length < 0 || static_cast<std::uint64_t>(length) > file.left() / size) {
         file.fail_at_offset("a list of " + element.text() + " promises " + std::to_string(length) +
                                 " values, but " + std::to_string(file.left()) + " bytes are left",
                             cut_short);
       }
-      file.take(static_cast<std::size_t>(length) * size);
-      continue;
-    }
-    for (int axis = 0; coordinates != nullptr && axis < 3; ++axis) {
-      if ((*coordinates)[axis] == i) {
-        detail::load_column(value, 0, property.type, order, {point, 1}, axis);
+      const auto count = static_cast<std::size_t>(length);
+      const std::byte* const list = file.take(count * size);
+      if (!property.corners) continue;
+      faces.corners.clear();
+      for (std::size_t k = 0; k < count; ++k) {
+        faces.corners.push_back(integer(property.type, list + k * size));
       }
+      add_triangles(element, faces, [&](const std::string& reason) {
+        file.fail_at_offset(reason, "write the file anew, or leave its faces out");
+      });
+    } else if (property.into != nullptr) {
+      detail::load_column(value, 0, property.type, order, {&(*property.into)[row], 1},
+                          property.axis);
     }
   }
 }
 
-// Reads all rows of an element; returns their coordinates, if any are asked for.
-std::vector<Vec3> read_element(Cursor& file, const Element& element, std::string_view encoding,
-                               const std::optional<Coordinates>& coordinates) {
+// Reads all rows of an element.
+void read_element(Cursor& file, const Element& element, std::string_view encoding, Faces& faces) {
   const std::vector<Property>& properties = element.properties;
   if (properties.empty()) {
-    return {};  // however many rows it promises, they take no space
+    return;  // however many rows it promises, they take no space
   }
   const bool ascii = encoding == "ascii";
   const std::endian order =
@@ -252,66 +320,67 @@ std::vector<Vec3> read_element(Cursor& file, const Element& element, std::string
   if (element.rows > (file.left() + (ascii ? 1 : 0)) / least_bytes) {
     fail_promise(file, element);
   }
-  std::vector<Vec3> points(coordinates ? element.rows : 0);
+  for (const Property& property : properties) {
+    if (property.into != nullptr) property.into->resize(element.rows);
+  }
   if (!ascii && !has_lists) {
-    const std::byte* const first = file.take(element.rows * least_bytes);
-    std::size_t offset = 0;
-    for (std::size_t i = 0; i < properties.size(); ++i) {
-      for (int axis = 0; coordinates && axis < 3; ++axis) {
-        if ((*coordinates)[axis] == i) {
-          detail::load_column(first + offset, least_bytes, properties[i].type, order, points, axis);
-        }
+    const std::byte* column = file.take(element.rows * least_bytes);
+    for (const Property& property : properties) {
+      if (property.into != nullptr) {
+        detail::load_column(column, least_bytes, property.type, order, *property.into,
+                            property.axis);
       }
-      offset += properties[i].least_bytes();
+      column += property.least_bytes();
     }
-    return points;
+    return;
   }
   for (std::size_t row = 0; row < element.rows; ++row) {
-    const Coordinates* const wanted = coordinates ? &*coordinates : nullptr;
-    Vec3* const point = coordinates ? &points[row] : nullptr;
     if (ascii) {
-      read_ascii_row(file, element, wanted, point);
+      read_ascii_row(file, element, row, faces);
     } else {
-      read_binary_row(file, element, order, wanted, point);
+      read_binary_row(file, element, order, row, faces);
     }
   }
-  return points;
 }
 
 }  // namespace
 
 PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
   Cursor file(bytes, name);
-  const Header header = read_header(file);
+  Header header = read_header(file);
   const auto is_vertex = [](const Element& element) { return element.name == "vertex"; };
+  const auto vertex = std::find_if(header.elements.begin(), header.elements.end(), is_vertex);
   if (std::count_if(header.elements.begin(), header.elements.end(), is_vertex) != 1) {
     file.fail("the header does not declare one element vertex", "give a file that holds points");
   }
 
   PointFile cloud;
   cloud.encoding = header.encoding;
-  for (const Element& element : header.elements) {
+  Faces faces{.vertices = vertex->rows};
+  std::vector<Vec3> viewpoints;
+  for (Element& element : header.elements) {
     if (is_vertex(element)) {
-      const auto coordinates = find_coordinates(element, {"x", "y", "z"});
-      if (!coordinates) {
+      if (!ask_for({"x", "y", "z"}, element, cloud.points)) {
         file.fail("element vertex does not have one x, one y and one z that are no lists",
                   "give a file that holds points");
       }
+      ask_for({"nx", "ny", "nz"}, element, cloud.normals);
       for (const Property& property : element.properties) {
         cloud.fields.push_back(
             {std::string(property.name),
              (property.length ? "list of " : "") + std::string(name_of(property.type))});
       }
-      cloud.points = read_element(file, element, header.encoding, coordinates);
-      continue;
+    } else if (element.name == "face" || element.name == "tristrips") {
+      ask_for_corners(file, element);
+      faces.strips = element.name == "tristrips";
+    } else if (element.name == "camera") {
+      ask_for({"view_px", "view_py", "view_pz"}, element, viewpoints);
     }
-    const bool is_camera = element.name == "camera";
-    const auto coordinates =
-        is_camera ? find_coordinates(element, {"view_px", "view_py", "view_pz"}) : std::nullopt;
-    const auto positions = read_element(file, element, header.encoding, coordinates);
-    if (!positions.empty()) {
-      cloud.viewpoint = positions.front();
-    }
+    read_element(file, element, header.encoding, faces);
+  }
+  cloud.triangles = std::move(faces.triangles);
+  if (!viewpoints.empty()) {
+    cloud.viewpoint = viewpoints.front();
   }
   if (cloud.viewpoint && !cloud.viewpoint->allFinite()) {
     file.fail("the camera's view_px, view_py, view_pz are not finite", "correct them");

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -27,6 +29,10 @@ struct PointFile {
   std::vector<Vec3> points;
   std::size_t width = 0;   ///< [points] in a row of an organised cloud; else all of them
   std::size_t height = 1;  ///< [points] rows of an organised cloud; else 1
+  /// A PLY's nx, ny, nz of each point, as they are: of any length, or not finite. Empty without.
+  std::vector<Vec3> normals;
+  /// A PLY's faces: indices of points, in the order of the file. Polygons are fanned, strips cut.
+  std::vector<std::array<std::uint32_t, 3>> triangles;
   /// From where the points were seen, in the frame of the points: the translation of PCD's
   /// VIEWPOINT, or view_px view_py view_pz of the `camera` element that PCL writes into a PLY.
   ///
@@ -51,8 +57,9 @@ PointFile read_pcd(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name);
 
-/// Reads the vertices of a PLY file, version 1.0: ascii, little or big endian; other elements,
-/// lists and properties are checked and passed over.
+/// Reads a PLY file, version 1.0: ascii, little or big endian. Of element `vertex` x, y, z and
+/// nx, ny, nz; of `face` and `tristrips` vertex_indices or vertex_index; of `camera` its place.
+/// Other elements, lists and properties are checked and passed over.
 ///
 /// Allocates in proportion to what the file holds, never to what its header promises.
 /// @throws Error naming the file, the line or offset, and what was wrong.

@@ -11,6 +11,15 @@ namespace {
 
 constexpr std::string_view blanks = " \t\r\n\v\f";
 
+// The whole token as a number of that type; none if it is not one that fits.
+template <class T>
+std::optional<T> to_whole(std::string_view token) noexcept {
+  T value = 0;
+  const char* const end = token.data() + token.size();
+  const auto [stop, error] = std::from_chars(token.data(), end, value);
+  return error == std::errc{} && stop == end ? std::optional(value) : std::nullopt;
+}
+
 }  // namespace
 
 std::string_view name_of(Scalar type) noexcept {
@@ -50,10 +59,11 @@ std::optional<double> to_number(std::string_view token) noexcept {
 }
 
 std::optional<std::uint64_t> to_count(std::string_view token) noexcept {
-  std::uint64_t value = 0;
-  const char* const end = token.data() + token.size();
-  const auto [stop, error] = std::from_chars(token.data(), end, value);
-  return error == std::errc{} && stop == end ? std::optional(value) : std::nullopt;
+  return to_whole<std::uint64_t>(token);
+}
+
+std::optional<std::int64_t> to_index(std::string_view token) noexcept {
+  return to_whole<std::int64_t>(token);
 }
 
 std::string quoted(std::string_view piece) {

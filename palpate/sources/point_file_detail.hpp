@@ -90,6 +90,7 @@ void load_column(const std::byte* first, std::size_t stride, Scalar type, std::e
 /// The whole token as a number, "nan" and "inf" included; none if it is not one that fits.
 [[nodiscard]] std::optional<double> to_number(std::string_view token) noexcept;
 [[nodiscard]] std::optional<std::uint64_t> to_count(std::string_view token) noexcept;
+[[nodiscard]] std::optional<std::int64_t> to_index(std::string_view token) noexcept;
 
 /// A piece of a file as a message can show it: in quotes, printable and short.
 [[nodiscard]] std::string quoted(std::string_view piece);

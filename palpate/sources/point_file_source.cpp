@@ -2,6 +2,7 @@
 #include "palpate/sources/point_file_source.hpp"
 
 #include <array>
+#include <cmath>
 #include <system_error>
 #include <utility>
 
@@ -23,6 +24,9 @@ std::string details_of(const PointFile& file) {
     if (field.count != 1) {
       text += " x " + std::to_string(field.count);
     }
+  }
+  if (!file.triangles.empty()) {
+    text += "; " + std::to_string(file.triangles.size()) + " triangles";
   }
   if (file.bytes_unread != 0) {
     text += "; " + std::to_string(file.bytes_unread) + " bytes after them not read";
@@ -50,8 +54,23 @@ std::optional<Frame> PointFileSource::next() {
   if (file.viewpoint) {
     *file.viewpoint *= options_.scale;
   }
-  return Frame{static_cast<double>(k) / options_.fps,
-               std::make_shared<PointCloud>(file.points, file.viewpoint, options_.voxel)};
+  const double stamp = static_cast<double>(k) / options_.fps;
+  const bool is_image = file.width > 1 && file.height > 1;
+  if (!is_image && file.normals.empty() && file.triangles.empty())
+    return Frame{stamp, std::make_shared<PointCloud>(file.points, file.viewpoint, options_.voxel)};
+  for (Vec3& normal : file.normals) {
+    const double length = normal.norm();
+    normal = length > 0.0 && std::isfinite(length) ? Vec3(normal / length) : Vec3::Zero();
+  }
+  Surface surface{.points = std::move(file.points),
+                  .normals = std::move(file.normals),
+                  .triangles = std::move(file.triangles)};
+  if (is_image) {
+    surface.columns = static_cast<int>(file.width);
+    surface.rows = static_cast<int>(file.height);
+  }
+  return Frame{stamp,
+               std::make_shared<PointCloud>(std::move(surface), file.viewpoint, options_.voxel)};
 }
 
 std::unique_ptr<Source> open_point_files(const Uri& uri) {

@@ -10,7 +10,8 @@
 
 namespace palpate {
 
-/// PCD or PLY files as frames, each a PointCloud.
+/// PCD or PLY files as frames, each a PointCloud, with the faces and normals of a PLY and the image
+/// of an organised PCD beside its points.
 ///
 /// A folder's files (.pcd or .ply, in any case of letters) come in natural order of their names;
 /// frame k is stamped k / fps, also if a file before it could not be used.

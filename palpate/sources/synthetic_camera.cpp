@@ -76,6 +76,7 @@ CameraSetup setup_of(const Uri& uri) {
                         uri.number_option("tilt", 34.0 * deg, -pi, pi, "rad"),
                         uri.number_option("azimuth", 0.0, -2.0 * pi, 2.0 * pi, "rad"));
   setup.frame_rate = uri.number_option("fps", 30.0, 1e-3, 10000.0, "Hz");
+  setup.brightness = uri.number_option("brightness", 0.0, 1e-4, 100.0, "m");
   if (uri.has("frames")) setup.frames = count_option(uri, "frames", 0, 1.0);
   return setup;
 }
@@ -141,9 +142,25 @@ std::optional<Frame> SyntheticCamera::next() {
 }
 
 Frame SyntheticCamera::capture(double t, std::uint64_t frame) {
-  return {t, std::make_shared<const DepthImage>(rays_, sensor_.measure(true_depth(t), frame),
+  const std::span<const float> depth = true_depth(t);
+  return {t, std::make_shared<const DepthImage>(rays_, sensor_.measure(depth, frame),
                                                 1.0 / sensor_.model().quantisation,
-                                                setup_.world_from_camera)};
+                                                setup_.world_from_camera, brightness(depth))};
+}
+
+std::vector<std::uint8_t> SyntheticCamera::brightness(std::span<const float> depth) const {
+  if (!(setup_.brightness > 0.0)) return {};
+  std::vector<std::uint8_t> values(depth.size(), 0);
+  const int width = setup_.intrinsics.width;
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    if (!std::isfinite(depth[i])) continue;
+    const Eigen::Vector2d ray =
+        rays_->ray(static_cast<int>(i) % width, static_cast<int>(i) / width);
+    const double x = (setup_.world_from_camera * Vec3(double{depth[i]} * ray.homogeneous())).x();
+    const double wave = 0.5 + 0.5 * std::sin(2.0 * pi * x / setup_.brightness);
+    values[i] = static_cast<std::uint8_t>(std::lround(255.0 * wave));
+  }
+  return values;
 }
 
 std::span<const float> SyntheticCamera::true_depth(double t) {
@@ -189,15 +206,10 @@ void SyntheticCamera::draw(const Part& part, double t, std::vector<float>& depth
 std::unique_ptr<SyntheticCamera> open_synthetic_camera(const Uri& text) {
   const Uri uri = text.path().empty() ? Uri("synthetic:desk" + text.text().substr(10)) : text;
   std::vector<std::string_view> options = scene_options(uri.path());
-  constexpr std::array<std::string_view, 17> camera_options{"size",         "fps",
-                                                            "frames",       "fov",
-                                                            "distance",     "tilt",
-                                                            "azimuth",      "seed",
-                                                            "sensor",       "noise",
-                                                            "noise_grows",  "correlation",
-                                                            "quantisation", "disparity_step",
-                                                            "dropouts",     "grazing",
-                                                            "flying"};
+  constexpr std::array<std::string_view, 18> camera_options{
+      "size",        "fps",          "frames",         "fov",      "distance", "tilt",
+      "azimuth",     "seed",         "brightness",     "sensor",   "noise",    "noise_grows",
+      "correlation", "quantisation", "disparity_step", "dropouts", "grazing",  "flying"};
   options.insert(options.end(), camera_options.begin(), camera_options.end());
   uri.allow_only(options);
   SourceInfo info;

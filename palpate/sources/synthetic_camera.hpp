@@ -29,6 +29,7 @@ struct CameraSetup {
   Intrinsics intrinsics = pinhole(640, 480, 0.995);  // 57 degrees, as the first Kinect
   Eigen::Isometry3d world_from_camera = looking_at_origin(0.7, 0.6, 0.0);
   double frame_rate = 30.0;           ///< [Hz]
+  double brightness = 0.0;            ///< [m] length of its waves along x; 0: depth alone
   std::optional<std::size_t> frames;  ///< how many; none: it never ends
 };
 
@@ -55,6 +56,7 @@ class SyntheticCamera final : public Source {
 
  private:
   void draw(const Part& part, double t, std::vector<float>& depth);
+  [[nodiscard]] std::vector<std::uint8_t> brightness(std::span<const float> depth) const;
 
   Scene scene_;
   CameraSetup setup_;
@@ -69,6 +71,7 @@ class SyntheticCamera final : public Source {
 
 /// `synthetic:SCENE?KEY=VALUE&...`: a scene with its options (make_scene) and
 ///   size=640x480 fps=30Hz frames=N fov=57deg distance=0.7m tilt=34deg azimuth=0deg seed=1
+///   brightness=20mm: everything is painted with waves of light along the world's x
 ///   sensor=ideal|d4xx|kinect, and over that noise=1mm noise_grows=0|1 correlation=5 or 5x3 [px]
 ///   quantisation=0.1mm disparity_step=3mm dropouts=1% grazing=80deg flying=30%
 /// Without a scene's name it is the desk.

@@ -169,6 +169,35 @@ TEST_F(Program, TellsWhatIsInASource) {
   EXPECT_GT(about["first_frame"]["measured_percent"], 90.0);
 }
 
+TEST_F(Program, TouchesTheFacesOfAPlyFile) {
+  // Two triangles of 200 mm about the origin, seen from above: no point within 100 mm of the hand.
+  const std::string points =
+      "element vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\n";
+  const std::string corners = "-0.1 -0.1 0\n0.1 -0.1 0\n0.1 0.1 0\n-0.1 0.1 0\n";
+  const std::string mesh = write("mesh.ply", "ply\nformat ascii 1.0\n" + points +
+                                                 "element face 1\n"
+                                                 "property list uchar int vertex_indices\n"
+                                                 "end_header\n" +
+                                                 corners + "4 0 1 2 3\n");
+  const Outcome info = run("info --json ply:" + mesh);
+  ASSERT_EQ(info.code, 0) << info.err;
+  EXPECT_EQ(nlohmann::json::parse(info.out)["first_frame"]["triangles"], 2);
+  const std::string touch = "trace --json --path " + press() + " --out " + path("trace.csv");
+  const auto held = [&](const std::string& method) {
+    const Outcome trace = run(touch + " --camera ply:" + mesh + " --method " + method);
+    EXPECT_EQ(trace.code, 0) << trace.err;
+    return nlohmann::json::parse(trace.out)["max_force"].get<double>();
+  };
+  for (const char* method :
+       {"god-object", "god-object-kept", "sphere-proxy", "sphere-proxy-kept", "force-shading"})
+    EXPECT_NEAR(held(method), 600.0 * 0.008, 1e-3) << method;
+  EXPECT_EQ(held("sight"), 0.0) << "it touches the points alone";
+  const std::string bare =
+      write("points.ply", "ply\nformat ascii 1.0\n" + points + "end_header\n" + corners);
+  expect_refusal(touch + " --camera ply:" + bare + " --method god-object", {"faces"});
+}
+
 TEST_F(Program, SaysWhichFramesOfARecordingItLeavesOut) {
   fs::create_directory(path("tum"));
   write("tum/0.png", test::png_of(1, 1, 16, test::grey, std::string("\0\x10\x00", 3)));

@@ -485,7 +485,7 @@ TEST(Sight, GivesTheSameTicksBitForBitOnEveryRun) {
 }
 
 TEST(Sight, BearsEmptyFramesAndStampsThatStandStill) {
-  const PointCloud nothing({});
+  const PointCloud nothing(std::vector<Vec3>{});
   std::mt19937 random(1);
   const PointCloud plane = seen_from_above(flat_grid(), 0.0, random);
   Renderer renderer = by_sight({0, 0, 0.02});

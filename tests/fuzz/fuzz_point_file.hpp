@@ -9,17 +9,15 @@
 #include "palpate/core/error.hpp"
 #include "palpate/sources/point_file.hpp"
 
+#include "tests/support/point_file_rules.hpp"
+
 namespace palpate::test {
 
 /// Stops the fuzzer unless the bytes give an Error of one line, or a consistent cloud.
 inline void fuzz_point_file(PointFile (*parse)(std::span<const std::byte>, std::string_view),
                             const std::uint8_t* data, std::size_t size) {
   try {
-    const PointFile cloud = parse(std::as_bytes(std::span(data, size)), "fuzz");
-    if (cloud.points.size() != cloud.width * cloud.height ||
-        cloud.non_finite > cloud.points.size() || cloud.bytes_unread > size) {
-      std::abort();
-    }
+    if (!is_consistent(parse(std::as_bytes(std::span(data, size)), "fuzz"), size)) std::abort();
   } catch (const Error& error) {
     if (std::string_view(error.what()).find_first_of("\r\n") != std::string_view::npos) {
       std::abort();

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every method does what its publication claims where it was made for, and fails where it should.
+#include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -11,10 +14,12 @@
 #include "lab/experiment.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
-#include "lab/surface_cloud.hpp"
 #include "palpate/cloud/point_cloud.hpp"
+#include "palpate/sources/source.hpp"
 
+#include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -51,11 +56,11 @@ Vec3 contact(const Tick& tick) {
 
 // The middle of an image that a camera a metre above takes of a height field.
 template <class Height>
-SurfaceCloud seen(const Height& height) {
+PointCloud seen(const Height& height) {
   Surface surface;
   surface.points = test::grid(spacing, 40, height);
   surface.columns = surface.rows = 81;
-  return SurfaceCloud(std::move(surface), camera);
+  return PointCloud(std::move(surface), camera);
 }
 
 double flat(double /*x*/, double /*y*/) {
@@ -65,7 +70,7 @@ double flat(double /*x*/, double /*y*/) {
 class EveryMethod : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(EveryMethod, PushesAHandOutOfAPlaneAndLeavesItAloneAbove) {
-  const SurfaceCloud plane = seen(flat);
+  const PointCloud plane = seen(flat);
   const auto method = make_method(GetParam(), with_flat_truth());
   const Tick pressed = press(*method, plane, {0.0002, 0.0003, -0.008});
   EXPECT_GT(pressed.force.normalized().z(), 0.99);
@@ -80,7 +85,7 @@ TEST_P(EveryMethod, FeelsNothingWithoutAFrameOrPoints) {
   if (GetParam() == "ideal") GTEST_SKIP() << "it needs neither";
   const auto method = make_method(GetParam(), {});
   EXPECT_TRUE(method->tick({0, 0, -0.01}, 0.0).force.isZero());
-  const PointCloud nothing({}, camera);
+  const PointCloud nothing(std::vector<Vec3>{}, camera);
   method->frame(nothing, 0.0);
   const Tick tick = method->tick({0, 0, -0.02}, 0.001);
   EXPECT_TRUE(tick.force.isZero());
@@ -227,7 +232,7 @@ TEST(Surfels, OverThreeFramesJittersLessAtRestAndLagsBehindWhatMoves) {
 TEST(GodObject, IsAsNearToTheHandAsAPlaneAllows) {
   const auto tilted = [](double x, double y) { return 0.3 * x - 0.2 * y; };
   const Vec3 normal = Vec3(-0.3, 0.2, 1.0).normalized();
-  const SurfaceCloud plane = seen(tilted);
+  const PointCloud plane = seen(tilted);
   const Vec3 foot(0.002, 0.001, tilted(0.002, 0.001));
   for (const char* name : {"god-object", "sphere-proxy", "force-shading"}) {
     const auto method = make_method(name, {});
@@ -244,7 +249,7 @@ TEST(GodObject, RestsInTheCornerOfThreePlanes) {
   const double big = 0.1;
   room.points = {{0, 0, 0}, {big, 0, 0}, {0, big, 0}, {0, 0, big}};
   room.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
-  const SurfaceCloud corner(std::move(room));
+  const PointCloud corner(std::move(room));
   for (const char* name : {"god-object", "sphere-proxy"}) {
     const double apart = std::string(name) == "sphere-proxy" ? r_c : 0.0;
     const auto method = make_method(name, {});
@@ -260,9 +265,170 @@ TEST(GodObject, RestsInTheCornerOfThreePlanes) {
   }
 }
 
+// A mesh in a PLY file, as a session has it.
+class MeshFile {
+ public:
+  MeshFile(const Surface& mesh, const std::string& faces) {
+    const bool normals = !mesh.normals.empty();
+    std::ostringstream text;
+    text << "ply\nformat ascii 1.0\nelement vertex " << mesh.points.size()
+         << "\nproperty double x\nproperty double y\nproperty double z\n";
+    if (normals) text << "property double nx\nproperty double ny\nproperty double nz\n";
+    text << "element face " << std::count(faces.begin(), faces.end(), '\n')
+         << "\nproperty list uchar int vertex_indices\nend_header\n";
+    text.precision(17);
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+      text << mesh.points[i].transpose();
+      if (normals) text << ' ' << mesh.normals[i].transpose();
+      text << '\n';
+    }
+    text << faces;
+    frame_ = *open_source("ply:" + folder_.write("mesh.ply", text.str()).string())->next();
+  }
+  [[nodiscard]] const Cloud& cloud() const { return *frame_.cloud; }
+
+ private:
+  test::TemporaryFolder folder_;
+  Frame frame_;
+};
+
+// A cube about the origin, of squares: touched from without, or a room touched from within.
+constexpr double half_edge = 0.05;  // [m]
+
+MeshFile cube(bool is_room) {
+  Surface mesh;
+  for (const double z : {-half_edge, half_edge}) {
+    for (const double y : {-half_edge, half_edge}) {
+      for (const double x : {-half_edge, half_edge}) mesh.points.emplace_back(x, y, z);
+    }
+  }
+  return {mesh, is_room ? "4 0 1 3 2\n4 4 6 7 5\n4 0 4 5 1\n4 2 3 7 6\n4 0 2 6 4\n4 1 5 7 3\n"
+                        : "4 0 2 3 1\n4 4 5 7 6\n4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n"};
+}
+
+TEST(GodObject, IsPushedOutOfACubesFaceByWhichItCameIn) {
+  const MeshFile file = cube(false);
+  for (const char* name : {"god-object", "god-object-kept", "force-shading"}) {
+    const auto method = make_method(name, {});
+    method->seat({0.01, 0.0, 0.07});
+    method->frame(file.cloud(), 0.0);
+    go(*method, {0.01, 0.0, 0.07}, {0.01, 0.0, 0.03});
+    // Now 20 mm below the top and 5 mm from a side, which would be the nearer.
+    const Tick tick = go(*method, {0.01, 0.0, 0.03}, {0.045, 0.01, 0.03});
+    EXPECT_LT((contact(tick) - Vec3(0.045, 0.01, half_edge)).norm(), 1e-6) << name;
+    if (name == std::string("force-shading")) continue;  // its corners are round
+    EXPECT_LT((tick.force - Vec3(0, 0, stiffness * 0.02)).norm(), 1e-3) << name;
+  }
+}
+
+TEST(GodObject, RestsInEdgesAndCornersOfARoom) {
+  const MeshFile file = cube(true);
+  for (const char* name : {"god-object", "god-object-kept", "sphere-proxy", "sphere-proxy-kept"}) {
+    const bool is_sphere = std::string(name).substr(0, 6) == "sphere";
+    const double wall = half_edge - (is_sphere ? r_c : 0.0);
+    struct Case {
+      Vec3 hip, rest;
+    };
+    for (const Case& c : {Case{{0.01, 0.02, 0.058}, {0.01, 0.02, wall}},   // a wall
+                          Case{{0.057, 0.01, 0.054}, {wall, 0.01, wall}},  // an edge: two planes
+                          Case{{-0.057, 0.051, 0.054}, {-wall, wall, wall}}}) {  // a corner: three
+      const auto method = make_method(name, {});
+      method->seat(Vec3::Zero());
+      method->frame(file.cloud(), 0.0);
+      const Tick tick = go(*method, Vec3::Zero(), c.hip);
+      const Vec3 rest = is_sphere ? tick.proxy : contact(tick);
+      EXPECT_LT((rest - c.rest).norm(), 1e-6) << name;
+      const Vec3 pull = c.rest - c.hip;
+      const double length = pull.norm() - (is_sphere ? r_c : 0.0);
+      EXPECT_LT((tick.force - stiffness * length * pull.normalized()).norm(), 1e-3) << name;
+    }
+  }
+}
+
+// A ball of 50 mm of 24 x 12 facets, whose corners know the ball's normals.
+MeshFile facetted_ball(double radius) {
+  constexpr int around = 24;
+  constexpr int down = 12;
+  constexpr double pi = std::numbers::pi;
+  Surface mesh;
+  std::ostringstream faces;
+  for (int i = 0; i <= down; ++i) {
+    for (int j = 0; j < around; ++j) {
+      const double a = pi * i / down;
+      const double b = 2.0 * pi * j / around;
+      mesh.normals.emplace_back(std::sin(a) * std::cos(b), std::sin(a) * std::sin(b), std::cos(a));
+      mesh.points.emplace_back(radius * mesh.normals.back());
+      const int next = (j + 1) % around;
+      if (i < down)
+        faces << "4 " << around * i + j << ' ' << around * (i + 1) + j << ' '
+              << around * (i + 1) + next << ' ' << around * i + next << '\n';
+    }
+  }
+  return {mesh, faces.str()};
+}
+
+TEST(ForceShading, TurnsTheForceSmoothlyOverTheFacetsOfAMesh) {
+  const double radius = 0.05;
+  const MeshFile ball = facetted_ball(radius);
+  // A stroke along a parallel, 2 mm below the surface, by 0.3 degrees a tick; the facets meet at
+  // some 12. The largest turn of the force in a tick, and how far it is off the ball's normal.
+  const auto turns = [&](const char* name) {
+    const auto out = [](double angle) {
+      return Vec3(std::cos(angle), std::sin(angle), 0.75).normalized();
+    };
+    const auto method = make_method(name, {});
+    const double deep = radius - 0.002;
+    method->seat(0.06 * out(0.0));
+    method->frame(ball.cloud(), 0.0);
+    Vec3 before = go(*method, 0.06 * out(0.0), deep * out(0.0)).force;
+    double step = 0.0;
+    double off = 0.0;
+    for (int i = 1; i <= 200; ++i) {
+      const double angle = 0.3 * i * std::numbers::pi / 180.0;
+      const Tick tick = method->tick(deep * out(angle), 1.0 + 1e-3 * i);
+      const auto between = [](const Vec3& a, const Vec3& b) {
+        return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
+      };
+      step = std::max(step, between(before, tick.force));
+      off = std::max(off, between(out(angle), tick.force));
+      before = tick.force;
+    }
+    return std::pair{step, off};
+  };
+  const auto [flat_step, flat_off] = turns("god-object");
+  const auto [shaded_step, shaded_off] = turns("force-shading");
+  EXPECT_GT(flat_step, 4.0);
+  EXPECT_LT(shaded_step, 1.0);
+  EXPECT_GT(flat_off, 5.0);
+  EXPECT_LT(shaded_off, 1.0);
+}
+
+TEST(PointNormals, TakesTheNormalsThatAFileGivesAtAnyLength) {
+  Surface mesh;
+  mesh.points = test::flat_grid();
+  const Vec3 given = Vec3(0.3, 0.0, 1.0);
+  mesh.normals.assign(mesh.points.size(), 7.0 * given);
+  const MeshFile file(mesh, "");
+  const Tick tick = press(*make_method("point-normals", {}), file.cloud(), {0, 0, -0.004});
+  EXPECT_LT((tick.normal - given.normalized()).norm(), 1e-9);
+  EXPECT_GT(press(*make_method("surfels", {}), file.cloud(), {0, 0, -0.004}).normal.z(), 0.999999);
+}
+
+TEST(GodObject, RefusesPointsThatNothingJoins) {
+  const PointCloud points(test::flat_grid(), camera);
+  for (const char* name : {"god-object", "sphere-proxy-kept", "force-shading"}) {
+    EXPECT_TRUE(test::fails_saying(
+        [&] {
+          make_method(name, {})->frame(points, 0.0);
+          return 0;
+        },
+        "polygons", "PLY with faces"));
+  }
+}
+
 TEST(GodObject, DoesNotPopThroughAThinPlate) {
   // Its claim: it remembers the side. The direct method, which doesn't, lets go.
-  const SurfaceCloud plate = seen(flat);
+  const PointCloud plate = seen(flat);
   for (const char* name : {"god-object", "sphere-proxy", "force-shading"}) {
     const auto method = make_method(name, {});
     EXPECT_NEAR(press(*method, plate, {0.0, 0.0, -0.025}).force.z(), stiffness * 0.025, 1e-2);
@@ -273,7 +439,7 @@ TEST(GodObject, DoesNotPopThroughAThinPlate) {
 
 TEST(SphereProxy, RollsOverAConvexEdgeAtItsRadius) {
   const auto roof = [](double x, double) { return -std::abs(x); };
-  const SurfaceCloud edge = seen(roof);
+  const PointCloud edge = seen(roof);
   const auto method = make_method("sphere-proxy", {});
   const Tick tick = press(*method, edge, {0.0, 0.0, -0.01});
   EXPECT_NEAR(tick.proxy.z(), r_c, 1e-6) << "on the edge, which is a line";
@@ -287,8 +453,8 @@ TEST(GodObject, IsLostWhereItIsKeptAndASurfaceRisesOverIt) {
   for (const auto& [name, held] :
        {std::pair{"god-object", true}, std::pair{"god-object-kept", false},
         std::pair{"sphere-proxy", true}}) {
-    const SurfaceCloud low = seen(flat);
-    const SurfaceCloud high = seen([](double, double) { return 0.003; });
+    const PointCloud low = seen(flat);
+    const PointCloud high = seen([](double, double) { return 0.003; });
     const auto method = make_method(name, {});
     const Tick before = press(*method, low, {0.0003, 0.0002, -0.008});
     method->frame(high, 1.0 / 30.0);
@@ -298,7 +464,7 @@ TEST(GodObject, IsLostWhereItIsKeptAndASurfaceRisesOverIt) {
       EXPECT_NEAR(contact(tick).z(), 0.003, 1e-6) << name;
     }
     // Further than r_c, and all are lost.
-    const SurfaceCloud higher = seen([](double, double) { return 0.020; });
+    const PointCloud higher = seen([](double, double) { return 0.020; });
     method->frame(higher, 2.0 / 30.0);
     EXPECT_TRUE(method->tick(before.hip, 0.6).force.isZero()) << name;
   }
@@ -310,7 +476,7 @@ TEST(ForceShading, SmoothsTheFacetsOfABall) {
   const auto height = [](double x, double y) { return std::sqrt(0.04 * 0.04 - x * x - y * y); };
   ball.points = test::grid(6e-3, 4, height);
   ball.columns = ball.rows = 9;
-  const SurfaceCloud cloud(std::move(ball), camera);
+  const PointCloud cloud(std::move(ball), camera);
   const auto worst = [&](const char* name) {
     const auto method = make_method(name, {});
     method->seat({0, 0, 0.06});
@@ -333,7 +499,7 @@ TEST(PointNormals, KeepsTheSideThatItsNormalsTell) {
   Surface ceiling;
   ceiling.points = test::flat_grid();
   ceiling.normals.assign(ceiling.points.size(), -Vec3::UnitZ());
-  const SurfaceCloud cloud(std::move(ceiling), camera);
+  const PointCloud cloud(std::move(ceiling), camera);
   const auto method = make_method("point-normals", {});
   method->seat({0, 0, -0.02});
   method->frame(cloud, 0.0);
@@ -354,27 +520,30 @@ TEST(PointNormals, RendersTheGivenNormalsEvenWhereNoiseHidesThem) {
 }
 
 TEST(ImageFeatures, FeelsHeightAndBrightnessAtItsOwnPixel) {
-  Surface image;
-  image.points = test::flat_grid();
-  for (const Vec3& point : image.points) image.brightness.push_back(point.x() > 0.0 ? 1.0F : 0.0F);
-  const SurfaceCloud cloud(std::move(image), camera);
+  // Waves of light, 20 mm long: white at x = 5 mm and black at -5 mm, where the camera, half a
+  // metre above, sees the surface in line with a hand 8 mm beneath it.
+  const auto source = open_source("synthetic:plane?brightness=20mm&distance=0.5m&tilt=0");
+  const Frame frame = *source->next();
   const auto method = make_method("image-features", {});
-  const double dark = press(*method, cloud, {-0.01, 0.0, -0.008}).force.z();
-  const double bright = method->tick({0.01, 0.0, -0.008}, 1.0).force.z();
-  EXPECT_NEAR(dark, stiffness * 0.008, 1e-3);
-  EXPECT_NEAR(bright - dark, stiffness * 0.5e-3, 1e-3);
+  method->frame(*frame.cloud, 0.0);
+  for (const double seen : {-0.005, -0.0025, 0.0, 0.0025, 0.005}) {
+    const double height = 0.5e-3 * (0.5 + 0.5 * std::sin(2.0 * std::numbers::pi * seen / 0.02));
+    const Tick tick = method->tick({seen * 0.508 / 0.5, 0.0, -0.008}, 0.0);
+    // A pixel is 0.85 mm wide.
+    EXPECT_NEAR(tick.force.z(), stiffness * (0.008 + height), 0.045) << seen;
+  }
 }
 
 TEST(ImageFeatures, PushesAHandThatIsBehindAnOccluder) {
   // A hand over a table is under an arm: the image knows only the arm.
-  const SurfaceCloud arm = seen([](double, double) { return 0.02; });
+  const PointCloud arm = seen([](double, double) { return 0.02; });
   const auto method = make_method("image-features", {});
   method->frame(arm, 0.0);
   EXPECT_GT(method->tick({0, 0, 0.0}, 0.0).force.z(), 10.0);
 }
 
 TEST(Tsdf, FindsAPlaneToATenthOfAVoxel) {
-  const SurfaceCloud plane = seen(flat);
+  const PointCloud plane = seen(flat);
   const auto method = make_method("tsdf", {});
   const Tick tick = press(*method, plane, {0.0003, 0.0002, -0.008});
   EXPECT_NEAR(contact(tick).z(), 0.0, 0.15e-3);
@@ -406,7 +575,7 @@ TEST(Tsdf, SmoothsNoiseOverFramesAndLagsBehindWhatMoves) {
 }
 
 TEST(VirtualCoupling, SinksInBySpringsInSeries) {
-  const SurfaceCloud plane = seen(flat);
+  const PointCloud plane = seen(flat);
   const auto method = make_method("virtual-coupling", {});
   const Tick tick = press(*method, plane, {0.0, 0.0, -0.008});
   // The ball's centre lies between its rest at r_c and the HIP, as 10 to 1.
@@ -417,7 +586,7 @@ TEST(VirtualCoupling, SinksInBySpringsInSeries) {
 // Energy [J] of a hand of 50 g that bounces on the coupling, in its fourth tenth of a second
 // against its first.
 double energy_kept(double stiffness_, double damping) {
-  const SurfaceCloud plane = seen(flat);
+  const PointCloud plane = seen(flat);
   MethodSetup setup;
   setup.parameters.coupling.stiffness = stiffness_;
   setup.parameters.coupling.max_force = 1e3;

@@ -68,6 +68,29 @@ TEST(DepthPng, RejectsOtherKindsOfPngSayingWhatTheyAre) {
   EXPECT_TRUE(fails(8, test::rgba, "8-bit colour and alpha,"));
 }
 
+TEST(GreyPng, WeighsColoursAndTakesEveryKind) {
+  const test::TemporaryFolder folder;
+  const auto grey_of = [&](char bits, test::Colour colour, const std::string& samples) {
+    const GreyPng image =
+        read_grey_png(folder.write("image.png", png_of(1, 2, bits, colour, samples)));
+    EXPECT_EQ(image.width, 1);
+    EXPECT_EQ(image.height, 2);
+    return std::vector<int>(image.brightness.begin(), image.brightness.end());
+  };
+  using Values = std::vector<int>;
+  EXPECT_EQ(grey_of(8, test::grey, {"\0\x07\0\xff", 4}), (Values{7, 255}));
+  EXPECT_EQ(grey_of(1, test::grey, {"\0\x80\0\0", 4}), (Values{255, 0}));
+  EXPECT_EQ(grey_of(16, test::grey, {"\0\x80\x80\0\xff\xff", 6}), (Values{128, 255}));
+  EXPECT_EQ(grey_of(8, test::grey_alpha, {"\0\x07\0\0\x09\xff", 6}), (Values{7, 9}));
+  // Of red, green and blue 0.2126, 0.7152 and 0.0722.
+  EXPECT_EQ(grey_of(8, test::rgb, {"\0\xff\0\0\0\x10\x10\x10", 8}), (Values{54, 16}));
+  EXPECT_EQ(grey_of(8, test::rgba, {"\0\0\xff\0\0\0\0\0\xff\0", 10}), (Values{182, 18}));
+  // The palette's first entry is (97, 98, 99), its second (100, 101, 102); parts are dropped.
+  EXPECT_EQ(grey_of(8, test::palette, {"\0\0\0\1", 4}), (Values{97, 100}));
+  EXPECT_TRUE(fails_saying([&] { return read_grey_png(folder.write("no.png", "none")); }, "no.png",
+                           "not a PNG"));
+}
+
 TEST(DepthPng, RejectsWhatIsNoPng) {
   EXPECT_TRUE(fails_saying([] { return parse(""); }, "is empty"));
   EXPECT_TRUE(fails_saying([] { return parse("\x89PNG"); }, "is not a PNG"));

@@ -137,6 +137,31 @@ TEST(TumRecording, HasTheFreiburgCameraUnlessToldOtherwise) {
   EXPECT_EQ(image_of(given).units_per_metre(), 1000.0);
 }
 
+TEST(TumRecording, GivesEachFrameTheVisibleImageNextToItInTime) {
+  const TumFolder folder;
+  std::filesystem::create_directory(folder.path() / "rgb");
+  const auto grey = [](char value) {
+    std::string samples;
+    for (int v = 0; v < 3; ++v) samples += std::string(1, '\0') + std::string(4, value);
+    return test::png_of(4, 3, 8, test::grey, samples);
+  };
+  folder.write("rgb/a.png", grey(10));
+  folder.write("rgb/b.png", grey(20));
+  folder.write("rgb.txt",
+               "99.985 rgb/a.png\n100.008 rgb/b.png\n100.53 rgb/a.png\n101.02 rgb/a.png\n");
+  EXPECT_TRUE(image_of(folder.open()->next()).brightness().empty()) << "unless it is asked for";
+  const auto source = folder.open("brightness=rgb.txt");
+  ASSERT_EQ(source->info().notes.size(), 1U);
+  EXPECT_EQ(source->info().notes[0].substr(0, 37), "1 of 3 frames have no brightness: rgb");
+  EXPECT_EQ(image_of(source->next()).brightness(), std::vector<std::uint8_t>(12, 20));
+  EXPECT_TRUE(image_of(source->next()).brightness().empty());
+  EXPECT_EQ(image_of(source->next()).brightness(), std::vector<std::uint8_t>(12, 10));
+  folder.write("rgb/b.png", test::png_of(1, 1, 8, test::grey, std::string(2, '\0')));
+  EXPECT_TRUE(
+      fails_saying([&] { return folder.open("brightness=rgb.txt")->next(); }, "b.png", "1x1"));
+  EXPECT_TRUE(fails_saying([&] { return folder.open("brightness=grey.txt"); }, "grey.txt"));
+}
+
 TEST(TumRecording, GoesOnAfterAnImageThatCannotBeUsed) {
   const TumFolder folder;
   const std::string good = test::png_of(1, 1, 16, test::grey, std::string(3, '\0'));

@@ -302,14 +302,7 @@ TEST(Pcd, FailsCleanlyWhereverAFileIsCutShort) {
     const std::string whole = valid_file(encoding);
     // What is left of an ascii file may still be a number where its last one ends sooner.
     const std::size_t last = encoding == "ascii" ? whole.rfind(' ') + 1 : whole.size() - 1;
-    for (std::size_t size = 0; size < whole.size(); ++size) {
-      const std::string_view part = std::string_view(whole).substr(0, size);
-      if (size <= last) {
-        EXPECT_TRUE(fails_saying([&] { return parse(part); }, "test file")) << size;
-      } else {
-        EXPECT_EQ(parse(part).points.size(), 3u) << size;
-      }
-    }
+    test::expect_errors_when_cut_short(parse_pcd, whole, last);
   }
 }
 

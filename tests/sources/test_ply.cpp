@@ -143,6 +143,104 @@ TEST(Ply, FindsItsVerticesBetweenOtherElementsListsAndProperties) {
   }
 }
 
+// A square and a line beside it, five vertices with normals.
+std::string faces_file(const std::string& encoding, const std::string& corner_type = "int") {
+  Values values(encoding);
+  const auto corner = [&](int index) {
+    if (corner_type == "int") values.add(std::int32_t{index});
+    if (corner_type == "uchar") values.add(static_cast<std::uint8_t>(index));
+    if (corner_type == "ushort") values.add(static_cast<std::uint16_t>(index));
+  };
+  for (const std::vector<int>& face : {std::vector{0, 1, 2, 3}, std::vector{3, 4}}) {
+    values.add(static_cast<std::uint8_t>(face.size()));
+    for (const int index : face) corner(index);
+    values.end_row();
+  }
+  for (int k = 0; k < 5; ++k) {
+    values.add(float(k)).add(float(k * k)).add(0.0F).add(0.5F).add(float(-k)).add(2.0F).end_row();
+  }
+  return header(encoding, "element face 2\nproperty list uchar " + corner_type +
+                              " vertex_index\nelement vertex 5\n" + vertices +
+                              "property float nx\nproperty float ny\nproperty float nz\n") +
+         values.text();
+}
+
+TEST(Ply, ReadsNormalsAndFansFacesInEveryEncoding) {
+  using Corners = std::array<std::uint32_t, 3>;
+  for (const char* encoding : encodings) {
+    for (const char* type : {"int", "uchar", "ushort"}) {
+      SCOPED_TRACE(std::string(encoding) + " " + type);
+      const PointFile cloud = parse(faces_file(encoding, type));
+      EXPECT_EQ(cloud.triangles, (std::vector<Corners>{{0, 1, 2}, {0, 2, 3}}))
+          << "a face of two corners is a line";
+      ASSERT_EQ(cloud.normals.size(), 5U);
+      EXPECT_EQ(cloud.normals[3], Vec3(0.5, -3, 2));
+      EXPECT_EQ(cloud.points[3], Vec3(3, 9, 0));
+    }
+    test::expect_defined_on_damage(parse_ply, faces_file(encoding), 3000);
+  }
+  EXPECT_TRUE(parse(header("ascii", "element vertex 1\n" + vertices +
+                                        "property float nx\nproperty float ny\n") +
+                    "1 2 3 0 1\n")
+                  .normals.empty())
+      << "two of three coordinates are no normal";
+}
+
+TEST(Ply, CutsStripsThatTurnWithEachTriangleAndBeginAnew) {
+  using Corners = std::array<std::uint32_t, 3>;
+  for (const char* encoding : encodings) {
+    Values values(encoding);
+    for (int k = 0; k < 5; ++k) values.add(float(k)).add(0.0F).add(0.0F).end_row();
+    values.add(std::int32_t{8});
+    for (const int corner : {0, 1, 2, 3, -1, 2, 3, 4}) values.add(std::int32_t{corner});
+    values.end_row();
+    const PointFile cloud = parse(header(encoding, "element vertex 5\n" + vertices +
+                                                       "element tristrips 1\n"
+                                                       "property list int int vertex_indices\n") +
+                                  values.text());
+    EXPECT_EQ(cloud.triangles, (std::vector<Corners>{{0, 1, 2}, {2, 1, 3}, {2, 3, 4}}));
+  }
+}
+
+TEST(Ply, SaysWhichFaceNamesAVertexThatIsNotThere) {
+  const auto bad = [](const std::string& encoding, int corner, const char* element = "face") {
+    Values values(encoding);
+    for (int k = 0; k < 3; ++k) values.add(float(k)).add(0.0F).add(0.0F).end_row();
+    values.add(std::uint8_t{3}).add(std::int32_t{0}).add(std::int32_t{1});
+    values.add(std::int32_t{corner}).end_row();
+    return header(encoding, "element vertex 3\n" + vertices + "element " + element +
+                                " 1\nproperty list uchar int vertex_indices\n") +
+           values.text();
+  };
+  for (const char* encoding : encodings) {
+    EXPECT_EQ(parse(bad(encoding, 2)).triangles.size(), 1U);
+    for (const int corner : {3, -1, -2147483647 - 1}) {
+      EXPECT_TRUE(fails_saying([&] { return parse(bad(encoding, corner)); },
+                               "\"face\" names vertex " + std::to_string(corner),
+                               "but there are 3"));
+    }
+    EXPECT_TRUE(fails_saying([&] { return parse(bad(encoding, -2, "tristrips")); },
+                             "\"tristrips\" names vertex -2"));
+  }
+  EXPECT_TRUE(fails_saying([&] { return parse(bad("ascii", 3)); }, "line 13: "));
+  EXPECT_TRUE(fails_saying([&] { return parse(bad("binary_big_endian", 3)); }, "byte "));
+  const std::string list = header("ascii", "element vertex 1\n" + vertices +
+                                               "element face 1\n"
+                                               "property list uchar int vertex_indices\n");
+  EXPECT_TRUE(fails_saying([&] { return parse(list + "1 2 3\n3 0 0 0.5\n"); },
+                           "line 11: a vertex of element \"face\" is \"0.5\""));
+  EXPECT_TRUE(fails_saying([&] { return parse(list + "1 2 3\n3 0 0\n"); }, "line 11: has too few"));
+  for (const char* property : {"list uchar float vertex_indices", "int vertex_index"}) {
+    EXPECT_TRUE(fails_saying(
+        [&] {
+          return parse(header("ascii", "element vertex 1\n" + vertices +
+                                           "element face 1\nproperty " + property + "\n") +
+                       "1 2 3\n1 0\n");
+        },
+        "is not a list of whole numbers"));
+  }
+}
+
 TEST(Ply, RemembersFromWhereThePointsWereSeenIfPclWroteIt) {
   const PointFile cloud = parse(valid_file("binary_big_endian"));
   ASSERT_TRUE(cloud.viewpoint.has_value());
@@ -198,14 +296,14 @@ TEST(Ply, RejectsAHeaderThatPromisesMoreThanTheFileHolds) {
         "promises 18446744073709551615 rows"));
   }
   // A list's length, too, is a promise.
-  const std::string lists = "element vertex 0\n" + vertices +
-                            "element face 1\nproperty list uint double vertex_indices\n";
+  const std::string lists =
+      "element vertex 0\n" + vertices + "element face 1\nproperty list uint double weights\n";
   EXPECT_TRUE(fails_saying(
       [&] {
         return parse(header("binary_little_endian", lists) + bytes_of(std::uint32_t{4000000000}) +
                      std::string(80, '?'));
       },
-      "byte 175: ", "promises 4000000000 values, but 80 bytes are left"));
+      "byte 168: ", "promises 4000000000 values, but 80 bytes are left"));
   EXPECT_TRUE(
       fails_saying([&] { return parse(header("ascii", lists) + "18446744073709551615 1 2 3\n"); },
                    "line 10: has too few values"));
@@ -279,14 +377,7 @@ TEST(Ply, FailsCleanlyWhereverAFileIsCutShort) {
     const std::string whole = valid_file(encoding);
     // What is left of an ascii file may still be a number where its last one ends sooner.
     const std::size_t last = encoding == "ascii" ? whole.rfind(" 1.0") + 1 : whole.size() - 1;
-    for (std::size_t size = 0; size < whole.size(); ++size) {
-      const std::string_view part = std::string_view(whole).substr(0, size);
-      if (size <= last) {
-        EXPECT_TRUE(fails_saying([&] { return parse(part); }, "test file")) << size;
-      } else {
-        EXPECT_EQ(parse(part).points.size(), 3u) << size;
-      }
-    }
+    test::expect_errors_when_cut_short(parse_ply, whole, last);
   }
 }
 
@@ -310,36 +401,39 @@ TEST(Ply, ReadsWhatOtherParsersReadAndRejectsWhatTheyReject) {
     const char* file;
     std::size_t points;
     Vec3 mean;
+    std::size_t triangles = 0;
+    bool normals = false;
   };
   const std::array accepted{
-      Expected{"assimp__cube_binary.ply", 8, {0.5, 0.5, 0.5}},
-      Expected{"assimp__cube_binary_header_with_RN_newline.ply", 8, {0.5, 0.5, 0.5}},
-      Expected{"assimp__cube_binary_starts_with_nl.ply", 8, {6.46753407, 0.5, 0.5}},
-      Expected{"assimp__float-color.ply", 3, {100, 66.6666667, 0}},
-      Expected{"assimp__points.ply", 4, {0, 0.5, 0.5}},
-      Expected{"happly__platonic_shelf.ply", 50, {1.81372228, -0.02773278, 0.00956212}},
-      Expected{"happly__platonic_shelf_ascii.ply", 50, {1.81372228, -0.02773278, 0.00956212}},
-      Expected{"happly__platonic_shelf_big_endian.ply", 50, {1.81372228, -0.02773278, 0.00956212}},
-      Expected{"pcl__cube.ply", 24, {0, 0, 0}},
-      Expected{"pyntcloud__diamond.ply", 6, {0.5, 0.5, 0.5}},
-      Expected{"pyntcloud__diamond_ascii.ply", 6, {0.5, 0.5, 0.5}},
+      Expected{"assimp__cube_binary.ply", 8, {0.5, 0.5, 0.5}, 12},
+      Expected{"assimp__cube_binary_header_with_RN_newline.ply", 8, {0.5, 0.5, 0.5}, 12},
+      Expected{"assimp__cube_binary_starts_with_nl.ply", 8, {6.46753407, 0.5, 0.5}, 12},
+      Expected{"assimp__float-color.ply", 3, {100, 66.6666667, 0}, 1},
+      Expected{"assimp__points.ply", 4, {0, 0.5, 0.5}, 0, true},
+      Expected{"happly__platonic_shelf.ply", 50, {1.81372228, -0.02773278, 0.00956212}, 80},
+      Expected{"happly__platonic_shelf_ascii.ply", 50, {1.81372228, -0.02773278, 0.00956212}, 80},
+      Expected{
+          "happly__platonic_shelf_big_endian.ply", 50, {1.81372228, -0.02773278, 0.00956212}, 80},
+      Expected{"pcl__cube.ply", 24, {0, 0, 0}, 12},
+      Expected{"pyntcloud__diamond.ply", 6, {0.5, 0.5, 0.5}, 8, true},
+      Expected{"pyntcloud__diamond_ascii.ply", 6, {0.5, 0.5, 0.5}, 8, true},
       Expected{"pyntcloud__voxelgrid.ply", 6, {0.449999997, 0.449999997, 0.449999997}},
-      Expected{"tinyply__elephant.ply", 19753, {-0.00612780005, -3.40451721, 4.9738905}},
-      Expected{"tinyply__icosahedron.ply", 12, {0, 0, 0}},
-      Expected{"tinyply__icosahedron_ascii.ply", 12, {0, 0, 0}},
-      Expected{"trimesh__cube_blender_uv_meshlab.ply", 24, {0, 0, 0}},
-      Expected{"trimesh__empty.ply", 0, {0, 0, 0}},
-      Expected{"trimesh__metadata.ply", 4, {0, 0, 0}},
-      Expected{"trimesh__multi.ply", 4, {0, 0, 0}},
-      Expected{"trimesh__ply_empty_bin.ply", 0, {0, 0, 0}},
+      Expected{"tinyply__elephant.ply", 19753, {-0.00612780005, -3.40451721, 4.9738905}, 39290},
+      Expected{"tinyply__icosahedron.ply", 12, {0, 0, 0}, 20, true},
+      Expected{"tinyply__icosahedron_ascii.ply", 12, {0, 0, 0}, 20, true},
+      Expected{"trimesh__cube_blender_uv_meshlab.ply", 24, {0, 0, 0}, 12},
+      Expected{"trimesh__empty.ply", 0, {0, 0, 0}, 0, true},
+      Expected{"trimesh__metadata.ply", 4, {0, 0, 0}, 2},
+      Expected{"trimesh__multi.ply", 4, {0, 0, 0}, 2},
+      Expected{"trimesh__ply_empty_bin.ply", 0, {0, 0, 0}, 0, true},
       Expected{"trimesh__ply_points_ascii.ply", 8, {0, 0, 0}},
-      Expected{"trimesh__ply_points_bin.ply", 8, {0, 0, 0}},
+      Expected{"trimesh__ply_points_bin.ply", 8, {0, 0, 0}, 0, true},
       Expected{"trimesh__points_ascii.ply", 5, {-0.0636, 0.03637442, 0.04180716}},
       Expected{"trimesh__points_ascii_with_lists.ply", 5, {-0.0636, 0.03637442, 0.04180716}},
       Expected{"trimesh__points_bin.ply", 5, {-0.0635999992, 0.0363744199, 0.0418071605}},
       // Holds a thirteenth line; the header's twelve count, as for other readers.
       Expected{"trimesh__points_emptyascii.ply", 12, {-0.0100495833, -0.0138001667, 0.0382333333}},
-      Expected{"trimesh__tet.ply", 4, {0, 0, 0}},
+      Expected{"trimesh__tet.ply", 4, {0, 0, 0}, 4},
   };
   const std::array rejected{
       Rejected{"assimp__crash-30d6d0f7c529b3b66b4131700b7a4580cd7082df.ply", "line 7"},
@@ -350,6 +444,8 @@ TEST(Ply, ReadsWhatOtherParsersReadAndRejectsWhatTheyReject) {
     SCOPED_TRACE(expected.file);
     const PointFile cloud = read_ply(folder / expected.file);
     EXPECT_EQ(cloud.points.size(), expected.points);
+    EXPECT_EQ(cloud.triangles.size(), expected.triangles);
+    EXPECT_EQ(cloud.normals.size(), expected.normals ? expected.points : 0U);
     EXPECT_EQ(cloud.non_finite, 0u);
     EXPECT_LT((test::mean_of(cloud) - expected.mean).norm(), 1e-6 * (1.0 + expected.mean.norm()));
   }

@@ -124,6 +124,44 @@ TEST(PointFiles, AreScaledToMetresTogetherWithTheirViewpoint) {
   }
 }
 
+TEST(PointFiles, KeepFacesAndNormalsOfUnitLengthBesideThePoints) {
+  const TemporaryFolder folder;
+  const std::string file =
+      "ply\nformat ascii 1.0\nelement vertex 3\n"
+      "property float x\nproperty float y\nproperty float z\n"
+      "property float nx\nproperty float ny\nproperty float nz\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 0 0 0 -2\n1000 0 0 nan 0 0\n0 1000 0 0 0 0\n3 0 2 1\n";
+  const auto source = open_source("ply:" + folder.write("mesh.ply", file).string() + "?scale=1mm");
+  const auto frame = source->next();
+  const Surface* surface = cloud_of(*frame).surface();
+  ASSERT_NE(surface, nullptr);
+  ASSERT_EQ(surface->triangles.size(), 1U);
+  EXPECT_EQ(surface->triangles[0], (std::array<std::uint32_t, 3>{0, 2, 1}));
+  EXPECT_TRUE(surface->points[1].isApprox(Vec3(1, 0, 0)));
+  EXPECT_EQ(surface->normals, (std::vector<Vec3>{-Vec3::UnitZ(), Vec3::Zero(), Vec3::Zero()}))
+      << "what is no direction is not known";
+  EXPECT_EQ(cloud_of(*frame).size(), 3U);
+  EXPECT_NE(source->info().details.find("; 1 triangles"), std::string::npos);
+}
+
+TEST(PointFiles, KeepTheImageOfAnOrganisedCloudWithItsHoles) {
+  const TemporaryFolder folder;
+  const auto source = open_source("pcd:" + folder
+                                               .write("0.pcd",
+                                                      "FIELDS x y z\nWIDTH 2\nHEIGHT 2\n"
+                                                      "POINTS 4\nDATA ascii\n"
+                                                      "0 0 1\nnan nan nan\n0 1 1\n1 1 1\n")
+                                               .string());
+  const auto frame = source->next();
+  const Surface* surface = cloud_of(*frame).surface();
+  ASSERT_NE(surface, nullptr);
+  EXPECT_EQ(surface->columns, 2);
+  EXPECT_EQ(surface->rows, 2);
+  EXPECT_EQ(surface->points[3], Vec3(1, 1, 1));
+  EXPECT_EQ(cloud_of(*frame).size(), 3U);
+}
+
 TEST(PointFiles, GoOnAfterAFileThatCannotBeUsed) {
   const TemporaryFolder folder;
   folder.write("0.pcd", pcd(0));

@@ -100,6 +100,22 @@ TEST(SyntheticCamera, StampsFramesByItsRateAndEndsWhenTold) {
   EXPECT_FALSE(camera("plane?size=8x6")->info().frames);
 }
 
+TEST(SyntheticCamera, SeesThePaintedWavesWhereItsPointsAre) {
+  const auto source = camera("wedge?size=60x40&brightness=50mm");
+  const Frame frame = *source->next();
+  const DepthImage& seen = image(frame);
+  for (int v = 0; v < 40; ++v) {
+    for (int u = 0; u < 60; ++u) {
+      const auto point = seen.deproject(u, v);
+      if (!point) continue;
+      const double wave = 0.5 + 0.5 * std::sin(2.0 * std::numbers::pi * point->x() / 0.05);
+      // A depth is rounded to 0.1 mm.
+      EXPECT_NEAR(seen.brightness()[static_cast<std::size_t>(60 * v + u)], 255.0 * wave, 1.5);
+    }
+  }
+  EXPECT_TRUE(image(*camera("wedge?size=60x40")->next()).brightness().empty());
+}
+
 TEST(SyntheticCamera, SeesALiftedPlaneComeNearer) {
   const auto source = camera("plane?size=9x9&tilt=0deg&distance=0.7m&speed=0.3&fps=10");
   for (int k = 0; k < 10; ++k) {

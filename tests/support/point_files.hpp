@@ -15,6 +15,8 @@
 #include "palpate/core/error.hpp"
 #include "palpate/sources/point_file.hpp"
 
+#include "tests/support/errors.hpp"
+#include "tests/support/point_file_rules.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::test {
@@ -39,9 +41,7 @@ std::string bytes_of(T value, std::endian order = std::endian::little) {
 /// What must hold of any bytes whatever: an Error of one line, or a consistent cloud.
 inline testing::AssertionResult is_error_or_consistent(Parse parser, std::string_view text) {
   try {
-    const PointFile cloud = parse(parser, text);
-    if (cloud.points.size() != cloud.width * cloud.height ||
-        cloud.non_finite > cloud.points.size() || cloud.bytes_unread > text.size()) {
+    if (!is_consistent(parse(parser, text), text.size())) {
       return testing::AssertionFailure() << "an inconsistent cloud";
     }
   } catch (const Error& error) {
@@ -61,6 +61,20 @@ inline void expect_defined_on_damage(Parse parser, const std::string& valid, int
       damaged[random() % damaged.size()] = static_cast<char>(random());
     }
     ASSERT_TRUE(is_error_or_consistent(parser, damaged)) << i;
+  }
+}
+
+/// Checks that every beginning of a file of up to `last` bytes is an error, and that a longer one
+/// gives all of its points.
+inline void expect_errors_when_cut_short(Parse parser, std::string_view whole, std::size_t last) {
+  const std::size_t points = parse(parser, whole).points.size();
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const std::string_view part = whole.substr(0, size);
+    if (size <= last) {
+      EXPECT_TRUE(fails_saying([&] { return parse(parser, part); }, "test file")) << size;
+    } else {
+      EXPECT_EQ(parse(parser, part).points.size(), points) << size;
+    }
   }
 }
 

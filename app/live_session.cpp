@@ -21,6 +21,7 @@
 #include <spawn.h>
 #include <unistd.h>
 
+#include "app/lab_rendering.hpp"
 #include "app/live_camera.hpp"
 #include "app/scripted_hand.hpp"
 #include "app/summary.hpp"
@@ -144,7 +145,10 @@ class LiveSession final : public ViewerHost {
     mouse_ = dynamic_cast<MouseDevice*>(device_.get());
     if (mouse_ != nullptr) target_ = start_ = mouse_->read(0.0).position;
     settings_.rendering = options.parameters;
-    loop_ = std::make_unique<ServoLoop>(rendering_by<Renderer>(options.parameters), *device_,
+    std::vector<std::shared_ptr<const Cloud>> seen;
+    for (const auto& camera : cameras_) seen.push_back(camera->first_frame().cloud);
+    method_ = options.method;
+    loop_ = std::make_unique<ServoLoop>(open_rendering(method_, options.parameters, seen), *device_,
                                         settings_, ServoOptions{options.rate, {}});
     reader_.emplace(loop_->reader());
     if (!options.record.empty()) open_recorder(options.record, {});
@@ -188,8 +192,8 @@ class LiveSession final : public ViewerHost {
     for (const SafetyParameterInfo& row : safety_parameter_table())
       safety.push_back(
           row_json(row.name, "", row.unit, row.default_value, row.min, row.max, row.meaning, ""));
-    for (const MethodInfo& row : method_table())
-      methods.push_back({{"name", row.name}, {"meaning", row.meaning}});
+    for (const lab::MethodInfo& row : live_methods())
+      methods.push_back({{"name", row.name}, {"meaning", row.summary}});
     for (const FlagInfo& flag : tick_flags)
       flags.push_back({{"name", flag.name}, {"meaning", flag.meaning}});
     for (const std::string_view name : safety_flag_names())
@@ -227,7 +231,7 @@ class LiveSession final : public ViewerHost {
     json interventions = json::array();
     for (const auto& count : cycles.interventions) interventions.push_back(count.load());
     return json{
-        {"method", method_name(settings_.rendering.method)},
+        {"method", method_},
         {"parameters", parameters},
         {"safety", safety},
         {"cameras", cameras},
@@ -283,7 +287,7 @@ class LiveSession final : public ViewerHost {
     } else if (const auto* limit = std::get_if<SetSafetyParameter>(&command)) {
       set_parameter(settings.safety, limit->name, limit->value);
     } else if (const auto* method = std::get_if<SetMethod>(&command)) {
-      settings.rendering.method = method_from_name(method->name);
+      set_method(method->name, settings.rendering);
     } else if (const auto* record = std::get_if<SetRecording>(&command)) {
       if (!record->on) stop_recording();
       if (record->on && !recorder_) start_recording();
@@ -297,6 +301,27 @@ class LiveSession final : public ViewerHost {
   }
 
  private:
+  void set_method(const std::string& name, Parameters& parameters) {
+    const bool by_kernel = is_of_the_kernel(name);
+    if (by_kernel) parameters.method = method_from_name(name);
+    if (!by_kernel && recorder_) refuse_recording(name);
+    if (!by_kernel || !is_of_the_kernel(method_)) {
+      std::vector<std::shared_ptr<const Cloud>> seen;
+      {
+        const std::lock_guard lock(mutex_);
+        seen = newest_;
+      }
+      loop_->renew(open_rendering(name, parameters, seen));
+    }
+    method_ = name;
+  }
+
+  [[noreturn]] static void refuse_recording(const std::string& method) {
+    throw Error("recording",
+                "a session is replayed by palpate's own methods, and '" + method + "' is not one",
+                "choose sight, paper, paper-as-printed or fixed-step");
+  }
+
   // A camera's thread: one frame to the loop and to the pages.
   void take(std::size_t camera, const Frame& frame, bool is_new) {
     {
@@ -363,6 +388,7 @@ class LiveSession final : public ViewerHost {
 
   // The server's thread, or before it runs and after.
   void open_recorder(const std::string& folder, std::function<void()> renew) {
+    if (!is_of_the_kernel(method_)) refuse_recording(method_);
     using std::chrono::nanoseconds;
     SessionInfo info{.kind = SessionInfo::Kind::live, .version = PALPATE_VERSION};
     for (const auto& camera : cameras_) info.cameras.push_back(camera->status().uri);
@@ -415,7 +441,9 @@ class LiveSession final : public ViewerHost {
 
   json recording_state() {
     if (recorder_ && !recorder_->status().trouble.empty()) stop_recording();
-    json state = {{"possible", true}, {"path", nullptr}, {"message", recording_message_}};
+    json state = {{"possible", is_of_the_kernel(method_)},
+                  {"path", nullptr},
+                  {"message", recording_message_}};
     if (recorder_) state["path"] = recorder_->status().folder.string();
     return state;
   }
@@ -437,6 +465,7 @@ class LiveSession final : public ViewerHost {
   std::vector<std::uint32_t> numbers_;                // each camera's own
 
   // The server's thread, and after it has ended the main one.
+  std::string method_;
   ServoSettings settings_;
   std::uint64_t settings_number_ = 0;  // as the loop counts them
   // Set and reset under mutex_, for the cameras' threads; before the loop, which it reads, is gone.
@@ -497,6 +526,9 @@ int run_live(const LiveOptions& options) {
   const Signals signals;
   LiveSession session(options);
   for (const std::string& line : session.advice()) fmt::print(stderr, "palpate: {}\n", line);
+  if (!is_of_the_kernel(options.method))
+    fmt::print(stderr, "palpate: {} is a method of the lab: its ticks can come late\n",
+               options.method);
   fmt::print(stderr, "palpate: open {} in a browser; Ctrl-C ends the session\n", session.url());
   if (options.open_browser && isatty(STDERR_FILENO) == 1) show_in_browser(session.url());
   const double end = options.duration ? monotonic_now() + *options.duration

@@ -19,6 +19,7 @@ struct LiveOptions {
   bool any_port_will_do = false;  ///< if another program has viewer.port
   bool open_browser = true;       ///< where there is a desktop
   bool json = false;              ///< the summary as a JSON object
+  std::string method = "sight";   ///< the kernel's, or one of the lab's
   Parameters parameters;
   std::string record;  ///< folder of a recording from the start; empty for none
 };

@@ -86,7 +86,9 @@ int run_in_browser(const RunOptions& options) {
   if (options.token.empty() && !is_loopback(options.listen)) live.viewer.token = make_token();
   live.open_browser = !options.no_browser;
   live.json = options.json;
-  live.parameters = options.method.parameters();
+  const auto [name, parameters] = options.method.any_method();
+  live.method = name;
+  live.parameters = parameters;
   live.record = options.record;
   return run_live(live);
 }
@@ -103,7 +105,7 @@ int run_headless(const RunOptions& options) {
   if (!options.record.empty() && name != method_name(parameters.method))
     throw Error("--record",
                 "a session is replayed by palpate's own methods, and '" + name + "' is not one",
-                "leave it out, or choose one of the first four");
+                "leave it out, or choose sight, paper, paper-as-printed or fixed-step");
   Playback playback(options.cameras);
   const HipPath hand = open_hand(options, playback);
   const Vec3 seat = hand.at(hand.first_time());
@@ -164,7 +166,7 @@ Verb add_run(CLI::App& program) {
   command->add_flag("--headless", options->headless,
                     "no page: as fast as the machine can, with a status line and a summary");
   command->add_flag("--json", options->json, "print the summary as a JSON object");
-  options->method.add_to(*command, std::string(any_method_help) + "; in the page the first four");
+  options->method.add_to(*command, any_method_help);
   return {command, [options] { return run(*options); }};
 }
 

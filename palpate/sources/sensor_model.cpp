@@ -87,6 +87,37 @@ void add_scaled(float factor, const float* in, float* out, int count) {
   for (int i = 0; i < count; ++i) out[i] += factor * in[i];
 }
 
+// With a ray (x, y, 1) and p, q the slopes of depth across a pixel's width and height as shares of
+// depth, the surface's normal is along (-p fx, -q fy, 1 + p fx x + q fy y), and its product with
+// the ray is 1.
+PALPATE_VECTORISED
+void blank_grazing_row(const Intrinsics& camera, double least_cosine, int v, const float* truth,
+                       std::uint16_t* readings) {
+  const std::ptrdiff_t width = camera.width;
+  const double fx = camera.fx;
+  const double fy = camera.fy;
+  const double cx = camera.cx;
+  const double y = (v - camera.cy) / fy;
+  const double limit = 1.0 / (least_cosine * least_cosine);
+#pragma omp simd
+  for (std::ptrdiff_t i = 1; i < width - 1; ++i) {
+    const float z = truth[i];
+    // The smaller of both differences: beside an edge the surface goes on to one side only.
+    const float left = z - truth[i - 1];
+    const float right = truth[i + 1] - z;
+    const float above = z - truth[i - width];
+    const float below = truth[i + width] - z;
+    const float across = std::abs(left) < std::abs(right) ? left : right;
+    const float down = std::abs(above) < std::abs(below) ? above : below;
+    const double x = (static_cast<double>(i) - cx) / fx;
+    const double a = fx * double{across} / double{z};
+    const double b = fy * double{down} / double{z};
+    const double c = 1.0 + a * x + b * y;
+    const bool seen = (a * a + b * b + c * c) * (x * x + y * y + 1.0) <= limit;
+    readings[i] = seen ? readings[i] : std::uint16_t{0};
+  }
+}
+
 // The D4xx's noise is what a block matcher makes: an average over a window, which correlates as a
 // triangle, and a little of each pixel's own. Fitted to the deviations of eight frames of a resting
 // table, by depth.
@@ -315,29 +346,10 @@ void Sensor::let_edges_fly(std::span<const float> truth, std::uint64_t frame) {
 
 void Sensor::blank_grazing(std::span<const float> truth,
                            std::vector<std::uint16_t>& readings) const {
-  const int width = camera_.width;
-  const int height = camera_.height;
-  const double least_cosine = std::cos(model_.grazing);
-  // The smaller of both differences: beside an edge the surface goes on to one side only.
-  const auto slope = [&](std::ptrdiff_t i, std::ptrdiff_t step) {
-    const double before = truth[i] - truth[i - step];
-    const double after = truth[i + step] - truth[i];
-    return std::abs(before) < std::abs(after) ? before : after;
-  };
-  for (int v = 1; v + 1 < height; ++v) {
-    const double y = (v - camera_.cy) / camera_.fy;
-    for (int u = 1; u + 1 < width; ++u) {
-      const std::ptrdiff_t i = static_cast<std::ptrdiff_t>(v) * width + u;
-      const double z = truth[i];
-      if (!(z < nothing)) continue;
-      const Vec3 ray((u - camera_.cx) / camera_.fx, y, 1.0);
-      const Vec3 along_u = slope(i, 1) * ray + Vec3(z / camera_.fx, 0.0, 0.0);
-      const Vec3 along_v = slope(i, width) * ray + Vec3(0.0, z / camera_.fy, 0.0);
-      const Vec3 normal = along_u.cross(along_v);
-      if (!(std::abs(normal.dot(ray)) >= least_cosine * normal.norm() * ray.norm())) {
-        readings[i] = 0;
-      }
-    }
+  for (int v = 1; v + 1 < camera_.height; ++v) {
+    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(v) * camera_.width;
+    blank_grazing_row(camera_, std::cos(model_.grazing), v, truth.data() + row,
+                      readings.data() + row);
   }
 }
 

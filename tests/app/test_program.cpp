@@ -154,6 +154,20 @@ TEST_F(Program, RunsALiveSessionAndSaysWhereItsPageIs) {
     EXPECT_TRUE(summary.contains(key)) << key;
 }
 
+TEST_F(Program, RunsALiveSessionWithAMethodOfTheLab) {
+  const std::string live =
+      "run --json --duration 1.5 --port 0 --no-browser --device hand: "
+      "--camera synthetic:plane?size=160x120 --method ";
+  const Outcome outcome = run(live + "direct");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("direct is a method of the lab"), std::string::npos) << outcome.err;
+  const auto summary = nlohmann::json::parse(outcome.out);
+  EXPECT_GT(summary["ticks"], 100);
+  EXPECT_GT(summary["max_force"], 0.1) << "the hand presses within the first second";
+  expect_refusal(live + "ideal", {"ideal", "truth"});
+  expect_refusal(live + "direct --record " + path("bag"), {"direct", "sight"});
+}
+
 TEST_F(Program, MakesATokenForOtherMachines) {
   const Outcome outcome =
       run("run --duration 0.2 --port 0 --no-browser --listen 0.0.0.0 "

@@ -150,6 +150,12 @@ test("what one page sets, all pages show", async () => {
   await other.getByRole("tab", { name: "Method" }).click();
   await expect.poll(() => other.locator("#method-name").inputValue()).toBe("fixed-step");
   await expect.poll(() => other.getByLabel("stiffness, N/m").inputValue()).toBe("0");
+  // One of the lab's, with which nothing can be recorded, and back.
+  await page.locator("#method-name").selectOption("surfels");
+  await expect.poll(() => other.locator("#method-name").inputValue()).toBe("surfels");
+  await expect.poll(() => other.locator("#record").isDisabled()).toBe(true);
+  await page.locator("#method-name").selectOption("sight");
+  await expect.poll(() => other.locator("#record").isDisabled()).toBe(false);
 });
 
 describe.each([

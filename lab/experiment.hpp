@@ -27,7 +27,7 @@ struct ExperimentOptions {
 
   // The bench `pop` alone.
   std::optional<int> cases;           ///< how many of each family
-  std::vector<std::string> families;  ///< which; empty: all
+  std::vector<std::string> families;  ///< of pop, or scenes of fidelity; empty: all
   std::vector<std::string> fixed;     ///< KEY=VALUE: not drawn by chance
   std::string case_text;              ///< one case, as a run printed it, and nothing else
 };

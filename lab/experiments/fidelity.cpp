@@ -14,6 +14,7 @@
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 #include "lab/signal.hpp"
+#include "palpate/core/error.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate::lab {
@@ -355,22 +356,34 @@ std::string push_by_sine(const std::string& name, const ExperimentOptions& optio
 }
 
 std::vector<Cell> fidelity_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  for (const std::string& name : options.families) {
+    std::vector<std::string_view> scenes;
+    for (const Measure& measure : measures) scenes.push_back(measure.scene);
+    if (std::find(scenes.begin(), scenes.end(), name) == scenes.end())
+      throw Error("--families " + name, "fidelity has no such scene",
+                  "did you mean '" + std::string(nearest_name(name, scenes)) + "'?");
+  }
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options)) {
-    cells.emplace_back([=] { return rest_on_grid(name, options, "white-1mm", Noise::white); });
-    cells.emplace_back(
-        [=] { return rest_on_grid(name, options, "correlated-1mm", Noise::correlated); });
+    // What plays a scene gets the method, the options, the scene's name and more.
+    const auto add = [&](const char* scene, auto play, auto... more) {
+      if (options.families.empty() || std::find(options.families.begin(), options.families.end(),
+                                                scene) != options.families.end())
+        cells.emplace_back([=] { return play(name, options, scene, more...); });
+    };
     const std::string plane = "synthetic:plane";
     const std::string sphere = "synthetic:sphere?radius=40mm&floor=80mm";
-    cells.emplace_back([=] { return rest_in_sight(name, options, "real-0.45m", plane, 0.45); });
-    cells.emplace_back([=] { return rest_in_sight(name, options, "real-0.7m", plane, 0.7); });
-    cells.emplace_back([=] { return rest_in_sight(name, options, "real-0.95m", plane, 0.95); });
-    cells.emplace_back([=] { return move_in_sight(name, options, "moving-0.95m"); });
-    cells.emplace_back([=] { return rest_in_sight(name, options, "sphere-0.45m", sphere, 0.45); });
-    cells.emplace_back([=] { return rest_in_sight(name, options, "sphere-0.7m", sphere, 0.7); });
-    cells.emplace_back([=] { return slide_on_plane(name, options, "quiet-plane"); });
-    cells.emplace_back([=] { return slide_on_relief(name, options, "quiet-relief"); });
-    cells.emplace_back([=] { return push_by_sine(name, options, "sine"); });
+    add("white-1mm", rest_on_grid, Noise::white);
+    add("correlated-1mm", rest_on_grid, Noise::correlated);
+    add("real-0.45m", rest_in_sight, plane, 0.45);
+    add("real-0.7m", rest_in_sight, plane, 0.7);
+    add("real-0.95m", rest_in_sight, plane, 0.95);
+    add("moving-0.95m", move_in_sight);
+    add("sphere-0.45m", rest_in_sight, sphere, 0.45);
+    add("sphere-0.7m", rest_in_sight, sphere, 0.7);
+    add("quiet-plane", slide_on_plane);
+    add("quiet-relief", slide_on_relief);
+    add("sine", push_by_sine);
   }
   return cells;
 }

@@ -129,6 +129,8 @@ std::string hold_rows(const std::string& method, const ExperimentOptions& option
 std::string contact_rows(const std::string& method, const ExperimentOptions& options) {
   ExperimentOptions part = only(method, options);
   part.grid = options.grid.value_or(std::pair{usual_repeats, usual_repeats});
+  part.families = {"white-1mm",   "real-0.45m",   "real-0.7m", "sphere-0.45m",
+                   "quiet-plane", "quiet-relief", "sine"};
   const Table fidelity = run_part("fidelity", part);
   const auto value = [&](std::string_view scene, std::string_view measure) {
     for (std::size_t i = 0; i < fidelity.rows(); ++i) {

@@ -210,6 +210,11 @@ TEST_F(Program, TouchesTheFacesOfAPlyFile) {
   const std::string bare =
       write("points.ply", "ply\nformat ascii 1.0\n" + points + "end_header\n" + corners);
   expect_refusal(touch + " --camera ply:" + bare + " --method god-object", {"faces"});
+  expect_refusal(
+      "run --no-browser --duration 1 --device 'mouse:?x=0&y=0&z=0.05' --method "
+      "god-object --camera ply:" +
+          bare,
+      {"faces"});
 }
 
 TEST_F(Program, SaysWhichFramesOfARecordingItLeavesOut) {

@@ -403,6 +403,18 @@ TEST(ForceShading, TurnsTheForceSmoothlyOverTheFacetsOfAMesh) {
   EXPECT_LT(shaded_off, 1.0);
 }
 
+TEST(ForceShading, TurnsTheForceToTheNormalsThatAMeshCameWith) {
+  Surface mesh;
+  mesh.points = {{-0.1, -0.1, 0}, {0.1, -0.1, 0}, {0.1, 0.1, 0}, {-0.1, 0.1, 0}};
+  const Vec3 given(0.3, 0.0, 1.0);
+  mesh.normals.assign(4, given);
+  const MeshFile square(mesh, "4 0 1 2 3\n");
+  const Tick tick = press(*make_method("force-shading", {}), square.cloud(), {0.01, 0.03, -0.004});
+  EXPECT_LT((tick.force - stiffness * 0.004 * given.normalized()).norm(), 1e-3);
+  EXPECT_GT(press(*make_method("god-object", {}), square.cloud(), {0.01, 0.03, -0.004}).normal.z(),
+            0.999999);
+}
+
 TEST(PointNormals, TakesTheNormalsThatAFileGivesAtAnyLength) {
   Surface mesh;
   mesh.points = test::flat_grid();

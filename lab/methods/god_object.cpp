@@ -16,7 +16,6 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <tuple>
 
 #include "lab/method.hpp"
 #include "lab/polygons.hpp"
@@ -34,8 +33,8 @@ struct Plane {
 };
 
 // The place nearest to `hip` that is behind none of the (at most three) planes: of the feet of
-// `hip` on each plane, on the lines where two meet and on the point where three do, the nearest
-// that the others allow.
+// `hip` on each plane and on the lines where two meet, the nearest that the others allow. Where
+// there is none, three planes meet in a corner: where it has come to meet the last of them.
 Vec3 nearest_allowed(const std::vector<Plane>& planes, const Vec3& hip) {
   std::array<double, 3> behind{};  // [m] how far the hip is
   for (std::size_t i = 0; i < planes.size(); ++i)
@@ -59,12 +58,6 @@ Vec3 nearest_allowed(const std::vector<Plane>& planes, const Vec3& hip) {
       if (rest < 1e-12) continue;  // parallel
       consider(((behind[i] - c * behind[j]) * n + (behind[j] - c * behind[i]) * m) / rest);
     }
-  }
-  if (planes.size() == 3) {
-    const auto& [a, b, c] = std::tie(planes[0].normal, planes[1].normal, planes[2].normal);
-    const double volume = a.dot(b.cross(c));
-    if (std::abs(volume) > 1e-12)
-      consider((behind[0] * b.cross(c) + behind[1] * c.cross(a) + behind[2] * a.cross(b)) / volume);
   }
   return best.value_or(planes.empty() ? hip : planes.back().at);
 }

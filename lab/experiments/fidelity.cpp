@@ -406,6 +406,12 @@ Scores fidelity_scores(const Table& table) {
   std::vector<int> met(methods.size(), 0);
   int aims = 0;
   for (const Measure& measure : measures) {
+    const bool played =
+        !table
+             .numbers("value",
+                      [&](std::size_t row) { return table.text(row, "scene") == measure.scene; })
+             .empty();
+    if (!played) continue;
     std::vector<std::string> line = {
         std::string(measure.scene), fmt::format("{} [{}]", measure.name, measure.unit),
         measure.aim ? fmt::format("<= {:g}", *measure.aim) : std::string("-")};

@@ -22,7 +22,9 @@ constexpr int side = 64;                     // [voxels]
 constexpr double voxel = 1.5e-3;             // [m]
 constexpr double truncation = 4.0 * voxel;   // [m]
 constexpr double half = 0.5 * side * voxel;  // [m]
-constexpr float most_weight = 8.0F;          // [frames]
+// From here on a line of sight writes nothing but that its voxels are free.
+constexpr double free_from = truncation + 2.0 * voxel;  // [m]
+constexpr float most_weight = 8.0F;                     // [frames]
 
 using Cell = Eigen::Vector3i;
 
@@ -92,7 +94,7 @@ class Tsdf final : public ImplicitMethod {
     for (std::size_t i = 0; i < patch_.size(); ++i) {
       const Vec3 point = patch_.ball().centre + Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]);
       const Vec3 out = towards_viewer(viewpoint, point).normalized();
-      for (double s = -truncation; s < 2.0 * half; s += 0.5 * voxel) {
+      for (double s = -truncation; s < 2.0 * half; s += s < free_from ? 0.5 * voxel : voxel) {
         const Vec3 at = (point + s * out - corner) / voxel - Vec3::Constant(0.5);
         const Cell low = at.array().floor().matrix().cast<int>();
         if ((low.array() < -1).any() || (low.array() >= side).any()) {
@@ -102,9 +104,14 @@ class Tsdf final : public ImplicitMethod {
         // To the eight voxels about the place, by how near they are.
         const Vec3 part = at - low.cast<double>();
         const auto value = static_cast<float>(std::min(s / truncation, 1.0));
+        const bool inside = low.minCoeff() >= 0 && low.maxCoeff() < side - 1;
         for (int k = 0; k < 8; ++k) {
           const Cell cell = low + Cell(k & 1, k >> 1 & 1, k >> 2);
-          if ((cell.array() < 0).any() || (cell.array() >= side).any()) continue;
+          if (!inside && (cell.minCoeff() < 0 || cell.maxCoeff() >= side)) continue;
+          if (s >= free_from) {
+            write_free(index(cell), all);
+            continue;
+          }
           const auto share = static_cast<float>((k & 1 ? part.x() : 1.0 - part.x()) *
                                                 (k & 2 ? part.y() : 1.0 - part.y()) *
                                                 (k & 4 ? part.z() : 1.0 - part.z()));
@@ -125,6 +132,13 @@ class Tsdf final : public ImplicitMethod {
       weight_[j] = std::min(weight + 1.0F, most_weight - 1.0F);
       sum_[j] = hits_[j] = 0.0F;
     }
+  }
+
+  // Once a frame is enough.
+  void write_free(std::size_t j, bool all) {
+    if (hits_[j] > 0.0F || (!all && weight_[j] > 0.0F)) return;
+    written_.push_back(static_cast<std::uint32_t>(j));
+    hits_[j] = sum_[j] = 1.0F;
   }
 
   // Trilinear; unknown where one of the eight voxels was never written.

@@ -147,9 +147,13 @@ Nearest nearest_on(const Wave& shape, const Vec3& p) {
   constexpr int samples = 64;
   const double pitch = shape.length / samples;
   double best = p.x();
+  double least = squared(best);
   for (int i = -samples / 2; i <= samples / 2; ++i) {
     const double x = p.x() + i * pitch;
-    if (squared(x) < squared(best)) best = x;
+    const double here = squared(x);
+    if (here >= least) continue;
+    best = x;
+    least = here;
   }
   double low = best - pitch;
   double high = best + pitch;

@@ -18,6 +18,7 @@
 #include "palpate/core/error.hpp"
 
 #include "tests/support/data.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -244,6 +245,24 @@ TEST_F(Lab, MeasuresNoErrorOfTheRulerAndThePaperLostInARealCamerasNoise) {
   const Scores scores = find_experiment("fidelity").scores(table);
   EXPECT_EQ(scores.rows.back().back(), "24") << "aims met by the ruler";
   EXPECT_LT(std::stoi(scores.rows.back()[3]), 8) << "and by the paper";
+}
+
+TEST_F(Lab, PlaysAndJudgesOnlyTheScenesOfFidelityThatAreAskedFor) {
+  ExperimentOptions options = with({"ideal"});
+  options.families = {"sine"};
+  const Table table = run("fidelity", options);
+  ASSERT_EQ(table.rows(), 2U);
+  EXPECT_EQ(table.text(0, "scene"), "sine");
+  const Scores scores = find_experiment("fidelity").scores(table);
+  ASSERT_EQ(scores.rows.size(), 3U);
+  EXPECT_EQ(scores.rows.back(), (std::vector<std::string>{"aims met", "", "2", "2"}));
+  options.families = {"sinus"};
+  EXPECT_TRUE(test::fails_saying(
+      [&] {
+        const Experiment& fidelity = find_experiment("fidelity");
+        return fidelity.cells(fidelity, options).size();
+      },
+      "--families sinus", "did you mean 'sine'"));
 }
 
 TEST_F(Lab, PaysForStillnessWithLagWhereItTakesPlainMeans) {

@@ -130,8 +130,12 @@ class Constrained final : public TouchMethod {
     std::vector<Plane> planes;
     std::optional<std::uint32_t> held;
     moves_ = 0;
+    Vec3 before = *centre_;
     while (moves_ < most_moves) {
-      ++moves_;
+      if (++moves_ % 6 == 0) {  // where more than three planes meet it would go on in a circle
+        if ((*centre_ - before).norm() < at_rest) break;
+        before = *centre_;
+      }
       const Vec3 goal = nearest_allowed(planes, hip);
       const Vec3 way = goal - *centre_;
       if (way.norm() < at_rest) break;

@@ -164,21 +164,27 @@ KernelCosts kernel_costs(const Subject& subject, const Parameters& parameters, c
   Renderer& renderer = session.renderer;
   const Tick rest = renderer.tick(session.next_hip(), 0.0);
   const ProxyParameters& proxy = parameters.proxy;
-  const Vec3 u = rest.hip - rest.proxy;
   // What a slide gathers: r_3 and the least that the renderer leaves for the proxy to travel.
   const Ball ball{rest.proxy, proxy.r_3 + 0.2 * proxy.r_c()};
   Patch patch;
   costs.gather = measure(budget, many, [&] { gather(*subject.frames.front(), ball, patch); });
-  costs.step = measure(budget, many, [&] {
-    const Surroundings around = look_around(patch, rest.proxy, proxy);
-    use(proxy_step(patch, rest.proxy, around, around.normal.value_or(rest.normal), u, proxy.r_c(),
-                   0, proxy));
-  });
+  // One step to the side and the look with which it ends: what a slide repeats.
+  const double cos_theta = std::cos(proxy.theta);
+  const Vec3 beside = rest.hip + 1e-3 * subject.along;
+  const auto move = [&](ProxyMovement movement, int steps) {
+    ProxyParameters limited = proxy;
+    limited.step_budget = steps;
+    move_proxy(patch, beside, limited, cos_theta, false, movement);
+    return movement;
+  };
+  const ProxyMovement start = move({.at = rest.proxy}, 0);
+  costs.step = measure(budget, many, [&] { use(move(start, 1)); });
   costs.limit_patch = measure(budget, many, [&] { use(load_and_add(patch)); }).median;
   costs.limit_gather = measure_window(*subject.frames.front(), ball, budget);
   // A step reads the patch once to look around and, unless it slides, once more to see how far it
-  // can go; the last look finds that it has converged. Counted here: the looks.
-  costs.limit_tick = (costs.steps + 1.0) * costs.limit_patch + costs.gathers * costs.limit_gather;
+  // can go. Counted here: the looks. A tick's first is known from the tick before but after frames.
+  const double looks = costs.steps + hand.frame_rate / hand.tick_rate;
+  costs.limit_tick = looks * costs.limit_patch + costs.gathers * costs.limit_gather;
 
   std::size_t frames = 0;
   costs.frame = measure(budget, many, [&] {

@@ -29,7 +29,7 @@ struct KernelCosts {
   Distribution tick;              ///< all that a cycle of haptic rendering does
   Distribution tick_after_frame;  ///< those ticks that had a new frame to gather from
   Distribution frame;             ///< handing a frame over
-  Distribution step;              ///< one look around and one step, at rest in contact
+  Distribution step;              ///< one step from contact at rest, and the look around after it
   Distribution gather;            ///< of the points about the proxy at rest
   double limit_patch = 0.0;       ///< [us] loading and adding that patch once
   double limit_gather = 0.0;      ///< [us] loading and adding its pixel window; 0 if unorganised

@@ -21,11 +21,12 @@ float add_points(const float* x, const float* y, const float* z, std::size_t siz
 }
 
 PALPATE_VECTORISED
-std::uint32_t add_pixels(const std::uint16_t* depth, std::size_t columns, std::size_t rows,
+std::uint16_t add_pixels(const std::uint16_t* depth, std::size_t columns, std::size_t rows,
                          std::size_t row_length) {
-  std::uint32_t sum = 0;
+  std::uint16_t sum = 0;  // modulo 65536: as many at once as a register holds
   for (std::size_t row = 0; row < rows; ++row) {
-    for (std::size_t i = 0; i < columns; ++i) sum += depth[row * row_length + i];
+    for (std::size_t i = 0; i < columns; ++i)
+      sum = static_cast<std::uint16_t>(sum + depth[row * row_length + i]);
   }
   return sum;
 }
@@ -36,7 +37,7 @@ float load_and_add(const Patch& patch) {
   return add_points(patch.x(), patch.y(), patch.z(), patch.padded_size());
 }
 
-std::uint32_t load_and_add(const std::uint16_t* depth, std::size_t columns, std::size_t rows,
+std::uint16_t load_and_add(const std::uint16_t* depth, std::size_t columns, std::size_t rows,
                            std::size_t row_length) {
   return add_pixels(depth, columns, rows, row_length);
 }

@@ -12,7 +12,7 @@ namespace palpate::bench {
 float load_and_add(const Patch& patch);
 
 /// The same for a pixel window: `rows` of `columns` readings, `row_length` apart.
-std::uint32_t load_and_add(const std::uint16_t* depth, std::size_t columns, std::size_t rows,
+std::uint16_t load_and_add(const std::uint16_t* depth, std::size_t columns, std::size_t rows,
                            std::size_t row_length);
 
 }  // namespace palpate::bench

@@ -10,10 +10,15 @@
 #include <Eigen/Core>
 
 #include "palpate/core/parameters.hpp"
+#include "palpate/core/patch_loops.hpp"
 
 namespace palpate {
 
 using Vec3 = Eigen::Vector3d;
+
+inline Float3 narrow(const Vec3& v) noexcept {
+  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
 
 /// A ball in the world frame [m].
 struct Ball {
@@ -31,8 +36,8 @@ class Patch {
   static constexpr std::size_t capacity = 16384;
   /// The most clouds that can contribute to one patch.
   static constexpr std::size_t max_views = 16;
-  /// Loops over a patch read whole blocks of points: the widest vector of floats there is.
-  static constexpr std::size_t block = 16;
+  /// Loops over a patch read whole blocks of points.
+  static constexpr std::size_t block = patch_block;
   /// Coordinate [m] of the points that fill the last block: farther than any point of a patch,
   /// near enough for its square to be a float.
   static constexpr float far = 1e9F;
@@ -114,6 +119,15 @@ class Patch {
   [[nodiscard]] std::size_t padded_size() const noexcept {
     return (size_ + block - 1) / block * block;
   }
+  /// All of it, for the loops.
+  [[nodiscard]] PointArrays points() const noexcept { return {x(), y(), z(), padded_size()}; }
+  /// A place [m, world] as the points are: relative to the ball's centre.
+  [[nodiscard]] Float3 relative(const Vec3& at) const noexcept { return narrow(at - ball_.centre); }
+  /// Does it hold all that is within `radius` [m] of `at` [m, world]?
+  [[nodiscard]] bool covers(const Vec3& at, double radius) const noexcept {
+    const double room = ball_.radius - radius;
+    return room >= 0.0 && (at - ball_.centre).squaredNorm() <= room * room;
+  }
 
  private:
   // A block beyond the capacity, so that filling one never needs a bound.
@@ -138,19 +152,6 @@ class Patch {
   Ball ball_{Vec3::Zero(), 0.0};
   bool thinned_ = false;
 };
-
-/// What the points say about a proxy at one position.
-struct ContactSums {
-  Vec3 direction;           ///< [-] n' of (1): the weighted sum of unit vectors towards the proxy
-  double nearest_distance;  ///< [m] to the nearest point; infinite without points
-};
-
-/// The weighting function psi(r) of (2): 1 up to r_1, Wendland's C2 function down to 0 at r_3.
-double wendland_weight(double r, const ProxyParameters& proxy);
-
-/// Eq. (1) and the state of section 4.1 in one pass over the patch. O(points), no allocation.
-/// @param at  [m] proxy, world
-ContactSums contact_sums(const Patch& patch, const Vec3& at, const ProxyParameters& proxy) noexcept;
 
 /// Eq. (9): how far a sphere of radius r_c at `at` can travel along the unit vector `direction`
 /// before it meets a point [m]; infinite if it meets none, 0 if it touches one that is ahead.

@@ -2,9 +2,7 @@
 #include "palpate/core/patch_loops.hpp"
 
 #include <cmath>
-#include <limits>
 
-#include "palpate/core/patch.hpp"
 #include "palpate/core/vectorise.hpp"
 
 // Plain loops that the compiler turns into vector code. This file is compiled with leave to add in
@@ -13,43 +11,6 @@
 
 namespace palpate {
 namespace {
-
-// A patch ends with a whole block; said so that no loop needs a remainder.
-constexpr std::size_t whole_blocks(std::size_t size) {
-  return size / Patch::block * Patch::block;
-}
-
-PALPATE_VECTORISED
-DirectionSums sum(const PointArrays& points, const Float3& at, float r_3, float inverse_width) {
-  const auto [x, y, z, size] = points;
-  const auto [px, py, pz] = at;
-  const float reach = r_3 * inverse_width;
-  float sum_x = 0.0F;
-  float sum_y = 0.0F;
-  float sum_z = 0.0F;
-  float nearest = std::numeric_limits<float>::max();
-  const std::size_t end = whole_blocks(size);
-  for (std::size_t i = 0; i < end; ++i) {
-    const float dx = px - x[i];
-    const float dy = py - y[i];
-    const float dz = pz - z[i];
-    constexpr float smallest = 1e-18F;  // a nanometre, squared: keeps 1 / r finite
-    const float squared = dx * dx + (dy * dy + (dz * dz + smallest));
-    const float r = std::sqrt(squared);
-    // Eq. (2) with s = (r_3 - r) / (r_3 - r_1) kept in 0..1, hence 1 within r_1 and 0 beyond r_3.
-    float s = reach - r * inverse_width;
-    s = s < 0.0F ? 0.0F : s;
-    s = s > 1.0F ? 1.0F : s;
-    const float s_2 = s * s;
-    const float psi = s_2 * s_2 * (5.0F - 4.0F * s);
-    const float scale = psi / r;
-    sum_x += dx * scale;  // Eq. (1)
-    sum_y += dy * scale;
-    sum_z += dz * scale;
-    nearest = squared < nearest ? squared : nearest;
-  }
-  return {{sum_x, sum_y, sum_z}, nearest};
-}
 
 PALPATE_VECTORISED
 float travel(const PointArrays& points, const Float3& at, const Float3& direction,
@@ -106,11 +67,6 @@ float escape(const PointArrays& points, const Float3& at, const Float3& directio
 }  // namespace
 
 // The choice between the clones has to be local to a file: compilers disagree on its symbols.
-
-DirectionSums sum_directions(const PointArrays& points, Float3 at, float r_3,
-                             float inverse_width) noexcept {
-  return sum(points, at, r_3, inverse_width);
-}
 
 float smallest_travel(const PointArrays& points, Float3 at, Float3 direction, float squared_r_c,
                       float unlimited) noexcept {

@@ -5,14 +5,17 @@
 
 namespace palpate {
 
-// The inner loops of the method. All lengths in metres relative to the patch's origin, everything
+// The loops that search a patch. All lengths in metres relative to the patch's origin, everything
 // finite.
+
+/// Loops over a patch read whole blocks of points: the widest vector of floats there is.
+inline constexpr std::size_t patch_block = 16;
 
 struct Float3 {
   float x, y, z;
 };
 
-/// Points (x[i], y[i], z[i]); `size` is a multiple of Patch::block.
+/// Points (x[i], y[i], z[i]); `size` is a multiple of `patch_block`.
 struct PointArrays {
   const float* x;
   const float* y;
@@ -20,14 +23,10 @@ struct PointArrays {
   std::size_t size;
 };
 
-struct DirectionSums {
-  Float3 direction;       ///< n' of (1)
-  float nearest_squared;  ///< [m^2] to the nearest point
-};
-
-/// Eq. (1) with the weights of (2); `inverse_width` is 1 / (r_3 - r_1).
-DirectionSums sum_directions(const PointArrays& points, Float3 at, float r_3,
-                             float inverse_width) noexcept;
+/// A patch ends with a whole block; said so that no loop needs a remainder.
+constexpr std::size_t whole_blocks(std::size_t size) noexcept {
+  return size / patch_block * patch_block;
+}
 
 /// Eq. (9) over the points ahead; `unlimited` if none is met.
 float smallest_travel(const PointArrays& points, Float3 at, Float3 direction, float squared_r_c,

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <optional>
-
 #include "palpate/core/patch.hpp"
 
 namespace palpate {
@@ -17,39 +15,36 @@ enum class ContactState {
 /// The field's word for a state, as in the trace: `free`, `contact`, `entrenchment`.
 const char* to_string(ContactState state) noexcept;
 
-/// What one look at the patch tells: section 4.1's state and section 4.2's normal.
-struct Surroundings {
-  ContactState state;
-  std::optional<Vec3>
-      normal;  ///< [-] unit n of (1), away from the points; none if the sum vanishes
+/// How a tick's movement over the points has gone so far: section 4.3.
+struct ProxyMovement {
+  Vec3 at;              ///< [m] P_k, world
+  bool looked = false;  ///< are `state` and `normal` those at `at`?
+  ContactState state = ContactState::free_motion;
+  Vec3 normal = Vec3::Zero();  ///< [-] n' of (1), of any length; zero if the sum vanishes
+  /// [-] The last one in contact, which may be an earlier tick's; zero if there was none.
+  Vec3 contact_normal = Vec3::Zero();
+  Vec3 first_step = Vec3::Zero();  ///< [m] s_k of (13)
+  int steps = 0;
+  int contact_steps = 0;          ///< those of them taken in contact: they scale gamma of (11)
+  bool touched = false;           ///< in contact or entrenched at any step
+  bool normal_undefined = false;  ///< in contact, the sum of (1) vanished
 };
 
-/// State and normal of a proxy at `at` [m, world]. Eq. (1), (2). O(points).
-Surroundings look_around(const Patch& patch, const Vec3& at, const ProxyParameters& proxy) noexcept;
+/// Why a movement ended.
+enum class MovementEnd {
+  at_rest,       ///< converged by (8), or blocked
+  budget_spent,  ///< after step_budget steps
+  patch_left,    ///< points are needed that the patch does not cover: gather, and go on
+};
 
-/// Eq. (8): does the proxy rest where it is?
+/// Movement steps 2 to 7 of section 4.3, over and over: moves the proxy until it rests.
 ///
-/// In contact, when the angle between -u and n is below theta; in free motion, when it has reached
-/// the HIP; never while entrenched.
-/// @param u          [m] from the proxy to the HIP
-/// @param cos_theta  [-] cosine of ProxyParameters::theta, which every step asks for
-bool has_converged(const Surroundings& around, const Vec3& u, double cos_theta) noexcept;
-
-/// One proxy step s_k [m]: movement steps 3 to 6 of section 4.3 with the sizes (9) to (12).
-///
-/// @param around  what `look_around` said at `at`
-/// @param normal  [-] n to use: `around.normal`, or the last one known where that is empty
-/// @param u       [m] from the proxy to the HIP
-/// @param reach   [m] a step is never longer: what the patch covers
-/// @param contact_steps  steps taken in this tick in contact and closer than r_1 to the ideal
-///                       position, before this one; scales gamma of (11)
-Vec3 proxy_step(const Patch& patch, const Vec3& at, const Surroundings& around, const Vec3& normal,
-                const Vec3& u, double reach, int contact_steps,
-                const ProxyParameters& proxy) noexcept;
-
-/// The same with the step size of the 2011 method [1]: always 0.1 r_1.
-Vec3 fixed_proxy_step(const Surroundings& around, const Vec3& normal, const Vec3& u,
-                      const ProxyParameters& proxy) noexcept;
+/// O(steps * points), no allocation.
+/// @param hip         [m] world
+/// @param cos_theta   [-] cosine of ProxyParameters::theta
+/// @param fixed_step  steps of 0.1 r_1, as in the 2011 method [1], instead of (9) to (12)
+MovementEnd move_proxy(const Patch& patch, const Vec3& hip, const ProxyParameters& proxy,
+                       double cos_theta, bool fixed_step, ProxyMovement& movement) noexcept;
 
 /// gamma of (11) after `contact_steps` such steps in the same tick: constant for the first eight,
 /// then falling as 8/k. Section 4.4.3 leaves the schedule open; docs/method.md gives the reason.

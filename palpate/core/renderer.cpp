@@ -16,9 +16,6 @@ namespace {
 constexpr double least_margin = 0.2;
 constexpr double most_margin = 4.0;
 
-// A step shorter than this [m] is none: the proxy is blocked where it is.
-constexpr double no_step = 1e-12;
-
 // Coordinates beyond this [m] are no place that a hand can be.
 constexpr double farthest = 1e6;
 
@@ -29,7 +26,8 @@ bool is_place(const Vec3& p) {
 }  // namespace
 
 struct Renderer::Movement {
-  Surroundings around{ContactState::free_motion, std::nullopt};
+  ContactState state = ContactState::free_motion;
+  Vec3 normal = Vec3::Zero();  // [-] unit; zero where there is none
   int steps = 0;
   bool touched = false;  // in contact or entrenched at any step of this tick
   std::uint32_t flags = 0;
@@ -149,10 +147,12 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
       ++movement.steps;
       if (contact.distance >= r_c) {
         proxy_ = hip;
-        movement.around = {ContactState::free_motion, contact.normal};
+        movement.state = ContactState::free_motion;
+        movement.normal = contact.normal;
       } else {
         proxy_ = contact.foot + r_c * contact.normal;
-        movement.around = {ContactState::contact, contact.normal};
+        movement.state = ContactState::contact;
+        movement.normal = contact.normal;
         movement.touched = true;
         normal_ = contact.normal;
       }
@@ -171,7 +171,7 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
   }
   on_fit_ = false;
   const int steps = movement.steps + slides;
-  movement = move_proxy(hip);
+  movement = move_over_points(hip);
   movement.steps += steps;
   if (!movement.touched || !normal_) return movement;
   sight_.touch(*cloud_, *proxy_ - r_c * *normal_, *normal_);
@@ -179,61 +179,49 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
   return movement;
 }
 
-// Gathers the points about the proxy unless the patch already holds all within r_3 of it.
-void Renderer::cover(double travel) noexcept {
-  const double room = patch_.ball().radius - (*proxy_ - patch_.ball().centre).norm();
-  if (!patch_is_stale_ && room >= parameters_.proxy.r_3) return;
+// Gathers the points about a place from where the proxy is drawn to the HIP by u.
+void Renderer::cover(const Vec3& at, const Vec3& u, const Vec3& contact_normal) noexcept {
   const double r_c = parameters_.proxy.r_c();
+  // In contact the proxy can be expected to travel along the surface and away from it only.
+  const double into = touching_ ? std::min(u.dot(contact_normal.normalized()), 0.0) : 0.0;
+  const double travel = std::sqrt(std::max(u.squaredNorm() - into * into, 0.0));
   const double margin = std::clamp(travel, least_margin * r_c, most_margin * r_c);
-  gather(*cloud_, Ball{*proxy_, parameters_.proxy.r_3 + margin}, patch_);
+  gather(*cloud_, Ball{at, parameters_.proxy.r_3 + margin}, patch_);
   patch_is_stale_ = false;
 }
 
-// Movement steps 2 to 7 of section 4.3.
-Renderer::Movement Renderer::move_proxy(const Vec3& hip) noexcept {
-  const ProxyParameters& parameters = parameters_.proxy;
+// The proxy's movement over the points: section 4.3.
+Renderer::Movement Renderer::move_over_points(const Vec3& hip) noexcept {
   const Vec3 normal_before = normal_.value_or(Vec3::Zero());  // n_(k-1) of (13)
-  Movement movement;
-  int contact_steps = 0;
-  for (;;) {
-    const Vec3 u = hip - *proxy_;
-    // In contact the proxy can be expected to travel along the surface and away from it only.
-    const double into = touching_ && normal_ ? std::min(u.dot(*normal_), 0.0) : 0.0;
-    cover(std::sqrt(std::max(u.squaredNorm() - into * into, 0.0)));
-
-    movement.around = look_around(patch_, *proxy_, parameters);  // Step 2
-    const Surroundings& around = movement.around;
-    const bool touches = around.state != ContactState::free_motion;
-    movement.touched = movement.touched || touches;
-    if (touches) {
-      if (around.normal) {
-        normal_ = around.normal;
-      } else {
-        movement.flags |= normal_undefined;
-      }
-    }
-    if (has_converged(around, u, cos_theta_)) break;  // Step 7, Eq. (8)
-    if (movement.steps == parameters.step_budget) {
-      movement.flags |= step_budget_hit;
-      break;
-    }
-
-    const Vec3 normal = around.normal.value_or(normal_.value_or(Vec3::Zero()));
-    const double room = patch_.ball().radius - (*proxy_ - patch_.ball().centre).norm();
-    const Vec3 step = parameters_.method == Method::fixed_step
-                          ? fixed_proxy_step(around, normal, u, parameters)
-                          : proxy_step(patch_, *proxy_, around, normal, u, room - parameters.r_c(),
-                                       contact_steps, parameters);  // Steps 3 to 6
-    if (velocity_update_due_) {
-      velocity_ = updated_velocity(velocity_, normal_before, step, interval_);  // Eq. (13)
-      velocity_update_due_ = false;
-    }
-    if (step.norm() <= no_step) break;
-    if (around.state == ContactState::contact) ++contact_steps;
-    *proxy_ += step;
-    ++movement.steps;
+  ProxyMovement proxy{.at = *proxy_, .contact_normal = normal_before};
+  MovementEnd end = MovementEnd::patch_left;
+  if (patch_is_stale_) {
+    cover(proxy.at, hip - proxy.at, proxy.contact_normal);
+  } else if (*proxy_ == looked_at_) {  // where the last tick ended its look is still good
+    proxy.looked = true;
+    proxy.state = state_;
+    proxy.normal = direction_;
   }
-  velocity_update_due_ = false;  // converged at once: s_k = 0 leaves (13) as it is
+  for (;;) {
+    end = move_proxy(patch_, hip, parameters_.proxy, cos_theta_,
+                     parameters_.method == Method::fixed_step, proxy);
+    if (end != MovementEnd::patch_left) break;
+    cover(proxy.at, hip - proxy.at, proxy.contact_normal);
+  }
+  if (velocity_update_due_) {
+    velocity_ =
+        updated_velocity(velocity_, normal_before, proxy.first_step, interval_);  // Eq. (13)
+    velocity_update_due_ = false;
+  }
+  proxy_ = looked_at_ = proxy.at;
+  state_ = proxy.state;
+  direction_ = proxy.normal;
+  if (!proxy.contact_normal.isZero(0.0)) normal_ = proxy.contact_normal.normalized();
+  Movement movement{
+      .state = proxy.state, .normal = proxy.normal, .steps = proxy.steps, .touched = proxy.touched};
+  movement.normal.normalize();  // zero stays zero
+  if (end == MovementEnd::budget_spent) movement.flags |= step_budget_hit;
+  if (proxy.normal_undefined) movement.flags |= normal_undefined;
   return movement;
 }
 
@@ -330,21 +318,21 @@ Tick Renderer::tick(const Vec3& hip, double t) noexcept {
   if (!proxy_) proxy_ = hip;
 
   const bool by_sight = parameters_.method == Method::sight;
-  const Movement movement = by_sight ? move_by_sight(hip, t) : move_proxy(hip);
+  const Movement movement = by_sight ? move_by_sight(hip, t) : move_over_points(hip);
   tick.flags = movement.flags;
   // The contact shell is 0.02 mm thick, so a proxy that slides on noise leaves it for single steps.
   // What counts is where it came to rest; if it did not come to rest, whether it touched at all.
-  touching_ = movement.around.state != ContactState::free_motion ||
+  touching_ = movement.state != ContactState::free_motion ||
               ((movement.flags & step_budget_hit) != 0 && movement.touched);
   if (!touching_) {
     velocity_ = 0.0;
     normal_.reset();
   }
   tick.proxy = *proxy_;
-  tick.normal = movement.around.normal.value_or(normal_.value_or(Vec3::Zero()));
+  tick.normal = movement.normal.isZero(0.0) ? normal_.value_or(Vec3::Zero()) : movement.normal;
   tick.force = render_force(hip, t, tick.flags);
   if (by_sight) tick.force = blend_force(tick.force, hip, t);
-  tick.state = movement.around.state;
+  tick.state = movement.state;
   tick.steps = movement.steps;
   tick.surface_velocity = by_sight && sight_.tracking() ? sight_.surface().velocity() : velocity_;
   if (by_sight && sight_.holding()) tick.flags |= surface_hidden;

@@ -93,10 +93,10 @@ class Renderer {
  private:
   struct Movement;
 
-  Movement move_proxy(const Vec3& hip) noexcept;
+  Movement move_over_points(const Vec3& hip) noexcept;
   Movement move_by_sight(const Vec3& hip, double t) noexcept;
   void frame_by_sight(const Cloud& cloud) noexcept;
-  void cover(double travel) noexcept;
+  void cover(const Vec3& at, const Vec3& u, const Vec3& contact_normal) noexcept;
   Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;
   Vec3 blend_force(const Vec3& force, const Vec3& hip, double t) noexcept;
 
@@ -109,6 +109,11 @@ class Renderer {
   std::optional<Vec3> proxy_;   // P_k
   std::optional<Vec3> normal_;  // the last n known while in contact
   bool touching_ = false;       // the state after the last tick's steps
+
+  // What the last look at the patch saw, and from where.
+  Vec3 looked_at_ = Vec3::Zero();
+  ContactState state_ = ContactState::free_motion;
+  Vec3 direction_ = Vec3::Zero();  // n' of (1)
 
   // The surface's motion.
   std::int64_t frame_count_ = 0;

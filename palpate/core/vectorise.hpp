@@ -9,3 +9,6 @@
 #else
 #define PALPATE_VECTORISED
 #endif
+
+// PALPATE_INLINED on a loop that is to be part of whatever clone calls it.
+#define PALPATE_INLINED __attribute__((always_inline)) inline

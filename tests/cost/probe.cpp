@@ -5,7 +5,7 @@
 #include <random>
 
 #include "palpate/cloud/depth_image.hpp"
-#include "palpate/core/patch.hpp"
+#include "palpate/core/proxy.hpp"
 
 namespace palpate {
 
@@ -35,7 +35,8 @@ Probe probe() {
     pose.linear() =
         Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
     const DepthImage image(std::make_shared<ViewingRays>(k), depth, 5000.0, pose);
-    const ProxyParameters proxy;
+    ProxyParameters proxy;
+    proxy.step_budget = 0;  // one look
     Patch patch;
     for (int i = 0; i < 40; ++i) {
       // At the surface, at the image's borders, and a ball so large that it is thinned.
@@ -49,12 +50,16 @@ Probe probe() {
         mean += Vec3(patch.x()[p], patch.y()[p], patch.z()[p]) / static_cast<double>(patch.size());
       const Vec3 at = ball.centre + 0.3 * ball.radius * Vec3(0.5, -0.3, 0.2);
       const Vec3 direction = Vec3(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)).normalized();
-      const ContactSums sums = contact_sums(patch, at, proxy);
+      proxy.r_1 = 0.2 * ball.radius;  // so that the patch covers r_3 about `at`
+      proxy.r_2 = 0.21 * ball.radius;
+      proxy.r_3 = 0.8 * ball.radius;
+      ProxyMovement look{.at = at};
+      move_proxy(patch, at, proxy, 1.0, false, look);
       const double clear = clear_travel(patch, at, direction, proxy.r_c());
       const double escape = escape_travel(patch, at, direction, proxy);
       for (const double value :
-           {mean.x(), mean.y(), mean.z(), sums.direction.x(), sums.direction.y(),
-            sums.direction.z(), std::min(sums.nearest_distance, 1.0), std::min(clear, 1.0), escape})
+           {mean.x(), mean.y(), mean.z(), look.normal.x(), look.normal.y(), look.normal.z(),
+            static_cast<double>(look.state), std::min(clear, 1.0), escape})
         result.sums.push_back(value);
     }
   }

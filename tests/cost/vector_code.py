@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import sys
 
-LOOPS = {"sum": "sqrtps", "travel": "sqrtps", "escape": "sqrtps", "deproject_pixels": "cvtdq2ps"}
+LOOPS = {"move": "sqrtps", "travel": "sqrtps", "escape": "sqrtps", "deproject_pixels": "cvtdq2ps"}
 REGISTERS = {"default": "xmm", "avx2": "ymm", "avx512f": "zmm"}
 LEAST = 12  # packed operations on the widest registers in a loop
 

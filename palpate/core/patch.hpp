@@ -90,6 +90,15 @@ class Patch {
         mark_thinned();
         break;
       }
+      if (kept == static_cast<std::int32_t>(block)) {
+        for (std::size_t i = 0; i < block; ++i) {
+          points_->x[size + i] = x[begin + i];
+          points_->y[size + i] = y[begin + i];
+          points_->z[size + i] = z[begin + i];
+        }
+        size += block;
+        continue;
+      }
       // Without a branch for each point: what is not kept is overwritten by the next.
       for (std::size_t i = begin; i < begin + block; ++i) {
         points_->x[size] = x[i];

@@ -123,14 +123,36 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   const double wide =
       holding_ ? std::max(gate_after_hold, 6.0 * surface_.height_sd()) : surface_.gate();
   const SightCone inner({place, SurfaceEstimate::radii[0], occluder_reach, axes.up}, viewpoint);
-  for (std::size_t i = 0; i < std::min(patch_.size(), wide_beam_points); ++i) {
-    const Vec3 p = Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]);
-    const Vec3 local = axes.local_from_world(patch_.ball().centre + p);
-    const double above = local.z() - moved.height(local.head<2>());
-    if (above > wide) ++before;
-    if (!inner.holds(p) || !(std::abs(above) <= occluder_reach) || above < -reach) continue;
-    if (std::abs(above) <= wide) ++near;
-    heights[seen++] = static_cast<float>(p.dot(line));
+  const Eigen::Vector3f axis = inner.axis().cast<float>();
+  const auto radius = static_cast<float>(inner.radius_at(0.0));
+  const auto widening = static_cast<float>(inner.radius_at(1.0) - inner.radius_at(0.0));
+  const Eigen::Vector3f towards = line.cast<float>();
+  const FloatQuadric expected_surface(moved);
+  const std::size_t size = std::min(patch_.size(), wide_beam_points);
+  points_.take(patch_, axes);
+  std::array<float, wide_beam_points> above_surface;
+  std::array<float, wide_beam_points> off_axis;  // [m^2] squared distance, less the cone's radius
+  std::array<float, wide_beam_points> height;
+  for (std::size_t i = 0; i < size; ++i) {
+    const float x = patch_.x()[i];
+    const float y = patch_.y()[i];
+    const float z = patch_.z()[i];
+    const float along = x * axis.x() + y * axis.y() + z * axis.z();
+    const float r = std::max(radius + widening * along, 0.0F);
+    off_axis[i] = x * x + y * y + z * z - along * along - r * r;
+    height[i] = x * towards.x() + y * towards.y() + z * towards.z();
+    above_surface[i] = points_.z[i] - expected_surface.height(points_.x[i], points_.y[i]);
+  }
+  const auto gate = static_cast<float>(wide);
+  for (std::size_t i = 0; i < size; ++i) {
+    const float above = above_surface[i];
+    before += above > gate ? 1 : 0;
+    const bool counts = (off_axis[i] <= 0.0F) & (above <= static_cast<float>(occluder_reach)) &
+                        (above >= static_cast<float>(-reach));
+    const bool is_near = counts & (std::abs(above) <= gate);
+    near += is_near ? 1 : 0;
+    heights[seen] = height[i];
+    seen += counts ? 1 : 0;
   }
 
   const double previous_stamp = surface_.stamp();
@@ -259,23 +281,25 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
   ring.fill(nothing);
   const LocalFrame& axes = surface_.frame();
   gather(cloud, Beam{place, beside_bands.back(), reach, axes.up}, beside_points, patch_);
-  const Vec3 centre = axes.local_from_world(place);
-  const Vec2 at = centre.head<2>();
-  const Vec2 slope = surface_.surface().gradient(surface_.centre());
-  const double base = surface_.surface().height(surface_.centre());
-  for (std::size_t i = 0; i < patch_.size(); ++i) {
-    const Vec3 local = axes.local_from_world(patch_.ball().centre +
-                                             Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
-    const Vec2 d = local.head<2>() - at;
-    const double away = d.norm();
-    if (away < beside_inner || away >= beside_bands.back()) continue;
+  points_.take(patch_, axes);
+  const Eigen::Vector3f at = axes.local_from_world(place).cast<float>();
+  // Beside the contact the surface is taken to go on as a plane.
+  Quadric plane;
+  plane.c.segment<2>(1) = surface_.surface().gradient(surface_.centre());
+  plane.c[0] = surface_.surface().height(surface_.centre()) - plane.height(surface_.centre());
+  const FloatQuadric tangent(plane);
+  const auto squared_band = [](double r) { return static_cast<float>(r * r); };
+  for (std::size_t i = 0; i < points_.size; ++i) {
+    const float dx = points_.x[i] - at.x();
+    const float dy = points_.y[i] - at.y();
+    const float away = dx * dx + dy * dy;
+    if (!(away >= squared_band(beside_inner) && away < squared_band(beside_bands.back()))) continue;
     std::size_t band = 0;
-    while (away >= beside_bands[band]) ++band;
+    for (const double end : beside_bands) band += away >= squared_band(end) ? 1 : 0;
     const std::size_t sector =
-        (d.x() > 0.0 ? 4 : 0) + (d.y() > 0.0 ? 2 : 0) + (std::abs(d.x()) > std::abs(d.y()) ? 1 : 0);
-    const double r = local.z() - base - slope.dot(local.head<2>() - surface_.centre());
+        (dx > 0.0F ? 4 : 0) + (dy > 0.0F ? 2 : 0) + (std::abs(dx) > std::abs(dy) ? 1 : 0);
     float& cell = ring[band * sectors + sector];
-    cell = std::max(cell, static_cast<float>(r));
+    cell = std::max(cell, points_.z[i] - tangent.height(points_.x[i], points_.y[i]));
   }
   return ring;
 }

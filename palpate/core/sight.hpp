@@ -82,6 +82,7 @@ class SightTracker {
                                  double hardest_strike) const noexcept;
 
   Patch patch_;
+  LocalPoints points_;  // of the patch
   SurfaceEstimate surface_;
   bool tracking_ = false;
   bool holding_ = false;

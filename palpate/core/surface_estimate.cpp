@@ -28,6 +28,11 @@ constexpr double usual_noise = 2e-3;
 // some 30 mm are common, and noise must not invent them.
 constexpr double curvature_sd = 15.0;
 
+// Discs of a rung tell of one surface if their centres are within this [m].
+double overlap(std::size_t rung) {
+  return std::max(3e-3, 0.5 * SurfaceEstimate::radii[rung]);
+}
+
 constexpr double squared(double x) {
   return x * x;
 }
@@ -126,8 +131,22 @@ SurfaceEstimate::Shape SurfaceEstimate::Shape::of(const Moments& disc) noexcept 
   const Vec6 b = disc.right_side();
   const double weight = std::max(a(0, 0), 1e-9);
   const Vec5 column = a.block<5, 1>(1, 0);
-  return {a.bottomRightCorner<5, 5>() - column * column.transpose() / weight,
-          b.tail<5>() - column * (b[0] / weight), column / weight, b[0] / weight, a(0, 0)};
+  const Eigen::Matrix<double, 5, 5> matrix =
+      a.bottomRightCorner<5, 5>() - column * column.transpose() / weight;
+  Shape shape{.sums = {}, .means = column / weight, .height = b[0] / weight, .points = a(0, 0)};
+  for (Eigen::Index i = 0, k = 0; i < 5; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) shape.sums[k++] = matrix(i, j);
+  }
+  shape.sums.tail<5>() = b.tail<5>() - column * (b[0] / weight);
+  return shape;
+}
+
+Eigen::Matrix<double, 5, 5> SurfaceEstimate::Shape::matrix(const Sums& sums) noexcept {
+  Eigen::Matrix<double, 5, 5> result;
+  for (Eigen::Index i = 0, k = 0; i < 5; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) result(i, j) = result(j, i) = sums[k++];
+  }
+  return result;
 }
 
 // The residuals of a patch's points within `radius` of `foot`: their median, and how they spread
@@ -136,25 +155,27 @@ SurfaceEstimate::Shape SurfaceEstimate::Shape::of(const Moments& disc) noexcept 
 std::optional<SurfaceEstimate::Residuals> SurfaceEstimate::residuals(const Vec2& foot,
                                                                      double radius,
                                                                      double wide) const noexcept {
-  std::array<float, median_points> values;
+  std::array<float, median_points + 1> values;
   std::size_t size = 0;
-  const std::size_t stride = 1 + patch_.size() / (values.size() + 1);
-  for (std::size_t i = 0; i < patch_.size() && size < values.size(); i += stride) {
-    const Vec3 local = frame_.local_from_world(patch_.ball().centre +
-                                               Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
-    if ((local.head<2>() - foot).squaredNorm() > squared(radius)) continue;
-    const double r = local.z() - surface_.height(local.head<2>());
-    if (std::abs(r) <= wide) values[size++] = static_cast<float>(r);
+  const FloatQuadric surface(surface_);
+  const auto foot_x = static_cast<float>(foot.x());
+  const auto foot_y = static_cast<float>(foot.y());
+  const auto radius_squared = static_cast<float>(squared(radius));
+  const auto most = static_cast<float>(wide);
+  const std::size_t stride = 1 + points_.size / (median_points + 1);
+  for (std::size_t i = 0; i < points_.size && size < median_points; i += stride) {
+    const float dx = points_.x[i] - foot_x;
+    const float dy = points_.y[i] - foot_y;
+    const float r = points_.z[i] - surface.height(points_.x[i], points_.y[i]);
+    values[size] = r;
+    const bool counts = (dx * dx + dy * dy <= radius_squared) & (std::abs(r) <= most);
+    size += counts ? 1 : 0;
   }
   if (size < least_points) return std::nullopt;
-  const auto median = [&] {
-    auto* middle = values.data() + size / 2;
-    std::nth_element(values.data(), middle, values.data() + size);
-    return *middle;
-  };
-  const float centre = median();
-  for (std::size_t i = 0; i < size; ++i) values[i] = std::abs(values[i] - centre);
-  return Residuals{centre, 1.4826 * median()};
+  const std::span found(values.data(), size);
+  const float centre = kth_smallest(found, size / 2);
+  for (float& each : found) each = std::abs(each - centre);
+  return Residuals{centre, 1.4826 * kth_smallest(found, size / 2)};
 }
 
 // Shifts the expected surface by the median residual near `foot` and says beyond which residual a
@@ -176,6 +197,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   const Vec3 place = frame_.world_from_local(Vec3(foot.x(), foot.y(), surface_.height(foot)));
   const double deep = wide + 2.0 * radii[1];
   gather(cloud, Beam{place, radii[1] * 1.2, deep, frame_.up}, inner_points, patch_);
+  points_.take(patch_, frame_);
   const Quadric before = surface_;
   double cut = 0.0;
   const bool first = count_ == 0;
@@ -210,6 +232,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   now.stamp = stamp_;
   now.centre = foot;
   now.whole = !look.partial;
+  now.lost = 0;
   const auto add_ring = [&](std::size_t j) {
     Moments moments = disc_moments(patch_, frame_, surface_,
                                    Disc{foot, j == 0 ? 0.0 : radii[j - 1], radii[j], cut});
@@ -228,6 +251,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   if (noisy) {
     gather(cloud, Beam{place, radii[rungs - 1] * 1.1, wide + radii[rungs - 1], frame_.up},
            outer_points, patch_);
+    points_.take(patch_, frame_);
     // Noise that is alike over the inner disc is not over the wide ones: what belongs to them is
     // told by their own spread about their own middle.
     if (const std::optional<Residuals> far = residuals(foot, radii[rungs - 1], wide)) {
@@ -258,21 +282,20 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   std::size_t chosen = 0;
   for (std::size_t j = 0; j < now.rungs; ++j) {
     // Evidence from frames whose disc overlaps this one's well.
-    Eigen::Matrix<double, 5, 5> matrix = Eigen::Matrix<double, 5, 5>::Zero();
-    Vec5 right_side = Vec5::Zero();
+    const double farthest = squared(overlap(j));
+    Shape::Sums sums = Shape::Sums::Zero();
     std::array<SlopeWindow, slope_windows> windows;
     std::size_t filled = 0;
     std::size_t whole = 0;
     std::size_t n = 0;
     for (; n < count_; ++n) {
       const Evidence& e = evidence(n);
-      if (e.rungs <= j || (e.centre - foot).norm() > std::max(3e-3, 0.5 * radii[j])) break;
+      if (j < e.lost || e.rungs <= j || (e.centre - foot).squaredNorm() > farthest) break;
       // A disc that something covers in part tells the height, but hardly the slope.
       if (!e.whole && n > 0) continue;
-      matrix += e.shape[j].matrix;
-      right_side += e.shape[j].right_side;
+      sums += e.shape[j].sums;
       if (++whole == std::size_t{2} << filled && filled < slope_windows) {
-        windows[filled++] = {matrix, right_side};
+        windows[filled++] = {Shape::matrix(sums), Shape::right_side(sums)};
       }
     }
     frames[j] = n;
@@ -285,7 +308,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       a.diagonal().tail<3>().array() += prior;
       shapes[j] = a.ldlt().solve(b);
     };
-    fit_shape(matrix, right_side);
+    fit_shape(Shape::matrix(sums), Shape::right_side(sums));
     confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / cm2);
     const double above = shapes[j].dot(basis);
     for (std::size_t i = 0; i < n; ++i) {
@@ -317,6 +340,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       const std::size_t n = std::min(frames[i], frames[j]);
       double sum = 0.0;
       double squares = 0.0;
+#pragma omp simd reduction(+ : sum, squares)
       for (std::size_t k = 0; k < n; ++k) {
         const double d = heights[j][k].height - heights[i][k].height;
         sum += d;
@@ -365,25 +389,35 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
 // Means of the inner patch's points in cells of a square about `foot`, kept to tell structure,
 // which stays, from noise, which does not.
 void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept {
-  constexpr double cell = 2.0 * 9e-3 / cells_per_side;
-  constexpr double half = 0.5 * cells_per_side;
+  constexpr float per_cell = cells_per_side / 18e-3F;
+  constexpr float half = 0.5F * cells_per_side;
   if (new_frame) newest_cells_ = (newest_cells_ + 1) % cell_frames;
   Cells& now = cells_[newest_cells_];
   now.centre = foot;
   now.heights.fill(0.0F);
   now.means.fill(Eigen::Matrix<float, 6, 1>::Zero());
-  for (std::size_t i = 0; i < patch_.size(); ++i) {
-    const Vec3 local = frame_.local_from_world(patch_.ball().centre +
-                                               Vec3(patch_.x()[i], patch_.y()[i], patch_.z()[i]));
-    const double u = (local.x() - foot.x()) / cell + half;
-    const double v = (local.y() - foot.y()) / cell + half;
-    if (!(u >= 0.0 && v >= 0.0 && u < cells_per_side && v < cells_per_side)) continue;
-    const Vec6 basis = quadric_basis(local.head<2>());
-    if (!(std::abs(local.z() - surface_.c.dot(basis)) <= look.gate)) continue;
+  const FloatQuadric surface(surface_);
+  const auto foot_x = static_cast<float>(foot.x());
+  const auto foot_y = static_cast<float>(foot.y());
+  const auto gate = static_cast<float>(look.gate);
+  for (std::size_t i = 0; i < points_.size; ++i) {
+    const float x = points_.x[i];
+    const float y = points_.y[i];
+    const float z = points_.z[i];
+    const float u = (x - foot_x) * per_cell + half;
+    const float v = (y - foot_y) * per_cell + half;
+    if (!(u >= 0.0F && v >= 0.0F && u < cells_per_side && v < cells_per_side)) continue;
+    if (!(std::abs(z - surface.height(x, y)) <= gate)) continue;
     const std::size_t k =
         static_cast<std::size_t>(v) * cells_per_side + static_cast<std::size_t>(u);
-    now.heights[k] += static_cast<float>(local.z());
-    now.means[k] += basis.cast<float>();
+    now.heights[k] += z;
+    Eigen::Matrix<float, 6, 1>& sums = now.means[k];
+    sums[0] += 1.0F;
+    sums[1] += x;
+    sums[2] += y;
+    sums[3] += x * x;
+    sums[4] += x * y;
+    sums[5] += y * y;
   }
   now.full = !look.partial;
   for (std::size_t k = 0; k < cells; ++k) {
@@ -403,20 +437,18 @@ double SurfaceEstimate::squared_structure(const Cells& frame,
                                           const std::array<double, cells>& residuals) noexcept {
   Eigen::Matrix<double, 6, 6> a = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
   Vec6 b = Vec6::Zero();
-  const auto basis = [&](std::size_t k) {
-    Vec6 means = frame.means[k].cast<double>();
-    means.segment<2>(1) /= Moments::unit;
-    means.tail<3>() /= squared(Moments::unit);
-    return means;
-  };
+  std::array<Vec6, cells> basis;
   for (std::size_t k = 0; k < cells; ++k) {
-    const Vec6 means = basis(k);
-    a += means * means.transpose();
+    Vec6& means = basis[k];
+    means = frame.means[k].cast<double>();
+    means.segment<2>(1) *= 1.0 / Moments::unit;
+    means.tail<3>() *= 1.0 / squared(Moments::unit);
+    a.noalias() += means * means.transpose();
     b += residuals[k] * means;
   }
   const Vec6 c = a.ldlt().solve(b);
   double sum = 0.0;
-  for (std::size_t k = 0; k < cells; ++k) sum += squared(residuals[k] - c.dot(basis(k)));
+  for (std::size_t k = 0; k < cells; ++k) sum += squared(residuals[k] - c.dot(basis[k]));
   constexpr double free = cells - 6;
   return sum / free;
 }
@@ -487,10 +519,17 @@ void SurfaceEstimate::move_origin(const Vec2& foot) noexcept {
   surface_.c[2] = gradient.y();
   centre_ -= foot;
   for (Cells& past : cells_) past.full = false;
+  // A disc that lies twice as far as discs may overlap from a newer frame's is never reached again,
+  // nor is what is older. The newest frame's may still be moved.
+  const Vec2 newer = count_ > 1 ? evidence(1).centre : foot;
+  std::size_t lost = 0;
   for (std::size_t age = 0; age < count_; ++age) {
     Evidence& e = evidence(age);
+    const double away = (e.centre - newer).norm();
+    while (age > 1 && lost < rungs && away > 2.0 * overlap(lost)) ++lost;
+    e.lost = std::max(e.lost, lost);
     e.centre -= foot;
-    for (std::size_t j = 0; j < e.rungs; ++j) {
+    for (std::size_t j = e.lost; j < e.rungs; ++j) {
       e.disc[j] = e.disc[j].moved(shift);
       e.shape[j] = Shape::of(e.disc[j]);
     }

@@ -106,12 +106,16 @@ class SurfaceEstimate {
 
   /// Moments with the height eliminated (Schur's complement): what is left tells of the shape.
   struct Shape {
-    Eigen::Matrix<double, 5, 5> matrix;
-    Eigen::Matrix<double, 5, 1> right_side;
+    using Sums = Eigen::Matrix<double, 20, 1>;  // they add up over frames
+    Sums sums;                          // lower triangle of the matrix, row by row, and right side
     Eigen::Matrix<double, 5, 1> means;  // of x, y, xx, xy, yy
     double height;                      // mean z [cm]
     double points;
 
+    static Eigen::Matrix<double, 5, 5> matrix(const Sums& sums) noexcept;
+    static Eigen::Matrix<double, 5, 1> right_side(const Sums& sums) noexcept {
+      return sums.tail<5>();
+    }
     static Shape of(const Moments& disc) noexcept;
   };
   /// What one frame said.
@@ -120,6 +124,7 @@ class SurfaceEstimate {
     Vec2 centre = Vec2::Zero();
     bool whole = true;      // nothing was before a part of it
     std::size_t rungs = 0;  // how many were measured
+    std::size_t lost = 0;   // of these the first, out of reach by now
     std::array<Moments, SurfaceEstimate::rungs> disc;
     std::array<Shape, SurfaceEstimate::rungs> shape;
   };
@@ -157,6 +162,7 @@ class SurfaceEstimate {
   [[nodiscard]] double variance(std::size_t rung) const noexcept;
 
   Patch patch_;
+  LocalPoints points_;  // of the patch
   LocalFrame frame_;
   Quadric surface_;
   Vec2 centre_ = Vec2::Zero();

@@ -2,7 +2,10 @@
 #include "palpate/core/surface_fit.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 
 #include <Eigen/Cholesky>
 
@@ -40,7 +43,6 @@ struct FloatMoments {
   float points, s[15], z[6], zz;
 };
 
-// The frame's axes in centimetres: local = rows * p + offset.
 struct Rows {
   float x[3], y[3], z[3], offset[3];
 };
@@ -55,7 +57,7 @@ FloatMoments sum_moments(const float* px, const float* py, const float* pz, std:
   float z0 = 0.0F, z1 = 0.0F, z2 = 0.0F, z3 = 0.0F, z4 = 0.0F, z5 = 0.0F, zz = 0.0F;
 #pragma omp simd reduction(+ : points, s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, \
                                s14, z0, z1, z2, z3, z4, z5, zz)
-  for (std::size_t i = 0; i < size; ++i) {
+  for (std::size_t i = 0; i < size / Patch::block * Patch::block; ++i) {
     float x = rows.x[0] * px[i] + rows.x[1] * py[i] + rows.x[2] * pz[i] + rows.offset[0];
     float y = rows.y[0] * px[i] + rows.y[1] * py[i] + rows.y[2] * pz[i] + rows.offset[1];
     float z = rows.z[0] * px[i] + rows.z[1] * py[i] + rows.z[2] * pz[i] + rows.offset[2];
@@ -111,6 +113,62 @@ FloatMoments sum_moments(const float* px, const float* py, const float* pz, std:
           zz};
 }
 
+// The frame's axes in `unit`s [m]: local = rows * p + offset, for points relative to `centre`.
+Rows rows_of(const LocalFrame& frame, const Vec3& centre, double unit) {
+  const Vec3 offset = frame.local_from_world(centre) / unit;
+  Rows rows{};
+  for (int i = 0; i < 3; ++i) {
+    rows.x[i] = static_cast<float>(frame.x[i] / unit);
+    rows.y[i] = static_cast<float>(frame.y[i] / unit);
+    rows.z[i] = static_cast<float>(frame.up[i] / unit);
+    rows.offset[i] = static_cast<float>(offset[i]);
+  }
+  return rows;
+}
+
+PALPATE_VECTORISED
+void transform(const float* px, const float* py, const float* pz, std::size_t size, const Rows rows,
+               float* x, float* y, float* z) {
+#pragma omp simd
+  for (std::size_t i = 0; i < size; ++i) {
+    x[i] = rows.x[0] * px[i] + rows.x[1] * py[i] + rows.x[2] * pz[i] + rows.offset[0];
+    y[i] = rows.y[0] * px[i] + rows.y[1] * py[i] + rows.y[2] * pz[i] + rows.offset[1];
+    z[i] = rows.z[0] * px[i] + rows.z[1] * py[i] + rows.z[2] * pz[i] + rows.offset[2];
+  }
+}
+
+// Bisection over the values' bits, which are in the order of the values once those of negative ones
+// are turned round.
+PALPATE_VECTORISED
+std::int32_t kth_key(const std::int32_t* keys, std::size_t size, std::size_t k) {
+  std::int64_t low = std::numeric_limits<std::int32_t>::min();
+  std::int64_t high = std::numeric_limits<std::int32_t>::max();
+  while (low < high) {
+    const std::int64_t middle = low + (high - low) / 2;
+    const auto key = static_cast<std::int32_t>(middle);
+    std::uint32_t count = 0;  // of those up to the middle
+    std::int32_t last = std::numeric_limits<std::int32_t>::min();
+#pragma omp simd reduction(+ : count) reduction(max : last)
+    for (std::size_t i = 0; i < size; ++i) {
+      const bool below = keys[i] <= key;
+      count += below ? 1U : 0U;
+      const std::int32_t candidate = below ? keys[i] : std::numeric_limits<std::int32_t>::min();
+      last = candidate > last ? candidate : last;
+    }
+    if (count == k + 1) return last;
+    if (count > k) {
+      high = middle;
+    } else {
+      low = middle + 1;
+    }
+  }
+  return static_cast<std::int32_t>(low);
+}
+
+constexpr std::int32_t ordered(std::int32_t bits) {
+  return bits ^ ((bits >> 31) & 0x7fffffff);
+}
+
 // Coefficients from metres to centimetres: a term of degree d has the unit m^(1-d).
 Vec6 in_units(const Vec6& metres) {
   Vec6 c = metres;
@@ -120,6 +178,20 @@ Vec6 in_units(const Vec6& metres) {
 }
 
 }  // namespace
+
+void LocalPoints::take(const Patch& patch, const LocalFrame& frame) noexcept {
+  size = std::min(patch.size(), capacity);
+  transform(patch.x(), patch.y(), patch.z(), size, rows_of(frame, patch.ball().centre, 1.0),
+            x.data(), y.data(), z.data());
+}
+
+float kth_smallest(std::span<const float> values, std::size_t k) noexcept {
+  constexpr std::size_t most = 512;
+  std::array<std::int32_t, most> keys;
+  const std::size_t size = std::min(values.size(), most);
+  for (std::size_t i = 0; i < size; ++i) keys[i] = ordered(std::bit_cast<std::int32_t>(values[i]));
+  return std::bit_cast<float>(ordered(kth_key(keys.data(), size, k)));
+}
 
 LocalFrame LocalFrame::about(const Vec3& origin, const Vec3& up) noexcept {
   int smallest = 0;
@@ -229,19 +301,12 @@ Moments Moments::moved(const Vec3& shift) const noexcept {
 Moments disc_moments(const Patch& patch, const LocalFrame& frame, const Quadric& surface,
                      const Disc& disc) noexcept {
   constexpr double per_metre = 1.0 / Moments::unit;
-  const Vec3 offset = frame.local_from_world(patch.ball().centre) * per_metre;
-  Rows rows{};
-  for (int i = 0; i < 3; ++i) {
-    rows.x[i] = static_cast<float>(frame.x[i] * per_metre);
-    rows.y[i] = static_cast<float>(frame.y[i] * per_metre);
-    rows.z[i] = static_cast<float>(frame.up[i] * per_metre);
-    rows.offset[i] = static_cast<float>(offset[i]);
-  }
+  const Rows rows = rows_of(frame, patch.ball().centre, Moments::unit);
   const Vec6 in_cm = in_units(surface.c);
   const Eigen::Matrix<float, 6, 1> c = in_cm.cast<float>();
   const auto squared = [](double r) { return static_cast<float>(r * r * per_metre * per_metre); };
   const FloatMoments sums =
-      sum_moments(patch.x(), patch.y(), patch.z(), patch.size(), rows, c.data(),
+      sum_moments(patch.x(), patch.y(), patch.z(), patch.padded_size(), rows, c.data(),
                   static_cast<float>(disc.centre.x() * per_metre),
                   static_cast<float>(disc.centre.y() * per_metre), squared(disc.inner),
                   squared(disc.outer), static_cast<float>(Moments::unit / disc.cut));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -66,6 +67,30 @@ struct Quadric {
   [[nodiscard]] Vec2 nearest(const Vec3& point, const Vec2& start, const Vec2& centre,
                              double reach) const noexcept;
 };
+
+/// A Quadric in floats, for places within some centimetres of the origin.
+struct FloatQuadric {
+  explicit FloatQuadric(const Quadric& surface) noexcept : c(surface.c.cast<float>()) {}
+  [[nodiscard]] float height(float x, float y) const noexcept {
+    return c[0] + x * (c[1] + c[3] * x + c[4] * y) + y * (c[2] + c[5] * y);
+  }
+  Eigen::Matrix<float, 6, 1> c;
+};
+
+/// A patch's points in a LocalFrame [m]: converted once, read by several loops. At most `capacity`
+/// of them. NaN where a point is no number.
+struct LocalPoints {
+  static constexpr std::size_t capacity = 2048;
+
+  std::size_t size = 0;
+  alignas(64) std::array<float, capacity> x, y, z;
+
+  void take(const Patch& patch, const LocalFrame& frame) noexcept;
+};
+
+/// The k-th smallest of `values`, k from 0: what std::nth_element finds, without its branches.
+/// Looks at 512 of them at most; all finite.
+float kth_smallest(std::span<const float> values, std::size_t k) noexcept;
 
 /// What points say about a quadric, all that a least-squares fit needs: sums of weights times
 /// monomials x^a y^b, a + b <= 4, and times z x^a y^b, a + b <= 2. They add up, over points and

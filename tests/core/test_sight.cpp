@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -118,6 +119,25 @@ TEST(SurfaceFit, SaysTheSameAboutAnotherOrigin) {
   const Quadric there = fit_quadric(here.moved(shift), 0.0);
   for (const Vec2& at : {Vec2(0, 0), Vec2(0.004, -0.003)}) {
     EXPECT_NEAR(there.height(at), surface.height(at + shift.head<2>()) - shift.z(), 2e-7);
+  }
+}
+
+TEST(SurfaceFit, FindsTheKthSmallestAsSortingDoes) {
+  std::mt19937 random(11);
+  std::normal_distribution<float> height(0.0F, 2e-3F);
+  for (const std::size_t size : {1, 2, 8, 37, 192}) {
+    std::vector<float> values(size);
+    // Every other time in steps, as quantised depth has them: many are equal.
+    for (const float step : {0.0F, 1e-3F}) {
+      for (float& value : values) {
+        value = height(random);
+        if (step > 0.0F) value = step * std::round(value / step);
+      }
+      std::vector<float> sorted = values;
+      std::sort(sorted.begin(), sorted.end());
+      for (std::size_t k = 0; k < size; k += 1 + size / 7)
+        EXPECT_EQ(kth_smallest(values, k), sorted[k]) << k << " of " << size;
+    }
   }
 }
 

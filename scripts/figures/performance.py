@@ -146,7 +146,7 @@ palpate bench --growth --out .
 *limit* is a loop that only loads and adds the same points, as often as the tick looks around, and
 the same pixels, as often as it gathers. It counts neither the roots and quotients of equations (2)
 and (9) nor the second look that a step in free motion or out of entrenchment takes. Nor does it
-wait: its passes run into one another, where a step begins with what the step before has found, sums,
+wait: its passes run into one another, where a step begins with what the one before has found, sums,
 quotient and all. The fewer the points, the more of a tick is that wait. The aim was a tick within
 three times the limit; it is missed: the last column says by how much.
 

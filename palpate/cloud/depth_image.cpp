@@ -223,6 +223,18 @@ void gather_strip(const Strip& strip, const Reference& reference, const Cone* co
   flush();
 }
 
+// Too many pixels: take every stride-th of every stride-th row, on a grid fixed in the image.
+int stride_of(const ViewingRays::Window& window, std::size_t most) noexcept {
+  int stride = 1;
+  const auto in_steps = [&stride](int length) {
+    return static_cast<std::size_t>((length + stride - 1) / stride);
+  };
+  while (in_steps(window.u_end - window.u_begin) * in_steps(window.v_end - window.v_begin) >
+         std::max<std::size_t>(most, 1))
+    ++stride;
+  return stride;
+}
+
 }  // namespace
 
 void validate(const Intrinsics& k) {
@@ -379,13 +391,8 @@ void DepthImage::gather(const Ball& ball, const SightCone* sight, std::size_t ma
   const ViewingRays::Window window = rays_->window(centre, ball.radius);
   if (window.empty()) return;
 
-  // Too many pixels: take every stride-th of every stride-th row, on a grid fixed in the image.
-  int stride = 1;
-  const auto in_steps = [&stride](int length) { return (length + stride - 1) / stride; };
-  while (static_cast<std::size_t>(in_steps(window.u_end - window.u_begin)) *
-             static_cast<std::size_t>(in_steps(window.v_end - window.v_begin)) >
-         std::max<std::size_t>(max_points, 1))
-    ++stride;
+  const int stride = stride_of(window, max_points);
+  const auto in_steps = [stride](int length) { return (length + stride - 1) / stride; };
   if (stride > 1) patch.mark_thinned();
 
   // What the points are reckoned from: the reading and the ray nearest to the ball's centre; the
@@ -436,6 +443,66 @@ void DepthImage::gather(const Ball& ball, const SightCone* sight, std::size_t ma
          .columns = std::min(strip_width, static_cast<std::size_t>(in_steps(window.u_end - u))),
          .rows = static_cast<std::size_t>(in_steps(window.v_end - first_v))},
         reference, sight == nullptr ? nullptr : &cone, patch);
+  }
+}
+
+std::optional<double> DepthImage::seen_past(int u, int v, double z, double jump,
+                                            int stride) const noexcept {
+  // Holes are looked across this far: a stereo camera sees nothing beside what is near.
+  constexpr int widest_hole = 16;   // [px]
+  constexpr double steepest = 2.0;  // [-] depth over width of a surface that goes on past a hole
+  const Intrinsics& k = intrinsics();
+  const auto beside = [&](int du, int dv) {
+    const double pitch = z * (du != 0 ? 1.0 / k.fx : 1.0 / k.fy) * stride;
+    for (int i = 1; i <= widest_hole; ++i) {
+      const int x = u + i * du * stride;
+      const int y = v + i * dv * stride;
+      if (x < 0 || y < 0 || x >= k.width || y >= k.height) return z;
+      const std::uint16_t raw =
+          depth_[static_cast<std::size_t>(y) * static_cast<std::size_t>(k.width) +
+                 static_cast<std::size_t>(x)];
+      if (!is_measured(raw)) continue;
+      const double there = raw * metres_per_unit_;
+      return there > z + jump + steepest * pitch * (i - 1) ? there : z;
+    }
+    return std::numeric_limits<double>::infinity();
+  };
+  const double end = std::max({beside(1, 0), beside(-1, 0), beside(0, 1), beside(0, -1)});
+  return end > z ? std::optional(end) : std::nullopt;
+}
+
+void DepthImage::gather_sides(const Ball& ball, const Sides& sides, std::size_t max_points,
+                              Patch& patch) const noexcept {
+  const Eigen::Matrix3d rotation = world_from_camera_.linear();
+  const Vec3 centre = rotation.transpose() * (ball.centre - world_from_camera_.translation());
+  if (!(centre.z() > ball.radius)) return;
+  const ViewingRays::Window window = rays_->window(centre, ball.radius);
+  if (window.empty()) return;
+  const Intrinsics& k = intrinsics();
+  const int stride = stride_of(window, max_points);
+  const auto on_grid = [stride](int first) { return (first + stride - 1) / stride * stride; };
+  const double nearest = centre.z() - ball.radius;
+  const double farthest = centre.z() + ball.radius;
+  for (int v = on_grid(window.v_begin); v < window.v_end; v += stride) {
+    const std::uint16_t* row =
+        depth_.data() + static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width);
+    for (int u = on_grid(window.u_begin); u < window.u_end; u += stride) {
+      const double z = row[u] * metres_per_unit_;
+      if (!is_measured(row[u]) || z > farthest || z + sides.depth < nearest) continue;
+      const std::optional<double> past = seen_past(u, v, z, sides.jump, stride);
+      if (!past) continue;
+      const Eigen::Vector2d ray = rays_->ray(u, v);
+      if (!ray.allFinite()) continue;
+      const double pitch = z / k.fx * stride;
+      const double end = std::min({*past, z + sides.depth, farthest});
+      for (int i = std::max(1, static_cast<int>((nearest - z) / pitch)); z + i * pitch < end; ++i) {
+        const double at = z + i * pitch;
+        const Vec3 p = Vec3(at * ray.x(), at * ray.y(), at) - centre;
+        if (p.squaredNorm() > ball.radius * ball.radius) continue;
+        const Vec3 q = rotation * p;
+        patch.push(static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()));
+      }
+    }
   }
 }
 

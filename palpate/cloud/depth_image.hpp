@@ -82,6 +82,8 @@ class DepthImage final : public Cloud {
 
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
   void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
+  void gather_sides(const Ball& ball, const Sides& sides, std::size_t max_points,
+                    Patch& patch) const noexcept override;
 
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return rays_->intrinsics(); }
   [[nodiscard]] const ViewingRays& rays() const noexcept { return *rays_; }
@@ -101,6 +103,10 @@ class DepthImage final : public Cloud {
  private:
   void gather(const Ball& ball, const SightCone* sight, std::size_t max_points,
               Patch& patch) const noexcept;
+  /// Depth [m] at which what is seen beside pixel (u, v) begins, if that is a side's `jump` farther
+  /// than the pixel's own z.
+  [[nodiscard]] std::optional<double> seen_past(int u, int v, double z, double jump,
+                                                int stride) const noexcept;
 
   std::shared_ptr<const ViewingRays> rays_;
   std::vector<std::uint16_t> depth_;

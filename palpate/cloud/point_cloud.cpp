@@ -304,4 +304,10 @@ void CloudSet::gather(const Beam& beam, std::size_t max_points, Patch& patch) co
   for (const auto& cloud : clouds_) cloud->gather(beam, max_points / clouds_.size(), patch);
 }
 
+void CloudSet::gather_sides(const Ball& ball, const Sides& sides, std::size_t max_points,
+                            Patch& patch) const noexcept {
+  for (const auto& cloud : clouds_)
+    cloud->gather_sides(ball, sides, max_points / clouds_.size(), patch);
+}
+
 }  // namespace palpate

@@ -98,6 +98,8 @@ class CloudSet final : public Cloud {
   /// Each cloud may fill an equal share of the patch.
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
   void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
+  void gather_sides(const Ball& ball, const Sides& sides, std::size_t max_points,
+                    Patch& patch) const noexcept override;
 
   [[nodiscard]] const std::vector<std::shared_ptr<const Cloud>>& clouds() const noexcept {
     return clouds_;

@@ -17,6 +17,12 @@ struct Beam {
   Vec3 axis;
 };
 
+/// How the side of a body that no one sees is made up, in `Cloud::gather_sides`.
+struct Sides {
+  double jump;   ///< [m] a surface ends where what is seen beside it is farther by more than this
+  double depth;  ///< [m] how far its side reaches behind its edge
+};
+
 /// Whatever can be touched: it can gather the points near a place into a patch.
 ///
 /// Clouds are immutable once built, hence safe to read from any thread.
@@ -37,6 +43,14 @@ class Cloud {
   /// `max_points`, an evenly thinned part of them is added and the patch is marked thinned.
   /// `patch.ball()` must be a ball about `beam.through`.
   virtual void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept = 0;
+
+  /// Adds points of the ball where bodies that are seen from one side have their own: on the lines
+  /// of sight that just meet the edge of a surface, from there to `sides.depth` behind it or to
+  /// what is seen past it, as densely as pixels lie. None from a cloud without lines of sight.
+  ///
+  /// [servo] As `gather`.
+  virtual void gather_sides(const Ball& /*ball*/, const Sides& /*sides*/,
+                            std::size_t /*max_points*/, Patch& /*patch*/) const noexcept {}
 };
 
 /// A beam as one viewpoint sees it.

@@ -83,6 +83,10 @@ constexpr std::array table = {
                   "a touched surface that would have to be struck harder is taken to be hidden",
                   "ours (sight)", [](const Parameters& p) { return p.sight.hardest_strike; },
                   [](Parameters& p, double v) { p.sight.hardest_strike = v; }},
+    ParameterInfo{"side_depth", "", "m", 0.1, 0.0, 1.0,
+                  "how far bodies go on behind the edges of what is seen of them; 0: not at all",
+                  "ours (sight)", [](const Parameters& p) { return p.sight.side_depth; },
+                  [](Parameters& p, double v) { p.sight.side_depth = v; }},
 };
 
 constexpr std::array methods = {

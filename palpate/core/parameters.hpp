@@ -47,6 +47,7 @@ struct SightParameters {
   double hidden_hold = 0.4;  ///< [s] a surface that something hides is felt in full for this long
   double hidden_fade = 0.3;  ///< [s] and then less and less over this
   double hardest_strike = 90.0;  ///< [m/s^2] what jumps harder than that is no touched surface
+  double side_depth = 0.1;  ///< [m] how far bodies go on behind the edges of what is seen of them
 };
 
 /// Everything that can be set on a renderer. Defaults are the paper's Table 2.

@@ -104,7 +104,7 @@ void Renderer::frame_by_sight(const Cloud& cloud) noexcept {
   if (!stamp_ok_) interval_ = 1.0 / parameters_.motion.frame_rate;
   // What was hidden is remembered for a hand that is at it, or may be soon again.
   constexpr double leaves = 20e-3;  // [m]
-  if (sight_.holding() && !touching_ &&
+  if (sight_.holding() && !(touching_ && on_fit_) &&
       sight_.contact(*proxy_, stamp_).distance > parameters_.proxy.r_c() + leaves) {
     sight_.forget();
   }
@@ -134,18 +134,24 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
 
   Movement movement;
   int slides = 0;
+  // Points that scatter this far [-, r_c] carry no sphere: there is nothing better than the fit.
+  constexpr double carries_none = 0.6;
+  const auto is_smooth = [&] {
+    return sight_.smooth() || (sight_.tracking() && sight_.surface().spread() > carries_none * r_c);
+  };
   const auto rest_on_fit = [&] {
-    while (sight_.smooth()) {
+    while (is_smooth()) {
       const SurfaceContact contact = sight_.contact(hip, t);
       if (contact.distance > r_c + near + 4.0 * sight_.surface().spread()) return false;
       if (contact.curvature * r_c > deepest) return false;
       if (contact.at_limit && !sight_.holding()) {
         if (slides == most_slides) movement.flags |= step_budget_hit;
         if (slides++ < most_slides && sight_.slide(*cloud_, contact.foot)) continue;
-        if (!sight_.smooth()) return false;
+        if (!is_smooth()) return false;
       }
       ++movement.steps;
       if (contact.distance >= r_c) {
+        if (sight_.holding()) return false;  // what else is there, the points tell
         proxy_ = hip;
         movement.state = ContactState::free_motion;
         movement.normal = contact.normal;
@@ -161,9 +167,8 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
     return false;
   };
 
-  const bool close =
-      on_fit_ || (sight_.smooth() && sight_.contact(*proxy_, t).distance <=
-                                         r_c + near + 4.0 * sight_.surface().spread());
+  const bool close = on_fit_ || (is_smooth() && sight_.contact(*proxy_, t).distance <=
+                                                    r_c + near + 4.0 * sight_.surface().spread());
   if (close && rest_on_fit()) {
     on_fit_ = true;
     patch_is_stale_ = true;
@@ -171,8 +176,17 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
   }
   on_fit_ = false;
   const int steps = movement.steps + slides;
+  const Vec3 before = *proxy_;
   movement = move_over_points(hip);
   movement.steps += steps;
+  // Points that scatter can let the proxy through. Its line of sight tells.
+  if (const std::optional<Vec3> front = sight_.in_front(*cloud_, before, *proxy_, r_c)) {
+    movement.state = ContactState::contact;
+    movement.normal = (*front - *proxy_).normalized();
+    movement.touched = true;
+    normal_ = movement.normal;
+    proxy_ = front;
+  }
   if (!movement.touched || !normal_) return movement;
   sight_.touch(*cloud_, *proxy_ - r_c * *normal_, *normal_);
   if (rest_on_fit()) on_fit_ = true;
@@ -186,7 +200,11 @@ void Renderer::cover(const Vec3& at, const Vec3& u, const Vec3& contact_normal) 
   const double into = touching_ ? std::min(u.dot(contact_normal.normalized()), 0.0) : 0.0;
   const double travel = std::sqrt(std::max(u.squaredNorm() - into * into, 0.0));
   const double margin = std::clamp(travel, least_margin * r_c, most_margin * r_c);
-  gather(*cloud_, Ball{at, parameters_.proxy.r_3 + margin}, patch_);
+  const Ball ball{at, parameters_.proxy.r_3 + margin};
+  gather(*cloud_, ball, patch_);
+  if (parameters_.method == Method::sight && parameters_.sight.side_depth > 0.0) {
+    cloud_->gather_sides(ball, {2.0 * r_c, parameters_.sight.side_depth}, Patch::capacity, patch_);
+  }
   patch_is_stale_ = false;
 }
 

@@ -120,8 +120,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   std::size_t near = 0;
   std::size_t before = 0;  // points between the viewpoint and the surface
   // What comes back into sight is where it was; what is left of an occluder may be near.
-  const double wide =
-      holding_ ? std::max(gate_after_hold, 6.0 * surface_.height_sd()) : surface_.gate();
+  const double wide = holding_ ? surface_.gate(gate_after_hold) : surface_.gate();
   const SightCone inner({place, SurfaceEstimate::radii[0], occluder_reach, axes.up}, viewpoint);
   const Eigen::Vector3f axis = inner.axis().cast<float>();
   const auto radius = static_cast<float>(inner.radius_at(0.0));
@@ -260,19 +259,40 @@ void SightTracker::start(const Cloud& cloud, const Vec3& foot, const Vec3& up) n
   if (tracking_) beside_ = look_beside(cloud, surface_.place());
 }
 
-bool SightTracker::shows_behind(const Cloud& cloud, const Vec3& proxy, double radius) noexcept {
-  if (!tracking_ || holding_ || covered_) return false;
-  const Vec3& up = surface_.frame().up;
-  gather(cloud, Beam{proxy, radius, reach, up}, beam_points, patch_);
+std::optional<SightTracker::Seen> SightTracker::look_at(const Cloud& cloud, const Vec3& place,
+                                                        double radius) noexcept {
+  gather(cloud, Beam{place, radius, reach, surface_.frame().up}, beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
+  if (!viewpoint || patch_.size() < SurfaceEstimate::least_points) return std::nullopt;
+  const Vec3 line = (*viewpoint - place).normalized();
   std::array<float, beam_points> heights;
-  if (!viewpoint || patch_.size() < SurfaceEstimate::least_points) return false;
-  const Vec3 line = (*viewpoint - proxy).normalized();
-  if (line.dot(up) < 0.0) return false;  // touched from behind: that is where it belongs
   const std::size_t seen = heights_along(patch_, line, heights);
   auto* middle = heights.data() + seen / 2;
   std::nth_element(heights.data(), middle, heights.data() + seen);
-  return *middle > 1e-3 + 3.0 * surface_.height_sd();
+  return Seen{*middle, line};
+}
+
+bool SightTracker::shows_behind(const Cloud& cloud, const Vec3& proxy, double radius) noexcept {
+  if (!tracking_ || holding_ || covered_) return false;
+  const std::optional<Seen> seen = look_at(cloud, proxy, radius);
+  if (!seen) return false;
+  // Touched from behind: that is where it belongs.
+  if (seen->line.dot(surface_.frame().up) < 0.0) return false;
+  return seen->above > 1e-3 + 3.0 * surface_.height_sd();
+}
+
+std::optional<Vec3> SightTracker::in_front(const Cloud& cloud, const Vec3& before,
+                                           const Vec3& after, double radius) noexcept {
+  // Whoever goes round an edge has the surface beside or behind the whole way, or comes from far.
+  const double farthest = 4.0 * radius;
+  const double way = (after - before).norm();
+  if (!tracking_ || holding_ || covered_ || way < 0.5 * radius || way > farthest)
+    return std::nullopt;
+  const std::optional<Seen> now = look_at(cloud, after, radius);
+  if (!now || now->above < 0.0 || now->above > farthest) return std::nullopt;
+  const std::optional<Seen> then = look_at(cloud, before, radius);
+  if (!then || then->above > 0.0 || then->above < -farthest) return std::nullopt;
+  return after + (now->above + radius) * now->line;
 }
 
 // Residuals of the nearest points beside the contact, by sector and band.

@@ -57,6 +57,13 @@ class SightTracker {
   /// @param radius  [m] of the footprint
   [[nodiscard]] bool shows_behind(const Cloud& cloud, const Vec3& proxy, double radius) noexcept;
 
+  /// Where a proxy that went through a surface on its way from `before` to `after` [m, world] ought
+  /// to be: before it, on the line of sight through `after`. None if it went through nothing, as
+  /// when it went round an edge.
+  /// @param radius  [m] of the proxy
+  [[nodiscard]] std::optional<Vec3> in_front(const Cloud& cloud, const Vec3& before,
+                                             const Vec3& after, double radius) noexcept;
+
   [[nodiscard]] bool tracking() const noexcept { return tracking_; }
   /// Is the surface so well described by its fit that the proxy can rest on that?
   [[nodiscard]] bool smooth() const noexcept {
@@ -77,6 +84,13 @@ class SightTracker {
 
   void start(const Cloud& cloud, const Vec3& foot, const Vec3& up) noexcept;
   Event hold(double since) noexcept;
+  /// The median of what is measured within `radius` [m] of the line of sight through `place`.
+  struct Seen {
+    double above;  // [m] `place`, towards the viewpoint
+    Vec3 line;     // [-] unit, towards the viewpoint
+  };
+  [[nodiscard]] std::optional<Seen> look_at(const Cloud& cloud, const Vec3& place,
+                                            double radius) noexcept;
   [[nodiscard]] Ring look_beside(const Cloud& cloud, const Vec3& place) noexcept;
   [[nodiscard]] bool is_occluder(const Ring& now, double height, double jump,
                                  double hardest_strike) const noexcept;

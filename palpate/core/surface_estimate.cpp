@@ -17,8 +17,7 @@ constexpr std::size_t inner_points = 768;
 constexpr std::size_t outer_points = 1280;
 constexpr std::size_t inner_rungs = 2;
 constexpr std::size_t median_points = 192;
-// Frames whose centres are this near [m] have seen the same cells.
-constexpr double same_place = 0.2e-3;
+constexpr double cell_size = 4.5e-3;  // [m]
 // Residuals this small are no structure, whatever the noise [m].
 constexpr double structure_floor = 50e-6;
 // Noise of a disc's height that is usual for a depth camera: this [m] at 1 m, growing with the
@@ -74,16 +73,18 @@ double SurfaceEstimate::height_sd() const noexcept {
 // camera; then what they told, with a margin for how few they were.
 double SurfaceEstimate::variance(std::size_t rung) const noexcept {
   const Scatter& scatter = scatter_[rung];
-  const double usual = squared(usual_noise * squared(distance_)) + 0.03 * squared(spread_) + 1e-12;
+  // Noise that moves the whole disc shows in it, too: a disc without spread has little.
+  const double most = 4.0 * spread_ + 0.5e-3;
+  const double usual =
+      squared(std::min(usual_noise * squared(distance_), most)) + 0.03 * squared(spread_) + 1e-12;
   if (scatter.samples < 1.0) return usual;
   const double told = scatter.variance * (1.0 + 4.0 / scatter.samples) + 1e-12;
   return scatter.samples < 6.0 ? std::max(usual, told) : told;
 }
 
-double SurfaceEstimate::gate() const noexcept {
+double SurfaceEstimate::gate(double narrowest) const noexcept {
   // The beam is as wide as the narrowest disc, whose height is the noisiest.
-  return std::clamp(std::max(4.0 * spread_, 6.0 * std::sqrt(variance(0))), narrowest_gate,
-                    widest_gate);
+  return std::clamp(std::max(4.0 * spread_, 6.0 * std::sqrt(variance(0))), narrowest, widest_gate);
 }
 
 double SurfaceEstimate::travel(double t) const noexcept {
@@ -98,7 +99,13 @@ SurfaceContact SurfaceEstimate::contact(const Vec3& point, double t, double reac
   Vec3 local = frame_.local_from_world(point);
   const double moved = travel(t);
   local.z() -= moved;
-  const Vec2 at = surface_.nearest(local, local.head<2>(), centre_, reach);
+  Vec3 from = local;
+  if (const double bulge = surface_.strongest_fall(); bulge > 0.0) {
+    // A hand at a bulge's centre is as near to any place around; the place it came by counts.
+    constexpr double deepest = 0.6;  // [-] of the bulge's radius
+    from.z() = std::max(from.z(), surface_.height(from.head<2>()) - deepest / bulge);
+  }
+  const Vec2 at = surface_.nearest(from, from.head<2>(), centre_, reach);
   const Vec3 foot(at.x(), at.y(), surface_.height(at));
   const Vec3 normal = surface_.normal(at);
   return {frame_.world_from_local(foot + Vec3(0, 0, moved)), frame_.direction_in_world(normal),
@@ -332,6 +339,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   // do not see the surface move, and tell their own noise.
   // A disc may differ from the narrower ones, because the surface is not its quadric, and yet move
   // with them: then it tells the motion, and they tell where the surface is.
+  const double negligible = 2e-6 + 0.02 * spread_;  // [m] noise shifts oblique lines of sight, too
   std::size_t mover = 0;
   bool agree = true;
   for (std::size_t j = 1; j < now.rungs; ++j) {
@@ -354,10 +362,10 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
           (std::max(squares - count * mean * mean, 0.0) + (n < 4 ? expected : 0.0)) / count;
       // What was in use needs better evidence against it: a change is felt.
       const double confidence = (j <= rung_ ? 4.5 : 3.5) + 4.0 / count;
-      agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + 2e-6;
+      agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
       const double newest = heights[j][0].height - heights[i][0].height;
       moves_along =
-          agree || (n >= 4 && std::abs(newest - mean) <= 3.0 * std::sqrt(scattered) + 2e-6);
+          agree || (n >= 4 && std::abs(newest - mean) <= 3.0 * std::sqrt(scattered) + negligible);
     }
     if (!moves_along) break;
     if (agree && variance(j) <= variance(chosen)) chosen = j;
@@ -389,46 +397,43 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
 // Means of the inner patch's points in cells of a square about `foot`, kept to tell structure,
 // which stays, from noise, which does not.
 void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept {
-  constexpr float per_cell = cells_per_side / 18e-3F;
-  constexpr float half = 0.5F * cells_per_side;
   if (new_frame) newest_cells_ = (newest_cells_ + 1) % cell_frames;
   Cells& now = cells_[newest_cells_];
-  now.centre = foot;
-  now.heights.fill(0.0F);
-  now.means.fill(Eigen::Matrix<float, 6, 1>::Zero());
+  const Vec2 corner = foot / cell_size - Vec2::Constant(0.5 * cells_per_side);
+  now.first = corner.array().round().cast<int>();
+  now.heights.fill(0.0);
+  now.means.fill(Vec6::Zero());
   const FloatQuadric surface(surface_);
-  const auto foot_x = static_cast<float>(foot.x());
-  const auto foot_y = static_cast<float>(foot.y());
+  const auto first_u = static_cast<float>(now.first.x());
+  const auto first_v = static_cast<float>(now.first.y());
+  constexpr auto per_cell = static_cast<float>(1.0 / cell_size);
   const auto gate = static_cast<float>(look.gate);
   for (std::size_t i = 0; i < points_.size; ++i) {
     const float x = points_.x[i];
     const float y = points_.y[i];
     const float z = points_.z[i];
-    const float u = (x - foot_x) * per_cell + half;
-    const float v = (y - foot_y) * per_cell + half;
+    const float u = x * per_cell - first_u;
+    const float v = y * per_cell - first_v;
     if (!(u >= 0.0F && v >= 0.0F && u < cells_per_side && v < cells_per_side)) continue;
     if (!(std::abs(z - surface.height(x, y)) <= gate)) continue;
-    const std::size_t k =
-        static_cast<std::size_t>(v) * cells_per_side + static_cast<std::size_t>(u);
-    now.heights[k] += z;
-    Eigen::Matrix<float, 6, 1>& sums = now.means[k];
-    sums[0] += 1.0F;
-    sums[1] += x;
-    sums[2] += y;
-    sums[3] += x * x;
-    sums[4] += x * y;
-    sums[5] += y * y;
+    const auto k =
+        static_cast<std::size_t>(static_cast<int>(v) * cells_per_side + static_cast<int>(u));
+    now.heights[k] += double{z};
+    now.means[k] += quadric_basis(Vec2(x, y));
   }
-  now.full = !look.partial;
+  // Noise empties a cell now and then, an edge a whole row of them.
+  constexpr int most_empty = 2;
+  int empty = 0;
   for (std::size_t k = 0; k < cells; ++k) {
-    const float count = now.means[k][0];
-    if (!(count > 0.0F)) {
-      now.full = false;
-      return;
+    const double count = now.means[k][0];
+    if (!(count > 0.0)) {
+      ++empty;
+      continue;
     }
     now.heights[k] /= count;
     now.means[k] /= count;
   }
+  now.full = !look.partial && empty <= most_empty;
 }
 
 // Mean square of what no quadric explains in residuals of cells [m^2]: the fit's own errors, which
@@ -440,7 +445,7 @@ double SurfaceEstimate::squared_structure(const Cells& frame,
   std::array<Vec6, cells> basis;
   for (std::size_t k = 0; k < cells; ++k) {
     Vec6& means = basis[k];
-    means = frame.means[k].cast<double>();
+    means = frame.means[k];
     means.segment<2>(1) *= 1.0 / Moments::unit;
     means.tail<3>() *= 1.0 / squared(Moments::unit);
     a.noalias() += means * means.transpose();
@@ -448,9 +453,12 @@ double SurfaceEstimate::squared_structure(const Cells& frame,
   }
   const Vec6 c = a.ldlt().solve(b);
   double sum = 0.0;
-  for (std::size_t k = 0; k < cells; ++k) sum += squared(residuals[k] - c.dot(basis[k]));
-  constexpr double free = cells - 6;
-  return sum / free;
+  double present = 0.0;
+  for (std::size_t k = 0; k < cells; ++k) {
+    sum += squared(residuals[k] - c.dot(basis[k]));
+    present += frame.means[k][0];
+  }
+  return sum / (present - 6.0);
 }
 
 // Is the surface what its fit says, up to noise?
@@ -467,39 +475,29 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
     smooth_ = false;
     return;
   }
-  // Residuals over the surface as it is known now, less what all cells share.
-  const auto residuals_of = [this](const Cells& frame) {
-    std::array<double, cells> residuals;
-    double mean = 0.0;
-    for (std::size_t k = 0; k < cells; ++k) {
-      const Vec6 means = frame.means[k].cast<double>();
-      residuals[k] = frame.heights[k] - surface_.c.dot(means);
-      mean += residuals[k] / cells;
-    }
-    for (double& r : residuals) r -= mean;
-    return residuals;
-  };
   const Cells& newest = cells_[newest_cells_];
   if (!newest.full) {
     smooth_ = false;
     return;
   }
-  std::array<double, cells> sums = residuals_of(newest);
-  const std::array<double, cells> residuals = sums;
+  // Residuals over the surface as it is known now.
+  const auto residuals_of = [this](const Cells& frame) {
+    std::array<double, cells> residuals;
+    for (std::size_t k = 0; k < cells; ++k) {
+      residuals[k] = frame.heights[k] - surface_.c.dot(frame.means[k]);
+    }
+    return residuals;
+  };
+  const std::array<double, cells> residuals = residuals_of(newest);
+  std::array<double, cells> sums = residuals;
   std::size_t frames = 1;
   for (; frames < cell_frames; ++frames) {
     const Cells& past = cells_[(newest_cells_ + cell_frames - frames) % cell_frames];
-    if (!past.full || (past.centre - newest.centre).norm() > same_place) break;
+    if (!past.full) break;
     const std::array<double, cells> older = residuals_of(past);
-    double change = 0.0;
-    for (std::size_t k = 0; k < cells; ++k) {
-      sums[k] += older[k];
-      change += squared(residuals[k] - older[k]) / (2.0 * cells);
-    }
-    if (frames == 1) {
-      cell_scatter_.samples = std::min(cell_scatter_.samples + 1.0, 30.0);
-      cell_scatter_.variance += (change - cell_scatter_.variance) / cell_scatter_.samples;
-    }
+    if (frames == 1) learn_cell_noise(newest, residuals, past, older);
+    if (past.first != newest.first) break;
+    for (std::size_t k = 0; k < cells; ++k) sums[k] += older[k];
   }
   const auto n = static_cast<double>(frames);
   const double structure = squared_structure(newest, sums) / squared(n);
@@ -509,16 +507,60 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   smooth_ = structure <= squared(structure_floor) + confidence * noise;
 }
 
+// Noise of a cell from what two frames differ by where both have looked, less what is common.
+void SurfaceEstimate::learn_cell_noise(const Cells& newest,
+                                       const std::array<double, cells>& residuals,
+                                       const Cells& past,
+                                       const std::array<double, cells>& older) noexcept {
+  const Eigen::Vector2i offset = newest.first - past.first;
+  double sum = 0.0;
+  double squares = 0.0;
+  double shared = 0.0;
+  for (int v = 0; v < cells_per_side; ++v) {
+    for (int u = 0; u < cells_per_side; ++u) {
+      const int past_u = u + offset.x();
+      const int past_v = v + offset.y();
+      if (past_u < 0 || past_v < 0 || past_u >= cells_per_side || past_v >= cells_per_side)
+        continue;
+      const auto k = static_cast<std::size_t>(v * cells_per_side + u);
+      const auto past_k = static_cast<std::size_t>(past_v * cells_per_side + past_u);
+      if (newest.means[k][0] == 0.0 || past.means[past_k][0] == 0.0) continue;
+      const double change = residuals[k] - older[past_k];
+      sum += change;
+      squares += squared(change);
+      shared += 1.0;
+    }
+  }
+  constexpr double enough = 6.0;
+  if (shared < enough) return;
+  const double change = std::max(squares - sum * sum / shared, 0.0) / (2.0 * (shared - 1.0));
+  cell_scatter_.samples = std::min(cell_scatter_.samples + 1.0, 30.0);
+  cell_scatter_.variance += (change - cell_scatter_.variance) / cell_scatter_.samples;
+}
+
 // Keeps the local origin near the contact: sums of fourth powers lose digits far from it.
 void SurfaceEstimate::move_origin(const Vec2& foot) noexcept {
-  const Vec3 shift(foot.x(), foot.y(), surface_.height(foot));
-  const Vec2 gradient = surface_.gradient(foot);
+  const Eigen::Vector2i step = (foot / cell_size).array().round().cast<int>();
+  const Vec2 to = cell_size * step.cast<double>();
+  const Vec3 shift(to.x(), to.y(), surface_.height(to));
+  const Vec2 gradient = surface_.gradient(to);
   frame_.origin = frame_.world_from_local(shift);
   surface_.c[0] = 0.0;
   surface_.c[1] = gradient.x();
   surface_.c[2] = gradient.y();
-  centre_ -= foot;
-  for (Cells& past : cells_) past.full = false;
+  centre_ -= to;
+  for (Cells& past : cells_) {
+    past.first -= step;
+    for (std::size_t k = 0; k < cells; ++k) {
+      Vec6& m = past.means[k];
+      if (m[0] == 0.0) continue;  // empty
+      past.heights[k] -= shift.z();
+      m[3] += to.x() * (to.x() - 2.0 * m[1]);
+      m[4] += to.x() * to.y() - to.x() * m[2] - to.y() * m[1];
+      m[5] += to.y() * (to.y() - 2.0 * m[2]);
+      m.segment<2>(1) -= to;
+    }
+  }
   // A disc that lies twice as far as discs may overlap from a newer frame's is never reached again,
   // nor is what is older. The newest frame's may still be moved.
   const Vec2 newer = count_ > 1 ? evidence(1).centre : foot;
@@ -528,7 +570,7 @@ void SurfaceEstimate::move_origin(const Vec2& foot) noexcept {
     const double away = (e.centre - newer).norm();
     while (age > 1 && lost < rungs && away > 2.0 * overlap(lost)) ++lost;
     e.lost = std::max(e.lost, lost);
-    e.centre -= foot;
+    e.centre -= to;
     for (std::size_t j = e.lost; j < e.rungs; ++j) {
       e.disc[j] = e.disc[j].moved(shift);
       e.shape[j] = Shape::of(e.disc[j]);

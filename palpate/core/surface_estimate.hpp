@@ -89,19 +89,20 @@ class SurfaceEstimate {
   [[nodiscard]] double clearance() const noexcept {
     return std::max(above_mean_, 0.0) + 3.0 * spread_;
   }
-  /// Points within this [m] of where the surface is expected are its own.
-  [[nodiscard]] double gate() const noexcept;
+  /// Points within this [m] of where the surface is expected are its own; `narrowest` [m] at
+  /// least.
+  [[nodiscard]] double gate(double narrowest = narrowest_gate) const noexcept;
 
   static constexpr std::size_t rungs = 6;
   /// Of the discs that a fit may be averaged over [m].
-  static constexpr std::array<double, rungs> radii = {7e-3, 11e-3, 17e-3, 27e-3, 42e-3, 60e-3};
+  static constexpr std::array<double, rungs> radii = {7e-3, 11e-3, 18e-3, 30e-3, 50e-3, 85e-3};
   static constexpr double narrowest_gate = 12e-3;  ///< [m]
   static constexpr double longest_gap = 0.25;      ///< [s] between frames that can tell a motion
   static constexpr std::size_t least_points = 8;
 
  private:
   static constexpr std::size_t history = most_heights;
-  static constexpr std::size_t cells_per_side = 4;
+  static constexpr int cells_per_side = 4;
   static constexpr std::size_t cells = cells_per_side * cells_per_side;
 
   /// Moments with the height eliminated (Schur's complement): what is left tells of the shape.
@@ -128,12 +129,13 @@ class SurfaceEstimate {
     std::array<Moments, SurfaceEstimate::rungs> disc;
     std::array<Shape, SurfaceEstimate::rungs> shape;
   };
-  /// Means over the points in each cell of a square about a frame's contact, local.
+  /// Means over the points in each cell of a square about a frame's contact. Cells are those of a
+  /// lattice through the local origin, so that frames can be compared while the contact slides.
   struct Cells {
-    bool full = false;  // no cell is without points, and nothing was before them
-    Vec2 centre = Vec2::Zero();
-    std::array<float, cells> heights;                     // [m]
-    std::array<Eigen::Matrix<float, 6, 1>, cells> means;  // of quadric_basis
+    bool full = false;  // hardly a cell is without points, and nothing was before them
+    Eigen::Vector2i first = Eigen::Vector2i::Zero();  // of the lattice's cells
+    std::array<double, cells> heights;                // [m]
+    std::array<Vec6, cells> means;                    // of quadric_basis
   };
   static constexpr std::size_t cell_frames = 8;
   /// How a height scatters from frame to frame.
@@ -155,6 +157,8 @@ class SurfaceEstimate {
   static double squared_structure(const Cells& frame,
                                   const std::array<double, cells>& residuals) noexcept;
   void judge(const Vec2& foot) noexcept;
+  void learn_cell_noise(const Cells& newest, const std::array<double, cells>& residuals,
+                        const Cells& past, const std::array<double, cells>& older) noexcept;
   void move_origin(const Vec2& foot) noexcept;
   [[nodiscard]] Evidence& evidence(std::size_t age) noexcept {
     return ring_[(newest_ + history - age) % history];

@@ -62,6 +62,10 @@ struct Quadric {
   [[nodiscard]] double strongest_rise() const noexcept {
     return c[3] + c[5] + std::hypot(c[3] - c[5], c[4]);
   }
+  /// The same downwards: how it bulges.
+  [[nodiscard]] double strongest_fall() const noexcept {
+    return std::hypot(c[3] - c[5], c[4]) - c[3] - c[5];
+  }
   /// Where the surface is nearest to `point` [m, local], by Newton's method from `start`, no
   /// farther than `reach` [m] from `centre`.
   [[nodiscard]] Vec2 nearest(const Vec3& point, const Vec2& start, const Vec2& centre,

@@ -297,6 +297,101 @@ TEST(CloudSet, GathersFromEveryCloudUnderItsOwnView) {
   EXPECT_EQ(patch.view(1).viewpoint, Vec3(1, 0, 0));
 }
 
+// A block, 40 to 79 pixels across, 0.5 m away before a wall at 0.5 m + `gap`, from straight on.
+struct BlockBeforeWall {
+  static constexpr int size = 120;
+  static constexpr double f = 300.0;
+
+  explicit BlockBeforeWall(double gap, int hole = 0) {
+    Intrinsics k;
+    k.width = k.height = size;
+    k.fx = k.fy = f;
+    k.cx = k.cy = 60.0;
+    const auto wall = static_cast<std::uint16_t>(std::lround((0.5 + gap) * 1e4));
+    std::vector<std::uint16_t> depth(static_cast<std::size_t>(size * size), wall);
+    for (int v = 40; v < 80; ++v) {
+      for (int u = 40; u < 80 + hole; ++u) {
+        depth[static_cast<std::size_t>(v * size + u)] =
+            u < 80 ? std::uint16_t{5000} : std::uint16_t{0};
+      }
+    }
+    image = std::make_unique<DepthImage>(std::make_shared<ViewingRays>(k), depth, 1e4);
+  }
+
+  // The sides within 30 mm of the middle of the block's right edge, `depth` behind it.
+  [[nodiscard]] std::vector<Vec3> sides(double depth, double radius = 0.03) const {
+    const Vec3 edge = Vec3((79.0 - 60.0) / f, 0.0, 1.0) * (0.5 + depth);
+    Patch patch;
+    patch.start({edge, radius});
+    image->gather_sides(patch.ball(), {0.01, 0.04}, Patch::capacity, patch);
+    std::vector<Vec3> points;
+    for (std::size_t i = 0; i < patch.size(); ++i)
+      points.emplace_back(edge + Vec3(patch.x()[i], patch.y()[i], patch.z()[i]));
+    return points;
+  }
+
+  std::unique_ptr<DepthImage> image;
+};
+
+TEST(DepthImage, GivesABodySidesOnTheLinesOfSightPastItsEdge) {
+  for (const int hole : {0, 5}) {  // a stereo camera sees nothing beside what is near
+    const std::vector<Vec3> sides = BlockBeforeWall(0.3, hole).sides(0.0);
+    double deepest = 0.0;
+    for (const Vec3& p : sides) {
+      EXPECT_NEAR(p.x() / p.z(), 19.0 / BlockBeforeWall::f, 1e-6);
+      EXPECT_LE(std::abs(p.y() / p.z()), 20.5 / BlockBeforeWall::f);
+      EXPECT_GT(p.z(), 0.5);
+      deepest = std::max(deepest, p.z());
+    }
+    // As far as the ball goes, and as densely as pixels lie: 30 mm of depth over 36 rows.
+    EXPECT_NEAR(deepest, 0.53, 2e-3);
+    EXPECT_GT(sides.size(), 400U);
+  }
+}
+
+TEST(DepthImage, EndsSidesAtTheirDepthOrAtWhatIsSeenPastThem) {
+  for (const auto& [gap, end] : {std::pair{0.3, 0.54}, std::pair{0.025, 0.525}}) {
+    double deepest = 0.0;
+    for (const Vec3& p : BlockBeforeWall(gap).sides(0.02)) deepest = std::max(deepest, p.z());
+    EXPECT_LT(deepest, end);
+    EXPECT_GT(deepest, end - 3e-3);
+  }
+  EXPECT_TRUE(BlockBeforeWall(0.008).sides(0.0).empty()) << "a step lower than `jump`";
+}
+
+TEST(DepthImage, GivesNoSidesToASlopeASmoothWallAHoleInItOrTheImagesBorder) {
+  Intrinsics k;
+  k.width = k.height = 60;
+  k.fx = k.fy = 300.0;
+  k.cx = k.cy = 30.0;
+  std::vector<std::uint16_t> depth;
+  for (int v = 0; v < 60; ++v) {
+    for (int u = 0; u < 60; ++u) {  // 60 degrees steep, with two holes
+      const bool hole = (u - 20) * (u - 20) + (v - 20) * (v - 20) < 16 || (u == 40 && v > 30 && v < 45);
+      depth.push_back(hole ? std::uint16_t{0} : static_cast<std::uint16_t>(5000 + 28 * u));
+    }
+  }
+  const DepthImage image(std::make_shared<ViewingRays>(k), depth, 1e4);
+  Patch patch;
+  patch.start({Vec3(0.0, 0.0, 0.58), 0.1});
+  image.gather_sides(patch.ball(), {0.01, 0.04}, Patch::capacity, patch);
+  EXPECT_EQ(patch.size(), 0U);
+}
+
+TEST(CloudSet, GathersTheSidesThatEachOfItsCamerasSees) {
+  const BlockBeforeWall one(0.3);
+  const BlockBeforeWall other(0.3);
+  const std::size_t alone = one.sides(0.0).size();
+  const CloudSet both({std::make_shared<DepthImage>(*one.image),
+                       std::make_shared<DepthImage>(*other.image),
+                       std::make_shared<PointCloud>(one.image->points())});
+  const Vec3 edge = Vec3((79.0 - 60.0) / BlockBeforeWall::f, 0.0, 1.0) * 0.5;
+  Patch patch;
+  patch.start({edge, 0.03});
+  both.gather_sides(patch.ball(), {0.01, 0.04}, Patch::capacity, patch);
+  EXPECT_EQ(patch.size(), 2 * alone);
+}
+
 TEST(CloudSet, RefusesMoreCloudsThanAPatchTellsApart) {
   const auto cloud = std::make_shared<BruteForceCloud>(std::vector<Vec3>{});
   EXPECT_THROW(CloudSet({Patch::max_views + 1, cloud}), Error);

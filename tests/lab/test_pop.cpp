@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "lab/experiment.hpp"
+#include "lab/experiments/pop.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/runner.hpp"
 #include "palpate/core/error.hpp"
@@ -66,6 +67,31 @@ TEST_F(Pop, ThePaperLosesEverySweepOfAnOccluderAndTheFailureIsShrunkAndRunsAgain
   EXPECT_EQ(rerun.number(0, "lost"), 1.0);
   EXPECT_EQ(rerun.text(0, "first_lost"), table.text(0, "simplest"));
   EXPECT_EQ(find_experiment("pop").scores(rerun).rows.back()[2], "0.00");
+}
+
+// What sight lost once, each for a reason of its own, shrunk.
+TEST(SightHolds, WhatItOnceLost) {
+  const Parameters parameters;
+  for (const char* text :
+       {// a finger in noise that was taken for structure while the contact slid
+        "pop:finger?sensor=1&tilt=0.24&distance=0.824&fps=30&stroke=0&frequency=0.5&radius=0.012"
+        "&seed=1010071551",
+        // round the edge of what is seen of a body, into it
+        "pop:layers?sensor=0&tilt=0&distance=0.7&fps=30&stroke=0&frequency=0.5&separation=0.04"
+        "&x=-0.00258&seed=285284197",
+        "pop:random?sensor=0&tilt=0&distance=0.7&fps=31.4&parts=1&stroke=0&slides=1&swing=0"
+        "&along=-0.0278&x=0&y=0&seed=1398606317",
+        // from a surface that is hidden through the floor
+        "pop:random?sensor=0&tilt=0&distance=0.7&fps=30&parts=1&stroke=0&slides=1&swing=0"
+        "&along=0.0405&x=0&y=0&seed=1397471427",
+        // a plane without noise whose camera is far away
+        "pop:first-contact?noise=0&speed=2.7&seed=2123823194",
+        // a hand between frames deeper than a ball's centre
+        "pop:lift-sphere?noise=0.00366&acceleration=6.72&radius=0.076&seed=543885337",
+        // a cell that noise had emptied
+        "pop:lift-white?noise=0.01&acceleration=1&seed=551311602"}) {
+    EXPECT_FALSE(is_lost("sight", parse_pop_case(text), parameters)) << text;
+  }
 }
 
 TEST_F(Pop, AValueThatIsFixedIsNotDrawn) {

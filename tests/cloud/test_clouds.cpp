@@ -367,7 +367,8 @@ TEST(DepthImage, GivesNoSidesToASlopeASmoothWallAHoleInItOrTheImagesBorder) {
   std::vector<std::uint16_t> depth;
   for (int v = 0; v < 60; ++v) {
     for (int u = 0; u < 60; ++u) {  // 60 degrees steep, with two holes
-      const bool hole = (u - 20) * (u - 20) + (v - 20) * (v - 20) < 16 || (u == 40 && v > 30 && v < 45);
+      const bool hole =
+          (u - 20) * (u - 20) + (v - 20) * (v - 20) < 16 || (u == 40 && v > 30 && v < 45);
       depth.push_back(hole ? std::uint16_t{0} : static_cast<std::uint16_t>(5000 + 28 * u));
     }
   }

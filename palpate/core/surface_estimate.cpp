@@ -22,7 +22,7 @@ constexpr double cell_size = 4.5e-3;  // [m]
 constexpr double structure_floor = 50e-6;
 // Noise of a disc's height that is usual for a depth camera: this [m] at 1 m, growing with the
 // square of the distance, as stereo does. Serves until the noise has been measured.
-constexpr double usual_noise = 2e-3;
+constexpr double usual_noise = 5e-3;
 // Spread of a surface's curvature coefficients x^2, xy, y^2 that is expected [1/m]: radii down to
 // some 30 mm are common, and noise must not invent them.
 constexpr double curvature_sd = 15.0;

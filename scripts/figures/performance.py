@@ -15,13 +15,13 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PANELS = [
-    ("image_width", "image width [px]", "size of the image", False),
-    ("focal_length", "points in the patch", "points: focal length 150 to 2400 px", False),
-    ("cameras", "cameras", "cameras", False),
-    ("frame_rate", "frame rate [Hz]", "frame rate", False),
-    ("depth_mm", "depth of the hand [mm]", "free motion (< 0) and contact", False),
-    ("unorganised", "points in the cloud", "unorganised points", True),
+PANELS = [  # the last: how far tics are apart; auto: a logarithmic axis
+    ("image_width", "image width [px]", "size of the image", "500"),
+    ("focal_length", "points in the patch", "points: focal length 150 to 2400 px", "400"),
+    ("cameras", "cameras", "cameras", "1"),
+    ("frame_rate", "frame rate [Hz]", "frame rate", "50"),
+    ("depth_mm", "depth of the hand [mm]", "free motion (< 0) and contact", "10"),
+    ("unorganised", "points in the cloud", "unorganised points", "auto"),
 ]
 
 
@@ -30,13 +30,13 @@ def draw(folder, rows, image):
     script = ['set terminal svg size 900,520 font "sans,12" background rgb "white"',
               f'set output "{image}"', "set multiplot layout 2,3",
               'set grid lc rgb "#dddddd"', "unset key", 'set ylabel "tick [us]"']
-    for series, label, title, log in PANELS:
+    for series, label, title, tics in PANELS:
         x = "points" if series == "focal_length" else "x"
         points = [(float(r[x]), float(r["tick_us"])) for r in rows if r["series"] == series]
         data = pathlib.Path(folder) / f"{series}.dat"
         data.write_text("".join(f"{a} {b}\n" for a, b in points))
-        script += [f'set title "{title}"', f'set xlabel "{label}"', "set xtics auto",
-                   'set logscale x; set format x "10^{%L}"' if log
+        script += [f'set title "{title}"', f'set xlabel "{label}"', f"set xtics {tics}",
+                   'set logscale x; set format x "10^{%L}"' if tics == "auto"
                    else 'unset logscale x; set format x "%g"',
                    f"set yrange [0:{1.25 * max(b for _, b in points):.3f}]",
                    f'plot "{data}" with linespoints lw 2 pt 7 ps 0.6 lc rgb "#1f77b4"']

@@ -134,20 +134,15 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
 
   Movement movement;
   int slides = 0;
-  // Points that scatter this far [-, r_c] carry no sphere: there is nothing better than the fit.
-  constexpr double carries_none = 0.6;
-  const auto is_smooth = [&] {
-    return sight_.smooth() || (sight_.tracking() && sight_.surface().spread() > carries_none * r_c);
-  };
   const auto rest_on_fit = [&] {
-    while (is_smooth()) {
+    while (sight_.smooth()) {
       const SurfaceContact contact = sight_.contact(hip, t);
       if (contact.distance > r_c + near + 4.0 * sight_.surface().spread()) return false;
       if (contact.curvature * r_c > deepest) return false;
       if (contact.at_limit && !sight_.holding()) {
         if (slides == most_slides) movement.flags |= step_budget_hit;
         if (slides++ < most_slides && sight_.slide(*cloud_, contact.foot)) continue;
-        if (!is_smooth()) return false;
+        if (!sight_.smooth()) return false;
       }
       ++movement.steps;
       if (contact.distance >= r_c) {
@@ -167,8 +162,9 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
     return false;
   };
 
-  const bool close = on_fit_ || (is_smooth() && sight_.contact(*proxy_, t).distance <=
-                                                    r_c + near + 4.0 * sight_.surface().spread());
+  const bool close =
+      on_fit_ || (sight_.smooth() && sight_.contact(*proxy_, t).distance <=
+                                         r_c + near + 4.0 * sight_.surface().spread());
   if (close && rest_on_fit()) {
     on_fit_ = true;
     patch_is_stale_ = true;

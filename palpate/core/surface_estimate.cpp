@@ -469,8 +469,11 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   const Vec2 middle(inner.means[0], inner.means[1]);
   const Vec2 spread = Vec2(inner.means[2], inner.means[4]) - Vec2(middle.cwiseAbs2());
   const double full = 0.25 * squared(radii[0] / Moments::unit);
-  const bool whole = (middle * Moments::unit - foot).norm() < 0.3 * radii[0] &&
-                     spread.minCoeff() > 0.65 * full && spread.maxCoeff() < 1.35 * full;
+  // Hysteresis, so that the way to rest does not change from frame to frame.
+  const double slack = smooth_ ? 0.5 : 0.35;
+  const bool whole = (middle * Moments::unit - foot).norm() < 0.85 * slack * radii[0] &&
+                     spread.minCoeff() > (1.0 - slack) * full &&
+                     spread.maxCoeff() < (1.0 + slack) * full;
   if (!whole) {
     smooth_ = false;
     return;
@@ -480,12 +483,17 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
     smooth_ = false;
     return;
   }
-  // Residuals over the surface as it is known now.
+  // Residuals over the surface as it is known now, less what all cells share; 0 of empty ones.
   const auto residuals_of = [this](const Cells& frame) {
     std::array<double, cells> residuals;
+    double sum = 0.0;
+    double present = 0.0;
     for (std::size_t k = 0; k < cells; ++k) {
       residuals[k] = frame.heights[k] - surface_.c.dot(frame.means[k]);
+      sum += residuals[k];
+      present += frame.means[k][0];
     }
+    for (std::size_t k = 0; k < cells; ++k) residuals[k] -= frame.means[k][0] * sum / present;
     return residuals;
   };
   const std::array<double, cells> residuals = residuals_of(newest);
@@ -502,7 +510,6 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   const auto n = static_cast<double>(frames);
   const double structure = squared_structure(newest, sums) / squared(n);
   const double noise = cell_scatter_.samples > 0.0 ? cell_scatter_.variance / n : 0.0;
-  // Hysteresis, so that the way to rest does not change from frame to frame.
   const double confidence = smooth_ ? 6.0 : 3.0;
   smooth_ = structure <= squared(structure_floor) + confidence * noise;
 }

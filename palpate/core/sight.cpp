@@ -33,10 +33,6 @@ constexpr std::size_t beside_points = 640;
 constexpr std::size_t well_known = 4;
 constexpr float nothing = -1e3F;
 
-constexpr double squared(double x) {
-  return x * x;
-}
-
 // Where the sightlines of the view that sees most of the patch come from; none if it does not know.
 std::optional<Vec3> main_viewpoint(const Patch& patch) {
   std::size_t most = 0;
@@ -263,13 +259,12 @@ std::optional<SightTracker::Seen> SightTracker::look_at(const Cloud& cloud, cons
                                                         double radius) noexcept {
   gather(cloud, Beam{place, radius, reach, surface_.frame().up}, beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
-  if (!viewpoint || patch_.size() < SurfaceEstimate::least_points) return std::nullopt;
+  if (!viewpoint) return std::nullopt;
   const Vec3 line = (*viewpoint - place).normalized();
   std::array<float, beam_points> heights;
   const std::size_t seen = heights_along(patch_, line, heights);
-  auto* middle = heights.data() + seen / 2;
-  std::nth_element(heights.data(), middle, heights.data() + seen);
-  return Seen{*middle, line};
+  if (seen < SurfaceEstimate::least_points) return std::nullopt;
+  return Seen{kth_smallest(std::span(heights.data(), seen), seen / 2), line};
 }
 
 bool SightTracker::shows_behind(const Cloud& cloud, const Vec3& proxy, double radius) noexcept {
@@ -331,7 +326,8 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
 // @param jump    [m] above where it was expected
 bool SightTracker::is_occluder(const Ring& now, double height, double jump,
                                double hardest_strike) const noexcept {
-  const double strike = 0.5 * hardest_strike * squared(surface_.interval());
+  const double interval = surface_.interval();
+  const double strike = 0.5 * hardest_strike * (interval * interval);
   const double times = surface_.jumped() ? 4.0 : surface_.velocity() != 0.0 ? 2.0 : 1.0;
   const double noise = std::max(surface_.spread(), surface_.height_sd());
   if (surface_.settled() >= well_known && jump > times * strike + 15e-3 + 4.0 * noise) return true;

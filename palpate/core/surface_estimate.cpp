@@ -157,8 +157,8 @@ Eigen::Matrix<double, 5, 5> SurfaceEstimate::Shape::matrix(const Sums& sums) noe
 }
 
 // The residuals of a patch's points within `radius` of `foot`: their median, and how they spread
-// about it. Looks at an even part of them: a median of so many is
-// good enough to tell what belongs to a surface.
+// about it. Looks at an even part of them: a median of so many is good enough to tell what belongs
+// to a surface.
 std::optional<SurfaceEstimate::Residuals> SurfaceEstimate::residuals(const Vec2& foot,
                                                                      double radius,
                                                                      double wide) const noexcept {

@@ -393,7 +393,7 @@ void DepthImage::gather(const Ball& ball, const SightCone* sight, std::size_t ma
 
   const int stride = stride_of(window, max_points);
   const auto in_steps = [stride](int length) { return (length + stride - 1) / stride; };
-  if (stride > 1) patch.mark_thinned();
+  if (stride > 1) patch.mark_thinned(1.0 / (stride * stride));
 
   // What the points are reckoned from: the reading and the ray nearest to the ball's centre; the
   // camera itself where the ball reaches behind it.

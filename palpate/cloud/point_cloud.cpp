@@ -240,7 +240,7 @@ void PointCloud::gather(const Ball& ball, std::size_t max_points, Patch& patch) 
   std::size_t candidates = 0;
   for_each_cell(ball, [&](const Cell& cell) { candidates += cell.end - cell.begin; });
   const std::size_t stride = candidates / std::max<std::size_t>(max_points, 1) + 1;
-  if (stride > 1) patch.mark_thinned();
+  if (stride > 1) patch.mark_thinned(1.0 / static_cast<double>(stride));
   for_each_cell(ball, [&](const Cell& cell) {
     for (std::size_t i = cell.begin; i < cell.end; i += stride) {
       push_if_inside(point(i), ball, patch);
@@ -259,7 +259,7 @@ void PointCloud::gather(const Beam& beam, std::size_t max_points, Patch& patch) 
     }
   });
   const std::size_t stride = inside / std::max<std::size_t>(max_points, 1) + 1;
-  if (stride > 1) patch.mark_thinned();
+  if (stride > 1) patch.mark_thinned(1.0 / static_cast<double>(stride));
   std::size_t next = 0;
   for_each_cell(beam, cone, [&](const Cell& cell) {
     for (std::size_t i = cell.begin; i < cell.end; ++i) {

@@ -17,7 +17,7 @@ constexpr std::size_t motion_frames = 24;
 // What each frame leaves of the log-likelihoods: some seven frames count.
 constexpr double memory = 0.85;
 // How much likelier rest is than any of the other filters, before anything is known (logarithm).
-constexpr double rest_bonus = 2.5;
+constexpr double rest_bonus = 4.0;
 // Standard deviations of a surface's velocity [m/s] and acceleration [m/s^2] before it is known.
 constexpr double first_velocity = 3.0;
 constexpr double first_acceleration = 10.0;
@@ -87,14 +87,15 @@ double likelihood_of_rest(std::span<const HeightSample> samples, std::size_t fra
   double likelihood = 0.0;
   for (std::size_t i = samples.size(); i-- > 0;) {
     const double height = samples[i].height - samples.front().height;
+    const double weight = 1.0 / samples[i].doubt;
     if (n > 0.0 && i + 1 < frames) {
       const double miss = height - sum / n;
-      const double spread = 1.0 + 1.0 / n;
-      likelihood =
-          memory * likelihood - 0.5 * (miss * miss / (variance * spread) + std::log(spread));
+      const double spread = 1.0 + weight / n;
+      likelihood = memory * likelihood -
+                   0.5 * (weight * miss * miss / (variance * spread) + std::log(spread));
     }
-    sum += height;
-    n += 1.0;
+    sum += weight * height;
+    n += weight;
   }
   return likelihood;
 }
@@ -109,12 +110,15 @@ double agreed_height(std::span<const HeightSample> samples, double sd, double co
   std::array<double, 8> counts{};
   std::size_t levels = 0;
   double sum = 0.0;
+  double count = 0.0;
   std::size_t next = 1;
   for (std::size_t i = 0; i < size && levels < means.size(); ++i) {
-    sum += samples[i].height - base;
+    const double weight = 1.0 / samples[i].doubt;
+    sum += weight * (samples[i].height - base);
+    count += weight;
     if (i + 1 == next || i + 1 == size) {
-      means[levels] = sum / static_cast<double>(i + 1);
-      counts[levels] = static_cast<double>(i + 1);
+      means[levels] = sum / count;
+      counts[levels] = count;
       ++levels;
       next *= 2;
     }
@@ -137,10 +141,10 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
 
   const double base = samples.front().height;
   const double variance = std::max(sd * sd, 1e-14);
-  Bank bank(samples[frames - 1].height - base, variance);
+  Bank bank(samples[frames - 1].height - base, samples[frames - 1].doubt * variance);
   for (std::size_t i = frames - 1; i-- > 0;) {
     const double dt = std::max(samples[i].stamp - samples[i + 1].stamp, 0.0);
-    bank.step(dt, samples[i].height - base, variance);
+    bank.step(dt, samples[i].height - base, samples[i].doubt * variance);
   }
   const double rest = likelihood_of_rest(samples, frames, variance) + rest_bonus;
   double most = rest;
@@ -157,7 +161,7 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
   }
   height /= shares;
   next /= shares;
-  const double slack = confidence * sd;
+  const double slack = confidence * sd * std::sqrt(samples.front().doubt);
   const double confined = std::clamp(height, -slack, slack);
   // A velocity is felt at once: it counts when the surface moves more likely than not.
   const bool rests = rest_share > 0.5 * shares;

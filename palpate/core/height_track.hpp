@@ -8,8 +8,9 @@ namespace palpate {
 
 /// One frame's measurement of a surface's height at one place.
 struct HeightSample {
-  double stamp;   ///< [s]
-  double height;  ///< [m]
+  double stamp;        ///< [s]
+  double height;       ///< [m]
+  double doubt = 1.0;  ///< [-] its variance over the usual one
 };
 
 /// Where a surface is and how it moves.
@@ -28,7 +29,7 @@ inline constexpr std::size_t most_heights = 64;
 /// estimate to `confidence` standard deviations about itself. So a surface at rest gains the square
 /// root of the frames, and one that moves is left behind by no more than the noise of short means.
 /// @param newest_first  heights measured
-/// @param sd            [m] standard deviation of one of them
+/// @param sd            [m] usual standard deviation of one of them
 double agreed_height(std::span<const HeightSample> newest_first, double sd,
                      double confidence) noexcept;
 
@@ -39,7 +40,7 @@ double agreed_height(std::span<const HeightSample> newest_first, double sd,
 /// heights to be before it saw them, rest being believed a little more. The height is the bank's,
 /// no farther than three standard deviations from the newest one. O(most_heights), no allocation.
 /// @param newest_first  heights measured; at least one
-/// @param sd            [m] standard deviation of one of them
+/// @param sd            [m] usual standard deviation of one of them
 /// @param interval      [s] until the next frame
 HeightTrack track_height(std::span<const HeightSample> newest_first, double sd,
                          double interval) noexcept;

@@ -56,6 +56,7 @@ class Patch {
     size_ = 0;
     view_count_ = 0;
     thinned_ = false;
+    share_ = 1.0;
   }
 
   /// Opens the run of points that the next `push`es belong to; a view beyond `max_views` is
@@ -87,7 +88,7 @@ class Patch {
       for (std::size_t i = begin; i < begin + block; ++i) kept += keep[i];
       if (kept == 0) continue;
       if (size + static_cast<std::size_t>(kept) > capacity) {
-        mark_thinned();
+        thinned_ = true;
         break;
       }
       if (kept == static_cast<std::int32_t>(block)) {
@@ -111,12 +112,17 @@ class Patch {
     fill_block();
   }
 
-  /// Says that a cloud left points out because they were too many.
-  void mark_thinned() noexcept { thinned_ = true; }
+  /// Says that a cloud left points out because they were too many: only this `share` [-] is here.
+  void mark_thinned(double share) noexcept {
+    thinned_ = true;
+    share_ = std::min(share_, share);
+  }
 
   [[nodiscard]] const Ball& ball() const noexcept { return ball_; }
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool thinned() const noexcept { return thinned_; }
+  /// Of the points that were to be gathered, the share [-] that an even thinning left.
+  [[nodiscard]] double share() const noexcept { return share_; }
   [[nodiscard]] std::size_t view_count() const noexcept { return view_count_; }
   [[nodiscard]] const View& view(std::size_t i) const noexcept { return views_[i]; }
   /// Coordinates relative to the ball's centre [m, world axes]: size() of them, then `far` ones up
@@ -160,6 +166,7 @@ class Patch {
   std::array<View, max_views> views_{};
   Ball ball_{Vec3::Zero(), 0.0};
   bool thinned_ = false;
+  double share_ = 1.0;
 };
 
 /// Eq. (9): how far a sphere of radius r_c at `at` can travel along the unit vector `direction`

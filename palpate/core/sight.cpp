@@ -124,6 +124,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   const Eigen::Vector3f towards = line.cast<float>();
   const FloatQuadric expected_surface(moved);
   const std::size_t size = std::min(patch_.size(), wide_beam_points);
+  const double share = patch_.share();
   points_.take(patch_, axes);
   std::array<float, wide_beam_points> above_surface;
   std::array<float, wide_beam_points> off_axis;  // [m^2] squared distance, less the cone's radius
@@ -181,8 +182,9 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   // the disc looks like an edge, and is none.
   // Points that vanish without anything before them are a sensor's shadow beside an occluder.
   const bool stays = foot == surface_.centre();
-  if (!stays || near > near_usual_) near_usual_ = near;
-  const bool covered = before >= 3 || near < near_usual_ - near_usual_ / 4;
+  const double all_near = static_cast<double>(near) / share;
+  if (!stays || all_near > near_usual_) near_usual_ = all_near;
+  const bool covered = before >= 3 || all_near < 0.75 * near_usual_;
   shadowed_ = covered && stays && (shadowed_ || resumed || !covered_);
   covered_ = covered;
   if (!surface_.add(cloud, foot, {wide, event == Event::jumped, shadowed_})) {

@@ -101,9 +101,9 @@ class SightTracker {
   bool tracking_ = false;
   bool holding_ = false;
   double held_since_ = 0.0;
-  bool covered_ = false;        // something was before a part of the disc
-  bool shadowed_ = false;       // and has come there since
-  std::size_t near_usual_ = 0;  // points of the surface in the beam, with nothing before them
+  bool covered_ = false;     // something was before a part of the disc
+  bool shadowed_ = false;    // and has come there since
+  double near_usual_ = 0.0;  // points of the surface in the beam, with nothing before them
   Ring beside_{};
 };
 

@@ -20,6 +20,8 @@ constexpr std::size_t median_points = 192;
 constexpr double cell_size = 4.5e-3;  // [m]
 // Residuals this small are no structure, whatever the noise [m].
 constexpr double structure_floor = 50e-6;
+// Noise may grow by this much at once, however little there was [m].
+constexpr double unnoticed_noise = 50e-6;
 // Noise of a disc's height that is usual for a depth camera: this [m] at 1 m, growing with the
 // square of the distance, as stereo does. Serves until the noise has been measured.
 constexpr double usual_noise = 5e-3;
@@ -35,6 +37,28 @@ double overlap(std::size_t rung) {
 constexpr double squared(double x) {
   return x * x;
 }
+
+// Variance of heights that do not move [m^2], all but the newest; 0 if there are too few.
+double variance_at_rest(std::span<const HeightSample> newest_first, std::size_t frames) {
+  constexpr std::size_t enough = 8;
+  if (frames <= enough) return 0.0;
+  const double base = newest_first[1].height;
+  double count = 0.0;
+  double sum = 0.0;
+  double squares = 0.0;
+  for (std::size_t i = 1; i < frames; ++i) {
+    const double height = newest_first[i].height - base;
+    const double weight = 1.0 / newest_first[i].doubt;
+    count += weight;
+    sum += weight * height;
+    squares += weight * height * height;
+  }
+  return std::max(squares - sum * sum / count, 0.0) / static_cast<double>(frames - 2);
+}
+
+// Full discs have this variance along each axis [cm^2].
+constexpr double full_disc =
+    0.25 * SurfaceEstimate::radii[0] * SurfaceEstimate::radii[0] / (Moments::unit * Moments::unit);
 
 // What the newest 2, 4, 8, ... frames say of a shape: matrix * shape = right_side, in centimetres.
 constexpr std::size_t slope_windows = 4;
@@ -78,7 +102,9 @@ double SurfaceEstimate::variance(std::size_t rung) const noexcept {
   const double usual =
       squared(std::min(usual_noise * squared(distance_), most)) + 0.03 * squared(spread_) + 1e-12;
   if (scatter.samples < 1.0) return usual;
-  const double told = scatter.variance * (1.0 + 4.0 / scatter.samples) + 1e-12;
+  const double told = std::max({scatter.variance * (1.0 + 4.0 / scatter.samples), scatter.least,
+                                std::min(scatter.at_rest, 4.0 * scatter.variance)}) +
+                      1e-12;
   return scatter.samples < 6.0 ? std::max(usual, told) : told;
 }
 
@@ -182,7 +208,9 @@ std::optional<SurfaceEstimate::Residuals> SurfaceEstimate::residuals(const Vec2&
   const std::span found(values.data(), size);
   const float centre = kth_smallest(found, size / 2);
   for (float& each : found) each = std::abs(each - centre);
-  return Residuals{centre, 1.4826 * kth_smallest(found, size / 2)};
+  // Of quantised depth half may well be equal.
+  return Residuals{centre, std::max(1.4826 * kth_smallest(found, size / 2),
+                                    0.965 * kth_smallest(found, size * 7 / 10))};
 }
 
 // Shifts the expected surface by the median residual near `foot` and says beyond which residual a
@@ -231,6 +259,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
     const bool goes_on = look.jumped && jumped_;
     jumped_ = look.jumped;
     if (count_ == 0 || (look.jumped && !goes_on)) settled_ = 0;
+    if (settled_ == 0) rested_ = 0;
     settled_ += goes_on && settled_ == 1 ? 2 : 1;
     newest_ = (newest_ + 1) % history;
     count_ = std::min(count_ + 1, history);
@@ -243,6 +272,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   const auto add_ring = [&](std::size_t j) {
     Moments moments = disc_moments(patch_, frame_, surface_,
                                    Disc{foot, j == 0 ? 0.0 : radii[j - 1], radii[j], cut});
+    now.extent[j] = moments.xy[0] / patch_.share() + (j > 0 ? now.extent[j - 1] : 0.0);
     moments.raise(surface_);
     if (j > 0) moments.add(now.disc[j - 1]);
     now.disc[j] = moments;
@@ -269,6 +299,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
     now.rungs = rungs;
   }
   for (std::size_t j = 0; j < now.rungs; ++j) now.shape[j] = Shape::of(now.disc[j]);
+  if (first && !spans_area(now.shape[0])) return false;
   estimate(foot, new_frame);
   if (!look.partial) judge(foot);
   centre_ = foot;
@@ -318,22 +349,34 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
     fit_shape(Shape::matrix(sums), Shape::right_side(sums));
     confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / cm2);
     const double above = shapes[j].dot(basis);
+    double usual_extent = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
       const Evidence& e = evidence(i);
       heights[j][i] = {
           e.stamp, (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * Moments::unit};
+      usual_extent += e.extent[j] / static_cast<double>(n);
+    }
+    // What is left of a disc that something begins to cover is the noisier.
+    for (std::size_t i = 0; i < n; ++i) {
+      const double share = evidence(i).extent[j] / usual_extent;
+      if (share < 0.8) heights[j][i].doubt = 1.0 / squared(std::max(share, 0.1));
     }
     if (new_frame && n >= 5 && now.whole) {
       // Fourth differences do not see a smooth motion; their variance is 70 times a height's.
       const auto& h = heights[j];
       const double fourth =
           h[0].height - 4.0 * h[1].height + 6.0 * h[2].height - 4.0 * h[3].height + h[4].height;
-      double change = fourth * fourth / 70.0;
+      double change =
+          fourth * fourth /
+          (h[0].doubt + 16.0 * (h[1].doubt + h[3].doubt) + 36.0 * h[2].doubt + h[4].doubt);
       // A single jump is no noise.
-      if (scatter.samples >= 4.0) change = std::min(change, 9.0 * scatter.variance + 1e-12);
+      if (scatter.samples >= 4.0) {
+        change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise));
+      }
       scatter.samples = std::min(scatter.samples + 1.0, 40.0);
       scatter.variance += (change - scatter.variance) / scatter.samples;
     }
+    if (new_frame) scatter.at_rest = variance_at_rest(heights[j], std::min(n, rested_));
   }
   // Lepski: the widest disc that agrees with all narrower ones. Their differences, frame by frame,
   // do not see the surface move, and tell their own noise.
@@ -360,6 +403,11 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       const double expected = 2.0 * (variance(i) + variance(j));
       const double scattered =
           (std::max(squares - count * mean * mean, 0.0) + (n < 4 ? expected : 0.0)) / count;
+      // Noise fades with the area it is averaged over: a disc has at least as much as its
+      // difference from the next narrower one tells.
+      if (i + 1 == j && n >= 4) {
+        scatter_[j].least = (1.0 + 2.0 / count) * scattered / (squared(radii[j] / radii[i]) - 1.0);
+      }
       // What was in use needs better evidence against it: a change is felt.
       const double confidence = (j <= rung_ ? 4.5 : 3.5) + 4.0 / count;
       agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
@@ -386,7 +434,10 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
                                             std::clamp<std::size_t>(settled_, 1, frames[mover]));
   const double sd = height_sd();
   const HeightTrack track = track_height(since, sd, interval_);
-  if (new_frame) velocity_ = track.velocity;
+  if (new_frame) {
+    velocity_ = track.velocity;
+    rested_ = velocity_ == 0.0 ? std::min(rested_ + 1, history) : 0;
+  }
   const double height = track.height;
   surface_.c.tail<5>() = shapes[chosen];
   surface_.c.tail<3>() /= Moments::unit;
@@ -461,6 +512,15 @@ double SurfaceEstimate::squared_structure(const Cells& frame,
   return sum / (present - 6.0);
 }
 
+// Do points say how a surface slopes? Those of a border seen from its side lie in a line.
+bool SurfaceEstimate::spans_area(const Shape& inner) noexcept {
+  const double xx = inner.means[2] - squared(inner.means[0]);
+  const double xy = inner.means[3] - inner.means[0] * inner.means[1];
+  const double yy = inner.means[4] - squared(inner.means[1]);
+  const double least = 0.5 * (xx + yy) - std::hypot(0.5 * (xx - yy), xy);
+  return least > 0.05 * full_disc;
+}
+
 // Is the surface what its fit says, up to noise?
 void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   const Evidence& now = evidence(0);
@@ -468,12 +528,11 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   const Shape& inner = now.shape[0];
   const Vec2 middle(inner.means[0], inner.means[1]);
   const Vec2 spread = Vec2(inner.means[2], inner.means[4]) - Vec2(middle.cwiseAbs2());
-  const double full = 0.25 * squared(radii[0] / Moments::unit);
   // Hysteresis, so that the way to rest does not change from frame to frame.
   const double slack = smooth_ ? 0.5 : 0.35;
   const bool whole = (middle * Moments::unit - foot).norm() < 0.85 * slack * radii[0] &&
-                     spread.minCoeff() > (1.0 - slack) * full &&
-                     spread.maxCoeff() < (1.0 + slack) * full;
+                     spread.minCoeff() > (1.0 - slack) * full_disc &&
+                     spread.maxCoeff() < (1.0 + slack) * full_disc;
   if (!whole) {
     smooth_ = false;
     return;
@@ -509,9 +568,9 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   }
   const auto n = static_cast<double>(frames);
   const double structure = squared_structure(newest, sums) / squared(n);
-  const double noise = cell_scatter_.samples > 0.0 ? cell_scatter_.variance / n : 0.0;
-  const double confidence = smooth_ ? 6.0 : 3.0;
-  smooth_ = structure <= squared(structure_floor) + confidence * noise;
+  // On points the proxy would rest no better than one frame's noise lets it.
+  const double times = std::max((smooth_ ? 6.0 : 3.0) / n, smooth_ ? 2.0 : 1.0);
+  smooth_ = structure <= squared(structure_floor) + times * cell_scatter_.variance;
 }
 
 // Noise of a cell from what two frames differ by where both have looked, less what is common.

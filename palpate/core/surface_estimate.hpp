@@ -128,6 +128,7 @@ class SurfaceEstimate {
     std::size_t lost = 0;   // of these the first, out of reach by now
     std::array<Moments, SurfaceEstimate::rungs> disc;
     std::array<Shape, SurfaceEstimate::rungs> shape;
+    std::array<double, SurfaceEstimate::rungs> extent;  // points in reach, thinned or not
   };
   /// Means over the points in each cell of a square about a frame's contact. Cells are those of a
   /// lattice through the local origin, so that frames can be compared while the contact slides.
@@ -140,8 +141,10 @@ class SurfaceEstimate {
   static constexpr std::size_t cell_frames = 8;
   /// How a height scatters from frame to frame.
   struct Scatter {
-    double variance = 0.0;  // [m^2]
+    double variance = 0.0;  // [m^2] as smooth motion does not change it
     double samples = 0.0;
+    double at_rest = 0.0;  // [m^2] about the mean while the surface rests; 0 if unknown
+    double least = 0.0;    // [m^2] what a disc's difference from the next narrower one tells
   };
   struct Residuals {
     float median;      // [m]
@@ -156,6 +159,7 @@ class SurfaceEstimate {
   void look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept;
   static double squared_structure(const Cells& frame,
                                   const std::array<double, cells>& residuals) noexcept;
+  static bool spans_area(const Shape& inner) noexcept;
   void judge(const Vec2& foot) noexcept;
   void learn_cell_noise(const Cells& newest, const std::array<double, cells>& residuals,
                         const Cells& past, const std::array<double, cells>& older) noexcept;
@@ -183,6 +187,7 @@ class SurfaceEstimate {
   std::size_t newest_ = 0;
   std::size_t count_ = 0;
   std::size_t settled_ = 0;
+  std::size_t rested_ = 0;  // frames since it moved
   bool jumped_ = false;
   bool smooth_ = false;
   double above_mean_ = 0.0;  // [m] the newest frame's height over the average

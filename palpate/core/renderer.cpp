@@ -57,6 +57,7 @@ void Renderer::seat(const Vec3& proxy) noexcept {
   patch_is_stale_ = true;
   sight_.forget();
   on_fit_ = false;
+  points_moved_ = Vec3::Zero();
   last_force_ = Vec3::Zero();
   blend_offset_ = Vec3::Zero();
 }
@@ -100,6 +101,7 @@ void Renderer::frame_by_sight(const Cloud& cloud) noexcept {
           ? (sight_.surface().travel(last_t_) - sight_.surface().travel(last_t_ - 1e-3)) / 1e-3
           : 0.0;
   behind_ = false;
+  points_moved_ = Vec3::Zero();
   if (!proxy_) return;
   if (!stamp_ok_) interval_ = 1.0 / parameters_.motion.frame_rate;
   // What was hidden is remembered for a hand that is at it, or may be soon again.
@@ -168,12 +170,18 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
   if (close && rest_on_fit()) {
     on_fit_ = true;
     patch_is_stale_ = true;
+    points_moved_ = sight_.surface().travel(t) * sight_.surface().frame().up;
     return movement;
   }
   on_fit_ = false;
   const int steps = movement.steps + slides;
+  // The points move on with the surface, and a proxy that touches them with them.
+  const Vec3 moved =
+      sight_.tracking() ? Vec3(sight_.surface().travel(t) * sight_.surface().frame().up)
+                        : Vec3(Vec3::Zero());
+  *proxy_ -= points_moved_;
   const Vec3 before = *proxy_;
-  movement = move_over_points(hip);
+  movement = move_over_points(hip - moved);
   movement.steps += steps;
   // Points that scatter can let the proxy through. Its line of sight tells.
   if (const std::optional<Vec3> front = sight_.in_front(*cloud_, before, *proxy_, r_c)) {
@@ -183,9 +191,11 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
     normal_ = movement.normal;
     proxy_ = front;
   }
-  if (!movement.touched || !normal_) return movement;
-  sight_.touch(*cloud_, *proxy_ - r_c * *normal_, *normal_);
-  if (rest_on_fit()) on_fit_ = true;
+  const bool touched = movement.touched && normal_;
+  if (touched) sight_.touch(*cloud_, *proxy_ - r_c * *normal_, *normal_);
+  *proxy_ += moved;
+  points_moved_ = moved;
+  if (touched && rest_on_fit()) on_fit_ = true;
   return movement;
 }
 
@@ -248,10 +258,8 @@ Vec3 Renderer::render_force(const Vec3& hip, double t, std::uint32_t& flags) noe
   const bool as_printed = parameters_.method == Method::paper_as_printed;
   double elapsed = std::max(t - stamp_, 0.0);
   if (!as_printed) elapsed = std::min(elapsed, parameters_.motion.max_extrapolation);
-  Vec3 u =
+  const Vec3 u =
       extrapolated_u(hip - *proxy_, velocity_, normal_.value_or(Vec3::Zero()), elapsed, as_printed);
-  // On the fit the proxy moves with the surface already; on points it is where they were.
-  if (sight_.tracking() && !on_fit_) u -= sight_.surface().travel(t) * sight_.surface().frame().up;
   const double distance = u.norm();
   const double dt = t - last_t_;
   const double rate = last_distance_ && dt > 0.0 ? (distance - *last_distance_) / dt : 0.0;

@@ -170,15 +170,14 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
   if (close && rest_on_fit()) {
     on_fit_ = true;
     patch_is_stale_ = true;
-    points_moved_ = sight_.surface().travel(t) * sight_.surface().frame().up;
+    points_moved_ = sight_.travel(t);
     return movement;
   }
   on_fit_ = false;
   const int steps = movement.steps + slides;
-  // The points move on with the surface, and a proxy that touches them with them.
+  // The points that the fit describes move on with it, and a proxy that touches them with them.
   const Vec3 moved =
-      sight_.tracking() ? Vec3(sight_.surface().travel(t) * sight_.surface().frame().up)
-                        : Vec3(Vec3::Zero());
+      sight_.tracking() && sight_.surface().smooth() ? sight_.travel(t) : Vec3(Vec3::Zero());
   *proxy_ -= points_moved_;
   const Vec3 before = *proxy_;
   movement = move_over_points(hip - moved);
@@ -258,8 +257,10 @@ Vec3 Renderer::render_force(const Vec3& hip, double t, std::uint32_t& flags) noe
   const bool as_printed = parameters_.method == Method::paper_as_printed;
   double elapsed = std::max(t - stamp_, 0.0);
   if (!as_printed) elapsed = std::min(elapsed, parameters_.motion.max_extrapolation);
-  const Vec3 u =
+  Vec3 u =
       extrapolated_u(hip - *proxy_, velocity_, normal_.value_or(Vec3::Zero()), elapsed, as_printed);
+  // On points that are still where they were, the hand feels how the surface moves all the same.
+  if (sight_.tracking()) u -= sight_.travel(t) - points_moved_;
   const double distance = u.norm();
   const double dt = t - last_t_;
   const double rate = last_distance_ && dt > 0.0 ? (distance - *last_distance_) / dt : 0.0;

@@ -74,6 +74,10 @@ class SightTracker {
 
   /// The surface nearest to `point` [m, world] at time t [s]; only while `tracking`.
   [[nodiscard]] SurfaceContact contact(const Vec3& point, double t) const noexcept;
+  /// How far the surface has moved at time t [s] since its frame [m, world]; only while `tracking`.
+  [[nodiscard]] Vec3 travel(double t) const noexcept {
+    return surface_.travel(t) * surface_.frame().up;
+  }
   /// What is known of the surface; only while `tracking`.
   [[nodiscard]] const SurfaceEstimate& surface() const noexcept { return surface_; }
 

@@ -13,6 +13,7 @@ constexpr double reach = 0.3;
 constexpr double occluder_reach = 1.2;
 // A surface is where it is expected if this share of its disc is within the gate.
 constexpr double least_support = 0.3;
+constexpr double most_support = 0.7;      // with more there is no doubt
 constexpr double gate_after_hold = 5e-3;  // [m]
 // Layers along a line of sight are told apart by a gap of at least this [m].
 constexpr double layer_gap = 20e-3;
@@ -139,6 +140,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     height[i] = x * towards.x() + y * towards.y() + z * towards.z();
     above_surface[i] = points_.z[i] - expected_surface.height(points_.x[i], points_.y[i]);
   }
+  std::array<float, wide_beam_points + 1> near_above;
   const auto gate = static_cast<float>(wide);
   for (std::size_t i = 0; i < size; ++i) {
     const float above = above_surface[i];
@@ -146,6 +148,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     const bool counts = (off_axis[i] <= 0.0F) & (above <= static_cast<float>(occluder_reach)) &
                         (above >= static_cast<float>(-reach));
     const bool is_near = counts & (std::abs(above) <= gate);
+    near_above[near] = above;
     near += is_near ? 1 : 0;
     heights[seen] = height[i];
     seen += counts ? 1 : 0;
@@ -155,8 +158,13 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   surface_.start_frame(stamp, interval);
   Event event = Event::followed;
   double jump = 0.0;  // [m] along up, from where it was expected
-  const bool there = near >= SurfaceEstimate::least_points &&
-                     static_cast<double>(near) >= least_support * static_cast<double>(seen);
+  bool there = near >= SurfaceEstimate::least_points &&
+               static_cast<double>(near) >= least_support * static_cast<double>(seen);
+  // A surface that went farther than the gate leaves the rim of its noise in it.
+  if (there && static_cast<double>(near) < most_support * static_cast<double>(seen)) {
+    const float middle = kth_smallest(std::span(near_above.data(), near), near / 2);
+    there = std::abs(middle) <= 0.5F * gate;
+  }
   if (!there) {
     const std::optional<Layer> layer = first_layer(
         std::span(heights.data(), seen), std::max(layer_gap, surface_.spread()), least_support);

@@ -19,13 +19,27 @@ namespace {
 constexpr int usual_cases = 50;   // of each family
 constexpr int block = 50;         // cases a row
 constexpr double patience = 0.5;  // [s] behind for longer than this is lost
+constexpr double noticed = 0.3;   // [N] more than this ought not to change when something passes
 
 struct Outcome {
   bool lost = false;
   int dips = 0;         // times that it was behind for more than a frame, and came back
   double step = 0.0;    // [N] largest change of the force in a tick, from contact on
   double change = 0.0;  // [N] between the largest and the smallest force while nothing moves
+  double caused = 0.0;  // [N] of it, by what passes: largest difference from the same without it
 };
+
+std::vector<double> forces_of(const std::string& method_name, const PopStage& stage,
+                              const Parameters& parameters) {
+  const auto method = make_method(method_name, {parameters, stage.truth});
+  method->seat(stage.seat);
+  std::vector<double> forces;
+  play(*method, stage.scenario, [&](const Tick& tick) {
+    forces.push_back(tick.force.norm());
+    return true;
+  });
+  return forces;
+}
 
 // The proxy is behind if its centre is inside a body, in truth now and as the newest frame showed
 // it (between frames nobody can know), while the ruler's is not.
@@ -41,6 +55,10 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
   double last_force = 0.0;
   double least = 1e9;
   double most = -1e9;
+  const std::vector<double> undisturbed =
+      stage.undisturbed ? forces_of(method_name, *stage.undisturbed, parameters)
+                        : std::vector<double>();
+  std::size_t ticks = 0;
   const double frame = stage.scenario.tick_rate / stage.scenario.frame_rate;
   play(*method, stage.scenario, [&](const Tick& tick) {
     const Tick truly = ruler->tick(tick.hip, tick.t);
@@ -60,7 +78,10 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
     if (tick.t >= stage.steady_from) {
       least = std::min(least, force);
       most = std::max(most, force);
+      if (ticks < undisturbed.size())
+        outcome.caused = std::max(outcome.caused, std::abs(force - undisturbed[ticks]));
     }
+    ++ticks;
     outcome.lost = behind > patience * stage.scenario.tick_rate;
     return !outcome.lost;
   });
@@ -127,6 +148,8 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
   int dipped = 0;
   double step = 0.0;
   double change = 0.0;
+  double caused = 0.0;
+  int noticeable = 0;
   std::string first = "-";
   std::string simplest = "-";
   for (int i = from; i < from + count; ++i) {
@@ -141,6 +164,8 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
     if (!outcome.lost) {
       step = std::max(step, outcome.step);
       change = std::max(change, outcome.change);
+      caused = std::max(caused, outcome.caused);
+      noticeable += outcome.caused > noticed ? 1 : 0;
     }
   }
   return Row()
@@ -152,6 +177,8 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
       .add(dipped)
       .add(step)
       .add(change)
+      .add(caused)
+      .add(noticeable)
       .add(first)
       .add(simplest)
       .done();
@@ -223,6 +250,8 @@ struct Sum {
   double lost = 0.0;
   double dipped = 0.0;
   double change = 0.0;
+  double caused = 0.0;
+  double noticeable = 0.0;
   std::string simplest;
 };
 
@@ -243,6 +272,8 @@ Scores pop_scores(const Table& table) {
     sum.lost += table.number(row, "lost");
     sum.dipped += table.number(row, "dipped");
     sum.change = std::max(sum.change, table.number(row, "worst_change_n"));
+    sum.caused = std::max(sum.caused, table.number(row, "worst_caused_n"));
+    sum.noticeable += table.number(row, "noticeable");
     if (sum.simplest.empty() && table.text(row, "simplest") != "-")
       sum.simplest = table.text(row, "simplest");
   }
@@ -267,8 +298,11 @@ Scores pop_scores(const Table& table) {
         scores.note +=
             fmt::format("\npalpate eval pop --methods {} --case '{}'", methods[m], sum.simplest);
       if (sum.change > 0.0)
-        scores.note += fmt::format("\n{}, {}: the force of what was held changed by up to {:.3f} N",
-                                   methods[m], family, sum.change);
+        scores.note += fmt::format(
+            "\n{}, {}: the force of what was held changed by up to {:.3f} N, because of what "
+            "passed "
+            "by up to {:.3f} N; by more than {:g} N in {:g} of {:g}",
+            methods[m], family, sum.change, sum.caused, noticed, sum.noticeable, sum.cases);
     }
     scores.rows.push_back(std::move(line));
   }
@@ -301,7 +335,8 @@ bool is_lost(const std::string& method, const PopCase& c, const Parameters& para
 Experiment pop_experiment() {
   return {"pop",
           "is the surface ever lost? families of cases drawn by chance, failures shrunk",
-          "method,family,from,cases,lost,dipped,worst_step_n,worst_change_n,first_lost,simplest",
+          "method,family,from,cases,lost,dipped,worst_step_n,worst_change_n,worst_caused_n,"
+          "noticeable,first_lost,simplest",
           {"paper", "sight"},
           false,
           pop_cells,

@@ -370,6 +370,8 @@ PopStage occluder(const PopCase& c, const Parameters& /*parameters*/) {
   PopStage stage = in_sight(
       c, scene, [](double, double, double) { return 0.0; }, {}, start + 1.0 / c["frequency"]);
   stage.steady_from = start;
+  stage.undisturbed =
+      std::make_shared<const PopStage>(in_sight(c, "synthetic:plane", {}, stage.scenario.duration));
   return stage;
 }
 

@@ -43,6 +43,8 @@ struct PopStage {
   /// It counts where the proxy is when the scene ends (5.2), and not only what lasts.
   bool judged_at_end = false;
   double steady_from = 1e9;  ///< [s] from then on the true force does not change
+  /// The same without what then passes, noise and all: what that changes, and what does not.
+  std::shared_ptr<const PopStage> undisturbed = nullptr;
 };
 
 /// A family of cases.

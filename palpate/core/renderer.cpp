@@ -140,7 +140,7 @@ Renderer::Movement Renderer::move_by_sight(const Vec3& hip, double t) noexcept {
     while (sight_.smooth()) {
       const SurfaceContact contact = sight_.contact(hip, t);
       if (contact.distance > r_c + near + 4.0 * sight_.surface().spread()) return false;
-      if (contact.curvature * r_c > deepest) return false;
+      if (contact.curvature * r_c > deepest || !sight_.faces(contact.normal)) return false;
       if (contact.at_limit && !sight_.holding()) {
         if (slides == most_slides) movement.flags |= step_budget_hit;
         if (slides++ < most_slides && sight_.slide(*cloud_, contact.foot)) continue;

@@ -126,10 +126,10 @@ class Renderer {
 
   // Method `sight`.
   SightTracker sight_;
-  bool on_fit_ = false;     // the proxy rests on the fitted surface, not on points
+  bool on_fit_ = false;               // the proxy rests on the fitted surface, not on points
   Vec3 points_moved_ = Vec3::Zero();  // [m] since their frame, with the surface, at the last tick
-  bool behind_ = false;     // the monitor's verdict on the frame in use
-  bool blend_due_ = false;  // a frame came since the last force
+  bool behind_ = false;               // the monitor's verdict on the frame in use
+  bool blend_due_ = false;            // a frame came since the last force
   Vec3 last_force_ = Vec3::Zero();
   Vec3 last_hip_ = Vec3::Zero();
   double last_blend_t_ = 0.0;

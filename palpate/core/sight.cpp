@@ -231,8 +231,7 @@ void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& norma
     const Vec2 at = local.head<2>();
     const double off = local.z() - surface_.surface().height(at);
     const double away = (at - surface_.centre()).norm();
-    const bool same_side = surface_.frame().up.dot(normal) > 0.35;
-    if (same_side && away < 12e-3 &&
+    if (faces(normal) && away < 12e-3 &&
         std::abs(off) < 3e-3 + 4.0 * (surface_.spread() + surface_.height_sd())) {
       if (away < serves) return;
       if (surface_.move_to(cloud, at, {surface_.gate(), false, shadowed_})) return;

@@ -74,6 +74,11 @@ class SightTracker {
 
   /// The surface nearest to `point` [m, world] at time t [s]; only while `tracking`.
   [[nodiscard]] SurfaceContact contact(const Vec3& point, double t) const noexcept;
+  /// Is a place with that normal [-, world] within 70 degrees of what the surface is a height over?
+  /// A steeper one it does not tell.
+  [[nodiscard]] bool faces(const Vec3& normal) const noexcept {
+    return surface_.frame().up.dot(normal) > 0.35;
+  }
   /// How far the surface has moved at time t [s] since its frame [m, world]; only while `tracking`.
   [[nodiscard]] Vec3 travel(double t) const noexcept {
     return surface_.travel(t) * surface_.frame().up;

@@ -25,8 +25,8 @@ constexpr double unnoticed_noise = 50e-6;
 // Noise of a disc's height that is usual for a depth camera: this [m] at 1 m, growing with the
 // square of the distance, as stereo does. Serves until the noise has been measured.
 constexpr double usual_noise = 5e-3;
-// A variance that 1 to 5 samples told of is at most this many times as large, 19 times out of 20.
-constexpr std::array most_told = {250.0, 40.0, 15.0, 9.0, 6.5};
+// A variance that 1 to 5 samples told of is at most this many times as large, 99 times out of 100.
+constexpr std::array most_told = {6000.0, 400.0, 120.0, 50.0, 28.0};
 // Spread of a surface's curvature coefficients x^2, xy, y^2 that is expected [1/m]: radii down to
 // some 30 mm are common, and noise must not invent them.
 constexpr double curvature_sd = 15.0;

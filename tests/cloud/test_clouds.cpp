@@ -241,6 +241,7 @@ TEST(PointCloud, ThinsABallThatHoldsMoreThanAPatchAndSaysSo) {
   EXPECT_TRUE(patch.thinned());
   EXPECT_GT(patch.size(), Patch::capacity / 3);
   EXPECT_LE(patch.size(), Patch::capacity);
+  EXPECT_NEAR(static_cast<double>(patch.size()) / patch.share(), 100000.0, 100.0);
   Vec3 mean = Vec3::Zero();
   for (std::size_t i = 0; i < patch.size(); ++i)
     mean += Vec3(patch.x()[i], patch.y()[i], patch.z()[i]) / static_cast<double>(patch.size());
@@ -255,6 +256,11 @@ TEST(DepthImage, ThinsAWindowThatHoldsMoreThanAPatchAndSaysSo) {
   gather(image, Ball{Vec3(0, 0, 0.1), 0.05}, patch);
   EXPECT_TRUE(patch.thinned());
   EXPECT_GT(patch.size(), Patch::capacity / 4);
+  int within = 0;
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) within += std::hypot(u - k.cx, v - k.cy) <= 300.0 ? 1 : 0;
+  }
+  EXPECT_NEAR(static_cast<double>(patch.size()) / patch.share(), within, 0.02 * within);
   float low = 0;
   float high = 0;
   for (std::size_t i = 0; i < patch.size(); ++i) {

@@ -168,6 +168,14 @@ TEST(AgreedHeight, LetsGoOfThePastInOneFrameWhenTheSurfaceJumps) {
   EXPECT_NEAR(agreed_height(samples, 1e-4, 2.5), 0.1, 2.5e-4);
 }
 
+TEST(AgreedHeight, CountsADoubtfulHeightForLittle) {
+  auto samples = heights_of({0, 0, 0, 0, 0, 0, 0, 4e-3});
+  const double sure = agreed_height(samples, 1e-3, 3.0);
+  EXPECT_GT(sure, 0.9e-3);
+  samples.front().doubt = 4.0;
+  EXPECT_NEAR(agreed_height(samples, 1e-3, 3.0), 4e-3 / 29.0, 1e-9) << "the weighted mean";
+}
+
 TEST(HeightTrack, HasNoVelocityAtRestUnderNoiseAndTheRightOneInSteadyMotion) {
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0.0, 1e-3);

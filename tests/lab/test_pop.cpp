@@ -89,8 +89,29 @@ TEST(SightHolds, WhatItOnceLost) {
         // a hand between frames deeper than a ball's centre
         "pop:lift-sphere?noise=0.00366&acceleration=6.72&radius=0.076&seed=543885337",
         // a cell that noise had emptied
-        "pop:lift-white?noise=0.01&acceleration=1&seed=551311602"}) {
+        "pop:lift-white?noise=0.01&acceleration=1&seed=551311602",
+        // a surface that had gone, but for the rim of its noise
+        "pop:lift-white?noise=0.002&acceleration=61.5&seed=1225764776",
+        // a border that was taken for a surface: its points lie in a line
+        "pop:layers?sensor=0&tilt=0&distance=0.945&fps=30&stroke=0&frequency=0.5&separation=0.04"
+        "&x=-0.00258&seed=285284197",
+        // a surface that came back, met from behind where the last frame had shown it
+        "pop:sine?sensor=1&tilt=0&distance=0.79&fps=24&stroke=0.0585&frequency=2.65"
+        "&seed=784532072"}) {
     EXPECT_FALSE(is_lost("sight", parse_pop_case(text), parameters)) << text;
+  }
+}
+
+TEST_F(Pop, WhatPassesBeforeAContactHardlyChangesTheForce) {
+  ExperimentOptions options = with("sight", 4);
+  options.families = {"occluder"};
+  for (const auto& [sensor, most] : {std::pair{"sensor=0", 0.01}, std::pair{"sensor=2", 0.15}}) {
+    options.fixed = {sensor};
+    const Table table = run(options);
+    EXPECT_EQ(table.number(0, "lost"), 0.0) << sensor;
+    EXPECT_LT(table.number(0, "worst_caused_n"), most) << sensor;
+    EXPECT_LE(table.number(0, "worst_caused_n"), 2.0 * table.number(0, "worst_change_n")) << sensor;
+    EXPECT_EQ(table.number(0, "noticeable"), 0.0) << sensor;
   }
 }
 

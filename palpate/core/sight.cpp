@@ -237,6 +237,10 @@ void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& norma
       if (surface_.move_to(cloud, at, {surface_.gate(), false, shadowed_})) return;
     }
   }
+  // What the camera sees well behind the place is not touched from behind there: a stray point is.
+  const std::optional<Seen> seen = look_at(cloud, foot, SurfaceEstimate::radii[0]);
+  if (seen && seen->line.dot(normal) < 0.0 && seen->above < -SurfaceEstimate::narrowest_gate)
+    return;
   gather(cloud, Beam{foot, SurfaceEstimate::radii[0], SurfaceEstimate::narrowest_gate, normal},
          beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);

@@ -43,7 +43,9 @@ std::vector<double> forces_of(const std::string& method_name, const PopStage& st
 
 // The proxy is behind if its centre is inside a body, in truth now and as the newest frame showed
 // it (between frames nobody can know), while the ruler's is not.
-Outcome play_case(const std::string& method_name, const PopCase& c, const Parameters& parameters) {
+// @param compare  play it without what passes, too, to say what that causes
+Outcome play_case(const std::string& method_name, const PopCase& c, const Parameters& parameters,
+                  bool compare) {
   const PopStage stage = find_pop_family(c.family).stage(c, parameters);
   const auto method = make_method(method_name, {parameters, stage.truth});
   const auto ruler = make_method("ideal", {parameters, stage.truth});
@@ -56,8 +58,8 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
   double least = 1e9;
   double most = -1e9;
   const std::vector<double> undisturbed =
-      stage.undisturbed ? forces_of(method_name, *stage.undisturbed, parameters)
-                        : std::vector<double>();
+      compare && stage.undisturbed ? forces_of(method_name, *stage.undisturbed, parameters)
+                                   : std::vector<double>();
   std::size_t ticks = 0;
   const double frame = stage.scenario.tick_rate / stage.scenario.frame_rate;
   play(*method, stage.scenario, [&](const Tick& tick) {
@@ -101,7 +103,7 @@ PopCase shrink(const std::string& method, PopCase c, const Parameters& parameter
   constexpr int most_tries = 60;
   int tries = 0;
   const auto still_lost = [&](const PopCase& simpler) {
-    return ++tries <= most_tries && play_case(method, simpler, parameters).lost;
+    return ++tries <= most_tries && play_case(method, simpler, parameters, false).lost;
   };
   for (bool simpler = true; simpler && tries < most_tries;) {
     simpler = false;
@@ -154,7 +156,7 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
   std::string simplest = "-";
   for (int i = from; i < from + count; ++i) {
     const PopCase c = draw(i);
-    const Outcome outcome = play_case(method, c, parameters);
+    const Outcome outcome = play_case(method, c, parameters, true);
     if (outcome.lost && lost == 0) {
       first = c.text();
       simplest = shrink(method, c, parameters).text();
@@ -300,8 +302,7 @@ Scores pop_scores(const Table& table) {
       if (sum.change > 0.0)
         scores.note += fmt::format(
             "\n{}, {}: the force of what was held changed by up to {:.3f} N, because of what "
-            "passed "
-            "by up to {:.3f} N; by more than {:g} N in {:g} of {:g}",
+            "passed by up to {:.3f} N; by more than {:g} N in {:g} of {:g}",
             methods[m], family, sum.change, sum.caused, noticed, sum.noticeable, sum.cases);
     }
     scores.rows.push_back(std::move(line));
@@ -329,7 +330,7 @@ plot for [m in methods] held(m) using 0:2:xtic(1) with points pt 7 ps 1.2 title 
 }  // namespace
 
 bool is_lost(const std::string& method, const PopCase& c, const Parameters& parameters) {
-  return play_case(method, c, parameters).lost;
+  return play_case(method, c, parameters, false).lost;
 }
 
 Experiment pop_experiment() {

@@ -10,6 +10,7 @@
 #include "app/verbs.hpp"
 #include "lab/runner.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/parameters.hpp"
 
 namespace palpate::app {

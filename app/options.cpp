@@ -9,6 +9,7 @@
 
 #include "lab/method.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
 
 namespace palpate::app {
 namespace {

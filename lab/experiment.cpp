@@ -12,6 +12,7 @@
 #include "lab/experiments/tradeoff.hpp"
 #include "lab/method.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
 
 namespace palpate::lab {
 

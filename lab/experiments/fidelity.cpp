@@ -15,6 +15,7 @@
 #include "lab/play.hpp"
 #include "lab/signal.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate::lab {

@@ -14,6 +14,7 @@
 
 #include "lab/grid_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 

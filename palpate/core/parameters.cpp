@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
 
 namespace palpate {
 namespace {
@@ -115,21 +116,6 @@ void check_range(const ParameterInfo& row, double value) {
               "give a value from " + number(row.min) + " to " + number(row.max) + unit);
 }
 
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t substitute = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substitute});
-    }
-  }
-  return row.back();
-}
-
 }  // namespace
 
 std::span<const ParameterInfo> parameter_table() {
@@ -181,19 +167,6 @@ Method method_from_name(std::string_view name) {
   }
   throw Error("method '" + std::string(name) + "'", "there is no such method",
               "choose one of: " + known);
-}
-
-std::string_view nearest_name(std::string_view word, std::span<const std::string_view> candidates) {
-  std::string_view best;
-  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 2);
-  for (const std::string_view candidate : candidates) {
-    const std::size_t distance = edit_distance(word, candidate);
-    if (distance <= best_distance && (best.empty() || distance < best_distance)) {
-      best = candidate;
-      best_distance = distance;
-    }
-  }
-  return best;
 }
 
 }  // namespace palpate

@@ -101,8 +101,4 @@ std::string_view method_name(Method method);
 /// @throws Error for an unknown name, listing the known ones.
 Method method_from_name(std::string_view name);
 
-/// The candidate with the smallest edit distance to `word`, or empty if none is near enough to be
-/// what was meant.
-std::string_view nearest_name(std::string_view word, std::span<const std::string_view> candidates);
-
 }  // namespace palpate

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/parameters.hpp"
 
 namespace palpate {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/parameters.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/devices/mouse_device.hpp"

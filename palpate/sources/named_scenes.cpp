@@ -7,6 +7,7 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/parameters.hpp"
 #include "palpate/sources/scene.hpp"
 

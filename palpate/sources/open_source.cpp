@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/parameters.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/sources/depth_recording.hpp"

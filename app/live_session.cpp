@@ -169,6 +169,8 @@ class LiveSession final : public ViewerHost {
     if (!server_) return;
     server_.reset();
     stop_recording();
+    for (const auto& recorder : closing_) recorder->stop();
+    report_closed();
     ticks();  // the last ones
     summary_.set_late_ticks(loop_->timing().late_ticks.load());
   }
@@ -421,8 +423,22 @@ class LiveSession final : public ViewerHost {
       const std::lock_guard lock(mutex_);
       recorder = std::move(recorder_);
     }
-    recorder->stop();
-    const Recorder::Status status = recorder->status();
+    // Closing takes as long as the disk does, and the hand must not wait for that.
+    recorder->request_stop();
+    recording_message_ = fmt::format("{}: closing", recorder->status().folder.string());
+    closing_.push_back(std::move(recorder));
+  }
+
+  // Says how the recordings ended that are closed by now.
+  void report_closed() {
+    std::erase_if(closing_, [this](const std::unique_ptr<Recorder>& recorder) {
+      const Recorder::Status status = recorder->status();
+      if (status.done) report(status);
+      return status.done;
+    });
+  }
+
+  void report(const Recorder::Status& status) {
     const std::string folder = status.folder.string();
     if (!status.trouble.empty()) {
       lost_recording_ = true;
@@ -430,7 +446,7 @@ class LiveSession final : public ViewerHost {
       fmt::print(stderr, "palpate: the recording has stopped: {}\n", status.trouble);
     } else if (status.lost_ticks + status.lost_frames > 0) {
       lost_recording_ = true;
-      recording_message_ = fmt::format("{}: the disk was too slow for {} ticks and {} frames",
+      recording_message_ = fmt::format("{}: the machine was too slow for {} ticks and {} frames",
                                        folder, status.lost_ticks, status.lost_frames);
       fmt::print(stderr, "palpate: {}\n", recording_message_);
     } else {
@@ -441,6 +457,7 @@ class LiveSession final : public ViewerHost {
 
   json recording_state() {
     if (recorder_ && !recorder_->status().trouble.empty()) stop_recording();
+    report_closed();
     json state = {{"possible", is_of_the_kernel(method_)},
                   {"path", nullptr},
                   {"message", recording_message_}};
@@ -470,6 +487,7 @@ class LiveSession final : public ViewerHost {
   std::uint64_t settings_number_ = 0;  // as the loop counts them
   // Set and reset under mutex_, for the cameras' threads; before the loop, which it reads, is gone.
   std::unique_ptr<Recorder> recorder_;
+  std::vector<std::unique_ptr<Recorder>> closing_;  // stopped, and still writing
   std::string recording_message_;
   bool lost_recording_ = false;
   Vec3 start_ = Vec3::Zero();   // [m] where the mouse's hand began

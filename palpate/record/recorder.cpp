@@ -1,165 +1,332 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/record/recorder.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <utility>
 
+#include "palpate/cloud/depth_image.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
 namespace {
 
-constexpr std::size_t most_items = 150;            // frames of five seconds, 90 MB
 constexpr std::chrono::milliseconds interval{20};  // between looks at the ring, which holds seconds
+
+unsigned packers_of(const RecorderOptions& options) {
+  if (options.packers > 0) return options.packers;
+  return std::clamp(std::thread::hardware_concurrency() / 2, 1U, 4U);
+}
 
 }  // namespace
 
 Recorder::Recorder(const std::filesystem::path& folder, const SessionInfo& info,
-                   TickRing<ServoTick>::Reader ticks, std::function<void()> renew)
-    : info_(info),
-      writer_(folder, info, monotonic_now()),
-      ticks_(ticks),
-      renew_(std::move(renew)),
-      begun_(!renew_) {
-  status_.folder = writer_.folder();
-  thread_ = std::thread([this] { run(); });
+                   TickRing<ServoTick>::Reader ticks, std::function<void()> renew,
+                   const RecorderOptions& options)
+    : options_(options), ring_(ticks), renew_(std::move(renew)), begun_(!renew_), info_(info) {
+  writer_.emplace(folder, info, monotonic_now(), std::nullopt, options.commit_interval);
+  status_.folder = writer_->folder();
+  threads_.emplace_back([this] { collect(); });
+  threads_.emplace_back([this] { write(); });
+  for (unsigned i = 0; i < packers_of(options_); ++i) threads_.emplace_back([this] { pack(); });
 }
 
 Recorder::~Recorder() {
-  stop();
+  request_stop();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void Recorder::request_stop() {
+  const std::lock_guard lock(mutex_);
+  if (stopping_) return;
+  stopping_ = true;
+  status_.closing = !status_.done;
+  wake_collector_.notify_all();
+  wake_packers_.notify_all();
+  wake_writer_.notify_all();
+  progress_.notify_all();
+}
+
+bool Recorder::done() const {
+  const std::lock_guard lock(mutex_);
+  return status_.done;
 }
 
 void Recorder::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  asked_.notify_all();
-  if (thread_.joinable()) thread_.join();
+  request_stop();
+  std::unique_lock lock(mutex_);
+  progress_.wait(lock, [this] { return status_.done; });
 }
 
 Recorder::Status Recorder::status() const {
   const std::lock_guard lock(mutex_);
-  return status_;
+  Status status = status_;
+  status.ticks_waiting = collected_.size();
+  status.frames_waiting = static_cast<std::uint64_t>(std::count_if(
+      entries_.begin(), entries_.end(),
+      [](const Entry& entry) { return std::holds_alternative<std::shared_ptr<PutFrame>>(entry); }));
+  return status;
 }
 
 void Recorder::frame(std::uint64_t number, double stamp,
                      std::vector<std::shared_ptr<const Cloud>> cameras) {
   const std::lock_guard lock(mutex_);
   if (stopping_) return;
-  frame_handed_ = number;
-  if (items_.size() >= most_items) {
+  auto frame = std::make_shared<PutFrame>(
+      PutFrame{.number = number, .stamp = stamp, .cameras = std::move(cameras), .fresh = {}});
+  if (entries_.size() >= options_.most_frames) {
     ++status_.lost_frames;
-    return;
+    frame->cameras.clear();
+    frame->left_out = true;
   }
-  items_.emplace_back(PutFrame{number, stamp, std::move(cameras)});
+  if (newest_.size() < frame->cameras.size()) newest_.resize(frame->cameras.size());
+  for (std::size_t i = 0; i < frame->cameras.size(); ++i) {
+    const auto& cloud = frame->cameras[i];
+    if (cloud == newest_[i]) continue;
+    newest_[i] = cloud;
+    if (dynamic_cast<const DepthImage*>(cloud.get()) != nullptr) frame->fresh.push_back(cloud);
+  }
+  frame->ready = frame->fresh.empty();
+  if (!frame->ready) {
+    to_pack_.push_back(frame);
+    wake_packers_.notify_one();
+  }
+  entries_.emplace_back(std::move(frame));
+  ++entries_handed_;
+  wake_writer_.notify_one();
 }
 
 void Recorder::settings(const NumberedSettings& settings, double t) {
   const std::lock_guard lock(mutex_);
   if (stopping_) return;
-  settings_handed_ = settings.number;
-  items_.emplace_back(SetSettings{settings, t});
+  entries_.emplace_back(SetSettings{settings, t});
+  ++entries_handed_;
+  wake_writer_.notify_one();
 }
 
 void Recorder::flush() {
   std::unique_lock lock(mutex_);
   const std::uint64_t mine = ++flushes_asked_;
-  asked_.notify_all();
-  done_.wait(lock, [&] { return stopping_ || flushes_done_ >= mine; });
+  flush_entries_ = entries_handed_;
+  wake_collector_.notify_all();
+  progress_.wait(lock, [&] { return stopping_ || flushes_done_ >= mine; });
 }
 
-void Recorder::run() {
+void Recorder::fail(const std::string& trouble) {
+  const std::lock_guard lock(mutex_);
+  if (!failed_) status_.trouble = trouble;
+  failed_ = true;
+  stopping_ = true;
+  status_.closing = false;
+  entries_.clear();
+  to_pack_.clear();
+  collected_.clear();
+  wake_collector_.notify_all();
+  wake_packers_.notify_all();
+  wake_writer_.notify_all();
+}
+
+template <class Work>
+void Recorder::guarded(const Work& work) {
   try {
+    work();
+  } catch (const std::exception& error) {
+    fail(error.what());
+  }
+}
+
+void Recorder::collect() {
+  guarded([this] {
     for (bool last = false; !last;) {
       std::uint64_t flushes = 0;
-      bool flush = false;
       {
         std::unique_lock lock(mutex_);
-        asked_.wait_for(lock, interval,
-                        [this] { return stopping_ || flushes_asked_ > flushes_done_; });
+        wake_collector_.wait_for(
+            lock, interval, [this] { return stopping_ || flushes_asked_ > flushes_collected_; });
         last = stopping_;
         flushes = flushes_asked_;
-        flush = flushes > flushes_done_;
       }
-      write_ticks();
-      write_items();
-      // What is committed can be replayed to its end: all that its ticks used is in it.
-      if (flush) {
-        writer_.commit();
-      } else if (frame_used_ <= frame_written_ && settings_used_ <= settings_written_) {
-        writer_.commit_if_due();
+      collect_ticks();
+      const std::lock_guard lock(mutex_);
+      flushes_collected_ = flushes;
+      if (flush_is_due()) wake_writer_.notify_one();
+    }
+  });
+  const std::lock_guard lock(mutex_);
+  collecting_ = false;
+  wake_writer_.notify_one();
+}
+
+void Recorder::collect_ticks() {
+  constexpr std::size_t most_at_once = 4096;
+  std::vector<ServoTick> ticks;
+  bool more = true;
+  while (more) {
+    ticks.clear();
+    for (ServoTick tick{}; ticks.size() < most_at_once;) {
+      more = ring_.try_pop(tick);
+      if (!more) break;
+      if (!begun_) {
+        const bool first = (tick.hand & rendering_renewed) != 0;
+        if (!first) {
+          proxy_ = tick.tick.proxy;
+          // Only now, so that the tick before the first is known.
+          if (renew_) std::exchange(renew_, nullptr)();
+          continue;
+        }
+        begun_ = true;
+        const std::lock_guard lock(mutex_);
+        seat_ = proxy_;
+        seated_at_ = tick.tick.t;
       }
+      ticks.push_back(tick);
+    }
+    const std::lock_guard lock(mutex_);
+    if (failed_) return;
+    if (begun_) status_.lost_ticks = ring_.lost() + overflowed_;
+    for (const ServoTick& tick : ticks) {
+      if (collected_.size() < options_.most_ticks) {
+        collected_.push_back(tick);
+      } else {
+        ++overflowed_;
+        ++status_.lost_ticks;
+      }
+    }
+  }
+}
+
+void Recorder::pack() {
+  guarded([this] {
+    for (;;) {
+      std::shared_ptr<PutFrame> frame;
+      PngPacking packing = PngPacking::fast;
+      {
+        std::unique_lock lock(mutex_);
+        wake_packers_.wait(lock, [this] { return stopping_ || !to_pack_.empty(); });
+        if (to_pack_.empty()) return;
+        frame = std::move(to_pack_.front());
+        to_pack_.pop_front();
+        if (entries_.size() > options_.compress_below) {
+          packing = PngPacking::stored;
+          ++status_.stored_frames;
+        }
+      }
+      PackedClouds packed;
+      for (const auto& cloud : frame->fresh) packed[cloud.get()] = packed_png(*cloud, packing);
+      const std::lock_guard lock(mutex_);
+      frame->packed = std::move(packed);
+      frame->ready = true;
+      wake_writer_.notify_one();
+    }
+  });
+}
+
+bool Recorder::has_ready_entry() const {
+  if (entries_.empty()) return false;
+  const auto* frame = std::get_if<std::shared_ptr<PutFrame>>(&entries_.front());
+  return frame == nullptr || (*frame)->ready;
+}
+
+bool Recorder::flush_is_due() const {
+  return flushes_collected_ > flushes_done_ && entries_written_ >= flush_entries_;
+}
+
+void Recorder::write() {
+  guarded([this] {
+    for (bool last = false; !last;) {
+      std::uint64_t flushes = 0;  // whose ticks are collected
+      {
+        std::unique_lock lock(mutex_);
+        const auto is_end = [this] { return stopping_ && !collecting_ && entries_.empty(); };
+        // Ticks are no reason to wake up: they come all the time and wait for frames anyway.
+        wake_writer_.wait_for(lock, interval, [&] {
+          return failed_ || has_ready_entry() || flush_is_due() || is_end();
+        });
+        if (failed_) return;
+        last = is_end();
+        flushes = flushes_collected_;
+      }
+      write_entries();
+      while (write_ticks() && (last || !writer_->commit_is_due())) {
+      }
+      bool flush = false;
       {
         const std::lock_guard lock(mutex_);
-        flushes_done_ = flushes;
+        flush = flushes > flushes_done_ && entries_written_ >= flush_entries_;
       }
-      done_.notify_all();
+      if (flush) writer_->commit();
+      const bool committed = flush || writer_->commit_if_due();
+      const std::lock_guard lock(mutex_);
+      if (committed) status_.committed_ticks = writer_->ticks();
+      if (flush) flushes_done_ = flushes;
+      progress_.notify_all();
     }
-    writer_.close();
-  } catch (const std::exception& error) {
+    writer_->close();
     const std::lock_guard lock(mutex_);
-    status_.trouble = error.what();
-    items_.clear();
-    stopping_ = true;
-  }
-  done_.notify_all();
-}
-
-bool Recorder::knows_what_it_used(const ServoTick& tick) const {
+    status_.committed_ticks = writer_->ticks();
+  });
+  writer_.reset();  // here, as closing waits for the disk even after trouble
   const std::lock_guard lock(mutex_);
-  return tick.frame_number <= frame_handed_ && tick.settings_number <= settings_handed_;
+  status_.closing = false;
+  status_.done = true;
+  progress_.notify_all();
 }
 
-void Recorder::write_ticks() {
-  for (ServoTick tick{}; waiting_ || ticks_.try_pop(tick);) {
-    if (waiting_) tick = *std::exchange(waiting_, std::nullopt);
-    if (!begun_) {
-      const bool first = (tick.hand & rendering_renewed) != 0;
-      if (!first) {
-        proxy_ = tick.tick.proxy;
-        // Only now, so that the tick before the first is known.
-        if (renew_) std::exchange(renew_, nullptr)();
-        continue;
+void Recorder::write_entries() {
+  for (;;) {
+    std::optional<Entry> entry;
+    {
+      const std::lock_guard lock(mutex_);
+      if (failed_ || !has_ready_entry()) return;
+      entry = entries_.front();
+    }
+    if (const auto* put = std::get_if<std::shared_ptr<PutFrame>>(&*entry)) {
+      const PutFrame& frame = **put;
+      if (frame.left_out) {
+        writer_->left_out(frame.number, frame.stamp);
+      } else {
+        writer_->frame(frame.number, frame.stamp, frame.cameras, frame.packed);
       }
-      begun_ = true;
-      info_.seat = proxy_;
-      writer_.info(info_, tick.tick.t);
-    }
-    if (!knows_what_it_used(tick)) {
-      waiting_ = tick;
-      break;
-    }
-    writer_.tick(tick);
-    frame_used_ = tick.frame_number;
-    settings_used_ = tick.settings_number;
-  }
-  const std::lock_guard lock(mutex_);
-  status_.ticks = writer_.ticks();
-  status_.lost_ticks = begun_ ? ticks_.lost() : 0;
-}
-
-void Recorder::write_items() {
-  std::deque<Item> items;
-  {
-    const std::lock_guard lock(mutex_);
-    items.swap(items_);
-  }
-  for (const Item& item : items) {
-    if (const auto* frame = std::get_if<PutFrame>(&item)) {
-      writer_.frame(frame->number, frame->stamp, frame->cameras);
-      frame_written_ = frame->number;
+      frame_written_ = frame.number;
     } else {
-      const auto& set = std::get<SetSettings>(item);
-      writer_.settings(set.settings, set.t);
+      const auto& set = std::get<SetSettings>(*entry);
+      writer_->settings(set.settings, set.t);
       settings_written_ = set.settings.number;
     }
-    // Images take milliseconds to pack: ticks are not to wait for many of them.
-    write_ticks();
+    const std::lock_guard lock(mutex_);
+    ++entries_written_;
+    if (failed_) return;
+    entries_.pop_front();
+    status_.frames = writer_->frames();
+    // A slow disk must not put off the commit.
+    if (writer_->commit_is_due()) return;
   }
+}
+
+// @return true if there may be more to write
+bool Recorder::write_ticks() {
+  constexpr std::size_t most_at_once = 4096;
+  std::vector<ServoTick> ticks;
+  std::optional<double> seated_at;
+  {
+    const std::lock_guard lock(mutex_);
+    seated_at = std::exchange(seated_at_, std::nullopt);
+    if (seated_at) info_.seat = seat_;
+    while (!collected_.empty() && ticks.size() < most_at_once) {
+      const ServoTick& tick = collected_.front();
+      if (tick.frame_number > frame_written_ || !settings_written_ ||
+          tick.settings_number > *settings_written_)
+        break;
+      ticks.push_back(tick);
+      collected_.pop_front();
+    }
+  }
+  if (seated_at) writer_->info(info_, *seated_at);
+  for (const ServoTick& tick : ticks) writer_->tick(tick);
   const std::lock_guard lock(mutex_);
-  status_.frames = writer_.frames();
+  status_.ticks = writer_->ticks();
+  return ticks.size() == most_at_once;
 }
 
 }  // namespace palpate

@@ -19,27 +19,49 @@
 
 namespace palpate {
 
-/// Records a live session on a thread of its own: ticks from the servo's ring, frames and settings
-/// from whoever hands them to the loop. Nobody waits for the disk; where it cannot keep up, what is
-/// lost is counted.
+/// How a Recorder shares out its work. The defaults suit a disk of 50 MB/s.
+struct RecorderOptions {
+  double commit_interval = 1.0;  ///< [s] on the machine's clock: how much a crash can cost
+  unsigned packers = 0;          ///< threads that compress images; 0: half of the cores, 1 to 4
+  /// Frames waiting up to which images are compressed. With more they are stored as they are, which
+  /// takes a tenth of the time and three times the space.
+  std::size_t compress_below = 8;
+  std::size_t most_frames = 150;    ///< waiting; the next is left out, and counted. 90 MB at VGA
+  std::size_t most_ticks = 60'000;  ///< waiting; the next are lost, and counted. 20 MB
+};
+
+/// Records a live session on threads of its own: ticks from the servo's ring, frames and settings
+/// from whoever hands them to the loop. None of these waits for a compressor or the disk.
+///
+/// One thread empties the ring, some compress images, one writes. A tick is written after the frame
+/// and the settings that it used, so that whatever is committed can be replayed to its end; a
+/// commit is made every second, however much is waiting. Where the machine cannot keep up, images
+/// are stored uncompressed, then frames are left out, then ticks are lost, and each is counted.
 class Recorder {
  public:
   struct Status {
     std::filesystem::path folder;
-    std::string trouble;  ///< why it ended before it was stopped; empty if it did not
-    std::uint64_t ticks = 0, frames = 0;
+    std::string trouble;   ///< why it ended before it was stopped; empty if it did not
+    bool closing = false;  ///< asked to stop, and not done yet
+    bool done = false;     ///< everything is written and the bag is closed, or there was trouble
+    std::uint64_t ticks = 0, frames = 0;  ///< written
+    std::uint64_t committed_ticks = 0;    ///< of these, safe from a crash of the program
+    std::uint64_t ticks_waiting = 0, frames_waiting = 0;
+    std::uint64_t stored_frames = 0;  ///< with images that were not compressed, for want of time
     std::uint64_t lost_ticks = 0, lost_frames = 0;
   };
 
   /// Starts.
   /// @param folder  of the bag; must not be there yet
-  /// @param ticks   a reader of the loop that nobody else reads
+  /// @param ticks   a reader of the loop that nobody else reads; the ring must outlive this
   /// @param renew   none if the loop has not started. Else asks the loop for a new renderer
-  ///                (Cycle::renew), which the first tick recorded has; called once, on this thread.
+  ///                (Cycle::renew), which the first tick recorded has; called once, on a thread of
+  ///                this.
   /// @throws Error if the folder is there or cannot be made.
   Recorder(const std::filesystem::path& folder, const SessionInfo& info,
-           TickRing<ServoTick>::Reader ticks, std::function<void()> renew = {});
-  /// Stops.
+           TickRing<ServoTick>::Reader ticks, std::function<void()> renew = {},
+           const RecorderOptions& options = {});
+  /// Stops, and waits until it is done.
   ~Recorder();
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
@@ -52,10 +74,15 @@ class Recorder {
   void settings(const NumberedSettings& settings, double t);
 
   /// Returns when what has come so far is written and committed, or the recording has ended. Waits
-  /// for the disk: not for the servo's thread or a camera's.
+  /// for the disk: not for the servo's thread, a camera's or the page's.
   void flush();
-  /// Records what has come so far and closes the bag. Ticks that use a frame or settings that this
-  /// was not handed any more are left out. Not from `renew`.
+  /// Asks for the end and returns at once: no frame or setting is taken any more, what has come so
+  /// far is written, and the bag is closed. Ticks that use a frame or settings that this was not
+  /// handed are left out. Any thread, but not from `renew`.
+  void request_stop();
+  /// Is everything written and the bag closed? Any thread; does not wait.
+  [[nodiscard]] bool done() const;
+  /// request_stop(), and waits until done(). Not for a thread on which a hand depends.
   void stop();
   /// Any thread.
   [[nodiscard]] Status status() const;
@@ -65,37 +92,60 @@ class Recorder {
     std::uint64_t number;
     double stamp;
     std::vector<std::shared_ptr<const Cloud>> cameras;
+    std::vector<std::shared_ptr<const Cloud>> fresh;  // of these, the images to compress
+    bool left_out = false;
+    PackedClouds packed{};
+    bool ready = false;  // guarded by mutex_, as are packed and fresh until it is set
   };
   struct SetSettings {
     NumberedSettings settings;
     double t;
   };
-  using Item = std::variant<PutFrame, SetSettings>;
+  using Entry = std::variant<std::shared_ptr<PutFrame>, SetSettings>;
 
-  void run();
-  void write_items();
-  void write_ticks();
-  [[nodiscard]] bool knows_what_it_used(const ServoTick& tick) const;
+  void collect();  // the thread that empties the ring
+  void pack();     // each thread that compresses
+  void write();    // the thread that writes the bag
+  void collect_ticks();
+  void write_entries();
+  bool write_ticks();
+  [[nodiscard]] bool has_ready_entry() const;
+  [[nodiscard]] bool flush_is_due() const;
+  void fail(const std::string& trouble);
+  template <class Work>
+  void guarded(const Work& work);
 
-  // The recorder's thread.
-  SessionInfo info_;
-  SessionWriter writer_;
-  TickRing<ServoTick>::Reader ticks_;
+  RecorderOptions options_;
+
+  // The collecting thread's.
+  TickRing<ServoTick>::Reader ring_;
   std::function<void()> renew_;
-  std::optional<ServoTick> waiting_;  // for its frame or settings
   bool begun_ = false;
-  std::optional<Vec3> proxy_;  // [m] in the tick before the first recorded one
-  std::uint64_t frame_used_ = 0, frame_written_ = 0;  // their numbers
-  std::uint64_t settings_used_ = 0, settings_written_ = 0;
+  std::optional<Vec3> proxy_;     // [m] in the tick before the first recorded one
+  std::uint64_t overflowed_ = 0;  // ticks that found no room in collected_
+
+  // The writing thread's.
+  SessionInfo info_;
+  std::optional<SessionWriter> writer_;
+  std::uint64_t frame_written_ = 0;                // its number
+  std::optional<std::uint64_t> settings_written_;  // their number
+  std::uint64_t entries_written_ = 0;
 
   mutable std::mutex mutex_;
-  std::condition_variable asked_, done_;
-  std::deque<Item> items_;                                // guarded by mutex_
-  Status status_;                                         // guarded by mutex_
-  std::uint64_t frame_handed_ = 0, settings_handed_ = 0;  // their numbers; guarded by mutex_
-  bool stopping_ = false;                                 // guarded by mutex_
-  std::uint64_t flushes_asked_ = 0, flushes_done_ = 0;    // guarded by mutex_
-  std::thread thread_;
+  std::condition_variable wake_collector_, wake_packers_, wake_writer_, progress_;
+  // All below are guarded by mutex_.
+  std::deque<Entry> entries_;                         // to be written, in this order
+  std::deque<std::shared_ptr<PutFrame>> to_pack_;     // of these, what no thread has taken yet
+  std::deque<ServoTick> collected_;                   // ticks to be written
+  std::vector<std::shared_ptr<const Cloud>> newest_;  // of each camera, as handed over
+  std::uint64_t entries_handed_ = 0;
+  std::optional<double> seated_at_;  // [s] when the seat in info_ has to be written anew
+  std::optional<Vec3> seat_;
+  Status status_;
+  bool stopping_ = false, collecting_ = true, failed_ = false;
+  std::uint64_t flushes_asked_ = 0, flushes_collected_ = 0, flushes_done_ = 0, flush_entries_ = 0;
+
+  std::vector<std::thread> threads_;
 };
 
 }  // namespace palpate

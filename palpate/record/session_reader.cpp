@@ -44,7 +44,7 @@ SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
   read_all<ros::Float64MultiArray>(
       session_topic::frame, [&](const auto& message, const auto& name) {
         const std::vector<double>& row = message.data;
-        if (row.size() < 4 || row.size() % 2 != 0)
+        if (row.size() < 2 || row.size() % 2 != 0)
           throw Error(name, "has " + std::to_string(row.size()) + " numbers", "it may be damaged");
         PutFrame& frame = frames_[whole(row[0], name)];
         frame.stamp = row[1];
@@ -85,6 +85,9 @@ std::shared_ptr<const Cloud> SessionReader::cloud(std::size_t camera, std::size_
 }
 
 std::shared_ptr<const Cloud> SessionReader::cloud(const PutFrame& frame) {
+  if (frame.parts.empty())
+    throw Error("recording", "a frame was left out of it when it was made",
+                "the machine or its disk was too slow to record all of them");
   std::vector<std::shared_ptr<const Cloud>> clouds;
   for (const auto& [camera, number] : frame.parts) clouds.push_back(cloud(camera, number));
   if (clouds.size() == 1) return clouds.front();

@@ -32,12 +32,12 @@ class SessionReader {
   /// A frame as the renderer got it.
   struct PutFrame {
     double stamp = 0.0;  ///< [s]
-    /// Which camera's which frame.
+    /// Which camera's which frame; none if the frame was left out of the recording.
     std::vector<std::pair<std::size_t, std::size_t>> parts;
   };
   /// By their number.
   [[nodiscard]] const std::map<std::uint64_t, PutFrame>& frames() const { return frames_; }
-  /// What the cameras saw. @throws Error if it is damaged.
+  /// What the cameras saw. @throws Error if it is damaged or was left out.
   [[nodiscard]] std::shared_ptr<const Cloud> cloud(const PutFrame& frame);
 
  private:

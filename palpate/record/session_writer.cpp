@@ -9,12 +9,9 @@
 #include "palpate/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/bag_camera.hpp"
-#include "palpate/sources/depth_png.hpp"
 
 namespace palpate {
 namespace {
-
-constexpr double commit_interval = 1.0;  // [s]
 
 std::array<double, 3> array_of(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
@@ -44,11 +41,18 @@ ros::TransformStamped transform(const ros::Header& header, const std::string& ch
 
 }  // namespace
 
+std::vector<std::byte> packed_png(const Cloud& image, PngPacking packing) {
+  const auto* depth = dynamic_cast<const DepthImage*>(&image);
+  if (depth == nullptr) throw Error("cloud", "is not a depth image", "pack depth images alone");
+  const Intrinsics& k = depth->intrinsics();
+  return encode_depth_png(k.width, k.height, depth->depth(), packing);
+}
+
 SessionWriter::SessionWriter(const std::filesystem::path& folder, const SessionInfo& info, double t,
-                             std::optional<std::uint64_t> max_bytes)
-    : epoch_(info.epoch), bag_(folder, max_bytes), committed_at_(monotonic_now()) {
+                             std::optional<std::uint64_t> max_bytes, double commit_interval)
+    : epoch_(info.epoch), bag_(folder, max_bytes), commit_interval_(commit_interval) {
   this->info(info, t);
-  bag_.commit();
+  commit();
 }
 
 void SessionWriter::info(const SessionInfo& info, double t) {
@@ -74,7 +78,8 @@ void SessionWriter::settings(const NumberedSettings& settings, double t) {
 }
 
 void SessionWriter::frame(std::uint64_t number, double stamp,
-                          std::span<const std::shared_ptr<const Cloud>> cameras) {
+                          std::span<const std::shared_ptr<const Cloud>> cameras,
+                          const PackedClouds& packed) {
   if (cameras_.size() < cameras.size()) cameras_.resize(cameras.size());
   // Number, stamp, and for each camera in use which one and which of its frames.
   ros::Float64MultiArray row{.label = "number,stamp,camera,frame,...",
@@ -84,7 +89,8 @@ void SessionWriter::frame(std::uint64_t number, double stamp,
     Camera& camera = cameras_[i];
     if (camera.newest != cameras[i]) {
       if (const auto* image = dynamic_cast<const DepthImage*>(cameras[i].get())) {
-        depth(i, stamp, *image);
+        const auto png = packed.find(image);
+        depth(i, stamp, *image, png == packed.end() ? packed_png(*image) : png->second);
       } else if (const auto* cloud = dynamic_cast<const PointCloud*>(cameras[i].get())) {
         points(i, stamp, *cloud);
       } else {
@@ -101,7 +107,15 @@ void SessionWriter::frame(std::uint64_t number, double stamp,
   ++frames_;
 }
 
-void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& image) {
+void SessionWriter::left_out(std::uint64_t number, double stamp) {
+  // The row of a frame that names no camera.
+  write(session_topic::frame, nanoseconds(stamp),
+        ros::Float64MultiArray{.label = "number,stamp,camera,frame,...",
+                               .data = {static_cast<double>(number), stamp}});
+}
+
+void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& image,
+                          std::span<const std::byte> png) {
   const CameraTopics topics(camera);
   const Intrinsics& k = image.intrinsics();
   const std::int64_t at = nanoseconds(stamp);
@@ -111,7 +125,6 @@ void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& im
   constexpr std::size_t config_header = 12;
   ros::CompressedImage packed{.header = header, .format = "16UC1; compressedDepth png", .data = {}};
   packed.data.resize(config_header);
-  const std::vector<std::byte> png = encode_depth_png(k.width, k.height, image.depth());
   packed.data.insert(packed.data.end(), png.begin(), png.end());
 
   ros::Float64MultiArray exact{.label = "stamp,units_per_metre,world_from_camera",
@@ -162,11 +175,19 @@ void SessionWriter::tick(const ServoTick& tick) {
   ++ticks_;
 }
 
-void SessionWriter::commit_if_due() {
-  const double now = monotonic_now();
-  if (now - committed_at_ < commit_interval) return;
+void SessionWriter::commit() {
   bag_.commit();
-  committed_at_ = now;
+  committed_at_ = monotonic_now();
+}
+
+bool SessionWriter::commit_is_due() const {
+  return monotonic_now() - committed_at_ >= commit_interval_;
+}
+
+bool SessionWriter::commit_if_due() {
+  if (!commit_is_due()) return false;
+  commit();
+  return true;
 }
 
 }  // namespace palpate

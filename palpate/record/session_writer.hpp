@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -15,8 +16,16 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/record/session.hpp"
+#include "palpate/sources/depth_png.hpp"
 
 namespace palpate {
+
+/// The PNG of a depth image, for SessionWriter::frame. Any thread.
+/// @throws Error for a cloud that is not a DepthImage.
+std::vector<std::byte> packed_png(const Cloud& image, PngPacking packing = PngPacking::fast);
+
+/// PNGs made beforehand, by the image that each was made of.
+using PackedClouds = std::map<const Cloud*, std::vector<std::byte>>;
 
 /// Writes a session as a ROS 2 bag (docs/recording.md): standard messages for whoever looks at it,
 /// and beside them every number that a replay needs, to the bit. Used on one thread.
@@ -25,9 +34,11 @@ class SessionWriter {
   /// @param folder     of the bag; must not be there yet
   /// @param t          [s] on the session's clock: now
   /// @param max_bytes  as BagWriter's
+  /// @param commit_interval  [s] of commit_if_due()
   /// @throws Error if it is there, or cannot be made.
   SessionWriter(const std::filesystem::path& folder, const SessionInfo& info, double t,
-                std::optional<std::uint64_t> max_bytes = std::nullopt);
+                std::optional<std::uint64_t> max_bytes = std::nullopt,
+                double commit_interval = 1.0);
 
   // Each throws Error if the disk is full or fails; what was committed before stays.
 
@@ -42,13 +53,19 @@ class SessionWriter {
   /// @param stamp    [s] as the renderer got it
   /// @param cameras  what each camera saw last, null before its first frame. What a camera saw
   ///                 before is not written again.
+  /// @param packed   PNGs of these images; one that is missing is made here
   /// @throws Error also for a cloud that is neither a DepthImage nor a PointCloud.
   void frame(std::uint64_t number, double stamp,
-             std::span<const std::shared_ptr<const Cloud>> cameras);
+             std::span<const std::shared_ptr<const Cloud>> cameras,
+             const PackedClouds& packed = {});
+  /// Notes that a frame is not in the recording, for want of time or space.
+  void left_out(std::uint64_t number, double stamp);
   void tick(const ServoTick& tick);
-  /// Commits once a second of the machine's clock; call it often.
-  void commit_if_due();
-  void commit() { bag_.commit(); }
+  /// Has the commit interval passed since the last commit, on the machine's clock?
+  [[nodiscard]] bool commit_is_due() const;
+  /// Commits if that is due; call it often. @return true if it did
+  bool commit_if_due();
+  void commit();
   void close() { bag_.close(); }
 
   [[nodiscard]] const std::filesystem::path& folder() const { return bag_.folder(); }
@@ -65,13 +82,15 @@ class SessionWriter {
   void write(std::string_view topic, std::int64_t nanoseconds, const Message& message,
              bool latched = false);
   [[nodiscard]] std::int64_t nanoseconds(double t) const;
-  void depth(std::size_t camera, double stamp, const DepthImage& image);
+  void depth(std::size_t camera, double stamp, const DepthImage& image,
+             std::span<const std::byte> png);
   void points(std::size_t camera, double stamp, const PointCloud& cloud);
 
   std::int64_t epoch_;  // [ns]
   BagWriter bag_;
   std::vector<Camera> cameras_;
   std::uint64_t ticks_ = 0, frames_ = 0;
+  double commit_interval_;     // [s]
   double committed_at_ = 0.0;  // [s] monotonic_now()
 };
 

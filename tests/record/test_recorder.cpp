@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <csignal>
+#include <latch>
 #include <memory>
+#include <random>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "palpate/record/recorder.hpp"
 #include "palpate/record/replay.hpp"
@@ -28,11 +34,12 @@ class LoopSession {
     cycle_ = std::make_unique<Cycle>(rendering_by<Renderer>(), device_, settings_);
   }
 
-  void record(const std::filesystem::path& folder) {
+  void record(const std::filesystem::path& folder, const RecorderOptions& options = {}) {
     const bool is_on = tick_ > 0;
     recorder_ = std::make_unique<Recorder>(
         folder, SessionInfo{.kind = SessionInfo::Kind::live, .version = "test"}, cycle_->reader(),
-        is_on ? [this] { cycle_->renew(rendering_by<Renderer>()); } : std::function<void()>{});
+        is_on ? [this] { cycle_->renew(rendering_by<Renderer>()); } : std::function<void()>{},
+        options);
     recorder_->settings({settings_number_, settings_}, now());
     if (frame_ > 0) recorder_->frame(frame_, stamp_, {cloud_});
   }
@@ -135,13 +142,138 @@ TEST(Recorder, EndsWithTheLastTickWhoseFrameItKnows) {
   EXPECT_EQ(report.ticks, 132U);
 }
 
+TEST(Recorder, AskedToStopReturnsAtOnceAndSaysWhenItIsDone) {
+  const TemporaryFolder folder;
+  std::latch held_up(1);
+  TickRing<ServoTick> ring(16);
+  Recorder recorder(folder.path() / "bag", {.version = "test"}, ring.reader(),
+                    [&] { held_up.wait(); });  // a thread of the recorder's can't go on
+  ring.push({});
+  recorder.request_stop();
+  EXPECT_FALSE(recorder.done());
+  EXPECT_TRUE(recorder.status().closing);
+  recorder.frame(1, 0.0, {wavy_floor(0)});  // comes too late
+  EXPECT_EQ(recorder.status().frames_waiting, 0U);
+  held_up.count_down();
+  recorder.stop();
+  EXPECT_TRUE(recorder.done());
+  EXPECT_FALSE(recorder.status().closing);
+  EXPECT_EQ(recorder.status().trouble, "");
+}
+
+TEST(Recorder, StoresImagesUncompressedWhereItLagsBehindAndCountsThem) {
+  const TemporaryFolder folder;
+  LoopSession session(Method::paper);
+  session.record(folder.path() / "bag", {.compress_below = 0});
+  session.run(200);
+  session.recorder().stop();
+  EXPECT_EQ(session.recorder().status().stored_frames, 7U);
+  SessionReader reader(folder.path() / "bag");
+  EXPECT_TRUE(replay(reader).identical());
+}
+
+TEST(Recorder, CountsFramesThatItHasNoRoomForAndAReplaySaysSo) {
+  const TemporaryFolder folder;
+  LoopSession session(Method::paper);
+  session.record(folder.path() / "bag", {.most_frames = 0});
+  session.run(200);
+  session.recorder().stop();
+  const Recorder::Status status = session.recorder().status();
+  EXPECT_EQ(status.lost_frames, 7U);
+  EXPECT_EQ(status.ticks, 200U);
+  SessionReader reader(folder.path() / "bag");
+  const ReplayReport report = replay(reader);
+  EXPECT_EQ(report.ticks, 0U);
+  EXPECT_NE(report.broken_off.find("left out"), std::string::npos) << report.broken_off;
+}
+
+TEST(Recorder, CountsTicksThatItHasNoRoomFor) {
+  const TemporaryFolder folder;
+  LoopSession session(Method::paper);
+  session.record(folder.path() / "bag", {.most_ticks = 0});
+  session.run(100);
+  session.recorder().stop();
+  EXPECT_EQ(session.recorder().status().lost_ticks, 100U);
+  EXPECT_EQ(session.recorder().status().ticks, 0U);
+}
+
+// 640x480 pixels with a noise of some units, as cameras have it.
+std::shared_ptr<const DepthImage> noisy_floor(unsigned seed) {
+  const Intrinsics k{.width = 640, .height = 480, .fx = 600.0, .fy = 600.0, .cx = 320, .cy = 240};
+  static const auto rays = std::make_shared<const ViewingRays>(k);
+  std::mt19937 random(seed);
+  std::vector<std::uint16_t> depth;
+  for (int i = 0; i < k.width * k.height; ++i)
+    depth.push_back(static_cast<std::uint16_t>(1000U + random() % 11));
+  return std::make_shared<DepthImage>(rays, std::move(depth), 1000.0,
+                                      Eigen::Isometry3d::Identity());
+}
+
+// Records frames faster than they can be compressed, and says on `to` how many ticks are committed
+// whenever that is more; until it is killed.
+[[noreturn]] void record_for_ever(const std::filesystem::path& folder, int to) {
+  constexpr std::size_t frames_kept_waiting = 20;
+  FakeDevice device;
+  Cycle cycle(rendering_by<Renderer>(), device);
+  Recorder recorder(folder, {.kind = SessionInfo::Kind::live, .version = "test"}, cycle.reader(),
+                    {}, {.commit_interval = 0.02});
+  recorder.settings({}, 0.0);
+  const std::vector<std::shared_ptr<const Cloud>> floors{noisy_floor(1), noisy_floor(2)};
+  std::uint64_t said = 0;
+  for (int tick = 0;; ++tick) {
+    const double now = 1e-3 * tick;
+    if (tick % 33 == 0) {
+      const auto& cloud = floors[static_cast<std::size_t>(tick / 33 % 2)];
+      recorder.frame(cycle.put_frame(cloud, now, now), now, {cloud});
+    }
+    device.hand.position = Vec3(0.0, 0.0, 0.98 + 1e-5 * (tick % 4000));
+    cycle.run({.t = now});
+    Recorder::Status status = recorder.status();
+    while (status.frames_waiting > frames_kept_waiting) {
+      std::this_thread::yield();
+      status = recorder.status();
+    }
+    if (status.committed_ticks <= said) continue;
+    said = status.committed_ticks;
+    if (::write(to, &said, sizeof said) != sizeof said) std::_Exit(1);
+  }
+}
+
+TEST(Recorder, KilledAtAnyTimeLeavesASessionThatReplaysToItsLastCommit) {
+  constexpr int rounds = 8;
+  std::mt19937 random(5);
+  for (int round = 0; round < rounds; ++round) {
+    const TemporaryFolder folder;
+    std::array<int, 2> pipe_ends{};
+    ASSERT_EQ(pipe(pipe_ends.data()), 0);
+    const pid_t child = fork();
+    if (child == 0) record_for_ever(folder.path() / "bag", pipe_ends[1]);
+    close(pipe_ends[1]);
+    std::uint64_t committed = 0;
+    for (auto commits = random() % 8 + 1; commits > 0; --commits) {
+      // It commits although frames wait all the time.
+      ASSERT_EQ(::read(pipe_ends[0], &committed, sizeof committed), sizeof committed);
+    }
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+    close(pipe_ends[0]);
+    SessionReader reader(folder.path() / "bag");
+    EXPECT_GE(reader.ticks(), committed);
+    const ReplayReport report = replay(reader);
+    EXPECT_TRUE(report.identical()) << report.field << " " << report.broken_off;
+    EXPECT_EQ(report.ticks, reader.ticks());
+  }
+}
+
 TEST(Recorder, EndsWithAMessageWhereItsFolderIsTakenAwayAndTheLoopGoesOn) {
   const TemporaryFolder folder;
   LoopSession session(Method::paper);
   session.record(folder.path() / "bag");
   std::filesystem::rename(folder.path() / "bag", folder.path() / "elsewhere");
   session.run(1000);
+  session.recorder().stop();
   const Recorder::Status status = session.recorder().status();
+  EXPECT_TRUE(status.done);
   EXPECT_NE(status.trouble.find("metadata.yaml"), std::string::npos) << status.trouble;
   session.run(100);
 }

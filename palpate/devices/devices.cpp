@@ -5,9 +5,6 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
-#include "palpate/core/parameters.hpp"
-#include "palpate/core/uri.hpp"
 #include "palpate/devices/mouse_device.hpp"
 #include "palpate/devices/scripted_device.hpp"
 #include "palpate/devices/simulated_hand.hpp"
@@ -57,29 +54,20 @@ std::unique_ptr<Device> open_mouse(const Uri& uri, const Path& /*path*/) {
                                        uri.text());
 }
 
-struct Scheme {
-  std::string_view name;
-  std::unique_ptr<Device> (*open)(const Uri&, const Path&);
-};
-// One line for each kind of device.
-constexpr std::array schemes{Scheme{"script", open_script}, Scheme{"hand", open_hand},
-                             Scheme{"mouse", open_mouse}};
-
 }  // namespace
 
-std::unique_ptr<Device> open_device(std::string_view text, const Path& path) {
+Registry<DeviceScheme> standard_devices() {
+  return {"kind of device",
+          ":",
+          {{"script", "follows a recorded path, whatever the force", open_script},
+           {"hand", "a simulated person that follows a path and yields to the force", open_hand},
+           {"mouse", "led from the viewer's page, made smooth", open_mouse}}};
+}
+
+std::unique_ptr<Device> open_device(std::string_view text, const Path& path,
+                                    const Registry<DeviceScheme>& registry) {
   const Uri uri(text);
-  std::array<std::string_view, schemes.size()> names;
-  std::string known;
-  for (std::size_t i = 0; i < schemes.size(); ++i) {
-    if (schemes[i].name == uri.scheme()) return schemes[i].open(uri, path);
-    names[i] = schemes[i].name;
-    known += " " + std::string(names[i]) + ":";
-  }
-  const std::string_view near = nearest_name(uri.scheme(), names);
-  throw Error(
-      uri.text(), "unknown kind of device '" + uri.scheme() + ":'",
-      (near.empty() ? "" : "did you mean '" + std::string(near) + ":'? ") + "known here:" + known);
+  return registry.find(uri.scheme(), uri.text()).open(uri, path);
 }
 
 }  // namespace palpate

@@ -22,6 +22,16 @@ std::uint64_t nanoseconds(double seconds) noexcept {
   return static_cast<std::uint64_t>(std::min(seconds, 1e6) * 1e9);
 }
 
+bool is_faulty(const HandState& hand) noexcept {
+  return hand.fault != DeviceFault::none;
+}
+
+std::uint32_t hand_bits(const HandState& hand) noexcept {
+  return (hand.present ? hand_present : 0U) | (hand.clutched ? hand_clutched : 0U) |
+         (is_faulty(hand) ? hand_fault : 0U) |
+         (static_cast<std::uint32_t>(hand.fault) << hand_fault_shift);
+}
+
 }  // namespace
 
 void validate(const ServoSettings& settings) {
@@ -111,8 +121,9 @@ double Cycle::frame_age(double t) const noexcept {
 
 void Cycle::run(const Wake& wake) noexcept {
   const double t = wake.t;
-  const HandState hand = device_.read(t);
+  HandState hand = device_.read(t);
   if (const ServoSettings* settings = settings_.take()) adopt_settings(*settings);
+  hand.clutched = workspace_.is_clutched(hand);
   const bool renewed = adopt_rendering();
   if (const CapturedFrame* frame = frames_.take()) {
     adopt_frame(*frame, t);
@@ -138,26 +149,25 @@ void Cycle::run(const Wake& wake) noexcept {
                                          .proxy = tick.proxy,
                                          .normal = tick.normal,
                                          .position = hand.position,
-                                         .hand = hand.present && !hand.clutched,
+                                         .hand = hand.present && !hand.clutched && !is_faulty(hand),
                                          .frame_age = age,
                                          .frame_interval = interval_});
   device_.write(workspace_.force_in_device(safe.force), t);
 
-  const ServoTick record{
-      .tick = tick,
-      .force = safe.force,
-      .position = hand.position,
-      .gain = safe.gain,
-      .frame_stamp = last_stamp_,
-      .frame_age = age,
-      .number = number_++,
-      .frame_number = frames_.number(),
-      .settings_number = settings_.number(),
-      .safety = safe.flags,
-      .wake_up_ns = wake.wake_up_ns,
-      .previous_compute_ns = wake.previous_compute_ns,
-      .hand = (hand.present ? hand_present : 0U) | (hand.clutched ? hand_clutched : 0U) |
-              (reseated ? proxy_reseated : 0U) | (renewed ? rendering_renewed : 0U)};
+  const ServoTick record{.tick = tick,
+                         .force = safe.force,
+                         .position = hand.position,
+                         .gain = safe.gain,
+                         .frame_stamp = last_stamp_,
+                         .frame_age = age,
+                         .number = number_++,
+                         .frame_number = frames_.number(),
+                         .settings_number = settings_.number(),
+                         .safety = safe.flags,
+                         .wake_up_ns = wake.wake_up_ns,
+                         .previous_compute_ns = wake.previous_compute_ns,
+                         .hand = hand_bits(hand) | (reseated ? proxy_reseated : 0U) |
+                                 (renewed ? rendering_renewed : 0U)};
   ring_.push(record);
   keep_statistics(record);
 }
@@ -167,6 +177,7 @@ void Cycle::keep_statistics(const ServoTick& record) noexcept {
   add(statistics_.steps, static_cast<std::uint64_t>(std::max(record.tick.steps, 0)));
   if (record.tick.state != ContactState::free_motion) add(statistics_.contact_ticks, 1);
   if (has_frame_) statistics_.frame_age.add(nanoseconds(record.frame_age));
+  statistics_.hand.store(record.hand, std::memory_order_relaxed);
   const double force = record.force.norm();
   if (force > statistics_.max_force.load(std::memory_order_relaxed))
     statistics_.max_force.store(force, std::memory_order_relaxed);

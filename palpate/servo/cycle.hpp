@@ -62,7 +62,15 @@ enum HandFlag : std::uint32_t {
   proxy_reseated = 1u << 2,
   /// A new renderer took over before the tick, with the proxy where it was; see Cycle::renew.
   rendering_renewed = 1u << 3,
+  /// The device reported a fault, so there was no force; fault_of() says which.
+  hand_fault = 1u << 4,
 };
+constexpr unsigned hand_fault_shift = 8;  ///< bits 8 to 15 of `ServoTick::hand`: the DeviceFault
+
+/// The device's fault in a tick's HandFlag bits.
+constexpr DeviceFault fault_of(std::uint32_t hand) {
+  return static_cast<DeviceFault>((hand >> hand_fault_shift) & 0xffU);
+}
 
 /// All that happened in one cycle: what viewers and recorders read.
 struct ServoTick {
@@ -78,7 +86,7 @@ struct ServoTick {
   std::uint32_t safety;           ///< SafetyFlag bits
   std::uint32_t wake_up_ns;       ///< as in Wake
   std::uint32_t previous_compute_ns;
-  std::uint32_t hand;  ///< HandFlag bits
+  std::uint32_t hand;  ///< HandFlag bits, and the device's fault: see fault_of()
 };
 
 /// What the cycles have done so far. The servo's thread writes, any may look.
@@ -90,6 +98,7 @@ struct CycleStatistics {
   std::atomic<std::uint64_t> frames_dropped{0};  ///< overtaken by a newer one before any tick
   std::atomic<std::uint64_t> settings_refused{0};
   std::atomic<double> max_force{0.0};  ///< [N] sent
+  std::atomic<std::uint32_t> hand{0};  ///< HandFlag bits of the last tick
   Histogram frame_age;                 ///< [ns] at each tick that had a frame
   Histogram hand_over;                 ///< [ns] from put_frame to the tick that uses the frame
   std::array<std::atomic<std::uint64_t>, safety_flag_count> interventions{};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <ctime>
 #include <limits>
@@ -41,8 +42,8 @@ void sleep_until(std::uint64_t deadline) noexcept {
 }  // namespace
 
 PeriodicThread::PeriodicThread(double rate, const RealtimeRequest& request,
-                               std::function<void(const Wake&)> cycle)
-    : cycle_(std::move(cycle)) {
+                               std::function<void(const Wake&)> cycle, std::function<void()> last)
+    : cycle_(std::move(cycle)), last_(std::move(last)), ended_(ending_.get_future()) {
   if (!(rate >= 1.0 && rate <= 10'000.0)) {
     throw Error("servo rate", std::to_string(rate) + " Hz is out of range",
                 "give a rate from 1 to 10000 Hz");
@@ -61,6 +62,11 @@ PeriodicThread::~PeriodicThread() {
 void PeriodicThread::stop() {
   stopping_.store(true, std::memory_order_relaxed);
   if (thread_.joinable()) thread_.join();
+}
+
+bool PeriodicThread::try_stop(double timeout) {
+  stopping_.store(true, std::memory_order_relaxed);
+  return ended_.wait_for(std::chrono::duration<double>(timeout)) == std::future_status::ready;
 }
 
 void PeriodicThread::run(std::uint64_t period, const RealtimeRequest& request,
@@ -86,6 +92,8 @@ void PeriodicThread::run(std::uint64_t period, const RealtimeRequest& request,
       timing_.skipped_deadlines.fetch_add(passed, std::memory_order_relaxed);
     }
   }
+  if (last_) last_();
+  ending_.set_value();
 }
 
 }  // namespace palpate

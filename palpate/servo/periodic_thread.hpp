@@ -36,9 +36,10 @@ class PeriodicThread {
   /// Starts at once and returns when the thread has its rights.
   /// @param rate   [Hz] 1 to 10 000
   /// @param cycle  [servo] called with the time by monotonic_now(); must not throw
+  /// @param last   [servo] called once on the same thread after the last cycle, if it is set
   /// @throws Error if the rate is out of range.
   PeriodicThread(double rate, const RealtimeRequest& request,
-                 std::function<void(const Wake&)> cycle);
+                 std::function<void(const Wake&)> cycle, std::function<void()> last = {});
   /// Stops after the cycle in progress.
   ~PeriodicThread();
   PeriodicThread(const PeriodicThread&) = delete;
@@ -46,6 +47,9 @@ class PeriodicThread {
 
   /// The same, and keeps the timing. Not from within a cycle.
   void stop();
+  /// Asks the thread to stop and waits, at most `timeout` [s], until `last` has been called.
+  /// @return false if it has not: the cycle in progress hangs
+  bool try_stop(double timeout);
   [[nodiscard]] bool stopped() const { return !thread_.joinable(); }
 
   [[nodiscard]] const RealtimeReport& realtime() const { return report_; }
@@ -56,6 +60,9 @@ class PeriodicThread {
            std::promise<RealtimeReport> started);
 
   std::function<void(const Wake&)> cycle_;
+  std::function<void()> last_;
+  std::promise<void> ending_;
+  std::future<void> ended_;
   Timing timing_;
   std::atomic<bool> stopping_{false};
   RealtimeReport report_;

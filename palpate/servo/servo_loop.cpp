@@ -1,19 +1,59 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/servo/servo_loop.hpp"
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <limits>
 #include <string>
 #include <utility>
+
+#include <pthread.h>
 
 #include "palpate/core/error.hpp"
 
 namespace palpate {
+namespace {
+
+constexpr double last_write_time = 0.05;     // [s] for the ticking thread to end
+constexpr double first_callback_time = 1.0;  // [s] for a driver to begin
+constexpr auto watch_interval = std::chrono::milliseconds(5);
+constexpr double enable_again_after = 1.0;  // [s] after the device refused
+
+std::uint64_t thread_cpu_time() noexcept {  // [ns]
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<std::uint64_t>(now.tv_sec) * 1'000'000'000U +
+         static_cast<std::uint64_t>(now.tv_nsec);
+}
+
+// Waits until `done()` or for `timeout` [s].
+template <class Condition>
+bool wait_for(double timeout, const Condition& done) {
+  const double end = monotonic_now() + timeout;
+  while (!done()) {
+    if (monotonic_now() >= end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+}  // namespace
 
 ServoLoop::ServoLoop(std::unique_ptr<Rendering> rendering, Device& device,
                      const ServoSettings& settings, const ServoOptions& options)
-    : device_(device), options_(options), cycle_(std::move(rendering), device, settings) {
+    : device_(device),
+      options_(options),
+      rate_(device.drives() ? device.info().rate.value_or(options.rate) : options.rate),
+      cycle_(std::move(rendering), device, settings) {
   if (!(options_.rate >= 500.0 && options_.rate <= 10'000.0)) {
     throw Error("servo rate", std::to_string(options_.rate) + " Hz is out of range",
                 "give a rate from 500 to 10000 Hz");
+  }
+  if (!(options_.watch_time >= 0.005 && options_.watch_time <= 1.0)) {
+    throw Error("watch time", std::to_string(options_.watch_time) + " s is out of range",
+                "give 0.005 to 1 s");
   }
 }
 
@@ -22,15 +62,149 @@ ServoLoop::~ServoLoop() {
 }
 
 void ServoLoop::start() {
-  if (thread_) return;
-  thread_ = std::make_unique<PeriodicThread>(options_.rate, options_.realtime,
-                                             [this](const Wake& wake) { cycle_.run(wake); });
+  if (started_) return;
+  device_.enable();
+  last_tick_.store(monotonic_now(), std::memory_order_relaxed);
+  if (device_.drives()) {
+    start_driven();
+  } else {
+    thread_ = std::make_unique<PeriodicThread>(
+        options_.rate, options_.realtime,
+        [this](const Wake& wake) {
+          last_tick_.store(wake.t, std::memory_order_relaxed);
+          cycle_.run(wake);
+        },
+        [this] { device_.write(Vec3::Zero(), monotonic_now()); });
+  }
+  started_ = true;
+  watch_ = std::thread(&ServoLoop::watch, this);
+}
+
+void ServoLoop::start_driven() {
+  const auto close = [this] {
+    device_.stop();
+    device_.disable();
+  };
+  try {
+    device_.start([this] { driven_tick(); });
+  } catch (...) {
+    close();
+    throw;
+  }
+  if (!wait_for(first_callback_time,
+                [this] { return first_tick_.load(std::memory_order_acquire); })) {
+    close();
+    const std::string fault = device_.fault_text();
+    throw Error(device_.info().uri, "its driver does not call the servo cycle",
+                fault.empty() ? "switch the device off and on again" : fault);
+  }
+}
+
+void ServoLoop::driven_tick() noexcept {
+  const double now = monotonic_now();
+  last_tick_.store(now, std::memory_order_relaxed);
+  if (stopping_.load(std::memory_order_acquire)) {
+    if (zero_sent_.load(std::memory_order_relaxed)) return;
+    device_.write(Vec3::Zero(), now);
+    zero_sent_.store(true, std::memory_order_release);
+    return;
+  }
+  const double period = 1.0 / rate_;
+  double late = 0.0;
+  if (!first_tick_.load(std::memory_order_relaxed)) {
+    int policy = 0;
+    sched_param scheduling{};
+    if (pthread_getschedparam(pthread_self(), &policy, &scheduling) == 0)
+      driven_report_.fifo = policy == SCHED_FIFO || policy == SCHED_RR;
+    if (driven_report_.fifo) driven_report_.priority = scheduling.sched_priority;
+    first_tick_.store(true, std::memory_order_release);
+  } else {
+    late = std::clamp(now - previous_tick_ - period, 0.0, 4.0);
+    driven_timing_.wake_up.add(static_cast<std::uint64_t>(1e9 * late));
+    if (late > 0.5 * period) {
+      driven_timing_.late_ticks.fetch_add(1, std::memory_order_relaxed);
+      driven_timing_.skipped_deadlines.fetch_add(
+          static_cast<std::uint64_t>(std::llround(late / period)), std::memory_order_relaxed);
+    }
+  }
+  previous_tick_ = now;
+  const std::uint64_t cpu = thread_cpu_time();
+  cycle_.run({now, static_cast<std::uint32_t>(1e9 * late), previous_compute_});
+  const std::uint64_t compute = thread_cpu_time() - cpu;
+  driven_timing_.compute.add(compute);
+  previous_compute_ = static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(compute, std::numeric_limits<std::uint32_t>::max()));
+}
+
+void ServoLoop::watch() {
+  double next_attempt = 0.0;
+  std::unique_lock lock(watch_mutex_);
+  while (!watch_wakes_.wait_for(lock, watch_interval, [this] { return watch_ends_; })) {
+    const double now = monotonic_now();
+    const bool stalled = now - last_tick_.load(std::memory_order_relaxed) > options_.watch_time;
+    if (stalled && !disabled_) {
+      device_.disable();
+      disabled_ = true;
+      stalls_.fetch_add(1, std::memory_order_relaxed);
+    } else if (!stalled && disabled_ && now >= next_attempt) {
+      try {
+        device_.enable();
+        disabled_ = false;
+        enable_failed_.clear();
+      } catch (const Error& error) {
+        enable_failed_ = error.what();
+        next_attempt = now + enable_again_after;
+      }
+    }
+  }
+}
+
+void ServoLoop::end_watch() {
+  {
+    const std::lock_guard lock(watch_mutex_);
+    watch_ends_ = true;
+  }
+  watch_wakes_.notify_all();
+  if (watch_.joinable()) watch_.join();
 }
 
 void ServoLoop::stop() {
-  if (!thread_ || thread_->stopped()) return;
-  thread_->stop();
-  device_.write(Vec3::Zero(), monotonic_now());
+  if (!started_ || stopped_.exchange(true)) return;
+  stopping_.store(true, std::memory_order_release);
+  const bool sent =
+      thread_ ? thread_->try_stop(last_write_time) : wait_for(last_write_time, [this] {
+        return zero_sent_.load(std::memory_order_acquire);
+      });
+  device_.disable();
+  end_watch();
+  device_.disable();  // the watch may have enabled it in between
+  if (thread_) {
+    thread_->stop();
+  } else {
+    device_.stop();
+    if (!sent) device_.write(Vec3::Zero(), monotonic_now());
+  }
+}
+
+DeviceStatus ServoLoop::device_status() const {
+  const std::uint32_t hand = statistics().hand.load(std::memory_order_relaxed);
+  const double silent = monotonic_now() - last_tick_.load(std::memory_order_relaxed);
+  DeviceStatus status{.ticking = started_ && !stopped_ && silent <= options_.watch_time,
+                      .present = (hand & hand_present) != 0,
+                      .fault = fault_of(hand),
+                      .text = device_.fault_text()};
+  if (!status.text.empty()) return status;
+  if (started_ && !stopped_ && !status.ticking) {
+    status.text = "no tick for " + std::to_string(std::lround(1e3 * silent)) +
+                  " ms: the device is disabled until ticks come again";
+    return status;
+  }
+  {
+    const std::lock_guard lock(watch_mutex_);
+    if (!enable_failed_.empty()) status.text = enable_failed_;
+  }
+  if (status.text.empty()) status.text = describe(status.fault);
+  return status;
 }
 
 }  // namespace palpate

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <string>
+#include <thread>
 
 #include "palpate/servo/cycle.hpp"
 #include "palpate/servo/periodic_thread.hpp"
@@ -11,16 +17,32 @@ namespace palpate {
 
 /// How the loop runs.
 struct ServoOptions {
-  double rate = 1000.0;  ///< [Hz] 500 to 10 000; a clean wall grows stiffer with it
+  /// [Hz] 500 to 10 000; a clean wall grows stiffer with it. A device that drives the loop has its
+  /// own rate: then this is what lateness is measured against if the device does not say its rate.
+  double rate = 1000.0;
   RealtimeRequest realtime{};
+  /// [s] 0.005 to 1: without a tick for so long the device is disabled.
+  double watch_time = 0.025;
 };
 
-/// The live loop: cycles on a real-time thread of their own, from `start` to `stop`.
+/// How the device does, as far as the loop knows.
+struct DeviceStatus {
+  bool ticking = false;                   ///< a tick began within the last ServoOptions::watch_time
+  bool present = false;                   ///< in the last tick
+  DeviceFault fault = DeviceFault::none;  ///< in the last tick
+  std::string text;  ///< why there is no force and what to do; empty if the device is well
+};
+
+/// The live loop: cycles on a real-time thread of their own, or on the thread of a device that
+/// drives them, from `start` to `stop`.
 ///
-/// Time is monotonic_now(): frames must be stamped on that clock.
+/// Time is monotonic_now(): frames must be stamped on that clock. A second thread watches the
+/// ticks: when none comes for ServoOptions::watch_time, because a cycle hangs or the device's
+/// callback has ended, it disables the device, and enables it again when ticks come again; the
+/// safety chain then lets the force rise slowly.
 class ServoLoop {
  public:
-  /// @throws Error if the rate is out of range or the settings do not validate.
+  /// @throws Error if the rate or watch time is out of range or the settings do not validate.
   ServoLoop(std::unique_ptr<Rendering> rendering, Device& device,
             const ServoSettings& settings = {}, const ServoOptions& options = {});
   /// Stops.
@@ -28,9 +50,13 @@ class ServoLoop {
   ServoLoop(const ServoLoop&) = delete;
   ServoLoop& operator=(const ServoLoop&) = delete;
 
-  /// Starts the thread, once; returns when it has its rights.
+  /// Enables the device and starts the ticks, once; returns when the thread has its rights or the
+  /// device's first callback has come.
+  /// @throws Error if the device cannot be enabled or started, or its callback does not come.
   void start();
-  /// Lets the cycle in progress end, then takes the force off the device.
+  /// Takes the force off the device before anything else ends: a zero force is the last write of
+  /// the thread that ticks; if that thread does not get there within 50 ms, the device is disabled
+  /// from here. Then the device is disabled and the threads end. Any thread but the servo's.
   void stop();
 
   /// As Cycle's.
@@ -44,15 +70,52 @@ class ServoLoop {
   [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return cycle_.reader(); }
   [[nodiscard]] const CycleStatistics& statistics() const { return cycle_.statistics(); }
 
-  /// Of the thread; from `start` on, also after `stop`.
-  [[nodiscard]] const Timing& timing() const { return thread_->timing(); }
-  [[nodiscard]] const RealtimeReport& realtime() const { return thread_->realtime(); }
+  /// Of the thread that ticks; empty before `start`, kept after `stop`. On a device's thread the
+  /// wake-up time is how much longer than a period the time since the last tick was.
+  [[nodiscard]] const Timing& timing() const {
+    return thread_ ? thread_->timing() : driven_timing_;
+  }
+  [[nodiscard]] const RealtimeReport& realtime() const {
+    return thread_ ? thread_->realtime() : driven_report_;
+  }
+  /// [Hz] of the ticks: the options', or that of a device that drives them.
+  [[nodiscard]] double rate() const { return rate_; }
+  /// How often the device was disabled because no tick came.
+  [[nodiscard]] std::uint64_t stalls() const { return stalls_.load(std::memory_order_relaxed); }
+  /// Any thread but the servo's.
+  [[nodiscard]] DeviceStatus device_status() const;
 
  private:
+  void driven_tick() noexcept;
+  void start_driven();
+  void watch();
+  void end_watch();
+
   Device& device_;
   ServoOptions options_;
+  double rate_;
   Cycle cycle_;
-  std::unique_ptr<PeriodicThread> thread_;
+  std::atomic<bool> started_{false};
+  std::atomic<bool> stopped_{false};
+  std::unique_ptr<PeriodicThread> thread_;  // null if the device drives
+
+  // Of a device that drives: its thread's, but for the atomics.
+  Timing driven_timing_;
+  RealtimeReport driven_report_;
+  std::atomic<bool> first_tick_{false};
+  std::atomic<bool> stopping_{false};
+  std::atomic<bool> zero_sent_{false};  // after stopping_
+  double previous_tick_ = 0.0;          // [s]
+  std::uint32_t previous_compute_ = 0;  // [ns]
+
+  std::atomic<double> last_tick_{0.0};  // [s] when it began
+  std::atomic<std::uint64_t> stalls_{0};
+  std::thread watch_;
+  mutable std::mutex watch_mutex_;  // the servo never takes it
+  std::condition_variable watch_wakes_;
+  bool watch_ends_ = false;    // guarded by watch_mutex_
+  bool disabled_ = false;      // guarded by watch_mutex_: by the watch
+  std::string enable_failed_;  // guarded by watch_mutex_: why it could not be enabled again
 };
 
 }  // namespace palpate

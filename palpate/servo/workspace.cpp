@@ -20,6 +20,10 @@ void validate(const Placement& placement) {
     throw Error("workspace_scale", std::to_string(placement.workspace_scale) + " is out of range",
                 "give scene metres per device metre, from 0.001 to 1000");
   }
+  if (placement.clutch_button && (*placement.clutch_button < 0 || *placement.clutch_button > 31)) {
+    throw Error("clutch_button", std::to_string(*placement.clutch_button) + " is out of range",
+                "give a button from 0 to 31");
+  }
 }
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 
 #include <Eigen/Geometry>
 
@@ -15,9 +16,13 @@ struct Placement {
   /// [-] scene metres per device metre. Forces are not scaled, so the hand feels the coupling's
   /// stiffness times this: scale up and the limit of stability comes nearer.
   double workspace_scale = 1.0;
+  /// Button of the device that clutches while it is pressed, 0 to 31; none: only the device's own
+  /// clutch does.
+  std::optional<int> clutch_button = {};
 };
 
-/// @throws Error if the pose is not rigid and finite or the scale is not in 0.001 to 1000.
+/// @throws Error if the pose is not rigid and finite, the scale is not in 0.001 to 1000 or the
+///         button not in 0 to 31.
 void validate(const Placement& placement);
 
 /// Brings hands into the world and forces back, and remembers what the clutch has shifted. [servo]
@@ -39,6 +44,12 @@ class Workspace {
       held_ = hand.position + shift_;
     }
     return placement_.world_from_device * Vec3(placement_.workspace_scale * held_);
+  }
+
+  /// Is the hand clutched, by the device or by the placement's button?
+  [[nodiscard]] bool is_clutched(const HandState& hand) const noexcept {
+    const auto& button = placement_.clutch_button;
+    return hand.clutched || (button && ((hand.buttons.value_or(0U) >> *button) & 1U) != 0);
   }
 
   [[nodiscard]] Vec3 force_in_device(const Vec3& force_in_world) const noexcept {

@@ -315,12 +315,36 @@ TEST(OpenDevice, OpensEachKindWithItsOptions) {
   EXPECT_EQ(mouse->info().limits.max_force, 3.3);
 }
 
+class Joystick final : public Device {
+ public:
+  explicit Joystick(const Uri& uri) : info_{.uri = uri.text(), .kind = "joystick", .limits = {}} {}
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  HandState read(double /*t*/) noexcept override { return {.position = {0, 0, 0.1}}; }
+  void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
+
+ private:
+  DeviceInfo info_;
+};
+
+TEST(OpenDevice, OpensADeviceOfAnotherProgramUnderItsOwnScheme) {
+  Registry<DeviceScheme> devices = standard_devices();
+  devices.add({"joystick", "a stick", [](const Uri& uri, const auto& /*path*/) {
+                 return std::make_unique<Joystick>(uri);
+               }});
+  EXPECT_EQ(open_device("joystick:0", {}, devices)->info().kind, "joystick");
+  EXPECT_EQ(open_device("mouse:", {}, devices)->info().kind, "mouse in the viewer");
+  EXPECT_TRUE(fails_saying([&] { return open_device("joystik:0", {}, devices) != nullptr; },
+                           "joystik", "did you mean 'joystick:'?"));
+  EXPECT_TRUE(fails_saying([] { return open_device("joystick:0") != nullptr; }, "joystick:0",
+                           "known here: script:, hand:, mouse:"));
+}
+
 TEST(OpenDevice, SaysWhatIsWrongWithAName) {
   const auto opening = [](std::string_view uri) {
     return [uri] { return open_device(uri) != nullptr; };
   };
   EXPECT_TRUE(fails_saying(opening("mous:"), "mous:", "did you mean 'mouse:'?"));
-  EXPECT_TRUE(fails_saying(opening("tum:x"), "unknown kind of device", "script: hand: mouse:"));
+  EXPECT_TRUE(fails_saying(opening("tum:x"), "unknown kind of device", "script:, hand:, mouse:"));
   EXPECT_TRUE(fails_saying(opening("mouse"), "scheme"));
   EXPECT_TRUE(fails_saying(opening("mouse:x"), "mouse:x", "write mouse: alone"));
   EXPECT_TRUE(fails_saying(opening("script:"), "no path to follow", "script:FILE.csv"));

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <vector>
+#include <atomic>
+#include <string>
 
 #include "palpate/servo/device.hpp"
 
@@ -17,7 +18,14 @@ class FakeDevice final : public Device {
     ++writes;
   }
 
+  void enable() override { ++enables; }
+  void disable() noexcept override { ++disables; }
+  [[nodiscard]] std::string fault_text() const override { return text; }
+
   HandState hand;
+  std::string text;
+  std::atomic<int> enables{0};
+  std::atomic<int> disables{0};
   Vec3 force = Vec3::Constant(-1.0);
   int writes = 0;
 

@@ -136,8 +136,11 @@ TEST(ServoLoop, CanBeDestroyedBeforeItStartedAndStoppedTwice) {
   { const ServoLoop never_started(rendering_by<Renderer>(), device); }
   EXPECT_EQ(device.writes, 0);
   ServoLoop loop(rendering_by<Renderer>(), device);
+  EXPECT_EQ(loop.timing().compute.count(), 0U);
   loop.start();
   loop.stop();
+  EXPECT_EQ(device.enables, 1);
+  EXPECT_GE(device.disables, 1);
   const int writes = device.writes;
   loop.stop();
   EXPECT_EQ(device.writes, writes);

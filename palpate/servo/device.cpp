@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/servo/device.hpp"
+
+#include <array>
+
+namespace palpate {
+namespace {
+
+struct Row {
+  std::string_view name, sentence;
+};
+// In DeviceFault's order.
+constexpr std::array rows{
+    Row{"none", ""},
+    Row{"not_calibrated", "the device is not calibrated; calibrate it as its manual says"},
+    Row{"disconnected", "the device does not answer; check its cable, power and driver"},
+    Row{"overheated", "the motors are too hot; let them cool down for some minutes"},
+    Row{"emergency_stop",
+        "the emergency stop or dead man's switch is open; close it when it is safe to do so"},
+    Row{"busy", "another program holds the device; close that program"},
+    Row{"refused_command", "the device did not accept the force; switch it off and on again"},
+    Row{"other", "the device reports a fault; see its manual, or switch it off and on again"},
+};
+
+const Row& row_of(DeviceFault fault) {
+  const auto i = static_cast<std::size_t>(fault);
+  return i < rows.size() ? rows[i] : rows.back();
+}
+
+}  // namespace
+
+std::string_view to_string(DeviceFault fault) {
+  return row_of(fault).name;
+}
+
+std::string_view describe(DeviceFault fault) {
+  return row_of(fault).sentence;
+}
+
+}  // namespace palpate

@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: Apache-2.0
+// The loop with a device that drives it, that stops answering, or that reports faults.
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/servo/servo_loop.hpp"
+
+#include "tests/servo/fake_device.hpp"
+#include "tests/support/errors.hpp"
+#include "tests/support/grids.hpp"
+
+namespace palpate {
+namespace {
+
+using test::FakeDevice;
+
+// A device whose own thread calls the cycle, as a vendor's scheduler does.
+class DrivingDevice final : public Device {
+ public:
+  ~DrivingDevice() override { stop(); }
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  HandState read(double /*t*/) noexcept override { return {.position = {0, 0, 0.02}}; }
+  void write(const Vec3& force, double /*t*/) noexcept override {
+    last_write_was_zero = force.isZero();
+    writer = std::this_thread::get_id();
+    ++writes;
+  }
+  void enable() override {
+    if (refuses) throw Error("driving:", "it refuses", "leave it");
+    enabled = true;
+  }
+  void disable() noexcept override { enabled = false; }
+  [[nodiscard]] bool drives() const override { return true; }
+  void start(CycleCallback cycle) override {
+    thread = std::thread([this, cycle = std::move(cycle)] {
+      while (!ending) {
+        if (!silent) {
+          cycle();
+          ++calls;
+        }
+        std::this_thread::yield();
+      }
+    });
+    id = thread.get_id();
+  }
+  void stop() noexcept override {
+    ending = true;
+    if (thread.joinable()) thread.join();
+  }
+
+  std::atomic<bool> silent{false}, ending{false}, enabled{false}, refuses{false};
+  std::atomic<int> calls{0}, writes{0};
+  std::atomic<bool> last_write_was_zero{false};
+  std::thread::id writer, id;
+  std::thread thread;
+
+ private:
+  DeviceInfo info_{
+      .uri = "driving:", .kind = "driving", .limits = {}, .rate = 2000.0, .watchdog = 0.01};
+};
+
+void wait_until(const std::function<bool()>& done) {
+  while (!done()) std::this_thread::yield();
+}
+
+TEST(DrivenLoop, RunsItsCyclesOnTheDevicesThreadAndKeepsTheirTiming) {
+  DrivingDevice device;
+  ServoLoop loop(rendering_by<Renderer>(), device);
+  auto reader = loop.reader();
+  loop.start();
+  EXPECT_TRUE(device.enabled);
+  EXPECT_EQ(loop.rate(), 2000.0);
+  wait_until([&] { return device.calls > 100; });
+  loop.stop();
+  EXPECT_EQ(device.writer, device.id) << "the last write too";
+  EXPECT_TRUE(device.last_write_was_zero);
+  EXPECT_FALSE(device.enabled);
+  std::uint64_t ticks = 0;
+  for (ServoTick record{}; reader.try_pop(record);) EXPECT_EQ(record.number, ticks++);
+  EXPECT_GE(ticks, 100U);
+  EXPECT_EQ(loop.timing().compute.count(), ticks);
+  EXPECT_EQ(loop.timing().wake_up.count(), ticks - 1) << "the first has none before it";
+  EXPECT_EQ(device.writes, static_cast<int>(ticks) + 1);
+}
+
+TEST(DrivenLoop, DisablesADeviceWhoseCallbacksStopAndEnablesItWhenTheyComeAgain) {
+  DrivingDevice device;
+  ServoLoop loop(rendering_by<Renderer>(), device);
+  loop.start();
+  device.silent = true;
+  wait_until([&] { return !device.enabled; });
+  EXPECT_FALSE(loop.device_status().ticking);
+  EXPECT_TRUE(loop.device_status().text.starts_with("no tick for")) << loop.device_status().text;
+  device.silent = false;
+  wait_until([&] { return device.enabled.load(); });
+  EXPECT_GE(loop.stalls(), 1U);
+  device.silent = true;
+  wait_until([&] { return !device.enabled; });
+  device.refuses = true;
+  device.silent = false;
+  wait_until([&] { return loop.device_status().text == "driving:: it refuses; leave it"; });
+  EXPECT_FALSE(device.enabled);
+}
+
+TEST(DrivenLoop, SendsZeroByItselfWhereTheCallbacksHaveEnded) {
+  DrivingDevice device;
+  ServoLoop loop(rendering_by<Renderer>(), device);
+  loop.start();
+  device.silent = true;
+  const int calls = device.calls;
+  loop.stop();
+  EXPECT_LE(device.calls, calls + 1);
+  EXPECT_TRUE(device.last_write_was_zero);
+  EXPECT_EQ(device.writer, std::this_thread::get_id());
+  EXPECT_FALSE(device.enabled);
+}
+
+TEST(DrivenLoop, RefusesADeviceThatCannotBeEnabledOrNeverCalls) {
+  DrivingDevice device;
+  device.refuses = true;
+  ServoLoop loop(rendering_by<Renderer>(), device);
+  EXPECT_TRUE(test::fails_saying([&] { return loop.start(), 0; }, "driving:", "refuses"));
+  EXPECT_EQ(device.calls, 0);
+
+  DrivingDevice mute;
+  mute.silent = true;
+  ServoLoop waiting(rendering_by<Renderer>(), mute);
+  EXPECT_TRUE(test::fails_saying([&] { return waiting.start(), 0; }, "driving:", "does not call"));
+  EXPECT_FALSE(mute.enabled);
+}
+
+// A method that takes as long as the test likes.
+class HangingMethod final : public Rendering {
+ public:
+  explicit HangingMethod(const std::atomic<bool>& hangs) : hangs_(hangs) {}
+  void seat(const Vec3& /*proxy*/) noexcept override {}
+  void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override {}
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    while (hangs_) std::this_thread::yield();
+    Tick tick{};
+    tick.hip = tick.proxy = hip;
+    tick.t = t;
+    return tick;
+  }
+  void set_parameters(const Parameters& /*parameters*/) override {}
+
+ private:
+  const std::atomic<bool>& hangs_;
+};
+
+TEST(ServoLoop, DisablesThePolledDeviceOfAMethodThatHangs) {
+  std::atomic<bool> hangs{false};
+  FakeDevice device;
+  ServoLoop loop(std::make_unique<HangingMethod>(hangs), device);
+  loop.start();
+  wait_until([&] { return loop.statistics().ticks > 3; });
+  const int before = device.disables;
+  hangs = true;
+  wait_until([&] { return device.disables > before; });
+  std::thread stopper([&] { loop.stop(); });
+  const int by_watch = device.disables;
+  wait_until([&] { return device.disables > by_watch; });  // by stop(), although it hangs
+  hangs = false;
+  stopper.join();
+  EXPECT_TRUE(device.force.isZero());
+}
+
+TEST(ServoLoop, RefusesAWatchTimeOutOfRange) {
+  FakeDevice device;
+  EXPECT_THROW(ServoLoop(rendering_by<Renderer>(), device, {}, {.watch_time = 0.0}), Error);
+}
+
+// In contact, with 2 N or so on the hand.
+struct Pressing {
+  Pressing() : cycle(rendering_by<Renderer>(), device), reader(cycle.reader()) {
+    device.hand.position = {0, 0, 0.02};
+    for (int i = 0; i < 2000; ++i) run();
+    while (device.hand.position.z() > -0.003) {
+      device.hand.position.z() -= 5e-5;
+      run();
+    }
+    for (int i = 0; i < 500; ++i) run();
+  }
+  ServoTick run() {
+    t += 1e-3;
+    if (++ticks % 30 == 1) cycle.put_frame(cloud, t, t);
+    cycle.run({.t = t});
+    ServoTick record{};
+    EXPECT_TRUE(reader.try_pop(record));
+    return record;
+  }
+  std::shared_ptr<PointCloud> cloud =
+      std::make_shared<PointCloud>(test::flat_grid(0.0, 1.5e-3, 30), Vec3(0, 0, 1));
+  FakeDevice device;
+  Cycle cycle;
+  TickRing<ServoTick>::Reader reader;
+  double t = 10.0;
+  int ticks = 0;
+};
+
+TEST(DeviceFault, TakesTheForceAwayInTwoTicksAndIsInTheRecord) {
+  Pressing session;
+  ASSERT_GT(session.run().force.norm(), 1.0);
+  session.device.hand.fault = DeviceFault::overheated;
+  session.run();
+  const ServoTick record = session.run();
+  EXPECT_TRUE(record.force.isZero()) << record.force.transpose();
+  EXPECT_TRUE(session.device.force.isZero());
+  EXPECT_NE(record.hand & hand_fault, 0U);
+  EXPECT_NE(record.hand & hand_present, 0U);
+  EXPECT_EQ(fault_of(record.hand), DeviceFault::overheated);
+  EXPECT_NE(record.safety & disengaged, 0U);
+  EXPECT_EQ(session.cycle.statistics().hand, record.hand);
+
+  session.device.hand.fault = DeviceFault::none;
+  for (int i = 0; i < 1000; ++i) {
+    ASSERT_TRUE(session.run().force.isZero()) << "still pressing: the engage gate stays closed";
+  }
+}
+
+TEST(DeviceFault, IsSaidInWordsByTheLoop) {
+  FakeDevice device;
+  ServoLoop loop(rendering_by<Renderer>(), device);
+  EXPECT_FALSE(loop.device_status().ticking) << "before it began";
+  device.hand.fault = DeviceFault::emergency_stop;
+  loop.start();
+  wait_until([&] { return loop.statistics().ticks > 0; });
+  EXPECT_EQ(loop.device_status().fault, DeviceFault::emergency_stop);
+  loop.stop();
+  EXPECT_EQ(loop.device_status().text, describe(DeviceFault::emergency_stop));
+  device.text = "motor 3 is at 80 degrees; wait";
+  EXPECT_EQ(loop.device_status().text, device.text) << "the device knows better";
+}
+
+TEST(DeviceFault, HasANameAndASentenceEach) {
+  EXPECT_EQ(to_string(DeviceFault::none), "none");
+  EXPECT_EQ(describe(DeviceFault::none), "");
+  for (int i = 1; i <= static_cast<int>(DeviceFault::other); ++i) {
+    EXPECT_FALSE(describe(static_cast<DeviceFault>(i)).empty()) << i;
+  }
+  EXPECT_EQ(to_string(static_cast<DeviceFault>(99)), "other") << "of a driver newer than this";
+}
+
+TEST(Clutch, IsWorkedByTheButtonOfThePlacement) {
+  Workspace workspace({.clutch_button = 2});
+  HandState hand{.position = {0, 0, 0.1}, .buttons = 0b011U};
+  EXPECT_FALSE(workspace.is_clutched(hand));
+  hand.buttons = 0b100U;
+  EXPECT_TRUE(workspace.is_clutched(hand));
+  EXPECT_FALSE(Workspace().is_clutched(hand));
+  EXPECT_FALSE(workspace.is_clutched({.position = {0, 0, 0.1}})) << "a device without buttons";
+  EXPECT_THROW(validate(Placement{.clutch_button = 32}), Error);
+
+  FakeDevice device;
+  device.hand.buttons = 0U;
+  ServoSettings settings;
+  settings.placement.clutch_button = 0;
+  Cycle cycle(rendering_by<Renderer>(), device, settings);
+  auto reader = cycle.reader();
+  ServoTick record{};
+  const auto run = [&](double t) {
+    cycle.run({.t = t});
+    EXPECT_TRUE(reader.try_pop(record));
+  };
+  run(1.0);
+  EXPECT_EQ(record.hand, hand_present);
+  device.hand.buttons = 1U;
+  device.hand.position = {0.05, 0, 0};
+  run(1.001);
+  EXPECT_EQ(record.hand, hand_present | hand_clutched);
+  EXPECT_TRUE(record.tick.hip.isZero()) << "the HIP stays";
+}
+
+}  // namespace
+}  // namespace palpate

@@ -79,6 +79,15 @@ class PngReader {
     return true;
   }
 
+  bool turn_colour(const Header& header) noexcept {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;
+    png_set_expand(png_);
+    png_set_scale_16(png_);
+    png_set_strip_alpha(png_);
+    if ((header.colour & PNG_COLOR_MASK_COLOR) == 0) png_set_gray_to_rgb(png_);
+    return true;
+  }
+
   bool read_rows(png_bytepp rows) noexcept {
     if (setjmp(png_jmpbuf(png_)) != 0) return false;
     if constexpr (std::endian::native == std::endian::little) png_set_swap(png_);
@@ -176,9 +185,9 @@ std::vector<std::byte> encode(int width, int height, std::span<const std::uint16
   return bytes;
 }
 
-// The pixels of an image; `set_up` judges its header and says how it is to be read, false where
-// libpng fails.
-template <class Value, class SetUp>
+// The pixels of an image, `channels` values each; `set_up` checks its header and configures the
+// reader, false where libpng fails.
+template <class Value, std::size_t channels = 1, class SetUp>
 std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& name,
                           const char* needed, int& width, int& height, const SetUp& set_up) {
   const auto* signature = reinterpret_cast<png_const_bytep>(bytes.data());
@@ -208,10 +217,10 @@ std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& n
   }
   width = static_cast<int>(header.width);
   height = static_cast<int>(header.height);
-  std::vector<Value> values(pixels);
+  std::vector<Value> values(channels * pixels);
   std::vector<png_bytep> rows(header.height);
   for (std::size_t v = 0; v < rows.size(); ++v) {
-    rows[v] = reinterpret_cast<png_bytep>(values.data() + v * header.width);
+    rows[v] = reinterpret_cast<png_bytep>(values.data() + v * channels * header.width);
   }
   if (!reader.read_rows(rows.data())) throw damaged();
   return values;
@@ -245,6 +254,14 @@ GreyPng read_grey_png(const std::filesystem::path& path) {
   image.brightness = decode<std::uint8_t>(
       read_file(path, largest_file), path.string(), "a PNG is needed", image.width, image.height,
       [](PngReader& reader, const auto& header) { return reader.turn_grey(header); });
+  return image;
+}
+
+ColourPng read_colour_png(const std::filesystem::path& path) {
+  ColourPng image;
+  image.rgb = decode<std::uint8_t, 3>(
+      read_file(path, largest_file), path.string(), "a PNG is needed", image.width, image.height,
+      [](PngReader& reader, const auto& header) { return reader.turn_colour(header); });
   return image;
 }
 

@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// A depth image as it lies in a file.
+/// A depth image as it is stored in a file.
 struct DepthPng {
   int width = 0;                     ///< [px]
   int height = 0;                    ///< [px]
@@ -33,10 +33,21 @@ struct GreyPng {
   std::vector<std::uint8_t> brightness;  ///< row by row, width*height; 255 is white
 };
 
-/// Decodes any PNG to 8-bit grey: colours are weighted as the eye does, what is transparent is as
-/// if it were not.
+/// Decodes any PNG to 8-bit grey: colours are weighted as the eye does, a transparent pixel is
+/// taken as if it were opaque.
 /// @throws Error as read_depth_png, but for its kind.
 GreyPng read_grey_png(const std::filesystem::path& path);
+
+/// An image of what a camera saw in colour.
+struct ColourPng {
+  int width = 0;                  ///< [px]
+  int height = 0;                 ///< [px]
+  std::vector<std::uint8_t> rgb;  ///< row by row, 3*width*height: red, green, blue of each pixel
+};
+
+/// Decodes any PNG to 8 bits each of red, green and blue; a transparent pixel as if it were opaque.
+/// @throws Error as read_depth_png, but for its kind.
+ColourPng read_colour_png(const std::filesystem::path& path);
 
 /// How a depth image is compressed; both are lossless.
 enum class PngPacking {

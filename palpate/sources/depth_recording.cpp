@@ -29,7 +29,8 @@ struct RecordedImage {
   fs::path file;
   double stamp = 0.0;  // [s]
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
-  fs::path brightness{};  // empty if none is wanted, or there is none
+  // Images in visible light; empty where none was asked for, or none is near in time.
+  fs::path brightness{}, colour{};
 };
 
 class DepthRecording final : public Source {
@@ -40,7 +41,7 @@ class DepthRecording final : public Source {
         images_(std::move(images)),
         info_(std::move(info)) {}
 
-  std::optional<Frame> next() override {
+  std::optional<Frame> next(double /*timeout*/) override {
     if (next_ == images_.size()) return std::nullopt;
     const RecordedImage& image = images_[next_++];  // before anything can throw
     DepthPng png = read_depth_png(image.file);
@@ -55,9 +56,22 @@ class DepthRecording final : public Source {
         std::replace(png.depth.begin(), png.depth.end(), no_value, std::uint16_t{0});
       }
     }
-    return Frame{image.stamp,
-                 std::make_shared<DepthImage>(rays_, std::move(png.depth), camera_.units_per_metre,
-                                              image.world_from_camera, std::move(grey.brightness))};
+    Frame frame{image.stamp,
+                std::make_shared<DepthImage>(rays_, std::move(png.depth), camera_.units_per_metre,
+                                             image.world_from_camera, std::move(grey.brightness))};
+    if (!image.colour.empty()) {
+      ColourPng colour = read_colour_png(image.colour);
+      check_size(image.colour, colour.width, colour.height);
+      frame.colour = std::make_shared<const ColourImage>(
+          ColourImage{colour.width, colour.height, std::move(colour.rgb)});
+    }
+    return frame;
+  }
+
+  std::size_t skip(std::size_t count) override {
+    const std::size_t skipped = std::min(count, images_.size() - next_);
+    next_ += skipped;
+    return skipped;
   }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
@@ -113,7 +127,7 @@ std::size_t count_option(const Uri& uri, std::string_view key, double fallback, 
   return static_cast<std::size_t>(count);
 }
 
-// Leaves out what `start` and `frames` say.
+// Keeps the frames that the options `start` and `frames` select.
 void select(const Uri& uri, std::vector<RecordedImage>& images) {
   const std::size_t start = count_option(uri, "start", 0.0, 0.0);
   const std::size_t frames = count_option(uri, "frames", 1e9, 1.0);
@@ -149,8 +163,9 @@ void place(const Uri& uri, const Trajectory& trajectory, const std::string& traj
 }
 
 // Gives each depth image the visible one that was taken nearest to it in time; a note says how many
-// have none.
-void brighten(const fs::path& list, std::vector<RecordedImage>& images, SourceInfo& info) {
+// have none. @param what  "brightness" or "colour", the same as the member
+void associate(const fs::path& list, const std::string& what, fs::path RecordedImage::*member,
+               std::vector<RecordedImage>& images, SourceInfo& info) {
   constexpr double apart = 0.02;  // [s] at most, as the benchmark's own scripts have it
   const std::vector<StampedFile> listed = parse_image_list(read_text(list), list.string());
   std::size_t without = 0;
@@ -160,13 +175,13 @@ void brighten(const fs::path& list, std::vector<RecordedImage>& images, SourceIn
         std::min_element(listed.begin(), listed.end(),
                          [&](const auto& a, const auto& b) { return off(a) < off(b); });
     if (nearest != listed.end() && off(*nearest) <= apart)
-      image.brightness = list.parent_path() / nearest->file;
+      image.*member = list.parent_path() / nearest->file;
     else
       ++without;
   }
   if (without > 0) {
     info.notes.push_back(std::to_string(without) + " of " + std::to_string(images.size()) +
-                         " frames have no brightness: " + list.filename().string() +
+                         " frames have no " + what + ": " + list.filename().string() +
                          " has no image within 20 ms");
   }
 }
@@ -194,7 +209,7 @@ bool is_json(const fs::path& path) {
 }  // namespace
 
 std::unique_ptr<Source> open_tum(const Uri& uri) {
-  allow_only(uri, {"poses", "stamps", "brightness"});
+  allow_only(uri, {"poses", "stamps", "brightness", "colour"});
   const fs::path folder = uri.path();
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
@@ -232,13 +247,15 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
     }
     place(uri, parse_trajectory(read_text(file), file.string()), poses, images, info);
   }
-  if (uri.has("brightness")) {
-    const fs::path file = folder / uri.text_option("brightness", "");
+  for (const auto& [what, member] : {std::pair("brightness", &RecordedImage::brightness),
+                                     std::pair("colour", &RecordedImage::colour)}) {
+    if (!uri.has(what)) continue;
+    const fs::path file = folder / uri.text_option(what, "");
     if (!fs::is_regular_file(file, error)) {
       throw Error(uri.text(), "has no list of images " + file.filename().string(),
-                  "name one as depth.txt is, such as brightness=rgb.txt");
+                  "name one as depth.txt is, such as " + std::string(what) + "=rgb.txt");
     }
-    brighten(file, images, info);
+    associate(file, what, member, images, info);
   }
   if (images.size() > 1) info.frame_rate = median_rate(images);
   if (stamps == "relative") start_clock(images, info);

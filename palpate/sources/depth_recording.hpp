@@ -8,25 +8,27 @@
 
 namespace palpate {
 
-// Both kinds of recording take these options. The camera is described by `intrinsics.json`
-// (intrinsics_file.hpp), which options override:
+// Options of both kinds of recording. The camera is described by `intrinsics.json`
+// (intrinsics_file.hpp), which these override:
 //   fx, fy, cx, cy                  [px] focal lengths and principal point
-//   k1, k2, p1, p2, k3, k4, k5, k6  Brown-Conrady distortion; what is not given stays
+//   k1, k2, p1, p2, k3, k4, k5, k6  Brown-Conrady distortion; those not given keep their value
 //   units                           raw depth units per metre
-//   start, frames                   leave out that many frames; give at most that many
-// Raw values that mean "invalid" or "saturated" there become 0, a hole. An image that is missing,
-// damaged or not of the camera's size is an Error from next(), which goes on with the one after it.
+//   start, frames                   number of the first frame, from 0; most frames to give
+// The raw values that intrinsics.json calls invalid or saturated become 0, a hole. For an image
+// that is missing, damaged or not of the camera's size, next() throws an Error; the call after it
+// goes on with the next image.
 
 /// Opens `tum:DIR`, the layout of the TUM RGB-D benchmark: depth.txt lists the images,
 /// groundtruth.txt the poses of the optical frame in the world (trajectory.hpp).
 ///
 /// Without intrinsics.json: 640x480, f = 525 px, centre (319.5, 239.5), 5000 units per metre.
-/// Stamps count from the first frame given; SourceInfo::start_time is when that was by the
+/// Stamps count from the first frame given; SourceInfo::start_time is the time of that frame on the
 /// recording's clock. `stamps=absolute` gives the recording's own stamps.
 /// `poses=FILE` reads another trajectory, named relative to DIR; `poses=none` gives points in the
-/// camera's own frame. Frames of which the trajectory does not know the pose are left out, which
-/// SourceInfo::notes says. `brightness=rgb.txt` reads that list of images in visible light, of the
-/// same camera and size, and gives each frame the one within 20 ms of it, if any.
+/// camera's own frame. Frames at whose stamp the trajectory has no pose are left out, and
+/// SourceInfo::notes says how many. `colour=rgb.txt` reads that list of images in visible light,
+/// registered to the depth and of its size, and gives each frame the one nearest to it within 20
+/// ms, if any, as Frame::colour; `brightness=rgb.txt` the same in grey, as DepthImage::brightness.
 /// @throws Error if the lists, poses or intrinsics cannot be used, or no frame is left.
 std::unique_ptr<Source> open_tum(const Uri& uri);
 

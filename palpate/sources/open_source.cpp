@@ -1,9 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <vector>
-
-#include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
-#include "palpate/core/parameters.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/sources/depth_recording.hpp"
 #include "palpate/sources/point_file_source.hpp"
@@ -12,41 +7,57 @@
 #include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate {
-namespace {
 
-struct Scheme {
-  std::string_view name;
-  std::unique_ptr<Source> (*open)(const Uri&);
-};
-
-// One line for each kind of source.
-const std::vector<Scheme>& schemes() {
-  static const std::vector<Scheme> table{
-      {"synthetic", open_synthetic}, {"pcd", open_point_files},
-      {"ply", open_point_files},     {"tum", open_tum},
-      {"depth", open_depth},         {"recording", open_recording},
-  };
-  return table;
+std::string_view name_of(StampClock clock) noexcept {
+  switch (clock) {
+    case StampClock::recording:
+      return "recording";
+    case StampClock::monotonic:
+      return "monotonic";
+    case StampClock::system:
+      return "system";
+    case StampClock::sensor:
+      break;
+  }
+  return "sensor";
 }
 
-}  // namespace
+std::string_view name_of(SensorKind sensor) noexcept {
+  switch (sensor) {
+    case SensorKind::stereo:
+      return "stereo";
+    case SensorKind::structured_light:
+      return "structured light";
+    case SensorKind::time_of_flight:
+      return "time of flight";
+    case SensorKind::unknown:
+      break;
+  }
+  return "unknown";
+}
 
-std::unique_ptr<Source> open_source(std::string_view text) {
+std::size_t Source::skip(std::size_t /*count*/) {
+  return 0;
+}
+
+void Source::cancel() noexcept {}
+
+const Registry<SourceScheme>& standard_sources() {
+  static const Registry<SourceScheme> schemes(
+      "kind of source", ":",
+      {{"synthetic", "synthetic:SCENE, a simulated depth camera", open_synthetic},
+       {"pcd", "pcd:FILE|DIR, point clouds of the Point Cloud Library", open_point_files},
+       {"ply", "ply:FILE|DIR, point clouds and meshes", open_point_files},
+       {"tum", "tum:DIR, a recording of the TUM RGB-D layout", open_tum},
+       {"depth", "depth:DIR|FILE.png, depth images as 16-bit PNG", open_depth},
+       {"recording", "recording:BAG, a session of palpate's or another ROS 2 bag",
+        open_recording}});
+  return schemes;
+}
+
+std::unique_ptr<Source> open_source(std::string_view text, const Registry<SourceScheme>& schemes) {
   const Uri uri(text);
-  std::vector<std::string_view> names;
-  for (const Scheme& scheme : schemes()) {
-    if (scheme.name == uri.scheme()) {
-      return scheme.open(uri);
-    }
-    names.push_back(scheme.name);
-  }
-  const std::string_view nearest = nearest_name(uri.scheme(), names);
-  std::string remedy =
-      nearest.empty() ? "known here:" : "did you mean '" + std::string(nearest) + ":'? known here:";
-  for (const std::string_view name : names) {
-    remedy += " " + std::string(name) + ":";
-  }
-  throw Error(uri.text(), "unknown kind of source '" + uri.scheme() + ":'", remedy);
+  return schemes.find(uri.scheme(), uri.text()).open(uri);
 }
 
 }  // namespace palpate

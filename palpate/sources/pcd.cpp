@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -33,7 +34,14 @@ struct Column {
 
 struct Layout {
   std::vector<Column> columns;
-  std::array<std::size_t, 3> xyz{};  // which columns those are
+  std::array<std::size_t, 3> xyz{};     // which columns those are
+  std::optional<std::size_t> colour{};  // that of rgb or rgba
+};
+
+// What is read of each point.
+struct Values {
+  std::vector<Vec3> points;
+  std::vector<std::uint8_t> rgb;  // 3 of each point; empty without a colour
 };
 
 std::string counted(std::uint64_t number, const std::string& noun) {
@@ -175,7 +183,35 @@ Layout layout_of(const Cursor& file, const Header& header) {
                 "give a file whose points have the fields x, y and z");
     }
   }
+  // PCL packs a colour into 4 bytes, 0xAARRGGBB, and declares them as a float or a whole number.
+  for (std::size_t i = 0; i < size; ++i) {
+    const Column& column = layout.columns[i];
+    const bool is_packed = column.field.count == 1 && detail::size_of(column.type) == 4;
+    if (is_packed && (column.field.name == "rgb" || column.field.name == "rgba") && !layout.colour)
+      layout.colour = i;
+  }
   return layout;
+}
+
+void set_colour(std::vector<std::uint8_t>& rgb, std::size_t point, std::uint32_t packed) {
+  for (std::size_t channel = 0; channel < 3; ++channel)
+    rgb[3 * point + channel] = static_cast<std::uint8_t>(packed >> (16 - 8 * channel));
+}
+
+// Packed colours, the first at `first` and each `stride` bytes behind the one before.
+void load_colours(const std::byte* first, std::size_t stride, std::vector<std::uint8_t>& rgb) {
+  for (std::size_t k = 0; 3 * k < rgb.size(); ++k)
+    set_colour(rgb, k, detail::load<std::uint32_t>(first + k * stride, std::endian::little));
+}
+
+// A packed colour written as text. Nothing depends on a colour: one that is no number is black.
+std::uint32_t packed_colour(std::string_view token, Scalar type) {
+  if (type == Scalar::float32) {
+    const double number = detail::to_number(token).value_or(0.0);
+    const bool fits = std::abs(number) <= double{std::numeric_limits<float>::max()};
+    return std::bit_cast<std::uint32_t>(fits ? static_cast<float>(number) : 0.0F);
+  }
+  return static_cast<std::uint32_t>(detail::to_index(token).value_or(0));
 }
 
 // Sets the cloud's width and height. Old files have no WIDTH, some no POINTS.
@@ -215,9 +251,10 @@ std::optional<Vec3> viewpoint_of(const Cursor& file, const Header& header) {
   return Vec3(numbers[0], numbers[1], numbers[2]);
 }
 
-// Where x, y and z lie if each column takes up `size(column)`, and what all take together.
+// Where x, y, z and the colour lie if each column takes up `size(column)`, and the size of all.
 struct Places {
   std::array<std::size_t, 3> xyz{};
+  std::size_t colour = 0;
   std::size_t all = 0;
 };
 
@@ -230,6 +267,7 @@ Places places(const Layout& layout, const Size& size) {
         result.xyz[axis] = result.all;
       }
     }
+    if (layout.colour == i) result.colour = result.all;
     result.all += size(layout.columns[i]);
   }
   return result;
@@ -241,13 +279,14 @@ Places places(const Layout& layout, const Size& size) {
             cut_short);
 }
 
-std::vector<Vec3> read_ascii(Cursor& file, const Layout& layout, std::size_t size) {
+Values read_ascii(Cursor& file, const Layout& layout, std::size_t size) {
   const Places values = places(layout, [](const Column& column) { return column.field.count; });
   // A value and what separates it take two bytes at least; the last line may lack its end.
   if (size > (file.left() + 1) / (2 * values.all)) {
     fail_promise(file, size);
   }
-  std::vector<Vec3> points(size);
+  Values read{std::vector<Vec3>(size), {}};
+  if (layout.colour) read.rgb.resize(3 * size);
   for (std::size_t k = 0; k < size; ++k) {
     auto line = file.next_full_line();
     if (!line) {
@@ -268,31 +307,37 @@ std::vector<Vec3> read_ascii(Cursor& file, const Layout& layout, std::size_t siz
                 std::string(1, "xyz"[axis]) + " is " + detail::quoted(token) + ", not a number",
                 "correct the line; nan marks a hole");
           }
-          points[k][axis] = *number;
+          read.points[k][axis] = *number;
         }
       }
+      if (layout.colour && values.colour == i)
+        set_colour(read.rgb, k, packed_colour(token, layout.columns[*layout.colour].type));
     }
     if (!detail::next_token(*line).empty()) {
       file.fail_in_line("has more than the " + counted(values.all, "value") + " of the FIELDS",
                         "shorten the line, or correct the header");
     }
   }
-  return points;
+  return read;
 }
 
 // Point after point, little endian: PCL writes what is in memory.
-std::vector<Vec3> read_binary(Cursor& file, const Layout& layout, std::size_t size) {
+Values read_binary(Cursor& file, const Layout& layout, std::size_t size) {
   const Places bytes = places(layout, [](const Column& column) { return column.bytes(); });
   if (size > file.left() / bytes.all) {
     fail_promise(file, size);
   }
-  std::vector<Vec3> points(size);
+  Values read{std::vector<Vec3>(size), {}};
   const std::byte* const first = file.take(size * bytes.all);
   for (int axis = 0; axis < 3; ++axis) {
     detail::load_column(first + bytes.xyz[axis], bytes.all, layout.columns[layout.xyz[axis]].type,
-                        std::endian::little, points, axis);
+                        std::endian::little, read.points, axis);
   }
-  return points;
+  if (layout.colour) {
+    read.rgb.resize(3 * size);
+    load_colours(first + bytes.colour, bytes.all, read.rgb);
+  }
+  return read;
 }
 
 // Two 32-bit sizes, then LZF.
@@ -323,7 +368,7 @@ std::vector<std::byte> decompress(Cursor& file) {
 }
 
 // All of the first field, then all of the second, and so on. PCL leaves padding out, others don't.
-std::vector<Vec3> read_compressed(Cursor& file, const Layout& layout, std::size_t size) {
+Values read_compressed(Cursor& file, const Layout& layout, std::size_t size) {
   const std::vector<std::byte> data = decompress(file);
   for (const bool has_padding : {true, false}) {
     const auto bytes_in_point = [&](const Column& column) {
@@ -335,13 +380,17 @@ std::vector<Vec3> read_compressed(Cursor& file, const Layout& layout, std::size_
     }
     const Places bytes =
         places(layout, [&](const Column& column) { return bytes_in_point(column) * size; });
-    std::vector<Vec3> points(size);
+    Values read{std::vector<Vec3>(size), {}};
     for (int axis = 0; axis < 3; ++axis) {
       const Column& column = layout.columns[layout.xyz[axis]];
       detail::load_column(data.data() + bytes.xyz[axis], column.bytes(), column.type,
-                          std::endian::little, points, axis);
+                          std::endian::little, read.points, axis);
     }
-    return points;
+    if (layout.colour) {
+      read.rgb.resize(3 * size);
+      load_colours(data.data() + bytes.colour, 4, read.rgb);
+    }
+    return read;
   }
   file.fail("the header declares " + counted(size, "point") + ", which is not what the " +
                 counted(data.size(), "byte") + " of compressed data hold",
@@ -369,16 +418,19 @@ PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name) {
   cloud.viewpoint = viewpoint_of(file, header);
   cloud.encoding = value_of(file, header, "DATA").value();
   const std::size_t size = cloud.width * cloud.height;
+  Values read;
   if (cloud.encoding == "ascii") {
-    cloud.points = read_ascii(file, layout, size);
+    read = read_ascii(file, layout, size);
   } else if (cloud.encoding == "binary") {
-    cloud.points = read_binary(file, layout, size);
+    read = read_binary(file, layout, size);
   } else if (cloud.encoding == "binary_compressed") {
-    cloud.points = read_compressed(file, layout, size);
+    read = read_compressed(file, layout, size);
   } else {
     file.fail("DATA " + detail::quoted(cloud.encoding) + " is not known",
               "it can be ascii, binary or binary_compressed");
   }
+  cloud.points = std::move(read.points);
+  cloud.colours = std::move(read.rgb);
   cloud.non_finite = detail::count_non_finite(cloud.points);
   cloud.bytes_unread = file.left_after_blanks();
   return cloud;

@@ -18,10 +18,11 @@ struct Property {
   std::string_view name;
   Scalar type;
   std::optional<Scalar> length;  // the type of a list's length; none if this is no list
-  // Where its values go; what is asked for by nobody is checked and passed over.
+  // Where its values go; a property that is not wanted is checked and passed over.
   std::vector<Vec3>* into = nullptr;
   int axis = 0;
-  bool corners = false;  // a list of vertices
+  std::vector<std::uint8_t>* colours = nullptr;  // with `axis` as the channel
+  bool corners = false;                          // a list of vertices
 
   [[nodiscard]] std::size_t least_bytes() const { return detail::size_of(length.value_or(type)); }
 };
@@ -161,6 +162,24 @@ bool ask_for(const std::array<std::string_view, 3>& names, Element& element,
   return true;
 }
 
+// Asks for the points' colours, if there is one red, one green and one blue of type uchar.
+void ask_for_colours(Element& element, std::vector<std::uint8_t>& into) {
+  constexpr std::array<std::string_view, 3> names{"red", "green", "blue"};
+  std::array<Property*, 3> found{};
+  for (Property& property : element.properties) {
+    const auto* const name = std::find(names.begin(), names.end(), property.name);
+    if (name == names.end()) continue;
+    Property*& place = found[static_cast<std::size_t>(name - names.begin())];
+    if (place != nullptr || property.length || property.type != Scalar::uint8) return;
+    place = &property;
+  }
+  if (std::find(found.begin(), found.end(), nullptr) != found.end()) return;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    found[channel]->colours = &into;
+    found[channel]->axis = static_cast<int>(channel);
+  }
+}
+
 // Asks for the lists of corners, if the element has them.
 void ask_for_corners(const Cursor& file, Element& element) {
   for (Property& property : element.properties) {
@@ -256,6 +275,11 @@ void read_ascii_row(Cursor& file, const Element& element, std::size_t row, Faces
             correct_line);
       }
       (*property.into)[row][property.axis] = *number;
+    } else if (property.colours != nullptr) {
+      // Nothing depends on a colour: one that is no number is black.
+      const auto value = std::min<std::uint64_t>(detail::to_count(token).value_or(0), 255);
+      (*property.colours)[3 * row + static_cast<std::size_t>(property.axis)] =
+          static_cast<std::uint8_t>(value);
     }
   }
   if (!detail::next_token(*line).empty()) {
@@ -297,6 +321,9 @@ void read_binary_row(Cursor& file, const Element& element, std::endian order, st
     } else if (property.into != nullptr) {
       detail::load_column(value, 0, property.type, order, {&(*property.into)[row], 1},
                           property.axis);
+    } else if (property.colours != nullptr) {
+      (*property.colours)[3 * row + static_cast<std::size_t>(property.axis)] =
+          static_cast<std::uint8_t>(*value);
     }
   }
 }
@@ -322,6 +349,7 @@ void read_element(Cursor& file, const Element& element, std::string_view encodin
   }
   for (const Property& property : properties) {
     if (property.into != nullptr) property.into->resize(element.rows);
+    if (property.colours != nullptr) property.colours->resize(3 * element.rows);
   }
   if (!ascii && !has_lists) {
     const std::byte* column = file.take(element.rows * least_bytes);
@@ -329,6 +357,11 @@ void read_element(Cursor& file, const Element& element, std::string_view encodin
       if (property.into != nullptr) {
         detail::load_column(column, least_bytes, property.type, order, *property.into,
                             property.axis);
+      }
+      if (property.colours != nullptr) {
+        for (std::size_t row = 0; row < element.rows; ++row)
+          (*property.colours)[3 * row + static_cast<std::size_t>(property.axis)] =
+              static_cast<std::uint8_t>(column[row * least_bytes]);
       }
       column += property.least_bytes();
     }
@@ -365,6 +398,7 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
                   "give a file that holds points");
       }
       ask_for({"nx", "ny", "nz"}, element, cloud.normals);
+      ask_for_colours(element, cloud.colours);
       for (const Property& property : element.properties) {
         cloud.fields.push_back(
             {std::string(property.name),

@@ -22,17 +22,20 @@ struct PointField {
   std::size_t count = 1;  ///< how many values of that type a point has; 1 for a list
 };
 
-/// What a PCD or PLY file says, in its own frame and unit (metres, unless its writer chose else).
+/// The content of a PCD or PLY file, in its own coordinates and unit (usually metres).
 struct PointFile {
   /// Every point in the order of the file; holes of an organised cloud stay, as NaN, so that the
   /// point of pixel (u, v) is points[v * width + u].
   std::vector<Vec3> points;
-  std::size_t width = 0;   ///< [points] in a row of an organised cloud; else all of them
+  std::size_t width = 0;   ///< [points] in a row of an organised cloud; else their number
   std::size_t height = 1;  ///< [points] rows of an organised cloud; else 1
   /// A PLY's nx, ny, nz of each point, as they are: of any length, or not finite. Empty without.
   std::vector<Vec3> normals;
   /// A PLY's faces: indices of points, in the order of the file. Polygons are fanned, strips cut.
   std::vector<std::array<std::uint32_t, 3>> triangles;
+  /// Red, green and blue of each point in its order, 3 values each: a PCD's rgb or rgba, a PLY's
+  /// red, green and blue of type uchar. Empty without.
+  std::vector<std::uint8_t> colours;
   /// From where the points were seen, in the frame of the points: the translation of PCD's
   /// VIEWPOINT, or view_px view_py view_pz of the `camera` element that PCL writes into a PLY.
   ///
@@ -43,8 +46,8 @@ struct PointFile {
   std::string encoding;            ///< as in the header, e.g. "binary_compressed"
   std::vector<PointField> fields;  ///< of a point, in the order of the file
   std::size_t non_finite = 0;      ///< how many points have a coordinate that is NaN or infinite
-  /// Bytes after all that the header declares, not counting white space. They are not read: PCL
-  /// fills binary files up to a whole page.
+  /// Bytes after the data that the header declares, not counting white space. They are not read:
+  /// PCL pads binary files to a whole page.
   std::size_t bytes_unread = 0;
 };
 
@@ -58,8 +61,8 @@ PointFile read_pcd(const std::filesystem::path& path);
 PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name);
 
 /// Reads a PLY file, version 1.0: ascii, little or big endian. Of element `vertex` x, y, z and
-/// nx, ny, nz; of `face` and `tristrips` vertex_indices or vertex_index; of `camera` its place.
-/// Other elements, lists and properties are checked and passed over.
+/// nx, ny, nz and red, green, blue; of `face` and `tristrips` vertex_indices or vertex_index; of
+/// `camera` its position. Other elements, lists and properties are checked and passed over.
 ///
 /// Allocates in proportion to what the file holds, never to what its header promises.
 /// @throws Error naming the file, the line or offset, and what was wrong.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/sources/point_file_source.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <system_error>
@@ -40,11 +41,11 @@ PointFileSource::PointFileSource(std::vector<fs::path> files, Reader reader, con
                                  SourceInfo info)
     : files_(std::move(files)), reader_(reader), options_(options), info_(std::move(info)) {}
 
-std::optional<Frame> PointFileSource::next() {
+std::optional<Frame> PointFileSource::next(double /*timeout*/) {
   if (next_ == files_.size()) {
     return std::nullopt;
   }
-  const std::size_t k = next_++;  // before anything can throw: the next call goes on
+  const std::size_t k = next_++;  // before anything can throw: the next call takes the file after
   info_.details.clear();
   PointFile file = reader_(files_[k]);
   info_.details = details_of(file);
@@ -62,6 +63,13 @@ std::optional<Frame> PointFileSource::next() {
     const double length = normal.norm();
     normal = length > 0.0 && std::isfinite(length) ? Vec3(normal / length) : Vec3::Zero();
   }
+  std::shared_ptr<ColourImage> colour;
+  if (!file.colours.empty()) {
+    colour = std::make_shared<ColourImage>();
+    colour->width = static_cast<int>(file.width);
+    colour->height = static_cast<int>(file.height);
+    colour->rgb = std::move(file.colours);
+  }
   Surface surface{.points = std::move(file.points),
                   .normals = std::move(file.normals),
                   .triangles = std::move(file.triangles)};
@@ -70,7 +78,14 @@ std::optional<Frame> PointFileSource::next() {
     surface.rows = static_cast<int>(file.height);
   }
   return Frame{stamp,
-               std::make_shared<PointCloud>(std::move(surface), file.viewpoint, options_.voxel)};
+               std::make_shared<PointCloud>(std::move(surface), file.viewpoint, options_.voxel),
+               std::move(colour)};
+}
+
+std::size_t PointFileSource::skip(std::size_t count) {
+  const std::size_t skipped = std::min(count, files_.size() - next_);
+  next_ += skipped;
+  return skipped;
 }
 
 std::unique_ptr<Source> open_point_files(const Uri& uri) {

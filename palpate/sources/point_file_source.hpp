@@ -11,16 +11,17 @@
 namespace palpate {
 
 /// PCD or PLY files as frames, each a PointCloud, with the faces and normals of a PLY and the image
-/// of an organised PCD beside its points.
+/// layout of an organised PCD beside its points; where one of these is there, so are the points'
+/// colours, as Frame::colour.
 ///
-/// A folder's files (.pcd or .ply, in any case of letters) come in natural order of their names;
-/// frame k is stamped k / fps, also if a file before it could not be used.
+/// The files of a folder (.pcd or .ply, upper or lower case) come in natural order of their names;
+/// frame k is stamped k / fps, even if a file before it could not be read.
 class PointFileSource final : public Source {
  public:
   struct Options {
     double fps = 30.0;     ///< [Hz] > 0
     double voxel = 0.010;  ///< [m] of the PointCloud, > 0
-    double scale = 1.0;    ///< [m] what 1 in the files is: 0.001 for files in millimetres; > 0
+    double scale = 1.0;    ///< [m] length of one unit of the files: 0.001 for millimetres; > 0
   };
   using Reader = PointFile (*)(const std::filesystem::path&);
 
@@ -28,7 +29,8 @@ class PointFileSource final : public Source {
   PointFileSource(std::vector<std::filesystem::path> files, Reader reader, const Options& options,
                   SourceInfo info);
 
-  std::optional<Frame> next() override;
+  std::optional<Frame> next(double timeout = no_timeout) override;
+  std::size_t skip(std::size_t count) override;
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
  private:
@@ -39,8 +41,8 @@ class PointFileSource final : public Source {
   std::size_t next_ = 0;
 };
 
-/// Opens `pcd:FILE|DIR` or `ply:FILE|DIR`, with `?fps=30`, `voxel=10mm` and `scale=1mm` (what 1 in
-/// the files is).
+/// Opens `pcd:FILE|DIR` or `ply:FILE|DIR`, with `?fps=30`, `voxel=10mm` and `scale=1mm` (the
+/// length of one unit of the files).
 /// @throws Error if there is no such file or folder, the folder holds no such file, or an option
 ///         is not known or out of range. The files themselves are read by `next`.
 std::unique_ptr<Source> open_point_files(const Uri& uri);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/sources/recording.hpp"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -25,12 +26,18 @@ class Recording final : public Source {
     info_.start_time = first_;
   }
 
-  std::optional<Frame> next() override {
+  std::optional<Frame> next(double /*timeout*/) override {
     if (next_ == camera_.frames()) return std::nullopt;
     Frame frame = camera_.frame(next_++);
     frame.stamp -= first_;
     info_.details = camera_.details();
     return frame;
+  }
+
+  std::size_t skip(std::size_t count) override {
+    const std::size_t skipped = std::min(count, camera_.frames() - next_);
+    next_ += skipped;
+    return skipped;
   }
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }

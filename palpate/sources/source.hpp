@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -8,38 +11,96 @@
 #include <vector>
 
 #include "palpate/cloud/frame.hpp"
+#include "palpate/core/registry.hpp"
+#include "palpate/core/uri.hpp"
 
 namespace palpate {
 
-/// What can be said of a source before, or without, reading all of it.
+/// Whose clock the stamps of a source are on.
+enum class StampClock : std::uint8_t {
+  recording,  ///< seconds since the beginning of a recording or simulation
+  monotonic,  ///< this machine's CLOCK_MONOTONIC, which the servo loop uses too
+  system,     ///< this machine's wall clock, CLOCK_REALTIME: seconds since 1970
+  sensor,     ///< the camera's own: any origin, drifts against this machine's clocks, may jump
+};
+
+/// How a depth camera measures, which decides how its noise grows with distance.
+enum class SensorKind : std::uint8_t {
+  unknown,
+  stereo,            ///< matches two images, such as a RealSense D4xx: noise grows with depth^2
+  structured_light,  ///< matches a projected pattern, such as a Kinect v1: noise grows with depth^2
+  time_of_flight,    ///< times light, such as an Azure Kinect: noise grows as the signal fades
+};
+
+/// "recording", "monotonic", "system", "sensor".
+[[nodiscard]] std::string_view name_of(StampClock clock) noexcept;
+/// "unknown", "stereo", "structured light", "time of flight".
+[[nodiscard]] std::string_view name_of(SensorKind sensor) noexcept;
+
+/// What is known of a source before, or without, reading all of it.
 struct SourceInfo {
   std::string uri;                      ///< as it was opened
   std::string kind;                     ///< e.g. "TUM RGB-D recording"
   std::optional<std::size_t> frames{};  ///< how many there are; none if endless
   std::optional<double> frame_rate{};   ///< [Hz] nominal, or the median of the stamps
   double start_time = 0.0;              ///< [s] stamp 0 by the recording's own clock
-  std::vector<std::string> notes{};     ///< what a person should know, such as frames left out
+  std::vector<std::string> notes{};     ///< remarks for the user, such as frames left out
   std::string details{};                ///< of the frame read last: its file's encoding, fields
+  /// True for a camera that captures now: frames come when the camera has them, and one that is not
+  /// taken in time is lost. False for a recording or simulation, which waits for its reader.
+  bool live = false;
+  StampClock clock = StampClock::recording;
+  SensorKind sensor = SensorKind::unknown;
 };
 
-/// Where frames come from: a camera, a simulation, a recording. Used on one thread, the camera's.
+/// Where frames come from: a camera, a simulation, a recording. Used on one thread, except for
+/// `cancel`.
+///
+/// A camera of your own is a class derived from this. To open it by a URI, add a SourceScheme to a
+/// copy of standard_sources().
 class Source {
  public:
+  static constexpr double no_timeout = std::numeric_limits<double>::infinity();
+
   virtual ~Source() = default;
 
-  /// The next frame in the order of capture, or none after the last. Reads and decodes; may wait
-  /// for files but never for the clock: pacing is the caller's.
-  /// @throws Error naming the file that cannot be used. The source can be asked again: it goes on
-  ///         with the frame after that.
-  virtual std::optional<Frame> next() = 0;
+  /// The next frame in the order of capture.
+  ///
+  /// A recording or simulation reads and decodes it at once and ignores `timeout`; it never waits
+  /// for the time of its stamp, which is the caller's task. A live camera waits up to `timeout` [s]
+  /// for a frame that has not been given yet; 0 looks without waiting.
+  /// @return none: the end (recording), or no frame yet (live camera: time-out or `cancel`)
+  /// @throws Error naming the file or camera that cannot be used. The source can be asked again: a
+  ///         recording goes on with the frame after it.
+  virtual std::optional<Frame> next(double timeout = no_timeout) = 0;
+
+  /// Leaves out up to `count` frames without decoding them, for a reader that is too slow.
+  /// @return how many were left out; 0 where the source cannot, or at the end
+  virtual std::size_t skip(std::size_t count);
+
+  /// Makes a `next` that waits return soon, and all later ones at once, without a frame. Any
+  /// thread; returns at once. A source that never waits need not override it.
+  virtual void cancel() noexcept;
 
   [[nodiscard]] virtual const SourceInfo& info() const = 0;
 };
 
-/// Opens `synthetic:SCENE?...`, `tum:DIR`, `depth:DIR`, `pcd:FILE|DIR`, `ply:FILE|DIR`,
-/// `recording:BAG`.
+/// One kind of source that a URI can name.
+struct SourceScheme {
+  std::string name;     ///< the URI's scheme, without ':'
+  std::string summary;  ///< one line, with the form of its URI
+  /// @throws Error for an unknown option, or input that cannot be used
+  std::function<std::unique_ptr<Source>(const Uri&)> open;
+};
+
+/// The library's own: `synthetic:SCENE?...`, `tum:DIR`, `depth:DIR`, `pcd:FILE|DIR`,
+/// `ply:FILE|DIR`, `recording:BAG`. To add to them, copy the registry.
+const Registry<SourceScheme>& standard_sources();
+
+/// Opens a source by its URI.
 /// @throws Error for an unknown scheme or option (naming the nearest known one), or input that
 ///         cannot be used.
-std::unique_ptr<Source> open_source(std::string_view uri);
+std::unique_ptr<Source> open_source(std::string_view uri,
+                                    const Registry<SourceScheme>& schemes = standard_sources());
 
 }  // namespace palpate

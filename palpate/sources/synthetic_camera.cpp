@@ -77,6 +77,7 @@ CameraSetup setup_of(const Uri& uri) {
                         uri.number_option("azimuth", 0.0, -2.0 * pi, 2.0 * pi, "rad"));
   setup.frame_rate = uri.number_option("fps", 30.0, 1e-3, 10000.0, "Hz");
   setup.brightness = uri.number_option("brightness", 0.0, 1e-4, 100.0, "m");
+  setup.colour = uri.number_option("colour", 0.0, 1e-4, 100.0, "m");
   if (uri.has("frames")) setup.frames = count_option(uri, "frames", 0, 1.0);
   return setup;
 }
@@ -135,32 +136,61 @@ SyntheticCamera::SyntheticCamera(Scene scene, const CameraSetup& setup, const Se
   if (info_.kind.empty()) info_.kind = "synthetic depth camera";
 }
 
-std::optional<Frame> SyntheticCamera::next() {
+std::optional<Frame> SyntheticCamera::next(double /*timeout*/) {
   if (setup_.frames && next_frame_ >= *setup_.frames) return std::nullopt;
   const std::uint64_t frame = next_frame_++;
   return capture(static_cast<double>(frame) / setup_.frame_rate, frame);
 }
 
+std::size_t SyntheticCamera::skip(std::size_t count) {
+  const std::uint64_t left = setup_.frames ? *setup_.frames - next_frame_ : count;
+  const std::uint64_t skipped = std::min<std::uint64_t>(count, left);
+  next_frame_ += skipped;
+  return skipped;
+}
+
 Frame SyntheticCamera::capture(double t, std::uint64_t frame) {
   const std::span<const float> depth = true_depth(t);
-  return {t, std::make_shared<const DepthImage>(rays_, sensor_.measure(depth, frame),
-                                                1.0 / sensor_.model().quantisation,
-                                                setup_.world_from_camera, brightness(depth))};
+  return {t,
+          std::make_shared<const DepthImage>(rays_, sensor_.measure(depth, frame),
+                                             1.0 / sensor_.model().quantisation,
+                                             setup_.world_from_camera, brightness(depth)),
+          colour(depth)};
+}
+
+std::uint8_t SyntheticCamera::wave(double along, double length) {
+  const double value = 0.5 + 0.5 * std::sin(2.0 * pi * along / length);
+  return static_cast<std::uint8_t>(std::lround(255.0 * value));
+}
+
+std::optional<Vec3> SyntheticCamera::true_point(std::span<const float> depth, std::size_t i) const {
+  if (!std::isfinite(depth[i])) return std::nullopt;
+  const int width = setup_.intrinsics.width;
+  const Eigen::Vector2d ray = rays_->ray(static_cast<int>(i) % width, static_cast<int>(i) / width);
+  return setup_.world_from_camera * Vec3(double{depth[i]} * ray.homogeneous());
 }
 
 std::vector<std::uint8_t> SyntheticCamera::brightness(std::span<const float> depth) const {
   if (!(setup_.brightness > 0.0)) return {};
   std::vector<std::uint8_t> values(depth.size(), 0);
-  const int width = setup_.intrinsics.width;
   for (std::size_t i = 0; i < depth.size(); ++i) {
-    if (!std::isfinite(depth[i])) continue;
-    const Eigen::Vector2d ray =
-        rays_->ray(static_cast<int>(i) % width, static_cast<int>(i) / width);
-    const double x = (setup_.world_from_camera * Vec3(double{depth[i]} * ray.homogeneous())).x();
-    const double wave = 0.5 + 0.5 * std::sin(2.0 * pi * x / setup_.brightness);
-    values[i] = static_cast<std::uint8_t>(std::lround(255.0 * wave));
+    if (const auto point = true_point(depth, i)) values[i] = wave(point->x(), setup_.brightness);
   }
   return values;
+}
+
+std::shared_ptr<const ColourImage> SyntheticCamera::colour(std::span<const float> depth) const {
+  if (!(setup_.colour > 0.0)) return nullptr;
+  auto image = std::make_shared<ColourImage>();
+  image->width = setup_.intrinsics.width;
+  image->height = setup_.intrinsics.height;
+  image->rgb.resize(3 * depth.size());
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    const auto point = true_point(depth, i);
+    for (std::size_t axis = 0; point && axis < 3; ++axis)
+      image->rgb[3 * i + axis] = wave((*point)[static_cast<Eigen::Index>(axis)], setup_.colour);
+  }
+  return image;
 }
 
 std::span<const float> SyntheticCamera::true_depth(double t) {
@@ -178,7 +208,7 @@ std::span<const float> SyntheticCamera::true_depth(double t) {
   return depth_;
 }
 
-// Rays are (x, y, 1) in the camera's frame, so that how far along they meet the part is the depth.
+// Rays are (x, y, 1) in the camera's frame, so that the length along a ray is the depth.
 void SyntheticCamera::draw(const Part& part, double t, std::vector<float>& depth) {
   const Intrinsics& image = setup_.intrinsics;
   const Eigen::Isometry3d part_from_camera = part.pose(t).inverse() * setup_.world_from_camera;
@@ -206,15 +236,19 @@ void SyntheticCamera::draw(const Part& part, double t, std::vector<float>& depth
 std::unique_ptr<SyntheticCamera> open_synthetic_camera(const Uri& text) {
   const Uri uri = text.path().empty() ? Uri("synthetic:desk" + text.text().substr(10)) : text;
   std::vector<std::string_view> options = scene_options(uri.path());
-  constexpr std::array<std::string_view, 18> camera_options{
-      "size",        "fps",          "frames",         "fov",      "distance", "tilt",
-      "azimuth",     "seed",         "brightness",     "sensor",   "noise",    "noise_grows",
-      "correlation", "quantisation", "disparity_step", "dropouts", "grazing",  "flying"};
+  constexpr std::array<std::string_view, 19> camera_options{
+      "size",           "fps",      "frames",      "fov",         "distance",
+      "tilt",           "colour",   "azimuth",     "seed",        "brightness",
+      "sensor",         "noise",    "noise_grows", "correlation", "quantisation",
+      "disparity_step", "dropouts", "grazing",     "flying"};
   options.insert(options.end(), camera_options.begin(), camera_options.end());
   uri.allow_only(options);
   SourceInfo info;
   info.uri = text.text();
   info.kind = "synthetic depth camera, scene " + uri.path();
+  const std::string sensor = uri.text_option("sensor", "ideal");
+  if (sensor == "d4xx") info.sensor = SensorKind::stereo;
+  if (sensor == "kinect") info.sensor = SensorKind::structured_light;
   return std::make_unique<SyntheticCamera>(make_scene(uri), setup_of(uri), sensor_of(uri),
                                            std::move(info));
 }

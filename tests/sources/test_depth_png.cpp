@@ -91,6 +91,26 @@ TEST(GreyPng, WeighsColoursAndTakesEveryKind) {
                            "not a PNG"));
 }
 
+TEST(ColourPng, GivesRedGreenBlueOfEveryKind) {
+  const test::TemporaryFolder folder;
+  using Values = std::vector<std::uint8_t>;
+  const auto colour_of = [&](char bits, test::Colour colour, const std::string& samples) {
+    const ColourPng image =
+        read_colour_png(folder.write("image.png", png_of(1, 2, bits, colour, samples)));
+    EXPECT_EQ(image.width, 1);
+    EXPECT_EQ(image.height, 2);
+    return image.rgb;
+  };
+  EXPECT_EQ(colour_of(8, test::grey, {"\0\x07\0\xff", 4}), (Values{7, 7, 7, 255, 255, 255}));
+  EXPECT_EQ(colour_of(8, test::rgb, {"\0\1\2\3\0\4\5\6", 8}), (Values{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(colour_of(8, test::rgba, {"\0\1\2\3\0\0\4\5\6\xff", 10}), (Values{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(colour_of(16, test::grey_alpha, {"\0\x80\x80\0\0\0\xff\xff\0\0", 10}),
+            (Values{128, 128, 128, 255, 255, 255}));
+  EXPECT_EQ(colour_of(8, test::palette, {"\0\0\0\1", 4}), (Values{'a', 'b', 'c', 'd', 'e', 'f'}));
+  EXPECT_TRUE(fails_saying([&] { return read_colour_png(folder.write("no.png", "none")); },
+                           "no.png", "a PNG is needed"));
+}
+
 TEST(DepthPng, RejectsWhatIsNoPng) {
   EXPECT_TRUE(fails_saying([] { return parse(""); }, "is empty"));
   EXPECT_TRUE(fails_saying([] { return parse("\x89PNG"); }, "is not a PNG"));

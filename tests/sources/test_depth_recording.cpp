@@ -162,6 +162,47 @@ TEST(TumRecording, GivesEachFrameTheVisibleImageNextToItInTime) {
   EXPECT_TRUE(fails_saying([&] { return folder.open("brightness=grey.txt"); }, "grey.txt"));
 }
 
+TEST(TumRecording, GivesEachFrameTheColoursNextToItInTimeOnRequest) {
+  const TumFolder folder;
+  std::string samples;
+  for (int v = 0; v < 3; ++v) {
+    samples += '\0';
+    for (int u = 0; u < 4; ++u)
+      samples += {static_cast<char>(u), static_cast<char>(v), static_cast<char>(200)};
+  }
+  folder.write("seen.png", test::png_of(4, 3, 8, test::rgb, samples));
+  folder.write("rgb.txt", "100.008 seen.png\n101.02 seen.png\n");
+  EXPECT_EQ(folder.open()->next()->colour, nullptr) << "unless it is asked for";
+  const auto source = folder.open("colour=rgb.txt");
+  ASSERT_EQ(source->info().notes.size(), 1U);
+  EXPECT_EQ(source->info().notes[0].substr(0, 33), "1 of 3 frames have no colour: rgb");
+  const auto frame = source->next();
+  ASSERT_NE(frame->colour, nullptr);
+  EXPECT_EQ(frame->colour->width, 4);
+  EXPECT_EQ(frame->colour->height, 3);
+  EXPECT_FALSE(frame->colour->camera) << "registered to the depth";
+  const std::vector<std::uint8_t> pixel(frame->colour->rgb.begin() + 3 * (4 * 2 + 3),
+                                        frame->colour->rgb.begin() + 3 * (4 * 2 + 4));
+  EXPECT_EQ(pixel, (std::vector<std::uint8_t>{3, 2, 200}));
+  EXPECT_TRUE(image_of(frame).brightness().empty());
+  EXPECT_EQ(source->next()->colour, nullptr);
+  EXPECT_NE(source->next()->colour, nullptr);
+  folder.write("seen.png", test::png_of(1, 1, 8, test::grey, std::string(2, '\0')));
+  EXPECT_TRUE(
+      fails_saying([&] { return folder.open("colour=rgb.txt")->next(); }, "seen.png", "1x1"));
+  EXPECT_TRUE(fails_saying([&] { return folder.open("colour=no.txt"); }, "no.txt", "colour="));
+}
+
+TEST(TumRecording, LeavesOutImagesWithoutReadingThem) {
+  const TumFolder folder;
+  folder.write("0.png", "damaged");
+  const auto source = folder.open();
+  EXPECT_EQ(source->skip(1), 1U);
+  EXPECT_EQ(image_of(source->next()).depth().front(), 1001);
+  EXPECT_EQ(source->skip(5), 1U);
+  EXPECT_FALSE(source->next());
+}
+
 TEST(TumRecording, GoesOnAfterAnImageThatCannotBeUsed) {
   const TumFolder folder;
   const std::string good = test::png_of(1, 1, 16, test::grey, std::string(3, '\0'));

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <type_traits>
 
 #include <lzf.h>
@@ -66,6 +68,42 @@ std::string valid_file(const std::string& encoding) {
     text += compressed(a + z + std::string(9, '_') + x + y);
   }
   return text;
+}
+
+TEST(Pcd, GivesThePackedColoursInEveryEncoding) {
+  constexpr std::uint32_t packed = 0x80102030;  // alpha, red, green, blue
+  constexpr std::uint32_t other = 0x00ffee01;
+  for (const std::string encoding : encodings) {
+    for (const std::string type : {"U", "I", "F"}) {
+      std::string text = "FIELDS x rgb y z\nSIZE 4 4 4 4\nTYPE F " + type +
+                         " F F\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA " + encoding + "\n";
+      std::string data;
+      for (const std::uint32_t colour : {packed, other}) {
+        if (encoding == "ascii") {
+          std::ostringstream written;
+          written.precision(9);
+          if (type == "F") written << std::bit_cast<float>(colour);
+          if (type == "I") written << std::bit_cast<std::int32_t>(colour);
+          if (type == "U") written << colour;
+          data += "1 " + written.str() + " 2 3\n";
+        } else if (encoding == "binary") {
+          data += bytes_of(1.0F) + bytes_of(colour) + bytes_of(2.0F) + bytes_of(3.0F);
+        }
+      }
+      const auto twice = [](float value) { return bytes_of(value) + bytes_of(value); };
+      if (encoding == "binary_compressed")
+        data = compressed(twice(1) + bytes_of(packed) + bytes_of(other) + twice(2) + twice(3));
+      const PointFile cloud = parse(text + data);
+      EXPECT_EQ(cloud.colours, (std::vector<std::uint8_t>{0x10, 0x20, 0x30, 0xff, 0xee, 0x01}))
+          << encoding << ' ' << type;
+      EXPECT_EQ(cloud.points[1], Vec3(1, 2, 3));
+    }
+  }
+  EXPECT_TRUE(parse(valid_file("ascii")).colours.empty());
+  const PointFile odd = parse(
+      "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nPOINTS 2\nDATA ascii\n"
+      "1 2 3 none\n1 2 3 1e300\n");
+  EXPECT_EQ(odd.colours, std::vector<std::uint8_t>(6, 0)) << "black where it is no number";
 }
 
 template <class T>

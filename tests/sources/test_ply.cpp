@@ -57,6 +57,32 @@ std::string vertices_of(const std::string& type) {
 
 const std::string vertices = vertices_of("float");
 
+TEST(Ply, GivesTheColoursInEveryEncodingWithAndWithoutLists) {
+  for (const std::string encoding : encodings) {
+    for (const bool lists : {false, true}) {
+      Values values(encoding);
+      for (int k = 0; k < 2; ++k) {
+        values.add(static_cast<std::uint8_t>(100 + k)).add(1.0F).add(2.0F).add(3.0F);
+        if (lists) values.add(std::uint8_t{1}).add(std::uint8_t{9});
+        values.add(static_cast<std::uint8_t>(200 + k)).add(std::uint8_t{0}).add(std::uint8_t{7});
+        values.end_row();
+      }
+      const PointFile cloud = parse(
+          header(encoding, "element vertex 2\nproperty uchar blue\n" + vertices +
+                               (lists ? "property list uchar uchar more\n" : "") +
+                               "property uchar red\nproperty uchar green\nproperty uchar alpha\n") +
+          values.text());
+      EXPECT_EQ(cloud.colours, (std::vector<std::uint8_t>{200, 0, 100, 201, 0, 101}))
+          << encoding << lists;
+      EXPECT_EQ(cloud.points[1], Vec3(1, 2, 3));
+    }
+  }
+  const std::string rest = "property float red\nproperty uchar green\nproperty uchar blue\n";
+  EXPECT_TRUE(parse(header("ascii", "element vertex 1\n" + vertices + rest) + "1 2 3 0 1 2\n")
+                  .colours.empty())
+      << "colours of another type are passed over";
+}
+
 // Three vertices among others' elements, with a list in the middle of each vertex.
 std::string valid_file(const std::string& encoding) {
   Values values(encoding);

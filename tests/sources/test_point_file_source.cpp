@@ -162,6 +162,28 @@ TEST(PointFiles, KeepTheImageOfAnOrganisedCloudWithItsHoles) {
   EXPECT_EQ(cloud_of(*frame).size(), 3U);
 }
 
+TEST(PointFiles, CarryTheColoursOfAnOrganisedCloudAndOfAMesh) {
+  const TemporaryFolder folder;
+  const std::string image =
+      "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nWIDTH 2\nHEIGHT 2\nPOINTS 4\nDATA ascii\n"
+      "0 0 1 1\nnan nan nan 2\n0 1 1 3\n1 1 1 4\n";
+  const auto frame = open_source("pcd:" + folder.write("0.pcd", image).string())->next();
+  ASSERT_NE(frame->colour, nullptr);
+  EXPECT_EQ(frame->colour->width, 2);
+  EXPECT_EQ(frame->colour->height, 2);
+  EXPECT_EQ(frame->colour->rgb, (std::vector<std::uint8_t>{0, 0, 1, 0, 0, 2, 0, 0, 3, 0, 0, 4}));
+  const std::string mesh =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+      "0 0 0 1 2 3\n1 0 0 4 5 6\n0 1 0 7 8 9\n3 0 1 2\n";
+  const auto coloured = open_source("ply:" + folder.write("0.ply", mesh).string())->next();
+  ASSERT_NE(coloured->colour, nullptr);
+  EXPECT_EQ(coloured->colour->width, 3);
+  EXPECT_EQ(coloured->colour->height, 1);
+  EXPECT_EQ(coloured->colour->rgb, (std::vector<std::uint8_t>{1, 2, 3, 4, 5, 6, 7, 8, 9}));
+}
+
 TEST(PointFiles, GoOnAfterAFileThatCannotBeUsed) {
   const TemporaryFolder folder;
   folder.write("0.pcd", pcd(0));

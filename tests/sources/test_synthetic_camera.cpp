@@ -116,6 +116,25 @@ TEST(SyntheticCamera, SeesThePaintedWavesWhereItsPointsAre) {
   EXPECT_TRUE(image(*camera("wedge?size=60x40")->next()).brightness().empty());
 }
 
+TEST(SyntheticCamera, SeesColouredWavesAlongEachAxisOnRequest) {
+  const Frame frame = *camera("wedge?size=60x40&colour=50mm")->next();
+  ASSERT_NE(frame.colour, nullptr);
+  EXPECT_FALSE(frame.colour->camera);
+  ASSERT_EQ(frame.colour->rgb.size(), 3U * 60U * 40U);
+  for (int v = 0; v < 40; ++v) {
+    for (int u = 0; u < 60; ++u) {
+      const auto point = image(frame).deproject(u, v);
+      if (!point) continue;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double wave = 0.5 + 0.5 * std::sin(2.0 * std::numbers::pi * (*point)[axis] / 0.05);
+        EXPECT_NEAR(frame.colour->rgb[static_cast<std::size_t>(3 * (60 * v + u) + axis)],
+                    255.0 * wave, 1.5);
+      }
+    }
+  }
+  EXPECT_EQ(camera("wedge?size=60x40")->next()->colour, nullptr);
+}
+
 TEST(SyntheticCamera, SeesALiftedPlaneComeNearer) {
   const auto source = camera("plane?size=9x9&tilt=0deg&distance=0.7m&speed=0.3&fps=10");
   for (int k = 0; k < 10; ++k) {

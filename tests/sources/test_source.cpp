@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/sources/source.hpp"
+
+#include "tests/support/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace palpate {
+namespace {
+
+using test::fails_saying;
+
+// A stranger's camera: the least that compiles.
+class TwoPoints final : public Source {
+ public:
+  explicit TwoPoints(const Uri& uri) {
+    info_.uri = uri.text();
+    info_.kind = "two points";
+    info_.live = true;
+    info_.clock = StampClock::sensor;
+  }
+  std::optional<Frame> next(double /*timeout*/) override {
+    return Frame{1.5, std::make_shared<BruteForceCloud>(std::vector<Vec3>{Vec3::Zero()})};
+  }
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+ private:
+  SourceInfo info_;
+};
+
+TEST(OpenSource, OpensASchemeThatAProgramAddedToACopyOfTheRegistry) {
+  Registry<SourceScheme> schemes = standard_sources();
+  const std::size_t standard = schemes.entries().size();
+  schemes.add({"two-points", "two-points:, for a test",
+               [](const Uri& uri) { return std::make_unique<TwoPoints>(uri); }});
+  const auto camera = open_source("two-points:left?gain=2", schemes);
+  EXPECT_EQ(camera->info().uri, "two-points:left?gain=2");
+  EXPECT_TRUE(camera->info().live);
+  EXPECT_EQ(camera->next()->stamp, 1.5);
+  EXPECT_EQ(camera->skip(3), 0U) << "a source that cannot skip says so";
+  camera->cancel();
+  EXPECT_TRUE(open_source("synthetic:plane?size=4x3", schemes)->next());
+  EXPECT_EQ(standard_sources().entries().size(), standard) << "the library's own is not changed";
+  EXPECT_TRUE(fails_saying([] { return open_source("two-points:"); }, "unknown kind of source",
+                           "synthetic:", "recording:"));
+  EXPECT_TRUE(fails_saying([&] { schemes.add({"tum", "", {}}); }, "'tum:'", "already"));
+}
+
+TEST(OpenSource, SaysTheNearestSchemeAndASummaryOfEach) {
+  EXPECT_TRUE(fails_saying([] { return open_source("synthetik:desk"); }, "synthetik:desk",
+                           "did you mean 'synthetic:'?"));
+  for (const SourceScheme& scheme : standard_sources().entries()) {
+    EXPECT_EQ(scheme.summary.rfind(scheme.name + ":", 0), 0U) << scheme.name;
+    EXPECT_TRUE(scheme.open) << scheme.name;
+  }
+}
+
+TEST(Source, ThatIsARecordingSaysSoAndLeavesOutFramesOnRequest) {
+  const test::TemporaryFolder folder;
+  for (int k = 0; k < 5; ++k)
+    folder.write(std::to_string(k) + ".pcd",
+                 "FIELDS x y z\nPOINTS 1\nDATA ascii\n" + std::to_string(k) + " 0 0\n");
+  for (const std::string& uri : {std::string("synthetic:plane?size=4x3&fps=1Hz&frames=5"),
+                                 "pcd:" + folder.path().string() + "?fps=1"}) {
+    const auto source = open_source(uri);
+    EXPECT_FALSE(source->info().live);
+    EXPECT_EQ(source->info().clock, StampClock::recording);
+    EXPECT_EQ(source->next(0.0)->stamp, 0.0);
+    EXPECT_EQ(source->skip(2), 2U);
+    EXPECT_EQ(source->next(0.0)->stamp, 3.0);
+    EXPECT_EQ(source->skip(9), 1U) << "no more than there are";
+    EXPECT_EQ(source->skip(9), 0U);
+    EXPECT_FALSE(source->next(0.0));
+  }
+  EXPECT_EQ(open_source("synthetic:plane?size=4x3")->skip(1000000), 1000000U);
+}
+
+TEST(Source, OfASimulatedSensorSaysHowThatMeasures) {
+  const auto sensor = [](const std::string& name) {
+    return open_source("synthetic:plane?size=8x6&sensor=" + name)->info().sensor;
+  };
+  EXPECT_EQ(sensor("ideal"), SensorKind::unknown);
+  EXPECT_EQ(sensor("d4xx"), SensorKind::stereo);
+  EXPECT_EQ(sensor("kinect"), SensorKind::structured_light);
+  EXPECT_EQ(name_of(SensorKind::time_of_flight), "time of flight");
+  EXPECT_EQ(name_of(StampClock::monotonic), "monotonic");
+}
+
+}  // namespace
+}  // namespace palpate

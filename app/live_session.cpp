@@ -198,8 +198,9 @@ class LiveSession final : public ViewerHost {
       methods.push_back({{"name", row.name}, {"meaning", row.summary}});
     for (const FlagInfo& flag : tick_flags)
       flags.push_back({{"name", flag.name}, {"meaning", flag.meaning}});
-    for (const std::string_view name : safety_flag_names())
-      safety_flags.push_back({{"name", name}, {"meaning", ""}});
+    for (std::size_t i = 0; i < safety_flag_count; ++i)
+      safety_flags.push_back(
+          {{"name", safety_flag_names()[i]}, {"meaning", safety_flag_meanings()[i]}});
     return json{{"version", PALPATE_VERSION}, {"methods", methods}, {"parameters", parameters},
                 {"safety", safety},           {"flags", flags},     {"safety_flags", safety_flags}}
         .dump();

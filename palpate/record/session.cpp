@@ -204,8 +204,11 @@ NumberedSettings settings_from_json(const std::string& text, const std::string& 
       if (row.name != "r_c" && parameters.contains(row.name))
         set_parameter(all.rendering, row.name, parameters.at(row.name).get<double>());
     }
-    for (const SafetyParameterInfo& row : safety_parameter_table())
-      set_parameter(all.safety, row.name, object.at("safety").at(row.name).get<double>());
+    const json& safety = object.at("safety");
+    for (const SafetyParameterInfo& row : safety_parameter_table()) {
+      if (safety.contains(row.name))
+        set_parameter(all.safety, row.name, safety.at(row.name).get<double>());
+    }
     const json& pose = object.at("world_from_device");
     for (int i = 0; i < 12; ++i)
       all.placement.world_from_device(i / 4, i % 4) =

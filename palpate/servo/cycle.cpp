@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <string>
 #include <utility>
 
 #include "palpate/core/error.hpp"
@@ -54,8 +54,26 @@ Cycle::Cycle(std::unique_ptr<Rendering> rendering, Device& device, const ServoSe
 }
 
 std::uint64_t Cycle::put_frame(std::shared_ptr<const Cloud> cloud, double stamp, double now) {
+  const CameraFrame camera{.camera = 0, .stamp = stamp};
+  return put_frame(std::move(cloud), stamp, {&camera, 1}, now);
+}
+
+std::uint64_t Cycle::put_frame(std::shared_ptr<const Cloud> cloud, double stamp,
+                               std::span<const CameraFrame> cameras, double now) {
   if (!cloud) throw Error("frame", "it has no cloud", "put only frames that hold something");
-  return frames_.put({std::move(cloud), stamp, now});
+  if (cameras.empty() || cameras.size() > Freshness::max_cameras) {
+    throw Error("frame", "it is of " + std::to_string(cameras.size()) + " cameras",
+                "name 1 to " + std::to_string(Freshness::max_cameras) + " cameras");
+  }
+  CapturedFrame frame{.cloud = std::move(cloud), .stamp = stamp, .put_at = now};
+  for (const CameraFrame& camera : cameras) {
+    if (camera.camera >= Freshness::max_cameras) {
+      throw Error("frame", "there is no camera " + std::to_string(camera.camera),
+                  "number cameras from 0 to " + std::to_string(Freshness::max_cameras - 1));
+    }
+    frame.cameras[frame.camera_count++] = camera;
+  }
+  return frames_.put(std::move(frame));
 }
 
 std::uint64_t Cycle::set_settings(const ServoSettings& settings) {
@@ -83,16 +101,10 @@ void Cycle::adopt_settings(const ServoSettings& settings) noexcept {
 
 void Cycle::adopt_frame(const CapturedFrame& frame, double t) noexcept {
   rendering_->frame(*frame.cloud, frame.stamp);
-  // A camera that repeats itself or whose clock runs elsewhere is not fresh, whatever arrives.
-  constexpr double most_ahead = 1.0;  // [s]
-  const double interval = frame.stamp - last_stamp_;
-  const bool in_order = !has_frame_ || interval > 0.0;
-  if (in_order && frame.stamp <= t + most_ahead) {
-    fresh_stamp_ = frame.stamp;
-    fresh_since_ = t;
-    if (has_frame_) interval_ = std::min(interval, most_ahead);
-  }
-  has_frame_ = has_frame_ || std::isfinite(frame.stamp);
+  // Arrived when it was put; if that is not on the loop's clock, now.
+  const double arrived = frame.put_at <= t ? frame.put_at : t;
+  freshness_.adopt({frame.cameras.data(), frame.camera_count}, arrived,
+                   safety_.parameters().future_tolerance);
   last_stamp_ = frame.stamp;
   add(statistics_.frames_adopted, 1);
   statistics_.frames_dropped.store(frames_.dropped(), std::memory_order_relaxed);
@@ -114,16 +126,16 @@ bool Cycle::adopt_rendering() noexcept {
   return true;
 }
 
-double Cycle::frame_age(double t) const noexcept {
-  return has_frame_ ? std::max(t - fresh_stamp_, t - fresh_since_)
-                    : std::numeric_limits<double>::infinity();
-}
-
 void Cycle::run(const Wake& wake) noexcept {
   const double t = wake.t;
   HandState hand = device_.read(t);
   if (const ServoSettings* settings = settings_.take()) adopt_settings(*settings);
   hand.clutched = workspace_.is_clutched(hand);
+  if (const std::uint64_t resets = fault_resets_.load(std::memory_order_relaxed);
+      resets != fault_resets_done_) {
+    fault_resets_done_ = resets;
+    safety_.reset();
+  }
   const bool renewed = adopt_rendering();
   if (const CapturedFrame* frame = frames_.take()) {
     adopt_frame(*frame, t);
@@ -142,7 +154,7 @@ void Cycle::run(const Wake& wake) noexcept {
   last_proxy_ = tick.proxy;
   last_normal_ = tick.normal;
 
-  const double age = frame_age(t);
+  const Freshness::Age age = freshness_.at(t);
   const SafetyOutput safe = safety_.run({.t = t,
                                          .force = tick.force,
                                          .hip = hip,
@@ -150,8 +162,8 @@ void Cycle::run(const Wake& wake) noexcept {
                                          .normal = tick.normal,
                                          .position = hand.position,
                                          .hand = hand.present && !hand.clutched && !is_faulty(hand),
-                                         .frame_age = age,
-                                         .frame_interval = interval_});
+                                         .frame_age = age.age,
+                                         .frame_intervals = age.intervals});
   device_.write(workspace_.force_in_device(safe.force), t);
 
   const ServoTick record{.tick = tick,
@@ -159,7 +171,7 @@ void Cycle::run(const Wake& wake) noexcept {
                          .position = hand.position,
                          .gain = safe.gain,
                          .frame_stamp = last_stamp_,
-                         .frame_age = age,
+                         .frame_age = age.age,
                          .number = number_++,
                          .frame_number = frames_.number(),
                          .settings_number = settings_.number(),
@@ -176,7 +188,7 @@ void Cycle::keep_statistics(const ServoTick& record) noexcept {
   add(statistics_.ticks, 1);
   add(statistics_.steps, static_cast<std::uint64_t>(std::max(record.tick.steps, 0)));
   if (record.tick.state != ContactState::free_motion) add(statistics_.contact_ticks, 1);
-  if (has_frame_) statistics_.frame_age.add(nanoseconds(record.frame_age));
+  if (std::isfinite(record.frame_age)) statistics_.frame_age.add(nanoseconds(record.frame_age));
   statistics_.hand.store(record.hand, std::memory_order_relaxed);
   const double force = record.force.norm();
   if (force > statistics_.max_force.load(std::memory_order_relaxed))
@@ -184,6 +196,8 @@ void Cycle::keep_statistics(const ServoTick& record) noexcept {
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
     statistics_.interventions[i].store(safety_.interventions()[i], std::memory_order_relaxed);
   }
+  statistics_.latched_by.store(safety_.latched_by(), std::memory_order_relaxed);
+  statistics_.heat.store(safety_.heat(), std::memory_order_relaxed);
 }
 
 }  // namespace palpate

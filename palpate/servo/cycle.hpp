@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <utility>
 
 #include "palpate/core/renderer.hpp"
 #include "palpate/servo/device.hpp"
+#include "palpate/servo/freshness.hpp"
 #include "palpate/servo/histogram.hpp"
 #include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/periodic_thread.hpp"
@@ -79,7 +81,7 @@ struct ServoTick {
   Vec3 position;               ///< [m] of the hand, device frame
   double gain;                 ///< [-] of the safety chain
   double frame_stamp;          ///< [s] of the frame in use; 0 before the first
-  double frame_age;            ///< [s] infinite before the first
+  double frame_age;            ///< [s] of the oldest camera's; infinite before the first
   std::uint64_t number;        ///< of the cycle, from 0
   std::uint64_t frame_number;  ///< of the frame in use among those put, from 1; 0 before the first
   std::uint64_t settings_number;  ///< of those in use among those set, from 1; 0: the first ones
@@ -102,6 +104,8 @@ struct CycleStatistics {
   Histogram frame_age;                 ///< [ns] at each tick that had a frame
   Histogram hand_over;                 ///< [ns] from put_frame to the tick that uses the frame
   std::array<std::atomic<std::uint64_t>, safety_flag_count> interventions{};
+  std::atomic<std::uint32_t> latched_by{0};  ///< SafetyFlag bits, as SafetyChain::latched_by
+  std::atomic<double> heat{0.0};             ///< [-] of the motors, as SafetyChain::heat
 };
 
 /// One cycle of the loop: device read, newest frame, renderer, safety chain, device write.
@@ -129,6 +133,20 @@ class Cycle {
   /// @return its number, as in ServoTick::frame_number
   std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp, double now);
 
+  /// The same for a cloud made of several cameras' newest frames: each camera's freshness is judged
+  /// by itself, and the one that is worst off decides.
+  /// @param stamp    [s] what the method is told: later than that of the frame before
+  /// @param cameras  an entry for each camera that has to be alive, whether or not its frame is
+  /// new;
+  ///                 a camera that is left out is no longer waited for
+  /// @throws Error if there are none, or a number is not below Freshness::max_cameras.
+  std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp,
+                          std::span<const CameraFrame> cameras, double now);
+
+  /// Ends a latched fault of the safety chain in the next cycle. An operator's decision. Any
+  /// thread.
+  void reset_faults() noexcept { fault_resets_.fetch_add(1, std::memory_order_relaxed); }
+
   /// Takes effect in the next cycle. Any thread but the servo's.
   /// @return their number, as in ServoTick::settings_number
   /// @throws Error if they do not validate.
@@ -151,12 +169,13 @@ class Cycle {
     std::shared_ptr<const Cloud> cloud;
     double stamp = 0.0;
     double put_at = 0.0;
+    std::array<CameraFrame, Freshness::max_cameras> cameras{};
+    std::size_t camera_count = 0;
   };
 
   void adopt_settings(const ServoSettings& settings) noexcept;
   void adopt_frame(const CapturedFrame& frame, double t) noexcept;
   bool adopt_rendering() noexcept;
-  [[nodiscard]] double frame_age(double t) const noexcept;
   void keep_statistics(const ServoTick& record) noexcept;
 
   std::unique_ptr<Rendering> first_rendering_;
@@ -177,11 +196,10 @@ class Cycle {
   std::uint64_t number_ = 0;
   Vec3 last_proxy_ = Vec3::Zero();
   Vec3 last_normal_ = Vec3::Zero();
-  bool has_frame_ = false;
-  double last_stamp_ = 0.0;       // [s] of the frame in use
-  double fresh_stamp_ = 0.0;      // [s] of the newest frame whose stamp makes sense
-  double fresh_since_ = 0.0;      // [s] when that was adopted
-  double interval_ = 1.0 / 30.0;  // [s] between stamps
+  double last_stamp_ = 0.0;  // [s] of the frame in use
+  Freshness freshness_;
+  std::atomic<std::uint64_t> fault_resets_{0};  // asked for
+  std::uint64_t fault_resets_done_ = 0;
 };
 
 }  // namespace palpate

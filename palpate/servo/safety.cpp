@@ -13,22 +13,47 @@
 namespace palpate {
 namespace {
 
-// No place [m], force [N] or direction that means anything is larger; their squares do not
+// No position [m], force [N] or direction that means anything is larger; their squares do not
 // overflow.
 constexpr double largest = 1e6;
-// A tick earns at most this much time [s] of slew and ramp, however late it is.
+// [s] of slew and ramp that a tick earns at most, however late it is: one period at 1 kHz.
 constexpr double longest_credit = 1e-3;
-// The share of the continuous budget below which all of max_force is there.
+// [-] share of the continuous budget below which all of max_force is allowed. From there to the
+// whole budget the limit comes down gradually, so that the hand feels no step.
 constexpr double cool = 0.8;
-// Smoothing of the hand's velocity [s]: several ticks, so that one count of an encoder is no speed.
+// [s] smoothing of the hand's velocity: several ticks, so that one count of an encoder (0.055 mm in
+// a millisecond is 0.055 m/s) is no speed.
 constexpr double velocity_time = 5e-3;
-// So long without a swing [s] and what the detector took comes back.
+// [s] without a swing, after which the oscillation detector gives its cut back: 10 periods at 20
+// Hz.
 constexpr double calm_time = 0.5;
+// [m], [N] Below that distance of the proxy from the HIP, or that force, the direction from one to
+// the other is noise: an encoder's count is 0.055 mm, and 0.05 N are hardly felt.
+constexpr double least_lever = 1e-3;
+constexpr double least_directed_force = 0.05;
 
 constexpr std::array<std::string_view, safety_flag_count> flag_names{
-    "input_refused",   "pull_removed",  "force_cut", "continuous_cut", "slew_cut",
-    "oscillation_cut", "disengaged",    "ramping",   "frame_late",     "frame_fading",
-    "frame_lost",      "hand_too_fast", "stalled"};
+    "input_refused",   "pull_removed",  "force_cut", "continuous_cut",    "slew_cut",
+    "oscillation_cut", "disengaged",    "ramping",   "frame_late",        "frame_fading",
+    "frame_lost",      "hand_too_fast", "stalled",   "direction_refused", "fault_latched"};
+
+constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
+    "no force: the device or the method gave a number that is not finite, or time ran backwards",
+    "the part of the force that pulled into the surface was removed",
+    "the force is at its limit: the method asked for more than the user or the device allows",
+    "the force is limited because the motors are warm",
+    "the force changes more slowly than the method asked",
+    "the force is weakened because it swung fast, again and again",
+    "no force: the hand is not engaged; it engages away from surfaces, once it is asked to feel "
+    "next to nothing",
+    "the force is coming up gradually after the hand engaged or after an interruption",
+    "the force may only fall: a camera's next frame is overdue",
+    "the force fades: a camera's newest frame is old",
+    "no force: a camera has sent no frame that can be used for too long",
+    "no force: the hand was faster than it may be",
+    "the force starts again from nothing: the loop missed its deadlines",
+    "no force: the method's surface normal contradicts the direction from the HIP to the proxy",
+    "no force: repeated faults; an operator has to reset the safety chain"};
 
 using P = SafetyParameters;
 constexpr std::array table{
@@ -36,32 +61,45 @@ constexpr std::array table{
                         "the user's limit; the device's own may be lower", &P::max_force},
     SafetyParameterInfo{"continuous_time", "s", 20.0, 1.0, 600.0,
                         "time constant of the motors' heat", &P::continuous_time},
+    SafetyParameterInfo{
+        "initial_heat", "-", 1.0, 0.0, 1.0,
+        "heat of the motors at the start, as a share of what they bear; 1 if unknown",
+        &P::initial_heat},
     SafetyParameterInfo{"rise_rate", "N/s", 500.0, 1.0, 1e5,
-                        "fastest change of the force, unless towards zero", &P::rise_rate},
-    SafetyParameterInfo{"fall_rate", "N/s", 2000.0, 1.0, 1e5, "fastest shrinking of the force",
-                        &P::fall_rate},
-    SafetyParameterInfo{"swing", "N", 0.5, 0.01, 10.0, "a smaller swing is no oscillation",
-                        &P::swing},
-    SafetyParameterInfo{"swing_time", "s", 0.025, 1e-3, 0.5, "a slower swing is no oscillation",
-                        &P::swing_time},
+                        "largest rate of change of the force, unless towards zero", &P::rise_rate},
+    SafetyParameterInfo{"fall_rate", "N/s", 2000.0, 1.0, 1e5,
+                        "largest rate at which the force shrinks", &P::fall_rate},
+    SafetyParameterInfo{"swing", "N", 0.5, 0.01, 10.0,
+                        "a smaller swing of the force is no oscillation", &P::swing},
+    SafetyParameterInfo{"swing_time", "s", 0.025, 1e-3, 0.5,
+                        "a slower swing of the force is no oscillation", &P::swing_time},
     SafetyParameterInfo{"swing_count", "-", 8.0, 2.0, 100.0,
-                        "so many swings in a row are an oscillation", &P::swing_count},
+                        "swings in a row that are an oscillation", &P::swing_count},
     SafetyParameterInfo{"engage_force", "N", 0.2, 0.0, 3.0,
-                        "engaging waits until less than this is asked for", &P::engage_force},
-    SafetyParameterInfo{"engage_ticks", "ticks", 10.0, 1.0, 1e5, "for so long", &P::engage_ticks},
+                        "the hand engages while less than this is asked for", &P::engage_force},
+    SafetyParameterInfo{"engage_ticks", "ticks", 10.0, 1.0, 1e5,
+                        "ticks in a row below engage_force that engage the hand", &P::engage_ticks},
     SafetyParameterInfo{"ramp_time", "s", 1.5, 0.01, 10.0, "from no force to all of it",
                         &P::ramp_time},
-    SafetyParameterInfo{"late_intervals", "frames", 3.0, 1.0, 100.0,
-                        "without a frame for so many intervals the force may only fall",
+    SafetyParameterInfo{"late_intervals", "intervals", 3.0, 1.0, 100.0,
+                        "of a camera without a frame, after which the force may only fall",
                         &P::late_intervals},
     SafetyParameterInfo{"fade_age", "s", 0.1, 0.01, 5.0,
                         "age of the newest frame from which the force fades", &P::fade_age},
     SafetyParameterInfo{"lost_age", "s", 0.5, 0.02, 10.0,
                         "age of the newest frame at which the hand disengages", &P::lost_age},
+    SafetyParameterInfo{"future_tolerance", "s", 0.05, 0.0, 1.0,
+                        "a stamp farther ahead of the loop's clock is not fresh",
+                        &P::future_tolerance},
     SafetyParameterInfo{"max_speed", "m/s", 1.5, 0.05, 20.0,
                         "a faster hand gets no force, then a ramp", &P::max_speed},
     SafetyParameterInfo{"stall_time", "s", 5e-3, 2e-3, 0.1, "a tick that comes later starts a ramp",
                         &P::stall_time},
+    SafetyParameterInfo{"fault_count", "-", 3.0, 1.0, 16.0,
+                        "faults within fault_time, after which an operator has to reset",
+                        &P::fault_count},
+    SafetyParameterInfo{"fault_time", "s", 2.0, 0.0, 600.0,
+                        "time within which faults add up to a latched one", &P::fault_time},
 };
 
 void check_range(const SafetyParameterInfo& row, double value) {
@@ -84,14 +122,24 @@ bool is_sound(const Vec3& v) {
 bool cut_to(double limit, Vec3& force) {
   const double length = force.norm();
   if (!(length > limit)) return false;
-  force *= limit / length;
+  force *= (1.0 - 1e-15) * limit / length;  // no longer than the limit after rounding, too
   return true;
+}
+
+// Removes the component of `force` against `outwards`, of any length but none.
+void remove_pull(const Vec3& outwards, Vec3& force) {
+  const double push = force.dot(outwards);
+  if (!outwards.isZero() && push < 0.0) force -= push / outwards.squaredNorm() * outwards;
 }
 
 }  // namespace
 
 std::span<const std::string_view> safety_flag_names() {
   return flag_names;
+}
+
+std::span<const std::string_view> safety_flag_meanings() {
+  return flag_meanings;
 }
 
 std::span<const SafetyParameterInfo> safety_parameter_table() {
@@ -127,25 +175,67 @@ SafetyChain::SafetyChain(const DeviceLimits& device, const SafetyParameters& par
   if (!(device_.max_force > 0.0 && device_.continuous_force > 0.0)) {
     throw Error("device limits", "a force limit is not positive", "give newtons above 0");
   }
+  heat_ = parameters_.initial_heat * device_.continuous_force * device_.continuous_force;
 }
 
 bool SafetyChain::stalls_at(double t) const noexcept {
   return has(stalled) && last_t_ && t - *last_t_ > parameters_.stall_time;
 }
 
-// Finite, pushes only, magnitude, continuous force; and frames that are late.
-Vec3 SafetyChain::limited(const SafetyInput& input, Vec3 force, std::uint32_t& flags) noexcept {
+double SafetyChain::heat() const noexcept {
+  return heat_ / (device_.continuous_force * device_.continuous_force);
+}
+
+void SafetyChain::reset() noexcept {
+  latched_by_ = 0;
+  faults_ = 0;
+}
+
+// Does the method's normal point away from where its proxy is? A force of any weight then acts
+// through the surface or sideways. A proxy next to the HIP shows no direction.
+bool SafetyChain::is_contradictory(const SafetyInput& input) const noexcept {
+  const Vec3 lever = input.proxy - input.hip;
+  return has(direction_refused) && input.normal.dot(lever) < 0.0 && lever.norm() > least_lever &&
+         input.force.norm() > least_directed_force;
+}
+
+// A fault is counted when it begins and not for each tick that it lasts.
+void SafetyChain::note_faults(std::uint32_t flags) noexcept {
+  const std::uint32_t begun =
+      flags & ~last_flags_ & (std::uint32_t{input_refused} | std::uint32_t{direction_refused});
+  if (begun == 0 || !has(fault_latched)) return;
+  last_faults_[faults_ % most_faults] = {fault_clock_, begun};
+  ++faults_;
+  const auto enough = static_cast<std::size_t>(parameters_.fault_count);
+  if (faults_ < enough) return;
+  std::uint32_t reasons = 0;
+  for (std::size_t i = faults_ - enough; i < faults_; ++i) {
+    const Fault& fault = last_faults_[i % most_faults];
+    if (fault_clock_ - fault.began > parameters_.fault_time) return;
+    reasons |= fault.flags;
+  }
+  latched_by_ |= reasons;
+}
+
+// After a gap the last force counts as held all through, but cooling only as of a tick that is just
+// not stalled: whether the motors were off is not known.
+void SafetyChain::warm_up(double since_last) noexcept {
+  const double change = last_force_.squaredNorm() - heat_;
+  const double elapsed = change > 0.0 ? since_last : std::min(since_last, parameters_.stall_time);
+  heat_ += share_of(elapsed, parameters_.continuous_time) * change;
+}
+
+// Pushes only, magnitude, continuous force; and frames that are late.
+Vec3 SafetyChain::limited(const SafetyInput& input, Vec3 force,
+                          std::uint32_t& flags) const noexcept {
   if (has(pull_removed)) {
-    const Vec3 outwards = input.normal.isZero() ? Vec3(input.proxy - input.hip) : input.normal;
-    const double length = outwards.norm();
-    const double push = length > 0.0 ? force.dot(outwards) / length : 0.0;
-    if (push < 0.0) {
-      force -= push / length * outwards;
-      flags |= pull_removed;
-    } else if (length == 0.0 && !force.isZero()) {  // no telling which way it acts
-      force.setZero();
-      flags |= pull_removed;
-    }
+    // Both the normal that the method gives and the direction that its proxy shows have to agree.
+    const Vec3 lever = input.proxy - input.hip;
+    const Vec3 before = force;
+    if (input.normal.isZero() && lever.isZero()) force.setZero();  // no telling which way it acts
+    remove_pull(input.normal, force);
+    if (lever.norm() > least_lever || input.normal.isZero()) remove_pull(lever, force);
+    if (force != before) flags |= pull_removed;
   }
   const double peak = std::min(parameters_.max_force, device_.max_force);
   if (has(force_cut) && cut_to(peak, force)) flags |= force_cut;
@@ -157,12 +247,8 @@ Vec3 SafetyChain::limited(const SafetyInput& input, Vec3 force, std::uint32_t& f
     if (cut_to(std::sqrt(budget + left * (peak * peak - budget)), force)) flags |= continuous_cut;
   }
 
-  // The chain's own way to forbid extrapolation: what was asked for in time is the most there is.
-  const bool late = input.frame_age > parameters_.late_intervals * input.frame_interval;
-  if (!late) fresh_force_ = force.norm();
-  if (has(frame_late) && late) {
+  if (has(frame_late) && !(input.frame_intervals <= parameters_.late_intervals)) {
     flags |= frame_late;
-    cut_to(fresh_force_, force);
   }
   return force;
 }
@@ -195,9 +281,15 @@ double SafetyChain::ceiling(const SafetyInput& input, double demand, double dt,
     if (ceiling < 1.0) flags |= oscillation_cut;
   }
 
+  if (latched_by_ != 0) {
+    flags |= fault_latched;
+    engaged_ = false;
+    ceiling = 0.0;
+  }
+
   const bool lost = has(frame_lost) && !(input.frame_age <= parameters_.lost_age);
   if (has(disengaged)) {
-    const bool allowed = input.hand && !lost;
+    const bool allowed = input.hand && !lost && latched_by_ == 0;
     const bool quiet = allowed && demand < parameters_.engage_force;
     quiet_ticks_ = quiet ? quiet_ticks_ + 1.0 : 0.0;
     engaged_ = allowed && (engaged_ || quiet_ticks_ >= parameters_.engage_ticks);
@@ -243,7 +335,8 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
                      is_sound(input.hip) && is_sound(input.proxy) && is_sound(input.position);
   const double since_last = in_order && last_t_ ? input.t - *last_t_ : 0.0;
   const double dt = std::min(since_last, longest_credit);
-  heat_ += share_of(since_last, parameters_.continuous_time) * (last_force_.squaredNorm() - heat_);
+  fault_clock_ += since_last;
+  warm_up(since_last);
 
   if (sound && since_last > 0.0) {
     const Vec3 velocity = (input.position - last_position_) / since_last;
@@ -251,8 +344,12 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   }
   if (sound) last_position_ = input.position;
 
+  if (!sound && has(input_refused)) flags |= input_refused;
+  if (sound && is_contradictory(input)) flags |= direction_refused;
+  note_faults(flags);
+
   Vec3 force = Vec3::Zero();
-  if (sound || !has(input_refused)) {
+  if (flags == 0) {
     force = limited(input, input.force, flags);
     double most = ceiling(input, force.norm(), dt, flags);
     if (stalls_at(input.t)) {
@@ -264,8 +361,10 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     if (gain_ < most) flags |= ramping;
     force *= gain_;
   } else {
-    flags |= input_refused;
     gain_ = 0.0;
+    engaged_ = false;
+    quiet_ticks_ = 0.0;
+    if (latched_by_ != 0) flags |= fault_latched;
   }
 
   if (has(slew_cut)) {
@@ -274,6 +373,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     force = slewed(wanted, dt, in_order && last_t_ ? dt : longest_credit);
     if (force != wanted) flags |= slew_cut;
   }
+  if ((flags & frame_late) != 0) cut_to(last_force_.norm(), force);
 
   if (std::isfinite(input.t)) last_t_ = input.t;
   last_force_ = force;

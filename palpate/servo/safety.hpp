@@ -14,10 +14,11 @@ namespace palpate {
 
 /// What the safety chain did in a tick; bits of `SafetyOutput::flags`.
 enum SafetyFlag : std::uint32_t {
-  /// Force, place or time was not finite or absurd, or time ran backwards: no force. Look for
-  /// the fault in the device or the renderer.
+  /// A force, position or time was not finite or absurdly large, or time ran backwards: no force,
+  /// and the hand is disengaged. Look for the fault in the device or the method.
   input_refused = 1u << 0,
-  /// The force pulled into the surface: that part was removed. A coupling only pushes.
+  /// The force pulled into the surface or away from the proxy: that part was removed. A coupling
+  /// only pushes.
   pull_removed = 1u << 1,
   /// The force was longer than the device or the user allows. Lower the stiffness.
   force_cut = 1u << 2,
@@ -32,38 +33,52 @@ enum SafetyFlag : std::uint32_t {
   disengaged = 1u << 6,
   /// Engaged, and the force is on its way up over ramp_time.
   ramping = 1u << 7,
-  /// The newest frame is older than late_intervals intervals: the force may only fall.
+  /// A camera's next frame is overdue by more than late_intervals of its intervals: the force that
+  /// is sent may only fall.
   frame_late = 1u << 8,
-  /// The newest frame is older than fade_age: the force fades.
+  /// A camera's newest frame is older than fade_age: the force fades.
   frame_fading = 1u << 9,
-  /// The newest frame is older than lost_age, or there is none: the hand is disengaged.
+  /// A camera's newest frame is older than lost_age, or there is none: the hand is disengaged.
   frame_lost = 1u << 10,
   /// The hand was faster than max_speed: no force, then a ramp.
   hand_too_fast = 1u << 11,
   /// A tick came later than stall_time: the force ramps up from nothing.
   stalled = 1u << 12,
+  /// The method's normal points more than 90 degrees away from the direction HIP to proxy: it may
+  /// push through the surface. No force, and the hand is disengaged.
+  direction_refused = 1u << 13,
+  /// fault_count faults (input_refused or direction_refused) within fault_time: no force until an
+  /// operator calls SafetyChain::reset. SafetyChain::latched_by says which faults they were.
+  fault_latched = 1u << 14,
 };
-constexpr std::size_t safety_flag_count = 13;
+constexpr std::size_t safety_flag_count = 15;
 /// A short name for each bit, in their order, e.g. "force_cut".
 std::span<const std::string_view> safety_flag_names();
+/// For each bit, in their order, a sentence for people: why the force is what it is.
+std::span<const std::string_view> safety_flag_meanings();
 
-/// What the chain allows. Defaults are safe for a Touch-class device.
+/// What the chain allows. Defaults are safe for a Touch-class device; docs/safety.md gives the
+/// reason for each number.
 struct SafetyParameters {
-  double max_force = 3.3;         ///< [N] the user's limit; the device's may be lower
-  double continuous_time = 20.0;  ///< [s] time constant of the motors' heat
-  double rise_rate = 500.0;       ///< [N/s] the force's change, unless towards zero
-  double fall_rate = 2000.0;      ///< [N/s] its shrinking
-  double swing = 0.5;             ///< [N] a smaller swing is no oscillation
-  double swing_time = 0.025;      ///< [s] nor a slower one
-  double swing_count = 8.0;       ///< [-] that many in a row are one
-  double engage_force = 0.2;      ///< [N] engaging waits until less than this is asked for
-  double engage_ticks = 10.0;     ///< [ticks] for so long
-  double ramp_time = 1.5;         ///< [s] from no force to all of it
-  double late_intervals = 3.0;    ///< [frames] after so many intervals the force may only fall
-  double fade_age = 0.1;          ///< [s] age of the newest frame from which the force fades
-  double lost_age = 0.5;          ///< [s] age at which it is gone and the hand disengaged
-  double max_speed = 1.5;         ///< [m/s] of the hand, on the device
-  double stall_time = 5e-3;       ///< [s] between two ticks
+  double max_force = 3.3;          ///< [N] the user's limit; the device's may be lower
+  double continuous_time = 20.0;   ///< [s] time constant of the motors' heat
+  double initial_heat = 1.0;       ///< [-] of what the motors bear, taken to be there at the start
+  double rise_rate = 500.0;        ///< [N/s] largest rate of change, unless towards zero
+  double fall_rate = 2000.0;       ///< [N/s] largest rate at which the force shrinks
+  double swing = 0.5;              ///< [N] a smaller swing of the force is no oscillation
+  double swing_time = 0.025;       ///< [s] a slower swing of the force is no oscillation
+  double swing_count = 8.0;        ///< [-] swings in a row that are an oscillation
+  double engage_force = 0.2;       ///< [N] the hand engages while less than this is asked for
+  double engage_ticks = 10.0;      ///< [ticks] in a row below engage_force
+  double ramp_time = 1.5;          ///< [s] from no force to all of it
+  double late_intervals = 3.0;     ///< [intervals] without a frame: the force may only fall
+  double fade_age = 0.1;           ///< [s] age of the newest frame from which the force fades
+  double lost_age = 0.5;           ///< [s] age at which it is gone and the hand disengaged
+  double future_tolerance = 0.05;  ///< [s] stamps farther ahead of the clock are not fresh
+  double max_speed = 1.5;          ///< [m/s] of the hand, on the device
+  double stall_time = 5e-3;        ///< [s] between two ticks
+  double fault_count = 3.0;        ///< [-] faults within fault_time that latch
+  double fault_time = 2.0;         ///< [s]
 };
 
 /// One row of the table that feeds help texts, configuration files and sliders.
@@ -86,15 +101,15 @@ void validate(const SafetyParameters& parameters);
 
 /// What a tick asks for, and what the chain needs to judge it.
 struct SafetyInput {
-  double t;               ///< [s] now
-  Vec3 force;             ///< [N] world: what the renderer wants
-  Vec3 hip;               ///< [m] world
-  Vec3 proxy;             ///< [m] world
-  Vec3 normal;            ///< [-] away from the surface; zero if not known
-  Vec3 position;          ///< [m] of the hand, device frame
-  bool hand;              ///< somebody holds the device, and it is not clutched
-  double frame_age;       ///< [s] of the newest frame with a stamp that makes sense; inf: none
-  double frame_interval;  ///< [s] between frames
+  double t;                ///< [s] now
+  Vec3 force;              ///< [N] world: what the method asks for
+  Vec3 hip;                ///< [m] world
+  Vec3 proxy;              ///< [m] world
+  Vec3 normal;             ///< [-] away from the surface; zero if not known
+  Vec3 position;           ///< [m] of the hand, device frame
+  bool hand;               ///< somebody holds the device, and it is not clutched
+  double frame_age;        ///< [s] of the oldest camera's newest fresh frame; inf: none
+  double frame_intervals;  ///< [intervals] the most overdue camera is without one; Freshness::Age
 };
 
 /// What the device gets.
@@ -106,9 +121,10 @@ struct SafetyOutput {
 
 /// Last before the device, whatever made the force. Knows no clock and no renderer.
 ///
-/// The links judge in the order of the flags. Those from the oscillation detector on give a gain
-/// that falls at once and rises over ramp_time; the slew limit is applied to the product, so that
-/// no link can make a step, and |force| never exceeds the larger of the last force and the limit.
+/// Links that judge the force itself come first, then those that give a gain: it falls at once and
+/// rises over ramp_time. The slew limit is applied to the product, so that no link can make a step,
+/// and |force| never exceeds the larger of the last force and the limit. While a frame is late the
+/// force that is sent never grows. Faults disengage the hand, and several of them latch.
 class SafetyChain {
  public:
   /// All links; the argument below leaves some out, which only tests of the chain may do.
@@ -125,6 +141,14 @@ class SafetyChain {
   /// `free_side`). [servo]
   [[nodiscard]] bool stalls_at(double t) const noexcept;
 
+  /// Ends a latched fault, by order of an operator; the hand has to pass the engage gate. [servo]
+  void reset() noexcept;
+  /// Faults that led to fault_latched, as SafetyFlag bits; 0 while it is not latched.
+  [[nodiscard]] std::uint32_t latched_by() const noexcept { return latched_by_; }
+  /// [-] heat of the motors as a share of what they bear: 1 allows the continuous force only. To be
+  /// kept and given to the next session as SafetyParameters::initial_heat.
+  [[nodiscard]] double heat() const noexcept;
+
   /// How often each flag was raised: changed from not set to set.
   [[nodiscard]] const std::array<std::uint64_t, safety_flag_count>& interventions() const noexcept {
     return interventions_;
@@ -132,6 +156,7 @@ class SafetyChain {
 
   /// Changes limits between two ticks. They must validate. [servo]
   void set_parameters(const SafetyParameters& parameters) noexcept { parameters_ = parameters; }
+  [[nodiscard]] const SafetyParameters& parameters() const noexcept { return parameters_; }
 
  private:
   // Counts swings of one coordinate of the force.
@@ -143,7 +168,10 @@ class SafetyChain {
   };
 
   [[nodiscard]] bool has(std::uint32_t links) const noexcept { return (links_ & links) != 0; }
-  Vec3 limited(const SafetyInput& input, Vec3 force, std::uint32_t& flags) noexcept;
+  [[nodiscard]] bool is_contradictory(const SafetyInput& input) const noexcept;
+  void note_faults(std::uint32_t flags) noexcept;
+  void warm_up(double since_last) noexcept;
+  Vec3 limited(const SafetyInput& input, Vec3 force, std::uint32_t& flags) const noexcept;
   double ceiling(const SafetyInput& input, double demand, double dt, std::uint32_t& flags) noexcept;
   double oscillation_ceiling(double t, double dt) noexcept;
   [[nodiscard]] Vec3 slewed(const Vec3& force, double rise_dt, double fall_dt) const noexcept;
@@ -157,8 +185,17 @@ class SafetyChain {
   std::uint32_t last_flags_ = 0;
   std::array<std::uint64_t, safety_flag_count> interventions_{};
 
-  double heat_ = 0.0;         // [N^2] mean square of the force over continuous_time
-  double fresh_force_ = 0.0;  // [N] asked for while the frame was not late
+  double heat_ = 0.0;  // [N^2] mean square of the force over continuous_time
+  // Faults: when the last few of them began, on a clock that only counts time that makes sense.
+  struct Fault {
+    double began;
+    std::uint32_t flags;
+  };
+  static constexpr std::size_t most_faults = 16;
+  double fault_clock_ = 0.0;  // [s]
+  std::array<Fault, most_faults> last_faults_{};
+  std::size_t faults_ = 0;
+  std::uint32_t latched_by_ = 0;  // SafetyFlag bits
   std::array<Swings, 3> swings_{};
   double swung_at_ = 0.0;  // [s] last swing of an oscillation
   double calm_ = 1.0;      // [-] what the oscillation detector allows

@@ -63,6 +63,11 @@ class ServoLoop {
   std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp) {
     return cycle_.put_frame(std::move(cloud), stamp, monotonic_now());
   }
+  std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp,
+                          std::span<const CameraFrame> cameras) {
+    return cycle_.put_frame(std::move(cloud), stamp, cameras, monotonic_now());
+  }
+  void reset_faults() noexcept { cycle_.reset_faults(); }
   std::uint64_t set_settings(const ServoSettings& settings) {
     return cycle_.set_settings(settings);
   }

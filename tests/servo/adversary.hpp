@@ -65,11 +65,15 @@ class Adversary {
     t_ += tick_interval();
     feed();
     if (random_() % 20'000 == 0) cycle_.set_settings(settings());
+    if (latched_ && one_in(500)) cycle_.reset_faults();
     const double given = one_in(50'000) ? nan : t_;
     cycle_.run({.t = given});
     ServoTick record{};
     if (!ticks_seen_.try_pop(record)) return "a tick that does not come out of the ring";
     if (!record.tick.proxy.allFinite()) return "a proxy that is nowhere";
+    latched_ = cycle_.statistics().latched_by != 0;
+    if (latched_ != ((record.safety & fault_latched) != 0)) return "a latched fault without a flag";
+    last_safety_ = record.safety;
     const Vec3 away = record.tick.hip - device_.hand.position;
     if (away.allFinite() && away.norm() < 1e3) clutched_away_ = away;
     const double since_last = given - last_given_;
@@ -95,7 +99,7 @@ class Adversary {
     void set_parameters(const Parameters& p) { renderer_.set_parameters(p); }
     Tick tick(const Vec3& hip, double t) noexcept {
       Tick tick = renderer_.tick(hip, t);
-      switch (random_() % 5000) {
+      switch (random_() % 6000) {
         case 0:
           tick.force.x() = nan;
           break;
@@ -110,6 +114,10 @@ class Adversary {
           break;
         case 4:
           tick.force = Vec3::Constant(1e308);
+          break;
+        case 5:
+          tick.normal = -tick.normal;
+          tick.force = -tick.force;
           break;
         default:
           break;
@@ -188,13 +196,13 @@ class Adversary {
     if (camera_mode_ == 3 && one_in(3)) stamp = one_in(2) ? nan : inf;
     if (camera_mode_ == 4) stamp = stuck_;
     if (camera_mode_ == 5 && one_in(4)) stamp -= between(0.0, 2.0);
-    if (camera_mode_ == 6 && one_in(4)) stamp += between(1.0, 1e6);
+    if (camera_mode_ == 6 && one_in(4)) stamp += between(0.1, 1e6);
     stuck_ = stamp;
     // A surface at rest for a while, or another at every frame.
     if (one_in(3)) cloud_ = random_() % clouds_.size();
     cycle_.put_frame(clouds_[cloud_], stamp, t_);
     // The chain may not trust a stamp that repeats or runs backwards, or is from the future.
-    if ((!any_frame_ || stamp > last_stamp_) && stamp <= t_ + 1.0) {
+    if ((!any_frame_ || stamp > last_stamp_) && stamp <= t_ + 0.05) {
       fresh_at_ = t_;
       fresh_stamp_ = stamp;
     }
@@ -221,7 +229,8 @@ class Adversary {
     const double rise = 500.0 * std::max(credit, 0.0) + 1e-9;
     const double fall = 2000.0 * 1e-3 + 1e-9;
     const double age = std::max(t_ - fresh_at_, t_ - fresh_stamp_);
-    const bool allowed = any_frame_ && age <= 0.5 && device_.hand.present && !device_.hand.clutched;
+    const bool allowed =
+        any_frame_ && age <= 0.5 && device_.hand.present && !device_.hand.clutched && !latched_;
     const double elapsed = std::isfinite(since_last) ? std::max(since_last, 0.0) : 0.0;
     heat_ += -std::expm1(-elapsed / 20.0) * (last_.squaredNorm() - heat_);
 
@@ -231,6 +240,8 @@ class Adversary {
     if (length - last_.norm() > rise) broken = "a force that rises too fast";
     if ((force - last_).norm() > rise + fall) broken = "a force that changes too fast";
     if (heat_ > 0.88 * 0.88 * 1.001) broken = "more force than the motors bear for long";
+    if ((last_safety_ & frame_late) != 0 && length > last_.norm())
+      broken = "a force that grows while a frame is late";
     // 3.3 N are gone in two milliseconds of time; ticks without time take none off.
     idle_time_ = allowed ? 0.0 : idle_time_ + std::max(credit, 0.0);
     if (!allowed && idle_time_ > 3e-3 && length > 0.0)
@@ -260,6 +271,8 @@ class Adversary {
   double t_ = 100.0, next_frame_ = 0.0, stuck_ = 100.0;
   std::size_t cloud_ = 0;
   double last_given_ = 100.0;  // [s] the time that a cycle was told last, if it was one
+  bool latched_ = false;
+  std::uint32_t last_safety_ = 0;
   bool any_frame_ = false;
   double last_stamp_ = 0.0, fresh_at_ = 0.0, fresh_stamp_ = 0.0;
   std::uint64_t ticks_ = 0, forceful_ticks_ = 0, last_forceful_ = 0;

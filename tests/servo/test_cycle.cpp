@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -90,7 +93,7 @@ TEST(Cycle, UsesAFrameInTheFirstCycleAfterItWasPut) {
   const ServoTick record = session.run();
   EXPECT_EQ(record.frame_number, 2U) << "and of two, the newer";
   EXPECT_EQ(record.tick.frame, 0);
-  EXPECT_NEAR(record.frame_age, 0.5 * ms, 1e-9);
+  EXPECT_NEAR(record.frame_age, ms, 1e-9) << "since it arrived, whatever its stamp";
   EXPECT_EQ(session.cycle.statistics().frames_adopted, 1U);
   EXPECT_EQ(session.cycle.statistics().frames_dropped, 1U);
   EXPECT_LE(session.cycle.statistics().hand_over.max(), 1'000'001U);
@@ -181,6 +184,132 @@ TEST(Cycle, TakesTheForceOffWhenTheCameraRepeatsItselfOrStandsStill) {
   EXPECT_GT(force_after(0.6, [](Session& s, const auto& cloud,
                                 double) { s.cycle.put_frame(cloud, s.t, s.t); }),
             0.5);
+}
+
+// A session with two cameras that show the same plane, each at 30 Hz.
+struct TwoCameras : Session {
+  void run_for(double seconds, bool second_lives) {
+    for (int i = 0; i < std::lround(seconds / ms); ++i) {
+      if (t >= next_frame) {
+        frames[0].stamp = t;
+        if (second_lives) frames[1].stamp = t + 1e-6;
+        cycle.put_frame(plane_at(0.0), t, frames, t);
+        next_frame = t + 1.0 / 30.0;
+      }
+      cycle.run({.t = t += ms});
+      EXPECT_TRUE(reader.try_pop(record));
+    }
+  }
+  std::array<CameraFrame, 2> frames{CameraFrame{.camera = 0}, CameraFrame{.camera = 1}};
+  ServoTick record{};
+};
+
+TEST(Cycle, TakesTheForceOffWhenOneOfTwoCamerasDies) {
+  TwoCameras session;
+  session.cloud = nullptr;
+  session.run_for(2.0, true);
+  for (int i = 0; i < 420; ++i) {
+    session.device.hand.position.z() -= 5e-5;
+    session.run_for(ms, true);
+  }
+  EXPECT_GT(session.device.force.z(), 0.5);
+  EXPECT_EQ(session.record.safety, 0U);
+  session.run_for(0.099, false);
+  EXPECT_GT(session.device.force.z(), 0.5);
+  session.run_for(0.42, false);
+  EXPECT_EQ(session.device.force.norm(), 0.0);
+  EXPECT_TRUE(session.record.safety & frame_lost);
+  EXPECT_GT(session.record.frame_age, 0.5);
+}
+
+TEST(Cycle, RefusesFramesOfNoCameraOrOfTooMany) {
+  Session session;
+  const std::vector<CameraFrame> many(Freshness::max_cameras + 1);
+  EXPECT_THROW(session.cycle.put_frame(session.cloud, 1.0, many, 1.0), Error);
+  EXPECT_THROW(session.cycle.put_frame(session.cloud, 1.0, {many.data(), 0}, 1.0), Error);
+  const CameraFrame beyond{.camera = Freshness::max_cameras, .stamp = 1.0};
+  EXPECT_THROW(session.cycle.put_frame(session.cloud, 1.0, {&beyond, 1}, 1.0), Error);
+}
+
+TEST(Cycle, CountsAFramesAgeFromWhenItWasPutAndNotFromWhenItWasTaken) {
+  Session session;
+  session.cloud = nullptr;
+  session.run();
+  session.cycle.put_frame(plane_at(0.0), session.t + 0.03, session.t);
+  EXPECT_NEAR(session.run(0.1).frame_age, 0.1, 1e-9);
+  session.cycle.put_frame(plane_at(0.0), session.t - 0.01, session.t + 1e6);
+  EXPECT_NEAR(session.run().frame_age, 0.011, 1e-9) << "put on another clock: counts from now";
+}
+
+TEST(Cycle, AdoptsTheToleranceOfFutureStampsWithTheSettings) {
+  const auto force_with = [](double tolerance) {
+    ServoSettings settings;
+    settings.safety.future_tolerance = tolerance;
+    Session session;
+    session.cycle.set_settings(settings);
+    session.run_for(2.0);
+    session.press_to(-0.001);
+    session.cloud = nullptr;
+    for (int i = 0; i < 600; ++i) {
+      if (i % 33 == 0) session.cycle.put_frame(plane_at(0.0), session.t + 0.2, session.t);
+      session.run();
+    }
+    return session.device.force.norm();
+  };
+  EXPECT_EQ(force_with(0.19), 0.0);
+  EXPECT_GT(force_with(0.21), 0.5);
+}
+
+TEST(Cycle, LatchesRepeatedFaultsUntilTheyAreReset) {
+  Session session;
+  session.run_for(2.0);
+  for (int i = 0; i < 3; ++i) {
+    session.device.hand.position.x() = std::numeric_limits<double>::quiet_NaN();
+    session.run();
+    session.device.hand.position.x() = 0.0;
+    session.run_for(0.1);
+  }
+  EXPECT_EQ(session.cycle.statistics().latched_by, std::uint32_t{input_refused});
+  EXPECT_EQ(session.run_for(3.0).safety, fault_latched | disengaged);
+  session.cycle.reset_faults();
+  session.run_for(2.0);
+  EXPECT_EQ(session.cycle.statistics().latched_by, 0U);
+  EXPECT_GT(session.press_to(-0.001).force.z(), 0.5);
+}
+
+TEST(Cycle, SaysHowWarmTheMotorsAre) {
+  Session session;
+  session.run_for(1.0);
+  EXPECT_NEAR(session.cycle.statistics().heat, std::exp(-1.0 / 20.0), 1e-3);
+}
+
+// What real methods do may never be taken for a fault: a plane that moves by up to 20 mm at 1 Hz,
+// with noise of its own in each frame, under a hand that presses, slides and lifts.
+TEST(Cycle, FindsNoFaultInTheDirectionsOfHonestContacts) {
+  std::uint64_t forceful = 0;
+  for (int run = 0; run < 24; ++run) {
+    std::mt19937_64 random(static_cast<std::uint64_t>(run));
+    std::normal_distribution<double> noise(0.0, 0.5e-3 * (run % 4));
+    Session session;
+    session.cloud = nullptr;
+    ServoTick record{};
+    for (int i = 0; i < 4000; ++i) {
+      const double z = 0.01 * std::sin(2.0 * std::numbers::pi * (run % 3) * 0.5 * i * ms);
+      if (i % 33 == 0) {
+        std::vector<Vec3> points = flat_grid(z, 1.5e-3, 30);
+        for (Vec3& point : points) point.z() += noise(random);
+        session.cycle.put_frame(std::make_shared<PointCloud>(points, Vec3(0, 0, 1)), session.t,
+                                session.t);
+      }
+      session.device.hand.position = {0.02 * std::sin(2.0 * i * ms), 0,
+                                      0.004 + z + 0.006 * std::cos(3.0 * i * ms)};
+      if (i < 1000) session.device.hand.position.z() += 0.02;
+      record = session.run();
+      ASSERT_EQ(record.safety & direction_refused, 0U) << "run " << run << ", tick " << i;
+      if (record.force.norm() > 0.2) ++forceful;
+    }
+  }
+  EXPECT_GT(forceful, 10'000U) << "nothing was at stake";
 }
 
 TEST(Cycle, SeatsTheProxyOnTheFreeSideAfterAStall) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -28,7 +29,7 @@ constexpr std::uint32_t all = SafetyChain::all_links;
 // about and looks at what the device gets.
 struct Session {
   explicit Session(std::uint32_t links = all, const DeviceLimits& device = {},
-                   const SafetyParameters& parameters = {})
+                   const SafetyParameters& parameters = {.initial_heat = 0.0})
       : chain(device, parameters, links) {}
 
   SafetyOutput run(double newtons, double dt = ms) {
@@ -56,7 +57,7 @@ struct Session {
                     .position = Vec3::Zero(),
                     .hand = true,
                     .frame_age = 0.01,
-                    .frame_interval = 1.0 / 30.0};
+                    .frame_intervals = 0.3};
 };
 
 // The session behind the gate, with some links left out.
@@ -138,10 +139,135 @@ TEST(SafetyChain, TellsAPushFromAPullByTheProxyWhereThereIsNoNormal) {
   EXPECT_EQ(session.run_for(0.02, 0.5).force.z(), 0.0) << "neither is known: no force";
 }
 
+TEST(SafetyChain, LetsNoForceActAwayFromTheProxyWhateverTheNormalSays) {
+  // The normal leans by 80 degrees from the direction to the proxy, and the force pulls along it.
+  Session session = engaged_without(0);
+  session.input.normal = {std::sin(1.4), 0, std::cos(1.4)};
+  session.input.force = {0.6, 0, -0.3};
+  SafetyOutput output{};
+  for (int i = 0; i < 20; ++i) {
+    session.input.t += ms;
+    output = session.chain.run(session.input);
+  }
+  EXPECT_NEAR(output.force.z(), 0.0, 1e-12);
+  EXPECT_NEAR(output.force.x(), 0.6, 1e-12);
+  EXPECT_TRUE(output.flags & pull_removed);
+}
+
+TEST(SafetyChain, RefusesANormalThatContradictsTheDirectionToTheProxy) {
+  const auto flipped = [](std::uint32_t links, double newtons, double lever) {
+    Session session = engaged_without(links | fault_latched);
+    session.run_for(0.1, 0.8);
+    session.input.normal = {0, 0, -1};
+    session.input.proxy = session.input.hip + Vec3(0, 0, lever);
+    SafetyOutput output{};
+    for (int i = 0; i < 20; ++i) {
+      session.input.t += ms;
+      session.input.force = {0, 0, newtons};
+      output = session.chain.run(session.input);
+    }
+    return output;
+  };
+  const SafetyOutput refused = flipped(0, -0.5, 0.015);
+  EXPECT_EQ(refused.force.norm(), 0.0);
+  EXPECT_TRUE(refused.flags & direction_refused);
+  EXPECT_FALSE(flipped(direction_refused, -0.5, 0.015).flags & direction_refused);
+  EXPECT_FALSE(flipped(0, -0.04, 0.015).flags & direction_refused) << "a force of no weight";
+  EXPECT_FALSE(flipped(0, -0.5, 0.0009).flags & direction_refused) << "a proxy beside the HIP";
+
+  Session session = engaged_without(0);
+  session.run_for(0.1, 0.8);
+  session.input.normal.z() = -1.0;
+  EXPECT_TRUE(session.run(0.8).flags & direction_refused);
+  session.input.normal.z() = 1.0;
+  EXPECT_EQ(session.run_for(1.0, 0.8).force.norm(), 0.0) << "and the hand has to engage anew";
+}
+
+TEST(SafetyChain, EngagesAnewAfterAFault) {
+  Session session = engaged_without(0, never_hot);
+  session.run_for(0.1, 2.0);
+  session.input.proxy.x() = nan;
+  EXPECT_TRUE(session.run(2.0).flags & input_refused);
+  session.input.proxy.x() = 0.0;
+  const SafetyOutput pressed = session.run_for(1.0, 2.0);
+  EXPECT_EQ(pressed.force.norm(), 0.0) << "still pressed into the wall";
+  EXPECT_EQ(pressed.flags, std::uint32_t{disengaged});
+  session.run_for(0.02, 0.0);
+  EXPECT_NEAR(session.run_for(2.0, 2.0).force.norm(), 2.0, 1e-9);
+}
+
+TEST(SafetyChain, CountsQuietTicksAnewAfterAFault) {
+  Session session(all, never_hot);
+  for (int i = 0; i < 9; ++i) session.run(0.0);
+  session.input.hip.x() = nan;
+  session.run(0.0);
+  session.input.hip.x() = 0.0;
+  for (int i = 0; i < 9; ++i) EXPECT_TRUE(session.run(0.0).flags & disengaged);
+  EXPECT_FALSE(session.run(0.0).flags & disengaged);
+}
+
+// One tick in `period` is not finite.
+void stumble(Session& session, int times, double period) {
+  for (int i = 0; i < times; ++i) {
+    session.input.hip.x() = nan;
+    session.run(0.0);
+    session.input.hip.x() = 0.0;
+    session.run_for(period - ms, 0.0);
+  }
+}
+
+TEST(SafetyChain, LatchesRepeatedFaultsUntilAnOperatorResetsIt) {
+  Session session = engaged_without(0, never_hot);
+  stumble(session, 2, 0.5);
+  EXPECT_EQ(session.chain.latched_by(), 0U);
+  stumble(session, 1, 0.5);
+  EXPECT_EQ(session.chain.latched_by(), std::uint32_t{input_refused});
+  const SafetyOutput output = session.run_for(20.0, 1.0);
+  EXPECT_EQ(output.force.norm(), 0.0);
+  EXPECT_EQ(output.flags, fault_latched | disengaged);
+  session.chain.reset();
+  EXPECT_EQ(session.chain.latched_by(), 0U);
+  EXPECT_EQ(session.run_for(1.0, 1.0).force.norm(), 0.0) << "the gate is still to be passed";
+  session.run_for(0.02, 0.0);
+  EXPECT_NEAR(session.run_for(2.0, 1.0).force.norm(), 1.0, 1e-9);
+  stumble(session, 2, 0.5);
+  EXPECT_EQ(session.chain.latched_by(), 0U) << "faults before the reset are forgotten";
+}
+
+TEST(SafetyChain, LatchesForEveryKindOfFaultAndNotForRareOrLongOnes) {
+  Session rare = engaged_without(0, never_hot);
+  stumble(rare, 20, 1.01);
+  EXPECT_EQ(rare.chain.latched_by(), 0U) << "three in 2.02 s";
+  stumble(rare, 1, 0.9);
+  stumble(rare, 1, 0.5);
+  EXPECT_NE(rare.chain.latched_by(), 0U);
+
+  Session lasting = engaged_without(0, never_hot);
+  lasting.input.hip.x() = nan;
+  lasting.run_for(5.0, 0.0);
+  EXPECT_EQ(lasting.chain.latched_by(), 0U) << "one fault, however long";
+
+  Session mixed = engaged_without(0, never_hot);
+  stumble(mixed, 2, 0.1);
+  mixed.input.normal.z() = -1.0;
+  const SafetyOutput third = mixed.run(0.5);
+  EXPECT_EQ(third.flags, direction_refused | fault_latched);
+  EXPECT_EQ(mixed.chain.latched_by(), input_refused | direction_refused);
+
+  Session once(all, never_hot, {.fault_count = 1.0});
+  stumble(once.engage(), 1, 0.1);
+  EXPECT_NE(once.chain.latched_by(), 0U);
+
+  Session without = engaged_without(fault_latched, never_hot);
+  stumble(without, 10, 0.1);
+  EXPECT_EQ(without.chain.latched_by(), 0U);
+}
+
 TEST(SafetyChain, CutsTheForceToTheLowerOfTheDevicesAndTheUsersLimit) {
   EXPECT_NEAR(engaged_without(0, never_hot).run_for(0.1, 10.0).force.norm(), 3.3, 1e-9);
   EXPECT_NEAR(engaged_without(force_cut, never_hot).run_for(0.1, 10.0).force.norm(), 10.0, 1e-9);
-  Session user(all, {.max_force = 20.0, .continuous_force = 20.0}, {.max_force = 2.0});
+  Session user(all, {.max_force = 20.0, .continuous_force = 20.0},
+               {.max_force = 2.0, .initial_heat = 0.0});
   EXPECT_NEAR(user.engage().run_for(0.1, 10.0).force.norm(), 2.0, 1e-9);
 }
 
@@ -165,6 +291,35 @@ TEST(SafetyChain, ComesDownToTheContinuousForceBeforeTheMotorsAreHot) {
   EXPECT_NEAR(last, 0.88, 0.01);
   EXPECT_LE(hottest, 0.88 * 1.001);
   EXPECT_NEAR(press(continuous_cut).first, 3.3, 1e-9);
+}
+
+TEST(SafetyChain, TakesTheMotorsForWarmAtTheStartUnlessToldOtherwise) {
+  const auto pressed_after = [](double seconds, const SafetyParameters& parameters) {
+    Session session(all, {}, parameters);
+    session.run_for(seconds, 0.0);
+    return session.run_for(0.02, 3.3).force.norm();
+  };
+  SafetyParameters quick;
+  quick.ramp_time = 0.01;
+  EXPECT_NEAR(pressed_after(0.02, quick), 0.88, 0.05);
+  EXPECT_NEAR(pressed_after(20.0 * std::log(1.0 / 0.8) + 0.5, quick), 3.3, 1e-9);
+  quick.initial_heat = 0.0;
+  EXPECT_NEAR(pressed_after(0.02, quick), 3.3, 1e-9);
+
+  // A session that goes on from the heat of the one before allows what that would have allowed.
+  Session before(all, {}, quick);
+  before.engage().run_for(1.2, 3.3);
+  EXPECT_NEAR(before.chain.heat(), 10.89 / 0.7744 * (1.0 - std::exp(-1.2 / 20.0)), 0.02);
+  quick.initial_heat = before.chain.heat();
+  Session after(all, {}, quick);
+  EXPECT_EQ(after.chain.heat(), quick.initial_heat);
+}
+
+TEST(SafetyChain, DoesNotTakeAGapOfTheClockForCooling) {
+  Session session(all, {}, {.initial_heat = 1.0});
+  session.run(0.0);
+  session.run(0.0, 3600.0);
+  EXPECT_GT(session.chain.heat(), 0.999);
 }
 
 TEST(SafetyChain, RisesNoFasterThanItsSlewLimitAndFallsFaster) {
@@ -259,14 +414,54 @@ TEST(SafetyChain, LetsGoOfAHandThatIsGoneAndEngagesAnewWhenItIsBack) {
 TEST(SafetyChain, LetsTheForceOnlyFallOnceAFrameIsLate) {
   const auto extrapolated = [](std::uint32_t links) {
     Session session = engaged_without(links, never_hot);
-    session.input.frame_interval = 0.01;
     session.run_for(0.1, 1.0);
-    session.input.frame_age = 0.05;
+    session.input.frame_intervals = 3.1;
     EXPECT_NEAR(session.run_for(0.01, 0.9).force.z(), 0.9, 1e-9);
     return session.run_for(0.01, 2.0).force.z();
   };
-  EXPECT_NEAR(extrapolated(0), 1.0, 1e-9);
+  EXPECT_NEAR(extrapolated(0), 0.9, 1e-9);
   EXPECT_NEAR(extrapolated(frame_late), 2.0, 1e-9);
+}
+
+TEST(SafetyChain, CallsAFrameLateAfterThreeIntervalsAndNotBefore) {
+  Session session = engaged_without(0);
+  session.input.frame_intervals = 3.0;
+  EXPECT_EQ(session.run(0.5).flags, 0U);
+  session.input.frame_intervals = std::nextafter(3.0, 4.0);
+  EXPECT_EQ(session.run(0.5).flags, std::uint32_t{frame_late});
+  for (const double none : {nan, inf}) {
+    session.input.frame_intervals = none;
+    EXPECT_TRUE(session.run(0.5).flags & frame_late);
+  }
+}
+
+// Whatever is asked, from whatever force and in the midst of a ramp: the cap is what was sent.
+TEST(SafetyChain, NeverSendsMoreThanTheTickBeforeWhileAFrameIsLate) {
+  std::mt19937_64 random(5);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  double most_risen = -inf;
+  double strongest = 0.0;
+  for (int run = 0; run < 200; ++run) {
+    SafetyParameters parameters{.initial_heat = 0.0};
+    if (run % 2 == 1) parameters.rise_rate = 1e4, parameters.fall_rate = 500.0;
+    Session session(all & ~pull_removed, never_hot, parameters);
+    session.run_for(0.02, 0.0);
+    session.run_for(uniform(0.0, 2.0), uniform(0.0, 3.3));
+    session.input.frame_intervals = uniform(3.1, 10.0);
+    double last = session.run(1.0).force.norm();
+    for (int i = 0; i < 200; ++i) {
+      session.input.t += ms;
+      session.input.force = {uniform(-1, 1), uniform(-1, 1), uniform(0.0, 5.0)};
+      const double force = session.chain.run(session.input).force.norm();
+      most_risen = std::max(most_risen, force - last);
+      last = force;
+      strongest = std::max(strongest, force);
+    }
+  }
+  EXPECT_LE(most_risen, 0.0);
+  EXPECT_GT(strongest, 1.0) << "nothing was at stake";
 }
 
 TEST(SafetyChain, FadesTheForceAsTheFrameGrowsOld) {
@@ -374,7 +569,7 @@ TEST(SafetyChain, KeepsItsPromisesForAnyInput) {
   };
   double strongest = 0.0;
   for (int run = 0; run < 20; ++run) {
-    Session session(all, {}, {.ramp_time = 0.02});
+    Session session(all, {}, {.initial_heat = 0.0, .ramp_time = 0.02});
     SafetyInput& input = session.input;
     Vec3 last = Vec3::Zero();
     for (int i = 0; i < 5000; ++i) {
@@ -390,7 +585,7 @@ TEST(SafetyChain, KeepsItsPromisesForAnyInput) {
                       .position = wild ? vector(0.1) : Vec3(0, 0, 0),
                       .hand = random() % 200 != 0,
                       .frame_age = random() % 20 == 0 ? uniform(-1.0, 1.0) : 0.01,
-                      .frame_interval = random() % 20 == 0 ? nan : 0.03};
+                      .frame_intervals = random() % 20 == 0 ? nan : 0.3};
       if (i % 1000 < 300) now = input, now.t = t, now.force = Vec3::Zero();  // let it engage
       const SafetyOutput output = session.chain.run(now);
       input.t = t;
@@ -418,6 +613,13 @@ TEST(SafetyParameters, HaveATableThatKnowsEveryOneAndItsDefault) {
   EXPECT_EQ(names.size() * sizeof(double), sizeof(SafetyParameters));
   EXPECT_NO_THROW(validate(defaults));
   EXPECT_EQ(safety_flag_names().size(), safety_flag_count);
+  std::set<std::string_view> flags;
+  for (std::size_t i = 0; i < safety_flag_count; ++i) {
+    EXPECT_TRUE(flags.insert(safety_flag_names()[i]).second) << safety_flag_names()[i];
+    EXPECT_GT(safety_flag_meanings()[i].size(), 20U) << safety_flag_names()[i];
+  }
+  EXPECT_EQ(safety_flag_names()[std::countr_zero(unsigned{frame_late})], "frame_late");
+  EXPECT_EQ(safety_flag_names()[std::countr_zero(unsigned{fault_latched})], "fault_latched");
 }
 
 TEST(SafetyParameters, AreRefusedByNameAndRange) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/pose.hpp"
 #include "palpate/core/vectorise.hpp"
 
 namespace palpate {
@@ -361,14 +362,7 @@ DepthImage::DepthImage(std::shared_ptr<const ViewingRays> rays, std::vector<std:
     throw Error("depth image", "units per metre must be positive",
                 "give 1000 for millimetres or 5000 for the TUM benchmark");
   }
-  const Eigen::Matrix3d rotation = world_from_camera_.linear();
-  const bool rigid = world_from_camera_.matrix().allFinite() &&
-                     (rotation * rotation.transpose()).isIdentity(1e-6) &&
-                     rotation.determinant() > 0.0;
-  if (!rigid) {
-    throw Error("camera pose", "it is not a rotation and a translation",
-                "give a right-handed rigid transform, with a quaternion of length 1");
-  }
+  check_rigid(world_from_camera_, "camera pose");
 }
 
 void DepthImage::gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept {

@@ -4,18 +4,12 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/pose.hpp"
 
 namespace palpate {
 
 void validate(const Placement& placement) {
-  const Eigen::Matrix3d rotation = placement.world_from_device.linear();
-  const bool rigid = placement.world_from_device.matrix().allFinite() &&
-                     (rotation * rotation.transpose()).isIdentity(1e-6) &&
-                     rotation.determinant() > 0.0;
-  if (!rigid) {
-    throw Error("world_from_device", "it is not a rotation and a translation",
-                "give a right-handed rigid transform, with a quaternion of length 1");
-  }
+  check_rigid(placement.world_from_device, "world_from_device");
   if (!(placement.workspace_scale >= 1e-3 && placement.workspace_scale <= 1e3)) {
     throw Error("workspace_scale", std::to_string(placement.workspace_scale) + " is out of range",
                 "give scene metres per device metre, from 0.001 to 1000");

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/pose.hpp"
 #include "palpate/sources/point_file_detail.hpp"
 
 namespace palpate {
@@ -81,12 +82,10 @@ Eigen::Isometry3d parse_matrix(const json& rows, const std::string& where) {
     }
   }
   if (!numbers) throw Error(where, "is not a matrix of 4x4 numbers", remedy);
-  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
-  if (!matrix.allFinite() || !(rotation * rotation.transpose()).isIdentity(1e-3) ||
-      rotation.determinant() < 0.0 || matrix.row(3) != Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0)) {
-    throw Error(where, "is not a rigid transform", remedy);
-  }
-  return pose(Eigen::Quaterniond(rotation).normalized(), matrix.topRightCorner<3, 1>());
+  constexpr double rounding = 1e-3;  // of matrices written with few digits
+  const Eigen::Isometry3d as_written(matrix);
+  if (!is_rigid(as_written, rounding)) throw Error(where, "is not a rigid transform", remedy);
+  return pose(Eigen::Quaterniond(as_written.linear()).normalized(), as_written.translation());
 }
 
 }  // namespace

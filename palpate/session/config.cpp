@@ -1,0 +1,436 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/session/config.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <span>
+#include <sstream>
+
+#define TOML_ENABLE_FORMATTERS 0
+#include <toml++/toml.h>
+
+#include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
+#include "palpate/core/pose.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double lowest_rate = 100.0;  // [Hz]
+constexpr double highest_rate = 1e5;
+constexpr std::size_t largest_file = 1 << 20;  // [bytes]
+constexpr const char* pose_remedy =
+    "write [x, y, z, qx, qy, qz, qw]: metres and a quaternion of length 1";
+
+std::string at_line(const std::string& file, toml::source_index line) {
+  return line > 0 ? file + ":" + std::to_string(line) : file;
+}
+
+// A table of the file, with the name by which messages call it.
+class Table {
+ public:
+  Table(const toml::table& table, std::string file, std::string title,
+        std::span<const std::string_view> keys)
+      : table_(table), file_(std::move(file)), title_(std::move(title)) {
+    for (const auto& [key, value] : table_) {
+      if (std::find(keys.begin(), keys.end(), key.str()) != keys.end()) continue;
+      const std::string_view near = nearest_name(key.str(), keys);
+      std::string known;
+      for (const std::string_view name : keys)
+        known += (known.empty() ? "" : ", ") + std::string(name);
+      throw Error(at_line(file_, key.source().begin.line),
+                  "there is no setting '" + std::string(key.str()) + "'" +
+                      (title_.empty() ? "" : " in " + title_),
+                  (near.empty() ? "" : "did you mean '" + std::string(near) + "'? ") +
+                      "known here: " + known);
+    }
+  }
+
+  [[nodiscard]] const toml::node* find(std::string_view key) const { return table_.get(key); }
+
+  [[noreturn]] void fail(const toml::node& node, const std::string& what,
+                         const std::string& remedy) const {
+    throw Error(at_line(file_, node.source().begin.line), what, remedy);
+  }
+
+  void read(std::string_view key, std::string& value) const {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    if (!node->is_string()) fail(*node, quoted(key) + " is not a text", "write it in quotes");
+    value = **node->as_string();
+  }
+
+  void read(std::string_view key, bool& value) const {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    if (!node->is_boolean())
+      fail(*node, quoted(key) + " is not true or false", "write one of them");
+    value = **node->as_boolean();
+  }
+
+  // Whole numbers only if `whole`.
+  void read(std::string_view key, double& value, double min, double max, std::string_view unit,
+            bool whole = false) const {
+    const toml::node* node = find(key);
+    if (node == nullptr) return;
+    const double number = number_of(*node, quoted(key));
+    if (!(number >= min && number <= max) || (whole && std::floor(number) != number)) {
+      fail(*node, quoted(key) + ": " + shortest(number) + " is out of range",
+           std::string("give a ") + (whole ? "whole number" : "value") + " from " + shortest(min) +
+               " to " + shortest(max) + (unit.empty() ? "" : " " + std::string(unit)));
+    }
+    value = number;
+  }
+
+  [[nodiscard]] double number_of(const toml::node& node, const std::string& what) const {
+    const auto number = node.value<double>();
+    if (!number || !node.is_number()) fail(node, what + " is not a number", "write it as 1.0");
+    return *number;
+  }
+
+  [[nodiscard]] std::optional<Eigen::Isometry3d> pose(std::string_view key) const {
+    const toml::node* node = find(key);
+    if (node == nullptr) return std::nullopt;
+    std::string text;
+    if (const toml::array* array = node->as_array()) {
+      for (const toml::node& element : *array)
+        text += shortest(number_of(element, "an element of " + quoted(key))) + " ";
+    } else if (node->is_string()) {
+      text = **node->as_string();
+    } else {
+      fail(*node, quoted(key) + " is no pose", pose_remedy);
+    }
+    return parse_pose(text, at_line(file_, node->source().begin.line) + ": " + quoted(key));
+  }
+
+  // Null if there is none. @throws Error if the key is there and is not a table.
+  [[nodiscard]] const toml::table* sub(std::string_view key) const {
+    const toml::node* node = find(key);
+    if (node != nullptr && !node->is_table())
+      fail(*node, quoted(key) + " is not a table", "write [" + std::string(key) + "]");
+    return node == nullptr ? nullptr : node->as_table();
+  }
+
+  [[nodiscard]] static std::string quoted(std::string_view key) {
+    return "'" + std::string(key) + "'";
+  }
+  [[nodiscard]] const std::string& file() const { return file_; }
+
+ private:
+  const toml::table& table_;
+  std::string file_, title_;
+};
+
+CameraConfig read_camera(const Table& root, const toml::node& node) {
+  CameraConfig camera;
+  if (node.is_string()) {
+    camera.uri = **node.as_string();
+    return camera;
+  }
+  if (!node.is_table()) root.fail(node, "a camera is not a table", "write [[camera]] and a uri");
+  constexpr std::array<std::string_view, 3> keys{"uri", "name", "world_from_camera"};
+  const Table table(*node.as_table(), root.file(), "[[camera]]", keys);
+  table.read("uri", camera.uri);
+  if (camera.uri.empty()) root.fail(node, "a camera has no 'uri'", "write uri = \"SCHEME:PATH\"");
+  table.read("name", camera.name);
+  camera.world_from_camera = table.pose("world_from_camera");
+  return camera;
+}
+
+std::vector<CameraConfig> read_cameras(const Table& root, const toml::node& node) {
+  std::vector<CameraConfig> cameras;
+  if (const toml::array* array = node.as_array()) {
+    for (const toml::node& element : *array) cameras.push_back(read_camera(root, element));
+  } else {
+    cameras.push_back(read_camera(root, node));
+  }
+  if (cameras.empty()) root.fail(node, "there is no camera in the list", "name at least one");
+  return cameras;
+}
+
+// [parameters] or [safety]: the rows of `rows`, set in the table's order, in which a derived
+// parameter comes before what it is derived from.
+template <class Rows, class Values>
+void read_rows(const Table& root, std::string_view key, const Rows& rows, Values& values) {
+  const toml::table* table = root.sub(key);
+  if (table == nullptr) return;
+  std::vector<std::string_view> names;
+  for (const auto& row : rows) names.push_back(row.name);
+  const Table known(*table, root.file(), "[" + std::string(key) + "]", names);
+  for (const auto& row : rows) {
+    const toml::node* node = known.find(row.name);
+    if (node == nullptr) continue;
+    const double number = known.number_of(*node, Table::quoted(row.name));
+    try {
+      set_parameter(values, row.name, number);
+    } catch (const Error& error) {
+      throw Error(at_line(root.file(), node->source().begin.line), error.what());
+    }
+  }
+}
+
+void read_placement(const Table& root, Placement& placement) {
+  const toml::table* sub = root.sub("placement");
+  if (sub == nullptr) return;
+  constexpr std::array<std::string_view, 3> keys{"world_from_device", "scale", "clutch_button"};
+  const Table table(*sub, root.file(), "[placement]", keys);
+  if (const auto pose = table.pose("world_from_device")) placement.world_from_device = *pose;
+  table.read("scale", placement.workspace_scale, 1e-3, 1e3, "scene m per device m");
+  double button = -1.0;
+  table.read("clutch_button", button, 0.0, 31.0, "", true);
+  if (button >= 0.0) placement.clutch_button = static_cast<int>(button);
+}
+
+void read_server(const Table& root, ServerConfig& server) {
+  const toml::table* sub = root.sub("server");
+  if (sub == nullptr) return;
+  constexpr std::array<std::string_view, 4> keys{"listen", "port", "token", "browser"};
+  const Table table(*sub, root.file(), "[server]", keys);
+  table.read("listen", server.listen);
+  table.read("token", server.token);
+  table.read("browser", server.browser);
+  double port = -1.0;
+  table.read("port", port, 0.0, 65535.0, "", true);
+  if (port >= 0.0) server.port = static_cast<std::uint16_t>(port);
+}
+
+toml::table parsed(std::string_view text, const std::string& name) {
+  try {
+    return toml::parse(text);
+  } catch (const toml::parse_error& error) {
+    throw Error(at_line(name, error.source().begin.line), std::string(error.description()),
+                "write it in TOML; docs/session.md has an example");
+  }
+}
+
+std::string toml_text(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      constexpr std::string_view digits = "0123456789abcdef";
+      const auto byte = static_cast<unsigned char>(c);
+      quoted += std::string("\\u00") + digits[byte >> 4U] + digits[byte & 15U];
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + '"';
+}
+
+std::string toml_number(double value) {
+  std::string text = shortest(value);
+  if (text.find_first_of(".eni") == std::string::npos) text += ".0";
+  return text;
+}
+
+std::string toml_pose(const Eigen::Isometry3d& pose) {
+  return "[" + pose_text(pose) + "]";
+}
+
+template <class Row>
+std::string row_line(const Row& row, double value) {
+  std::string line = std::string(row.name) + " = " + toml_number(value);
+  line.resize(std::max<std::size_t>(line.size(), 28), ' ');
+  const std::string unit = row.unit == "-" ? "" : std::string(row.unit) + ", ";
+  return line + "  # " + unit + shortest(row.min) + " to " + shortest(row.max) + ": " +
+         std::string(row.meaning) + "\n";
+}
+
+// A key with a comment behind it.
+std::string key_line(const std::string& key, const std::string& value, const std::string& comment) {
+  return key + " = " + value + "  # " + comment + "\n";
+}
+
+std::vector<std::string> lines_of(std::string_view text) {
+  std::vector<std::string> lines;
+  while (!text.empty()) {
+    const std::size_t end = text.find('\n');
+    lines.emplace_back(text.substr(0, end));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  }
+  return lines;
+}
+
+// Sets a key of [placement] in `lines`, whose TOML is `root`.
+void edit(std::vector<std::string>& lines, const toml::table& root, const std::string& name,
+          std::string_view key, const std::string& value) {
+  const toml::table* placement = root["placement"].as_table();
+  const std::string assignment = std::string(key) + " = " + value;
+  if (placement == nullptr) {
+    if (!lines.empty() && !lines.back().empty()) lines.emplace_back();
+    lines.insert(lines.end(), {"[placement]", assignment});
+    return;
+  }
+  const std::size_t table_line = placement->source().begin.line;
+  if (placement->is_inline()) {
+    throw Error(at_line(name, placement->source().begin.line),
+                "an inline table cannot be edited by a program",
+                "write [placement] on a line of its own, and each key on one below it");
+  }
+  const toml::node* node = placement->get(key);
+  if (node == nullptr) {
+    // Behind the table's header; of `placement.scale = 1` there is none.
+    const std::string& header = lines[table_line - 1];
+    const bool dotted = header.find_first_not_of(" \t") != header.find('[');
+    lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(table_line),
+                 dotted ? "placement." + assignment : assignment);
+    return;
+  }
+  // The value may go over several lines; a comment behind it is kept.
+  const toml::source_region& at = node->source();
+  const std::string& first = lines[at.begin.line - 1];
+  const std::string& last = lines[at.end.line - 1];
+  const std::size_t equals = first.find('=');
+  const std::size_t comment = last.find('#', std::min<std::size_t>(at.end.column - 1, last.size()));
+  const std::string edited = first.substr(0, equals + 1) + " " + value +
+                             (comment == std::string::npos ? "" : "  " + last.substr(comment));
+  const auto begin = lines.begin() + static_cast<std::ptrdiff_t>(at.begin.line - 1);
+  lines.erase(begin + 1, lines.begin() + static_cast<std::ptrdiff_t>(at.end.line));
+  *begin = edited;
+}
+
+std::string joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += line + "\n";
+  return text;
+}
+
+}  // namespace
+
+SessionConfig parse_session_config(std::string_view text, const std::string& name,
+                                   const SessionConfig& base, const MethodCheck& check_method) {
+  const toml::table tree = parsed(text, name);
+  constexpr std::array<std::string_view, 9> keys{"camera", "device", "placement",
+                                                 "rate",   "method", "parameters",
+                                                 "safety", "record", "server"};
+  const Table root(tree, name, "", keys);
+  SessionConfig config = base;
+  if (const toml::node* cameras = root.find("camera"))
+    config.cameras = read_cameras(root, *cameras);
+  root.read("device", config.device);
+  root.read("rate", config.rate, lowest_rate, highest_rate, "Hz");
+  root.read("method", config.method);
+  root.read("record", config.record);
+  const auto with_line = [&](const toml::node* node, const auto& action) {
+    try {
+      action();
+    } catch (const Error& error) {
+      if (node == nullptr) throw;
+      throw Error(at_line(name, node->source().begin.line), error.what());
+    }
+  };
+  if (const toml::node* method = root.find("method"); method != nullptr && check_method)
+    with_line(method, [&] { check_method(config.method); });
+  read_placement(root, config.placement);
+  read_rows(root, "parameters", parameter_table(), config.parameters);
+  read_rows(root, "safety", safety_parameter_table(), config.safety);
+  read_server(root, config.server);
+  with_line(root.find("parameters"), [&] { validate(config.parameters); });
+  with_line(root.find("safety"), [&] { validate(config.safety); });
+  return config;
+}
+
+SessionConfig read_session_config(const std::filesystem::path& file, const SessionConfig& base,
+                                  const MethodCheck& check_method) {
+  const std::string name = file.string();
+  std::error_code unused;
+  std::ifstream in(file, std::ios::binary);
+  if (!in || std::filesystem::is_directory(file, unused))
+    throw Error(name, "it cannot be read", "name a TOML file; docs/session.md has an example");
+  std::string text(largest_file + 1, '\0');
+  in.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(in.gcount()));
+  if (text.size() > largest_file)
+    throw Error(name, "it is larger than 1 MiB", "name a TOML file of a session");
+  return parse_session_config(text, name, base, check_method);
+}
+
+std::string to_toml(const SessionConfig& config) {
+  std::string text = "# A palpate session; docs/session.md describes each key.\n";
+  text += key_line("method", toml_text(config.method), "how forces are computed");
+  text += key_line("rate", toml_number(config.rate), "Hz, 100 to 100000: ticks of the servo loop");
+  text += key_line("device", toml_text(config.device), "URI of the hand; \"\": the usual one");
+  text += key_line("record", toml_text(config.record), "folder to record into; \"\": none");
+  for (const CameraConfig& camera : config.cameras) {
+    text += "\n[[camera]]\n";
+    text += "uri = " + toml_text(camera.uri) + "\n";
+    if (!camera.name.empty()) text += "name = " + toml_text(camera.name) + "\n";
+    const std::string comment = "x, y, z in m; quaternion x, y, z, w";
+    if (camera.world_from_camera) {
+      text += key_line("world_from_camera", toml_pose(*camera.world_from_camera), comment);
+    } else {
+      text += key_line("# world_from_camera", "[0, 0, 0, 0, 0, 0, 1]", comment);
+    }
+  }
+  text += "\n[placement]\n";
+  text += key_line("world_from_device", toml_pose(config.placement.world_from_device),
+                   "x, y, z in m; quaternion x, y, z, w");
+  text += key_line("scale", toml_number(config.placement.workspace_scale),
+                   "0.001 to 1000: scene metres per device metre");
+  text += config.placement.clutch_button
+              ? key_line("clutch_button", std::to_string(*config.placement.clutch_button),
+                         "0 to 31: the HIP stays while it is pressed")
+              : key_line("# clutch_button", "0", "0 to 31: the HIP stays while it is pressed");
+  text += "\n[parameters]\n";
+  for (const ParameterInfo& row : parameter_table()) {
+    // r_c is derived from the radii below it: setting it scales them.
+    const std::string line = row_line(row, row.get(config.parameters));
+    text += row.name == "r_c" ? "# " + line : line;
+  }
+  text += "\n[safety]\n";
+  for (const SafetyParameterInfo& row : safety_parameter_table())
+    text += row_line(row, config.safety.*row.member);
+  text += "\n[server]\n";
+  text += key_line("listen", toml_text(config.server.listen), "address at which browsers find it");
+  text += config.server.port
+              ? key_line("port", std::to_string(*config.server.port), "0 to 65535; 0: any")
+              : key_line("# port", "8642", "0 to 65535; 0: any");
+  text += key_line("token", toml_text(config.server.token), "what a page must know; \"\": nothing");
+  text += key_line("browser", config.server.browser ? "true" : "false", "open one at the start");
+  return text;
+}
+
+std::string with_placement(std::string_view text, const std::string& name,
+                           const Placement& placement) {
+  validate(placement);
+  SessionConfig wanted = parse_session_config(text, name);
+  std::vector<std::string> lines = lines_of(text);
+  edit(lines, parsed(text, name), name, "world_from_device",
+       toml_pose(placement.world_from_device));
+  std::string edited = joined(lines);
+  const bool scale_matters = placement.workspace_scale != wanted.placement.workspace_scale;
+  if (scale_matters) {
+    edit(lines, parsed(edited, name), name, "scale", toml_number(placement.workspace_scale));
+    edited = joined(lines);
+  }
+  // What was written must be what is read, and nothing else may have changed.
+  const Placement got = parse_session_config(edited, name).placement;
+  wanted.placement.workspace_scale = placement.workspace_scale;
+  const bool right = got.workspace_scale == placement.workspace_scale &&
+                     got.clutch_button == wanted.placement.clutch_button &&
+                     got.world_from_device.isApprox(placement.world_from_device, 1e-12);
+  if (!right) {
+    throw Error(name, "its [placement] is written in a way that a program cannot edit",
+                "write [placement] on a line of its own, and each key on one below it");
+  }
+  return edited;
+}
+
+void validate(const SessionConfig& config) {
+  for (const CameraConfig& camera : config.cameras) {
+    if (camera.world_from_camera)
+      check_rigid(*camera.world_from_camera, "world_from_camera of " + camera.uri);
+  }
+  validate(config.placement);
+  validate(config.parameters);
+  validate(config.safety);
+  if (!(config.rate >= lowest_rate && config.rate <= highest_rate)) {
+    throw Error("rate", shortest(config.rate) + " Hz is out of range", "give 100 to 100000 Hz");
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "palpate/core/parameters.hpp"
+#include "palpate/servo/safety.hpp"
+#include "palpate/servo/workspace.hpp"
+
+namespace palpate {
+
+/// A camera of a session.
+struct CameraConfig {
+  std::string uri;
+  /// Pose of the optical frame; none: the source's own.
+  std::optional<Eigen::Isometry3d> world_from_camera = {};
+  std::string name = {};  ///< for messages and the page; empty: the URI
+};
+
+/// The page's server.
+struct ServerConfig {
+  std::string listen = "127.0.0.1";        ///< address; this default lets in this machine alone
+  std::optional<std::uint16_t> port = {};  ///< none: 8642, or any free one; 0: any free one
+  std::string token = {};                  ///< what a page must know; empty: none is asked for
+  bool browser = true;                     ///< open one at the start, where there is a desktop
+};
+
+/// A whole session as one TOML file describes it. docs/session.md lists the keys.
+struct SessionConfig {
+  std::vector<CameraConfig> cameras{{.uri = "synthetic:desk?noise=1mm"}};
+  std::string device = {};  ///< URI; empty: the program's choice
+  Placement placement;
+  double rate = 1000.0;  ///< [Hz] of the servo loop, 100 to 100 000
+  std::string method = "sight";
+  Parameters parameters;
+  SafetyParameters safety;
+  std::string record = {};  ///< folder to record into; empty: none
+  ServerConfig server;
+};
+
+/// Throws Error if there is no method of that name; for what the file names.
+using MethodCheck = std::function<void(const std::string& name)>;
+
+/// Reads a session's TOML file. What it leaves out is taken from `base`.
+/// @throws Error naming FILE:LINE for a file that cannot be read or is no TOML, an unknown key
+///         (naming the nearest known one), a value of another type or out of range.
+SessionConfig read_session_config(const std::filesystem::path& file, const SessionConfig& base = {},
+                                  const MethodCheck& check_method = {});
+
+/// The same from a text. @param name  of the file, for messages
+SessionConfig parse_session_config(std::string_view text, const std::string& name,
+                                   const SessionConfig& base = {},
+                                   const MethodCheck& check_method = {});
+
+/// The TOML file of a configuration, every key with its unit and range in a comment.
+/// parse_session_config gives back the same values bit for bit, but for the rounding of the poses'
+/// quaternions.
+std::string to_toml(const SessionConfig& config);
+
+/// A session's TOML text with another placement, and everything else, comments included, as it is.
+/// @param text  may be empty
+/// @param name  of the file, for messages
+/// @throws Error as parse_session_config, or if the [placement] table is written in a way that
+///         cannot be edited (an inline table).
+std::string with_placement(std::string_view text, const std::string& name,
+                           const Placement& placement);
+
+/// @throws Error if a pose, the placement, a parameter or the rate is out of range.
+void validate(const SessionConfig& config);
+
+}  // namespace palpate

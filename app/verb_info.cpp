@@ -8,10 +8,12 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/recording_check.hpp"
 #include "app/verbs.hpp"
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/uri.hpp"
 #include "palpate/sources/source.hpp"
 
 namespace palpate::app {
@@ -92,6 +94,11 @@ int info(const InfoOptions& options) {
   if (about.frame_rate) json["frame_rate_hz"] = *about.frame_rate;
   if (about.start_time != 0.0) json["start_time_s"] = about.start_time;
   if (!about.notes.empty()) json["notes"] = about.notes;
+  // Before a damaged frame ends it.
+  if (const Uri uri(options.uri); uri.scheme() == "recording") {
+    json["checksums"] = text_of(BagReader(uri.path()).check());
+    if (!options.json) fmt::print("checksums: {}\n", json["checksums"].get<std::string>());
+  }
   const auto frame = source->next();
   if (!frame) throw Error(options.uri, "it has no frames", "give a source with at least one");
   Json first = {{"stamp_s", frame->stamp}};

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "app/progress.hpp"
+#include "app/recording_check.hpp"
 #include "app/verbs.hpp"
 #include "palpate/record/replay.hpp"
 
@@ -28,7 +29,7 @@ std::string text_of(const ReplayReport& report) {
                        report.largest_difference);
   }
   if (!report.broken_off.empty()) text += "the replay broke off: " + report.broken_off + "\n";
-  return text;
+  return text + app::text_of(report.check) + "\n";
 }
 
 std::string json_of(const ReplayReport& report) {
@@ -42,6 +43,8 @@ std::string json_of(const ReplayReport& report) {
     object["field"] = report.field;
   }
   if (!report.broken_off.empty()) object["broken_off"] = report.broken_off;
+  object["checksums"] = app::text_of(report.check);
+  if (!report.check.damage.empty()) object["damage"] = report.check.damage;
   return object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 

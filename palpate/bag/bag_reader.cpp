@@ -67,17 +67,18 @@ void expect_table(const Database& database, const std::string& name) {
 
 BagReader::BagReader(const fs::path& path) : path_(path) {
   for (const fs::path& file : files_of(path)) {
-    File& entry = files_.emplace_back(File{Database::open(file), {}});
+    File& entry = files_.emplace_back(File{Database::open(file), {}, {}});
     expect_table(entry.database, "topics");
     expect_table(entry.database, "messages");
     Statement list(entry.database, "SELECT id, name, type FROM topics ORDER BY id");
     while (list.step()) {
       Topic topic{.name = list.text(1), .type = list.text(2)};
-      entry.topics.emplace_back(topic.name, list.integer(0));
+      entry.topics.emplace_back(topic, list.integer(0));
       if (find(topic.name) == nullptr) topics_.push_back(std::move(topic));
       if (topics_.size() > most_topics)
         throw Error(file.string(), "has too many topics", "it may be damaged");
     }
+    entry.checksums = read_checksums(entry.database);
   }
   std::sort(topics_.begin(), topics_.end(),
             [](const Topic& a, const Topic& b) { return a.name < b.name; });
@@ -92,8 +93,8 @@ const BagReader::Topic* BagReader::find(std::string_view name) const {
 std::vector<BagReader::Place> BagReader::places(std::string_view topic) {
   std::vector<Place> places;
   for (std::size_t i = 0; i < files_.size(); ++i) {
-    for (const auto& [name, id] : files_[i].topics) {
-      if (name != topic) continue;
+    for (const auto& [each, id] : files_[i].topics) {
+      if (each.name != topic) continue;
       Statement list(files_[i].database,
                      "SELECT id, timestamp FROM messages WHERE topic_id = ? ORDER BY id");
       list.bind(0, id);
@@ -103,15 +104,76 @@ std::vector<BagReader::Place> BagReader::places(std::string_view topic) {
   return places;
 }
 
+const BagReader::Topic* BagReader::File::find(std::int64_t number) const {
+  const auto topic = std::find_if(topics.begin(), topics.end(),
+                                  [&](const auto& each) { return each.second == number; });
+  return topic == topics.end() ? nullptr : &topic->first;
+}
+
 std::vector<std::byte> BagReader::read(const Place& place) {
-  const Database& database = files_[place.file].database;
-  Statement select(database, "SELECT data FROM messages WHERE id = ?");
+  const File& file = files_[place.file];
+  Statement select(file.database, "SELECT data, topic_id, timestamp FROM messages WHERE id = ?");
   select.bind(0, place.id);
   if (!select.step())
-    throw Error(database.file().string(), "message " + std::to_string(place.id) + " is gone",
+    throw Error(file.database.file().string(), "message " + std::to_string(place.id) + " is gone",
                 "do not change a bag while it is read");
   const std::span<const std::byte> bytes = select.bytes(0);
+  if (const std::uint32_t* expected = file.checksums.find(place.id)) {
+    const Topic* topic = file.find(select.integer(1));
+    if (topic == nullptr ||
+        checksum_of(topic->name, topic->type, select.integer(2), bytes) != *expected)
+      throw Error(name(topic == nullptr ? "an unknown topic" : topic->name, place),
+                  "is not what its checksum says",
+                  "it is damaged; what was recorded before it can be used");
+  }
   return {bytes.begin(), bytes.end()};
+}
+
+void BagReader::check(const File& file, BagCheck& check) {
+  const auto damaged = [&](const std::string& what) {
+    if (check.damage.empty()) check.damage = file.database.file().string() + ": " + what;
+  };
+  const Checksums& checksums = file.checksums;
+  std::int64_t expected = 1;  // the next message's id
+  std::int64_t covered = 0;   // the last id that has a checksum
+  if (!checksums.blocks.empty()) {
+    const ChecksumBlock& last = checksums.blocks.back();
+    covered = last.first + static_cast<std::int64_t>(last.messages.size()) - 1;
+    check.closed = last.closed;
+  }
+  try {
+    Statement list(file.database, "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id");
+    while (list.step()) {
+      ++check.messages;
+      const std::int64_t id = list.integer(0);
+      const std::uint32_t* checksum = checksums.find(id);
+      if (checksum == nullptr) {
+        ++check.unchecked;
+        continue;
+      }
+      if (id != expected) damaged("message " + std::to_string(expected) + " is missing");
+      expected = id + 1;
+      const Topic* topic = file.find(list.integer(1));
+      if (topic == nullptr)
+        damaged("message " + std::to_string(id) + " is of no topic");
+      else if (checksum_of(topic->name, topic->type, list.integer(2), list.bytes(3)) != *checksum)
+        damaged("message " + std::to_string(id) + " of " + topic->name +
+                " is not what its checksum says");
+    }
+    if (expected <= covered) damaged("message " + std::to_string(expected) + " is missing");
+  } catch (const Error& error) {
+    if (check.damage.empty()) check.damage = error.what();
+  }
+  if (!checksums.damage.empty()) damaged(checksums.damage);
+}
+
+BagCheck BagReader::check() {
+  BagCheck check;
+  for (const File& file : files_) {
+    check.has_checksums = check.has_checksums || file.checksums.there;
+    BagReader::check(file, check);
+  }
+  return check;
 }
 
 std::string BagReader::name(std::string_view topic, const Place& place) const {

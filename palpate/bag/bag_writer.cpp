@@ -114,9 +114,20 @@ void BagWriter::write(std::size_t topic, std::int64_t nanoseconds,
   last_ = messages_ == 0 ? nanoseconds : std::max(last_, nanoseconds);
   ++messages_;
   ++topics_[topic].messages;
+  checksums_.messages.push_back(
+      checksum_of(topics_[topic].name, topics_[topic].type, nanoseconds, message));
+}
+
+void BagWriter::write_checksums(bool closed) {
+  checksums_.closed = closed;
+  if (!closed && checksums_.messages.empty()) return;
+  chain_ = append(*database_, chain_, checksums_);
+  checksums_.first += static_cast<std::int64_t>(checksums_.messages.size());
+  checksums_.messages.clear();
 }
 
 void BagWriter::commit() {
+  write_checksums(false);
   database_->run("COMMIT");
   write_metadata();
   database_->run("BEGIN");
@@ -124,6 +135,7 @@ void BagWriter::commit() {
 
 void BagWriter::close() {
   if (!std::exchange(open_, false)) return;
+  write_checksums(true);
   Statement insert(*database_, "INSERT INTO metadata(metadata_version,metadata) VALUES(?,?)");
   const std::string text = metadata();
   insert.bind(0, std::int64_t{metadata_version});

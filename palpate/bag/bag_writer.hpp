@@ -9,12 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "palpate/bag/checksum.hpp"
 #include "palpate/bag/database.hpp"
 
 namespace palpate {
 
 /// Writes a bag as ROS 2's rosbag2 does: a folder with metadata.yaml (version 7) and one file of
-/// SQLite (schema 4).
+/// SQLite (schema 4). Beside what rosbag2 knows, each commit writes the checksums of its messages.
 ///
 /// What was committed stays readable whatever happens to the program: SQLite keeps it in the
 /// write-ahead log beside the file until the bag is closed. Used on one thread.
@@ -53,6 +54,7 @@ class BagWriter {
     std::uint64_t messages = 0;
   };
 
+  void write_checksums(bool closed);
   [[nodiscard]] std::string metadata() const;
   void write_metadata() const;
 
@@ -61,6 +63,8 @@ class BagWriter {
   std::vector<Topic> topics_;
   std::uint64_t messages_ = 0;
   std::int64_t first_ = 0, last_ = 0;  // [ns]
+  ChecksumBlock checksums_;            // of what was written since the last commit
+  std::uint32_t chain_ = 0;
   bool open_ = true;
   std::optional<Database> database_;
   std::optional<Statement> insert_;

@@ -96,8 +96,9 @@ void Statement::bind(int parameter, std::string_view text) {
 }
 
 void Statement::bind(int parameter, std::span<const std::byte> bytes) {
-  check(
-      sqlite3_bind_blob64(handle_.get(), parameter + 1, bytes.data(), bytes.size(), SQLITE_STATIC));
+  // Without a pointer SQLite would bind NULL.
+  const void* data = bytes.empty() ? "" : static_cast<const void*>(bytes.data());
+  check(sqlite3_bind_blob64(handle_.get(), parameter + 1, data, bytes.size(), SQLITE_STATIC));
 }
 
 bool Statement::step() {

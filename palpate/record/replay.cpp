@@ -100,6 +100,7 @@ class Rerun {
 ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress) {
   constexpr std::size_t ticks_a_report = 1000;
   ReplayReport report;
+  report.check = session.check();
   if (session.ticks() == 0) {
     report.broken_off = "the recording has no ticks";
     return report;

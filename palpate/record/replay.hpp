@@ -21,8 +21,12 @@ struct ReplayReport {
   double largest_difference = 0.0;  ///< [N] between two forces
   /// Why it could not go on to the end, such as ticks that the recorder lost; empty if it could.
   std::string broken_off;
+  /// What the checksums say of all messages, also of those that a replay does not need.
+  BagCheck check{};
 
-  [[nodiscard]] bool identical() const { return different_ticks == 0 && broken_off.empty(); }
+  [[nodiscard]] bool identical() const {
+    return different_ticks == 0 && broken_off.empty() && check.damage.empty();
+  }
 };
 
 /// Runs the renderer anew on a session's frames, HIPs and settings, each before the tick that it

@@ -23,6 +23,8 @@ class SessionReader {
   explicit SessionReader(const std::filesystem::path& path);
 
   [[nodiscard]] const SessionInfo& info() const { return info_; }
+  /// As BagReader::check().
+  [[nodiscard]] BagCheck check() { return bag_.check(); }
   [[nodiscard]] std::size_t ticks() const { return ticks_.size(); }
   /// @param index  from 0, in the order of the session  @throws Error if it is damaged.
   [[nodiscard]] ServoTick tick(std::size_t index);

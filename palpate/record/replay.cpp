@@ -105,20 +105,18 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
     report.broken_off = "the recording has no ticks";
     return report;
   }
-  ServoTick recorded = session.tick(0);
-  Rerun rerun(session, recorded);
+  std::optional<ServoTick> last;
+  std::optional<Rerun> rerun;
   for (std::size_t i = 0; i < session.ticks(); ++i) {
-    if (i > 0) {
-      const std::uint64_t expected = recorded.number + 1;
-      recorded = session.tick(i);
-      if (recorded.number != expected) {
-        report.broken_off = "ticks " + std::to_string(expected) + " to " +
+    try {
+      const ServoTick recorded = session.tick(i);
+      if (last && recorded.number != last->number + 1) {
+        report.broken_off = "ticks " + std::to_string(last->number + 1) + " to " +
                             std::to_string(recorded.number - 1) + " are missing";
         break;
       }
-    }
-    try {
-      const Tick again = rerun.tick(recorded);
+      if (!rerun) rerun.emplace(session, recorded);
+      const Tick again = rerun->tick(recorded);
       const std::string field = difference(again, recorded.tick);
       if (!field.empty()) {
         ++report.different_ticks;
@@ -129,14 +127,16 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
         const double distance = (again.force - recorded.tick.force).norm();
         report.largest_difference = std::max(report.largest_difference, distance);
       }
+      last = recorded;
     } catch (const Error& error) {
-      report.broken_off = "tick " + std::to_string(recorded.number) + ": " + error.what();
+      report.broken_off = last ? "after tick " + std::to_string(last->number) + ": " : "";
+      report.broken_off += error.what();
       break;
     }
     ++report.ticks;
     if (progress && i % ticks_a_report == 0) progress(i);
   }
-  report.frames = rerun.frames();
+  if (rerun) report.frames = rerun->frames();
   return report;
 }
 

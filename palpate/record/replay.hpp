@@ -33,7 +33,7 @@ struct ReplayReport {
 /// was used in, and compares each tick with the recorded one, bit for bit: the proxy, the normal,
 /// the force before the safety chain, the state and the flags.
 /// @param progress  called now and then with the number of ticks done; may be empty
-/// @throws Error if the recording is damaged.
+/// A recording that is damaged in its midst ends the replay there, as the report says.
 ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress = {});
 
 }  // namespace palpate

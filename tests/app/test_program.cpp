@@ -385,13 +385,24 @@ TEST_F(Program, FailsWithOneWhenAReplayDiffers) {
                 .code,
             0);
   // The lowest bit of one HIP's z: the fourth number behind 36 bytes of layout.
+  const std::string open = "/usr/bin/python3 -B -c \"import sqlite3; b = sqlite3.connect('" +
+                           path("bag/bag_0.db3") + "'); ";
   const std::string change =
-      "/usr/bin/python3 -B -c \"import sqlite3; b = sqlite3.connect('" + path("bag/bag_0.db3") +
-      "'); i, d = b.execute('select messages.id, data from messages join topics on topics.id = "
+      open +
+      "i, d = b.execute('select messages.id, data from messages join topics on topics.id = "
       "topic_id where name = \\\"/palpate/tick\\\" order by messages.id limit 1 offset "
       "1500').fetchone(); n = 36 + 8 * 3; b.execute('update messages set data = ? "
       "where id = ?', (d[:n] + bytes([d[n] ^ 1]) + d[n + 1:], i)); b.commit()\"";
   if (std::system(change.c_str()) != 0) GTEST_SKIP() << "there is no /usr/bin/python3";
+  const Outcome damaged = run("replay " + path("bag"));
+  EXPECT_EQ(damaged.code, 1);
+  EXPECT_NE(damaged.out.find("of /palpate/tick is not what its checksum says"), std::string::npos)
+      << damaged.out;
+  EXPECT_NE(run("info recording:" + path("bag")).out.find("of /palpate/tick is not"),
+            std::string::npos);
+  // Without its checksums the change shows in the forces.
+  const std::string drop = open + "b.execute('drop table palpate_checksums'); b.commit()\"";
+  ASSERT_EQ(std::system(drop.c_str()), 0);
   const Outcome outcome = run("replay --json " + path("bag"));
   EXPECT_EQ(outcome.code, 1);
   const auto report = nlohmann::json::parse(outcome.out);

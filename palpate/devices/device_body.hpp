@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string_view>
+
+#include "palpate/servo/device.hpp"
+
+namespace palpate {
+
+/// The mechanics of a haptic device as the hand feels them at the handle.
+struct DeviceBody {
+  double mass = 0.06;            ///< [kg] apparent mass, 1 g to 10 kg
+  double damping = 0.7;          ///< [N s/m] viscous, 0 to 100
+  double friction = 0.26;        ///< [N] Coulomb, against the motion, 0 to 10
+  double resolution = 0.055e-3;  ///< [m] of the position that is read; 0 to 10 mm, 0: exact
+  double delay = 1e-3;           ///< [s] from a write until the motors give the force, 0 to 10 ms
+};
+
+/// @throws Error naming the first figure out of its range.
+void validate(const DeviceBody& body);
+
+/// A body with what its device says of itself.
+struct DevicePreset {
+  std::string_view name;
+  DeviceBody body;
+  DeviceLimits limits;
+  double reach;  ///< [m] radius
+};
+
+/// The models `touch`, `omega` and `falcon`: the middle of what is known of such devices.
+/// @throws Error for another name.
+const DevicePreset& device_preset(std::string_view name);
+
+/// How a hand holds the handle.
+struct Grip {
+  std::string_view name;
+  double mass;       ///< [kg] of the hand that moves with the handle
+  double stiffness;  ///< [N/m]
+  double damping;    ///< [N s/m]
+};
+
+/// `light`, `firm`, or `none`: nobody holds it.
+/// @throws Error for another name.
+const Grip& grip_preset(std::string_view name);
+
+/// A mass on a spring and damper under a constant force, one axis: m y'' = -k y - b y' + g.
+struct MassSpringDamper {
+  double mass;       ///< [kg] more than 0
+  double damping;    ///< [N s/m] b
+  double stiffness;  ///< [N/m] k
+};
+
+/// The exact solution after a fixed time, as factors for many axes and steps of that time.
+class ExactStep {
+ public:
+  ExactStep() = default;
+  ExactStep(const MassSpringDamper& system, double dt) noexcept;
+
+  /// Lets dt pass. @param y  [m] @param v  [m/s] @param g  [N] constant over dt
+  void advance(Vec3& y, Vec3& v, const Vec3& g) const noexcept;
+
+ private:
+  // y1 = yy y + yv v + yg g, v1 = vy y + vv v + vg g
+  double yy_ = 1.0, yv_ = 0.0, yg_ = 0.0, vy_ = 0.0, vv_ = 1.0, vg_ = 0.0;
+};
+
+}  // namespace palpate

@@ -22,7 +22,6 @@
 #include <unistd.h>
 
 #include "app/lab_rendering.hpp"
-#include "app/live_camera.hpp"
 #include "app/scripted_hand.hpp"
 #include "app/summary.hpp"
 #include "palpate/cloud/depth_image.hpp"
@@ -33,6 +32,7 @@
 #include "palpate/devices/mouse_device.hpp"
 #include "palpate/record/recorder.hpp"
 #include "palpate/servo/servo_loop.hpp"
+#include "palpate/session/camera_feed.hpp"
 #include "palpate/viewer/tick_batcher.hpp"
 
 namespace palpate::app {
@@ -41,6 +41,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double samples_per_second = 200.0;  // of the page's plots
+constexpr double first_frame_timeout = 10.0;  // [s] for a live camera to start up
 
 struct FlagInfo {
   std::string_view name, meaning;
@@ -137,16 +138,21 @@ class LiveSession final : public ViewerHost {
       : rate_(options.rate),
         device_uri_(options.device),
         batcher_(static_cast<unsigned>(std::max(1.0, options.rate / samples_per_second))) {
-    for (const std::string& uri : options.cameras)
-      cameras_.push_back(std::make_unique<LiveCamera>(uri));
+    std::vector<std::shared_ptr<const Cloud>> seen;
+    for (const std::string& uri : options.cameras) {
+      cameras_.push_back(std::make_unique<CameraFeed>(uri));
+      const std::optional<Frame> first = cameras_.back()->first_frame(first_frame_timeout);
+      if (!first)
+        throw Error(uri, fmt::format("it has delivered no frame in {} s", first_frame_timeout),
+                    "check the camera, its cable and its permissions");
+      seen.push_back(first->cloud);
+    }
     newest_.resize(cameras_.size());
     numbers_.resize(cameras_.size());
-    device_ = open_hand(options.device, *cameras_.front()->first_frame().cloud);
+    device_ = open_hand(options.device, *seen.front());
     mouse_ = dynamic_cast<MouseDevice*>(device_.get());
     if (mouse_ != nullptr) target_ = start_ = mouse_->read(0.0).position;
     settings_.rendering = options.parameters;
-    std::vector<std::shared_ptr<const Cloud>> seen;
-    for (const auto& camera : cameras_) seen.push_back(camera->first_frame().cloud);
     method_ = options.method;
     loop_ = std::make_unique<ServoLoop>(open_rendering(method_, options.parameters, seen), *device_,
                                         settings_, ServoOptions{options.rate, {}});
@@ -155,7 +161,7 @@ class LiveSession final : public ViewerHost {
     loop_->start();  // before anybody asks how it does
     server_ = open_server(options, *this);
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
-      cameras_[i]->start([this, i](const Frame& frame, bool is_new) { take(i, frame, is_new); });
+      cameras_[i]->start([this, i](const FedFrame& fed) { take(i, fed.frame, fed.is_new); });
     }
   }
   ~LiveSession() override { close(); }
@@ -164,8 +170,9 @@ class LiveSession final : public ViewerHost {
 
   // Ends all threads; the summary stays.
   void close() {
+    if (loop_) loop_->stop();  // first of all the force
+    for (const auto& camera : cameras_) camera->request_stop();
     for (const auto& camera : cameras_) camera->stop();
-    loop_->stop();
     if (!server_) return;
     server_.reset();
     stop_recording();
@@ -219,7 +226,7 @@ class LiveSession final : public ViewerHost {
       cameras.push_back({{"uri", status.uri},
                          {"kind", status.kind},
                          {"rate", status.rate},
-                         {"state", status.state}});
+                         {"state", status.text}});
     }
     const CycleStatistics& cycles = loop_->statistics();
     const Timing& timing = loop_->timing();
@@ -468,7 +475,7 @@ class LiveSession final : public ViewerHost {
 
   double rate_;
   std::string device_uri_;
-  std::vector<std::unique_ptr<LiveCamera>> cameras_;
+  std::vector<std::unique_ptr<CameraFeed>> cameras_;
   std::unique_ptr<Device> device_;
   MouseDevice* mouse_ = nullptr;  // device_, if the page moves it
   std::unique_ptr<ServoLoop> loop_;

@@ -39,7 +39,9 @@ class DepthRecording final : public Source {
       : camera_(camera),
         rays_(std::make_shared<const ViewingRays>(camera.intrinsics)),
         images_(std::move(images)),
-        info_(std::move(info)) {}
+        info_(std::move(info)) {
+    info_.sensor = camera.sensor;
+  }
 
   std::optional<Frame> next(double /*timeout*/) override {
     if (next_ == images_.size()) return std::nullopt;

@@ -8,16 +8,18 @@
 #include <string_view>
 
 #include "palpate/cloud/depth_image.hpp"
+#include "palpate/sources/source.hpp"
 
 namespace palpate {
 
-/// What a recording says of its depth camera, the content of an `intrinsics.json`:
+/// The depth camera of a recording: the content of an `intrinsics.json`,
 ///
 ///     {"width": 640, "height": 480, "fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5,
 ///      "depth_units_per_metre": 5000, "distortion": null, "invalid_value": 0,
-///      "saturated_value": 65535, "fps_nominal": 30}
+///      "saturated_value": 65535, "fps_nominal": 30, "sensor_kind": "stereo"}
 ///
-/// The second line's keys, but for the units, may be left out or null. `distortion` is an object
+/// The keys after depth_units_per_metre may be left out or null; `sensor_kind` is `stereo`,
+/// `structured light` or `time of flight`. `distortion` is an object
 /// of k1..k6, p1, p2 (Brown-Conrady, those left out are 0), which may also be called
 /// `distortion_brown_conrady_k1_6_p`. Keys not named here are notes and are passed over.
 struct RecordedCamera {
@@ -27,6 +29,7 @@ struct RecordedCamera {
   std::uint16_t invalid_value = 0;
   std::uint16_t saturated_value = 65535;
   std::optional<double> frame_rate{};  ///< [Hz] nominal
+  SensorKind sensor = SensorKind::unknown;
 };
 
 /// @param name  of the file, for messages

@@ -20,6 +20,7 @@ KNOWS = {
     "sources": {"core", "cloud", "bag"},
     "devices": {"core", "servo"},
     "record": {"core", "cloud", "servo", "bag", "sources"},
+    "session": {"core", "cloud", "servo", "sources", "devices", "record"},
     "viewer": {"core", "cloud", "servo"},
     "lab": {"core", "cloud", "sources"},
     "bench": {"core", "cloud"},

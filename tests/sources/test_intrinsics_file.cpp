@@ -139,5 +139,19 @@ TEST(IntrinsicsFile, IsReadFromAFileThatIsNamedInErrors) {
   EXPECT_TRUE(fails_saying([&] { return read_intrinsics(folder.path() / "c.json"); }, "c.json"));
 }
 
+TEST(Intrinsics, SayHowTheSensorMeasures) {
+  json object = complete();
+  EXPECT_EQ(parse(object).sensor, SensorKind::unknown);
+  object["sensor_kind"] = nullptr;
+  EXPECT_EQ(parse(object).sensor, SensorKind::unknown);
+  object["sensor_kind"] = "time of flight";
+  EXPECT_EQ(parse(object).sensor, SensorKind::time_of_flight);
+  object["sensor_kind"] = "radar";
+  EXPECT_TRUE(fails_saying([&] { return parse(object); }, "k.json", "sensor_kind", "\"radar\"",
+                           "structured light"));
+  object["sensor_kind"] = 3;
+  EXPECT_TRUE(fails_saying([&] { return parse(object); }, "k.json", "sensor_kind"));
+}
+
 }  // namespace
 }  // namespace palpate

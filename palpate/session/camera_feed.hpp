@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "palpate/session/stamp_placer.hpp"
+#include "palpate/sources/source.hpp"
+
+namespace palpate {
+
+/// Time and waiting of a CameraFeed: this machine's, or a simulated one in tests.
+class FeedClock {
+ public:
+  virtual ~FeedClock() = default;
+  /// [s] the servo loop's clock, CLOCK_MONOTONIC. Any thread.
+  [[nodiscard]] virtual double now() const = 0;
+  /// [s since 1970] the wall clock, CLOCK_REALTIME.
+  [[nodiscard]] virtual double system_now() const = 0;
+  /// Waits on `changed` until it is notified or time `t` [s] has come; may return early.
+  virtual void wait(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
+                    double t) = 0;
+};
+
+/// This machine's clocks.
+std::shared_ptr<FeedClock> machine_clock();
+
+/// When a camera is given up, looked for again and shown. Times in seconds.
+struct FeedOptions {
+  double silence = 2.0;        ///< [s] without a frame after which a live camera is opened again
+  double start_up = 5.0;       ///< [s] the same, for its first frame after it was opened
+  double first_pause = 0.1;    ///< [s] before it is opened again; doubles with each failure
+  double longest_pause = 5.0;  ///< [s] at most
+  double waiting = 0.25;       ///< [s] without a frame after which its state says so
+  double still_interval = 1.0 / 30.0;  ///< [s] at which a recording of one frame is shown again
+  double longest_gap = 10.0;  ///< [s] between frames of a recording beyond which it is cut short
+  double longest_lag = 1.0;   ///< [s] behind its stamps, beyond which a recording is slowed down
+  int frozen_frames = 10;     ///< identical depth images in a row that make a live camera frozen
+  StampPlacerOptions stamps{};
+  Registry<SourceScheme> schemes = standard_sources();  ///< opens the URI, also again
+  std::shared_ptr<FeedClock> clock = machine_clock();
+};
+
+/// A frame as it is handed over.
+struct FedFrame {
+  Frame frame;                ///< its stamp is on the servo loop's clock [s, CLOCK_MONOTONIC]
+  double source_stamp = 0.0;  ///< [s] the stamp that the source gave it
+  /// False where the only frame of a recording is shown again: a still picture is not captured,
+  /// so its stamp is the time at which it is shown.
+  bool is_new = true;
+};
+
+enum class CameraState : std::uint8_t {
+  waiting,    ///< open, but no frame has come lately
+  live,       ///< frames come
+  frozen,     ///< a live camera gives the same picture again and again
+  searching,  ///< it is gone and is looked for again
+  ended,      ///< a recording that cannot be opened again is over
+  stopped,    ///< by request_stop
+};
+
+/// How a camera is doing.
+struct CameraStatus {
+  std::string uri, kind;
+  CameraState state = CameraState::waiting;
+  std::string text;          ///< the state in words, with what is wrong; "live"
+  double rate = 0.0;         ///< [Hz] of the frames lately
+  std::uint64_t frames = 0;  ///< handed over, each once
+  /// Not handed over: left out to keep up with a recording, frozen, unreadable, or with a stamp
+  /// that is not later than the last.
+  std::uint64_t dropped = 0;
+  std::uint64_t opened_again = 0;  ///< how often after it was gone
+  std::uint64_t slowed = 0;        ///< how often a recording was slowed down, see longest_lag
+  /// How often each StampProblem was seen; [0] is not used.
+  std::array<std::uint64_t, stamp_problem_count> stamp_problems{};
+  double latency = 0.0;                ///< [s] usual time from capture to arrival (live cameras)
+  std::optional<double> last_frame{};  ///< [s, CLOCK_MONOTONIC] stamp of the newest frame
+  std::string trouble;                 ///< the error met last; a live camera's next frame clears it
+};
+
+/// One camera on a thread of its own.
+///
+/// Frames reach the sink with their stamps of capture, brought to the servo loop's clock by one
+/// constant offset, so that intervals between stamps stay what the camera measured:
+/// - A recording plays at the pace of its stamps; each pass has its offset. Where decoding is too
+///   slow, frames come late or are left out (`dropped`); the stamps stay. What ends begins again; a
+///   recording of one frame is shown again at 30 Hz with new stamps (FedFrame::is_new is false).
+/// - A live camera's clock is followed as StampPlacer says; stamps that cannot be true are replaced
+///   by the time of arrival, and counted.
+///
+/// A live camera that throws an Error three times in a row, or delivers nothing for `silence`, is
+/// closed and opened again after pauses that double from `first_pause` to `longest_pause`, for
+/// ever. A picture that stays the same to the bit is a camera that hangs: no noise is that
+/// constant. From the `frozen_frames`-th on it is not handed over, so that the age of the last
+/// frame shows.
+///
+/// Nothing here waits for the camera's thread without a bound: a thread that hangs inside the
+/// source is left behind with all that it uses and ends when the source returns.
+class CameraFeed {
+ public:
+  /// Called on the camera's thread for each frame. Must be quick and must not throw.
+  using Sink = std::function<void(const FedFrame&)>;
+  using Open = std::function<std::unique_ptr<Source>()>;
+
+  /// Opens the source. @throws Error as open_source.
+  explicit CameraFeed(const std::string& uri, FeedOptions options = {});
+  /// @param source  open
+  /// @param open    opens it again after it has ended or gone; empty: it cannot be opened again
+  explicit CameraFeed(std::unique_ptr<Source> source, FeedOptions options = {}, Open open = {});
+  /// stop().
+  ~CameraFeed();
+  CameraFeed(const CameraFeed&) = delete;
+  CameraFeed& operator=(const CameraFeed&) = delete;
+
+  /// Before start(): the first frame, read on the caller's thread and handed over after start().
+  /// Its stamp is the source's own.
+  /// @return none if a live camera delivers none within `timeout` [s]
+  /// @throws Error as Source::next, or if a recording holds no frames.
+  std::optional<Frame> first_frame(double timeout);
+
+  /// Starts the thread, which calls `sink`. Once.
+  void start(Sink sink);
+
+  /// Asks the thread to end and returns at once (after a sink that is just being called). Never is
+  /// the sink called after this has returned. Hold no lock that the sink takes. Any thread; from
+  /// within the sink, too.
+  void request_stop() noexcept;
+  /// Waits up to `timeout` [s, real time] for the thread to end.
+  /// @return false if it has not, because the source hangs
+  bool join(double timeout);
+  /// request_stop, then join; a thread that does not end is left behind. @return as join
+  bool stop(double timeout = 0.5);
+
+  /// Any thread; waits for nothing.
+  [[nodiscard]] CameraStatus status() const;
+  /// As the source was opened first.
+  [[nodiscard]] const SourceInfo& info() const { return info_; }
+
+ private:
+  class Worker;
+  SourceInfo info_;
+  std::shared_ptr<Worker> worker_;  // shared with the thread, which may outlive this
+  std::thread thread_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <string_view>
+
+#include "palpate/sources/source.hpp"
+
+namespace palpate {
+
+/// What was wrong with a stamp of capture.
+enum class StampProblem : std::uint8_t {
+  none,
+  jumped,           ///< the camera's clock was reset; the offset was measured anew
+  drifted,          ///< the clock, or the camera's latency, moved slowly beyond what is followed
+  from_the_future,  ///< later than the frame's arrival
+  too_old,          ///< older than `max_age` at arrival, or older than the frames before explain
+  not_increasing,   ///< not later than the frame before
+};
+constexpr std::size_t stamp_problem_count = 6;
+
+/// "jumped", "drifted", "from the future", "too old", "not increasing"; "none".
+[[nodiscard]] std::string_view name_of(StampProblem problem) noexcept;
+
+/// When a frame was captured, on the servo loop's clock.
+struct PlacedStamp {
+  double time = 0.0;  ///< [s, CLOCK_MONOTONIC] never later than the arrival
+  StampProblem problem = StampProblem::none;
+  /// False for a frame to leave out: its time is not later than that of the frame before.
+  bool usable = true;
+};
+
+struct StampPlacerOptions {
+  double max_drift =
+      200e-6;               ///< [-] how fast the offset may grow: crystals differ by up to 100 ppm
+  double window = 10.0;     ///< [s] of arrivals, whose least latency counts
+  double jump = 0.005;      ///< [s] a stamp this much too late cannot be jitter of the estimate
+  double max_age = 1.0;     ///< [s] a stamp older than this at arrival is not believed
+  double departure = 0.05;  ///< [s] between estimate and window beyond which it is a drift
+  double settling = 1.0;    ///< [s] after a (re)start in which the offset may fall freely
+};
+
+/// Brings a camera's stamps of capture to the servo loop's clock, from the times of arrival.
+///
+/// Model: arrival = stamp + offset + latency, latency >= 0. The offset is the lower envelope of
+/// arrival - stamp: the least of the last `window` seconds, which falls at once, as a latency
+/// cannot be negative, and grows by `max_drift` at most, so that a latency that grows is not taken
+/// for a drift. The least latency itself cannot be seen from arrivals: a stamp is placed that much
+/// too late, some 10 to 70 ms for USB cameras. While the clock keeps time the offset is constant,
+/// so that intervals between stamps stay what they were.
+///
+/// Clocks of this machine (StampClock::monotonic, system) have a known offset, which is used as
+/// long as the stamps agree with it.
+///
+/// A stamp that cannot be true (StampProblem) is replaced by the arrival less the usual latency;
+/// after three in a row that agree with one another the offset is measured anew (`jumped`). Late
+/// frames whose stamps follow each other regularly, such as those of a queue behind a stall, keep
+/// their stamps, however old they are.
+///
+/// Values in, values out: no clock, no thread. Used on the camera's thread.
+class StampPlacer {
+ public:
+  explicit StampPlacer(StampClock clock = StampClock::sensor,
+                       const StampPlacerOptions& options = {});
+
+  /// @param stamp         [s] of capture, by the camera's clock
+  /// @param arrival       [s, CLOCK_MONOTONIC] when the frame reached this machine
+  /// @param known_offset  [s] of a clock of this machine: add it to a stamp to get CLOCK_MONOTONIC
+  PlacedStamp place(double stamp, double arrival, double known_offset = 0.0);
+
+  /// Begins anew, as after the camera was opened again; times go on increasing.
+  void restart(StampClock clock);
+
+  /// [s] from the camera's clock to CLOCK_MONOTONIC.
+  [[nodiscard]] double offset() const { return offset_; }
+  /// [s] usual time from capture to arrival, less the least latency where the offset is estimated.
+  [[nodiscard]] double latency() const { return latency_; }
+
+ private:
+  struct Sample {
+    double arrival, difference;
+  };
+
+  [[nodiscard]] StampProblem judge(double stamp, double arrival) const;
+  [[nodiscard]] bool is_regular(double interval) const;
+  [[nodiscard]] double period() const;
+  StampProblem suspect(double difference, double arrival, StampProblem problem);
+  void begin(double difference, double arrival);
+  StampProblem follow(double difference, double arrival);
+  PlacedStamp give(double time, double arrival, StampProblem problem);
+
+  StampPlacerOptions options_;
+  bool is_known_;         // the offset is given rather than estimated
+  bool is_first_ = true;  // no stamp since the (re)start
+  double offset_ = 0.0;   // [s]
+  double latency_ = 0.0;  // [s]
+  double settled_ = 0.0;  // [s] arrival from which the offset has settled
+  double last_stamp_ = 0.0, last_arrival_ = 0.0;
+  double last_time_;           // [s] given last, for ever
+  int suspects_ = 0;           // stamps in a row that cannot be true and agree with one another
+  double candidate_ = 0.0;     // [s] least difference of those
+  int repeated_ = 0;           // stamps in a row that are equal
+  std::deque<Sample> window_;  // differences that grow with time: candidates for the least
+  std::array<double, 9> intervals_{};  // [s] between stamps, the last ones
+  std::size_t interval_count_ = 0;
+};
+
+}  // namespace palpate

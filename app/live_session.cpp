@@ -21,7 +21,7 @@
 #include <spawn.h>
 #include <unistd.h>
 
-#include "app/lab_rendering.hpp"
+#include "app/program_methods.hpp"
 #include "app/scripted_hand.hpp"
 #include "app/summary.hpp"
 #include "palpate/cloud/depth_image.hpp"
@@ -30,6 +30,7 @@
 #include "palpate/core/uri.hpp"
 #include "palpate/devices/devices.hpp"
 #include "palpate/devices/mouse_device.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/record/recorder.hpp"
 #include "palpate/servo/servo_loop.hpp"
 #include "palpate/session/camera_feed.hpp"
@@ -42,22 +43,6 @@ using nlohmann::json;
 
 constexpr double samples_per_second = 200.0;  // of the page's plots
 constexpr double first_frame_timeout = 10.0;  // [s] for a live camera to start up
-
-struct FlagInfo {
-  std::string_view name, meaning;
-};
-// TickFlag's bits, in their order.
-constexpr std::array tick_flags = {
-    FlagInfo{"step_budget_hit", "the proxy goes on in the next tick; raise step_budget"},
-    FlagInfo{"patch_thinned", "more points were near than a patch holds"},
-    FlagInfo{"force_saturated", "the coupling asked for more than max_force"},
-    FlagInfo{"non_finite_input", "the hand's place was not finite"},
-    FlagInfo{"no_frame", "there is no frame to touch yet"},
-    FlagInfo{"stamp_not_increasing", "a camera's clock stood still or ran backwards"},
-    FlagInfo{"frame_stale", "the newest frame is older than max_extrapolation"},
-    FlagInfo{"normal_undefined", "the points' directions cancel out"},
-    FlagInfo{"surface_hidden", "something hides the surface: it is held where it was"},
-    FlagInfo{"pop_through_suspected", "the proxy was found behind what the camera sees"}};
 
 // Where a hand hovers at first: before the middle of what the camera sees.
 Vec3 hover_place(const Cloud& cloud) {
@@ -124,6 +109,16 @@ json row_json(std::string_view name, std::string_view symbol, std::string_view u
           {"min", min},   {"max", max},       {"meaning", meaning}, {"source", source}};
 }
 
+// All that a session can run: `ideal`, the lab's ruler, needs the truth.
+MethodRegistry session_methods() {
+  const MethodRegistry all = program_methods();
+  MethodRegistry methods("method", "", {});
+  for (const MethodInfo& method : all.entries()) {
+    if (method.name != "ideal") methods.add(method);
+  }
+  return methods;
+}
+
 std::string realtime_text(const RealtimeReport& report) {
   std::string text = report.fifo ? fmt::format("real-time, priority {}", report.priority)
                                  : "not real-time; see palpate doctor";
@@ -152,10 +147,10 @@ class LiveSession final : public ViewerHost {
     device_ = open_hand(options.device, *seen.front());
     mouse_ = dynamic_cast<MouseDevice*>(device_.get());
     if (mouse_ != nullptr) target_ = start_ = mouse_->read(0.0).position;
-    settings_.rendering = options.parameters;
-    method_ = options.method;
-    loop_ = std::make_unique<ServoLoop>(open_rendering(method_, options.parameters, seen), *device_,
-                                        settings_, ServoOptions{options.rate, {}});
+    settings_.parameters = options.parameters;
+    settings_.method = options.method;
+    loop_ = std::make_unique<ServoLoop>(open_method(settings_, seen), *device_, settings_,
+                                        ServoOptions{options.rate, {}});
     reader_.emplace(loop_->reader());
     if (!options.record.empty()) open_recorder(options.record, {});
     loop_->start();  // before anybody asks how it does
@@ -201,9 +196,9 @@ class LiveSession final : public ViewerHost {
     for (const SafetyParameterInfo& row : safety_parameter_table())
       safety.push_back(
           row_json(row.name, "", row.unit, row.default_value, row.min, row.max, row.meaning, ""));
-    for (const lab::MethodInfo& row : live_methods())
+    for (const MethodInfo& row : methods_.entries())
       methods.push_back({{"name", row.name}, {"meaning", row.summary}});
-    for (const FlagInfo& flag : tick_flags)
+    for (const TickFlagInfo& flag : tick_flag_table())
       flags.push_back({{"name", flag.name}, {"meaning", flag.meaning}});
     for (std::size_t i = 0; i < safety_flag_count; ++i)
       safety_flags.push_back(
@@ -218,7 +213,7 @@ class LiveSession final : public ViewerHost {
     json safety;
     json cameras = json::array();
     for (const ParameterInfo& row : parameter_table())
-      parameters[std::string(row.name)] = row.get(settings_.rendering);
+      parameters[std::string(row.name)] = row.get(settings_.parameters);
     for (const SafetyParameterInfo& row : safety_parameter_table())
       safety[std::string(row.name)] = settings_.safety.*row.member;
     for (const auto& camera : cameras_) {
@@ -241,7 +236,7 @@ class LiveSession final : public ViewerHost {
     json interventions = json::array();
     for (const auto& count : cycles.interventions) interventions.push_back(count.load());
     return json{
-        {"method", method_},
+        {"method", settings_.method},
         {"parameters", parameters},
         {"safety", safety},
         {"cameras", cameras},
@@ -265,7 +260,7 @@ class LiveSession final : public ViewerHost {
       frames = frames_;
     }
     for (const auto& cloud : newest) seen.push_back(cloud.get());
-    const double r_c = settings_.rendering.proxy.r_c();
+    const double r_c = settings_.parameters.proxy.r_c();
     ServoTick record{};
     bool any = false;
     const auto count = [&](bool look) {
@@ -293,11 +288,11 @@ class LiveSession final : public ViewerHost {
   void command(const Command& command) override {
     ServoSettings settings = settings_;
     if (const auto* set = std::get_if<SetParameter>(&command)) {
-      set_parameter(settings.rendering, set->name, set->value);
+      set_parameter(settings.parameters, set->name, set->value);
     } else if (const auto* limit = std::get_if<SetSafetyParameter>(&command)) {
       set_parameter(settings.safety, limit->name, limit->value);
     } else if (const auto* method = std::get_if<SetMethod>(&command)) {
-      set_method(method->name, settings.rendering);
+      settings.method = method->name;
     } else if (const auto* record = std::get_if<SetRecording>(&command)) {
       if (!record->on) stop_recording();
       if (record->on && !recorder_) start_recording();
@@ -305,31 +300,27 @@ class LiveSession final : public ViewerHost {
     } else if (mouse_ != nullptr) {
       mouse_->aim({.position = target_ = start_, .present = false});
     }
-    settings_number_ = loop_->set_settings(settings);
+    settings_number_ = settings.method == settings_.method
+                           ? loop_->set_settings(settings)
+                           : loop_->set_method(open_method(settings, newest()), settings);
     settings_ = settings;
     if (recorder_) recorder_->settings({settings_number_, settings_}, monotonic_now());
   }
 
  private:
-  void set_method(const std::string& name, Parameters& parameters) {
-    const bool by_kernel = is_of_the_kernel(name);
-    if (by_kernel) parameters.method = method_from_name(name);
-    if (!by_kernel && recorder_) refuse_recording(name);
-    if (!by_kernel || !is_of_the_kernel(method_)) {
-      std::vector<std::shared_ptr<const Cloud>> seen;
-      {
-        const std::lock_guard lock(mutex_);
-        seen = newest_;
-      }
-      loop_->renew(open_rendering(name, parameters, seen));
-    }
-    method_ = name;
+  [[nodiscard]] std::vector<std::shared_ptr<const Cloud>> newest() {
+    const std::lock_guard lock(mutex_);
+    return newest_;
   }
 
-  [[noreturn]] static void refuse_recording(const std::string& method) {
-    throw Error("recording",
-                "a session is replayed by palpate's own methods, and '" + method + "' is not one",
-                "choose sight, paper, paper-as-printed or fixed-step");
+  // The method of the settings, if it can touch what the cameras see.
+  [[nodiscard]] std::shared_ptr<Method> open_method(
+      const ServoSettings& settings, const std::vector<std::shared_ptr<const Cloud>>& seen) const {
+    std::shared_ptr<Method> method = make_method(settings.method, settings.parameters, methods_);
+    for (const auto& cloud : seen) {
+      if (cloud) method->check(*cloud);
+    }
+    return method;
   }
 
   // A camera's thread: one frame to the loop and to the pages.
@@ -398,7 +389,6 @@ class LiveSession final : public ViewerHost {
 
   // The server's thread, or before it runs and after.
   void open_recorder(const std::string& folder, std::function<void()> renew) {
-    if (!is_of_the_kernel(method_)) refuse_recording(method_);
     using std::chrono::nanoseconds;
     SessionInfo info{.kind = SessionInfo::Kind::live, .version = PALPATE_VERSION};
     for (const auto& camera : cameras_) info.cameras.push_back(camera->status().uri);
@@ -419,8 +409,10 @@ class LiveSession final : public ViewerHost {
     const std::time_t now = std::time(nullptr);
     std::tm local{};
     localtime_r(&now, &local);
-    open_recorder(fmt::format("palpate_{:%Y-%m-%d_%H-%M-%S}", local), [this] {
-      loop_->renew(rendering_by<Renderer>());  // gets the settings in use
+    open_recorder(fmt::format("palpate_{:%Y-%m-%d_%H-%M-%S}", local), [this, settings = settings_] {
+      const NumberedSettings anew = loop_->set_method(open_method(settings, newest()));
+      const std::lock_guard lock(mutex_);
+      if (recorder_) recorder_->settings(anew, monotonic_now());
     });
   }
 
@@ -466,13 +458,12 @@ class LiveSession final : public ViewerHost {
   json recording_state() {
     if (recorder_ && !recorder_->status().trouble.empty()) stop_recording();
     report_closed();
-    json state = {{"possible", is_of_the_kernel(method_)},
-                  {"path", nullptr},
-                  {"message", recording_message_}};
+    json state = {{"possible", true}, {"path", nullptr}, {"message", recording_message_}};
     if (recorder_) state["path"] = recorder_->status().folder.string();
     return state;
   }
 
+  MethodRegistry methods_ = session_methods();
   double rate_;
   std::string device_uri_;
   std::vector<std::unique_ptr<CameraFeed>> cameras_;
@@ -490,7 +481,6 @@ class LiveSession final : public ViewerHost {
   std::vector<std::uint32_t> numbers_;                // each camera's own
 
   // The server's thread, and after it has ended the main one.
-  std::string method_;
   ServoSettings settings_;
   std::uint64_t settings_number_ = 0;  // as the loop counts them
   // Set and reset under mutex_, for the cameras' threads; before the loop, which it reads, is gone.
@@ -503,7 +493,7 @@ class LiveSession final : public ViewerHost {
   std::optional<TickRing<ServoTick>::Reader> reader_;
   TickBatcher batcher_;
   Summary summary_;
-  std::array<std::uint64_t, tick_flags.size()> flag_ticks_{};
+  std::array<std::uint64_t, tick_flag_count> flag_ticks_{};
 };
 
 // SIGINT and SIGTERM wait to be asked for, in all threads that begin from here on.
@@ -552,7 +542,7 @@ int run_live(const LiveOptions& options) {
   const Signals signals;
   LiveSession session(options);
   for (const std::string& line : session.advice()) fmt::print(stderr, "palpate: {}\n", line);
-  if (!is_of_the_kernel(options.method))
+  if (!program_methods().find(options.method).bounded)
     fmt::print(stderr, "palpate: {} is a method of the lab: its ticks can come late\n",
                options.method);
   fmt::print(stderr, "palpate: open {} in a browser; Ctrl-C ends the session\n", session.url());

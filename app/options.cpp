@@ -7,9 +7,9 @@
 
 #include <toml++/toml.h>
 
-#include "lab/method.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/nearest_name.hpp"
+#include "palpate/methods/methods.hpp"
 
 namespace palpate::app {
 namespace {
@@ -59,9 +59,13 @@ double parse_number(const std::string& subject, const std::string& text) {
   return value;
 }
 
-void MethodOptions::add_to(CLI::App& command, const std::string& methods) {
+void MethodOptions::add_to(CLI::App& command) {
   command.add_option("--method", method_,
-                     methods + "; without it " + std::string(method_name(usual_)));
+                     "sight (the default), paper, or any other that `palpate methods` lists");
+  add_parameters_to(command);
+}
+
+void MethodOptions::add_parameters_to(CLI::App& command) {
   command
       .add_option("--set", assignments_,
                   "set a parameter, NAME=VALUE in SI units; see `palpate parameters`")
@@ -69,32 +73,24 @@ void MethodOptions::add_to(CLI::App& command, const std::string& methods) {
   command.add_option("--config", config_, "read the method and parameters from a TOML file");
 }
 
-MethodOptions::Any MethodOptions::read(void (*check)(const std::string& method)) const {
-  Any any{std::string(method_name(usual_)), {}};
-  if (config_) apply_config(*config_, any.method, any.parameters);
-  check(any.method);
-  if (method_) check(any.method = *method_);
+MethodChoice MethodOptions::choice(const MethodRegistry& methods) const {
+  MethodChoice choice{std::string(default_method), {}};
+  if (config_) {
+    apply_config(*config_, choice.name, choice.parameters);
+    static_cast<void>(methods.find(choice.name));
+  }
+  if (method_) choice.name = *method_;
+  static_cast<void>(methods.find(choice.name));
   for (const std::string& assignment : assignments_) {
     const std::size_t equals = assignment.find('=');
     if (equals == std::string::npos)
       throw Error("--set " + assignment, "there is no '='", "write --set NAME=VALUE");
     const std::string name = assignment.substr(0, equals);
-    set_parameter(any.parameters, name,
+    set_parameter(choice.parameters, name,
                   parse_number("--set " + name, assignment.substr(equals + 1)));
   }
-  for (const MethodInfo& known : method_table()) {
-    if (known.name == any.method) any.parameters.method = known.method;
-  }
-  validate(any.parameters);
-  return any;
-}
-
-Parameters MethodOptions::parameters() const {
-  return read([](const std::string& method) { method_from_name(method); }).parameters;
-}
-
-MethodOptions::Any MethodOptions::any_method() const {
-  return read([](const std::string& method) { lab::find_method(method); });
+  validate(choice.parameters);
+  return choice;
 }
 
 }  // namespace palpate::app

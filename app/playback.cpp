@@ -5,7 +5,6 @@
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate::app {
 
@@ -54,10 +53,8 @@ void Playback::adopt_until(double t, const std::function<void(const Cloud&, doub
   }
 }
 
-lab::Truth truth_of(const Playback& playback) {
-  const auto* camera = dynamic_cast<const SyntheticCamera*>(&playback.source(0));
-  if (camera == nullptr || playback.cameras() != 1) return nullptr;
-  return lab::truth_of(std::make_shared<const Scene>(camera->scene()));
+void Playback::check(const Method& method) const {
+  for (const Camera& camera : cameras_) method.check(*camera.next->cloud);
 }
 
 }  // namespace palpate::app

@@ -8,8 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/method.hpp"
-#include "palpate/core/cloud.hpp"
+#include "palpate/core/method.hpp"
 #include "palpate/sources/source.hpp"
 
 namespace palpate::app {
@@ -30,6 +29,8 @@ class Playback {
   using Watcher = std::function<void(double, std::span<const std::shared_ptr<const Cloud>>)>;
   void watch(Watcher watcher) { watcher_ = std::move(watcher); }
 
+  /// @throws Error if the method cannot touch what a camera shows first.
+  void check(const Method& method) const;
   /// Frames handed over so far.
   [[nodiscard]] std::size_t adopted() const { return adopted_; }
   [[nodiscard]] std::size_t cameras() const { return cameras_.size(); }
@@ -53,12 +54,5 @@ class Playback {
   std::shared_ptr<const Cloud> in_use_;
   std::size_t adopted_ = 0;
 };
-
-/// What is true of what the first camera sees: known of a synthetic one that is alone.
-lab::Truth truth_of(const Playback& playback);
-
-/// What --method can be where any method of the lab will do.
-constexpr const char* any_method_help =
-    "sight, paper, or any other of `palpate eval --list-methods`";
 
 }  // namespace palpate::app

@@ -12,7 +12,7 @@
 namespace palpate::app {
 
 RunRecording::RunRecording(const std::string& folder, SessionInfo info,
-                           const Parameters& parameters, double start) {
+                           const ServoSettings& settings, double start) {
   if (folder.empty()) return;
   using std::chrono::nanoseconds;
   const auto now = std::chrono::system_clock::now().time_since_epoch();
@@ -20,7 +20,7 @@ RunRecording::RunRecording(const std::string& folder, SessionInfo info,
   info.version = PALPATE_VERSION;
   info.epoch = std::chrono::duration_cast<nanoseconds>(now).count() - std::llround(1e9 * start);
   writer_ = std::make_unique<SessionWriter>(folder, info, start);
-  writer_->settings({.number = 0, .settings = {parameters, {}, {}}}, start);
+  writer_->settings({.number = 0, .settings = settings}, start);
 }
 
 template <class Write>

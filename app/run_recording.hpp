@@ -20,7 +20,7 @@ class RunRecording {
   /// @param info    kind, version and epoch are filled in
   /// @param start   [s] of the session's clock at which the run begins
   /// @throws Error if the folder is there already or cannot be made.
-  RunRecording(const std::string& folder, SessionInfo info, const Parameters& parameters,
+  RunRecording(const std::string& folder, SessionInfo info, const ServoSettings& settings,
                double start);
 
   /// A frame was adopted. @param cameras  what each saw last

@@ -6,7 +6,8 @@
 #include <span>
 #include <string>
 
-#include "palpate/core/renderer.hpp"
+#include "palpate/core/cloud.hpp"
+#include "palpate/core/tick.hpp"
 
 namespace palpate::app {
 

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "palpate/core/renderer.hpp"
+#include "palpate/core/tick.hpp"
 
 namespace palpate::app {
 

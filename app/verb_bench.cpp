@@ -15,6 +15,7 @@
 #include "app/progress.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/sources/source.hpp"
 
 #include "bench/costs.hpp"
@@ -34,7 +35,7 @@ constexpr double summary_distance = 1.0;
 constexpr double focal_length = 525.0;  // [px] of a 640x480 image, as a Kinect has it
 
 struct BenchOptions {
-  MethodOptions method{Method::paper};
+  MethodOptions method;
   std::optional<std::string> camera;
   bool json = false;
   bool quick = false;
@@ -114,7 +115,12 @@ const SearchCosts& search_named(const Row& row, const std::string& name) {
   throw std::logic_error("no search is called " + name);
 }
 
-std::vector<Row> measure_all(const BenchOptions& options, const Parameters& parameters) {
+bench::MethodChoice choice_of(const BenchOptions& options) {
+  const MethodChoice choice = options.method.choice(standard_methods());
+  return {choice.name, choice.parameters};
+}
+
+std::vector<Row> measure_all(const BenchOptions& options, const bench::MethodChoice& method) {
   struct Scene {
     std::string name;
     std::function<Subject()> make;
@@ -144,9 +150,8 @@ std::vector<Row> measure_all(const BenchOptions& options, const Parameters& para
   std::vector<Row> rows;
   for (const Scene& scene : scenes) {
     const Subject subject = scene.make();
-    rows.push_back({scene.name,
-                    bench::kernel_costs(subject, parameters, Hand{}, budget_of(options)),
-                    bench::search_costs(subject, parameters, budget_of(options))});
+    rows.push_back({scene.name, bench::kernel_costs(subject, method, Hand{}, budget_of(options)),
+                    bench::search_costs(subject, method.parameters, budget_of(options))});
     progress.advance();
   }
   progress.finish();
@@ -154,21 +159,21 @@ std::vector<Row> measure_all(const BenchOptions& options, const Parameters& para
 }
 
 // How much a session grows once it is warm [bytes].
-std::size_t growth_of_memory(const Parameters& parameters, double budget) {
+std::size_t growth_of_memory(const bench::MethodChoice& method, double budget) {
   const Subject subject = bench::noisy_plane(640, 480, focal_length, summary_distance);
-  bench::kernel_costs(subject, parameters, Hand{}, budget);
+  bench::kernel_costs(subject, method, Hand{}, budget);
   const std::size_t before = resident();
-  bench::kernel_costs(subject, parameters, Hand{}, budget);
+  bench::kernel_costs(subject, method, Hand{}, budget);
   const std::size_t after = resident();
   return after > before ? after - before : 0;
 }
 
 int report(const BenchOptions& options) {
-  const Parameters parameters = options.method.parameters();
-  const std::vector<Row> rows = measure_all(options, parameters);
+  const bench::MethodChoice method = choice_of(options);
+  const std::vector<Row> rows = measure_all(options, method);
   const Row& one_metre = rows[2];  // 640x480 at summary_distance
   const SearchCosts& tree = search_named(one_metre, "nanoflann");
-  const std::size_t growth = growth_of_memory(parameters, budget_of(options));
+  const std::size_t growth = growth_of_memory(method, budget_of(options));
   const std::string processor = first_line_with("/proc/cpuinfo", "model name");
 
   if (options.json) {
@@ -238,7 +243,7 @@ int report(const BenchOptions& options) {
 
 // How a tick's cost grows with each thing that could make it grow: one CSV.
 int report_growth(const BenchOptions& options) {
-  const Parameters parameters = options.method.parameters();
+  const bench::MethodChoice method = choice_of(options);
   const std::filesystem::path file = std::filesystem::path(options.out) / "growth.csv";
   std::filesystem::create_directories(options.out);
   std::ofstream csv(file);
@@ -246,7 +251,7 @@ int report_growth(const BenchOptions& options) {
   const double budget = budget_of(options);
   const auto add = [&](const std::string& series, double x, const Subject& subject,
                        const Hand& hand, double build_us) {
-    const KernelCosts k = bench::kernel_costs(subject, parameters, hand, budget);
+    const KernelCosts k = bench::kernel_costs(subject, method, hand, budget);
     csv << fmt::format("{},{:g},{:.1f},{:.3f},{:.4f},{:.4f},{:.4f},{:.4f},{:.1f}\n", series, x,
                        k.points, k.steps, k.gathers, k.tick.median, k.tick.p999, k.gather.median,
                        build_us);

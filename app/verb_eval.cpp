@@ -39,7 +39,7 @@ struct EvalOptions {
   bool resume = false;
   bool list_methods = false;
   bool list_experiments = false;
-  MethodOptions parameters{Method::paper};
+  MethodOptions parameters;
 };
 
 std::pair<int, int> parse_grid(const std::string& text) {
@@ -56,7 +56,7 @@ std::pair<int, int> parse_grid(const std::string& text) {
 
 lab::ExperimentOptions experiment_options(const EvalOptions& options) {
   lab::ExperimentOptions result;
-  result.parameters = options.parameters.parameters();
+  result.parameters = options.parameters.choice(lab::methods()).parameters;
   result.methods = options.methods;
   if (options.seed < 0)
     throw Error("--seed " + std::to_string(options.seed), "it is negative",
@@ -82,7 +82,8 @@ lab::ExperimentOptions experiment_options(const EvalOptions& options) {
 
 int list(const EvalOptions& options) {
   if (options.list_methods) {
-    for (const lab::MethodInfo& method : lab::known_methods()) fmt::print("{}\n", method.name);
+    const MethodRegistry methods = lab::methods();
+    for (const MethodInfo& method : methods.entries()) fmt::print("{}\n", method.name);
     return 0;
   }
   for (const lab::Experiment& experiment : lab::known_experiments())
@@ -181,7 +182,7 @@ Verb add_eval(CLI::App& program) {
   command->add_flag("--resume", options->resume, "go on from an interrupted run's finished cells");
   command->add_flag("--list", options->list_experiments, "list the experiments");
   command->add_flag("--list-methods", options->list_methods, "list the methods, one a line");
-  options->parameters.add_to(*command);
+  options->parameters.add_parameters_to(*command);
   return {command, [options] { return eval(*options); }};
 }
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/program_methods.hpp"
 #include "app/progress.hpp"
 #include "app/recording_check.hpp"
 #include "app/verbs.hpp"
@@ -51,8 +52,8 @@ std::string json_of(const ReplayReport& report) {
 int run(const ReplayOptions& options) {
   SessionReader session(options.path);
   Progress progress("replay", session.ticks());
-  const ReplayReport report =
-      replay(session, [&progress](std::size_t ticks) { progress.set(ticks); });
+  const ReplayReport report = replay(
+      session, [&progress](std::size_t ticks) { progress.set(ticks); }, program_methods());
   progress.finish();
   std::fputs(options.json ? json_of(report).c_str() : text_of(report).c_str(), stdout);
   return report.identical() ? 0 : 1;

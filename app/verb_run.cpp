@@ -13,12 +13,13 @@
 #include "app/live_session.hpp"
 #include "app/options.hpp"
 #include "app/playback.hpp"
+#include "app/program_methods.hpp"
 #include "app/run_recording.hpp"
 #include "app/scripted_hand.hpp"
 #include "app/summary.hpp"
 #include "app/verbs.hpp"
-#include "lab/method.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/methods/methods.hpp"
 
 namespace palpate::app {
 namespace {
@@ -86,7 +87,7 @@ int run_in_browser(const RunOptions& options) {
   if (options.token.empty() && !is_loopback(options.listen)) live.viewer.token = make_token();
   live.open_browser = !options.no_browser;
   live.json = options.json;
-  const auto [name, parameters] = options.method.any_method();
+  const auto [name, parameters] = options.method.choice(program_methods());
   live.method = name;
   live.parameters = parameters;
   live.record = options.record;
@@ -101,21 +102,18 @@ int run_headless(const RunOptions& options) {
   if (!(duration >= 2.0 && duration <= 86400.0))
     throw Error("--duration", fmt::format("{} s is too short or too long", duration),
                 "give 2 to 86400");
-  const auto [name, parameters] = options.method.any_method();
-  if (!options.record.empty() && name != method_name(parameters.method))
-    throw Error("--record",
-                "a session is replayed by palpate's own methods, and '" + name + "' is not one",
-                "leave it out, or choose sight, paper, paper-as-printed or fixed-step");
   Playback playback(options.cameras);
+  const MethodRegistry methods = program_methods(&playback.source(0));
+  const auto [name, parameters] = options.method.choice(methods);
   const HipPath hand = open_hand(options, playback);
   const Vec3 seat = hand.at(hand.first_time());
-  const std::unique_ptr<lab::TouchMethod> method =
-      lab::make_method(name, {parameters, truth_of(playback)});
+  const std::unique_ptr<Method> method = make_method(name, parameters, methods);
+  playback.check(*method);
   method->seat(seat);
   Summary summary;
   RunRecording recording(options.record,
                          {.cameras = options.cameras, .device = options.device, .seat = seat},
-                         parameters, hand.first_time());
+                         {name, parameters, {}, {}}, hand.first_time());
   playback.watch([&recording](double stamp, auto cameras) { recording.frame(stamp, cameras); });
 
   const bool watched = isatty(STDERR_FILENO) == 1;
@@ -166,7 +164,7 @@ Verb add_run(CLI::App& program) {
   command->add_flag("--headless", options->headless,
                     "no page: as fast as the machine can, with a status line and a summary");
   command->add_flag("--json", options->json, "print the summary as a JSON object");
-  options->method.add_to(*command, any_method_help);
+  options->method.add_to(*command);
   return {command, [options] { return run(*options); }};
 }
 

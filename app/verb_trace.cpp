@@ -7,13 +7,14 @@
 
 #include "app/options.hpp"
 #include "app/playback.hpp"
+#include "app/program_methods.hpp"
 #include "app/progress.hpp"
 #include "app/summary.hpp"
 #include "app/trace_csv.hpp"
 #include "app/verbs.hpp"
-#include "lab/method.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/devices/hip_path.hpp"
+#include "palpate/methods/methods.hpp"
 
 namespace palpate::app {
 namespace {
@@ -34,7 +35,6 @@ int trace(const TraceOptions& options) {
   if (options.json && options.out == "-")
     throw Error("--json", "the trace itself goes to standard output",
                 "name a file for it with --out");
-  const auto [name, parameters] = options.method.any_method();
   const HipPath path = HipPath::read_csv(options.path);
   Playback playback(options.cameras);
   for (std::size_t camera = 0; camera < playback.cameras(); ++camera) {
@@ -42,8 +42,10 @@ int trace(const TraceOptions& options) {
     for (const std::string& note : about.notes)
       std::fprintf(stderr, "palpate: %s: %s\n", about.uri.c_str(), note.c_str());
   }
-  const std::unique_ptr<lab::TouchMethod> method =
-      lab::make_method(name, {parameters, truth_of(playback)});
+  const MethodRegistry methods = program_methods(&playback.source(0));
+  const auto [name, parameters] = options.method.choice(methods);
+  const std::unique_ptr<Method> method = make_method(name, parameters, methods);
+  playback.check(*method);
   method->seat(path.at(path.first_time()));
   TraceWriter writer(options.out);
   Summary summary;
@@ -87,7 +89,7 @@ Verb add_trace(CLI::App& program) {
   command->add_option("--out", options->out, "where the trace goes, - for standard output");
   command->add_option("--rate", options->rate, "ticks a second (1000)");
   command->add_flag("--json", options->json, "print the summary as a JSON object");
-  options->method.add_to(*command, any_method_help);
+  options->method.add_to(*command);
   return {command, [options] { return trace(*options); }};
 }
 

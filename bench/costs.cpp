@@ -7,7 +7,8 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/renderer.hpp"
+#include "palpate/methods/methods.hpp"
+#include "palpate/paper/proxy.hpp"
 
 #include "bench/kd_tree.hpp"
 #include "bench/limit.hpp"
@@ -54,13 +55,13 @@ Vec3 hip_at(const Subject& subject, const Hand& hand, double t) {
 // The hand's session: comes down on the surface, then moves.
 class Session {
  public:
-  Session(const Subject& subject, const Parameters& parameters, const Hand& hand)
-      : subject_(subject), hand_(hand), renderer(parameters) {
-    renderer.frame(*subject.frames.front(), 0.0);
+  Session(const Subject& subject, const MethodChoice& method, const Hand& hand)
+      : subject_(subject), hand_(hand), touch(make_method(method.name, method.parameters)) {
+    touch->frame(*subject.frames.front(), 0.0);
     const Vec3 start = hip_at(subject, hand, 0.0);
-    renderer.seat(start - (std::max(hand.depth, 0.0) + 0.03) * subject.into);
+    touch->seat(start - (std::max(hand.depth, 0.0) + 0.03) * subject.into);
     constexpr int settling = 200;
-    for (int i = 0; i < settling; ++i) renderer.tick(start, 0.0);
+    for (int i = 0; i < settling; ++i) touch->tick(start, 0.0);
   }
 
   // Is there a new frame for the next tick?
@@ -68,8 +69,7 @@ class Session {
     return static_cast<double>(frames_) <= (now() + 1.0 / hand_.tick_rate) * hand_.frame_rate;
   }
   void frame(const std::vector<const Cloud*>& clouds) {
-    renderer.frame(*clouds[frames_ % clouds.size()],
-                   static_cast<double>(frames_) / hand_.frame_rate);
+    touch->frame(*clouds[frames_ % clouds.size()], static_cast<double>(frames_) / hand_.frame_rate);
     ++frames_;
   }
   [[nodiscard]] Vec3 next_hip() const {
@@ -77,7 +77,7 @@ class Session {
   }
   Tick tick(const Vec3& hip) {
     ++ticks_;
-    return renderer.tick(hip, now());
+    return touch->tick(hip, now());
   }
   [[nodiscard]] double now() const { return static_cast<double>(ticks_) / hand_.tick_rate; }
 
@@ -88,17 +88,17 @@ class Session {
   std::size_t frames_ = 1;
 
  public:
-  Renderer renderer;
+  std::unique_ptr<Method> touch;
 };
 
-void measure_ticks(const Subject& subject, const Parameters& parameters, const Hand& hand,
+void measure_ticks(const Subject& subject, const MethodChoice& method, const Hand& hand,
                    double budget, KernelCosts& costs) {
   std::vector<CountedCloud> counted;
   counted.reserve(subject.frames.size());
   std::vector<const Cloud*> clouds;
   for (const auto& frame : subject.frames) clouds.push_back(&counted.emplace_back(*frame));
 
-  Session session(subject, parameters, hand);
+  Session session(subject, method, hand);
   constexpr std::size_t most = 200000;
   std::vector<double> ticks;
   std::vector<double> after_frame;
@@ -120,7 +120,7 @@ void measure_ticks(const Subject& subject, const Parameters& parameters, const H
     ticks.push_back(taken);
     if (new_frame) after_frame.push_back(taken);
     steps += tick.steps;
-    points += static_cast<double>(session.renderer.patch().size());
+    points += static_cast<double>(session.touch->patch()->size());
   }
   const auto count = static_cast<double>(ticks.size());
   std::size_t gathers = 0;
@@ -155,16 +155,16 @@ double measure_window(const Cloud& cloud, const Ball& ball, double budget) {
 
 }  // namespace
 
-KernelCosts kernel_costs(const Subject& subject, const Parameters& parameters, const Hand& hand,
+KernelCosts kernel_costs(const Subject& subject, const MethodChoice& method, const Hand& hand,
                          double budget) {
   KernelCosts costs;
-  measure_ticks(subject, parameters, hand, budget, costs);
+  measure_ticks(subject, method, hand, budget, costs);
 
-  Session session(subject, parameters, hand);
-  Renderer& renderer = session.renderer;
-  const Tick rest = renderer.tick(session.next_hip(), 0.0);
-  const ProxyParameters& proxy = parameters.proxy;
-  // What a slide gathers: r_3 and the least that the renderer leaves for the proxy to travel.
+  Session session(subject, method, hand);
+  Method& touch = *session.touch;
+  const Tick rest = touch.tick(session.next_hip(), 0.0);
+  const ProxyParameters& proxy = method.parameters.proxy;
+  // What a slide gathers: r_3 and the least that the method leaves for the proxy to travel.
   const Ball ball{rest.proxy, proxy.r_3 + 0.2 * proxy.r_c()};
   Patch patch;
   costs.gather = measure(budget, many, [&] { gather(*subject.frames.front(), ball, patch); });
@@ -189,8 +189,8 @@ KernelCosts kernel_costs(const Subject& subject, const Parameters& parameters, c
   std::size_t frames = 0;
   costs.frame = measure(budget, many, [&] {
     ++frames;
-    renderer.frame(*subject.frames[frames % subject.frames.size()],
-                   static_cast<double>(frames) / hand.frame_rate);
+    touch.frame(*subject.frames[frames % subject.frames.size()],
+                static_cast<double>(frames) / hand.frame_rate);
   });
   return costs;
 }

@@ -21,6 +21,12 @@ struct Hand {
   double tick_rate = 1000.0;  ///< [Hz] of ticks
 };
 
+/// The library's method that is measured.
+struct MethodChoice {
+  std::string name = "sight";
+  Parameters parameters{};
+};
+
 /// What the kernel costs on a subject.
 struct KernelCosts {
   double points = 0.0;            ///< in the patch, mean over ticks
@@ -37,7 +43,7 @@ struct KernelCosts {
 };
 
 /// Runs the hand over the subject for about `budget` seconds a figure.
-KernelCosts kernel_costs(const Subject& subject, const Parameters& parameters, const Hand& hand,
+KernelCosts kernel_costs(const Subject& subject, const MethodChoice& method, const Hand& hand,
                          double budget);
 
 /// One way to find the points near a place.

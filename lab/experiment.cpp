@@ -45,7 +45,7 @@ std::vector<std::string> methods_of(const Experiment& experiment,
                                     const ExperimentOptions& options) {
   if (options.methods.empty())
     return {experiment.default_methods.begin(), experiment.default_methods.end()};
-  for (const std::string& name : options.methods) find_method(name);
+  for (const std::string& name : options.methods) static_cast<void>(methods().find(name));
   return options.methods;
 }
 

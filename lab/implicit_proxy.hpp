@@ -35,6 +35,7 @@ class ImplicitProxy {
   /// [m] world: where the next tick begins.
   [[nodiscard]] Vec3 point_or(const Vec3& hip) const { return point_.value_or(hip); }
   [[nodiscard]] int steps() const { return steps_; }
+  void set_reach(double reach) { reach_ = reach; }  ///< [m] as in the constructor
 
  private:
   void climb(const Field& field);
@@ -51,25 +52,25 @@ class ImplicitProxy {
 };
 
 /// A method that is a field: what it does with frames, and its value at a place.
-class ImplicitMethod : public TouchMethod {
+class ImplicitMethod : public LabMethod {
  public:
-  void seat(const Vec3& proxy) final { proxy_.seat(proxy); }
-  void frame(const Cloud& cloud, double stamp) final;
-  Tick tick(const Vec3& hip, double t) final;
+  void seat(const Vec3& proxy) noexcept final { proxy_.seat(proxy); }
+  void frame(const Cloud& cloud, double stamp) noexcept final;
+  Tick tick(const Vec3& hip, double t) noexcept final;
 
  protected:
   /// @param stride, reach  as ImplicitProxy
   ImplicitMethod(const Parameters& parameters, double stride, double reach)
-      : parameters_(parameters), proxy_(stride, reach) {}
+      : LabMethod(parameters), proxy_(stride, reach) {}
 
   /// A new frame; the cloud lives until the next call.
   virtual void take(const Cloud& cloud, const Vec3& place) = 0;
   /// Before each tick: the field will be asked about places near this one.
   virtual void prepare(const Vec3& place) = 0;
   virtual std::optional<FieldValue> field(const Vec3& at) = 0;
+  void set_reach(double reach) { proxy_.set_reach(reach); }  ///< [m] as in the constructor
 
  private:
-  Parameters parameters_;
   ImplicitProxy proxy_;
   std::int64_t frames_ = 0;
 };

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "palpate/core/renderer.hpp"
+#include "palpate/core/method.hpp"
 #include "palpate/sources/scene.hpp"
 
 namespace palpate::lab {
@@ -24,41 +24,39 @@ using Truth = std::function<TruePoint(const Vec3& point, double t)>;
 /// The truth of an analytic scene.
 Truth truth_of(const std::shared_ptr<const Scene>& scene);
 
-/// A method under test: what the lab knows of it. Frames and HIPs in, ticks out.
+/// Base of the methods written to compare: their parameters, read as they are needed.
 ///
-/// Of a tick, the experiments read `proxy`, `normal`, `force`, `state` (free or not) and `steps`.
-/// A method without a proxy reports the point it pushes the hand towards, r_c above the surface.
-class TouchMethod {
+/// Of a tick, the experiments read `proxy`, `normal`, `force`, `state` (free or not) and `steps`. A
+/// method without a proxy reports the point it pushes the hand towards, r_c above the surface.
+class LabMethod : public Method {
  public:
-  virtual ~TouchMethod() = default;
-  /// Puts the proxy at `proxy` [m, world] before the first tick.
-  virtual void seat(const Vec3& proxy) = 0;
-  /// A new frame, captured at `stamp` [s]; the cloud lives until the next call.
-  virtual void frame(const Cloud& cloud, double stamp) = 0;
-  /// One cycle, as Renderer::tick.
-  virtual Tick tick(const Vec3& hip, double t) = 0;
+  void set_parameters(const Parameters& parameters) final {
+    validate(parameters);
+    parameters_ = parameters;
+    parameters_changed();
+  }
+
+ protected:
+  explicit LabMethod(const Parameters& parameters) : parameters_(parameters) {}
+  /// For what was derived from the parameters.
+  virtual void parameters_changed() {}
+  [[nodiscard]] const Parameters& parameters() const { return parameters_; }
+
+ private:
+  Parameters parameters_;
 };
 
 /// What a method may be given to start with.
 struct MethodSetup {
-  Parameters parameters;  ///< its `method` is set by make_method where the kernel has it
-  Truth truth;            ///< for `ideal`, the ruler; no honest method looks at it
+  Parameters parameters;
+  Truth truth;  ///< for `ideal`, the ruler; no honest method looks at it
 };
 
-/// A method that can be asked for by name.
-struct MethodInfo {
-  std::string_view name;
-  std::string_view summary;  ///< what it is and where it is published, one line
-  std::unique_ptr<TouchMethod> (*make)(const MethodSetup&);
-};
+/// The library's methods and those of the lab, in the order in which tables show them.
+/// @param truth  for `ideal`; without it making that one fails
+MethodRegistry methods(const Truth& truth = nullptr);
 
-/// All methods, in the order in which tables show them.
-const std::vector<MethodInfo>& known_methods();
-
-/// @throws Error for an unknown name, naming the nearest and listing all.
-const MethodInfo& find_method(std::string_view name);
-
-/// @throws Error as find_method, or if the method lacks something in the set-up.
-std::unique_ptr<TouchMethod> make_method(std::string_view name, const MethodSetup& setup);
+/// @throws Error for an unknown name, or if the method lacks something in the set-up.
+std::unique_ptr<Method> make_method(std::string_view name, const MethodSetup& setup);
 
 }  // namespace palpate::lab

@@ -25,7 +25,7 @@ struct Scenario {
 /// Plays a scenario to a method: every frame at the first tick at or after it arrives, in order.
 /// @param on_tick  (const Tick&) -> bool, after each tick: go on?
 template <class OnTick>
-void play(TouchMethod& method, const Scenario& scenario, const OnTick& on_tick) {
+void play(Method& method, const Scenario& scenario, const OnTick& on_tick) {
   std::shared_ptr<const Cloud> in_use;
   std::uint64_t next_frame = 0;
   const auto ticks =

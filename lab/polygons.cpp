@@ -32,19 +32,6 @@ struct InBox {
   }
 };
 
-// Refuses what triangles cannot be made of.
-void check(const Cloud& cloud) {
-  if (const auto* set = dynamic_cast<const CloudSet*>(&cloud)) {
-    for (const auto& member : set->clouds()) check(*member);
-  } else if (const auto* points = dynamic_cast<const PointCloud*>(&cloud);
-             points != nullptr && points->size() > 0) {
-    const Surface* surface = points->surface();
-    if (surface != nullptr && (!surface->triangles.empty() || surface->columns > 0)) return;
-    throw Error("frame", "it is of points alone, and the method touches polygons",
-                "give a PLY with faces, an organised PCD or a depth camera");
-  }
-}
-
 // The place nearest to p on the triangle a b c (Ericson, Real-Time Collision Detection, 5.1.5).
 Vec3 nearest_on(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
   const Vec3 ab = b - a;
@@ -97,8 +84,19 @@ std::optional<double> meets_line(const Vec3& from, const Vec3& way, double radiu
 
 }  // namespace
 
-void Polygons::frame(const Cloud& cloud) {
-  check(cloud);
+void Polygons::check(const Cloud& cloud) {
+  if (const auto* set = dynamic_cast<const CloudSet*>(&cloud)) {
+    for (const auto& member : set->clouds()) check(*member);
+  } else if (const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+             points != nullptr && points->size() > 0) {
+    const Surface* surface = points->surface();
+    if (surface != nullptr && (!surface->triangles.empty() || surface->columns > 0)) return;
+    throw Error("frame", "it is of points alone, and the method touches polygons",
+                "give a PLY with faces, an organised PCD or a depth camera");
+  }
+}
+
+void Polygons::frame(const Cloud& cloud) noexcept {
   cloud_ = &cloud;
   stale_ = true;
 }

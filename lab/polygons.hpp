@@ -20,9 +20,12 @@ class Polygons {
   /// @param reach  [m] of an image, what is farther than this from the place is left out
   explicit Polygons(double reach) : reach_(reach) {}
 
-  /// Takes a new frame into use. The cloud must live until the next call.
+  /// Can triangles be made of such a cloud?
   /// @throws Error if it has points, but neither faces nor an image to make them of.
-  void frame(const Cloud& cloud);
+  static void check(const Cloud& cloud);
+  /// Takes a new frame into use. The cloud must live until the next call. One that `check` refuses
+  /// has no triangles.
+  void frame(const Cloud& cloud) noexcept;
   /// Sees to it that all triangles within 2/3 of the reach of `place` are here.
   void cover(const Vec3& place);
 

@@ -3,7 +3,8 @@
 
 #include <algorithm>
 
-#include "palpate/core/renderer.hpp"
+#include "palpate/core/parameters.hpp"
+#include "palpate/core/tick.hpp"
 
 namespace palpate::lab {
 
@@ -12,20 +13,6 @@ struct Contact {
   Vec3 point;   ///< [m] world, on the surface as the method has it
   Vec3 normal;  ///< [-] outward
 };
-
-/// The tick of a method that touches nothing: its proxy is at the HIP.
-inline Tick free_tick(const Vec3& hip, double t, std::int64_t frame) {
-  return {.t = t,
-          .hip = hip,
-          .proxy = hip,
-          .normal = Vec3::Zero(),
-          .force = Vec3::Zero(),
-          .state = ContactState::free_motion,
-          .steps = 0,
-          .surface_velocity = 0.0,
-          .frame = frame,
-          .flags = 0};
-}
 
 /// The tick of a method that holds a point of the hand on a surface: a spring pulls the HIP to
 /// that point, and the proxy that the experiments ask for is a sphere of radius r_c upon it.

@@ -100,8 +100,8 @@ constexpr double patience = 0.5;
 // Plays a scenario from free space into contact and watches the seconds from `from` on. A surface
 // is lost where the proxy's centre stays behind it; that ends the repeat, and what was seen of it
 // before it went behind counts.
-void watch(TouchMethod& method, const Scenario& scenario, const Truth& truth, double r_c,
-           double from, Watched& watched) {
+void watch(Method& method, const Scenario& scenario, const Truth& truth, double r_c, double from,
+           Watched& watched) {
   std::vector<double> force;
   int behind = 0;
   std::size_t before = watched.error.size();  // what was seen when it last was in front

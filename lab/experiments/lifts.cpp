@@ -67,7 +67,7 @@ Lifted lift(std::string_view name, const ExperimentOptions& options, const Law& 
   const Truth truth = [&law](const Vec3& p, double t) {
     return TruePoint{p.z() - law.height(t), Vec3::UnitZ()};
   };
-  const std::unique_ptr<TouchMethod> method = make_method(name, {options.parameters, truth});
+  const std::unique_ptr<Method> method = make_method(name, {options.parameters, truth});
   method->seat(Vec3::Zero());
   const Scenario scenario{
       .frame_rate = f_c,

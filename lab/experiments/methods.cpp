@@ -304,8 +304,8 @@ Experiment methods_experiment() {
                         methods_plot,
                         no_claims,
                         methods_scores};
-  for (const MethodInfo& method : known_methods())
-    experiment.default_methods.push_back(method.name);
+  static const MethodRegistry all = methods();
+  for (const MethodInfo& method : all.entries()) experiment.default_methods.push_back(method.name);
   return experiment;
 }
 

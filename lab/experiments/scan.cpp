@@ -14,7 +14,7 @@
 #include "palpate/cloud/audit.hpp"
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/core/renderer.hpp"
+#include "palpate/paper/paper.hpp"
 #include "palpate/sources/source.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 
@@ -258,8 +258,8 @@ std::vector<Cell> scan_cells(const Experiment& experiment, const ExperimentOptio
 double step_rate() {
   const Subject subject = synthetic_desk(1);
   const Frame frame = subject.frame(0);
-  Renderer renderer;
-  renderer.frame(*frame.cloud, 0.0);
+  Paper paper;
+  paper.frame(*frame.cloud, 0.0);
   const auto now = [] {
     timespec t{};
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
@@ -268,7 +268,7 @@ double step_rate() {
   const auto ticks = static_cast<int>(subject.duration * 1e3);
   double steps = 0.0;
   const double begin = now();
-  for (int i = 0; i < ticks; ++i) steps += renderer.tick(subject.hip(i * 1e-3), 0.0).steps;
+  for (int i = 0; i < ticks; ++i) steps += paper.tick(subject.hip(i * 1e-3), 0.0).steps;
   return steps / (now() - begin);
 }
 

@@ -31,12 +31,12 @@ constexpr std::array windows = {1, 2, 4, 8, 16, 32};   // [frames] of the plain 
 
 // The reference: nothing but the mean height of the points within 30 mm over the last frames. It is
 // told that the surface is level.
-class MeanOfFrames final : public TouchMethod {
+class MeanOfFrames final : public LabMethod {
  public:
   MeanOfFrames(const Parameters& parameters, std::size_t window)
-      : parameters_(parameters), window_(window) {}
-  void seat(const Vec3& /*proxy*/) override {}
-  void frame(const Cloud& cloud, double /*stamp*/) override {
+      : LabMethod(parameters), window_(window) {}
+  void seat(const Vec3& /*proxy*/) noexcept override {}
+  void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
     gather(cloud, Beam{Vec3::Zero(), 0.030, 0.3, -Vec3::UnitZ()}, Patch::capacity, patch_);
     if (patch_.size() == 0) return;
     double sum = 0.0;
@@ -47,8 +47,8 @@ class MeanOfFrames final : public TouchMethod {
         std::accumulate(heights_.end() - static_cast<std::ptrdiff_t>(used), heights_.end(), 0.0) /
         static_cast<double>(used);
   }
-  Tick tick(const Vec3& hip, double t) override {
-    const double z = std::max(hip.z(), height_ + parameters_.proxy.r_c());
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    const double z = std::max(hip.z(), height_ + parameters().proxy.r_c());
     return {.t = t,
             .hip = hip,
             .proxy = Vec3(hip.x(), hip.y(), z),
@@ -62,7 +62,6 @@ class MeanOfFrames final : public TouchMethod {
   }
 
  private:
-  Parameters parameters_;
   std::size_t window_;
   Patch patch_;
   std::vector<double> heights_;
@@ -70,24 +69,27 @@ class MeanOfFrames final : public TouchMethod {
 };
 
 // Several methods at once, so that a frame is made but once.
-class Chorus final : public TouchMethod {
+class Chorus final : public Method {
  public:
-  explicit Chorus(std::vector<std::unique_ptr<TouchMethod>> members)
+  explicit Chorus(std::vector<std::unique_ptr<Method>> members)
       : members_(std::move(members)), ticks_(members_.size()) {}
-  void seat(const Vec3& proxy) override {
+  void seat(const Vec3& proxy) noexcept override {
     for (const auto& member : members_) member->seat(proxy);
   }
-  void frame(const Cloud& cloud, double stamp) override {
+  void frame(const Cloud& cloud, double stamp) noexcept override {
     for (const auto& member : members_) member->frame(cloud, stamp);
   }
-  Tick tick(const Vec3& hip, double t) override {
+  Tick tick(const Vec3& hip, double t) noexcept override {
     for (std::size_t i = 0; i < members_.size(); ++i) ticks_[i] = members_[i]->tick(hip, t);
     return ticks_.front();
+  }
+  void set_parameters(const Parameters& parameters) override {
+    for (const auto& member : members_) member->set_parameters(parameters);
   }
   [[nodiscard]] const std::vector<Tick>& ticks() const { return ticks_; }
 
  private:
-  std::vector<std::unique_ptr<TouchMethod>> members_;
+  std::vector<std::unique_ptr<Method>> members_;
   std::vector<Tick> ticks_;
 };
 
@@ -119,7 +121,7 @@ std::vector<std::string> names_of(const Experiment& experiment, const Experiment
 
 Chorus chorus_of(const std::vector<std::string>& names, const Parameters& parameters,
                  const Truth& truth) {
-  std::vector<std::unique_ptr<TouchMethod>> members;
+  std::vector<std::unique_ptr<Method>> members;
   for (std::size_t i = 0; i + windows.size() < names.size(); ++i)
     members.push_back(make_method(names[i], {parameters, truth}));
   for (const int window : windows)

@@ -11,23 +11,23 @@
 namespace palpate::lab {
 namespace {
 
-class Direct final : public TouchMethod {
+class Direct final : public LabMethod {
  public:
-  explicit Direct(const Parameters& parameters) : parameters_(parameters) {}
+  explicit Direct(const Parameters& parameters) : LabMethod(parameters) {}
 
-  void seat(const Vec3& /*proxy*/) override {}
+  void seat(const Vec3& /*proxy*/) noexcept override {}
 
-  void frame(const Cloud& cloud, double /*stamp*/) override {
+  void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
     cloud_ = &cloud;
     ++frames_;
   }
 
-  Tick tick(const Vec3& hip, double t) override {
+  Tick tick(const Vec3& hip, double t) noexcept override {
     Tick tick = free_tick(hip, t, frames_ - 1);
     if (cloud_ == nullptr) return tick;
     // The HIP is deep in the surface when a hand presses hard: the radius has to reach the surface
     // from there. Seven r_c is generous to the method.
-    const double radius = 7.0 * parameters_.proxy.r_c();
+    const double radius = 7.0 * parameters().proxy.r_c();
     gather(*cloud_, Ball{hip, radius}, patch_);
     const std::optional<Contact> plane = fit_plane(patch_, radius);
     if (!plane) return tick;
@@ -35,22 +35,21 @@ class Direct final : public TouchMethod {
     const double distance = plane->normal.dot(hip - plane->point);
     if (distance >= 0.0) return tick;
     const double magnitude =
-        std::min(-parameters_.coupling.stiffness * distance, parameters_.coupling.max_force);
+        std::min(-parameters().coupling.stiffness * distance, parameters().coupling.max_force);
     tick.force = magnitude * plane->normal;
-    tick.proxy = hip + (parameters_.proxy.r_c() - distance) * plane->normal;
+    tick.proxy = hip + (parameters().proxy.r_c() - distance) * plane->normal;
     tick.state = ContactState::contact;
     return tick;
   }
 
  private:
-  Parameters parameters_;
   Patch patch_;
   const Cloud* cloud_ = nullptr;
   std::int64_t frames_ = 0;
 };
 
-std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
-  return std::make_unique<Direct>(setup.parameters);
+std::unique_ptr<Method> make(const Parameters& parameters) {
+  return std::make_unique<Direct>(parameters);
 }
 
 }  // namespace

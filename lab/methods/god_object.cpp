@@ -62,7 +62,7 @@ Vec3 nearest_allowed(const std::vector<Plane>& planes, const Vec3& hip) {
   return best.value_or(planes.empty() ? hip : planes.back().at);
 }
 
-class Constrained final : public TouchMethod {
+class Constrained final : public LabMethod {
  public:
   struct Kind {
     bool sphere = false;
@@ -70,37 +70,36 @@ class Constrained final : public TouchMethod {
     bool shaded = false;
   };
 
-  Constrained(const Parameters& parameters, Kind kind)
-      : parameters_(parameters), kind_(kind), radius_(kind.sphere ? parameters.proxy.r_c() : 0.0) {}
+  Constrained(const Parameters& parameters, Kind kind) : LabMethod(parameters), kind_(kind) {}
 
-  void seat(const Vec3& proxy) override {
+  void seat(const Vec3& proxy) noexcept override {
     centre_ = proxy;
     normal_.reset();
   }
 
-  void frame(const Cloud& cloud, double /*stamp*/) override {
+  void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
     polygons_.frame(cloud);
     new_frame_ = true;
     ++frames_;
   }
 
-  Tick tick(const Vec3& hip, double t) override {
+  Tick tick(const Vec3& hip, double t) noexcept override {
     if (!centre_) centre_ = hip;
     polygons_.cover(*centre_);
     if (new_frame_ && kind_.lifted && normal_) lift();
     new_frame_ = false;
     const auto triangle = follow(hip);
     if (!triangle) return free_tick(hip, t, frames_ - 1);
-    const Vec3 point = *centre_ - radius_ * *normal_;
+    const Vec3 point = *centre_ - radius() * *normal_;
     Vec3 normal = *normal_;
     if (kind_.shaded) normal = polygons_.shaded_normal(*triangle, point);
-    Tick tick = contact_tick(parameters_, hip, {point, normal}, t, frames_ - 1);
+    Tick tick = contact_tick(parameters(), hip, {point, normal}, t, frames_ - 1);
     if (kind_.sphere) {
       // The spring of a sphere ends at its centre, and is slack at r_c: (16).
       tick.proxy = *centre_;
       const double length = (*centre_ - hip).norm();
-      tick.force = std::min(parameters_.coupling.stiffness * std::max(length - radius_, 0.0),
-                            parameters_.coupling.max_force) *
+      tick.force = std::min(parameters().coupling.stiffness * std::max(length - radius(), 0.0),
+                            parameters().coupling.max_force) *
                    *normal_;
     }
     if (kind_.shaded) tick.force = tick.force.norm() * normal;
@@ -108,20 +107,25 @@ class Constrained final : public TouchMethod {
     return tick;
   }
 
+  void check(const Cloud& cloud) const override { Polygons::check(cloud); }
+
  private:
+  // [m] 0 of a god-object
+  [[nodiscard]] double radius() const { return kind_.sphere ? parameters().proxy.r_c() : 0.0; }
+
   // Onto a new surface that has come over it by no more than r_c; then out of what the sphere
   // reaches into.
   void lift() {
     const Vec3 up = polygons_.towards_camera(*centre_).value_or(*normal_);
-    const double high = parameters_.proxy.r_c();
-    const double low = radius_ + 1e-6;
+    const double high = parameters().proxy.r_c();
+    const double low = radius() + 1e-6;
     const Vec3 from = *centre_ + high * up;
     if (const auto hit = polygons_.sweep(from, -(high + low) * up, 0.0))
-      centre_ = from + (radius_ + 1e-8 - hit->share * (high + low)) * up;
-    for (int i = 0; i < 8 && radius_ > 0.0; ++i) {
-      const auto near = polygons_.nearest(*centre_, radius_);
+      centre_ = from + (radius() + 1e-8 - hit->share * (high + low)) * up;
+    for (int i = 0; i < 8 && radius() > 0.0; ++i) {
+      const auto near = polygons_.nearest(*centre_, radius());
       if (!near || (*centre_ - *near).norm() < 1e-9) return;
-      centre_ = *near + (radius_ + 1e-8) * (*centre_ - *near).normalized();
+      centre_ = *near + (radius() + 1e-8) * (*centre_ - *near).normalized();
     }
   }
 
@@ -139,7 +143,7 @@ class Constrained final : public TouchMethod {
       const Vec3 goal = nearest_allowed(planes, hip);
       const Vec3 way = goal - *centre_;
       if (way.norm() < at_rest) break;
-      const auto hit = polygons_.sweep(*centre_, way, radius_);
+      const auto hit = polygons_.sweep(*centre_, way, radius());
       if (!hit) {
         centre_ = goal;
         break;
@@ -158,9 +162,7 @@ class Constrained final : public TouchMethod {
     return held;
   }
 
-  Parameters parameters_;
   Kind kind_;
-  double radius_;  // [m] 0 of a god-object
   Polygons polygons_{0.03};
   std::optional<Vec3> centre_;
   std::optional<Vec3> normal_;  // while it is held
@@ -170,8 +172,8 @@ class Constrained final : public TouchMethod {
 };
 
 template <bool sphere, bool lifted, bool shaded>
-std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
-  return std::make_unique<Constrained>(setup.parameters, Constrained::Kind{sphere, lifted, shaded});
+std::unique_ptr<Method> make(const Parameters& parameters) {
+  return std::make_unique<Constrained>(parameters, Constrained::Kind{sphere, lifted, shaded});
 }
 
 }  // namespace

@@ -3,24 +3,26 @@
 // coupled to the HIP by (16).
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "lab/method.hpp"
-#include "palpate/core/coupling.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/paper/coupling.hpp"
 
 namespace palpate::lab {
 namespace {
 
-class Ideal final : public TouchMethod {
+class Ideal final : public LabMethod {
  public:
-  explicit Ideal(const MethodSetup& setup) : truth_(setup.truth), parameters_(setup.parameters) {}
+  Ideal(const Parameters& parameters, Truth truth)
+      : LabMethod(parameters), truth_(std::move(truth)) {}
 
-  void seat(const Vec3& proxy) override { proxy_ = proxy; }
-  void frame(const Cloud& /*cloud*/, double /*stamp*/) override { ++frames_; }
+  void seat(const Vec3& proxy) noexcept override { proxy_ = proxy; }
+  void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override { ++frames_; }
 
-  Tick tick(const Vec3& hip, double t) override {
+  Tick tick(const Vec3& hip, double t) noexcept override {
     if (!proxy_) proxy_ = hip;
-    const double r_c = parameters_.proxy.r_c();
+    const double r_c = parameters().proxy.r_c();
     // Steps towards the HIP, each no longer than a tenth of the radius and followed by a push out
     // of the surface along its normal, end where the way to the HIP is along the normal.
     const double longest = 0.1 * r_c;
@@ -43,7 +45,7 @@ class Ideal final : public TouchMethod {
     }
     const bool touching = under.distance <= r_c + 1e-7 && (hip - *proxy_).norm() > 1e-9;
     const Vec3 force =
-        touching ? coupling_force(parameters_.coupling, hip - *proxy_, 0.0, r_c, false).force
+        touching ? coupling_force(parameters().coupling, hip - *proxy_, 0.0, r_c, false).force
                  : Vec3(Vec3::Zero());
     return {.t = t,
             .hip = hip,
@@ -59,22 +61,20 @@ class Ideal final : public TouchMethod {
 
  private:
   Truth truth_;
-  Parameters parameters_;
   std::optional<Vec3> proxy_;
   std::int64_t frames_ = 0;
 };
 
-std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
-  if (!setup.truth)
-    throw Error("method 'ideal'", "there is no analytic truth here",
-                "choose another method, or a synthetic scene");
-  return std::make_unique<Ideal>(setup);
-}
-
 }  // namespace
 
-std::vector<MethodInfo> ideal_methods() {
-  return {{"ideal", "the proxy on the true surface: the ruler", make}};
+MethodInfo ideal_method(const Truth& truth) {
+  const auto make = [truth](const Parameters& parameters) {
+    if (!truth)
+      throw Error("method 'ideal'", "there is no analytic truth here",
+                  "choose another method, or a synthetic scene");
+    return std::make_unique<Ideal>(parameters, truth);
+  };
+  return {"ideal", "the proxy on the true surface: the ruler", make, false};
 }
 
 }  // namespace palpate::lab

@@ -23,18 +23,18 @@ constexpr double around = 0.004;           // [m]
 constexpr double reach = 0.3;              // [m] along the line of sight
 constexpr double texture_height = 0.5e-3;  // [m] of white
 
-class ImageFeatures final : public TouchMethod {
+class ImageFeatures final : public LabMethod {
  public:
-  explicit ImageFeatures(const Parameters& parameters) : parameters_(parameters) {}
+  explicit ImageFeatures(const Parameters& parameters) : LabMethod(parameters) {}
 
-  void seat(const Vec3& /*proxy*/) override {}
+  void seat(const Vec3& /*proxy*/) noexcept override {}
 
-  void frame(const Cloud& cloud, double /*stamp*/) override {
+  void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
     cloud_ = &cloud;
     ++frames_;
   }
 
-  Tick tick(const Vec3& hip, double t) override {
+  Tick tick(const Vec3& hip, double t) noexcept override {
     const Tick nothing = free_tick(hip, t, frames_ - 1);
     if (cloud_ == nullptr) return nothing;
     const Beam beam{hip, around, reach, -Vec3::UnitZ()};
@@ -60,7 +60,7 @@ class ImageFeatures final : public TouchMethod {
     const Vec3 seen = hip + plane[0] * away + texture(hip) * normal;
     const double depth = normal.dot(seen - hip);
     if (!(depth > 0.0)) return nothing;
-    return contact_tick(parameters_, hip, {hip + depth * normal, normal}, t, frames_ - 1);
+    return contact_tick(parameters(), hip, {hip + depth * normal, normal}, t, frames_ - 1);
   }
 
  private:
@@ -84,14 +84,13 @@ class ImageFeatures final : public TouchMethod {
     return height;
   }
 
-  Parameters parameters_;
   Patch patch_;
   const Cloud* cloud_ = nullptr;
   std::int64_t frames_ = 0;
 };
 
-std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
-  return std::make_unique<ImageFeatures>(setup.parameters);
+std::unique_ptr<Method> make(const Parameters& parameters) {
+  return std::make_unique<ImageFeatures>(parameters);
 }
 
 }  // namespace

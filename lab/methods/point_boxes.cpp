@@ -22,22 +22,22 @@ namespace {
 constexpr double share_of_spacing = 0.8;
 constexpr double off = 1e-9;  // [m] between a face and what rests on it
 
-class PointBoxes final : public TouchMethod {
+class PointBoxes final : public LabMethod {
  public:
-  explicit PointBoxes(const Parameters& parameters) : parameters_(parameters) {}
+  explicit PointBoxes(const Parameters& parameters) : LabMethod(parameters) {}
 
-  void seat(const Vec3& proxy) override {
+  void seat(const Vec3& proxy) noexcept override {
     proxy_ = proxy;
     touching_ = false;
   }
 
-  void frame(const Cloud& cloud, double /*stamp*/) override {
+  void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
     points_.frame(cloud);
     new_frame_ = true;
     ++frames_;
   }
 
-  Tick tick(const Vec3& hip, double t) override {
+  Tick tick(const Vec3& hip, double t) noexcept override {
     if (!proxy_) proxy_ = hip;
     if (points_.cover(*proxy_)) build();
     if (new_frame_) climb();
@@ -48,7 +48,7 @@ class PointBoxes final : public TouchMethod {
     if (touching_) {
       const Vec3 pull = *proxy_ - hip;
       normal_ = pull.norm() > 1e-12 ? Vec3(pull.normalized()) : normal_;
-      tick = contact_tick(parameters_, hip, {*proxy_, normal_}, t, frames_ - 1);
+      tick = contact_tick(parameters(), hip, {*proxy_, normal_}, t, frames_ - 1);
     }
     tick.steps = faces + 1;
     return tick;
@@ -172,7 +172,6 @@ class PointBoxes final : public TouchMethod {
     return 3;
   }
 
-  Parameters parameters_;
   LocalPoints points_{0.03};
   std::vector<LocalPoints::Neighbour> near_;
   std::unordered_map<Key, std::vector<std::uint32_t>, Hash> cells_;
@@ -184,8 +183,8 @@ class PointBoxes final : public TouchMethod {
   std::int64_t frames_ = 0;
 };
 
-std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
-  return std::make_unique<PointBoxes>(setup.parameters);
+std::unique_ptr<Method> make(const Parameters& parameters) {
+  return std::make_unique<PointBoxes>(parameters);
 }
 
 }  // namespace

@@ -64,11 +64,11 @@ class RadialFields final : public ImplicitMethod {
   std::vector<LocalPoints::Neighbour> near_, neighbours_;
 };
 
-std::unique_ptr<TouchMethod> of_one(const MethodSetup& setup) {
-  return std::make_unique<RadialFields>(setup.parameters, 1);
+std::unique_ptr<Method> of_one(const Parameters& parameters) {
+  return std::make_unique<RadialFields>(parameters, 1);
 }
-std::unique_ptr<TouchMethod> of_a_few(const MethodSetup& setup) {
-  return std::make_unique<RadialFields>(setup.parameters, a_few);
+std::unique_ptr<Method> of_a_few(const Parameters& parameters) {
+  return std::make_unique<RadialFields>(parameters, a_few);
 }
 
 }  // namespace

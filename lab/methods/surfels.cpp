@@ -28,11 +28,12 @@ class Surfels final : public ImplicitMethod {
  public:
   Surfels(const Parameters& parameters, std::size_t window, bool given)
       : ImplicitMethod(parameters, stride, parameters.proxy.r_3),
-        radius_(parameters.proxy.r_3),
         given_(given),
         points_(0.03, window) {}
 
  private:
+  void parameters_changed() override { set_reach(parameters().proxy.r_3); }
+
   void take(const Cloud& cloud, const Vec3& /*place*/) override { points_.frame(cloud); }
 
   void prepare(const Vec3& place) override {
@@ -62,12 +63,13 @@ class Surfels final : public ImplicitMethod {
   }
 
   std::optional<FieldValue> field(const Vec3& at) override {
-    points_.within(at, radius_, near_);
+    const double radius = parameters().proxy.r_3;  // w is 0 beyond
+    points_.within(at, radius, near_);
     double total = 0.0;
     Vec3 mean = Vec3::Zero();
     Vec3 direction = Vec3::Zero();
     for (const auto& [index, squared] : near_) {
-      const double q = std::sqrt(squared) / radius_;
+      const double q = std::sqrt(squared) / radius;
       const double square = (1.0 - q) * (1.0 - q);
       const double w = square * square * (4.0 * q + 1.0);
       total += w;
@@ -79,22 +81,21 @@ class Surfels final : public ImplicitMethod {
     return FieldValue{direction.dot(at - mean / total), direction};
   }
 
-  double radius_;  // [m] w is 0 beyond
-  bool given_;     // normals are taken as they came, where they did
+  bool given_;  // normals are taken as they came, where they did
   LocalPoints points_;
   std::vector<Vec3> normals_;  // of each point, zero until it is asked for
   std::vector<LocalPoints::Neighbour> near_, neighbours_;
 };
 
-std::unique_ptr<TouchMethod> of_one(const MethodSetup& setup) {
-  return std::make_unique<Surfels>(setup.parameters, 1, false);
+std::unique_ptr<Method> of_one(const Parameters& parameters) {
+  return std::make_unique<Surfels>(parameters, 1, false);
 }
-std::unique_ptr<TouchMethod> of_a_few(const MethodSetup& setup) {
-  return std::make_unique<Surfels>(setup.parameters, a_few, false);
+std::unique_ptr<Method> of_a_few(const Parameters& parameters) {
+  return std::make_unique<Surfels>(parameters, a_few, false);
 }
 
-std::unique_ptr<TouchMethod> of_given(const MethodSetup& setup) {
-  return std::make_unique<Surfels>(setup.parameters, 1, true);
+std::unique_ptr<Method> of_given(const Parameters& parameters) {
+  return std::make_unique<Surfels>(parameters, 1, true);
 }
 
 }  // namespace

@@ -171,8 +171,8 @@ class Tsdf final : public ImplicitMethod {
   std::vector<std::uint32_t> written_;
 };
 
-std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
-  return std::make_unique<Tsdf>(setup.parameters);
+std::unique_ptr<Method> make(const Parameters& parameters) {
+  return std::make_unique<Tsdf>(parameters);
 }
 
 }  // namespace

@@ -23,18 +23,18 @@ namespace {
 constexpr double device_damping = 0.5;    // [N s/m]
 constexpr double scene_to_spring = 10.0;  // [-]
 
-class VirtualCoupling final : public TouchMethod {
+class VirtualCoupling final : public LabMethod {
  public:
-  explicit VirtualCoupling(const Parameters& parameters) : parameters_(parameters) {}
+  explicit VirtualCoupling(const Parameters& parameters) : LabMethod(parameters) {}
 
-  void seat(const Vec3& proxy) override { tool_ = proxy; }
+  void seat(const Vec3& proxy) noexcept override { tool_ = proxy; }
 
-  void frame(const Cloud& cloud, double /*stamp*/) override {
+  void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
     cloud_ = &cloud;
     ++frames_;
   }
 
-  Tick tick(const Vec3& hip, double t) override {
+  Tick tick(const Vec3& hip, double t) noexcept override {
     const double period = t > last_t_ ? t - last_t_ : 1e-3;
     const Vec3 before = tool_.value_or(hip);
     const Vec3 hand_velocity = (hip - last_hip_.value_or(hip)) / period;
@@ -44,15 +44,15 @@ class VirtualCoupling final : public TouchMethod {
     tool_ = hip;
     if (cloud_ == nullptr) return tick;
 
-    const double r_c = parameters_.proxy.r_c();
+    const double r_c = parameters().proxy.r_c();
     const double radius = 7.0 * r_c;
     gather(*cloud_, Ball{before, radius}, patch_);
     const auto plane = fit_plane(patch_, radius);
     if (!plane) return tick;
 
     // K (hip - x) + B (v_hip - (x - before) / T) + K_s max(0, r_c - n.(x - a)) n = 0
-    const double damping = parameters_.coupling.damping;
-    const double stiffness = std::min(parameters_.coupling.stiffness,
+    const double damping = parameters().coupling.damping;
+    const double stiffness = std::min(parameters().coupling.stiffness,
                                       passive_stiffness(device_damping, damping, period));
     const double soft = stiffness + damping / period;
     if (!(soft > 0.0)) return tick;
@@ -72,13 +72,12 @@ class VirtualCoupling final : public TouchMethod {
         stiffness * (*tool_ - hip) + damping * ((*tool_ - before) / period - hand_velocity);
     // As of the other methods, the spring is slack where the ball touches.
     const double length = tick.force.norm();
-    const double felt = std::clamp(length - stiffness * r_c, 0.0, parameters_.coupling.max_force);
+    const double felt = std::clamp(length - stiffness * r_c, 0.0, parameters().coupling.max_force);
     tick.force *= length > 0.0 ? felt / length : 0.0;
     return tick;
   }
 
  private:
-  Parameters parameters_;
   Patch patch_;
   const Cloud* cloud_ = nullptr;
   std::optional<Vec3> tool_, last_hip_;
@@ -86,8 +85,8 @@ class VirtualCoupling final : public TouchMethod {
   std::int64_t frames_ = 0;
 };
 
-std::unique_ptr<TouchMethod> make(const MethodSetup& setup) {
-  return std::make_unique<VirtualCoupling>(setup.parameters);
+std::unique_ptr<Method> make(const Parameters& parameters) {
+  return std::make_unique<VirtualCoupling>(parameters);
 }
 
 }  // namespace

@@ -90,14 +90,6 @@ constexpr std::array table = {
                   [](Parameters& p, double v) { p.sight.side_depth = v; }},
 };
 
-constexpr std::array methods = {
-    MethodInfo{Method::paper, "paper", "the paper's method with its errata corrected"},
-    MethodInfo{Method::paper_as_printed, "paper-as-printed", "the paper's method to the letter"},
-    MethodInfo{Method::fixed_step, "fixed-step",
-               "the method of 2011: every step 0.1 r_1, no velocity estimate"},
-    MethodInfo{Method::sight, "sight",
-               "tracks the surface along the camera's sightlines, also before contact"}};
-
 std::string number(double value) {
   std::string text = std::to_string(value);
   if (value != 0.0 && std::abs(value) < 1e-3) {
@@ -146,27 +138,6 @@ void validate(const Parameters& parameters) {
                     number(proxy.r_3) + " m do not increase",
                 "give r_1 < r_2 < r_3, or set r_c to scale all three");
   }
-}
-
-std::span<const MethodInfo> method_table() {
-  return methods;
-}
-
-std::string_view method_name(Method method) {
-  for (const MethodInfo& row : methods) {
-    if (row.method == method) return row.name;
-  }
-  return "unknown";
-}
-
-Method method_from_name(std::string_view name) {
-  std::string known;
-  for (const MethodInfo& row : methods) {
-    if (row.name == name) return row.method;
-    known += (known.empty() ? "" : ", ") + std::string(row.name);
-  }
-  throw Error("method '" + std::string(name) + "'", "there is no such method",
-              "choose one of: " + known);
 }
 
 }  // namespace palpate

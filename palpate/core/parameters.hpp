@@ -7,14 +7,6 @@
 
 namespace palpate {
 
-/// Which variant of the method the renderer runs.
-enum class Method {
-  paper,             ///< sections 4.1-4.6 with the errata of docs/method.md corrected
-  paper_as_printed,  ///< the same to the letter: signs of (15) and (16), 1/f_c in (3) and (13)
-  fixed_step,        ///< the 2011 method [1]: every step 0.1 r_1, no velocity estimate
-  sight,             ///< sightline tracking: docs/method.md, "Sight"
-};
-
 /// The proxy's regions and the constants of its movement. Section 4.1, 4.3, 4.4; Table 2.
 struct ProxyParameters {
   double r_1 = 4.99e-3;  ///< [m] a point nearer than this entrenches the proxy
@@ -50,9 +42,8 @@ struct SightParameters {
   double side_depth = 0.1;  ///< [m] how far bodies go on behind the edges of what is seen of them
 };
 
-/// Everything that can be set on a renderer. Defaults are the paper's Table 2.
+/// Everything that can be set on a method. Defaults are the paper's Table 2 where it has them.
 struct Parameters {
-  Method method = Method::paper;
   ProxyParameters proxy;
   Coupling coupling;
   MotionParameters motion;
@@ -84,21 +75,5 @@ void set_parameter(Parameters& parameters, std::string_view name, double value);
 /// Checks every range and that 0 < r_1 < r_2 < r_3.
 /// @throws Error naming the first parameter that does not hold.
 void validate(const Parameters& parameters);
-
-/// One row of the table of methods.
-struct MethodInfo {
-  Method method;
-  std::string_view name;     ///< on the command line, such as `paper-as-printed`
-  std::string_view meaning;  ///< what it is, in a sentence
-};
-
-/// All methods, in the order in which they are shown.
-std::span<const MethodInfo> method_table();
-
-/// The method's name on the command line, such as `paper-as-printed`.
-std::string_view method_name(Method method);
-
-/// @throws Error for an unknown name, listing the known ones.
-Method method_from_name(std::string_view name);
 
 }  // namespace palpate

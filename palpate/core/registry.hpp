@@ -63,7 +63,8 @@ class Registry {
   }
 
   /// In the order in which they are shown.
-  [[nodiscard]] const std::vector<Entry>& entries() const { return entries_; }
+  [[nodiscard]] const std::vector<Entry>& entries() const& { return entries_; }
+  const std::vector<Entry>& entries() const&& = delete;  // they would be gone with the registry
 
  private:
   std::string noun_, suffix_;

@@ -168,7 +168,7 @@ void Recorder::collect_ticks() {
       more = ring_.try_pop(tick);
       if (!more) break;
       if (!begun_) {
-        const bool first = (tick.hand & rendering_renewed) != 0;
+        const bool first = (tick.hand & method_switched) != 0;
         if (!first) {
           proxy_ = tick.tick.proxy;
           // Only now, so that the tick before the first is known.

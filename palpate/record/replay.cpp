@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "palpate/core/error.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/servo/free_side.hpp"
 
 namespace palpate {
@@ -32,31 +33,42 @@ std::string difference(const Tick& a, const Tick& b) {
   return {};
 }
 
-// The renderer of a session, given again what it was given then.
+// The method of a session, given again what it was given then.
 class Rerun {
  public:
-  Rerun(SessionReader& session, const ServoTick& first)
+  Rerun(SessionReader& session, const ServoTick& first, const MethodRegistry& methods)
       : session_(session),
+        methods_(methods),
         settings_number_(first.settings_number),
         settings_(session.settings(settings_number_)),
-        renderer_(settings_.rendering) {
+        method_(make_method(settings_.method, settings_.parameters, methods_)) {
     if (!session.info().seat) return;
     last_proxy_ = *session.info().seat;
-    renderer_.seat(last_proxy_);
+    method_->seat(last_proxy_);
   }
 
   Tick tick(const ServoTick& recorded) {
+    bool switched = (recorded.hand & method_switched) != 0 && ticks_ > 0;
     if (recorded.settings_number != settings_number_) {
+      const std::string before = settings_.method;
       settings_number_ = recorded.settings_number;
       settings_ = session_.settings(settings_number_);
-      renderer_.set_parameters(settings_.rendering);
+      switched = switched || settings_.method != before;
+      if (!switched) method_->set_parameters(settings_.parameters);
     }
+    if (switched) {
+      method_ = make_method(settings_.method, settings_.parameters, methods_);
+      method_->seat(last_proxy_);
+      last_normal_ = Vec3::Zero();
+      if (recorded.frame_number == frame_number_ && cloud_) method_->frame(*cloud_, stamp_);
+    }
+    ++ticks_;
     adopt(recorded.frame_number);
     if ((recorded.hand & proxy_reseated) != 0 && cloud_) {
-      renderer_.seat(
-          free_side(*cloud_, last_proxy_, last_normal_, settings_.rendering.proxy.r_c(), patch_));
+      method_->seat(
+          free_side(*cloud_, last_proxy_, last_normal_, settings_.parameters.proxy.r_c(), patch_));
     }
-    Tick tick = renderer_.tick(recorded.tick.hip, recorded.tick.t);
+    Tick tick = method_->tick(recorded.tick.hip, recorded.tick.t);
     last_proxy_ = tick.proxy;
     last_normal_ = tick.normal;
     return tick;
@@ -76,7 +88,8 @@ class Rerun {
     if (session_.info().kind == SessionInfo::Kind::headless) frame = put.upper_bound(frame_number_);
     for (; frame != std::next(last); ++frame) {
       std::shared_ptr<const Cloud> cloud = session_.cloud(frame->second);
-      renderer_.frame(*cloud, frame->second.stamp);
+      stamp_ = frame->second.stamp;
+      method_->frame(*cloud, stamp_);
       cloud_ = std::move(cloud);  // only now may the one before go
       ++frames_;
     }
@@ -84,11 +97,14 @@ class Rerun {
   }
 
   SessionReader& session_;
+  const MethodRegistry& methods_;
   std::uint64_t settings_number_;
   ServoSettings settings_;
-  Renderer renderer_;
+  std::unique_ptr<Method> method_;
+  std::uint64_t ticks_ = 0;
   std::uint64_t frame_number_ = 0;
   std::shared_ptr<const Cloud> cloud_;
+  double stamp_ = 0.0;  // [s] of cloud_
   Patch patch_;
   Vec3 last_proxy_ = Vec3::Zero();
   Vec3 last_normal_ = Vec3::Zero();
@@ -97,7 +113,8 @@ class Rerun {
 
 }  // namespace
 
-ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress) {
+ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress,
+                    const MethodRegistry& methods) {
   constexpr std::size_t ticks_a_report = 1000;
   ReplayReport report;
   report.check = session.check();
@@ -115,7 +132,7 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
                             std::to_string(recorded.number - 1) + " are missing";
         break;
       }
-      if (!rerun) rerun.emplace(session, recorded);
+      if (!rerun) rerun.emplace(session, recorded, methods);
       const Tick again = rerun->tick(recorded);
       const std::string field = difference(again, recorded.tick);
       if (!field.empty()) {

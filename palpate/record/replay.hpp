@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "palpate/methods/methods.hpp"
 #include "palpate/record/session_reader.hpp"
 
 namespace palpate {
@@ -29,11 +30,14 @@ struct ReplayReport {
   }
 };
 
-/// Runs the renderer anew on a session's frames, HIPs and settings, each before the tick that it
+/// Runs the method anew on a session's frames, HIPs and settings, each before the tick that it
 /// was used in, and compares each tick with the recorded one, bit for bit: the proxy, the normal,
 /// the force before the safety chain, the state and the flags.
 /// @param progress  called now and then with the number of ticks done; may be empty
-/// A recording that is damaged in its midst ends the replay there, as the report says.
-ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress = {});
+/// @param methods   those that the session may name
+/// A recording that is damaged in its midst, or names a method that is not there, ends the replay
+/// there, as the report says.
+ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress = {},
+                    const MethodRegistry& methods = standard_methods());
 
 }  // namespace palpate

@@ -178,15 +178,15 @@ SessionInfo session_from_json(const std::string& text, const std::string& name) 
 
 std::string to_json(const NumberedSettings& settings) {
   const ServoSettings& all = settings.settings;
-  json rendering;
+  json parameters;
   json safety;
   json pose = json::array();
-  for (const ParameterInfo& row : parameter_table()) rendering[row.name] = row.get(all.rendering);
+  for (const ParameterInfo& row : parameter_table()) parameters[row.name] = row.get(all.parameters);
   for (const SafetyParameterInfo& row : safety_parameter_table())
     safety[row.name] = all.safety.*row.member;
   for (int i = 0; i < 12; ++i) pose.push_back(all.placement.world_from_device(i / 4, i % 4));
-  return json{{"number", settings.number}, {"method", method_name(all.rendering.method)},
-              {"parameters", rendering},   {"safety", safety},
+  return json{{"number", settings.number}, {"method", all.method},
+              {"parameters", parameters},  {"safety", safety},
               {"world_from_device", pose}, {"workspace_scale", all.placement.workspace_scale}}
       .dump();
 }
@@ -196,13 +196,13 @@ NumberedSettings settings_from_json(const std::string& text, const std::string& 
     NumberedSettings settings;
     ServoSettings& all = settings.settings;
     settings.number = object.at("number").get<std::uint64_t>();
-    all.rendering.method = method_from_name(object.at("method").get<std::string>());
+    all.method = object.at("method").get<std::string>();
     const json& parameters = object.at("parameters");
     for (const ParameterInfo& row : parameter_table()) {
       // r_c is derived: setting it would round the three radii that it scales. What an older
       // version did not have yet stays at its default.
       if (row.name != "r_c" && parameters.contains(row.name))
-        set_parameter(all.rendering, row.name, parameters.at(row.name).get<double>());
+        set_parameter(all.parameters, row.name, parameters.at(row.name).get<double>());
     }
     const json& safety = object.at("safety");
     for (const SafetyParameterInfo& row : safety_parameter_table()) {

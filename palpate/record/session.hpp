@@ -51,10 +51,6 @@ std::string to_json(const SessionInfo& info);
 /// @throws Error naming `name` if it is damaged.
 SessionInfo session_from_json(const std::string& text, const std::string& name);
 
-struct NumberedSettings {
-  std::uint64_t number = 0;  ///< as ServoTick's
-  ServoSettings settings;
-};
 std::string to_json(const NumberedSettings& settings);
 /// @throws Error naming `name` if it is damaged or does not validate.
 NumberedSettings settings_from_json(const std::string& text, const std::string& name);

@@ -35,22 +35,24 @@ std::uint32_t hand_bits(const HandState& hand) noexcept {
 }  // namespace
 
 void validate(const ServoSettings& settings) {
-  validate(settings.rendering);
+  validate(settings.parameters);
   validate(settings.safety);
   validate(settings.placement);
 }
 
-Cycle::Cycle(std::unique_ptr<Rendering> rendering, Device& device, const ServoSettings& settings,
+Cycle::Cycle(std::shared_ptr<Method> method, Device& device, const ServoSettings& settings,
              std::size_t ring)
-    : first_rendering_(std::move(rendering)),
-      rendering_(first_rendering_.get()),
+    : first_method_(std::move(method)),
+      method_(first_method_.get()),
       device_(device),
       safety_(device.info().limits, settings.safety),
       workspace_(settings.placement),
-      parameters_(settings.rendering),
+      parameters_(settings.parameters),
+      newest_change_{settings, first_method_},
       ring_(ring) {
+  if (method_ == nullptr) throw Error("method", "there is none", "give one");
   validate(settings);
-  rendering_->set_parameters(settings.rendering);
+  method_->set_parameters(settings.parameters);
 }
 
 std::uint64_t Cycle::put_frame(std::shared_ptr<const Cloud> cloud, double stamp, double now) {
@@ -79,28 +81,48 @@ std::uint64_t Cycle::put_frame(std::shared_ptr<const Cloud> cloud, double stamp,
 std::uint64_t Cycle::set_settings(const ServoSettings& settings) {
   validate(settings);
   const std::lock_guard lock(writers_);
-  return settings_.put(settings);
+  newest_change_.settings = settings;
+  return changes_.put(newest_change_);
 }
 
-void Cycle::renew(std::shared_ptr<Rendering> rendering) {
-  if (!rendering) throw Error("renderer", "there is none", "give one");
+std::uint64_t Cycle::set_method(std::shared_ptr<Method> method, const ServoSettings& settings) {
+  if (!method) throw Error("method", "there is none", "give one");
+  validate(settings);
+  method->set_parameters(settings.parameters);
   const std::lock_guard lock(writers_);
-  renewals_.put(std::move(rendering));
+  newest_change_ = {settings, std::move(method)};
+  return changes_.put(newest_change_);
 }
 
-void Cycle::adopt_settings(const ServoSettings& settings) noexcept {
-  safety_.set_parameters(settings.safety);
-  workspace_.place(settings.placement);
-  parameters_ = settings.rendering;
+NumberedSettings Cycle::set_method(std::shared_ptr<Method> method) {
+  if (!method) throw Error("method", "there is none", "give one");
+  const std::lock_guard lock(writers_);
+  method->set_parameters(newest_change_.settings.parameters);
+  newest_change_.method = std::move(method);
+  const std::uint64_t number = changes_.put(newest_change_);
+  return {number, newest_change_.settings};
+}
+
+// The proxy is all that another method is told of the one before. True if it is another.
+bool Cycle::adopt_change(const Change& change) noexcept {
+  safety_.set_parameters(change.settings.safety);
+  workspace_.place(change.settings.placement);
+  parameters_ = change.settings.parameters;
+  const bool switched = change.method.get() != method_;
+  method_ = change.method.get();
   try {
-    rendering_->set_parameters(settings.rendering);
+    method_->set_parameters(parameters_);
   } catch (const Error&) {  // validated, so only a method with limits of its own comes here
     add(statistics_.settings_refused, 1);
   }
+  if (!switched) return false;
+  if (number_ > 0) method_->seat(last_proxy_);
+  last_normal_ = Vec3::Zero();
+  return true;
 }
 
 void Cycle::adopt_frame(const CapturedFrame& frame, double t) noexcept {
-  rendering_->frame(*frame.cloud, frame.stamp);
+  method_->frame(*frame.cloud, frame.stamp);
   // Arrived when it was put; if that is not on the loop's clock, now.
   const double arrived = frame.put_at <= t ? frame.put_at : t;
   freshness_.adopt({frame.cameras.data(), frame.camera_count}, arrived,
@@ -111,46 +133,31 @@ void Cycle::adopt_frame(const CapturedFrame& frame, double t) noexcept {
   statistics_.hand_over.add(nanoseconds(t - frame.put_at));
 }
 
-// The proxy is all that a new renderer is told of the one before.
-bool Cycle::adopt_rendering() noexcept {
-  const std::shared_ptr<Rendering>* renewal = renewals_.take();
-  if (renewal == nullptr) return false;
-  rendering_ = renewal->get();
-  try {
-    rendering_->set_parameters(parameters_);
-  } catch (const Error&) {
-    add(statistics_.settings_refused, 1);
-  }
-  if (number_ > 0) rendering_->seat(last_proxy_);
-  last_normal_ = Vec3::Zero();
-  return true;
-}
-
 void Cycle::run(const Wake& wake) noexcept {
   const double t = wake.t;
   HandState hand = device_.read(t);
-  if (const ServoSettings* settings = settings_.take()) adopt_settings(*settings);
+  const Change* change = changes_.take();
+  const bool switched = change != nullptr && adopt_change(*change);
   hand.clutched = workspace_.is_clutched(hand);
   if (const std::uint64_t resets = fault_resets_.load(std::memory_order_relaxed);
       resets != fault_resets_done_) {
     fault_resets_done_ = resets;
     safety_.reset();
   }
-  const bool renewed = adopt_rendering();
   if (const CapturedFrame* frame = frames_.take()) {
     adopt_frame(*frame, t);
-  } else if (const auto& in_use = frames_.taken_last(); renewed && in_use.cloud) {
-    rendering_->frame(*in_use.cloud, in_use.stamp);
+  } else if (const auto& in_use = frames_.taken_last(); switched && in_use.cloud) {
+    method_->frame(*in_use.cloud, in_use.stamp);
   }
 
   const Vec3 hip = workspace_.hip_in_world(hand);
   bool reseated = false;
   if (const auto& frame = frames_.taken_last(); frame.cloud && safety_.stalls_at(t)) {
     reseated = true;
-    rendering_->seat(
+    method_->seat(
         free_side(*frame.cloud, last_proxy_, last_normal_, parameters_.proxy.r_c(), patch_));
   }
-  const Tick tick = rendering_->tick(hip, t);
+  const Tick tick = method_->tick(hip, t);
   last_proxy_ = tick.proxy;
   last_normal_ = tick.normal;
 
@@ -174,12 +181,12 @@ void Cycle::run(const Wake& wake) noexcept {
                          .frame_age = age.age,
                          .number = number_++,
                          .frame_number = frames_.number(),
-                         .settings_number = settings_.number(),
+                         .settings_number = changes_.number(),
                          .safety = safe.flags,
                          .wake_up_ns = wake.wake_up_ns,
                          .previous_compute_ns = wake.previous_compute_ns,
                          .hand = hand_bits(hand) | (reseated ? proxy_reseated : 0U) |
-                                 (renewed ? rendering_renewed : 0U)};
+                                 (switched ? method_switched : 0U)};
   ring_.push(record);
   keep_statistics(record);
 }

@@ -7,9 +7,9 @@
 #include <memory>
 #include <mutex>
 #include <span>
-#include <utility>
+#include <string>
 
-#include "palpate/core/renderer.hpp"
+#include "palpate/core/method.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/freshness.hpp"
 #include "palpate/servo/histogram.hpp"
@@ -21,34 +21,11 @@
 
 namespace palpate {
 
-/// What the loop asks of a method. `Renderer` has this shape; see `rendering_by`.
-class Rendering {
- public:
-  virtual ~Rendering() = default;
-  virtual void seat(const Vec3& proxy) noexcept = 0;
-  virtual void frame(const Cloud& cloud, double stamp) noexcept = 0;
-  virtual Tick tick(const Vec3& hip, double t) noexcept = 0;
-  /// @throws Error if the method cannot use them; it then keeps the old ones.
-  virtual void set_parameters(const Parameters& parameters) = 0;
-};
-
-/// Any class with Renderer's four functions as a Rendering.
-template <class Method, class... Arguments>
-std::unique_ptr<Rendering> rendering_by(Arguments&&... arguments) {
-  struct By final : Rendering {
-    explicit By(Arguments&&... a) : method(std::forward<Arguments>(a)...) {}
-    void seat(const Vec3& proxy) noexcept override { method.seat(proxy); }
-    void frame(const Cloud& cloud, double stamp) noexcept override { method.frame(cloud, stamp); }
-    Tick tick(const Vec3& hip, double t) noexcept override { return method.tick(hip, t); }
-    void set_parameters(const Parameters& p) override { method.set_parameters(p); }
-    Method method;
-  };
-  return std::make_unique<By>(std::forward<Arguments>(arguments)...);
-}
-
 /// Everything that can be changed while the loop runs.
 struct ServoSettings {
-  Parameters rendering;
+  /// The method's name, for the record: Cycle::set_method is what switches.
+  std::string method = "sight";
+  Parameters parameters;
   SafetyParameters safety;
   Placement placement;
 };
@@ -56,14 +33,20 @@ struct ServoSettings {
 /// @throws Error if one of them does not validate.
 void validate(const ServoSettings& settings);
 
+/// Settings, and their number among those set.
+struct NumberedSettings {
+  std::uint64_t number = 0;  ///< as ServoTick::settings_number
+  ServoSettings settings;
+};
+
 /// What was done with the hand in a cycle; bits of `ServoTick::hand`.
 enum HandFlag : std::uint32_t {
   hand_present = 1u << 0,
   hand_clutched = 1u << 1,
   /// The proxy was seated on the surface's free side before the tick, as ticks were missed.
   proxy_reseated = 1u << 2,
-  /// A new renderer took over before the tick, with the proxy where it was; see Cycle::renew.
-  rendering_renewed = 1u << 3,
+  /// Another method took over before the tick, with the proxy where it was; see Cycle::set_method.
+  method_switched = 1u << 3,
   /// The device reported a fault, so there was no force; fault_of() says which.
   hand_fault = 1u << 4,
 };
@@ -76,19 +59,19 @@ constexpr DeviceFault fault_of(std::uint32_t hand) {
 
 /// All that happened in one cycle: what viewers and recorders read.
 struct ServoTick {
-  Tick tick;                   ///< the renderer's; `tick.force` is what it asked for
-  Vec3 force;                  ///< [N] world: what the device got
-  Vec3 position;               ///< [m] of the hand, device frame
-  double gain;                 ///< [-] of the safety chain
-  double frame_stamp;          ///< [s] of the frame in use; 0 before the first
-  double frame_age;            ///< [s] of the oldest camera's; infinite before the first
-  std::uint64_t number;        ///< of the cycle, from 0
-  std::uint64_t frame_number;  ///< of the frame in use among those put, from 1; 0 before the first
-  std::uint64_t settings_number;  ///< of those in use among those set, from 1; 0: the first ones
-  std::uint32_t safety;           ///< SafetyFlag bits
-  std::uint32_t wake_up_ns;       ///< as in Wake
-  std::uint32_t previous_compute_ns;
-  std::uint32_t hand;  ///< HandFlag bits, and the device's fault: see fault_of()
+  Tick tick;                          ///< the method's; `tick.force` is the force asked for
+  Vec3 force = Vec3::Zero();          ///< [N] world: the force sent to the device
+  Vec3 position = Vec3::Zero();       ///< [m] of the hand, device frame
+  double gain = 0.0;                  ///< [-] of the safety chain
+  double frame_stamp = 0.0;           ///< [s] of the frame in use; 0 before the first
+  double frame_age = 0.0;             ///< [s] of the oldest camera's; infinite before the first
+  std::uint64_t number = 0;           ///< of the cycle, from 0
+  std::uint64_t frame_number = 0;     ///< of the frame in use, from 1 as put; 0 before the first
+  std::uint64_t settings_number = 0;  ///< of those in use, from 1 as set; 0: the first ones
+  std::uint32_t safety = 0;           ///< SafetyFlag bits
+  std::uint32_t wake_up_ns = 0;       ///< as in Wake
+  std::uint32_t previous_compute_ns = 0;  ///< as in Wake
+  std::uint32_t hand = 0;                 ///< HandFlag bits, and the device's fault: see fault_of()
 };
 
 /// What the cycles have done so far. The servo's thread writes, any may look.
@@ -115,11 +98,11 @@ struct CycleStatistics {
 /// so that nothing outside can hold up a cycle.
 class Cycle {
  public:
-  /// @param rendering  the method
-  /// @param device     must outlive this
-  /// @param ring       [ticks] that a reader can fall behind
-  /// @throws Error if the settings do not validate.
-  Cycle(std::unique_ptr<Rendering> rendering, Device& device, const ServoSettings& settings = {},
+  /// @param method  given the settings' parameters
+  /// @param device  must outlive this
+  /// @param ring    [ticks] that a reader can fall behind
+  /// @throws Error if the settings do not validate or the method refuses its parameters.
+  Cycle(std::shared_ptr<Method> method, Device& device, const ServoSettings& settings = {},
         std::size_t ring = 8192);
 
   /// [servo] No allocation, deallocation, lock, system call or exception (as far as the device
@@ -152,12 +135,16 @@ class Cycle {
   /// @throws Error if they do not validate.
   std::uint64_t set_settings(const ServoSettings& settings);
 
-  /// Puts another renderer, which remembers nothing, in the place of the one in use, in the next
-  /// cycle: it gets the settings, the frame and the proxy's place, and begins from there. From then
-  /// on what it does follows from what it is given, which is what a recording that begins in the
-  /// midst of a session needs. The hand may notice: method `sight` brings the force up over most of
-  /// a frame's interval, as it does what any frame changes. Any thread but the servo's.
-  void renew(std::shared_ptr<Rendering> rendering);
+  /// Switches to another method, which remembers nothing, in the next cycle: it gets the settings'
+  /// parameters, the proxy's place and the newest frame, and begins from there. What it does then
+  /// follows from what it is given, so a recording can begin here in mid-session. The hand may
+  /// notice: method `sight` brings the force up over most of a frame's interval, as it does any
+  /// change that a frame brings. Any thread but the servo's.
+  /// @return the number of the settings, as in ServoTick::settings_number
+  /// @throws Error if they do not validate or the method refuses its parameters.
+  std::uint64_t set_method(std::shared_ptr<Method> method, const ServoSettings& settings);
+  /// The same with the settings that were set last: for one of the same name, made anew.
+  NumberedSettings set_method(std::shared_ptr<Method> method);
 
   /// Sees every cycle from the next one on. Any thread.
   [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return ring_.reader(); }
@@ -173,22 +160,27 @@ class Cycle {
     std::size_t camera_count = 0;
   };
 
-  void adopt_settings(const ServoSettings& settings) noexcept;
+  /// Settings, and the method that they are for.
+  struct Change {
+    ServoSettings settings;
+    std::shared_ptr<Method> method;
+  };
+
+  bool adopt_change(const Change& change) noexcept;
   void adopt_frame(const CapturedFrame& frame, double t) noexcept;
-  bool adopt_rendering() noexcept;
   void keep_statistics(const ServoTick& record) noexcept;
 
-  std::unique_ptr<Rendering> first_rendering_;
-  Rendering* rendering_;  // that one, or one of renewals_
+  std::shared_ptr<Method> first_method_;
+  Method* method_;  // in use: that one, or the newest of changes_
   Device& device_;
   SafetyChain safety_;
   Workspace workspace_;
   Parameters parameters_;  // in use
   Patch patch_;            // for seating the proxy anew
 
-  std::mutex writers_;  // of settings and renewals, kept apart; the servo never takes it
-  Mailbox<ServoSettings> settings_;
-  Mailbox<std::shared_ptr<Rendering>> renewals_;
+  mutable std::mutex writers_;  // of changes, kept apart; the servo never takes it
+  Change newest_change_;        // guarded by writers_
+  Mailbox<Change> changes_;
   Mailbox<CapturedFrame> frames_;
   TickRing<ServoTick> ring_;
   CycleStatistics statistics_;

@@ -41,12 +41,12 @@ bool wait_for(double timeout, const Condition& done) {
 
 }  // namespace
 
-ServoLoop::ServoLoop(std::unique_ptr<Rendering> rendering, Device& device,
-                     const ServoSettings& settings, const ServoOptions& options)
+ServoLoop::ServoLoop(std::shared_ptr<Method> method, Device& device, const ServoSettings& settings,
+                     const ServoOptions& options)
     : device_(device),
       options_(options),
       rate_(device.drives() ? device.info().rate.value_or(options.rate) : options.rate),
-      cycle_(std::move(rendering), device, settings) {
+      cycle_(std::move(method), device, settings) {
   if (!(options_.rate >= 500.0 && options_.rate <= 10'000.0)) {
     throw Error("servo rate", std::to_string(options_.rate) + " Hz is out of range",
                 "give a rate from 500 to 10000 Hz");

@@ -43,8 +43,8 @@ struct DeviceStatus {
 class ServoLoop {
  public:
   /// @throws Error if the rate or watch time is out of range or the settings do not validate.
-  ServoLoop(std::unique_ptr<Rendering> rendering, Device& device,
-            const ServoSettings& settings = {}, const ServoOptions& options = {});
+  ServoLoop(std::shared_ptr<Method> method, Device& device, const ServoSettings& settings = {},
+            const ServoOptions& options = {});
   /// Stops.
   ~ServoLoop();
   ServoLoop(const ServoLoop&) = delete;
@@ -71,7 +71,12 @@ class ServoLoop {
   std::uint64_t set_settings(const ServoSettings& settings) {
     return cycle_.set_settings(settings);
   }
-  void renew(std::shared_ptr<Rendering> rendering) { cycle_.renew(std::move(rendering)); }
+  std::uint64_t set_method(std::shared_ptr<Method> method, const ServoSettings& settings) {
+    return cycle_.set_method(std::move(method), settings);
+  }
+  NumberedSettings set_method(std::shared_ptr<Method> method) {
+    return cycle_.set_method(std::move(method));
+  }
   [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return cycle_.reader(); }
   [[nodiscard]] const CycleStatistics& statistics() const { return cycle_.statistics(); }
 

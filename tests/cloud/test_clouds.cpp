@@ -14,7 +14,7 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/core/renderer.hpp"
+#include "palpate/paper/paper.hpp"
 
 namespace palpate {
 namespace {
@@ -456,9 +456,9 @@ TEST(Clouds, AllGiveTheSameProxyToRounding) {
   const std::vector<Vec3> points = image.points();
   const PointCloud hashed(points);
   const BruteForceCloud oracle(points);
-  Renderer a;
-  Renderer b;
-  Renderer c;
+  Paper a;
+  Paper b;
+  Paper c;
   a.frame(image, 0);
   b.frame(hashed, 0);
   c.frame(oracle, 0);

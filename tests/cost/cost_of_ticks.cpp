@@ -4,22 +4,22 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "palpate/core/renderer.hpp"
+#include "palpate/paper/paper.hpp"
 
 #include "bench/subject.hpp"
 
 int main(int argc, char** argv) {
   const int ticks = argc > 1 ? std::atoi(argv[1]) : 0;
   const palpate::bench::Subject subject = palpate::bench::noisy_plane(160, 120, 525.0, 1.0);
-  palpate::Renderer renderer;
-  renderer.frame(*subject.frames.front(), 0.0);
-  renderer.seat(subject.surface - 0.03 * subject.into);
+  palpate::Paper paper;
+  paper.frame(*subject.frames.front(), 0.0);
+  paper.seat(subject.surface - 0.03 * subject.into);
   long steps = 0;
   for (int i = 0; i < ticks; ++i) {
     const double t = 1e-3 * i;
-    if (i % 33 == 32) renderer.frame(*subject.frames[static_cast<std::size_t>(i / 33 % 2)], t);
+    if (i % 33 == 32) paper.frame(*subject.frames[static_cast<std::size_t>(i / 33 % 2)], t);
     const double along = 0.01 * std::abs(std::fmod(10.0 * t, 2.0) - 1.0);
-    steps += renderer.tick(subject.surface + 0.005 * subject.into + along * subject.along, t).steps;
+    steps += paper.tick(subject.surface + 0.005 * subject.into + along * subject.along, t).steps;
   }
   std::printf("%ld\n", steps);
 }

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "palpate/cloud/depth_image.hpp"
-#include "palpate/core/proxy.hpp"
+#include "palpate/paper/proxy.hpp"
 
 namespace palpate {
 

@@ -10,7 +10,7 @@ namespace {
 constexpr double budget = 0.02;
 
 KernelCosts slide(const Subject& subject, double depth = 0.005) {
-  return kernel_costs(subject, Parameters{}, Hand{.depth = depth}, budget);
+  return kernel_costs(subject, {.name = "paper"}, Hand{.depth = depth}, budget);
 }
 
 TEST(Cost, ASlideTakesFewStepsAndGathersNotMuchMoreThanOnceAFrame) {

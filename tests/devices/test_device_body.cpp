@@ -14,6 +14,7 @@
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/devices/devices.hpp"
 #include "palpate/devices/simulated_hand.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
 
 #include "tests/support/errors.hpp"
@@ -256,7 +257,7 @@ TEST(SimulatedHand, TouchesAPlaneByADeviceInALightAndAFirmGrip) {
   for (const char* uri : {"hand:?device=touch&grip=light", "hand:?device=touch&grip=firm",
                           "hand:?device=omega&grip=light", "hand:?device=falcon&grip=firm"}) {
     const auto device = open_device(uri, path);
-    Cycle cycle(rendering_by<Renderer>(), *device);
+    Cycle cycle(make_method("paper"), *device);
     auto reader = cycle.reader();
     ServoTick record{};
     for (int i = 0; i < 5000; ++i) {

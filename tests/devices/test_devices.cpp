@@ -17,6 +17,7 @@
 #include "palpate/devices/mouse_device.hpp"
 #include "palpate/devices/scripted_device.hpp"
 #include "palpate/devices/simulated_hand.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
 
 #include "tests/support/errors.hpp"
@@ -167,7 +168,7 @@ TEST_P(PressedScene, IsStableUnderASimulatedHandAndGivesItNoEnergy) {
                               {5.0, Vec3(0, 0, surface - 0.01)},
                               {6.0, Vec3(0, 0, surface + 0.03)}}),
                      {});
-  Cycle cycle(rendering_by<Renderer>(), hand);
+  Cycle cycle(make_method("paper"), hand);
   auto reader = cycle.reader();
   ServoTick record{};
   double early = 0.0;

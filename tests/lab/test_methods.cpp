@@ -34,7 +34,7 @@ MethodSetup with_flat_truth() {
 }
 
 // The hand goes from one place to another at 0.1 m/s, one tick a millisecond.
-Tick go(TouchMethod& method, const Vec3& from, const Vec3& to) {
+Tick go(Method& method, const Vec3& from, const Vec3& to) {
   const int ticks = std::max(1, static_cast<int>((to - from).norm() / 1e-4));
   Tick tick{};
   for (int i = 0; i <= ticks; ++i)
@@ -43,7 +43,7 @@ Tick go(TouchMethod& method, const Vec3& from, const Vec3& to) {
 }
 
 // Onto a cloud from above, and how the hand is held there.
-Tick press(TouchMethod& method, const Cloud& cloud, const Vec3& to) {
+Tick press(Method& method, const Cloud& cloud, const Vec3& to) {
   method.seat(Vec3(to.x(), to.y(), 0.03));
   method.frame(cloud, 0.0);
   return go(method, Vec3(to.x(), to.y(), 0.03), to);
@@ -113,7 +113,8 @@ TEST_P(EveryMethod, StaysFiniteUnderFiveMillimetresOfNoise) {
 
 std::vector<std::string> all_names() {
   std::vector<std::string> names;
-  for (const MethodInfo& method : known_methods()) names.emplace_back(method.name);
+  const MethodRegistry all = methods();
+  for (const MethodInfo& method : all.entries()) names.emplace_back(method.name);
   return names;
 }
 
@@ -431,7 +432,7 @@ TEST(GodObject, RefusesPointsThatNothingJoins) {
   for (const char* name : {"god-object", "sphere-proxy-kept", "force-shading"}) {
     EXPECT_TRUE(test::fails_saying(
         [&] {
-          make_method(name, {})->frame(points, 0.0);
+          make_method(name, {})->check(points);
           return 0;
         },
         "polygons", "PLY with faces"));

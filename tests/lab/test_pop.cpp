@@ -160,11 +160,11 @@ TEST(PopCase, RefusesWhatCannotBe) {
 }
 
 TEST(Play, DeliversFramesLateAndInOrderAndLeavesOutWhatIsDropped) {
-  class Recorder final : public TouchMethod {
+  class Recorder final : public Method {
    public:
-    void seat(const Vec3& /*proxy*/) override {}
-    void frame(const Cloud& /*cloud*/, double stamp) override { stamps.push_back(stamp); }
-    Tick tick(const Vec3& hip, double t) override {
+    void seat(const Vec3& /*proxy*/) noexcept override {}
+    void frame(const Cloud& /*cloud*/, double stamp) noexcept override { stamps.push_back(stamp); }
+    Tick tick(const Vec3& hip, double t) noexcept override {
       arrived.resize(stamps.size(), t);
       return {.t = t,
               .hip = hip,
@@ -177,6 +177,7 @@ TEST(Play, DeliversFramesLateAndInOrderAndLeavesOutWhatIsDropped) {
               .frame = 0,
               .flags = 0};
     }
+    void set_parameters(const Parameters& /*parameters*/) override {}
     std::vector<double> stamps, arrived;
   };
   Recorder recorder;

@@ -5,10 +5,12 @@
 #include <filesystem>
 #include <memory>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/record/session_reader.hpp"
 #include "palpate/record/session_writer.hpp"
 
@@ -38,23 +40,24 @@ inline std::shared_ptr<const DepthImage> wavy_floor(int frame, bool distorted = 
 
 /// Runs a hand through the floor and records it. @return the ticks as they were
 inline std::vector<ServoTick> record_press(SessionWriter& writer, const Parameters& parameters,
-                                           int ticks, bool close = true) {
+                                           int ticks, bool close = true,
+                                           const std::string& method = "sight") {
   const auto place = [](int i) { return Vec3(0.03 + 1e-5 * i, -0.05, -0.01 - 4e-4 * i); };
-  Renderer renderer(parameters);
-  renderer.seat(place(0));
-  writer.settings({.number = 0, .settings = {parameters, {}, {}}}, 0.0);
+  const auto touch = make_method(method, parameters);
+  touch->seat(place(0));
+  writer.settings({.number = 0, .settings = {method, parameters, {}, {}}}, 0.0);
   std::vector<ServoTick> recorded;
   std::shared_ptr<const Cloud> cloud;
   for (int i = 0; i < ticks; ++i) {
     if (i % 33 == 0) {
       const double stamp = i * 1e-3 - 1e-4 / 3.0;
       const auto fresh = wavy_floor(i / 33);
-      renderer.frame(*fresh, stamp);
+      touch->frame(*fresh, stamp);
       cloud = fresh;
       writer.frame(static_cast<std::uint64_t>(i / 33 + 1), stamp, std::span(&cloud, 1));
     }
     ServoTick record{};
-    record.tick = renderer.tick(place(i), i * 1e-3);
+    record.tick = touch->tick(place(i), i * 1e-3);
     record.force = 0.5 * record.tick.force;
     record.number = static_cast<std::uint64_t>(i);
     record.frame_number = static_cast<std::uint64_t>(i / 33 + 1);

@@ -13,7 +13,7 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/renderer.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/sources/source.hpp"
 
 #include "tests/support/data.hpp"
@@ -130,16 +130,16 @@ TEST_P(Touching, PressesAndSlidesOnARestingSurfaceWithoutPoppingThrough) {
   EXPECT_GE(places.size(), recording.least_places);
 
   for (const Place& place : places) {
-    Renderer renderer;
+    const auto method = make_method("paper");
     const Vec3 side = place.normal.unitOrthogonal();
-    renderer.seat(place.point + 0.03 * place.normal);
-    renderer.frame(*frame->cloud, 0.0);
+    method->seat(place.point + 0.03 * place.normal);
+    method->frame(*frame->cloud, 0.0);
     double largest = 0.0;
     for (int i = 0; i <= 900; ++i) {  // 10 mm deep within 0.3 s, then 10 mm sideways and back
       const double height = std::max(0.03 - i * (0.04 / 300), -0.01);
       const double slide = i < 300 ? 0.0 : 0.010 * std::sin((i - 300) * 0.0104719755);
-      if (i % 33 == 32) renderer.frame(*frame->cloud, i * 1e-3);
-      const Tick tick = renderer.tick(place.point + height * place.normal + slide * side, i * 1e-3);
+      if (i % 33 == 32) method->frame(*frame->cloud, i * 1e-3);
+      const Tick tick = method->tick(place.point + height * place.normal + slide * side, i * 1e-3);
       ASSERT_TRUE(tick.force.allFinite() && tick.proxy.allFinite());
       ASSERT_LE(tick.force.norm(), 20.0);
       largest = std::max(largest, tick.force.norm());
@@ -158,20 +158,18 @@ struct Hold {
   std::optional<double> lost_at;  // [s]
 };
 
-Hold hold(const std::vector<Frame>& frames, const Place& place, Method method = Method::paper) {
+Hold hold(const std::vector<Frame>& frames, const Place& place, std::string_view name = "paper") {
   Hold result;
-  Parameters parameters;
-  parameters.method = method;
-  Renderer renderer(parameters);
-  renderer.seat(place.point + 0.02 * place.normal);
+  const auto method = make_method(name);
+  method->seat(place.point + 0.02 * place.normal);
   std::size_t next = 0;
   const auto ticks = static_cast<int>(frames.back().stamp * 1000.0);
   for (int i = 0; i <= ticks; ++i) {
     const double t = i * 1e-3;
     for (; next < frames.size() && frames[next].stamp <= t; ++next)
-      renderer.frame(*frames[next].cloud, frames[next].stamp);
+      method->frame(*frames[next].cloud, frames[next].stamp);
     const double height = std::max(0.02 - i * 2e-4, -0.01);
-    const Tick tick = renderer.tick(place.point + height * place.normal, t);
+    const Tick tick = method->tick(place.point + height * place.normal, t);
     EXPECT_TRUE(tick.force.allFinite() && tick.proxy.allFinite());
     EXPECT_LE(tick.force.norm(), 20.0);
     result.touched = result.touched || tick.force.norm() > 0.5;
@@ -229,8 +227,8 @@ TEST(TouchingNoise, SightHoldsMostOfWhatAHandHeldKinectShowsAndThePapersMethodLo
   std::size_t held = 0;
   std::size_t held_by_paper = 0;
   for (const Place& place : places) {
-    held += hold(frames, place, Method::sight).lost_at ? 0 : 1;
-    held_by_paper += hold(frames, place, Method::paper).lost_at ? 0 : 1;
+    held += hold(frames, place, "sight").lost_at ? 0 : 1;
+    held_by_paper += hold(frames, place, "paper").lost_at ? 0 : 1;
   }
   EXPECT_GE(4 * held, 3 * places.size());
   EXPECT_EQ(held_by_paper, 0U);

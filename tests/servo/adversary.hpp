@@ -13,6 +13,7 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
 
 #include "tests/servo/fake_device.hpp"
@@ -22,13 +23,12 @@ namespace palpate::test {
 
 /// Everything that can go wrong around a cycle, at random and from a seed: hands that press, shake,
 /// jump and are no number; frames that move, flicker, are empty, come from another clock or not at
-/// all; a renderer that asks for nonsense now and then; ticks that stall, repeat and run backwards;
-/// settings that change. After each cycle it holds
+/// all; a method that asks for nonsense now and then; ticks that stall, repeat and run backwards;
+/// settings and methods that change. After each cycle it holds
 /// what the device got against the promises of the safety chain, by its own book-keeping.
 class Adversary {
  public:
-  explicit Adversary(std::uint64_t seed)
-      : random_(seed), cycle_(rendering_by<SpoiledRenderer>(seed), device_) {
+  explicit Adversary(std::uint64_t seed) : random_(seed), cycle_(spoiled("sight"), device_) {
     auto rays = std::make_shared<const ViewingRays>(
         Intrinsics{.width = 80, .height = 60, .fx = 70, .fy = 70, .cx = 39.5, .cy = 29.5});
     Eigen::Isometry3d looking_down = Eigen::Isometry3d::Identity();
@@ -65,6 +65,7 @@ class Adversary {
     t_ += tick_interval();
     feed();
     if (random_() % 20'000 == 0) cycle_.set_settings(settings());
+    if (random_() % 20'000 == 0) switch_method();
     if (latched_ && one_in(500)) cycle_.reset_faults();
     const double given = one_in(50'000) ? nan : t_;
     cycle_.run({.t = given});
@@ -90,15 +91,16 @@ class Adversary {
   static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   static constexpr double inf = std::numeric_limits<double>::infinity();
 
-  // The renderer, but one force in a thousand is wrong.
-  class SpoiledRenderer {
+  // A method, but one force in a thousand is wrong.
+  class Spoiled final : public Method {
    public:
-    explicit SpoiledRenderer(std::uint64_t seed) : random_(seed + 1) {}
-    void seat(const Vec3& proxy) noexcept { renderer_.seat(proxy); }
-    void frame(const Cloud& cloud, double stamp) noexcept { renderer_.frame(cloud, stamp); }
-    void set_parameters(const Parameters& p) { renderer_.set_parameters(p); }
-    Tick tick(const Vec3& hip, double t) noexcept {
-      Tick tick = renderer_.tick(hip, t);
+    Spoiled(std::unique_ptr<Method> method, std::uint64_t seed)
+        : method_(std::move(method)), random_(seed) {}
+    void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
+    void frame(const Cloud& cloud, double stamp) noexcept override { method_->frame(cloud, stamp); }
+    void set_parameters(const Parameters& p) override { method_->set_parameters(p); }
+    Tick tick(const Vec3& hip, double t) noexcept override {
+      Tick tick = method_->tick(hip, t);
       switch (random_() % 6000) {
         case 0:
           tick.force.x() = nan;
@@ -126,9 +128,13 @@ class Adversary {
     }
 
    private:
-    Renderer renderer_;
+    std::unique_ptr<Method> method_;
     std::mt19937_64 random_;
   };
+
+  std::shared_ptr<Method> spoiled(std::string_view name) {
+    return std::make_shared<Spoiled>(make_method(name), random_());
+  }
 
   double between(double low, double high) {
     return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
@@ -212,14 +218,17 @@ class Adversary {
 
   ServoSettings settings() {
     ServoSettings settings;
-    settings.rendering.coupling.stiffness = between(0.0, 1e4);
-    settings.rendering.coupling.damping = one_in(2) ? 0.0 : between(0.0, 50.0);
-    settings.rendering.coupling.max_force = between(0.0, 1000.0);
-    settings.rendering.proxy.step_budget = one_in(4) ? 2 : 64;
+    settings.parameters.coupling.stiffness = between(0.0, 1e4);
+    settings.parameters.coupling.damping = one_in(2) ? 0.0 : between(0.0, 50.0);
+    settings.parameters.coupling.max_force = between(0.0, 1000.0);
+    settings.parameters.proxy.step_budget = one_in(4) ? 2 : 64;
     settings.safety.ramp_time = between(0.01, 0.3);
-    const auto methods = method_table();
-    settings.rendering.method = methods[random_() % methods.size()].method;
     return settings;
+  }
+
+  void switch_method() {
+    const auto& methods = standard_methods().entries();
+    cycle_.set_method(spoiled(methods[random_() % methods.size()].name), settings());
   }
 
   std::string verdict(double t, double since_last) {

@@ -13,6 +13,7 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
 #include "palpate/servo/free_side.hpp"
 
@@ -35,7 +36,7 @@ std::shared_ptr<const Cloud> plane_at(double z) {
 // Cycles at 1 kHz on a clock of their own, under a camera that shows a plane at 30 Hz.
 struct Session {
   explicit Session(const ServoSettings& settings = {})
-      : cycle(rendering_by<Renderer>(), device, settings), reader(cycle.reader()) {
+      : cycle(make_method("paper"), device, settings), reader(cycle.reader()) {
     device.hand.position = {0, 0, 0.02};
   }
 
@@ -73,7 +74,7 @@ struct Session {
   double next_frame = 0.0;
 };
 
-TEST(Cycle, GivesTheDeviceTheRenderersForceOnceTheHandIsEngaged) {
+TEST(Cycle, GivesTheDeviceTheMethodsForceOnceTheHandIsEngaged) {
   Session session;
   session.run_for(2.0);
   const ServoTick record = session.press_to(-0.001);
@@ -345,14 +346,14 @@ TEST(Cycle, AdoptsSettingsInTheNextCycleAndRefusesBadOnesAtTheDoor) {
   session.run_for(2.0);
   session.press_to(-0.003);
   ServoSettings settings;
-  settings.rendering.coupling.stiffness = 100.0;
+  settings.parameters.coupling.stiffness = 100.0;
   session.cycle.set_settings(settings);
   const ServoTick record = session.run_for(0.1);
   EXPECT_NEAR(record.force.z(), 0.3, 0.02);
   settings.safety.max_force = -1.0;
   EXPECT_THROW(session.cycle.set_settings(settings), Error);
   settings = {};
-  settings.rendering.proxy.r_1 = 1.0;
+  settings.parameters.proxy.r_1 = 1.0;
   EXPECT_THROW(session.cycle.set_settings(settings), Error);
   settings = {};
   settings.placement.workspace_scale = 0.0;
@@ -364,24 +365,18 @@ TEST(Cycle, AdoptsSettingsInTheNextCycleAndRefusesBadOnesAtTheDoor) {
 }
 
 TEST(Cycle, KeepsGoingWithAMethodThatRefusesParameters) {
-  struct Stubborn {
-    void seat(const Vec3&) noexcept {}
-    void frame(const Cloud&, double) noexcept {}
-    Tick tick(const Vec3& hip, double t) noexcept {
-      Tick tick{};
-      tick.t = t;
-      tick.hip = tick.proxy = hip;
-      tick.normal = tick.force = Vec3::Zero();
-      return tick;
-    }
-    void set_parameters(const Parameters& p) {
+  struct Stubborn final : Method {
+    void seat(const Vec3&) noexcept override {}
+    void frame(const Cloud&, double) noexcept override {}
+    Tick tick(const Vec3& hip, double t) noexcept override { return free_tick(hip, t, -1); }
+    void set_parameters(const Parameters& p) override {
       if (p.coupling.stiffness > 1000.0) throw Error("stiffness", "too much");
     }
   };
   FakeDevice device;
-  Cycle cycle(rendering_by<Stubborn>(), device);
+  Cycle cycle(std::make_shared<Stubborn>(), device);
   ServoSettings settings;
-  settings.rendering.coupling.stiffness = 2000.0;
+  settings.parameters.coupling.stiffness = 2000.0;
   cycle.set_settings(settings);
   cycle.run({.t = 1.0});
   EXPECT_EQ(cycle.statistics().settings_refused, 1U);
@@ -458,25 +453,61 @@ TEST(Cycle, NeitherAllocatesNorReleasesMemory) {
   EXPECT_GT(contacts, 500U) << "it must have touched all of that";
 }
 
-TEST(Cycle, GoesOnWithANewRendererWhereTheOldOneWas) {
+TEST(Cycle, GoesOnWithAnotherMethodWhereTheOldOneWas) {
   Session session;
   session.run_for(2.0);
   const ServoTick before = session.press_to(-0.001);
-  const std::uint64_t settings = session.cycle.set_settings({});
-  session.cycle.renew(rendering_by<Renderer>());
+  const std::uint64_t settings = session.cycle.set_method(make_method("paper")).number;
   const test::MemoryCalls calls;
   session.cycle.run({.t = session.t += ms});
   EXPECT_EQ(calls.count(), 0U);
   ServoTick record{};
   ASSERT_TRUE(session.reader.try_pop(record));
-  EXPECT_NE(record.hand & rendering_renewed, 0U);
+  EXPECT_NE(record.hand & method_switched, 0U);
   EXPECT_EQ(record.settings_number, settings);
   EXPECT_EQ(record.frame_number, before.frame_number);
   EXPECT_EQ(record.tick.frame, 0);  // of the new one
   EXPECT_EQ(record.tick.state, before.tick.state);
   EXPECT_NEAR(record.tick.force.z(), before.tick.force.z(), 0.05);
   EXPECT_LT((record.tick.proxy - before.tick.proxy).norm(), 1e-4);
-  EXPECT_EQ(session.run().hand & rendering_renewed, 0U);
+  EXPECT_EQ(session.run().hand & method_switched, 0U);
+}
+
+// A hand at rest, pressed into a plane that rises at 50 mm/s; the force of the last tick.
+Vec3 press_while_methods_change(const std::vector<std::string>& names) {
+  test::FakeDevice device;
+  Cycle cycle(make_method(names.front()), device);
+  auto reader = cycle.reader();
+  std::vector<std::shared_ptr<const Cloud>> planes;
+  ServoTick record{};
+  for (int i = 0; i < 2000; ++i) {
+    const double t = 1e-3 * i;
+    const bool rises = i < 1000;
+    const double height = 0.05 * (rises ? t : 1.0) - 0.06;
+    if (i % 33 == 0) {
+      planes.push_back(std::make_shared<PointCloud>(test::flat_grid(height), Vec3(0, 0, 1)));
+      cycle.put_frame(planes.back(), t, t);
+    }
+    const std::size_t phase = rises ? 0 : static_cast<std::size_t>(i - 1000) / 300;
+    if (i >= 1000 && (i - 1000) % 300 == 0 && phase < names.size()) {
+      ServoSettings settings;
+      settings.method = names[phase];
+      cycle.set_method(make_method(settings.method), settings);
+    }
+    device.hand.position = Vec3(0, 0, rises ? height + 0.02 - 0.025 * t : -0.015);
+    cycle.run({.t = t});
+    static_cast<void>(reader.try_pop(record));
+  }
+  return record.tick.force;
+}
+
+TEST(Cycle, SwitchesMethodsWithoutLeavingOneOnesVelocityToTheNext) {
+  // A surface at rest gives the same force whichever methods came before.
+  const double alone = press_while_methods_change({"sight"}).z();
+  EXPECT_NEAR(press_while_methods_change({"paper", "sight"}).z(), alone, 0.1);
+  EXPECT_NEAR(press_while_methods_change({"paper", "sight", "paper", "sight"}).z(), alone, 0.1);
+  const double papers = press_while_methods_change({"paper"}).z();
+  EXPECT_NEAR(press_while_methods_change({"sight", "paper"}).z(), papers, 0.1);
 }
 
 }  // namespace

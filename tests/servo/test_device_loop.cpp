@@ -10,6 +10,7 @@
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/servo/servo_loop.hpp"
 
 #include "tests/servo/fake_device.hpp"
@@ -72,7 +73,7 @@ void wait_until(const std::function<bool()>& done) {
 
 TEST(DrivenLoop, RunsItsCyclesOnTheDevicesThreadAndKeepsTheirTiming) {
   DrivingDevice device;
-  ServoLoop loop(rendering_by<Renderer>(), device);
+  ServoLoop loop(make_method("paper"), device);
   auto reader = loop.reader();
   loop.start();
   EXPECT_TRUE(device.enabled);
@@ -92,7 +93,7 @@ TEST(DrivenLoop, RunsItsCyclesOnTheDevicesThreadAndKeepsTheirTiming) {
 
 TEST(DrivenLoop, DisablesADeviceWhoseCallbacksStopAndEnablesItWhenTheyComeAgain) {
   DrivingDevice device;
-  ServoLoop loop(rendering_by<Renderer>(), device);
+  ServoLoop loop(make_method("paper"), device);
   loop.start();
   device.silent = true;
   wait_until([&] { return !device.enabled; });
@@ -111,7 +112,7 @@ TEST(DrivenLoop, DisablesADeviceWhoseCallbacksStopAndEnablesItWhenTheyComeAgain)
 
 TEST(DrivenLoop, SendsZeroByItselfWhereTheCallbacksHaveEnded) {
   DrivingDevice device;
-  ServoLoop loop(rendering_by<Renderer>(), device);
+  ServoLoop loop(make_method("paper"), device);
   loop.start();
   device.silent = true;
   const int calls = device.calls;
@@ -125,29 +126,26 @@ TEST(DrivenLoop, SendsZeroByItselfWhereTheCallbacksHaveEnded) {
 TEST(DrivenLoop, RefusesADeviceThatCannotBeEnabledOrNeverCalls) {
   DrivingDevice device;
   device.refuses = true;
-  ServoLoop loop(rendering_by<Renderer>(), device);
+  ServoLoop loop(make_method("paper"), device);
   EXPECT_TRUE(test::fails_saying([&] { return loop.start(), 0; }, "driving:", "refuses"));
   EXPECT_EQ(device.calls, 0);
 
   DrivingDevice mute;
   mute.silent = true;
-  ServoLoop waiting(rendering_by<Renderer>(), mute);
+  ServoLoop waiting(make_method("paper"), mute);
   EXPECT_TRUE(test::fails_saying([&] { return waiting.start(), 0; }, "driving:", "does not call"));
   EXPECT_FALSE(mute.enabled);
 }
 
 // A method that takes as long as the test likes.
-class HangingMethod final : public Rendering {
+class HangingMethod final : public Method {
  public:
   explicit HangingMethod(const std::atomic<bool>& hangs) : hangs_(hangs) {}
   void seat(const Vec3& /*proxy*/) noexcept override {}
   void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override {}
   Tick tick(const Vec3& hip, double t) noexcept override {
     while (hangs_) std::this_thread::yield();
-    Tick tick{};
-    tick.hip = tick.proxy = hip;
-    tick.t = t;
-    return tick;
+    return free_tick(hip, t, -1);
   }
   void set_parameters(const Parameters& /*parameters*/) override {}
 
@@ -174,12 +172,12 @@ TEST(ServoLoop, DisablesThePolledDeviceOfAMethodThatHangs) {
 
 TEST(ServoLoop, RefusesAWatchTimeOutOfRange) {
   FakeDevice device;
-  EXPECT_THROW(ServoLoop(rendering_by<Renderer>(), device, {}, {.watch_time = 0.0}), Error);
+  EXPECT_THROW(ServoLoop(make_method("paper"), device, {}, {.watch_time = 0.0}), Error);
 }
 
 // In contact, with 2 N or so on the hand.
 struct Pressing {
-  Pressing() : cycle(rendering_by<Renderer>(), device), reader(cycle.reader()) {
+  Pressing() : cycle(make_method("paper"), device), reader(cycle.reader()) {
     device.hand.position = {0, 0, 0.02};
     for (int i = 0; i < 2000; ++i) run();
     while (device.hand.position.z() > -0.003) {
@@ -227,7 +225,7 @@ TEST(DeviceFault, TakesTheForceAwayInTwoTicksAndIsInTheRecord) {
 
 TEST(DeviceFault, IsSaidInWordsByTheLoop) {
   FakeDevice device;
-  ServoLoop loop(rendering_by<Renderer>(), device);
+  ServoLoop loop(make_method("paper"), device);
   EXPECT_FALSE(loop.device_status().ticking) << "before it began";
   device.hand.fault = DeviceFault::emergency_stop;
   loop.start();
@@ -262,7 +260,7 @@ TEST(Clutch, IsWorkedByTheButtonOfThePlacement) {
   device.hand.buttons = 0U;
   ServoSettings settings;
   settings.placement.clutch_button = 0;
-  Cycle cycle(rendering_by<Renderer>(), device, settings);
+  Cycle cycle(make_method("paper"), device, settings);
   auto reader = cycle.reader();
   ServoTick record{};
   const auto run = [&](double t) {

@@ -8,6 +8,7 @@
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/servo/servo_loop.hpp"
 
 #include "tests/servo/fake_device.hpp"
@@ -46,7 +47,7 @@ TEST(PeriodicThread, RefusesARateOutOfRange) {
   EXPECT_THROW(PeriodicThread(0.0, {}, nothing), Error);
   EXPECT_THROW(PeriodicThread(1e6, {}, nothing), Error);
   FakeDevice device;
-  EXPECT_THROW(ServoLoop(rendering_by<Renderer>(), device, {}, {.rate = 100.0}), Error);
+  EXPECT_THROW(ServoLoop(make_method("paper"), device, {}, {.rate = 100.0}), Error);
 }
 
 TEST(PeriodicThread, SaysWhatTheSystemGrantedAndHowToGetTheRest) {
@@ -84,7 +85,7 @@ TEST(PeriodicThread, SkipsDeadlinesThatPassedAndDoesNotMakeThemUp) {
 TEST(ServoLoop, TicksWhileACameraFloodsItAndViewersComeAndGo) {
   FakeDevice device;
   device.hand.position = {0, 0, 0.01};
-  ServoLoop loop(rendering_by<Renderer>(), device);
+  ServoLoop loop(make_method("paper"), device);
   auto recorder = loop.reader();
   loop.start();
   std::atomic<bool> done{false};
@@ -100,7 +101,8 @@ TEST(ServoLoop, TicksWhileACameraFloodsItAndViewersComeAndGo) {
       ServoTick record{};
       while (!done && !reader.try_pop(record)) std::this_thread::yield();
       ServoSettings settings;
-      settings.rendering.coupling.stiffness = stiffness = stiffness < 900.0 ? stiffness + 1.0 : 100;
+      settings.parameters.coupling.stiffness = stiffness =
+          stiffness < 900.0 ? stiffness + 1.0 : 100;
       loop.set_settings(settings);
       static_cast<void>(loop.timing().wake_up.quantile(0.99));
       static_cast<void>(loop.statistics().max_force.load());
@@ -133,9 +135,9 @@ TEST(ServoLoop, TicksWhileACameraFloodsItAndViewersComeAndGo) {
 
 TEST(ServoLoop, CanBeDestroyedBeforeItStartedAndStoppedTwice) {
   FakeDevice device;
-  { const ServoLoop never_started(rendering_by<Renderer>(), device); }
+  { const ServoLoop never_started(make_method("paper"), device); }
   EXPECT_EQ(device.writes, 0);
-  ServoLoop loop(rendering_by<Renderer>(), device);
+  ServoLoop loop(make_method("paper"), device);
   EXPECT_EQ(loop.timing().compute.count(), 0U);
   loop.start();
   loop.stop();

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "palpate/cloud/depth_image.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/servo/servo_loop.hpp"
 
 namespace palpate {
@@ -62,7 +63,7 @@ void run(double seconds, double rate) {
   }
 
   Circling device;
-  ServoLoop loop(rendering_by<Renderer>(), device, {}, {.rate = rate});
+  ServoLoop loop(make_method("paper"), device, {}, {.rate = rate});
   loop.start();
   RealtimeRequest anywhere;
   anywhere.pin = false;

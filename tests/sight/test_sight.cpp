@@ -6,6 +6,7 @@
 #include <memory>
 #include <numbers>
 #include <random>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -13,8 +14,9 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/renderer.hpp"
-#include "palpate/core/sight.hpp"
+#include "palpate/methods/methods.hpp"
+#include "palpate/sight/sight.hpp"
+#include "palpate/sight/tracker.hpp"
 
 #include "tests/support/grids.hpp"
 
@@ -27,21 +29,19 @@ using test::grid;
 constexpr double r_c = 5e-3;
 constexpr double interval = 1.0 / 30.0;
 
-Renderer by_sight(const Vec3& seat) {
-  Parameters parameters;
-  parameters.method = Method::sight;
-  Renderer renderer(parameters);
-  renderer.seat(seat);
-  return renderer;
+Sight seated(const Vec3& seat) {
+  Sight sight;
+  sight.seat(seat);
+  return sight;
 }
 
 using HipPath = std::function<Vec3(double t)>;
 
 // One frame and its ticks; the last one.
-Tick live_through(Renderer& renderer, const Cloud& cloud, double stamp, const HipPath& hip) {
-  renderer.frame(cloud, stamp);
-  Tick tick{};
-  for (int i = 0; i < 33; ++i) tick = renderer.tick(hip(stamp + i * 1e-3), stamp + i * 1e-3);
+Tick live_through(Method& method, const Cloud& cloud, double stamp, const HipPath& hip) {
+  method.frame(cloud, stamp);
+  Tick tick;
+  for (int i = 0; i < 33; ++i) tick = method.tick(hip(stamp + i * 1e-3), stamp + i * 1e-3);
   return tick;
 }
 
@@ -204,10 +204,10 @@ TEST(FirstLayer, IsTheNearestOneThatEnoughPointsBelongTo) {
 TEST(Sight, RestsExactlyOneContactRadiusAboveAPlaneWithoutNoise) {
   std::mt19937 random(1);
   const PointCloud plane = seen_from_above(flat_grid(), 0.0, random);
-  Renderer renderer = by_sight({0, 0, 0.02});
+  Sight sight = seated({0, 0, 0.02});
   Tick tick{};
   for (int k = 0; k < 4; ++k) {
-    tick = live_through(renderer, plane, k * interval,
+    tick = live_through(sight, plane, k * interval,
                         [](double) { return Vec3(0.0003, 0.0004, -0.01); });
     EXPECT_NEAR(tick.proxy.z(), r_c, 1e-6);
   }
@@ -218,10 +218,10 @@ TEST(Sight, FeelsAWedgeAndAGapAsPointsBecauseTheyAreNotSmooth) {
   std::mt19937 random(1);
   const PointCloud wedge =
       seen_from_above(grid(1e-3, 60, [](double x, double) { return std::abs(x); }), 0.0, random);
-  Renderer renderer = by_sight({0, 0, 0.03});
+  Sight sight = seated({0, 0, 0.03});
   Tick tick{};
   for (int k = 0; k < 5; ++k) {
-    tick = live_through(renderer, wedge, k * interval, [](double) { return Vec3(0, 0, -0.01); });
+    tick = live_through(sight, wedge, k * interval, [](double) { return Vec3(0, 0, -0.01); });
   }
   EXPECT_NEAR(tick.proxy.z(), r_c * std::numbers::sqrt2, 0.2e-3);
 
@@ -230,20 +230,20 @@ TEST(Sight, FeelsAWedgeAndAGapAsPointsBecauseTheyAreNotSmooth) {
     if (std::abs(p.x()) >= 3e-3) rims.push_back(p);
   }
   const PointCloud gap = seen_from_above(rims, 0.0, random);
-  renderer = by_sight({0, 0, 0.03});
+  sight = seated({0, 0, 0.03});
   for (int k = 0; k < 5; ++k) {
-    tick = live_through(renderer, gap, k * interval, [](double) { return Vec3(0, 0, -0.02); });
+    tick = live_through(sight, gap, k * interval, [](double) { return Vec3(0, 0, -0.02); });
   }
   EXPECT_NEAR(tick.proxy.z(), std::sqrt(r_c * r_c - 9e-6), 0.2e-3);
 }
 
 TEST(Sight, RestsOnASheetTouchedFromBehind) {
   std::mt19937 random(2);
-  Renderer renderer = by_sight({0, 0, -0.03});
+  Sight sight = seated({0, 0, -0.03});
   Tick tick{};
   for (int k = 0; k < 10; ++k) {
     const PointCloud sheet = seen_from_above(flat_grid(), 0.2e-3, random);
-    tick = live_through(renderer, sheet, k * interval, [](double) { return Vec3(0, 0, 0.01); });
+    tick = live_through(sight, sheet, k * interval, [](double) { return Vec3(0, 0, 0.01); });
   }
   EXPECT_NEAR(tick.proxy.z(), -r_c, 0.5e-3);
   EXPECT_LT(tick.force.z(), -5.0);
@@ -254,12 +254,10 @@ struct Lift {
 };
 
 // Section 5.2's experiment, on a smaller grid. True if the proxy is above the surface at its end.
-bool is_held(const Lift& lift, Method method, unsigned seed) {
+bool is_held(const Lift& lift, std::string_view name, unsigned seed) {
   std::mt19937 random(seed);
-  Parameters parameters;
-  parameters.method = method;
-  Renderer renderer(parameters);
-  renderer.seat({0, 0, 0});
+  const auto method = make_method(name);
+  method->seat({0, 0, 0});
   const auto height = [&](double t) {
     const double after = std::max(t - 0.5, 0.0);
     return -0.05 + 0.1 * t + 0.5 * lift.acceleration * after * after;
@@ -267,7 +265,7 @@ bool is_held(const Lift& lift, Method method, unsigned seed) {
   for (int k = 0; k <= 26; ++k) {
     const double t = k * interval;
     const PointCloud cloud = seen_from_above(flat_grid(height(t), 1.5e-3, 40), lift.sigma, random);
-    const Tick tick = live_through(renderer, cloud, t, [&](double now) {
+    const Tick tick = live_through(*method, cloud, t, [&](double now) {
       return Vec3(0, 0, now < 0.5 ? 0.0 : height(now) - 6 * r_c);
     });
     if (k > 15 && tick.proxy.z() < height(t)) return false;
@@ -281,8 +279,8 @@ TEST(Sight, HoldsLiftsThatThePapersMethodLoses) {
   for (const Lift& lift :
        {Lift{600 * r_c, 0.6 * r_c}, Lift{1400 * r_c, 0.0}, Lift{1400 * r_c, 3.0 * r_c},
         Lift{1000 * r_c, 1.5 * r_c}, Lift{10000 * r_c, 0.2 * r_c}, Lift{18000 * r_c, 1.0 * r_c}}) {
-    EXPECT_TRUE(is_held(lift, Method::sight, seed)) << lift.acceleration << " " << lift.sigma;
-    if (!is_held(lift, Method::paper, seed)) ++lost_by_paper;
+    EXPECT_TRUE(is_held(lift, "sight", seed)) << lift.acceleration << " " << lift.sigma;
+    if (!is_held(lift, "paper", seed)) ++lost_by_paper;
     ++seed;
   }
   EXPECT_GE(lost_by_paper, 4);
@@ -291,13 +289,13 @@ TEST(Sight, HoldsLiftsThatThePapersMethodLoses) {
 TEST(Sight, MeetsASurfaceThatComesFromFreeSpaceAtAnySpeed) {
   for (const double speed : {0.1, 0.2, 1.0, 5.0}) {
     std::mt19937 random(5);
-    Renderer renderer = by_sight({0, 0, 0});
+    Sight sight = seated({0, 0, 0});
     for (int k = 0; k < 40; ++k) {
       const double z = -0.15 * std::max(1.0, speed) + 0.003 + speed * k * interval;
       if (z > 0.1) break;
       const PointCloud cloud = seen_from_above(flat_grid(z, 1.5e-3, 40), 1e-3, random);
       const Tick tick =
-          live_through(renderer, cloud, k * interval, [](double) { return Vec3(0, 0, 0); });
+          live_through(sight, cloud, k * interval, [](double) { return Vec3(0, 0, 0); });
       if (z > 0) {
         EXPECT_GT(tick.proxy.z(), z) << "at " << speed << " m/s";
       }
@@ -309,7 +307,7 @@ TEST(Sight, HoldsTheContactWhileAHandPassesBeforeIt) {
   const Overhead camera;
   for (const double speed : {0.3, 0.9, 1.7}) {
     std::mt19937 random(3);
-    Renderer renderer = by_sight({0, 0, 0.03});
+    Sight sight = seated({0, 0, 0.03});
     bool hidden = false;
     double lowest = 1.0;
     double highest = 0.0;
@@ -318,7 +316,7 @@ TEST(Sight, HoldsTheContactWhileAHandPassesBeforeIt) {
       const DepthImage image = camera.shoot(
           [&](double x, double) { return std::abs(x - edge) < 0.04 ? 0.1 : 0.0; }, 1e-3, random);
       const Tick tick =
-          live_through(renderer, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
+          live_through(sight, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
       hidden = hidden || (tick.flags & surface_hidden) != 0;
       if (k < 10) continue;
       lowest = std::min(lowest, tick.proxy.z());
@@ -333,12 +331,12 @@ TEST(Sight, HoldsTheContactWhileAHandPassesBeforeIt) {
 TEST(Sight, HoldsTheContactWhenSomethingCoversAllThatIsSeenWithinAFrame) {
   const Overhead camera;
   std::mt19937 random(3);
-  Renderer renderer = by_sight({0, 0, 0.03});
+  Sight sight = seated({0, 0, 0.03});
   for (int k = 0; k < 40; ++k) {
     const double height = k >= 20 && k < 25 ? 0.1 : 0.0;
     const DepthImage image = camera.shoot([&](double, double) { return height; }, 1e-3, random);
     const Tick tick =
-        live_through(renderer, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
+        live_through(sight, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
     if (k < 15) continue;
     EXPECT_EQ((tick.flags & surface_hidden) != 0, height > 0.0) << "frame " << k;
     EXPECT_NEAR(tick.proxy.z(), r_c, 0.2e-3) << "frame " << k;
@@ -350,14 +348,14 @@ TEST(Sight, HoldsTheContactBesideAShadowWithoutPoints) {
   // Stereo sees nothing beside an occluder: a hole comes over the contact, half of it first.
   const Overhead camera;
   std::mt19937 random(4);
-  Renderer renderer = by_sight({0, 0, 0.03});
+  Sight sight = seated({0, 0, 0.03});
   for (int k = 0; k < 60; ++k) {
     const double edge = -0.04 + 0.003 * std::max(k - 20, 0);
     const DepthImage image = camera.shoot(
         [&](double x, double) { return std::abs(x - edge) < 0.02 ? Overhead::distance : 0.0; }, 0.0,
         random);
     const Tick tick =
-        live_through(renderer, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
+        live_through(sight, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
     EXPECT_NEAR(tick.proxy.z(), r_c, 0.2e-3) << "frame " << k;
   }
 }
@@ -375,14 +373,14 @@ TEST(Sight, KeepsToTheFlanksOfReliefFinerThanTheProxy) {
     return z;
   };
   const DepthImage image = camera.shoot([&](double x, double) { return height(x); }, 0.0, random);
-  Renderer renderer = by_sight({-0.01, 0.0003, 0.03});
+  Sight sight = seated({-0.01, 0.0003, 0.03});
   double squares = 0.0;
   int ticks = 0;
   for (int k = 0; k < 60; ++k) {
-    renderer.frame(image, k * interval);
+    sight.frame(image, k * interval);
     for (int i = 0; i < 33; ++i) {
       const double t = k * interval + i * 1e-3;
-      const Tick tick = renderer.tick(Vec3(-0.01 + 0.01 * t, 0.0003, -0.01), t);
+      const Tick tick = sight.tick(Vec3(-0.01 + 0.01 * t, 0.0003, -0.01), t);
       if (k < 10) continue;
       squares += std::pow(tick.proxy.z() - rest(tick.proxy.x()), 2);
       ++ticks;
@@ -395,14 +393,14 @@ TEST(Sight, KeepsToTheFlanksOfReliefFinerThanTheProxy) {
 TEST(Sight, LetsTheForceFadeWhenTheSurfaceStaysHidden) {
   const Overhead camera;
   std::mt19937 random(3);
-  Renderer renderer = by_sight({0, 0, 0.03});
+  Sight sight = seated({0, 0, 0.03});
   Tick tick{};
   for (int k = 0; k < 60; ++k) {
     const double edge =
         -0.15 + 0.5 * std::clamp(k - 10, 0, 9) * interval;  // stops over the contact
     const DepthImage image = camera.shoot(
         [&](double x, double) { return std::abs(x - edge) < 0.04 ? 0.1 : 0.0; }, 0.0, random);
-    tick = live_through(renderer, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
+    tick = live_through(sight, image, k * interval, [](double) { return Vec3(0, 0, -0.01); });
     if (k == 9) {
       EXPECT_NEAR(tick.force.z(), 6.0, 0.1);
     }
@@ -415,11 +413,11 @@ TEST(Sight, LetsTheForceFadeWhenTheSurfaceStaysHidden) {
 TEST(Sight, AveragesTheNoiseOfASurfaceAtRestAway) {
   const Overhead camera;
   std::mt19937 random(4);
-  Renderer renderer = by_sight({0, 0, 0.03});
+  Sight sight = seated({0, 0, 0.03});
   for (int k = 0; k < 30; ++k) {
     const DepthImage image = camera.shoot([](double, double) { return 0.0; }, 1e-3, random);
     const Tick tick =
-        live_through(renderer, image, k * interval, [](double) { return Vec3(0.0002, 0, -0.01); });
+        live_through(sight, image, k * interval, [](double) { return Vec3(0.0002, 0, -0.01); });
     if (k >= 8) {
       EXPECT_NEAR(tick.proxy.z(), r_c, 0.15e-3) << "frame " << k;
       EXPECT_EQ(tick.surface_velocity, 0.0) << "frame " << k;
@@ -431,12 +429,12 @@ TEST(Sight, KeepsItsNormalWhileTheSurfaceRests) {
   const Overhead camera;
   for (unsigned seed = 1; seed <= 6; ++seed) {
     std::mt19937 random(seed);
-    Renderer renderer = by_sight({0, 0, 0.03});
+    Sight sight = seated({0, 0, 0.03});
     std::optional<Vec3> last;
     for (int k = 0; k < 150; ++k) {
       const DepthImage image = camera.shoot([](double, double) { return 0.0; }, 3e-3, random);
-      const Tick tick = live_through(renderer, image, k * interval,
-                                     [](double) { return Vec3(0.0002, 0, -0.01); });
+      const Tick tick =
+          live_through(sight, image, k * interval, [](double) { return Vec3(0.0002, 0, -0.01); });
       if (last && k > 40) {
         EXPECT_GT(tick.normal.dot(*last), std::cos(0.02)) << "seed " << seed << " frame " << k;
       }
@@ -448,7 +446,7 @@ TEST(Sight, KeepsItsNormalWhileTheSurfaceRests) {
 TEST(Sight, RendersASineOfTwentyMillimetresWithoutStepsAndWithoutLag) {
   const Overhead camera;
   std::mt19937 random(6);
-  Renderer renderer = by_sight({0, 0, 0.04});
+  Sight sight = seated({0, 0, 0.04});
   const auto height = [](double t) { return 0.01 * std::sin(2.0 * std::numbers::pi * t); };
   double squares = 0.0;
   double largest_step = 0.0;
@@ -457,14 +455,14 @@ TEST(Sight, RendersASineOfTwentyMillimetresWithoutStepsAndWithoutLag) {
   int frames = 0;
   for (int i = 0; i < 2000; ++i) {
     const double t = i * 1e-3;
-    // Frames outlive their use here because the renderer reads them until the next.
+    // Frames outlive their use here because the sight reads them until the next.
     static std::optional<DepthImage> image;
     if (t >= frames * interval - 1e-9) {
       const double stamp = frames++ * interval;
       image.emplace(camera.shoot([&](double, double) { return height(stamp); }, 0.0, random));
-      renderer.frame(*image, stamp);
+      sight.frame(*image, stamp);
     }
-    const double force = renderer.tick({0, 0, -0.0125}, t).force.z();
+    const double force = sight.tick({0, 0, -0.0125}, t).force.z();
     if (i >= 1000) {
       squares += std::pow(force - 600.0 * (height(t) + 0.0125), 2);
       largest_step = std::max(largest_step, std::abs(force - last));
@@ -478,13 +476,13 @@ TEST(Sight, RendersASineOfTwentyMillimetresWithoutStepsAndWithoutLag) {
 
 TEST(Sight, FollowsASurfaceThatTurns) {
   std::mt19937 random(8);
-  Renderer renderer = by_sight({0, 0, 0.03});
+  Sight sight = seated({0, 0, 0.03});
   for (int k = 0; k < 40; ++k) {
     const double slope = 0.02 * std::max(k - 10, 0);
     const PointCloud plane = seen_from_above(
         grid(1.5e-3, 40, [&](double x, double) { return slope * x; }), 0.2e-3, random);
     const Tick tick =
-        live_through(renderer, plane, k * interval, [](double) { return Vec3(0, 0, -0.003); });
+        live_through(sight, plane, k * interval, [](double) { return Vec3(0, 0, -0.003); });
     const Vec3 normal = Vec3(-slope, 0, 1).normalized();
     if (k < 3) continue;
     EXPECT_GT(tick.normal.dot(normal), std::cos(0.06)) << "frame " << k;
@@ -496,12 +494,12 @@ TEST(Sight, GivesTheSameTicksBitForBitOnEveryRun) {
   const Overhead camera;
   const auto run = [&] {
     std::mt19937 random(9);
-    Renderer renderer = by_sight({0, 0, 0.02});
+    Sight sight = seated({0, 0, 0.02});
     std::vector<double> out;
     for (int k = 0; k < 12; ++k) {
       const DepthImage image =
           camera.shoot([](double x, double) { return 1e-3 * std::sin(300 * x); }, 0.5e-3, random);
-      const Tick tick = live_through(renderer, image, k * interval, [](double t) {
+      const Tick tick = live_through(sight, image, k * interval, [](double t) {
         return Vec3(0.05 * t, 0.02 * t, 0.01 - 0.05 * t);
       });
       for (int i = 0; i < 3; ++i) out.push_back(tick.force[i]);
@@ -516,14 +514,14 @@ TEST(Sight, BearsEmptyFramesAndStampsThatStandStill) {
   const PointCloud nothing(std::vector<Vec3>{});
   std::mt19937 random(1);
   const PointCloud plane = seen_from_above(flat_grid(), 0.0, random);
-  Renderer renderer = by_sight({0, 0, 0.02});
+  Sight sight = seated({0, 0, 0.02});
   const HipPath press = [](double) { return Vec3(0, 0, -0.01); };
-  live_through(renderer, plane, 0.0, press);
-  live_through(renderer, plane, 0.0, press);
-  const Tick hidden = live_through(renderer, nothing, 0.033, press);
+  live_through(sight, plane, 0.0, press);
+  live_through(sight, plane, 0.0, press);
+  const Tick hidden = live_through(sight, nothing, 0.033, press);
   EXPECT_TRUE(hidden.flags & surface_hidden);
   EXPECT_NEAR(hidden.proxy.z(), r_c, 1e-4);
-  const Tick again = live_through(renderer, plane, 0.066, press);
+  const Tick again = live_through(sight, plane, 0.066, press);
   EXPECT_FALSE(again.flags & surface_hidden);
   EXPECT_NEAR(again.proxy.z(), r_c, 1e-4);
 }

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/renderer.hpp"
+#include "palpate/paper/paper.hpp"
 
 #include "tests/support/grids.hpp"
 
@@ -26,18 +26,18 @@ constexpr double shell = 0.011e-3;  // half the contact shell, and rounding
 constexpr double spacing = 1.5e-3;
 
 // Ticks at one place until the proxy rests there.
-Tick settle(Renderer& renderer, const Vec3& hip, double t = 0.0, int ticks = 50) {
-  Tick tick = renderer.tick(hip, t);
-  for (int i = 1; i < ticks; ++i) tick = renderer.tick(hip, t + i * 1e-3);
+Tick settle(Paper& paper, const Vec3& hip, double t = 0.0, int ticks = 50) {
+  Tick tick = paper.tick(hip, t);
+  for (int i = 1; i < ticks; ++i) tick = paper.tick(hip, t + i * 1e-3);
   return tick;
 }
 
-TEST(Renderer, RestsOneContactRadiusAboveAPlane) {
+TEST(Paper, RestsOneContactRadiusAboveAPlane) {
   const BruteForceCloud plane(flat_grid());
-  Renderer renderer;
-  renderer.seat({0.0002, 0.0003, 0.02});
-  renderer.frame(plane, 0.0);
-  const Tick tick = settle(renderer, {0.0002, 0.0003, -0.010});
+  Paper paper;
+  paper.seat({0.0002, 0.0003, 0.02});
+  paper.frame(plane, 0.0);
+  const Tick tick = settle(paper, {0.0002, 0.0003, -0.010});
   EXPECT_NE(tick.state, ContactState::free_motion);
   EXPECT_GE(tick.proxy.z(), lowest_rest(r_c, spacing) - shell);
   EXPECT_LE(tick.proxy.z(), r_c + shell);
@@ -46,45 +46,45 @@ TEST(Renderer, RestsOneContactRadiusAboveAPlane) {
   EXPECT_NEAR(tick.force.z(), 600.0 * (tick.proxy.z() + 0.010 - r_c), 1e-3);
 }
 
-TEST(Renderer, MovesThroughFreeSpaceToTheHipInOneTick) {
+TEST(Paper, MovesThroughFreeSpaceToTheHipInOneTick) {
   const BruteForceCloud plane(flat_grid());
-  Renderer renderer;
-  renderer.seat({0, 0, 0.05});
-  renderer.frame(plane, 0.0);
+  Paper paper;
+  paper.seat({0, 0, 0.05});
+  paper.frame(plane, 0.0);
   const Vec3 hip(0.13, -0.2, 0.31);
-  const Tick tick = renderer.tick(hip, 0.001);
+  const Tick tick = paper.tick(hip, 0.001);
   EXPECT_LT((tick.proxy - hip).norm(), 1e-9);
   EXPECT_EQ(tick.state, ContactState::free_motion);
   EXPECT_TRUE(tick.force.isZero());
 }
 
-TEST(Renderer, IsOnTheSurfaceInTheSameTickAsAJumpToSixRadiiBelowIt) {
+TEST(Paper, IsOnTheSurfaceInTheSameTickAsAJumpToSixRadiiBelowIt) {
   const BruteForceCloud plane(flat_grid());
-  Renderer renderer;
-  renderer.frame(plane, 0.0);
-  settle(renderer, {0, 0, r_c});
-  const Tick tick = renderer.tick({0, 0, -6 * r_c}, 1.0);
+  Paper paper;
+  paper.frame(plane, 0.0);
+  settle(paper, {0, 0, r_c});
+  const Tick tick = paper.tick({0, 0, -6 * r_c}, 1.0);
   EXPECT_GE(tick.proxy.z(), lowest_rest(r_c, spacing) - shell);
   EXPECT_LE(tick.proxy.z(), r_c + shell);
   EXPECT_GT(tick.force.z(), 0.0);
 }
 
-TEST(Renderer, RestsOnATiltedPlaneAlongItsNormal) {
+TEST(Paper, RestsOnATiltedPlaneAlongItsNormal) {
   const double slope = std::tan(30.0 * std::numbers::pi / 180.0);
   const BruteForceCloud tilt(grid(spacing, 50, [&](double x, double) { return slope * x; }));
   const Vec3 n = Vec3(-slope, 0, 1).normalized();
-  Renderer renderer;
-  renderer.seat({0, 0, 0.02});
-  renderer.frame(tilt, 0.0);
+  Paper paper;
+  paper.seat({0, 0, 0.02});
+  paper.frame(tilt, 0.0);
   const Vec3 hip = -0.01 * n + Vec3(0, 0.0004, 0);
-  const Tick tick = settle(renderer, hip);
+  const Tick tick = settle(paper, hip);
   // Points lie at most spacing/cos(30) apart along the slope.
   EXPECT_NEAR(tick.proxy.dot(n), r_c, r_c - lowest_rest(r_c, spacing / std::cos(0.5236)) + shell);
   EXPECT_LT((tick.proxy - (hip + (tick.proxy - hip).dot(n) * n)).norm(), 0.8e-3);
   EXPECT_GT(tick.force.normalized().dot(n), 0.998);
 }
 
-TEST(Renderer, RestsOneContactRadiusOutsideASphere) {
+TEST(Paper, RestsOneContactRadiusOutsideASphere) {
   std::vector<Vec3> points;
   constexpr double radius = 0.04;
   constexpr int count = 12000;
@@ -97,27 +97,27 @@ TEST(Renderer, RestsOneContactRadiusOutsideASphere) {
   const BruteForceCloud sphere(points);
   for (const Vec3& direction : {Vec3(0, 0, 1), Vec3(1, 2, 3), Vec3(-3, 1, 0.4)}) {
     const Vec3 n = direction.normalized();
-    Renderer renderer;
-    renderer.seat(0.06 * n);
-    renderer.frame(sphere, 0.0);
-    const Tick tick = settle(renderer, 0.03 * n);
+    Paper paper;
+    paper.seat(0.06 * n);
+    paper.frame(sphere, 0.0);
+    const Tick tick = settle(paper, 0.03 * n);
     EXPECT_NEAR(tick.proxy.norm(), radius + r_c, 0.12e-3);
     EXPECT_GT(tick.proxy.normalized().dot(n), 0.999);
   }
 }
 
-TEST(Renderer, RestsInAWedgeWhereASphereFits) {
+TEST(Paper, RestsInAWedgeWhereASphereFits) {
   // Two planes at 45 degrees meet at x = 0: a sphere touches both at height r_c sqrt(2).
   const BruteForceCloud wedge(grid(1e-3, 60, [](double x, double) { return std::abs(x); }));
-  Renderer renderer;
-  renderer.seat({0.0, 0, 0.03});
-  renderer.frame(wedge, 0.0);
-  const Tick tick = settle(renderer, {0.0, 0, -0.01});
+  Paper paper;
+  paper.seat({0.0, 0, 0.03});
+  paper.frame(wedge, 0.0);
+  const Tick tick = settle(paper, {0.0, 0, -0.01});
   EXPECT_NEAR(tick.proxy.z(), r_c * std::numbers::sqrt2, 0.15e-3);
   EXPECT_NEAR(tick.proxy.x(), 0.0, 0.15e-3);
 }
 
-TEST(Renderer, PassesAGapWiderThanItselfAndNotANarrowerOne) {
+TEST(Paper, PassesAGapWiderThanItselfAndNotANarrowerOne) {
   const auto gap = [](double width) {
     std::vector<Vec3> points;
     for (const Vec3& p : flat_grid(0.0, 1e-3, 40)) {
@@ -126,10 +126,10 @@ TEST(Renderer, PassesAGapWiderThanItselfAndNotANarrowerOne) {
     return BruteForceCloud(points);
   };
   const auto depth_reached = [](const Cloud& cloud) {
-    Renderer renderer;
-    renderer.seat({0, 0, 0.02});
-    renderer.frame(cloud, 0.0);
-    return settle(renderer, {0, 0, -0.02}).proxy.z();
+    Paper paper;
+    paper.seat({0, 0, 0.02});
+    paper.frame(cloud, 0.0);
+    return settle(paper, {0, 0, -0.02}).proxy.z();
   };
   EXPECT_NEAR(depth_reached(gap(2.2 * r_c)), -0.02, 1e-6);
   // A gap of width w lets a sphere sink until it touches both rims.
@@ -137,7 +137,7 @@ TEST(Renderer, PassesAGapWiderThanItselfAndNotANarrowerOne) {
   EXPECT_NEAR(depth_reached(gap(w)), std::sqrt(r_c * r_c - 0.25 * w * w), 0.15e-3);
 }
 
-TEST(Renderer, TurnsTheForceWithTheScene) {
+TEST(Paper, TurnsTheForceWithTheScene) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   std::vector<Vec3> points = grid(spacing, 20, [](double x, double y) {
@@ -156,8 +156,8 @@ TEST(Renderer, TurnsTheForceWithTheScene) {
     const BruteForceCloud there(turned);
     const Vec3 start(0.01 * uniform(random), 0.01 * uniform(random), 0.02);
     const Vec3 hip(start.x(), start.y(), -0.008);
-    Renderer a;
-    Renderer b;
+    Paper a;
+    Paper b;
     a.seat(start);
     b.seat(turn * start);
     a.frame(here, 0.0);
@@ -169,14 +169,14 @@ TEST(Renderer, TurnsTheForceWithTheScene) {
   }
 }
 
-TEST(Renderer, DoesNotCareInWhichOrderPointsCome) {
+TEST(Paper, DoesNotCareInWhichOrderPointsCome) {
   std::vector<Vec3> points = flat_grid();
   const BruteForceCloud ordered(points);
   std::mt19937 random(3);
   std::shuffle(points.begin(), points.end(), random);
   const BruteForceCloud shuffled(points);
-  Renderer a;
-  Renderer b;
+  Paper a;
+  Paper b;
   a.seat({0.0004, 0.0001, 0.02});
   b.seat({0.0004, 0.0001, 0.02});
   a.frame(ordered, 0.0);
@@ -187,15 +187,15 @@ TEST(Renderer, DoesNotCareInWhichOrderPointsCome) {
   EXPECT_LT((tick_a.force - tick_b.force).norm(), 0.02);
 }
 
-TEST(Renderer, GivesTheSameTicksBitForBitOnEveryRun) {
+TEST(Paper, GivesTheSameTicksBitForBitOnEveryRun) {
   const BruteForceCloud plane(flat_grid());
   const auto run = [&] {
-    Renderer renderer;
-    renderer.frame(plane, 0.0);
+    Paper paper;
+    paper.frame(plane, 0.0);
     std::vector<double> out;
     for (int i = 0; i < 400; ++i) {
-      if (i % 33 == 0) renderer.frame(plane, i * 1e-3);
-      const Tick tick = renderer.tick({i * 1e-5, 2e-4, 0.01 - i * 5e-5}, i * 1e-3);
+      if (i % 33 == 0) paper.frame(plane, i * 1e-3);
+      const Tick tick = paper.tick({i * 1e-5, 2e-4, 0.01 - i * 5e-5}, i * 1e-3);
       for (int k = 0; k < 3; ++k) out.push_back(tick.force[k]);
       for (int k = 0; k < 3; ++k) out.push_back(tick.proxy[k]);
     }
@@ -204,81 +204,81 @@ TEST(Renderer, GivesTheSameTicksBitForBitOnEveryRun) {
   EXPECT_EQ(run(), run());
 }
 
-TEST(Renderer, FeelsNothingWhereThereAreNoPoints) {
+TEST(Paper, FeelsNothingWhereThereAreNoPoints) {
   const BruteForceCloud empty({});
-  Renderer renderer;
-  renderer.frame(empty, 0.0);
-  const Tick tick = settle(renderer, {1, 2, 3});
+  Paper paper;
+  paper.frame(empty, 0.0);
+  const Tick tick = settle(paper, {1, 2, 3});
   EXPECT_TRUE(tick.force.isZero());
   EXPECT_EQ(tick.proxy, Vec3(1, 2, 3));
 }
 
-TEST(Renderer, FollowsTheHipAndSaysSoBeforeTheFirstFrame) {
-  Renderer renderer;
-  const Tick tick = renderer.tick({1, 2, 3}, 0.0);
+TEST(Paper, FollowsTheHipAndSaysSoBeforeTheFirstFrame) {
+  Paper paper;
+  const Tick tick = paper.tick({1, 2, 3}, 0.0);
   EXPECT_EQ(tick.proxy, Vec3(1, 2, 3));
   EXPECT_EQ(tick.frame, -1);
   EXPECT_TRUE(tick.flags & no_frame);
   EXPECT_TRUE(tick.force.isZero());
 }
 
-TEST(Renderer, AnswersANonFiniteHipWithNoForceAndStaysWhereItIs) {
+TEST(Paper, AnswersANonFiniteHipWithNoForceAndStaysWhereItIs) {
   const BruteForceCloud plane(flat_grid());
-  Renderer renderer;
-  renderer.seat({0, 0, 0.01});
-  renderer.frame(plane, 0.0);
-  const Tick before = settle(renderer, {0, 0, -0.01});
+  Paper paper;
+  paper.seat({0, 0, 0.01});
+  paper.frame(plane, 0.0);
+  const Tick before = settle(paper, {0, 0, -0.01});
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300}) {
-    const Tick tick = renderer.tick({0, bad, 0}, 0.1);
+    const Tick tick = paper.tick({0, bad, 0}, 0.1);
     EXPECT_TRUE(tick.flags & non_finite_input);
     EXPECT_TRUE(tick.force.isZero());
     EXPECT_EQ(tick.proxy, before.proxy);
   }
-  EXPECT_GT(renderer.tick({0, 0, -0.01}, 0.2).force.z(), 0.0);
+  EXPECT_GT(paper.tick({0, 0, -0.01}, 0.2).force.z(), 0.0);
 }
 
-TEST(Renderer, NeverAsksForMoreThanTheForceLimit) {
+TEST(Paper, NeverAsksForMoreThanTheForceLimit) {
   const BruteForceCloud plane(flat_grid());
   Parameters parameters;
   parameters.coupling.max_force = 3.3;
-  Renderer renderer(parameters);
-  renderer.seat({0, 0, 0.02});
-  renderer.frame(plane, 0.0);
-  const Tick tick = settle(renderer, {0, 0, -1.0});
+  Paper paper(parameters);
+  paper.seat({0, 0, 0.02});
+  paper.frame(plane, 0.0);
+  const Tick tick = settle(paper, {0, 0, -1.0});
   EXPECT_NEAR(tick.force.norm(), 3.3, 1e-9);
   EXPECT_TRUE(tick.flags & force_saturated);
 }
 
-TEST(Renderer, KeepsItsWorkWithinTheStepBudgetAndSaysWhenItIsSpent) {
+TEST(Paper, KeepsItsWorkWithinTheStepBudgetAndSaysWhenItIsSpent) {
   const BruteForceCloud plane(flat_grid(0.0, spacing, 200));
   Parameters parameters;
   parameters.proxy.step_budget = 5;
-  Renderer renderer(parameters);
-  renderer.seat({0, 0, r_c});
-  renderer.frame(plane, 0.0);
-  const Tick tick = renderer.tick({0.1, 0, -0.01}, 0.0);
+  Paper paper(parameters);
+  paper.seat({0, 0, r_c});
+  paper.frame(plane, 0.0);
+  const Tick tick = paper.tick({0.1, 0, -0.01}, 0.0);
   EXPECT_EQ(tick.steps, 5);
   EXPECT_TRUE(tick.flags & step_budget_hit);
   EXPECT_GT(tick.force.norm(), 0.0) << "a force must not drop out while the proxy is on its way";
 }
 
-TEST(Renderer, KeepsTheForceOnWhileSlidingOverASurfaceAtRest) {
+TEST(Paper, KeepsTheForceOnWhileSlidingOverASurfaceAtRest) {
   const BruteForceCloud plane(flat_grid(0.0, spacing, 100));
-  Renderer renderer;
-  renderer.seat({-0.05, 0, 0.02});
-  renderer.frame(plane, 0.0);
-  settle(renderer, {-0.05, 0.0003, -0.005});
+  Paper paper;
+  paper.seat({-0.05, 0, 0.02});
+  paper.frame(plane, 0.0);
+  settle(paper, {-0.05, 0.0003, -0.005});
   for (int i = 0; i < 1000; ++i) {  // 0.1 m/s
-    const Tick tick = renderer.tick({-0.05 + i * 1e-4, 0.0003, -0.005}, 0.05 + i * 1e-3);
+    const Tick tick = paper.tick({-0.05 + i * 1e-4, 0.0003, -0.005}, 0.05 + i * 1e-3);
     ASSERT_GT(tick.force.z(), 600.0 * 4.5e-3) << "at tick " << i;
   }
 }
 
-TEST(Renderer, RefusesRadiiThatDoNotIncrease) {
+TEST(Paper, RefusesRadiiThatDoNotIncrease) {
   Parameters parameters;
   parameters.proxy.r_2 = parameters.proxy.r_1;
-  EXPECT_THROW(Renderer{parameters}, std::runtime_error);
+  EXPECT_THROW(Paper{parameters}, std::runtime_error);
 }
 
 // A surface that rises at a constant velocity, in frames at 30 Hz.
@@ -287,106 +287,103 @@ struct Lift {
   std::vector<double> heights;  // of the newest frame's surface at each tick
 };
 
-Lift lift(Renderer& renderer, double velocity, int frames, double f_c = 30.0) {
+Lift lift(Paper& paper, double velocity, int frames, double f_c = 30.0) {
   std::vector<std::unique_ptr<BruteForceCloud>> clouds;
   Lift result;
   int adopted = -1;
-  renderer.seat({0.0002, 0.0001, 0.01});
+  paper.seat({0.0002, 0.0001, 0.01});
   for (int i = 0; i < frames * 1000 / static_cast<int>(f_c); ++i) {
     const double t = i * 1e-3;
     const int frame = static_cast<int>(std::floor(t * f_c + 1e-9));
     if (frame != adopted) {
       clouds.push_back(std::make_unique<BruteForceCloud>(flat_grid(velocity * frame / f_c)));
-      renderer.frame(*clouds.back(), frame / f_c);
+      paper.frame(*clouds.back(), frame / f_c);
       adopted = frame;
     }
     // The HIP keeps 30 mm below the true surface.
-    result.ticks.push_back(renderer.tick({0.0002, 0.0001, velocity * t - 0.03}, t));
+    result.ticks.push_back(paper.tick({0.0002, 0.0001, velocity * t - 0.03}, t));
     result.heights.push_back(velocity * frame / f_c);
   }
   return result;
 }
 
 TEST(Velocity, IsThatOfASurfaceThatRisesSteadily) {
-  Renderer renderer;
-  const Lift result = lift(renderer, 0.1, 12);
+  Paper paper;
+  const Lift result = lift(paper, 0.1, 12);
   EXPECT_NEAR(result.ticks.back().surface_velocity, 0.1, 1e-3);
   EXPECT_NEAR(result.ticks.back().proxy.z() - result.heights.back(), r_c, 0.12e-3);
 }
 
 TEST(Velocity, CarriesTheProxyWhereTheFixedStepMethodLosesIt) {
   // 0.4 m/s is 13 mm a frame: far more than a radius, reached by a steady acceleration.
-  const auto lost = [](Method method) {
+  const auto lost = [](Paper::Variant variant) {
     Parameters parameters;
-    parameters.method = method;
-    Renderer renderer(parameters);
-    renderer.seat({0, 0, 0.01});
+    Paper paper(parameters, variant);
+    paper.seat({0, 0, 0.01});
     std::vector<std::unique_ptr<BruteForceCloud>> clouds;
     double height = 0.0;
     double velocity = 0.0;
     Tick tick{};
     for (int frame = 0; frame < 12; ++frame) {
       clouds.push_back(std::make_unique<BruteForceCloud>(flat_grid(height)));
-      renderer.frame(*clouds.back(), frame / 30.0);
+      paper.frame(*clouds.back(), frame / 30.0);
       for (int i = 0; i < 33; ++i)
-        tick = renderer.tick({0, 0, height - 0.03}, frame / 30.0 + i * 1e-3);
+        tick = paper.tick({0, 0, height - 0.03}, frame / 30.0 + i * 1e-3);
       velocity += 1.5 / 30.0;  // 300 r_c/s^2, below the bound of 898 (14)
       height += velocity / 30.0;
     }
     return tick.proxy.z() < height - velocity / 30.0;
   };
-  EXPECT_TRUE(lost(Method::fixed_step));
-  EXPECT_FALSE(lost(Method::paper));
+  EXPECT_TRUE(lost(Paper::Variant::fixed_step));
+  EXPECT_FALSE(lost(Paper::Variant::corrected));
 }
 
 TEST(Erratum15, TheForceBetweenTwoFramesOfASteadyLiftIsARampWithoutAStep) {
   // The HIP rises with the surface, so the force on it ought to be constant; the proxy is carried
   // up in steps and (15) has to fill them in.
-  const auto largest_step = [](Method method) {
+  const auto largest_step = [](Paper::Variant variant) {
     Parameters parameters;
-    parameters.method = method;
-    Renderer renderer(parameters);
-    const Lift result = lift(renderer, 0.1, 30);
+    Paper paper(parameters, variant);
+    const Lift result = lift(paper, 0.1, 30);
     double step = 0.0;
     for (std::size_t i = result.ticks.size() / 2; i < result.ticks.size(); ++i)
       step = std::max(step, (result.ticks[i].force - result.ticks[i - 1].force).norm());
     return step;
   };
   const double one_frame = 600.0 * 0.1 / 30.0;  // [N] that a frame's travel is worth
-  EXPECT_LT(largest_step(Method::paper), 0.02 * one_frame + 0.1);
-  EXPECT_GT(largest_step(Method::paper_as_printed), 1.8 * one_frame);
+  EXPECT_LT(largest_step(Paper::Variant::corrected), 0.02 * one_frame + 0.1);
+  EXPECT_GT(largest_step(Paper::Variant::as_printed), 1.8 * one_frame);
 }
 
 TEST(Erratum16, ADamperOpposesAHipThatMovesAwayFromTheProxy) {
-  const auto force_while_pressing = [](Method method) {
+  const auto force_while_pressing = [](Paper::Variant variant) {
     const BruteForceCloud plane(flat_grid());
     Parameters parameters;
-    parameters.method = method;
     parameters.coupling.damping = 2.0;
-    Renderer renderer(parameters);
-    renderer.seat({0, 0, 0.01});
-    renderer.frame(plane, 0.0);
+    Paper paper(parameters, variant);
+    paper.seat({0, 0, 0.01});
+    paper.frame(plane, 0.0);
     Tick tick{};
-    for (int i = 0; i <= 100; ++i) tick = renderer.tick({0, 0, -1e-4 * i}, i * 1e-3);
+    for (int i = 0; i <= 100; ++i) tick = paper.tick({0, 0, -1e-4 * i}, i * 1e-3);
     return tick.force.z();  // pressing at 0.1 m/s, 10 mm deep: spring 6 N, damper 0.2 N
   };
-  EXPECT_NEAR(force_while_pressing(Method::paper), 6.2, 0.08);
-  EXPECT_NEAR(force_while_pressing(Method::paper_as_printed), 5.8, 0.08);
+  EXPECT_NEAR(force_while_pressing(Paper::Variant::corrected), 6.2, 0.08);
+  EXPECT_NEAR(force_while_pressing(Paper::Variant::as_printed), 5.8, 0.08);
 }
 
 TEST(Erratum14, TheNoiseFreeBoundIsR1TimesTheFrameRateSquared) {
   // 4.49 m/s^2 = 898 r_c/s^2: held just below, lost just above, from a steady velocity.
   const auto held = [](double acceleration_rc) {
-    Renderer renderer;
+    Paper paper;
     std::vector<std::unique_ptr<BruteForceCloud>> clouds;
     double height = 0.0;
     double velocity = 0.1;
     for (int frame = 0; frame < 22; ++frame) {
       clouds.push_back(std::make_unique<BruteForceCloud>(flat_grid(height)));
-      if (frame == 0) renderer.seat({0, 0, height + 0.01});
-      renderer.frame(*clouds.back(), frame / 30.0);
+      if (frame == 0) paper.seat({0, 0, height + 0.01});
+      paper.frame(*clouds.back(), frame / 30.0);
       for (int i = 0; i < 33; ++i) {
-        const Tick tick = renderer.tick({0, 0, height - 0.03}, frame / 30.0 + i * 1e-3);
+        const Tick tick = paper.tick({0, 0, height - 0.03}, frame / 30.0 + i * 1e-3);
         if (tick.proxy.z() < height) return false;
       }
       if (frame >= 12) velocity += acceleration_rc * r_c / 30.0;
@@ -399,27 +396,27 @@ TEST(Erratum14, TheNoiseFreeBoundIsR1TimesTheFrameRateSquared) {
   EXPECT_FALSE(held(920.0));
 }
 
-TEST(Renderer, DerivesNoVelocityFromStampsThatDoNotIncrease) {
+TEST(Paper, DerivesNoVelocityFromStampsThatDoNotIncrease) {
   const BruteForceCloud low(flat_grid(0.0));
   const BruteForceCloud high(flat_grid(0.002));
-  Renderer renderer;
-  renderer.seat({0, 0, 0.01});
-  renderer.frame(low, 1.0);
-  settle(renderer, {0, 0, -0.01}, 1.0);
-  renderer.frame(high, 1.0);
-  const Tick tick = renderer.tick({0, 0, -0.01}, 1.1);
+  Paper paper;
+  paper.seat({0, 0, 0.01});
+  paper.frame(low, 1.0);
+  settle(paper, {0, 0, -0.01}, 1.0);
+  paper.frame(high, 1.0);
+  const Tick tick = paper.tick({0, 0, -0.01}, 1.1);
   EXPECT_TRUE(tick.flags & stamp_not_increasing);
   EXPECT_EQ(tick.surface_velocity, 0.0);
   EXPECT_TRUE(tick.force.allFinite());
 }
 
-TEST(Renderer, TrustsAVelocityNoLongerThanItIsToldTo) {
+TEST(Paper, TrustsAVelocityNoLongerThanItIsToldTo) {
   // 0.1 m/s and a second without frames would ask for 60 N.
-  Renderer renderer;
-  Lift result = lift(renderer, 0.1, 12);
+  Paper paper;
+  Lift result = lift(paper, 0.1, 12);
   const double force = result.ticks.back().force.z();
   const Vec3 hip = result.ticks.back().hip;
-  const Tick later = renderer.tick(hip, result.ticks.back().t + 1.0);
+  const Tick later = paper.tick(hip, result.ticks.back().t + 1.0);
   EXPECT_TRUE(later.flags & frame_stale);
   EXPECT_LT(later.force.z() - force, 600.0 * 0.1 * 0.1 + 0.1);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/core/surface_estimate.hpp"
+#include "palpate/sight/surface_estimate.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -118,7 +118,7 @@ double SurfaceEstimate::gate(double narrowest) const noexcept {
   return std::clamp(std::max(4.0 * spread_, 6.0 * std::sqrt(variance(0))), narrowest, widest_gate);
 }
 
-double SurfaceEstimate::travel(double t) const noexcept {
+double SurfaceEstimate::displacement(double t) const noexcept {
   if (velocity_ == 0.0) return 0.0;
   // Beyond one and a half intervals the velocity fades over another, and the surface stays there.
   const double elapsed = std::max(t - stamp_, 0.0) / interval_;
@@ -128,7 +128,7 @@ double SurfaceEstimate::travel(double t) const noexcept {
 
 SurfaceContact SurfaceEstimate::contact(const Vec3& point, double t, double reach) const noexcept {
   Vec3 local = frame_.local_from_world(point);
-  const double moved = travel(t);
+  const double moved = displacement(t);
   local.z() -= moved;
   Vec3 from = local;
   if (const double bulge = surface_.strongest_fall(); bulge > 0.0) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/core/coupling.hpp"
+#include "palpate/paper/coupling.hpp"
 
 namespace palpate {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/core/surface_fit.hpp"
+#include "palpate/sight/surface_fit.hpp"
 
 #include <algorithm>
 #include <bit>

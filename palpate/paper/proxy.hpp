@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "palpate/core/parameters.hpp"
 #include "palpate/core/patch.hpp"
+#include "palpate/core/tick.hpp"
 
 namespace palpate {
-
-/// Where the proxy stands with respect to the points. Section 4.1.
-enum class ContactState {
-  free_motion,   ///< no point within r_2
-  contact,       ///< points between r_1 and r_2, none within r_1
-  entrenchment,  ///< points within r_1
-};
-
-/// The field's word for a state, as in the trace: `free`, `contact`, `entrenchment`.
-const char* to_string(ContactState state) noexcept;
 
 /// How a tick's movement over the points has gone so far: section 4.3.
 struct ProxyMovement {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/core/sight.hpp"
+#include "palpate/sight/tracker.hpp"
 
 #include <algorithm>
 #include <cmath>

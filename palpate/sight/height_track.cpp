@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/core/height_track.hpp"
+#include "palpate/sight/height_track.hpp"
 
 #include <algorithm>
 #include <array>

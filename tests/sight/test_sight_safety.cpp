@@ -12,7 +12,7 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/renderer.hpp"
+#include "palpate/sight/sight.hpp"
 
 #include "tests/support/allocations.hpp"
 #include "tests/support/grids.hpp"
@@ -123,12 +123,6 @@ Vec3 hostile_hip(std::mt19937& random) {
   return {values[any(random)], values[any(random)], values[any(random)]};
 }
 
-Renderer by_sight() {
-  Parameters parameters;
-  parameters.method = Method::sight;
-  return Renderer(parameters);
-}
-
 void expect_sane(const Tick& tick) {
   ASSERT_TRUE(tick.force.allFinite());
   ASSERT_TRUE(tick.proxy.allFinite());
@@ -143,17 +137,17 @@ TEST(SightSafety, StaysFiniteAndWithinTheForceLimitOnWhateverCamerasAndHandsSend
     std::mt19937 random(seed);
     std::uniform_int_distribution<std::size_t> any(0, clouds.size() - 1);
     std::uniform_real_distribution<double> share(0.0, 1.0);
-    Renderer renderer = by_sight();
+    Sight sight;
     double t = 0.0;
     for (int k = 0; k < 300; ++k) {
       // Mostly the plane, so that there is a contact to be upset.
-      renderer.frame(share(random) < 0.5 ? *clouds[0] : *clouds[any(random)],
-                     share(random) < 0.05 ? std::numeric_limits<double>::quiet_NaN()
-                                          : t - (share(random) < 0.1 ? 1.0 : 0.0));
+      sight.frame(share(random) < 0.5 ? *clouds[0] : *clouds[any(random)],
+                  share(random) < 0.05 ? std::numeric_limits<double>::quiet_NaN()
+                                       : t - (share(random) < 0.1 ? 1.0 : 0.0));
       for (int i = 0; i < 10; ++i) {
         t += share(random) < 0.01 ? 10.0 : 3e-3;
         const Vec3 hip = share(random) < 0.8 ? Vec3(0, 0, -0.01) : hostile_hip(random);
-        expect_sane(renderer.tick(hip, t));
+        expect_sane(sight.tick(hip, t));
         if (HasFatalFailure()) return;
       }
     }
@@ -165,15 +159,15 @@ TEST(SightSafety, StaysFiniteOnPointsThatAreNoNumbers) {
   for (const float value : {std::numeric_limits<float>::quiet_NaN(),
                             std::numeric_limits<float>::infinity(), 1e30F, -1e30F}) {
     const Garbage garbage(value);
-    Renderer renderer = by_sight();
+    Sight sight;
     for (int k = 0; k < 30; ++k) {
       if (k % 3 == 2) {
-        renderer.frame(garbage, k * interval);
+        sight.frame(garbage, k * interval);
       } else {
-        renderer.frame(plane, k * interval);
+        sight.frame(plane, k * interval);
       }
       for (int i = 0; i < 33; ++i) {
-        expect_sane(renderer.tick(Vec3(0, 0, k < 2 ? 0.02 : -0.01), k * interval + i * 1e-3));
+        expect_sane(sight.tick(Vec3(0, 0, k < 2 ? 0.02 : -0.01), k * interval + i * 1e-3));
         if (HasFatalFailure()) return;
       }
     }
@@ -183,13 +177,13 @@ TEST(SightSafety, StaysFiniteOnPointsThatAreNoNumbers) {
 TEST(SightSafety, FeelsThePlaneAgainASecondAfterAnyHostileFrames) {
   const auto clouds = hostile_clouds();
   for (std::size_t hostile = 1; hostile < clouds.size(); ++hostile) {
-    Renderer renderer = by_sight();
+    Sight sight;
     Tick tick{};
     for (int k = 0; k < 60; ++k) {
-      renderer.frame(k >= 20 && k < 25 ? *clouds[hostile] : *clouds[0], k * interval);
+      sight.frame(k >= 20 && k < 25 ? *clouds[hostile] : *clouds[0], k * interval);
       for (int i = 0; i < 33; ++i) {
         const bool lifted = k < 3 || (k >= 25 && k < 32);
-        tick = renderer.tick(Vec3(0.0, 0.0, lifted ? 0.03 : -0.01), k * interval + i * 1e-3);
+        tick = sight.tick(Vec3(0.0, 0.0, lifted ? 0.03 : -0.01), k * interval + i * 1e-3);
       }
     }
     EXPECT_NEAR(tick.force.z(), 6.0, 0.3) << "cloud " << hostile;
@@ -203,27 +197,41 @@ TEST(SightSafety, NeitherAllocatesNorGathersMoreThanItsBounds) {
   for (const auto& cloud : clouds) all.emplace_back(*cloud);
   std::mt19937 random(3);
   std::uniform_int_distribution<std::size_t> any(0, clouds.size() - 1);
-  Renderer renderer = by_sight();
+  Sight sight;
   const test::MemoryCalls calls;
   for (int k = 0; k < 200; ++k) {
     const Counted& cloud = k % 2 == 0 ? all[0] : all[any(random)];
     cloud.gathers = 0;
     cloud.beam_points = 0;
-    renderer.frame(cloud, k * interval);
+    sight.frame(cloud, k * interval);
     // A look along the beam, the contact near and far, beside it, and the audit.
     ASSERT_LE(cloud.gathers, 8);
     ASSERT_LE(cloud.beam_points, 8192U);
     for (int i = 0; i < 33; ++i) {
       const double t = k * interval + i * 1e-3;
       cloud.gathers = 0;
-      const Tick tick =
-          renderer.tick(Vec3(0.02 * std::sin(7 * t), 0.02 * std::cos(5 * t), -0.01), t);
+      const Tick tick = sight.tick(Vec3(0.02 * std::sin(7 * t), 0.02 * std::cos(5 * t), -0.01), t);
       ASSERT_LE(tick.steps, 64 + 8);
       ASSERT_LE(cloud.gathers, 64 + 32);
     }
   }
   if (test::memory_is_counted) {
     EXPECT_EQ(calls.count(), 0U);
+  }
+}
+
+TEST(SightSafety, AsksForAFiniteForceAfterTwoFramesOfTheSameStamp) {
+  // The interval between them is no interval: what a frame changes was blended over 0 seconds.
+  const PointCloud plane(test::flat_grid(0.0, 1e-3, 40), Vec3(0, 0, 1));
+  for (const double second : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    Sight sight;
+    sight.frame(plane, 0.0);
+    sight.frame(plane, second);
+    for (int i = 0; i < 100; ++i) {
+      const Tick tick = sight.tick({0, 0, 0.02 - 5e-4 * i}, 1e-3 * i);
+      expect_sane(tick);
+      EXPECT_NE(tick.flags & stamp_not_increasing, 0U);
+    }
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/core/proxy.hpp"
+#include "palpate/paper/proxy.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -186,18 +186,6 @@ MovementEnd move(const Patch& patch, const Vec3& hip, const ProxyParameters& par
 }
 
 }  // namespace
-
-const char* to_string(ContactState state) noexcept {
-  switch (state) {
-    case ContactState::free_motion:
-      return "free";
-    case ContactState::contact:
-      return "contact";
-    case ContactState::entrenchment:
-      return "entrenchment";
-  }
-  return "unknown";
-}
 
 double gamma_schedule(double gamma, int contact_steps) noexcept {
   constexpr int constant_for = 8;

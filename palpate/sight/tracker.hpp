@@ -7,7 +7,7 @@
 #include <span>
 
 #include "palpate/core/cloud.hpp"
-#include "palpate/core/surface_estimate.hpp"
+#include "palpate/sight/surface_estimate.hpp"
 
 namespace palpate {
 
@@ -80,8 +80,8 @@ class SightTracker {
     return surface_.frame().up.dot(normal) > 0.35;
   }
   /// How far the surface has moved at time t [s] since its frame [m, world]; only while `tracking`.
-  [[nodiscard]] Vec3 travel(double t) const noexcept {
-    return surface_.travel(t) * surface_.frame().up;
+  [[nodiscard]] Vec3 displacement(double t) const noexcept {
+    return surface_.displacement(t) * surface_.frame().up;
   }
   /// What is known of the surface; only while `tracking`.
   [[nodiscard]] const SurfaceEstimate& surface() const noexcept { return surface_; }

@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "palpate/core/cloud.hpp"
-#include "palpate/core/height_track.hpp"
-#include "palpate/core/surface_fit.hpp"
+#include "palpate/sight/height_track.hpp"
+#include "palpate/sight/surface_fit.hpp"
 
 namespace palpate {
 
@@ -74,7 +74,7 @@ class SurfaceEstimate {
   [[nodiscard]] double stamp() const noexcept { return stamp_; }        ///< [s]
   [[nodiscard]] double interval() const noexcept { return interval_; }  ///< [s]
   /// How far the surface has moved along `up` at time t [s] since its frame [m].
-  [[nodiscard]] double travel(double t) const noexcept;
+  [[nodiscard]] double displacement(double t) const noexcept;
   /// Is the surface what its fit says, up to noise?
   [[nodiscard]] bool smooth() const noexcept { return smooth_; }
   /// Frames whose heights are this surface's.
@@ -133,6 +133,11 @@ class SurfaceEstimate {
   /// Means over the points in each cell of a square about a frame's contact. Cells are those of a
   /// lattice through the local origin, so that frames can be compared while the contact slides.
   struct Cells {
+    Cells() noexcept {
+      heights.fill(0.0);
+      means.fill(Vec6::Zero());
+    }
+
     bool full = false;  // hardly a cell is without points, and nothing was before them
     Eigen::Vector2i first = Eigen::Vector2i::Zero();  // of the lattice's cells
     std::array<double, cells> heights;                // [m]

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/core/tick.hpp"
+
+#include <array>
+
+namespace palpate {
+namespace {
+
+constexpr std::array<TickFlagInfo, tick_flag_count> table{{
+    {"step_budget_hit",
+     "the proxy had not converged and goes on in the next tick; raise "
+     "step_budget"},
+    {"patch_thinned", "more points were near than a patch holds; move the camera away"},
+    {"force_saturated", "the coupling asked for more than max_force; lower the stiffness"},
+    {"non_finite_input", "the hand's position or the time was not finite"},
+    {"no_frame", "there is no frame to touch yet"},
+    {"stamp_not_increasing", "a camera's clock stood still or ran backwards"},
+    {"frame_stale", "the newest frame is older than max_extrapolation"},
+    {"normal_undefined", "the points' directions cancel out; the last normal was used"},
+    {"surface_hidden", "an occluder hides the surface: it is held where it was"},
+    {"pop_through_suspected", "the proxy was found behind the surface that the camera sees"},
+}};
+
+}  // namespace
+
+std::span<const TickFlagInfo> tick_flag_table() {
+  return table;
+}
+
+const char* to_string(ContactState state) noexcept {
+  switch (state) {
+    case ContactState::free_motion:
+      return "free";
+    case ContactState::contact:
+      return "contact";
+    case ContactState::entrenchment:
+      return "entrenchment";
+  }
+  return "unknown";
+}
+
+bool is_place(const Vec3& p) noexcept {
+  constexpr double farthest = 1e6;  // [m]
+  return p.allFinite() && p.cwiseAbs().maxCoeff() <= farthest;
+}
+
+Tick free_tick(const Vec3& hip, double t, std::int64_t frame) noexcept {
+  Tick tick;
+  tick.t = t;
+  tick.hip = hip;
+  tick.proxy = hip;
+  tick.frame = frame;
+  return tick;
+}
+
+}  // namespace palpate

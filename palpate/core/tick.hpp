@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "palpate/core/patch.hpp"
+
+namespace palpate {
+
+/// Where the proxy stands with respect to the points. Section 4.1.
+enum class ContactState {
+  free_motion,   ///< no point within r_2
+  contact,       ///< points between r_1 and r_2, none within r_1
+  entrenchment,  ///< points within r_1
+};
+
+/// The field's word for a state, as in the trace: `free`, `contact`, `entrenchment`.
+const char* to_string(ContactState state) noexcept;
+
+/// What happened in a tick besides the result; bits of `Tick::flags`.
+enum TickFlag : std::uint32_t {
+  /// The proxy had not converged after `step_budget` steps: it goes on in the next tick. Raise
+  /// step_budget if this is regular and there is time.
+  step_budget_hit = 1u << 0,
+  /// More points were near than a patch holds; an even part of them was used. Move the camera away
+  /// or lower its resolution.
+  patch_thinned = 1u << 1,
+  /// The coupling asked for more than max_force.
+  force_saturated = 1u << 2,
+  /// The HIP or the time was not finite: no force, and the proxy stayed.
+  non_finite_input = 1u << 3,
+  /// There is no frame to touch yet: no force, and the proxy is at the HIP.
+  no_frame = 1u << 4,
+  /// The stamps of the last two frames do not increase: no velocity was derived from them.
+  stamp_not_increasing = 1u << 5,
+  /// The newest frame is older than max_extrapolation: the surface is taken to rest where it was
+  /// last predicted to be.
+  frame_stale = 1u << 6,
+  /// The points' directions cancel out, so there is no normal: the last one was used.
+  normal_undefined = 1u << 7,
+  /// Method `sight`: the surface is hidden by an occluder or lies in a hole of the image. The proxy
+  /// rests on the remembered surface, and the force fades out if that lasts.
+  surface_hidden = 1u << 8,
+  /// Method `sight`: the newest frame shows the proxy behind the surface that it should be in front
+  /// of, by more than noise explains. Set for as long as that frame is in use.
+  pop_through_suspected = 1u << 9,
+};
+constexpr std::size_t tick_flag_count = 10;
+
+/// A flag's name and what it means, for people.
+struct TickFlagInfo {
+  std::string_view name;     ///< such as "step_budget_hit"
+  std::string_view meaning;  ///< one line, with the remedy where there is one
+};
+/// One row for each bit of `TickFlag`, in their order.
+std::span<const TickFlagInfo> tick_flag_table();
+
+/// One cycle of haptic rendering: what the hand did, where the proxy went, what the hand feels.
+struct Tick {
+  double t = 0.0;              ///< [s] as given
+  Vec3 hip = Vec3::Zero();     ///< [m] world, as given
+  Vec3 proxy = Vec3::Zero();   ///< [m] world, centre of the sphere after the tick's steps
+  Vec3 normal = Vec3::Zero();  ///< [-] unit, away from the surface; zero: nothing within r_3
+  Vec3 force = Vec3::Zero();   ///< [N] world, on the hand; finite, at most max_force long
+  ContactState state = ContactState::free_motion;  ///< after the tick's steps
+  int steps = 0;                                   ///< proxy steps taken
+  double surface_velocity = 0.0;                   ///< [m/s] v of (13), towards the proxy
+  std::int64_t frame = -1;  ///< number of the frame in use, from 0; -1 before the first
+  std::uint32_t flags = 0;  ///< TickFlag bits
+};
+
+/// Can `p` [m] be a place? It is finite and within 1000 km of the origin.
+bool is_place(const Vec3& p) noexcept;
+
+/// The tick of a hand in free space: the proxy is at the HIP, and there is no force.
+Tick free_tick(const Vec3& hip, double t, std::int64_t frame) noexcept;
+
+}  // namespace palpate

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/paper/point_mover.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/paper/proxy.hpp"
+
+namespace palpate {
+namespace {
+
+// A gather reaches beyond r_3 by as much as the proxy may travel, between these multiples of r_c:
+// less would make slow slides gather anew every few steps, more would make every loop longer.
+constexpr double least_margin = 0.2;
+constexpr double most_margin = 4.0;
+
+// A surface ends where the one beside it is farther from the camera by this multiple of r_c.
+constexpr double side_jump = 2.0;
+
+}  // namespace
+
+void PointMover::set(const Options& options) noexcept {
+  options_ = options;
+  cos_theta_ = std::cos(options.proxy.theta);
+  stale_ = true;
+}
+
+// Gathers the points about a place from where the proxy is drawn to the HIP by u.
+void PointMover::cover(const Proxy& proxy, const Cloud& cloud, const Vec3& at, const Vec3& u,
+                       const Vec3& contact_normal) noexcept {
+  const double r_c = options_.proxy.r_c();
+  // In contact the proxy can be expected to travel along the surface and away from it only.
+  const double into = proxy.touching ? std::min(u.dot(contact_normal.normalized()), 0.0) : 0.0;
+  const double travel = std::sqrt(std::max(u.squaredNorm() - into * into, 0.0));
+  const double margin = std::clamp(travel, least_margin * r_c, most_margin * r_c);
+  const Ball ball{at, options_.proxy.r_3 + margin};
+  gather(cloud, ball, patch_);
+  if (options_.side_depth > 0.0) {
+    cloud.gather_sides(ball, {side_jump * r_c, options_.side_depth}, Patch::capacity, patch_);
+  }
+  stale_ = false;
+}
+
+Movement PointMover::move(Proxy& proxy, const Cloud& cloud, const Vec3& hip) noexcept {
+  ProxyMovement now{.at = *proxy.at, .contact_normal = proxy.normal.value_or(Vec3::Zero())};
+  if (stale_) {
+    cover(proxy, cloud, now.at, hip - now.at, now.contact_normal);
+  } else if (now.at == seen_from_) {  // what the last movement saw here last is still good
+    now.looked = true;
+    now.state = state_;
+    now.normal = direction_;
+  }
+  MovementEnd end = MovementEnd::patch_left;
+  for (;;) {
+    end = move_proxy(patch_, hip, options_.proxy, cos_theta_, options_.fixed_step, now);
+    if (end != MovementEnd::patch_left) break;
+    cover(proxy, cloud, now.at, hip - now.at, now.contact_normal);
+  }
+  proxy.at = seen_from_ = now.at;
+  state_ = now.state;
+  direction_ = now.normal;
+  if (!now.contact_normal.isZero(0.0)) proxy.normal = now.contact_normal.normalized();
+  Movement movement{.state = now.state,
+                    .normal = now.normal,
+                    .first_step = now.first_step,
+                    .steps = now.steps,
+                    .touched = now.touched};
+  movement.normal.normalize();  // zero stays zero
+  if (end == MovementEnd::budget_spent) movement.flags |= step_budget_hit;
+  if (now.normal_undefined) movement.flags |= normal_undefined;
+  return movement;
+}
+
+void finish_movement(Proxy& proxy, const Movement& movement) noexcept {
+  proxy.touching = movement.state != ContactState::free_motion ||
+                   ((movement.flags & step_budget_hit) != 0 && movement.touched);
+  if (!proxy.touching) proxy.normal.reset();
+}
+
+}  // namespace palpate

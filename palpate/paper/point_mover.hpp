@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "palpate/core/cloud.hpp"
+#include "palpate/core/parameters.hpp"
+#include "palpate/core/tick.hpp"
+
+namespace palpate {
+
+/// The proxy, and what it remembers of its contact from tick to tick.
+struct Proxy {
+  std::optional<Vec3> at;      ///< [m] P_k, world; none before the first tick
+  std::optional<Vec3> normal;  ///< [-] unit: the last n known while in contact
+  bool touching = false;       ///< the state after the last tick's steps
+};
+
+/// Where a movement of the proxy has led.
+struct Movement {
+  ContactState state = ContactState::free_motion;
+  Vec3 normal = Vec3::Zero();      ///< [-] unit; zero where there is none
+  Vec3 first_step = Vec3::Zero();  ///< [m] s_k of (13)
+  int steps = 0;
+  bool touched = false;     ///< in contact or entrenched at any step
+  std::uint32_t flags = 0;  ///< TickFlag bits
+};
+
+/// Moves a proxy over the points of a cloud, section 4.3: gathers the patch that the movement
+/// needs, once for as long as it serves, and steps until the proxy rests.
+///
+/// [servo] Nothing here allocates, locks or throws after construction.
+class PointMover {
+ public:
+  /// What may be set; all but `proxy` as in the paper by default.
+  struct Options {
+    ProxyParameters proxy;
+    bool fixed_step = false;  ///< steps of 0.1 r_1 [1] instead of (9) to (12)
+    double side_depth = 0.0;  ///< [m] sides of bodies, SightParameters::side_depth; 0: none
+  };
+
+  explicit PointMover(const Options& options) { set(options); }
+  void set(const Options& options) noexcept;
+
+  /// The cloud or the proxy has changed: the next movement gathers anew.
+  void invalidate() noexcept { stale_ = true; }
+
+  /// Moves `proxy`, which must have a place, towards the HIP until it converges.
+  ///
+  /// At most step_budget steps over at most Patch::capacity points each.
+  /// @param hip  [m] world
+  Movement move(Proxy& proxy, const Cloud& cloud, const Vec3& hip) noexcept;
+
+  /// The patch that the last movement saw.
+  [[nodiscard]] const Patch& patch() const noexcept { return patch_; }
+
+ private:
+  void cover(const Proxy& proxy, const Cloud& cloud, const Vec3& at, const Vec3& u,
+             const Vec3& contact_normal) noexcept;
+
+  Options options_;
+  double cos_theta_ = 1.0;
+  Patch patch_;
+  bool stale_ = true;
+
+  // What the last look at the patch saw, and from where.
+  Vec3 seen_from_ = Vec3::Zero();
+  ContactState state_ = ContactState::free_motion;
+  Vec3 direction_ = Vec3::Zero();  // n' of (1)
+};
+
+/// Ends a tick's movement: does the proxy touch, and what does it remember?
+///
+/// The contact shell is 0.02 mm thick, so a proxy that slides on noise leaves it for single steps.
+/// What counts is where it came to rest; if it did not come to rest, whether it touched at all.
+void finish_movement(Proxy& proxy, const Movement& movement) noexcept;
+
+}  // namespace palpate

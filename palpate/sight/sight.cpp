@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sight/sight.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace palpate {
+namespace {
+
+PointMover::Options mover_options(const Parameters& parameters) {
+  return {.proxy = parameters.proxy, .side_depth = parameters.sight.side_depth};
+}
+
+}  // namespace
+
+Sight::Sight(const Parameters& parameters)
+    : parameters_(parameters), mover_(mover_options(parameters)) {
+  validate(parameters_);
+}
+
+void Sight::set_parameters(const Parameters& parameters) {
+  validate(parameters);
+  parameters_ = parameters;
+  mover_.set(mover_options(parameters));
+}
+
+void Sight::seat(const Vec3& proxy) noexcept {
+  if (!is_place(proxy)) return;
+  proxy_ = {};
+  proxy_.at = proxy;
+  distance_rate_.reset();
+  mover_.invalidate();
+  tracker_.forget();
+  on_fit_ = false;
+  points_moved_ = Vec3::Zero();
+  last_force_ = Vec3::Zero();
+  blend_offset_ = Vec3::Zero();
+}
+
+// [s] between the newest two frames; the nominal one where their stamps do not tell.
+double Sight::interval() const noexcept {
+  return frame_.in_order() ? frame_.interval() : 1.0 / parameters_.motion.frame_rate;
+}
+
+// A frame seen along the lines of sight: docs/method.md, "Sight".
+void Sight::frame(const Cloud& cloud, double stamp) noexcept {
+  frame_.take(cloud, stamp, 1.0 / parameters_.motion.frame_rate);
+  mover_.invalidate();
+  blend_due_ = true;
+  // What the surface's own motion adds to the force from the last tick on.
+  carried_rate_ = tracker_.tracking()
+                      ? (tracker_.surface().displacement(distance_rate_.last_t()) -
+                         tracker_.surface().displacement(distance_rate_.last_t() - 1e-3)) /
+                            1e-3
+                      : 0.0;
+  behind_ = false;
+  points_moved_ = Vec3::Zero();
+  if (!proxy_.at) return;
+  // What was hidden is remembered for a hand that is at it, or may be soon again.
+  constexpr double leaves = 20e-3;  // [m]
+  if (tracker_.holding() && !(proxy_.touching && on_fit_) &&
+      tracker_.contact(*proxy_.at, frame_.stamp()).distance > parameters_.proxy.r_c() + leaves) {
+    tracker_.forget();
+  }
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  using Event = SightTracker::Event;
+  const Event event = tracker_.frame(cloud, frame_.stamp(), interval(), *proxy_.at,
+                                     proxy_.touching ? parameters_.sight.hardest_strike : infinite);
+  if (event != Event::followed && event != Event::jumped) return;
+  // Side repair: the proxy was on the surface's free side and has to be there still.
+  // One that will move over points has to be in front of this frame's, not only of the average.
+  const SurfaceContact contact = tracker_.contact(*proxy_.at, frame_.stamp());
+  const double r_c = parameters_.proxy.r_c();
+  const double least =
+      proxy_.touching && !tracker_.smooth() ? r_c + tracker_.surface().clearance() : r_c;
+  if (contact.distance < least) *proxy_.at = contact.foot + least * contact.normal;
+  behind_ = tracker_.shows_behind(cloud, *proxy_.at, parameters_.proxy.r_c());
+}
+
+// Movement on the fitted surface where it describes the points well, on the points elsewhere.
+Movement Sight::move(const Vec3& hip, double t) noexcept {
+  // How far from the fitted surface the points' noise can stop a proxy.
+  constexpr double near = 10e-3;
+  constexpr int most_slides = 6;
+  // A proxy does not touch the bottom of a trough much narrower than itself, but its flanks.
+  constexpr double deepest = 0.7;  // [-] r_c times curvature
+  const double r_c = parameters_.proxy.r_c();
+  if (!proxy_.touching) tracker_.watch(*frame_.cloud(), *proxy_.at);
+
+  Movement movement;
+  int slides = 0;
+  const auto rest_on_fit = [&] {
+    while (tracker_.smooth()) {
+      const SurfaceContact contact = tracker_.contact(hip, t);
+      if (contact.distance > r_c + near + 4.0 * tracker_.surface().spread()) return false;
+      if (contact.curvature * r_c > deepest || !tracker_.faces(contact.normal)) return false;
+      if (contact.at_limit && !tracker_.holding()) {
+        if (slides == most_slides) movement.flags |= step_budget_hit;
+        if (slides++ < most_slides && tracker_.slide(*frame_.cloud(), contact.foot)) continue;
+        if (!tracker_.smooth()) return false;
+      }
+      ++movement.steps;
+      if (contact.distance >= r_c) {
+        if (tracker_.holding()) return false;  // what else is there, the points tell
+        proxy_.at = hip;
+        movement.state = ContactState::free_motion;
+        movement.normal = contact.normal;
+      } else {
+        proxy_.at = contact.foot + r_c * contact.normal;
+        movement.state = ContactState::contact;
+        movement.normal = contact.normal;
+        movement.touched = true;
+        proxy_.normal = contact.normal;
+      }
+      return true;
+    }
+    return false;
+  };
+
+  const bool close =
+      on_fit_ || (tracker_.smooth() && tracker_.contact(*proxy_.at, t).distance <=
+                                           r_c + near + 4.0 * tracker_.surface().spread());
+  if (close && rest_on_fit()) {
+    on_fit_ = true;
+    mover_.invalidate();
+    points_moved_ = tracker_.displacement(t);
+    return movement;
+  }
+  on_fit_ = false;
+  const int steps = movement.steps + slides;
+  // The points that the fit describes move on with it, and a proxy that touches them with them.
+  const Vec3 moved = tracker_.tracking() && tracker_.surface().smooth() ? tracker_.displacement(t)
+                                                                        : Vec3(Vec3::Zero());
+  *proxy_.at -= points_moved_;
+  const Vec3 before = *proxy_.at;
+  movement = mover_.move(proxy_, *frame_.cloud(), hip - moved);
+  movement.steps += steps;
+  // Points that scatter can let the proxy through. Its line of sight tells.
+  if (const std::optional<Vec3> front =
+          tracker_.in_front(*frame_.cloud(), before, *proxy_.at, r_c)) {
+    movement.state = ContactState::contact;
+    movement.normal = (*front - *proxy_.at).normalized();
+    movement.touched = true;
+    proxy_.normal = movement.normal;
+    proxy_.at = front;
+  }
+  const bool touched = movement.touched && proxy_.normal;
+  if (touched) tracker_.touch(*frame_.cloud(), *proxy_.at - r_c * *proxy_.normal, *proxy_.normal);
+  *proxy_.at += moved;
+  points_moved_ = moved;
+  if (touched && rest_on_fit()) on_fit_ = true;
+  return movement;
+}
+
+// Section 4.6, from the proxy where it will be on the moving surface.
+Vec3 Sight::render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept {
+  if (!proxy_.touching) {
+    distance_rate_.reset();
+    return Vec3::Zero();
+  }
+  Vec3 u = hip - *proxy_.at;
+  // On points that are still where they were, the hand feels how the surface moves all the same.
+  if (tracker_.tracking()) u -= tracker_.displacement(t) - points_moved_;
+  const CouplingForce result = coupling_force(
+      parameters_.coupling, u, distance_rate_.update(u.norm(), t), parameters_.proxy.r_c(), false);
+  if (result.saturated) flags |= force_saturated;
+  return result.force;
+}
+
+// What a frame corrected at once in the geometry reaches the hand over most of an interval, and a
+// surface that is no longer seen fades.
+Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
+  constexpr double blend = 0.85;    // [intervals]
+  const auto ease = [](double x) {  // from 1 to 0 with slopes 0
+    x = std::clamp(x, 0.0, 1.0);
+    return 1.0 - x * x * (3.0 - 2.0 * x);
+  };
+  if (blend_due_) {
+    // The force goes on as it would have without the frame, then turns to what the frame says.
+    Vec3 carried = last_force_;
+    const double push = last_force_.norm();
+    if (push > 0.0) {
+      const Vec3 outwards = last_force_ / push;
+      const double deeper =
+          carried_rate_ * (t - last_blend_t_) * tracker_.surface().frame().up.dot(outwards) -
+          (hip - last_hip_).dot(outwards);
+      carried += parameters_.coupling.stiffness * deeper * outwards;
+    }
+    blend_offset_ = carried - force;
+    blend_start_ = t;
+    blend_due_ = false;
+  }
+  Vec3 blended = force + ease((t - blend_start_) / (blend * interval())) * blend_offset_;
+  // The rest of an old force may push on, but nothing pulls.
+  const Vec3 normal = proxy_.normal.value_or(Vec3::Zero());
+  const double pull = blended.dot(normal);
+  if (pull < 0.0) blended -= pull * normal;
+  if (tracker_.holding()) {
+    const SightParameters& sight = parameters_.sight;
+    blended *= ease((t - tracker_.held_since() - sight.hidden_hold) / sight.hidden_fade);
+  }
+  // A single frame is a scan, not a stream that stopped.
+  const double late = parameters_.motion.max_extrapolation;
+  if (frame_.count() > 1) blended *= ease((t - frame_.stamp() - late) / late);
+  const double force_now = blended.norm();
+  if (force_now > parameters_.coupling.max_force) {
+    blended *= (1.0 - 1e-15) * parameters_.coupling.max_force / force_now;  // after rounding, too
+  }
+  last_force_ = blended;
+  last_hip_ = hip;
+  last_blend_t_ = t;
+  return blended;
+}
+
+Tick Sight::tick(const Vec3& hip, double t) noexcept {
+  Tick tick = free_tick(hip, t, frame_.number());
+  if (!is_place(hip) || !std::isfinite(t)) {
+    tick.proxy = proxy_.at.value_or(Vec3::Zero());
+    tick.flags = non_finite_input;
+    return tick;
+  }
+  if (!proxy_.at || frame_.cloud() == nullptr) proxy_.at = hip;
+  if (frame_.cloud() == nullptr) {
+    tick.flags = no_frame;
+    return tick;
+  }
+
+  const Movement movement = move(hip, t);
+  finish_movement(proxy_, movement);
+  tick.proxy = *proxy_.at;
+  tick.normal =
+      movement.normal.isZero(0.0) ? proxy_.normal.value_or(Vec3::Zero()) : movement.normal;
+  tick.flags = movement.flags;
+  tick.force = blend_force(render_force(hip, t, tick.flags), hip, t);
+  tick.state = movement.state;
+  tick.steps = movement.steps;
+  tick.surface_velocity = tracker_.tracking() ? tracker_.surface().velocity() : 0.0;
+  if (tracker_.holding()) tick.flags |= surface_hidden;
+  if (behind_) tick.flags |= pop_through_suspected;
+  if (mover_.patch().thinned()) tick.flags |= patch_thinned;
+  if (!frame_.in_order()) tick.flags |= stamp_not_increasing;
+  if (t - frame_.stamp() > parameters_.motion.max_extrapolation) tick.flags |= frame_stale;
+  return tick;
+}
+
+}  // namespace palpate

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "palpate/core/method.hpp"
+#include "palpate/core/newest_frame.hpp"
+#include "palpate/paper/coupling.hpp"
+#include "palpate/paper/point_mover.hpp"
+#include "palpate/sight/tracker.hpp"
+
+namespace palpate {
+
+/// Sightline tracking: follows the surface along the camera's lines of sight, before contact and in
+/// it, and lets the proxy rest on a fit averaged over space and time. docs/method.md, "Sight".
+///
+/// Where the fit does not describe the points, the proxy moves over them as the paper's does.
+class Sight final : public Method {
+ public:
+  /// Allocates all it will ever need. @throws Error if the parameters do not validate.
+  explicit Sight(const Parameters& parameters = {});
+
+  void seat(const Vec3& proxy) noexcept override;
+  void frame(const Cloud& cloud, double stamp) noexcept override;
+  Tick tick(const Vec3& hip, double t) noexcept override;
+  void set_parameters(const Parameters& parameters) override;
+
+  [[nodiscard]] const Patch* patch() const noexcept override { return &mover_.patch(); }
+
+ private:
+  Movement move(const Vec3& hip, double t) noexcept;
+  Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;
+  Vec3 blend_force(const Vec3& force, const Vec3& hip, double t) noexcept;
+  [[nodiscard]] double interval() const noexcept;
+
+  Parameters parameters_;
+  PointMover mover_;
+  NewestFrame frame_;
+  Proxy proxy_;
+  SightTracker tracker_;
+  bool on_fit_ = false;  // the proxy rests on the fitted surface, not on points
+  // [m] displacement of the points since their frame, with the surface, at the last tick
+  Vec3 points_moved_ = Vec3::Zero();
+  bool behind_ = false;  // the monitor's verdict on the frame in use
+
+  // What the force goes on from when a frame arrives.
+  bool blend_due_ = false;  // a frame came since the last force
+  Vec3 last_force_ = Vec3::Zero();
+  Vec3 last_hip_ = Vec3::Zero();
+  double last_blend_t_ = 0.0;
+  double carried_rate_ = 0.0;  // [m/s] of the surface, before the newest frame
+  Vec3 blend_offset_ = Vec3::Zero();
+  double blend_start_ = 0.0;
+
+  DistanceRate distance_rate_;  // of (16)
+};
+
+}  // namespace palpate

@@ -170,7 +170,8 @@ void Cycle::run(const Wake& wake) noexcept {
                                          .position = hand.position,
                                          .hand = hand.present && !hand.clutched && !is_faulty(hand),
                                          .frame_age = age.age,
-                                         .frame_intervals = age.intervals});
+                                         .frame_intervals = age.intervals,
+                                         .surface_velocity = tick.surface_velocity});
   device_.write(workspace_.force_in_device(safe.force), t);
 
   const ServoTick record{.tick = tick,

@@ -27,15 +27,18 @@ constexpr double velocity_time = 5e-3;
 // [s] without a swing, after which the oscillation detector gives its cut back: 10 periods at 20
 // Hz.
 constexpr double calm_time = 0.5;
+// [-] A cut that leaves more than that is over: nobody feels 1 % of a stiffness.
+constexpr double forgotten = 0.99;
 // [m], [N] Below that distance of the proxy from the HIP, or that force, the direction from one to
 // the other is noise: an encoder's count is 0.055 mm, and 0.05 N are hardly felt.
 constexpr double least_lever = 1e-3;
 constexpr double least_directed_force = 0.05;
 
 constexpr std::array<std::string_view, safety_flag_count> flag_names{
-    "input_refused",   "pull_removed",  "force_cut", "continuous_cut",    "slew_cut",
-    "oscillation_cut", "disengaged",    "ramping",   "frame_late",        "frame_fading",
-    "frame_lost",      "hand_too_fast", "stalled",   "direction_refused", "fault_latched"};
+    "input_refused", "pull_removed",      "force_cut",     "continuous_cut",
+    "slew_cut",      "oscillation_cut",   "disengaged",    "ramping",
+    "frame_late",    "frame_fading",      "frame_lost",    "hand_too_fast",
+    "stalled",       "direction_refused", "fault_latched", "energy_cut"};
 
 constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the device or the method gave a number that is not finite, or time ran backwards",
@@ -53,7 +56,8 @@ constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the hand was faster than it may be",
     "the force starts again from nothing: the loop missed its deadlines",
     "no force: the method's surface normal contradicts the direction from the HIP to the proxy",
-    "no force: repeated faults; an operator has to reset the safety chain"};
+    "no force: repeated faults; an operator has to reset the safety chain",
+    "the force is weakened because the rendered surface kept up an oscillation"};
 
 using P = SafetyParameters;
 constexpr std::array table{
@@ -75,6 +79,15 @@ constexpr std::array table{
                         "a slower swing of the force is no oscillation", &P::swing_time},
     SafetyParameterInfo{"swing_count", "-", 8.0, 2.0, 100.0,
                         "swings in a row that are an oscillation", &P::swing_count},
+    SafetyParameterInfo{"cycle_distance", "m", 1e-3, 1e-4, 0.05,
+                        "a smaller swing of the hand is no cycle of an oscillation",
+                        &P::cycle_distance},
+    SafetyParameterInfo{"cycle_count", "-", 6.0, 3.0, 100.0,
+                        "cycles in a row that generate energy, which are an oscillation",
+                        &P::cycle_count},
+    SafetyParameterInfo{"cut_memory", "s", 30.0, 1.0, 600.0,
+                        "time constant with which a cut for generated energy is forgotten",
+                        &P::cut_memory},
     SafetyParameterInfo{"engage_force", "N", 0.2, 0.0, 3.0,
                         "the hand engages while less than this is asked for", &P::engage_force},
     SafetyParameterInfo{"engage_ticks", "ticks", 10.0, 1.0, 1e5,
@@ -272,6 +285,22 @@ double SafetyChain::oscillation_ceiling(double t, double dt) noexcept {
   return calm_;
 }
 
+// Halves what is allowed at each oscillation that the surface keeps up, and gives it back over so
+// long a time that the next one is not felt as one more burst of a vibration.
+double SafetyChain::energy_ceiling(const SafetyInput& input, double since_last) noexcept {
+  if (since_last > parameters_.stall_time) energy_.restart();
+  const bool found =
+      energy_.run(since_last, last_force_, input.hip, input.normal, input.surface_velocity,
+                  {parameters_.cycle_distance, parameters_.cycle_count, energy_ceiling_ < 1.0});
+  if (found) {
+    energy_ceiling_ *= 0.5;
+  } else if (energy_ceiling_ < 1.0) {
+    energy_ceiling_ += share_of(since_last, parameters_.cut_memory) * (1.0 - energy_ceiling_);
+    if (energy_ceiling_ > forgotten) energy_ceiling_ = 1.0;
+  }
+  return energy_ceiling_;
+}
+
 // What the links from the oscillation detector on let through, 0 to 1.
 double SafetyChain::ceiling(const SafetyInput& input, double demand, double dt,
                             std::uint32_t& flags) noexcept {
@@ -332,7 +361,8 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   std::uint32_t flags = 0;
   const bool in_order = std::isfinite(input.t) && (!last_t_ || input.t >= *last_t_);
   const bool sound = in_order && is_sound(input.force) && is_sound(input.normal) &&
-                     is_sound(input.hip) && is_sound(input.proxy) && is_sound(input.position);
+                     is_sound(input.hip) && is_sound(input.proxy) && is_sound(input.position) &&
+                     std::abs(input.surface_velocity) <= largest;
   const double since_last = in_order && last_t_ ? input.t - *last_t_ : 0.0;
   const double dt = std::min(since_last, longest_credit);
   fault_clock_ += since_last;
@@ -350,7 +380,10 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
 
   Vec3 force = Vec3::Zero();
   if (flags == 0) {
-    force = limited(input, input.force, flags);
+    // Before the limits: a softer surface still holds a hand with all the force that is allowed.
+    const double softened = has(energy_cut) ? energy_ceiling(input, since_last) : 1.0;
+    if (softened < 1.0) flags |= energy_cut;
+    force = limited(input, softened * input.force, flags);
     double most = ceiling(input, force.norm(), dt, flags);
     if (stalls_at(input.t)) {
       flags |= stalled;
@@ -364,6 +397,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     gain_ = 0.0;
     engaged_ = false;
     quiet_ticks_ = 0.0;
+    energy_.restart();
     if (latched_by_ != 0) flags |= fault_latched;
   }
 

@@ -9,6 +9,7 @@
 
 #include "palpate/core/patch.hpp"
 #include "palpate/servo/device.hpp"
+#include "palpate/servo/energy_monitor.hpp"
 
 namespace palpate {
 
@@ -50,8 +51,12 @@ enum SafetyFlag : std::uint32_t {
   /// fault_count faults (input_refused or direction_refused) within fault_time: no force until an
   /// operator calls SafetyChain::reset. SafetyChain::latched_by says which faults they were.
   fault_latched = 1u << 14,
+  /// The rendered surface gave the hand more energy than it took, cycle after cycle: an oscillation
+  /// that keeps itself up. The force is weakened until it stops. Lower the stiffness, raise the
+  /// servo rate or damping, or hold the handle more firmly.
+  energy_cut = 1u << 15,
 };
-constexpr std::size_t safety_flag_count = 15;
+constexpr std::size_t safety_flag_count = 16;
 /// A short name for each bit, in their order, e.g. "force_cut".
 std::span<const std::string_view> safety_flag_names();
 /// For each bit, in their order, a sentence for people: why the force is what it is.
@@ -68,6 +73,9 @@ struct SafetyParameters {
   double swing = 0.5;              ///< [N] a smaller swing of the force is no oscillation
   double swing_time = 0.025;       ///< [s] a slower swing of the force is no oscillation
   double swing_count = 8.0;        ///< [-] swings in a row that are an oscillation
+  double cycle_distance = 1e-3;    ///< [m] a smaller swing of the hand is no cycle
+  double cycle_count = 6.0;        ///< [-] cycles in a row that generate energy: an oscillation
+  double cut_memory = 30.0;        ///< [s] time constant with which a cut of energy is forgotten
   double engage_force = 0.2;       ///< [N] the hand engages while less than this is asked for
   double engage_ticks = 10.0;      ///< [ticks] in a row below engage_force
   double ramp_time = 1.5;          ///< [s] from no force to all of it
@@ -101,15 +109,16 @@ void validate(const SafetyParameters& parameters);
 
 /// What a tick asks for, and what the chain needs to judge it.
 struct SafetyInput {
-  double t;                ///< [s] now
-  Vec3 force;              ///< [N] world: what the method asks for
-  Vec3 hip;                ///< [m] world
-  Vec3 proxy;              ///< [m] world
-  Vec3 normal;             ///< [-] away from the surface; zero if not known
-  Vec3 position;           ///< [m] of the hand, device frame
-  bool hand;               ///< somebody holds the device, and it is not clutched
-  double frame_age;        ///< [s] of the oldest camera's newest fresh frame; inf: none
-  double frame_intervals;  ///< [intervals] the most overdue camera is without one; Freshness::Age
+  double t;                 ///< [s] now
+  Vec3 force;               ///< [N] world: what the method asks for
+  Vec3 hip;                 ///< [m] world
+  Vec3 proxy;               ///< [m] world
+  Vec3 normal;              ///< [-] away from the surface; zero if not known
+  Vec3 position;            ///< [m] of the hand, device frame
+  bool hand;                ///< somebody holds the device, and it is not clutched
+  double frame_age;         ///< [s] of the oldest camera's newest fresh frame; inf: none
+  double frame_intervals;   ///< [intervals] the most overdue camera is without one; Freshness::Age
+  double surface_velocity;  ///< [m/s] of the surface along the normal, as the method tracks it
 };
 
 /// What the device gets.
@@ -174,6 +183,7 @@ class SafetyChain {
   Vec3 limited(const SafetyInput& input, Vec3 force, std::uint32_t& flags) const noexcept;
   double ceiling(const SafetyInput& input, double demand, double dt, std::uint32_t& flags) noexcept;
   double oscillation_ceiling(double t, double dt) noexcept;
+  double energy_ceiling(const SafetyInput& input, double since_last) noexcept;
   [[nodiscard]] Vec3 slewed(const Vec3& force, double rise_dt, double fall_dt) const noexcept;
 
   DeviceLimits device_;
@@ -199,6 +209,8 @@ class SafetyChain {
   std::array<Swings, 3> swings_{};
   double swung_at_ = 0.0;  // [s] last swing of an oscillation
   double calm_ = 1.0;      // [-] what the oscillation detector allows
+  EnergyMonitor energy_;
+  double energy_ceiling_ = 1.0;  // [-] what the energy link allows
   bool engaged_ = false;
   double quiet_ticks_ = 0.0;
   double gain_ = 0.0;

@@ -57,7 +57,8 @@ struct Session {
                     .position = Vec3::Zero(),
                     .hand = true,
                     .frame_age = 0.01,
-                    .frame_intervals = 0.3};
+                    .frame_intervals = 0.3,
+                    .surface_velocity = 0.0};
 };
 
 // The session behind the gate, with some links left out.
@@ -585,7 +586,8 @@ TEST(SafetyChain, KeepsItsPromisesForAnyInput) {
                       .position = wild ? vector(0.1) : Vec3(0, 0, 0),
                       .hand = random() % 200 != 0,
                       .frame_age = random() % 20 == 0 ? uniform(-1.0, 1.0) : 0.01,
-                      .frame_intervals = random() % 20 == 0 ? nan : 0.3};
+                      .frame_intervals = random() % 20 == 0 ? nan : 0.3,
+                      .surface_velocity = random() % 500 == 0 ? nan : uniform(-1, 1)};
       if (i % 1000 < 300) now = input, now.t = t, now.force = Vec3::Zero();  // let it engage
       const SafetyOutput output = session.chain.run(now);
       input.t = t;

@@ -199,6 +199,7 @@ void Cycle::keep_statistics(const ServoTick& record) noexcept {
   if (std::isfinite(record.frame_age)) statistics_.frame_age.add(nanoseconds(record.frame_age));
   statistics_.hand.store(record.hand, std::memory_order_relaxed);
   const double force = record.force.norm();
+  statistics_.force_out.store(force > 0.0, std::memory_order_relaxed);
   if (force > statistics_.max_force.load(std::memory_order_relaxed))
     statistics_.max_force.store(force, std::memory_order_relaxed);
   for (std::size_t i = 0; i < safety_flag_count; ++i) {

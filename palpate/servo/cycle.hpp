@@ -87,6 +87,7 @@ struct CycleStatistics {
   Histogram frame_age;                 ///< [ns] at each tick that had a frame
   Histogram hand_over;                 ///< [ns] from put_frame to the tick that uses the frame
   std::array<std::atomic<std::uint64_t>, safety_flag_count> interventions{};
+  std::atomic<bool> force_out{false};        ///< the last tick sent a force other than zero
   std::atomic<std::uint32_t> latched_by{0};  ///< SafetyFlag bits, as SafetyChain::latched_by
   std::atomic<double> heat{0.0};             ///< [-] of the motors, as SafetyChain::heat
 };

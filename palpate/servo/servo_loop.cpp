@@ -16,10 +16,10 @@
 namespace palpate {
 namespace {
 
-constexpr double last_write_time = 0.05;     // [s] for the ticking thread to end
-constexpr double first_callback_time = 1.0;  // [s] for a driver to begin
-constexpr auto watch_interval = std::chrono::milliseconds(5);
-constexpr double enable_again_after = 1.0;  // [s] after the device refused
+constexpr double last_write_time = 0.05;                       // [s] for the ticking thread to end
+constexpr double first_callback_time = 1.0;                    // [s] for a driver to begin
+constexpr auto watch_interval = std::chrono::milliseconds(2);  // a fifth of the shortest limit
+constexpr int watch_priority = 5;                              // above the servo's
 
 std::uint64_t thread_cpu_time() noexcept {  // [ns]
   timespec now{};
@@ -46,7 +46,10 @@ ServoLoop::ServoLoop(std::shared_ptr<Method> method, Device& device, const Servo
     : device_(device),
       options_(options),
       rate_(device.drives() ? device.info().rate.value_or(options.rate) : options.rate),
-      cycle_(std::move(method), device, settings) {
+      cycle_(std::move(method), device, settings),
+      watchdog_(device,
+                {.force_time = std::min(ForceWatchdog::Limits().force_time, options.watch_time),
+                 .watch_time = options.watch_time}) {
   if (!(options_.rate >= 500.0 && options_.rate <= 10'000.0)) {
     throw Error("servo rate", std::to_string(options_.rate) + " Hz is out of range",
                 "give a rate from 500 to 10000 Hz");
@@ -64,14 +67,14 @@ ServoLoop::~ServoLoop() {
 void ServoLoop::start() {
   if (started_) return;
   device_.enable();
-  last_tick_.store(monotonic_now(), std::memory_order_relaxed);
+  watchdog_.beat(monotonic_now(), false);
   if (device_.drives()) {
     start_driven();
   } else {
     thread_ = std::make_unique<PeriodicThread>(
         options_.rate, options_.realtime,
         [this](const Wake& wake) {
-          last_tick_.store(wake.t, std::memory_order_relaxed);
+          beat(wake.t);
           cycle_.run(wake);
         },
         [this] { device_.write(Vec3::Zero(), monotonic_now()); });
@@ -102,7 +105,7 @@ void ServoLoop::start_driven() {
 
 void ServoLoop::driven_tick() noexcept {
   const double now = monotonic_now();
-  last_tick_.store(now, std::memory_order_relaxed);
+  beat(now);
   if (stopping_.load(std::memory_order_acquire)) {
     if (zero_sent_.load(std::memory_order_relaxed)) return;
     device_.write(Vec3::Zero(), now);
@@ -136,26 +139,20 @@ void ServoLoop::driven_tick() noexcept {
       std::min<std::uint64_t>(compute, std::numeric_limits<std::uint32_t>::max()));
 }
 
+void ServoLoop::beat(double now) noexcept {
+  watchdog_.beat(now, statistics().force_out.load(std::memory_order_relaxed));
+}
+
 void ServoLoop::watch() {
-  double next_attempt = 0.0;
+  RealtimeRequest request = options_.realtime;
+  request.priority = std::min(request.priority + watch_priority, 99);
+  request.pin = false;  // the servo's core may be the one that hangs
+  const RealtimeThread realtime(request);
   std::unique_lock lock(watch_mutex_);
   while (!watch_wakes_.wait_for(lock, watch_interval, [this] { return watch_ends_; })) {
-    const double now = monotonic_now();
-    const bool stalled = now - last_tick_.load(std::memory_order_relaxed) > options_.watch_time;
-    if (stalled && !disabled_) {
-      device_.disable();
-      disabled_ = true;
-      stalls_.fetch_add(1, std::memory_order_relaxed);
-    } else if (!stalled && disabled_ && now >= next_attempt) {
-      try {
-        device_.enable();
-        disabled_ = false;
-        enable_failed_.clear();
-      } catch (const Error& error) {
-        enable_failed_ = error.what();
-        next_attempt = now + enable_again_after;
-      }
-    }
+    lock.unlock();
+    watchdog_.look(monotonic_now());
+    lock.lock();
   }
 }
 
@@ -188,7 +185,7 @@ void ServoLoop::stop() {
 
 DeviceStatus ServoLoop::device_status() const {
   const std::uint32_t hand = statistics().hand.load(std::memory_order_relaxed);
-  const double silent = monotonic_now() - last_tick_.load(std::memory_order_relaxed);
+  const double silent = watchdog_.silence(monotonic_now());
   DeviceStatus status{.ticking = started_ && !stopped_ && silent <= options_.watch_time,
                       .present = (hand & hand_present) != 0,
                       .fault = fault_of(hand),
@@ -199,10 +196,7 @@ DeviceStatus ServoLoop::device_status() const {
                   " ms: the device is disabled until ticks come again";
     return status;
   }
-  {
-    const std::lock_guard lock(watch_mutex_);
-    if (!enable_failed_.empty()) status.text = enable_failed_;
-  }
+  status.text = watchdog_.refusal();
   if (status.text.empty()) status.text = describe(status.fault);
   return status;
 }

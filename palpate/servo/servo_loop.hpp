@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "palpate/servo/cycle.hpp"
+#include "palpate/servo/force_watchdog.hpp"
 #include "palpate/servo/periodic_thread.hpp"
 
 namespace palpate {
@@ -21,7 +22,8 @@ struct ServoOptions {
   /// own rate: then this is what lateness is measured against if the device does not say its rate.
   double rate = 1000.0;
   RealtimeRequest realtime{};
-  /// [s] 0.005 to 1: without a tick for so long the device is disabled.
+  /// [s] 0.005 to 1: without a tick for so long the device is disabled; while a force is out, after
+  /// ForceWatchdog::Limits::force_time or this, whichever is shorter.
   double watch_time = 0.025;
 };
 
@@ -36,10 +38,10 @@ struct DeviceStatus {
 /// The live loop: cycles on a real-time thread of their own, or on the thread of a device that
 /// drives them, from `start` to `stop`.
 ///
-/// Time is monotonic_now(): frames must be stamped on that clock. A second thread watches the
-/// ticks: when none comes for ServoOptions::watch_time, because a cycle hangs or the device's
-/// callback has ended, it disables the device, and enables it again when ticks come again; the
-/// safety chain then lets the force rise slowly.
+/// Time is monotonic_now(): frames must be stamped on that clock. A second thread, of a higher
+/// priority where it may, watches the ticks (ForceWatchdog): when none comes for 10 ms while a
+/// force is out, because a cycle hangs or the device's callback has ended, it disables the device,
+/// and enables it again when ticks come again; the safety chain then lets the force rise slowly.
 class ServoLoop {
  public:
   /// @throws Error if the rate or watch time is out of range or the settings do not validate.
@@ -91,13 +93,14 @@ class ServoLoop {
   /// [Hz] of the ticks: the options', or that of a device that drives them.
   [[nodiscard]] double rate() const { return rate_; }
   /// How often the device was disabled because no tick came.
-  [[nodiscard]] std::uint64_t stalls() const { return stalls_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t stalls() const { return watchdog_.stalls(); }
   /// Any thread but the servo's.
   [[nodiscard]] DeviceStatus device_status() const;
 
  private:
   void driven_tick() noexcept;
   void start_driven();
+  void beat(double now) noexcept;
   void watch();
   void end_watch();
 
@@ -118,14 +121,11 @@ class ServoLoop {
   double previous_tick_ = 0.0;          // [s]
   std::uint32_t previous_compute_ = 0;  // [ns]
 
-  std::atomic<double> last_tick_{0.0};  // [s] when it began
-  std::atomic<std::uint64_t> stalls_{0};
+  ForceWatchdog watchdog_;
   std::thread watch_;
-  mutable std::mutex watch_mutex_;  // the servo never takes it
+  std::mutex watch_mutex_;  // the servo never takes it
   std::condition_variable watch_wakes_;
-  bool watch_ends_ = false;    // guarded by watch_mutex_
-  bool disabled_ = false;      // guarded by watch_mutex_: by the watch
-  std::string enable_failed_;  // guarded by watch_mutex_: why it could not be enabled again
+  bool watch_ends_ = false;  // guarded by watch_mutex_
 };
 
 }  // namespace palpate

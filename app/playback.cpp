@@ -43,13 +43,8 @@ void Playback::adopt_until(double t, const std::function<void(const Cloud&, doub
         clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds));
     adopt(*cloud, due->newest.stamp);
     in_use_ = std::move(cloud);  // only now may the frame before go
-    newest_[static_cast<std::size_t>(due - cameras_.data())] = due->newest.cloud.get();
+    newest_[static_cast<std::size_t>(due - cameras_.data())] = due->newest.cloud;
     ++adopted_;
-    if (watcher_) {
-      std::vector<std::shared_ptr<const Cloud>> seen;
-      for (const Camera& camera : cameras_) seen.push_back(camera.newest.cloud);
-      watcher_(due->newest.stamp, seen);
-    }
   }
 }
 

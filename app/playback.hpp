@@ -25,10 +25,6 @@ class Playback {
   /// @throws Error if a frame cannot be read.
   void adopt_until(double t, const std::function<void(const Cloud&, double)>& adopt);
 
-  /// Is told of each frame that is adopted: its stamp, and what each camera saw last.
-  using Watcher = std::function<void(double, std::span<const std::shared_ptr<const Cloud>>)>;
-  void watch(Watcher watcher) { watcher_ = std::move(watcher); }
-
   /// @throws Error if the method cannot touch what a camera shows first.
   void check(const Method& method) const;
   /// Frames handed over so far.
@@ -39,8 +35,8 @@ class Playback {
   [[nodiscard]] const Cloud* upcoming(std::size_t camera) const {
     return cameras_[camera].next ? cameras_[camera].next->cloud.get() : nullptr;
   }
-  /// What each camera saw last; null before its first frame. Valid until the next is adopted.
-  [[nodiscard]] std::span<const Cloud* const> newest() const { return newest_; }
+  /// What each camera saw last; null before its first frame.
+  [[nodiscard]] std::span<const std::shared_ptr<const Cloud>> newest() const { return newest_; }
 
  private:
   struct Camera {
@@ -49,8 +45,7 @@ class Playback {
     Frame newest;
   };
   std::vector<Camera> cameras_;
-  std::vector<const Cloud*> newest_;
-  Watcher watcher_;
+  std::vector<std::shared_ptr<const Cloud>> newest_;
   std::shared_ptr<const Cloud> in_use_;
   std::size_t adopted_ = 0;
 };

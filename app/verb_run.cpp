@@ -1,25 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
+#include <spawn.h>
 #include <unistd.h>
 
-#include "app/live_session.hpp"
 #include "app/options.hpp"
-#include "app/playback.hpp"
 #include "app/program_methods.hpp"
-#include "app/run_recording.hpp"
-#include "app/scripted_hand.hpp"
-#include "app/summary.hpp"
+#include "app/signals.hpp"
+#include "app/summary_text.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/core/uri.hpp"
+#include "palpate/session/session.hpp"
+#include "palpate/viewer/session_host.hpp"
 
 namespace palpate::app {
 namespace {
@@ -43,98 +44,147 @@ constexpr double headless_duration = 10.0;  // [s]
 constexpr std::uint16_t usual_port = 8642;
 
 // One line that is written over and over while a person watches.
-void show_status(const Tick& tick) {
-  fmt::print(stderr, "\rt {:7.2f} s  {:<12} proxy {:+.3f} {:+.3f} {:+.3f} m  force {:6.3f} N  ",
-             tick.t, to_string(tick.state), tick.proxy.x(), tick.proxy.y(), tick.proxy.z(),
-             tick.force.norm());
+void show_status(const ServoTick& record) {
+  const Tick& tick = record.tick;
+  fmt::print(
+      stderr,
+      "\rt {:7.2f} s  {:<12} proxy {:+.3f} {:+.3f} {:+.3f} m  asked {:6.3f} N  sent {:6.3f} N ",
+      tick.t, to_string(tick.state), tick.proxy.x(), tick.proxy.y(), tick.proxy.z(),
+      tick.force.norm(), record.force.norm());
   std::fflush(stderr);
-}
-
-HipPath open_hand(const RunOptions& options, const Playback& playback) {
-  constexpr std::string_view script = "script:";
-  if (!options.device.empty()) {
-    if (options.device.substr(0, script.size()) != script)
-      throw Error("--device " + options.device, "a headless run has no such hand",
-                  "give script:FILE.csv, or none for the built-in one");
-    return HipPath::read_csv(options.device.substr(script.size()));
-  }
-  const auto* image = dynamic_cast<const DepthImage*>(playback.upcoming(0));
-  if (image == nullptr)
-    throw Error("scripted hand",
-                "it follows a depth image, and " + options.cameras.front() + " has none",
-                "give a path with --device script:FILE.csv");
-  constexpr double press = 0.008;
-  return scripted_hand(*image, options.duration.value_or(headless_duration), press);
 }
 
 bool is_loopback(std::string_view address) {
   return address.substr(0, 4) == "127." || address == "::1";
 }
 
-int run_in_browser(const RunOptions& options) {
-  if (options.duration && !(*options.duration > 0.0))
-    throw Error("--duration", fmt::format("{} s is no time", *options.duration),
-                "give seconds, or nothing to go on until Ctrl-C");
-  LiveOptions live;
-  live.cameras = options.cameras;
-  if (!options.device.empty()) live.device = options.device;
-  live.duration = options.duration;
-  live.rate = options.rate;
-  live.viewer.listen = options.listen;
-  live.viewer.port = options.port.value_or(usual_port);
-  live.any_port_will_do = !options.port;
-  live.viewer.token = options.token;
-  if (options.token.empty() && !is_loopback(options.listen)) live.viewer.token = make_token();
-  live.open_browser = !options.no_browser;
-  live.json = options.json;
-  const auto [name, parameters] = options.method.choice(program_methods());
-  live.method = name;
-  live.parameters = parameters;
-  live.record = options.record;
-  return run_live(live);
+void show_in_browser(const std::string& url) {
+  if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return;
+  std::string program = "xdg-open";
+  std::string argument = url;
+  std::array<char*, 3> arguments = {program.data(), argument.data(), nullptr};
+  pid_t pid = 0;
+  // Without a browser the person still has the address.
+  static_cast<void>(
+      posix_spawnp(&pid, program.c_str(), nullptr, nullptr, arguments.data(), environ));
 }
 
-int run_headless(const RunOptions& options) {
-  const double duration = options.duration.value_or(headless_duration);
+std::unique_ptr<ViewerServer> open_server(const RunOptions& options, ViewerHost& host) {
+  ViewerOptions viewer{
+      .listen = options.listen, .port = options.port.value_or(usual_port), .token = options.token};
+  if (options.token.empty() && !is_loopback(options.listen)) viewer.token = make_token();
+  try {
+    return std::make_unique<ViewerServer>(viewer, host);
+  } catch (const Error&) {
+    if (options.port) throw;
+    viewer.port = 0;  // another program has the usual one
+    return std::make_unique<ViewerServer>(viewer, host);
+  }
+}
+
+// All that a session can run: `ideal`, the lab's ruler, needs the truth.
+MethodRegistry session_methods() {
+  const MethodRegistry all = program_methods();
+  MethodRegistry methods("method", "", {});
+  for (const MethodInfo& method : all.entries()) {
+    if (method.name != "ideal") methods.add(method);
+  }
+  return methods;
+}
+
+// Can it run faster than time? Only where nothing but simulations and recordings takes part.
+bool can_run_freely(const RunOptions& options) {
+  for (const std::string& uri : options.cameras) {
+    if (open_source(uri)->info().live) return false;
+  }
+  const std::string scheme = Uri(options.device.empty() ? "hand:" : options.device).scheme();
+  return scheme == "hand" || scheme == "script";
+}
+
+SessionOptions session_options(const RunOptions& options) {
   if (!(options.rate >= 100.0 && options.rate <= 100000.0))
     throw Error("--rate", fmt::format("{} Hz is not a servo rate", options.rate),
-                "give 100 to 100000");
-  if (!(duration >= 2.0 && duration <= 86400.0))
-    throw Error("--duration", fmt::format("{} s is too short or too long", duration),
-                "give 2 to 86400");
-  Playback playback(options.cameras);
-  const MethodRegistry methods = program_methods(&playback.source(0));
-  const auto [name, parameters] = options.method.choice(methods);
-  const HipPath hand = open_hand(options, playback);
-  const Vec3 seat = hand.at(hand.first_time());
-  const std::unique_ptr<Method> method = make_method(name, parameters, methods);
-  playback.check(*method);
-  method->seat(seat);
-  Summary summary;
-  RunRecording recording(options.record,
-                         {.cameras = options.cameras, .device = options.device, .seat = seat},
-                         {name, parameters, {}, {}}, hand.first_time());
-  playback.watch([&recording](double stamp, auto cameras) { recording.frame(stamp, cameras); });
-
-  const bool watched = isatty(STDERR_FILENO) == 1;
-  const auto ticks = static_cast<std::int64_t>(duration * options.rate);
-  const auto ticks_a_line = static_cast<std::int64_t>(options.rate / 10.0);
-  for (std::int64_t i = 0; i < ticks; ++i) {
-    const double t = hand.first_time() + static_cast<double>(i) / options.rate;
-    playback.adopt_until(t, [&](const Cloud& cloud, double stamp) { method->frame(cloud, stamp); });
-    const Tick tick = method->tick(hand.at(t), t);
-    recording.tick(tick);
-    const double r_c = parameters.proxy.r_c();
-    summary.count(tick, playback.adopted(), least_behind(playback.newest(), tick.proxy, r_c), r_c);
-    if (watched && i % ticks_a_line == 0) show_status(tick);
+                "give 100 to 100000, or 500 to 10000 in real time");
+  if (options.duration && !(*options.duration >= 0.1 && *options.duration <= 86400.0))
+    throw Error("--duration", fmt::format("{} s is too short or too long", *options.duration),
+                "give 0.1 to 86400 s");
+  SessionOptions session;
+  session.methods = session_methods();
+  const auto [name, parameters] = options.method.choice(session.methods);
+  for (const std::string& uri : options.cameras) session.cameras.push_back({.uri = uri});
+  session.device_uri = !options.device.empty() ? options.device
+                       : options.headless      ? "hand:"
+                                               : "mouse:";
+  session.settings.method = name;
+  session.settings.parameters = parameters;
+  session.servo.rate = options.rate;
+  session.record = options.record;
+  session.version = PALPATE_VERSION;
+  if (options.headless) {
+    if (can_run_freely(options)) session.pace = Pace::free_running;
+    session.stroke_time = std::max(options.duration.value_or(headless_duration), 2.0);
   }
-  if (watched) fmt::print(stderr, "\n");
-  std::fputs(options.json ? summary.json().c_str() : summary.text().c_str(), stdout);
-  return recording.finish() ? 0 : 1;
+  return session;
+}
+
+// The last words: what was recorded, and what the session amounted to.
+int finish(Session& session, bool json) {
+  const SessionState state = session.state();
+  if (!state.recording.message.empty())
+    fmt::print(stderr, "palpate: {}\n", state.recording.message);
+  std::fputs(json ? json_of(state.summary).c_str() : text_of(state.summary).c_str(), stdout);
+  return state.recording.failed ? 1 : 0;
 }
 
 int run(const RunOptions& options) {
-  return options.headless ? run_headless(options) : run_in_browser(options);
+  // Before any other thread begins, so that these signals come to this one alone.
+  std::atomic<Session*> running{nullptr};
+  std::atomic<bool> ended{false};
+  const EndingSignals signals([&] {
+    ended = true;
+    if (Session* session = running.load()) session->request_stop();
+  });
+
+  SessionHost host(PALPATE_VERSION);
+  SessionOptions wanted = session_options(options);
+  if (!options.headless)
+    wanted.on_frame = [&host](std::size_t camera, const FedFrame& frame) {
+      host.show(camera, frame);
+    };
+  const bool is_bounded = wanted.methods.find(wanted.settings.method).bounded;
+  const bool is_free = wanted.pace == Pace::free_running;
+  Session session(std::move(wanted));
+  running = &session;
+  if (ended) return finish(session, options.json);
+  if (!is_bounded)
+    fmt::print(stderr, "palpate: {} is a method of the lab: its ticks can come late\n",
+               session.settings().method);
+
+  if (options.headless) {
+    const bool watched = isatty(STDERR_FILENO) == 1;
+    const auto ticks_a_line = static_cast<std::uint64_t>(std::max(options.rate / 10.0, 1.0));
+    session.run(options.duration.value_or(headless_duration), [&](const ServoTick& record) {
+      if (watched && is_free && record.number % ticks_a_line == 0) show_status(record);
+    });
+    if (watched && is_free) fmt::print(stderr, "\n");
+    running = nullptr;
+    return finish(session, options.json);
+  }
+
+  session.start();
+  for (const std::string& line : session.realtime()->advice)
+    fmt::print(stderr, "palpate: {}\n", line);
+  {
+    host.attach(session);
+    const std::unique_ptr<ViewerServer> server = open_server(options, host);
+    host.show_on(server.get());
+    fmt::print(stderr, "palpate: open {} in a browser; Ctrl-C ends the session\n", server->url());
+    if (!options.no_browser && isatty(STDERR_FILENO) == 1) show_in_browser(server->url());
+    session.run(options.duration);
+    host.show_on(nullptr);
+  }
+  running = nullptr;
+  return finish(session, options.json);
 }
 
 }  // namespace
@@ -147,8 +197,8 @@ Verb add_run(CLI::App& program) {
                    "where frames come from (synthetic:desk?noise=1mm); may be given several times")
       ->allow_extra_args(false);
   command->add_option("--device", options->device,
-                      "the hand: mouse: in the page, script:FILE.csv, hand:FILE.csv; headless a "
-                      "script:FILE.csv or a built-in one");
+                      "the hand: mouse: in the page (the default), hand: a simulated person (the "
+                      "default of --headless), script:FILE.csv a path");
   command->add_option("--duration", options->duration,
                       "seconds of the session (until Ctrl-C; headless 10)");
   command->add_option("--rate", options->rate, "ticks a second (1000)");
@@ -162,7 +212,7 @@ Verb add_run(CLI::App& program) {
   command->add_option("--record", options->record,
                       "write the session into this folder, a ROS 2 bag; palpate replay checks it");
   command->add_flag("--headless", options->headless,
-                    "no page: as fast as the machine can, with a status line and a summary");
+                    "no page; recordings and simulations run as fast as the machine can");
   command->add_flag("--json", options->json, "print the summary as a JSON object");
   options->method.add_to(*command);
   return {command, [options] { return run(*options); }};

@@ -9,7 +9,7 @@
 #include "app/playback.hpp"
 #include "app/program_methods.hpp"
 #include "app/progress.hpp"
-#include "app/summary.hpp"
+#include "app/summary_text.hpp"
 #include "app/trace_csv.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -60,15 +60,16 @@ int trace(const TraceOptions& options) {
     const Tick tick = method->tick(path.at(t), t);
     writer.write(tick);
     const double r_c = parameters.proxy.r_c();
-    summary.count(tick, playback.adopted(), least_behind(playback.newest(), tick.proxy, r_c), r_c);
+    summary.count(tick, least_behind(playback.newest(), tick.proxy, r_c), r_c);
     progress.advance();
   }
+  summary.frames = playback.adopted();
   writer.finish();
   progress.finish();
   if (options.json) {
-    std::fputs(summary.json().c_str(), stdout);
+    std::fputs(json_of(summary).c_str(), stdout);
   } else {
-    std::fputs(summary.text().c_str(), options.out == "-" ? stderr : stdout);
+    std::fputs(text_of(summary).c_str(), options.out == "-" ? stderr : stdout);
   }
   return 0;
 }

@@ -25,6 +25,7 @@ void check(const char* name, double value, double min, double max) {
 
 MouseDevice::MouseDevice(const Vec3& start, double response, double max_speed, std::string uri)
     : info_{.uri = std::move(uri), .kind = "mouse in the viewer", .limits = no_motors},
+      start_(start),
       frequency_(2.0 / response),
       max_speed_(max_speed),
       target_{.position = start, .present = false},

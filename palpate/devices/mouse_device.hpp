@@ -39,9 +39,12 @@ class MouseDevice final : public Device {
   /// Where to go from now on. Any thread but the servo's; never holds the servo up.
   /// @throws Error if the place is not finite or farther than 1000 km.
   void aim(const MouseTarget& target);
+  /// [m] device frame: where the hand was before the first target.
+  [[nodiscard]] const Vec3& start() const { return start_; }
 
  private:
   DeviceInfo info_;
+  Vec3 start_;
   double frequency_;  // [1/s] w
   double max_speed_;
   std::mutex aimers_;  // keeps several of them apart; the servo never takes it

@@ -61,6 +61,8 @@ class ServoLoop {
   /// from here. Then the device is disabled and the threads end. Any thread but the servo's.
   void stop();
 
+  /// What runs in each tick; alive from construction to destruction.
+  [[nodiscard]] Cycle& cycle() { return cycle_; }
   /// As Cycle's.
   std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp) {
     return cycle_.put_frame(std::move(cloud), stamp, monotonic_now());

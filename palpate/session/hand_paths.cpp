@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/scripted_hand.hpp"
+#include "palpate/session/hand_paths.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,10 @@
 #include <optional>
 #include <vector>
 
+#include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 
-namespace palpate::app {
+namespace palpate {
 namespace {
 
 // The median depth of a few pixels about (u, v) [m].
@@ -31,7 +32,7 @@ std::optional<double> depth_at(const DepthImage& image, int u, int v) {
 
 }  // namespace
 
-HipPath scripted_hand(const DepthImage& image, double duration, double press) {
+HipPath stroke_path(const DepthImage& image, double duration, double press) {
   const Intrinsics& k = image.intrinsics();
   constexpr double hover = 0.05;       // [m] in front of the surface, before and after
   constexpr double clearance = 0.02;   // [m] in front of what it is lifted over
@@ -44,7 +45,7 @@ HipPath scripted_hand(const DepthImage& image, double duration, double press) {
 
   std::optional<double> depth = depth_at(image, k.width / 2, k.height / 2);
   if (!depth)
-    throw Error("scripted hand", "the middle of the first frame measures nothing to touch",
+    throw Error("built-in hand", "the middle of the first frame measures nothing to touch",
                 "give a path with --device script:FILE.csv");
   struct Place {
     Eigen::Vector2d ray;
@@ -90,4 +91,33 @@ HipPath scripted_hand(const DepthImage& image, double duration, double press) {
   return HipPath(std::move(samples));
 }
 
-}  // namespace palpate::app
+Vec3 hover_place(const Cloud& cloud) {
+  constexpr double hover = 0.05;  // [m]
+  if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
+    const Intrinsics& k = image->intrinsics();
+    const Vec3 camera = image->world_from_camera().translation();
+    // Outwards from the middle until something was measured.
+    for (int ring = 0; ring < k.width / 2; ++ring) {
+      for (const int side : {-1, 1}) {
+        const auto point = image->deproject(k.width / 2 + side * ring, k.height / 2);
+        if (point) return *point + hover * (camera - *point).normalized();
+      }
+    }
+    return camera;
+  }
+  const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+  if (points == nullptr || points->size() == 0) return Vec3::Zero();
+  Vec3 middle = Vec3::Zero();
+  for (std::size_t i = 0; i < points->size(); ++i) middle += points->point(i);
+  middle /= static_cast<double>(points->size());
+  Vec3 nearest = points->point(0);
+  for (std::size_t i = 1; i < points->size(); ++i) {
+    const Vec3 point = points->point(i);
+    if ((point - middle).squaredNorm() < (nearest - middle).squaredNorm()) nearest = point;
+  }
+  const Vec3 from = points->viewpoint().value_or(Vec3::Zero());
+  const Vec3 away = from - nearest;
+  return nearest + hover * (away.norm() > 1e-3 ? away.normalized() : Vec3::UnitZ());
+}
+
+}  // namespace palpate

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/summary_text.hpp"
+
+#include <algorithm>
+#include <bit>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace palpate::app {
+namespace {
+
+std::uint64_t ticks_with(const Summary& summary, TickFlag flag) {
+  return summary.flag_ticks[static_cast<std::size_t>(std::countr_zero(std::uint32_t{flag}))];
+}
+
+}  // namespace
+
+std::string text_of(const Summary& summary) {
+  const auto ticks = static_cast<double>(std::max<std::size_t>(summary.ticks, 1));
+  std::string text = fmt::format(
+      "{} ticks over {:.3f} s, {} frames, in contact {:.1f} % of the time, largest force asked "
+      "{:.3f} N, sent {:.3f} N, {:.2f} steps a tick, suspected pop-throughs {}",
+      summary.ticks, summary.duration(), summary.frames,
+      100.0 * static_cast<double>(summary.contact_ticks) / ticks, summary.largest_asked,
+      summary.largest_sent, static_cast<double>(summary.steps) / ticks, summary.pop_throughs);
+  if (summary.late_ticks > 0) text += fmt::format(", late ticks {}", summary.late_ticks);
+  if (const auto hits = ticks_with(summary, step_budget_hit); hits > 0)
+    text += fmt::format(", step budget spent in {} ticks", hits);
+  if (const auto thinned = ticks_with(summary, patch_thinned); thinned > 0)
+    text += fmt::format(", points thinned in {} ticks", thinned);
+  return text + "\n";
+}
+
+std::string json_of(const Summary& summary) {
+  nlohmann::ordered_json safety;
+  for (std::size_t i = 0; i < safety_flag_count; ++i)
+    safety[std::string(safety_flag_names()[i])] = summary.safety_ticks[i];
+  const nlohmann::ordered_json object = {
+      {"ticks", summary.ticks},
+      {"frames", summary.frames},
+      {"duration_s", summary.duration()},
+      {"late_ticks", summary.late_ticks},
+      {"contact_ticks", summary.contact_ticks},
+      {"force_ticks", summary.force_ticks},
+      {"steps", summary.steps},
+      {"step_budget_hits", ticks_with(summary, step_budget_hit)},
+      {"patch_thinned_ticks", ticks_with(summary, patch_thinned)},
+      {"max_force_asked", summary.largest_asked},
+      {"max_force_sent", summary.largest_sent},
+      {"pop_throughs", summary.pop_throughs},
+      {"safety_ticks", safety}};
+  return object.dump(2) + "\n";
+}
+
+}  // namespace palpate::app

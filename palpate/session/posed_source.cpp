@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/session/posed_source.hpp"
+
+#include <utility>
+#include <vector>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+class PosedSource final : public Source {
+ public:
+  PosedSource(std::unique_ptr<Source> source, const Eigen::Isometry3d& pose)
+      : source_(std::move(source)), pose_(pose) {}
+
+  std::optional<Frame> next(double timeout) override {
+    std::optional<Frame> frame = source_->next(timeout);
+    if (frame) frame->cloud = posed(*frame->cloud);
+    return frame;
+  }
+  std::size_t skip(std::size_t count) override { return source_->skip(count); }
+  void cancel() noexcept override { source_->cancel(); }
+  [[nodiscard]] const SourceInfo& info() const override { return source_->info(); }
+
+ private:
+  [[nodiscard]] std::shared_ptr<const Cloud> posed(const Cloud& cloud) {
+    if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
+      // The rays stay the same from frame to frame: computed once.
+      if (!rays_ || rays_->intrinsics() != image->intrinsics())
+        rays_ = std::make_shared<const ViewingRays>(image->intrinsics());
+      return std::make_shared<DepthImage>(rays_, image->depth(), image->units_per_metre(), pose_,
+                                          image->brightness());
+    }
+    const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+    if (points == nullptr)
+      throw Error(info().uri, "its frames are neither depth images nor points",
+                  "leave the camera's pose out");
+    std::optional<Vec3> viewpoint = points->viewpoint();
+    if (viewpoint) viewpoint = pose_ * *viewpoint;
+    if (const Surface* surface = points->surface()) {
+      Surface moved = *surface;
+      for (Vec3& point : moved.points) point = pose_ * point;
+      for (Vec3& normal : moved.normals) normal = pose_.linear() * normal;
+      return std::make_shared<PointCloud>(std::move(moved), viewpoint, points->voxel());
+    }
+    std::vector<Vec3> moved;
+    moved.reserve(points->size());
+    for (std::size_t i = 0; i < points->size(); ++i) moved.push_back(pose_ * points->point(i));
+    return std::make_shared<PointCloud>(moved, viewpoint, points->voxel());
+  }
+
+  std::unique_ptr<Source> source_;
+  Eigen::Isometry3d pose_;
+  std::shared_ptr<const ViewingRays> rays_;
+};
+
+}  // namespace
+
+std::unique_ptr<Source> with_pose(std::unique_ptr<Source> source,
+                                  const Eigen::Isometry3d& world_from_camera) {
+  return std::make_unique<PosedSource>(std::move(source), world_from_camera);
+}
+
+}  // namespace palpate

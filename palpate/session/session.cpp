@@ -1,0 +1,514 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/session/session.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <future>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/core/uri.hpp"
+#include "palpate/devices/mouse_device.hpp"
+#include "palpate/session/hand_paths.hpp"
+#include "palpate/session/played_source.hpp"
+#include "palpate/session/posed_source.hpp"
+
+namespace palpate {
+namespace {
+
+using Seconds = std::chrono::duration<double>;
+
+constexpr double first_frame_timeout = 10.0;  // [s] for a live camera to start up
+constexpr double press = 0.008;               // [m] of the built-in path
+constexpr auto housekeeping_interval = std::chrono::milliseconds(10);
+constexpr auto stop_poll_interval = std::chrono::milliseconds(5);
+constexpr double camera_join_time = 0.5;              // [s] for a camera's thread to end
+constexpr std::int64_t ticks_between_flushes = 2000;  // of a free-running session's recording
+
+std::string seconds_text(double seconds) {
+  return std::to_string(static_cast<int>(seconds)) + " s";
+}
+
+std::function<std::unique_ptr<Source>()> opener(const SessionCamera& camera,
+                                                const Registry<SourceScheme>& sources) {
+  return [uri = camera.uri, pose = camera.world_from_camera, sources] {
+    std::unique_ptr<Source> source = open_source(uri, sources);
+    return pose ? with_pose(std::move(source), *pose) : std::move(source);
+  };
+}
+
+// A mouse starts where it can hover; a hand without a path strokes what the camera sees.
+std::unique_ptr<Device> open_hand(const SessionOptions& options, const Cloud& seen) {
+  const Uri uri(options.device_uri);
+  if (uri.scheme() == "mouse" && !uri.has("x") && !uri.has("y") && !uri.has("z")) {
+    const Vec3 place = hover_place(seen);
+    std::string text = options.device_uri;
+    char mark = text.find('?') == std::string::npos ? '?' : '&';
+    for (int axis = 0; axis < 3; ++axis) {
+      text += std::string(1, std::exchange(mark, '&')) + "xyz"[axis] + "=" +
+              std::to_string(place[axis]);
+    }
+    return open_device(text, std::nullopt, options.devices);
+  }
+  std::optional<HipPath> path;
+  const bool follows_path = uri.scheme() == "hand" || uri.scheme() == "script";
+  if (const auto* image = dynamic_cast<const DepthImage*>(&seen);
+      image != nullptr && follows_path && uri.path().empty()) {
+    path = stroke_path(*image, options.stroke_time, press);
+  }
+  return open_device(options.device_uri, path, options.devices);
+}
+
+}  // namespace
+
+class Session::Impl {
+ public:
+  explicit Impl(SessionOptions options) : options_(std::move(options)) {
+    if (options_.cameras.empty())
+      throw Error("camera", "the session has none", "give one, such as synthetic:desk");
+    if (options_.cameras.size() > Patch::max_views)
+      throw Error("camera", std::to_string(options_.cameras.size()) + " cameras are too many",
+                  "give at most " + std::to_string(Patch::max_views));
+    validate(options_.settings);
+    newest_.resize(options_.cameras.size());
+    stamps_.resize(options_.cameras.size());
+    for (std::size_t i = 0; i < stamps_.size(); ++i) stamps_[i].camera = i;
+    std::vector<std::shared_ptr<const Cloud>> first;
+    for (SessionCamera& camera : options_.cameras) first.push_back(open_camera(camera));
+    device_ = options_.device ? std::move(options_.device) : open_hand(options_, *first.front());
+    settings_ = options_.settings;
+    proxy_radius_ = settings_.parameters.proxy.r_c();
+    auto method = open_method(settings_, first);
+    if (is_live()) {
+      loop_ = std::make_unique<ServoLoop>(std::move(method), *device_, settings_, options_.servo);
+      cycle_ = &loop_->cycle();
+    } else {
+      free_cycle_ = std::make_unique<Cycle>(std::move(method), *device_, settings_);
+      cycle_ = free_cycle_.get();
+    }
+    ticks_.emplace(cycle_->reader());
+    if (!options_.record.empty()) open_recorder(options_.record, false);
+  }
+
+  ~Impl() { stop(); }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void start() {
+    if (started_) return;
+    if (!is_live())
+      throw Error("session", "a free-running session has no time of its own to start in",
+                  "call run, or choose real time");
+    loop_->start();
+    started_ = true;
+    for (std::size_t i = 0; i < feeds_.size(); ++i)
+      feeds_[i]->start([this, i](const FedFrame& frame) { take(i, frame); });
+    housekeeper_ = std::thread([this] { keep_house(); });
+  }
+
+  void stop() noexcept {
+    if (stopped_.exchange(true)) return;
+    // Zero force leaves first: nothing above this line may wait for anything.
+    if (loop_) loop_->stop();
+    device_->disable();
+    for (const auto& feed : feeds_) feed->request_stop();
+    {
+      const std::lock_guard lock(house_mutex_);
+      house_ends_ = true;
+    }
+    house_wakes_.notify_all();
+    if (housekeeper_.joinable()) housekeeper_.join();
+    for (const auto& feed : feeds_) static_cast<void>(feed->join(camera_join_time));
+    {
+      const std::lock_guard lock(control_);
+      end_recording();
+    }
+    drain();
+    const std::lock_guard lock(control_);
+    for (const auto& recorder : closing_) recorder->stop();
+    report_closed();
+  }
+
+  void run(std::optional<double> duration, const std::function<void(const ServoTick&)>& on_tick,
+           const std::atomic<bool>& stop_requested) {
+    if (is_live()) {
+      start();
+      const double end = monotonic_now() + duration.value_or(1e18);
+      while (!stop_requested.load(std::memory_order_relaxed) && monotonic_now() < end)
+        std::this_thread::sleep_for(stop_poll_interval);
+    } else {
+      run_free(duration, on_tick, stop_requested);
+    }
+    stop();
+  }
+
+  [[nodiscard]] std::vector<std::shared_ptr<const Cloud>> newest() const {
+    const std::lock_guard lock(frames_mutex_);
+    return newest_;
+  }
+
+  SessionState state() {
+    drain();
+    SessionState state;
+    for (const auto& feed : feeds_) state.cameras.push_back(feed->status());
+    for (const auto& played : played_) state.cameras.push_back(played->status());
+    if (loop_) state.device = loop_->device_status();
+    const CycleStatistics& statistics = cycle_->statistics();
+    for (std::size_t i = 0; i < safety_flag_count; ++i)
+      state.interventions[i] = statistics.interventions[i].load();
+    state.latched_by = statistics.latched_by.load();
+    state.rate = loop_ ? loop_->rate() : options_.servo.rate;
+    state.running = started_ && !stopped_;
+    {
+      const std::lock_guard lock(summary_mutex_);
+      state.summary = summary_;
+    }
+    if (loop_) state.summary.late_ticks = loop_->timing().late_ticks.load();
+    {
+      const std::lock_guard lock(frames_mutex_);
+      state.summary.frames = frames_;
+    }
+    const std::lock_guard lock(control_);
+    state.settings = settings_;
+    if (recorder_ && !recorder_->status().trouble.empty()) end_recording();
+    report_closed();
+    state.recording = recording_;
+    state.recording.on = recorder_ != nullptr;
+    state.recording.closing = !closing_.empty();
+    if (recorder_) state.recording.folder = recorder_->status().folder.string();
+    return state;
+  }
+
+  [[nodiscard]] ServoSettings settings() const {
+    const std::lock_guard lock(control_);
+    return settings_;
+  }
+
+  void set(const ServoSettings& settings) {
+    const std::lock_guard lock(control_);
+    const std::uint64_t number =
+        settings.method == settings_.method
+            ? cycle_->set_settings(settings)
+            : cycle_->set_method(open_method(settings, newest()), settings);
+    settings_ = settings;
+    settings_number_ = number;
+    proxy_radius_ = settings.parameters.proxy.r_c();
+    if (recorder_) recorder_->settings({number, settings}, now());
+  }
+
+  void start_recording(const std::string& folder) {
+    const std::lock_guard lock(control_);
+    if (recorder_)
+      throw Error(folder, "a recording is on already", "stop it before another is begun");
+    open_recorder(folder, cycle_->statistics().ticks > 0);
+  }
+
+  void stop_recording() {
+    const std::lock_guard lock(control_);
+    end_recording();
+  }
+
+  Cycle& cycle() { return *cycle_; }
+  [[nodiscard]] const Cycle& cycle() const { return *cycle_; }
+  [[nodiscard]] const Device& device() const { return *device_; }
+  [[nodiscard]] MouseDevice* mouse() const { return dynamic_cast<MouseDevice*>(device_.get()); }
+  [[nodiscard]] const MethodRegistry& methods() const { return options_.methods; }
+  [[nodiscard]] const ServoLoop* loop() const { return loop_.get(); }
+
+ private:
+  [[nodiscard]] bool is_live() const { return options_.pace == Pace::real_time; }
+  // [s] on the session's clock
+  [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }
+
+  std::shared_ptr<const Cloud> open_camera(SessionCamera& camera) {
+    std::unique_ptr<Source> source = std::move(camera.source);
+    std::function<std::unique_ptr<Source>()> open;
+    if (source) {
+      if (camera.uri.empty()) camera.uri = source->info().uri;
+      if (camera.world_from_camera)
+        source = with_pose(std::move(source), *camera.world_from_camera);
+    } else {
+      open = opener(camera, options_.sources);
+      source = open();
+    }
+    if (!is_live()) {
+      if (!open)
+        open = [uri = camera.uri]() -> std::unique_ptr<Source> {
+          throw Error(uri, "it has ended and cannot be opened again", "run a shorter session");
+        };
+      played_.push_back(std::make_unique<PlayedSource>(std::move(source), open));
+      return played_.back()->first_frame().cloud;
+    }
+    feeds_.push_back(std::make_unique<CameraFeed>(
+        std::move(source), FeedOptions{.schemes = options_.sources}, std::move(open)));
+    const std::optional<Frame> first = feeds_.back()->first_frame(first_frame_timeout);
+    if (!first)
+      throw Error(camera.uri, "it has delivered no frame in " + seconds_text(first_frame_timeout),
+                  "check the camera, its cable and its permissions");
+    return first->cloud;
+  }
+
+  [[nodiscard]] std::shared_ptr<Method> open_method(
+      const ServoSettings& settings, const std::vector<std::shared_ptr<const Cloud>>& seen) const {
+    std::shared_ptr<Method> method =
+        make_method(settings.method, settings.parameters, options_.methods);
+    for (const auto& cloud : seen) {
+      if (cloud) method->check(*cloud);
+    }
+    return method;
+  }
+
+  // A camera's thread, or the free-running one: a frame to the method and the recorder.
+  void take(std::size_t camera, const FedFrame& fed) {
+    {
+      const std::lock_guard lock(frames_mutex_);
+      newest_[camera] = fed.frame.cloud;
+      stamps_[camera].stamp = fed.frame.stamp;
+      std::vector<std::shared_ptr<const Cloud>> clouds;
+      for (const auto& cloud : newest_) {
+        if (cloud) clouds.push_back(cloud);
+      }
+      stamp_ = std::max(fed.frame.stamp, stamp_ + 1e-6);  // of two cameras in the wrong order
+      frame_number_ = cycle_->put_frame(
+          clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds)),
+          stamp_, stamps_, now());
+      if (recorder_) recorder_->frame(frame_number_, stamp_, newest_);
+      ++frames_;
+    }
+    if (options_.on_frame) options_.on_frame(camera, fed);
+  }
+
+  void run_free(std::optional<double> duration,
+                const std::function<void(const ServoTick&)>& on_tick,
+                const std::atomic<bool>& stop_requested) {
+    device_->enable();
+    started_ = true;
+    const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.servo.rate);
+    TickRing<ServoTick>::Reader reader = cycle_->reader();
+    for (std::int64_t i = 0; i < ticks && !stop_requested.load(std::memory_order_relaxed); ++i) {
+      const double t = static_cast<double>(i) / options_.servo.rate;
+      free_t_ = t;
+      for (std::size_t camera = 0; camera < played_.size(); ++camera) {
+        while (const auto frame = played_[camera]->next_until(t)) take(camera, *frame);
+      }
+      cycle_->run({.t = t});
+      if (ServoTick record{}; on_tick && reader.try_pop(record)) on_tick(record);
+      drain();
+      if (i % ticks_between_flushes == 0) wait_for_recorder();
+    }
+  }
+
+  // The clock waits for the disk here, as it runs faster than time.
+  void wait_for_recorder() {
+    const std::lock_guard lock(control_);
+    if (recorder_) recorder_->flush();
+  }
+
+  void keep_house() {
+    std::unique_lock lock(house_mutex_);
+    while (!house_wakes_.wait_for(lock, housekeeping_interval, [this] { return house_ends_; })) {
+      lock.unlock();
+      drain();
+      lock.lock();
+    }
+  }
+
+  // Counts the ticks that came since the last time; of the newest one, whether its proxy is behind
+  // what the cameras see.
+  void drain() {
+    const std::lock_guard lock(summary_mutex_);
+    const double r_c = proxy_radius_.load(std::memory_order_relaxed);
+    ServoTick record{};
+    bool any = false;
+    for (ServoTick next{}; ticks_->try_pop(next); record = next) {
+      if (any) summary_.count(record, std::nullopt, r_c);
+      any = true;
+    }
+    if (any) summary_.count(record, least_behind(newest(), record.tick.proxy, r_c), r_c);
+  }
+
+  // With control_ held, or before anything runs.
+  void open_recorder(const std::string& folder, bool is_on) {
+    using std::chrono::nanoseconds;
+    using std::chrono::system_clock;
+    SessionInfo info{.kind = SessionInfo::Kind::live, .version = options_.version};
+    for (const SessionCamera& camera : options_.cameras) info.cameras.push_back(camera.uri);
+    info.device = device_->info().uri;
+    info.epoch =
+        std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count() -
+        std::llround(1e9 * now());
+    std::function<void()> begin_anew;
+    auto opened = std::make_shared<std::promise<Recorder*>>();
+    if (is_on) {
+      // On the recorder's thread, once: the recording begins with a method that remembers nothing.
+      begin_anew = [this, opened, settings = settings_] {
+        Recorder* recorder = opened->get_future().get();
+        recorder->settings(cycle_->set_method(open_method(settings, newest())), now());
+      };
+    }
+    auto recorder =
+        std::make_unique<Recorder>(folder, info, cycle_->reader(), std::move(begin_anew));
+    recorder->settings({settings_number_, settings_}, now());
+    {
+      const std::lock_guard lock(frames_mutex_);
+      // The first tick of the recording uses this frame, or one that is yet to come.
+      if (frame_number_ > 0) recorder->frame(frame_number_, stamp_, newest_);
+      recorder_ = std::move(recorder);
+    }
+    opened->set_value(recorder_.get());
+    recording_.folder = folder;
+  }
+
+  // With control_ held. Closing takes as long as the disk does, and nobody waits for that.
+  void end_recording() {
+    if (!recorder_) return;
+    std::unique_ptr<Recorder> recorder;
+    {
+      const std::lock_guard lock(frames_mutex_);
+      recorder = std::move(recorder_);
+    }
+    recorder->request_stop();
+    recording_.message = recorder->status().folder.string() + ": closing";
+    closing_.push_back(std::move(recorder));
+  }
+
+  // With control_ held: how the recordings ended that are closed by now.
+  void report_closed() {
+    std::erase_if(closing_, [this](const std::unique_ptr<Recorder>& recorder) {
+      const Recorder::Status status = recorder->status();
+      if (!status.done) return false;
+      const std::string folder = status.folder.string();
+      const auto counts = [](std::uint64_t ticks, std::uint64_t frames) {
+        return std::to_string(ticks) + " ticks and " + std::to_string(frames) + " frames";
+      };
+      if (!status.trouble.empty()) {
+        recording_.failed = true;
+        recording_.message = "the recording has stopped: " + status.trouble;
+      } else if (status.lost_ticks + status.lost_frames > 0) {
+        recording_.failed = true;
+        recording_.message = folder + ": the machine was too slow for " +
+                             counts(status.lost_ticks, status.lost_frames);
+      } else {
+        recording_.message = folder + ": " + counts(status.ticks, status.frames);
+      }
+      return true;
+    });
+  }
+
+  SessionOptions options_;
+  std::vector<std::unique_ptr<CameraFeed>> feeds_;     // in real time
+  std::vector<std::unique_ptr<PlayedSource>> played_;  // free-running
+  std::unique_ptr<Device> device_;
+  std::unique_ptr<ServoLoop> loop_;    // in real time
+  std::unique_ptr<Cycle> free_cycle_;  // free-running
+  Cycle* cycle_ = nullptr;             // of one of these
+  std::atomic<double> free_t_{0.0};    // [s]
+  std::atomic<bool> started_{false};
+  std::atomic<bool> stopped_{false};
+
+  mutable std::mutex frames_mutex_;  // taken by the cameras' threads; never held for long
+  std::vector<std::shared_ptr<const Cloud>> newest_;  // guarded by frames_mutex_
+  std::vector<CameraFrame> stamps_;                   // guarded by frames_mutex_
+  double stamp_ = 0.0;                                // guarded by frames_mutex_
+  std::uint64_t frame_number_ = 0;                    // guarded by frames_mutex_
+  std::size_t frames_ = 0;                            // guarded by frames_mutex_
+  // Set and reset with both mutexes held; used with either.
+  std::unique_ptr<Recorder> recorder_;
+
+  mutable std::mutex control_;         // settings and recordings; taken before frames_mutex_
+  ServoSettings settings_;             // guarded by control_
+  std::uint64_t settings_number_ = 0;  // guarded by control_
+  RecordingState recording_;           // guarded by control_
+  std::vector<std::unique_ptr<Recorder>> closing_;  // guarded by control_
+  std::atomic<double> proxy_radius_{ProxyParameters{}.r_c()};
+
+  std::mutex summary_mutex_;                          // taken before frames_mutex_
+  std::optional<TickRing<ServoTick>::Reader> ticks_;  // guarded by summary_mutex_
+  Summary summary_;                                   // guarded by summary_mutex_
+
+  std::thread housekeeper_;
+  std::mutex house_mutex_;
+  std::condition_variable house_wakes_;
+  bool house_ends_ = false;  // guarded by house_mutex_
+};
+
+Session::Session(SessionOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
+
+Session::~Session() = default;
+
+void Session::start() {
+  impl_->start();
+}
+
+void Session::stop() noexcept {
+  impl_->stop();
+}
+
+void Session::run(std::optional<double> duration,
+                  const std::function<void(const ServoTick&)>& on_tick) {
+  impl_->run(duration, on_tick, stop_requested_);
+}
+
+TickRing<ServoTick>::Reader Session::ticks() const {
+  return impl_->cycle().reader();
+}
+
+std::vector<std::shared_ptr<const Cloud>> Session::newest_clouds() const {
+  return impl_->newest();
+}
+
+SessionState Session::state() {
+  return impl_->state();
+}
+
+ServoSettings Session::settings() const {
+  return impl_->settings();
+}
+
+void Session::set(const ServoSettings& settings) {
+  impl_->set(settings);
+}
+
+void Session::reset_faults() noexcept {
+  impl_->cycle().reset_faults();
+}
+
+void Session::start_recording(const std::string& folder) {
+  impl_->start_recording(folder);
+}
+
+void Session::stop_recording() {
+  impl_->stop_recording();
+}
+
+const Device& Session::device() const {
+  return impl_->device();
+}
+
+MouseDevice* Session::mouse() const {
+  return impl_->mouse();
+}
+
+const MethodRegistry& Session::methods() const {
+  return impl_->methods();
+}
+
+const CycleStatistics& Session::statistics() const {
+  return impl_->cycle().statistics();
+}
+
+const Timing* Session::timing() const {
+  return impl_->loop() == nullptr ? nullptr : &impl_->loop()->timing();
+}
+
+const RealtimeReport* Session::realtime() const {
+  return impl_->loop() == nullptr ? nullptr : &impl_->loop()->realtime();
+}
+
+}  // namespace palpate

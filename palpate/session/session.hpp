@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/devices/devices.hpp"
+#include "palpate/methods/methods.hpp"
+#include "palpate/record/recorder.hpp"
+#include "palpate/servo/servo_loop.hpp"
+#include "palpate/session/camera_feed.hpp"
+#include "palpate/session/summary.hpp"
+#include "palpate/sources/source.hpp"
+
+namespace palpate {
+
+class MouseDevice;
+
+/// A camera of a session: a source by its URI, or one that is open.
+struct SessionCamera {
+  std::string uri;  ///< opened by SessionOptions::sources
+  /// Used in place of the URI, which only names it then. It cannot be opened again when it ends.
+  std::unique_ptr<Source> source = {};
+  /// Where it stands; none: the source's own pose.
+  std::optional<Eigen::Isometry3d> world_from_camera = {};
+};
+
+/// Whose time a session runs in.
+enum class Pace {
+  real_time,     ///< this machine's clock: a person, a device, a live camera
+  free_running,  ///< as fast as the machine can: recordings and simulations, a simulated hand
+};
+
+/// A whole session, as it begins. What has a default may be left out.
+struct SessionOptions {
+  std::vector<SessionCamera> cameras;  ///< 1 to Patch::max_views
+  /// Opened by `devices`. `mouse:` without a place starts before what the first camera sees;
+  /// `hand:` and `script:` without a file stroke it.
+  std::string device_uri = "hand:";
+  std::unique_ptr<Device> device = {};  ///< used in place of the URI
+  ServoSettings settings = {};          ///< method, its parameters, safety limits, placement
+  ServoOptions servo = {};              ///< rate, real-time rights
+  Pace pace = Pace::real_time;
+  double stroke_time = 20.0;  ///< [s] of the built-in path of `hand:` and `script:`
+  std::string record = {};    ///< folder to record into from the start; empty: none
+  std::string version = {};   ///< of the program, for recordings
+  MethodRegistry methods = standard_methods();
+  Registry<SourceScheme> sources = standard_sources();
+  Registry<DeviceScheme> devices = standard_devices();
+  /// Sees each frame after the method got it. A camera's thread, or the caller's of `run` where the
+  /// session is free-running. Must be quick and must not throw.
+  std::function<void(std::size_t camera, const FedFrame& frame)> on_frame = {};
+};
+
+/// How a recording does.
+struct RecordingState {
+  bool on = false;
+  std::string folder;    ///< of the one that is on, or else of the last; empty: none
+  std::string message;   ///< about the last: how it went
+  bool failed = false;   ///< one ended before its time or lost something
+  bool closing = false;  ///< one that was stopped is still being written
+};
+
+/// How a session does: what a page or a program shows of it.
+struct SessionState {
+  ServoSettings settings;
+  std::vector<CameraStatus> cameras;
+  DeviceStatus device;
+  RecordingState recording;
+  Summary summary;
+  std::array<std::uint64_t, safety_flag_count> interventions{};
+  std::uint32_t latched_by = 0;  ///< SafetyFlag bits that hold the force off until `reset_faults`
+  double rate = 0.0;             ///< [Hz]
+  bool running = false;
+};
+
+/// Cameras, device, method, safety chain and recorder, wired together: a whole session as one
+/// object. Prints nothing.
+///
+/// One way through, whatever the clock, the hand and the watcher: camera's thread → newest frame →
+/// method → safety chain → device. Program, page and tests differ in their options alone.
+///
+/// Functions may be called by any thread but the servo's; `run`, `start` and `stop` by one.
+class Session {
+ public:
+  /// Opens cameras and device, waits for each camera's first frame, and makes the method.
+  /// @throws Error if one of them cannot be used: a URI, a device, a method that cannot touch what
+  ///         the cameras see, settings out of range.
+  explicit Session(SessionOptions options);
+  /// stop().
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// Real time: starts loop and cameras, and returns. @throws Error if the device refuses.
+  void start();
+  /// Takes the force off the device before anything else, then ends everything. A camera that hangs
+  /// is left behind. Any number of times.
+  void stop() noexcept;
+
+  /// Runs until `duration` [s] has passed (none: for ever) or `request_stop`, then stops.
+  /// Real time: starts what is not started. Free-running: runs the ticks on this thread.
+  /// @param on_tick  free-running: sees each tick
+  void run(std::optional<double> duration,
+           const std::function<void(const ServoTick&)>& on_tick = {});
+  /// Makes `run` return soon. Any thread, and a signal handler.
+  void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
+
+  /// Sees every tick from the next one on; must not outlive the session.
+  [[nodiscard]] TickRing<ServoTick>::Reader ticks() const;
+  /// What each camera saw last; null before its first frame.
+  [[nodiscard]] std::vector<std::shared_ptr<const Cloud>> newest_clouds() const;
+  /// Counts what has happened so far; looks at no more than the last second of ticks.
+  [[nodiscard]] SessionState state();
+
+  [[nodiscard]] ServoSettings settings() const;
+  /// Takes effect in the next tick. Another method is made and takes over where the proxy is.
+  /// @throws Error, leaving everything as it was, if something does not validate, there is no such
+  ///         method or it cannot touch what the cameras see.
+  void set(const ServoSettings& settings);
+  /// Ends a latched fault of the safety chain: an operator's decision.
+  void reset_faults() noexcept;
+
+  /// Begins to record into `folder`, which must not be there yet. @throws Error if it cannot be
+  /// made, or a recording is on.
+  void start_recording(const std::string& folder);
+  /// Returns at once; state().recording says when all is written.
+  void stop_recording();
+
+  [[nodiscard]] const Device& device() const;
+  /// The device, if a page moves it; else null.
+  [[nodiscard]] MouseDevice* mouse() const;
+  [[nodiscard]] const MethodRegistry& methods() const;
+  [[nodiscard]] const CycleStatistics& statistics() const;
+  /// Real time: of the loop. Free-running: empty.
+  [[nodiscard]] const Timing* timing() const;
+  [[nodiscard]] const RealtimeReport* realtime() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+  std::atomic<bool> stop_requested_{false};
+};
+
+}  // namespace palpate

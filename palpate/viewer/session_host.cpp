@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/viewer/session_host.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/devices/mouse_device.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+constexpr double samples_per_second = 200.0;  // of the page's plots
+
+json row_json(std::string_view name, std::string_view symbol, std::string_view unit,
+              double default_value, double min, double max, std::string_view meaning,
+              std::string_view source) {
+  return {{"name", name}, {"symbol", symbol}, {"unit", unit},       {"default", default_value},
+          {"min", min},   {"max", max},       {"meaning", meaning}, {"source", source}};
+}
+
+std::string realtime_text(const RealtimeReport& report) {
+  std::string text = report.fifo ? "real-time, priority " + std::to_string(report.priority)
+                                 : "not real-time; see palpate doctor";
+  if (report.core >= 0) text += ", core " + std::to_string(report.core);
+  return text;
+}
+
+// A folder beside the program, named after the time.
+std::string folder_of_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  localtime_r(&now, &local);
+  std::array<char, 64> name{};
+  std::strftime(name.data(), name.size(), "palpate_%Y-%m-%d_%H-%M-%S", &local);
+  return name.data();
+}
+
+}  // namespace
+
+void SessionHost::attach(Session& session) {
+  session_ = &session;
+  mouse_ = session.mouse();
+  if (mouse_ != nullptr) target_ = start_ = mouse_->start();
+  reader_.emplace(session.ticks());
+  const double rate = session.state().rate;
+  batcher_.emplace(static_cast<unsigned>(std::max(1.0, rate / samples_per_second)));
+}
+
+std::string SessionHost::hello() {
+  json parameters = json::array();
+  json safety = json::array();
+  json methods = json::array();
+  json flags = json::array();
+  json safety_flags = json::array();
+  for (const ParameterInfo& row : parameter_table())
+    parameters.push_back(row_json(row.name, row.symbol, row.unit, row.default_value, row.min,
+                                  row.max, row.meaning, row.source));
+  for (const SafetyParameterInfo& row : safety_parameter_table())
+    safety.push_back(
+        row_json(row.name, "", row.unit, row.default_value, row.min, row.max, row.meaning, ""));
+  for (const MethodInfo& row : session_->methods().entries())
+    methods.push_back({{"name", row.name}, {"meaning", row.summary}});
+  for (const TickFlagInfo& flag : tick_flag_table())
+    flags.push_back({{"name", flag.name}, {"meaning", flag.meaning}});
+  for (std::size_t i = 0; i < safety_flag_count; ++i)
+    safety_flags.push_back(
+        {{"name", safety_flag_names()[i]}, {"meaning", safety_flag_meanings()[i]}});
+  return json{{"version", version_}, {"methods", methods}, {"parameters", parameters},
+              {"safety", safety},    {"flags", flags},     {"safety_flags", safety_flags}}
+      .dump();
+}
+
+std::string SessionHost::state() {
+  SessionState state = session_->state();
+  json parameters;
+  json safety;
+  json cameras = json::array();
+  for (const ParameterInfo& row : parameter_table())
+    parameters[std::string(row.name)] = row.get(state.settings.parameters);
+  for (const SafetyParameterInfo& row : safety_parameter_table())
+    safety[std::string(row.name)] = state.settings.safety.*row.member;
+  for (const CameraStatus& status : state.cameras) {
+    cameras.push_back({{"uri", status.uri},
+                       {"kind", status.kind},
+                       {"rate", status.rate},
+                       {"state", status.text}});
+  }
+  const CycleStatistics& cycles = session_->statistics();
+  json servo = {{"rate", state.rate},
+                {"ticks", cycles.ticks.load()},
+                {"late_ticks", state.summary.late_ticks},
+                {"frames_adopted", cycles.frames_adopted.load()},
+                {"frames_dropped", cycles.frames_dropped.load()}};
+  if (const Timing* timing = session_->timing()) {
+    servo["realtime"] = realtime_text(*session_->realtime());
+    servo["compute_p99"] = 1e-9 * static_cast<double>(timing->compute.quantile(0.99));
+    servo["wake_up_p99"] = 1e-9 * static_cast<double>(timing->wake_up.quantile(0.99));
+  }
+  json recording = {{"possible", true}, {"path", nullptr}, {"message", state.recording.message}};
+  if (state.recording.on) recording["path"] = state.recording.folder;
+  const DeviceInfo& device = session_->device().info();
+  return json{{"method", state.settings.method},
+              {"parameters", parameters},
+              {"safety", safety},
+              {"cameras", cameras},
+              {"device",
+               {{"uri", device.uri},
+                {"kind", device.kind},
+                {"takes_hand", mouse_ != nullptr},
+                {"fault", state.device.text}}},
+              {"servo", servo},
+              {"interventions", state.interventions},
+              {"flag_ticks", state.summary.flag_ticks},
+              {"pop_throughs", state.summary.pop_throughs},
+              {"recording", recording}}
+      .dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::optional<TickBatch> SessionHost::ticks() {
+  for (ServoTick record{}; reader_->try_pop(record);) batcher_->add(record);
+  return batcher_->take();
+}
+
+void SessionHost::hand(const std::optional<Vec3>& target) {
+  if (mouse_ == nullptr) return;
+  if (target) target_ = *target;
+  mouse_->aim({.position = target_, .present = target.has_value()});
+}
+
+void SessionHost::command(const Command& command) {
+  ServoSettings settings = session_->settings();
+  if (const auto* set = std::get_if<SetParameter>(&command)) {
+    set_parameter(settings.parameters, set->name, set->value);
+  } else if (const auto* limit = std::get_if<SetSafetyParameter>(&command)) {
+    set_parameter(settings.safety, limit->name, limit->value);
+  } else if (const auto* method = std::get_if<SetMethod>(&command)) {
+    settings.method = method->name;
+  } else if (const auto* record = std::get_if<SetRecording>(&command)) {
+    const bool is_on = session_->state().recording.on;
+    if (!record->on) session_->stop_recording();
+    if (record->on && !is_on) session_->start_recording(folder_of_now());
+    return;
+  } else {
+    if (mouse_ != nullptr) mouse_->aim({.position = target_ = start_, .present = false});
+    return;
+  }
+  session_->set(settings);
+}
+
+void SessionHost::show(std::size_t number, const FedFrame& fed) {
+  ViewerServer* server = server_.load(std::memory_order_acquire);
+  if (server == nullptr || !fed.is_new) return;
+  const auto camera = static_cast<std::uint8_t>(number);
+  const Frame& frame = fed.frame;
+  FrameHeader header;
+  header.camera = camera;
+  header.number = numbers_[camera]++;
+  header.stamp = frame.stamp;
+  if (const auto* image = dynamic_cast<const DepthImage*>(frame.cloud.get())) {
+    const Intrinsics& k = image->intrinsics();
+    header.width = static_cast<std::uint32_t>(k.width);
+    header.height = static_cast<std::uint32_t>(k.height);
+    header.fx = k.fx;
+    header.fy = k.fy;
+    header.cx = k.cx;
+    header.cy = k.cy;
+    header.metres_per_unit = 1.0 / image->units_per_metre();
+    header.world_from_camera = image->world_from_camera();
+    header.has_rays = k.distorted();
+    if (header.has_rays && header.number == 0) describe(camera, image->rays());
+    server->show(camera, depth_message(header, image->depth(), frame.cloud));
+  } else if (const auto* points = dynamic_cast<const PointCloud*>(frame.cloud.get())) {
+    std::vector<float> xyz;
+    xyz.reserve(3 * points->size());
+    for (std::size_t i = 0; i < points->size(); ++i) {
+      const Vec3 point = points->point(i);
+      for (int axis = 0; axis < 3; ++axis) xyz.push_back(static_cast<float>(point[axis]));
+    }
+    header.width = static_cast<std::uint32_t>(points->size());
+    server->show(camera, points_message(header, std::move(xyz)));
+  }
+}
+
+void SessionHost::describe(std::uint8_t camera, const ViewingRays& rays) {
+  const Intrinsics& k = rays.intrinsics();
+  std::vector<float> xy;
+  xy.reserve(2 * static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height));
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) {
+      const Eigen::Vector2d ray = rays.ray(u, v);
+      xy.push_back(static_cast<float>(ray.x()));
+      xy.push_back(static_cast<float>(ray.y()));
+    }
+  }
+  server_.load()->describe(camera,
+                           rays_message(camera, static_cast<std::uint32_t>(k.width),
+                                        static_cast<std::uint32_t>(k.height), std::move(xy)));
+}
+
+}  // namespace palpate

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <charconv>
 #include <limits>
 #include <memory>
 #include <string>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -11,6 +14,7 @@
 #include "app/recording_check.hpp"
 #include "app/verbs.hpp"
 #include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/pixel_probe.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/uri.hpp"
@@ -21,9 +25,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr double first_frame_timeout = 10.0;  // [s] for a live camera to start up
+
 struct InfoOptions {
   std::string uri;
   bool json = false;
+  std::string at;  // "U,V", or empty
 };
 
 Json numbers(const Vec3& v) {
@@ -86,10 +93,53 @@ Json describe(const PointCloud& cloud) {
   return json;
 }
 
+// "320,240"
+std::pair<int, int> pixel_of(const std::string& text) {
+  std::pair<int, int> pixel;
+  const char* const end = text.data() + text.size();
+  const auto [comma, error] = std::from_chars(text.data(), end, pixel.first);
+  bool good = error == std::errc{} && comma != end && *comma == ',';
+  if (good) {
+    const auto [rest, second] = std::from_chars(comma + 1, end, pixel.second);
+    good = second == std::errc{} && rest == end;
+  }
+  if (!good)
+    throw Error("--at", "'" + text + "' is not a pixel",
+                "give column and row as whole numbers, such as --at 320,240");
+  return pixel;
+}
+
+Json describe(const PixelProbe& probe, int u, int v) {
+  Json json = {{"pixel", Json::array({u, v})}, {"hole", !probe.in_world}};
+  if (probe.depth) json["depth_m"] = *probe.depth;
+  if (probe.in_camera) json["in_camera_m"] = numbers(*probe.in_camera);
+  if (probe.in_world) json["in_world_m"] = numbers(*probe.in_world);
+  if (probe.normal) {
+    json["normal"] = numbers(*probe.normal);
+    json["normal_from_px"] = 2 * probe.normal_radius + 1;
+  }
+  json["neighbours"] = probe.neighbours;
+  json["neighbours_measured"] = probe.measured;
+  return json;
+}
+
+Json describe_pixel(const Cloud& cloud, const std::string& text, const std::string& uri) {
+  const auto [u, v] = pixel_of(text);
+  if (const auto* image = dynamic_cast<const DepthImage*>(&cloud))
+    return describe(probe_pixel(*image, u, v), u, v);
+  if (const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+      points != nullptr && points->surface() != nullptr && points->surface()->columns > 0)
+    return describe(probe_pixel(*points, u, v), u, v);
+  throw Error(uri, "its points are no image, so there is no pixel " + text,
+              "leave out --at, or give a source of depth images");
+}
+
 int info(const InfoOptions& options) {
   const std::unique_ptr<Source> source = open_source(options.uri);
   const SourceInfo& about = source->info();
-  Json json = {{"uri", about.uri}, {"kind", about.kind}};
+  Json json = {{"uri", about.uri}, {"kind", about.kind}, {"live", about.live}};
+  if (about.live) json["clock"] = name_of(about.clock);
+  if (about.sensor != SensorKind::unknown) json["sensor"] = name_of(about.sensor);
   if (about.frames) json["frames"] = *about.frames;
   if (about.frame_rate) json["frame_rate_hz"] = *about.frame_rate;
   if (about.start_time != 0.0) json["start_time_s"] = about.start_time;
@@ -99,7 +149,10 @@ int info(const InfoOptions& options) {
     json["checksums"] = text_of(BagReader(uri.path()).check());
     if (!options.json) fmt::print("checksums: {}\n", json["checksums"].get<std::string>());
   }
-  const auto frame = source->next();
+  const auto frame = source->next(first_frame_timeout);
+  if (!frame && about.live)
+    throw Error(options.uri, fmt::format("it has delivered no frame in {} s", first_frame_timeout),
+                "check the camera, its cable and its permissions");
   if (!frame) throw Error(options.uri, "it has no frames", "give a source with at least one");
   Json first = {{"stamp_s", frame->stamp}};
   if (!about.details.empty()) first["details"] = about.details;
@@ -108,7 +161,10 @@ int info(const InfoOptions& options) {
   } else if (const auto* cloud = dynamic_cast<const PointCloud*>(frame->cloud.get())) {
     first.update(describe(*cloud));
   }
+  if (frame->colour)
+    first["colour"] = fmt::format("{}x{}", frame->colour->width, frame->colour->height);
   json["first_frame"] = first;
+  if (!options.at.empty()) json["at"] = describe_pixel(*frame->cloud, options.at, options.uri);
 
   if (options.json) {
     fmt::print("{}\n", json.dump(2));
@@ -124,6 +180,10 @@ int info(const InfoOptions& options) {
   print(json, "");
   fmt::print("first_frame:\n");
   print(json["first_frame"], "  ");
+  if (json.contains("at")) {
+    fmt::print("at:\n");
+    print(json["at"], "  ");
+  }
   return 0;
 }
 
@@ -134,6 +194,9 @@ Verb add_info(CLI::App& program) {
   const auto options = std::make_shared<InfoOptions>();
   command->add_option("source", options->uri, "e.g. tum:DIR, pcd:FILE, synthetic:desk")->required();
   command->add_flag("--json", options->json, "print a JSON object");
+  command->add_option("--at", options->at,
+                      "U,V: what is at this pixel of the first frame: depth [m], point in the "
+                      "camera's and the world's frame, normal, measured neighbours");
   return {command, [options] { return info(*options); }};
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program as a user meets it: exit codes, messages, files.
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -181,6 +182,29 @@ TEST_F(Program, TellsWhatIsInASource) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto about = nlohmann::json::parse(outcome.out);
   EXPECT_GT(about["first_frame"]["measured_percent"], 90.0);
+}
+
+TEST_F(Program, InfoSaysWhatIsAtAPixel) {
+  const Outcome outcome =
+      run("info 'synthetic:tilt?slope=20deg&tilt=0deg&distance=0.5m&size=64x48' --json --at 31,23");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto at = nlohmann::json::parse(outcome.out)["at"];
+  // Straight down onto a plane that rises along x by 20 degrees; 0.5 px off the image's middle.
+  EXPECT_NEAR(at["depth_m"].get<double>(), 0.5, 0.01);
+  EXPECT_NEAR(at["in_camera_m"][2].get<double>(), at["depth_m"].get<double>(), 1e-12);
+  EXPECT_NEAR(at["in_world_m"][2].get<double>(), 0.5 - at["depth_m"].get<double>(), 1e-9);
+  EXPECT_NEAR(at["normal"][0].get<double>(), -std::sin(0.349), 0.02);
+  EXPECT_NEAR(at["normal"][2].get<double>(), std::cos(0.349), 0.02);
+  EXPECT_EQ(at["neighbours"], 48);
+  EXPECT_EQ(at["neighbours_measured"], 48);
+  const Outcome text = run("info synthetic:plane --at 0,0");
+  EXPECT_NE(text.out.find("at:\n  pixel: [0,0]\n"), std::string::npos) << text.out;
+  expect_refusal("info synthetic:plane --at 640,0", {"pixel 640,0", "640x480", "0 to 639"});
+  expect_refusal("info synthetic:plane --at=-1,0", {"pixel -1,0"});
+  expect_refusal("info synthetic:plane --at 3", {"--at", "'3'", "--at 320,240"});
+  expect_refusal("info synthetic:plane --at 3,4x", {"--at", "3,4x"});
+  const std::string points = write("two.pcd", "FIELDS x y z\nPOINTS 2\nDATA ascii\n0 0 1\n0 0 2\n");
+  expect_refusal("info pcd:" + points + " --at 0,0", {"no image", "--at"});
 }
 
 TEST_F(Program, TouchesTheFacesOfAPlyFile) {

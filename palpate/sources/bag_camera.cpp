@@ -73,8 +73,8 @@ std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
   return depth;
 }
 
-// What compressed_depth_image_transport packed. Floats were rounded in inverse depth; they come out
-// as 16UC1 in `units`.
+// The image in a message of compressed_depth_image_transport. Floats are stored as rounded inverse
+// depth; they are returned as 16UC1 in `units`.
 ros::Image unpacked(ros::CompressedImage message, double units, const std::string& name) {
   if (message.format.find("compressedDepth") == std::string::npos)
     throw Error(name, "is an image of format '" + message.format + "', not of depth",
@@ -126,7 +126,7 @@ Intrinsics intrinsics_of(const ros::CameraInfo& info, bool is_rectified, const s
   return k;
 }
 
-// Where in a point its x, y and z are, and whether they are doubles.
+// Byte offsets of x, y and z in a point, and whether they are doubles.
 struct Axes {
   std::array<std::size_t, 3> offset{};
   std::array<bool, 3> is_double{};
@@ -193,7 +193,7 @@ CameraTopics::CameraTopics(std::size_t number) {
 std::vector<std::string> BagCamera::topics_of(const BagReader& bag) {
   std::vector<std::string> topics;
   for (const BagReader::Topic& topic : bag.topics()) {
-    // An image may be one of colour: its name tells, or reading it does.
+    // Colour images have the same type: only topics with "depth" in their name are listed.
     const bool is_image =
         topic.type == ros::Image::type && topic.name.find("depth") != std::string::npos;
     const bool is_packed =
@@ -248,7 +248,7 @@ double BagCamera::stamp(std::size_t number, const ros::Header& header) const {
   return 1e-9 * static_cast<double>(stamped != 0 ? stamped : places_[number].nanoseconds);
 }
 
-// The numbers that belong to a frame of palpate's own.
+// The numbers recorded with each frame of palpate's own bags (CameraTopics::exact).
 std::vector<double> BagCamera::exact(std::size_t number, std::size_t size) {
   if (number >= exact_places_.size())
     throw Error(name(number), "has no message on " + exact_topic_, "the bag may be damaged");
@@ -265,7 +265,7 @@ std::vector<double> BagCamera::exact(std::size_t number, std::size_t size) {
 
 const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
                                                           const ros::Image& image) {
-  // Others' cameras do not change on the way.
+  // In other bags the intrinsics are taken to be constant: those of the first CameraInfo.
   const std::size_t which = is_ours() ? number : 0;
   if (which >= info_places_.size())
     throw Error(name(number), "has no message on " + info_topic_, "the bag may be damaged");

@@ -14,29 +14,29 @@
 
 namespace palpate {
 
-/// What a recording of palpate's own calls the topics of camera `number`, from 0.
+/// Names of the topics of camera `number`, from 0, in a recording of palpate's own.
 struct CameraTopics {
   explicit CameraTopics(std::size_t number);
 
   std::string depth;  ///< CompressedImage, "16UC1; compressedDepth png": the camera's own bits
   std::string camera_info;  ///< CameraInfo, one for each depth image
   std::string points;       ///< PointCloud2 of float64, where the camera gives points
-  /// Float64MultiArray, one for each image or cloud: what the standard messages leave out or round.
+  /// Float64MultiArray, one for each image or cloud: values that standard messages lack or round.
   /// Depth: stamp [s], units per metre, world_from_camera (3 x 4, row by row).
   /// Points: stamp [s], voxel [m], 1 if a viewpoint follows, the viewpoint [m].
   std::string exact;
   std::string optical_frame;  ///< in TF
 };
 
-/// The frames of one topic of a bag: what palpate recorded, to the bit, or what others did.
+/// The frames of one topic of a bag, recorded by palpate (restored to the bit) or by others.
 ///
 /// Depth images of encoding 16UC1, mono16 [mm] and 32FC1 [m], raw or compressedDepth (PNG), with a
-/// CameraInfo beside them; PointCloud2 with x, y and z. Of others the points are in the camera's
+/// CameraInfo beside them; PointCloud2 with x, y and z. Points of other bags are in the camera's
 /// own frame.
 class BagCamera {
  public:
   struct Options {
-    std::optional<double> units;  ///< [1/m] of raw depth; for 32FC1, what it is rounded to
+    std::optional<double> units;  ///< [1/m] of raw depth; 32FC1 is rounded to it
     double voxel = 0.010;         ///< [m] of a PointCloud that palpate did not record
   };
 
@@ -49,9 +49,10 @@ class BagCamera {
 
   [[nodiscard]] std::size_t frames() const { return places_.size(); }
   [[nodiscard]] const std::string& topic() const { return topic_; }
-  /// By its own stamp: of palpate's the session's clock, else since 1970. @throws Error
+  /// Its stamp is on the session's clock in palpate's own bags, else in seconds since 1970.
+  /// @throws Error if it cannot be read.
   [[nodiscard]] Frame frame(std::size_t number);
-  /// [Hz] the median, by when they were recorded; none of less than two frames.
+  /// [Hz] from the median interval of the times of recording; none for less than two frames.
   [[nodiscard]] std::optional<double> frame_rate() const;
   [[nodiscard]] bool is_ours() const { return !exact_places_.empty(); }
   /// The encoding of the frame read last.

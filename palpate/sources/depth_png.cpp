@@ -58,7 +58,7 @@ class PngReader {
   bool read_header(Header& header) noexcept {
     if (setjmp(png_jmpbuf(png_)) != 0) return false;
     png_set_read_fn(png_, &rest_, take);
-    png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);  // judged by the caller
+    png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);  // checked by the caller
     // Colour profiles and texts are not wanted, nor what they might unpack to.
     png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     png_read_info(png_, info_);
@@ -67,7 +67,7 @@ class PngReader {
     return true;
   }
 
-  // Of the rows to come.
+  // Configures the reading of the rows.
   bool turn_grey(const Header& header) noexcept {
     if (setjmp(png_jmpbuf(png_)) != 0) return false;
     png_set_expand(png_);
@@ -206,7 +206,7 @@ std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& n
     throw Error(name, "is an image of " + size + " pixels",
                 "images up to 16384x16384 can be read; it may be damaged");
   }
-  // Deflate shrinks by 1032 at most; what is promised beyond that cannot be there.
+  // Deflate compresses by 1032 at most: a header that declares more pixels is wrong.
   constexpr std::size_t best_ratio = 1032;
   const std::size_t pixels = std::size_t{header.width} * header.height;
   if (pixels * static_cast<std::size_t>(header.bits) / 8 / best_ratio > bytes.size()) {

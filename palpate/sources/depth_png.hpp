@@ -20,25 +20,25 @@ struct DepthPng {
 /// Decodes a 16-bit grey PNG, interlaced or not; about 3 ms for 640x480.
 /// @param name  of the file, for messages
 /// @throws Error if it is no PNG, another kind of PNG, larger than 16384x16384, cut short or
-///         corrupt. What its header promises is held against its length before it is allocated.
+///         corrupt. Its length is checked against the size in its header before allocating.
 DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& name);
 
 /// @throws Error as parse_depth_png, or if the file cannot be read.
 DepthPng read_depth_png(const std::filesystem::path& path);
 
-/// An image of what a camera saw in visible light.
+/// An image in visible light, in grey.
 struct GreyPng {
   int width = 0;                         ///< [px]
   int height = 0;                        ///< [px]
   std::vector<std::uint8_t> brightness;  ///< row by row, width*height; 255 is white
 };
 
-/// Decodes any PNG to 8-bit grey: colours are weighted as the eye does, a transparent pixel is
+/// Decodes any PNG to 8-bit grey: colours are weighted by luminance, a transparent pixel is
 /// taken as if it were opaque.
 /// @throws Error as read_depth_png, but for its kind.
 GreyPng read_grey_png(const std::filesystem::path& path);
 
-/// An image of what a camera saw in colour.
+/// An image in visible light, in colour.
 struct ColourPng {
   int width = 0;                  ///< [px]
   int height = 0;                 ///< [px]

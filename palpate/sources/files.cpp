@@ -19,7 +19,7 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::uintmax
   if (!std::filesystem::exists(status)) {
     throw Error(path.string(), "no such file", "check the path");
   }
-  // Opening a folder succeeds and a pipe may never end: neither is read.
+  // Opening a folder would succeed, and reading a pipe may never end: both are refused.
   if (!std::filesystem::is_regular_file(status)) {
     throw Error(path.string(), "is not a file", "name a file");
   }

@@ -19,7 +19,7 @@ using nlohmann::json;
 constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 20;
 constexpr const char* long_distortion = "distortion_brown_conrady_k1_6_p";
 
-// One JSON object and how it complains about its keys.
+// A JSON object; its accessors throw an Error that names the file and the key.
 class Object {
  public:
   Object(const json& object, std::string name) : object_(object), name_(std::move(name)) {}

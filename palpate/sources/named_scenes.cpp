@@ -18,7 +18,7 @@ using Vec2 = Eigen::Vector2d;
 
 constexpr double pi = std::numbers::pi;
 constexpr double endless = std::numeric_limits<double>::infinity();
-constexpr double far_away = 10.0;  // [m] as good as endless where an outline needs corners
+constexpr double far_away = 10.0;  // [m] stands for infinity where an outline needs corners
 
 Eigen::Isometry3d place(double x, double y, double z) {
   return Eigen::Isometry3d(Eigen::Translation3d(x, y, z));

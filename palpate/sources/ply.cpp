@@ -194,7 +194,7 @@ void ask_for_corners(const Cursor& file, Element& element) {
   }
 }
 
-// @throws Error by `fail(reason)` where a corner is no vertex.
+// Calls `fail(reason)`, which throws, where a corner is no vertex.
 template <class Fail>
 void add_triangles(const Element& element, Faces& faces, const Fail& fail) {
   const std::vector<std::int64_t>& corners = faces.corners;
@@ -332,7 +332,7 @@ void read_binary_row(Cursor& file, const Element& element, std::endian order, st
 void read_element(Cursor& file, const Element& element, std::string_view encoding, Faces& faces) {
   const std::vector<Property>& properties = element.properties;
   if (properties.empty()) {
-    return;  // however many rows it promises, they take no space
+    return;  // its rows take no space, whatever their number
   }
   const bool ascii = encoding == "ascii";
   const std::endian order =

@@ -29,19 +29,19 @@ struct PointFile {
   std::vector<Vec3> points;
   std::size_t width = 0;   ///< [points] in a row of an organised cloud; else their number
   std::size_t height = 1;  ///< [points] rows of an organised cloud; else 1
-  /// A PLY's nx, ny, nz of each point, as they are: of any length, or not finite. Empty without.
+  /// A PLY's nx, ny, nz of each point as stored: of any length, perhaps not finite. Empty without.
   std::vector<Vec3> normals;
   /// A PLY's faces: indices of points, in the order of the file. Polygons are fanned, strips cut.
   std::vector<std::array<std::uint32_t, 3>> triangles;
   /// Red, green and blue of each point in its order, 3 values each: a PCD's rgb or rgba, a PLY's
   /// red, green and blue of type uchar. Empty without.
   std::vector<std::uint8_t> colours;
-  /// From where the points were seen, in the frame of the points: the translation of PCD's
+  /// Position of the camera in the frame of the points: the translation of PCD's
   /// VIEWPOINT, or view_px view_py view_pz of the `camera` element that PCL writes into a PLY.
   ///
   /// PCL keeps points as they are stored and takes the viewpoint to be in the same frame (its
-  /// normals are turned towards it), though its viewer moves the points by it. We follow the
-  /// former: nothing is transformed, and the orientation is not used.
+  /// normals are turned towards it), though its viewer moves the points by it. Here too
+  /// nothing is transformed, and the orientation is not used.
   std::optional<Vec3> viewpoint;
   std::string encoding;            ///< as in the header, e.g. "binary_compressed"
   std::vector<PointField> fields;  ///< of a point, in the order of the file
@@ -54,7 +54,7 @@ struct PointFile {
 /// Reads a PCD file, versions 0.5 to 0.7: ascii, binary (little endian) or binary_compressed;
 /// fields of any order, type, size and count, as long as x, y and z are among them.
 ///
-/// Allocates in proportion to what the file holds, never to what its header promises.
+/// Allocates in proportion to the size of the file, whatever its header declares.
 /// @throws Error naming the file, the line or offset, and what was wrong.
 PointFile read_pcd(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.
@@ -64,7 +64,7 @@ PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name);
 /// nx, ny, nz and red, green, blue; of `face` and `tristrips` vertex_indices or vertex_index; of
 /// `camera` its position. Other elements, lists and properties are checked and passed over.
 ///
-/// Allocates in proportion to what the file holds, never to what its header promises.
+/// Allocates in proportion to the size of the file, whatever its header declares.
 /// @throws Error naming the file, the line or offset, and what was wrong.
 PointFile read_ply(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.

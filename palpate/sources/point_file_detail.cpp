@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::string_view blanks = " \t\r\n\v\f";
 
-// The whole token as a number of that type; none if it is not one that fits.
+// The whole token as a number of that type; none if it is no number in range.
 template <class T>
 std::optional<T> to_whole(std::string_view token) noexcept {
   T value = 0;

@@ -15,13 +15,13 @@
 
 #include "palpate/core/patch.hpp"
 
-/// What the readers of files share; not for use outside this room.
+/// Common parts of the readers of point files; not for use outside this room.
 namespace palpate::detail {
 
-/// What to do about a file that ends too early.
+/// The remedy for a file that ends too early.
 inline constexpr const char* cut_short = "copy the file again, it may have been cut short";
 
-/// The types that values have in point files.
+/// Types of values in point files.
 enum class Scalar : std::uint8_t {
   int8,
   uint8,
@@ -87,7 +87,7 @@ void load_column(const std::byte* first, std::size_t stride, Scalar type, std::e
 /// The next token of `rest`, which shrinks by it; empty if there is none. Blanks separate.
 [[nodiscard]] std::string_view next_token(std::string_view& rest) noexcept;
 
-/// The whole token as a number, "nan" and "inf" included; none if it is not one that fits.
+/// The whole token as a number, "nan" and "inf" included; none if it is no number in range.
 [[nodiscard]] std::optional<double> to_number(std::string_view token) noexcept;
 [[nodiscard]] std::optional<std::uint64_t> to_count(std::string_view token) noexcept;
 [[nodiscard]] std::optional<std::int64_t> to_index(std::string_view token) noexcept;
@@ -100,7 +100,7 @@ void load_column(const std::byte* first, std::size_t stride, Scalar type, std::e
 /// PCD and PLY files larger than this are not read.
 inline constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 32;
 
-/// How far a parser has come in a file, and how it complains about it.
+/// A parser's position in a file, and its errors.
 class Cursor {
  public:
   Cursor(std::span<const std::byte> bytes, std::string_view name) : bytes_(bytes), name_(name) {}

@@ -11,9 +11,10 @@ namespace palpate {
 /// Opens `recording:PATH`: the frames of a session that palpate recorded, to the bit, or of any ROS
 /// 2 bag in SQLite with depth images or points (bag_camera.hpp). Stamps count from the first frame.
 ///
-/// `topic=/NAME` chooses among several; `units=1000` says what raw depth counts [1/m], or to what
-/// depth in floats is rounded (5000: 0.2 mm, up to 13 m); `voxel=10mm` is that of a PointCloud.
-/// A frame that cannot be read is an Error from next(), which goes on with the one after it.
+/// `topic=/NAME` chooses among several topics; `units=1000` is the number of raw depth units per
+/// metre, to which depth in floats is rounded (5000: 0.2 mm, up to 13 m); `voxel=10mm` is that of a
+/// PointCloud. For a frame that cannot be read next() throws an Error; the call after it goes on
+/// with the next frame.
 /// @throws Error if the bag cannot be used, or holds no frames.
 std::unique_ptr<Source> open_recording(const Uri& uri);
 

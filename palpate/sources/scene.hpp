@@ -30,7 +30,7 @@ struct Motion {
   Vec3 pivot = Vec3::Zero();       ///< [m] world, before the shift
 
   [[nodiscard]] bool rests() const;
-  /// Where what began at a place is at time t.
+  /// Pose at time t relative to the pose at rest.
   [[nodiscard]] Eigen::Isometry3d at(double t) const;
   /// Velocity [m/s] at time t of the material that is at `point` [m, world] then.
   [[nodiscard]] Vec3 velocity(const Vec3& point, double t) const;
@@ -54,9 +54,9 @@ struct SurfacePoint {
   std::size_t part;  ///< which of the scene's parts
 };
 
-/// Bodies that move by known laws: what a synthetic camera sees, and the truth to judge by.
+/// Bodies with motion in closed form: the view of a synthetic camera, and its ground truth.
 ///
-/// World: metres, z up, what is touched about the origin.
+/// World frame: metres, z up; the bodies to touch lie about the origin.
 class Scene {
  public:
   /// @throws Error if there is no part.
@@ -84,18 +84,18 @@ class Scene {
 ///
 /// Besides its own options every scene takes those of Motion (start, speed, acceleration, stroke,
 /// frequency, swing) for the part that its summary names, or for all of it, and `floor`, the depth
-/// of a resting plane beneath [m]. Other options of the URI are not looked at (docs/synthetic.md).
+/// of a resting plane beneath [m]. Other options of the URI are ignored (docs/synthetic.md).
 /// @throws Error for an unknown scene, naming the known ones, or a value out of range.
 Scene make_scene(const Uri& uri);
 
-/// A scene that can be asked for by name.
+/// A scene with a name.
 struct SceneInfo {
   std::string_view name;
   std::string_view summary;                   ///< what it is, one line
   std::span<const std::string_view> options;  ///< its own, besides those of every scene
 };
 
-/// All of them.
+/// All named scenes.
 std::span<const SceneInfo> known_scenes();
 
 /// Every option that a scene takes. @throws Error as make_scene.

@@ -16,7 +16,7 @@ namespace {
 
 constexpr float nothing = std::numeric_limits<float>::infinity();
 
-// What each use of chance is keyed with, so that switching one on changes no other.
+// Keys of the random streams, one for each use: switching one on leaves the others unchanged.
 enum class Salt : std::uint64_t { white = 1, window, nugget, dropout, flying, point };
 
 constexpr std::uint64_t golden = 0x9e3779b97f4a7c15;
@@ -41,9 +41,9 @@ constexpr double share(std::uint32_t random) {
 }
 
 // Acklam's rational approximation of the inverse normal distribution; relative error 1.2e-9. This
-// half is for the middle; beyond, it goes on growing.
+// is its central part; beyond that it still increases with p, but is not accurate.
 constexpr double tail = 0.02425;      // [-] probability on each side
-constexpr float middle_ends = 1.97F;  // just within the values there
+constexpr float middle_ends = 1.97F;  // just inside the central part's values at its ends
 double middle_quantile(double p) {
   constexpr std::array a{-3.969683028665376e+01, 2.209460984245205e+02,  -2.759285104469687e+02,
                          1.383577518672690e+02,  -3.066479806614716e+01, 2.506628277459239e+00};
@@ -259,8 +259,8 @@ Sensor::Sensor(const SensorModel& model, const Intrinsics& intrinsics)
   kernel_y_ = gaussian_kernel(model.correlation_y);
 }
 
-// White noise about the image as far as the kernel reaches, then one pass along rows and one along
-// columns. Everything has unit variance until it meets the depth.
+// White noise over the image and a margin of the kernel's reach, then one pass along rows and one
+// along columns. The field has unit variance until it is scaled and added to the depth.
 void Sensor::add_gaussian_noise(std::uint64_t frame) {
   const int width = camera_.width;
   const int height = camera_.height;
@@ -341,7 +341,8 @@ void Sensor::let_edges_fly(std::span<const float> truth, std::uint64_t frame) {
   const int width = camera_.width;
   const int height = camera_.height;
   const std::uint64_t key = key_of(model_.seed, frame, Salt::flying);
-  constexpr float edge = 0.03F;  // of the depth; a surface would have to be seen at 87 degrees
+  constexpr float edge =
+      0.03F;  // [-] of the depth: a surface would need an angle of incidence of 87 degrees
   for (int v = 1; v + 1 < height; ++v) {
     for (int u = 1; u + 1 < width; ++u) {
       const std::ptrdiff_t i = static_cast<std::ptrdiff_t>(v) * width + u;
@@ -388,7 +389,7 @@ std::vector<std::uint16_t> Sensor::measure(std::span<const float> depth, std::ui
   const auto units_per_metre = static_cast<float>(1.0 / model_.quantisation);
   for (std::size_t i = 0; i < pixels; ++i) {
     const float units = depth_[i] * units_per_metre + 0.5F;
-    // 65535 means saturated, 0 means none; so does what noise has moved behind the camera.
+    // 65535 means saturated; 0 means no reading, also where noise moved it behind the camera.
     readings[i] = units >= 1.0F && units < 65535.0F
                       ? static_cast<std::uint16_t>(static_cast<std::int32_t>(units))
                       : std::uint16_t{0};

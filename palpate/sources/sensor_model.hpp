@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// What a depth camera does to true depth. The defaults change nothing but the resolution.
+/// The errors of a depth camera. With the defaults true depth is only rounded.
 struct SensorModel {
   double noise = 0.0;  ///< [m] standard deviation along the optical axis
   /// `noise` is that at 1 m and grows with the square of depth, as triangulation has it.
@@ -21,7 +21,7 @@ struct SensorModel {
   /// 0.45, 0.7 and 0.9 m, correlated over 10 to 20 pixels.
   bool d4xx_noise = false;
   /// [m] difference between two neighbouring readings at 1 m where the camera counts disparities;
-  /// grows with the square of depth. 0: it doesn't.
+  /// grows with the square of depth. 0: no such steps.
   double disparity_step = 0.0;
   double quantisation = 1e-4;  ///< [m] one unit of the image; 65534 of them is the farthest reading
   double dropouts = 0.0;       ///< [-] share of pixels that are holes at random
@@ -61,7 +61,7 @@ class Sensor {
   SensorModel model_;
   Intrinsics camera_;
   std::vector<float> kernel_x_, kernel_y_;  // odd lengths, sum of squares 1
-  // Kept between frames for their memory alone.
+  // Buffers, kept to allocate once.
   std::vector<float> depth_, field_, rows_;
   std::vector<double> sums_;
 };

@@ -43,7 +43,7 @@ double cast_ball(const Vec3& centre, double radius, const Vec3& origin, const Ve
                     offset.squaredNorm() - radius * radius);
 }
 
-// What the outline of a body stretched along y is nearest to, in the x-z plane.
+// The point of an outline, in the x-z plane, that is nearest to a given one.
 struct Nearest2 {
   double distance;
   Vec2 point, normal;

@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-// Solid bodies in closed form, each in its own frame [m]. From these, scenes are put together.
+// Solid bodies in closed form, each in its own frame [m]. Scenes consist of them.
 
 /// Everything at z <= 0.
 struct HalfSpace {};

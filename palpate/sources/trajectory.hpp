@@ -10,12 +10,12 @@
 
 namespace palpate {
 
-/// Where a camera was over time.
+/// The poses of a camera over time.
 class Trajectory {
  public:
-  /// How far from a known pose [s] that pose still holds.
+  /// [s] A pose is used for stamps up to this far from its own.
   static constexpr double tolerance = 0.02;
-  /// Poses further apart than this [s] are not interpolated between: tracking was lost.
+  /// [s] Poses farther apart are not interpolated: the camera's tracking was lost between them.
   static constexpr double max_gap = 0.2;
 
   struct Sample {
@@ -38,9 +38,8 @@ class Trajectory {
 /// Reads the TUM benchmark's format: lines of `stamp tx ty tz qx qy qz qw`, [s] and [m], the pose
 /// of the optical frame in the world; lines that begin with # are comments.
 /// @param name  of the file, for messages
-/// @throws Error naming the line that is not of eight finite numbers, has a quaternion not of
-/// length
-///         1, or a stamp not after the one before.
+/// @throws Error naming the line that is not of eight finite numbers, has a quaternion not
+///         of length 1, or a stamp not after the one before.
 Trajectory parse_trajectory(std::string_view text, const std::string& name);
 
 /// Reads a JSON object with one array of rigid 4x4 matrices, one for each frame, row by row: either

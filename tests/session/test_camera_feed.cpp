@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <atomic>
+#include <cmath>
 #include <condition_variable>
 #include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
+#include <random>
 #include <string>
 #include <thread>
 #include <utility>
@@ -401,6 +403,51 @@ TEST(CameraFeed, OpensAUriByTheRegistryThatItIsGiven) {
                          return std::make_unique<ScriptedSource>(clock, frames(3, 0.0), info);
                        }});
   EXPECT_EQ(CameraFeed("scripted:left", options).status().uri, "scripted:left");
+}
+
+// Random cameras: frames, errors, silences, resets, repeated stamps and pictures, ends.
+TEST(CameraFeed, GivesIncreasingStampsNeverAheadOfTimeWhateverTheCameraDoes) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    std::mt19937 random(seed);
+    const auto chance = [&](unsigned percent) { return random() % 100 < percent; };
+    Playing run;
+    run.options.frozen_frames = 3;
+    const auto script = [&](bool is_live) {
+      std::vector<Step> steps;
+      double at = 0.0;
+      double offset = 0.001 * static_cast<double>(random() % 100000);
+      for (auto k = random() % 60; k > 0; --k) {
+        at += chance(3) ? 3.0 : 0.033;
+        if (chance(3)) offset += chance(50) ? 15.0 : -0.7;
+        Step step{at + 0.001 * static_cast<double>(random() % 5), at + offset,
+                  static_cast<std::uint16_t>(1000 + random() % 5)};
+        if (chance(5)) step.stamp = steps.empty() ? 0.0 : steps.back().stamp;
+        if (chance(2)) step.stamp = std::nan("");
+        if (chance(5)) step.error = "damaged";
+        if (!is_live) step.took = chance(10) ? 0.3 : 0.001;
+        steps.push_back(step);
+      }
+      return steps;
+    };
+    const auto open = [&](int) -> std::unique_ptr<Source> {
+      if (chance(20)) throw Error("scripted:", "no such device", "plug it in");
+      const bool is_live = chance(60);
+      auto source = run.source(script(is_live), is_live ? live : recording);
+      source->can_skip = chance(50);
+      return source;
+    };
+    const CameraStatus status = run.until(30.0, run.source(script(true), live), open);
+    double before = 0.0;
+    std::uint64_t is_new = 0;
+    for (const auto& [fed, at] : run.given) {
+      ASSERT_GT(fed.frame.stamp, before) << seed;
+      ASSERT_LE(fed.frame.stamp, run.start + at + 1e-9) << seed;
+      before = fed.frame.stamp;
+      is_new += fed.is_new ? 1 : 0;
+    }
+    EXPECT_EQ(status.frames, is_new) << seed;
+    EXPECT_FALSE(status.text.empty());
+  }
 }
 
 // What a driver does whose read hangs, or only ends when it is cancelled.

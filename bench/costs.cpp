@@ -10,9 +10,9 @@
 #include "palpate/methods/methods.hpp"
 #include "palpate/paper/proxy.hpp"
 
-#include "bench/kd_tree.hpp"
 #include "bench/limit.hpp"
 #include "bench/pcl_searches.hpp"
+#include "search/kd_tree.hpp"
 
 namespace palpate::bench {
 namespace {

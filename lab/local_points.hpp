@@ -9,6 +9,8 @@
 
 #include "palpate/core/cloud.hpp"
 
+#include "search/kd_tree.hpp"
+
 namespace palpate::lab {
 
 /// The points of the newest frame (or of the last few) near a place, with a k-d tree over them.
@@ -17,17 +19,11 @@ namespace palpate::lab {
 /// publications work through the whole frame, this is the choice that favours them.
 class LocalPoints {
  public:
-  struct Neighbour {
-    std::uint32_t index;
-    double squared;  ///< [m^2] its distance
-  };
+  using Neighbour = KdTree::Neighbour;
 
   /// @param reach   [m] points farther than this from the place are left out
   /// @param window  how many frames count: the newest and those just before it
   explicit LocalPoints(double reach, std::size_t window = 1);
-  ~LocalPoints();
-  LocalPoints(const LocalPoints&) = delete;
-  LocalPoints& operator=(const LocalPoints&) = delete;
 
   /// Takes a new frame into use. The cloud must live until the next call.
   void frame(const Cloud& cloud);
@@ -48,8 +44,6 @@ class LocalPoints {
   void nearest(const Vec3& at, std::size_t count, std::vector<Neighbour>& found) const;
 
  private:
-  struct Tree;
-
   double reach_;
   std::size_t window_;
   const Cloud* cloud_ = nullptr;
@@ -60,7 +54,7 @@ class LocalPoints {
   std::deque<std::vector<Vec3>> before_;
   std::vector<Vec3> points_, normals_;
   std::optional<Vec3> viewpoint_;
-  std::unique_ptr<Tree> tree_;
+  std::unique_ptr<KdTree> tree_;
 };
 
 /// From where a surface at `at` was seen; from above where a cloud does not know.

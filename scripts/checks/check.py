@@ -25,8 +25,9 @@ KNOWS = {
     "record": {"core", "methods", "cloud", "servo", "bag", "sources"},
     "session": {"core", "methods", "cloud", "servo", "sources", "devices", "bag", "record"},
     "viewer": {"core", "methods", "cloud", "servo", "sources", "devices", "record", "session"},
-    "lab": {"core", "paper", "methods", "cloud", "sources"},
-    "bench": {"core", "paper", "methods", "cloud"},
+    "search": {"core"},
+    "lab": {"core", "paper", "methods", "cloud", "sources", "search"},
+    "bench": {"core", "paper", "methods", "cloud", "search"},
 }
 KNOWS["app"] = set(KNOWS)
 
@@ -68,7 +69,7 @@ def lines(root, path):
 def room_of(path):
     """The room that a path from the root belongs to, or None."""
     parts = path.split("/")
-    if len(parts) > 1 and parts[0] in ("lab", "bench", "app"):
+    if len(parts) > 1 and parts[0] in ("search", "lab", "bench", "app"):
         return parts[0]
     return parts[1] if len(parts) > 2 and parts[0] == "palpate" else None
 
@@ -76,7 +77,8 @@ def room_of(path):
 def check_rooms(root):
     """Includes and CMake links that point up or sideways."""
     faults = []
-    for path in files(root, re.compile(r"^(palpate|lab|bench|app)/.*(\.[ch]pp|CMakeLists\.txt)$")):
+    of_a_room = re.compile(r"^(palpate|search|lab|bench|app)/.*(\.[ch]pp|CMakeLists\.txt)$")
+    for path in files(root, of_a_room):
         room = room_of(path)
         if room is None:
             continue

@@ -301,15 +301,20 @@ double SafetyChain::energy_ceiling(const SafetyInput& input, double since_last) 
   return energy_ceiling_;
 }
 
-// What the links from the oscillation detector on let through, 0 to 1.
-double SafetyChain::ceiling(const SafetyInput& input, double demand, double dt,
+// What the oscillation links leave of the stiffness, 0 to 1.
+double SafetyChain::softened(const SafetyInput& input, double since_last, double dt,
+                             std::uint32_t& flags) noexcept {
+  const double by_swings = has(oscillation_cut) ? oscillation_ceiling(input.t, dt) : 1.0;
+  const double by_energy = has(energy_cut) ? energy_ceiling(input, since_last) : 1.0;
+  if (by_swings < 1.0) flags |= oscillation_cut;
+  if (by_energy < 1.0) flags |= energy_cut;
+  return std::min(by_swings, by_energy);
+}
+
+// What the links from the engage gate on let through, 0 to 1.
+double SafetyChain::ceiling(const SafetyInput& input, double demand,
                             std::uint32_t& flags) noexcept {
   double ceiling = 1.0;
-  if (has(oscillation_cut)) {
-    ceiling = oscillation_ceiling(input.t, dt);
-    if (ceiling < 1.0) flags |= oscillation_cut;
-  }
-
   if (latched_by_ != 0) {
     flags |= fault_latched;
     engaged_ = false;
@@ -381,10 +386,8 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   Vec3 force = Vec3::Zero();
   if (flags == 0) {
     // Before the limits: a softer surface still holds a hand with all the force that is allowed.
-    const double softened = has(energy_cut) ? energy_ceiling(input, since_last) : 1.0;
-    if (softened < 1.0) flags |= energy_cut;
-    force = limited(input, softened * input.force, flags);
-    double most = ceiling(input, force.norm(), dt, flags);
+    force = limited(input, softened(input, since_last, dt, flags) * input.force, flags);
+    double most = ceiling(input, force.norm(), flags);
     if (stalls_at(input.t)) {
       flags |= stalled;
       most = 0.0;

@@ -27,8 +27,8 @@ enum SafetyFlag : std::uint32_t {
   continuous_cut = 1u << 3,
   /// The force changed faster than rise_rate or fall_rate. Regular at impacts with a stiff wall.
   slew_cut = 1u << 4,
-  /// The force swung fast and far, again and again: it is weakened until that stops. Lower the
-  /// stiffness, or raise the servo rate or the damping.
+  /// The force swung fast and far, again and again: the surface is softened until that stops. Lower
+  /// the stiffness, or raise the servo rate or the damping.
   oscillation_cut = 1u << 5,
   /// The hand is not engaged: it engages after engage_ticks ticks below engage_force.
   disengaged = 1u << 6,
@@ -130,10 +130,11 @@ struct SafetyOutput {
 
 /// Last before the device, whatever made the force. Knows no clock and no renderer.
 ///
-/// Links that judge the force itself come first, then those that give a gain: it falls at once and
-/// rises over ramp_time. The slew limit is applied to the product, so that no link can make a step,
-/// and |force| never exceeds the larger of the last force and the limit. While a frame is late the
-/// force that is sent never grows. Faults disengage the hand, and several of them latch.
+/// Links that soften what oscillates come first, then those that judge and limit the force itself,
+/// then those that give a gain: it falls at once and rises over ramp_time. The slew limit is
+/// applied to the product, so that no link can make a step, and |force| never exceeds the larger of
+/// the last force and the limit. While a frame is late the force that is sent never grows. Faults
+/// disengage the hand, and several of them latch.
 class SafetyChain {
  public:
   /// All links; the argument below leaves some out, which only tests of the chain may do.
@@ -181,7 +182,9 @@ class SafetyChain {
   void note_faults(std::uint32_t flags) noexcept;
   void warm_up(double since_last) noexcept;
   Vec3 limited(const SafetyInput& input, Vec3 force, std::uint32_t& flags) const noexcept;
-  double ceiling(const SafetyInput& input, double demand, double dt, std::uint32_t& flags) noexcept;
+  double softened(const SafetyInput& input, double since_last, double dt,
+                  std::uint32_t& flags) noexcept;
+  double ceiling(const SafetyInput& input, double demand, std::uint32_t& flags) noexcept;
   double oscillation_ceiling(double t, double dt) noexcept;
   double energy_ceiling(const SafetyInput& input, double since_last) noexcept;
   [[nodiscard]] Vec3 slewed(const Vec3& force, double rise_dt, double fall_dt) const noexcept;

@@ -363,10 +363,31 @@ double swing_left(std::uint32_t links, double hertz) {
   return high - low;
 }
 
+TEST(SafetyChain, SeesAnOscillationAlongEachAxis) {
+  for (int axis = 0; axis < 3; ++axis) {
+    Session session = engaged_without(pull_removed, never_hot);
+    std::uint32_t flags = 0;
+    for (int i = 0; i < 1000; ++i) {
+      session.input.t += ms;
+      session.input.force = ((i / 10) % 2 == 0 ? 2.8 : 0.3) * Vec3::Unit(axis);
+      flags |= session.chain.run(session.input).flags;
+    }
+    EXPECT_TRUE(flags & oscillation_cut) << axis;
+  }
+}
+
 TEST(SafetyChain, WeakensAFastOscillationAndNotASlowOne) {
   EXPECT_LE(swing_left(0, 50.0), 0.7);  // what is no oscillation, and a little while it recovers
   EXPECT_NEAR(swing_left(oscillation_cut, 50.0), 2.5, 1e-6);
   EXPECT_NEAR(swing_left(0, 3.0), 2.5, 1e-6);
+}
+
+TEST(SafetyChain, SoftensWhatOscillatesAndStillGivesAllTheForceThatIsAllowed) {
+  // A gain behind the limit would let a hand of 2 N sink through the surface.
+  Session session = engaged_without(0, never_hot);
+  for (int i = 0; i < 500; ++i) session.run((i / 10) % 2 == 0 ? 2.8 : 0.3);
+  EXPECT_TRUE(session.run(2.0).flags & oscillation_cut);
+  EXPECT_NEAR(session.run_for(0.05, 60.0).force.z(), 3.3, 1e-9);
 }
 
 TEST(SafetyChain, GivesTheForceBackWhenAnOscillationHasStopped) {

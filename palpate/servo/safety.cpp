@@ -27,6 +27,8 @@ constexpr double velocity_time = 5e-3;
 // [s] without a swing, after which the oscillation detector gives its cut back: 10 periods at 20
 // Hz.
 constexpr double calm_time = 0.5;
+// [N] by which sums of forces up to the largest limit, 50 N, may be rounded.
+constexpr double rounding = 1e-12;
 // [-] A cut that leaves more than that is over: nobody feels 1 % of a stiffness.
 constexpr double forgotten = 0.99;
 // [m], [N] Below that distance of the proxy from the HIP, or that force, the direction from one to
@@ -35,10 +37,10 @@ constexpr double least_lever = 1e-3;
 constexpr double least_directed_force = 0.05;
 
 constexpr std::array<std::string_view, safety_flag_count> flag_names{
-    "input_refused", "pull_removed",      "force_cut",     "continuous_cut",
-    "slew_cut",      "oscillation_cut",   "disengaged",    "ramping",
-    "frame_late",    "frame_fading",      "frame_lost",    "hand_too_fast",
-    "stalled",       "direction_refused", "fault_latched", "energy_cut"};
+    "input_refused",   "pull_removed",  "force_cut", "continuous_cut",    "slew_cut",
+    "oscillation_cut", "disengaged",    "ramping",   "frame_late",        "frame_fading",
+    "frame_lost",      "hand_too_fast", "stalled",   "direction_refused", "fault_latched",
+    "energy_cut",      "output_refused"};
 
 constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the device or the method gave a number that is not finite, or time ran backwards",
@@ -46,7 +48,7 @@ constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "the force is at its limit: the method asked for more than the user or the device allows",
     "the force is limited because the motors are warm",
     "the force changes more slowly than the method asked",
-    "the force is weakened because it swung fast, again and again",
+    "the surface is softened because the force swung fast, again and again",
     "no force: the hand is not engaged; it engages away from surfaces, once it is asked to feel "
     "next to nothing",
     "the force is coming up gradually after the hand engaged or after an interruption",
@@ -57,7 +59,8 @@ constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "the force starts again from nothing: the loop missed its deadlines",
     "no force: the method's surface normal contradicts the direction from the HIP to the proxy",
     "no force: repeated faults; an operator has to reset the safety chain",
-    "the force is weakened because the rendered surface kept up an oscillation"};
+    "the surface is softened because it kept up an oscillation",
+    "no force: the safety chain's own result broke its bounds; please report it"};
 
 using P = SafetyParameters;
 constexpr std::array table{
@@ -351,15 +354,32 @@ double SafetyChain::ceiling(const SafetyInput& input, double demand,
 }
 
 // Shrinks along the last force at fall_rate and changes otherwise at rise_rate.
-Vec3 SafetyChain::slewed(const Vec3& force, double rise_dt, double fall_dt) const noexcept {
+Vec3 SafetyChain::slewed(const Vec3& force, double rise, double fall) const noexcept {
   const double last = last_force_.norm();
   const Vec3 along = last > 0.0 ? Vec3(last_force_ / last) : Vec3::Zero();
-  const double least = std::max(last - parameters_.fall_rate * fall_dt, 0.0);
+  const double least = std::max(last - fall, 0.0);
   const Vec3 from = std::clamp(force.dot(along), least, last) * along;
   Vec3 change = force - from;
   if (least > 0.0) change -= std::min(change.dot(along), 0.0) * along;  // shrunk as far as it may
-  cut_to(parameters_.rise_rate * rise_dt, change);
+  cut_to(rise, change);
   return from + change;
+}
+
+// The last word. A force that turns while it shrinks slowly may be longer than before and than the
+// limit: here it is not. Then the promises are checked on the result itself, and what breaks one, a
+// NaN included, is no force.
+Vec3 SafetyChain::bounded(Vec3 force, double rise, std::uint32_t& flags) noexcept {
+  const double last = last_force_.norm();
+  const double peak = std::min(parameters_.max_force, device_.max_force);
+  const double most = (flags & frame_late) != 0 ? last : std::max(last, peak);
+  if (has(force_cut) || (flags & frame_late) != 0) cut_to(most, force);
+  if (links_ != all_links) return force;
+  const double length = force.norm();
+  if (length <= most && length - last <= rise + rounding) return force;
+  flags |= output_refused;
+  engaged_ = false;
+  gain_ = 0.0;
+  return Vec3::Zero();
 }
 
 SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
@@ -404,13 +424,15 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     if (latched_by_ != 0) flags |= fault_latched;
   }
 
+  const double rise = parameters_.rise_rate * dt;
   if (has(slew_cut)) {
     // Without a clock the force falls as if a tick had passed.
     const Vec3 wanted = force;
-    force = slewed(wanted, dt, in_order && last_t_ ? dt : longest_credit);
+    force =
+        slewed(wanted, rise, parameters_.fall_rate * (in_order && last_t_ ? dt : longest_credit));
     if (force != wanted) flags |= slew_cut;
   }
-  if ((flags & frame_late) != 0) cut_to(last_force_.norm(), force);
+  force = bounded(force, rise, flags);
 
   if (std::isfinite(input.t)) last_t_ = input.t;
   last_force_ = force;

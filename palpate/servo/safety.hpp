@@ -52,11 +52,13 @@ enum SafetyFlag : std::uint32_t {
   /// operator calls SafetyChain::reset. SafetyChain::latched_by says which faults they were.
   fault_latched = 1u << 14,
   /// The rendered surface gave the hand more energy than it took, cycle after cycle: an oscillation
-  /// that keeps itself up. The force is weakened until it stops. Lower the stiffness, raise the
+  /// that keeps itself up. The surface is softened until it stops. Lower the stiffness, raise the
   /// servo rate or damping, or hold the handle more firmly.
   energy_cut = 1u << 15,
+  /// What the chain computed broke its own bounds: no force. Never seen; please report it.
+  output_refused = 1u << 16,
 };
-constexpr std::size_t safety_flag_count = 16;
+constexpr std::size_t safety_flag_count = 17;
 /// A short name for each bit, in their order, e.g. "force_cut".
 std::span<const std::string_view> safety_flag_names();
 /// For each bit, in their order, a sentence for people: why the force is what it is.
@@ -187,7 +189,8 @@ class SafetyChain {
   double ceiling(const SafetyInput& input, double demand, std::uint32_t& flags) noexcept;
   double oscillation_ceiling(double t, double dt) noexcept;
   double energy_ceiling(const SafetyInput& input, double since_last) noexcept;
-  [[nodiscard]] Vec3 slewed(const Vec3& force, double rise_dt, double fall_dt) const noexcept;
+  [[nodiscard]] Vec3 slewed(const Vec3& force, double rise, double fall) const noexcept;
+  [[nodiscard]] Vec3 bounded(Vec3 force, double rise, std::uint32_t& flags) noexcept;
 
   DeviceLimits device_;
   SafetyParameters parameters_;

@@ -251,6 +251,7 @@ class Adversary {
     if (heat_ > 0.88 * 0.88 * 1.001) broken = "more force than the motors bear for long";
     if ((last_safety_ & frame_late) != 0 && length > last_.norm())
       broken = "a force that grows while a frame is late";
+    if ((last_safety_ & output_refused) != 0) broken = "a chain that had to refuse its own result";
     // 3.3 N are gone in two milliseconds of time; ticks without time take none off.
     idle_time_ = allowed ? 0.0 : idle_time_ + std::max(credit, 0.0);
     if (!allowed && idle_time_ > 3e-3 && length > 0.0)

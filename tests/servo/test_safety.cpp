@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -621,6 +622,92 @@ TEST(SafetyChain, KeepsItsPromisesForAnyInput) {
     }
   }
   EXPECT_GT(strongest, 3.0) << "the chain was hardly ever engaged";
+}
+
+TEST(SafetyChain, StaysWithinItsLimitsWithWhateverParametersAreAllowed) {
+  // A force that turns while it may shrink only slowly is neither the old nor the new one.
+  Session session(all & ~pull_removed, never_hot,
+                  {.initial_heat = 0.0, .rise_rate = 1e5, .fall_rate = 1.0});
+  session.engage().run_for(0.1, 3.3);
+  for (int i = 0; i < 50; ++i) {
+    session.input.t += ms;
+    session.input.force = {0, 3.3, 0};
+    EXPECT_LE(session.chain.run(session.input).force.norm(), 3.3);
+  }
+}
+
+// Every combination of states of the chain, extreme parameters and special inputs, one tick each.
+TEST(SafetyChain, KeepsItsBoundsFromEveryStateForEverySpecialInput) {
+  constexpr double tiny = std::numeric_limits<double>::denorm_min();
+  const std::array forces{Vec3(0, 0, 0),       Vec3(0, 0, 3.0),   Vec3(2.0, -2.0, 0.1),
+                          Vec3(0, 0, -3.0),    Vec3(0, 0, 1e6),   Vec3(1e308, 0, 0),
+                          Vec3(tiny, 0, tiny), Vec3(0, nan, 0.5), Vec3(0, 0, -inf)};
+  const std::array times{ms, 0.0, 1e-12, 6 * ms, 1e9, -1.0, nan, inf};
+  const std::array ages{0.01, 0.3, 0.5, 0.6, -1.0, inf, nan};
+  const std::array intervals{0.3, 3.1, nan};
+  const std::array normals{Vec3(0, 0, 1),    Vec3(0, 0, 0),  Vec3(1, 0, 1e-3),
+                           Vec3(0, tiny, 0), Vec3(0, 0, -1), Vec3(nan, 0, 0)};
+  const std::array levers{0.015, 0.0, -0.002, 1e300};
+  std::uint64_t ticks = 0;
+  std::uint64_t forceful = 0;
+  for (int set = 0; set < 8; ++set) {
+    SafetyParameters parameters{.initial_heat = set % 2 == 0 ? 0.0 : 1.0};
+    parameters.rise_rate = (set & 2) != 0 ? 1e5 : 500.0;
+    parameters.fall_rate = (set & 4) != 0 ? 1.0 : 2000.0;
+    for (int state = 0; state < 6; ++state) {
+      Session session(all, {}, parameters);
+      if (state > 0) session.run_for(0.02, 0.0);
+      if (state == 2) session.run_for(0.7, 1.0);
+      if (state > 2) session.run_for(2.0, 3.3);
+      if (state == 4) session.input.frame_age = 0.3, session.run_for(0.05, 3.3);
+      if (state == 5) {
+        session.input.hip.x() = nan;
+        for (int i = 0; i < 3; ++i) session.run(3.3);
+        session.input.hip.x() = 0.0;
+      }
+      const Vec3 last = session.run(3.3).force;
+      for (const Vec3& force : forces) {
+        for (const double dt : times) {
+          for (const double age : ages) {
+            for (const double late : intervals) {
+              for (const Vec3& normal : normals) {
+                for (const double lever : levers) {
+                  for (const bool hand : {true, false}) {
+                    SafetyChain chain = session.chain;
+                    SafetyInput input = session.input;
+                    input.t += dt;
+                    input.force = force;
+                    input.frame_age = age;
+                    input.frame_intervals = late;
+                    input.normal = normal;
+                    input.proxy = input.hip + Vec3(0, 0, lever);
+                    input.hand = hand;
+                    const SafetyOutput output = chain.run(input);
+                    const double length = output.force.norm();
+                    const double earned = std::isfinite(dt) ? std::clamp(dt, 0.0, ms) : 0.0;
+                    ASSERT_TRUE(output.force.allFinite());
+                    ASSERT_LE(length, 3.3);
+                    ASSERT_LE(length - last.norm(), parameters.rise_rate * earned + 1e-12);
+                    ASSERT_LE((output.force - last).norm(),
+                              parameters.rise_rate * earned + parameters.fall_rate * ms + 1e-12);
+                    ASSERT_TRUE(late <= 3.0 || length <= last.norm());
+                    const bool nothing = !hand || !(age <= 0.5) || !(dt >= 0.0 && dt <= 5 * ms) ||
+                                         !force.allFinite() || !normal.allFinite();
+                    ASSERT_TRUE(!nothing || output.gain == 0.0);
+                    ASSERT_EQ(output.flags & output_refused, 0U);
+                    ++ticks;
+                    if (length > 0.0) ++forceful;
+                  }
+                }
+              }
+            }
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(ticks, 1'000'000U);
+  EXPECT_GT(forceful, ticks / 5) << "nothing was at stake";
 }
 
 TEST(SafetyParameters, HaveATableThatKnowsEveryOneAndItsDefault) {

@@ -24,7 +24,7 @@ class TraceWriter {
 
   /// @throws std::runtime_error if nothing more can be written (a full disk).
   void write(const Tick& tick);
-  /// Writes out what is buffered; call it before taking the trace for complete. Throws as `write`.
+  /// Flushes the buffer; the trace is complete after it. Throws as `write`.
   void finish();
 
  private:

@@ -37,7 +37,7 @@ struct DoctorOptions {
 constexpr double most_late = 0.5e-3;        // [s] 99.9 % of the wake-ups
 constexpr double most_late_ticks = 1.0e-3;  // [-] share of ticks that are not done when due
 
-// A loop that does nothing: what is late in it is the machine's doing.
+// A loop that does nothing: its late ticks are due to the machine.
 Json look_at_time(const DoctorOptions& options, std::vector<std::string>& advice) {
   PeriodicThread thread(options.rate, RealtimeRequest{}, [](const Wake&) {});
   std::this_thread::sleep_for(std::chrono::duration<double>(options.seconds));

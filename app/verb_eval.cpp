@@ -75,7 +75,7 @@ lab::ExperimentOptions experiment_options(const EvalOptions& options) {
   else if (options.noise != "white")
     throw Error("--noise " + options.noise, "there is no such noise", "choose white or correlated");
   result.recording = options.recording;
-  // Of what was recorded nobody knows the truth, so `ideal` has no place there.
+  // The true surface of a recording is unknown, so `ideal` cannot take part.
   if (!options.recording.empty() && options.methods.empty()) result.methods = {"paper", "sight"};
   return result;
 }

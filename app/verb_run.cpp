@@ -127,7 +127,7 @@ SessionOptions session_options(const RunOptions& options) {
   return session;
 }
 
-// The last words: what was recorded, and what the session amounted to.
+// Prints how the recording ended and the summary.
 int finish(Session& session, bool json) {
   const SessionState state = session.state();
   if (!state.recording.message.empty())

@@ -51,7 +51,7 @@ class ImplicitProxy {
   int steps_ = 0;
 };
 
-/// A method that is a field: what it does with frames, and its value at a place.
+/// A method given by an implicit surface: how a frame changes the field, and its value at a place.
 class ImplicitMethod : public LabMethod {
  public:
   void seat(const Vec3& proxy) noexcept final { proxy_.seat(proxy); }

@@ -38,7 +38,7 @@ class LabMethod : public Method {
 
  protected:
   explicit LabMethod(const Parameters& parameters) : parameters_(parameters) {}
-  /// For what was derived from the parameters.
+  /// Called after a change, for members derived from the parameters.
   virtual void parameters_changed() {}
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
 
@@ -46,7 +46,7 @@ class LabMethod : public Method {
   Parameters parameters_;
 };
 
-/// What a method may be given to start with.
+/// What a method is made from.
 struct MethodSetup {
   Parameters parameters;
   Truth truth;  ///< for `ideal`, the ruler; no honest method looks at it

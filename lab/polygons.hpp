@@ -17,7 +17,7 @@ namespace palpate::lab {
 /// cloud, or a depth image (or organised points) of which every four neighbours make two triangles.
 class Polygons {
  public:
-  /// @param reach  [m] of an image, what is farther than this from the place is left out
+  /// @param reach  [m] pixels of an image farther than this from the place are left out
   explicit Polygons(double reach) : reach_(reach) {}
 
   /// Can triangles be made of such a cloud?

@@ -29,7 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What tells one run from another: resuming under other options would mix them.
+// Identifies a run by its options: resuming under other options would mix two runs.
 std::string fingerprint(const Experiment& experiment, const ExperimentOptions& options) {
   std::ostringstream text;
   text << "palpate experiment " << experiment.name << " seed " << options.seed << " noise "

@@ -9,7 +9,7 @@ namespace palpate::lab {
 double rms(const std::vector<double>& values);
 
 /// The part of a signal sampled at 1 kHz that lies in 20 to 400 Hz, rms: what a finger is most
-/// sensitive to. Over whole seconds of it; what is left over is not looked at.
+/// sensitive to. Over whole seconds; a remainder is left out.
 double felt_rms(const std::vector<double>& signal);
 
 }  // namespace palpate::lab

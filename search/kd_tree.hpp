@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// nanoflann's k-d tree over a list of points.
+/// A k-d tree over a list of points: nanoflann's.
 class KdTree {
  public:
   struct Neighbour {

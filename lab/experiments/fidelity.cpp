@@ -29,7 +29,7 @@ std::pair<int, int> repeats_of(const ExperimentOptions& options) {
   return options.grid.value_or(std::pair{20, 20});
 }
 
-// What is measured in which scene, and what it should be at most.
+// Measures, their scenes and their aims (upper bounds).
 struct Measure {
   std::string_view scene;
   std::string_view name;
@@ -104,7 +104,7 @@ void watch(Method& method, const Scenario& scenario, const Truth& truth, double 
            Watched& watched) {
   std::vector<double> force;
   int behind = 0;
-  std::size_t before = watched.error.size();  // what was seen when it last was in front
+  std::size_t before = watched.error.size();  // samples when it was last in front
   bool lost = false;
   play(method, scenario, [&](const Tick& tick) {
     const TruePoint under = truth(tick.proxy, tick.t);
@@ -134,7 +134,7 @@ double mean(const std::vector<double>& values) {
   return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
 }
 
-// Of what was lost in every repeat nothing is known but that.
+// A case that was lost in every repeat has no other figure.
 std::vector<std::pair<std::string_view, double>> summary(const Watched& watched) {
   const int held = watched.repeats - watched.lost;
   std::vector<std::pair<std::string_view, double>> values = {
@@ -177,7 +177,7 @@ std::string rest_on_grid(const std::string& name, const ExperimentOptions& optio
   return rows_of(name, scene, summary(watched));
 }
 
-// A D4xx straight above what is touched, with its focal length but only as many pixels as matter.
+// A D4xx straight above the surface, with its focal length but only the pixels near the contact.
 CameraSetup d4xx_above(double distance) {
   CameraSetup setup;
   const int pixels = std::min(320, static_cast<int>(0.3 * 589.0 / distance));

@@ -6,7 +6,7 @@
 namespace palpate::lab {
 
 /// How near the rendered contact and force are to the true ones, white noise and a real camera's,
-/// beside what is aimed at. Some seconds a method: the ruler for work on a method.
+/// beside its aims. Takes some seconds a method.
 Experiment fidelity_experiment();
 
 }  // namespace palpate::lab

@@ -178,7 +178,7 @@ plot csv using (strcol(1) eq word(methods,1) ? $2 : NaN):($3/r) with lines lw 1.
 constexpr double most_noise = 3.0;
 constexpr double most_acceleration = 1400.0;
 
-// The seed of a cell follows from what it is, not from when it runs.
+// The seed of a cell depends on its axes, not on the order of running.
 std::uint64_t cell_seed(std::uint64_t seed, int i, int j) {
   return (seed * 1000003ULL + static_cast<std::uint64_t>(i)) * 1000003ULL +
          static_cast<std::uint64_t>(j);

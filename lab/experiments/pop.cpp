@@ -19,7 +19,8 @@ namespace {
 constexpr int usual_cases = 50;   // of each family
 constexpr int block = 50;         // cases a row
 constexpr double patience = 0.5;  // [s] behind for longer than this is lost
-constexpr double noticed = 0.3;   // [N] more than this ought not to change when something passes
+constexpr double noticed =
+    0.3;  // [N] largest change of force by an occluder that counts as unnoticed
 
 struct Outcome {
   bool lost = false;
@@ -88,7 +89,7 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
     return !outcome.lost;
   });
   if (stage.judged_at_end) {
-    // 5.2 ends with the last frame: whoever is behind then has no more time to come back.
+    // Section 5.2 ends with the last frame: a proxy that is behind then counts as lost.
     outcome.lost = outcome.lost || behind > 0;
   } else if (behind > frame && !outcome.lost) {
     ++outcome.dips;

@@ -513,7 +513,7 @@ constexpr std::array families = {
     PopFamily{"stream", "a moving plane, frames dropped and late", stream_ranges, stream},
     PopFamily{"random", "one to four bodies of any kind that move", random_ranges, random_scene}};
 
-// To three digits, so that what is printed is what was played.
+// Rounded to three digits, so that the printed case is exactly the one that was played.
 double rounded(double value) {
   return std::strtod(fmt::format("{:.3g}", value).c_str(), nullptr);
 }

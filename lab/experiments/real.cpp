@@ -26,13 +26,13 @@ constexpr double patience = 0.5;       // [s] behind for longer than this is los
 constexpr double press = 0.008;        // [m] how far below the surface the hand goes
 constexpr double contact_time = 0.4;   // [s]
 constexpr double flat_radius = 0.025;  // [m] a place is flat as far as that
-constexpr double patch_radius = 0.06;  // [m] of what is cut out and moved
+constexpr double patch_radius = 0.06;  // [m] of the patch that is cut out and moved
 constexpr std::size_t most_places = 8;
 constexpr std::size_t most_frames = 60;
 // Where nothing is recorded: the desk before a D4xx, eight frames.
 constexpr std::string_view stand_in = "synthetic:desk?sensor=d4xx&frames=8";
 
-// A flat place on what was recorded, in the camera's frame.
+// A flat place of the recording, in the camera's frame.
 struct Place {
   Vec3 at;      // [m]
   Vec3 normal;  // [-] towards the camera
@@ -201,7 +201,7 @@ std::shared_ptr<const DepthImage> composed(const DepthImage& frame, const Place&
 // What became of a contact.
 struct Outcome {
   bool lost = false;
-  int suspected = 0;    // times that a proxy was seen behind what was measured for over a frame
+  int suspected = 0;    // how often a proxy was behind the measured surface for over a frame
   double error = 0.0;   // [m] rms, of the contact against the plane
   double felt = 0.0;    // [N]
   double step = 0.0;    // [N] largest change in a tick

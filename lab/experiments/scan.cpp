@@ -135,7 +135,7 @@ Stretch longest_stretch(const DepthImage& image) {
   return {best.v, best.from + edge, best.to - edge};
 }
 
-// Along that stretch at some 0.05 m/s: from 50 mm in front of what was measured there to 10 mm
+// Along that stretch at some 0.05 m/s: from 50 mm in front of the measured surface to 10 mm
 // behind it. A place each millisecond.
 std::vector<Vec3> stroke_along(const DepthImage& image, const std::string& recording) {
   constexpr double hover = 0.05;

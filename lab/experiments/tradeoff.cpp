@@ -30,7 +30,7 @@ constexpr std::array speeds = {0.02, 0.05, 0.1, 0.2};  // [m/s]
 constexpr std::array windows = {1, 2, 4, 8, 16, 32};   // [frames] of the plain means
 
 // The reference: nothing but the mean height of the points within 30 mm over the last frames. It is
-// told that the surface is level.
+// given that the surface is level.
 class MeanOfFrames final : public LabMethod {
  public:
   MeanOfFrames(const Parameters& parameters, std::size_t window)
@@ -95,7 +95,7 @@ class Chorus final : public Method {
 
 struct Measured {
   std::vector<double> at_rest;  // [m] contact errors
-  std::vector<double> lag;      // [m] by time since the onset, summed over what was held
+  std::vector<double> lag;      // [m] by time since the onset, summed over the held cases
   int held = 0;
   int lost = 0;
 };

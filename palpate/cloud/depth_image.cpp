@@ -442,7 +442,7 @@ void DepthImage::gather(const Ball& ball, const SightCone* sight, std::size_t ma
 
 std::optional<double> DepthImage::seen_past(int u, int v, double z, double jump,
                                             int stride) const noexcept {
-  // Holes are looked across this far: a stereo camera sees nothing beside what is near.
+  // Largest hole that an edge search crosses: stereo cameras leave a shadow beside near objects.
   constexpr int widest_hole = 16;   // [px]
   constexpr double steepest = 2.0;  // [-] depth over width of a surface that goes on past a hole
   const Intrinsics& k = intrinsics();

@@ -103,8 +103,8 @@ class DepthImage final : public Cloud {
  private:
   void gather(const Ball& ball, const SightCone* sight, std::size_t max_points,
               Patch& patch) const noexcept;
-  /// Depth [m] at which what is seen beside pixel (u, v) begins, if that is a side's `jump` farther
-  /// than the pixel's own z.
+  /// Depth [m] of the background beside pixel (u, v), if it is farther than the pixel's own z by
+  /// more than a side's `jump`.
   [[nodiscard]] std::optional<double> seen_past(int u, int v, double z, double jump,
                                                 int stride) const noexcept;
 

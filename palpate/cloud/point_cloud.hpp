@@ -12,7 +12,7 @@
 
 namespace palpate {
 
-/// What else may be known of points; what is empty is not known. The kernel touches points alone.
+/// Points with further properties; an empty member is not known. Library methods use points alone.
 struct Surface {
   std::vector<Vec3> points{};                             ///< [m] world
   int columns = 0, rows = 0;                              ///< of points in the order of an image
@@ -31,7 +31,7 @@ class PointCloud final : public Cloud {
   /// @throws Error if `voxel` is not in 0.001 to 1 m.
   explicit PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoint = std::nullopt,
                       double voxel = 0.010);
-  /// The same, with what else is known kept beside it.
+  /// The same, keeping the further properties beside the points.
   /// @throws Error also if normals, image or triangles do not fit the points.
   explicit PointCloud(Surface surface, std::optional<Vec3> viewpoint = std::nullopt,
                       double voxel = 0.010);
@@ -39,7 +39,7 @@ class PointCloud final : public Cloud {
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
   void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
 
-  /// All points as they came, non-finite ones included, and what else is known of them; or null.
+  /// All points as given, non-finite ones included, with their further properties; or null.
   [[nodiscard]] const Surface* surface() const noexcept { return surface_.get(); }
 
   [[nodiscard]] std::size_t size() const noexcept { return x_.size(); }

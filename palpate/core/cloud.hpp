@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// All that is seen along the lines of sight through a place: a narrow cone from the viewpoint.
+/// A narrow cone of lines of sight from the viewpoint through a place.
 struct Beam {
   Vec3 through;   ///< [m] world: a place on its axis
   double radius;  ///< [m] of its cross-section there
@@ -17,10 +17,10 @@ struct Beam {
   Vec3 axis;
 };
 
-/// How the side of a body that no one sees is made up, in `Cloud::gather_sides`.
+/// Parameters for synthesising points on unseen side faces, in `Cloud::gather_sides`.
 struct Sides {
-  double jump;   ///< [m] a surface ends where what is seen beside it is farther by more than this
-  double depth;  ///< [m] how far its side reaches behind its edge
+  double jump;   ///< [m] a step in depth larger than this between neighbours is an edge
+  double depth;  ///< [m] how far the side face reaches behind the edge
 };
 
 /// Whatever can be touched: it can gather the points near a place into a patch.

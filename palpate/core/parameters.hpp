@@ -36,10 +36,10 @@ struct MotionParameters {
 
 /// What sightline tracking assumes. docs/method.md, "Sight".
 struct SightParameters {
-  double hidden_hold = 0.4;  ///< [s] a surface that something hides is felt in full for this long
-  double hidden_fade = 0.3;  ///< [s] and then less and less over this
-  double hardest_strike = 90.0;  ///< [m/s^2] what jumps harder than that is no touched surface
-  double side_depth = 0.1;  ///< [m] how far bodies go on behind the edges of what is seen of them
+  double hidden_hold = 0.4;      ///< [s] the force of an occluded surface is kept in full this long
+  double hidden_fade = 0.3;      ///< [s] and then fades out over this
+  double hardest_strike = 90.0;  ///< [m/s^2] a faster jump is taken for an occluder
+  double side_depth = 0.1;       ///< [m] depth of the side faces synthesised behind visible edges
 };
 
 /// Everything that can be set on a method. Defaults are the paper's Table 2 where it has them.

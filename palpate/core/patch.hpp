@@ -100,7 +100,7 @@ class Patch {
         size += block;
         continue;
       }
-      // Without a branch for each point: what is not kept is overwritten by the next.
+      // Without a branch for each point: a point that is not kept is overwritten by the next.
       for (std::size_t i = begin; i < begin + block; ++i) {
         points_->x[size] = x[i];
         points_->y[size] = y[i];

@@ -19,7 +19,7 @@ enum class ContactState {
 /// The field's word for a state, as in the trace: `free`, `contact`, `entrenchment`.
 const char* to_string(ContactState state) noexcept;
 
-/// What happened in a tick besides the result; bits of `Tick::flags`.
+/// Conditions that a tick met; bits of `Tick::flags`.
 enum TickFlag : std::uint32_t {
   /// The proxy had not converged after `step_budget` steps: it goes on in the next tick. Raise
   /// step_budget if this is regular and there is time.
@@ -57,7 +57,7 @@ struct TickFlagInfo {
 /// One row for each bit of `TickFlag`, in their order.
 std::span<const TickFlagInfo> tick_flag_table();
 
-/// One cycle of haptic rendering: what the hand did, where the proxy went, what the hand feels.
+/// The result of one cycle of haptic rendering: HIP in, proxy and force out.
 struct Tick {
   double t = 0.0;              ///< [s] as given
   Vec3 hip = Vec3::Zero();     ///< [m] world, as given

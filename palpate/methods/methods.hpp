@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// The method that everything uses unless it is told otherwise.
+/// The default method of library and programs.
 inline constexpr std::string_view default_method = "sight";
 
 /// The library's methods, in the order in which they are shown. Copy it to add methods.

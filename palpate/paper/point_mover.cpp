@@ -45,7 +45,8 @@ Movement PointMover::move(Proxy& proxy, const Cloud& cloud, const Vec3& hip) noe
   ProxyMovement now{.at = *proxy.at, .contact_normal = proxy.normal.value_or(Vec3::Zero())};
   if (stale_) {
     cover(proxy, cloud, now.at, hip - now.at, now.contact_normal);
-  } else if (now.at == seen_from_) {  // what the last movement saw here last is still good
+  } else if (now.at ==
+             seen_from_) {  // normal and state found here by the last movement are still valid
     now.looked = true;
     now.state = state_;
     now.normal = direction_;

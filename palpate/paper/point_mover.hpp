@@ -10,14 +10,14 @@
 
 namespace palpate {
 
-/// The proxy, and what it remembers of its contact from tick to tick.
+/// The proxy and the state of its contact from tick to tick.
 struct Proxy {
   std::optional<Vec3> at;      ///< [m] P_k, world; none before the first tick
   std::optional<Vec3> normal;  ///< [-] unit: the last n known while in contact
   bool touching = false;       ///< the state after the last tick's steps
 };
 
-/// Where a movement of the proxy has led.
+/// The result of a movement of the proxy.
 struct Movement {
   ContactState state = ContactState::free_motion;
   Vec3 normal = Vec3::Zero();      ///< [-] unit; zero where there is none
@@ -64,7 +64,7 @@ class PointMover {
   Patch patch_;
   bool stale_ = true;
 
-  // What the last look at the patch saw, and from where.
+  // Normal and state that the last movement ended with, and where.
   Vec3 seen_from_ = Vec3::Zero();
   ContactState state_ = ContactState::free_motion;
   Vec3 direction_ = Vec3::Zero();  // n' of (1)

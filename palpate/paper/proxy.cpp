@@ -10,7 +10,7 @@
 #include "palpate/core/vectorise.hpp"
 
 // Compiled as patch_loops.cpp is, so that (1) becomes vector code in the middle of the movement: a
-// step waits for the step before, and most of what it costs is that wait.
+// step waits for the step before, and that wait is most of its cost.
 
 namespace palpate {
 namespace {
@@ -29,8 +29,8 @@ constexpr double square(double x) {
   return x * x;
 }
 
-// Is x finite, whatever the compiler was told to take for granted? A cloud may hold points that are
-// no numbers.
+// Is x finite? A test of its bits, as this file is compiled with -ffinite-math-only and a cloud may
+// hold points that are NaN.
 constexpr bool is_number(double x) {
   constexpr std::uint64_t exponent = 0x7ff0'0000'0000'0000U;
   return (std::bit_cast<std::uint64_t>(x) & exponent) != exponent;

@@ -385,7 +385,7 @@ class Session::Impl {
       if (!status.done) return false;
       const std::string folder = status.folder.string();
       const auto counts = [](std::uint64_t ticks, std::uint64_t frames) {
-        return std::to_string(ticks) + " ticks and " + std::to_string(frames) + " frames";
+        return std::to_string(ticks) + " ticks, " + std::to_string(frames) + " frames";
       };
       if (!status.trouble.empty()) {
         recording_.failed = true;

@@ -180,7 +180,7 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
     hub_.left(*this);
   }
 
-  // Sends what is due next, if nothing is on its way.
+  // Sends the next message that is due, unless one is being sent.
   void pump() {
     if (!open_ || writing_) return;
     if (!queue_.empty()) {
@@ -440,7 +440,7 @@ class ViewerServer::Impl final : public Hub {
   asio::steady_timer timer_{context_};
   asio::steady_timer accept_again_{context_};
   std::vector<std::shared_ptr<PageSession>> pages_;
-  std::array<Camera, Patch::max_views> cameras_;  // what was shown last
+  std::array<Camera, Patch::max_views> cameras_;  // newest frames
   PageSession* hand_owner_ = nullptr;
   Clock::time_point hand_heard_;
   int beats_ = 0;

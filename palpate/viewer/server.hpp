@@ -10,18 +10,18 @@
 
 namespace palpate {
 
-/// What the pages show, and whom they talk to: the program's side.
+/// The program's side of the pages: gives them state and takes their commands.
 ///
 /// All functions are called on the server's thread, never by two at a time.
 class ViewerHost {
  public:
   virtual ~ViewerHost() = default;
 
-  /// What a page is told once, as the JSON object of docs/protocol.md.
+  /// The first message to a page, as the JSON object of docs/protocol.md.
   virtual std::string hello() = 0;
-  /// What pages are told a few times a second, likewise.
+  /// The state message that pages get a few times a second, likewise.
   virtual std::string state() = 0;
-  /// What happened since the last call; none if there was no tick.
+  /// Ticks since the last call; none if there was no tick.
   virtual std::optional<TickBatch> ticks() = 0;
   /// The one hand moved [m, world], or was let go.
   virtual void hand(const std::optional<Vec3>& target) = 0;

@@ -106,7 +106,10 @@ NumberedSettings Cycle::set_method(std::shared_ptr<Method> method) {
 // The proxy is all that another method is told of the one before. True if it is another.
 bool Cycle::adopt_change(const Change& change) noexcept {
   safety_.set_parameters(change.settings.safety);
-  workspace_.place(change.settings.placement);
+  if (workspace_.placement() != change.settings.placement) {
+    workspace_.place(change.settings.placement);
+    placement_changed_ = number_ > 0;
+  }
   parameters_ = change.settings.parameters;
   const bool switched = change.method.get() != method_;
   method_ = change.method.get();
@@ -152,7 +155,10 @@ void Cycle::run(const Wake& wake) noexcept {
 
   const Vec3 hip = workspace_.hip_in_world(hand);
   bool reseated = false;
-  if (const auto& frame = frames_.taken_last(); frame.cloud && safety_.stalls_at(t)) {
+  // Where the hand is in the scene has changed at once, and with it the force: the hand is
+  // disengaged, and the proxy starts anew on the free side.
+  const bool jumped = std::exchange(placement_changed_, false);
+  if (const auto& frame = frames_.taken_last(); frame.cloud && (safety_.stalls_at(t) || jumped)) {
     reseated = true;
     method_->seat(
         free_side(*frame.cloud, last_proxy_, last_normal_, parameters_.proxy.r_c(), patch_));
@@ -162,16 +168,17 @@ void Cycle::run(const Wake& wake) noexcept {
   last_normal_ = tick.normal;
 
   const Freshness::Age age = freshness_.at(t);
-  const SafetyOutput safe = safety_.run({.t = t,
-                                         .force = tick.force,
-                                         .hip = hip,
-                                         .proxy = tick.proxy,
-                                         .normal = tick.normal,
-                                         .position = hand.position,
-                                         .hand = hand.present && !hand.clutched && !is_faulty(hand),
-                                         .frame_age = age.age,
-                                         .frame_intervals = age.intervals,
-                                         .surface_velocity = tick.surface_velocity});
+  const SafetyOutput safe =
+      safety_.run({.t = t,
+                   .force = tick.force,
+                   .hip = hip,
+                   .proxy = tick.proxy,
+                   .normal = tick.normal,
+                   .position = hand.position,
+                   .hand = hand.present && !hand.clutched && !is_faulty(hand) && !jumped,
+                   .frame_age = age.age,
+                   .frame_intervals = age.intervals,
+                   .surface_velocity = tick.surface_velocity});
   device_.write(workspace_.force_in_device(safe.force), t);
 
   const ServoTick record{.tick = tick,

@@ -189,7 +189,8 @@ class Cycle {
   std::uint64_t number_ = 0;
   Vec3 last_proxy_ = Vec3::Zero();
   Vec3 last_normal_ = Vec3::Zero();
-  double last_stamp_ = 0.0;  // [s] of the frame in use
+  double last_stamp_ = 0.0;         // [s] of the frame in use
+  bool placement_changed_ = false;  // before this tick
   Freshness freshness_;
   std::atomic<std::uint64_t> fault_resets_{0};  // asked for
   std::uint64_t fault_resets_done_ = 0;

@@ -19,6 +19,11 @@ struct Placement {
   /// Button of the device that clutches while it is pressed, 0 to 31; none: only the device's own
   /// clutch does.
   std::optional<int> clutch_button = {};
+
+  bool operator==(const Placement& other) const {
+    return world_from_device.matrix() == other.world_from_device.matrix() &&
+           workspace_scale == other.workspace_scale && clutch_button == other.clutch_button;
+  }
 };
 
 /// @throws Error if the pose is not rigid and finite, the scale is not in 0.001 to 1000 or the
@@ -31,6 +36,7 @@ class Workspace {
   explicit Workspace(const Placement& placement = {}) : placement_(placement) {}
 
   void place(const Placement& placement) noexcept { placement_ = placement; }
+  [[nodiscard]] const Placement& placement() const noexcept { return placement_; }
 
   /// The HIP [m, world]. While the hand is clutched the HIP stays, and goes on from there after.
   /// A position that is not finite, or absurd, gives a HIP that is not finite and leaves no trace.

@@ -160,13 +160,14 @@ std::optional<Command> parse_command(std::string_view message) {
   if (!json.is_object() || json.size() != 1) return std::nullopt;
   const std::string& verb = json.begin().key();
   const nlohmann::json& what = json.begin().value();
-  if (verb == "set" || verb == "set_safety") {
+  if (verb == "set" || verb == "set_safety" || verb == "place") {
     if (!what.is_object() || what.size() != 2) return std::nullopt;
     const auto name = what.find("name");
     const auto value = what.find("value");
     if (name == what.end() || value == what.end() || !name->is_string() || !value->is_number())
       return std::nullopt;
     if (verb == "set") return SetParameter{name->get<std::string>(), value->get<double>()};
+    if (verb == "place") return SetPlacement{name->get<std::string>(), value->get<double>()};
     return SetSafetyParameter{name->get<std::string>(), value->get<double>()};
   }
   if (verb == "method" && what.is_string()) return SetMethod{what.get<std::string>()};

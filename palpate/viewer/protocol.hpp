@@ -98,6 +98,10 @@ struct SetSafetyParameter {
   std::string name;
   double value;
 };
+struct SetPlacement {
+  std::string name;
+  double value;
+};
 struct SetMethod {
   std::string name;
 };
@@ -105,7 +109,8 @@ struct SetRecording {
   bool on;
 };
 struct ResetHand {};
-using Command = std::variant<SetParameter, SetSafetyParameter, SetMethod, SetRecording, ResetHand>;
+using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod,
+                             SetRecording, ResetHand>;
 
 /// The longest message a page may send [bytes].
 constexpr std::size_t max_page_message = 1024;

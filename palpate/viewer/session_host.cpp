@@ -10,6 +10,7 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/devices/mouse_device.hpp"
+#include "palpate/servo/placement_table.hpp"
 
 namespace palpate {
 namespace {
@@ -65,6 +66,10 @@ std::string SessionHost::hello() {
   for (const SafetyParameterInfo& row : safety_parameter_table())
     safety.push_back(
         row_json(row.name, "", row.unit, row.default_value, row.min, row.max, row.meaning, ""));
+  json placement = json::array();
+  for (const PlacementInfo& row : placement_table())
+    placement.push_back(
+        row_json(row.name, "", row.unit, row.default_value, row.min, row.max, row.meaning, ""));
   for (const MethodInfo& row : session_->methods().entries())
     methods.push_back({{"name", row.name}, {"meaning", row.summary}});
   for (const TickFlagInfo& flag : tick_flag_table())
@@ -72,8 +77,10 @@ std::string SessionHost::hello() {
   for (std::size_t i = 0; i < safety_flag_count; ++i)
     safety_flags.push_back(
         {{"name", safety_flag_names()[i]}, {"meaning", safety_flag_meanings()[i]}});
-  return json{{"version", version_}, {"methods", methods}, {"parameters", parameters},
-              {"safety", safety},    {"flags", flags},     {"safety_flags", safety_flags}}
+  return json{{"version", version_},         {"methods", methods},
+              {"parameters", parameters},    {"safety", safety},
+              {"placement", placement},      {"flags", flags},
+              {"safety_flags", safety_flags}}
       .dump();
 }
 
@@ -86,6 +93,9 @@ std::string SessionHost::state() {
     parameters[std::string(row.name)] = row.get(state.settings.parameters);
   for (const SafetyParameterInfo& row : safety_parameter_table())
     safety[std::string(row.name)] = state.settings.safety.*row.member;
+  json placement;
+  for (const PlacementInfo& row : placement_table())
+    placement[std::string(row.name)] = row.get(state.settings.placement);
   for (const CameraStatus& status : state.cameras) {
     cameras.push_back({{"uri", status.uri},
                        {"kind", status.kind},
@@ -109,6 +119,7 @@ std::string SessionHost::state() {
   return json{{"method", state.settings.method},
               {"parameters", parameters},
               {"safety", safety},
+              {"placement", placement},
               {"cameras", cameras},
               {"device",
                {{"uri", device.uri},
@@ -140,6 +151,8 @@ void SessionHost::command(const Command& command) {
     set_parameter(settings.parameters, set->name, set->value);
   } else if (const auto* limit = std::get_if<SetSafetyParameter>(&command)) {
     set_parameter(settings.safety, limit->name, limit->value);
+  } else if (const auto* place = std::get_if<SetPlacement>(&command)) {
+    set_placement(settings.placement, place->name, place->value);
   } else if (const auto* method = std::get_if<SetMethod>(&command)) {
     settings.method = method->name;
   } else if (const auto* record = std::get_if<SetRecording>(&command)) {

@@ -39,6 +39,7 @@ const view = makeView();
 const panel = new Panel({
   setParameter: (name, value) => connection.ask({ set: { name, value } }),
   setLimit: (name, value) => connection.ask({ set_safety: { name, value } }),
+  place: (name, value) => connection.ask({ place: { name, value } }),
   setMethod: (name) => connection.ask({ method: name }),
 });
 

@@ -131,6 +131,7 @@ function symbol(text: string): HTMLElement {
 export interface PanelActions {
   setParameter(name: string, value: number): void;
   setLimit(name: string, value: number): void;
+  place(name: string, value: number): void;
   setMethod(name: string): void;
 }
 
@@ -139,6 +140,7 @@ export class Panel {
   private readonly method = get<HTMLSelectElement>("method-name");
   private rows = new Map<string, Row>();
   private limits = new Map<string, Row>();
+  private placement = new Map<string, Row>();
   private hello: Hello | null = null;
   private safetyNow = 0;
   private safetySeen = 0;
@@ -188,6 +190,7 @@ export class Panel {
     };
     this.rows = build("parameters", hello.parameters, this.actions.setParameter);
     this.limits = build("limits", hello.safety, this.actions.setLimit);
+    this.placement = build("placement", hello.placement, this.actions.place);
     const tally = (id: string, flags: Hello["flags"]) =>
       get(id).replaceChildren(
         ...flags.map(({ name, meaning }) =>
@@ -214,6 +217,7 @@ export class Panel {
       this.hello?.methods.find(({ name }) => name === state.method)?.meaning ?? "";
     for (const [name, row] of this.rows) row.show(state.parameters[name] ?? Number.NaN);
     for (const [name, row] of this.limits) row.show(state.safety[name] ?? Number.NaN);
+    for (const [name, row] of this.placement) row.show(state.placement[name] ?? Number.NaN);
     const count = (id: string, counts: readonly number[]) =>
       [...get(id).children].forEach((item, i) => {
         item.lastElementChild!.textContent = (counts[i] ?? 0).toLocaleString("en");
@@ -236,7 +240,10 @@ export class Panel {
         state.cameras.length > 1 ? `Camera ${i + 1}` : "Camera",
         `${uri} · ${kind}${how === "live" ? `, ${rate.toFixed(1)} Hz` : ` · ${how}`}`,
       ]),
-      ["Hand", `${state.device.uri} · ${state.device.kind}`],
+      [
+        "Hand",
+        `${state.device.uri} · ${state.device.kind}${state.device.fault ? ` · ${state.device.fault}` : ""}`,
+      ],
       ["Servo", `${servo.rate.toLocaleString("en")} Hz · ${servo.realtime}`],
       ["Ticks", servo.ticks.toLocaleString("en")],
       ["Late ticks", servo.late_ticks.toLocaleString("en")],

@@ -211,6 +211,8 @@ export interface Hello {
   methods: { name: string; meaning: string }[];
   parameters: ParameterRow[];
   safety: ParameterRow[];
+  /** where the device's workspace lies in the scene */
+  placement: ParameterRow[];
   /** names of the bits, in their order */
   flags: { name: string; meaning: string }[];
   safety_flags: { name: string; meaning: string }[];
@@ -231,10 +233,11 @@ export interface State {
   /** values of the rows, by name */
   parameters: Record<string, number>;
   safety: Record<string, number>;
+  placement: Record<string, number>;
   hand: "you" | "other" | "free";
   viewers: number;
   cameras: CameraState[];
-  device: { uri: string; kind: string; takes_hand: boolean };
+  device: { uri: string; kind: string; takes_hand: boolean; fault: string };
   servo: {
     /** [Hz] */
     rate: number;
@@ -259,6 +262,7 @@ export interface State {
 export type Command =
   | { set: { name: string; value: number } }
   | { set_safety: { name: string; value: number } }
+  | { place: { name: string; value: number } }
   | { method: string }
   | { record: boolean }
   | { reset: true };

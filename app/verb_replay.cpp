@@ -19,29 +19,47 @@ struct ReplayOptions {
   bool json = false;
 };
 
+std::string text_of(const ReplayDifferences& differences, std::uint64_t ticks) {
+  if (!differences.first) return "identical, bit for bit";
+  const ReplayDifference& first = *differences.first;
+  return fmt::format(
+      "{} of {} ticks differ, forces by up to {:.3g} N; first tick {}: {} was {}, and is {} now",
+      differences.ticks, ticks, differences.largest_force, first.tick, first.field, first.recorded,
+      first.replayed);
+}
+
 std::string text_of(const ReplayReport& report) {
-  std::string text;
-  if (report.different_ticks == 0) {
-    text = fmt::format("{} ticks and {} frames replayed: every force is the same, bit for bit\n",
-                       report.ticks, report.frames);
-  } else {
-    text = fmt::format("{} of {} ticks differ, first tick {} in its {}; forces by up to {:.3g} N\n",
-                       report.different_ticks, report.ticks, *report.first_difference, report.field,
-                       report.largest_difference);
-  }
+  std::string text =
+      fmt::format("{} ticks and {} frames replayed\nasked: {}\nsent:  {}\n", report.ticks,
+                  report.frames, text_of(report.asked, report.ticks),
+                  report.sent_unchecked.empty() ? text_of(report.sent, report.ticks)
+                                                : "not checked: " + report.sent_unchecked);
   if (!report.broken_off.empty()) text += "the replay broke off: " + report.broken_off + "\n";
   return text + app::text_of(report.check) + "\n";
+}
+
+nlohmann::ordered_json json_of(const ReplayDifferences& differences) {
+  nlohmann::ordered_json object = {{"identical", !differences.first},
+                                   {"different_ticks", differences.ticks}};
+  if (differences.first) {
+    object["largest_force_difference"] = differences.largest_force;
+    object["first_difference"] = {{"tick", differences.first->tick},
+                                  {"field", differences.first->field},
+                                  {"recorded", differences.first->recorded},
+                                  {"replayed", differences.first->replayed}};
+  }
+  return object;
 }
 
 std::string json_of(const ReplayReport& report) {
   nlohmann::ordered_json object = {{"identical", report.identical()},
                                    {"ticks", report.ticks},
                                    {"frames", report.frames},
-                                   {"different_ticks", report.different_ticks},
-                                   {"largest_difference", report.largest_difference}};
-  if (report.first_difference) {
-    object["first_difference"] = *report.first_difference;
-    object["field"] = report.field;
+                                   {"asked", json_of(report.asked)}};
+  if (report.sent_unchecked.empty()) {
+    object["sent"] = json_of(report.sent);
+  } else {
+    object["sent"] = {{"not_checked", report.sent_unchecked}};
   }
   if (!report.broken_off.empty()) object["broken_off"] = report.broken_off;
   object["checksums"] = app::text_of(report.check);

@@ -22,9 +22,9 @@ unsigned packers_of(const RecorderOptions& options) {
 }  // namespace
 
 Recorder::Recorder(const std::filesystem::path& folder, const SessionInfo& info,
-                   TickRing<ServoTick>::Reader ticks, std::function<void()> renew,
+                   const CycleReader& cycle, std::function<void()> renew,
                    const RecorderOptions& options)
-    : options_(options), ring_(ticks), renew_(std::move(renew)), begun_(!renew_), info_(info) {
+    : options_(options), cycle_(cycle), renew_(std::move(renew)), begun_(!renew_), info_(info) {
   writer_.emplace(folder, info, monotonic_now(), std::nullopt, options.commit_interval);
   status_.folder = writer_->folder();
   threads_.emplace_back([this] { collect(); });
@@ -122,6 +122,7 @@ void Recorder::fail(const std::string& trouble) {
   entries_.clear();
   to_pack_.clear();
   collected_.clear();
+  adopted_.clear();
   wake_collector_.notify_all();
   wake_packers_.notify_all();
   wake_writer_.notify_all();
@@ -158,6 +159,19 @@ void Recorder::collect() {
   wake_writer_.notify_one();
 }
 
+// The first tick of a recording that begins in mid-session.
+void Recorder::begin(const ServoTick& first) {
+  begun_ = true;
+  CycleState state;
+  bool found = false;
+  while (!found && cycle_.states.try_pop(state))
+    found = state.numbers[0] == static_cast<double>(first.number);
+  const std::lock_guard lock(mutex_);
+  seat_ = proxy_;
+  seated_at_ = first.tick.t;
+  if (found) state_ = state;
+}
+
 void Recorder::collect_ticks() {
   constexpr std::size_t most_at_once = 4096;
   std::vector<ServoTick> ticks;
@@ -165,26 +179,31 @@ void Recorder::collect_ticks() {
   while (more) {
     ticks.clear();
     for (ServoTick tick{}; ticks.size() < most_at_once;) {
-      more = ring_.try_pop(tick);
+      more = cycle_.ticks.try_pop(tick);
       if (!more) break;
       if (!begun_) {
-        const bool first = (tick.hand & method_switched) != 0;
-        if (!first) {
+        if ((tick.hand & method_switched) == 0) {
           proxy_ = tick.tick.proxy;
+          frame_before_ = tick.frame_number;
           // Only now, so that the tick before the first is known.
           if (renew_) std::exchange(renew_, nullptr)();
           continue;
         }
-        begun_ = true;
-        const std::lock_guard lock(mutex_);
-        seat_ = proxy_;
-        seated_at_ = tick.tick.t;
+        begin(tick);
       }
       ticks.push_back(tick);
     }
+    // After the ticks, so that none lacks its frame.
+    for (AdoptedFrame frame; cycle_.frames.try_pop(frame);) frames_after_.push_back(frame);
+    std::erase_if(frames_after_,
+                  [this](const AdoptedFrame& frame) { return frame.number <= frame_before_; });
     const std::lock_guard lock(mutex_);
     if (failed_) return;
-    if (begun_) status_.lost_ticks = ring_.lost() + overflowed_;
+    if (begun_) {
+      adopted_.insert(adopted_.end(), frames_after_.begin(), frames_after_.end());
+      frames_after_.clear();
+    }
+    if (begun_) status_.lost_ticks = cycle_.ticks.lost() + overflowed_;
     for (const ServoTick& tick : ticks) {
       if (collected_.size() < options_.most_ticks) {
         collected_.push_back(tick);
@@ -308,9 +327,13 @@ void Recorder::write_entries() {
 bool Recorder::write_ticks() {
   constexpr std::size_t most_at_once = 4096;
   std::vector<ServoTick> ticks;
+  std::deque<AdoptedFrame> adopted;
   std::optional<double> seated_at;
+  std::optional<CycleState> state;
   {
     const std::lock_guard lock(mutex_);
+    adopted.swap(adopted_);
+    state = std::exchange(state_, std::nullopt);
     seated_at = std::exchange(seated_at_, std::nullopt);
     if (seated_at) info_.seat = seat_;
     while (!collected_.empty() && ticks.size() < most_at_once) {
@@ -323,6 +346,8 @@ bool Recorder::write_ticks() {
     }
   }
   if (seated_at) writer_->info(info_, *seated_at);
+  if (state) writer_->state(*state, seated_at.value_or(0.0));
+  for (const AdoptedFrame& frame : adopted) writer_->adopted(frame);
   for (const ServoTick& tick : ticks) writer_->tick(tick);
   const std::lock_guard lock(mutex_);
   status_.ticks = writer_->ticks();

@@ -53,14 +53,13 @@ class Recorder {
 
   /// Starts.
   /// @param folder  of the bag; must not be there yet
-  /// @param ticks   a reader of the loop that nobody else reads; the ring must outlive this
+  /// @param cycle   a reader of the loop that nobody else reads; the loop must outlive this
   /// @param renew   none if the loop has not started. Else asks the loop for a new renderer
   ///                (Cycle::renew), which the first tick recorded has; called once, on a thread of
   ///                this.
   /// @throws Error if the folder is there or cannot be made.
-  Recorder(const std::filesystem::path& folder, const SessionInfo& info,
-           TickRing<ServoTick>::Reader ticks, std::function<void()> renew = {},
-           const RecorderOptions& options = {});
+  Recorder(const std::filesystem::path& folder, const SessionInfo& info, const CycleReader& cycle,
+           std::function<void()> renew = {}, const RecorderOptions& options = {});
   /// Stops, and waits until it is done.
   ~Recorder();
   Recorder(const Recorder&) = delete;
@@ -107,6 +106,7 @@ class Recorder {
   void pack();     // each thread that compresses
   void write();    // the thread that writes the bag
   void collect_ticks();
+  void begin(const ServoTick& first);
   void write_entries();
   bool write_ticks();
   [[nodiscard]] bool has_ready_entry() const;
@@ -118,11 +118,13 @@ class Recorder {
   RecorderOptions options_;
 
   // The collecting thread's.
-  TickRing<ServoTick>::Reader ring_;
+  CycleReader cycle_;
   std::function<void()> renew_;
   bool begun_ = false;
-  std::optional<Vec3> proxy_;     // [m] in the tick before the first recorded one
-  std::uint64_t overflowed_ = 0;  // ticks that found no room in collected_
+  std::optional<Vec3> proxy_;               // [m] in the tick before the first recorded one
+  std::uint64_t frame_before_ = 0;          // in use in that tick
+  std::vector<AdoptedFrame> frames_after_;  // that one
+  std::uint64_t overflowed_ = 0;            // ticks that found no room in collected_
 
   // The writing thread's.
   SessionInfo info_;
@@ -137,10 +139,12 @@ class Recorder {
   std::deque<Entry> entries_;                         // to be written, in this order
   std::deque<std::shared_ptr<PutFrame>> to_pack_;     // of these, what no thread has taken yet
   std::deque<ServoTick> collected_;                   // ticks to be written
+  std::deque<AdoptedFrame> adopted_;                  // to be written before them
   std::vector<std::shared_ptr<const Cloud>> newest_;  // of each camera, as handed over
   std::uint64_t entries_handed_ = 0;
   std::optional<double> seated_at_;  // [s] when the seat in info_ has to be written anew
   std::optional<Vec3> seat_;
+  std::optional<CycleState> state_;  // at seated_at_
   Status status_;
   bool stopping_ = false, collecting_ = true, failed_ = false;
   std::uint64_t flushes_asked_ = 0, flushes_collected_ = 0, flushes_done_ = 0, flush_entries_ = 0;

@@ -2,41 +2,170 @@
 #include "palpate/record/replay.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
-#include <cmath>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <utility>
 
 #include "palpate/core/error.hpp"
-#include "palpate/methods/methods.hpp"
 #include "palpate/servo/free_side.hpp"
 
 namespace palpate {
 namespace {
 
-bool same(double a, double b) {
-  return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+// The columns of a tick that follow from what went into the cycle. A recording that begins in
+// mid-session counts its frames and settings differently.
+constexpr std::array<std::string_view, 6> sent_columns{"force",     "gain",   "frame_stamp",
+                                                       "frame_age", "safety", "hand"};
+constexpr std::array<std::string_view, 8> asked_columns{
+    "hip", "proxy", "normal", "rendered_force", "state", "steps", "surface_velocity", "flags"};
+
+// Does `columns` name the column, or the vector that it is an axis of?
+bool names(std::span<const std::string_view> columns, std::string_view column) {
+  if (column.ends_with("_x") || column.ends_with("_y") || column.ends_with("_z"))
+    column.remove_suffix(2);
+  return std::find(columns.begin(), columns.end(), column) != columns.end();
 }
 
-bool same(const Vec3& a, const Vec3& b) {
-  return same(a.x(), b.x()) && same(a.y(), b.y()) && same(a.z(), b.z());
+// Compares the columns that are named.
+void compare(const ServoTick& recorded, const ServoTick& again,
+             std::span<const std::string_view> columns, const Vec3& force_difference,
+             ReplayDifferences& differences) {
+  const std::vector<double> a = row_of(recorded);
+  const std::vector<double> b = row_of(again);
+  bool different = false;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const std::string& column = tick_columns()[i];
+    if (std::bit_cast<std::uint64_t>(a[i]) == std::bit_cast<std::uint64_t>(b[i]) ||
+        !names(columns, column))
+      continue;
+    different = true;
+    if (!differences.first)
+      differences.first = ReplayDifference{recorded.number, column, a[i], b[i]};
+  }
+  if (!different) return;
+  ++differences.ticks;
+  differences.largest_force = std::max(differences.largest_force, force_difference.norm());
 }
 
-// The field in which two ticks differ; empty if there is none. A recording that begins in the midst
-// of a session has other numbers for its frames.
-std::string difference(const Tick& a, const Tick& b) {
-  if (!same(a.force, b.force)) return "force";
-  if (!same(a.proxy, b.proxy)) return "proxy";
-  if (!same(a.normal, b.normal)) return "normal";
-  if (!same(a.surface_velocity, b.surface_velocity)) return "surface_velocity";
-  if (a.state != b.state) return "state";
-  if (a.steps != b.steps) return "steps";
-  if (a.flags != b.flags) return "flags";
-  return {};
-}
-
-// The method of a session, given again what it was given then.
+// A session's ticks made again.
 class Rerun {
  public:
-  Rerun(SessionReader& session, const ServoTick& first, const MethodRegistry& methods)
+  virtual ~Rerun() = default;
+  // The next tick. @throws Error if the recording lacks what it needs
+  virtual ServoTick tick(const ServoTick& recorded) = 0;
+  [[nodiscard]] virtual std::uint64_t frames() const = 0;
+};
+
+// The device of a replay: its hand is where it was then.
+class ReplayDevice final : public Device {
+ public:
+  explicit ReplayDevice(const DeviceLimits& limits)
+      : info_{.uri = "replay:", .kind = "replay", .limits = limits} {}
+
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  HandState read(double /*t*/) noexcept override { return hand_; }
+  void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
+
+  void set_hand(const ServoTick& recorded) {
+    hand_ = {.position = recorded.position,
+             .present = (recorded.hand & hand_present) != 0,
+             .clutched = (recorded.hand & hand_clutched) != 0,
+             .fault = fault_of(recorded.hand)};
+  }
+
+ private:
+  DeviceInfo info_;
+  HandState hand_;
+};
+
+// The very cycle of a live session, with all that went into it then.
+class CycleRerun final : public Rerun {
+ public:
+  CycleRerun(SessionReader& session, const ServoTick& first, const MethodRegistry& methods)
+      : session_(session),
+        methods_(methods),
+        device_(session.info().limits.value()),
+        settings_(session.settings(first.settings_number)),
+        settings_number_(first.settings_number),
+        cycle_(make_method(settings_.method, settings_.parameters, methods_), device_, settings_),
+        ticks_(cycle_.reader()) {
+    if (!session.state()) return;
+    const bool in_use_before =
+        first.frame_number > 0 && !session.adopted().contains(first.frame_number);
+    if (!in_use_before) {
+      cycle_.restore(*session.state(), nullptr, 0.0);
+      return;
+    }
+    const SessionReader::PutFrame& frame = put_frame(first.frame_number);
+    cycle_.restore(*session.state(), session.cloud(frame), frame.stamp);
+    frame_number_ = first.frame_number;
+    ++frames_;
+  }
+
+  ServoTick tick(const ServoTick& recorded) override {
+    const bool new_settings = recorded.settings_number != settings_number_;
+    if (new_settings) {
+      settings_number_ = recorded.settings_number;
+      settings_ = session_.settings(settings_number_);
+    }
+    if ((recorded.hand & method_switched) != 0) {
+      cycle_.set_method(make_method(settings_.method, settings_.parameters, methods_), settings_);
+    } else if (new_settings) {
+      cycle_.set_settings(settings_);
+    }
+    if ((recorded.hand & faults_reset) != 0) cycle_.reset_faults();
+    if (recorded.frame_number != frame_number_) adopt(recorded.frame_number);
+    device_.set_hand(recorded);
+    cycle_.run({.t = recorded.tick.t,
+                .wake_up_ns = recorded.wake_up_ns,
+                .previous_compute_ns = recorded.previous_compute_ns});
+    ServoTick again{};
+    ticks_.try_pop(again);
+    return again;
+  }
+
+  [[nodiscard]] std::uint64_t frames() const override { return frames_; }
+
+ private:
+  const SessionReader::PutFrame& put_frame(std::uint64_t number) const {
+    const auto frame = session_.frames().find(number);
+    if (frame == session_.frames().end())
+      throw Error("recording", "lacks frame " + std::to_string(number),
+                  "the disk was too slow, or the recording is damaged");
+    return frame->second;
+  }
+
+  void adopt(std::uint64_t number) {
+    const auto adopted = session_.adopted().find(number);
+    if (adopted == session_.adopted().end())
+      throw Error("recording", "lacks how frame " + std::to_string(number) + " was handed over",
+                  "it may be damaged");
+    const AdoptedFrame& frame = adopted->second;
+    cycle_.put_frame(session_.cloud(put_frame(number)), frame.stamp,
+                     std::span(frame.cameras.data(), frame.camera_count), frame.put_at);
+    frame_number_ = number;
+    ++frames_;
+  }
+
+  SessionReader& session_;
+  const MethodRegistry& methods_;
+  ReplayDevice device_;
+  ServoSettings settings_;
+  std::uint64_t settings_number_;
+  Cycle cycle_;
+  TickRing<ServoTick>::Reader ticks_;
+  std::uint64_t frame_number_ = 0;
+  std::uint64_t frames_ = 0;
+};
+
+// The method of a session alone, given again what it was given then: for recordings that lack what
+// the rest of the cycle needs.
+class MethodRerun final : public Rerun {
+ public:
+  MethodRerun(SessionReader& session, const ServoTick& first, const MethodRegistry& methods)
       : session_(session),
         methods_(methods),
         settings_number_(first.settings_number),
@@ -47,7 +176,7 @@ class Rerun {
     method_->seat(last_proxy_);
   }
 
-  Tick tick(const ServoTick& recorded) {
+  ServoTick tick(const ServoTick& recorded) override {
     bool switched = (recorded.hand & method_switched) != 0 && ticks_ > 0;
     if (recorded.settings_number != settings_number_) {
       const std::string before = settings_.method;
@@ -68,13 +197,14 @@ class Rerun {
       method_->seat(
           free_side(*cloud_, last_proxy_, last_normal_, settings_.parameters.proxy.r_c(), patch_));
     }
-    Tick tick = method_->tick(recorded.tick.hip, recorded.tick.t);
-    last_proxy_ = tick.proxy;
-    last_normal_ = tick.normal;
-    return tick;
+    ServoTick again = recorded;
+    again.tick = method_->tick(recorded.tick.hip, recorded.tick.t);
+    last_proxy_ = again.tick.proxy;
+    last_normal_ = again.tick.normal;
+    return again;
   }
 
-  [[nodiscard]] std::uint64_t frames() const { return frames_; }
+  [[nodiscard]] std::uint64_t frames() const override { return frames_; }
 
  private:
   void adopt(std::uint64_t number) {
@@ -111,6 +241,23 @@ class Rerun {
   std::uint64_t frames_ = 0;
 };
 
+// Why the cycle cannot be run again; empty if it can.
+std::string lacks_for_cycle(const SessionReader& session, const ServoTick& first) {
+  if (!session.info().limits)
+    return "the recording has no device limits: it is older than these, or of a session "
+           "without a safety chain";
+  if (first.number > 0 && !session.state())
+    return "the recording begins in mid-session, without a state of this version's safety chain";
+  return {};
+}
+
+std::unique_ptr<Rerun> open_rerun(SessionReader& session, const ServoTick& first,
+                                  const MethodRegistry& methods, ReplayReport& report) {
+  report.sent_unchecked = lacks_for_cycle(session, first);
+  if (report.sent_unchecked.empty()) return std::make_unique<CycleRerun>(session, first, methods);
+  return std::make_unique<MethodRerun>(session, first, methods);
+}
+
 }  // namespace
 
 ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress,
@@ -123,7 +270,7 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
     return report;
   }
   std::optional<ServoTick> last;
-  std::optional<Rerun> rerun;
+  std::unique_ptr<Rerun> rerun;
   for (std::size_t i = 0; i < session.ticks(); ++i) {
     try {
       const ServoTick recorded = session.tick(i);
@@ -132,18 +279,11 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
                             std::to_string(recorded.number - 1) + " are missing";
         break;
       }
-      if (!rerun) rerun.emplace(session, recorded, methods);
-      const Tick again = rerun->tick(recorded);
-      const std::string field = difference(again, recorded.tick);
-      if (!field.empty()) {
-        ++report.different_ticks;
-        if (!report.first_difference) {
-          report.first_difference = recorded.number;
-          report.field = field;
-        }
-        const double distance = (again.force - recorded.tick.force).norm();
-        report.largest_difference = std::max(report.largest_difference, distance);
-      }
+      if (!rerun) rerun = open_rerun(session, recorded, methods, report);
+      const ServoTick again = rerun->tick(recorded);
+      compare(recorded, again, asked_columns, again.tick.force - recorded.tick.force, report.asked);
+      if (report.sent_unchecked.empty())
+        compare(recorded, again, sent_columns, again.force - recorded.force, report.sent);
       last = recorded;
     } catch (const Error& error) {
       report.broken_off = last ? "after tick " + std::to_string(last->number) + ": " : "";

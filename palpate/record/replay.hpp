@@ -11,32 +11,50 @@
 
 namespace palpate {
 
+/// Where a replay came to another number than the recording.
+struct ReplayDifference {
+  std::uint64_t tick = 0;  ///< its number
+  std::string field;       ///< as in tick_columns()
+  double recorded = 0.0, replayed = 0.0;
+};
+
+/// Ticks of which some fields differ in a bit.
+struct ReplayDifferences {
+  std::uint64_t ticks = 0;
+  std::optional<ReplayDifference> first{};
+  double largest_force = 0.0;  ///< [N] between recorded and replayed force
+};
+
 /// What a replay found.
 struct ReplayReport {
-  std::uint64_t ticks = 0;            ///< replayed
-  std::uint64_t frames = 0;           ///< adopted
-  std::uint64_t different_ticks = 0;  ///< in which a bit differs
-  /// The first of those: its number, and the field that differs.
-  std::optional<std::uint64_t> first_difference;
-  std::string field;
-  double largest_difference = 0.0;  ///< [N] between two forces
+  std::uint64_t ticks = 0;   ///< replayed
+  std::uint64_t frames = 0;  ///< adopted
+  /// What the method made: HIP, proxy, normal, the force that it asked for, state, steps, surface
+  /// velocity, flags.
+  ReplayDifferences asked{};
+  /// What the cycle made of it: the force that was sent, gain, safety flags, the frame's age and
+  /// stamp, flags of the hand.
+  ReplayDifferences sent{};
+  /// Why `sent` could not be compared, such as a recording that is too old; empty if it was.
+  std::string sent_unchecked;
   /// Why it could not go on to the end, such as ticks that the recorder lost; empty if it could.
   std::string broken_off;
   /// What the checksums say of all messages, also of those that a replay does not need.
   BagCheck check{};
 
+  /// Is everything that could be compared the same?
   [[nodiscard]] bool identical() const {
-    return different_ticks == 0 && broken_off.empty() && check.damage.empty();
+    return asked.ticks == 0 && sent.ticks == 0 && broken_off.empty() && check.damage.empty();
   }
 };
 
-/// Runs the method anew on a session's frames, HIPs and settings, each before the tick that it
-/// was used in, and compares each tick with the recorded one, bit for bit: the proxy, the normal,
-/// the force before the safety chain, the state and the flags.
+/// Runs the loop's cycle anew, method and safety chain, on what went into it: a session's frames,
+/// hands, settings and wake-up times. Compares each tick with the recorded one, bit for bit.
+///
+/// Of recordings that lack what the chain needs, the method alone is run and compared. Where a
+/// recording is damaged or names a method that is not there, the replay ends, as the report says.
 /// @param progress  called now and then with the number of ticks done; may be empty
 /// @param methods   those that the session may name
-/// A recording that is damaged in its midst, or names a method that is not there, ends the replay
-/// there, as the report says.
 ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress = {},
                     const MethodRegistry& methods = standard_methods());
 

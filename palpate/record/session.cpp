@@ -151,6 +151,30 @@ ServoTick tick_of(std::span<const double> row, const std::string& name) {
   return tick;
 }
 
+std::vector<double> row_of(const AdoptedFrame& frame) {
+  std::vector<double> row{static_cast<double>(frame.number), frame.stamp, frame.put_at};
+  for (std::size_t i = 0; i < frame.camera_count; ++i)
+    row.insert(row.end(), {static_cast<double>(frame.cameras[i].camera), frame.cameras[i].stamp});
+  return row;
+}
+
+AdoptedFrame adopted_of(std::span<const double> row, const std::string& name) {
+  constexpr std::size_t fixed = 3;
+  constexpr double most = 9007199254740992.0;  // 2^53
+  const auto whole = [&](double value) {
+    if (!(value >= 0.0 && value <= most && value == std::floor(value)))
+      throw Error(name, "has a number of " + std::to_string(value), "it may be damaged");
+    return static_cast<std::uint64_t>(value);
+  };
+  if (row.size() < fixed || row.size() % 2 != fixed % 2 ||
+      row.size() > fixed + 2 * Freshness::max_cameras)
+    throw Error(name, "has " + std::to_string(row.size()) + " numbers", "it may be damaged");
+  AdoptedFrame frame{.number = whole(row[0]), .stamp = row[1], .put_at = row[2]};
+  for (std::size_t i = fixed; i < row.size(); i += 2)
+    frame.cameras[frame.camera_count++] = {.camera = whole(row[i]), .stamp = row[i + 1]};
+  return frame;
+}
+
 std::string to_json(const SessionInfo& info) {
   json object = {{"palpate", info.version},
                  {"kind", info.kind == SessionInfo::Kind::live ? "live" : "headless"},
@@ -159,6 +183,9 @@ std::string to_json(const SessionInfo& info) {
                  {"epoch_ns", info.epoch},
                  {"tick_columns", tick_columns()}};
   if (info.seat) object["seat"] = numbers(*info.seat);
+  if (info.limits)
+    object["device_limits"] = {{"max_force", info.limits->max_force},
+                               {"continuous_force", info.limits->continuous_force}};
   return object.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -172,6 +199,11 @@ SessionInfo session_from_json(const std::string& text, const std::string& name) 
     info.device = object.at("device").get<std::string>();
     info.epoch = object.at("epoch_ns").get<std::int64_t>();
     if (object.contains("seat")) info.seat = vec3_of(object.at("seat"));
+    if (object.contains("device_limits")) {
+      const json& limits = object.at("device_limits");
+      info.limits = DeviceLimits{.max_force = limits.at("max_force").get<double>(),
+                                 .continuous_force = limits.at("continuous_force").get<double>()};
+    }
     return info;
   });
 }

@@ -25,6 +25,8 @@ struct SessionInfo {
   std::string device{};                ///< URI
   std::int64_t epoch = 0;              ///< [ns] since 1970: when the session's clock was 0
   std::optional<Vec3> seat{};          ///< [m] where the proxy was put before the first tick
+  /// Of the device; none in recordings of which a replay cannot run the safety chain.
+  std::optional<DeviceLimits> limits{};
 };
 
 /// The topics of a session besides its cameras' (CameraTopics).
@@ -32,6 +34,8 @@ namespace session_topic {
 constexpr std::string_view session = "/palpate/session";    ///< String, JSON: SessionInfo
 constexpr std::string_view settings = "/palpate/settings";  ///< String, JSON: each ServoSettings
 constexpr std::string_view frame = "/palpate/frame";        ///< Float64MultiArray: each frame put
+constexpr std::string_view adopted = "/palpate/adopted";    ///< Float64MultiArray: AdoptedFrame
+constexpr std::string_view state = "/palpate/state";        ///< Float64MultiArray: CycleState
 constexpr std::string_view tick = "/palpate/tick";          ///< Float64MultiArray: each ServoTick
 constexpr std::string_view hip = "/palpate/hip";            ///< PoseStamped, of each tick
 constexpr std::string_view proxy = "/palpate/proxy";        ///< PoseStamped
@@ -46,6 +50,11 @@ const std::vector<std::string>& tick_columns();
 std::vector<double> row_of(const ServoTick& tick);
 /// @throws Error naming `name` if the numbers are not as many as tick_columns().
 ServoTick tick_of(std::span<const double> row, const std::string& name);
+
+/// number, stamp, put_at, and for each camera its number and when its frame was captured.
+std::vector<double> row_of(const AdoptedFrame& frame);
+/// @throws Error naming `name` if it is damaged.
+AdoptedFrame adopted_of(std::span<const double> row, const std::string& name);
 
 std::string to_json(const SessionInfo& info);
 /// @throws Error naming `name` if it is damaged.

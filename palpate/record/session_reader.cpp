@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/record/session_reader.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -50,6 +51,21 @@ SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
         frame.stamp = row[1];
         for (std::size_t i = 2; i < row.size(); i += 2)
           frame.parts.emplace_back(whole(row[i], name), whole(row[i + 1], name));
+      });
+  read_all<ros::Float64MultiArray>(session_topic::adopted,
+                                   [&](const auto& message, const auto& name) {
+                                     const AdoptedFrame frame = adopted_of(message.data, name);
+                                     adopted_[frame.number] = frame;
+                                   });
+  read_all<ros::Float64MultiArray>(
+      session_topic::state, [&](const auto& message, const auto& /*name*/) {
+        std::string names;
+        for (const std::string& each : cycle_state_names())
+          names += (names.empty() ? "" : ",") + each;
+        const std::vector<double>& row = message.data;
+        if (message.label != names || row.size() > CycleState::capacity) return;
+        state_.emplace().count = row.size();
+        std::copy(row.begin(), row.end(), state_->numbers.begin());
       });
   ticks_ = bag_.places(session_topic::tick);
 }

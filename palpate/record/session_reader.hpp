@@ -39,6 +39,11 @@ class SessionReader {
   };
   /// By their number.
   [[nodiscard]] const std::map<std::uint64_t, PutFrame>& frames() const { return frames_; }
+  /// How frames were taken into use, by their number; none in old recordings.
+  [[nodiscard]] const std::map<std::uint64_t, AdoptedFrame>& adopted() const { return adopted_; }
+  /// What the cycle remembered before the first tick; none of a session from its start, of an old
+  /// recording, or of another version's state.
+  [[nodiscard]] const std::optional<CycleState>& state() const { return state_; }
   /// What the cameras saw. @throws Error if it is damaged or was left out.
   [[nodiscard]] std::shared_ptr<const Cloud> cloud(const PutFrame& frame);
 
@@ -58,6 +63,8 @@ class SessionReader {
   std::vector<BagReader::Place> ticks_;
   std::map<std::uint64_t, ServoSettings> settings_;
   std::map<std::uint64_t, PutFrame> frames_;
+  std::map<std::uint64_t, AdoptedFrame> adopted_;
+  std::optional<CycleState> state_;
   std::map<std::size_t, Camera> cameras_;
 };
 

@@ -165,6 +165,19 @@ void SessionWriter::points(std::size_t camera, double stamp, const PointCloud& c
   write(topics.exact, at, exact);
 }
 
+void SessionWriter::adopted(const AdoptedFrame& frame) {
+  write(session_topic::adopted, nanoseconds(frame.put_at),
+        ros::Float64MultiArray{"number,stamp,put_at,camera,captured,...", row_of(frame)});
+}
+
+void SessionWriter::state(const CycleState& state, double t) {
+  std::string names;
+  for (const std::string& name : cycle_state_names()) names += (names.empty() ? "" : ",") + name;
+  const auto end = state.numbers.begin() + static_cast<std::ptrdiff_t>(state.count);
+  write(session_topic::state, nanoseconds(t),
+        ros::Float64MultiArray{names, std::vector<double>(state.numbers.begin(), end)});
+}
+
 void SessionWriter::tick(const ServoTick& tick) {
   const std::int64_t at = nanoseconds(tick.tick.t);
   const ros::Header header{ros::Time::at(at), std::string(world_frame)};

@@ -60,6 +60,11 @@ class SessionWriter {
              const PackedClouds& packed = {});
   /// Notes that a frame is not in the recording, for want of time or space.
   void left_out(std::uint64_t number, double stamp);
+  /// How a frame was taken into use, before the ticks that use it.
+  void adopted(const AdoptedFrame& frame);
+  /// What the cycle remembered before the first tick, if that is in mid-session.
+  /// @param t  [s] of that tick
+  void state(const CycleState& state, double t);
   void tick(const ServoTick& tick);
   /// Has the commit interval passed since the last commit, on the machine's clock?
   [[nodiscard]] bool commit_is_due() const;

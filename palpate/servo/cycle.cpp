@@ -124,6 +124,41 @@ bool Cycle::adopt_change(const Change& change) noexcept {
   return true;
 }
 
+template <class Way, class Self>
+void Cycle::walk(Way& way, Self& self) {
+  way("number", self.number_);
+  way("last_proxy", self.last_proxy_);
+  way("frame_stamp", self.last_stamp_);
+  SafetyChain::walk(way, self.safety_);
+  Workspace::walk(way, self.workspace_);
+  Freshness::walk(way, self.freshness_);
+}
+
+std::vector<std::string> cycle_state_names() {
+  struct {
+    std::uint64_t number_ = 0;
+    Vec3 last_proxy_ = Vec3::Zero();
+    double last_stamp_ = 0.0;
+    SafetyChain safety_{};
+    Workspace workspace_{};
+    Freshness freshness_{};
+  } memory;
+  NameState name;
+  Cycle::walk(name, memory);
+  return std::move(name.names);
+}
+
+void Cycle::restore(const CycleState& state, std::shared_ptr<const Cloud> cloud, double stamp) {
+  GetState get(state);
+  walk(get, *this);
+  if (!get.at_end())
+    throw Error("state of the cycle", "has too many numbers",
+                "it may be damaged, or of another version of palpate");
+  if (!cloud) return;
+  frames_.put({.cloud = std::move(cloud), .stamp = stamp});
+  static_cast<void>(frames_.take());
+}
+
 void Cycle::adopt_frame(const CapturedFrame& frame, double t) noexcept {
   method_->frame(*frame.cloud, frame.stamp);
   // Arrived when it was put; if that is not on the loop's clock, now.
@@ -131,6 +166,11 @@ void Cycle::adopt_frame(const CapturedFrame& frame, double t) noexcept {
   freshness_.adopt({frame.cameras.data(), frame.camera_count}, arrived,
                    safety_.parameters().future_tolerance);
   last_stamp_ = frame.stamp;
+  adopted_.push({.number = frames_.number(),
+                 .stamp = frame.stamp,
+                 .put_at = frame.put_at,
+                 .cameras = frame.cameras,
+                 .camera_count = frame.camera_count});
   add(statistics_.frames_adopted, 1);
   statistics_.frames_dropped.store(frames_.dropped(), std::memory_order_relaxed);
   statistics_.hand_over.add(nanoseconds(t - frame.put_at));
@@ -140,13 +180,17 @@ void Cycle::run(const Wake& wake) noexcept {
   const double t = wake.t;
   HandState hand = device_.read(t);
   const Change* change = changes_.take();
+  if (change != nullptr && change->method.get() != method_) {
+    CycleState state;
+    PutState put(state);
+    walk(put, *this);
+    states_.push(state);
+  }
   const bool switched = change != nullptr && adopt_change(*change);
   hand.clutched = workspace_.is_clutched(hand);
-  if (const std::uint64_t resets = fault_resets_.load(std::memory_order_relaxed);
-      resets != fault_resets_done_) {
-    fault_resets_done_ = resets;
-    safety_.reset();
-  }
+  const std::uint64_t resets = fault_resets_.load(std::memory_order_relaxed);
+  const bool reset = std::exchange(fault_resets_done_, resets) != resets;
+  if (reset) safety_.reset();
   if (const CapturedFrame* frame = frames_.take()) {
     adopt_frame(*frame, t);
   } else if (const auto& in_use = frames_.taken_last(); switched && in_use.cloud) {
@@ -194,7 +238,7 @@ void Cycle::run(const Wake& wake) noexcept {
                          .wake_up_ns = wake.wake_up_ns,
                          .previous_compute_ns = wake.previous_compute_ns,
                          .hand = hand_bits(hand) | (reseated ? proxy_reseated : 0U) |
-                                 (switched ? method_switched : 0U)};
+                                 (switched ? method_switched : 0U) | (reset ? faults_reset : 0U)};
   ring_.push(record);
   keep_statistics(record);
 }

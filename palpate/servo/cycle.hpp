@@ -8,8 +8,10 @@
 #include <mutex>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "palpate/core/method.hpp"
+#include "palpate/servo/cycle_state.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/freshness.hpp"
 #include "palpate/servo/histogram.hpp"
@@ -49,6 +51,8 @@ enum HandFlag : std::uint32_t {
   method_switched = 1u << 3,
   /// The device reported a fault, so there was no force; fault_of() says which.
   hand_fault = 1u << 4,
+  /// A latched fault of the safety chain was reset before the tick; see Cycle::reset_faults.
+  faults_reset = 1u << 5,
 };
 constexpr unsigned hand_fault_shift = 8;  ///< bits 8 to 15 of `ServoTick::hand`: the DeviceFault
 
@@ -90,6 +94,16 @@ struct CycleStatistics {
   std::atomic<bool> force_out{false};        ///< the last tick sent a force other than zero
   std::atomic<std::uint32_t> latched_by{0};  ///< SafetyFlag bits, as SafetyChain::latched_by
   std::atomic<double> heat{0.0};             ///< [-] of the motors, as SafetyChain::heat
+};
+
+/// Reads all that went into a loop's cycles and came out of them: what a recorder needs. Each part
+/// is of one thread; none must outlive the cycle.
+struct CycleReader {
+  TickRing<ServoTick>::Reader ticks;
+  /// Those that ticks use, pushed before the first of these ticks.
+  TickRing<AdoptedFrame>::Reader frames;
+  /// Before each tick with `method_switched`, pushed before it.
+  TickRing<CycleState>::Reader states;
 };
 
 /// One cycle of the loop: device read, newest frame, renderer, safety chain, device write.
@@ -149,8 +163,19 @@ class Cycle {
 
   /// Sees every cycle from the next one on. Any thread.
   [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return ring_.reader(); }
+  [[nodiscard]] CycleReader full_reader() const {
+    return {ring_.reader(), adopted_.reader(), states_.reader()};
+  }
   [[nodiscard]] const CycleStatistics& statistics() const { return statistics_; }
   [[nodiscard]] const Device& device() const { return device_; }
+
+  /// Makes a new cycle remember what another one did. Before its first `run`, then with set_method
+  /// as at that time: for replays.
+  /// @param state  as a CycleReader gave it
+  /// @param cloud  of the frame in use at that time; null if there was none
+  /// @param stamp  [s] of that frame
+  /// @throws Error if the state is damaged or of another version.
+  void restore(const CycleState& state, std::shared_ptr<const Cloud> cloud, double stamp);
 
  private:
   struct CapturedFrame {
@@ -170,6 +195,9 @@ class Cycle {
   bool adopt_change(const Change& change) noexcept;
   void adopt_frame(const CapturedFrame& frame, double t) noexcept;
   void keep_statistics(const ServoTick& record) noexcept;
+  template <class Way, class Self>
+  static void walk(Way& way, Self& self);
+  friend std::vector<std::string> cycle_state_names();
 
   std::shared_ptr<Method> first_method_;
   Method* method_;  // in use: that one, or the newest of changes_
@@ -184,6 +212,8 @@ class Cycle {
   Mailbox<Change> changes_;
   Mailbox<CapturedFrame> frames_;
   TickRing<ServoTick> ring_;
+  TickRing<AdoptedFrame> adopted_{1024};
+  TickRing<CycleState> states_{8};
   CycleStatistics statistics_;
 
   std::uint64_t number_ = 0;
@@ -195,5 +225,8 @@ class Cycle {
   std::atomic<std::uint64_t> fault_resets_{0};  // asked for
   std::uint64_t fault_resets_done_ = 0;
 };
+
+/// What the numbers of a CycleState are called, in their order; those of equal things are alike.
+std::vector<std::string> cycle_state_names();
 
 }  // namespace palpate

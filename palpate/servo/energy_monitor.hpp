@@ -41,7 +41,38 @@ class EnergyMonitor {
   /// Forgets everything: after a gap in what was measured.
   void restart() noexcept { *this = {}; }
 
+  /// Walks over all that is remembered from tick to tick; see CycleState.
+  template <class Way, class Self>
+  static void walk(Way& way, Self& self) {
+    way("energy.started", self.started_);
+    way("energy.t", self.t_);
+    way("energy.height", self.height_);
+    way("energy.energy", self.energy_);
+    way("energy.last_hip", self.last_hip_);
+    way("energy.normal", self.normal_);
+    way("energy.delayed_force", self.delayed_force_);
+    way("energy.rising", self.rising_);
+    for (auto* top : {&self.top_, &self.began_}) {
+      way("energy.top.t", top->t);
+      way("energy.top.height", top->height);
+      way("energy.top.energy", top->energy);
+      way("energy.top.force", top->force);
+      way("energy.top.hip", top->hip);
+    }
+    way("energy.lowest", self.lowest_);
+    way("energy.has_began", self.has_began_);
+    way("energy.bottom", self.bottom_);
+    way("energy.ticks", self.ticks_);
+    way("energy.least_energy", self.least_energy_);
+    way("energy.least_force", self.least_force_);
+    way("energy.most_force", self.most_force_);
+    way("energy.last_duration", self.last_cycle_.duration);
+    way("energy.last_swing", self.last_cycle_.swing);
+    way("energy.generating", self.generating_);
+  }
+
  private:
+  // walk() lists all of these.
   // Where the hand turned back towards the surface.
   struct Top {
     double t = 0.0;        // [s]

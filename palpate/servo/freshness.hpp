@@ -44,12 +44,32 @@ class Freshness {
   };
   [[nodiscard]] Age at(double t) const noexcept;
 
+  /// Walks over all that is remembered of the cameras; see CycleState.
+  template <class Way, class Self>
+  static void walk(Way& way, Self& self) {
+    for (auto& camera : self.cameras_) {
+      way("camera.expected", camera.expected);
+      way("camera.last_stamp", camera.last_stamp);
+      way("camera.fresh_stamp", camera.fresh_stamp);
+      way("camera.arrived", camera.arrived);
+      way("camera.was_fresh", camera.was_fresh);
+      way("camera.ever_fresh", camera.ever_fresh);
+      Interval::walk(way, camera.interval);
+    }
+  }
+
  private:
   // The median of the last intervals: neither a frame that was skipped nor a burst changes it.
   class Interval {
    public:
     void add(double seconds) noexcept;
     [[nodiscard]] double usual() const noexcept { return usual_; }
+    template <class Way, class Self>
+    static void walk(Way& way, Self& self) {
+      for (auto& last : self.last_) way("camera.interval", last);
+      way("camera.intervals", self.added_);
+      way("camera.usual_interval", self.usual_);
+    }
 
    private:
     static constexpr std::size_t count = 9;

@@ -170,6 +170,37 @@ class SafetyChain {
   void set_parameters(const SafetyParameters& parameters) noexcept { parameters_ = parameters; }
   [[nodiscard]] const SafetyParameters& parameters() const noexcept { return parameters_; }
 
+  /// Walks over all that the chain remembers from tick to tick; see CycleState.
+  template <class Way, class Self>
+  static void walk(Way& way, Self& self) {
+    way("last_t", self.last_t_);
+    way("last_force", self.last_force_);
+    way("last_flags", self.last_flags_);
+    way("heat", self.heat_);
+    way("fault_clock", self.fault_clock_);
+    for (auto& fault : self.last_faults_) {
+      way("fault.began", fault.began);
+      way("fault.flags", fault.flags);
+    }
+    way("faults", self.faults_);
+    way("latched_by", self.latched_by_);
+    for (auto& swings : self.swings_) {
+      way("swings.extreme", swings.extreme);
+      way("swings.turned_at", swings.turned_at);
+      way("swings.count", swings.count);
+      way("swings.up", swings.up);
+    }
+    way("swung_at", self.swung_at_);
+    way("calm", self.calm_);
+    EnergyMonitor::walk(way, self.energy_);
+    way("energy_ceiling", self.energy_ceiling_);
+    way("engaged", self.engaged_);
+    way("quiet_ticks", self.quiet_ticks_);
+    way("gain", self.gain_);
+    way("last_position", self.last_position_);
+    way("velocity", self.velocity_);
+  }
+
  private:
   // Counts swings of one coordinate of the force.
   struct Swings {
@@ -196,6 +227,7 @@ class SafetyChain {
   SafetyParameters parameters_;
   std::uint32_t links_;
 
+  // walk() lists all of these, but for the interventions, which change nothing.
   std::optional<double> last_t_;
   Vec3 last_force_ = Vec3::Zero();  // as sent
   std::uint32_t last_flags_ = 0;

@@ -82,6 +82,7 @@ class ServoLoop {
     return cycle_.set_method(std::move(method));
   }
   [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return cycle_.reader(); }
+  [[nodiscard]] CycleReader full_reader() const { return cycle_.full_reader(); }
   [[nodiscard]] const CycleStatistics& statistics() const { return cycle_.statistics(); }
 
   /// Of the thread that ticks; empty before `start`, kept after `stop`. On a device's thread the

@@ -62,6 +62,13 @@ class Workspace {
     return placement_.world_from_device.linear().transpose() * force_in_world;
   }
 
+  /// Walks over all that is remembered from tick to tick; see CycleState.
+  template <class Way, class Self>
+  static void walk(Way& way, Self& self) {
+    way("shift", self.shift_);
+    way("held", self.held_);
+  }
+
  private:
   Placement placement_;
   Vec3 shift_ = Vec3::Zero();  // [m, device] what clutching has added to the hand's position

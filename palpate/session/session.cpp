@@ -340,6 +340,7 @@ class Session::Impl {
     SessionInfo info{.kind = SessionInfo::Kind::live, .version = options_.version};
     for (const SessionCamera& camera : options_.cameras) info.cameras.push_back(camera.uri);
     info.device = device_->info().uri;
+    info.limits = device_->info().limits;
     info.epoch =
         std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count() -
         std::llround(1e9 * now());
@@ -353,7 +354,7 @@ class Session::Impl {
       };
     }
     auto recorder =
-        std::make_unique<Recorder>(folder, info, cycle_->reader(), std::move(begin_anew));
+        std::make_unique<Recorder>(folder, info, cycle_->full_reader(), std::move(begin_anew));
     recorder->settings({settings_number_, settings_}, now());
     {
       const std::lock_guard lock(frames_mutex_);

@@ -400,7 +400,7 @@ TEST_F(Program, GoesOnWithoutItsRecordingWhenTheDiskIsFull) {
   EXPECT_NE(outcome.err.find("disk"), std::string::npos) << outcome.err;
   // What was committed is a session as any other.
   const auto report = nlohmann::json::parse(run("replay --json " + path("bag")).out);
-  EXPECT_EQ(report["different_ticks"], 0);
+  EXPECT_EQ(report["asked"]["different_ticks"], 0);
 }
 
 TEST_F(Program, FailsWithOneWhenAReplayDiffers) {
@@ -431,7 +431,7 @@ TEST_F(Program, FailsWithOneWhenAReplayDiffers) {
   EXPECT_EQ(outcome.code, 1);
   const auto report = nlohmann::json::parse(outcome.out);
   EXPECT_EQ(report["identical"], false);
-  EXPECT_EQ(report["first_difference"], 1500);
+  EXPECT_EQ(report["asked"]["first_difference"]["tick"], 1500);
   EXPECT_NE(run("replay " + path("bag")).out.find("tick 1500"), std::string::npos);
 }
 

@@ -11,6 +11,7 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/methods/methods.hpp"
+#include "palpate/record/replay.hpp"
 #include "palpate/record/session_reader.hpp"
 #include "palpate/record/session_writer.hpp"
 
@@ -66,6 +67,18 @@ inline std::vector<ServoTick> record_press(SessionWriter& writer, const Paramete
   }
   if (close) writer.close();
   return recorded;
+}
+
+/// What a replay found, for messages.
+inline std::string text_of(const ReplayReport& report) {
+  std::string text = report.broken_off + report.sent_unchecked + report.check.damage;
+  for (const ReplayDifferences* each : {&report.asked, &report.sent}) {
+    if (each->first)
+      text += " tick " + std::to_string(each->first->tick) + " " + each->first->field + " was " +
+              std::to_string(each->first->recorded) + ", is " +
+              std::to_string(each->first->replayed);
+  }
+  return text;
 }
 
 inline SessionInfo press_info() {

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <cmath>
 #include <csignal>
+#include <functional>
 #include <latch>
 #include <memory>
 #include <random>
@@ -32,14 +35,20 @@ class LoopSession {
  public:
   explicit LoopSession(const std::string& method) {
     settings_.method = method;
+    // Forces that are sent at once.
+    settings_.safety.engage_force = 3.0;
+    settings_.safety.engage_ticks = 2.0;
+    settings_.safety.ramp_time = 0.02;
+    settings_.safety.initial_heat = 0.5;
     cycle_ = std::make_unique<Cycle>(make_method(method), device_, settings_);
   }
 
   void record(const std::filesystem::path& folder, const RecorderOptions& options = {}) {
     const bool is_on = tick_ > 0;
     recorder_ = std::make_unique<Recorder>(
-        folder, SessionInfo{.kind = SessionInfo::Kind::live, .version = "test"}, cycle_->reader(),
-        is_on ? [this] { begin_anew(); } : std::function<void()>{}, options);
+        folder,
+        SessionInfo{.kind = SessionInfo::Kind::live, .version = "test", .limits = DeviceLimits{}},
+        cycle_->full_reader(), is_on ? [this] { begin_anew(); } : std::function<void()>{}, options);
     recorder_->settings({settings_number_, settings_}, now());
     if (frame_ > 0) recorder_->frame(frame_, stamp_, {cloud_});
   }
@@ -50,7 +59,11 @@ class LoopSession {
       if (tick_ % 33 == 0) {
         cloud_ = wavy_floor(tick_ / 33 % 10);
         stamp_ = now() - 1e-4 / 3.0;
-        frame_ = cycle_->put_frame(cloud_, stamp_, now());
+        // Another camera is listed now and then, whose pictures come late.
+        const std::array<CameraFrame, 2> cameras = {
+            {{.camera = 0, .stamp = stamp_}, {.camera = 3, .stamp = stamp_ - 0.02}}};
+        const std::size_t count = tick_ % 99 == 0 ? 2 : 1;
+        frame_ = cycle_->put_frame(cloud_, stamp_, std::span(cameras.data(), count), now() - 1e-3);
         if (recorder_ && handing_) recorder_->frame(frame_, stamp_, {cloud_});
       }
       if (tick_ % 70 == 69) {
@@ -59,7 +72,15 @@ class LoopSession {
         if (recorder_) recorder_->settings({settings_number_, settings_}, now());
       }
       device_.hand.position = Vec3(0.03 + 1e-5 * tick_, -0.05, -0.02 - 1e-4 * std::min(tick_, 300));
-      cycle_->run({.t = now()});
+      // It swings with 14 Hz, as a hand on a surface that oscillates does.
+      if (tick_ > 100)
+        device_.hand.position.z() += 2e-3 * std::sin(2e-3 * std::acos(-1.0) * 14 * tick_);
+      // Now and then the device's clutch, nobody at it, a fault, and its reset.
+      device_.hand.clutched = tick_ % 120 >= 110;
+      device_.hand.present = tick_ % 170 < 165;
+      device_.hand.fault = tick_ % 200 == 199 ? DeviceFault::overheated : DeviceFault::none;
+      if (tick_ % 130 == 0) cycle_->reset_faults();
+      cycle_->run({.t = now(), .wake_up_ns = static_cast<std::uint32_t>(tick_ % 7)});
     }
   }
 
@@ -100,15 +121,19 @@ TEST_P(RecorderOf, ASessionFromItsStartIsReplayedBitForBit) {
   EXPECT_EQ(session.recorder().status().ticks, 400U);
   SessionReader reader(folder.path() / "bag");
   const ReplayReport report = replay(reader);
-  EXPECT_TRUE(report.identical()) << report.field << " " << report.broken_off;
+  EXPECT_TRUE(report.identical()) << test::text_of(report);
   EXPECT_EQ(report.ticks, 400U);
+  EXPECT_EQ(report.sent_unchecked, "");
   double largest = 0.0;
+  double sent = 0.0;
   bool reseated = false;
   for (std::size_t i = 0; i < reader.ticks(); ++i) {
     largest = std::max(largest, reader.tick(i).tick.force.norm());
+    sent = std::max(sent, reader.tick(i).force.norm());
     reseated = reseated || (reader.tick(i).hand & proxy_reseated) != 0;
   }
   EXPECT_GT(largest, 1.0);
+  EXPECT_GT(sent, 1.0);
   EXPECT_TRUE(reseated);
 }
 
@@ -127,11 +152,89 @@ TEST_P(RecorderOf, ASessionInItsMidstIsReplayedBitForBit) {
   EXPECT_NE(reader.tick(10).tick.state, ContactState::free_motion);  // in the midst of a touch
   EXPECT_GT(reader.tick(100).tick.force.norm(), 1.0);
   const ReplayReport report = replay(reader);
-  EXPECT_TRUE(report.identical()) << report.field << " " << report.broken_off;
+  EXPECT_TRUE(report.identical()) << test::text_of(report);
+  EXPECT_EQ(report.sent_unchecked, "");
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, RecorderOf, ::testing::Values("paper", "sight"),
                          [](const auto& each) { return std::string(each.param); });
+
+// Replays a session of which each tick was changed. @return what it found
+ReplayReport replay_changed(const std::function<void(ServoTick&)>& change) {
+  const TemporaryFolder folder;
+  LoopSession session("paper");
+  session.record(folder.path() / "bag");
+  session.run(150);
+  session.recorder().stop();
+  SessionReader reader(folder.path() / "bag");
+  {
+    SessionWriter writer(folder.path() / "changed", reader.info(), 0.0);
+    for (std::uint64_t i = 0; i <= reader.tick(reader.ticks() - 1).settings_number; ++i)
+      writer.settings({i, reader.settings(i)}, 0.0);
+    for (const auto& [number, frame] : reader.frames()) {
+      const auto cloud = reader.cloud(frame);
+      writer.frame(number, frame.stamp, std::span(&cloud, 1));
+      writer.adopted(reader.adopted().at(number));
+    }
+    for (std::size_t i = 0; i < reader.ticks(); ++i) {
+      ServoTick tick = reader.tick(i);
+      change(tick);
+      writer.tick(tick);
+    }
+    writer.close();
+  }
+  SessionReader changed(folder.path() / "changed");
+  return replay(changed);
+}
+
+TEST(ReplayOfACycle, IsIdenticalWhereNothingWasChanged) {
+  const ReplayReport report = replay_changed([](ServoTick& /*tick*/) {});
+  EXPECT_TRUE(report.identical()) << test::text_of(report);
+  EXPECT_EQ(report.sent_unchecked, "");
+}
+
+TEST(ReplayOfACycle, FindsForcesThatWereNotTheOnesSent) {
+  const ReplayReport report =
+      replay_changed([](ServoTick& tick) { tick.force = Vec3::Constant(99.0); });
+  EXPECT_FALSE(report.identical());
+  EXPECT_EQ(report.asked.ticks, 0U);
+  EXPECT_EQ(report.sent.ticks, 150U);
+  EXPECT_GT(report.sent.largest_force, 90.0);
+}
+
+TEST(ReplayOfACycle, FindsEachChangedBitOfWhatWasSent) {
+  struct Change {
+    const char* field;
+    std::function<void(ServoTick&)> change;
+  };
+  const std::vector<Change> changes = {
+      {"force_y", [](ServoTick& tick) { tick.force.y() = std::nextafter(tick.force.y(), 9.0); }},
+      {"gain", [](ServoTick& tick) { tick.gain = std::nextafter(tick.gain, -1.0); }},
+      {"safety", [](ServoTick& tick) { tick.safety ^= 1U << 3U; }},
+      {"hand", [](ServoTick& tick) { tick.hand ^= proxy_reseated; }},
+      {"frame_age", [](ServoTick& tick) { tick.frame_age = std::nextafter(tick.frame_age, 9.0); }},
+      {"frame_stamp", [](ServoTick& tick) { tick.frame_stamp += 1e-9; }}};
+  for (const Change& each : changes) {
+    const ReplayReport report = replay_changed([&](ServoTick& tick) {
+      if (tick.number == 77) each.change(tick);
+    });
+    EXPECT_EQ(report.asked.ticks, 0U) << each.field;
+    EXPECT_EQ(report.sent.ticks, 1U) << each.field;
+    ASSERT_TRUE(report.sent.first) << each.field;
+    EXPECT_EQ(report.sent.first->tick, 77U);
+    EXPECT_EQ(report.sent.first->field, each.field);
+    EXPECT_NE(report.sent.first->recorded, report.sent.first->replayed);
+  }
+}
+
+TEST(ReplayOfACycle, FindsAHandThatWasElsewhere) {
+  const ReplayReport report = replay_changed([](ServoTick& tick) {
+    if (tick.number == 77) tick.position.z() = std::nextafter(tick.position.z(), -1.0);
+  });
+  ASSERT_TRUE(report.asked.first);
+  EXPECT_EQ(report.asked.first->tick, 77U);
+  EXPECT_EQ(report.asked.first->field, "hip_z");
+}
 
 TEST(Recorder, EndsWithTheLastTickWhoseFrameItKnows) {
   const TemporaryFolder folder;
@@ -151,7 +254,10 @@ TEST(Recorder, AskedToStopReturnsAtOnceAndSaysWhenItIsDone) {
   const TemporaryFolder folder;
   std::latch held_up(1);
   TickRing<ServoTick> ring(16);
-  Recorder recorder(folder.path() / "bag", {.version = "test"}, ring.reader(),
+  const TickRing<AdoptedFrame> frames(16);
+  const TickRing<CycleState> states(16);
+  Recorder recorder(folder.path() / "bag", {.version = "test"},
+                    {ring.reader(), frames.reader(), states.reader()},
                     [&] { held_up.wait(); });  // a thread of the recorder's can't go on
   ring.push({});
   recorder.request_stop();
@@ -220,8 +326,9 @@ std::shared_ptr<const DepthImage> noisy_floor(unsigned seed) {
   constexpr std::size_t frames_kept_waiting = 20;
   FakeDevice device;
   Cycle cycle(make_method(), device);
-  Recorder recorder(folder, {.kind = SessionInfo::Kind::live, .version = "test"}, cycle.reader(),
-                    {}, {.commit_interval = 0.02});
+  Recorder recorder(folder,
+                    {.kind = SessionInfo::Kind::live, .version = "test", .limits = DeviceLimits{}},
+                    cycle.full_reader(), {}, {.commit_interval = 0.02});
   recorder.settings({}, 0.0);
   const std::vector<std::shared_ptr<const Cloud>> floors{noisy_floor(1), noisy_floor(2)};
   std::uint64_t said = 0;
@@ -265,7 +372,8 @@ TEST(Recorder, KilledAtAnyTimeLeavesASessionThatReplaysToItsLastCommit) {
     SessionReader reader(folder.path() / "bag");
     EXPECT_GE(reader.ticks(), committed);
     const ReplayReport report = replay(reader);
-    EXPECT_TRUE(report.identical()) << report.field << " " << report.broken_off;
+    EXPECT_TRUE(report.identical()) << test::text_of(report);
+    EXPECT_EQ(report.sent_unchecked, "");
     EXPECT_EQ(report.ticks, reader.ticks());
   }
 }

@@ -36,7 +36,7 @@ TEST_P(Replay, GivesTheSameForcesBitForBit) {
   ASSERT_GT(largest, 0.5);  // it touched
   SessionReader reader(folder.path() / "bag");
   const ReplayReport report = replay(reader);
-  EXPECT_TRUE(report.identical()) << report.field << report.broken_off;
+  EXPECT_TRUE(report.identical()) << test::text_of(report);
   EXPECT_EQ(report.ticks, 150U);
   EXPECT_EQ(report.frames, 5U);
 }
@@ -94,9 +94,12 @@ TEST(ReplayOf, AForceThatDiffersInItsLastBitIsFound) {
     return tick.number < 99;
   });
   EXPECT_FALSE(report.identical());
-  EXPECT_EQ(report.different_ticks, 1U);
-  EXPECT_EQ(report.first_difference, 42U);
-  EXPECT_EQ(report.field, "force");
+  EXPECT_EQ(report.asked.ticks, 1U);
+  ASSERT_TRUE(report.asked.first);
+  EXPECT_EQ(report.asked.first->tick, 42U);
+  EXPECT_EQ(report.asked.first->field, "rendered_force_z");
+  EXPECT_EQ(report.asked.first->recorded, std::nextafter(report.asked.first->replayed, 1e9));
+  EXPECT_NE(report.sent_unchecked, "");  // there was no safety chain
   EXPECT_TRUE(report.broken_off.empty()) << report.broken_off;
   EXPECT_EQ(report.ticks, 99U);
 }
@@ -105,7 +108,7 @@ TEST(ReplayOf, TicksThatTheRecorderLostEndThere) {
   const ReplayReport report =
       replay_changed([](const ServoTick& tick) { return tick.number < 50 || tick.number > 60; });
   EXPECT_EQ(report.ticks, 50U);
-  EXPECT_EQ(report.different_ticks, 0U);
+  EXPECT_EQ(report.asked.ticks, 0U);
   EXPECT_FALSE(report.identical());
   EXPECT_NE(report.broken_off.find("50 to 60"), std::string::npos) << report.broken_off;
 }

@@ -393,9 +393,12 @@ TEST(SafetyChain, SoftensWhatOscillatesAndStillGivesAllTheForceThatIsAllowed) {
 
 TEST(SafetyChain, GivesTheForceBackWhenAnOscillationHasStopped) {
   Session session = engaged_without(0, never_hot);
-  for (int i = 0; i < 500; ++i) session.run((i / 10) % 2 == 0 ? 2.8 : 0.3);
-  EXPECT_LT(session.run_for(0.2, 2.0).force.z(), 1.1);
-  EXPECT_NEAR(session.run_for(3.0, 2.0).force.z(), 2.0, 1e-9);
+  int ticks = 0;
+  while (!(session.run((ticks / 10) % 2 == 0 ? 2.8 : 0.3).flags & oscillation_cut)) ++ticks;
+  EXPECT_LT(ticks, 120) << "8 swings of 10 ms";
+  EXPECT_NEAR(session.run_for(0.1, 2.0).force.z(), 1.0, 1e-9);
+  EXPECT_NEAR(session.run_for(0.35, 2.0).force.z(), 1.0, 1e-9) << "for half a second";
+  EXPECT_NEAR(session.run_for(1.0, 2.0).force.z(), 2.0, 1e-9);
 }
 
 TEST(SafetyChain, EngagesOnlyAfterTheHandFeltNextToNothing) {
@@ -546,6 +549,27 @@ TEST(SafetyChain, TakesAJumpOfTheHandForTooFast) {
   session.input.position.y() += 0.05;
   EXPECT_TRUE(session.run(2.0).flags & hand_too_fast);
   EXPECT_LT(session.run_for(0.003, 2.0).force.z(), 0.01);
+}
+
+TEST(SafetyChain, DoesNotTakeACountOfACoarseEncoderForSpeed) {
+  Session session = engaged_without(0, never_hot);
+  session.run_for(0.1, 2.0);
+  session.input.position.y() += 2e-3;  // 2 m/s if it were one
+  EXPECT_EQ(session.run(2.0).flags, 0U);
+}
+
+TEST(SafetyChain, MeasuresTheHandsSpeedOnTheDeviceAndNotInTheScene) {
+  const auto flags_of = [](Vec3 SafetyInput::*moving) {
+    Session session = engaged_without(direction_refused, never_hot);
+    std::uint32_t flags = 0;
+    for (int i = 0; i < 100; ++i) {
+      (session.input.*moving).x() += 3e-3;
+      flags |= session.run(2.0).flags;
+    }
+    return flags;
+  };
+  EXPECT_FALSE(flags_of(&SafetyInput::hip) & hand_too_fast);
+  EXPECT_TRUE(flags_of(&SafetyInput::position) & hand_too_fast);
 }
 
 TEST(SafetyChain, RampsFromNothingAfterAStalledTick) {

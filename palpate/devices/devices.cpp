@@ -75,7 +75,8 @@ std::unique_ptr<Device> open_hand(const Uri& uri, const Path& path) {
 }
 
 std::unique_ptr<Device> open_mouse(const Uri& uri, const Path& /*path*/) {
-  constexpr std::array<std::string_view, 5> options{"x", "y", "z", "response", "max_speed"};
+  constexpr std::array<std::string_view, 6> options{"x",        "y",         "z",
+                                                    "response", "max_speed", "silence"};
   uri.allow_only(options);
   if (!uri.path().empty()) {
     throw Error(uri.text(), "a mouse has no '" + uri.path() + "'", "write mouse: alone");
@@ -86,7 +87,8 @@ std::unique_ptr<Device> open_mouse(const Uri& uri, const Path& /*path*/) {
   const Vec3 start(coordinate("x"), coordinate("y"), coordinate("z"));
   return std::make_unique<MouseDevice>(start, uri.number_option("response", 0.025, 1e-3, 1.0, "s"),
                                        uri.number_option("max_speed", 1.0, 0.01, 10.0, "m/s"),
-                                       uri.text());
+                                       uri.text(),
+                                       uri.number_option("silence", 0.5, 0.2, 60.0, "s"));
 }
 
 }  // namespace

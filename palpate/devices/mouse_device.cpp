@@ -23,16 +23,19 @@ void check(const char* name, double value, double min, double max) {
 
 }  // namespace
 
-MouseDevice::MouseDevice(const Vec3& start, double response, double max_speed, std::string uri)
+MouseDevice::MouseDevice(const Vec3& start, double response, double max_speed, std::string uri,
+                         double silence)
     : info_{.uri = std::move(uri), .kind = "mouse in the viewer", .limits = no_motors},
       start_(start),
       frequency_(2.0 / response),
       max_speed_(max_speed),
+      silence_(silence),
       target_{.position = start, .present = false},
       position_(start) {
   check_place(start);
   check("response", response, 1e-3, 1.0);
   check("max_speed", max_speed, 0.01, 10.0);
+  check("silence", silence, 0.2, 60.0);
 }
 
 void MouseDevice::aim(const MouseTarget& target) {
@@ -42,9 +45,16 @@ void MouseDevice::aim(const MouseTarget& target) {
 }
 
 HandState MouseDevice::read(double t) noexcept {
-  if (const MouseTarget* target = targets_.take()) target_ = *target;
+  if (const MouseTarget* target = targets_.take()) {
+    target_ = *target;
+    aimed_t_.reset();
+  }
   const double dt = last_t_ && t > *last_t_ ? t - *last_t_ : 0.0;
-  if (std::isfinite(t)) last_t_ = t;
+  if (std::isfinite(t)) {
+    last_t_ = t;
+    if (!aimed_t_) aimed_t_ = t;
+    if (t - *aimed_t_ > silence_) target_.present = false;
+  }
 
   // The exact solution over dt, from the distance e and the velocity.
   const Vec3 e = position_ - target_.position;

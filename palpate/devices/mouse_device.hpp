@@ -21,16 +21,18 @@ struct MouseTarget {
 ///
 /// Between targets the hand follows a critically damped spring, x'' = w^2 (target - x) - 2 w x',
 /// integrated exactly, and is never faster than `max_speed`: a jump of the mouse is a glide. Before
-/// the first target nobody holds it.
+/// the first target nobody holds it, nor when no target has come for `silence`: a page that holds
+/// the hand repeats its target several times a second.
 class MouseDevice final : public Device {
  public:
   /// @param start      [m] device frame: where the hand is before the first target
   /// @param response   [s] 2 / w: by which the hand lags behind a steady move
   /// @param max_speed  [m/s]
-  /// @throws Error if `start` is not a place, response is not in 1 ms to 1 s or max_speed not in
-  ///         0.01 to 10 m/s.
+  /// @param silence    [s] without a target after which the hand is let go
+  /// @throws Error if `start` is not a place, response is not in 1 ms to 1 s, max_speed not in
+  ///         0.01 to 10 m/s or silence not in 0.2 to 60 s.
   explicit MouseDevice(const Vec3& start = Vec3::Zero(), double response = 0.025,
-                       double max_speed = 1.0, std::string uri = "mouse:");
+                       double max_speed = 1.0, std::string uri = "mouse:", double silence = 0.5);
 
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
   HandState read(double t) noexcept override;
@@ -47,10 +49,12 @@ class MouseDevice final : public Device {
   Vec3 start_;
   double frequency_;  // [1/s] w
   double max_speed_;
+  double silence_;     // [s]
   std::mutex aimers_;  // keeps several of them apart; the servo never takes it
   Mailbox<MouseTarget> targets_;
   MouseTarget target_;
   std::optional<double> last_t_;
+  std::optional<double> aimed_t_;  // [s] when the newest target was first read
   Vec3 position_;
   Vec3 velocity_ = Vec3::Zero();
 };

@@ -220,6 +220,27 @@ TEST(MouseDevice, IsHeldByNobodyUntilItIsAimed) {
   EXPECT_TRUE(mouse.read(1.003).clutched);
 }
 
+TEST(MouseDevice, IsLetGoWhenNoTargetHasComeForLong) {
+  MouseDevice mouse;
+  mouse.aim({.position = {0.01, 0, 0}});
+  EXPECT_TRUE(mouse.read(10.0).present);
+  EXPECT_TRUE(mouse.read(10.5).present);
+  mouse.aim({.position = {0.01, 0, 0}});  // the same place again: it is held still
+  EXPECT_TRUE(mouse.read(10.6).present);
+  EXPECT_TRUE(mouse.read(11.0).present);
+  EXPECT_FALSE(mouse.read(11.101).present);
+  EXPECT_FALSE(mouse.read(12.0).present);
+  mouse.aim({.position = {0.01, 0, 0}});
+  EXPECT_TRUE(mouse.read(12.001).present);
+  MouseDevice patient(Vec3::Zero(), 0.025, 1.0, "mouse:", 2.0);
+  patient.aim({.position = {0.01, 0, 0}});
+  EXPECT_TRUE(patient.read(0.0).present);
+  EXPECT_TRUE(patient.read(1.9).present);
+  EXPECT_FALSE(patient.read(2.1).present);
+  EXPECT_TRUE(
+      fails_saying([] { return MouseDevice({}, 0.025, 1.0, "mouse:", 0.1).start(); }, "silence"));
+}
+
 TEST(MouseDevice, ReachesAFarTargetWithoutOvershootAndNeverFasterThanItMay) {
   MouseDevice mouse(Vec3::Zero(), 0.025, 1.0);
   mouse.read(0.0);

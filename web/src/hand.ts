@@ -22,7 +22,7 @@ const KEY_SPEED = 0.16; // [-] of the hand's distance, a second
 const KEY_TURN = 1.1; // [rad/s]
 const KEY_TICK = 16; // [ms]
 const DEEPEST = 0.05; // [m] of the hand in what is touched: a mouse feels no wall
-const REPEAT = 150; // [ms] a held hand is said again, so that a lost page is noticed
+const REPEAT = 100; // [ms] a held hand is said again: after 0.5 s of silence it is let go
 
 export interface HandHost {
   /** Where the proxy is, and whether it touches: a hand that is taken begins there. */

@@ -1,11 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/session/played_source.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "palpate/core/error.hpp"
 
 namespace palpate {
+namespace {
+
+constexpr int most_dropped = 100;        // frames in a row that one look leaves out
+constexpr double stamp_step_back = 1.0;  // [s] stamps this far back begin anew
+constexpr double longest_gap = 10.0;     // [s] between frames beyond which it is cut short
+
+}  // namespace
 
 PlayedSource::PlayedSource(std::unique_ptr<Source> source,
                            std::function<std::unique_ptr<Source>()> open)
@@ -21,9 +29,32 @@ PlayedSource::PlayedSource(std::unique_ptr<Source> source,
   status_.text = "live";
 }
 
+// The next frame whose stamp is of use; none at the end, or after many that are not.
+std::optional<Frame> PlayedSource::read() {
+  for (int dropped = 0; dropped < most_dropped; ++dropped) {
+    std::optional<Frame> frame = source_->next();
+    if (!frame) {
+      has_ended_ = true;
+      return std::nullopt;
+    }
+    const bool is_first = frames_in_pass_ == 0;
+    const bool is_usable = frame->cloud && std::isfinite(frame->stamp);
+    const double interval = is_first ? 0.0 : frame->stamp - source_stamp_;  // [s]
+    if (is_usable && (is_first || (interval > 0.0 && interval <= longest_gap))) return frame;
+    if (is_usable && (interval < -stamp_step_back || interval > longest_gap)) {
+      offset_ = last_ + interval_ - frame->stamp;
+      ++status_.stamp_problems[static_cast<std::size_t>(StampProblem::jumped)];
+      return frame;
+    }
+    ++status_.dropped;
+    ++status_.stamp_problems[static_cast<std::size_t>(StampProblem::not_increasing)];
+  }
+  return std::nullopt;
+}
+
 void PlayedSource::begin() {
   if (next_ || frames_in_pass_ > 0) return;
-  next_ = source_->next();
+  next_ = read();
   if (!next_) throw Error(status_.uri, "it has no frames", "give a source with at least one");
   offset_ = -next_->stamp;
 }
@@ -35,15 +66,16 @@ const Frame& PlayedSource::first_frame() {
 
 // The frame after the last: of a recording that is over, the first again.
 void PlayedSource::read_next() {
-  next_ = source_->next();
-  if (next_) return;
+  next_ = read();
+  if (next_ || !has_ended_) return;
   if (frames_in_pass_ <= 1) {
     is_still_ = true;
     return;
   }
   source_ = open_();
   frames_in_pass_ = 0;
-  next_ = source_->next();
+  has_ended_ = false;
+  next_ = read();
   if (!next_) throw Error(status_.uri, "it has no frames any more", "check the recording");
   offset_ = last_ + interval_ - next_->stamp;
 }
@@ -58,6 +90,8 @@ std::optional<FedFrame> PlayedSource::next_until(double t) {
     frame.stamp = last_;
     return FedFrame{.frame = std::move(frame), .source_stamp = still_.stamp, .is_new = false};
   }
+  if (!next_) read_next();
+  if (!next_) return std::nullopt;
   const double stamp = next_->stamp + offset_;
   if (stamp > t) return std::nullopt;
   FedFrame fed{.frame = std::move(*next_), .source_stamp = next_->stamp};
@@ -69,6 +103,7 @@ std::optional<FedFrame> PlayedSource::next_until(double t) {
     interval_ = stamp - last_;
   }
   last_ = stamp;
+  source_stamp_ = fed.source_stamp;
   ++frames_in_pass_;
   ++status_.frames;
   status_.last_frame = stamp;

@@ -11,9 +11,9 @@
 namespace palpate {
 
 /// A recording or simulation played on the caller's clock, which may run as fast as the machine
-/// can. No thread; each frame comes, none is left out. As with a CameraFeed, stamps of capture stay
-/// what they are but for one offset a pass, what ends begins again, and a recording of one frame is
-/// shown again at 30 Hz.
+/// can. No thread; each frame comes, but those whose stamp is not later than that of the frame
+/// before. As with a CameraFeed, stamps of capture stay what they are but for one offset a pass,
+/// what ends begins again, and a recording of one frame is shown again at 30 Hz.
 class PlayedSource {
  public:
   /// @param source  open; not live
@@ -32,6 +32,7 @@ class PlayedSource {
 
  private:
   void begin();
+  std::optional<Frame> read();
   void read_next();
 
   std::unique_ptr<Source> source_;
@@ -39,7 +40,9 @@ class PlayedSource {
   std::optional<Frame> next_;  // read already
   Frame still_;                // the only frame of a recording
   bool is_still_ = false;
+  bool has_ended_ = false;  // this pass
   std::uint64_t frames_in_pass_ = 0;
+  double source_stamp_ = 0.0;     // [s] of the last frame, by the source's clock
   double offset_ = 0.0;           // [s] from the source's clock to the caller's
   double last_ = 0.0;             // [s] stamp of the last frame on the caller's clock
   double interval_ = 1.0 / 30.0;  // [s] of the last two frames

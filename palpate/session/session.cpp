@@ -75,6 +75,9 @@ class Session::Impl {
     if (options_.cameras.size() > Patch::max_views)
       throw Error("camera", std::to_string(options_.cameras.size()) + " cameras are too many",
                   "give at most " + std::to_string(Patch::max_views));
+    if (!is_live() && !(options_.servo.rate >= 1.0 && options_.servo.rate <= 100'000.0))
+      throw Error("servo rate", std::to_string(options_.servo.rate) + " Hz is out of range",
+                  "give a rate from 1 to 100000 Hz");
     validate(options_.settings);
     newest_.resize(options_.cameras.size());
     stamps_.resize(options_.cameras.size());
@@ -101,6 +104,7 @@ class Session::Impl {
   Impl& operator=(const Impl&) = delete;
 
   void start() {
+    refuse_if_stopped();
     if (started_) return;
     if (!is_live())
       throw Error("session", "a free-running session has no time of its own to start in",
@@ -116,6 +120,7 @@ class Session::Impl {
     if (stopped_.exchange(true)) return;
     // Zero force leaves first: nothing above this line may wait for anything.
     if (loop_) loop_->stop();
+    if (free_cycle_ && started_) device_->write(Vec3::Zero(), free_t_);
     device_->disable();
     for (const auto& feed : feeds_) feed->request_stop();
     {
@@ -137,6 +142,12 @@ class Session::Impl {
 
   void run(std::optional<double> duration, const std::function<void(const ServoTick&)>& on_tick,
            const std::atomic<bool>& stop_requested) {
+    refuse_if_stopped();
+    // Also where a source or the caller's function throws.
+    struct End {
+      Impl& session;
+      ~End() { session.stop(); }
+    } const end_of_run{*this};
     if (is_live()) {
       start();
       const double end = monotonic_now() + duration.value_or(1e18);
@@ -145,7 +156,6 @@ class Session::Impl {
     } else {
       run_free(duration, on_tick, stop_requested);
     }
-    stop();
   }
 
   [[nodiscard]] std::vector<std::shared_ptr<const Cloud>> newest() const {
@@ -223,6 +233,10 @@ class Session::Impl {
 
  private:
   [[nodiscard]] bool is_live() const { return options_.pace == Pace::real_time; }
+  void refuse_if_stopped() const {
+    if (stopped_)
+      throw Error("session", "it has been stopped and cannot go on", "make another session");
+  }
   // [s] on the session's clock
   [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }
 

@@ -23,7 +23,7 @@ class MouseDevice;
 
 /// A camera of a session: a source by its URI, or one that is open.
 struct SessionCamera {
-  std::string uri;  ///< opened by SessionOptions::sources
+  std::string uri = {};  ///< opened by SessionOptions::sources
   /// Used in place of the URI, which only names it then. It cannot be opened again when it ends.
   std::unique_ptr<Source> source = {};
   /// Where it stands; none: the source's own pose.
@@ -97,7 +97,8 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Real time: starts loop and cameras, and returns. @throws Error if the device refuses.
+  /// Real time: starts loop and cameras, and returns. A session runs once.
+  /// @throws Error if the device refuses, or the session has been stopped.
   void start();
   /// Takes the force off the device before anything else, then ends everything. A camera that hangs
   /// is left behind. Any number of times.
@@ -106,6 +107,8 @@ class Session {
   /// Runs until `duration` [s] has passed (none: for ever) or `request_stop`, then stops.
   /// Real time: starts what is not started. Free-running: runs the ticks on this thread.
   /// @param on_tick  free-running: sees each tick
+  /// @throws Error as `start`; free-running: what a source throws whose frame cannot be read. The
+  ///         session is stopped then, too.
   void run(std::optional<double> duration,
            const std::function<void(const ServoTick&)>& on_tick = {});
   /// Makes `run` return soon. Any thread, and a signal handler.

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/session/played_source.hpp"
+#include "palpate/session/posed_source.hpp"
+
+#include "tests/session/fakes.hpp"
+#include "tests/support/errors.hpp"
+
+namespace palpate {
+namespace {
+
+using test::fails_saying;
+using test::MadeSource;
+using test::wall;
+
+std::unique_ptr<Source> stamped(std::vector<double> stamps) {
+  return std::make_unique<MadeSource>([stamps = std::move(stamps)](int k) -> std::optional<Frame> {
+    if (k >= static_cast<int>(stamps.size())) return std::nullopt;
+    return Frame{stamps[static_cast<std::size_t>(k)], wall()};
+  });
+}
+
+// What comes until `end` [s] of a clock of 1 kHz.
+std::vector<FedFrame> played(PlayedSource& source, double end) {
+  std::vector<FedFrame> frames;
+  for (int i = 0; 1e-3 * i <= end; ++i) {
+    while (auto frame = source.next_until(1e-3 * i)) frames.push_back(*frame);
+  }
+  return frames;
+}
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(PlayedSource, GivesEachFrameWhenItIsDueWithOneOffset) {
+  PlayedSource source(stamped({7.0, 7.1, 7.15, 7.4}), [] { return stamped({7.0, 7.1}); });
+  EXPECT_EQ(source.first_frame().stamp, 7.0);
+  const std::vector<FedFrame> frames = played(source, 0.41);
+  ASSERT_EQ(frames.size(), 4U);
+  for (const FedFrame& fed : frames) {
+    EXPECT_NEAR(fed.frame.stamp, fed.source_stamp - 7.0, 1e-12);
+    EXPECT_TRUE(fed.is_new);
+  }
+  EXPECT_EQ(source.status().frames, 4U);
+}
+
+TEST(PlayedSource, BeginsAgainAnIntervalAfterTheLastFrame) {
+  PlayedSource source(stamped({0.0, 0.1, 0.2}), [] { return stamped({5.0, 5.1, 5.2}); });
+  const std::vector<FedFrame> frames = played(source, 0.55);
+  ASSERT_EQ(frames.size(), 6U);
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    EXPECT_NEAR(frames[k].frame.stamp, 0.1 * static_cast<double>(k), 1e-12);
+}
+
+TEST(PlayedSource, ShowsASingleFrameAgainAtThirtyHertz) {
+  PlayedSource source(stamped({3.0}), [] { return stamped({}); });
+  const std::vector<FedFrame> frames = played(source, 1.001);
+  ASSERT_EQ(frames.size(), 31U);
+  EXPECT_TRUE(frames[0].is_new);
+  for (std::size_t k = 1; k < frames.size(); ++k) {
+    EXPECT_NEAR(frames[k].frame.stamp, static_cast<double>(k) / 30.0, 1e-9);
+    EXPECT_FALSE(frames[k].is_new);
+    EXPECT_EQ(frames[k].frame.cloud, frames[0].frame.cloud);
+  }
+}
+
+TEST(PlayedSource, LeavesOutFramesWhoseStampsCannotBeTrue) {
+  PlayedSource source(stamped({nan, 0.0, 0.1, 0.1, 0.05, nan, 0.2}), [] { return stamped({0.0}); });
+  const std::vector<FedFrame> frames = played(source, 0.25);
+  ASSERT_EQ(frames.size(), 3U);
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    EXPECT_NEAR(frames[k].frame.stamp, 0.1 * static_cast<double>(k), 1e-12);
+  EXPECT_EQ(source.status().dropped, 4U);
+}
+
+TEST(PlayedSource, GoesOnWhenItsClockIsSet) {
+  PlayedSource source(stamped({100.0, 100.1, 20.0, 20.1, 1e12, 1e12 + 0.1}),
+                      [] { return stamped({0.0}); });
+  const std::vector<FedFrame> frames = played(source, 0.51);
+  ASSERT_EQ(frames.size(), 6U);
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    EXPECT_NEAR(frames[k].frame.stamp, 0.1 * static_cast<double>(k), 1e-3);
+}
+
+TEST(PlayedSource, EndsEachLookAtASourceThatRepeatsOneStampForEver) {
+  PlayedSource source(std::make_unique<MadeSource>([](int) {
+                        return Frame{1.0, wall()};
+                      }),
+                      [] { return stamped({0.0}); });
+  EXPECT_EQ(played(source, 0.02).size(), 1U);
+  EXPECT_GT(source.status().dropped, 0U);
+}
+
+TEST(PlayedSource, RefusesLiveCamerasAndEmptyRecordings) {
+  const auto open = [] { return stamped({}); };
+  const auto live = [] {
+    return std::make_unique<MadeSource>(
+        [](int k) {
+          return Frame{0.1 * k, wall()};
+        },
+        SourceInfo{.uri = "camera:", .kind = "camera", .live = true});
+  };
+  EXPECT_TRUE(fails_saying([&] { PlayedSource(live(), open); }, "camera:", "real time"));
+  EXPECT_TRUE(
+      fails_saying([&] { return PlayedSource(stamped({}), open).first_frame().stamp; }, "made:"));
+  EXPECT_TRUE(fails_saying(
+      [&] {
+        return PlayedSource(stamped({nan, nan}), open).first_frame().stamp;
+      },
+      "made:"));
+  PlayedSource gone(stamped({0.0, 0.1}), open);
+  EXPECT_TRUE(fails_saying([&] { return played(gone, 1.0).size(); }, "no frames any more"));
+}
+
+TEST(PosedSource, PutsDepthImagesAndPointsWhereTheCameraStands) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = Vec3(1.0, 2.0, 3.0);
+  pose.rotate(Eigen::AngleAxisd(0.5, Vec3::UnitY()));
+
+  const auto image = with_pose(stamped({4.0}), pose)->next();
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->stamp, 4.0);
+  const auto* posed = dynamic_cast<const DepthImage*>(image->cloud.get());
+  ASSERT_NE(posed, nullptr);
+  EXPECT_TRUE(posed->world_from_camera().isApprox(pose, 0.0));
+  EXPECT_EQ(posed->depth(), wall()->depth());
+
+  const std::vector<Vec3> points = {{0.0, 0.0, 1.0}, {0.1, 0.0, 1.0}, {0.0, 0.1, 1.2}};
+  const auto cloud =
+      with_pose(std::make_unique<MadeSource>([&](int) {
+                  return Frame{0.0, std::make_shared<PointCloud>(points, Vec3(0.0, 0.0, 0.5))};
+                }),
+                pose)
+          ->next();
+  ASSERT_TRUE(cloud);
+  const auto* moved = dynamic_cast<const PointCloud*>(cloud->cloud.get());
+  ASSERT_NE(moved, nullptr);
+  ASSERT_EQ(moved->size(), points.size());
+  ASSERT_TRUE(moved->viewpoint());
+  EXPECT_TRUE(moved->viewpoint()->isApprox(pose * Vec3(0.0, 0.0, 0.5), 1e-12));
+  // The cloud may keep its points in another order: each is where one of ours was taken to.
+  for (const Vec3& point : points) {
+    double nearest = 1.0;
+    for (std::size_t i = 0; i < moved->size(); ++i)
+      nearest = std::min(nearest, (moved->point(i) - pose * point).norm());
+    EXPECT_LT(nearest, 1e-6);
+  }
+}
+
+TEST(PosedSource, RefusesACloudOfAnotherKind) {
+  class Nothing final : public Cloud {
+   public:
+    void gather(const Ball&, std::size_t, Patch&) const noexcept override {}
+    void gather(const Beam&, std::size_t, Patch&) const noexcept override {}
+  };
+  const auto source = with_pose(std::make_unique<MadeSource>([](int) {
+                                  return Frame{0.0, std::make_shared<Nothing>()};
+                                }),
+                                Eigen::Isometry3d::Identity());
+  EXPECT_TRUE(fails_saying([&] { return source->next()->stamp; }, "made:", "pose"));
+}
+
+}  // namespace
+}  // namespace palpate

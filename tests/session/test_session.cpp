@@ -1,0 +1,453 @@
+// SPDX-License-Identifier: Apache-2.0
+// A whole session on a free-running clock: what its options promise.
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/devices/mouse_device.hpp"
+#include "palpate/devices/scripted_device.hpp"
+#include "palpate/record/replay.hpp"
+#include "palpate/session/session.hpp"
+
+#include "tests/session/fakes.hpp"
+#include "tests/support/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace palpate {
+namespace {
+
+using test::fails_saying;
+using test::MadeSource;
+using test::wall;
+using test::wall_depth;
+using test::wall_source;
+
+// Hovers, comes down on the wall at 1 s, and stays `into` [m] behind it.
+HipPath pressing(double into = 0.005) {
+  const double hover = wall_depth - 0.05;
+  const double pressed = wall_depth + into;
+  return HipPath({{0.0, {0.0, 0.0, hover}}, {1.0, {0.0, 0.0, hover}}, {1.1, {0.0, 0.0, pressed}}});
+}
+
+// A session on the wall.
+SessionOptions on_the_wall() {
+  SessionOptions options;
+  options.cameras.push_back({.source = wall_source()});
+  options.device = std::make_unique<ScriptedDevice>(pressing(), false);
+  options.pace = Pace::free_running;
+  return options;
+}
+
+struct Outcome {
+  std::vector<ServoTick> ticks;
+  SessionState state;
+};
+
+Outcome play(SessionOptions options, double duration) {
+  Session session(std::move(options));
+  Outcome outcome;
+  session.run(duration, [&](const ServoTick& tick) { outcome.ticks.push_back(tick); });
+  outcome.state = session.state();
+  return outcome;
+}
+
+void expect_the_same(const Outcome& a, const Outcome& b) {
+  ASSERT_EQ(a.ticks.size(), b.ticks.size());
+  for (std::size_t i = 0; i < a.ticks.size(); ++i) {
+    ASSERT_EQ(a.ticks[i].force, b.ticks[i].force) << "tick " << i;
+    ASSERT_EQ(a.ticks[i].tick.force, b.ticks[i].tick.force) << "tick " << i;
+    ASSERT_EQ(a.ticks[i].tick.proxy, b.ticks[i].tick.proxy) << "tick " << i;
+    ASSERT_EQ(a.ticks[i].safety, b.ticks[i].safety) << "tick " << i;
+  }
+}
+
+TEST(Session, AsksForTheCouplingsForceAndSendsWhatTheLimitAllows) {
+  SessionOptions options = on_the_wall();
+  options.device = std::make_unique<ScriptedDevice>(pressing(0.02), false);
+  const Outcome run = play(std::move(options), 4.0);
+  ASSERT_EQ(run.ticks.size(), 4000U);
+  const Summary& summary = run.state.summary;
+  EXPECT_EQ(summary.ticks, 4000U);
+  EXPECT_EQ(summary.frames, 120U);
+  // 600 N/m times 20 mm.
+  EXPECT_NEAR(run.ticks.back().tick.force.norm(), 12.0, 0.1);
+  EXPECT_NEAR(summary.largest_asked, 12.0, 0.5);
+  EXPECT_NEAR(summary.largest_sent, 3.3, 1e-9);
+  for (const ServoTick& tick : run.ticks) EXPECT_LE(tick.force.norm(), 3.3 + 1e-9);
+  EXPECT_GT(summary.safety_ticks[2], 1000U) << "force_cut says so";
+  EXPECT_EQ(summary.pop_throughs, 0U);
+  EXPECT_FALSE(run.state.running);
+}
+
+TEST(Session, KeepsALowerLimitFromItsSettings) {
+  SessionOptions options = on_the_wall();
+  options.settings.safety.max_force = 1.25;
+  EXPECT_NEAR(play(std::move(options), 4.0).state.summary.largest_sent, 1.25, 1e-9);
+}
+
+TEST(Session, GivesTheSameForcesBitForBit) {
+  for (const char* method : {"sight", "paper"}) {
+    const auto on_the_desk = [&] {
+      SessionOptions options;
+      options.cameras.push_back({.uri = "synthetic:desk?noise=1mm"});
+      options.settings.method = method;
+      options.pace = Pace::free_running;
+      options.stroke_time = 4.0;
+      return options;
+    };
+    const Outcome first = play(on_the_desk(), 4.0);
+    EXPECT_GT(first.state.summary.contact_ticks, 500U) << method;
+    EXPECT_GT(first.state.summary.largest_sent, 0.5) << method;
+    EXPECT_LE(first.state.summary.largest_sent, 3.3 + 1e-9) << method;
+    expect_the_same(first, play(on_the_desk(), 4.0));
+  }
+}
+
+TEST(Session, IsReplayedFromItsRecordingBitForBit) {
+  const test::TemporaryFolder folder;
+  const std::string bag = (folder.path() / "bag").string();
+  SessionOptions options = on_the_wall();
+  options.record = bag;
+  const Outcome recorded = play(std::move(options), 2.0);
+  EXPECT_FALSE(recorded.state.recording.failed) << recorded.state.recording.message;
+  EXPECT_FALSE(recorded.state.recording.on);
+  expect_the_same(recorded, play(on_the_wall(), 2.0));
+  SessionReader reader(bag);
+  EXPECT_EQ(reader.ticks(), 2000U);
+  const ReplayReport report = replay(reader);
+  EXPECT_TRUE(report.identical());
+  EXPECT_EQ(report.ticks, 2000U);
+
+  SessionOptions again = on_the_wall();
+  again.record = bag;
+  EXPECT_TRUE(fails_saying([&] { Session session(std::move(again)); }, "bag", "already"));
+}
+
+TEST(Session, SwitchesMethodsWhereTheProxyIs) {
+  const test::TemporaryFolder folder;
+  SessionOptions options = on_the_wall();
+  options.record = (folder.path() / "bag").string();
+  Session session(std::move(options));
+  std::vector<ServoTick> ticks;
+  session.run(5.0, [&](const ServoTick& tick) {
+    ticks.push_back(tick);
+    if (ticks.size() == 3000 || ticks.size() == 4000) {
+      ServoSettings settings = session.settings();
+      settings.method = ticks.size() == 3000 ? "paper" : "sight";
+      session.set(settings);
+    }
+  });
+  ASSERT_EQ(ticks.size(), 5000U);
+  for (std::size_t i = 1; i < ticks.size(); ++i) {
+    const bool is_switched = (ticks[i].hand & method_switched) != 0;
+    EXPECT_EQ(is_switched, i == 3000 || i == 4000) << "tick " << i;
+    EXPECT_LE(ticks[i].force.norm(), ticks[i - 1].force.norm() + 0.5 + 1e-9) << "tick " << i;
+  }
+  // `paper` lets the proxy a little way between points that lie 2.5 mm apart.
+  for (const std::size_t i : {2999U, 3999U, 4999U})
+    EXPECT_NEAR(ticks[i].force.norm(), i == 3999 ? 2.8 : 3.0, 0.1) << "tick " << i;
+  EXPECT_EQ(session.settings().method, "sight");
+  SessionReader reader(folder.path() / "bag");
+  EXPECT_TRUE(replay(reader).identical());
+}
+
+TEST(Session, ChangesParametersFromTheNextTickOn) {
+  Session session(on_the_wall());
+  std::vector<double> forces;
+  session.run(4.0, [&](const ServoTick& tick) {
+    forces.push_back(tick.tick.force.norm());
+    if (forces.size() != 3500) return;
+    ServoSettings settings = session.settings();
+    settings.parameters.coupling.stiffness = 300.0;
+    session.set(settings);
+  });
+  EXPECT_NEAR(forces[3499], 3.0, 0.05);
+  EXPECT_NEAR(forces[3999], 1.5, 0.05);
+}
+
+// A method in one class: a wall of its own, wherever the camera sees one.
+class OwnWall final : public Method {
+ public:
+  explicit OwnWall(double z) : z_(z) {}
+  void seat(const Vec3& /*proxy*/) noexcept override {}
+  void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override { ++frame_; }
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    Tick tick = free_tick(hip, t, frame_);
+    if (hip.z() <= z_) return tick;
+    tick.state = ContactState::contact;
+    tick.normal = -Vec3::UnitZ();
+    tick.proxy.z() = z_;
+    tick.force = 100.0 * (tick.proxy - hip);
+    return tick;
+  }
+  void set_parameters(const Parameters& /*parameters*/) override {}
+  void check(const Cloud& cloud) const override {
+    if (dynamic_cast<const DepthImage*>(&cloud) == nullptr)
+      throw Error("own-wall", "it touches depth images alone", "choose another method");
+  }
+
+ private:
+  double z_;
+  std::int64_t frame_ = -1;
+};
+
+MethodRegistry with_own_wall() {
+  MethodRegistry methods = standard_methods();
+  methods.add({"own-wall", "a wall of its own",
+               [](const Parameters&) { return std::make_unique<OwnWall>(0.48); }});
+  return methods;
+}
+
+// A device in one class: stays where it is put and keeps what it is told.
+class OwnDevice final : public Device {
+ public:
+  struct Seen {
+    int enables = 0, disables = 0;
+    Vec3 force = Vec3::Constant(-1.0);
+  };
+  OwnDevice(std::shared_ptr<Seen> seen, HipPath path)
+      : seen_(std::move(seen)), path_(std::move(path)) {}
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  HandState read(double t) noexcept override { return {.position = path_.at(t)}; }
+  void write(const Vec3& force, double /*t*/) noexcept override { seen_->force = force; }
+  void enable() override { ++seen_->enables; }
+  void disable() noexcept override { ++seen_->disables; }
+
+ private:
+  std::shared_ptr<Seen> seen_;
+  HipPath path_;
+  DeviceInfo info_{.uri = "own:", .kind = "own device", .limits = no_motors};
+};
+
+TEST(Session, RunsAMethodCameraAndDeviceOfOnesOwn) {
+  SessionOptions options;
+  options.sources.add({"own", "a wall", [](const Uri&) { return wall_source(); }});
+  options.cameras.push_back({.uri = "own:"});
+  options.methods = with_own_wall();
+  options.settings.method = "own-wall";
+  const auto seen = std::make_shared<OwnDevice::Seen>();
+  options.devices.add({"own", "a device", [&](const Uri&, const std::optional<HipPath>&) {
+                         return std::make_unique<OwnDevice>(seen, pressing());
+                       }});
+  options.device_uri = "own:";
+  options.pace = Pace::free_running;
+  Session session(std::move(options));
+  EXPECT_EQ(session.device().info().kind, "own device");
+  Vec3 last = Vec3::Zero();
+  session.run(3.5, [&](const ServoTick& tick) { last = tick.force; });
+  EXPECT_NEAR(last.z(), -2.5, 1e-9) << "100 N/m times 25 mm";
+  EXPECT_EQ(seen->force, Vec3::Zero()) << "the last write is zero";
+  EXPECT_EQ(seen->enables, 1);
+  EXPECT_GE(seen->disables, 1);
+}
+
+TEST(Session, TouchesWhereACameraStands) {
+  SessionOptions options = on_the_wall();
+  options.cameras[0].world_from_camera = Eigen::Translation3d(0.0, 0.0, 1.0);
+  std::vector<HipPath::Sample> samples = pressing().samples();
+  for (HipPath::Sample& sample : samples) sample.hip.z() += 1.0;
+  options.device = std::make_unique<ScriptedDevice>(HipPath(samples), false);
+  const Outcome there = play(std::move(options), 3.5);
+  EXPECT_NEAR(there.ticks.back().force.norm(), 3.0, 0.05);
+
+  SessionOptions away = on_the_wall();
+  away.cameras[0].world_from_camera = Eigen::Translation3d(0.0, 0.0, 1.0);
+  EXPECT_EQ(play(std::move(away), 3.5).state.summary.largest_asked, 0.0);
+}
+
+TEST(Session, TouchesWhatSeveralCamerasSee) {
+  // The second stands beside the first and sees a wall that is nearer.
+  SessionOptions options = on_the_wall();
+  options.cameras.push_back(
+      {.source = std::make_unique<MadeSource>([](int k) {
+         return Frame{k / 15.0, wall(480)};
+       }),
+       .world_from_camera = Eigen::Isometry3d(Eigen::Translation3d(0.5, 0.0, 0.0))});
+  options.device = std::make_unique<ScriptedDevice>(
+      HipPath({{0.0, {0.5, 0.0, 0.43}}, {1.0, {0.5, 0.0, 0.43}}, {1.1, {0.5, 0.0, 0.483}}}), false);
+  const Outcome run = play(std::move(options), 3.5);
+  EXPECT_NEAR(run.ticks.back().force.norm(), 600.0 * 0.003, 0.1);
+  EXPECT_EQ(run.state.summary.frames, 105U + 53U);
+  ASSERT_EQ(run.state.cameras.size(), 2U);
+  EXPECT_EQ(run.state.cameras[1].frames, 53U);
+}
+
+TEST(Session, GoesOnWithAPictureOfOneFrameAndARecordingThatEnds) {
+  const test::TemporaryFolder folder;
+  for (const int frames : {1, 12}) {
+    SessionOptions options = on_the_wall();
+    options.sources.add({"short", "", [=](const Uri&) -> std::unique_ptr<Source> {
+                           return std::make_unique<MadeSource>([=](int k) -> std::optional<Frame> {
+                             if (k == frames) return std::nullopt;
+                             return Frame{5.0 + k / 30.0, wall()};
+                           });
+                         }});
+    options.cameras.clear();
+    options.cameras.push_back({.uri = "short:"});
+    const Outcome run = play(std::move(options), 3.5);
+    EXPECT_NEAR(run.ticks.back().force.norm(), 3.0, 0.05) << frames << " frames";
+    for (const ServoTick& tick : run.ticks) ASSERT_LT(tick.frame_age, 0.05) << tick.number;
+  }
+}
+
+TEST(Session, StopsAndTakesTheForceOffWhereASourceThrows) {
+  SessionOptions options;
+  options.cameras.push_back({.source = std::make_unique<MadeSource>([](int k) -> Frame {
+                               if (k == 90) throw Error("made:", "frame 90 is damaged", "mend it");
+                               return {k / 30.0, wall()};
+                             })});
+  const auto seen = std::make_shared<OwnDevice::Seen>();
+  options.device = std::make_unique<OwnDevice>(seen, pressing());
+  options.pace = Pace::free_running;
+  Session session(std::move(options));
+  Vec3 last = Vec3::Zero();
+  EXPECT_TRUE(fails_saying(
+      [&] { session.run(5.0, [&](const ServoTick& tick) { last = tick.force; }); }, "frame 90"));
+  EXPECT_GT(last.norm(), 1.0);
+  EXPECT_EQ(seen->force, Vec3::Zero());
+  EXPECT_GE(seen->disables, 1);
+}
+
+TEST(Session, EndsWhenItIsAskedTo) {
+  Session session(on_the_wall());
+  int ticks = 0;
+  session.run(5.0, [&](const ServoTick&) {
+    if (++ticks == 100) session.request_stop();
+  });
+  EXPECT_EQ(ticks, 100);
+  EXPECT_EQ(session.state().summary.ticks, 100U);
+  EXPECT_TRUE(fails_saying([&] { session.run(1.0); }, "session", "stopped"));
+  session.stop();
+}
+
+TEST(Session, ShowsItsFramesToWhoeverWatches) {
+  std::vector<double> stamps;
+  SessionOptions options = on_the_wall();
+  options.on_frame = [&](std::size_t camera, const FedFrame& fed) {
+    EXPECT_EQ(camera, 0U);
+    stamps.push_back(fed.frame.stamp);
+  };
+  Session session(std::move(options));
+  EXPECT_EQ(session.newest_clouds().at(0), nullptr);
+  session.run(1.0);
+  ASSERT_EQ(stamps.size(), 30U);
+  EXPECT_NEAR(stamps.back(), 29.0 / 30.0, 1e-12);
+  EXPECT_NE(session.newest_clouds().at(0), nullptr);
+}
+
+TEST(Session, StartsAMouseBeforeWhatTheCameraSees) {
+  SessionOptions options = on_the_wall();
+  options.device = nullptr;
+  options.device_uri = "mouse:?max_speed=0.5";
+  Session session(std::move(options));
+  ASSERT_NE(session.mouse(), nullptr);
+  EXPECT_NEAR(session.mouse()->start().z(), wall_depth - 0.05, 0.002);
+  SessionOptions placed = on_the_wall();
+  placed.device = nullptr;
+  placed.device_uri = "mouse:?z=0.3";
+  EXPECT_NEAR(Session(std::move(placed)).mouse()->start().z(), 0.3, 1e-12);
+}
+
+// What each error has to name: the thing, and what to do about it.
+template <class Change, class... Parts>
+testing::AssertionResult refuses(const Change& change, const Parts&... parts) {
+  SessionOptions options = on_the_wall();
+  change(options);
+  return fails_saying([&] { const Session session(std::move(options)); }, parts...);
+}
+
+TEST(Session, RefusesWhatItCannotRun) {
+  using Options = SessionOptions;
+  EXPECT_TRUE(refuses([](Options& o) { o.cameras.clear(); }, "camera", "synthetic:desk"));
+  EXPECT_TRUE(refuses(
+      [](Options& o) {
+        while (o.cameras.size() <= Patch::max_views)
+          o.cameras.push_back({.uri = "synthetic:plane"});
+      },
+      "camera", "at most " + std::to_string(Patch::max_views)));
+  EXPECT_TRUE(refuses([](Options& o) { o.settings.method = "sigth"; }, "sigth", "'sight'"));
+  EXPECT_TRUE(refuses(
+      [](Options& o) {
+        o.cameras.clear();
+        o.cameras.push_back({.uri = "sinthetic:desk"});
+      },
+      "sinthetic", "'synthetic:'"));
+  EXPECT_TRUE(refuses(
+      [](Options& o) {
+        o.device = nullptr;
+        o.device_uri = "hnad:";
+      },
+      "hnad", "'hand:'"));
+  EXPECT_TRUE(refuses(
+      [](Options& o) {
+        o.cameras[0].source = std::make_unique<MadeSource>(
+            [](int k) {
+              return Frame{k / 30.0, wall()};
+            },
+            SourceInfo{.uri = "camera:1", .kind = "camera", .live = true});
+      },
+      "camera:1", "real time"));
+  EXPECT_TRUE(refuses(
+      [](Options& o) {
+        o.cameras[0].source =
+            std::make_unique<MadeSource>([](int) -> std::optional<Frame> { return std::nullopt; });
+      },
+      "made:", "no frames"));
+  EXPECT_TRUE(refuses([](Options& o) { o.settings.safety.max_force = -1.0; }, "max_device_force"));
+  EXPECT_TRUE(
+      refuses([](Options& o) { o.settings.parameters.coupling.stiffness = -1.0; }, "stiffness"));
+  EXPECT_TRUE(refuses([](Options& o) { o.servo.rate = 0.0; }, "servo rate", "1 to 100000"));
+  EXPECT_TRUE(refuses(
+      [](Options& o) {
+        o.pace = Pace::real_time;
+        o.servo.rate = 10.0;
+      },
+      "servo rate", "500 to 10000"));
+  EXPECT_TRUE(fails_saying([] { Session(on_the_wall()).start(); }, "free-running", "run"));
+}
+
+TEST(Session, RefusesAMethodThatCannotTouchWhatTheCamerasSee) {
+  const auto points = [] {
+    return std::make_unique<MadeSource>([](int k) {
+      const std::vector<Vec3> two = {{0.0, 0.0, 0.5}, {0.01, 0.0, 0.5}};
+      return Frame{k / 30.0, std::make_shared<PointCloud>(two, Vec3::Zero())};
+    });
+  };
+  EXPECT_TRUE(refuses(
+      [&](SessionOptions& o) {
+        o.cameras[0].source = points();
+        o.methods = with_own_wall();
+        o.settings.method = "own-wall";
+      },
+      "own-wall", "depth images", "another method"));
+
+  // In mid-session everything stays as it was.
+  SessionOptions options = on_the_wall();
+  options.cameras[0].source = points();
+  options.methods = with_own_wall();
+  Session session(std::move(options));
+  session.run(0.1, [&](const ServoTick& tick) {
+    if (tick.number != 50) return;
+    ServoSettings settings = session.settings();
+    settings.method = "own-wall";
+    settings.parameters.coupling.stiffness = 100.0;
+    EXPECT_TRUE(fails_saying([&] { session.set(settings); }, "own-wall"));
+    settings.method = "papr";
+    EXPECT_TRUE(fails_saying([&] { session.set(settings); }, "papr", "'paper'"));
+    settings = session.settings();
+    settings.safety.ramp_time = -1.0;
+    EXPECT_TRUE(fails_saying([&] { session.set(settings); }, "ramp_time"));
+  });
+  EXPECT_EQ(session.settings().method, "sight");
+  EXPECT_EQ(session.settings().parameters.coupling.stiffness, 600.0);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+// A session in real time: how it starts and ends. Orders of events are judged, never times.
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <functional>
+#include <future>
+#include <iterator>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/core/error.hpp"
+#include "palpate/session/session.hpp"
+
+#include "tests/session/fakes.hpp"
+#include "tests/support/errors.hpp"
+
+namespace palpate {
+namespace {
+
+using test::fails_saying;
+using test::wall;
+using test::wall_depth;
+
+// What happened, in its order. Any thread.
+class Log {
+ public:
+  void note(std::string event) {
+    const std::lock_guard lock(mutex_);
+    events_.push_back(std::move(event));
+  }
+  [[nodiscard]] std::vector<std::string> events() const {
+    const std::lock_guard lock(mutex_);
+    return events_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<std::string> events_;
+};
+
+// A door that stays shut until it is opened.
+class Gate {
+ public:
+  void open() {
+    {
+      const std::lock_guard lock(mutex_);
+      is_open_ = true;
+    }
+    opened_.notify_all();
+  }
+  void wait() {
+    std::unique_lock lock(mutex_);
+    opened_.wait(lock, [this] { return is_open_; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable opened_;
+  bool is_open_ = false;
+};
+
+const SourceInfo live{.uri = "live:",
+                      .kind = "live camera",
+                      .frame_rate = 100.0,
+                      .live = true,
+                      .clock = StampClock::monotonic};
+
+// Gives one frame, then never returns from `next` until the gate opens, whoever cancels it.
+class HangingCamera final : public Source {
+ public:
+  HangingCamera(std::shared_ptr<Log> log, std::shared_ptr<Gate> gate, std::promise<void> ended)
+      : log_(std::move(log)), gate_(std::move(gate)), ended_(std::move(ended)) {}
+  ~HangingCamera() override { ended_.set_value(); }
+  std::optional<Frame> next(double /*timeout*/) override {
+    if (std::exchange(is_first_, false)) return Frame{monotonic_now(), wall()};
+    hangs = true;
+    gate_->wait();
+    return std::nullopt;
+  }
+  void cancel() noexcept override { log_->note("cancel the hanging camera"); }
+  [[nodiscard]] const SourceInfo& info() const override { return live; }
+  static inline std::atomic<bool> hangs{false};
+
+ private:
+  std::shared_ptr<Log> log_;
+  std::shared_ptr<Gate> gate_;
+  std::promise<void> ended_;
+  bool is_first_ = true;
+};
+
+// 100 frames a second.
+class LivingCamera final : public Source {
+ public:
+  explicit LivingCamera(std::shared_ptr<Log> log) : log_(std::move(log)) {}
+  std::optional<Frame> next(double timeout) override {
+    std::unique_lock lock(mutex_);
+    const auto pause = std::chrono::duration<double>(std::min(timeout, 0.01));
+    if (changed_.wait_for(lock, pause, [this] { return is_cancelled_; })) return std::nullopt;
+    return Frame{monotonic_now(), wall(static_cast<std::uint16_t>(500 + number_++ % 2))};
+  }
+  void cancel() noexcept override {
+    log_->note("cancel the living camera");
+    {
+      const std::lock_guard lock(mutex_);
+      is_cancelled_ = true;
+    }
+    changed_.notify_all();
+  }
+  [[nodiscard]] const SourceInfo& info() const override { return live; }
+
+ private:
+  std::shared_ptr<Log> log_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool is_cancelled_ = false;
+  int number_ = 0;
+};
+
+// A hand that hovers for 50 reads and then presses into the wall.
+class LoggingDevice final : public Device {
+ public:
+  explicit LoggingDevice(std::shared_ptr<Log> log, bool refuses = false)
+      : log_(std::move(log)), refuses_(refuses) {}
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  HandState read(double /*t*/) noexcept override {
+    return {.position = {0.0, 0.0, ++reads_ <= 50 ? wall_depth - 0.05 : wall_depth + 0.005}};
+  }
+  void write(const Vec3& force, double /*t*/) noexcept override {
+    log_->note(force.isZero(0.0) ? "write zero" : "write a force");
+  }
+  void enable() override {
+    if (refuses_) throw Error("logging:", "it is not calibrated", "calibrate it");
+    log_->note("enable");
+  }
+  void disable() noexcept override { log_->note("disable"); }
+
+ private:
+  std::shared_ptr<Log> log_;
+  bool refuses_;
+  int reads_ = 0;
+  DeviceInfo info_{.uri = "logging:", .kind = "logging", .limits = no_motors};
+};
+
+// The camera that hangs must not be what takes the force off.
+SessionOptions patient(const std::shared_ptr<Log>& log) {
+  SessionOptions options;
+  options.cameras.push_back({.source = std::make_unique<LivingCamera>(log)});
+  options.device = std::make_unique<LoggingDevice>(log);
+  options.settings.safety.fade_age = 5.0;
+  options.settings.safety.lost_age = 10.0;
+  options.settings.safety.late_intervals = 100.0;
+  options.settings.safety.stall_time = 0.1;
+  return options;
+}
+
+bool comes_true(const std::function<bool()>& condition) {
+  const double patience = monotonic_now() + 60.0;
+  while (!condition() && monotonic_now() < patience) std::this_thread::yield();
+  return condition();
+}
+
+std::size_t threads_of_this_process() {
+  const std::filesystem::directory_iterator tasks("/proc/self/task");
+  return static_cast<std::size_t>(std::distance(begin(tasks), end(tasks)));
+}
+
+TEST(LiveSession, TakesTheForceOffBeforeAnyCameraIsWaitedFor) {
+  const auto log = std::make_shared<Log>();
+  const auto gate = std::make_shared<Gate>();
+  std::promise<void> ended;
+  std::future<void> camera_ended = ended.get_future();
+  HangingCamera::hangs = false;
+  {
+    SessionOptions options = patient(log);
+    options.cameras.push_back(
+        {.source = std::make_unique<HangingCamera>(log, gate, std::move(ended))});
+    Session session(std::move(options));
+    EXPECT_FALSE(session.state().running);
+    session.start();
+    session.start();  // harmless
+    EXPECT_TRUE(session.state().running);
+    ASSERT_TRUE(comes_true([&] {
+      return HangingCamera::hangs && session.statistics().force_out.load();
+    })) << "no force was sent";
+    session.stop();  // returns although the camera hangs
+
+    const std::vector<std::string> events = log->events();
+    const auto is_cancel = [](const std::string& event) { return event.starts_with("cancel"); };
+    const auto is_write = [](const std::string& event) { return event.starts_with("write"); };
+    const auto first_cancel = std::find_if(events.begin(), events.end(), is_cancel);
+    ASSERT_NE(first_cancel, events.end());
+    EXPECT_EQ(std::count_if(events.begin(), events.end(), is_cancel), 2);
+    EXPECT_EQ(std::find_if(first_cancel, events.end(), is_write), events.end())
+        << "nothing is written once a camera is told to end";
+    const auto last_write =
+        std::find_if(std::make_reverse_iterator(first_cancel), events.rend(), is_write);
+    ASSERT_NE(last_write, events.rend());
+    EXPECT_EQ(*last_write, "write zero");
+    EXPECT_NE(std::find(last_write.base(), first_cancel, "disable"), first_cancel)
+        << "the device is disabled between the last write and the first camera's end";
+    EXPECT_GT(std::count(events.begin(), events.end(), "write a force"), 0);
+
+    session.stop();  // harmless
+    EXPECT_EQ(log->events().size(), events.size());
+    EXPECT_FALSE(session.state().running);
+    EXPECT_TRUE(fails_saying([&] { session.start(); }, "session", "stopped"));
+  }
+  gate->open();
+  camera_ended.wait();
+}
+
+TEST(LiveSession, EndsWithoutEverHavingBegun) {
+  const auto log = std::make_shared<Log>();
+  { const Session session(patient(log)); }
+  const std::vector<std::string> events = log->events();
+  EXPECT_EQ(std::count(events.begin(), events.end(), "enable"), 0);
+  EXPECT_EQ(std::count(events.begin(), events.end(), "write a force"), 0);
+  EXPECT_GT(std::count(events.begin(), events.end(), "disable"), 0);
+}
+
+TEST(LiveSession, LeavesNoThreadBehindWhereTheDeviceRefuses) {
+  const auto log = std::make_shared<Log>();
+  SessionOptions options = patient(log);
+  options.device = std::make_unique<LoggingDevice>(log, true);
+  const std::size_t before = threads_of_this_process();
+  Session session(std::move(options));
+  EXPECT_TRUE(fails_saying([&] { session.start(); }, "logging:", "calibrate it"));
+  EXPECT_EQ(threads_of_this_process(), before);
+  EXPECT_FALSE(session.state().running);
+  session.stop();
+}
+
+TEST(LiveSession, EndsARunWhenItIsAskedTo) {
+  Session session(patient(std::make_shared<Log>()));
+  std::thread other([&] {
+    comes_true([&] { return session.statistics().ticks.load() > 20; });
+    session.request_stop();
+  });
+  session.run(std::nullopt);
+  other.join();
+  const SessionState state = session.state();
+  EXPECT_GT(state.summary.ticks, 20U);
+  EXPECT_FALSE(state.running);
+  ASSERT_NE(session.timing(), nullptr);
+}
+
+TEST(LiveSession, IsChangedAndWatchedFromSeveralThreads) {
+  Session session(patient(std::make_shared<Log>()));
+  session.start();
+  std::atomic<bool> ended{false};
+  std::vector<std::thread> threads;
+  for (const double stiffness : {300.0, 500.0}) {
+    threads.emplace_back([&session, stiffness] {
+      for (int i = 0; i < 30; ++i) {
+        ServoSettings settings = session.settings();
+        settings.parameters.coupling.stiffness = stiffness;
+        session.set(settings);
+      }
+    });
+  }
+  threads.emplace_back([&session] {
+    for (int i = 0; i < 20; ++i) {
+      ServoSettings settings = session.settings();
+      settings.method = i % 2 == 0 ? "paper" : "sight";
+      session.set(settings);
+      session.reset_faults();
+    }
+  });
+  std::thread watcher([&] {
+    auto ticks = session.ticks();
+    while (!ended) {
+      for (ServoTick tick{}; ticks.try_pop(tick);) EXPECT_TRUE(tick.force.allFinite());
+      EXPECT_EQ(session.state().cameras.size(), 1U);
+      static_cast<void>(session.newest_clouds());
+    }
+  });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_TRUE(comes_true([&] { return session.state().summary.ticks > 20; }));
+  ended = true;
+  watcher.join();
+  session.stop();
+  const double stiffness = session.settings().parameters.coupling.stiffness;
+  EXPECT_TRUE(stiffness == 300.0 || stiffness == 500.0) << stiffness;
+}
+
+}  // namespace
+}  // namespace palpate

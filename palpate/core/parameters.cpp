@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/core/parameters.hpp"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <numbers>
-#include <vector>
+#include <string>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
 
 namespace palpate {
 namespace {
@@ -91,23 +88,7 @@ constexpr std::array table = {
                   [](Parameters& p, double v) { p.sight.side_depth = v; }},
 };
 
-std::string number(double value) {
-  std::string text = std::to_string(value);
-  if (value != 0.0 && std::abs(value) < 1e-3) {
-    std::array<char, 32> buffer{};
-    std::snprintf(buffer.data(), buffer.size(), "%g", value);
-    text = buffer.data();
-  }
-  return text;
-}
-
-void check_range(const ParameterInfo& row, double value) {
-  if (std::isfinite(value) && value >= row.min && value <= row.max) return;
-  const std::string unit = row.unit == "-" ? "" : " " + std::string(row.unit);
-  throw Error("parameter '" + std::string(row.name) + "'",
-              number(value) + unit + " is out of range",
-              "give a value from " + number(row.min) + " to " + number(row.max) + unit);
-}
+constexpr std::string_view noun = "parameter";
 
 }  // namespace
 
@@ -116,27 +97,16 @@ std::span<const ParameterInfo> parameter_table() {
 }
 
 void set_parameter(Parameters& parameters, std::string_view name, double value) {
-  for (const ParameterInfo& row : table) {
-    if (row.name != name) continue;
-    check_range(row, value);
-    row.set(parameters, value);
-    return;
-  }
-  std::vector<std::string_view> names;
-  for (const ParameterInfo& row : table) names.push_back(row.name);
-  const std::string_view near = nearest_name(name, names);
-  throw Error("parameter '" + std::string(name) + "'", "there is no such parameter",
-              near.empty() ? "see 'palpate help parameters' for their names"
-                           : "did you mean '" + std::string(near) + "'?");
+  set_by_name(parameter_table(), parameters, name, value, noun);
 }
 
 void validate(const Parameters& parameters) {
-  for (const ParameterInfo& row : table) check_range(row, row.get(parameters));
+  check_ranges(parameter_table(), parameters, noun);
   const ProxyParameters& proxy = parameters.proxy;
   if (!(proxy.r_1 < proxy.r_2 && proxy.r_2 < proxy.r_3)) {
     throw Error("parameters r_1, r_2, r_3",
-                "the radii " + number(proxy.r_1) + ", " + number(proxy.r_2) + " and " +
-                    number(proxy.r_3) + " m do not increase",
+                "the radii " + number_text(proxy.r_1) + ", " + number_text(proxy.r_2) + " and " +
+                    number_text(proxy.r_3) + " m do not increase",
                 "give r_1 < r_2 < r_3, or set r_c to scale all three");
   }
 }

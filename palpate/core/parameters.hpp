@@ -2,8 +2,9 @@
 #pragma once
 
 #include <span>
-#include <string>
 #include <string_view>
+
+#include "palpate/core/parameter_table.hpp"
 
 namespace palpate {
 
@@ -50,19 +51,7 @@ struct Parameters {
   SightParameters sight;
 };
 
-/// One row of the table that feeds help texts, configuration files and sliders.
-struct ParameterInfo {
-  std::string_view name;
-  std::string_view symbol;  ///< as in the paper, empty where it has none
-  std::string_view unit;
-  double default_value;
-  double min;  ///< smallest value allowed
-  double max;  ///< largest value allowed
-  std::string_view meaning;
-  std::string_view source;
-  double (*get)(const Parameters&);
-  void (*set)(Parameters&, double);
-};
+using ParameterInfo = ParameterRow<Parameters>;
 
 /// All numeric parameters, in the order in which they are shown.
 /// The row `r_c` is derived: setting it scales r_1, r_2 and r_3 together (section 5).

@@ -215,7 +215,7 @@ std::string to_json(const NumberedSettings& settings) {
   json pose = json::array();
   for (const ParameterInfo& row : parameter_table()) parameters[row.name] = row.get(all.parameters);
   for (const SafetyParameterInfo& row : safety_parameter_table())
-    safety[row.name] = all.safety.*row.member;
+    safety[row.name] = row.get(all.safety);
   for (int i = 0; i < 12; ++i) pose.push_back(all.placement.world_from_device(i / 4, i % 4));
   return json{{"number", settings.number}, {"method", all.method},
               {"parameters", parameters},  {"safety", safety},

@@ -5,11 +5,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <string>
-#include <vector>
-
-#include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
 
 namespace palpate {
 namespace {
@@ -51,21 +46,21 @@ void set_angle(Placement& placement, double value) {
 }
 
 constexpr std::array table{
-    PlacementInfo{"scale", "-", 1.0, 0.001, 1000.0,
-                  "scene metres per device metre; the felt stiffness grows with it",
+    PlacementInfo{"scale", "", "-", 1.0, 0.001, 1000.0,
+                  "scene metres per device metre; the felt stiffness grows with it", "",
                   [](const Placement& p) { return p.workspace_scale; },
                   [](Placement& p, double v) { p.workspace_scale = v; }},
-    PlacementInfo{"origin_x", "m", 0.0, -farthest, farthest, "device's origin in the world",
+    PlacementInfo{"origin_x", "", "m", 0.0, -farthest, farthest, "device's origin in the world", "",
                   origin<0>, set_origin<0>},
-    PlacementInfo{"origin_y", "m", 0.0, -farthest, farthest, "device's origin in the world",
+    PlacementInfo{"origin_y", "", "m", 0.0, -farthest, farthest, "device's origin in the world", "",
                   origin<1>, set_origin<1>},
-    PlacementInfo{"origin_z", "m", 0.0, -farthest, farthest, "device's origin in the world",
+    PlacementInfo{"origin_z", "", "m", 0.0, -farthest, farthest, "device's origin in the world", "",
                   origin<2>, set_origin<2>},
-    PlacementInfo{"roll", "rad", 0.0, -pi, pi, "device's rotation about the world's x axis",
+    PlacementInfo{"roll", "", "rad", 0.0, -pi, pi, "device's rotation about the world's x axis", "",
                   angle<0>, set_angle<0>},
-    PlacementInfo{"pitch", "rad", 0.0, -0.5 * pi, 0.5 * pi, "then about the world's y axis",
+    PlacementInfo{"pitch", "", "rad", 0.0, -0.5 * pi, 0.5 * pi, "then about the world's y axis", "",
                   angle<1>, set_angle<1>},
-    PlacementInfo{"yaw", "rad", 0.0, -pi, pi, "then about the world's z axis", angle<2>,
+    PlacementInfo{"yaw", "", "rad", 0.0, -pi, pi, "then about the world's z axis", "", angle<2>,
                   set_angle<2>},
 };
 
@@ -76,21 +71,7 @@ std::span<const PlacementInfo> placement_table() {
 }
 
 void set_placement(Placement& placement, std::string_view name, double value) {
-  std::vector<std::string_view> names;
-  for (const PlacementInfo& row : table) {
-    names.push_back(row.name);
-    if (row.name != name) continue;
-    if (!(value >= row.min && value <= row.max))
-      throw Error(
-          "placement '" + std::string(name) + "'",
-          std::to_string(value) + " " + std::string(row.unit) + " is out of range",
-          "give a value from " + std::to_string(row.min) + " to " + std::to_string(row.max));
-    row.set(placement, value);
-    return;
-  }
-  const std::string_view near = nearest_name(name, names);
-  throw Error("placement '" + std::string(name) + "'", "there is no such number of a placement",
-              near.empty() ? "" : "did you mean '" + std::string(near) + "'?");
+  set_by_name(placement_table(), placement, name, value, "placement");
 }
 
 }  // namespace palpate

@@ -4,21 +4,12 @@
 #include <span>
 #include <string_view>
 
+#include "palpate/core/parameter_table.hpp"
 #include "palpate/servo/workspace.hpp"
 
 namespace palpate {
 
-/// One number of a placement, for sliders and options.
-struct PlacementInfo {
-  std::string_view name;
-  std::string_view unit;
-  double default_value;
-  double min;
-  double max;
-  std::string_view meaning;
-  double (*get)(const Placement&);
-  void (*set)(Placement&, double);
-};
+using PlacementInfo = ParameterRow<Placement>;
 
 /// Scale, origin and angles of a placement, in the order in which they are shown. The angles turn
 /// about the world's x, then y, then z axis.

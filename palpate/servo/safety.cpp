@@ -7,8 +7,6 @@
 #include <vector>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
-#include "palpate/core/parameters.hpp"
 
 namespace palpate {
 namespace {
@@ -63,67 +61,69 @@ constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the safety chain's own result broke its bounds; please report it"};
 
 using P = SafetyParameters;
+template <double P::*member>
+constexpr SafetyParameterInfo row(std::string_view name, std::string_view unit,
+                                  double default_value, double min, double max,
+                                  std::string_view meaning) {
+  return {name,
+          "",
+          unit,
+          default_value,
+          min,
+          max,
+          meaning,
+          "",
+          [](const P& p) { return p.*member; },
+          [](P& p, double v) { p.*member = v; }};
+}
+
 constexpr std::array table{
-    SafetyParameterInfo{"max_device_force", "N", 3.3, 0.0, 50.0,
-                        "the user's limit; the device's own may be lower", &P::max_force},
-    SafetyParameterInfo{"continuous_time", "s", 20.0, 1.0, 600.0,
-                        "time constant of the motors' heat", &P::continuous_time},
-    SafetyParameterInfo{
+    row<&P::max_force>("max_device_force", "N", 3.3, 0.0, 50.0,
+                       "the user's limit; the device's own may be lower"),
+    row<&P::continuous_time>("continuous_time", "s", 20.0, 1.0, 600.0,
+                             "time constant of the motors' heat"),
+    row<&P::initial_heat>(
         "initial_heat", "-", 1.0, 0.0, 1.0,
-        "heat of the motors at the start, as a share of what they bear; 1 if unknown",
-        &P::initial_heat},
-    SafetyParameterInfo{"rise_rate", "N/s", 500.0, 1.0, 1e5,
-                        "largest rate of change of the force, unless towards zero", &P::rise_rate},
-    SafetyParameterInfo{"fall_rate", "N/s", 2000.0, 1.0, 1e5,
-                        "largest rate at which the force shrinks", &P::fall_rate},
-    SafetyParameterInfo{"swing", "N", 0.5, 0.01, 10.0,
-                        "a smaller swing of the force is no oscillation", &P::swing},
-    SafetyParameterInfo{"swing_time", "s", 0.025, 1e-3, 0.5,
-                        "a slower swing of the force is no oscillation", &P::swing_time},
-    SafetyParameterInfo{"swing_count", "-", 8.0, 2.0, 100.0,
-                        "swings in a row that are an oscillation", &P::swing_count},
-    SafetyParameterInfo{"cycle_distance", "m", 1e-3, 1e-4, 0.05,
-                        "a smaller swing of the hand is no cycle of an oscillation",
-                        &P::cycle_distance},
-    SafetyParameterInfo{"cycle_count", "-", 6.0, 3.0, 100.0,
-                        "cycles in a row that generate energy, which are an oscillation",
-                        &P::cycle_count},
-    SafetyParameterInfo{"cut_memory", "s", 30.0, 1.0, 600.0,
-                        "time constant with which a cut for generated energy is forgotten",
-                        &P::cut_memory},
-    SafetyParameterInfo{"engage_force", "N", 0.2, 0.0, 3.0,
-                        "the hand engages while less than this is asked for", &P::engage_force},
-    SafetyParameterInfo{"engage_ticks", "ticks", 10.0, 1.0, 1e5,
-                        "ticks in a row below engage_force that engage the hand", &P::engage_ticks},
-    SafetyParameterInfo{"ramp_time", "s", 1.5, 0.01, 10.0, "from no force to all of it",
-                        &P::ramp_time},
-    SafetyParameterInfo{"late_intervals", "intervals", 3.0, 1.0, 100.0,
-                        "of a camera without a frame, after which the force may only fall",
-                        &P::late_intervals},
-    SafetyParameterInfo{"fade_age", "s", 0.1, 0.01, 5.0,
-                        "age of the newest frame from which the force fades", &P::fade_age},
-    SafetyParameterInfo{"lost_age", "s", 0.5, 0.02, 10.0,
-                        "age of the newest frame at which the hand disengages", &P::lost_age},
-    SafetyParameterInfo{"future_tolerance", "s", 0.05, 0.0, 1.0,
-                        "a stamp farther ahead of the loop's clock is not fresh",
-                        &P::future_tolerance},
-    SafetyParameterInfo{"max_speed", "m/s", 1.5, 0.05, 20.0,
-                        "a faster hand gets no force, then a ramp", &P::max_speed},
-    SafetyParameterInfo{"stall_time", "s", 5e-3, 2e-3, 0.1, "a tick that comes later starts a ramp",
-                        &P::stall_time},
-    SafetyParameterInfo{"fault_count", "-", 3.0, 1.0, 16.0,
-                        "faults within fault_time, after which an operator has to reset",
-                        &P::fault_count},
-    SafetyParameterInfo{"fault_time", "s", 2.0, 0.0, 600.0,
-                        "time within which faults add up to a latched one", &P::fault_time},
+        "heat of the motors at the start, as a share of what they bear; 1 if unknown"),
+    row<&P::rise_rate>("rise_rate", "N/s", 500.0, 1.0, 1e5,
+                       "largest rate of change of the force, unless towards zero"),
+    row<&P::fall_rate>("fall_rate", "N/s", 2000.0, 1.0, 1e5,
+                       "largest rate at which the force shrinks"),
+    row<&P::swing>("swing", "N", 0.5, 0.01, 10.0, "a smaller swing of the force is no oscillation"),
+    row<&P::swing_time>("swing_time", "s", 0.025, 1e-3, 0.5,
+                        "a slower swing of the force is no oscillation"),
+    row<&P::swing_count>("swing_count", "-", 8.0, 2.0, 100.0,
+                         "swings in a row that are an oscillation"),
+    row<&P::cycle_distance>("cycle_distance", "m", 1e-3, 1e-4, 0.05,
+                            "a smaller swing of the hand is no cycle of an oscillation"),
+    row<&P::cycle_count>("cycle_count", "-", 6.0, 3.0, 100.0,
+                         "cycles in a row that generate energy, which are an oscillation"),
+    row<&P::cut_memory>("cut_memory", "s", 30.0, 1.0, 600.0,
+                        "time constant with which a cut for generated energy is forgotten"),
+    row<&P::engage_force>("engage_force", "N", 0.2, 0.0, 3.0,
+                          "the hand engages while less than this is asked for"),
+    row<&P::engage_ticks>("engage_ticks", "ticks", 10.0, 1.0, 1e5,
+                          "ticks in a row below engage_force that engage the hand"),
+    row<&P::ramp_time>("ramp_time", "s", 1.5, 0.01, 10.0, "from no force to all of it"),
+    row<&P::late_intervals>("late_intervals", "intervals", 3.0, 1.0, 100.0,
+                            "of a camera without a frame, after which the force may only fall"),
+    row<&P::fade_age>("fade_age", "s", 0.1, 0.01, 5.0,
+                      "age of the newest frame from which the force fades"),
+    row<&P::lost_age>("lost_age", "s", 0.5, 0.02, 10.0,
+                      "age of the newest frame at which the hand disengages"),
+    row<&P::future_tolerance>("future_tolerance", "s", 0.05, 0.0, 1.0,
+                              "a stamp farther ahead of the loop's clock is not fresh"),
+    row<&P::max_speed>("max_speed", "m/s", 1.5, 0.05, 20.0,
+                       "a faster hand gets no force, then a ramp"),
+    row<&P::stall_time>("stall_time", "s", 5e-3, 2e-3, 0.1,
+                        "a tick that comes later starts a ramp"),
+    row<&P::fault_count>("fault_count", "-", 3.0, 1.0, 16.0,
+                         "faults within fault_time, after which an operator has to reset"),
+    row<&P::fault_time>("fault_time", "s", 2.0, 0.0, 600.0,
+                        "time within which faults add up to a latched one"),
 };
 
-void check_range(const SafetyParameterInfo& row, double value) {
-  if (value >= row.min && value <= row.max) return;
-  throw Error("parameter '" + std::string(row.name) + "'",
-              std::to_string(value) + " " + std::string(row.unit) + " is out of range",
-              "give a value from " + std::to_string(row.min) + " to " + std::to_string(row.max));
-}
+constexpr std::string_view noun = "safety parameter";
 
 // Of what changes with a time constant, the share that `dt` changes.
 double share_of(double dt, double time_constant) {
@@ -163,21 +163,11 @@ std::span<const SafetyParameterInfo> safety_parameter_table() {
 }
 
 void set_parameter(SafetyParameters& parameters, std::string_view name, double value) {
-  std::vector<std::string_view> names;
-  for (const SafetyParameterInfo& row : table) {
-    names.push_back(row.name);
-    if (row.name != name) continue;
-    check_range(row, value);
-    parameters.*row.member = value;
-    return;
-  }
-  const std::string_view near = nearest_name(name, names);
-  throw Error("parameter '" + std::string(name) + "'", "there is no such safety parameter",
-              near.empty() ? "" : "did you mean '" + std::string(near) + "'?");
+  set_by_name(safety_parameter_table(), parameters, name, value, noun);
 }
 
 void validate(const SafetyParameters& parameters) {
-  for (const SafetyParameterInfo& row : table) check_range(row, parameters.*row.member);
+  check_ranges(safety_parameter_table(), parameters, noun);
   if (!(parameters.fade_age < parameters.lost_age)) {
     throw Error("parameters fade_age, lost_age", "a frame is lost before the force has faded",
                 "give fade_age < lost_age");

@@ -7,6 +7,7 @@
 #include <span>
 #include <string_view>
 
+#include "palpate/core/parameter_table.hpp"
 #include "palpate/core/patch.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/energy_monitor.hpp"
@@ -91,16 +92,7 @@ struct SafetyParameters {
   double fault_time = 2.0;         ///< [s]
 };
 
-/// One row of the table that feeds help texts, configuration files and sliders.
-struct SafetyParameterInfo {
-  std::string_view name;
-  std::string_view unit;
-  double default_value;
-  double min;
-  double max;
-  std::string_view meaning;
-  double SafetyParameters::*member;
-};
+using SafetyParameterInfo = ParameterRow<SafetyParameters>;
 
 /// All of them, in the order in which they are shown.
 std::span<const SafetyParameterInfo> safety_parameter_table();

@@ -383,7 +383,7 @@ std::string to_toml(const SessionConfig& config) {
   }
   text += "\n[safety]\n";
   for (const SafetyParameterInfo& row : safety_parameter_table())
-    text += row_line(row, config.safety.*row.member);
+    text += row_line(row, row.get(config.safety));
   text += "\n[server]\n";
   text += key_line("listen", toml_text(config.server.listen), "address at which browsers find it");
   text += config.server.port

@@ -92,7 +92,7 @@ std::string SessionHost::state() {
   for (const ParameterInfo& row : parameter_table())
     parameters[std::string(row.name)] = row.get(state.settings.parameters);
   for (const SafetyParameterInfo& row : safety_parameter_table())
-    safety[std::string(row.name)] = state.settings.safety.*row.member;
+    safety[std::string(row.name)] = row.get(state.settings.safety);
   json placement;
   for (const PlacementInfo& row : placement_table())
     placement[std::string(row.name)] = row.get(state.settings.placement);

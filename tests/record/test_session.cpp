@@ -154,7 +154,7 @@ TEST(Session, KeepsEachBitOfTheSettings) {
   for (const ParameterInfo& row : parameter_table())
     EXPECT_EQ(bits(row.get(back.settings.parameters)), bits(row.get(all.parameters))) << row.name;
   for (const SafetyParameterInfo& row : safety_parameter_table())
-    EXPECT_EQ(bits(back.settings.safety.*row.member), bits(all.safety.*row.member)) << row.name;
+    EXPECT_EQ(bits(row.get(back.settings.safety)), bits(row.get(all.safety))) << row.name;
   EXPECT_EQ(back.settings.placement.world_from_device.matrix(),
             all.placement.world_from_device.matrix());
   EXPECT_EQ(back.settings.placement.workspace_scale, all.placement.workspace_scale);

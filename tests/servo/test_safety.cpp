@@ -739,7 +739,7 @@ TEST(SafetyParameters, HaveATableThatKnowsEveryOneAndItsDefault) {
   std::set<std::string_view> names;
   for (const SafetyParameterInfo& row : safety_parameter_table()) {
     EXPECT_TRUE(names.insert(row.name).second) << row.name;
-    EXPECT_EQ(defaults.*row.member, row.default_value) << row.name;
+    EXPECT_EQ(row.get(defaults), row.default_value) << row.name;
     EXPECT_LE(row.min, row.default_value) << row.name;
     EXPECT_LE(row.default_value, row.max) << row.name;
     EXPECT_FALSE(row.meaning.empty() || row.unit.empty()) << row.name;

@@ -59,7 +59,7 @@ void expect_same(const SessionConfig& a, const SessionConfig& b) {
   for (const ParameterInfo& row : parameter_table())
     EXPECT_EQ(row.get(a.parameters), row.get(b.parameters)) << row.name;
   for (const SafetyParameterInfo& row : safety_parameter_table())
-    EXPECT_EQ(a.safety.*row.member, b.safety.*row.member) << row.name;
+    EXPECT_EQ(row.get(a.safety), row.get(b.safety)) << row.name;
   EXPECT_EQ(a.record, b.record);
   EXPECT_EQ(a.server.listen, b.server.listen);
   EXPECT_EQ(a.server.port, b.server.port);
@@ -87,7 +87,7 @@ TEST(SessionConfig, ComesBackWhateverTheValues) {
       if (row.name.substr(0, 2) != "r_") row.set(config.parameters, between(row.min, row.max));
     }
     for (const SafetyParameterInfo& row : safety_parameter_table())
-      config.safety.*row.member = between(row.min, row.max);
+      row.set(config.safety, between(row.min, row.max));
     config.safety.fade_age = 0.5 * config.safety.lost_age;
     set_parameter(config.parameters, "r_c", between(1e-3, 1e-2));
     expect_same(parse_session_config(to_toml(config), "session.toml"), config);

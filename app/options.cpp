@@ -7,6 +7,7 @@
 
 #include <toml++/toml.h>
 
+#include "app/program.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/nearest_name.hpp"
 #include "palpate/methods/methods.hpp"
@@ -50,6 +51,14 @@ void apply_config(const std::string& path, std::string& method, Parameters& para
 
 }  // namespace
 
+void check_method(const MethodRegistry& methods, const std::string& name) {
+  try {
+    static_cast<void>(methods.find(name));
+  } catch (const Error& error) {
+    throw UnknownMethod(error);
+  }
+}
+
 double parse_number(const std::string& subject, const std::string& text) {
   double value = 0.0;
   const char* end = text.data() + text.size();
@@ -77,10 +86,10 @@ MethodChoice MethodOptions::choice(const MethodRegistry& methods) const {
   MethodChoice choice{std::string(default_method), {}};
   if (config_) {
     apply_config(*config_, choice.name, choice.parameters);
-    static_cast<void>(methods.find(choice.name));
+    check_method(methods, choice.name);
   }
   if (method_) choice.name = *method_;
-  static_cast<void>(methods.find(choice.name));
+  check_method(methods, choice.name);
   for (const std::string& assignment : assignments_) {
     const std::size_t equals = assignment.find('=');
     if (equals == std::string::npos)

@@ -26,7 +26,8 @@ class MethodOptions {
   /// The same without --method.
   void add_parameters_to(CLI::App& command);
 
-  /// @throws Error for an unknown method, parameter or key, a value out of range, or a
+  /// @throws UnknownMethod for a method that is not among these.
+  /// @throws Error for an unknown parameter or key, a value out of range, or a
   ///         configuration file that cannot be read.
   [[nodiscard]] MethodChoice choice(const MethodRegistry& methods) const;
 
@@ -35,6 +36,9 @@ class MethodOptions {
   std::vector<std::string> assignments_;
   std::optional<std::string> config_;
 };
+
+/// @throws UnknownMethod if no method has that name.
+void check_method(const MethodRegistry& methods, const std::string& name);
 
 /// The number that `text` is, whole. @throws Error naming `subject`.
 double parse_number(const std::string& subject, const std::string& text);

@@ -153,7 +153,7 @@ std::string listed(const Json& object) {
   return text;
 }
 
-std::string text_of(const Json& report) {
+std::string doctor_text(const Json& report) {
   const Json& time = report["realtime"];
   const auto microseconds = [&](const char* key) { return 1e6 * time[key].get<double>(); };
   std::string text = fmt::format(
@@ -203,7 +203,7 @@ int run(const DoctorOptions& options) {
   report["advice"] = advice;
   const std::string text = options.json
                                ? report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
-                               : text_of(report);
+                               : doctor_text(report);
   std::fputs(text.c_str(), stdout);
   return 0;
 }

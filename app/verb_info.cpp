@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -146,7 +147,7 @@ int info(const InfoOptions& options) {
   if (!about.notes.empty()) json["notes"] = about.notes;
   // Before a damaged frame ends it.
   if (const Uri uri(options.uri); uri.scheme() == "recording") {
-    json["checksums"] = text_of(BagReader(uri.path()).check());
+    json["checksums"] = app::text_of(BagReader(uri.path()).check());
     if (!options.json) fmt::print("checksums: {}\n", json["checksums"].get<std::string>());
   }
   const auto frame = source->next(first_frame_timeout);

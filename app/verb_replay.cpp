@@ -2,6 +2,7 @@
 #include <memory>
 #include <string>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -19,7 +20,7 @@ struct ReplayOptions {
   bool json = false;
 };
 
-std::string text_of(const ReplayDifferences& differences, std::uint64_t ticks) {
+std::string replay_text(const ReplayDifferences& differences, std::uint64_t ticks) {
   if (!differences.first) return "identical, bit for bit";
   const ReplayDifference& first = *differences.first;
   return fmt::format(
@@ -28,17 +29,17 @@ std::string text_of(const ReplayDifferences& differences, std::uint64_t ticks) {
       first.replayed);
 }
 
-std::string text_of(const ReplayReport& report) {
+std::string replay_text(const ReplayReport& report) {
   std::string text =
       fmt::format("{} ticks and {} frames replayed\nasked: {}\nsent:  {}\n", report.ticks,
-                  report.frames, text_of(report.asked, report.ticks),
-                  report.sent_unchecked.empty() ? text_of(report.sent, report.ticks)
+                  report.frames, replay_text(report.asked, report.ticks),
+                  report.sent_unchecked.empty() ? replay_text(report.sent, report.ticks)
                                                 : "not checked: " + report.sent_unchecked);
   if (!report.broken_off.empty()) text += "the replay broke off: " + report.broken_off + "\n";
   return text + app::text_of(report.check) + "\n";
 }
 
-nlohmann::ordered_json json_of(const ReplayDifferences& differences) {
+nlohmann::ordered_json replay_json(const ReplayDifferences& differences) {
   nlohmann::ordered_json object = {{"identical", !differences.first},
                                    {"different_ticks", differences.ticks}};
   if (differences.first) {
@@ -51,13 +52,13 @@ nlohmann::ordered_json json_of(const ReplayDifferences& differences) {
   return object;
 }
 
-std::string json_of(const ReplayReport& report) {
+std::string replay_json(const ReplayReport& report) {
   nlohmann::ordered_json object = {{"identical", report.identical()},
                                    {"ticks", report.ticks},
                                    {"frames", report.frames},
-                                   {"asked", json_of(report.asked)}};
+                                   {"asked", replay_json(report.asked)}};
   if (report.sent_unchecked.empty()) {
-    object["sent"] = json_of(report.sent);
+    object["sent"] = replay_json(report.sent);
   } else {
     object["sent"] = {{"not_checked", report.sent_unchecked}};
   }
@@ -73,7 +74,7 @@ int run(const ReplayOptions& options) {
   const ReplayReport report = replay(
       session, [&progress](std::size_t ticks) { progress.set(ticks); }, program_methods());
   progress.finish();
-  std::fputs(options.json ? json_of(report).c_str() : text_of(report).c_str(), stdout);
+  std::fputs(options.json ? replay_json(report).c_str() : replay_text(report).c_str(), stdout);
   return report.identical() ? 0 : 1;
 }
 

@@ -3,7 +3,9 @@
 
 #include <functional>
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace palpate::app {
 
@@ -16,14 +18,14 @@ struct Verb {
   CLI::App* command;
   Action action;
 };
+using AddVerb = Verb (*)(CLI::App& program);
 
 Verb add_run(CLI::App& program);
 Verb add_trace(CLI::App& program);
-Verb add_eval(CLI::App& program);
 Verb add_info(CLI::App& program);
-Verb add_bench(CLI::App& program);
 Verb add_replay(CLI::App& program);
 Verb add_doctor(CLI::App& program);
+Verb add_methods(CLI::App& program);
 Verb add_parameters(CLI::App& program);
 
 }  // namespace palpate::app

@@ -23,6 +23,13 @@ function(palpate_target_options target)
     # GCC bug 105651: false alarms about overlap in std::string's operator+.
     target_compile_options(${target} PRIVATE -Wno-restrict)
   endif()
+  get_target_property(unity ${target} UNITY_BUILD)
+  if(unity)
+    # All files of a room as one (-DCMAKE_UNITY_BUILD=ON), which parses the big headers once. Then
+    # a local name may be that of another file's constant; builds file by file have all warnings.
+    set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
+    target_compile_options(${target} PRIVATE -Wno-shadow -Wno-subobject-linkage)
+  endif()
   if(PALPATE_WERROR)
     target_compile_options(${target} PRIVATE -Werror)
   endif()
@@ -46,6 +53,12 @@ function(palpate_target_options target)
     set_target_properties(${target} PROPERTIES CXX_CLANG_TIDY
                           "${PALPATE_CLANG_TIDY_PROGRAM};--quiet;--warnings-as-errors=*")
   endif()
+endfunction()
+
+# palpate_runs_once(TARGET): little optimised, as code that runs once (options, messages, set-up)
+# costs more processor time to optimise than it ever gains.
+function(palpate_runs_once target)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 endfunction()
 
 # palpate_room(NAME LINKS <public libraries...> PRIVATE <private libraries...>)
@@ -81,6 +94,7 @@ function(palpate_test name)
     return()
   endif()
   add_executable(test_${name} ${sources})
+  set_target_properties(test_${name} PROPERTIES UNITY_BUILD OFF)  # their helpers share names
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(test_${name} PRIVATE ${ARG_LINKS} GTest::gtest_main)
   palpate_target_options(test_${name})
@@ -88,4 +102,20 @@ function(palpate_test name)
   gtest_discover_tests(test_${name} DISCOVERY_TIMEOUT 60
     TEST_PREFIX "${PALPATE_TEST_PREFIX}"
     PROPERTIES TIMEOUT 300 ENVIRONMENT "PALPATE_DATA=${PALPATE_DATA}")
+endfunction()
+
+# palpate_memcheck(NAME FILTER): tests of test_NAME under valgrind, which finds reads of what was
+# never written. Valgrind offers no AVX-512, so the AVX2 loops run. FILTER, as GoogleTest's, keeps
+# the time bounded: everything takes some forty times as long.
+function(palpate_memcheck name filter)
+  find_program(PALPATE_VALGRIND valgrind)
+  if(NOT PALPATE_VALGRIND OR PALPATE_SANITIZE OR NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU"
+     OR NOT TARGET test_${name})
+    return()
+  endif()
+  # Tests that count allocations bring an operator new of their own: no mismatch.
+  add_test(NAME "${PALPATE_TEST_PREFIX}memcheck/${name}"
+           COMMAND ${PALPATE_VALGRIND} --quiet --error-exitcode=9 --show-mismatched-frees=no
+                   $<TARGET_FILE:test_${name}> --gtest_brief=1 --gtest_filter=${filter})
+  set_tests_properties("${PALPATE_TEST_PREFIX}memcheck/${name}" PROPERTIES TIMEOUT 900 COST 100)
 endfunction()

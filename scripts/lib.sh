@@ -1,36 +1,91 @@
 # SPDX-License-Identifier: Apache-2.0
 # shellcheck shell=bash
-# What scripts/run and scripts/test share; sourced by them, in the repository's root.
+# What scripts/run, scripts/test and scripts/screenshot share; sourced by them, in the repository's
+# root.
 
-# build_in FOLDER CMAKE_ARGUMENTS...: configures and builds. A person sees ninja's progress line, a
-# log only what went wrong. Writes to stderr alone: stdout is the program's.
-build_in() {
-  local folder=$1 said quiet=()
+say() { echo "${0##*/}: $*" >&2; }
+
+# in_cache FOLDER ARGUMENTS...: whether FOLDER is configured with all these -DNAME=VALUE.
+in_cache() {
+  local cache argument name value
+  [[ -e $1/build.ninja ]] || return 1
+  cache=$'\n'$(<"$1/CMakeCache.txt")$'\n'
   shift
-  if command -v ccache >/dev/null; then set -- "$@" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache; fi
-  said=$(cmake -B "$folder" -G Ninja "$@" 2>&1) || {
+  for argument in "$@"; do
+    name=${argument#-D} value=${argument#*=}
+    name=${name%%=*}
+    [[ $cache =~ $'\n'"$name":[A-Z]+="$value"$'\n' ]] || return 1
+  done
+}
+
+# progress: of ninja's output, what went wrong; and every five seconds how far it has come. Serves
+# where no terminal shows ninja's own line.
+progress() {
+  local line built total shown='' next=0 status=0
+  while IFS= read -r -t 1 line || { status=$?; ((status > 128)); }; do
+    if ((status == 0)); then
+      if [[ $line =~ ^@([0-9]+)/([0-9]+)\  ]]; then
+        built=${BASH_REMATCH[1]} total=${BASH_REMATCH[2]}
+      elif [[ $line != ninja:\ Entering* && $line != "ninja: no work"* && $line != "-- "* ]]; then
+        echo "$line" >&2
+      fi
+    fi
+    if ((SECONDS >= next)) && [[ ${total-} && $built/$total != "$shown" ]]; then
+      say "building $built of $total"
+      shown=$built/$total next=$((SECONDS + 5))
+    fi
+    status=0
+  done
+}
+
+# build_in FOLDER -DNAME=VALUE... [-- TARGETS...]: configures and builds. With every argument in
+# CMake's cache it leaves it to ninja to see whether anything has changed: sources, their headers,
+# CMake's files, and the folders' contents. Writes to stderr alone: stdout is the program's.
+build_in() {
+  local folder=$1 said arguments=() targets=()
+  shift
+  while (($#)) && [[ $1 != -- ]]; do
+    arguments+=("$1")
+    shift
+  done
+  if (($#)); then targets=("${@:2}"); fi
+  if command -v ccache >/dev/null; then arguments+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
+  if ! in_cache "$folder" "${arguments[@]}"; then
+    [[ -e $folder/build.ninja ]] || say "configuring $folder"
+    said=$(cmake -B "$folder" -G Ninja "${arguments[@]}" 2>&1) || {
+      echo "$said" >&2
+      return 1
+    }
+  fi
+  local ninja=(ninja -C "$folder" -k 0 -j "$(nproc)" "${targets[@]}")
+  if [[ -t 2 ]]; then
+    "${ninja[@]}" >&2
+  else
+    NINJA_STATUS='@%f/%t ' "${ninja[@]}" 2>&1 | progress
+  fi
+}
+
+# npm_quietly ARGUMENTS...: npm in web/, of which only a failure is shown.
+npm_quietly() {
+  local said
+  said=$(cd web && npm "$@" 2>&1) || {
     echo "$said" >&2
     return 1
   }
-  [[ -t 2 ]] || quiet=(--quiet)
-  ninja -C "$folder" -k 0 -j "$(nproc)" "${quiet[@]}" >&2
 }
 
 # build_page: the viewer's page, web/dist, which becomes part of the program; only if something has
 # changed.
 build_page() {
-  local said lock=web/node_modules/.package-lock.json page=web/dist/index.html
+  local lock=web/node_modules/.package-lock.json page=web/dist/index.html
   if [[ ! -e $lock || web/package-lock.json -nt $lock ]]; then
-    said=$(cd web && npm ci 2>&1 && touch node_modules/.package-lock.json) || {
-      echo "$said" >&2
-      return 1
-    }
+    say "getting the page's packages with npm"
+    npm_quietly ci --no-audit --no-fund || return 1
+    touch "$lock"
   fi
-  if [[ -e $page && -z $(find web/src web/index.html web/*.ts "$lock" -newer "$page") ]]; then
-    return 0
+  if [[ -e $page ]]; then
+    [[ $(find web/src web/index.html web/*.ts "$lock" -newer "$page" -print -quit) ]] || return 0
   fi
-  said=$(cd web && npm run build 2>&1) || {
-    echo "$said" >&2
-    return 1
-  }
+  say "building the page"
+  npm_quietly run build
 }

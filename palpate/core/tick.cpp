@@ -6,7 +6,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::array<TickFlagInfo, tick_flag_count> table{{
+constexpr std::array<TickFlagInfo, tick_flag_count> flag_table{{
     {"step_budget_hit",
      "the proxy had not converged and goes on in the next tick; raise "
      "step_budget"},
@@ -24,7 +24,7 @@ constexpr std::array<TickFlagInfo, tick_flag_count> table{{
 }  // namespace
 
 std::span<const TickFlagInfo> tick_flag_table() {
-  return table;
+  return flag_table;
 }
 
 const char* to_string(ContactState state) noexcept {

@@ -61,7 +61,7 @@ const auto& row_of(const Rows& rows, std::string_view name, const char* noun,
               "choose one of: " + known);
 }
 
-void check(const char* name, double value, double min, double max, const char* unit) {
+void check_body(const char* name, double value, double min, double max, const char* unit) {
   if (value >= min && value <= max) return;
   throw Error(std::string("device model: ") + name,
               shortest(value) + " " + unit + " is out of range",
@@ -71,11 +71,11 @@ void check(const char* name, double value, double min, double max, const char* u
 }  // namespace
 
 void validate(const DeviceBody& body) {
-  check("mass", body.mass, 1e-3, 10.0, "kg");
-  check("damping", body.damping, 0.0, 100.0, "N s/m");
-  check("friction", body.friction, 0.0, 10.0, "N");
-  check("resolution", body.resolution, 0.0, 0.01, "m");
-  check("delay", body.delay, 0.0, 0.01, "s");
+  check_body("mass", body.mass, 1e-3, 10.0, "kg");
+  check_body("damping", body.damping, 0.0, 100.0, "N s/m");
+  check_body("friction", body.friction, 0.0, 10.0, "N");
+  check_body("resolution", body.resolution, 0.0, 0.01, "m");
+  check_body("delay", body.delay, 0.0, 0.01, "s");
 }
 
 const DevicePreset& device_preset(std::string_view name) {

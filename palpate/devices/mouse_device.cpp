@@ -15,7 +15,7 @@ void check_place(const Vec3& place) {
   throw Error("mouse", "a place is not finite or farther than 1000 km", "give metres");
 }
 
-void check(const char* name, double value, double min, double max) {
+void check_mouse(const char* name, double value, double min, double max) {
   if (value >= min && value <= max) return;
   throw Error("mouse: " + std::string(name), std::to_string(value) + " is out of range",
               "give a value from " + std::to_string(min) + " to " + std::to_string(max));
@@ -33,9 +33,9 @@ MouseDevice::MouseDevice(const Vec3& start, double response, double max_speed, s
       target_{.position = start, .present = false},
       position_(start) {
   check_place(start);
-  check("response", response, 1e-3, 1.0);
-  check("max_speed", max_speed, 0.01, 10.0);
-  check("silence", silence, 0.2, 60.0);
+  check_mouse("response", response, 1e-3, 1.0);
+  check_mouse("max_speed", max_speed, 0.01, 10.0);
+  check_mouse("silence", silence, 0.2, 60.0);
 }
 
 void MouseDevice::aim(const MouseTarget& target) {

@@ -19,7 +19,8 @@ constexpr std::array<double, 3> tones{8.3, 9.7, 11.9};  // [Hz] physiological tr
 constexpr double shake_from = 20.0;                     // [Hz] no hand moves so fast by itself
 constexpr double shake_time = 0.25;                     // [s]
 
-void check(std::string_view name, double value, double min, double max, std::string_view unit) {
+void check_hand(std::string_view name, double value, double min, double max,
+                std::string_view unit) {
   if (value >= min && value <= max) return;
   throw Error("simulated hand: " + std::string(name),
               std::to_string(value) + " " + std::string(unit) + " is out of range",
@@ -38,10 +39,10 @@ SimulatedHand::SimulatedHand(HipPath target, const HandModel& model, std::string
       path_(std::move(target)),
       model_(model) {
   const bool held = !model_.body || model_.mass > 0.0;
-  check("mass", model_.mass, held ? 0.01 : 0.0, 10.0, "kg");
-  check("stiffness", model_.stiffness, model_.body ? 0.0 : 1.0, 1e4, "N/m");
-  check("damping", model_.damping, 0.0, 1e3, "N s/m");
-  check("tremor", model_.tremor, 0.0, 0.01, "m");
+  check_hand("mass", model_.mass, held ? 0.01 : 0.0, 10.0, "kg");
+  check_hand("stiffness", model_.stiffness, model_.body ? 0.0 : 1.0, 1e4, "N/m");
+  check_hand("damping", model_.damping, 0.0, 1e3, "N s/m");
+  check_hand("tremor", model_.tremor, 0.0, 0.01, "m");
   if (const auto& body = model_.body) {
     validate(*body);
     info_.kind = "simulated hand on a device";

@@ -19,8 +19,8 @@
 namespace palpate {
 namespace {
 
-constexpr std::uint32_t largest_side = 16384;  // [px] as in validate(Intrinsics)
-constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 30;
+constexpr std::uint32_t largest_png_side = 16384;  // [px] as in validate(Intrinsics)
+constexpr std::uintmax_t largest_png_file = std::uintmax_t{1} << 30;
 constexpr std::size_t signature_size = 8;
 
 // libpng reports an error by a longjmp, which must not pass over a destructor: functions that call
@@ -163,7 +163,7 @@ bool write_rows(std::vector<std::byte>& to, Failure& failure, png_uint_32 width,
 
 std::vector<std::byte> encode(int width, int height, std::span<const std::uint16_t> depth,
                               const std::string& name, PngPacking packing) {
-  constexpr auto largest = static_cast<int>(largest_side);
+  constexpr auto largest = static_cast<int>(largest_png_side);
   if (width < 1 || height < 1 || width > largest || height > largest ||
       depth.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
     throw Error(name,
@@ -202,7 +202,7 @@ std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& n
   };
   if (!reader.read_header(header) || !set_up(reader, header)) throw damaged();
   const std::string size = std::to_string(header.width) + "x" + std::to_string(header.height);
-  if (header.width > largest_side || header.height > largest_side) {
+  if (header.width > largest_png_side || header.height > largest_png_side) {
     throw Error(name, "is an image of " + size + " pixels",
                 "images up to 16384x16384 can be read; it may be damaged");
   }
@@ -246,21 +246,22 @@ DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& na
 }
 
 DepthPng read_depth_png(const std::filesystem::path& path) {
-  return parse_depth_png(read_file(path, largest_file), path.string());
+  return parse_depth_png(read_file(path, largest_png_file), path.string());
 }
 
 GreyPng read_grey_png(const std::filesystem::path& path) {
   GreyPng image;
   image.brightness = decode<std::uint8_t>(
-      read_file(path, largest_file), path.string(), "a PNG is needed", image.width, image.height,
-      [](PngReader& reader, const auto& header) { return reader.turn_grey(header); });
+      read_file(path, largest_png_file), path.string(), "a PNG is needed", image.width,
+      image.height, [](PngReader& reader, const auto& header) { return reader.turn_grey(header); });
   return image;
 }
 
 ColourPng read_colour_png(const std::filesystem::path& path) {
   ColourPng image;
   image.rgb = decode<std::uint8_t, 3>(
-      read_file(path, largest_file), path.string(), "a PNG is needed", image.width, image.height,
+      read_file(path, largest_png_file), path.string(), "a PNG is needed", image.width,
+      image.height,
       [](PngReader& reader, const auto& header) { return reader.turn_colour(header); });
   return image;
 }

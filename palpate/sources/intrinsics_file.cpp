@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 20;
+constexpr std::uintmax_t largest_intrinsics = std::uintmax_t{1} << 20;
 constexpr const char* long_distortion = "distortion_brown_conrady_k1_6_p";
 
 // A JSON object; its accessors throw an Error that names the file and the key.
@@ -140,7 +140,7 @@ RecordedCamera parse_intrinsics(std::string_view text, const std::string& name) 
 }
 
 RecordedCamera read_intrinsics(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = read_file(path, largest_file);
+  const std::vector<std::byte> bytes = read_file(path, largest_intrinsics);
   return parse_intrinsics({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
                           path.string());
 }

@@ -23,7 +23,7 @@ constexpr const char* correct_header = "correct the header";
 constexpr const char* write_anew = "write the file anew";
 
 // The values of each line of the header, by keyword.
-using Header = std::map<std::string_view, std::vector<std::string_view>>;
+using PcdHeader = std::map<std::string_view, std::vector<std::string_view>>;
 
 struct Column {
   PointField field;
@@ -48,11 +48,11 @@ std::string counted(std::uint64_t number, const std::string& noun) {
   return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
 }
 
-Header read_header(Cursor& file) {
+PcdHeader read_pcd_header(Cursor& file) {
   constexpr std::array<std::string_view, 10> keywords{"VERSION", "FIELDS", "SIZE",   "TYPE",
                                                       "COUNT",   "WIDTH",  "HEIGHT", "VIEWPOINT",
                                                       "POINTS",  "DATA"};
-  Header header;
+  PcdHeader header;
   while (const auto line = file.next_full_line()) {
     std::string_view rest = *line;
     std::string_view keyword = detail::next_token(rest);
@@ -81,7 +81,7 @@ Header read_header(Cursor& file) {
 }
 
 // The one value of a keyword; none if the header lacks it.
-std::optional<std::string_view> value_of(const Cursor& file, const Header& header,
+std::optional<std::string_view> value_of(const Cursor& file, const PcdHeader& header,
                                          std::string_view keyword) {
   const auto entry = header.find(keyword);
   if (entry == header.end()) {
@@ -95,7 +95,7 @@ std::optional<std::string_view> value_of(const Cursor& file, const Header& heade
   return entry->second.front();
 }
 
-std::optional<std::uint64_t> count_of(const Cursor& file, const Header& header,
+std::optional<std::uint64_t> count_of(const Cursor& file, const PcdHeader& header,
                                       std::string_view keyword) {
   const auto value = value_of(file, header, keyword);
   if (!value) {
@@ -131,7 +131,7 @@ Scalar type_of(const Cursor& file, std::string_view type, std::string_view size)
   return found->second;
 }
 
-Layout layout_of(const Cursor& file, const Header& header) {
+Layout layout_of(const Cursor& file, const PcdHeader& header) {
   const auto fields = header.find("FIELDS");
   if (fields == header.end()) {
     file.fail("the header has no FIELDS line", not_pcd);
@@ -215,7 +215,7 @@ std::uint32_t packed_colour(std::string_view token, Scalar type) {
 }
 
 // Sets the cloud's width and height. Old files have no WIDTH, some no POINTS.
-void read_extent(const Cursor& file, const Header& header, PointFile& cloud) {
+void read_extent(const Cursor& file, const PcdHeader& header, PointFile& cloud) {
   const auto points = count_of(file, header, "POINTS");
   const auto width = count_of(file, header, "WIDTH");
   const auto height = count_of(file, header, "HEIGHT");
@@ -234,7 +234,7 @@ void read_extent(const Cursor& file, const Header& header, PointFile& cloud) {
   }
 }
 
-std::optional<Vec3> viewpoint_of(const Cursor& file, const Header& header) {
+std::optional<Vec3> viewpoint_of(const Cursor& file, const PcdHeader& header) {
   const auto entry = header.find("VIEWPOINT");
   if (entry == header.end()) {
     return std::nullopt;
@@ -401,7 +401,7 @@ Values read_compressed(Cursor& file, const Layout& layout, std::size_t size) {
 
 PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name) {
   Cursor file(bytes, name);
-  const Header header = read_header(file);
+  const PcdHeader header = read_pcd_header(file);
   const auto version = value_of(file, header, "VERSION");
   constexpr std::array<std::string_view, 6> versions{".5", "0.5", ".6", "0.6", ".7", "0.7"};
   if (version && std::find(versions.begin(), versions.end(), *version) == versions.end()) {

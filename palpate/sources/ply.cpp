@@ -43,7 +43,7 @@ struct Faces {
   std::vector<std::int64_t> corners{};  // the list being read
 };
 
-struct Header {
+struct PlyHeader {
   std::string_view encoding;
   std::vector<Element> elements;
 };
@@ -94,12 +94,12 @@ Property read_property(const Cursor& file, std::string_view rest) {
   return property;
 }
 
-Header read_header(Cursor& file) {
+PlyHeader read_ply_header(Cursor& file) {
   const std::string_view magic = file.next_line().value_or("");
   if (magic != "ply") {
     file.fail("does not begin with `ply`", not_ply);
   }
-  Header header;
+  PlyHeader header;
   while (const auto line = file.next_full_line()) {
     std::string_view rest = *line;
     const std::string_view keyword = detail::next_token(rest);
@@ -380,7 +380,7 @@ void read_element(Cursor& file, const Element& element, std::string_view encodin
 
 PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
   Cursor file(bytes, name);
-  Header header = read_header(file);
+  PlyHeader header = read_ply_header(file);
   const auto is_vertex = [](const Element& element) { return element.name == "vertex"; };
   const auto vertex = std::find_if(header.elements.begin(), header.elements.end(), is_vertex);
   if (std::count_if(header.elements.begin(), header.elements.end(), is_vertex) != 1) {

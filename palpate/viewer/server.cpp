@@ -209,7 +209,7 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
   }
 
   Hub& hub_;
-  websocket::stream<beast::tcp_stream> socket_;
+  websocket::stream<beast::tcp_stream, false> socket_;  // without compression
   beast::flat_buffer buffer_;
   std::deque<SharedMessage> queue_;
   std::array<CameraFeed, Patch::max_views> cameras_;

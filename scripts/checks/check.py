@@ -29,7 +29,10 @@ KNOWS = {
     "lab": {"core", "paper", "methods", "cloud", "sources", "search"},
     "bench": {"core", "paper", "methods", "cloud", "search"},
 }
-KNOWS["app"] = set(KNOWS)
+KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench"}
+# The programs that are built when they are first asked for.
+KNOWS["app/lab"] = KNOWS["app"] | {"app", "lab"}
+KNOWS["app/bench"] = KNOWS["app"] | {"app", "bench"}
 
 # Methods are pure: neither threads nor clocks nor files, and no library but Eigen.
 PURE = {"core", "paper", "sight", "methods"}
@@ -69,6 +72,8 @@ def lines(root, path):
 def room_of(path):
     """The room that a path from the root belongs to, or None."""
     parts = path.split("/")
+    if "/".join(parts[:2]) in ("app/lab", "app/bench"):
+        return "/".join(parts[:2])
     if len(parts) > 1 and parts[0] in ("search", "lab", "bench", "app"):
         return parts[0]
     return parts[1] if len(parts) > 2 and parts[0] == "palpate" else None

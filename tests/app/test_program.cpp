@@ -50,9 +50,10 @@ class Program : public ::testing::Test {
   }
 
   // Runs the program with arguments that need no quoting, after `before` in the same shell.
-  [[nodiscard]] Outcome run(const std::string& arguments, const std::string& before = "") const {
-    const std::string command = before + PALPATE_PROGRAM + " " + arguments + " >" + path("stdout") +
-                                " 2>" + path("stderr") + " </dev/null";
+  [[nodiscard]] Outcome run(const std::string& arguments, const std::string& before = "",
+                            const std::string& program = PALPATE_PROGRAM) const {
+    const std::string command = before + program + " " + arguments + " >" + path("stdout") + " 2>" +
+                                path("stderr") + " </dev/null";
     const int status = std::system(command.c_str());  // NOLINT(cert-env33-c): a shell is wanted
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(folder_.path() / "stdout"),
             read(folder_.path() / "stderr")};
@@ -286,6 +287,27 @@ TEST_F(Program, WritesHowATicksCostGrows) {
   for (const char* series :
        {"image_width,", "focal_length,", "cameras,", "frame_rate,", "depth_mm,", "unorganised,"})
     EXPECT_NE(csv.find(series), std::string::npos) << series;
+}
+
+TEST_F(Program, SaysHowToGetWhatTheProgramsBesideItHave) {
+  const std::string alone = path("palpate");
+  std::filesystem::copy_file(PALPATE_PROGRAM, alone);
+  for (const auto& [arguments, words] :
+       {std::pair<std::string, std::vector<std::string>>{"eval flat", {"eval", "palpate-lab"}},
+        {"bench --help", {"bench", "palpate-bench"}},
+        {"run --headless --method god-object", {"god-object", "palpate-lab", "scripts/run"}}}) {
+    const Outcome outcome = run(arguments, "", alone);
+    EXPECT_EQ(outcome.code, 2) << arguments;
+    EXPECT_EQ(lines_in(outcome.err), 1U) << outcome.err;
+    for (const std::string& word : words)
+      EXPECT_NE(outcome.err.find(word), std::string::npos) << word << " is not in " << outcome.err;
+  }
+  EXPECT_EQ(run("methods --names", "", alone).out, "paper paper-as-printed fixed-step sight\n");
+}
+
+TEST_F(Program, HandsOverToTheProgramsBesideIt) {
+  EXPECT_NE(run("eval --list-methods").out.find("god-object"), std::string::npos);
+  EXPECT_NE(run("bench --help").out.find("--growth"), std::string::npos);
 }
 
 TEST_F(Program, SuggestsTheWordThatWasMeant) {

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// palpate-lab: the program with the lab's methods and its experiments.
+#include <array>
+
+#include "app/program.hpp"
+#include "lab/runner.hpp"
+
+namespace palpate::app {
+Verb add_eval(CLI::App& program);
+}
+
+int main(int argc, char** argv) {
+  const palpate::lab::Ranks ranks(&argc, &argv);
+  constexpr std::array<palpate::app::AddVerb, 1> own = {palpate::app::add_eval};
+  return palpate::app::run_program(argc, argv, own);
+}

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "app/verbs.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::app {
+
+/// The whole of a program: parses the command line and runs its verb. The programs `palpate`,
+/// `palpate-lab` and `palpate-bench` share all verbs but their own, and give `program_methods` as
+/// they link it. A verb or method of another program is handed to that program if it lies beside
+/// this one.
+/// @param own_verbs  verbs that this program alone has
+/// @return the exit status: 0 done, 1 failed while running, 2 wrong usage or input
+int run_program(int argc, char** argv, std::span<const AddVerb> own_verbs = {});
+
+/// A method that this program does not know; palpate-lab may.
+class UnknownMethod : public Error {
+ public:
+  explicit UnknownMethod(const Error& error) : Error(error) {}
+};
+
+}  // namespace palpate::app

@@ -3,11 +3,13 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "palpate/core/method.hpp"
+#include "palpate/session/config.hpp"
 
 namespace palpate::app {
 
@@ -30,6 +32,8 @@ class MethodOptions {
   /// @throws Error for an unknown parameter or key, a value out of range, or a
   ///         configuration file that cannot be read.
   [[nodiscard]] MethodChoice choice(const MethodRegistry& methods) const;
+  /// The same with all else that the configuration file says.
+  [[nodiscard]] SessionConfig session(const MethodRegistry& methods) const;
 
  private:
   std::optional<std::string> method_;
@@ -42,5 +46,8 @@ void check_method(const MethodRegistry& methods, const std::string& name);
 
 /// The number that `text` is, whole. @throws Error naming `subject`.
 double parse_number(const std::string& subject, const std::string& text);
+
+/// NAME=VALUE taken apart. @throws Error naming `option` if it is none.
+std::pair<std::string, double> parse_assignment(const std::string& option, const std::string& text);
 
 }  // namespace palpate::app

@@ -35,6 +35,10 @@ class Playback {
   [[nodiscard]] const Cloud* upcoming(std::size_t camera) const {
     return cameras_[camera].next ? cameras_[camera].next->cloud.get() : nullptr;
   }
+  /// [s] When it was captured; 0 after the last frame.
+  [[nodiscard]] double upcoming_stamp(std::size_t camera) const {
+    return cameras_[camera].next ? cameras_[camera].next->stamp : 0.0;
+  }
   /// What each camera saw last; null before its first frame.
   [[nodiscard]] std::span<const std::shared_ptr<const Cloud>> newest() const { return newest_; }
 

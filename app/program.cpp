@@ -72,8 +72,8 @@ int run_verb(int argc, char** argv, std::span<const AddVerb> own_verbs) {
   program.set_version_flag("--version", "palpate " PALPATE_VERSION);
   program.allow_extras();
 
-  std::vector<AddVerb> adders = {add_run,     add_trace,      add_replay, add_info,
-                                 add_methods, add_parameters, add_doctor};
+  std::vector<AddVerb> adders = {add_run,     add_trace,      add_replay,    add_info,
+                                 add_methods, add_parameters, add_calibrate, add_doctor};
   adders.insert(adders.begin() + 3, own_verbs.begin(), own_verbs.end());
   std::vector<Verb> verbs;
   std::vector<std::string> words;

@@ -6,23 +6,33 @@
 
 #include "app/verbs.hpp"
 #include "palpate/core/parameters.hpp"
+#include "palpate/servo/safety.hpp"
 
 namespace palpate::app {
+namespace {
+
+int print_parameters() {
+  fmt::print("{:<18} {:<4} {:<11} {:>12} {:>9} {:>9}  {}\n", "name", "", "unit", "default", "min",
+             "max", "meaning (source)");
+  for (const ParameterInfo& row : parameter_table()) {
+    // The width of a Greek letter is one column, but two bytes.
+    fmt::print("{:<18} {:<4} {:<11} {:>12.6g} {:>9g} {:>9g}  {} ({})\n", row.name, row.symbol,
+               row.unit, row.default_value, row.min, row.max, row.meaning, row.source);
+  }
+  fmt::print("\nlimits of the safety chain (--limit):\n");
+  for (const SafetyParameterInfo& row : safety_parameter_table()) {
+    fmt::print("{:<18} {:<4} {:<11} {:>12.6g} {:>9g} {:>9g}  {}\n", row.name, "", row.unit,
+               row.default_value, row.min, row.max, row.meaning);
+  }
+  return 0;
+}
+
+}  // namespace
 
 Verb add_parameters(CLI::App& program) {
-  CLI::App* command =
-      program.add_subcommand("parameters", "list what --set can set: default, range and meaning");
-  return {command, [] {
-            fmt::print("{:<18} {:<4} {:<11} {:>12} {:>9} {:>9}  {}\n", "name", "", "unit",
-                       "default", "min", "max", "meaning (source)");
-            for (const ParameterInfo& row : parameter_table()) {
-              // The width of a Greek letter is one column, but two bytes.
-              fmt::print("{:<18} {:<4} {:<11} {:>12.6g} {:>9g} {:>9g}  {} ({})\n", row.name,
-                         row.symbol, row.unit, row.default_value, row.min, row.max, row.meaning,
-                         row.source);
-            }
-            return 0;
-          }};
+  CLI::App* command = program.add_subcommand(
+      "parameters", "list what --set and --limit can set: default, range and meaning");
+  return {command, print_parameters};
 }
 
 }  // namespace palpate::app

@@ -15,6 +15,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/devices/hip_path.hpp"
 #include "palpate/methods/methods.hpp"
+#include "palpate/session/press_path.hpp"
 
 namespace palpate::app {
 namespace {
@@ -22,11 +23,26 @@ namespace {
 struct TraceOptions {
   std::vector<std::string> cameras;
   std::string path;
+  std::string press, slide_to;
+  PressOptions pressing;
   std::string out = "-";
   double rate = 1000.0;
   bool json = false;
   MethodOptions method;
 };
+
+// A file's path, or one that presses what the first camera sees.
+HipPath path_of(const TraceOptions& options, const Playback& playback) {
+  if (options.press.empty()) return HipPath::read_csv(options.path);
+  const auto* image = dynamic_cast<const DepthImage*>(playback.upcoming(0));
+  if (image == nullptr)
+    throw Error("--press", options.cameras.front() + " has no depth image",
+                "give a path with --path FILE.csv");
+  PressOptions pressing = options.pressing;
+  if (!options.slide_to.empty()) pressing.slide_to = parse_pixel(options.slide_to, "--slide-to");
+  return press_path(*image, parse_pixel(options.press, "--press"), pressing,
+                    playback.upcoming_stamp(0));
+}
 
 int trace(const TraceOptions& options) {
   if (!(options.rate >= 1.0 && options.rate <= 100000.0))
@@ -35,8 +51,13 @@ int trace(const TraceOptions& options) {
   if (options.json && options.out == "-")
     throw Error("--json", "the trace itself goes to standard output",
                 "name a file for it with --out");
-  const HipPath path = HipPath::read_csv(options.path);
+  if (options.path.empty() == options.press.empty())
+    throw Error("trace", "it needs one of --path and --press",
+                "give a CSV file with --path, or a pixel of the first frame with --press U,V");
+  if (options.press.empty() && !options.slide_to.empty())
+    throw Error("--slide-to", "there is no --press to slide from", "add --press U,V");
   Playback playback(options.cameras);
+  const HipPath path = path_of(options, playback);
   for (std::size_t camera = 0; camera < playback.cameras(); ++camera) {
     const SourceInfo& about = playback.source(camera).info();
     for (const std::string& note : about.notes)
@@ -85,8 +106,18 @@ Verb add_trace(CLI::App& program) {
                    "where frames come from, e.g. tum:DIR; may be given several times")
       ->required()
       ->allow_extra_args(false);
-  command->add_option("--path", options->path, "CSV of the HIP's path: t,x,y,z in s and m, world")
-      ->required();
+  command->add_option("--path", options->path, "CSV of the HIP's path: t,x,y,z in s and m, world");
+  command->add_option("--press", options->press,
+                      "instead of a path: press what this pixel of the first frame sees, U,V, "
+                      "along the line of sight, and lift again");
+  command->add_option("--slide-to", options->slide_to,
+                      "with --press: stroke the surface to this pixel before lifting, U,V");
+  command->add_option("--press-depth", options->pressing.depth,
+                      "with --press: how far behind the surface [m] (0.008)");
+  command->add_option("--press-speed", options->pressing.speed,
+                      "with --press: speed down, along and up [m/s] (0.05)");
+  command->add_option("--press-hold", options->pressing.hold,
+                      "with --press: time to stay before sliding and before lifting [s] (0.5)");
   command->add_option("--out", options->out, "where the trace goes, - for standard output");
   command->add_option("--rate", options->rate, "ticks a second (1000)");
   command->add_flag("--json", options->json, "print the summary as a JSON object");

@@ -27,5 +27,6 @@ Verb add_replay(CLI::App& program);
 Verb add_doctor(CLI::App& program);
 Verb add_methods(CLI::App& program);
 Verb add_parameters(CLI::App& program);
+Verb add_calibrate(CLI::App& program);
 
 }  // namespace palpate::app

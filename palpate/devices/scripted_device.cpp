@@ -7,7 +7,7 @@
 namespace palpate {
 
 ScriptedDevice::ScriptedDevice(HipPath path, bool repeat, std::string uri)
-    : info_{.uri = std::move(uri), .kind = "scripted path", .limits = no_motors},
+    : info_{.uri = std::move(uri), .kind = "scripted path", .limits = no_motors, .simulated = true},
       path_(std::move(path)),
       repeat_(repeat) {}
 

@@ -35,7 +35,10 @@ void keep_largest(std::atomic<double>& largest, double value) noexcept {
 }  // namespace
 
 SimulatedHand::SimulatedHand(HipPath target, const HandModel& model, std::string uri)
-    : info_{.uri = std::move(uri), .kind = "simulated hand", .limits = no_motors},
+    : info_{.uri = std::move(uri),
+            .kind = "simulated hand",
+            .limits = no_motors,
+            .simulated = true},
       path_(std::move(target)),
       model_(model) {
   const bool held = !model_.body || model_.mass > 0.0;

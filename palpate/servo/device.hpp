@@ -49,6 +49,7 @@ struct DeviceInfo {
   std::optional<double> rate = {};        ///< [Hz] at which the device is updated
   /// [s] the hardware takes its force away when no command came for this long; empty: never.
   std::optional<double> watchdog = {};
+  bool simulated = false;     ///< a simulated hand: it may be read on any clock
   std::string serial = {};    ///< serial number, empty if unknown
   std::string firmware = {};  ///< firmware and driver versions, empty if unknown
 };

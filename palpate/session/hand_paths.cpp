@@ -9,29 +9,9 @@
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/session/press_path.hpp"
 
 namespace palpate {
-namespace {
-
-// The median depth of a few pixels about (u, v) [m].
-std::optional<double> depth_at(const DepthImage& image, int u, int v) {
-  constexpr int half = 3;
-  std::vector<std::uint16_t> near;
-  const Intrinsics& k = image.intrinsics();
-  for (int y = std::max(v - half, 0); y <= std::min(v + half, k.height - 1); ++y) {
-    for (int x = std::max(u - half, 0); x <= std::min(u + half, k.width - 1); ++x) {
-      const std::uint16_t raw = image.depth()[static_cast<std::size_t>(y * k.width + x)];
-      if (is_measured(raw)) near.push_back(raw);
-    }
-  }
-  if (near.empty()) return std::nullopt;
-  const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
-  std::nth_element(near.begin(), middle, near.end());
-  return *middle / image.units_per_metre();
-}
-
-}  // namespace
-
 HipPath stroke_path(const DepthImage& image, double duration, double press) {
   const Intrinsics& k = image.intrinsics();
   constexpr double hover = 0.05;       // [m] in front of the surface, before and after
@@ -43,7 +23,7 @@ HipPath stroke_path(const DepthImage& image, double duration, double press) {
   constexpr double circle_time = 4.0;  // [s]
   const double radius = k.height / 6.0;
 
-  std::optional<double> depth = depth_at(image, k.width / 2, k.height / 2);
+  std::optional<double> depth = median_depth(image, {k.width / 2, k.height / 2});
   if (!depth)
     throw Error("built-in hand", "the middle of the first frame measures nothing to touch",
                 "give a path with --device script:FILE.csv");
@@ -59,7 +39,7 @@ HipPath stroke_path(const DepthImage& image, double duration, double press) {
     const double angle = 2.0 * std::numbers::pi * stroke / circle_time;
     const int u = k.width / 2 + static_cast<int>(radius * std::sin(angle));
     const int v = k.height / 2 + static_cast<int>(radius * (std::cos(angle) - 1.0));
-    const std::optional<double> measured = depth_at(image, u, v);
+    const std::optional<double> measured = median_depth(image, {u, v});
     const bool flat = measured && std::abs(*measured - *depth) < edge;
     if (measured) depth = measured;
     places.push_back({image.rays().ray(u, v), *depth, flat});

@@ -130,6 +130,130 @@ TEST_F(Program, SetsParametersFromAFileAndFromTheCommandLine) {
   EXPECT_NEAR(hard["max_force"].get<double>() / soft["max_force"].get<double>(), 4.0, 1e-9);
 }
 
+// A device that lies in the scene turned by 90 degrees about z, at (0.1, 0.2, 0.3).
+std::array<double, 3> on_device(double x, double y, double z) {
+  return {y - 0.2, -(x - 0.1), z - 0.3};
+}
+
+TEST_F(Program, PrintsASessionThatReadsBackTheSame) {
+  const std::string options =
+      " --camera synthetic:plane --device hand:?device=touch --device-pose 0.1,0.2,0.3,0,0,0,1"
+      " --scale 2 --clutch-button 1 --limit max_device_force=1.5 --set stiffness=400 --rate 2000"
+      " --method paper --port 0 --no-browser";
+  const Outcome first = run("run --print-config" + options);
+  ASSERT_EQ(first.code, 0) << first.err;
+  EXPECT_NE(first.out.find("scale = 2.0"), std::string::npos) << first.out;
+  EXPECT_NE(first.out.find("max_device_force = 1.5"), std::string::npos) << first.out;
+  const Outcome again = run("run --print-config --config " + write("s.toml", first.out));
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_EQ(again.out, first.out);
+  const Outcome other = run("run --print-config --scale 3 --config " + path("s.toml"));
+  EXPECT_NE(other.out.find("scale = 3.0"), std::string::npos) << "options come after the file";
+  const Outcome placed = run("run --print-config --device-pose " + path("s.toml"));
+  EXPECT_NE(placed.out.find("world_from_device = [0.1, 0.2, 0.3, 0, 0, 0, 1]"), std::string::npos);
+  expect_refusal("run --limit max_fore=1", {"max_fore"});
+  expect_refusal("run --limit max_device_force", {"--limit", "NAME=VALUE"});
+  expect_refusal("run --limit max_device_force=99", {"max_device_force", "out of range"});
+  expect_refusal("run --device-pose 1,2,3", {"--device-pose", "x,y,z,qx,qy,qz,qw"});
+  expect_refusal("run --device-pose nowhere.toml", {"nowhere.toml", "no such file"});
+  expect_refusal("run --scale 0", {"scale"});
+  expect_refusal("run --clutch-button 40", {"clutch_button", "0 to 31"});
+  expect_refusal("run --config " + write("k.toml", "\n[safety]\nswig = 1\n"),
+                 {"k.toml:3", "did you mean 'swing'"});
+}
+
+TEST_F(Program, KeepsTheLimitsItIsGiven) {
+  const std::string base = "run --headless --json --duration 4";
+  const auto usual = nlohmann::json::parse(run(base).out);
+  const auto low = nlohmann::json::parse(run(base + " --limit max_device_force=0.5").out);
+  EXPECT_GT(usual["max_force_sent"].get<double>(), 0.6);
+  EXPECT_LE(low["max_force_sent"].get<double>(), 0.5 + 1e-12);
+}
+
+TEST_F(Program, CalibratesADeviceFromPairs) {
+  std::string pairs = "dx,dy,dz,wx,wy,wz\n";
+  const double points[][3] = {{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}, {0, 0, 0.1}};
+  for (const auto& w : points) {
+    const auto d = on_device(w[0], w[1], w[2]);
+    for (const double number : {d[0], d[1], d[2], w[0], w[1]})
+      pairs += std::to_string(number) + ",";
+    pairs += std::to_string(w[2]) + "\n";
+  }
+  const std::string out = write("session.toml", "# mine\nmethod = \"paper\"  # the old one\n");
+  const Outcome outcome =
+      run("calibrate --json --pairs " + write("pairs.csv", pairs) + " --out " + out);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_LT(json["rms_m"].get<double>(), 1e-9);
+  EXPECT_EQ(json["residuals_m"].size(), 4U);
+  const std::string written = read(out);
+  EXPECT_EQ(written.find("# mine\nmethod = \"paper\"  # the old one\n"), 0U) << written;
+  EXPECT_NE(written.find("world_from_device = [0.1"), std::string::npos) << written;
+  EXPECT_EQ(run("run --print-config --config " + out).code, 0);
+
+  expect_refusal("calibrate", {"--at", "--points", "--pairs"});
+  expect_refusal("calibrate --pairs " + write("two.csv", "dx,dy,dz,wx,wy,wz\n0,0,0,0,0,0\n"),
+                 {"too few"});
+  expect_refusal("calibrate --pairs " + write("bad.csv", "dx,dy,dz,wx,wy,wz\n0,0,0,0,0\n"),
+                 {"bad.csv:2"});
+  expect_refusal("calibrate --at 1,2", {"--device"});
+}
+
+TEST_F(Program, CalibratesADeviceThatTouchesPixels) {
+  // The device touches what the camera sees at these pixels, resting a second at each.
+  const std::string camera = "'synthetic:tilt?slope=20deg&tilt=0deg&distance=0.5m&size=64x48'";
+  std::string script = "t,x,y,z\n0,0,0,0\n";
+  std::string pixels;
+  int t = 1;
+  for (const char* pixel : {"10,10", "50,12", "30,40", "20,30"}) {
+    const auto at =
+        nlohmann::json::parse(run("info " + camera + " --json --at " + pixel).out)["at"];
+    const auto& w = at["in_world_m"];
+    const auto d = on_device(w[0].get<double>(), w[1].get<double>(), w[2].get<double>());
+    for (int rest = 0; rest < 2; ++rest, ++t) {
+      script += std::to_string(t);
+      for (const double number : d) script += "," + std::to_string(number);
+      script += "\n";
+    }
+    pixels += std::string(" --at ") + pixel;
+  }
+  const std::string base = "calibrate --camera " + camera +
+                           " --device script:" + write("touch.csv", script) + pixels + " --out " +
+                           path("new.toml");
+  const Outcome outcome = run(base + " --json");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_LT(nlohmann::json::parse(outcome.out)["rms_m"].get<double>(), 2e-3);
+  EXPECT_NE(outcome.err.find("1 of 4: touch pixel 10,10"), std::string::npos) << outcome.err;
+  EXPECT_NE(read(path("new.toml")).find("[placement]\nworld_from_device = ["), std::string::npos);
+
+  fs::remove(path("new.toml"));
+  const Outcome strict = run(base + " --max-residual 1e-9");
+  EXPECT_EQ(strict.code, 2) << strict.err;
+  EXPECT_NE(strict.err.find("--max-residual"), std::string::npos) << strict.err;
+  EXPECT_FALSE(fs::exists(path("new.toml")));
+}
+
+TEST_F(Program, TracesAPressOnAPixel) {
+  const std::string base =
+      std::string("trace --camera ") + plane + " --json --out " + path("p.csv");
+  const Outcome press = run(base + " --press 320,240");
+  ASSERT_EQ(press.code, 0) << press.err;
+  const auto summary = nlohmann::json::parse(press.out);
+  EXPECT_GT(summary["max_force_asked"].get<double>(), 2.0);
+  EXPECT_LT(summary["max_force_asked"].get<double>(), 8.0);
+  EXPECT_EQ(summary["pop_throughs"], 0);
+  const auto light = nlohmann::json::parse(run(base + " --press 320,240 --press-depth 0.002").out);
+  EXPECT_LT(light["max_force_asked"].get<double>(), 2.0);
+  const Outcome slide = run(base + " --press 320,240 --slide-to 400,240");
+  ASSERT_EQ(slide.code, 0) << slide.err;
+  EXPECT_GT(nlohmann::json::parse(slide.out)["ticks"], summary["ticks"]);
+  expect_refusal(base, {"--path", "--press"});
+  expect_refusal(base + " --press 320", {"--press", "320,240"});
+  expect_refusal(base + " --press 9999,0", {"pixel 9999,0", "outside"});
+  expect_refusal(base + " --press 1,1 --press-depth 5", {"press depth", "0.1"});
+  expect_refusal(base + " --slide-to 1,1 --path " + this->press(), {"--slide-to", "--press"});
+}
+
 TEST_F(Program, RunsHeadlessOnTheSyntheticDesk) {
   const Outcome outcome = run("run --headless --json --duration 4");
   ASSERT_EQ(outcome.code, 0) << outcome.err;

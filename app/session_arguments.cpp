@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/session_arguments.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "palpate/core/error.hpp"
+#include "palpate/core/pose.hpp"
+
+namespace palpate::app {
+namespace {
+
+// The cameras named on the command line, with what the file says of those of the same URI.
+std::vector<CameraConfig> chosen(const std::vector<std::string>& uris,
+                                 const std::vector<CameraConfig>& in_file) {
+  std::vector<CameraConfig> cameras;
+  for (const std::string& uri : uris) {
+    const auto known = std::find_if(in_file.begin(), in_file.end(),
+                                    [&](const CameraConfig& camera) { return camera.uri == uri; });
+    cameras.push_back(known == in_file.end() ? CameraConfig{.uri = uri} : *known);
+  }
+  return cameras;
+}
+
+}  // namespace
+
+void apply_placement(const std::optional<std::string>& pose, const std::optional<double>& scale,
+                     const std::optional<int>& clutch_button, Placement& placement) {
+  if (pose) {
+    std::error_code unused;
+    if (std::filesystem::is_regular_file(*pose, unused)) {
+      placement.world_from_device = read_session_config(*pose).placement.world_from_device;
+    } else if (pose->find(',') == std::string::npos && pose->find(' ') == std::string::npos) {
+      throw Error("--device-pose " + *pose, "there is no such file",
+                  "give x,y,z,qx,qy,qz,qw or the TOML file that palpate calibrate wrote");
+    } else {
+      placement.world_from_device = parse_pose(*pose, "--device-pose");
+    }
+  }
+  if (scale) placement.workspace_scale = *scale;
+  if (clutch_button) placement.clutch_button = clutch_button;
+  validate(placement);
+}
+
+void SessionArguments::add_to(CLI::App& command) {
+  command
+      .add_option("--camera", cameras_,
+                  "where frames come from (synthetic:desk?noise=1mm); may be given several times")
+      ->allow_extra_args(false);
+  command.add_option("--device", device_,
+                     "the hand: mouse: in the page (the default), hand: a simulated person (the "
+                     "default of --headless), script:FILE.csv a path");
+  command.add_option("--device-pose", device_pose_,
+                     "where the device lies in the scene: x,y,z,qx,qy,qz,qw [m], or the TOML file "
+                     "that palpate calibrate wrote");
+  command.add_option("--scale", scale_, "scene metres per device metre (1)");
+  command.add_option("--clutch-button", clutch_button_,
+                     "while this button of the device is pressed the HIP stays: 0 to 31");
+  command
+      .add_option("--limit", limits_,
+                  "set a safety limit, NAME=VALUE in SI units; see `palpate parameters`")
+      ->allow_extra_args(false);
+  command.add_option("--rate", rate_, "ticks a second (1000)");
+  command.add_option("--listen", listen_,
+                     "address at which browsers find the page (127.0.0.1: this machine's alone)");
+  command.add_option("--port", port_, "port of the page (8642, or any if that is taken; 0: any)");
+  command.add_option("--token", token_,
+                     "what a page must know; made up if --listen lets other machines in");
+  command.add_flag("--no-browser", no_browser_, "only say where the page is");
+  command.add_option("--record", record_,
+                     "write the session into this folder, a ROS 2 bag; palpate replay checks it");
+  method_.add_to(command);
+  command.get_option("--config")->description("read the session from a TOML file");
+}
+
+SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
+  SessionConfig config = method_.session(methods);
+  if (!cameras_.empty()) config.cameras = chosen(cameras_, config.cameras);
+  if (device_) config.device = *device_;
+  apply_placement(device_pose_, scale_, clutch_button_, config.placement);
+  for (const std::string& limit : limits_) {
+    const auto [name, value] = parse_assignment("--limit", limit);
+    set_parameter(config.safety, name, value);
+  }
+  if (rate_) config.rate = *rate_;
+  if (record_) config.record = *record_;
+  if (listen_) config.server.listen = *listen_;
+  if (port_) config.server.port = port_;
+  if (token_) config.server.token = *token_;
+  if (no_browser_) config.server.browser = false;
+  validate(config);
+  return config;
+}
+
+}  // namespace palpate::app

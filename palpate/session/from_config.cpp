@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/session/from_config.hpp"
+
+namespace palpate {
+
+SessionOptions session_options(const SessionConfig& config) {
+  validate(config);
+  SessionOptions options;
+  for (const CameraConfig& camera : config.cameras)
+    options.cameras.push_back({.uri = camera.uri, .world_from_camera = camera.world_from_camera});
+  if (!config.device.empty()) options.device_uri = config.device;
+  options.settings.method = config.method;
+  options.settings.parameters = config.parameters;
+  options.settings.safety = config.safety;
+  options.settings.placement = config.placement;
+  options.servo.rate = config.rate;
+  options.record = config.record;
+  return options;
+}
+
+}  // namespace palpate

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/session/registration.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <string_view>
+
+#include <Eigen/SVD>
+
+#include "palpate/core/error.hpp"
+#include "palpate/core/pose.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr std::string_view bom = "\xEF\xBB\xBF";
+constexpr double farthest = 1e6;  // [m]
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r");
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+}
+
+std::vector<std::string_view> fields_of(std::string_view line) {
+  std::vector<std::string_view> fields;
+  for (;;) {
+    const std::size_t comma = line.find(',');
+    fields.push_back(trimmed(line.substr(0, comma)));
+    if (comma == std::string_view::npos) return fields;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+// The named columns of a CSV file, line by line.
+template <std::size_t N>
+std::vector<std::array<double, N>> read_columns(const std::filesystem::path& file,
+                                                const std::array<std::string_view, N>& columns) {
+  const std::string name = file.string();
+  std::string header;
+  for (const std::string_view column : columns)
+    header += (header.empty() ? "" : ",") + std::string(column);
+  std::ifstream in(file);
+  std::error_code unused;
+  if (!in || std::filesystem::is_directory(file, unused))
+    throw Error(name, "it cannot be read", "name a CSV file with the columns " + header);
+  std::array<std::size_t, N> places{};
+  std::vector<std::array<double, N>> rows;
+  bool has_header = false;
+  std::string text;
+  for (std::size_t number = 1; std::getline(in, text); ++number) {
+    const std::string where = name + ":" + std::to_string(number);
+    std::string_view line = text;
+    if (number == 1 && line.starts_with(bom)) line.remove_prefix(bom.size());
+    line = trimmed(line);
+    if (line.empty()) continue;
+    const std::vector<std::string_view> fields = fields_of(line);
+    if (!has_header) {
+      for (std::size_t i = 0; i < N; ++i) {
+        const auto found = std::find(fields.begin(), fields.end(), columns[i]);
+        if (found == fields.end()) {
+          throw Error(where, "the header has no column '" + std::string(columns[i]) + "'",
+                      "begin the file with the line '" + header + "'");
+        }
+        places[i] = static_cast<std::size_t>(found - fields.begin());
+      }
+      has_header = true;
+      continue;
+    }
+    std::array<double, N> row{};
+    for (std::size_t i = 0; i < N; ++i) {
+      const std::string_view field = places[i] < fields.size() ? fields[places[i]] : "";
+      const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), row[i]);
+      if (error != std::errc{} || end != field.data() + field.size() ||
+          !(std::abs(row[i]) <= farthest)) {
+        throw Error(
+            where,
+            std::string(columns[i]) + ": '" + std::string(field) + "' is not a number of metres",
+            "give a finite number within 1000 km");
+      }
+    }
+    rows.push_back(row);
+  }
+  if (rows.empty())
+    throw Error(name, "it has no points", "give the line '" + header + "' and a line for each");
+  return rows;
+}
+
+// The height of the points' largest triangle over their longest distance [m].
+double height_over_longest_side(std::span<const PointPair> pairs, Vec3 PointPair::*member) {
+  double longest = 0.0;
+  Vec3 from = Vec3::Zero();
+  Vec3 along = Vec3::UnitX();
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    for (std::size_t j = i + 1; j < pairs.size(); ++j) {
+      const Vec3 side = pairs[j].*member - pairs[i].*member;
+      if (side.norm() <= longest) continue;
+      longest = side.norm();
+      from = pairs[i].*member;
+      along = side.normalized();
+    }
+  }
+  double height = 0.0;
+  for (const PointPair& pair : pairs)
+    height = std::max(height, (pair.*member - from).cross(along).norm());
+  return height;
+}
+
+std::string millimetres(double metres) {
+  return shortest(std::round(1e4 * metres) / 10.0) + " mm";
+}
+
+void check_spread(std::span<const PointPair> pairs, const FitOptions& options) {
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    for (std::size_t j = i + 1; j < pairs.size(); ++j) {
+      const double distance = (pairs[i].world - pairs[j].world).norm();
+      if (distance >= options.least_distance) continue;
+      throw Error(
+          "calibration points",
+          "points " + std::to_string(i + 1) + " and " + std::to_string(j + 1) + " are only " +
+              millimetres(distance) + " apart",
+          "choose points at least " + millimetres(options.least_distance) + " apart, better 10 cm");
+    }
+  }
+  const double height = height_over_longest_side(pairs, &PointPair::world);
+  if (height >= options.least_height) return;
+  throw Error("calibration points",
+              "they lie on a line, to within " + millimetres(height) +
+                  ": the rotation about it is not determined",
+              "choose points that span a triangle or more");
+}
+
+struct Rigid {
+  Eigen::Matrix3d rotation;
+  double scale;
+  Vec3 translation;
+  double rms;
+};
+
+// Umeyama's solution; `mirrored` allows a reflection.
+Rigid best_fit(std::span<const PointPair> pairs, const FitOptions& options, bool mirrored) {
+  const auto n = static_cast<double>(pairs.size());
+  Vec3 device_mean = Vec3::Zero();
+  Vec3 world_mean = Vec3::Zero();
+  for (const PointPair& pair : pairs) {
+    device_mean += pair.device / n;
+    world_mean += pair.world / n;
+  }
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  double device_variance = 0.0;
+  for (const PointPair& pair : pairs) {
+    const Vec3 device = pair.device - device_mean;
+    covariance += (pair.world - world_mean) * device.transpose() / n;
+    device_variance += device.squaredNorm() / n;
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance,
+                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Vec3 signs = Vec3::Ones();
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  if (sign < 0.0 && !mirrored) signs.z() = -1.0;
+  Rigid fit{};
+  fit.rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  fit.scale = options.fit_scale ? svd.singularValues().dot(signs) / device_variance : options.scale;
+  fit.translation = world_mean - fit.scale * (fit.rotation * device_mean);
+  double squares = 0.0;
+  for (const PointPair& pair : pairs) {
+    squares +=
+        (pair.world - fit.scale * (fit.rotation * pair.device) - fit.translation).squaredNorm();
+  }
+  fit.rms = std::sqrt(squares / n);
+  return fit;
+}
+
+// The mean distance of the points from their centre [m].
+double spread(std::span<const PointPair> pairs, Vec3 PointPair::*member) {
+  Vec3 mean = Vec3::Zero();
+  for (const PointPair& pair : pairs) mean += pair.*member / static_cast<double>(pairs.size());
+  double squares = 0.0;
+  for (const PointPair& pair : pairs) squares += (pair.*member - mean).squaredNorm();
+  return std::sqrt(squares / static_cast<double>(pairs.size()));
+}
+
+}  // namespace
+
+PlacementFit fit_placement(std::span<const PointPair> pairs, const FitOptions& options) {
+  if (pairs.size() < 3) {
+    throw Error("calibration points", std::to_string(pairs.size()) + " are too few",
+                "touch three points or more");
+  }
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (!pairs[i].device.allFinite() || !pairs[i].world.allFinite())
+      throw Error("calibration points", "point " + std::to_string(i + 1) + " is not finite",
+                  "give finite metres");
+  }
+  check_spread(pairs, options);
+  const double ratio = spread(pairs, &PointPair::world) / spread(pairs, &PointPair::device);
+  constexpr double most_off = 1.5;
+  const double off = options.fit_scale ? 1.0 : ratio / options.scale;
+  if (!(off < most_off && off > 1.0 / most_off)) {
+    throw Error("calibration points",
+                "distances in the scene are " + shortest(std::round(1e3 * ratio) / 1e3) +
+                    " times those on the device, not " + shortest(options.scale),
+                "give both in metres and check the order of the points, or let the scale be "
+                "fitted");
+  }
+  const Rigid fit = best_fit(pairs, options, false);
+  constexpr double noticeable = 5e-3;  // [m] more than a good calibration leaves
+  const Rigid mirrored = best_fit(pairs, options, true);
+  if (fit.rms > noticeable && mirrored.rms < 0.3 * fit.rms) {
+    throw Error("calibration points",
+                "they fit within " + millimetres(mirrored.rms) + " if the device's frame is " +
+                    "mirrored, but only within " + millimetres(fit.rms) + " as it is",
+                "check the signs and the order of the device's axes");
+  }
+  PlacementFit result;
+  result.placement.world_from_device.linear() = fit.rotation;
+  result.placement.world_from_device.translation() = fit.translation;
+  result.placement.workspace_scale = fit.scale;
+  result.rms = fit.rms;
+  for (const PointPair& pair : pairs) {
+    const Vec3 fitted = result.placement.world_from_device * Vec3(fit.scale * pair.device);
+    result.residuals.push_back((pair.world - fitted).norm());
+  }
+  validate(result.placement);
+  return result;
+}
+
+std::vector<PointPair> read_pairs(const std::filesystem::path& file) {
+  constexpr std::array<std::string_view, 6> columns{"dx", "dy", "dz", "wx", "wy", "wz"};
+  std::vector<PointPair> pairs;
+  for (const auto& row : read_columns(file, columns))
+    pairs.push_back({{row[0], row[1], row[2]}, {row[3], row[4], row[5]}});
+  return pairs;
+}
+
+std::vector<Vec3> read_points(const std::filesystem::path& file) {
+  constexpr std::array<std::string_view, 3> columns{"x", "y", "z"};
+  std::vector<Vec3> points;
+  for (const auto& row : read_columns(file, columns)) points.emplace_back(row[0], row[1], row[2]);
+  return points;
+}
+
+}  // namespace palpate

@@ -42,7 +42,7 @@ struct Target {
   Vec3 world;
 };
 
-std::string text_of(const Vec3& v) {
+std::string text_of_point(const Vec3& v) {
   return fmt::format("{:+.4f} {:+.4f} {:+.4f} m", v.x(), v.y(), v.z());
 }
 
@@ -104,7 +104,7 @@ std::vector<PointPair> touched_pairs(const CalibrateOptions& options, const Sess
   const auto ask = [&] {
     if (next >= targets.size()) return;
     fmt::print(stderr, "palpate: {} of {}: touch {} at {}\n", next + 1, targets.size(),
-               targets[next].name, text_of(targets[next].world));
+               targets[next].name, text_of_point(targets[next].world));
   };
   fmt::print(stderr,
              "palpate: the device gets no force; at each point press a button of the device, or "
@@ -112,7 +112,7 @@ std::vector<PointPair> touched_pairs(const CalibrateOptions& options, const Sess
   ask();
   const std::vector<Vec3> touched =
       capture_points(*device, targets.size(), options.timeout, [&](const Vec3& point) {
-        fmt::print(stderr, "palpate: taken at {} of the device\n", text_of(point));
+        fmt::print(stderr, "palpate: taken at {} of the device\n", text_of_point(point));
         ++next;
         ask();
       });
@@ -161,7 +161,8 @@ int calibrate(const CalibrateOptions& options) {
   } else {
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       fmt::print("point {}  device {}  scene {}  off by {:.2f} mm\n", i + 1,
-                 text_of(pairs[i].device), text_of(pairs[i].world), 1e3 * fit.residuals[i]);
+                 text_of_point(pairs[i].device), text_of_point(pairs[i].world),
+                 1e3 * fit.residuals[i]);
     }
     fmt::print("world_from_device = [{}]\nscale = {}\nrms = {:.2f} mm\n",
                pose_text(fit.placement.world_from_device), shortest(fit.placement.workspace_scale),

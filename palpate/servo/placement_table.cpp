@@ -45,7 +45,7 @@ void set_angle(Placement& placement, double value) {
           .toRotationMatrix();
 }
 
-constexpr std::array table{
+constexpr std::array placement_rows{
     PlacementInfo{"scale", "", "-", 1.0, 0.001, 1000.0,
                   "scene metres per device metre; the felt stiffness grows with it", "",
                   [](const Placement& p) { return p.workspace_scale; },
@@ -67,7 +67,7 @@ constexpr std::array table{
 }  // namespace
 
 std::span<const PlacementInfo> placement_table() {
-  return table;
+  return placement_rows;
 }
 
 void set_placement(Placement& placement, std::string_view name, double value) {

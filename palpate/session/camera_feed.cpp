@@ -23,7 +23,6 @@ constexpr double hang_margin = 1.0;        // [s] by which a read may overrun it
 constexpr double idle_pause = 0.005;       // [s] after a live source that did not wait
 constexpr double rate_weight = 0.1;        // of a new interval in the rate
 constexpr double remark_time = 5.0;        // [s] for which a problem of stamps is said
-constexpr double stamp_step_back = 1.0;    // [s] a recording's stamps this far back begin anew
 
 class MachineClock final : public FeedClock {
  public:

@@ -48,6 +48,9 @@ struct FeedOptions {
   std::shared_ptr<FeedClock> clock = machine_clock();
 };
 
+/// A recording whose stamps go back by this much [s] begins anew there.
+inline constexpr double stamp_step_back = 1.0;
+
 /// A frame as it is handed over.
 struct FedFrame {
   Frame frame;                ///< its stamp is on the servo loop's clock [s, CLOCK_MONOTONIC]

@@ -9,9 +9,8 @@
 namespace palpate {
 namespace {
 
-constexpr int most_dropped = 100;        // frames in a row that one look leaves out
-constexpr double stamp_step_back = 1.0;  // [s] stamps this far back begin anew
-constexpr double longest_gap = 10.0;     // [s] between frames beyond which it is cut short
+constexpr int most_dropped = 100;     // frames in a row that one look leaves out
+constexpr double longest_gap = 10.0;  // [s] between frames beyond which it is cut short
 
 }  // namespace
 

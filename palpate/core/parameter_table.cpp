@@ -2,8 +2,8 @@
 #include "palpate/core/parameter_table.hpp"
 
 #include <array>
+#include <charconv>
 #include <cmath>
-#include <cstdio>
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/nearest_name.hpp"
@@ -12,8 +12,9 @@ namespace palpate {
 
 std::string number_text(double value) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%g", value);
-  return text.data();
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 6);
+  return {text.data(), end.ptr};
 }
 
 void check_range(std::string_view noun, std::string_view name, std::string_view unit, double min,

@@ -348,11 +348,11 @@ TEST(Session, StartsAMouseBeforeWhatTheCameraSees) {
   options.device_uri = "mouse:?max_speed=0.5";
   Session session(std::move(options));
   ASSERT_NE(session.mouse(), nullptr);
-  EXPECT_NEAR(session.mouse()->start().z(), wall_depth - 0.05, 0.002);
+  EXPECT_NEAR(session.mouse()->start_position().z(), wall_depth - 0.05, 0.002);
   SessionOptions placed = on_the_wall();
   placed.device = nullptr;
   placed.device_uri = "mouse:?z=0.3";
-  EXPECT_NEAR(Session(std::move(placed)).mouse()->start().z(), 0.3, 1e-12);
+  EXPECT_NEAR(Session(std::move(placed)).mouse()->start_position().z(), 0.3, 1e-12);
 }
 
 // What each error has to name: the thing, and what to do about it.

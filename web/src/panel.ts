@@ -242,7 +242,7 @@ export class Panel {
       ]),
       [
         "Hand",
-        `${state.device.uri} · ${state.device.kind}${state.device.fault ? ` · ${state.device.fault}` : ""}`,
+        [state.device.uri, state.device.kind, state.device.fault].filter(Boolean).join(" · "),
       ],
       ["Servo", `${servo.rate.toLocaleString("en")} Hz · ${servo.realtime}`],
       ["Ticks", servo.ticks.toLocaleString("en")],

@@ -237,8 +237,8 @@ TEST(MouseDevice, IsLetGoWhenNoTargetHasComeForLong) {
   EXPECT_TRUE(patient.read(0.0).present);
   EXPECT_TRUE(patient.read(1.9).present);
   EXPECT_FALSE(patient.read(2.1).present);
-  EXPECT_TRUE(
-      fails_saying([] { return MouseDevice({}, 0.025, 1.0, "mouse:", 0.1).start_position(); }, "silence"));
+  EXPECT_TRUE(fails_saying(
+      [] { return MouseDevice({}, 0.025, 1.0, "mouse:", 0.1).start_position(); }, "silence"));
 }
 
 TEST(MouseDevice, ReachesAFarTargetWithoutOvershootAndNeverFasterThanItMay) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <condition_variable>
 #include <future>
+#include <limits>
 #include <mutex>
 #include <thread>
 #include <utility>
@@ -428,11 +429,11 @@ class Session::Impl {
   std::atomic<bool> stopped_{false};
 
   mutable std::mutex frames_mutex_;  // taken by the cameras' threads; never held for long
-  std::vector<std::shared_ptr<const Cloud>> newest_;  // guarded by frames_mutex_
-  std::vector<CameraFrame> stamps_;                   // guarded by frames_mutex_
-  double stamp_ = 0.0;                                // guarded by frames_mutex_
-  std::uint64_t frame_number_ = 0;                    // guarded by frames_mutex_
-  std::size_t frames_ = 0;                            // guarded by frames_mutex_
+  std::vector<std::shared_ptr<const Cloud>> newest_;         // guarded by frames_mutex_
+  std::vector<CameraFrame> stamps_;                          // guarded by frames_mutex_
+  double stamp_ = -std::numeric_limits<double>::infinity();  // guarded by frames_mutex_
+  std::uint64_t frame_number_ = 0;                           // guarded by frames_mutex_
+  std::size_t frames_ = 0;                                   // guarded by frames_mutex_
   // Set and reset with both mutexes held; used with either.
   std::unique_ptr<Recorder> recorder_;
 

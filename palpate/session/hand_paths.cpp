@@ -75,7 +75,7 @@ Vec3 hover_place(const Cloud& cloud) {
   constexpr double hover = 0.05;  // [m]
   if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
     const Intrinsics& k = image->intrinsics();
-    const Vec3 camera = image->world_from_camera().translation();
+    Vec3 camera = image->world_from_camera().translation();
     // Outwards from the middle until something was measured.
     for (int ring = 0; ring < k.width / 2; ++ring) {
       for (const int side : {-1, 1}) {

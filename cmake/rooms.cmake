@@ -28,7 +28,10 @@ function(palpate_target_options target)
     # All files of a room as one (-DCMAKE_UNITY_BUILD=ON), which parses the big headers once. Then
     # a local name may be that of another file's constant; builds file by file have all warnings.
     set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
-    target_compile_options(${target} PRIVATE -Wno-shadow -Wno-subobject-linkage)
+    target_compile_options(${target} PRIVATE -Wno-shadow)
+    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+      target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+    endif()
   endif()
   if(PALPATE_WERROR)
     target_compile_options(${target} PRIVATE -Werror)

@@ -178,8 +178,10 @@ std::string name_of_cell(const testing::TestParamInfo<Cell>& info) {
 class SessionFaults : public testing::TestWithParam<Cell> {};
 
 TEST_P(SessionFaults, TakeTheForceOffAndGiveItBack) {
-  const auto [fault, place, motion] = GetParam();
-  const auto fault_of = [fault = fault, place = place](Place here) {
+  const auto fault = std::get<0>(GetParam());
+  const auto place = std::get<1>(GetParam());
+  const auto motion = std::get<2>(GetParam());
+  const auto fault_of = [fault, place](Place here) {
     return place == here ? std::optional(fault) : std::nullopt;
   };
   std::array<std::shared_ptr<std::vector<double>>, 2> good;

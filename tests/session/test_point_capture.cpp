@@ -109,7 +109,7 @@ class Watching final : public Device {
   HandState read(double /*t*/) noexcept override {
     HandState hand{.position = {1e-3 * reads, 0, 0}};
     hand.buttons = ++reads % 4 == 0 ? 1U : 0U;
-    if (reads > 40) hand.fault = DeviceFault::emergency_stop;
+    if (!drives_ && reads > 40) hand.fault = DeviceFault::emergency_stop;
     return hand;
   }
   void write(const Vec3& force, double /*t*/) noexcept override {

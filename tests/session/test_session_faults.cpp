@@ -82,7 +82,8 @@ class FaultyCamera {
     return {stamp, wall()};
   }
   std::shared_ptr<const Cloud> noise() {
-    const DepthImage& image = *wall();
+    const auto seen = wall();
+    const DepthImage& image = *seen;
     std::vector<std::uint16_t> depth = image.depth();
     for (std::uint16_t& value : depth) value = static_cast<std::uint16_t>(random_());
     return std::make_shared<DepthImage>(std::make_shared<ViewingRays>(image.intrinsics()), depth,

@@ -42,7 +42,7 @@ class MouseDevice final : public Device {
   /// @throws Error if the place is not finite or farther than 1000 km.
   void aim(const MouseTarget& target);
   /// [m] device frame: where the hand was before the first target.
-  [[nodiscard]] const Vec3& start() const { return start_; }
+  [[nodiscard]] const Vec3& start_position() const { return start_; }
 
  private:
   DeviceInfo info_;

@@ -48,7 +48,7 @@ std::string folder_of_now() {
 void SessionHost::attach(Session& session) {
   session_ = &session;
   mouse_ = session.mouse();
-  if (mouse_ != nullptr) target_ = start_ = mouse_->start();
+  if (mouse_ != nullptr) target_ = start_ = mouse_->start_position();
   reader_.emplace(session.ticks());
   const double rate = session.state().rate;
   batcher_.emplace(static_cast<unsigned>(std::max(1.0, rate / samples_per_second)));

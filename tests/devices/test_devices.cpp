@@ -238,7 +238,7 @@ TEST(MouseDevice, IsLetGoWhenNoTargetHasComeForLong) {
   EXPECT_TRUE(patient.read(1.9).present);
   EXPECT_FALSE(patient.read(2.1).present);
   EXPECT_TRUE(
-      fails_saying([] { return MouseDevice({}, 0.025, 1.0, "mouse:", 0.1).start(); }, "silence"));
+      fails_saying([] { return MouseDevice({}, 0.025, 1.0, "mouse:", 0.1).start_position(); }, "silence"));
 }
 
 TEST(MouseDevice, ReachesAFarTargetWithoutOvershootAndNeverFasterThanItMay) {

@@ -3,11 +3,15 @@
 
 // PALPATE_VECTORISED on a function with a `#pragma omp simd` loop: compiled once per instruction
 // set, the best one picked when the program starts. Sanitizers can't run inside that choice, so
-// their builds have the portable code only, as do other processors and systems.
-#if defined(__x86_64__) && defined(__linux__) && !defined(PALPATE_SANITIZED)
-#define PALPATE_VECTORISED __attribute__((target_clones("default", "avx2", "avx512f")))
-#else
+// their builds have the portable code only, as do other processors and systems. The sets can give
+// other last bits; CMake's PALPATE_VECTOR_SET leaves some out, to make those of another processor.
+#if !defined(__x86_64__) || !defined(__linux__) || defined(PALPATE_SANITIZED) || \
+    defined(PALPATE_VECTOR_SET_DEFAULT)
 #define PALPATE_VECTORISED
+#elif defined(PALPATE_VECTOR_SET_AVX2)
+#define PALPATE_VECTORISED __attribute__((target_clones("default", "avx2")))
+#else
+#define PALPATE_VECTORISED __attribute__((target_clones("default", "avx2", "avx512f")))
 #endif
 
 // PALPATE_INLINED on a loop that is to be part of whatever clone calls it.

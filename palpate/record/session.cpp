@@ -217,10 +217,11 @@ std::string to_json(const NumberedSettings& settings) {
   for (const SafetyParameterInfo& row : safety_parameter_table())
     safety[row.name] = all.safety.*row.member;
   for (int i = 0; i < 12; ++i) pose.push_back(all.placement.world_from_device(i / 4, i % 4));
-  return json{{"number", settings.number}, {"method", all.method},
-              {"parameters", parameters},  {"safety", safety},
-              {"world_from_device", pose}, {"workspace_scale", all.placement.workspace_scale}}
-      .dump();
+  json object = {{"number", settings.number}, {"method", all.method},
+                 {"parameters", parameters},  {"safety", safety},
+                 {"world_from_device", pose}, {"workspace_scale", all.placement.workspace_scale}};
+  if (all.placement.clutch_button) object["clutch_button"] = *all.placement.clutch_button;
+  return object.dump();
 }
 
 NumberedSettings settings_from_json(const std::string& text, const std::string& name) {
@@ -246,6 +247,8 @@ NumberedSettings settings_from_json(const std::string& text, const std::string& 
       all.placement.world_from_device(i / 4, i % 4) =
           pose.at(static_cast<std::size_t>(i)).get<double>();
     all.placement.workspace_scale = object.at("workspace_scale").get<double>();
+    if (object.contains("clutch_button"))
+      all.placement.clutch_button = object.at("clutch_button").get<int>();
     validate(all);
     return settings;
   });

@@ -147,6 +147,7 @@ TEST(Session, KeepsEachBitOfTheSettings) {
   all.safety.max_force = 1.0 / 3.0;
   all.safety.fade_age = 0.1 / 3.0;
   all.placement.workspace_scale = 2.0 / 3.0;
+  all.placement.clutch_button = 3;
   all.placement.world_from_device.rotate(Eigen::AngleAxisd(0.1 / 3.0, Vec3::UnitY()));
   const NumberedSettings back = settings_from_json(to_json(settings), "settings");
   EXPECT_EQ(back.number, 9U);
@@ -158,6 +159,7 @@ TEST(Session, KeepsEachBitOfTheSettings) {
   EXPECT_EQ(back.settings.placement.world_from_device.matrix(),
             all.placement.world_from_device.matrix());
   EXPECT_EQ(back.settings.placement.workspace_scale, all.placement.workspace_scale);
+  EXPECT_EQ(back.settings.placement.clutch_button, 3);
 }
 
 TEST(Session, WithDamagedSettingsIsRefused) {

@@ -122,7 +122,7 @@ def without_code(text):
 
 
 def check_text(root):
-    """SPDX lines, length of lines, machine paths, links, and the README's C++."""
+    """SPDX lines, length of lines, machine paths, links, and quoted C++."""
     faults = []
     for path in files(root, TEXT):
         is_code = CODE.search(path)
@@ -152,6 +152,14 @@ def check_text(root):
         code = example.read_text(encoding="utf-8").split("\n", 1)[1]  # without the SPDX line
         if quoted != [code]:
             faults.append("README.md:1: its C++ is not examples/touch_a_plane.cpp, to the letter")
+    library = root / "docs/library.md"
+    if library.exists():
+        programs = [path.read_text(encoding="utf-8") for path in (root / "examples").glob("*.cpp")]
+        text = library.read_text(encoding="utf-8")
+        for block in re.finditer(r"^```cpp\n(.*?)^```", text, re.M | re.S):
+            if not any(block.group(1) in program for program in programs):
+                number = text[:block.start()].count("\n") + 1
+                faults.append(f"docs/library.md:{number}: its C++ is in no example, to the letter")
     return faults
 
 

@@ -104,6 +104,13 @@ class Text(Tree):
         self.write("README.md", "```cpp\nint main() { return 1; }\n```\n")
         self.assertEqual(len(self.faults()), 1)
 
+    def test_a_quotation_that_left_its_example_behind_is_found(self):
+        self.write("examples/session.cpp", SPDX + "int main() {\n  run();\n}\n")
+        self.write("docs/library.md", "```cpp\n  run();\n```\n")
+        self.assertEqual(self.faults(), [])
+        self.write("docs/library.md", "```cpp\n  run(1);\n```\n")
+        self.assertEqual(len(self.faults()), 1)
+
 
 class Format(Tree):
     def test_bad_format_is_found(self):

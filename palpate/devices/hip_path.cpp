@@ -79,6 +79,11 @@ HipPath HipPath::read_csv(const std::filesystem::path& file) {
   if (!in || std::filesystem::is_directory(file, unused)) {
     throw Error(subject, "it cannot be read", "name a CSV file with the columns t,x,y,z");
   }
+  return parse_csv(in, subject);
+}
+
+HipPath HipPath::parse_csv(std::istream& in, const std::string& name) {
+  const std::string& subject = name;
   std::string text;
   std::size_t number = 0;
   // The next line that is not blank.

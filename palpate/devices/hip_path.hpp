@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <istream>
+#include <string>
 #include <vector>
 
 #include "palpate/core/patch.hpp"
@@ -22,6 +24,8 @@ class HipPath {
   ///         that is not a finite number, times that do not increase, places beyond 1000 km or a
   ///         path longer than 10^6 s (units that are not metres and seconds).
   static HipPath read_csv(const std::filesystem::path& file);
+  /// The same from a stream. @param name  of it, for messages
+  static HipPath parse_csv(std::istream& in, const std::string& name);
 
   /// @throws Error as `read_csv`, counting samples from 1.
   explicit HipPath(std::vector<Sample> samples);

@@ -19,6 +19,9 @@ constexpr std::array<TickFlagInfo, tick_flag_count> flag_table{{
     {"normal_undefined", "the points' directions cancel out; the last normal was used"},
     {"surface_hidden", "an occluder hides the surface: it is held where it was"},
     {"pop_through_suspected", "the proxy was found behind the surface that the camera sees"},
+    {"free_space_released", "the camera sees free space around the hand: the force was taken off"},
+    {"proxy_let_go", "the proxy was farther from its hand than can be and was put there"},
+    {"returned_to_front", "the proxy was behind the surface and was brought back in front of it"},
 }};
 
 }  // namespace

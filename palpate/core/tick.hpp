@@ -33,7 +33,9 @@ enum TickFlag : std::uint32_t {
   non_finite_input = 1u << 3,
   /// There is no frame to touch yet: no force, and the proxy is at the HIP.
   no_frame = 1u << 4,
-  /// The stamps of the last two frames do not increase: no velocity was derived from them.
+  /// The stamps of the last two frames do not increase by 1 ms or more: no velocity was derived
+  /// from
+  /// them.
   stamp_not_increasing = 1u << 5,
   /// The newest frame is older than max_extrapolation: the surface is taken to rest where it was
   /// last predicted to be.
@@ -46,8 +48,18 @@ enum TickFlag : std::uint32_t {
   /// Method `sight`: the newest frame shows the proxy behind the surface that it should be in front
   /// of, by more than noise explains. Set for as long as that frame is in use.
   pop_through_suspected = 1u << 9,
+  /// Method `sight`: the newest frame shows free space around the hand, or the force pointed away
+  /// from every camera without the surface having been met from behind: no force, and the proxy is
+  /// at the hand again. Set in the tick that does so, as the two below.
+  free_space_released = 1u << 10,
+  /// Method `sight`: the proxy was farther from its hand than can be and is at the hand again.
+  proxy_let_go = 1u << 11,
+  /// Method `sight`: the proxy was found behind the surface and was brought back in front of it;
+  /// the
+  /// force rises over `return_ramp`.
+  returned_to_front = 1u << 12,
 };
-constexpr std::size_t tick_flag_count = 10;
+constexpr std::size_t tick_flag_count = 13;
 
 /// A flag's name and what it means, for people.
 struct TickFlagInfo {

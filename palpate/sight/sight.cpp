@@ -32,6 +32,9 @@ void Sight::seat(const Vec3& proxy) noexcept {
   distance_rate_.reset();
   mover_.invalidate();
   tracker_.forget();
+  monitor_.forget();
+  last_proxy_.reset();
+  strength_ = 1.0;
   on_fit_ = false;
   points_moved_ = Vec3::Zero();
   last_force_ = Vec3::Zero();
@@ -46,6 +49,7 @@ double Sight::interval() const noexcept {
 // A frame seen along the lines of sight: docs/method.md, "Sight".
 void Sight::frame(const Cloud& cloud, double stamp) noexcept {
   frame_.take(cloud, stamp, 1.0 / parameters_.motion.frame_rate);
+  timing_.frame(frame_.stamp(), frame_.in_order() && frame_.count() > 1 ? frame_.interval() : 0.0);
   mover_.invalidate();
   blend_due_ = true;
   // What the surface's own motion adds to the force from the last tick on.
@@ -54,7 +58,7 @@ void Sight::frame(const Cloud& cloud, double stamp) noexcept {
                          tracker_.surface().displacement(distance_rate_.last_t() - 1e-3)) /
                             1e-3
                       : 0.0;
-  behind_ = false;
+  monitor_.start_frame();
   points_moved_ = Vec3::Zero();
   if (!proxy_.at) return;
   // What was hidden is remembered for a hand that is at it, or may be soon again.
@@ -75,7 +79,6 @@ void Sight::frame(const Cloud& cloud, double stamp) noexcept {
   const double least =
       proxy_.touching && !tracker_.smooth() ? r_c + tracker_.surface().clearance() : r_c;
   if (contact.distance < least) *proxy_.at = contact.foot + least * contact.normal;
-  behind_ = tracker_.shows_behind(cloud, *proxy_.at, parameters_.proxy.r_c());
 }
 
 // Movement on the fitted surface where it describes the points well, on the points elsewhere.
@@ -153,6 +156,73 @@ Movement Sight::move(const Vec3& hip, double t) noexcept {
   return movement;
 }
 
+// Puts the proxy at the hand, without a force.
+void Sight::release(const Vec3& hip, Movement& movement) noexcept {
+  tracker_.forget();
+  mover_.invalidate();
+  proxy_ = {};
+  proxy_.at = hip;
+  on_fit_ = false;
+  points_moved_ = Vec3::Zero();
+  blend_due_ = false;
+  blend_offset_ = Vec3::Zero();
+  movement.state = ContactState::free_motion;
+  movement.normal = Vec3::Zero();
+}
+
+// The law that comes first, docs/method.md: what the newest frame itself shows overrules all else.
+void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
+  // A frame's correction moves a proxy no farther than a surface is looked for [m].
+  constexpr double farthest_move = 0.3;
+  // What moves faster than the tracker can tell of is no reason for a force [m].
+  constexpr double deepest_return = 65e-3;
+  const double r_c = parameters_.proxy.r_c();
+  if (last_proxy_ && (*proxy_.at - hip).norm() > (*last_proxy_ - hip).norm() + farthest_move) {
+    release(hip, movement);
+    monitor_.forget();
+    movement.flags |= proxy_let_go;
+  }
+  const SightParameters& sight = parameters_.sight;
+  const Coupling& coupling = parameters_.coupling;
+  const double deepest =
+      r_c + std::min(coupling.max_force / std::max(coupling.stiffness, 1e-9), deepest_return);
+  const Monitor::Verdict verdict = monitor_.judge(
+      *frame_.cloud(),
+      {.hip = hip,
+       .proxy = *proxy_.at,
+       .normal = proxy_.normal.value_or(Vec3::Zero()),
+       .touching = proxy_.touching,
+       .held =
+           tracker_.holding() && t - tracker_.held_since() < sight.hidden_hold + sight.hidden_fade,
+       .carried = tracker_.tracking() ? tracker_.displacement(t) : Vec3(Vec3::Zero()),
+       .noise = tracker_.surface().beam_sd(),
+       .r_c = r_c,
+       .deepest = deepest});
+  if (verdict.behind) movement.flags |= pop_through_suspected;
+  switch (verdict.action) {
+    case Monitor::Action::none:
+      break;
+    case Monitor::Action::release:
+      release(hip, movement);
+      movement.flags |= free_space_released;
+      break;
+    case Monitor::Action::let_go:
+      release(hip, movement);
+      movement.flags |= proxy_let_go;
+      break;
+    case Monitor::Action::return_to_front:
+      release(verdict.front, movement);
+      tracker_.watch(*frame_.cloud(), verdict.front);
+      proxy_.touching = true;
+      proxy_.normal = movement.normal = verdict.normal;
+      movement.state = ContactState::contact;
+      movement.flags |= returned_to_front;
+      strength_ = 0.0;
+      break;
+  }
+  last_proxy_ = proxy_.at;
+}
+
 // Section 4.6, from the proxy where it will be on the moving surface.
 Vec3 Sight::render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept {
   if (!proxy_.touching) {
@@ -196,18 +266,22 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
   const Vec3 normal = proxy_.normal.value_or(Vec3::Zero());
   const double pull = blended.dot(normal);
   if (pull < 0.0) blended -= pull * normal;
-  if (tracker_.holding()) {
-    const SightParameters& sight = parameters_.sight;
-    blended *= ease((t - tracker_.held_since() - sight.hidden_hold) / sight.hidden_fade);
-  }
-  // A single frame is a scan, not a stream that stopped.
-  const double late = parameters_.motion.max_extrapolation;
-  if (frame_.count() > 1) blended *= ease((t - frame_.stamp() - late) / late);
-  const double force_now = blended.norm();
-  if (force_now > parameters_.coupling.max_force) {
-    blended *= (1.0 - 1e-15) * parameters_.coupling.max_force / force_now;  // after rounding, too
-  }
+  if (const double length = blended.norm(); length > parameters_.coupling.max_force)
+    blended *= (1.0 - 1e-15) * parameters_.coupling.max_force / length;  // after rounding, too
   last_force_ = blended;
+  const SightParameters& sight = parameters_.sight;
+  double known = 1.0;
+  if (tracker_.holding())
+    known = ease((t - tracker_.held_since() - sight.hidden_hold) / sight.hidden_fade);
+  // A single frame is a scan, not a stream that stopped. One frame may be lost.
+  const double fade = std::max(parameters_.motion.max_extrapolation, 1e-3);
+  const double late = std::max(fade, 2.0 * timing_.interval());
+  if (frame_.count() > 1) known *= ease((timing_.age(t) - late) / fade);
+  // A force falls with what is known at once, and rises slowly: what is found again must not kick.
+  constexpr double return_ramp = 0.5;  // [s]
+  strength_ = std::min(strength_ + std::max(t - last_blend_t_, 0.0) / return_ramp, 1.0);
+  if (proxy_.touching) strength_ = std::min(strength_, known);
+  blended *= std::min(strength_, known);
   last_hip_ = hip;
   last_blend_t_ = t;
   return blended;
@@ -226,8 +300,10 @@ Tick Sight::tick(const Vec3& hip, double t) noexcept {
     return tick;
   }
 
-  const Movement movement = move(hip, t);
+  timing_.tick(t);
+  Movement movement = move(hip, t);
   finish_movement(proxy_, movement);
+  supervise(hip, t, movement);
   tick.proxy = *proxy_.at;
   tick.normal =
       movement.normal.isZero(0.0) ? proxy_.normal.value_or(Vec3::Zero()) : movement.normal;
@@ -237,7 +313,6 @@ Tick Sight::tick(const Vec3& hip, double t) noexcept {
   tick.steps = movement.steps;
   tick.surface_velocity = tracker_.tracking() ? tracker_.surface().velocity() : 0.0;
   if (tracker_.holding()) tick.flags |= surface_hidden;
-  if (behind_) tick.flags |= pop_through_suspected;
   if (mover_.patch().thinned()) tick.flags |= patch_thinned;
   if (!frame_.in_order()) tick.flags |= stamp_not_increasing;
   if (t - frame_.stamp() > parameters_.motion.max_extrapolation) tick.flags |= frame_stale;

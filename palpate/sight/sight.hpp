@@ -7,6 +7,8 @@
 #include "palpate/core/newest_frame.hpp"
 #include "palpate/paper/coupling.hpp"
 #include "palpate/paper/point_mover.hpp"
+#include "palpate/sight/frame_timing.hpp"
+#include "palpate/sight/monitor.hpp"
 #include "palpate/sight/tracker.hpp"
 
 namespace palpate {
@@ -29,6 +31,8 @@ class Sight final : public Method {
 
  private:
   Movement move(const Vec3& hip, double t) noexcept;
+  void supervise(const Vec3& hip, double t, Movement& movement) noexcept;
+  void release(const Vec3& hip, Movement& movement) noexcept;
   Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;
   Vec3 blend_force(const Vec3& force, const Vec3& hip, double t) noexcept;
   [[nodiscard]] double interval() const noexcept;
@@ -36,12 +40,15 @@ class Sight final : public Method {
   Parameters parameters_;
   PointMover mover_;
   NewestFrame frame_;
+  FrameTiming timing_;
   Proxy proxy_;
   SightTracker tracker_;
   bool on_fit_ = false;  // the proxy rests on the fitted surface, not on points
   // [m] displacement of the points since their frame, with the surface, at the last tick
   Vec3 points_moved_ = Vec3::Zero();
-  bool behind_ = false;  // the monitor's verdict on the frame in use
+  Monitor monitor_;
+  std::optional<Vec3> last_proxy_;  // [m] of the last tick
+  double strength_ = 1.0;           // [-] share of the force that a contact found again has so far
 
   // What the force goes on from when a frame arrives.
   bool blend_due_ = false;  // a frame came since the last force

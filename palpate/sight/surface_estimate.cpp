@@ -95,6 +95,10 @@ double SurfaceEstimate::height_sd() const noexcept {
   return std::sqrt(variance(mover_));
 }
 
+double SurfaceEstimate::beam_sd() const noexcept {
+  return std::sqrt(variance(0));
+}
+
 // Of one frame's height in a disc [m^2]. Until a few frames have told, what is usual for a depth
 // camera; then what they told, with a margin for how few they were.
 double SurfaceEstimate::variance(std::size_t rung) const noexcept {
@@ -115,7 +119,7 @@ double SurfaceEstimate::variance(std::size_t rung) const noexcept {
 
 double SurfaceEstimate::gate(double narrowest) const noexcept {
   // The beam is as wide as the narrowest disc, whose height is the noisiest.
-  return std::clamp(std::max(4.0 * spread_, 6.0 * std::sqrt(variance(0))), narrowest, widest_gate);
+  return std::clamp(std::max(4.0 * spread_, 6.0 * beam_sd()), narrowest, widest_gate);
 }
 
 double SurfaceEstimate::displacement(double t) const noexcept {
@@ -304,7 +308,11 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
     now.rungs = rungs;
   }
   for (std::size_t j = 0; j < now.rungs; ++j) now.shape[j] = Shape::of(now.disc[j]);
-  if (first && !spans_area(now.shape[0])) return false;
+  if (first && !spans_area(now.shape[0])) {
+    surface_ = before;
+    count_ = 0;
+    return false;
+  }
   estimate(foot, new_frame);
   if (!look.partial) judge(foot);
   centre_ = foot;

@@ -85,6 +85,8 @@ class SurfaceEstimate {
   [[nodiscard]] double spread() const noexcept { return spread_; }
   /// Standard deviation of one frame's height of the surface [m], as measured.
   [[nodiscard]] double height_sd() const noexcept;
+  /// The same of the narrowest disc, which is as wide as the beam [m].
+  [[nodiscard]] double beam_sd() const noexcept;
   /// How far the newest frame's own points may lie above the averaged surface [m].
   [[nodiscard]] double clearance() const noexcept {
     return std::max(above_mean_, 0.0) + 3.0 * spread_;

@@ -183,7 +183,6 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     event = Event::jumped;
   }
   const bool resumed = holding_;
-  holding_ = false;
   surface_.shift(expected + jump);
   if (resumed && event == Event::jumped) surface_.forget_frames();
   // Something that moves in before a contact that stays hides a part of it first. What is left of
@@ -199,6 +198,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     surface_.shift(-expected - jump);
     return hold(previous_stamp);
   }
+  holding_ = false;
   beside_ = look_beside(cloud, surface_.place());
   return event;
 }
@@ -278,15 +278,6 @@ std::optional<SightTracker::Seen> SightTracker::look_at(const Cloud& cloud, cons
   const std::size_t seen = heights_along(patch_, line, heights);
   if (seen < SurfaceEstimate::least_points) return std::nullopt;
   return Seen{kth_smallest(std::span(heights.data(), seen), seen / 2), line};
-}
-
-bool SightTracker::shows_behind(const Cloud& cloud, const Vec3& proxy, double radius) noexcept {
-  if (!tracking_ || holding_ || covered_) return false;
-  const std::optional<Seen> seen = look_at(cloud, proxy, radius);
-  if (!seen) return false;
-  // Touched from behind: that is where it belongs.
-  if (seen->line.dot(surface_.frame().up) < 0.0) return false;
-  return seen->above > 1e-3 + 3.0 * surface_.height_sd();
 }
 
 std::optional<Vec3> SightTracker::in_front(const Cloud& cloud, const Vec3& before,

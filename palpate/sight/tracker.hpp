@@ -52,11 +52,6 @@ class SightTracker {
   /// Fits the surface anew around `foot` [m, world], a place on it. False if it ends before there.
   bool slide(const Cloud& cloud, const Vec3& foot) noexcept;
 
-  /// Does the frame show a proxy that ought to be in front of the surface behind it? An audit: the
-  /// median of what is measured on its line of sight, independent of the fit.
-  /// @param radius  [m] of the footprint
-  [[nodiscard]] bool shows_behind(const Cloud& cloud, const Vec3& proxy, double radius) noexcept;
-
   /// Where a proxy that went through a surface on its way from `before` to `after` [m, world] ought
   /// to be: before it, on the line of sight through `after`. None if it went through nothing, as
   /// when it went round an edge.

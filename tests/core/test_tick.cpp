@@ -33,7 +33,7 @@ TEST(Tick, NamesEveryFlagOnce) {
     EXPECT_FALSE(row.meaning.empty()) << row.name;
   }
   EXPECT_EQ(names.size(), tick_flag_count);
-  EXPECT_EQ(1U << (tick_flag_count - 1), std::uint32_t{pop_through_suspected});
+  EXPECT_EQ(1U << (tick_flag_count - 1), std::uint32_t{returned_to_front});
   EXPECT_EQ(names.at(8), "surface_hidden");
   std::sort(names.begin(), names.end());
   EXPECT_EQ(std::unique(names.begin(), names.end()), names.end());

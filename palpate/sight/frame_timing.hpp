@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <limits>
+
+namespace palpate {
+
+/// How late frames come and how often, by the newest eight: what tells a slow or distant camera,
+/// whose frames are as fresh as they can be, from a stream that stopped.
+///
+/// [servo] Nothing here allocates, locks or throws.
+class FrameTiming {
+ public:
+  /// A frame captured at `stamp` [s] is in use; `interval` [s] after the one before, 0 if unknown.
+  void frame(double stamp, double interval) noexcept {
+    stamp_ = stamp;
+    newest_ = (newest_ + 1) % remembered;
+    latencies_[newest_] = none;
+    intervals_[newest_] = interval > 0.0 ? interval : none;
+    used_ = false;
+  }
+  /// A tick at `t` [s]: the first after a frame says how late that came.
+  void tick(double t) noexcept {
+    if (used_) return;
+    used_ = true;
+    latencies_[newest_] = std::max(t - stamp_, 0.0);
+  }
+  /// [s] since the newest frame would have come if it had been as punctual as the best of the last.
+  [[nodiscard]] double age(double t) const noexcept { return t - stamp_ - latency(); }
+  /// [s] the shortest of the last latencies, `longest_latency` at most.
+  [[nodiscard]] double latency() const noexcept {
+    return std::min(*std::min_element(latencies_.begin(), latencies_.end()), longest_latency);
+  }
+  /// [s] the shortest of the last intervals, `longest_interval` at most.
+  [[nodiscard]] double interval() const noexcept {
+    return std::min(*std::min_element(intervals_.begin(), intervals_.end()), longest_interval);
+  }
+
+  /// [s] What is older than this when it comes is history, not a surface to touch.
+  static constexpr double longest_latency = 0.5;
+  /// [s] At less than 4 Hz a hand outruns what it is shown.
+  static constexpr double longest_interval = 0.25;
+
+ private:
+  static constexpr std::size_t remembered = 8;
+  static constexpr double none = std::numeric_limits<double>::infinity();
+  static constexpr std::array<double, remembered> nothing() noexcept {
+    std::array<double, remembered> all{};
+    for (double& each : all) each = none;
+    return all;
+  }
+
+  double stamp_ = 0.0;
+  std::array<double, remembered> latencies_ = nothing();
+  std::array<double, remembered> intervals_ = nothing();
+  std::size_t newest_ = 0;
+  bool used_ = true;
+};
+
+}  // namespace palpate

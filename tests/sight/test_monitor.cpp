@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: Apache-2.0
+// The law that comes first: what the newest frame itself shows overrules every estimate.
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/sight/monitor.hpp"
+#include "palpate/sight/sight.hpp"
+#include "palpate/sight/tracker.hpp"
+#include "palpate/sources/synthetic_camera.hpp"
+
+#include "tests/support/grids.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double interval = 1.0 / 30.0;
+constexpr double r_c = 5e-3;
+const Vec3 eye(0, 0, 1);
+
+PointCloud plane_at(double z) {
+  return PointCloud(test::flat_grid(z, 1.5e-3, 40), eye);
+}
+
+// A contact pressed into a plane at z = 0 from above.
+Monitor::Contact pressed(double hip_z, double proxy_z) {
+  return {.hip = {0, 0, hip_z},
+          .proxy = {0, 0, proxy_z},
+          .normal = Vec3::UnitZ(),
+          .touching = true,
+          .noise = 1e-3,
+          .deepest = 38e-3};
+}
+
+// A monitor that knows from a frame before that the proxy is in front of the plane, or behind it.
+void meet(Monitor& monitor, double side) {
+  const PointCloud plane = plane_at(0.0);
+  monitor.start_frame();
+  Monitor::Contact hovering = pressed(side * 0.03, side * 0.03);
+  hovering.touching = false;
+  EXPECT_EQ(monitor.judge(plane, hovering).action, Monitor::Action::none);
+  monitor.start_frame();
+}
+
+TEST(Monitor, LeavesAHandAloneThatPressesIntoWhatItSees) {
+  Monitor monitor;
+  meet(monitor, 1.0);
+  const PointCloud plane = plane_at(0.0);
+  for (const double hip : {0.004, 0.0, -0.01, -0.1}) {
+    const Monitor::Verdict verdict = monitor.judge(plane, pressed(hip, r_c));
+    EXPECT_EQ(verdict.action, Monitor::Action::none) << hip;
+    EXPECT_FALSE(verdict.behind) << hip;
+  }
+}
+
+TEST(Monitor, ReleasesAHandInSpaceThatTheFrameShowsFree) {
+  Monitor monitor;
+  meet(monitor, 1.0);
+  const PointCloud plane = plane_at(0.0);
+  EXPECT_EQ(monitor.judge(plane, pressed(0.03, 0.0)).action, Monitor::Action::release);
+  EXPECT_EQ(monitor.judge(plane, pressed(0.03, -0.01)).action, Monitor::Action::release);
+}
+
+TEST(Monitor, SaysNothingAboutAHandThatNoCameraSees) {
+  Monitor monitor;
+  meet(monitor, 1.0);
+  const PointCloud nothing(std::vector<Vec3>{}, eye);
+  EXPECT_EQ(monitor.judge(nothing, pressed(0.03, 0.0)).action, Monitor::Action::none);
+  const PointCloud no_viewpoint(test::flat_grid(0.0, 1.5e-3, 40));
+  monitor.start_frame();
+  EXPECT_EQ(monitor.judge(no_viewpoint, pressed(0.03, 0.0)).action, Monitor::Action::none);
+}
+
+TEST(Monitor, LooksWiderWhereTheImageIsCoarse) {
+  Monitor monitor;
+  meet(monitor, 1.0);
+  const PointCloud coarse(test::flat_grid(0.0, 15e-3, 10), eye);
+  EXPECT_EQ(monitor.judge(coarse, pressed(0.05, 0.0)).action, Monitor::Action::release);
+}
+
+TEST(Monitor, TakesOffAForceThatPointsAwayFromTheCameraUnlessTheSurfaceWasMetFromBehind) {
+  const PointCloud plane = plane_at(0.0);
+  Monitor::Contact pulled = pressed(0.004, -0.004);
+  pulled.normal = -Vec3::UnitZ();
+  Monitor in_front;
+  meet(in_front, 1.0);
+  EXPECT_EQ(in_front.judge(plane, pulled).action, Monitor::Action::release);
+  Monitor behind;
+  meet(behind, -1.0);
+  pulled.hip.z() = 0.02;
+  EXPECT_EQ(behind.judge(plane, pulled).action, Monitor::Action::none);
+  // Farther through than the coupling has force for.
+  pulled.hip.z() = 0.06;
+  EXPECT_EQ(behind.judge(plane, pulled).action, Monitor::Action::let_go);
+}
+
+TEST(Monitor, BringsAProxyBackInFrontWhenTwoFramesShowItBehind) {
+  Monitor monitor;
+  meet(monitor, 1.0);
+  const PointCloud plane = plane_at(0.0);
+  Monitor::Contact lost = pressed(-0.01, -0.01);
+  lost.touching = false;
+  Monitor::Verdict verdict = monitor.judge(plane, lost);
+  EXPECT_TRUE(verdict.behind);
+  EXPECT_EQ(verdict.action, Monitor::Action::none);
+  monitor.start_frame();
+  verdict = monitor.judge(plane, lost);
+  ASSERT_EQ(verdict.action, Monitor::Action::return_to_front);
+  EXPECT_NEAR(verdict.front.z(), r_c, 1e-4);
+  EXPECT_NEAR(verdict.normal.z(), 1.0, 1e-6);
+}
+
+TEST(Monitor, TakesWhatComesFarBeforeTheContactForSomethingElse) {
+  Monitor monitor;
+  meet(monitor, 1.0);
+  const PointCloud arm = plane_at(0.1);
+  for (int k = 0; k < 10; ++k) {
+    monitor.start_frame();
+    const Monitor::Verdict verdict = monitor.judge(arm, pressed(-0.01, r_c));
+    EXPECT_EQ(verdict.action, Monitor::Action::none);
+    EXPECT_FALSE(verdict.behind);
+  }
+}
+
+TEST(Monitor, LetsAHandGoRoundAnEdgeBehindABody) {
+  // A plate over x < 0, a floor 0.2 m below it.
+  const PointCloud plate(
+      test::grid(1.5e-3, 60, [](double x, double) { return x < 0.0 ? 0.0 : -0.2; }), eye);
+  Monitor monitor;
+  for (int k = 0; k < 40; ++k) {
+    monitor.start_frame();
+    Monitor::Contact hand = pressed(-0.02, -0.02);
+    hand.touching = false;
+    hand.hip.x() = hand.proxy.x() = 0.03 - 1.5e-3 * k;
+    const Monitor::Verdict verdict = monitor.judge(plate, hand);
+    EXPECT_EQ(verdict.action, Monitor::Action::none) << k;
+  }
+}
+
+TEST(SightLaw, AHandThatPressesSlidesAndLiftsIsFree) {
+  // A RealSense's noise at 1.2 m once left the proxy behind the plane: 20 N down, for ever.
+  const auto camera = open_synthetic_camera(
+      Uri("synthetic:plane?tilt=34deg&distance=1.2m&sensor=d4xx&seed=3&size=320x240&fov=30.38deg"));
+  const auto camera_full =
+      open_synthetic_camera(Uri("synthetic:plane?tilt=34deg&distance=1.2m&sensor=d4xx&seed=3"));
+  const auto between = [](double a, double b, double from, double to, double t) {
+    return a + (b - a) * std::clamp((t - from) / (to - from), 0.0, 1.0);
+  };
+  const auto hip = [&](double t) {
+    const double slide = between(0.0, 0.03, 1.3, 2.0, t);
+    return Vec3(0.003 + slide, 0.001 + slide / 3.0,
+                between(0.06, -0.01, 0.2, 1.0, t) + between(0.0, 0.09, 2.0, 2.6, t));
+  };
+  for (SyntheticCamera* source : {camera.get(), camera_full.get()}) {
+    Sight sight;
+    sight.seat(hip(0.0));
+    Frame frame;
+    for (int i = 0, k = 0; i <= 3000; ++i) {
+      const double t = 1e-3 * i;
+      if (t >= k * interval - 1e-9) {
+        Frame next = *source->next();
+        sight.frame(*next.cloud, next.stamp);
+        frame = std::move(next);
+        ++k;
+      }
+      const Tick tick = sight.tick(hip(t), t);
+      if (hip(t).z() > 0.05) {
+        ASSERT_EQ(tick.force.norm(), 0.0) << t;
+      }
+    }
+  }
+}
+
+TEST(SightLaw, FindsThePlaneAgainWithinTwoTenthsOfASecondAndWithoutAKick) {
+  // Behind the plane after a jump that no frame showed: the proxy is put there by the hand itself.
+  Sight sight;
+  sight.seat({0, 0, 0.03});
+  const PointCloud low = plane_at(-0.03);
+  const PointCloud high = plane_at(0.01);
+  double t = 0.0;
+  double found = 0.0;
+  double last = 0.0;
+  for (int k = 0; k < 60; ++k) {
+    // Nothing is seen while the plane rises past the free hand.
+    const PointCloud nothing(std::vector<Vec3>{}, eye);
+    sight.frame(k < 10 ? low : k < 20 ? nothing : high, k * interval);
+    for (int i = 0; i < 33; ++i) {
+      t = k * interval + i * 1e-3;
+      const Tick tick = sight.tick({0, 0, 0}, t);
+      if (k >= 20 && found == 0.0 && (tick.flags & returned_to_front) != 0)
+        found = t - 20 * interval;
+      // 6 N over half a second.
+      EXPECT_LE(tick.force.norm() - last, 0.025) << t;
+      last = tick.force.norm();
+    }
+  }
+  EXPECT_GT(found, 0.0);
+  EXPECT_LT(found, 0.2);
+  EXPECT_NEAR(last, 6.0, 0.2);
+}
+
+TEST(SightLaw, AForceThatReturnsAfterTheStreamStoppedRisesSlowly) {
+  Sight sight;
+  sight.seat({0, 0, 0.03});
+  const PointCloud plane = plane_at(0.0);
+  double last = 0.0;
+  for (int i = 0, k = 0; i < 4000; ++i) {
+    const double t = 1e-3 * i;
+    if (t >= k * interval - 1e-9) {
+      if (k < 30 || k > 40) sight.frame(plane, k * interval);
+      ++k;
+    }
+    const double force = sight.tick({0, 0, i < 100 ? 0.03 : -0.01}, t).force.norm();
+    if (i > 1000) {
+      EXPECT_LE(force - last, 0.025) << t;
+    }
+    last = force;
+  }
+  EXPECT_NEAR(last, 6.0, 0.2);
+}
+
+TEST(SightLaw, FeelsARestingPlaneInFullHoweverSlowOrLateTheCamera) {
+  const PointCloud plane = plane_at(0.0);
+  for (const double rate : {5.0, 9.0, 30.0, 90.0}) {
+    for (const double latency : {0.0, 0.1, 0.15, 0.5}) {
+      Sight sight;
+      sight.seat({0, 0, 0.03});
+      for (int i = 0, k = 0; i < 4000; ++i) {
+        const double t = 1e-3 * i;
+        if (t >= k / rate + latency - 1e-9) {
+          sight.frame(plane, k / rate);
+          ++k;
+        }
+        const Tick tick = sight.tick({0, 0, t < 1.5 ? 0.03 : -0.01}, t);
+        if (t > 2.5) {
+          ASSERT_NEAR(tick.force.z(), 6.0, 5e-3) << rate << " Hz, " << latency << " s";
+        }
+      }
+    }
+  }
+}
+
+TEST(SightTracker, CountsTheTimeOfAHoldFromItsBeginning) {
+  // After a frame without points, a line of points far below: it is no surface to go on from.
+  const PointCloud plane = plane_at(0.0);
+  const PointCloud nothing(std::vector<Vec3>{}, eye);
+  std::vector<Vec3> points;
+  for (int i = -20; i <= 20; ++i) points.emplace_back(1.2e-3 * i, 0.0, -0.1);
+  const PointCloud line(points, eye);
+  SightTracker tracker;
+  for (int k = 0; k < 10; ++k) tracker.frame(plane, k * interval, interval, Vec3(0, 0, r_c), 90.0);
+  ASSERT_TRUE(tracker.tracking());
+  tracker.frame(nothing, 10 * interval, interval, Vec3(0, 0, r_c), 90.0);
+  ASSERT_TRUE(tracker.holding());
+  const double since = tracker.held_since();
+  for (int k = 11; k < 40; ++k) {
+    tracker.frame(line, k * interval, interval, Vec3(0, 0, r_c), 90.0);
+    if (!tracker.holding()) break;
+    EXPECT_EQ(tracker.held_since(), since) << k;
+    EXPECT_NEAR(tracker.contact(Vec3(0, 0, 0.01), k * interval).distance, 0.01, 1e-4) << k;
+  }
+}
+
+}  // namespace
+}  // namespace palpate

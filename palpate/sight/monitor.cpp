@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t least_points = 8;
 // [m] What lies along a line of sight is looked for this far from a place: as far as the tracker
 // looks for a surface.
-constexpr double reach = 0.3;
+constexpr double look_reach = 0.3;
 // [-] Share of the points that may lie before a hand in free space: flying pixels and other strays.
 // More would let go of a hand at an edge that only grazes its lines of sight.
 constexpr double strays = 0.05;
@@ -48,7 +48,7 @@ constexpr double away = -0.5;
 // hardly two.
 constexpr int frames_of_evidence = 2;
 // [m] A look serves as long as its place moves less than this: a fifth of r_c.
-constexpr double serves = 1e-3;
+constexpr double look_serves = 1e-3;
 
 }  // namespace
 
@@ -65,7 +65,7 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
   result = {};
   result.fresh = true;
   result.place = place;
-  gather(cloud, Beam{place, radius, reach, Vec3::UnitZ()}, look_points, patch_);
+  gather(cloud, Beam{place, radius, look_reach, Vec3::UnitZ()}, look_points, patch_);
   std::array<float, look_points> heights;
   for (std::size_t v = 0; v < patch_.view_count(); ++v) {
     const Patch::View& view = patch_.view(v);
@@ -99,7 +99,7 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
 // The look at `place`, taken anew only if the last one does not serve any more.
 const Monitor::Look& Monitor::look_at(const Cloud& cloud, const Vec3& place, double radius,
                                       Look& last) noexcept {
-  if (last.fresh && (place - last.place).squaredNorm() < serves * serves) return last;
+  if (last.fresh && (place - last.place).squaredNorm() < look_serves * look_serves) return last;
   for (int i = 0; i < 3; ++i, radius *= widening) {
     look(cloud, place, radius, last);
     if (last.seen) break;

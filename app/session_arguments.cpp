@@ -62,13 +62,34 @@ void SessionArguments::add_to(CLI::App& command) {
       ->allow_extra_args(false);
   command.add_option("--rate", rate_, "ticks a second (1000)");
   command.add_option("--listen", listen_,
-                     "address at which browsers find the page (127.0.0.1: this machine's alone)");
+                     "address at which browsers find the page (127.0.0.1: this machine's alone). "
+                     "Beyond this machine the tokens travel in clear: better leave it, and tunnel "
+                     "from the other machine, ssh -L 8642:localhost:8642 THIS_MACHINE");
   command.add_option("--port", port_, "port of the page (8642, or any if that is taken; 0: any)");
-  command.add_option("--token", token_,
-                     "what a page must know; made up if --listen lets other machines in");
+  command
+      .add_option("--token", token_,
+                  "what a page must know to look on and to hold the hand; made up if --listen "
+                  "lets other machines in")
+      ->envname("PALPATE_TOKEN");
+  command
+      .add_option("--operator-token", operator_token_,
+                  "what the operator's page must know, which alone changes method, placement and "
+                  "limits, and records; made up and printed if it is not given. Other accounts of "
+                  "this machine see a command line, not the environment")
+      ->envname("PALPATE_OPERATOR_TOKEN");
+  command
+      .add_option("--operator-limit", operator_limits_,
+                  "the loosest value to which the operator's page may set a safety limit, "
+                  "NAME=VALUE in SI units (the end of its range)")
+      ->allow_extra_args(false);
   command.add_flag("--no-browser", no_browser_, "only say where the page is");
   command.add_option("--record", record_,
                      "write the session into this folder, a ROS 2 bag; palpate replay checks it");
+  command.add_option("--record-folder", record_folder_,
+                     "where the recordings go that the page starts (the current folder)");
+  command.add_option("--record-limit", record_limit_,
+                     "GB of all recordings that the page starts; the last is ended there, or when "
+                     "less than 1 GB is free (20)");
   method_.add_to(command);
   command.get_option("--config")->description("read the session from a TOML file");
 }
@@ -83,10 +104,19 @@ SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
     set_parameter(config.safety, name, value);
   }
   if (rate_) config.rate = *rate_;
+  for (const std::string& limit : operator_limits_) {
+    const auto [name, value] = parse_assignment("--operator-limit", limit);
+    SafetyParameters checked;
+    set_parameter(checked, name, value);
+    config.operator_limits[name] = value;
+  }
   if (record_) config.record = *record_;
+  if (record_folder_) config.record_folder = *record_folder_;
+  if (record_limit_) config.record_limit = *record_limit_;
   if (listen_) config.server.listen = *listen_;
   if (port_) config.server.port = port_;
   if (token_) config.server.token = *token_;
+  if (operator_token_) config.server.operator_token = *operator_token_;
   if (no_browser_) config.server.browser = false;
   validate(config);
   return config;

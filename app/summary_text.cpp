@@ -32,25 +32,25 @@ std::string text_of(const Summary& summary) {
   return text + "\n";
 }
 
-std::string json_of(const Summary& summary) {
+std::string json_of(const Summary& summary, const std::string& recording) {
   nlohmann::ordered_json safety;
   for (std::size_t i = 0; i < safety_flag_count; ++i)
     safety[std::string(safety_flag_names()[i])] = summary.safety_ticks[i];
-  const nlohmann::ordered_json object = {
-      {"ticks", summary.ticks},
-      {"frames", summary.frames},
-      {"duration_s", summary.duration()},
-      {"late_ticks", summary.late_ticks},
-      {"contact_ticks", summary.contact_ticks},
-      {"force_ticks", summary.force_ticks},
-      {"steps", summary.steps},
-      {"step_budget_hits", ticks_with(summary, step_budget_hit)},
-      {"patch_thinned_ticks", ticks_with(summary, patch_thinned)},
-      {"max_force_asked", summary.largest_asked},
-      {"max_force_sent", summary.largest_sent},
-      {"pop_throughs", summary.pop_throughs},
-      {"safety_ticks", safety}};
-  return object.dump(2) + "\n";
+  nlohmann::ordered_json object = {{"ticks", summary.ticks},
+                                   {"frames", summary.frames},
+                                   {"duration_s", summary.duration()},
+                                   {"late_ticks", summary.late_ticks},
+                                   {"contact_ticks", summary.contact_ticks},
+                                   {"force_ticks", summary.force_ticks},
+                                   {"steps", summary.steps},
+                                   {"step_budget_hits", ticks_with(summary, step_budget_hit)},
+                                   {"patch_thinned_ticks", ticks_with(summary, patch_thinned)},
+                                   {"max_force_asked", summary.largest_asked},
+                                   {"max_force_sent", summary.largest_sent},
+                                   {"pop_throughs", summary.pop_throughs},
+                                   {"safety_ticks", safety}};
+  if (!recording.empty()) object["recording"] = recording;
+  return object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace palpate::app

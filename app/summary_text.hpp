@@ -10,6 +10,7 @@ namespace palpate::app {
 /// A summary in one line, for people.
 std::string text_of(const Summary& summary);
 /// The same as a JSON object, SI units.
-std::string json_of(const Summary& summary);
+/// @param recording  how it went; empty: there was none
+std::string json_of(const Summary& summary, const std::string& recording = {});
 
 }  // namespace palpate::app

@@ -63,8 +63,10 @@ void show_in_browser(const std::string& url) {
 }
 
 std::unique_ptr<ViewerServer> open_server(const ServerConfig& config, ViewerHost& host) {
-  ViewerOptions viewer{
-      .listen = config.listen, .port = config.port.value_or(usual_port), .token = config.token};
+  ViewerOptions viewer{.listen = config.listen,
+                       .port = config.port.value_or(usual_port),
+                       .token = config.token,
+                       .operator_token = config.operator_token};
   if (config.token.empty() && !is_loopback(config.listen)) viewer.token = make_token();
   try {
     return std::make_unique<ViewerServer>(viewer, host);
@@ -94,6 +96,15 @@ bool can_run_freely(const SessionConfig& config) {
   return scheme == "hand" || scheme == "script";
 }
 
+PageRules page_rules(const SessionConfig& config) {
+  static_cast<void>(LimitBounds(config.safety, config.operator_limits));  // refuses what is wrong
+  PageRules rules;
+  rules.operator_limits = config.operator_limits;
+  rules.recordings.folder = config.record_folder;
+  rules.recordings.limit = 1e9 * config.record_limit;
+  return rules;
+}
+
 SessionOptions options_of(const RunOptions& options, const SessionConfig& config,
                           MethodRegistry methods) {
   if (options.duration && !(*options.duration >= 0.1 && *options.duration <= 86400.0))
@@ -111,11 +122,14 @@ SessionOptions options_of(const RunOptions& options, const SessionConfig& config
 }
 
 // Prints how the recording ended and the summary.
-int finish(Session& session, bool json) {
+// @param ended  why a page's recording was ended by its limits; empty if it was not
+int finish(Session& session, bool json, const std::string& ended = {}) {
   const SessionState state = session.state();
-  if (!state.recording.message.empty())
-    fmt::print(stderr, "palpate: {}\n", state.recording.message);
-  std::fputs(json ? json_of(state.summary).c_str() : text_of(state.summary).c_str(), stdout);
+  std::string recording = state.recording.message;
+  if (!ended.empty()) recording += (recording.empty() ? "" : "; ") + ended;
+  if (!recording.empty()) fmt::print(stderr, "palpate: {}\n", recording);
+  std::fputs(json ? json_of(state.summary, recording).c_str() : text_of(state.summary).c_str(),
+             stdout);
   return state.recording.failed ? 1 : 0;
 }
 
@@ -134,7 +148,7 @@ int run(const RunOptions& options) {
     if (Session* session = running.load()) session->request_stop();
   });
 
-  SessionHost host(PALPATE_VERSION);
+  SessionHost host(PALPATE_VERSION, page_rules(config));
   SessionOptions wanted = options_of(options, config, std::move(methods));
   if (!options.headless)
     wanted.on_frame = [&host](std::size_t camera, const FedFrame& frame) {
@@ -160,20 +174,34 @@ int run(const RunOptions& options) {
     return finish(session, options.json);
   }
 
+  std::string ended_recording;
   session.start();
   for (const std::string& line : session.realtime()->advice)
     fmt::print(stderr, "palpate: {}\n", line);
   {
     host.attach(session);
+    struct Detach {
+      SessionHost& host;
+      ~Detach() { host.detach(); }
+    } const after_the_server{host};
     const std::unique_ptr<ViewerServer> server = open_server(config.server, host);
     host.show_on(server.get());
-    fmt::print(stderr, "palpate: open {} in a browser; Ctrl-C ends the session\n", server->url());
-    if (config.server.browser && isatty(STDERR_FILENO) == 1) show_in_browser(server->url());
+    fmt::print(stderr, "palpate: open {} in a browser; Ctrl-C ends the session\n",
+               server->operator_url());
+    fmt::print(stderr,
+               "palpate: that is the operator's link; to look on or to hold the hand, open {}\n",
+               server->url());
+    if (!is_loopback(config.server.listen))
+      fmt::print(stderr,
+                 "palpate: tokens and pictures travel in clear; palpate run --help says at "
+                 "--listen how to tunnel\n");
+    if (config.server.browser && isatty(STDERR_FILENO) == 1) show_in_browser(server->opening_url());
     session.run(options.duration);
     host.show_on(nullptr);
+    ended_recording = host.recording_ended();
   }
   running = nullptr;
-  return finish(session, options.json);
+  return finish(session, options.json, ended_recording);
 }
 
 }  // namespace

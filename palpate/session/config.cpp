@@ -22,6 +22,8 @@ namespace {
 constexpr double lowest_rate = 100.0;  // [Hz]
 constexpr double highest_rate = 1e5;
 constexpr std::size_t largest_file = 1 << 20;  // [bytes]
+constexpr double lowest_record_limit = 0.001;  // [GB]
+constexpr double highest_record_limit = 1e6;
 constexpr const char* pose_remedy =
     "write [x, y, z, qx, qy, qz, qw]: metres and a quaternion of length 1";
 
@@ -184,13 +186,25 @@ void read_placement(const Table& root, Placement& placement) {
   if (button >= 0.0) placement.clutch_button = static_cast<int>(button);
 }
 
+void read_operator_limits(const Table& root, std::map<std::string, double>& limits) {
+  const toml::table* sub = root.sub("operator_limits");
+  if (sub == nullptr) return;
+  SafetyParameters values;
+  read_rows(root, "operator_limits", safety_parameter_table(), values);
+  for (const SafetyParameterInfo& row : safety_parameter_table()) {
+    if (sub->get(row.name) != nullptr) limits[std::string(row.name)] = row.get(values);
+  }
+}
+
 void read_server(const Table& root, ServerConfig& server) {
   const toml::table* sub = root.sub("server");
   if (sub == nullptr) return;
-  constexpr std::array<std::string_view, 4> keys{"listen", "port", "token", "browser"};
+  constexpr std::array<std::string_view, 5> keys{"listen", "port", "token", "operator_token",
+                                                 "browser"};
   const Table table(*sub, root.file(), "[server]", keys);
   table.read("listen", server.listen);
   table.read("token", server.token);
+  table.read("operator_token", server.operator_token);
   table.read("browser", server.browser);
   double port = -1.0;
   table.read("port", port, 0.0, 65535.0, "", true);
@@ -304,9 +318,9 @@ std::string joined(const std::vector<std::string>& lines) {
 SessionConfig parse_session_config(std::string_view text, const std::string& name,
                                    const SessionConfig& base, const MethodCheck& check_method) {
   const toml::table tree = parsed(text, name);
-  constexpr std::array<std::string_view, 9> keys{"camera", "device", "placement",
-                                                 "rate",   "method", "parameters",
-                                                 "safety", "record", "server"};
+  constexpr std::array<std::string_view, 12> keys{
+      "camera", "device", "placement",     "rate",         "method",          "parameters",
+      "safety", "record", "record_folder", "record_limit", "operator_limits", "server"};
   const Table root(tree, name, "", keys);
   SessionConfig config = base;
   if (const toml::node* cameras = root.find("camera"))
@@ -315,6 +329,8 @@ SessionConfig parse_session_config(std::string_view text, const std::string& nam
   root.read("rate", config.rate, lowest_rate, highest_rate, "Hz");
   root.read("method", config.method);
   root.read("record", config.record);
+  root.read("record_folder", config.record_folder);
+  root.read("record_limit", config.record_limit, lowest_record_limit, highest_record_limit, "GB");
   const auto with_line = [&](const toml::node* node, const auto& action) {
     try {
       action();
@@ -328,6 +344,7 @@ SessionConfig parse_session_config(std::string_view text, const std::string& nam
   read_placement(root, config.placement);
   read_rows(root, "parameters", parameter_table(), config.parameters);
   read_rows(root, "safety", safety_parameter_table(), config.safety);
+  read_operator_limits(root, config.operator_limits);
   read_server(root, config.server);
   with_line(root.find("parameters"), [&] { validate(config.parameters); });
   with_line(root.find("safety"), [&] { validate(config.safety); });
@@ -355,6 +372,10 @@ std::string to_toml(const SessionConfig& config) {
   text += key_line("rate", toml_number(config.rate), "Hz, 100 to 100000: ticks of the servo loop");
   text += key_line("device", toml_text(config.device), "URI of the hand; \"\": the usual one");
   text += key_line("record", toml_text(config.record), "folder to record into; \"\": none");
+  text += key_line("record_folder", toml_text(config.record_folder),
+                   "where a page's recordings go; \"\": the current folder");
+  text += key_line("record_limit", toml_number(config.record_limit),
+                   "GB, 0.001 to 1000000: of all that pages record in a session");
   for (const CameraConfig& camera : config.cameras) {
     text += "\n[[camera]]\n";
     text += "uri = " + toml_text(camera.uri) + "\n";
@@ -384,12 +405,19 @@ std::string to_toml(const SessionConfig& config) {
   text += "\n[safety]\n";
   for (const SafetyParameterInfo& row : safety_parameter_table())
     text += row_line(row, row.get(config.safety));
+  if (!config.operator_limits.empty()) {
+    text += "\n[operator_limits]\n";
+    for (const auto& [name, value] : config.operator_limits)
+      text += key_line(name, toml_number(value), "the loosest value for the operator's page");
+  }
   text += "\n[server]\n";
   text += key_line("listen", toml_text(config.server.listen), "address at which browsers find it");
   text += config.server.port
               ? key_line("port", std::to_string(*config.server.port), "0 to 65535; 0: any")
               : key_line("# port", "8642", "0 to 65535; 0: any");
   text += key_line("token", toml_text(config.server.token), "what a page must know; \"\": nothing");
+  text += key_line("operator_token", toml_text(config.server.operator_token),
+                   "what the operator's page must know; \"\": one is made");
   text += key_line("browser", config.server.browser ? "true" : "false", "open one at the start");
   return text;
 }
@@ -430,6 +458,11 @@ void validate(const SessionConfig& config) {
   validate(config.safety);
   if (!(config.rate >= lowest_rate && config.rate <= highest_rate)) {
     throw Error("rate", shortest(config.rate) + " Hz is out of range", "give 100 to 100000 Hz");
+  }
+  if (!(config.record_limit >= lowest_record_limit &&
+        config.record_limit <= highest_record_limit)) {
+    throw Error("record_limit", shortest(config.record_limit) + " GB is out of range",
+                "give 0.001 to 1000000 GB");
   }
 }
 

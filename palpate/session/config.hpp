@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,6 +31,7 @@ struct ServerConfig {
   std::string listen = "127.0.0.1";        ///< address; this default lets in this machine alone
   std::optional<std::uint16_t> port = {};  ///< none: 8642, or any free one; 0: any free one
   std::string token = {};                  ///< what a page must know; empty: none is asked for
+  std::string operator_token = {};         ///< the operator's page's; empty: one is made
   bool browser = true;                     ///< open one at the start, where there is a desktop
 };
 
@@ -42,7 +44,12 @@ struct SessionConfig {
   std::string method = "sight";
   Parameters parameters;
   SafetyParameters safety;
-  std::string record = {};  ///< folder to record into; empty: none
+  std::string record = {};         ///< folder to record into; empty: none
+  std::string record_folder = {};  ///< where recordings go that a page starts; empty: the current
+  double record_limit = 20.0;      ///< [GB] of all recordings of a session that pages start
+  /// By name, the loosest value to which the operator's page may set a safety limit; of those that
+  /// are left out, the end of the range.
+  std::map<std::string, double> operator_limits = {};
   ServerConfig server;
 };
 

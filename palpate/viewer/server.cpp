@@ -6,6 +6,8 @@
 #include <cctype>
 #include <chrono>
 #include <deque>
+#include <map>
+#include <memory>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -21,6 +23,7 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/core/error.hpp"
+#include "palpate/viewer/admission.hpp"
 #include "palpate/viewer/page.hpp"
 
 namespace palpate {
@@ -37,11 +40,15 @@ using SharedMessage = std::shared_ptr<const ViewerMessage>;
 
 constexpr std::chrono::milliseconds ticks_interval(33);
 constexpr int ticks_per_state = 6;
-constexpr std::chrono::seconds request_timeout(10);
+constexpr std::chrono::seconds handshake_timeout(5);
 constexpr std::chrono::seconds idle_timeout(10);  // a ping goes out at half of it
+constexpr std::chrono::seconds answer_timeout(10);
+constexpr std::chrono::seconds opening_time(60);  // for a browser to open the page by itself
 constexpr std::chrono::seconds hand_timeout(2);   // pages repeat a held hand several times a second
-constexpr int max_connections = 64;
-constexpr std::size_t max_viewers = 16;
+constexpr std::size_t max_connections = 64;
+constexpr int max_viewers = 16;
+constexpr int max_operator_pages = 4;  // besides
+constexpr std::size_t shortest_token = 8;
 constexpr std::uint32_t max_header = 8192;
 constexpr std::size_t max_queue = 32;   // of small messages to one page
 constexpr std::uint32_t max_ahead = 2;  // frames sent that a page has not drawn yet
@@ -65,15 +72,6 @@ bool is_loopback_name(const std::string& host) {
   return !error && address.is_loopback();
 }
 
-// Takes the same time wherever two texts of the same length differ.
-bool equal_secrets(std::string_view a, std::string_view b) {
-  if (a.size() != b.size()) return false;
-  unsigned difference = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    difference |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i]);
-  return difference == 0;
-}
-
 std::string_view token_of(std::string_view target) {
   constexpr std::string_view key = "token=";
   const std::size_t question = target.find('?');
@@ -91,6 +89,47 @@ std::string_view view(beast::string_view text) {
   return {text.data(), text.size()};
 }
 
+// Whom a connection comes from: an address, of IPv6 the network, as one machine has many.
+std::string source_of(const tcp::socket& socket) {
+  boost::system::error_code error;
+  const auto endpoint = socket.remote_endpoint(error);
+  if (error) return {};
+  auto address = endpoint.address();
+  if (!address.is_v6()) return address.to_string();
+  auto bytes = address.to_v6().to_bytes();
+  if (address.to_v6().is_v4_mapped())
+    return asio::ip::make_address_v4(asio::ip::v4_mapped, address.to_v6()).to_string();
+  std::fill(bytes.begin() + 8, bytes.end(), std::uint8_t{0});
+  return asio::ip::make_address_v6(bytes).to_string();
+}
+
+// A JSON object with another member in front.
+std::string with_member(const std::string& object, std::string_view name, std::string_view text) {
+  std::string made = "{\"" + std::string(name) + "\":\"" + std::string(text) + "\"";
+  if (object.size() > 2) made += ",";
+  return made + object.substr(1);
+}
+
+// One of a limited number of places, taken from the request on until the page has gone.
+struct GiveBack {
+  void operator()(int* taken) const { --*taken; }
+};
+using Place = std::unique_ptr<int, GiveBack>;
+
+Place take_place(int& taken, int most) {
+  if (taken >= most) return nullptr;
+  ++taken;
+  return Place(&taken);
+}
+
+// With what a page comes in.
+struct Admission {
+  http::status status = http::status::ok;
+  Place place = nullptr;
+  bool is_operator = false;
+  bool needs_token = false;  // it was opened by the program, and does not know the token yet
+};
+
 class PageSession;
 
 // What sessions ask of the server they belong to.
@@ -106,11 +145,14 @@ class Hub {
 // One page, from the WebSocket handshake on. All on the server's thread.
 class PageSession : public std::enable_shared_from_this<PageSession> {
  public:
-  PageSession(Hub& hub, beast::tcp_stream stream) : hub_(hub), socket_(std::move(stream)) {}
+  PageSession(Hub& hub, beast::tcp_stream stream, Admission admission)
+      : hub_(hub), admission_(std::move(admission)), socket_(std::move(stream)) {}
+
+  [[nodiscard]] const Admission& admission() const { return admission_; }
 
   void start(const Request& request) {
     beast::get_lowest_layer(socket_).expires_never();
-    socket_.set_option(websocket::stream_base::timeout{request_timeout, idle_timeout, true});
+    socket_.set_option(websocket::stream_base::timeout{handshake_timeout, idle_timeout, true});
     socket_.read_message_max(max_page_message);
     socket_.async_accept(request, [self = shared_from_this()](beast::error_code error) {
       if (error) return;
@@ -125,6 +167,19 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
     if (queue_.size() >= max_queue) queue_.pop_front();  // a page that reads nothing
     queue_.push_back(std::move(message));
     pump();
+  }
+
+  // Says once why the page's hand is not taken, until `may_explain_again`.
+  void explain(std::string_view why) {
+    if (std::exchange(explained_, true)) return;
+    refuse(why);
+  }
+  void may_explain_again() { explained_ = false; }
+
+  // Why what the page asked for was not done.
+  void refuse(std::string_view why) {
+    send(std::make_shared<const ViewerMessage>(text_message(nlohmann::json{{"error", why}}.dump(
+        -1, ' ', false, nlohmann::json::error_handler_t::replace))));
   }
 
   // A camera's newest frame, which takes the place of one that has not been sent yet.
@@ -177,6 +232,7 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
   void leave() {
     if (!open_) return;
     open_ = false;
+    admission_.place.reset();
     hub_.left(*this);
   }
 
@@ -209,6 +265,8 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
   }
 
   Hub& hub_;
+  Admission admission_;
+  bool explained_ = false;
   websocket::stream<beast::tcp_stream, false> socket_;  // without compression
   beast::flat_buffer buffer_;
   std::deque<SharedMessage> queue_;
@@ -222,20 +280,28 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
 
 class ViewerServer::Impl final : public Hub {
  public:
-  Impl(const ViewerOptions& options, ViewerHost& host) : token_(options.token), host_(host) {
-    const auto well_formed = [](unsigned char c) {
-      return std::isalnum(c) || c == '-' || c == '_';
-    };
-    if (!std::all_of(token_.begin(), token_.end(), well_formed) || token_.size() > 128)
-      throw Error("--token", "it has other characters than letters, digits, - and _, or over 128",
-                  "give a simpler one");
+  Impl(const ViewerOptions& options, ViewerHost& host)
+      : token_(options.token),
+        operator_token_(options.operator_token.empty() ? make_token() : options.operator_token),
+        opening_token_(make_token()),
+        opened_until_(Clock::now() + opening_time),
+        request_timeout_(
+            std::chrono::duration_cast<Clock::duration>(Seconds(options.request_timeout))),
+        host_(host) {
+    check_token("--token", token_);
+    check_token("--operator-token", operator_token_);
+    if (operator_token_.size() < shortest_token)
+      throw Error("--operator-token", "it must have at least 8 characters",
+                  "give a longer one, or none to have one made");
+    if (operator_token_ == token_)
+      throw Error("--operator-token", "it is the same as --token", "give another");
     boost::system::error_code error;
     const auto address = asio::ip::make_address(options.listen, error);
     if (error)
       throw Error("--listen " + options.listen, "it is not an IP address",
                   "give 127.0.0.1, or 0.0.0.0 for everybody who has the token");
     beyond_loopback_ = !address.is_loopback();
-    if (beyond_loopback_ && token_.size() < 8)
+    if (beyond_loopback_ && token_.size() < shortest_token)
       throw Error("--token", "beyond this machine it must have at least 8 characters",
                   "give a longer one, or none to have one made");
     listen({address, options.port});
@@ -243,7 +309,6 @@ class ViewerServer::Impl final : public Hub {
                                   : address.is_v6()        ? "[" + address.to_string() + "]"
                                                            : address.to_string();
     url_ = "http://" + host_name + ":" + std::to_string(port()) + "/";
-    if (!token_.empty()) url_ += "?token=" + token_;
     accept();
     wait();
     thread_ = std::thread([this] { context_.run(); });
@@ -257,7 +322,9 @@ class ViewerServer::Impl final : public Hub {
   Impl& operator=(const Impl&) = delete;
 
   [[nodiscard]] std::uint16_t port() const { return port_; }
-  [[nodiscard]] const std::string& url() const { return url_; }
+  [[nodiscard]] std::string url() const { return token_.empty() ? url_ : link(token_); }
+  [[nodiscard]] std::string operator_url() const { return link(operator_token_); }
+  [[nodiscard]] std::string opening_url() const { return link(opening_token_); }
   [[nodiscard]] std::size_t viewers() const { return viewers_.load(); }
 
   void publish(std::uint8_t camera, ViewerMessage message, bool is_frame) {
@@ -269,68 +336,84 @@ class ViewerServer::Impl final : public Hub {
     asio::post(context_, [this] { distribute(); });
   }
 
-  // A request's refusal, or 0.
-  http::status judge(const Request& request) const {
+  // Is a request answered, and if it begins a page's session, as whose?
+  Admission judge(const Request& request, const std::string& source) {
     if (request.method() != http::verb::get && request.method() != http::verb::head)
-      return http::status::method_not_allowed;
+      return {http::status::method_not_allowed};
     // A page of another site can make a browser come here under that site's name, or from it.
     const std::string_view authority = view(request[http::field::host]);
-    if (!beyond_loopback_ && !is_loopback_name(host_of(authority))) return http::status::forbidden;
+    if (!beyond_loopback_ && !is_loopback_name(host_of(authority)))
+      return {http::status::forbidden};
     if (request.find(http::field::origin) != request.end()) {
       const std::string_view origin = view(request[http::field::origin]);
       const std::size_t slashes = origin.find("://");
       if (slashes == std::string_view::npos || origin.substr(slashes + 3) != authority)
-        return http::status::forbidden;
+        return {http::status::forbidden};
     }
-    if (websocket::is_upgrade(request)) {
-      const std::string_view target = view(request.target());
-      if (target.substr(0, target.find('?')) != "/session") return http::status::not_found;
-      if (!token_.empty() && !equal_secrets(token_of(target), token_))
-        return http::status::unauthorized;
-      if (pages_.size() >= max_viewers) return http::status::service_unavailable;
-    }
-    return http::status::ok;
+    if (!websocket::is_upgrade(request)) return {};
+    const std::string_view target = view(request.target());
+    if (target.substr(0, target.find('?')) != "/session") return {http::status::not_found};
+    Admission admission = judge_token(token_of(target), source);
+    if (admission.status != http::status::ok) return admission;
+    if (admission.is_operator) admission.place = take_place(operator_pages_, max_operator_pages);
+    if (!admission.place) admission.place = take_place(viewer_pages_, max_viewers);
+    if (!admission.place) admission.status = http::status::service_unavailable;
+    return admission;
   }
 
   void joined(const std::shared_ptr<PageSession>& page) override {
     pages_.push_back(page);
     viewers_ = pages_.size();
-    page->send(shared_text("{\"hello\":" + host_.hello() + "}"));
-    page->send(shared_text("{\"state\":" + host_.state() + "}"));
+    std::string hello = with_member(host_.hello(), "role", to_string(role_of(*page)));
+    if (page->admission().needs_token)
+      hello = with_member(hello, "operator_token", operator_token_);
+    page->send(shared_text("{\"hello\":" + hello + "}"));
+    send_state({page});
     for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
       if (cameras_[camera].rays) page->send(cameras_[camera].rays);
       if (cameras_[camera].frame) page->offer(camera, 0, cameras_[camera].frame);
     }
-    tell_presence();
+    tell_presence(false);
   }
 
   void left(PageSession& page) override {
-    if (hand_owner_ == &page) release_hand();
+    const bool had_hand = hand_owner_ == &page;
+    if (had_hand) release_hand();
     std::erase_if(pages_, [&](const auto& other) { return other.get() == &page; });
     viewers_ = pages_.size();
-    tell_presence();
+    tell_presence(had_hand);
   }
 
   void moved_hand(PageSession& page, const HandMessage& hand) override {
-    if (hand_owner_ != nullptr && hand_owner_ != &page) return;
+    if (!host_.takes_hand()) {
+      if (hand.target) page.explain("hand: no page moves this session's device");
+      return;
+    }
+    if (hand_owner_ != nullptr && hand_owner_ != &page) {
+      if (hand.target) page.explain("hand: another page has it; wait until it lets go");
+      return;
+    }
     if (!hand.target) {
       if (hand_owner_ == nullptr) return;
       release_hand();
-      return tell_presence();
+      return tell_presence(true);
     }
     hand_heard_ = Clock::now();
     host_.hand(hand.target);
-    if (std::exchange(hand_owner_, &page) == nullptr) tell_presence();
+    if (std::exchange(hand_owner_, &page) == nullptr) tell_presence(true);
   }
 
   void commanded(PageSession& page, const Command& command) override {
     try {
-      host_.command(command);
-      const auto state = shared_text("{\"state\":" + host_.state() + "}");
-      for (const auto& other : pages_) other->send(state);
+      const Role role = role_of(page);
+      check_allowed(command, role);
+      if (std::holds_alternative<ResetHand>(command) && hand_owner_ != nullptr &&
+          hand_owner_ != &page)
+        throw Error("hand", "another page has it", "wait until it lets go");
+      host_.command(command, role);
+      send_state(pages_);
     } catch (const std::exception& error) {
-      page.send(shared_text(nlohmann::json{{"error", error.what()}}.dump(
-          -1, ' ', false, nlohmann::json::error_handler_t::replace)));
+      page.refuse(error.what());
     }
   }
 
@@ -339,6 +422,48 @@ class ViewerServer::Impl final : public Hub {
   struct Camera {
     SharedMessage rays, frame;
   };
+
+  static void check_token(const char* option, const std::string& token) {
+    const auto well_formed = [](unsigned char c) {
+      return std::isalnum(c) || c == '-' || c == '_';
+    };
+    if (!std::all_of(token.begin(), token.end(), well_formed) || token.size() > longest_token)
+      throw Error(option, "it has other characters than letters, digits, - and _, or over 128",
+                  "give a simpler one");
+  }
+
+  [[nodiscard]] std::string link(const std::string& token) const {
+    return url_ + "?token=" + token;
+  }
+
+  // Whose token is it? On a loopback address that asks for none, a wrong one lets in who looks,
+  // such as a page left open from an earlier session; it counts as a guess all the same.
+  Admission judge_token(std::string_view given, const std::string& source) {
+    if (given.empty()) return {token_.empty() ? http::status::ok : http::status::unauthorized};
+    const double t = Seconds(Clock::now().time_since_epoch()).count();
+    if (guesses_.pause(source, t) > 0.0) return {http::status::too_many_requests};
+    // All are compared, whichever it is.
+    const bool is_opening = is_token(given, opening_token_);
+    const bool is_operator = is_token(given, operator_token_);
+    const bool is_viewer = is_token(given, token_);
+    Admission admission;
+    if (is_opening && Clock::now() < opened_until_) {
+      opening_token_.clear();  // other accounts see the browser's command line
+      admission.is_operator = admission.needs_token = true;
+    } else if (is_operator) {
+      admission.is_operator = true;
+    } else if (!is_viewer) {
+      guesses_.wrong(source, given, t);
+      if (!token_.empty()) admission.status = http::status::unauthorized;
+    }
+    return admission;
+  }
+
+  [[nodiscard]] Role role_of(const PageSession& page) const {
+    return page.admission().is_operator ? Role::operating
+           : hand_owner_ == &page       ? Role::holding
+                                        : Role::looking;
+  }
 
   void listen(const tcp::endpoint& endpoint) {
     const std::string subject =
@@ -356,6 +481,7 @@ class ViewerServer::Impl final : public Hub {
   }
 
   void accept();
+  void make_room();
 
   // Every ticks_interval.
   void wait() {
@@ -370,7 +496,7 @@ class ViewerServer::Impl final : public Hub {
   void beat() {
     if (hand_owner_ != nullptr && Clock::now() - hand_heard_ > hand_timeout) {
       release_hand();
-      tell_presence();
+      tell_presence(true);
     }
     const std::optional<TickBatch> batch = host_.ticks();  // also when nobody looks: it drains
     if (pages_.empty()) return;
@@ -378,10 +504,7 @@ class ViewerServer::Impl final : public Hub {
       const auto message = std::make_shared<const ViewerMessage>(ticks_message(*batch));
       for (const auto& page : pages_) page->send(message);
     }
-    if (++beats_ % ticks_per_state == 0) {
-      const auto message = shared_text("{\"state\":" + host_.state() + "}");
-      for (const auto& page : pages_) page->send(message);
-    }
+    if (++beats_ % ticks_per_state == 0) send_state(pages_);
   }
 
   void release_hand() {
@@ -389,13 +512,30 @@ class ViewerServer::Impl final : public Hub {
     host_.hand(std::nullopt);
   }
 
-  void tell_presence() {
+  // To all. @param hand_changed  then roles have changed, too, which are part of the state
+  void tell_presence(bool hand_changed) {
     for (const auto& page : pages_) {
       const char* hand = hand_owner_ == nullptr      ? "free"
                          : hand_owner_ == page.get() ? "you"
                                                      : "other";
       const nlohmann::json presence = {{"hand", hand}, {"viewers", pages_.size()}};
       page->send(shared_text(nlohmann::json{{"presence", presence}}.dump()));
+      if (hand_changed) page->may_explain_again();
+    }
+    if (hand_changed) send_state(pages_);
+  }
+
+  // The state with each page's role; one message for all of a role.
+  void send_state(const std::vector<std::shared_ptr<PageSession>>& pages) {
+    if (pages.empty()) return;
+    const std::string state = host_.state();
+    std::map<Role, SharedMessage> messages;
+    for (const auto& page : pages) {
+      const Role role = role_of(*page);
+      SharedMessage& message = messages[role];
+      if (!message)
+        message = shared_text("{\"state\":" + with_member(state, "role", to_string(role)) + "}");
+      page->send(message);
     }
   }
 
@@ -423,13 +563,21 @@ class ViewerServer::Impl final : public Hub {
     return std::make_shared<const ViewerMessage>(text_message(text));
   }
 
-  std::string token_;
+  using Seconds = std::chrono::duration<double>;
+
+  std::string token_, operator_token_;
+  std::string opening_token_;        // good once; empty: used
+  Clock::time_point opened_until_;   // and until then
+  Clock::duration request_timeout_;  // from a connection's begin, or its last answer
+  GuessLimit guesses_;
   ViewerHost& host_;
   bool beyond_loopback_ = false;
   std::string url_;
   std::uint16_t port_ = 0;
   std::atomic<std::size_t> viewers_{0};
-  int connections_ = 0;  // outlives the context, and so all sessions
+  // These outlive the context, and so all sessions.
+  std::vector<HttpSession*> connections_;  // without pages, oldest first
+  int viewer_pages_ = 0, operator_pages_ = 0;
 
   std::mutex mutex_;
   std::array<Camera, Patch::max_views> arrived_;  // guarded by mutex_
@@ -450,10 +598,11 @@ class ViewerServer::Impl final : public Hub {
 // One connection, until it becomes a page's session.
 class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<HttpSession> {
  public:
-  HttpSession(Impl& server, tcp::socket socket) : server_(server), stream_(std::move(socket)) {
-    ++server_.connections_;
+  HttpSession(Impl& server, tcp::socket socket)
+      : server_(server), source_(source_of(socket)), stream_(std::move(socket)) {
+    server_.connections_.push_back(this);
   }
-  ~HttpSession() { --server_.connections_; }
+  ~HttpSession() { std::erase(server_.connections_, this); }
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
 
@@ -461,25 +610,30 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
     parser_.emplace();
     parser_->header_limit(max_header);
     parser_->body_limit(0);
-    stream_.expires_after(request_timeout);
+    stream_.expires_after(server_.request_timeout_);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](beast::error_code error, std::size_t) {
                        if (!error) self->answer(self->parser_->release());
                      });
   }
 
+  [[nodiscard]] const std::string& source() const { return source_; }
+  // Closes the connection, whatever it is doing.
+  void close() { stream_.close(); }
+
  private:
   using Response = http::response<http::span_body<const char>>;
 
   void answer(const Request& request) {
-    const http::status judgement = server_.judge(request);
-    if (judgement == http::status::ok && websocket::is_upgrade(request)) {
-      std::make_shared<PageSession>(server_, std::move(stream_))->start(request);
+    Admission admission = server_.judge(request, source_);
+    if (admission.status == http::status::ok && websocket::is_upgrade(request)) {
+      std::make_shared<PageSession>(server_, std::move(stream_), std::move(admission))
+          ->start(request);
       return;
     }
     std::string_view type = "text/plain; charset=utf-8";
     std::string_view content;
-    http::status status = judgement;
+    http::status status = admission.status;
     if (status == http::status::ok) {
       const std::string_view target = view(request.target());
       const std::string_view path = target.substr(0, target.find('?'));
@@ -505,6 +659,8 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
         return "Not from this host or origin.\n";
       case http::status::unauthorized:
         return "The token is missing or wrong.\n";
+      case http::status::too_many_requests:
+        return "Too many wrong tokens came from this address; wait five minutes.\n";
       case http::status::service_unavailable:
         return "Too many pages are open.\n";
       default:
@@ -527,6 +683,7 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
     response.keep_alive(request.keep_alive());
     response.content_length(content.size());
     if (request.method() != http::verb::head) response.body() = {content.data(), content.size()};
+    stream_.expires_after(answer_timeout);
     http::async_write(stream_, response,
                       [self = shared_from_this()](beast::error_code error, std::size_t) {
                         if (error) return;
@@ -536,11 +693,28 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
   }
 
   Impl& server_;
+  std::string source_;
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_{max_header};
   std::optional<http::request_parser<http::empty_body>> parser_;
   std::optional<Response> response_;
 };
+
+// Closes the oldest connection of the address that has the most, if there are too many.
+void ViewerServer::Impl::make_room() {
+  if (connections_.size() < max_connections) return;
+  std::map<std::string, int> counts;
+  for (const HttpSession* connection : connections_) ++counts[connection->source()];
+  const auto busiest =
+      std::max_element(counts.begin(), counts.end(),
+                       [](const auto& a, const auto& b) { return a.second < b.second; });
+  const auto oldest = std::find_if(
+      connections_.begin(), connections_.end(),
+      [&](const HttpSession* connection) { return connection->source() == busiest->first; });
+  HttpSession* closed = *oldest;
+  connections_.erase(oldest);
+  closed->close();
+}
 
 void ViewerServer::Impl::accept() {
   acceptor_.async_accept([this](beast::error_code error, tcp::socket socket) {
@@ -552,10 +726,9 @@ void ViewerServer::Impl::accept() {
       });
       return;
     }
-    if (connections_ < max_connections) {
-      socket.set_option(tcp::no_delay(true), error);
-      std::make_shared<HttpSession>(*this, std::move(socket))->read();
-    }
+    make_room();
+    socket.set_option(tcp::no_delay(true), error);
+    std::make_shared<HttpSession>(*this, std::move(socket))->read();
     accept();
   });
 }
@@ -569,6 +742,12 @@ std::uint16_t ViewerServer::port() const {
 }
 std::string ViewerServer::url() const {
   return impl_->url();
+}
+std::string ViewerServer::operator_url() const {
+  return impl_->operator_url();
+}
+std::string ViewerServer::opening_url() const {
+  return impl_->opening_url();
 }
 std::size_t ViewerServer::viewers() const {
   return impl_->viewers();

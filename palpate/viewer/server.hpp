@@ -7,6 +7,7 @@
 #include <string>
 
 #include "palpate/viewer/protocol.hpp"
+#include "palpate/viewer/roles.hpp"
 
 namespace palpate {
 
@@ -23,17 +24,24 @@ class ViewerHost {
   virtual std::string state() = 0;
   /// Ticks since the last call; none if there was no tick.
   virtual std::optional<TickBatch> ticks() = 0;
+  /// Does a page move the session's device? If not, no page ever holds the hand.
+  virtual bool takes_hand() = 0;
   /// The one hand moved [m, world], or was let go.
   virtual void hand(const std::optional<Vec3>& target) = 0;
-  /// @throws Error to refuse: the page that asked shows it.
-  virtual void command(const Command& command) = 0;
+  /// A command that `check_allowed` allows the role of the page that asks.
+  /// @throws Error to refuse: the page shows it.
+  virtual void command(const Command& command, Role role) = 0;
 };
 
 struct ViewerOptions {
   std::string listen = "127.0.0.1";  ///< an address of this machine
   std::uint16_t port = 0;            ///< 0: any that is free
   /// What a page must present; may be empty only on a loopback address. Letters, digits, - and _.
-  std::string token;
+  std::string token = {};
+  /// What the operator's page must present, on loopback, too; 8 characters at least. Empty: one is
+  /// made.
+  std::string operator_token = {};
+  double request_timeout = 5.0;  ///< [s] for a request to be there, from the connection's begin on
 };
 
 /// Serves the page and, by WebSocket, its sessions, on one thread of its own.
@@ -41,7 +49,7 @@ struct ViewerOptions {
 /// Several pages can look; the first that takes the hand has it until it lets go, falls silent for
 /// two seconds or is lost. A page that is slow gets fewer frames and never holds up anything.
 /// Requests for another host, from another origin or without the token are refused, malformed
-/// messages end their session.
+/// messages end their session. What a page may change depends on its Role; see docs/protocol.md.
 class ViewerServer {
  public:
   /// Listens at once. @param host  must outlive the server
@@ -53,8 +61,12 @@ class ViewerServer {
   ViewerServer& operator=(const ViewerServer&) = delete;
 
   [[nodiscard]] std::uint16_t port() const;
-  /// Where a browser finds the page, with the token.
+  /// Where a browser finds the page, with the token: to look, and to hold the hand.
   [[nodiscard]] std::string url() const;
+  /// The same for the operator.
+  [[nodiscard]] std::string operator_url() const;
+  /// The operator's page, once and within a minute: for a command line, which others may see.
+  [[nodiscard]] std::string opening_url() const;
   /// How many pages are connected. Any thread.
   [[nodiscard]] std::size_t viewers() const;
 

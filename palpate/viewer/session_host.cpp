@@ -2,7 +2,6 @@
 #include "palpate/viewer/session_host.hpp"
 
 #include <algorithm>
-#include <ctime>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -33,19 +32,23 @@ std::string realtime_text(const RealtimeReport& report) {
   return text;
 }
 
-// A folder beside the program, named after the time.
-std::string folder_of_now() {
-  const std::time_t now = std::time(nullptr);
-  std::tm local{};
-  localtime_r(&now, &local);
-  std::array<char, 64> name{};
-  std::strftime(name.data(), name.size(), "palpate_%Y-%m-%d_%H-%M-%S", &local);
-  return name.data();
+std::string_view stricter_text(std::string_view limit) {
+  switch (stricter_direction(limit)) {
+    case Stricter::lower:
+      return "lower";
+    case Stricter::higher:
+      return "higher";
+    case Stricter::neither:
+      break;
+  }
+  return "";
 }
 
 }  // namespace
 
 void SessionHost::attach(Session& session) {
+  bounds_.emplace(session.settings().safety, rules_.operator_limits);
+  recordings_ = std::make_unique<PageRecordings>(session, rules_.recordings);
   session_ = &session;
   mouse_ = session.mouse();
   if (mouse_ != nullptr) target_ = start_ = mouse_->start_position();
@@ -63,9 +66,11 @@ std::string SessionHost::hello() {
   for (const ParameterInfo& row : parameter_table())
     parameters.push_back(row_json(row.name, row.symbol, row.unit, row.default_value, row.min,
                                   row.max, row.meaning, row.source));
-  for (const SafetyParameterInfo& row : safety_parameter_table())
+  for (const SafetyParameterInfo& row : safety_parameter_table()) {
     safety.push_back(
         row_json(row.name, "", row.unit, row.default_value, row.min, row.max, row.meaning, ""));
+    safety.back()["stricter"] = stricter_text(row.name);
+  }
   json placement = json::array();
   for (const PlacementInfo& row : placement_table())
     placement.push_back(
@@ -113,7 +118,10 @@ std::string SessionHost::state() {
     servo["compute_p99"] = 1e-9 * static_cast<double>(timing->compute.quantile(0.99));
     servo["wake_up_p99"] = 1e-9 * static_cast<double>(timing->wake_up.quantile(0.99));
   }
-  json recording = {{"possible", true}, {"path", nullptr}, {"message", state.recording.message}};
+  json recording = {{"possible", true},
+                    {"path", nullptr},
+                    {"message", state.recording.message},
+                    {"ended", recording_ended()}};
   if (state.recording.on) recording["path"] = state.recording.folder;
   const DeviceInfo& device = session_->device().info();
   return json{{"method", state.settings.method},
@@ -145,20 +153,22 @@ void SessionHost::hand(const std::optional<Vec3>& target) {
   mouse_->aim({.position = target_, .present = target.has_value()});
 }
 
-void SessionHost::command(const Command& command) {
+void SessionHost::command(const Command& command, Role role) {
   ServoSettings settings = session_->settings();
   if (const auto* set = std::get_if<SetParameter>(&command)) {
     set_parameter(settings.parameters, set->name, set->value);
   } else if (const auto* limit = std::get_if<SetSafetyParameter>(&command)) {
+    bounds_->check(limit->name, limit->value, role);
     set_parameter(settings.safety, limit->name, limit->value);
+    session_->set(settings);
+    if (role == Role::operating) bounds_->set_by_operator(limit->name, limit->value);
+    return;
   } else if (const auto* place = std::get_if<SetPlacement>(&command)) {
     set_placement(settings.placement, place->name, place->value);
   } else if (const auto* method = std::get_if<SetMethod>(&command)) {
     settings.method = method->name;
   } else if (const auto* record = std::get_if<SetRecording>(&command)) {
-    const bool is_on = session_->state().recording.on;
-    if (!record->on) session_->stop_recording();
-    if (record->on && !is_on) session_->start_recording(folder_of_now());
+    record->on ? recordings_->start() : recordings_->stop();
     return;
   } else {
     if (mouse_ != nullptr) mouse_->aim({.position = target_ = start_, .present = false});

@@ -4,26 +4,41 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "palpate/session/session.hpp"
+#include "palpate/viewer/page_recordings.hpp"
 #include "palpate/viewer/server.hpp"
 #include "palpate/viewer/tick_batcher.hpp"
 
 namespace palpate {
 
+/// What a session's options say about its pages.
+struct PageRules {
+  /// By name, the loosest values to which the operator's page may set safety limits.
+  std::map<std::string, double> operator_limits = {};
+  RecordingRules recordings = {};
+};
+
 /// A session as pages see it: an observer that reads its ticks and frames and sends settings back.
 ///
-/// Made before the session, whose frames it shows; then `attach`, then the server, then `show_on`.
+/// Made before the session, whose frames it shows; then `attach`, then the server, then `show_on`;
+/// at the end `detach`, after the server and before the session.
 class SessionHost final : public ViewerHost {
  public:
   /// @param version  of the program, for pages
-  explicit SessionHost(std::string version) : version_(std::move(version)) {}
+  explicit SessionHost(std::string version, PageRules rules = {})
+      : version_(std::move(version)), rules_(std::move(rules)) {}
 
-  /// Before there is a server. @param session  must outlive the server
+  /// Before there is a server. @param session  must outlive the server, and be there until `detach`
+  /// @throws Error if the rules name no limit.
   void attach(Session& session);
+  /// After the server. May be left out if no recording was ever started.
+  void detach() { recordings_.reset(); }
   /// @param server  shows the frames from now on; null: nobody does, before the server goes
   void show_on(ViewerServer* server) noexcept { server_.store(server, std::memory_order_release); }
   /// A camera's frame, as SessionOptions::on_frame: to all pages. Any camera's thread.
@@ -32,13 +47,22 @@ class SessionHost final : public ViewerHost {
   std::string hello() override;
   std::string state() override;
   std::optional<TickBatch> ticks() override;
+  bool takes_hand() override { return mouse_ != nullptr; }
   void hand(const std::optional<Vec3>& target) override;
-  void command(const Command& command) override;
+  void command(const Command& command, Role role) override;
+
+  /// Why the last recording of a page was ended by its limits; empty if it was not.
+  [[nodiscard]] std::string recording_ended() const {
+    return recordings_ ? recordings_->ended() : std::string();
+  }
 
  private:
   void describe(std::uint8_t camera, const ViewingRays& rays);
 
   std::string version_;
+  PageRules rules_;
+  std::optional<LimitBounds> bounds_;
+  std::unique_ptr<PageRecordings> recordings_;
   Session* session_ = nullptr;
   std::atomic<ViewerServer*> server_{nullptr};
   std::array<std::uint32_t, Patch::max_views> numbers_{};  // of each camera's own frames

@@ -301,6 +301,19 @@ TEST_F(Program, MakesATokenForOtherMachines) {
           "--camera synthetic:plane?size=160x120");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("/?token="), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("in clear"), std::string::npos) << outcome.err;
+}
+
+TEST_F(Program, PrintsTheOperatorsLinkAndTheViewers) {
+  const std::string session =
+      "run --duration 0.2 --port 0 --no-browser --camera synthetic:plane?size=160x120 ";
+  const Outcome made = run(session);
+  ASSERT_EQ(made.code, 0) << made.err;
+  EXPECT_NE(made.err.find("/?token="), std::string::npos) << made.err;
+  EXPECT_NE(made.err.find("to hold the hand, open http://127.0.0.1:"), std::string::npos)
+      << made.err;
+  const Outcome given = run(session, "PALPATE_OPERATOR_TOKEN=from-outside ");
+  EXPECT_NE(given.err.find("/?token=from-outside in a browser"), std::string::npos) << given.err;
 }
 
 TEST_F(Program, TellsWhatIsInASource) {
@@ -476,6 +489,11 @@ TEST_F(Program, RefusesBadInputInOneLineThatNamesIt) {
   expect_refusal("run --duration -1", {"--duration"});
   expect_refusal("run --listen nowhere", {"--listen nowhere"});
   expect_refusal("run --listen 0.0.0.0 --token short", {"--token"});
+  expect_refusal("run --operator-token short", {"--operator-token", "8"});
+  expect_refusal("run --operator-limit fall_rate=1", {"--operator-limit", "fall_rate"});
+  expect_refusal("run --operator-limit max_device_farce=1",
+                 {"max_device_farce", "max_device_force"});
+  expect_refusal("run --record-limit 0", {"record_limit", "0.001"});
   expect_refusal("run --device mouze:", {"mouze", "mouse"});
   expect_refusal("run --rate 10", {"10"});
 }

@@ -30,6 +30,18 @@ inline boost::asio::ip::tcp::socket connect_to(boost::asio::io_context& context,
   return socket;
 }
 
+/// A page's request to begin a session.
+inline http::request<http::empty_body> upgrade_request(const std::string& target,
+                                                       const std::string& host) {
+  http::request<http::empty_body> request(http::verb::get, target, 11);
+  request.set(http::field::host, host);
+  request.set(http::field::connection, "Upgrade");
+  request.set(http::field::upgrade, "websocket");
+  request.set(http::field::sec_websocket_version, "13");
+  request.set(http::field::sec_websocket_key, "dGhlIHNhbXBsZSBub25jZQ==");
+  return request;
+}
+
 /// What a server answers to one request.
 inline http::response<http::string_body> ask(std::uint16_t port, const std::string& target,
                                              const std::string& host,
@@ -40,13 +52,8 @@ inline http::response<http::string_body> ask(std::uint16_t port, const std::stri
   auto socket = connect_to(context, port);
   http::request<http::empty_body> request(method, target, 11);
   request.set(http::field::host, host);
+  if (upgrade) request = upgrade_request(target, host);
   if (!origin.empty()) request.set(http::field::origin, origin);
-  if (upgrade) {
-    request.set(http::field::connection, "Upgrade");
-    request.set(http::field::upgrade, "websocket");
-    request.set(http::field::sec_websocket_version, "13");
-    request.set(http::field::sec_websocket_key, "dGhlIHNhbXBsZSBub25jZQ==");
-  }
   http::write(socket, request);
   http::response_parser<http::string_body> parser;
   parser.body_limit(16 << 20);

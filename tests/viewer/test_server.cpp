@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <random>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -24,6 +25,9 @@ class FakeHost final : public ViewerHost {
   std::string hello() override { return R"({"version":"test"})"; }
   std::string state() override { return R"({"method":"paper"})"; }
   std::optional<TickBatch> ticks() override {
+    waits_ = true;
+    const std::lock_guard gate(gate_);
+    waits_ = false;
     TickBatch batch;
     batch.t = ++beats_;
     return batch;
@@ -33,7 +37,9 @@ class FakeHost final : public ViewerHost {
     hands_.push_back(target);
     changed_.notify_all();
   }
-  void command(const Command& command) override {
+  bool takes_hand() override { return takes_hand_; }
+  void command(const Command& command, Role role) override {
+    static_cast<void>(role);
     if (const auto* set = std::get_if<SetParameter>(&command); set != nullptr && set->value < 0.0)
       throw Error("parameter '" + set->name + "'", "it is negative");
     ++commands_;
@@ -50,20 +56,37 @@ class FakeHost final : public ViewerHost {
     return hands_.size();
   }
   [[nodiscard]] int commands() const { return commands_; }
+  // Holds the server's thread up, from the return on and as long as the lock lives.
+  std::unique_lock<std::mutex> hold() {
+    std::unique_lock lock(gate_);
+    while (!waits_) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return lock;
+  }
+  void have_another_device() { takes_hand_ = false; }
 
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::optional<Vec3>> hands_;
   std::atomic<int> commands_{0};
+  std::atomic<bool> takes_hand_{true};
+  std::mutex gate_;
+  std::atomic<bool> waits_{false};
   double beats_ = 0.0;
 };
+
+constexpr const char* as_operator = "/session?token=operator-123";
 
 class ViewerServerTest : public ::testing::Test {
  protected:
   FakeHost host;
-  ViewerServer server{{}, host};
+  ViewerServer server{{.operator_token = "operator-123"}, host};
 };
+
+// What a page has to know after `token=` in the address that the server gives.
+std::string target_of(const std::string& url) {
+  return "/session" + url.substr(url.find('?'));
+}
 
 ViewerMessage frame(std::uint32_t number, std::uint8_t camera = 0) {
   const auto depth =
@@ -228,8 +251,9 @@ TEST_F(ViewerServerTest, GivesTheOneHandToWhoComesFirst) {
   }
   second.move_hand(true, 9.0, 9.0, 9.0);
   second.move_hand(false, 0.0, 0.0, 0.0);  // nor may it let go what it does not hold
+  EXPECT_NE(second.until("error").get<std::string>().find("another page"), std::string::npos);
   second.send_text(R"({"reset": true})");
-  second.until("state");
+  EXPECT_NE(second.until("error").get<std::string>().find("resets"), std::string::npos);
   EXPECT_EQ(host.hands(), 1u);
   first.move_hand(false, 0.0, 0.0, 0.0);
   EXPECT_FALSE(host.hand_number(2)) << "let go";
@@ -258,7 +282,7 @@ TEST_F(ViewerServerTest, LetsTheHandGoWhenItsPageFallsSilent) {
 }
 
 TEST_F(ViewerServerTest, PassesCommandsOnAndExplainsRefusals) {
-  Page page(server.port());
+  Page page(server.port(), as_operator);
   Page other(server.port());
   page.send_text(R"({"set": {"name": "stiffness", "value": -1}})");
   EXPECT_EQ(page.until("error"), "parameter 'stiffness': it is negative");
@@ -312,6 +336,202 @@ TEST_F(ViewerServerTest, HasRoomForSixteenPages) {
   }
   EXPECT_EQ(server.viewers(), 16u);
   EXPECT_EQ(Page(server.port()).refusal(), http::status::service_unavailable);
+}
+
+// Pages that ask to come in at the same moment, before any of them is answered: how many came in.
+int admitted_of(std::uint16_t port, FakeHost& host, int count, const std::string& target) {
+  boost::asio::io_context context;
+  std::vector<boost::asio::ip::tcp::socket> sockets;
+  for (int i = 0; i < count; ++i) sockets.push_back(connect_to(context, port));
+  ask(port, "/", "localhost");  // after that, all connections above have been accepted
+  {
+    const auto held = host.hold();
+    for (auto& socket : sockets) http::write(socket, upgrade_request(target, "localhost"));
+  }
+  int admitted = 0;
+  for (auto& socket : sockets) {
+    http::response_parser<http::empty_body> parser;
+    boost::beast::flat_buffer buffer;
+    boost::system::error_code error;
+    http::read_header(socket, buffer, parser, error);
+    if (!error && parser.get().result() == http::status::switching_protocols) ++admitted;
+  }
+  return admitted;
+}
+
+TEST_F(ViewerServerTest, LetsInSixteenPagesOfSixtyThatComeAtOnce) {
+  EXPECT_EQ(admitted_of(server.port(), host, 60, "/session"), 16);
+}
+
+TEST_F(ViewerServerTest, AnswersNewcomersWhileManyConnectionsSayNothing) {
+  boost::asio::io_context context;
+  std::vector<boost::asio::ip::tcp::socket> silent;
+  for (int i = 0; i < 200; ++i) {
+    silent.push_back(connect_to(context, server.port()));
+    const std::string half = "GET / HTTP/1.1\r\nHost: loc";
+    boost::system::error_code closed;
+    if (i % 2 == 0) boost::asio::write(silent.back(), boost::asio::buffer(half), closed);
+  }
+  EXPECT_EQ(ask(server.port(), "/", "localhost").result(), http::status::ok);
+  EXPECT_TRUE(Page(server.port()).accepted());
+}
+
+TEST_F(ViewerServerTest, LetsALookingPageChangeNothing) {
+  Page page(server.port());
+  for (const char* text : {R"({"set": {"name": "stiffness", "value": 1}})",
+                           R"({"set_safety": {"name": "max_device_force", "value": 50}})",
+                           R"({"place": {"name": "scale", "value": 2}})", R"({"method": "paper"})",
+                           R"({"record": true})", R"({"record": false})", R"({"reset": true})"})
+    page.send_text(text);
+  page.send_text("no message of the protocol: the session ends");
+  while (page.read()) {
+  }
+  EXPECT_EQ(host.commands(), 0);
+}
+
+TEST_F(ViewerServerTest, TellsEachPageItsRoleAndTheRolesOfTheHand) {
+  Page viewer(server.port());
+  Page chief(server.port(), as_operator);
+  EXPECT_EQ(viewer.until("hello")["role"], "looking");
+  EXPECT_EQ(viewer.until("state")["role"], "looking");
+  const auto hello = chief.until("hello");
+  EXPECT_EQ(hello["role"], "operating");
+  EXPECT_FALSE(hello.contains("operator_token"));
+  viewer.move_hand(true, 0.1, 0.2, 0.3);
+  while (viewer.until("state")["role"] != "holding") {
+  }
+  EXPECT_EQ(chief.until("state")["role"], "operating");
+  viewer.move_hand(false, 0.0, 0.0, 0.0);
+  while (viewer.until("state")["role"] != "looking") {
+  }
+}
+
+TEST_F(ViewerServerTest, LetsThePageWithTheHandSetParametersAndNoMore) {
+  Page page(server.port());
+  page.send_text(R"({"set": {"name": "stiffness", "value": 1}})");
+  EXPECT_NE(page.until("error").get<std::string>().find("looks on"), std::string::npos);
+  page.move_hand(true, 0.1, 0.2, 0.3);
+  page.send_text(R"({"method": "paper"})");
+  EXPECT_NE(page.until("error").get<std::string>().find("operator"), std::string::npos);
+  EXPECT_EQ(host.commands(), 0);
+  page.send_text(R"({"set": {"name": "stiffness", "value": 1}})");
+  page.send_text(R"({"reset": true})");
+  page.send_text(R"({"record": false})");
+  EXPECT_FALSE(page.until("error").is_null());
+  EXPECT_EQ(host.commands(), 2);
+}
+
+TEST_F(ViewerServerTest, LeavesTheHandToItsPageWhateverTheOperatorResets) {
+  Page page(server.port());
+  Page chief(server.port(), as_operator);
+  page.move_hand(true, 0.1, 0.2, 0.3);
+  while (chief.until("presence")["hand"] != "other") {
+  }
+  chief.send_text(R"({"reset": true})");
+  EXPECT_NE(chief.until("error").get<std::string>().find("another page"), std::string::npos);
+  page.move_hand(false, 0.0, 0.0, 0.0);
+  while (chief.until("presence")["hand"] != "free") {
+  }
+  chief.send_text(R"({"reset": true})");
+  chief.send_text(R"({"set": {"name": "stiffness", "value": -1}})");
+  EXPECT_FALSE(chief.until("error").is_null());
+  EXPECT_EQ(host.commands(), 1);
+}
+
+TEST_F(ViewerServerTest, GivesNoPageTheHandOfADeviceThatPagesDoNotMove) {
+  host.have_another_device();
+  Page page(server.port());
+  page.move_hand(true, 0.1, 0.2, 0.3);
+  EXPECT_NE(page.until("error").get<std::string>().find("device"), std::string::npos);
+  page.send_text(R"({"set": {"name": "stiffness", "value": 1}})");
+  EXPECT_NE(page.until("error").get<std::string>().find("looks on"), std::string::npos);
+  EXPECT_EQ(host.hands(), 0u);
+  EXPECT_EQ(host.commands(), 0);
+}
+
+TEST_F(ViewerServerTest, LetsALeftOverPageLookOn) {
+  Page page(server.port(), "/session?token=of-an-earlier-session");
+  EXPECT_EQ(page.until("hello")["role"], "looking");
+}
+
+TEST_F(ViewerServerTest, OpensTheOperatorsPageOnceWithoutItsToken) {
+  const std::string target = target_of(server.opening_url());
+  EXPECT_EQ(server.opening_url().find("operator-123"), std::string::npos);
+  Page first(server.port(), target);
+  const auto hello = first.until("hello");
+  EXPECT_EQ(hello["role"], "operating");
+  EXPECT_EQ(hello["operator_token"], "operator-123");
+  EXPECT_EQ(Page(server.port(), target).until("hello")["role"], "looking");
+}
+
+TEST(ViewerServer, MakesAnOperatorTokenAndAsksForItOnLoopback) {
+  FakeHost host;
+  const ViewerServer server({}, host);
+  EXPECT_EQ(server.url().find("token"), std::string::npos);
+  Page page(server.port(), target_of(server.operator_url()));
+  EXPECT_EQ(page.until("hello")["role"], "operating");
+  const auto open = [&](const std::string& token, const std::string& operator_token) {
+    return [&host, token, operator_token] {
+      return ViewerServer({.token = token, .operator_token = operator_token}, host).port();
+    };
+  };
+  EXPECT_TRUE(test::fails_saying(open("", "short"), "--operator-token", "8 characters"));
+  EXPECT_TRUE(test::fails_saying(open("", "no spaces"), "--operator-token"));
+  EXPECT_TRUE(test::fails_saying(open("same-token", "same-token"), "--operator-token", "--token"));
+}
+
+TEST_F(ViewerServerTest, RefusesEvenTheRightTokenAfterManyWrongOnes) {
+  Page before(server.port(), as_operator);
+  bool refused = false;
+  // Pauses grow: however slow the machine, one of them lasts longer than a request.
+  for (int i = 0; i < 100 && !refused; ++i) {
+    const std::string wrong = "/session?token=operator-" + std::to_string(1000 + i);
+    const auto status = [&](const std::string& target) {
+      return ask(server.port(), target, "localhost", {}, http::verb::get, true).result();
+    };
+    const http::status answer = status(wrong);
+    EXPECT_TRUE(i >= 8 || answer == http::status::switching_protocols) << i;
+    refused = status(as_operator) == http::status::too_many_requests;
+    EXPECT_TRUE(i >= 8 || !refused) << i;
+  }
+  EXPECT_TRUE(refused);
+  EXPECT_TRUE(Page(server.port()).accepted()) << "who gives no token guesses none";
+  before.send_text(R"({"set": {"name": "stiffness", "value": 1}})");
+  EXPECT_FALSE(before.until("state").is_null()) << "who is in stays in";
+}
+
+TEST_F(ViewerServerTest, KeepsPlacesForTheOperator) {
+  std::vector<std::unique_ptr<Page>> pages;
+  for (int i = 0; i < 16; ++i) {
+    pages.push_back(std::make_unique<Page>(server.port()));
+    ASSERT_TRUE(pages.back()->accepted()) << i;
+  }
+  EXPECT_EQ(Page(server.port()).refusal(), http::status::service_unavailable);
+  EXPECT_TRUE(Page(server.port(), as_operator).accepted());
+  EXPECT_EQ(admitted_of(server.port(), host, 20, as_operator), 4);
+}
+
+TEST_F(ViewerServerTest, GivesThePlaceOfAPageThatHasGoneToTheNext) {
+  for (int i = 0; i < 50; ++i) {
+    Page page(server.port());
+    ASSERT_TRUE(page.accepted()) << i;
+    page.send_text("no message of the protocol: the session ends");
+    while (page.read()) {
+    }
+  }
+}
+
+TEST(ViewerServer, ClosesAConnectionWhoseRequestDoesNotCome) {
+  FakeHost host;
+  const ViewerServer server({.request_timeout = 0.2}, host);
+  boost::asio::io_context context;
+  auto socket = connect_to(context, server.port());
+  boost::asio::write(socket, boost::asio::buffer(std::string("GET / HTTP/1.1\r\nHost: loc")));
+  char byte = 0;
+  boost::system::error_code error;
+  socket.read_some(boost::asio::buffer(&byte, 1), error);
+  EXPECT_TRUE(error == boost::asio::error::eof || error == boost::asio::error::connection_reset)
+      << error.message();
 }
 
 }  // namespace

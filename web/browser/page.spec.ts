@@ -191,6 +191,64 @@ describe.each([
   });
 });
 
+test("without the operator's link a page is greyed out and may hold the hand", async () => {
+  const page = await open(DESK);
+  expect(await page.locator("#role").textContent()).toBe("operator");
+  expect(await page.locator("#record").isEnabled()).toBe(true);
+  expect(await page.locator("#method-why").isHidden()).toBe(true);
+
+  const viewer = await browser.newPage({ viewport: { width: 900, height: 600 } });
+  await viewer.goto(program!.viewersUrl);
+  await drawn(viewer);
+  await expect.poll(() => viewer.locator("#role").textContent()).toBe("looking on");
+  expect(await viewer.locator("#record").isDisabled()).toBe(true);
+  expect(await viewer.locator("#record").getAttribute("title")).toContain("Only the operator");
+  await viewer.getByRole("tab", { name: "Method" }).click();
+  expect(await viewer.locator("#method-why").textContent()).toContain("looking on");
+  expect(await viewer.locator("#parameters-stiffness").isDisabled()).toBe(true);
+  expect(await viewer.locator("#method-name").isDisabled()).toBe(true);
+
+  // Whoever holds the hand sets parameters, and may make limits stricter but not looser.
+  await viewer.locator("#view").focus();
+  await viewer.keyboard.press("Space");
+  await expect.poll(() => viewer.locator("#role").textContent()).toBe("hand holder");
+  await expect.poll(() => viewer.locator("#parameters-stiffness").isEnabled()).toBe(true);
+  expect(await viewer.locator("#method-name").isDisabled()).toBe(true);
+  await viewer.getByRole("tab", { name: "Safety" }).click();
+  expect(await viewer.locator("#limits-fall_rate").isDisabled()).toBe(true);
+  const set = (value: string) =>
+    viewer.locator("#limits-max_device_force").evaluate((slider: HTMLInputElement, to) => {
+      slider.value = to;
+      slider.dispatchEvent(new Event("input"));
+    }, value);
+  const force = (seen: Page) =>
+    seen.evaluate(() => (window as any).palpate.newest().state.safety.max_device_force as number);
+  const started = await force(page);
+  await set("1000");
+  await expect.poll(() => viewer.locator("#toast").textContent()).toContain("the operator's");
+  expect(await force(page)).toBe(started);
+  await set("0");
+  await expect.poll(() => force(page)).toBeLessThan(started);
+});
+
+test("a recording ends at its limit, and the page says so", async () => {
+  const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
+  try {
+    const limits = ["--record-folder", join(folder, "made"), "--record-limit", "0.001"];
+    const page = await open([...DESK, ...limits]);
+    await page.click("#record");
+    const pressed = () => page.locator("#record").getAttribute("aria-pressed");
+    await expect.poll(pressed).toBe("true");
+    await expect
+      .poll(() => page.locator("#toast").textContent(), { timeout: 60_000 })
+      .toContain("reached 1 MB");
+    await expect.poll(pressed).toBe("false");
+    expect(readdirSync(join(folder, "made"))).toHaveLength(1);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+});
+
 test("the record button records what a replay gives again, bit for bit", async () => {
   const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
   try {

@@ -15,7 +15,8 @@ export class Program {
   static async start(options: string[], port = 0, cwd?: string): Promise<Program> {
     const program = process.env.PALPATE;
     if (!program) throw new Error("PALPATE must name the program");
-    const words = ["run", "--no-browser", "--port", String(port), ...options];
+    const token = ["--operator-token", "of-the-browser-tests"];
+    const words = ["run", "--no-browser", "--port", String(port), ...token, ...options];
     const child = spawn(program, words, { cwd });
     let said = "";
     const url = await new Promise<string>((resolve, reject) => {
@@ -27,6 +28,11 @@ export class Program {
       child.on("exit", () => reject(new Error(`the program ended: ${said}`)));
     });
     return new Program(child, url);
+  }
+
+  /** Where who only looks on, or holds the hand, finds the page. */
+  get viewersUrl(): string {
+    return new URL("/", this.url).href;
   }
 
   get port(): number {

@@ -25,12 +25,9 @@ export class Connection {
   private socket: WebSocket | null = null;
   private pause = FIRST_PAUSE;
   private heard = 0;
-  private readonly url: string;
+  private token = new URLSearchParams(location.search).get("token");
 
   constructor(private readonly handlers: Handlers) {
-    const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-    const token = new URLSearchParams(location.search).get("token");
-    this.url = `${scheme}//${location.host}/session${token ? `?token=${token}` : ""}`;
     this.open();
     setInterval(() => {
       if (this.socket && performance.now() - this.heard > SILENCE) this.drop(this.socket);
@@ -50,7 +47,9 @@ export class Connection {
   }
 
   private open(): void {
-    const socket = new WebSocket(this.url);
+    const scheme = location.protocol === "https:" ? "wss:" : "ws:";
+    const query = this.token ? `?token=${encodeURIComponent(this.token)}` : "";
+    const socket = new WebSocket(`${scheme}//${location.host}/session${query}`);
     this.socket = socket;
     this.heard = performance.now() + SILENCE; // time to get through
     socket.binaryType = "arraybuffer";
@@ -69,10 +68,19 @@ export class Connection {
 
   private take(text: string): void {
     const [[verb, what]] = Object.entries(JSON.parse(text)) as [[string, unknown]];
-    if (verb === "hello") this.handlers.hello(what as Hello);
+    if (verb === "hello") this.greet(what as Hello);
     if (verb === "state") this.handlers.state(what as State);
     if (verb === "presence") this.handlers.presence(what as Presence);
     if (verb === "error") this.handlers.refused(what as string);
+  }
+
+  private greet(hello: Hello): void {
+    if (hello.operator_token) {
+      // The address with which the program opened the page is good once.
+      this.token = hello.operator_token;
+      history.replaceState(null, "", `?token=${encodeURIComponent(this.token)}`);
+    }
+    this.handlers.hello(hello);
   }
 
   private drop(socket: WebSocket): void {

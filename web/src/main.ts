@@ -3,7 +3,7 @@ import "./style.css";
 import { Connection } from "./connection";
 import { HandInput, isForForm } from "./hand";
 import { length } from "./camera_math";
-import { Panel } from "./panel";
+import { mayOperate, Panel, roleNames } from "./panel";
 import { Plots } from "./plots";
 import { encodeHand, encodeShown, type Frame, type State, type Ticks } from "./protocol";
 import { SceneView, type Palette } from "./scene";
@@ -58,7 +58,13 @@ const connection = new Connection({
   },
   hello: (hello) => panel.introduce(hello),
   state(newest) {
+    const { ended } = newest.recording;
+    if (ended && ended !== state?.recording.ended) toast(ended, 0);
     state = newest;
+    const role = get("role");
+    role.dataset.role = newest.role;
+    role.textContent = roleNames[newest.role].name;
+    role.title = roleNames[newest.role].may;
     panel.update(newest);
     const { r_c, r_1, r_3 } = newest.parameters;
     view.setRadii({ r_c: r_c ?? 0.005, r_1: r_1 ?? 0.005, r_3: r_3 ?? 0.01 });
@@ -70,9 +76,12 @@ const connection = new Connection({
         ? `${first.uri} · ${first.rate.toFixed(0)} Hz`
         : "no camera";
     const record = get<HTMLButtonElement>("record");
-    record.disabled = !newest.recording.possible;
+    record.disabled = !newest.recording.possible || !mayOperate(newest);
     const { path, message } = newest.recording;
-    record.title = path ? `Recording ${path}; press to end (R)` : message || "Record (R)";
+    const about = path ? `Recording ${path}; press to end (R)` : message || "Record (R)";
+    record.title = mayOperate(newest)
+      ? about
+      : `${path ? `Recording ${path}. ` : ""}Only the operator's page starts and ends recordings.`;
     record.setAttribute("aria-pressed", String(newest.recording.path !== null));
   },
   presence({ hand: whose, viewers }) {
@@ -153,7 +162,8 @@ function follow(): void {
   get("follow").setAttribute("aria-pressed", String(following));
 }
 function record(): void {
-  if (state?.recording.possible) connection.ask({ record: state.recording.path === null });
+  if (state?.recording.possible && mayOperate(state))
+    connection.ask({ record: state.recording.path === null });
 }
 function help(): void {
   const dialog = get<HTMLDialogElement>("help");

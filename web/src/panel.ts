@@ -1,7 +1,49 @@
 // SPDX-License-Identifier: Apache-2.0
 // Method, parameters, safety and session: what the program says of itself, and what can be set.
 
-import type { Hello, ParameterRow, State } from "./protocol";
+import type { Hello, ParameterRow, Role, State } from "./protocol";
+
+/** What a page is called, and what it may do. */
+export const roleNames: Record<Role, { name: string; may: string }> = {
+  looking: {
+    name: "looking on",
+    may: "This page looks on. Take the hand to move it and to set the method's parameters.",
+  },
+  holding: {
+    name: "hand holder",
+    may: "This page has the hand: it sets the method's parameters and makes limits stricter.",
+  },
+  operating: { name: "operator", may: "This page operates the session: it may change everything." },
+};
+
+const OPERATORS_LINK = "the operator's link, which the program printed at its start";
+
+export function mayOperate({ role }: Pick<State, "role">): boolean {
+  return role === "operating";
+}
+
+/** May a page of this role set a safety limit, at least to a stricter value? */
+export function maySetLimit(role: Role, row: Pick<ParameterRow, "stricter">): boolean {
+  return role === "operating" || (role === "holding" && Boolean(row.stricter));
+}
+
+/** Why something is greyed out, for each part of the panel; empty: nothing is. */
+export function whyNot(role: Role): { method: string; safety: string; session: string } {
+  if (role === "operating") return { method: "", safety: "", session: "" };
+  const [who, parameters, limits] =
+    role === "holding"
+      ? ["You have the hand", "You may set the parameters", "You may make limits stricter"]
+      : [
+          "You are looking on",
+          "Hold the hand (Space) to set the parameters",
+          "Hold the hand (Space) to make limits stricter",
+        ];
+  return {
+    method: `${who}. ${parameters}. For all else, open ${OPERATORS_LINK}.`,
+    safety: `${who}. ${limits}. To loosen them, open ${OPERATORS_LINK}.`,
+    session: `${who}. To change where the hand is, open ${OPERATORS_LINK}.`,
+  };
+}
 
 /** How a unit of the table is shown: small lengths in mm, angles in degrees. */
 export function shownUnit(row: Pick<ParameterRow, "unit" | "max">): {
@@ -56,12 +98,13 @@ class Row {
   private readonly slider: HTMLInputElement;
   private readonly number: HTMLInputElement;
   private readonly root: HTMLElement;
+  private readonly back: HTMLButtonElement;
   private readonly factor: number;
   private held = 0;
 
   constructor(
     parent: HTMLElement,
-    private readonly row: ParameterRow,
+    readonly row: ParameterRow,
     prefix: string,
     private readonly set: (value: number) => void,
   ) {
@@ -78,8 +121,8 @@ class Row {
     });
     this.number = element("input", { type: "number", step: "any", title: row.meaning });
     this.number.setAttribute("aria-label", `${name}, ${unit}`);
-    const back = element("button", { className: "back", title: "back to the default" }, "↺");
-    back.setAttribute(
+    this.back = element("button", { className: "back", title: "back to the default" }, "↺");
+    this.back.setAttribute(
       "aria-label",
       `${name}: back to ${shortNumber(row.default * factor)} ${unit}`,
     );
@@ -91,7 +134,7 @@ class Row {
       "div",
       { className: "row" },
       label,
-      element("span", { className: "value" }, back, this.number, unit),
+      element("span", { className: "value" }, this.back, this.number, unit),
       this.slider,
       element("small", {}, meaning),
     );
@@ -100,7 +143,12 @@ class Row {
       this.change(valueFromSlider(row, +this.slider.value)),
     );
     this.number.addEventListener("change", () => this.change(+this.number.value / factor));
-    back.addEventListener("click", () => this.change(row.default));
+    this.back.addEventListener("click", () => this.change(row.default));
+  }
+
+  allow(allowed: boolean): void {
+    for (const input of [this.slider, this.number, this.back]) input.disabled = !allowed;
+    this.root.classList.toggle("off", !allowed);
   }
 
   show(value: number): void {
@@ -144,6 +192,7 @@ export class Panel {
   private hello: Hello | null = null;
   private safetyNow = 0;
   private safetySeen = 0;
+  private role: Role | null = null;
 
   constructor(private readonly actions: PanelActions) {
     const tabs = [...this.root.querySelectorAll<HTMLButtonElement>("[role=tab]")];
@@ -172,6 +221,7 @@ export class Panel {
 
   introduce(hello: Hello): void {
     this.hello = hello;
+    this.role = null; // rows are made anew
     this.method.replaceChildren(
       ...hello.methods.map(({ name }) =>
         element("option", { value: name }, name.replaceAll("-", " ")),
@@ -218,6 +268,7 @@ export class Panel {
     for (const [name, row] of this.rows) row.show(state.parameters[name] ?? Number.NaN);
     for (const [name, row] of this.limits) row.show(state.safety[name] ?? Number.NaN);
     for (const [name, row] of this.placement) row.show(state.placement[name] ?? Number.NaN);
+    this.showRole(state.role);
     const count = (id: string, counts: readonly number[]) =>
       [...get(id).children].forEach((item, i) => {
         item.lastElementChild!.textContent = (counts[i] ?? 0).toLocaleString("en");
@@ -230,6 +281,21 @@ export class Panel {
       `${total.toLocaleString("en")} interventions of the safety chain; suspected pop-throughs: ` +
       `${state.pop_throughs}.`;
     this.showFacts(state);
+  }
+
+  // Greys out what the page may not do, and says why.
+  private showRole(role: Role): void {
+    if (role === this.role) return;
+    this.role = role;
+    this.method.disabled = role !== "operating";
+    for (const row of this.rows.values()) row.allow(role !== "looking");
+    for (const row of this.limits.values()) row.allow(maySetLimit(role, row.row));
+    for (const row of this.placement.values()) row.allow(role === "operating");
+    for (const [part, why] of Object.entries(whyNot(role))) {
+      const text = get(`${part}-why`);
+      text.textContent = why;
+      text.hidden = !why;
+    }
   }
 
   private showFacts(state: State): void {
@@ -253,6 +319,7 @@ export class Panel {
       ["Frames overtaken", servo.frames_dropped.toLocaleString("en")],
       ["Pop-throughs", `${state.pop_throughs} suspected`],
       ["Recording", state.recording.path ?? (state.recording.message || "off")],
+      ["This page", roleNames[state.role].name],
       ["Version", this.hello?.version ?? ""],
     ];
     const list = get("facts");

@@ -203,11 +203,19 @@ export interface ParameterRow {
   max: number;
   meaning: string;
   source: string;
+  /** of a safety limit: where its strict end is; empty: it has none */
+  stricter?: "lower" | "higher" | "";
 }
+
+/** What the page may do. */
+export type Role = "looking" | "holding" | "operating";
 
 /** Sent once, on connecting. */
 export interface Hello {
   version: string;
+  role: Role;
+  /** of a page that the program has opened by itself: what it must know when it comes again */
+  operator_token?: string;
   methods: { name: string; meaning: string }[];
   parameters: ParameterRow[];
   safety: ParameterRow[];
@@ -229,6 +237,7 @@ export interface CameraState {
 
 /** Sent a few times a second. */
 export interface State {
+  role: Role;
   method: string;
   /** values of the rows, by name */
   parameters: Record<string, number>;
@@ -255,7 +264,13 @@ export interface State {
   /** how many ticks had each flag */
   flag_ticks: number[];
   pop_throughs: number;
-  recording: { possible: boolean; path: string | null; message: string };
+  recording: {
+    possible: boolean;
+    path: string | null;
+    message: string;
+    /** why the last was ended by its limits; empty: it was not */
+    ended: string;
+  };
 }
 
 /** What the page can ask for in words. */

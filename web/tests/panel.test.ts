@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 import { expect, test } from "vitest";
-import { shownUnit, shortNumber, sliderFromValue, valueFromSlider } from "../src/panel";
+import {
+  maySetLimit,
+  shownUnit,
+  shortNumber,
+  sliderFromValue,
+  valueFromSlider,
+  whyNot,
+} from "../src/panel";
 
 test("a slider's ends are the range's ends, to the bit", () => {
   for (const row of [
@@ -32,4 +39,14 @@ test("millimetres and degrees are shown, not their thousandths", () => {
   expect(shownUnit({ unit: "-", max: 1 }).unit).toBe("");
   expect(shownUnit({ unit: "N/m", max: 1e5 })).toEqual({ unit: "N/m", factor: 1 });
   expect(shortNumber(5.0000000001)).toBe("5");
+});
+
+test("each role may set what the program lets it set, and is told why not the rest", () => {
+  expect(maySetLimit("looking", { stricter: "lower" })).toBe(false);
+  expect(maySetLimit("holding", { stricter: "lower" })).toBe(true);
+  expect(maySetLimit("holding", { stricter: "" })).toBe(false);
+  expect(maySetLimit("operating", { stricter: "" })).toBe(true);
+  expect(Object.values(whyNot("operating")).join("")).toBe("");
+  for (const role of ["looking", "holding"] as const)
+    for (const why of Object.values(whyNot(role))) expect(why).toContain("operator's link");
 });

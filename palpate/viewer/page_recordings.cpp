@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/viewer/page_recordings.hpp"
+
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+// Named after the time, and in `folder` the first of that name.
+std::filesystem::path new_folder(const std::filesystem::path& folder) {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  localtime_r(&now, &local);
+  std::array<char, 64> name{};
+  std::strftime(name.data(), name.size(), "palpate_%Y-%m-%d_%H-%M-%S", &local);
+  std::filesystem::path made = folder / name.data();
+  std::error_code unused;
+  for (int i = 2; std::filesystem::exists(made, unused); ++i)
+    made = folder / (name.data() + ("_" + std::to_string(i)));
+  return made;
+}
+
+double size_of(const std::filesystem::path& folder) {
+  double size = 0.0;
+  std::error_code error;
+  std::filesystem::directory_iterator file(folder, error);
+  for (; !error && file != std::filesystem::directory_iterator(); file.increment(error)) {
+    std::error_code gone;
+    const std::uintmax_t bytes = file->file_size(gone);
+    if (!gone) size += static_cast<double>(bytes);
+  }
+  return size;
+}
+
+std::string size_text(double bytes) {
+  const auto [unit, name] = bytes >= 1e9   ? std::pair(1e9, "GB")
+                            : bytes >= 1e6 ? std::pair(1e6, "MB")
+                                           : std::pair(1e3, "kB");
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.4g %s", bytes / unit, name);
+  return text.data();
+}
+
+}  // namespace
+
+PageRecordings::PageRecordings(Session& session, RecordingRules rules)
+    : session_(session), rules_(std::move(rules)), thread_([this] { watch(); }) {}
+
+PageRecordings::~PageRecordings() {
+  {
+    const std::lock_guard lock(mutex_);
+    ends_ = true;
+  }
+  wakes_.notify_all();
+  thread_.join();
+}
+
+void PageRecordings::start() {
+  if (session_.state().recording.on) return;
+  if (!rules_.folder.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(rules_.folder, error);
+    if (error)
+      throw Error("--record-folder " + rules_.folder.string(), error.message(),
+                  "give a folder that can be written to");
+  }
+  const std::string reason = reason_to_end();
+  if (!reason.empty()) throw Error("recording", reason, "make room, or start another session");
+  const std::filesystem::path folder = new_folder(rules_.folder);
+  session_.start_recording(folder.string());
+  {
+    const std::lock_guard lock(mutex_);
+    folders_.push_back(folder);
+    ended_.clear();
+    watching_ = true;
+  }
+  wakes_.notify_all();
+}
+
+void PageRecordings::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    watching_ = false;
+  }
+  session_.stop_recording();
+}
+
+std::string PageRecordings::ended() const {
+  const std::lock_guard lock(mutex_);
+  return ended_;
+}
+
+void PageRecordings::watch() {
+  const std::chrono::duration<double> interval(rules_.interval);
+  std::unique_lock lock(mutex_);
+  while (!ends_) {
+    if (!watching_) {
+      wakes_.wait(lock, [this] { return ends_ || watching_; });
+      continue;
+    }
+    lock.unlock();
+    const std::string reason = reason_to_end();
+    if (!reason.empty()) session_.stop_recording();
+    lock.lock();
+    if (!reason.empty()) {
+      ended_ = "the recording was ended: " + reason;
+      watching_ = false;
+    }
+    wakes_.wait_for(lock, interval, [this] { return ends_; });
+  }
+}
+
+std::string PageRecordings::reason_to_end() const {
+  if (recorded() >= rules_.limit)
+    return "the page's recordings have reached " + size_text(rules_.limit) + " (--record-limit)";
+  std::error_code error;
+  const std::filesystem::space_info space =
+      std::filesystem::space(rules_.folder.empty() ? "." : rules_.folder, error);
+  if (!error && static_cast<double>(space.available) < rules_.keep_free)
+    return "less than " + size_text(rules_.keep_free) + " is free on the disk";
+  return {};
+}
+
+double PageRecordings::recorded() const {
+  std::vector<std::filesystem::path> folders;
+  {
+    const std::lock_guard lock(mutex_);
+    folders = folders_;
+  }
+  double size = 0.0;
+  for (const auto& folder : folders) size += size_of(folder);
+  return size;
+}
+
+}  // namespace palpate

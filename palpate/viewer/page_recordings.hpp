@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <condition_variable>
+#include <filesystem>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "palpate/session/session.hpp"
+
+namespace palpate {
+
+/// Where recordings go that a page starts, and how large they may grow.
+struct RecordingRules {
+  std::filesystem::path folder = {};  ///< made when it is needed; empty: the current one
+  double limit = 20e9;                ///< [bytes] of all that pages record in a session
+  double keep_free = 1e9;             ///< [bytes] left free on the disk
+  double interval = 0.5;              ///< [s] between two looks at the sizes
+};
+
+/// The recordings that pages start: in one folder, under names made here, ended in time.
+///
+/// A thread of its own looks at the sizes while a recording is on, as a disk may be slow.
+class PageRecordings {
+ public:
+  /// @param session  must outlive this
+  PageRecordings(Session& session, RecordingRules rules);
+  ~PageRecordings();
+  PageRecordings(const PageRecordings&) = delete;
+  PageRecordings& operator=(const PageRecordings&) = delete;
+
+  /// Begins a recording, unless one is on. @throws Error if the limit is reached, the disk is
+  /// nearly full or the folder cannot be made.
+  void start();
+  void stop();
+  /// Why the last one was ended by its limits; empty if it was not. Any thread.
+  [[nodiscard]] std::string ended() const;
+
+ private:
+  void watch();
+  [[nodiscard]] std::string reason_to_end() const;  // empty: none
+  [[nodiscard]] double recorded() const;            // [bytes]
+
+  Session& session_;
+  const RecordingRules rules_;
+  mutable std::mutex mutex_;
+  std::condition_variable wakes_;
+  std::vector<std::filesystem::path> folders_;  // guarded by mutex_: of all that were begun
+  std::string ended_;                           // guarded by mutex_
+  bool watching_ = false;                       // guarded by mutex_
+  bool ends_ = false;                           // guarded by mutex_
+  std::thread thread_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/viewer/roles.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr const char* operator_remedy = "open the operator's link, which the program printed";
+
+struct Direction {
+  std::string_view limit;
+  Stricter stricter;
+};
+
+// Limits that are not here have no strict end: a short `continuous_time`, say, heats the motors
+// sooner and lets them cool sooner, and a low `fall_rate` keeps a force for longer.
+constexpr std::array directions = {
+    Direction{"max_device_force", Stricter::lower}, Direction{"rise_rate", Stricter::lower},
+    Direction{"engage_force", Stricter::lower},     Direction{"engage_ticks", Stricter::higher},
+    Direction{"ramp_time", Stricter::higher},       Direction{"late_intervals", Stricter::lower},
+    Direction{"fade_age", Stricter::lower},         Direction{"lost_age", Stricter::lower},
+    Direction{"future_tolerance", Stricter::lower}, Direction{"max_speed", Stricter::lower},
+    Direction{"stall_time", Stricter::lower},
+};
+
+const SafetyParameterInfo& row_of(std::string_view name) {
+  const auto table = safety_parameter_table();
+  const auto row = std::find_if(table.begin(), table.end(),
+                                [&](const SafetyParameterInfo& r) { return r.name == name; });
+  if (row != table.end()) return *row;
+  SafetyParameters unused;
+  set_parameter(unused, name, 0.0);  // says that there is none, and which is near
+  throw Error("safety parameter '" + std::string(name) + "'", "there is none of that name");
+}
+
+bool is_looser(Stricter stricter, double value, double bound) {
+  return stricter == Stricter::lower ? value > bound : value < bound;
+}
+
+std::string amount(const SafetyParameterInfo& row, double value) {
+  return number_text(value) + (row.unit == "-" ? "" : " " + std::string(row.unit));
+}
+
+}  // namespace
+
+std::string_view to_string(Role role) {
+  constexpr std::array<std::string_view, 3> names = {"looking", "holding", "operating"};
+  return names[static_cast<std::size_t>(role)];
+}
+
+void check_allowed(const Command& command, Role role) {
+  if (role == Role::operating) return;
+  if (std::holds_alternative<SetMethod>(command))
+    throw Error("method", "only the operator changes it", operator_remedy);
+  if (std::holds_alternative<SetRecording>(command))
+    throw Error("recording", "only the operator starts and ends it", operator_remedy);
+  if (std::holds_alternative<SetPlacement>(command))
+    throw Error("placement", "only the operator changes it", operator_remedy);
+  if (role == Role::holding) return;
+  const std::string remedy = "take the hand, or " + std::string(operator_remedy);
+  if (std::holds_alternative<ResetHand>(command))
+    throw Error("hand", "only the page that has it resets it", "take the hand");
+  if (std::holds_alternative<SetSafetyParameter>(command))
+    throw Error("safety limit", "a page that looks on does not change it", remedy);
+  throw Error("parameter", "a page that looks on does not change it", remedy);
+}
+
+Stricter stricter_direction(std::string_view limit) {
+  const auto* row = std::find_if(directions.begin(), directions.end(),
+                                 [&](const Direction& d) { return d.limit == limit; });
+  return row == directions.end() ? Stricter::neither : row->stricter;
+}
+
+LimitBounds::LimitBounds(const SafetyParameters& start,
+                         const std::map<std::string, double>& loosest)
+    : operators_(start), loosest_(loosest) {
+  for (const auto& [name, value] : loosest) {
+    SafetyParameters checked;
+    set_parameter(checked, name, value);
+    if (stricter_direction(name) == Stricter::neither)
+      throw Error("--operator-limit " + name, "that limit has no strict end",
+                  "give one such as max_device_force or max_speed");
+  }
+}
+
+void LimitBounds::check(std::string_view name, double value, Role role) const {
+  const SafetyParameterInfo& row = row_of(name);
+  const Stricter stricter = stricter_direction(name);
+  const std::string subject = "limit '" + std::string(name) + "'";
+  const std::string end = stricter == Stricter::lower ? "above" : "below";
+  if (role == Role::operating) {
+    const auto bound = loosest_.find(std::string(name));
+    if (bound != loosest_.end() && is_looser(stricter, value, bound->second))
+      throw Error(subject,
+                  amount(row, value) + " is " + end + " the " + amount(row, bound->second) +
+                      " of --operator-limit",
+                  "start the session with another");
+    return;
+  }
+  if (role == Role::looking)
+    throw Error(subject, "a page that looks on does not change it", "take the hand");
+  if (stricter == Stricter::neither)
+    throw Error(subject, "only the operator changes it", operator_remedy);
+  if (!is_looser(stricter, value, row.get(operators_))) return;
+  throw Error(
+      subject,
+      amount(row, value) + " is " + end + " the operator's " + amount(row, row.get(operators_)),
+      operator_remedy);
+}
+
+void LimitBounds::set_by_operator(std::string_view name, double value) {
+  row_of(name).set(operators_, value);
+}
+
+}  // namespace palpate

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "palpate/devices/mouse_device.hpp"
+#include "palpate/viewer/session_host.hpp"
+
+#include "tests/session/fakes.hpp"
+#include "tests/support/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+using test::fails_saying;
+
+SessionOptions wall_options(const std::string& device) {
+  SessionOptions options;
+  options.cameras.push_back({.uri = "wall:"});
+  options.sources.add({"wall", "", [](const Uri&) { return test::wall_source(); }});
+  options.device_uri = device;
+  options.pace = Pace::free_running;
+  return options;
+}
+
+// Pages' view of a session on a wall.
+struct Hosted {
+  explicit Hosted(PageRules rules = {}, const std::string& device = "mouse:")
+      : host("1.2.3", std::move(rules)), session(wall_options(device)) {
+    host.attach(session);
+  }
+  ~Hosted() { host.detach(); }
+  Hosted(const Hosted&) = delete;
+  Hosted& operator=(const Hosted&) = delete;
+
+  json state() { return json::parse(host.state()); }
+  auto asking(const Command& command, Role role) {
+    return [this, command, role] { host.command(command, role); };
+  }
+
+  SessionHost host;
+  Session session;
+};
+
+TEST(SessionHost, HoldsLimitsToWhatTheSessionWasStartedWith) {
+  Hosted hosted;
+  const auto force = [](double newtons) { return SetSafetyParameter{"max_device_force", newtons}; };
+  const json before = hosted.state();
+  ASSERT_EQ(before["safety"]["max_device_force"], 3.3);
+  EXPECT_TRUE(fails_saying(hosted.asking(force(50.0), Role::holding), "3.3 N"));
+  EXPECT_TRUE(
+      fails_saying(hosted.asking(SetSafetyParameter{"rise_rate", 1e5}, Role::holding), "500 N/s"));
+  EXPECT_TRUE(
+      fails_saying(hosted.asking(SetSafetyParameter{"fall_rate", 1.0}, Role::holding), "operator"));
+  EXPECT_EQ(hosted.state()["safety"], before["safety"]) << "what is refused changes nothing";
+
+  hosted.host.command(force(1.0), Role::holding);
+  EXPECT_EQ(hosted.state()["safety"]["max_device_force"], 1.0);
+  hosted.host.command(force(3.3), Role::holding);  // back to what the operator allows
+  hosted.host.command(force(2.0), Role::operating);
+  EXPECT_TRUE(fails_saying(hosted.asking(force(3.3), Role::holding), "2 N"));
+  hosted.host.command(force(5.0), Role::operating);
+  hosted.host.command(force(4.5), Role::holding);
+  EXPECT_EQ(hosted.state()["safety"]["max_device_force"], 4.5);
+  // A value that the session refuses is no new bound either.
+  EXPECT_TRUE(fails_saying(hosted.asking(force(1e9), Role::operating), "max_device_force"));
+  EXPECT_TRUE(fails_saying(hosted.asking(force(5.1), Role::holding), "5 N"));
+}
+
+TEST(SessionHost, HoldsTheOperatorToTheSessionsOptions) {
+  Hosted hosted({.operator_limits = {{"max_device_force", 4.0}}});
+  const auto force = [](double newtons) { return SetSafetyParameter{"max_device_force", newtons}; };
+  EXPECT_TRUE(fails_saying(hosted.asking(force(4.5), Role::operating), "--operator-limit"));
+  hosted.host.command(force(4.0), Role::operating);
+  EXPECT_EQ(hosted.state()["safety"]["max_device_force"], 4.0);
+}
+
+TEST(SessionHost, SaysInWhichDirectionLimitsAreStricter) {
+  Hosted hosted;
+  for (const json& row : json::parse(hosted.host.hello())["safety"]) {
+    if (row["name"] == "max_device_force") {
+      EXPECT_EQ(row["stricter"], "lower");
+    } else if (row["name"] == "ramp_time") {
+      EXPECT_EQ(row["stricter"], "higher");
+    } else if (row["name"] == "fall_rate") {
+      EXPECT_EQ(row["stricter"], "");
+    }
+  }
+}
+
+TEST(SessionHost, TakesAHandOnlyForTheMouse) {
+  EXPECT_TRUE(Hosted().host.takes_hand());
+  EXPECT_FALSE(Hosted({}, "hand:").host.takes_hand());
+}
+
+TEST(SessionHost, RecordsIntoItsFolderUnderNamesOfItsOwn) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path made = folder.path() / "made" / "here";
+  Hosted hosted({.recordings = {.folder = made}});
+  std::vector<std::string> paths;
+  for (int i = 0; i < 3; ++i) {
+    hosted.host.command(SetRecording{true}, Role::operating);
+    hosted.host.command(SetRecording{true}, Role::operating);  // it is on
+    paths.push_back(hosted.state()["recording"]["path"]);
+    EXPECT_EQ(std::filesystem::path(paths.back()).parent_path(), made);
+    hosted.host.command(SetRecording{false}, Role::operating);
+    EXPECT_EQ(hosted.state()["recording"]["path"], nullptr);
+  }
+  EXPECT_NE(paths[0], paths[1]);
+  EXPECT_NE(paths[1], paths[2]);
+  EXPECT_EQ(hosted.host.recording_ended(), "");
+}
+
+TEST(SessionHost, EndsARecordingAtItsLimitAndStartsNoOther) {
+  const test::TemporaryFolder folder;
+  Hosted hosted({.recordings = {.folder = folder.path(), .limit = 1000.0, .interval = 0.01}});
+  hosted.host.command(SetRecording{true}, Role::operating);
+  // The file alone is larger. Its end comes from a thread; a minute is for hanging tests.
+  for (int i = 0; i < 6000 && hosted.host.recording_ended().empty(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_NE(hosted.host.recording_ended().find("--record-limit"), std::string::npos);
+  const json recording = hosted.state()["recording"];
+  EXPECT_EQ(recording["path"], nullptr);
+  EXPECT_EQ(recording["ended"], hosted.host.recording_ended());
+  EXPECT_TRUE(fails_saying(hosted.asking(SetRecording{true}, Role::operating), "1 kB"));
+}
+
+TEST(SessionHost, LeavesTheDiskItsFreeSpace) {
+  const test::TemporaryFolder folder;
+  Hosted hosted({.recordings = {.folder = folder.path() / "made", .keep_free = 1e30}});
+  EXPECT_TRUE(fails_saying(hosted.asking(SetRecording{true}, Role::operating), "free"));
+  EXPECT_EQ(hosted.state()["recording"]["path"], nullptr);
+}
+
+TEST(SessionHost, SaysThatARecordingFolderCannotBeMade) {
+  const test::TemporaryFolder folder;
+  const auto file = folder.write("file", "");
+  Hosted hosted({.recordings = {.folder = file / "below"}});
+  EXPECT_TRUE(
+      fails_saying(hosted.asking(SetRecording{true}, Role::operating), "--record-folder", "file"));
+}
+
+}  // namespace
+}  // namespace palpate

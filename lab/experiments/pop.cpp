@@ -22,11 +22,23 @@ constexpr double patience = 0.5;  // [s] behind for longer than this is lost
 constexpr double noticed =
     0.3;  // [N] largest change of force by an occluder that counts as unnoticed
 
+// The two-sided rules, docs/pop.md.
+constexpr double clear_space = 6.0;   // [r_c] a hand this far from all that is feels nothing
+constexpr double felt = 0.01;         // [N] a force that counts there
+constexpr double firm = 1.0;          // [N] the ruler's force from which a hand must feel something
+constexpr double least_share = 0.25;  // [-] of it, or the hand is numb
+constexpr double least_wrong = 0.05;  // [N] a force that has a direction
+constexpr double wrong_cosine = -0.5;  // [-] between a force and the ruler's: on the wrong side
+
 struct Outcome {
   bool lost = false;
-  int dips = 0;         // times that it was behind for more than a frame, and came back
-  double step = 0.0;    // [N] largest change of the force in a tick, from contact on
-  double change = 0.0;  // [N] between the largest and the smallest force while nothing moves
+  bool ghost = false;        // a force in free space
+  bool numb = false;         // nearly no force for long where the ruler has one
+  bool wrong = false;        // a force against the ruler's for more than a frame
+  double worst_ghost = 0.0;  // [N]
+  int dips = 0;              // times that it was behind for more than a frame, and came back
+  double step = 0.0;         // [N] largest change of the force in a tick, from contact on
+  double change = 0.0;       // [N] between the largest and the smallest force while nothing moves
   double caused = 0.0;  // [N] of it, by what passes: largest difference from the same without it
 };
 
@@ -62,6 +74,8 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
       compare && stage.undisturbed ? forces_of(method_name, *stage.undisturbed, parameters)
                                    : std::vector<double>();
   std::size_t ticks = 0;
+  int numb = 0;
+  int wrong = 0;
   const double frame = stage.scenario.tick_rate / stage.scenario.frame_rate;
   play(*method, stage.scenario, [&](const Tick& tick) {
     const Tick truly = ruler->tick(tick.hip, tick.t);
@@ -75,6 +89,19 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
       behind = 0;
     }
     const double force = tick.force.norm();
+    const double clear = clear_space * parameters.proxy.r_c();
+    const double true_force = truly.force.norm();
+    if (force > felt && true_force == 0.0 && stage.truth(tick.hip, tick.t).distance > clear &&
+        stage.truth(tick.hip, *stage.shown).distance > clear) {
+      outcome.ghost = true;
+      outcome.worst_ghost = std::max(outcome.worst_ghost, force);
+    }
+    numb = true_force > firm && force < least_share * true_force ? numb + 1 : 0;
+    outcome.numb = outcome.numb || numb > patience * stage.scenario.tick_rate;
+    const bool opposed = force > least_wrong && true_force > least_wrong &&
+                         tick.force.dot(truly.force) < wrong_cosine * force * true_force;
+    wrong = opposed ? wrong + 1 : 0;
+    outcome.wrong = outcome.wrong || wrong > frame;
     if (touched) outcome.step = std::max(outcome.step, std::abs(force - last_force));
     touched = touched || truly.state != ContactState::free_motion;
     last_force = force;
@@ -153,6 +180,12 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
   double change = 0.0;
   double caused = 0.0;
   int noticeable = 0;
+  int ghosts = 0;
+  int numb = 0;
+  int wrong = 0;
+  int right = 0;
+  double worst_ghost = 0.0;
+  std::string first_not_right = "-";
   std::string first = "-";
   std::string simplest = "-";
   for (int i = from; i < from + count; ++i) {
@@ -163,6 +196,13 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
       simplest = shrink(method, c, parameters).text();
     }
     lost += outcome.lost ? 1 : 0;
+    ghosts += outcome.ghost ? 1 : 0;
+    numb += outcome.numb ? 1 : 0;
+    wrong += outcome.wrong ? 1 : 0;
+    worst_ghost = std::max(worst_ghost, outcome.worst_ghost);
+    const bool all_right = !(outcome.lost || outcome.ghost || outcome.numb || outcome.wrong);
+    right += all_right ? 1 : 0;
+    if (!all_right && !outcome.lost && first_not_right == "-") first_not_right = c.text();
     dipped += !outcome.lost && outcome.dips > 0 ? 1 : 0;
     if (!outcome.lost) {
       step = std::max(step, outcome.step);
@@ -184,6 +224,12 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
       .add(noticeable)
       .add(first)
       .add(simplest)
+      .add(ghosts)
+      .add(numb)
+      .add(wrong)
+      .add(right)
+      .add(worst_ghost)
+      .add(first_not_right)
       .done();
 }
 
@@ -255,7 +301,13 @@ struct Sum {
   double change = 0.0;
   double caused = 0.0;
   double noticeable = 0.0;
+  double ghost = 0.0;
+  double numb = 0.0;
+  double wrong = 0.0;
+  double right = 0.0;
+  double worst_ghost = 0.0;
   std::string simplest;
+  std::string not_right;
 };
 
 Scores pop_scores(const Table& table) {
@@ -277,6 +329,13 @@ Scores pop_scores(const Table& table) {
     sum.change = std::max(sum.change, table.number(row, "worst_change_n"));
     sum.caused = std::max(sum.caused, table.number(row, "worst_caused_n"));
     sum.noticeable += table.number(row, "noticeable");
+    sum.ghost += table.number(row, "ghost");
+    sum.numb += table.number(row, "numb");
+    sum.wrong += table.number(row, "wrong");
+    sum.right += table.number(row, "right");
+    sum.worst_ghost = std::max(sum.worst_ghost, table.number(row, "worst_ghost_n"));
+    if (sum.not_right.empty() && table.text(row, "first_not_right") != "-")
+      sum.not_right = table.text(row, "first_not_right");
     if (sum.simplest.empty() && table.text(row, "simplest") != "-")
       sum.simplest = table.text(row, "simplest");
   }
@@ -285,10 +344,13 @@ Scores pop_scores(const Table& table) {
   for (const std::string& method : methods) {
     scores.columns.push_back(method + " held [%]");
     scores.columns.push_back("dips [%]");
+    scores.columns.push_back("right [%]");
   }
   std::vector<double> held(methods.size(), 0.0);
+  std::vector<double> right(methods.size(), 0.0);
   scores.note =
-      "The score is the mean over the families of the share held; docs/pop.md has the rules.";
+      "The score is the mean over the families of the share held, and of the share right: held, "
+      "no force in free space, none on the wrong side, and not numb. docs/pop.md has the rules.";
   for (const std::string& family : families) {
     std::vector<std::string> line = {family};
     for (std::size_t m = 0; m < methods.size(); ++m) {
@@ -296,7 +358,15 @@ Scores pop_scores(const Table& table) {
       if (m == 0) line.push_back(fmt::format("{:g}", sum.cases));
       line.push_back(percent_held(sum.cases - sum.lost, sum.cases));
       line.push_back(fmt::format("{:.1f}", 100.0 * sum.dipped / sum.cases));
+      line.push_back(percent_held(sum.right, sum.cases));
       held[m] += (sum.cases - sum.lost) / sum.cases;
+      right[m] += sum.right / sum.cases;
+      if (sum.ghost + sum.numb + sum.wrong > 0.0)
+        scores.note += fmt::format(
+            "\n{}, {}: of {:g} cases {:g} with a force in free space (up to {:.2f} N), {:g} numb, "
+            "{:g} with a force on the wrong side; palpate eval pop --methods {} --case '{}'",
+            methods[m], family, sum.cases, sum.ghost, sum.worst_ghost, sum.numb, sum.wrong,
+            methods[m], sum.not_right);
       if (!sum.simplest.empty())
         scores.note +=
             fmt::format("\npalpate eval pop --methods {} --case '{}'", methods[m], sum.simplest);
@@ -309,9 +379,11 @@ Scores pop_scores(const Table& table) {
     scores.rows.push_back(std::move(line));
   }
   std::vector<std::string> line = {"score", ""};
-  for (const double sum : held) {
-    line.push_back(percent_held(sum, static_cast<double>(families.size())));
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    const auto count = static_cast<double>(families.size());
+    line.push_back(percent_held(held[m], count));
     line.emplace_back("");
+    line.push_back(percent_held(right[m], count));
   }
   scores.rows.push_back(std::move(line));
   return scores;
@@ -338,7 +410,7 @@ Experiment pop_experiment() {
   return {"pop",
           "is the surface ever lost? families of cases drawn by chance, failures shrunk",
           "method,family,from,cases,lost,dipped,worst_step_n,worst_change_n,worst_caused_n,"
-          "noticeable,first_lost,simplest",
+          "noticeable,first_lost,simplest,ghost,numb,wrong,right,worst_ghost_n,first_not_right",
           {"paper", "sight"},
           false,
           pop_cells,

@@ -486,6 +486,87 @@ PopStage random_scene(const PopCase& c, const Parameters& /*parameters*/) {
                   2.4);
 }
 
+// A hand comes down, presses, slides and is lifted far away, over a body at rest.
+struct Stroke {
+  double x = 0.0, y = 0.0;   // [m] where it comes down
+  double heading = 0.0;      // [rad]
+  double slide = 0.0;        // [m]
+  double press = 0.01;       // [m] below the surface
+  double speed = 0.3;        // [m/s] down and up
+  double slide_speed = 0.1;  // [m/s]
+  double wait = 0.1;         // [s] before it comes down
+  double hold = 0.2;         // [s] pressed, before and after the slide
+};
+
+PopStage press_slide_lift(const PopCase& c, const std::shared_ptr<const Scene>& scene,
+                          const Stroke& stroke) {
+  constexpr double from = 0.07;  // [m] above the surface
+  constexpr double to = 0.09;
+  constexpr double free_for = 0.5;  // [s] after it was lifted
+  const double down = stroke.wait + (from + stroke.press) / stroke.speed;
+  const double slide_from = down + stroke.hold;
+  const double slide_to = slide_from + stroke.slide / stroke.slide_speed;
+  const double up_from = slide_to + stroke.hold;
+  const double up_to = up_from + (to + stroke.press) / stroke.speed;
+  const auto height = seen_from_above(scene);
+  const auto hip = [=](double t) {
+    const double way =
+        stroke.slide * std::clamp((t - slide_from) / (slide_to - slide_from + 1e-9), 0.0, 1.0);
+    const double x = stroke.x + way * std::cos(stroke.heading);
+    const double y = stroke.y + way * std::sin(stroke.heading);
+    const double above =
+        t < up_from ? std::max(from - stroke.speed * std::max(t - stroke.wait, 0.0), -stroke.press)
+                    : std::min(stroke.speed * (t - up_from) - stroke.press, to);
+    return Vec3(x, y, height(x, y, 0.0) + above);
+  };
+  PopStage stage = in_sight(c, scene, height, {.x = stroke.x, .y = stroke.y}, up_to + free_for);
+  stage.seat = hip(0.0);
+  stage.scenario.hip = hip;
+  return stage;
+}
+
+// All round: near and far, steep, on bodies of any shape, quick and slow.
+constexpr std::array lift_off_ranges = {sensor_range,
+                                        PopRange{"tilt", 0.0, 0.0, 1.05, even, 1.2},
+                                        PopRange{"distance", 0.7, 0.4, 1.5, even, 5.0},
+                                        PopRange{"fps", 30.0, 30.0, 30.0, even, 1000.0},
+                                        PopRange{"body", 0.0, 0.0, 3.0, whole},
+                                        PopRange{"press", 0.01, 0.004, 0.025, even, 0.1},
+                                        PopRange{"speed", 0.3, 0.05, 0.6, by_factor, 5.0},
+                                        PopRange{"slide", 0.0, 0.0, 0.03, even, 0.1},
+                                        PopRange{"slide_speed", 0.1, 0.02, 0.3, by_factor, 5.0},
+                                        PopRange{"heading", 0.0, 0.0, 6.28, even, 6.3},
+                                        PopRange{"x", 0.0, -0.008, 0.008, even, 0.1},
+                                        PopRange{"y", 0.0, -0.008, 0.008, even, 0.1}};
+PopStage lift_off(const PopCase& c, const Parameters& /*parameters*/) {
+  constexpr std::array bodies = {"synthetic:plane", "synthetic:sphere?radius=0.06&floor=0.25",
+                                 "synthetic:wedge?edge=convex", "synthetic:wedge?edge=concave"};
+  return press_slide_lift(c, scene_of(bodies[static_cast<std::size_t>(c["body"])]),
+                          {.x = c["x"],
+                           .y = c["y"],
+                           .heading = c["heading"],
+                           .slide = c["slide"],
+                           .press = c["press"],
+                           .speed = c["speed"],
+                           .slide_speed = c["slide_speed"]});
+}
+
+// Every frame arrives late by the same time, and the next may be far.
+constexpr std::array late_ranges = {sensor_range,
+                                    tilt_range,
+                                    distance_range,
+                                    PopRange{"fps", 30.0, 5.0, 90.0, by_factor, 1000.0},
+                                    PopRange{"latency", 0.0, 0.0, 0.5, even, 5.0},
+                                    PopRange{"press", 0.01, 0.004, 0.025, even, 0.1}};
+PopStage late(const PopCase& c, const Parameters& /*parameters*/) {
+  const double latency = c["latency"];
+  PopStage stage =
+      press_slide_lift(c, scene_of("synthetic:plane"),
+                       {.press = c["press"], .wait = latency + 2.0 / c["fps"] + 0.1, .hold = 0.5});
+  stage.scenario.delay = [latency](std::uint64_t) -> std::optional<double> { return latency; };
+  return stage;
+}
+
 constexpr std::array families = {
     PopFamily{"lift-white", "5.2 with up to 18 000 r_c/s^2 and 2 r_c of white noise",
               lift_white_ranges, lift_white},
@@ -511,7 +592,10 @@ constexpr std::array families = {
     PopFamily{"hole", "over a hole that the sphere does not fit into", hole_ranges, hole},
     PopFamily{"layers", "a terrace that goes up and down over a plane", layers_ranges, layers},
     PopFamily{"stream", "a moving plane, frames dropped and late", stream_ranges, stream},
-    PopFamily{"random", "one to four bodies of any kind that move", random_ranges, random_scene}};
+    PopFamily{"random", "one to four bodies of any kind that move", random_ranges, random_scene},
+    PopFamily{"lift-off", "a hand presses, slides and is lifted over bodies at rest",
+              lift_off_ranges, lift_off},
+    PopFamily{"late", "slow and late cameras, a plane at rest", late_ranges, late}};
 
 // Rounded to three digits, so that the printed case is exactly the one that was played.
 double rounded(double value) {

@@ -40,7 +40,7 @@ constexpr std::size_t index_of(int x, int y) {
 }
 
 struct FloatMoments {
-  float points, s[15], z[6], zz;
+  float s[15], z[6];
 };
 
 struct Rows {
@@ -51,12 +51,11 @@ PALPATE_VECTORISED
 FloatMoments sum_moments(const float* px, const float* py, const float* pz, std::size_t size,
                          const Rows rows, const float* c, float centre_x, float centre_y,
                          float inner_squared, float outer_squared, float inverse_cut) {
-  float points = 0.0F;
   float s0 = 0.0F, s1 = 0.0F, s2 = 0.0F, s3 = 0.0F, s4 = 0.0F, s5 = 0.0F, s6 = 0.0F, s7 = 0.0F,
         s8 = 0.0F, s9 = 0.0F, s10 = 0.0F, s11 = 0.0F, s12 = 0.0F, s13 = 0.0F, s14 = 0.0F;
-  float z0 = 0.0F, z1 = 0.0F, z2 = 0.0F, z3 = 0.0F, z4 = 0.0F, z5 = 0.0F, zz = 0.0F;
-#pragma omp simd reduction(+ : points, s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, \
-                               s14, z0, z1, z2, z3, z4, z5, zz)
+  float z0 = 0.0F, z1 = 0.0F, z2 = 0.0F, z3 = 0.0F, z4 = 0.0F, z5 = 0.0F;
+#pragma omp simd reduction(+ : s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, \
+                               s14, z0, z1, z2, z3, z4, z5)
   for (std::size_t i = 0; i < size / Patch::block * Patch::block; ++i) {
     float x = rows.x[0] * px[i] + rows.x[1] * py[i] + rows.x[2] * pz[i] + rows.offset[0];
     float y = rows.y[0] * px[i] + rows.y[1] * py[i] + rows.y[2] * pz[i] + rows.offset[1];
@@ -78,7 +77,6 @@ FloatMoments sum_moments(const float* px, const float* py, const float* pz, std:
     t = t * t;
     t = t < 1.0F ? 1.0F - t : 0.0F;
     const float w = in_disc * t * t;  // Tukey's biweight
-    points += in_disc;
     const float wx = w * x;
     const float wy = w * y;
     const float wxx = w * xx;
@@ -105,12 +103,9 @@ FloatMoments sum_moments(const float* px, const float* py, const float* pz, std:
     z3 += wxx * r;
     z4 += wxy * r;
     z5 += wyy * r;
-    zz += w * r * r;
   }
-  return {points,
-          {s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, s14},
-          {z0, z1, z2, z3, z4, z5},
-          zz};
+  return {{s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, s14},
+          {z0, z1, z2, z3, z4, z5}};
 }
 
 // The frame's axes in `unit`s [m]: local = rows * p + offset, for points relative to `centre`.
@@ -237,10 +232,8 @@ Vec2 Quadric::nearest(const Vec3& point, const Vec2& start, const Vec2& centre,
 }
 
 void Moments::add(const Moments& other) noexcept {
-  points += other.points;
   for (std::size_t i = 0; i < xy.size(); ++i) xy[i] += other.xy[i];
   for (std::size_t i = 0; i < z.size(); ++i) z[i] += other.z[i];
-  zz += other.zz;
 }
 
 Eigen::Matrix<double, 6, 6> Moments::normal_matrix() const noexcept {
@@ -261,7 +254,6 @@ Vec6 Moments::right_side() const noexcept {
 void Moments::raise(const Quadric& surface) noexcept {
   const Vec6 c = in_units(surface.c);
   const Vec6 ac = normal_matrix() * c;
-  zz += 2.0 * c.dot(right_side()) + c.dot(ac);
   Eigen::Map<Vec6>(z.data()) += ac;
 }
 
@@ -289,12 +281,10 @@ Moments Moments::moved(const Vec3& shift) const noexcept {
     return total;
   };
   Moments result;
-  result.points = points;
   for (std::size_t k = 0; k < xy.size(); ++k) result.xy[k] = expand(xy, k);
   for (std::size_t k = 0; k < z.size(); ++k) {
     result.z[k] = expand(z, k) - s.z() * result.xy[k];
   }
-  result.zz = zz - 2.0 * s.z() * z[0] + s.z() * s.z() * xy[0];
   return result;
 }
 
@@ -311,10 +301,8 @@ Moments disc_moments(const Patch& patch, const LocalFrame& frame, const Quadric&
                   static_cast<float>(disc.centre.y() * per_metre), squared(disc.inner),
                   squared(disc.outer), static_cast<float>(Moments::unit / disc.cut));
   Moments moments;
-  moments.points = sums.points;
   std::copy(std::begin(sums.s), std::end(sums.s), moments.xy.begin());
   std::copy(std::begin(sums.z), std::end(sums.z), moments.z.begin());
-  moments.zz = sums.zz;
   return moments;
 }
 

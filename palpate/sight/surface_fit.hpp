@@ -102,10 +102,8 @@ float kth_smallest(std::span<const float> values, std::size_t k) noexcept;
 struct Moments {
   static constexpr double unit = 0.01;  ///< [m]
 
-  double points = 0.0;          ///< how many were within the disc, whatever their weight
   std::array<double, 15> xy{};  ///< 1, x, y, xx, xy, yy, xxx, ...
   std::array<double, 6> z{};    ///< z, zx, zy, zxx, zxy, zyy
-  double zz = 0.0;
 
   void add(const Moments& other) noexcept;
   /// Adds `surface` to every point's height.

@@ -22,20 +22,9 @@ constexpr double patience = 0.5;  // [s] behind for longer than this is lost
 constexpr double noticed =
     0.3;  // [N] largest change of force by an occluder that counts as unnoticed
 
-// The two-sided rules, docs/pop.md.
-constexpr double clear_space = 6.0;   // [r_c] a hand this far from all that is feels nothing
-constexpr double felt = 0.01;         // [N] a force that counts there
-constexpr double firm = 1.0;          // [N] the ruler's force from which a hand must feel something
-constexpr double least_share = 0.25;  // [-] of it, or the hand is numb
-constexpr double least_wrong = 0.05;  // [N] a force that has a direction
-constexpr double wrong_cosine = -0.5;  // [-] between a force and the ruler's: on the wrong side
-
 struct Outcome {
   bool lost = false;
-  bool ghost = false;        // a force in free space
-  bool numb = false;         // nearly no force for long where the ruler has one
-  bool wrong = false;        // a force against the ruler's for more than a frame
-  double worst_ghost = 0.0;  // [N]
+  ForceJudge force{0.0, 0.0, 0.0};
   int dips = 0;              // times that it was behind for more than a frame, and came back
   double step = 0.0;         // [N] largest change of the force in a tick, from contact on
   double change = 0.0;       // [N] between the largest and the smallest force while nothing moves
@@ -74,9 +63,8 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
       compare && stage.undisturbed ? forces_of(method_name, *stage.undisturbed, parameters)
                                    : std::vector<double>();
   std::size_t ticks = 0;
-  int numb = 0;
-  int wrong = 0;
   const double frame = stage.scenario.tick_rate / stage.scenario.frame_rate;
+  outcome.force = ForceJudge(parameters.proxy.r_c(), stage.scenario.tick_rate, frame);
   play(*method, stage.scenario, [&](const Tick& tick) {
     const Tick truly = ruler->tick(tick.hip, tick.t);
     const auto inside = [&](const Vec3& at) {
@@ -89,19 +77,9 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
       behind = 0;
     }
     const double force = tick.force.norm();
-    const double clear = clear_space * parameters.proxy.r_c();
-    const double true_force = truly.force.norm();
-    if (force > felt && true_force == 0.0 && stage.truth(tick.hip, tick.t).distance > clear &&
-        stage.truth(tick.hip, *stage.shown).distance > clear) {
-      outcome.ghost = true;
-      outcome.worst_ghost = std::max(outcome.worst_ghost, force);
-    }
-    numb = true_force > firm && force < least_share * true_force ? numb + 1 : 0;
-    outcome.numb = outcome.numb || numb > patience * stage.scenario.tick_rate;
-    const bool opposed = force > least_wrong && true_force > least_wrong &&
-                         tick.force.dot(truly.force) < wrong_cosine * force * true_force;
-    wrong = opposed ? wrong + 1 : 0;
-    outcome.wrong = outcome.wrong || wrong > frame;
+    outcome.force.add(tick, truly,
+                      std::min(stage.truth(tick.hip, tick.t).distance,
+                               stage.truth(tick.hip, *stage.shown).distance));
     if (touched) outcome.step = std::max(outcome.step, std::abs(force - last_force));
     touched = touched || truly.state != ContactState::free_motion;
     last_force = force;
@@ -196,11 +174,11 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
       simplest = shrink(method, c, parameters).text();
     }
     lost += outcome.lost ? 1 : 0;
-    ghosts += outcome.ghost ? 1 : 0;
-    numb += outcome.numb ? 1 : 0;
-    wrong += outcome.wrong ? 1 : 0;
-    worst_ghost = std::max(worst_ghost, outcome.worst_ghost);
-    const bool all_right = !(outcome.lost || outcome.ghost || outcome.numb || outcome.wrong);
+    ghosts += outcome.force.ghost() ? 1 : 0;
+    numb += outcome.force.numb() ? 1 : 0;
+    wrong += outcome.force.wrong_side() ? 1 : 0;
+    worst_ghost = std::max(worst_ghost, outcome.force.worst_ghost());
+    const bool all_right = !outcome.lost && outcome.force.right();
     right += all_right ? 1 : 0;
     if (!all_right && !outcome.lost && first_not_right == "-") first_not_right = c.text();
     dipped += !outcome.lost && outcome.dips > 0 ? 1 : 0;
@@ -401,6 +379,25 @@ plot for [m in methods] held(m) using 0:2:xtic(1) with points pt 7 ps 1.2 title 
 )gp";
 
 }  // namespace
+
+void ForceJudge::add(const Tick& tick, const Tick& ruler, double clear) {
+  constexpr double clear_space = 6.0;     // [r_c] a hand this far from every body feels nothing
+  constexpr double felt = 0.01;           // [N] a force that counts there
+  constexpr double firm = 1.0;            // [N] the ruler's force from which a hand must feel some
+  constexpr double least_share = 0.25;    // [-] of it, or the hand is numb
+  constexpr double has_direction = 0.05;  // [N]
+  constexpr double opposite = -0.5;       // [-] cosine between a force and the ruler's
+  const double force = tick.force.norm();
+  const double truth = ruler.force.norm();
+  if (force > felt && truth == 0.0 && clear > clear_space * r_c_)
+    worst_ghost_ = std::max(worst_ghost_, force);
+  numb_for_ = truth > firm && force < least_share * truth ? numb_for_ + 1 : 0;
+  numb_ = numb_ || numb_for_ > patience * tick_rate_;
+  const bool opposed = force > has_direction && truth > has_direction &&
+                       tick.force.dot(ruler.force) < opposite * force * truth;
+  wrong_for_ = opposed ? wrong_for_ + 1 : 0;
+  wrong_ = wrong_ || wrong_for_ > frame_;
+}
 
 bool is_lost(const std::string& method, const PopCase& c, const Parameters& parameters) {
   return play_case(method, c, parameters, false).lost;

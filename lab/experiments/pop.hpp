@@ -2,10 +2,43 @@
 #pragma once
 
 #include "lab/experiment.hpp"
+#include "palpate/core/tick.hpp"
 
 namespace palpate::lab {
 
 struct PopCase;
+
+/// The bench's rules for a force on both sides, docs/pop.md, rule 4: none in free space, none on
+/// the wrong side, and not next to none where the ruler has one.
+class ForceJudge {
+ public:
+  /// @param r_c        [m] contact radius
+  /// @param tick_rate  [Hz]
+  /// @param frame      [ticks] from one frame to the next
+  ForceJudge(double r_c, double tick_rate, double frame)
+      : r_c_(r_c), tick_rate_(tick_rate), frame_(frame) {}
+
+  /// Judges the next tick.
+  /// @param ruler  the same tick by the ruler
+  /// @param clear  [m] from the hand to the nearest body, now and in the newest frame
+  void add(const Tick& tick, const Tick& ruler, double clear);
+
+  [[nodiscard]] bool ghost() const { return worst_ghost_ > 0.0; }
+  [[nodiscard]] bool numb() const { return numb_; }
+  [[nodiscard]] bool wrong_side() const { return wrong_; }
+  [[nodiscard]] bool right() const { return !ghost() && !numb_ && !wrong_; }
+  [[nodiscard]] double worst_ghost() const { return worst_ghost_; }  ///< [N]
+
+ private:
+  double r_c_;
+  double tick_rate_;
+  double frame_;
+  double worst_ghost_ = 0.0;
+  int numb_for_ = 0;   // ticks in a row
+  int wrong_for_ = 0;  // ticks in a row
+  bool numb_ = false;
+  bool wrong_ = false;
+};
 
 /// Is the surface lost in a case? Nothing is shrunk: for tables of many methods.
 bool is_lost(const std::string& method, const PopCase& c, const Parameters& parameters);

@@ -43,9 +43,55 @@ TEST_F(Pop, TheRulerHoldsEveryCaseOfEveryFamily) {
   for (std::size_t row = 0; row < table.rows(); ++row) {
     EXPECT_EQ(table.number(row, "lost"), 0.0) << table.text(row, "first_lost");
     EXPECT_EQ(table.number(row, "dipped"), 0.0) << table.text(row, "family");
+    EXPECT_EQ(table.number(row, "right"), 1.0) << table.text(row, "first_not_right");
   }
   const Scores scores = find_experiment("pop").scores(table);
   EXPECT_EQ(scores.rows.back()[2], "100.00");
+}
+
+// A tick with a force along z, at a thousand ticks a second and 33 a frame.
+Tick pushing(double newtons) {
+  Tick tick;
+  tick.force = Vec3(0.0, 0.0, newtons);
+  return tick;
+}
+
+TEST(ForceJudge, FindsAGhostOnlyInFreeSpaceWhereTheRulerHasNoForce) {
+  ForceJudge near(5e-3, 1000.0, 33.0);
+  near.add(pushing(2.0), pushing(0.0), 0.029);
+  near.add(pushing(0.009), pushing(0.0), 0.1);
+  near.add(pushing(2.0), pushing(2.0), 0.1);
+  EXPECT_TRUE(near.right());
+  ForceJudge far(5e-3, 1000.0, 33.0);
+  far.add(pushing(2.0), pushing(0.0), 0.031);
+  EXPECT_TRUE(far.ghost());
+  EXPECT_FALSE(far.right());
+  EXPECT_EQ(far.worst_ghost(), 2.0);
+}
+
+TEST(ForceJudge, CallsAHandNumbThatFeelsNothingForLong) {
+  // A method that touches nothing loses no contact, and wins nothing.
+  ForceJudge nothing(5e-3, 1000.0, 33.0);
+  for (int i = 0; i < 500; ++i) nothing.add(pushing(0.0), pushing(4.0), 0.0);
+  EXPECT_FALSE(nothing.numb());
+  nothing.add(pushing(0.0), pushing(4.0), 0.0);
+  EXPECT_TRUE(nothing.numb());
+  ForceJudge weak(5e-3, 1000.0, 33.0);
+  for (int i = 0; i < 2000; ++i) {
+    weak.add(pushing(1.1), pushing(4.0), 0.0);
+    weak.add(pushing(0.0), pushing(0.9), 0.0);
+  }
+  EXPECT_TRUE(weak.right());
+}
+
+TEST(ForceJudge, ForgivesAForceOnTheWrongSideForNoMoreThanAFrame) {
+  ForceJudge judge(5e-3, 1000.0, 33.0);
+  for (int i = 0; i < 33; ++i) judge.add(pushing(-1.0), pushing(1.0), 0.0);
+  judge.add(pushing(1.0), pushing(1.0), 0.0);
+  for (int i = 0; i < 33; ++i) judge.add(pushing(-1.0), pushing(1.0), 0.0);
+  EXPECT_TRUE(judge.right());
+  judge.add(pushing(-1.0), pushing(1.0), 0.0);
+  EXPECT_TRUE(judge.wrong_side());
 }
 
 TEST_F(Pop, ThePaperLosesEverySweepOfAnOccluderAndTheFailureIsShrunkAndRunsAgain) {
@@ -100,6 +146,15 @@ TEST(SightHolds, WhatItOnceLost) {
         "&seed=784532072"}) {
     EXPECT_FALSE(is_lost("sight", parse_pop_case(text), parameters)) << text;
   }
+}
+
+// A free hand that the tracker once pulled on, slow and late cameras that it once did not feel.
+TEST_F(Pop, SightIsRightAboutHandsThatAreLiftedAndCamerasThatAreLate) {
+  ExperimentOptions options = with("sight", 6);
+  options.families = {"lift-off", "late"};
+  const Table table = run(options);
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    EXPECT_EQ(table.number(row, "right"), 6.0) << table.text(row, "first_not_right");
 }
 
 TEST_F(Pop, WhatPassesBeforeAContactHardlyChangesTheForce) {

@@ -25,9 +25,9 @@ constexpr double noticed =
 struct Outcome {
   bool lost = false;
   ForceJudge force{0.0, 0.0, 0.0};
-  int dips = 0;              // times that it was behind for more than a frame, and came back
-  double step = 0.0;         // [N] largest change of the force in a tick, from contact on
-  double change = 0.0;       // [N] between the largest and the smallest force while nothing moves
+  int dips = 0;         // times that it was behind for more than a frame, and came back
+  double step = 0.0;    // [N] largest change of the force in a tick, from contact on
+  double change = 0.0;  // [N] between the largest and the smallest force while nothing moves
   double caused = 0.0;  // [N] of it, by what passes: largest difference from the same without it
 };
 

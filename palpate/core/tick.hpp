@@ -34,8 +34,7 @@ enum TickFlag : std::uint32_t {
   /// There is no frame to touch yet: no force, and the proxy is at the HIP.
   no_frame = 1u << 4,
   /// The stamps of the last two frames do not increase by 1 ms or more: no velocity was derived
-  /// from
-  /// them.
+  /// from them.
   stamp_not_increasing = 1u << 5,
   /// The newest frame is older than max_extrapolation: the surface is taken to rest where it was
   /// last predicted to be.
@@ -55,8 +54,7 @@ enum TickFlag : std::uint32_t {
   /// Method `sight`: the proxy was farther from its hand than can be and is at the hand again.
   proxy_let_go = 1u << 11,
   /// Method `sight`: the proxy was found behind the surface and was brought back in front of it;
-  /// the
-  /// force rises over `return_ramp`.
+  /// the force rises over `return_ramp`.
   returned_to_front = 1u << 12,
 };
 constexpr std::size_t tick_flag_count = 13;

@@ -70,17 +70,8 @@ Vec3 Paper::render_force(const Vec3& hip, double t, std::uint32_t& flags) noexce
 }
 
 Tick Paper::tick(const Vec3& hip, double t) noexcept {
-  Tick tick = free_tick(hip, t, frame_.number());
-  if (!is_place(hip) || !std::isfinite(t)) {
-    tick.proxy = proxy_.at.value_or(Vec3::Zero());
-    tick.flags = non_finite_input;
-    return tick;
-  }
-  if (!proxy_.at || frame_.cloud() == nullptr) proxy_.at = hip;
-  if (frame_.cloud() == nullptr) {
-    tick.flags = no_frame;
-    return tick;
-  }
+  auto [tick, can_move] = begin_tick(proxy_, frame_, hip, t);
+  if (!can_move) return tick;
 
   const Vec3 normal_before = proxy_.normal.value_or(Vec3::Zero());  // n_(k-1) of (13)
   const Movement movement = mover_.move(proxy_, *frame_.cloud(), hip);
@@ -92,17 +83,10 @@ Tick Paper::tick(const Vec3& hip, double t) noexcept {
   finish_movement(proxy_, movement);
   if (!proxy_.touching) velocity_ = 0.0;
 
-  tick.proxy = *proxy_.at;
-  tick.normal =
-      movement.normal.isZero(0.0) ? proxy_.normal.value_or(Vec3::Zero()) : movement.normal;
-  tick.flags = movement.flags;
+  write_movement(proxy_, movement, mover_.patch(), frame_, parameters_.motion.max_extrapolation,
+                 tick);
   tick.force = render_force(hip, t, tick.flags);
-  tick.state = movement.state;
-  tick.steps = movement.steps;
   tick.surface_velocity = velocity_;
-  if (mover_.patch().thinned()) tick.flags |= patch_thinned;
-  if (!frame_.in_order()) tick.flags |= stamp_not_increasing;
-  if (t - frame_.stamp() > parameters_.motion.max_extrapolation) tick.flags |= frame_stale;
   return tick;
 }
 

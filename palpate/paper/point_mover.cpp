@@ -72,6 +72,34 @@ Movement PointMover::move(Proxy& proxy, const Cloud& cloud, const Vec3& hip) noe
   return movement;
 }
 
+std::pair<Tick, bool> begin_tick(Proxy& proxy, const NewestFrame& frame, const Vec3& hip,
+                                 double t) noexcept {
+  Tick tick = free_tick(hip, t, frame.number());
+  if (!is_place(hip) || !std::isfinite(t)) {
+    tick.proxy = proxy.at.value_or(Vec3::Zero());
+    tick.flags = non_finite_input;
+    return {tick, false};
+  }
+  if (!proxy.at || frame.cloud() == nullptr) proxy.at = hip;
+  if (frame.cloud() == nullptr) {
+    tick.flags = no_frame;
+    return {tick, false};
+  }
+  return {tick, true};
+}
+
+void write_movement(const Proxy& proxy, const Movement& movement, const Patch& patch,
+                    const NewestFrame& frame, double longest_age, Tick& tick) noexcept {
+  tick.proxy = *proxy.at;
+  tick.normal = movement.normal.isZero(0.0) ? proxy.normal.value_or(Vec3::Zero()) : movement.normal;
+  tick.state = movement.state;
+  tick.steps = movement.steps;
+  tick.flags = movement.flags;
+  if (patch.thinned()) tick.flags |= patch_thinned;
+  if (!frame.in_order()) tick.flags |= stamp_not_increasing;
+  if (tick.t - frame.stamp() > longest_age) tick.flags |= frame_stale;
+}
+
 void finish_movement(Proxy& proxy, const Movement& movement) noexcept {
   proxy.touching = movement.state != ContactState::free_motion ||
                    ((movement.flags & step_budget_hit) != 0 && movement.touched);

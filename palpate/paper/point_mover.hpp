@@ -3,8 +3,10 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "palpate/core/cloud.hpp"
+#include "palpate/core/newest_frame.hpp"
 #include "palpate/core/parameters.hpp"
 #include "palpate/core/tick.hpp"
 
@@ -69,6 +71,18 @@ class PointMover {
   ContactState state_ = ContactState::free_motion;
   Vec3 direction_ = Vec3::Zero();  // n' of (1)
 };
+
+/// Begins a tick in which a proxy is to move. A proxy without a place is put at the hand.
+/// @return the tick as far as it is known; if it is complete, because the input is not finite or
+/// there
+///         is nothing to touch, the second is false and nothing is to be moved
+std::pair<Tick, bool> begin_tick(Proxy& proxy, const NewestFrame& frame, const Vec3& hip,
+                                 double t) noexcept;
+
+/// Writes where the proxy came to rest into a tick: all but force and surface velocity.
+/// @param longest_age  [s] of a frame that is not stale
+void write_movement(const Proxy& proxy, const Movement& movement, const Patch& patch,
+                    const NewestFrame& frame, double longest_age, Tick& tick) noexcept;
 
 /// Ends a tick's movement: does the proxy touch, and what does it remember?
 ///

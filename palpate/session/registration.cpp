@@ -3,89 +3,43 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <string_view>
 
 #include <Eigen/SVD>
 
+#include "palpate/core/csv.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/pose.hpp"
 
 namespace palpate {
 namespace {
 
-constexpr std::string_view bom = "\xEF\xBB\xBF";
 constexpr double farthest = 1e6;  // [m]
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t begin = text.find_first_not_of(" \t\r");
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
-}
-
-std::vector<std::string_view> fields_of(std::string_view line) {
-  std::vector<std::string_view> fields;
-  for (;;) {
-    const std::size_t comma = line.find(',');
-    fields.push_back(trimmed(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return fields;
-    line.remove_prefix(comma + 1);
-  }
-}
 
 // The named columns of a CSV file, line by line.
 template <std::size_t N>
 std::vector<std::array<double, N>> read_columns(const std::filesystem::path& file,
                                                 const std::array<std::string_view, N>& columns) {
   const std::string name = file.string();
-  std::string header;
-  for (const std::string_view column : columns)
-    header += (header.empty() ? "" : ",") + std::string(column);
   std::ifstream in(file);
   std::error_code unused;
   if (!in || std::filesystem::is_directory(file, unused))
-    throw Error(name, "it cannot be read", "name a CSV file with the columns " + header);
-  std::array<std::size_t, N> places{};
+    throw Error(name, "it cannot be read", "name a CSV file of touched points");
+  CsvColumns lines(in, name, columns);
   std::vector<std::array<double, N>> rows;
-  bool has_header = false;
-  std::string text;
-  for (std::size_t number = 1; std::getline(in, text); ++number) {
-    const std::string where = name + ":" + std::to_string(number);
-    std::string_view line = text;
-    if (number == 1 && line.starts_with(bom)) line.remove_prefix(bom.size());
-    line = trimmed(line);
-    if (line.empty()) continue;
-    const std::vector<std::string_view> fields = fields_of(line);
-    if (!has_header) {
-      for (std::size_t i = 0; i < N; ++i) {
-        const auto found = std::find(fields.begin(), fields.end(), columns[i]);
-        if (found == fields.end()) {
-          throw Error(where, "the header has no column '" + std::string(columns[i]) + "'",
-                      "begin the file with the line '" + header + "'");
-        }
-        places[i] = static_cast<std::size_t>(found - fields.begin());
-      }
-      has_header = true;
-      continue;
-    }
-    std::array<double, N> row{};
+  for (std::array<double, N> row{}; lines.next(row); rows.push_back(row)) {
     for (std::size_t i = 0; i < N; ++i) {
-      const std::string_view field = places[i] < fields.size() ? fields[places[i]] : "";
-      const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), row[i]);
-      if (error != std::errc{} || end != field.data() + field.size() ||
-          !(std::abs(row[i]) <= farthest)) {
-        throw Error(
-            where,
-            std::string(columns[i]) + ": '" + std::string(field) + "' is not a number of metres",
-            "give a finite number within 1000 km");
-      }
+      if (!(std::abs(row[i]) <= farthest))
+        throw Error(lines.where(), std::string(columns[i]) + " is no place",
+                    "give a finite number of metres within 1000 km");
     }
-    rows.push_back(row);
   }
-  if (rows.empty())
-    throw Error(name, "it has no points", "give the line '" + header + "' and a line for each");
+  if (rows.empty()) {
+    throw Error(name, "it has no points",
+                "give the line '" + lines.header() + "' and a line for each");
+  }
   return rows;
 }
 

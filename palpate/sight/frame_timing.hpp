@@ -8,8 +8,8 @@
 
 namespace palpate {
 
-/// How late frames come and how often, by the newest eight: what tells a slow or distant camera,
-/// whose frames are as fresh as they can be, from a stream that stopped.
+/// Latency and interval of the newest eight frames: by these a slow or distant camera, whose frames
+/// are as fresh as they can be, is distinguished from a stream that stopped.
 ///
 /// [servo] Nothing here allocates, locks or throws.
 class FrameTiming {
@@ -22,7 +22,7 @@ class FrameTiming {
     intervals_[newest_] = interval > 0.0 ? interval : none;
     used_ = false;
   }
-  /// A tick at `t` [s]: the first after a frame says how late that came.
+  /// A tick at `t` [s]: the first after a frame measures its latency.
   void tick(double t) noexcept {
     if (used_) return;
     used_ = true;

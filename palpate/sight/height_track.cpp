@@ -8,15 +8,15 @@
 namespace palpate {
 namespace {
 
-// How fast a surface's acceleration may change in each filter of the bank [m/s^3], from what a hand
-// moves slowly to what is struck (18 000 r_c/s^2 within one frame).
+// Jerk assumed by each filter of the bank [m/s^3], from a surface that a hand moves slowly to one
+// that is struck (18 000 r_c/s^2 within one frame).
 constexpr std::array<double, 5> jerks = {1.0, 6.0, 40.0, 250.0, 3000.0};
 constexpr std::size_t filters = jerks.size();
-// What was before these many frames says little of a motion now.
+// Older frames say little about the present motion.
 constexpr std::size_t motion_frames = 24;
-// What each frame leaves of the log-likelihoods: some seven frames count.
+// Forgetting factor of the log-likelihoods, per frame: some seven frames count.
 constexpr double memory = 0.85;
-// How much likelier rest is than any of the other filters, before anything is known (logarithm).
+// Logarithm of the prior odds of rest against any of the other filters.
 constexpr double rest_bonus = 4.0;
 // Standard deviations of a surface's velocity [m/s] and acceleration [m/s^2] before it is known.
 constexpr double first_velocity = 3.0;
@@ -39,7 +39,7 @@ struct Bank {
   void step(double dt, double height, double variance) noexcept {
     const double h = 0.5 * dt * dt;
     for (std::size_t i = 0; i < filters; ++i) {
-      // What a change of acceleration at the interval's begin adds, and the state after it.
+      // Prediction: process noise is a step of the acceleration at the begin of the interval.
       const double ga = jerks[i] * dt;
       const double gv = ga * dt;
       const double gx = ga * h;
@@ -57,7 +57,7 @@ struct Bank {
       vv[i] = new_vv + gv * gv;
       va[i] = new_va + gv * ga;
       aa[i] += ga * ga;
-      // What was measured.
+      // Correction.
       const double expected = xx[i] + variance;
       const double inverse = 1.0 / expected;
       const double miss = height - x[i];
@@ -163,7 +163,7 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
   next /= shares;
   const double slack = confidence * sd * std::sqrt(samples.front().doubt);
   const double confined = std::clamp(height, -slack, slack);
-  // A velocity is felt at once: it counts when the surface moves more likely than not.
+  // A velocity is felt at once: it is used only if motion is more likely than rest.
   const bool rests = rest_share > 0.5 * shares;
   return {base + confined, rests ? 0.0 : (next - height) / interval};
 }

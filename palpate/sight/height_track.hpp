@@ -25,20 +25,21 @@ inline constexpr std::size_t most_heights = 64;
 /// The height of a surface at rest [m], averaged over as much of the past as agrees with the
 /// present.
 ///
-/// From the longest mean (all heights) to the newest height alone, each shorter mean confines the
-/// estimate to `confidence` standard deviations about itself. So a surface at rest gains the square
-/// root of the frames, and one that moves is left behind by no more than the noise of short means.
+/// From the longest mean (all heights) to the newest height alone, each shorter mean limits the
+/// estimate to `confidence` standard deviations about itself. So at rest the error falls with the
+/// square root of the frames, and of a moving surface the estimate lags by no more than the noise
+/// of short means.
 /// @param newest_first  heights measured
 /// @param sd            [m] usual standard deviation of one of them
 double agreed_height(std::span<const HeightSample> newest_first, double sd,
                      double confidence) noexcept;
 
-/// Height and motion that the heights tell of.
+/// Estimates height and motion from measured heights.
 ///
 /// A bank of filters runs over the heights: one for a surface at rest, and Kalman filters for
-/// surfaces that jerk by little up to very much. Each counts by how likely it found the last
-/// heights to be before it saw them, rest being believed a little more. The height is the bank's,
-/// no farther than three standard deviations from the newest one. O(most_heights), no allocation.
+/// jerks from small to very large. Each is weighted by the likelihood of its innovations over the
+/// last frames, rest with a higher prior. The height is the bank's mean, within three standard
+/// deviations of the newest measurement. O(most_heights), no allocation.
 /// @param newest_first  heights measured; at least one
 /// @param sd            [m] usual standard deviation of one of them
 /// @param interval      [s] until the next frame

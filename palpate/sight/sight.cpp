@@ -29,7 +29,7 @@ void Sight::seat(const Vec3& proxy) noexcept {
   if (!is_place(proxy)) return;
   proxy_ = {};
   proxy_.at = proxy;
-  distance_rate_.reset();
+  hand_velocity_.reset();
   mover_.invalidate();
   tracker_.forget();
   monitor_.forget();
@@ -41,9 +41,16 @@ void Sight::seat(const Vec3& proxy) noexcept {
   blend_offset_ = Vec3::Zero();
 }
 
-// [s] between the newest two frames; the nominal one where their stamps do not tell.
+// [s] between the newest two frames; the nominal one where their stamps do not increase.
 double Sight::interval() const noexcept {
   return frame_.in_order() ? frame_.interval() : 1.0 / parameters_.motion.frame_rate;
+}
+
+// [m/s] of the surface along its frame's axis, as it is rendered at time t [s].
+double Sight::surface_speed(double t) const noexcept {
+  constexpr double dt = 1e-3;  // [s]
+  if (!tracker_.tracking()) return 0.0;
+  return (tracker_.surface().displacement(t) - tracker_.surface().displacement(t - dt)) / dt;
 }
 
 // A frame seen along the lines of sight: docs/method.md, "Sight".
@@ -52,16 +59,12 @@ void Sight::frame(const Cloud& cloud, double stamp) noexcept {
   timing_.frame(frame_.stamp(), frame_.in_order() && frame_.count() > 1 ? frame_.interval() : 0.0);
   mover_.invalidate();
   blend_due_ = true;
-  // What the surface's own motion adds to the force from the last tick on.
-  carried_rate_ = tracker_.tracking()
-                      ? (tracker_.surface().displacement(distance_rate_.last_t()) -
-                         tracker_.surface().displacement(distance_rate_.last_t() - 1e-3)) /
-                            1e-3
-                      : 0.0;
+  // The surface's own velocity, by which the force would go on changing without this frame.
+  carried_rate_ = surface_speed(hand_velocity_.t());
   monitor_.start_frame();
   points_moved_ = Vec3::Zero();
   if (!proxy_.at) return;
-  // What was hidden is remembered for a hand that is at it, or may be soon again.
+  // A hidden surface is kept only while the proxy is near it.
   constexpr double leaves = 20e-3;  // [m]
   if (tracker_.holding() && !(proxy_.touching && on_fit_) &&
       tracker_.contact(*proxy_.at, frame_.stamp()).distance > parameters_.proxy.r_c() + leaves) {
@@ -72,8 +75,8 @@ void Sight::frame(const Cloud& cloud, double stamp) noexcept {
   const Event event = tracker_.frame(cloud, frame_.stamp(), interval(), *proxy_.at,
                                      proxy_.touching ? parameters_.sight.hardest_strike : infinite);
   if (event != Event::followed && event != Event::jumped) return;
-  // Side repair: the proxy was on the surface's free side and has to be there still.
-  // One that will move over points has to be in front of this frame's, not only of the average.
+  // Side repair: the proxy was on the surface's free side and must be there still. If it will move
+  // over points, it must be in front of this frame's points, not only of their average.
   const SurfaceContact contact = tracker_.contact(*proxy_.at, frame_.stamp());
   const double r_c = parameters_.proxy.r_c();
   const double least =
@@ -105,7 +108,7 @@ Movement Sight::move(const Vec3& hip, double t) noexcept {
       }
       ++movement.steps;
       if (contact.distance >= r_c) {
-        if (tracker_.holding()) return false;  // what else is there, the points tell
+        if (tracker_.holding()) return false;  // free of the hidden surface: move over the points
         proxy_.at = hip;
         movement.state = ContactState::free_motion;
         movement.normal = contact.normal;
@@ -132,14 +135,15 @@ Movement Sight::move(const Vec3& hip, double t) noexcept {
   }
   on_fit_ = false;
   const int steps = movement.steps + slides;
-  // The points that the fit describes move on with it, and a proxy that touches them with them.
+  // Between frames the points move with the surface that was fitted to them, and so does a proxy
+  // that touches them.
   const Vec3 moved = tracker_.tracking() && tracker_.surface().smooth() ? tracker_.displacement(t)
                                                                         : Vec3(Vec3::Zero());
   *proxy_.at -= points_moved_;
   const Vec3 before = *proxy_.at;
   movement = mover_.move(proxy_, *frame_.cloud(), hip - moved);
   movement.steps += steps;
-  // Points that scatter can let the proxy through. Its line of sight tells.
+  // Scattered points can let the proxy through; the line of sight through it shows that.
   if (const std::optional<Vec3> front =
           tracker_.in_front(*frame_.cloud(), before, *proxy_.at, r_c)) {
     movement.state = ContactState::contact;
@@ -170,11 +174,12 @@ void Sight::release(const Vec3& hip, Movement& movement) noexcept {
   movement.normal = Vec3::Zero();
 }
 
-// The law that comes first, docs/method.md: what the newest frame itself shows overrules all else.
+// What the newest frame itself shows overrules every estimate: docs/method.md, "The monitor".
 void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
   // A frame's correction moves a proxy no farther than a surface is looked for [m].
   constexpr double farthest_move = 0.3;
-  // What moves faster than the tracker can tell of is no reason for a force [m].
+  // A proxy deeper than this behind the surface is not brought back: nothing moves so far between
+  // frames that the tracker could have followed [m].
   constexpr double deepest_return = 65e-3;
   const double r_c = parameters_.proxy.r_c();
   if (last_proxy_ && (*proxy_.at - hip).norm() > (*last_proxy_ - hip).norm() + farthest_move) {
@@ -223,23 +228,25 @@ void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
   last_proxy_ = proxy_.at;
 }
 
-// Section 4.6, from the proxy where it will be on the moving surface.
+// Section 4.6, from the proxy where it will be on the moving surface. The damper acts on the hand's
+// velocity relative to the surface. The rate of the distance, as in the paper, would also contain
+// every correction of the estimate, and damp noise.
 Vec3 Sight::render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept {
-  if (!proxy_.touching) {
-    distance_rate_.reset();
-    return Vec3::Zero();
-  }
+  if (!proxy_.touching) return Vec3::Zero();
   Vec3 u = hip - *proxy_.at;
-  // On points that are still where they were, the hand feels how the surface moves all the same.
+  // A proxy that rests on points is moved with the surface for the force.
   if (tracker_.tracking()) u -= tracker_.displacement(t) - points_moved_;
-  const CouplingForce result = coupling_force(
-      parameters_.coupling, u, distance_rate_.update(u.norm(), t), parameters_.proxy.r_c(), false);
+  const Vec3 relative = hand_velocity_.value() - surface_speed(t) * tracker_.surface().frame().up;
+  const double distance = u.norm();
+  const double rate = distance > 0.0 ? relative.dot(u) / distance : 0.0;
+  const CouplingForce result =
+      coupling_force(parameters_.coupling, u, rate, parameters_.proxy.r_c(), false);
   if (result.saturated) flags |= force_saturated;
   return result.force;
 }
 
-// What a frame corrected at once in the geometry reaches the hand over most of an interval, and a
-// surface that is no longer seen fades.
+// Spreads what a frame corrects over most of an interval, and fades the force of a surface that is
+// no longer measured.
 Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
   constexpr double blend = 0.85;    // [intervals]
   const auto ease = [](double x) {  // from 1 to 0 with slopes 0
@@ -273,13 +280,14 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
   double known = 1.0;
   if (tracker_.holding())
     known = ease((t - tracker_.held_since() - sight.hidden_hold) / sight.hidden_fade);
-  // A single frame is a scan, not a stream that stopped. One frame may be lost.
+  // A single frame is a scan, not a stream that stopped. One lost frame is no reason to fade.
   const double fade = std::max(parameters_.motion.max_extrapolation, 1e-3);
   const double late = std::max(fade, 2.0 * timing_.interval());
   if (frame_.count() > 1) known *= ease((timing_.age(t) - late) / fade);
-  // A force falls with what is known at once, and rises slowly: what is found again must not kick.
-  constexpr double return_ramp = 0.5;  // [s]
-  strength_ = std::min(strength_ + std::max(t - last_blend_t_, 0.0) / return_ramp, 1.0);
+  // The force falls at once with the confidence in the surface and rises slowly: a surface that is
+  // found again must not kick.
+  const double ramp = std::max(sight.return_ramp, 1e-3);
+  strength_ = std::min(strength_ + std::max(t - last_blend_t_, 0.0) / ramp, 1.0);
   if (proxy_.touching) strength_ = std::min(strength_, known);
   blended *= std::min(strength_, known);
   last_hip_ = hip;
@@ -288,34 +296,19 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
 }
 
 Tick Sight::tick(const Vec3& hip, double t) noexcept {
-  Tick tick = free_tick(hip, t, frame_.number());
-  if (!is_place(hip) || !std::isfinite(t)) {
-    tick.proxy = proxy_.at.value_or(Vec3::Zero());
-    tick.flags = non_finite_input;
-    return tick;
-  }
-  if (!proxy_.at || frame_.cloud() == nullptr) proxy_.at = hip;
-  if (frame_.cloud() == nullptr) {
-    tick.flags = no_frame;
-    return tick;
-  }
+  auto [tick, can_move] = begin_tick(proxy_, frame_, hip, t);
+  if (!can_move) return tick;
 
   timing_.tick(t);
+  hand_velocity_.update(hip, t);
   Movement movement = move(hip, t);
   finish_movement(proxy_, movement);
   supervise(hip, t, movement);
-  tick.proxy = *proxy_.at;
-  tick.normal =
-      movement.normal.isZero(0.0) ? proxy_.normal.value_or(Vec3::Zero()) : movement.normal;
-  tick.flags = movement.flags;
-  tick.force = blend_force(render_force(hip, t, tick.flags), hip, t);
-  tick.state = movement.state;
-  tick.steps = movement.steps;
-  tick.surface_velocity = tracker_.tracking() ? tracker_.surface().velocity() : 0.0;
+  write_movement(proxy_, movement, mover_.patch(), frame_, parameters_.motion.max_extrapolation,
+                 tick);
   if (tracker_.holding()) tick.flags |= surface_hidden;
-  if (mover_.patch().thinned()) tick.flags |= patch_thinned;
-  if (!frame_.in_order()) tick.flags |= stamp_not_increasing;
-  if (t - frame_.stamp() > parameters_.motion.max_extrapolation) tick.flags |= frame_stale;
+  tick.force = blend_force(render_force(hip, t, tick.flags), hip, t);
+  tick.surface_velocity = tracker_.tracking() ? tracker_.surface().velocity() : 0.0;
   return tick;
 }
 

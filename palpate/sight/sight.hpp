@@ -8,6 +8,7 @@
 #include "palpate/paper/coupling.hpp"
 #include "palpate/paper/point_mover.hpp"
 #include "palpate/sight/frame_timing.hpp"
+#include "palpate/sight/hand_velocity.hpp"
 #include "palpate/sight/monitor.hpp"
 #include "palpate/sight/tracker.hpp"
 
@@ -36,6 +37,7 @@ class Sight final : public Method {
   Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;
   Vec3 blend_force(const Vec3& force, const Vec3& hip, double t) noexcept;
   [[nodiscard]] double interval() const noexcept;
+  [[nodiscard]] double surface_speed(double t) const noexcept;
 
   Parameters parameters_;
   PointMover mover_;
@@ -50,7 +52,7 @@ class Sight final : public Method {
   std::optional<Vec3> last_proxy_;  // [m] of the last tick
   double strength_ = 1.0;           // [-] share of the force that a contact found again has so far
 
-  // What the force goes on from when a frame arrives.
+  // From which the force goes on when a frame arrives.
   bool blend_due_ = false;  // a frame came since the last force
   Vec3 last_force_ = Vec3::Zero();
   Vec3 last_hip_ = Vec3::Zero();
@@ -59,7 +61,7 @@ class Sight final : public Method {
   Vec3 blend_offset_ = Vec3::Zero();
   double blend_start_ = 0.0;
 
-  DistanceRate distance_rate_;  // of (16)
+  HandVelocity hand_velocity_;
 };
 
 }  // namespace palpate

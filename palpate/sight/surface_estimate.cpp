@@ -25,13 +25,13 @@ constexpr double unnoticed_noise = 50e-6;
 // Noise of a disc's height that is usual for a depth camera: this [m] at 1 m, growing with the
 // square of the distance, as stereo does. Serves until the noise has been measured.
 constexpr double usual_noise = 5e-3;
-// A variance that 1 to 5 samples told of is at most this many times as large, 99 times out of 100.
-constexpr std::array most_told = {6000.0, 400.0, 120.0, 50.0, 28.0};
+// Upper 99 % confidence bounds of a variance estimated from 1 to 5 samples, in multiples of it.
+constexpr std::array upper_bounds = {6000.0, 400.0, 120.0, 50.0, 28.0};
 // Spread of a surface's curvature coefficients x^2, xy, y^2 that is expected [1/m]: radii down to
 // some 30 mm are common, and noise must not invent them.
 constexpr double curvature_sd = 15.0;
 
-// Discs of a rung tell of one surface if their centres are within this [m].
+// Discs of a rung are evidence about the same place if their centres are within this [m].
 double overlap(std::size_t rung) {
   return std::max(3e-3, 0.5 * SurfaceEstimate::radii[rung]);
 }
@@ -62,7 +62,8 @@ double variance_at_rest(std::span<const HeightSample> newest_first, std::size_t 
 constexpr double full_disc =
     0.25 * SurfaceEstimate::radii[0] * SurfaceEstimate::radii[0] / (Moments::unit * Moments::unit);
 
-// What the newest 2, 4, 8, ... frames say of a shape: matrix * shape = right_side, in centimetres.
+// Normal equations of the shape over the newest 2, 4, 8, ... frames: matrix * shape = right_side,
+// in centimetres.
 constexpr std::size_t slope_windows = 4;
 struct SlopeWindow {
   Eigen::Matrix<double, 5, 5> matrix;
@@ -70,7 +71,7 @@ struct SlopeWindow {
 };
 
 // Keeps the slopes of a shape that was summed over all frames within 4 standard deviations of what
-// each window of the newest ones says, the longest first: a surface that turns is never farther
+// each window of the newest ones gives, the longest first: a surface that turns is never farther
 // off than their noise, and a false alarm costs no more than a little of the averaging.
 // @param point_variance  [cm^2] what one point weighs
 void confine_slopes(Vec5& shape, std::span<const SlopeWindow> windows, double point_variance) {
@@ -99,22 +100,22 @@ double SurfaceEstimate::beam_sd() const noexcept {
   return std::sqrt(variance(0));
 }
 
-// Of one frame's height in a disc [m^2]. Until a few frames have told, what is usual for a depth
-// camera; then what they told, with a margin for how few they were.
+// Variance of one frame's height in a disc [m^2]: the usual one of a depth camera, until enough
+// frames have been measured; then the measured one, with a margin for how few they were.
 double SurfaceEstimate::variance(std::size_t rung) const noexcept {
   const Scatter& scatter = scatter_[rung];
-  // Noise that moves the whole disc shows in it, too: a disc without spread has little.
+  // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
   const double most = 4.0 * spread_ + 0.5e-3;
   const double usual =
       squared(std::min(usual_noise * squared(distance_), most)) + 0.03 * squared(spread_) + 1e-12;
   if (scatter.samples < 1.0) return usual;
-  const double told = std::max({scatter.variance * (1.0 + 4.0 / scatter.samples), scatter.least,
-                                std::min(scatter.at_rest, 4.0 * scatter.variance)}) +
-                      1e-12;
-  if (scatter.samples > static_cast<double>(most_told.size())) return told;
+  const double measured = std::max({scatter.variance * (1.0 + 4.0 / scatter.samples), scatter.least,
+                                    std::min(scatter.at_rest, 4.0 * scatter.variance)}) +
+                          1e-12;
+  if (scatter.samples > static_cast<double>(upper_bounds.size())) return measured;
   const double largest =
-      most_told[static_cast<std::size_t>(scatter.samples) - 1] * (scatter.variance + 1e-12);
-  return std::max(std::min(usual, largest), told);
+      upper_bounds[static_cast<std::size_t>(scatter.samples) - 1] * (scatter.variance + 1e-12);
+  return std::max(std::min(usual, largest), measured);
 }
 
 double SurfaceEstimate::gate(double narrowest) const noexcept {
@@ -136,7 +137,7 @@ SurfaceContact SurfaceEstimate::contact(const Vec3& point, double t, double reac
   local.z() -= moved;
   Vec3 from = local;
   if (const double bulge = surface_.strongest_fall(); bulge > 0.0) {
-    // A hand at a bulge's centre is as near to any place around; the place it came by counts.
+    // From near the centre of curvature all places around are equally near. The one above counts.
     constexpr double deepest = 0.6;  // [-] of the bulge's radius
     from.z() = std::max(from.z(), surface_.height(from.head<2>()) - deepest / bulge);
   }
@@ -192,7 +193,7 @@ Eigen::Matrix<double, 5, 5> SurfaceEstimate::Shape::matrix(const Sums& sums) noe
 }
 
 // The residuals of a patch's points within `radius` of `foot`: their median, and how they spread
-// about it. Looks at an even part of them: a median of so many is good enough to tell what belongs
+// about it. Looks at an even part of them: a median of so many is good enough to judge what belongs
 // to a surface.
 std::optional<SurfaceEstimate::Residuals> SurfaceEstimate::residuals(const Vec2& foot,
                                                                      double radius,
@@ -222,19 +223,19 @@ std::optional<SurfaceEstimate::Residuals> SurfaceEstimate::residuals(const Vec2&
                                     0.965 * kth_smallest(found, size * 7 / 10))};
 }
 
-// Shifts the expected surface by the median residual near `foot` and says beyond which residual a
-// point does not belong to it.
+// Shifts the expected surface by the median residual near `foot`, and sets `cut` [m], the residual
+// beyond which a point is an outlier.
 bool SurfaceEstimate::recentre(const Vec2& foot, double wide, double& cut) noexcept {
   const std::optional<Residuals> near = residuals(foot, radii[0], wide);
   if (!near) return false;
   surface_.c[0] += near->median;
-  // Quantised depth makes single deviations jump between the steps.
+  // Smoothed, since quantised depth makes single deviations jump between its steps.
   spread_ = count_ == 0 ? near->deviation : spread_ + 0.2 * (near->deviation - spread_);
   cut = std::clamp(6.0 * std::max(near->deviation, spread_), 0.5e-3, wide);
   return true;
 }
 
-// One frame's evidence about the surface around `foot`, and what follows from all of it.
+// Measures the surface around `foot` in the newest frame, and estimates anew from all frames.
 bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& look,
                               bool new_frame) noexcept {
   const double wide = look.gate;
@@ -245,7 +246,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   const Quadric before = surface_;
   double cut = 0.0;
   const bool first = count_ == 0;
-  // From nothing, the shape is found by fitting the disc a few times over.
+  // Without an estimate to start from, the shape is found by iterating the fit.
   for (int i = 0; i < (first ? 3 : 1); ++i) {
     if (!recentre(foot, wide, cut)) {
       surface_ = before;
@@ -298,8 +299,8 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
     gather(cloud, Beam{place, radii[rungs - 1] * 1.1, wide + radii[rungs - 1], frame_.up},
            outer_points, patch_);
     points_.take(patch_, frame_);
-    // Noise that is alike over the inner disc is not over the wide ones: what belongs to them is
-    // told by their own spread about their own middle.
+    // Noise that is common to the inner disc is not common to the wide ones: their outliers are
+    // judged by their own median and deviation.
     if (const std::optional<Residuals> far = residuals(foot, radii[rungs - 1], wide)) {
       surface_.c[0] += far->median;
       cut = std::clamp(6.0 * far->deviation, cut, wide);
@@ -342,7 +343,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
     for (; n < count_; ++n) {
       const Evidence& e = evidence(n);
       if (j < e.lost || e.rungs <= j || (e.centre - foot).squaredNorm() > farthest) break;
-      // A disc that something covers in part tells the height, but hardly the slope.
+      // A partly hidden disc determines the height, but hardly the slope.
       if (!e.whole && n > 0) continue;
       sums += e.shape[j].sums;
       if (++whole == std::size_t{2} << filled && filled < slope_windows) {
@@ -352,7 +353,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
     frames[j] = n;
     const double points = std::max(now.shape[j].points, 1.0);
     Scatter& scatter = scatter_[j];
-    // What one point weighs against the prior, whatever correlation does to it.
+    // Weight of the curvature prior in points, with correlated noise counted by its effect.
     const double prior = variance(j) * points / cm2 / squared(curvature_sd * Moments::unit);
     const auto fit_shape = [&](Eigen::Matrix<double, 5, 5> a, const Vec5& b) {
       a.diagonal().array() += 1e-9;
@@ -369,7 +370,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
           e.stamp, (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * Moments::unit};
       usual_extent += e.extent[j] / static_cast<double>(n);
     }
-    // What is left of a disc that something begins to cover is the noisier.
+    // A disc that an occluder begins to hide has fewer points and more noise.
     for (std::size_t i = 0; i < n; ++i) {
       const double share = evidence(i).extent[j] / usual_extent;
       if (share < 0.8) heights[j][i].doubt = 1.0 / squared(std::max(share, 0.1));
@@ -382,7 +383,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       double change =
           fourth * fourth /
           (h[0].doubt + 16.0 * (h[1].doubt + h[3].doubt) + 36.0 * h[2].doubt + h[4].doubt);
-      // A single jump is no noise.
+      // A single jump is not noise.
       if (scatter.samples >= 4.0) {
         change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise));
       }
@@ -391,11 +392,12 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
     }
     if (new_frame) scatter.at_rest = variance_at_rest(heights[j], std::min(n, rested_));
   }
-  // Lepski: the widest disc that agrees with all narrower ones. Their differences, frame by frame,
-  // do not see the surface move, and tell their own noise.
-  // A disc may differ from the narrower ones, because the surface is not its quadric, and yet move
-  // with them: then it tells the motion, and they tell where the surface is.
-  const double negligible = 2e-6 + 0.02 * spread_;  // [m] noise shifts oblique lines of sight, too
+  // Lepski's rule: the widest disc that agrees with all narrower ones determines the height. The
+  // differences between discs are taken frame by frame, so that motion cancels and their scatter is
+  // the noise. A disc may differ from the narrower ones, because the surface is not a quadric over
+  // its width, and yet move with them: then it determines the motion only.
+  const double negligible =
+      2e-6 + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
   std::size_t mover = 0;
   bool agree = true;
   for (std::size_t j = 1; j < now.rungs; ++j) {
@@ -412,16 +414,16 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       }
       const auto count = static_cast<double>(n);
       const double mean = sum / count;
-      // Until there are frames to tell, what the heights' own noise suggests counts as two of them.
+      // With few frames, the variance expected from the heights' noise counts as two of them.
       const double expected = 2.0 * (variance(i) + variance(j));
       const double scattered =
           (std::max(squares - count * mean * mean, 0.0) + (n < 4 ? expected : 0.0)) / count;
-      // Noise fades with the area it is averaged over: a disc has at least as much as its
-      // difference from the next narrower one tells.
+      // Noise falls at most with the area it is averaged over, so the difference from the next
+      // narrower disc is a lower bound of a disc's noise.
       if (i + 1 == j && n >= 4) {
         scatter_[j].least = (1.0 + 2.0 / count) * scattered / (squared(radii[j] / radii[i]) - 1.0);
       }
-      // What was in use needs better evidence against it: a change is felt.
+      // Hysteresis: the disc in use needs stronger evidence against it, since a change is felt.
       const double confidence = (j <= rung_ ? 4.5 : 3.5) + 4.0 / count;
       agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
       const double newest = heights[j][0].height - heights[i][0].height;
@@ -458,8 +460,8 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   surface_.c[0] = height - shapes[chosen].dot(basis) * Moments::unit;
 }
 
-// Means of the inner patch's points in cells of a square about `foot`, kept to tell structure,
-// which stays, from noise, which does not.
+// Means of the inner patch's points in cells of a square about `foot`. Structure stays from frame
+// to frame, noise does not.
 void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept {
   if (new_frame) newest_cells_ = (newest_cells_ + 1) % cell_frames;
   Cells& now = cells_[newest_cells_];
@@ -485,7 +487,7 @@ void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new
     now.heights[k] += double{z};
     now.means[k] += quadric_basis(Vec2(x, y));
   }
-  // Noise empties a cell now and then, an edge a whole row of them.
+  // Noise leaves single cells empty, an edge leaves a whole row.
   constexpr int most_empty = 2;
   int empty = 0;
   for (std::size_t k = 0; k < cells; ++k) {
@@ -500,8 +502,8 @@ void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new
   now.full = !look.partial && empty <= most_empty;
 }
 
-// Mean square of what no quadric explains in residuals of cells [m^2]: the fit's own errors, which
-// grow towards the corners, are no structure.
+// Mean square of the cells' residuals about their own best quadric [m^2]: errors of the fit, which
+// grow towards the corners, do not count as structure.
 double SurfaceEstimate::squared_structure(const Cells& frame,
                                           const std::array<double, cells>& residuals) noexcept {
   Eigen::Matrix<double, 6, 6> a = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
@@ -525,7 +527,8 @@ double SurfaceEstimate::squared_structure(const Cells& frame,
   return sum / (present - 6.0);
 }
 
-// Do points say how a surface slopes? Those of a border seen from its side lie in a line.
+// Do the points span an area, so that they determine a slope? Those of a border seen from its side
+// lie in a line.
 bool SurfaceEstimate::spans_area(const Shape& inner) noexcept {
   const double xx = inner.means[2] - squared(inner.means[0]);
   const double xy = inner.means[3] - inner.means[0] * inner.means[1];
@@ -534,10 +537,10 @@ bool SurfaceEstimate::spans_area(const Shape& inner) noexcept {
   return least > 0.05 * full_disc;
 }
 
-// Is the surface what its fit says, up to noise?
+// Does the fit describe the surface, up to noise?
 void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   const Evidence& now = evidence(0);
-  // An edge shows as a disc whose points lie to one side, a gap as one without a middle.
+  // At an edge the points lie to one side of the disc, at a gap around an empty middle.
   const Shape& inner = now.shape[0];
   const Vec2 middle(inner.means[0], inner.means[1]);
   const Vec2 spread = Vec2(inner.means[2], inner.means[4]) - Vec2(middle.cwiseAbs2());
@@ -581,12 +584,13 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   }
   const auto n = static_cast<double>(frames);
   const double structure = squared_structure(newest, sums) / squared(n);
-  // On points the proxy would rest no better than one frame's noise lets it.
+  // Structure below the noise of one frame is ignored: over points the proxy would not rest better.
   const double times = std::max((smooth_ ? 6.0 : 3.0) / n, smooth_ ? 2.0 : 1.0);
   smooth_ = structure <= squared(structure_floor) + times * cell_scatter_.variance;
 }
 
-// Noise of a cell from what two frames differ by where both have looked, less what is common.
+// Noise of a cell, from the differences of two frames in the cells that both measured, less their
+// common part.
 void SurfaceEstimate::learn_cell_noise(const Cells& newest,
                                        const std::array<double, cells>& residuals,
                                        const Cells& past,

@@ -22,9 +22,9 @@ struct SurfaceContact {
       curvature;  ///< [1/m] the strongest towards the proxy: a sphere of 1/curvature just fits in
 };
 
-/// One surface around one place, as the frames so far tell of it: its shape, where it is, how it
-/// moves, and how far noise reaches. docs/method.md, "Sight", 3 to 5. Which points of a frame are
-/// this surface's is for the SightTracker to say.
+/// The estimate of one surface around one place, from all frames so far: shape, position, motion
+/// and measurement noise. docs/method.md, "Sight", 3 to 5. SightTracker decides which of a frame's
+/// points belong to it.
 ///
 /// [servo] Nothing here allocates, locks or throws after construction.
 class SurfaceEstimate {
@@ -38,8 +38,8 @@ class SurfaceEstimate {
 
   /// A frame at `stamp` [s], `interval` [s] after the one before, will be measured.
   void start_frame(double stamp, double interval) noexcept;
-  /// Begins with the surface at `foot` [m, world], `up` [-] the way it faces or is seen from. What
-  /// was before belongs to another one. False if there are too few points.
+  /// Begins with the surface at `foot` [m, world], with heights along `up` [-]. Earlier frames are
+  /// forgotten. False if there are too few points.
   bool start(const Cloud& cloud, const Vec3& foot, const Vec3& up) noexcept;
   /// Takes a new frame's points about `foot` [m, local] in. False, and nothing has changed, if
   /// there are too few.
@@ -56,7 +56,7 @@ class SurfaceEstimate {
   void stop() noexcept { velocity_ = 0.0; }
   /// It may be another one from here on: earlier frames no longer count.
   void forget_frames() noexcept { count_ = 0; }
-  /// How far the sensor is [m]: its noise, until that has been measured, depends on it.
+  /// Distance of the sensor [m], from which its noise is assumed until that has been measured.
   void set_distance(double distance) noexcept { distance_ = distance; }
 
   [[nodiscard]] const LocalFrame& frame() const noexcept { return frame_; }
@@ -75,7 +75,7 @@ class SurfaceEstimate {
   [[nodiscard]] double interval() const noexcept { return interval_; }  ///< [s]
   /// How far the surface has moved along `up` at time t [s] since its frame [m].
   [[nodiscard]] double displacement(double t) const noexcept;
-  /// Is the surface what its fit says, up to noise?
+  /// Does the fit describe the surface, up to noise?
   [[nodiscard]] bool smooth() const noexcept { return smooth_; }
   /// Frames whose heights are this surface's.
   [[nodiscard]] std::size_t settled() const noexcept { return settled_; }
@@ -107,7 +107,8 @@ class SurfaceEstimate {
   static constexpr int cells_per_side = 4;
   static constexpr std::size_t cells = cells_per_side * cells_per_side;
 
-  /// Moments with the height eliminated (Schur's complement): what is left tells of the shape.
+  /// Moments with the height eliminated (Schur's complement): what remains determines slope and
+  /// curvature.
   struct Shape {
     using Sums = Eigen::Matrix<double, 20, 1>;  // they add up over frames
     Sums sums;                          // lower triangle of the matrix, row by row, and right side
@@ -121,11 +122,11 @@ class SurfaceEstimate {
     }
     static Shape of(const Moments& disc) noexcept;
   };
-  /// What one frame said.
+  /// What was measured in one frame.
   struct Evidence {
     double stamp = 0.0;
     Vec2 centre = Vec2::Zero();
-    bool whole = true;      // nothing was before a part of it
+    bool whole = true;      // no occluder hid a part of it
     std::size_t rungs = 0;  // how many were measured
     std::size_t lost = 0;   // of these the first, out of reach by now
     std::array<Moments, SurfaceEstimate::rungs> disc;
@@ -140,18 +141,18 @@ class SurfaceEstimate {
       means.fill(Vec6::Zero());
     }
 
-    bool full = false;  // hardly a cell is without points, and nothing was before them
+    bool full = false;  // nearly all cells have points, and no occluder hid any
     Eigen::Vector2i first = Eigen::Vector2i::Zero();  // of the lattice's cells
     std::array<double, cells> heights;                // [m]
     std::array<Vec6, cells> means;                    // of quadric_basis
   };
   static constexpr std::size_t cell_frames = 8;
-  /// How a height scatters from frame to frame.
+  /// Variance of a height from frame to frame.
   struct Scatter {
-    double variance = 0.0;  // [m^2] as smooth motion does not change it
+    double variance = 0.0;  // [m^2] from fourth differences, which smooth motion hardly changes
     double samples = 0.0;
     double at_rest = 0.0;  // [m^2] about the mean while the surface rests; 0 if unknown
-    double least = 0.0;    // [m^2] what a disc's difference from the next narrower one tells
+    double least = 0.0;    // [m^2] a lower bound, from differences to the next narrower disc
   };
   struct Residuals {
     float median;      // [m]
@@ -185,8 +186,8 @@ class SurfaceEstimate {
   double interval_ = 1.0 / 30.0;
   double velocity_ = 0.0;
   double spread_ = 0.0;
-  std::size_t rung_ = 0;   // whose disc tells the shape, and where the surface is
-  std::size_t mover_ = 0;  // whose disc tells how it moves
+  std::size_t rung_ = 0;   // the disc that determines shape and height
+  std::size_t mover_ = 0;  // the disc that determines motion
 
   std::array<Evidence, history> ring_;
   std::array<Cells, cell_frames> cells_;
@@ -200,7 +201,7 @@ class SurfaceEstimate {
   double above_mean_ = 0.0;  // [m] the newest frame's height over the average
   double distance_ = 0.0;    // [m] from the viewpoint
 
-  // The sensor's noise outlives a contact.
+  // The sensor's noise is kept when a contact ends.
   std::array<Scatter, rungs> scatter_;
   Scatter cell_scatter_;
 };

@@ -308,7 +308,7 @@ Moments disc_moments(const Patch& patch, const LocalFrame& frame, const Quadric&
 
 Quadric fit_quadric(const Moments& moments, double curvature_prior) noexcept {
   Eigen::Matrix<double, 6, 6> a = moments.normal_matrix();
-  // A trace of a prior keeps directions that no point tells of at 0.
+  // A very weak prior keeps coefficients at 0 that no point determines.
   for (int i = 0; i < 6; ++i) a(i, i) += 1e-9;
   a.diagonal().tail<3>().array() += curvature_prior;
   Quadric quadric;

@@ -9,32 +9,32 @@ namespace {
 
 // Along a line of sight a surface is looked for this far from where it is expected [m].
 constexpr double reach = 0.3;
-// What comes before it is looked for this far [m]: an arm may be held high.
+// Occluders are looked for this far in front of the surface [m]: an arm may be held high.
 constexpr double occluder_reach = 1.2;
 // A surface is where it is expected if this share of its disc is within the gate.
 constexpr double least_support = 0.3;
-constexpr double most_support = 0.7;      // with more there is no doubt
+constexpr double most_support = 0.7;      // beyond this share nothing else is checked
 constexpr double gate_after_hold = 5e-3;  // [m]
-// Layers along a line of sight are told apart by a gap of at least this [m].
+// Layers along a line of sight are separated by a gap of at least this [m].
 constexpr double layer_gap = 20e-3;
 constexpr std::size_t beam_points = 256;
-// What comes before a contact is looked for in all that `judge` looks at [m].
+// Radius within which an occluder is looked for: that of the cells of SurfaceEstimate::judge [m].
 constexpr double shadow_radius = 15e-3;
 constexpr std::size_t wide_beam_points = 512;
-// A fit serves contacts within this of its centre [m].
+// A fit is used for contacts within this of its centre [m].
 constexpr double serves = 1.5e-3;
-// While the surface is out of sight there is nothing to fit: what is remembered serves this far
-// [m].
+// While the surface is hidden it cannot be fitted anew: the last fit is used this far from its
+// centre [m].
 constexpr double serves_while_held = 15e-3;
-// A map of what is beside the contact [m].
+// Radii of the rings of the map of heights beside the contact [m].
 constexpr double beside_inner = 12e-3;
 constexpr std::array<double, 5> beside_bands = {40e-3, 80e-3, 140e-3, 220e-3, 320e-3};
 constexpr std::size_t beside_points = 640;
-// A surface that has been followed for so many frames is known not to jump on its own.
+// From so many frames on, a jump is compared with `hardest_strike`.
 constexpr std::size_t well_known = 4;
 constexpr float nothing = -1e3F;
 
-// Where the sightlines of the view that sees most of the patch come from; none if it does not know.
+// The viewpoint of the view that contributed most of the patch's points; none if it has none.
 std::optional<Vec3> main_viewpoint(const Patch& patch) {
   std::size_t most = 0;
   std::optional<Vec3> viewpoint;
@@ -80,7 +80,7 @@ SurfaceContact SightTracker::contact(const Vec3& point, double t) const noexcept
   return surface_.contact(point, t, holding_ ? serves_while_held : serves);
 }
 
-// Nothing tells of the surface: it is kept as it was at `since`.
+// The surface was not measured: it is kept as it was at `since` [s].
 SightTracker::Event SightTracker::hold(double since) noexcept {
   if (!holding_) held_since_ = since;
   holding_ = true;
@@ -95,13 +95,13 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     watch(cloud, proxy);
     return tracking_ ? Event::followed : Event::none;
   }
-  // Where the surface is expected: below the proxy, moved on.
+  // Where the surface is expected: below the proxy, moved by its velocity.
   const LocalFrame& axes = surface_.frame();
   const double expected = surface_.velocity() * std::min(interval, SurfaceEstimate::longest_gap);
   const Vec3 hand = axes.local_from_world(proxy);
   Vec2 foot = surface_.surface().nearest(hand, hand.head<2>(), surface_.centre(),
                                          holding_ ? serves_while_held : 2.0 * serves);
-  // Frames of one place can be compared cell by cell.
+  // An unchanged centre lets frames be compared cell by cell.
   if ((foot - surface_.centre()).norm() < serves) foot = surface_.centre();
   Quadric moved = surface_.surface();
   moved.c[0] += expected;
@@ -116,7 +116,8 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   std::size_t seen = 0;
   std::size_t near = 0;
   std::size_t before = 0;  // points between the viewpoint and the surface
-  // What comes back into sight is where it was; what is left of an occluder may be near.
+  // After a hold the gate is narrow: the surface is where it was, and what remains of an occluder
+  // may be close to it.
   const double wide = holding_ ? surface_.gate(gate_after_hold) : surface_.gate();
   const SightCone inner({place, SurfaceEstimate::radii[0], occluder_reach, axes.up}, viewpoint);
   const Eigen::Vector3f axis = inner.axis().cast<float>();
@@ -160,7 +161,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   double jump = 0.0;  // [m] along up, from where it was expected
   bool there = near >= SurfaceEstimate::least_points &&
                static_cast<double>(near) >= least_support * static_cast<double>(seen);
-  // A surface that went farther than the gate leaves the rim of its noise in it.
+  // Of a surface that moved beyond the gate, the tail of the noise is still inside.
   if (there && static_cast<double>(near) < most_support * static_cast<double>(seen)) {
     const float middle = kth_smallest(std::span(near_above.data(), near), near / 2);
     there = std::abs(middle) <= 0.5F * gate;
@@ -169,7 +170,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     const std::optional<Layer> layer = first_layer(
         std::span(heights.data(), seen), std::max(layer_gap, surface_.spread()), least_support);
     if (from_behind && layer) {
-      // Touched from behind, the surface went out of reach: the points decide.
+      // A surface touched from behind has left the gate: the proxy goes on over the points.
       forget();
       return Event::none;
     }
@@ -185,9 +186,9 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   const bool resumed = holding_;
   surface_.shift(expected + jump);
   if (resumed && event == Event::jumped) surface_.forget_frames();
-  // Something that moves in before a contact that stays hides a part of it first. What is left of
-  // the disc looks like an edge, and is none.
-  // Points that vanish without anything before them are a sensor's shadow beside an occluder.
+  // An occluder that moves in front of a resting contact first hides a part of the disc. The border
+  // of the rest is not an edge of the surface. Points that vanish without an occluder in front of
+  // them lie in a stereo camera's shadow beside one.
   const bool stays = foot == surface_.centre();
   const double all_near = static_cast<double>(near) / share;
   if (!stays || all_near > near_usual_) near_usual_ = all_near;
@@ -237,7 +238,8 @@ void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& norma
       if (surface_.move_to(cloud, at, {surface_.gate(), false, shadowed_})) return;
     }
   }
-  // What the camera sees well behind the place is not touched from behind there: a stray point is.
+  // Where the camera sees the surface well behind this place, the contact from behind is with a
+  // stray point.
   const std::optional<Seen> seen = look_at(cloud, foot, SurfaceEstimate::radii[0]);
   if (seen && seen->line.dot(normal) < 0.0 && seen->above < -SurfaceEstimate::narrowest_gate)
     return;
@@ -282,7 +284,8 @@ std::optional<SightTracker::Seen> SightTracker::look_at(const Cloud& cloud, cons
 
 std::optional<Vec3> SightTracker::in_front(const Cloud& cloud, const Vec3& before,
                                            const Vec3& after, double radius) noexcept {
-  // Whoever goes round an edge has the surface beside or behind the whole way, or comes from far.
+  // A proxy that goes round an edge has the surface beside or behind it all the way, or comes from
+  // farther away.
   const double farthest = 4.0 * radius;
   const double way = (after - before).norm();
   if (!tracking_ || holding_ || covered_ || way < 0.5 * radius || way > farthest)
@@ -294,7 +297,7 @@ std::optional<Vec3> SightTracker::in_front(const Cloud& cloud, const Vec3& befor
   return after + (now->above + radius) * now->line;
 }
 
-// Residuals of the nearest points beside the contact, by sector and band.
+// For each sector and ring beside the contact, the height of the point nearest to the camera.
 SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& place) noexcept {
   Ring ring;
   ring.fill(nothing);
@@ -302,7 +305,7 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
   gather(cloud, Beam{place, beside_bands.back(), reach, axes.up}, beside_points, patch_);
   points_.take(patch_, axes);
   const Eigen::Vector3f at = axes.local_from_world(place).cast<float>();
-  // Beside the contact the surface is taken to go on as a plane.
+  // Beside the contact the surface is continued as its tangent plane.
   Quadric plane;
   plane.c.segment<2>(1) = surface_.surface().gradient(surface_.centre());
   plane.c[0] = surface_.surface().height(surface_.centre()) - plane.height(surface_.centre());
@@ -323,9 +326,9 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
   return ring;
 }
 
-// Did something come between the viewpoint and the surface, or did the surface itself come?
-// Something did if it was already to be seen beside the contact, if the surface still is, or if no
-// surface could have been struck so hard.
+// Is the nearer layer an occluder, or the surface itself? It is an occluder if it was visible
+// beside the contact in the frame before, if the surface is still visible there, or if the surface
+// would need a larger acceleration than `hardest_strike`.
 // @param height  [m] of what is seen now, above where the surface was
 // @param jump    [m] above where it was expected
 bool SightTracker::is_occluder(const Ring& now, double height, double jump,
@@ -336,7 +339,7 @@ bool SightTracker::is_occluder(const Ring& now, double height, double jump,
   const double noise = std::max(surface_.spread(), surface_.height_sd());
   if (surface_.settled() >= well_known && jump > times * strike + 15e-3 + 4.0 * noise) return true;
   const double tolerance = std::max(15e-3, 4.0 * noise);
-  // A cell keeps its nearest point, and that is the noise's farthest.
+  // A cell keeps its nearest point, which is the extreme of the noise.
   const double nearer = std::max(15e-3, 6.0 * noise);
   std::size_t same_before = 0;
   std::size_t unchanged = 0;

@@ -22,8 +22,9 @@ struct Layer {
 std::optional<Layer> first_layer(std::span<float> heights, double gap,
                                  double least_support) noexcept;
 
-/// Sightline tracking: which of the points that a frame shows are the surface that the proxy
-/// touches, or that lies behind it on its line of sight. docs/method.md, "Sight", 1, 2 and 7.
+/// Sightline tracking: decides which of a frame's points belong to the surface that the proxy
+/// touches, or that lies behind a free proxy on its line of sight. docs/method.md, "Sight", 1, 2
+/// and 7.
 ///
 /// [servo] Nothing here allocates, locks or throws after construction.
 class SightTracker {
@@ -33,14 +34,14 @@ class SightTracker {
     none,      ///< there is nothing to follow
     followed,  ///< it is where it was expected
     jumped,    ///< it is elsewhere on the line of sight
-    hidden,    ///< something came before it, or nothing was measured: held as it was
+    hidden,    ///< by an occluder, or nothing was measured: held as it was
   };
 
   void forget() noexcept { tracking_ = holding_ = false; }
 
   /// Takes a new frame into use. @param proxy  [m] world
-  /// @param hardest_strike  [m/s^2] what jumps harder than that came between; infinite for a
-  ///                        surface that is only watched, which is believed
+  /// @param hardest_strike  [m/s^2] a layer that would need a larger acceleration is an occluder;
+  ///                        infinite for a surface that is not touched yet
   Event frame(const Cloud& cloud, double stamp, double interval, const Vec3& proxy,
               double hardest_strike) noexcept;
   /// Looks for a surface to follow behind a proxy in free space, unless one is followed there.
@@ -52,9 +53,9 @@ class SightTracker {
   /// Fits the surface anew around `foot` [m, world], a place on it. False if it ends before there.
   bool slide(const Cloud& cloud, const Vec3& foot) noexcept;
 
-  /// Where a proxy that went through a surface on its way from `before` to `after` [m, world] ought
-  /// to be: before it, on the line of sight through `after`. None if it went through nothing, as
-  /// when it went round an edge.
+  /// Where to put a proxy that passed through a surface on its way from `before` to `after` [m,
+  /// world]: in front of it, on the line of sight through `after`. None if it passed through
+  /// nothing, or went round an edge.
   /// @param radius  [m] of the proxy
   [[nodiscard]] std::optional<Vec3> in_front(const Cloud& cloud, const Vec3& before,
                                              const Vec3& after, double radius) noexcept;
@@ -69,8 +70,8 @@ class SightTracker {
 
   /// The surface nearest to `point` [m, world] at time t [s]; only while `tracking`.
   [[nodiscard]] SurfaceContact contact(const Vec3& point, double t) const noexcept;
-  /// Is a place with that normal [-, world] within 70 degrees of what the surface is a height over?
-  /// A steeper one it does not tell.
+  /// Is that normal [-, world] within 70 degrees of the axis along which heights are measured?
+  /// Steeper parts of a surface are not described by heights.
   [[nodiscard]] bool faces(const Vec3& normal) const noexcept {
     return surface_.frame().up.dot(normal) > 0.35;
   }
@@ -78,7 +79,7 @@ class SightTracker {
   [[nodiscard]] Vec3 displacement(double t) const noexcept {
     return surface_.displacement(t) * surface_.frame().up;
   }
-  /// What is known of the surface; only while `tracking`.
+  /// The estimate of the surface; only while `tracking`.
   [[nodiscard]] const SurfaceEstimate& surface() const noexcept { return surface_; }
 
  private:
@@ -105,9 +106,9 @@ class SightTracker {
   bool tracking_ = false;
   bool holding_ = false;
   double held_since_ = 0.0;
-  bool covered_ = false;     // something was before a part of the disc
-  bool shadowed_ = false;    // and has come there since
-  double near_usual_ = 0.0;  // points of the surface in the beam, with nothing before them
+  bool covered_ = false;     // an occluder hides a part of the disc
+  bool shadowed_ = false;    // and arrived while the contact stayed in place
+  double near_usual_ = 0.0;  // points of the surface in the beam without an occluder
   Ring beside_{};
 };
 

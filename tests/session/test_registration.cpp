@@ -144,10 +144,13 @@ TEST(ReadPairs, ReadsACsvFileAndNamesFileAndLineOfWhatIsWrong) {
     const auto file = folder.write("bad.csv", text);
     return [file] { return read_pairs(file), 0; };
   };
-  EXPECT_TRUE(fails_saying(reading("dx,dy,dz,wx,wy\n1,2,3,4,5\n"), "bad.csv:1:", "'wz'"));
-  EXPECT_TRUE(fails_saying(reading("dx,dy,dz,wx,wy,wz\n1,2,3,4,5,x\n"), "bad.csv:2:", "wz: 'x'"));
-  EXPECT_TRUE(fails_saying(reading("dx,dy,dz,wx,wy,wz\n1,2,3,4,5\n"), "bad.csv:2:", "wz: ''"));
-  EXPECT_TRUE(fails_saying(reading("dx,dy,dz,wx,wy,wz\n1,2,nan,4,5,6\n"), "bad.csv:2:", "dz"));
+  EXPECT_TRUE(fails_saying(reading("dx,dy,dz,wx,wy\n1,2,3,4,5\n"), "bad.csv: line 1:", "'wz'"));
+  EXPECT_TRUE(fails_saying(reading("dx,dy,dz,wx,wy,wz\n1,2,3,4,5,x\n"),
+                           "bad.csv: line 2:", "wz is not a number"));
+  EXPECT_TRUE(
+      fails_saying(reading("dx,dy,dz,wx,wy,wz\n1,2,3,4,5\n"), "bad.csv: line 2:", "wz is missing"));
+  EXPECT_TRUE(fails_saying(reading("dx,dy,dz,wx,wy,wz\n1,2,nan,4,5,6\n"),
+                           "bad.csv: line 2:", "dz is no place"));
   EXPECT_TRUE(fails_saying(reading("dx,dy,dz,wx,wy,wz\n"), "no points"));
   EXPECT_TRUE(fails_saying([&] { return read_pairs(folder.path() / "none.csv"), 0; }, "none.csv",
                            "cannot be read"));

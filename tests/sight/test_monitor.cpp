@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The law that comes first: what the newest frame itself shows overrules every estimate.
+// The monitor: what the newest frame itself shows overrules every estimate.
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -142,7 +142,7 @@ TEST(Monitor, LetsAHandGoRoundAnEdgeBehindABody) {
   }
 }
 
-TEST(SightLaw, AHandThatPressesSlidesAndLiftsIsFree) {
+TEST(SightMonitor, AHandThatPressesSlidesAndLiftsIsFree) {
   // A RealSense's noise at 1.2 m once left the proxy behind the plane: 20 N down, for ever.
   const auto camera = open_synthetic_camera(
       Uri("synthetic:plane?tilt=34deg&distance=1.2m&sensor=d4xx&seed=3&size=320x240&fov=30.38deg"));
@@ -176,7 +176,7 @@ TEST(SightLaw, AHandThatPressesSlidesAndLiftsIsFree) {
   }
 }
 
-TEST(SightLaw, FindsThePlaneAgainWithinTwoTenthsOfASecondAndWithoutAKick) {
+TEST(SightMonitor, FindsThePlaneAgainWithinTwoTenthsOfASecondAndWithoutAKick) {
   // Behind the plane after a jump that no frame showed: the proxy is put there by the hand itself.
   Sight sight;
   sight.seat({0, 0, 0.03});
@@ -204,7 +204,7 @@ TEST(SightLaw, FindsThePlaneAgainWithinTwoTenthsOfASecondAndWithoutAKick) {
   EXPECT_NEAR(last, 6.0, 0.2);
 }
 
-TEST(SightLaw, AForceThatReturnsAfterTheStreamStoppedRisesSlowly) {
+TEST(SightMonitor, AForceThatReturnsAfterTheStreamStoppedRisesSlowly) {
   Sight sight;
   sight.seat({0, 0, 0.03});
   const PointCloud plane = plane_at(0.0);
@@ -224,7 +224,7 @@ TEST(SightLaw, AForceThatReturnsAfterTheStreamStoppedRisesSlowly) {
   EXPECT_NEAR(last, 6.0, 0.2);
 }
 
-TEST(SightLaw, FeelsARestingPlaneInFullHoweverSlowOrLateTheCamera) {
+TEST(SightMonitor, FeelsARestingPlaneInFullHoweverSlowOrLateTheCamera) {
   const PointCloud plane = plane_at(0.0);
   for (const double rate : {5.0, 9.0, 30.0, 90.0}) {
     for (const double latency : {0.0, 0.1, 0.15, 0.5}) {

@@ -474,6 +474,38 @@ TEST(Sight, RendersASineOfTwentyMillimetresWithoutStepsAndWithoutLag) {
   EXPECT_LT(largest_step, 0.06);
 }
 
+// The force at the end of a second of contact with a plane, both moving along z at those speeds.
+double pressed_force(double damping, double hand_speed, double surface_speed, double sigma) {
+  Parameters parameters;
+  parameters.coupling.damping = damping;
+  Sight sight(parameters);
+  sight.seat(Vec3(0, 0, 0.03));
+  std::mt19937 random(3);
+  constexpr int frames = 30;
+  const double end = frames * interval;
+  Tick tick;
+  for (int k = 0; k < frames; ++k) {
+    const double stamp = k * interval;
+    const PointCloud cloud =
+        seen_from_above(flat_grid(surface_speed * (stamp - end), 1.5e-3, 40), sigma, random);
+    tick = live_through(sight, cloud, stamp,
+                        [&](double t) { return Vec3(0, 0, -0.01 + hand_speed * (t - end)); });
+  }
+  return tick.force.z();
+}
+
+TEST(Sight, DampsTheHandsVelocityRelativeToTheSurface) {
+  constexpr double damping = 2.0;
+  const auto added = [](double hand, double surface) {
+    return pressed_force(damping, hand, surface, 0.0) - pressed_force(0.0, hand, surface, 0.0);
+  };
+  EXPECT_NEAR(added(-0.02, 0.0), damping * 0.02, 1e-4) << "a hand that presses in";
+  EXPECT_NEAR(added(0.02, 0.0), -damping * 0.02, 1e-4) << "a hand that yields";
+  EXPECT_NEAR(added(0.02, 0.02), 0.0, 2e-3) << "a hand that goes along";
+  // Corrections of the estimate under noise are no velocity.
+  EXPECT_EQ(pressed_force(damping, 0.0, 0.0, 1e-3), pressed_force(0.0, 0.0, 0.0, 1e-3));
+}
+
 TEST(Sight, FollowsASurfaceThatTurns) {
   std::mt19937 random(8);
   Sight sight = seated({0, 0, 0.03});

@@ -1,0 +1,412 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/devices/device_guard.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <limits>
+#include <new>
+#include <string>
+#include <thread>
+#include <type_traits>
+
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double opening_time = 30.0;   // [s] for the device to open, or to be enabled
+constexpr double guard_silence = 0.05;  // [s] without the guard's loop: the device is lost
+constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+
+double now_s() {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+// A value in shared memory that one process writes and the other reads, neither waiting: two slots,
+// of which the number of values written so far names the newer.
+template <class Value>
+class Newest {
+  static_assert(std::is_trivially_copyable_v<Value>);
+
+ public:
+  void write(const Value& value) noexcept {
+    const std::uint64_t next = count_.load(std::memory_order_relaxed) + 1;
+    Slot& slot = slots_[next % slots_.size()];
+    slot.count.store(0, std::memory_order_relaxed);
+    std::atomic_thread_fence(std::memory_order_release);
+    std::memcpy(&slot.value, &value, sizeof value);
+    slot.count.store(next, std::memory_order_release);
+    count_.store(next, std::memory_order_release);
+  }
+  // The newest value; false if there is none, or writers were faster than the copy eight times.
+  bool read(Value& value) const noexcept {
+    for (int attempt = 0; attempt < 8; ++attempt) {
+      const std::uint64_t count = count_.load(std::memory_order_acquire);
+      if (count == 0) return false;
+      const Slot& slot = slots_[count % slots_.size()];
+      if (slot.count.load(std::memory_order_acquire) != count) continue;
+      std::memcpy(&value, &slot.value, sizeof value);
+      std::atomic_thread_fence(std::memory_order_acquire);
+      if (slot.count.load(std::memory_order_relaxed) == count) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] std::uint64_t count() const noexcept {
+    return count_.load(std::memory_order_acquire);
+  }
+
+ private:
+  struct Slot {
+    std::atomic<std::uint64_t> count{0};
+    Value value{};
+  };
+  std::atomic<std::uint64_t> count_{0};
+  std::array<Slot, 4> slots_{};
+};
+
+struct Force {
+  double x, y, z;  // [N] device
+  std::uint64_t beats;
+};
+
+struct Hand {
+  std::array<double, 3> position;     // [m]
+  std::array<double, 3> velocity;     // [m/s] NaN: none
+  std::array<double, 4> orientation;  // x y z w; NaN: none
+  double stamp;                       // [s] NaN: none
+  std::int64_t buttons;               // -1: none
+  bool present, clutched;
+  DeviceFault fault;
+};
+
+using Text = std::array<char, 256>;
+
+void put_text(Text& to, const std::string& from) {
+  to.fill('\0');
+  std::copy_n(from.begin(), std::min(from.size(), to.size() - 1), to.begin());
+}
+
+// DeviceInfo without what needs memory of its own.
+struct Info {
+  Text uri, kind, serial, firmware;
+  DeviceLimits limits;
+  double mass, damping, friction, resolution, delay, rate, watchdog;  // NaN: empty
+  bool has_reach;
+  std::array<double, 7> reach;  // lowest, highest, radius
+  bool simulated;
+};
+static_assert(std::is_trivially_copyable_v<DeviceLimits>);
+
+enum class Phase : int { opening, open, refused };
+enum class Wish : int { disabled, enabled, ended };
+
+struct Memory {
+  std::atomic<Phase> phase{Phase::opening};
+  Text refusal{};  // written before `phase`
+  Info info{};     // likewise
+  Newest<Force> force;
+  Newest<Hand> hand;
+  std::atomic<std::uint64_t> turns{0};   // of the guard's loop
+  std::atomic<std::uint64_t> wishes{0};  // raised with each new wish
+  std::atomic<Wish> wish{Wish::disabled};
+  std::atomic<std::uint64_t> granted{0};  // the number of the wish that was done
+  std::atomic<bool> enable_failed{false};
+  Text enable_refusal{};  // written before `granted`
+};
+static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
+static_assert(std::atomic<Phase>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+
+double or_nan(const std::optional<double>& value) {
+  return value.value_or(nothing);
+}
+
+std::optional<double> optional_of(double value) {
+  return value == value ? std::optional(value) : std::nullopt;
+}
+
+void put_info(const DeviceInfo& from, double beat_time, Info& to) {
+  put_text(to.uri, from.uri);
+  put_text(to.kind, from.kind + ", guarded");
+  put_text(to.serial, from.serial);
+  put_text(to.firmware, from.firmware);
+  to.limits = from.limits;
+  to.mass = or_nan(from.mass);
+  to.damping = or_nan(from.damping);
+  to.friction = or_nan(from.friction);
+  to.resolution = or_nan(from.resolution);
+  to.delay = or_nan(from.delay);
+  to.rate = or_nan(from.rate);
+  to.watchdog = std::min(from.watchdog.value_or(beat_time), beat_time);
+  to.has_reach = from.reach.has_value();
+  if (from.reach)
+    to.reach = {from.reach->lowest.x(),    from.reach->lowest.y(),  from.reach->lowest.z(),
+                from.reach->highest.x(),   from.reach->highest.y(), from.reach->highest.z(),
+                or_nan(from.reach->radius)};
+  to.simulated = from.simulated;
+}
+
+DeviceInfo info_of(const Info& from) {
+  DeviceInfo info;
+  info.uri = from.uri.data();
+  info.kind = from.kind.data();
+  info.limits = from.limits;
+  if (from.has_reach) {
+    const auto& r = from.reach;
+    info.reach = DeviceReach{Vec3(r[0], r[1], r[2]), Vec3(r[3], r[4], r[5]), optional_of(r[6])};
+  }
+  info.mass = optional_of(from.mass);
+  info.damping = optional_of(from.damping);
+  info.friction = optional_of(from.friction);
+  info.resolution = optional_of(from.resolution);
+  info.delay = optional_of(from.delay);
+  info.rate = optional_of(from.rate);
+  info.watchdog = from.watchdog;
+  info.simulated = from.simulated;
+  info.serial = from.serial.data();
+  info.firmware = from.firmware.data();
+  return info;
+}
+
+Hand hand_of(const HandState& from) {
+  Hand hand{};
+  const Vec3 velocity = from.velocity.value_or(Vec3::Constant(nothing));
+  for (int i = 0; i < 3; ++i) {
+    hand.position[static_cast<std::size_t>(i)] = from.position[i];
+    hand.velocity[static_cast<std::size_t>(i)] = velocity[i];
+  }
+  hand.orientation.fill(nothing);
+  if (from.orientation)
+    hand.orientation = {from.orientation->x(), from.orientation->y(), from.orientation->z(),
+                        from.orientation->w()};
+  hand.stamp = or_nan(from.stamp);
+  hand.buttons = from.buttons ? static_cast<std::int64_t>(*from.buttons) : -1;
+  hand.present = from.present;
+  hand.clutched = from.clutched;
+  hand.fault = from.fault;
+  return hand;
+}
+
+HandState state_of(const Hand& hand) {
+  HandState state;
+  state.position = Vec3(hand.position[0], hand.position[1], hand.position[2]);
+  if (hand.velocity[0] == hand.velocity[0])
+    state.velocity = Vec3(hand.velocity[0], hand.velocity[1], hand.velocity[2]);
+  if (hand.orientation[0] == hand.orientation[0])
+    state.orientation = Eigen::Quaterniond(hand.orientation[3], hand.orientation[0],
+                                           hand.orientation[1], hand.orientation[2]);
+  state.stamp = optional_of(hand.stamp);
+  if (hand.buttons >= 0) state.buttons = static_cast<std::uint32_t>(hand.buttons);
+  state.present = hand.present;
+  state.clutched = hand.clutched;
+  state.fault = hand.fault;
+  return state;
+}
+
+void sleep_until(double t) {
+  timespec time{};
+  time.tv_sec = static_cast<time_t>(t);
+  time.tv_nsec = static_cast<long>(1e9 * (t - static_cast<double>(time.tv_sec)));
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) == EINTR) {
+  }
+}
+
+// Does what the session wished for last, if it is new.
+void grant(Memory& memory, Device& device) {
+  const std::uint64_t wished = memory.wishes.load(std::memory_order_acquire);
+  if (wished == memory.granted.load(std::memory_order_relaxed)) return;
+  memory.enable_failed = false;
+  if (memory.wish.load(std::memory_order_acquire) == Wish::enabled) {
+    try {
+      device.enable();
+    } catch (const std::exception& error) {
+      put_text(memory.enable_refusal, error.what());
+      memory.enable_failed = true;
+    }
+  } else {
+    device.disable();
+  }
+  memory.granted.store(wished, std::memory_order_release);
+}
+
+// The guard's process: until the session wishes for the end, or has ended.
+void hold(Memory& memory, Device& device, const GuardLimits& limits, pid_t session) {
+  GuardGate gate(limits.beat_time);
+  Vec3 wanted = Vec3::Zero();
+  std::uint64_t beats = 0;
+  double next = now_s();
+  while (getppid() == session && memory.wish.load(std::memory_order_acquire) != Wish::ended) {
+    grant(memory, device);
+    HandState state = device.read(now_s());
+    if (Force force{}; memory.force.read(force)) {
+      wanted = Vec3(force.x, force.y, force.z);
+      beats = force.beats;
+    }
+    const double now = now_s();
+    device.write(gate.pass(now, beats, wanted), now);
+    if (gate.closed()) {
+      state.present = false;  // so that the session's safety chain lets go, and engages anew
+      if (state.fault == DeviceFault::none && beats > 0) state.fault = DeviceFault::other;
+    }
+    memory.hand.write(hand_of(state));
+    memory.turns.fetch_add(1, std::memory_order_release);
+    next = std::max(next + limits.period, now_s());
+    sleep_until(next);
+  }
+  device.write(Vec3::Zero(), now_s());
+  device.disable();
+}
+
+[[noreturn]] void run_guard(Memory& memory, const std::function<std::unique_ptr<Device>()>& open,
+                            const GuardLimits& limits, pid_t session) {
+  // What ends a session reaches its whole group; the guard outlives it.
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTOU, SIGTTIN})
+    std::signal(number, SIG_IGN);  // NOLINT(cert-err33-c): these can all be ignored
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+  int status = 0;
+  try {
+    const std::unique_ptr<Device> device = open();
+    if (device->drives())
+      throw Error(device->info().uri, "its driver calls the loop, which a guard cannot",
+                  "give the guard a device that is polled");
+    put_info(device->info(), limits.beat_time, memory.info);
+    memory.phase.store(Phase::open, std::memory_order_release);
+    hold(memory, *device, limits, session);
+  } catch (const std::exception& error) {
+    put_text(memory.refusal, error.what());
+    memory.phase.store(Phase::refused, std::memory_order_release);
+    status = 1;
+  }
+  _exit(status);  // nothing that the session's process has registered runs here
+}
+
+// The session's side.
+class GuardedDevice final : public Device {
+ public:
+  GuardedDevice(Memory* memory, pid_t guard)
+      : memory_(memory), guard_(guard), info_(info_of(memory->info)) {}
+  ~GuardedDevice() override {
+    memory_->wish.store(Wish::ended, std::memory_order_release);
+    waitpid(guard_, nullptr, 0);
+    munmap(memory_, sizeof(Memory));
+  }
+
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+
+  HandState read(double t) noexcept override {
+    Hand hand{};
+    if (memory_->hand.read(hand)) last_ = state_of(hand);
+    const std::uint64_t turns = memory_->turns.load(std::memory_order_acquire);
+    if (turns != turns_) {
+      turns_ = turns;
+      heard_ = t;
+    }
+    HandState state = last_;
+    if (t - heard_ > guard_silence || turns == 0) {
+      state.present = false;
+      state.fault = DeviceFault::disconnected;
+    }
+    return state;
+  }
+
+  void write(const Vec3& force, double /*t*/) noexcept override {
+    const bool passes = enabled_.load(std::memory_order_acquire);
+    memory_->force.write(passes ? Force{force.x(), force.y(), force.z(), ++beats_}
+                                : Force{0.0, 0.0, 0.0, ++beats_});
+  }
+
+  void enable() override {
+    const std::uint64_t number = wish(Wish::enabled);
+    const double end = now_s() + opening_time;
+    while (memory_->granted.load(std::memory_order_acquire) < number) {
+      if (now_s() > end || waitpid(guard_, nullptr, WNOHANG) != 0)
+        throw Error(info_.uri, "its guard does not answer", "start the session again");
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    if (memory_->enable_failed) throw Error(info_.uri, memory_->enable_refusal.data());
+    enabled_.store(true, std::memory_order_release);
+  }
+
+  void disable() noexcept override {
+    enabled_.store(false, std::memory_order_release);
+    wish(Wish::disabled);
+  }
+
+ private:
+  std::uint64_t wish(Wish wish) noexcept {
+    memory_->wish.store(wish, std::memory_order_release);
+    return memory_->wishes.fetch_add(1, std::memory_order_acq_rel) + 1;
+  }
+
+  Memory* memory_;
+  pid_t guard_;
+  DeviceInfo info_;
+  std::atomic<bool> enabled_{false};
+  // Of the thread that reads and writes:
+  HandState last_;
+  std::uint64_t beats_ = 0;
+  std::uint64_t turns_ = 0;
+  double heard_ = 0.0;  // [s]
+};
+
+}  // namespace
+
+Vec3 GuardGate::pass(double now, std::uint64_t beats, const Vec3& force) {
+  if (beats != beats_) {
+    beats_ = beats;
+    last_beat_ = now;
+    if (force.isZero(0.0)) closed_ = false;
+  }
+  if (now - last_beat_ > beat_time_ || !force.allFinite()) closed_ = true;
+  return closed_ ? Vec3::Zero() : force;
+}
+
+std::unique_ptr<Device> open_guarded(const std::function<std::unique_ptr<Device>()>& open,
+                                     const GuardLimits& limits) {
+  if (!(limits.beat_time >= 0.005 && limits.beat_time <= 0.05))
+    throw Error("beat_time of the guard", "it is out of range", "give 0.005 to 0.05 s");
+  if (!(limits.period >= 1e-4 && limits.period <= 0.01))
+    throw Error("period of the guard", "it is out of range", "give 1e-4 to 0.01 s");
+  void* shared =
+      mmap(nullptr, sizeof(Memory), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (shared == MAP_FAILED) throw Error("guard", std::strerror(errno));
+  auto* memory = new (shared) Memory;
+  const pid_t session = getpid();
+  const pid_t guard = fork();
+  if (guard < 0) {
+    munmap(shared, sizeof(Memory));
+    throw Error("guard", std::strerror(errno), "end other processes");
+  }
+  if (guard == 0) run_guard(*memory, open, limits, session);
+  const double end = now_s() + opening_time;
+  int status = 0;
+  std::string trouble;
+  while (memory->phase.load(std::memory_order_acquire) == Phase::opening && trouble.empty()) {
+    if (waitpid(guard, &status, WNOHANG) == guard) trouble = "guard: its process has ended";
+    if (now_s() > end) trouble = "guard: the device did not open in 30 s";
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  if (memory->phase == Phase::refused) trouble = memory->refusal.data();
+  if (!trouble.empty()) {
+    kill(guard, SIGKILL);
+    waitpid(guard, &status, 0);
+    munmap(shared, sizeof(Memory));
+    throw Error(trouble, "the device cannot be guarded");
+  }
+  return std::make_unique<GuardedDevice>(memory, guard);
+}
+
+}  // namespace palpate

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "palpate/servo/device.hpp"
+
+namespace palpate {
+
+/// How a guard watches the session's process.
+struct GuardLimits {
+  double beat_time = 0.020;  ///< [s] without a `write` of the session: zero force; 0.005 to 0.05
+  double period = 0.001;     ///< [s] between two reads of the device; 1e-4 to 0.01
+};
+
+/// Decides which force a guard passes on. Follows from the times that it is given alone.
+class GuardGate {
+ public:
+  explicit GuardGate(double beat_time) : beat_time_(beat_time) {}
+
+  /// @param now    [s]
+  /// @param beats  how many forces the session has written so far
+  /// @param force  [N] device frame: the newest of them
+  /// @return [N] zero if none came for beat_time, and from then on until the session has written a
+  ///         zero force: a process that was stopped may go on in the middle of a tick.
+  Vec3 pass(double now, std::uint64_t beats, const Vec3& force);
+
+  /// Is the session's force kept from the device?
+  [[nodiscard]] bool closed() const { return closed_; }
+
+ private:
+  double beat_time_;
+  std::uint64_t beats_ = 0;
+  double last_beat_ = 0.0;  // [s]
+  bool closed_ = true;      // until the first zero force
+};
+
+/// A device in a process of its own, which takes the force away when this one dies, is stopped or
+/// hangs: nothing that can happen to a session keeps a force on the device for longer than
+/// `GuardLimits::beat_time` and one period, but the machine's own end.
+///
+/// The guard is forked here, opens the device, reads it once a period and writes what the session
+/// wrote last. What the session sees is one period older than without a guard. After the guard has
+/// taken a force away the device reports a fault until the session has written a zero force. The
+/// guard ignores the signals that end a session, and ends by itself when its parent has ended.
+///
+/// The result's `DeviceInfo::watchdog` is `beat_time`, or the device's own if that is shorter. The
+/// device must be polled; it may have no `drives()`. If the guard itself dies, the result reports
+/// `DeviceFault::disconnected`, and the device's driver has closed the device, or its own watchdog
+/// counts.
+///
+/// @param open  opens the device, in the guard's process. Call this while the process has one
+///              thread: others are not there in the guard, with whatever lock they hold.
+/// @throws Error if the process cannot be made or the device cannot be opened: what `open` said.
+std::unique_ptr<Device> open_guarded(const std::function<std::unique_ptr<Device>()>& open,
+                                     const GuardLimits& limits = {});
+
+}  // namespace palpate

@@ -105,6 +105,8 @@ function(palpate_test name)
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(test_${name} PRIVATE ${ARG_LINKS} GTest::gtest_main)
   palpate_target_options(test_${name})
+  palpate_runs_once(test_${name})
+  target_precompile_headers(test_${name} REUSE_FROM palpate_test_headers)
   set_target_properties(test_${name} PROPERTIES CXX_CLANG_TIDY "")  # GoogleTest's macros cost it
   gtest_discover_tests(test_${name} DISCOVERY_TIMEOUT 60
     TEST_PREFIX "${PALPATE_TEST_PREFIX}"

@@ -103,7 +103,15 @@ Movement Sight::move(const Vec3& hip, double t) noexcept {
       if (contact.curvature * r_c > deepest || !tracker_.faces(contact.normal)) return false;
       if (contact.at_limit && !tracker_.holding()) {
         if (slides == most_slides) movement.flags |= step_budget_hit;
-        if (slides++ < most_slides && tracker_.slide(*frame_.cloud(), contact.foot)) continue;
+        const double rate = surface_speed(hand_velocity_.t());
+        if (slides++ < most_slides && tracker_.slide(*frame_.cloud(), contact.foot)) {
+          // The force goes on smoothly from one fit to the next, as from frame to frame.
+          if (on_fit_ && proxy_.touching && !blend_due_) {
+            blend_due_ = true;
+            carried_rate_ = rate;
+          }
+          continue;
+        }
         if (!tracker_.smooth()) return false;
       }
       ++movement.steps;

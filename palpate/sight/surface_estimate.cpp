@@ -151,7 +151,7 @@ SurfaceContact SurfaceEstimate::contact(const Vec3& point, double t, double reac
 
 void SurfaceEstimate::start_frame(double stamp, double interval) noexcept {
   if (!(stamp > stamp_ && stamp - stamp_ <= longest_gap)) {
-    velocity_ = 0.0;
+    stop();
     settled_ = 0;
   }
   stamp_ = stamp;
@@ -163,7 +163,7 @@ bool SurfaceEstimate::start(const Cloud& cloud, const Vec3& foot, const Vec3& up
   surface_ = {};
   count_ = 0;
   for (Cells& past : cells_) past.full = false;
-  velocity_ = 0.0;
+  stop();
   jumped_ = false;
   smooth_ = false;
   return measure(cloud, Vec2::Zero(), Look{narrowest_gate + 4.0 * spread_}, true);
@@ -450,8 +450,9 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   const double sd = height_sd();
   const HeightTrack track = track_height(since, sd, interval_);
   if (new_frame) {
-    velocity_ = track.velocity;
-    rested_ = velocity_ == 0.0 ? std::min(rested_ + 1, history) : 0;
+    predicted_velocity_ = track.velocity;
+    velocity_ = confined_velocity(track.velocity, since, sd);
+    rested_ = predicted_velocity_ == 0.0 ? std::min(rested_ + 1, history) : 0;
   }
   const double height = track.height;
   surface_.c.tail<5>() = shapes[chosen];

@@ -74,27 +74,31 @@ const SourceInfo live{.uri = "live:",
                       .live = true,
                       .clock = StampClock::monotonic};
 
-// Gives one frame, then never returns from `next` until the gate opens, whoever cancels it.
+// 100 frames a second; once it may, never returns from `next` until the gate opens, whoever cancels
+// it.
 class HangingCamera final : public Source {
  public:
   HangingCamera(std::shared_ptr<Log> log, std::shared_ptr<Gate> gate, std::promise<void> ended)
       : log_(std::move(log)), gate_(std::move(gate)), ended_(std::move(ended)) {}
   ~HangingCamera() override { ended_.set_value(); }
   std::optional<Frame> next(double /*timeout*/) override {
-    if (std::exchange(is_first_, false)) return Frame{monotonic_now(), wall()};
+    if (!may_hang) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      return Frame{monotonic_now(), wall()};
+    }
     hangs = true;
     gate_->wait();
     return std::nullopt;
   }
   void cancel() noexcept override { log_->note("cancel the hanging camera"); }
   [[nodiscard]] const SourceInfo& info() const override { return live; }
+  static inline std::atomic<bool> may_hang{false};
   static inline std::atomic<bool> hangs{false};
 
  private:
   std::shared_ptr<Log> log_;
   std::shared_ptr<Gate> gate_;
   std::promise<void> ended_;
-  bool is_first_ = true;
 };
 
 // 100 frames a second.
@@ -125,14 +129,15 @@ class LivingCamera final : public Source {
   int number_ = 0;
 };
 
-// A hand that hovers for 50 reads and then presses into the wall.
+// A hand that hovers for 50 reads, then presses into the wall for 500, again and again: after a
+// stall of a busy machine it is free to engage anew.
 class LoggingDevice final : public Device {
  public:
   explicit LoggingDevice(std::shared_ptr<Log> log, bool refuses = false)
       : log_(std::move(log)), refuses_(refuses) {}
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
   HandState read(double /*t*/) noexcept override {
-    return {.position = {0.0, 0.0, ++reads_ <= 50 ? wall_depth - 0.05 : wall_depth + 0.005}};
+    return {.position = {0.0, 0.0, ++reads_ % 550 <= 50 ? wall_depth - 0.05 : wall_depth + 0.005}};
   }
   void write(const Vec3& force, double /*t*/) noexcept override {
     log_->note(force.isZero(0.0) ? "write zero" : "write a force");
@@ -178,7 +183,7 @@ TEST(LiveSession, TakesTheForceOffBeforeAnyCameraIsWaitedFor) {
   const auto gate = std::make_shared<Gate>();
   std::promise<void> ended;
   std::future<void> camera_ended = ended.get_future();
-  HangingCamera::hangs = false;
+  HangingCamera::may_hang = HangingCamera::hangs = false;
   {
     SessionOptions options = patient(log);
     options.cameras.push_back(
@@ -188,9 +193,10 @@ TEST(LiveSession, TakesTheForceOffBeforeAnyCameraIsWaitedFor) {
     session.start();
     session.start();  // harmless
     EXPECT_TRUE(session.state().running);
-    ASSERT_TRUE(comes_true([&] {
-      return HangingCamera::hangs && session.statistics().force_out.load();
-    })) << "no force was sent";
+    const auto force_is_out = [&] { return session.statistics().force_out.load(); };
+    ASSERT_TRUE(comes_true(force_is_out)) << "no force was sent";
+    HangingCamera::may_hang = true;
+    ASSERT_TRUE(comes_true([&] { return HangingCamera::hangs && force_is_out(); }));
     session.stop();  // returns although the camera hangs
 
     const std::vector<std::string> events = log->events();

@@ -17,6 +17,7 @@ namespace palpate {
 namespace {
 
 constexpr double last_write_time = 0.05;                       // [s] for the ticking thread to end
+constexpr double hang_time = 1.0;                              // [s] for a cycle to return
 constexpr double first_callback_time = 1.0;                    // [s] for a driver to begin
 constexpr auto watch_interval = std::chrono::milliseconds(2);  // a fifth of the shortest limit
 constexpr int watch_priority = 5;                              // above the servo's
@@ -62,6 +63,7 @@ ServoLoop::ServoLoop(std::shared_ptr<Method> method, Device& device, const Servo
 
 ServoLoop::~ServoLoop() {
   stop();
+  if (started_ && !ended_) finish();
 }
 
 void ServoLoop::start() {
@@ -104,6 +106,13 @@ void ServoLoop::start_driven() {
 }
 
 void ServoLoop::driven_tick() noexcept {
+  struct Callback {
+    std::atomic<bool>& in_progress;
+    explicit Callback(std::atomic<bool>& flag) : in_progress(flag) {
+      in_progress.store(true, std::memory_order_release);
+    }
+    ~Callback() { in_progress.store(false, std::memory_order_release); }
+  } const callback(in_callback_);
   const double now = monotonic_now();
   beat(now);
   if (stopping_.load(std::memory_order_acquire)) {
@@ -154,33 +163,51 @@ void ServoLoop::watch() {
     watchdog_.look(monotonic_now());
     lock.lock();
   }
+  device_.disable();  // this thread may have enabled it after it was to end
+  watch_has_ended_.store(true, std::memory_order_release);
 }
 
-void ServoLoop::end_watch() {
+void ServoLoop::request_end_of_watch() {
   {
     const std::lock_guard lock(watch_mutex_);
     watch_ends_ = true;
   }
   watch_wakes_.notify_all();
-  if (watch_.joinable()) watch_.join();
 }
 
-void ServoLoop::stop() {
-  if (!started_ || stopped_.exchange(true)) return;
+bool ServoLoop::stop() {
+  if (!started_) return true;
+  if (stopped_.exchange(true)) {
+    if (!ended_) device_.disable();
+    return ended_;
+  }
   stopping_.store(true, std::memory_order_release);
   const bool sent =
       thread_ ? thread_->try_stop(last_write_time) : wait_for(last_write_time, [this] {
         return zero_sent_.load(std::memory_order_acquire);
       });
   device_.disable();
-  end_watch();
-  device_.disable();  // the watch may have enabled it in between
+  request_end_of_watch();
+  const bool returns =
+      wait_for(hang_time, [this] { return watch_has_ended_.load(std::memory_order_acquire); }) &&
+      (sent || (thread_ ? thread_->try_stop(hang_time) : wait_for(hang_time, [this] {
+         return !in_callback_.load(std::memory_order_acquire);
+       })));
+  hangs_ = !returns;
+  if (returns) finish();
+  return returns;
+}
+
+// Waits for all threads, as long as that takes.
+void ServoLoop::finish() {
+  if (watch_.joinable()) watch_.join();
   if (thread_) {
     thread_->stop();
   } else {
     device_.stop();
-    if (!sent) device_.write(Vec3::Zero(), monotonic_now());
+    if (!zero_sent_) device_.write(Vec3::Zero(), monotonic_now());
   }
+  ended_.store(true, std::memory_order_release);
 }
 
 DeviceStatus ServoLoop::device_status() const {
@@ -191,6 +218,12 @@ DeviceStatus ServoLoop::device_status() const {
                       .fault = fault_of(hand),
                       .text = device_.fault_text()};
   if (!status.text.empty()) return status;
+  if (hangs_ && !ended_) {
+    status.text =
+        "the method or the device's driver has not returned from its last tick: the "
+        "device is disabled, and that thread ends when it returns";
+    return status;
+  }
   if (started_ && !stopped_ && !status.ticking) {
     status.text = "no tick for " + std::to_string(std::lround(1e3 * silent)) +
                   " ms: the device is disabled until ticks come again";

@@ -47,7 +47,8 @@ class ServoLoop {
   /// @throws Error if the rate or watch time is out of range or the settings do not validate.
   ServoLoop(std::shared_ptr<Method> method, Device& device, const ServoSettings& settings = {},
             const ServoOptions& options = {});
-  /// Stops.
+  /// Stops, and waits for a cycle that hangs, however long it does: the device is disabled by then,
+  /// and what the cycle uses must live until it returns.
   ~ServoLoop();
   ServoLoop(const ServoLoop&) = delete;
   ServoLoop& operator=(const ServoLoop&) = delete;
@@ -58,8 +59,14 @@ class ServoLoop {
   void start();
   /// Takes the force off the device before anything else ends: a zero force is the last write of
   /// the thread that ticks; if that thread does not get there within 50 ms, the device is disabled
-  /// from here. Then the device is disabled and the threads end. Any thread but the servo's.
-  void stop();
+  /// from here. Then the device is disabled and the threads end. A cycle that hangs, in the method
+  /// or the driver, is waited for one second at most. While one call is at work another one only
+  /// disables the device, at once. Any thread but the servo's.
+  /// @return false if a cycle (or Device::enable) hangs: its thread goes on until that returns and
+  ///         then ends; the device stays disabled. Destroying this waits for it
+  bool stop();
+  /// Has `stop` returned true? Any thread.
+  [[nodiscard]] bool has_ended() const noexcept { return ended_.load(std::memory_order_acquire); }
 
   /// What runs in each tick; alive from construction to destruction.
   [[nodiscard]] Cycle& cycle() { return cycle_; }
@@ -105,7 +112,8 @@ class ServoLoop {
   void start_driven();
   void beat(double now) noexcept;
   void watch();
-  void end_watch();
+  void request_end_of_watch();
+  void finish();
 
   Device& device_;
   ServoOptions options_;
@@ -113,6 +121,8 @@ class ServoLoop {
   Cycle cycle_;
   std::atomic<bool> started_{false};
   std::atomic<bool> stopped_{false};
+  std::atomic<bool> ended_{false};          // all threads have
+  std::atomic<bool> hangs_{false};          // a thread, when it was to stop
   std::unique_ptr<PeriodicThread> thread_;  // null if the device drives
 
   // Of a device that drives: its thread's, but for the atomics.
@@ -121,6 +131,7 @@ class ServoLoop {
   std::atomic<bool> first_tick_{false};
   std::atomic<bool> stopping_{false};
   std::atomic<bool> zero_sent_{false};  // after stopping_
+  std::atomic<bool> in_callback_{false};
   double previous_tick_ = 0.0;          // [s]
   std::uint32_t previous_compute_ = 0;  // [ns]
 
@@ -129,6 +140,7 @@ class ServoLoop {
   std::mutex watch_mutex_;  // the servo never takes it
   std::condition_variable watch_wakes_;
   bool watch_ends_ = false;  // guarded by watch_mutex_
+  std::atomic<bool> watch_has_ended_{false};
 };
 
 }  // namespace palpate

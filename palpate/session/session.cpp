@@ -100,7 +100,10 @@ class Session::Impl {
     if (!options_.record.empty()) open_recorder(options_.record, false);
   }
 
-  ~Impl() { stop(); }
+  ~Impl() {
+    stop();
+    if (loop_ && !loop_->has_ended()) leave_behind();
+  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
@@ -118,7 +121,10 @@ class Session::Impl {
   }
 
   void stop() noexcept {
-    if (stopped_.exchange(true)) return;
+    if (stopped_.exchange(true)) {
+      if (loop_) loop_->stop();
+      return;
+    }
     // Zero force leaves first: nothing above this line may wait for anything.
     if (loop_) loop_->stop();
     if (free_cycle_ && started_) device_->write(Vec3::Zero(), free_t_);
@@ -237,6 +243,17 @@ class Session::Impl {
   void refuse_if_stopped() const {
     if (stopped_)
       throw Error("session", "it has been stopped and cannot go on", "make another session");
+  }
+  // The thread of a cycle that hangs uses loop and device until it returns.
+  void leave_behind() {
+    struct Left {
+      std::unique_ptr<Device> device;
+      std::unique_ptr<ServoLoop> loop;  // destroyed first
+    };
+    auto left = std::make_unique<Left>();
+    left->device = std::move(device_);
+    left->loop = std::move(loop_);
+    std::thread([left = std::move(left)]() mutable { left.reset(); }).detach();
   }
   // [s] on the session's clock
   [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }

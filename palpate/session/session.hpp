@@ -100,8 +100,10 @@ class Session {
   /// Real time: starts loop and cameras, and returns. A session runs once.
   /// @throws Error if the device refuses, or the session has been stopped.
   void start();
-  /// Takes the force off the device before anything else, then ends everything. A camera that hangs
-  /// is left behind. Any number of times.
+  /// Takes the force off the device before anything else, then ends everything. A camera, a method
+  /// or a driver that hangs is left behind: its thread ends when it returns, also after this has
+  /// been destroyed, and the device stays disabled. Any number of times; while one call is at work
+  /// another one disables the device at once.
   void stop() noexcept;
 
   /// Runs until `duration` [s] has passed (none: for ever) or `request_stop`, then stops.

@@ -137,37 +137,148 @@ TEST(DrivenLoop, RefusesADeviceThatCannotBeEnabledOrNeverCalls) {
   EXPECT_FALSE(mute.enabled);
 }
 
+struct Hang {
+  std::atomic<bool> asked{false};
+  std::atomic<bool> is_on{false};
+
+  void begin() {
+    asked = true;
+    wait_until([this] { return is_on.load(); });
+  }
+  void end() { asked = false; }
+};
+
 // A method that takes as long as the test likes.
 class HangingMethod final : public Method {
  public:
-  explicit HangingMethod(const std::atomic<bool>& hangs) : hangs_(hangs) {}
+  explicit HangingMethod(Hang& hang) : hang_(hang) {}
   void seat(const Vec3& /*proxy*/) noexcept override {}
   void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override {}
   Tick tick(const Vec3& hip, double t) noexcept override {
-    while (hangs_) std::this_thread::yield();
+    while (hang_.asked) {
+      hang_.is_on = true;
+      std::this_thread::yield();
+    }
     return free_tick(hip, t, -1);
   }
   void set_parameters(const Parameters& /*parameters*/) override {}
 
  private:
-  const std::atomic<bool>& hangs_;
+  Hang& hang_;
 };
 
 TEST(ServoLoop, DisablesThePolledDeviceOfAMethodThatHangs) {
-  std::atomic<bool> hangs{false};
+  Hang hang;
   FakeDevice device;
-  ServoLoop loop(std::make_unique<HangingMethod>(hangs), device);
+  ServoLoop loop(std::make_unique<HangingMethod>(hang), device);
   loop.start();
   wait_until([&] { return loop.statistics().ticks > 3; });
   const int before = device.disables;
-  hangs = true;
+  hang.begin();
   wait_until([&] { return device.disables > before; });
-  std::thread stopper([&] { loop.stop(); });
   const int by_watch = device.disables;
+  std::thread stopper([&] { loop.stop(); });
   wait_until([&] { return device.disables > by_watch; });  // by stop(), although it hangs
-  hangs = false;
+  hang.end();
   stopper.join();
   EXPECT_TRUE(device.force.isZero());
+}
+
+TEST(ServoLoop, StopsAlthoughAMethodHangsAndEndsItsThreadWhenThatReturns) {
+  Hang hang;
+  FakeDevice device;
+  {
+    ServoLoop loop(std::make_unique<HangingMethod>(hang), device);
+    loop.start();
+    wait_until([&] { return loop.statistics().ticks > 3; });
+    hang.begin();
+    EXPECT_FALSE(loop.stop());
+    EXPECT_FALSE(loop.has_ended());
+    EXPECT_TRUE(loop.device_status().text.starts_with("the method or the device's driver"))
+        << loop.device_status().text;
+    const int disables = device.disables;
+    EXPECT_GT(disables, 0);
+    EXPECT_FALSE(loop.stop()) << "a second stop";
+    EXPECT_GT(device.disables, disables);
+    hang.end();
+  }
+  EXPECT_TRUE(device.force.isZero());
+  EXPECT_EQ(device.enables, 1);
+}
+
+TEST(ServoLoop, DisablesTheDeviceAtOnceByASecondStopWhileTheFirstWaits) {
+  Hang hang;
+  FakeDevice device;
+  ServoLoop loop(std::make_unique<HangingMethod>(hang), device);
+  loop.start();
+  wait_until([&] { return loop.statistics().ticks > 3; });
+  hang.begin();
+  bool first = true;
+  std::thread stopper([&] { first = loop.stop(); });
+  wait_until([&] { return device.disables > 0; });
+  const int disables = device.disables;
+  EXPECT_FALSE(loop.stop());
+  EXPECT_GT(device.disables, disables);
+  stopper.join();
+  EXPECT_FALSE(first);
+  hang.end();
+}
+
+TEST(DrivenLoop, StopsAlthoughACallbackHangsAndEndsItWhenThatReturns) {
+  Hang hang;
+  DrivingDevice device;
+  {
+    ServoLoop loop(std::make_unique<HangingMethod>(hang), device);
+    loop.start();
+    wait_until([&] { return device.calls > 3; });
+    hang.begin();
+    EXPECT_FALSE(loop.stop());
+    EXPECT_FALSE(device.enabled);
+    EXPECT_FALSE(device.ending) << "the driver would wait for its callback";
+    hang.end();
+  }
+  EXPECT_TRUE(device.ending);
+  EXPECT_TRUE(device.last_write_was_zero);
+  EXPECT_FALSE(device.enabled);
+}
+
+// A device whose motors can only be switched on when the test likes.
+struct SlowlyEnabledDevice final : Device {
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  HandState read(double /*t*/) noexcept override { return {}; }
+  void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
+  void enable() override {
+    ++enables;
+    while (enable_hangs) std::this_thread::yield();
+    enabled = true;
+    ++enabled_times;
+  }
+  void disable() noexcept override { enabled = false; }
+
+  std::atomic<bool> enable_hangs{false}, enabled{false};
+  std::atomic<int> enables{0}, enabled_times{0};
+
+ private:
+  DeviceInfo info_{.uri = "slow:", .kind = "slow", .limits = {}};
+};
+
+TEST(ServoLoop, StopsAlthoughTheDeviceHangsWhileItIsEnabledAndLeavesItDisabled) {
+  Hang hang;
+  SlowlyEnabledDevice device;
+  {
+    ServoLoop loop(std::make_unique<HangingMethod>(hang), device);
+    loop.start();
+    wait_until([&] { return loop.statistics().ticks > 3; });
+    device.enable_hangs = true;
+    hang.begin();
+    wait_until([&] { return !device.enabled; });
+    hang.end();
+    wait_until([&] { return device.enables > 1; });
+    EXPECT_FALSE(loop.stop());
+    device.enable_hangs = false;
+    wait_until([&] { return device.enabled_times == 2 && !device.enabled; });
+  }
+  EXPECT_FALSE(device.enabled);
 }
 
 TEST(ServoLoop, RefusesAWatchTimeOutOfRange) {

@@ -18,6 +18,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/core/error.hpp"
+#include "palpate/methods/methods.hpp"
 #include "palpate/session/session.hpp"
 
 #include "tests/session/fakes.hpp"
@@ -140,19 +141,53 @@ class LoggingDevice final : public Device {
     return {.position = {0.0, 0.0, ++reads_ % 550 <= 50 ? wall_depth - 0.05 : wall_depth + 0.005}};
   }
   void write(const Vec3& force, double /*t*/) noexcept override {
-    log_->note(force.isZero(0.0) ? "write zero" : "write a force");
+    if (is_enabled_) log_->note(force.isZero(0.0) ? "write zero" : "write a force");
   }
   void enable() override {
     if (refuses_) throw Error("logging:", "it is not calibrated", "calibrate it");
     log_->note("enable");
+    is_enabled_ = true;
   }
-  void disable() noexcept override { log_->note("disable"); }
+  void disable() noexcept override {
+    is_enabled_ = false;
+    log_->note("disable");
+  }
 
  private:
+  std::atomic<bool> is_enabled_{false};
   std::shared_ptr<Log> log_;
   bool refuses_;
   int reads_ = 0;
   DeviceInfo info_{.uri = "logging:", .kind = "logging", .limits = no_motors};
+};
+
+// Method `paper`, until `hangs` is set: then a tick does not return before the gate opens.
+class HangingMethod final : public Method {
+ public:
+  HangingMethod(const Parameters& parameters, std::shared_ptr<Gate> gate,
+                std::shared_ptr<std::promise<void>> ended)
+      : method_(make_method("paper", parameters)),
+        gate_(std::move(gate)),
+        ended_(std::move(ended)) {}
+  ~HangingMethod() override { ended_->set_value(); }
+  void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
+  void frame(const Cloud& cloud, double stamp) noexcept override { method_->frame(cloud, stamp); }
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    if (hangs) {
+      is_hanging = true;
+      gate_->wait();
+    }
+    return method_->tick(hip, t);
+  }
+  void set_parameters(const Parameters& parameters) override {
+    method_->set_parameters(parameters);
+  }
+  static inline std::atomic<bool> hangs{false}, is_hanging{false};
+
+ private:
+  std::unique_ptr<Method> method_;
+  std::shared_ptr<Gate> gate_;
+  std::shared_ptr<std::promise<void>> ended_;
 };
 
 // The camera that hangs must not be what takes the force off.
@@ -171,6 +206,14 @@ bool comes_true(const std::function<bool()>& condition) {
   const double patience = monotonic_now() + 60.0;
   while (!condition() && monotonic_now() < patience) std::this_thread::yield();
   return condition();
+}
+
+std::string last_event_of_the_device(const Log& log) {
+  std::string last;
+  for (const std::string& event : log.events()) {
+    if (!event.starts_with("cancel")) last = event;
+  }
+  return last;
 }
 
 std::size_t threads_of_this_process() {
@@ -222,6 +265,40 @@ TEST(LiveSession, TakesTheForceOffBeforeAnyCameraIsWaitedFor) {
   }
   gate->open();
   camera_ended.wait();
+}
+
+TEST(LiveSession, TakesTheForceOfAMethodThatHangsAwayAndLeavesItsThreadBehind) {
+  const auto log = std::make_shared<Log>();
+  const auto gate = std::make_shared<Gate>();
+  const auto ended = std::make_shared<std::promise<void>>();
+  const std::size_t threads = threads_of_this_process();
+  HangingMethod::hangs = HangingMethod::is_hanging = false;
+  {
+    SessionOptions options = patient(log);
+    options.methods.add(
+        {.name = "hanging", .summary = "", .make = [=](const Parameters& parameters) {
+           return std::make_unique<HangingMethod>(parameters, gate, ended);
+         }});
+    options.settings.method = "hanging";
+    Session session(std::move(options));
+    session.start();
+    ASSERT_TRUE(comes_true([&] { return session.statistics().force_out.load(); }));
+    HangingMethod::hangs = true;
+    ASSERT_TRUE(comes_true([] { return HangingMethod::is_hanging.load(); }));
+    const auto is_disabled = [&] { return last_event_of_the_device(*log) == "disable"; };
+    EXPECT_TRUE(comes_true(is_disabled)) << "before anybody stops the session";
+    EXPECT_TRUE(comes_true([&] { return session.state().device.text.starts_with("no tick for"); }))
+        << session.state().device.text;
+    session.stop();  // returns although the method hangs
+    EXPECT_TRUE(is_disabled());
+    EXPECT_TRUE(session.state().device.text.starts_with("the method or the device's driver"))
+        << session.state().device.text;
+    session.stop();
+  }
+  gate->open();
+  ended->get_future().wait();
+  EXPECT_EQ(last_event_of_the_device(*log), "disable")
+      << "nothing is written or enabled afterwards";
 }
 
 TEST(LiveSession, EndsWithoutEverHavingBegun) {

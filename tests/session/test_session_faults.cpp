@@ -1,20 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-// A fault matrix: whatever fails, in free motion or in contact, the force is gone within the
-// documented age, never grows while a camera is late, and comes back when all is well again.
+// A fault matrix: whatever fails, in free motion, in contact or on a moving surface, the force is
+// gone within the documented age, never grows while a camera is late, comes back when all is well
+// again, and the ticks say why. Then two faults at a time, drawn by chance.
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <random>
+#include <sstream>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "palpate/methods/methods.hpp"
 #include "palpate/session/session.hpp"
 
 #include "tests/session/fakes.hpp"
@@ -26,60 +34,114 @@ using test::MadeSource;
 using test::wall;
 using test::wall_depth;
 
-enum class Fault { off, stuck, garbage, wrong, delayed, intermittent };
-enum class Place { first_camera, second_camera, hand, device };
-enum class Motion { free, contact };
+enum class Fault { off, stuck, garbage, wrong, slow, delayed, intermittent };
+enum class Place { first_camera, second_camera, hand, device, method };
+enum class Motion { free, contact, moving };
 
-constexpr double fault_begins = 3.0, fault_ends = 4.5;  // [s]
-constexpr double lift_off = 5.0, back_again = 6.0;      // [s] of the hand
-constexpr double session_ends = 8.5;                    // [s]
-constexpr double frame_interval = 1.0 / 30.0;           // [s]
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::array fault_names = {"Off",  "Stuck",   "Garbage",     "Wrong",
+                                    "Slow", "Delayed", "Intermittent"};
+constexpr std::array place_names = {"FirstCamera", "SecondCamera", "Hand", "Device", "Method"};
+constexpr std::array motion_names = {"Free", "Contact", "Moving"};
 
-bool is_during(double t) {
-  return t >= fault_begins && t < fault_ends;
+template <class Enum>
+constexpr std::size_t index_of(Enum value) {
+  return static_cast<std::size_t>(value);
 }
 
-/// The wall at 30 Hz, with a fault; notes the stamps of its good frames.
+constexpr double touch_down = 1.0, lift_off = 5.0, back_again = 6.0;  // [s] of the hand
+constexpr double session_ends = 8.5;                                  // [s]
+constexpr double reset_at = lift_off + 0.2;                           // [s] of latched faults
+constexpr double frame_interval = 1.0 / 30.0;                         // [s]
+constexpr double delay = 0.2;                                         // [s] of what is delayed
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double inf = std::numeric_limits<double>::infinity();
+
+struct Failure {
+  Fault fault = Fault::off;
+  Place place = Place::first_camera;
+  double begins = 3.0, ends = 4.5;  // [s]
+
+  [[nodiscard]] bool is_on(double t) const { return t >= begins && t < ends; }
+};
+
+struct Scenario {
+  Motion motion = Motion::contact;
+  std::vector<Failure> failures;
+};
+
+std::string text_of(const Scenario& scenario) {
+  std::ostringstream text;
+  text << motion_names[index_of(scenario.motion)];
+  for (const Failure& failure : scenario.failures) {
+    text << ", " << place_names[index_of(failure.place)] << " "
+         << fault_names[index_of(failure.fault)] << " from " << failure.begins << " to "
+         << failure.ends << " s";
+  }
+  return text.str();
+}
+
+std::vector<Failure> failures_of(const Scenario& scenario, Place place) {
+  std::vector<Failure> failures = scenario.failures;
+  std::erase_if(failures, [=](const Failure& failure) { return failure.place != place; });
+  return failures;
+}
+
+const Failure* failure_at(const std::vector<Failure>& failures, double t) {
+  for (const Failure& failure : failures) {
+    if (failure.is_on(t)) return &failure;
+  }
+  return nullptr;
+}
+
+// [m] by which the surface and the hand are farther away than at the start.
+double moved_at(Motion motion, double t) {
+  return motion == Motion::moving ? 0.004 * std::sin(std::numbers::pi * t) : 0.0;
+}
+
+std::shared_ptr<const DepthImage> wall_at(Motion motion, double t) {
+  return wall(static_cast<std::uint16_t>(std::lround(500.0 + 1e3 * moved_at(motion, t))));
+}
+
+/// The wall at 30 Hz, with faults; notes the stamps of its good frames.
 class FaultyCamera {
  public:
-  FaultyCamera(std::optional<Fault> fault, std::shared_ptr<std::vector<double>> good)
-      : fault_(fault), good_(std::move(good)) {}
+  FaultyCamera(Motion motion, std::vector<Failure> failures,
+               std::shared_ptr<std::vector<double>> good)
+      : motion_(motion), failures_(std::move(failures)), good_(std::move(good)) {}
 
   std::optional<Frame> operator()(int /*k*/) {
-    double stamp = frame_interval * number_++;
-    if (!fault_) return make(stamp);
-    while (is_during(stamp) && is_missing(stamp)) stamp = frame_interval * number_++;
-    if (!is_during(stamp)) return make(stamp);
-    switch (*fault_) {
-      case Fault::stuck:  // the same capture again and again
-        return Frame{good_->back(), wall()};
-      case Fault::garbage: {
-        const std::array<double, 3> stamps = {nan, -std::numeric_limits<double>::infinity(),
-                                              good_->back() - 0.5};
-        return Frame{stamps[static_cast<std::size_t>(number_) % 3], noise()};
+    for (;;) {
+      const double stamp = frame_interval * number_++;
+      const Failure* failure = failure_at(failures_, stamp);
+      if (failure == nullptr) return make(stamp, stamp);
+      switch (failure->fault) {
+        case Fault::off:
+          continue;
+        case Fault::slow:  // a frame in 0.6 s
+          if (number_ % 18 != 0) continue;
+          return make(stamp, stamp);
+        case Fault::intermittent:
+          if (std::fmod(stamp - failure->begins, 0.8) < 0.6) continue;
+          return make(stamp, stamp);
+        case Fault::stuck:  // the same capture again and again
+          return Frame{good_->back(), wall_at(motion_, good_->back())};
+        case Fault::garbage: {
+          const std::array<double, 3> stamps = {nan, -inf, good_->back() - 0.5};
+          return Frame{stamps[static_cast<std::size_t>(number_) % 3], noise()};
+        }
+        case Fault::wrong:  // good stamps, a picture of anything
+          good_->push_back(stamp);
+          return Frame{stamp, noise()};
+        case Fault::delayed:  // an older picture than its stamp says
+          return make(stamp, stamp - delay);
       }
-      case Fault::wrong:  // good stamps, a picture of anything
-        good_->push_back(stamp);
-        return Frame{stamp, noise()};
-      case Fault::off:
-      case Fault::delayed:
-      case Fault::intermittent:
-        break;
     }
-    return make(stamp);
   }
 
  private:
-  [[nodiscard]] bool is_missing(double stamp) const {
-    const double since = stamp - fault_begins;
-    if (*fault_ == Fault::off) return true;
-    if (*fault_ == Fault::delayed) return number_ % 18 != 0;  // a frame in 0.6 s
-    return *fault_ == Fault::intermittent && std::fmod(since, 0.8) < 0.6;
-  }
-  Frame make(double stamp) {
+  Frame make(double stamp, double captured) {
     good_->push_back(stamp);
-    return {stamp, wall()};
+    return {stamp, wall_at(motion_, captured)};
   }
   std::shared_ptr<const Cloud> noise() {
     const auto seen = wall();
@@ -90,51 +152,34 @@ class FaultyCamera {
                                         1000.0);
   }
 
-  std::optional<Fault> fault_;
+  Motion motion_;
+  std::vector<Failure> failures_;
   std::shared_ptr<std::vector<double>> good_;
   std::minstd_rand random_{7};
   int number_ = 0;
 };
 
+bool is_odd(double t) {
+  return static_cast<int>(std::floor(t / 0.02)) % 2 != 0;
+}
+
 /// Hovers or presses until 5 s, lets go of the wall, and presses again at 6 s.
 class FaultyHand final : public Device {
  public:
-  FaultyHand(Motion motion, std::optional<Fault> hand, std::optional<Fault> device)
-      : motion_(motion), hand_(hand), device_(device) {}
+  FaultyHand(Motion motion, std::vector<Failure> hand, std::vector<Failure> device)
+      : motion_(motion), hand_(std::move(hand)), device_(std::move(device)) {}
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
   void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
 
   HandState read(double t) noexcept override {
     HandState state{.position = at(t)};
-    if (!is_during(t)) return state;
-    const bool is_odd = static_cast<int>(std::floor(t / 0.02)) % 2 != 0;
-    if (hand_) {
-      switch (*hand_) {
-        case Fault::off:
-          state.present = false;
-          break;
-        case Fault::stuck:
-          state.position = at(fault_begins);
-          break;
-        case Fault::garbage:
-          state.position = is_odd ? Vec3::Constant(nan) : Vec3::Constant(1e12);
-          break;
-        case Fault::wrong:  // jumps 0.1 m to and fro
-          state.position.x() += is_odd ? 0.1 : 0.0;
-          break;
-        case Fault::delayed:
-          state.position = at(t - 0.2);
-          break;
-        case Fault::intermittent:
-          state.present = is_odd;
-          break;
+    if (const Failure* failure = failure_at(hand_, t)) fail(*failure, t, state);
+    if (const Failure* failure = failure_at(device_, t)) {
+      const bool is_bad = failure->fault == Fault::intermittent ? is_odd(t) : true;
+      if (is_bad) {
+        state.fault = failure->fault == Fault::off ? DeviceFault::disconnected : DeviceFault::other;
       }
-    }
-    if (device_) {
-      const bool is_bad = *device_ != Fault::intermittent || is_odd;
-      if (is_bad)
-        state.fault = *device_ == Fault::off ? DeviceFault::disconnected : DeviceFault::other;
-      if (*device_ == Fault::garbage) {
+      if (failure->fault == Fault::garbage) {
         state.velocity = Vec3::Constant(nan);
         state.orientation = Eigen::Quaterniond(nan, 0.0, nan, 1e300);
         state.stamp = -nan;
@@ -146,55 +191,170 @@ class FaultyHand final : public Device {
   }
 
  private:
+  void fail(const Failure& failure, double t, HandState& state) const {
+    switch (failure.fault) {
+      case Fault::off:
+        state.present = false;
+        break;
+      case Fault::stuck:
+        state.position = at(failure.begins);
+        break;
+      case Fault::garbage:
+        state.position = is_odd(t) ? Vec3::Constant(nan) : Vec3::Constant(1e12);
+        break;
+      case Fault::wrong:  // jumps 0.1 m to and fro
+        state.position.x() += is_odd(t) ? 0.1 : 0.0;
+        break;
+      case Fault::slow:  // is read anew at 50 Hz only
+        state.position = at(0.02 * std::floor(t / 0.02));
+        break;
+      case Fault::delayed:
+        state.position = at(t - delay);
+        break;
+      case Fault::intermittent:
+        state.present = is_odd(t);
+        break;
+    }
+  }
   [[nodiscard]] Vec3 at(double t) const {
     const auto ramp = [&](double begin) { return std::clamp((t - begin) / 0.1, 0.0, 1.0); };
     double pressed = ramp(back_again);
-    if (motion_ == Motion::contact) pressed += ramp(1.0) - ramp(lift_off);
-    return {0.0, 0.0, wall_depth - 0.05 + 0.055 * pressed};
+    if (motion_ != Motion::free) pressed += ramp(touch_down) - ramp(lift_off);
+    return {0.0, 0.0, wall_depth - 0.05 + 0.055 * pressed + moved_at(motion_, t)};
   }
 
   Motion motion_;
-  std::optional<Fault> hand_, device_;
+  std::vector<Failure> hand_, device_;
   DeviceInfo info_{.uri = "faulty:", .kind = "faulty", .limits = no_motors};
 };
 
+/// The default method, with faults in what it returns.
+class FaultyMethod final : public Method {
+ public:
+  FaultyMethod(const Parameters& parameters, std::vector<Failure> failures)
+      : method_(make_method(default_method, parameters)), failures_(std::move(failures)) {}
+  void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
+  void frame(const Cloud& cloud, double stamp) noexcept override { method_->frame(cloud, stamp); }
+  void set_parameters(const Parameters& parameters) override {
+    method_->set_parameters(parameters);
+  }
+
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    const Tick good = method_->tick(hip, t);
+    past_.push_back(good);
+    if (past_.size() > 200) past_.pop_front();
+    const Failure* failure = failure_at(failures_, t);
+    if (failure == nullptr) {
+      held_ = good;
+      return good;
+    }
+    Tick bad = good;
+    switch (failure->fault) {
+      case Fault::off:
+        return free_tick(hip, t, good.frame);
+      case Fault::stuck:
+        bad = held_;
+        break;
+      case Fault::garbage:
+        spoil(bad);
+        break;
+      case Fault::wrong:  // through the surface
+        bad.force = -good.force;
+        bad.normal = -good.normal;
+        break;
+      case Fault::slow:  // a new force in 50 ms
+        if (std::fmod(t - failure->begins, 0.05) < 1e-3) held_ = good;
+        bad = held_;
+        break;
+      case Fault::delayed:
+        bad = past_.front();
+        break;
+      case Fault::intermittent:
+        if (is_odd(t)) spoil(bad);
+        break;
+    }
+    bad.t = t;
+    bad.hip = hip;
+    return bad;
+  }
+
+ private:
+  void spoil(Tick& tick) noexcept {
+    constexpr std::array values = {nan, inf, -1e300, 1e300};
+    const double value = values[++spoiled_ % values.size()];
+    tick.force = Vec3(value, 1.0, value);
+    tick.normal = tick.proxy = Vec3::Constant(value);
+    tick.surface_velocity = value;
+  }
+
+  std::unique_ptr<Method> method_;
+  std::vector<Failure> failures_;
+  std::deque<Tick> past_;
+  Tick held_;
+  std::size_t spoiled_ = 0;
+};
+
+bool is_camera(Place place) {
+  return place == Place::first_camera || place == Place::second_camera;
+}
+
 /// Does the chain have to take the force off altogether?
-bool ends_the_force(Fault fault, Place place) {
-  if (fault == Fault::wrong) return place == Place::device;
-  if (place == Place::hand) return fault != Fault::stuck && fault != Fault::delayed;
+bool ends_the_force(const Failure& failure) {
+  const Fault fault = failure.fault;
+  switch (failure.place) {
+    case Place::first_camera:
+    case Place::second_camera:
+      return fault != Fault::wrong && fault != Fault::delayed;
+    case Place::hand:
+      return fault == Fault::off || fault == Fault::garbage || fault == Fault::intermittent;
+    case Place::device:
+      return true;
+    case Place::method:
+      return fault == Fault::off || fault == Fault::garbage || fault == Fault::wrong ||
+             fault == Fault::intermittent;
+  }
   return true;
 }
 
-using Cell = std::tuple<Fault, Place, Motion>;
-
-std::string name_of_cell(const testing::TestParamInfo<Cell>& info) {
-  constexpr std::array faults = {"Off", "Stuck", "Garbage", "Wrong", "Delayed", "Intermittent"};
-  constexpr std::array places = {"FirstCamera", "SecondCamera", "Hand", "Device"};
-  constexpr std::array motions = {"Free", "Contact"};
-  const auto index = [](auto value) { return static_cast<std::size_t>(value); };
-  return std::string(faults[index(std::get<0>(info.param))]) +
-         places[index(std::get<1>(info.param))] + motions[index(std::get<2>(info.param))];
+/// All the time? Else there is a force now and then.
+bool ends_the_force_throughout(const Failure& failure) {
+  if (!ends_the_force(failure) || failure.fault == Fault::intermittent) return false;
+  return !is_camera(failure.place) || failure.fault != Fault::slow;
 }
 
-class SessionFaults : public testing::TestWithParam<Cell> {};
+/// Of these flags a tick has to raise at least one, to tell people why there is no force.
+std::uint32_t flags_that_tell(Place place) {
+  switch (place) {
+    case Place::first_camera:
+    case Place::second_camera:
+      return std::uint32_t{frame_lost} | frame_fading;
+    case Place::hand:
+      return std::uint32_t{disengaged} | input_refused | fault_latched;
+    case Place::device:
+      return std::uint32_t{disengaged} | input_refused | fault_latched;
+    case Place::method:
+      return std::uint32_t{input_refused} | direction_refused | fault_latched;
+  }
+  return 0;
+}
 
-TEST_P(SessionFaults, TakeTheForceOffAndGiveItBack) {
-  const auto fault = std::get<0>(GetParam());
-  const auto place = std::get<1>(GetParam());
-  const auto motion = std::get<2>(GetParam());
-  const auto fault_of = [fault, place](Place here) {
-    return place == here ? std::optional(fault) : std::nullopt;
-  };
+/// Runs a session and says which promise was broken first, and when; empty: none.
+std::string violation_of(const Scenario& scenario) {
   std::array<std::shared_ptr<std::vector<double>>, 2> good;
   SessionOptions options;
   for (std::size_t i = 0; i < good.size(); ++i) {
     good[i] = std::make_shared<std::vector<double>>();
-    options.cameras.push_back(
-        {.source = std::make_unique<MadeSource>(FaultyCamera(
-             fault_of(i == 0 ? Place::first_camera : Place::second_camera), good[i]))});
+    const Place place = i == 0 ? Place::first_camera : Place::second_camera;
+    options.cameras.push_back({.source = std::make_unique<MadeSource>(FaultyCamera(
+                                   scenario.motion, failures_of(scenario, place), good[i]))});
   }
-  options.device =
-      std::make_unique<FaultyHand>(motion, fault_of(Place::hand), fault_of(Place::device));
+  options.device = std::make_unique<FaultyHand>(scenario.motion, failures_of(scenario, Place::hand),
+                                                failures_of(scenario, Place::device));
+  options.methods.add(
+      {.name = "faulty", .summary = "", .make = [&scenario](const Parameters& parameters) {
+         return std::make_unique<FaultyMethod>(parameters, failures_of(scenario, Place::method));
+       }});
+  options.settings.method = "faulty";
   options.pace = Pace::free_running;
   const SafetyParameters limits = options.settings.safety;
   Session session(std::move(options));
@@ -209,64 +369,178 @@ TEST_P(SessionFaults, TakeTheForceOffAndGiveItBack) {
     return age;
   };
   constexpr double slack = 2e-3;  // [s] two ticks
-  const bool is_camera = place == Place::first_camera || place == Place::second_camera;
-  const bool must_end = ends_the_force(fault, place);
-  const double gone_within = is_camera ? limits.lost_age : 0.0;
   const double fall_time = limits.max_force / limits.fall_rate;
+  const bool has_faulty_camera =
+      std::any_of(scenario.failures.begin(), scenario.failures.end(),
+                  [](const Failure& failure) { return is_camera(failure.place); });
+  const bool is_one = scenario.failures.size() == 1;
 
+  std::string violation;
   std::vector<double> sent;
+  std::vector<std::uint32_t> told(scenario.failures.size());  // SafetyFlag bits during each
+  std::uint32_t telling = 0;  // those of which one is enough: a fault may hide another
+  for (const Failure& failure : scenario.failures) telling |= flags_that_tell(failure.place);
+  double before = 0.0;
   session.run(session_ends, [&](const ServoTick& tick) {
     const double t = tick.tick.t;
     const double force = tick.force.norm();
-    const double before = sent.empty() ? 0.0 : sent.back();
-    sent.push_back(force);
-    ASSERT_TRUE(tick.force.allFinite()) << t;
-    ASSERT_LE(force, limits.max_force + 1e-9) << t;
-    ASSERT_LE(force - before, 1e-3 * limits.rise_rate + 1e-9) << t;
-    ASSERT_LE(before - force, 1e-3 * limits.fall_rate + 1e-9) << t;
-    if (is_camera) {
+    const auto demand = [&](bool promise, const std::string& text) {
+      if (promise || !violation.empty()) return;
+      std::ostringstream what;
+      what << "at " << t << " s, " << before << " N, then " << force << " N: " << text;
+      violation = what.str();
+    };
+    demand(tick.force.allFinite(), "it is not finite");
+    demand(force <= limits.max_force + 1e-9, "it is larger than the limit");
+    demand(force - before <= 1e-3 * limits.rise_rate + 1e-9, "it rises too fast");
+    demand(before - force <= 1e-3 * limits.fall_rate + 1e-9, "it falls too fast");
+    if (has_faulty_camera) {
       const double age = age_at(t);
-      if (age > limits.late_intervals * frame_interval + slack) {
-        ASSERT_LE(force, before + 1e-12)
-            << t << " s: it grows while a camera is " << age << " late";
+      const double late_age = limits.late_intervals * frame_interval + slack;
+      demand(age <= late_age || force <= before + 1e-12, "it grows while a camera is late");
+      demand(age <= limits.lost_age + slack || force == 0.0, "a camera is lost");
+    }
+    for (std::size_t i = 0; i < scenario.failures.size(); ++i) {
+      const Failure& failure = scenario.failures[i];
+      if (!failure.is_on(t)) continue;
+      told[i] |= tick.safety;
+      const double gone_within = is_camera(failure.place) ? limits.lost_age + frame_interval : 0.0;
+      if (ends_the_force_throughout(failure)) {
+        demand(t <= failure.begins + gone_within + fall_time + slack || force == 0.0,
+               "the fault has lasted for too long");
       }
-      if (age > limits.lost_age + slack) {
-        ASSERT_EQ(force, 0.0) << t << " s: a camera has been lost for " << age << " s";
+      if (failure.place == Place::device && tick.safety != 0)
+        demand(failure.fault == Fault::intermittent || (tick.hand & hand_fault) != 0,
+               "the device's fault is not told");
+      if (is_one && failure.fault == Fault::wrong && failure.place == Place::hand &&
+          t > failure.begins + 0.02 + fall_time + slack) {  // the first jump
+        demand(force < 0.05, "between two jumps, which are too fast for a hand");
       }
     }
-    const bool is_on = is_during(t) && (fault != Fault::delayed && fault != Fault::intermittent);
-    if (must_end && is_on && t > fault_begins + gone_within + fall_time + frame_interval + slack) {
-      ASSERT_EQ(force, 0.0) << t;
-    }
-    if (fault == Fault::wrong && place == Place::hand && is_during(t) &&
-        t > fault_begins + 0.02 + fall_time + slack) {  // the first jump
-      ASSERT_LT(force, 0.05) << t << " s: between two jumps, which are too fast for a hand";
-    }
-    if (t >= lift_off + 0.2 && t < lift_off + 0.201) session.reset_faults();
+    if (t >= reset_at && t < reset_at + 1e-3) session.reset_faults();
+    sent.push_back(force);
+    before = force;
   });
 
-  ASSERT_EQ(sent.size(), static_cast<std::size_t>(1000.0 * session_ends));
-  const auto at = [&](double t) { return sent[static_cast<std::size_t>(1000.0 * t)]; };
-  if (motion == Motion::contact) {
-    EXPECT_GT(at(fault_begins - 0.001), 2.0);
-  } else {
-    EXPECT_EQ(*std::max_element(sent.begin(), sent.begin() + 6000), 0.0);
+  const auto at = [&](double t) { return sent.at(static_cast<std::size_t>(1000.0 * t)); };
+  const auto expect = [&](bool promise, const char* text) {
+    if (!promise && violation.empty()) violation = text;
+  };
+  expect(sent.size() == static_cast<std::size_t>(1000.0 * session_ends), "ticks are missing");
+  for (std::size_t i = 0; i < scenario.failures.size(); ++i) {
+    const Failure& failure = scenario.failures[i];
+    // A method that asks for no force is no fault that anything could tell.
+    const bool is_silent = failure.place == Place::method && failure.fault == Fault::off;
+    // A force of nothing has no direction.
+    const bool is_idle = failure.place == Place::method && failure.fault == Fault::wrong &&
+                         scenario.motion == Motion::free;
+    if (ends_the_force(failure) && !is_silent && !is_idle &&
+        failure.ends - failure.begins > limits.lost_age) {
+      expect((told[i] & telling) != 0, "nobody is told why");
+    }
   }
-  // Once the force was gone in contact it does not come back while the hand presses.
-  if (must_end && motion == Motion::contact) {
-    EXPECT_EQ(at(fault_ends - 0.001), 0.0);
+  if (scenario.motion == Motion::free) {
+    if (is_one) {
+      expect(*std::max_element(sent.begin(), sent.begin() + 6000) == 0.0, "there is nothing there");
+    }
+  } else if (is_one) {
+    const Failure& failure = scenario.failures.front();
+    expect(at(failure.begins - 0.001) > 2.0, "there was no contact");
+    // Once the force was gone in contact it does not come back while the hand presses.
+    const bool is_interrupted = failure.place == Place::method && failure.fault == Fault::off;
+    if (ends_the_force(failure) && !is_interrupted)
+      expect(at(failure.ends - 0.001) == 0.0, "it came back while the hand pressed");
   }
-  EXPECT_GT(sent.back(), 2.0) << "all is well again";
+  expect(sent.back() > 2.0, "it does not come back when all is well again");
+  return violation;
 }
 
-INSTANTIATE_TEST_SUITE_P(Matrix, SessionFaults,
-                         testing::Combine(testing::Values(Fault::off, Fault::stuck, Fault::garbage,
-                                                          Fault::wrong, Fault::delayed,
-                                                          Fault::intermittent),
-                                          testing::Values(Place::first_camera, Place::second_camera,
-                                                          Place::hand, Place::device),
-                                          testing::Values(Motion::free, Motion::contact)),
-                         name_of_cell);
+using Cell = std::tuple<Fault, Place, Motion>;
+
+std::string name_of_cell(const testing::TestParamInfo<Cell>& info) {
+  return std::string(fault_names[index_of(std::get<0>(info.param))]) +
+         place_names[index_of(std::get<1>(info.param))] +
+         motion_names[index_of(std::get<2>(info.param))];
+}
+
+class SessionFaults : public testing::TestWithParam<Cell> {};
+
+TEST_P(SessionFaults, TakeTheForceOffAndGiveItBack) {
+  const Scenario scenario{std::get<2>(GetParam()),
+                          {{.fault = std::get<0>(GetParam()), .place = std::get<1>(GetParam())}}};
+  EXPECT_EQ(violation_of(scenario), "");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Matrix, SessionFaults,
+    testing::Combine(testing::Values(Fault::off, Fault::stuck, Fault::garbage, Fault::wrong,
+                                     Fault::slow, Fault::delayed, Fault::intermittent),
+                     testing::Values(Place::first_camera, Place::second_camera, Place::hand,
+                                     Place::device, Place::method),
+                     testing::Values(Motion::free, Motion::contact, Motion::moving)),
+    name_of_cell);
+
+/// The smallest scenario that still fails: with as few failures, and these as short, as possible.
+Scenario shrunk(Scenario scenario, const std::function<bool(const Scenario&)>& fails) {
+  constexpr double shortest = 0.06;  // [s]
+  for (bool smaller = true; std::exchange(smaller, false);) {
+    for (std::size_t i = 0; i < scenario.failures.size() && !smaller; ++i) {
+      const Failure failure = scenario.failures[i];
+      const double middle = 0.5 * (failure.begins + failure.ends);
+      std::array<Scenario, 3> candidates = {scenario, scenario, scenario};
+      candidates[0].failures.erase(candidates[0].failures.begin() + static_cast<std::ptrdiff_t>(i));
+      candidates[1].failures[i].ends = middle;
+      candidates[2].failures[i].begins = middle;
+      const bool is_long = failure.ends - failure.begins > 2.0 * shortest;
+      for (std::size_t c = 0; c < (is_long ? candidates.size() : 1); ++c) {
+        if (candidates[c].failures.empty() || !fails(candidates[c])) continue;
+        scenario = candidates[c];
+        smaller = true;
+        break;
+      }
+    }
+  }
+  return scenario;
+}
+
+TEST(SessionFaultsByChance, ShrinkToTheSmallestThatFails) {
+  const Scenario drawn{
+      Motion::contact,
+      {{Fault::slow, Place::hand, 2.0, 4.0}, {Fault::off, Place::device, 3.0, 4.6}}};
+  const Scenario smallest = shrunk(drawn, [](const Scenario& scenario) {
+    return std::any_of(scenario.failures.begin(), scenario.failures.end(), [](const auto& failure) {
+      return failure.place == Place::device && failure.is_on(3.1);
+    });
+  });
+  EXPECT_EQ(text_of(smallest), "Contact, Device Off from 3.1 to 3.2 s");
+}
+
+TEST(SessionFaultsByChance, TwoAtATimeBreakNoPromise) {
+  std::mt19937 random(2026);
+  const auto draw = [&](std::size_t n) {
+    return std::uniform_int_distribution<std::size_t>(0, n - 1)(random);
+  };
+  const auto draw_time = [&](double low, double high) {
+    return 0.01 * std::round(100.0 * std::uniform_real_distribution<double>(low, high)(random));
+  };
+  constexpr int scenarios = 40;
+  for (int k = 0; k < scenarios; ++k) {
+    Scenario scenario{static_cast<Motion>(draw(motion_names.size())), {}};
+    for (int i = 0; i < 2; ++i) {
+      const double begins = draw_time(2.8, 3.8);
+      scenario.failures.push_back({.fault = static_cast<Fault>(draw(fault_names.size())),
+                                   .place = static_cast<Place>(draw(place_names.size())),
+                                   .begins = begins,
+                                   .ends = begins + draw_time(0.05, 1.0)});
+    }
+    const std::string violation = violation_of(scenario);
+    if (violation.empty()) continue;
+    const Scenario smallest = shrunk(
+        scenario, [](const Scenario& candidate) { return !violation_of(candidate).empty(); });
+    ADD_FAILURE() << text_of(scenario) << ": " << violation
+                  << "\n the smallest: " << text_of(smallest) << ": " << violation_of(smallest);
+  }
+}
 
 }  // namespace
 }  // namespace palpate

@@ -141,6 +141,16 @@ TEST(SafetyChain, TellsAPushFromAPullByTheProxyWhereThereIsNoNormal) {
   EXPECT_EQ(session.run_for(0.02, 0.5).force.z(), 0.0) << "neither is known: no force";
 }
 
+TEST(SafetyChain, OnlyPushesWhereTheProxyIsNextToTheHand) {
+  Session session = engaged_without(0);
+  session.input.proxy = session.input.hip + Vec3(0, 0, 0.5e-3);
+  EXPECT_NEAR(session.run_for(0.02, 0.5).force.z(), 0.5, 1e-12);
+  EXPECT_EQ(session.run_for(0.02, -0.5).force.z(), 0.0) << "by the normal";
+  session.input.normal = Vec3::Zero();
+  EXPECT_NEAR(session.run_for(0.02, 0.5).force.z(), 0.5, 1e-12);
+  EXPECT_EQ(session.run_for(0.02, -0.5).force.z(), 0.0) << "by the proxy, as there is no normal";
+}
+
 TEST(SafetyChain, LetsNoForceActAwayFromTheProxyWhateverTheNormalSays) {
   // The normal leans by 80 degrees from the direction to the proxy, and the force pulls along it.
   Session session = engaged_without(0);
@@ -271,6 +281,12 @@ TEST(SafetyChain, CutsTheForceToTheLowerOfTheDevicesAndTheUsersLimit) {
   Session user(all, {.max_force = 20.0, .continuous_force = 20.0},
                {.max_force = 2.0, .initial_heat = 0.0});
   EXPECT_NEAR(user.engage().run_for(0.1, 10.0).force.norm(), 2.0, 1e-9);
+  EXPECT_TRUE(user.run(2.5).flags & force_cut);
+  Session device(all, {.max_force = 2.0, .continuous_force = 2.0});
+  const SafetyOutput cut = device.engage().run_for(0.1, 2.5);
+  EXPECT_NEAR(cut.force.norm(), 2.0, 1e-9);
+  EXPECT_TRUE(cut.flags & force_cut) << "and says so";
+  EXPECT_FALSE(device.run_for(0.1, 1.9).flags & force_cut);
 }
 
 TEST(SafetyChain, ComesDownToTheContinuousForceBeforeTheMotorsAreHot) {

@@ -297,6 +297,7 @@ TEST(LiveSession, TakesTheForceOfAMethodThatHangsAwayAndLeavesItsThreadBehind) {
   }
   gate->open();
   ended->get_future().wait();
+  EXPECT_TRUE(comes_true([&] { return threads_of_this_process() <= threads; }));
   EXPECT_EQ(last_event_of_the_device(*log), "disable")
       << "nothing is written or enabled afterwards";
 }
@@ -317,7 +318,7 @@ TEST(LiveSession, LeavesNoThreadBehindWhereTheDeviceRefuses) {
   const std::size_t before = threads_of_this_process();
   Session session(std::move(options));
   EXPECT_TRUE(fails_saying([&] { session.start(); }, "logging:", "calibrate it"));
-  EXPECT_EQ(threads_of_this_process(), before);
+  EXPECT_LE(threads_of_this_process(), before);
   EXPECT_FALSE(session.state().running);
   session.stop();
 }

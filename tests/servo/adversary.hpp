@@ -207,13 +207,15 @@ class Adversary {
     // A surface at rest for a while, or another at every frame.
     if (one_in(3)) cloud_ = random_() % clouds_.size();
     cycle_.put_frame(clouds_[cloud_], stamp, t_);
-    // The chain may not trust a stamp that repeats or runs backwards, or is from the future.
+    // The chain may not trust a stamp that repeats or runs backwards, or is from the future. One
+    // that is no number says nothing, also of the next.
+    if (!std::isfinite(stamp)) return;
     if ((!any_frame_ || stamp > last_stamp_) && stamp <= t_ + 0.05) {
       fresh_at_ = t_;
       fresh_stamp_ = stamp;
     }
     last_stamp_ = stamp;
-    any_frame_ = any_frame_ || std::isfinite(stamp);
+    any_frame_ = true;
   }
 
   ServoSettings settings() {

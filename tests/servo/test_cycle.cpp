@@ -313,6 +313,78 @@ TEST(Cycle, FindsNoFaultInTheDirectionsOfHonestContacts) {
   EXPECT_GT(forceful, 10'000U) << "nothing was at stake";
 }
 
+TEST(Cycle, MovesTheHipWithThePlacementAndSeatsTheProxyAnew) {
+  Session session;
+  session.run_for(2.0);
+  ServoSettings settings;
+  settings.placement.world_from_device.translation() = Vec3(0.01, 0, 0.02);
+  session.cycle.set_settings(settings);
+  const ServoTick record = session.run();
+  EXPECT_LT((record.tick.hip - Vec3(0.01, 0, 0.04)).norm(), 1e-12);
+  EXPECT_TRUE(record.hand & proxy_reseated);
+  EXPECT_FALSE(session.run().hand & proxy_reseated) << "once";
+}
+
+TEST(Cycle, JudgesTheHandsSpeedOnTheDeviceWhateverTheScale) {
+  ServoSettings settings;
+  settings.placement.workspace_scale = 10.0;
+  Session session(settings);
+  session.device.hand.position = {0, 0, 0.05};
+  session.run_for(0.5);
+  std::uint32_t flags = 0;
+  ServoTick record{};
+  for (int i = 0; i < 100; ++i) {
+    session.device.hand.position.x() += 0.3 * ms;  // 3 m/s in the scene
+    record = session.run();
+    flags |= record.safety;
+  }
+  EXPECT_FALSE(flags & hand_too_fast);
+  EXPECT_EQ(record.position, session.device.hand.position);
+}
+
+TEST(Cycle, LetsGoOfADeviceThatNobodyHolds) {
+  Session session;
+  session.run_for(2.0);
+  ASSERT_GT(session.press_to(-0.002).force.norm(), 0.5);
+  session.device.hand.present = false;
+  session.run();
+  const ServoTick record = session.run();
+  EXPECT_EQ(record.force.norm(), 0.0);
+  EXPECT_TRUE(record.safety & disengaged);
+}
+
+TEST(Cycle, SaysThatAFrameIsLateWhateverTheClockOfWhoPutIt) {
+  for (const double ahead : {0.0, 100.0}) {
+    Session session;
+    session.cloud = nullptr;
+    for (int i = 0; i < 300; ++i) {
+      if (i % 10 == 0) {
+        const double stamp = session.t;
+        EXPECT_GT(session.cycle.put_frame(plane_at(0.0), stamp, session.t + ahead), 0U);
+        EXPECT_EQ(session.run().frame_stamp, stamp);
+      } else {
+        EXPECT_FALSE(session.run().safety & frame_late) << i;
+      }
+    }
+    session.run_for(0.03);
+    EXPECT_TRUE(session.run().safety & frame_late) << ahead;
+  }
+}
+
+TEST(Cycle, KeepsTheLargestForceAndTheAgesOfFramesInItsStatistics) {
+  Session session;
+  session.run_for(2.0);
+  const CycleStatistics& statistics = session.cycle.statistics();
+  EXPECT_FALSE(statistics.force_out);
+  EXPECT_GT(statistics.frame_age.count(), 1900U);
+  const double pressed = session.press_to(-0.002).force.norm();
+  EXPECT_TRUE(statistics.force_out);
+  session.device.hand.position.z() = 0.02;
+  session.run_for(0.1);
+  EXPECT_FALSE(statistics.force_out);
+  EXPECT_GE(statistics.max_force.load(), pressed);
+}
+
 TEST(Cycle, SeatsTheProxyOnTheFreeSideAfterAStall) {
   // While the loop stood still for 50 ms the surface rose by 30 mm, past the proxy.
   Session session;
@@ -322,6 +394,7 @@ TEST(Cycle, SeatsTheProxyOnTheFreeSideAfterAStall) {
   session.next_frame = 0.0;
   const ServoTick record = session.run(0.05);
   EXPECT_TRUE(record.safety & stalled);
+  EXPECT_TRUE(record.hand & proxy_reseated);
   EXPECT_GT(record.tick.proxy.z(), 0.03 + 4.8e-3);
   EXPECT_EQ(record.force.norm(), 0.0);
   EXPECT_LT(session.run().force.norm(), 0.01) << "and the force ramps up";

@@ -65,6 +65,48 @@ TEST(Freshness, KnowsACamerasIntervalDespiteSkippedFramesAndBursts) {
   }
 }
 
+TEST(Freshness, IsThatOfTheWorstOfTwoCamerasWhicheverThatIs) {
+  for (const std::size_t dead : {0U, 1U}) {
+    Freshness freshness;
+    std::array<CameraFrame, 2> frames = {CameraFrame{.camera = 0}, CameraFrame{.camera = 1}};
+    double t = 10.0;
+    for (int i = 0; i < 30; ++i) {
+      t += 0.01;
+      for (std::size_t camera = 0; camera < frames.size(); ++camera) {
+        if (camera != dead || i < 20) frames[camera].stamp = t;
+      }
+      freshness.adopt(frames, t, tolerance);
+    }
+    EXPECT_NEAR(freshness.at(t).age, 0.1, 1e-9) << dead;
+    EXPECT_NEAR(freshness.at(t).intervals, 10.0, 1e-6) << dead;
+  }
+}
+
+TEST(Freshness, IsNoneAtATimeThatIsNone) {
+  Freshness freshness;
+  feed(freshness, 0.01, 20);
+  EXPECT_FALSE(freshness.at(nan).age <= 1e9);
+  EXPECT_FALSE(freshness.at(nan).intervals <= 1e9);
+}
+
+TEST(Freshness, TakesNoCameraForFasterThanAKilohertz) {
+  Freshness freshness;
+  double stamp = 10.0;
+  for (int i = 0; i < 60; ++i) {
+    stamp += 1e-6;
+    adopt(freshness, stamp, stamp);
+  }
+  EXPECT_NEAR(freshness.at(stamp + 0.002).intervals, 2.0, 1e-6);
+}
+
+TEST(Freshness, GoesOnAfterAnInfiniteStamp) {
+  Freshness freshness;
+  const double last = feed(freshness, 0.01, 20);
+  adopt(freshness, inf, last + 0.01);
+  adopt(freshness, last + 0.02, last + 0.02);
+  EXPECT_NEAR(freshness.at(last + 0.025).age, 0.005, 1e-12);
+}
+
 TEST(Freshness, AdaptsToACameraThatChangesItsRate) {
   Freshness freshness;
   double stamp = feed(freshness, 1.0 / 90.0, 50);

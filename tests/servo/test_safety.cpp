@@ -114,6 +114,7 @@ TEST(SafetyChain, TakesTheForceOffWhenTimeRunsBackwards) {
   session.run_for(0.1, 0.8);
   EXPECT_TRUE(session.run(0.8, -10.0).flags & input_refused);
   EXPECT_EQ(session.run(0.8).force.norm() < 0.01, true) << "and it ramps from there";
+  EXPECT_NEAR(session.engage().run_for(0.1, 0.8).force.norm(), 0.8, 1e-9) << "on the new time";
 }
 
 TEST(SafetyChain, OnlyPushesAndLeavesWhatIsAlongTheSurface) {
@@ -145,10 +146,10 @@ TEST(SafetyChain, OnlyPushesWhereTheProxyIsNextToTheHand) {
   Session session = engaged_without(0);
   session.input.proxy = session.input.hip + Vec3(0, 0, 0.5e-3);
   EXPECT_NEAR(session.run_for(0.02, 0.5).force.z(), 0.5, 1e-12);
-  EXPECT_EQ(session.run_for(0.02, -0.5).force.z(), 0.0) << "by the normal";
+  EXPECT_NEAR(session.run_for(0.02, -0.5).force.z(), 0.0, 1e-12) << "by the normal";
   session.input.normal = Vec3::Zero();
   EXPECT_NEAR(session.run_for(0.02, 0.5).force.z(), 0.5, 1e-12);
-  EXPECT_EQ(session.run_for(0.02, -0.5).force.z(), 0.0) << "by the proxy, as there is no normal";
+  EXPECT_NEAR(session.run_for(0.02, -0.5).force.z(), 0.0, 1e-12) << "by the proxy alone";
 }
 
 TEST(SafetyChain, LetsNoForceActAwayFromTheProxyWhateverTheNormalSays) {
@@ -340,6 +341,22 @@ TEST(SafetyChain, DoesNotTakeAGapOfTheClockForCooling) {
   EXPECT_GT(session.chain.heat(), 0.999);
 }
 
+TEST(SafetyChain, GivesTheContinuousForceToMotorsThatAreTooHot) {
+  Session session = engaged_without(0);
+  session.run_for(0.1, 3.3);
+  session.run(3.3, 30.0);  // held all the time, for all that is known
+  EXPECT_GT(session.chain.heat(), 2.0);
+  EXPECT_NEAR(session.run_for(1.6, 3.3).force.norm(), 0.88, 1e-9);
+}
+
+TEST(SafetyChain, ComesDownToALimitThatIsLoweredMeanwhileAtItsFallRate) {
+  Session session = engaged_without(0, never_hot);
+  session.run_for(0.1, 3.3);
+  session.chain.set_parameters({.max_force = 0.5});
+  EXPECT_NEAR(session.run(3.3).force.norm(), 1.3, 1e-9);
+  EXPECT_NEAR(session.run(3.3).force.norm(), 0.5, 1e-9);
+}
+
 TEST(SafetyChain, RisesNoFasterThanItsSlewLimitAndFallsFaster) {
   const auto steps = [](std::uint32_t links) {
     Session session = engaged_without(links, never_hot);
@@ -399,6 +416,30 @@ TEST(SafetyChain, WeakensAFastOscillationAndNotASlowOne) {
   EXPECT_NEAR(swing_left(0, 3.0), 2.5, 1e-6);
 }
 
+// The force is held, changes `count` times by 1 N, 5 ms apart, and is held again.
+std::uint32_t flags_of_changes(Session& session, int count) {
+  std::uint32_t flags = 0;
+  for (int change = 1; change <= count; ++change) {
+    for (int i = 0; i < 5; ++i) flags |= session.run(change % 2 != 0 ? 2.0 : 1.0).flags;
+  }
+  for (int i = 0; i < 100; ++i) flags |= session.run(count % 2 != 0 ? 2.0 : 1.0).flags;
+  return flags & oscillation_cut;
+}
+
+TEST(SafetyChain, TakesEightFastSwingsInARowForAnOscillationAndNoFewer) {
+  // Of n changes the first begins a swing, n - 1 turn round, and n - 2 times that was fast.
+  const auto flags_after = [](int changes) {
+    Session session = engaged_without(0, never_hot);
+    session.run_for(0.2, 1.0);
+    return flags_of_changes(session, changes);
+  };
+  EXPECT_FALSE(flags_after(9));
+  EXPECT_TRUE(flags_after(10));
+  Session trains = engaged_without(0, never_hot);
+  trains.run_for(0.2, 1.0);
+  for (int i = 0; i < 5; ++i) EXPECT_FALSE(flags_of_changes(trains, 8)) << "with pauses between";
+}
+
 TEST(SafetyChain, SoftensWhatOscillatesAndStillGivesAllTheForceThatIsAllowed) {
   // A gain behind the limit would let a hand of 2 N sink through the surface.
   Session session = engaged_without(0, never_hot);
@@ -431,6 +472,23 @@ TEST(SafetyChain, EngagesOnlyAfterTheHandFeltNextToNothing) {
   EXPECT_EQ(session.run_for(0.5, 2.0).force.norm(), 0.0) << "9 quiet ticks are not 10";
   for (int i = 0; i < 10; ++i) session.run(0.19);
   EXPECT_GT(session.run_for(0.5, 2.0).force.norm(), 0.5);
+}
+
+TEST(SafetyChain, CountsNoQuietTicksWhileNobodyHoldsTheDevice) {
+  Session session(all, never_hot);
+  session.input.hand = false;
+  session.run_for(0.1, 0.0);
+  session.input.hand = true;
+  for (int i = 0; i < 9; ++i) EXPECT_TRUE(session.run(0.0).flags & disengaged) << i;
+  EXPECT_FALSE(session.run(0.0).flags & disengaged);
+}
+
+TEST(SafetyChain, RampsMoreSlowlyWhereTicksAreFewer) {
+  Session session(all, never_hot);
+  for (int i = 0; i < 10; ++i) session.run(0.0);
+  SafetyOutput output{};
+  for (int i = 0; i < 300; ++i) output = session.run(2.0, 4.0 * ms);
+  EXPECT_NEAR(output.force.z(), 2.0 * 0.3 / 1.5, 0.01) << "as 300 ticks of a millisecond";
 }
 
 TEST(SafetyChain, RampsTheForceUpAfterEngaging) {
@@ -514,9 +572,15 @@ TEST(SafetyChain, FadesTheForceAsTheFrameGrowsOld) {
     return session.run_for(0.01, 2.0).force.z();
   };
   EXPECT_NEAR(at_age(0, 0.1), 2.0, 1e-9);
+  EXPECT_NEAR(at_age(0, 0.15), 2.0 * 0.35 / 0.4, 1e-9);
   EXPECT_NEAR(at_age(0, 0.3), 1.0, 1e-9);
   EXPECT_NEAR(at_age(0, 0.499), 0.005, 1e-3);
   EXPECT_NEAR(at_age(frame_fading, 0.3), 2.0, 1e-9);
+  Session session = engaged_without(0, never_hot);
+  session.input.frame_age = 0.099;
+  EXPECT_FALSE(session.run(0.0).flags & frame_fading);
+  session.input.frame_age = 0.101;
+  EXPECT_TRUE(session.run(0.0).flags & frame_fading);
 }
 
 TEST(SafetyChain, DisengagesWhenFramesStayAwayAndIsNotFooledByTheirReturn) {
@@ -565,6 +629,16 @@ TEST(SafetyChain, TakesAJumpOfTheHandForTooFast) {
   session.input.position.y() += 0.05;
   EXPECT_TRUE(session.run(2.0).flags & hand_too_fast);
   EXPECT_LT(session.run_for(0.003, 2.0).force.z(), 0.01);
+}
+
+TEST(SafetyChain, StillKnowsTheHandsSpeedAfterAPositionThatWasNone) {
+  Session session = engaged_without(0, never_hot);
+  session.input.position.x() = nan;
+  session.run(0.0);
+  session.input.position.x() = 0.0;
+  session.engage();
+  session.input.position.y() += 0.05;
+  EXPECT_TRUE(session.run(0.0).flags & hand_too_fast);
 }
 
 TEST(SafetyChain, DoesNotTakeACountOfACoarseEncoderForSpeed) {

@@ -125,6 +125,10 @@ class Patch {
   [[nodiscard]] double share() const noexcept { return share_; }
   [[nodiscard]] std::size_t view_count() const noexcept { return view_count_; }
   [[nodiscard]] const View& view(std::size_t i) const noexcept { return views_[i]; }
+  /// The first point that is not view i's.
+  [[nodiscard]] std::size_t view_end(std::size_t i) const noexcept {
+    return i + 1 < view_count_ ? views_[i + 1].begin : size_;
+  }
   /// Coordinates relative to the ball's centre [m, world axes]: size() of them, then `far` ones up
   /// to padded_size().
   [[nodiscard]] const float* x() const noexcept { return points_->x.data(); }

@@ -13,8 +13,7 @@ Vec3 free_side(const Cloud& cloud, const Vec3& proxy, const Vec3& normal, double
 
   Vec3 outwards = normal;
   for (std::size_t i = 0; i < patch.view_count(); ++i) {
-    const std::size_t end = i + 1 < patch.view_count() ? patch.view(i + 1).begin : patch.size();
-    if (patch.view(i).begin == end || !patch.view(i).viewpoint) continue;
+    if (patch.view(i).begin == patch.view_end(i) || !patch.view(i).viewpoint) continue;
     outwards = *patch.view(i).viewpoint - proxy;
     break;
   }

@@ -69,7 +69,7 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
   std::array<float, look_points> heights;
   for (std::size_t v = 0; v < patch_.view_count(); ++v) {
     const Patch::View& view = patch_.view(v);
-    const std::size_t end = v + 1 < patch_.view_count() ? patch_.view(v + 1).begin : patch_.size();
+    const std::size_t end = patch_.view_end(v);
     if (!view.viewpoint) continue;
     const Vec3 line = (*view.viewpoint - place).normalized();
     const Eigen::Vector3f towards = line.cast<float>();

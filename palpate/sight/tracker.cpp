@@ -39,9 +39,9 @@ std::optional<Vec3> main_viewpoint(const Patch& patch) {
   std::size_t most = 0;
   std::optional<Vec3> viewpoint;
   for (std::size_t i = 0; i < patch.view_count(); ++i) {
-    const std::size_t end = i + 1 < patch.view_count() ? patch.view(i + 1).begin : patch.size();
-    if (end - patch.view(i).begin <= most) continue;
-    most = end - patch.view(i).begin;
+    const std::size_t points = patch.view_end(i) - patch.view(i).begin;
+    if (points <= most) continue;
+    most = points;
     viewpoint = patch.view(i).viewpoint;
   }
   return viewpoint;

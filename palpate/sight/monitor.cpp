@@ -159,11 +159,10 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
     if (side_ == Side::behind) {
       if (free && (contact.hip - contact.proxy).norm() > contact.deepest + margin)
         verdict.action = Action::let_go;
-    } else if (free) {
-      verdict.action = Action::release;
-    } else if (proxy.seen && std::abs(proxy.behind) < 2.0 * r_c + margin &&
-               contact.normal.dot(proxy.line) < away) {
-      verdict.action = Action::release;
+    } else {
+      const bool pulls = proxy.seen && std::abs(proxy.behind) < 2.0 * r_c + margin &&
+                         contact.normal.dot(proxy.line) < away;
+      if (free || pulls) verdict.action = Action::release;
     }
     if (verdict.action != Action::none) return verdict;
   }

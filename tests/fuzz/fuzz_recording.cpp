@@ -24,8 +24,8 @@ void read_all(const fs::path& path) {
   test::succeeds([&] { static_cast<void>(BagReader(path).check()); });
   test::succeeds([&] {
     SessionReader session(path);
-    for (const auto& [number, frame] : session.frames())
-      test::succeeds([&] { static_cast<void>(session.cloud(frame)); });
+    for (const auto& frame : session.frames())
+      test::succeeds([&] { static_cast<void>(session.cloud(frame.second)); });
     static_cast<void>(replay(session));
   });
   test::succeeds([&] {

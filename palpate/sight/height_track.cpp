@@ -168,42 +168,4 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
   return {base + confined, rests ? 0.0 : (next - height) / interval};
 }
 
-double confined_velocity(double velocity, std::span<const HeightSample> newest_first,
-                         double sd) noexcept {
-  constexpr double tolerance = 0.2;  // [-] of the last interval's velocity
-  constexpr double confidence = 3.0;
-  constexpr std::size_t intervals = 4;
-  if (newest_first.size() < 2) return velocity;
-  std::array<double, intervals> rates{};  // [m/s] over each interval, newest first
-  std::size_t known = 0;
-  double shortest = 0.0;
-  for (; known < intervals && known + 1 < newest_first.size(); ++known) {
-    const double dt = newest_first[known].stamp - newest_first[known + 1].stamp;
-    if (!(dt > 0.0)) break;
-    if (known == 0) shortest = dt;
-    rates[known] = (newest_first[known].height - newest_first[known + 1].height) / dt;
-  }
-  if (known == 0) return velocity;
-  // What an acceleration adds until the next frame, if the last three changes agree that there is
-  // one: the least of them.
-  double change = 0.0;
-  if (known == intervals) {
-    const std::array<double, 3> changes = {rates[0] - rates[1], rates[1] - rates[2],
-                                           rates[2] - rates[3]};
-    const auto [least, most] = std::minmax_element(changes.begin(), changes.end());
-    if (*least > 0.0) change = *least;
-    if (*most < 0.0) change = *most;
-  }
-  const double noise =
-      confidence * sd * std::sqrt(newest_first[0].doubt + newest_first[1].doubt) / shortest;
-  const double expected = rates[0] + 1.5 * change;
-  const double slack = noise + std::abs(change);
-  // A motion that has just begun may have begun in the midst of the interval, or end.
-  const double slower =
-      rates[0] > 0.0 ? std::clamp(rates[1], 0.0, rates[0]) : std::clamp(rates[1], rates[0], 0.0);
-  const auto [low, high] =
-      std::minmax({(1.0 - tolerance) * rates[0], (1.0 + tolerance) * rates[0], slower, expected});
-  return std::clamp(velocity, low - slack, high + slack);
-}
-
 }  // namespace palpate

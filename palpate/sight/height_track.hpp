@@ -46,16 +46,4 @@ double agreed_height(std::span<const HeightSample> newest_first, double sd,
 HeightTrack track_height(std::span<const HeightSample> newest_first, double sd,
                          double interval) noexcept;
 
-/// A predicted velocity confined to what the newest heights have shown [m/s].
-///
-/// A filter that allows for acceleration takes the first frame of a motion for the begin of an
-/// acceleration: at the onset of a steady motion its prediction is up to three times too fast, and
-/// then swings. For the force the velocity is therefore confined to within 20 % of the last
-/// interval's, or between that and the one before where a motion has just begun, and as much as
-/// noise, or an acceleration that three intervals in a row have shown, may add.
-/// @param newest_first  heights measured; at least one
-/// @param sd            [m] usual standard deviation of one of them
-double confined_velocity(double velocity, std::span<const HeightSample> newest_first,
-                         double sd) noexcept;
-
 }  // namespace palpate

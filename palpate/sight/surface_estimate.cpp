@@ -450,9 +450,8 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   const double sd = height_sd();
   const HeightTrack track = track_height(since, sd, interval_);
   if (new_frame) {
-    predicted_velocity_ = track.velocity;
-    velocity_ = confined_velocity(track.velocity, since, sd);
-    rested_ = predicted_velocity_ == 0.0 ? std::min(rested_ + 1, history) : 0;
+    velocity_ = track.velocity;
+    rested_ = velocity_ == 0.0 ? std::min(rested_ + 1, history) : 0;
   }
   const double height = track.height;
   surface_.c.tail<5>() = shapes[chosen];

@@ -53,7 +53,7 @@ class SurfaceEstimate {
   /// Moves the surface along `up` by `height` [m].
   void shift(double height) noexcept { surface_.c[0] += height; }
   /// It is held where it is.
-  void stop() noexcept { velocity_ = predicted_velocity_ = 0.0; }
+  void stop() noexcept { velocity_ = 0.0; }
   /// It may be another one from here on: earlier frames no longer count.
   void forget_frames() noexcept { count_ = 0; }
   /// Distance of the sensor [m], from which its noise is assumed until that has been measured.
@@ -69,10 +69,8 @@ class SurfaceEstimate {
   /// The point of the surface nearest to `point` [m, world] at time t [s], within `reach` [m] of
   /// the centre of the fit.
   [[nodiscard]] SurfaceContact contact(const Vec3& point, double t, double reach) const noexcept;
-  /// [m/s] along `up`, at which the surface is rendered between frames.
+  /// [m/s] along `up`.
   [[nodiscard]] double velocity() const noexcept { return velocity_; }
-  /// [m/s] along `up`, that leads to where the next frame is expected to show it.
-  [[nodiscard]] double predicted_velocity() const noexcept { return predicted_velocity_; }
   [[nodiscard]] double stamp() const noexcept { return stamp_; }        ///< [s]
   [[nodiscard]] double interval() const noexcept { return interval_; }  ///< [s]
   /// How far the surface has moved along `up` at time t [s] since its frame [m].
@@ -187,7 +185,6 @@ class SurfaceEstimate {
   double stamp_ = 0.0;
   double interval_ = 1.0 / 30.0;
   double velocity_ = 0.0;
-  double predicted_velocity_ = 0.0;
   double spread_ = 0.0;
   std::size_t rung_ = 0;   // the disc that determines shape and height
   std::size_t mover_ = 0;  // the disc that determines motion

@@ -97,8 +97,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   }
   // Where the surface is expected: below the proxy, moved by its velocity.
   const LocalFrame& axes = surface_.frame();
-  const double expected =
-      surface_.predicted_velocity() * std::min(interval, SurfaceEstimate::longest_gap);
+  const double expected = surface_.velocity() * std::min(interval, SurfaceEstimate::longest_gap);
   const Vec3 hand = axes.local_from_world(proxy);
   Vec2 foot = surface_.surface().nearest(hand, hand.head<2>(), surface_.centre(),
                                          holding_ ? serves_while_held : 2.0 * serves);
@@ -336,7 +335,7 @@ bool SightTracker::is_occluder(const Ring& now, double height, double jump,
                                double hardest_strike) const noexcept {
   const double interval = surface_.interval();
   const double strike = 0.5 * hardest_strike * (interval * interval);
-  const double times = surface_.jumped() ? 4.0 : surface_.predicted_velocity() != 0.0 ? 2.0 : 1.0;
+  const double times = surface_.jumped() ? 4.0 : surface_.velocity() != 0.0 ? 2.0 : 1.0;
   const double noise = std::max(surface_.spread(), surface_.height_sd());
   if (surface_.settled() >= well_known && jump > times * strike + 15e-3 + 4.0 * noise) return true;
   const double tolerance = std::max(15e-3, 4.0 * noise);

@@ -196,7 +196,7 @@ TEST_F(Program, CalibratesADeviceFromPairs) {
   expect_refusal("calibrate --pairs " + write("two.csv", "dx,dy,dz,wx,wy,wz\n0,0,0,0,0,0\n"),
                  {"too few"});
   expect_refusal("calibrate --pairs " + write("bad.csv", "dx,dy,dz,wx,wy,wz\n0,0,0,0,0\n"),
-                 {"bad.csv:2"});
+                 {"bad.csv: line 2"});
   expect_refusal("calibrate --at 1,2", {"--device"});
 }
 

@@ -6,7 +6,6 @@
 #include <memory>
 #include <numbers>
 #include <random>
-#include <span>
 #include <string_view>
 #include <vector>
 
@@ -505,54 +504,6 @@ TEST(Sight, DampsTheHandsVelocityRelativeToTheSurface) {
   EXPECT_NEAR(added(0.02, 0.02), 0.0, 2e-3) << "a hand that goes along";
   // Corrections of the estimate under noise are no velocity.
   EXPECT_EQ(pressed_force(damping, 0.0, 0.0, 1e-3), pressed_force(0.0, 0.0, 0.0, 1e-3));
-}
-
-TEST(ConfinedVelocity, OvershootsAnOnsetByNoMoreThanAFifthAndLetsAccelerationsThrough) {
-  // At rest, then 2 mm an interval: a filter that allows for jerk foretells 6 mm.
-  const auto at = [](double newest, double second, double third, double fourth, double fifth) {
-    return std::array<HeightSample, 5>{HeightSample{4.0, newest}, HeightSample{3.0, second},
-                                       HeightSample{2.0, third}, HeightSample{1.0, fourth},
-                                       HeightSample{0.0, fifth}};
-  };
-  EXPECT_NEAR(confined_velocity(0.006, at(0.002, 0, 0, 0, 0), 0.0), 0.0024, 1e-12);
-  EXPECT_NEAR(confined_velocity(-0.006, at(0.002, 0, 0, 0, 0), 0.0), 0.0, 1e-12);
-  EXPECT_NEAR(confined_velocity(-0.006, at(-0.002, 0, 0, 0, 0), 0.0), -0.0024, 1e-12);
-  // Once it goes on steadily, neither faster nor slower; when it ends, not on.
-  EXPECT_NEAR(confined_velocity(0.006, at(0.004, 0.002, 0, 0, 0), 0.0), 0.0024, 1e-12);
-  EXPECT_NEAR(confined_velocity(-0.006, at(0.004, 0.002, 0, 0, 0), 0.0), 0.0016, 1e-12);
-  EXPECT_NEAR(confined_velocity(0.006, at(0.002, 0.002, 0, 0, 0), 0.0), 0.0, 1e-12);
-  EXPECT_EQ(confined_velocity(0.002, at(0.002, 0, 0, 0, 0), 0.0), 0.002);
-  // Steady acceleration: 1, 2, 3, 4 mm an interval; 4.5 or 5 come next.
-  const auto accelerating = at(0.010, 0.006, 0.003, 0.001, 0.0);
-  EXPECT_EQ(confined_velocity(0.005, accelerating, 0.0), 0.005);
-  EXPECT_NEAR(confined_velocity(0.020, accelerating, 0.0), 0.0065, 1e-12);
-  // What noise may explain is not confined, nor what nothing is known of.
-  EXPECT_EQ(confined_velocity(0.006, at(0.002, 0, 0, 0, 0), 1e-3), 0.006);
-  const auto two = at(0.002, 0, 0, 0, 0);
-  EXPECT_EQ(confined_velocity(0.006, std::span(two).first(1), 0.0), 0.006);
-  EXPECT_NEAR(confined_velocity(0.006, std::span(two).first(2), 0.0), 0.0024, 1e-12);
-}
-
-TEST(Sight, DoesNotRingWhenAPlaneBeginsToMove) {
-  constexpr double speed = 0.05;
-  for (const double phase : {0.1, 0.35, 0.6, 0.85}) {
-    Sight sight = seated(Vec3(0, 0, 0.03));
-    const double start = (20 + phase) * interval;
-    double fastest = 0.0;
-    double slowest = speed;
-    for (int k = 0; k < 40; ++k) {
-      const double stamp = k * interval;
-      const PointCloud cloud(flat_grid(speed * std::max(stamp - start, 0.0), 1.5e-3, 40),
-                             Vec3(0, 0, 1));
-      const Tick tick = live_through(sight, cloud, stamp, [&](double t) {
-        return Vec3(0, 0, t < 0.3 ? 0.03 : -0.01 + speed * std::max(stamp - start, 0.0));
-      });
-      fastest = std::max(fastest, tick.surface_velocity);
-      if (k > 22) slowest = std::min(slowest, tick.surface_velocity);
-    }
-    EXPECT_LE(fastest, 1.3 * speed) << phase;
-    EXPECT_GE(slowest, 0.7 * speed) << phase;
-  }
 }
 
 TEST(Sight, FollowsASurfaceThatTurns) {

@@ -85,7 +85,8 @@ TEST(SessionHost, HoldsTheOperatorToTheSessionsOptions) {
 
 TEST(SessionHost, SaysInWhichDirectionLimitsAreStricter) {
   Hosted hosted;
-  for (const json& row : json::parse(hosted.host.hello())["safety"]) {
+  const json hello = json::parse(hosted.host.hello());
+  for (const json& row : hello["safety"]) {
     if (row["name"] == "max_device_force") {
       EXPECT_EQ(row["stricter"], "lower");
     } else if (row["name"] == "ramp_time") {

@@ -60,6 +60,9 @@ void SessionArguments::add_to(CLI::App& command) {
       .add_option("--limit", limits_,
                   "set a safety limit, NAME=VALUE in SI units; see `palpate parameters`")
       ->allow_extra_args(false);
+  command.add_flag("--without-watchdog", without_watchdog_,
+                   "allow a device whose motors no watchdog switches off more than engage_force: "
+                   "if the program is killed, its last force stays");
   command.add_option("--rate", rate_, "ticks a second (1000)");
   command.add_option("--listen", listen_,
                      "address at which browsers find the page (127.0.0.1: this machine's alone). "
@@ -103,6 +106,7 @@ SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
     const auto [name, value] = parse_assignment("--limit", limit);
     set_parameter(config.safety, name, value);
   }
+  if (without_watchdog_) config.without_watchdog = true;
   if (rate_) config.rate = *rate_;
   for (const std::string& limit : operator_limits_) {
     const auto [name, value] = parse_assignment("--operator-limit", limit);

@@ -29,7 +29,7 @@ class SessionArguments {
   std::optional<double> rate_, scale_, record_limit_;
   std::optional<int> clutch_button_;
   std::optional<std::uint16_t> port_;
-  bool no_browser_ = false;
+  bool no_browser_ = false, without_watchdog_ = false;
   MethodOptions method_;
 };
 

@@ -19,10 +19,11 @@ struct DeviceLimits {
   double continuous_force = 0.88;            ///< [N] continuous (thermal) force rating
   std::optional<double> max_stiffness = {};  ///< [N/m] nominal: a stiffer wall may oscillate
   std::optional<double> max_damping = {};    ///< [N s/m] nominal
+  bool motors = true;                        ///< false: no force that is sent reaches a hand
 };
 
 /// Limits of a hand without motors: the peak force of a Touch, continuously.
-constexpr DeviceLimits no_motors{.max_force = 3.3, .continuous_force = 3.3};
+constexpr DeviceLimits no_motors{.max_force = 3.3, .continuous_force = 3.3, .motors = false};
 
 /// Where a device can reach, in its own frame: a box, or a ball about the origin.
 struct DeviceReach {
@@ -47,7 +48,8 @@ struct DeviceInfo {
   std::optional<double> resolution = {};  ///< [m] of the position
   std::optional<double> delay = {};       ///< [s] from a write to the motors' force
   std::optional<double> rate = {};        ///< [Hz] at which the device is updated
-  /// [s] the hardware takes its force away when no command came for this long; empty: never.
+  /// [s] the hardware takes its force away when no command came for this long; empty: never. A
+  /// session in real time refuses forces on a device with motors without one; see SessionOptions.
   std::optional<double> watchdog = {};
   bool simulated = false;     ///< a simulated hand: it may be read on any clock
   std::string serial = {};    ///< serial number, empty if unknown

@@ -320,14 +320,16 @@ std::string joined(const std::vector<std::string>& lines) {
 SessionConfig parse_session_config(std::string_view text, const std::string& name,
                                    const SessionConfig& base, const MethodCheck& check_method) {
   const toml::table tree = parsed(text, name);
-  constexpr std::array<std::string_view, 12> keys{
-      "camera", "device", "placement",     "rate",         "method",          "parameters",
-      "safety", "record", "record_folder", "record_limit", "operator_limits", "server"};
+  constexpr std::array<std::string_view, 13> keys{
+      "camera",          "device", "placement",       "rate",          "method",
+      "parameters",      "safety", "record",          "record_folder", "record_limit",
+      "operator_limits", "server", "without_watchdog"};
   const Table root(tree, name, "", keys);
   SessionConfig config = base;
   if (const toml::node* cameras = root.find("camera"))
     config.cameras = read_cameras(root, *cameras);
   root.read("device", config.device);
+  root.read("without_watchdog", config.without_watchdog);
   root.read("rate", config.rate, lowest_rate, highest_rate, "Hz");
   root.read("method", config.method);
   root.read("record", config.record);
@@ -373,6 +375,8 @@ std::string to_toml(const SessionConfig& config) {
   text += key_line("method", toml_text(config.method), "how forces are computed");
   text += key_line("rate", toml_number(config.rate), "Hz, 100 to 100000: ticks of the servo loop");
   text += key_line("device", toml_text(config.device), "URI of the hand; \"\": the usual one");
+  text += key_line("without_watchdog", config.without_watchdog ? "true" : "false",
+                   "allow motors more than engage_force that no watchdog switches off");
   text += key_line("record", toml_text(config.record), "folder to record into; \"\": none");
   text += key_line("record_folder", toml_text(config.record_folder),
                    "where a page's recordings go; \"\": the current folder");

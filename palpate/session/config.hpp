@@ -40,6 +40,8 @@ struct SessionConfig {
   std::vector<CameraConfig> cameras{{.uri = "synthetic:desk?noise=1mm"}};
   std::string device = {};  ///< URI; empty: the program's choice
   Placement placement;
+  /// SessionOptions::without_watchdog: more than the engage force on motors that nothing watches.
+  bool without_watchdog = false;
   double rate = 1000.0;  ///< [Hz] of the servo loop, 100 to 100 000
   std::string method = "sight";
   Parameters parameters;

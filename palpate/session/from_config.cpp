@@ -14,6 +14,7 @@ SessionOptions session_options(const SessionConfig& config) {
   options.settings.safety = config.safety;
   options.settings.placement = config.placement;
   options.servo.rate = config.rate;
+  options.without_watchdog = config.without_watchdog;
   options.record = config.record;
   return options;
 }

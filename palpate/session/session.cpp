@@ -29,6 +29,7 @@ constexpr double first_frame_timeout = 10.0;  // [s] for a live camera to start 
 constexpr double press = 0.008;               // [m] of the built-in path
 constexpr auto housekeeping_interval = std::chrono::milliseconds(10);
 constexpr auto stop_poll_interval = std::chrono::milliseconds(5);
+constexpr double longest_watchdog = 0.5;              // [s] in which a hand reacts
 constexpr double camera_join_time = 0.5;              // [s] for a camera's thread to end
 constexpr std::int64_t ticks_between_flushes = 2000;  // of a free-running session's recording
 
@@ -66,6 +67,23 @@ std::unique_ptr<Device> open_hand(const SessionOptions& options, const Cloud& se
   return open_device(options.device_uri, path, options.devices);
 }
 
+// A device with motors that nothing watches keeps its last force when this process is killed: no
+// more than what a hand engages at, whatever the settings call that.
+void refuse_without_watchdog(const DeviceInfo& device, const SafetyParameters& safety) {
+  const bool watched =
+      device.watchdog && *device.watchdog > 0.0 && *device.watchdog <= longest_watchdog;
+  if (watched || device.simulated || !device.limits.motors) return;
+  const double most = std::min(safety.engage_force, SafetyParameters{}.engage_force);
+  const double limit = std::min(safety.max_force, device.limits.max_force);
+  if (limit <= most) return;
+  throw Error(device.uri,
+              "a force of up to " + number_text(limit) + " N is allowed on it, but it states no " +
+                  "watchdog of at most " + number_text(longest_watchdog) +
+                  " s that takes the force away when the session is killed",
+              "hold it by open_guarded, set max_device_force to " + number_text(most) +
+                  " N, or allow it by without_watchdog");
+}
+
 }  // namespace
 
 class Session::Impl {
@@ -86,6 +104,7 @@ class Session::Impl {
     std::vector<std::shared_ptr<const Cloud>> first;
     for (SessionCamera& camera : options_.cameras) first.push_back(open_camera(camera));
     device_ = options_.device ? std::move(options_.device) : open_hand(options_, *first.front());
+    if (needs_watchdog()) refuse_without_watchdog(device_->info(), options_.settings.safety);
     settings_ = options_.settings;
     proxy_radius_ = settings_.parameters.proxy.r_c();
     auto method = open_method(settings_, first);
@@ -208,6 +227,7 @@ class Session::Impl {
   }
 
   void set(const ServoSettings& settings) {
+    if (needs_watchdog()) refuse_without_watchdog(device_->info(), settings.safety);
     const std::lock_guard lock(control_);
     const std::uint64_t number =
         settings.method == settings_.method
@@ -240,6 +260,7 @@ class Session::Impl {
 
  private:
   [[nodiscard]] bool is_live() const { return options_.pace == Pace::real_time; }
+  [[nodiscard]] bool needs_watchdog() const { return is_live() && !options_.without_watchdog; }
   void refuse_if_stopped() const {
     if (stopped_)
       throw Error("session", "it has been stopped and cannot go on", "make another session");

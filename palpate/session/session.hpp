@@ -46,6 +46,10 @@ struct SessionOptions {
   ServoSettings settings = {};          ///< method, its parameters, safety limits, placement
   ServoOptions servo = {};              ///< rate, real-time rights
   Pace pace = Pace::real_time;
+  /// Real time: allows a device with motors to send more than SafetyParameters::engage_force
+  /// although it states no watchdog (DeviceInfo::watchdog) of at most 0.5 s: if this process is
+  /// killed, its last force stays. `open_guarded` gives a device a watchdog.
+  bool without_watchdog = false;
   double stroke_time = 20.0;  ///< [s] of the built-in path of `hand:` and `script:`
   std::string record = {};    ///< folder to record into from the start; empty: none
   std::string version = {};   ///< of the program, for recordings
@@ -90,7 +94,7 @@ class Session {
  public:
   /// Opens cameras and device, waits for each camera's first frame, and makes the method.
   /// @throws Error if one of them cannot be used: a URI, a device, a method that cannot touch what
-  ///         the cameras see, settings out of range.
+  ///         the cameras see, settings out of range, a force that needs a watchdog.
   explicit Session(SessionOptions options);
   /// stop().
   ~Session();
@@ -126,7 +130,7 @@ class Session {
   [[nodiscard]] ServoSettings settings() const;
   /// Takes effect in the next tick. Another method is made and takes over where the proxy is.
   /// @throws Error, leaving everything as it was, if something does not validate, there is no such
-  ///         method or it cannot touch what the cameras see.
+  ///         method, it cannot touch what the cameras see, or the force limit needs a watchdog.
   void set(const ServoSettings& settings);
   /// Ends a latched fault of the safety chain: an operator's decision.
   void reset_faults() noexcept;

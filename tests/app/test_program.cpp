@@ -140,11 +140,12 @@ TEST_F(Program, PrintsASessionThatReadsBackTheSame) {
   const std::string options =
       " --camera synthetic:plane --device hand:?device=touch --device-pose 0.1,0.2,0.3,0,0,0,1"
       " --scale 2 --clutch-button 1 --limit max_device_force=1.5 --set stiffness=400 --rate 2000"
-      " --method paper --port 0 --no-browser";
+      " --method paper --port 0 --no-browser --without-watchdog";
   const Outcome first = run("run --print-config" + options);
   ASSERT_EQ(first.code, 0) << first.err;
   EXPECT_NE(first.out.find("scale = 2.0"), std::string::npos) << first.out;
   EXPECT_NE(first.out.find("max_device_force = 1.5"), std::string::npos) << first.out;
+  EXPECT_NE(first.out.find("without_watchdog = true"), std::string::npos) << first.out;
   const Outcome again = run("run --print-config --config " + write("s.toml", first.out));
   ASSERT_EQ(again.code, 0) << again.err;
   EXPECT_EQ(again.out, first.out);

@@ -29,6 +29,7 @@ SessionConfig everything() {
                     {.uri = "synthetic:desk", .name = "left"}};
   config.device = "hand:?device=touch";
   config.placement = {pose_of(-2.0), 2.5, 1};
+  config.without_watchdog = true;
   config.rate = 2000.0;
   config.method = "paper";
   set_parameter(config.parameters, "r_c", 7e-3);
@@ -57,6 +58,7 @@ void expect_same(const SessionConfig& a, const SessionConfig& b) {
   EXPECT_TRUE(a.placement.world_from_device.isApprox(b.placement.world_from_device, 1e-14));
   EXPECT_EQ(a.placement.workspace_scale, b.placement.workspace_scale);
   EXPECT_EQ(a.placement.clutch_button, b.placement.clutch_button);
+  EXPECT_EQ(a.without_watchdog, b.without_watchdog);
   EXPECT_EQ(a.rate, b.rate);
   EXPECT_EQ(a.method, b.method);
   for (const ParameterInfo& row : parameter_table())

@@ -134,8 +134,10 @@ class LivingCamera final : public Source {
 // stall of a busy machine it is free to engage anew.
 class LoggingDevice final : public Device {
  public:
-  explicit LoggingDevice(std::shared_ptr<Log> log, bool refuses = false)
-      : log_(std::move(log)), refuses_(refuses) {}
+  explicit LoggingDevice(
+      std::shared_ptr<Log> log, bool refuses = false,
+      const DeviceInfo& info = {.uri = "logging:", .kind = "logging", .limits = no_motors})
+      : log_(std::move(log)), refuses_(refuses), info_(info) {}
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
   HandState read(double /*t*/) noexcept override {
     return {.position = {0.0, 0.0, ++reads_ % 550 <= 50 ? wall_depth - 0.05 : wall_depth + 0.005}};
@@ -158,7 +160,7 @@ class LoggingDevice final : public Device {
   std::shared_ptr<Log> log_;
   bool refuses_;
   int reads_ = 0;
-  DeviceInfo info_{.uri = "logging:", .kind = "logging", .limits = no_motors};
+  DeviceInfo info_;
 };
 
 // Method `paper`, until `hangs` is set: then a tick does not return before the gate opens.
@@ -322,6 +324,54 @@ TEST(LiveSession, LeavesNoThreadBehindWhereTheDeviceRefuses) {
   EXPECT_LE(threads_of_this_process(), before);
   EXPECT_FALSE(session.state().running);
   session.stop();
+}
+
+TEST(LiveSession, RefusesForcesOnMotorsThatNothingWatches) {
+  const DeviceInfo arm{.uri = "arm:", .kind = "an arm", .limits = {.max_force = 2.0}};
+  const auto with_limit = [](double newtons) {
+    SafetyParameters safety;
+    safety.max_force = newtons;
+    return safety;
+  };
+  const auto open = [&](const DeviceInfo& info, const SafetyParameters& safety,
+                        bool without_watchdog = false) {
+    const auto log = std::make_shared<Log>();
+    SessionOptions options;
+    options.cameras.push_back({.source = std::make_unique<LivingCamera>(log)});
+    options.device = std::make_unique<LoggingDevice>(log, false, info);
+    options.settings.safety = safety;
+    options.without_watchdog = without_watchdog;
+    return std::make_unique<Session>(std::move(options));
+  };
+  const auto is_refused = [&](const DeviceInfo& info, const SafetyParameters& safety) {
+    return fails_saying([&] { return open(info, safety); }, "arm:", "watchdog", "open_guarded",
+                        "0.2 N", "without_watchdog");
+  };
+  EXPECT_TRUE(is_refused(arm, {}));
+  EXPECT_TRUE(fails_saying([&] { return open(arm, {}); }, "up to 2 N")) << "the device's own limit";
+  EXPECT_TRUE(is_refused(arm, with_limit(0.21)));
+  SafetyParameters engages_late = with_limit(1.0);
+  engages_late.engage_force = 1.0;
+  EXPECT_TRUE(is_refused(arm, engages_late));
+  DeviceInfo weak = arm, watched = arm, slow = arm, simulated = arm, motorless = arm;
+  weak.limits.max_force = 0.2;
+  watched.watchdog = 0.05;
+  slow.watchdog = 10.0;
+  simulated.simulated = true;
+  motorless.limits = no_motors;
+  EXPECT_TRUE(is_refused(slow, {}));
+  for (const DeviceInfo& info : {weak, watched, simulated, motorless})
+    EXPECT_NO_THROW(open(info, {})->set({}));
+  EXPECT_NO_THROW(open(arm, {}, true)->set({}));
+
+  const std::unique_ptr<Session> gentle = open(arm, with_limit(0.2));
+  ServoSettings settings = gentle->settings();
+  settings.safety.max_force = 1.0;
+  EXPECT_TRUE(fails_saying([&] { return gentle->set(settings), 0; }, "arm:", "up to 1 N"));
+  EXPECT_EQ(gentle->settings().safety.max_force, 0.2) << "nothing was changed";
+  settings.safety.max_force = 0.1;
+  gentle->set(settings);
+  EXPECT_EQ(gentle->settings().safety.max_force, 0.1);
 }
 
 TEST(LiveSession, EndsARunWhenItIsAskedTo) {

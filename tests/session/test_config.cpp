@@ -164,6 +164,11 @@ TEST(SessionConfig, NamesFileAndLineOfWhatIsWrong) {
   EXPECT_TRUE(fails_saying(parsing("[[camera]]\nname = \"x\""), "session.toml:1:", "no 'uri'"));
   EXPECT_TRUE(fails_saying(parsing("camera = []"), "session.toml:1:", "no camera"));
   EXPECT_TRUE(fails_saying(parsing("a = = 1"), "session.toml:1:"));
+  for (const char* text :
+       {"\nrate = \u00e9", "\nrate = \u3042", "\nrate = 1.0\u0416", "\n\u00fc = 1", "\nrate = \xff",
+        "\nrate = 1.0\xc3", "\xef\xbb\xbf\nrate = \xe2\x80"})
+    EXPECT_TRUE(fails_saying(parsing(text), "session.toml:2:", "in UTF-8")) << text;
+  EXPECT_EQ(parse_session_config("device = \"\u3042\" # \u00e9", "s").device, "\u3042");
   EXPECT_TRUE(fails_saying(
       [] {
         return parse_session_config("\nmethod = \"papr\"", "session.toml", {},

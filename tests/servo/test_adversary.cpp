@@ -5,15 +5,12 @@
 #include <gtest/gtest.h>
 
 #include "tests/servo/adversary.hpp"
+#include "tests/support/sanitized.hpp"
 
 namespace palpate {
 namespace {
 
-#ifdef PALPATE_SANITIZED
-constexpr std::uint64_t ticks = 50'000;
-#else
-constexpr std::uint64_t ticks = 1'000'000;
-#endif
+constexpr std::uint64_t ticks = test::sanitized ? 50'000 : 1'000'000;
 
 // The same for longer: adversarial_ticks, beside this program.
 TEST(Adversary, GetsNoForceThatBreaksAPromise) {

@@ -10,17 +10,13 @@
 #include "palpate/servo/energy_monitor.hpp"
 
 #include "tests/servo/haptic_loop.hpp"
+#include "tests/support/sanitized.hpp"
 
 namespace palpate {
 namespace {
 
-#ifdef PALPATE_SANITIZED
-constexpr std::uint64_t honest_contacts = 30;
-constexpr std::uint64_t free_swings = 10;
-#else
-constexpr std::uint64_t honest_contacts = 400;
-constexpr std::uint64_t free_swings = 80;
-#endif
+constexpr std::uint64_t honest_contacts = test::sanitized ? 30 : 400;
+constexpr std::uint64_t free_swings = test::sanitized ? 10 : 80;
 // The monitor was tuned on the seeds 1 to 6000; contact_population runs as many as one likes.
 constexpr std::uint64_t first_seed = 100'000;
 

@@ -18,6 +18,7 @@
 
 #include "tests/session/fakes.hpp"
 #include "tests/support/errors.hpp"
+#include "tests/support/sanitized.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
@@ -96,7 +97,7 @@ TEST(Session, GivesTheSameForcesBitForBit) {
   for (const char* method : {"sight", "paper"}) {
     const auto on_the_desk = [&] {
       SessionOptions options;
-      options.cameras.push_back({.uri = "synthetic:desk?noise=1mm"});
+      options.cameras.push_back({.uri = "synthetic:desk?noise=1mm&size=320x240"});
       options.settings.method = method;
       options.pace = Pace::free_running;
       options.stroke_time = 4.0;

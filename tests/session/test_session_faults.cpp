@@ -26,6 +26,7 @@
 #include "palpate/session/session.hpp"
 
 #include "tests/session/fakes.hpp"
+#include "tests/support/sanitized.hpp"
 
 namespace palpate {
 namespace {
@@ -42,6 +43,10 @@ constexpr std::array fault_names = {"Off",  "Stuck",   "Garbage",     "Wrong",
                                     "Slow", "Delayed", "Intermittent"};
 constexpr std::array place_names = {"FirstCamera", "SecondCamera", "Hand", "Device", "Method"};
 constexpr std::array motion_names = {"Free", "Contact", "Moving"};
+
+const std::vector<Motion> motions =
+    test::sanitized ? std::vector{Motion::moving}
+                    : std::vector{Motion::free, Motion::contact, Motion::moving};
 
 template <class Enum>
 constexpr std::size_t index_of(Enum value) {
@@ -477,7 +482,7 @@ INSTANTIATE_TEST_SUITE_P(
                                      Fault::slow, Fault::delayed, Fault::intermittent),
                      testing::Values(Place::first_camera, Place::second_camera, Place::hand,
                                      Place::device, Place::method),
-                     testing::Values(Motion::free, Motion::contact, Motion::moving)),
+                     testing::ValuesIn(motions)),
     name_of_cell);
 
 /// The smallest scenario that still fails: with as few failures, and these as short, as possible.
@@ -523,7 +528,7 @@ TEST(SessionFaultsByChance, TwoAtATimeBreakNoPromise) {
   const auto draw_time = [&](double low, double high) {
     return 0.01 * std::round(100.0 * std::uniform_real_distribution<double>(low, high)(random));
   };
-  constexpr int scenarios = 40;
+  constexpr int scenarios = test::sanitized ? 4 : 40;
   for (int k = 0; k < scenarios; ++k) {
     Scenario scenario{static_cast<Motion>(draw(motion_names.size())), {}};
     for (int i = 0; i < 2; ++i) {

@@ -23,8 +23,8 @@ constexpr double noticed =
     0.3;  // [N] largest change of force by an occluder that counts as unnoticed
 
 struct Outcome {
+  ForceJudge force;
   bool lost = false;
-  ForceJudge force{0.0, 0.0, 0.0};
   int dips = 0;         // times that it was behind for more than a frame, and came back
   double step = 0.0;    // [N] largest change of the force in a tick, from contact on
   double change = 0.0;  // [N] between the largest and the smallest force while nothing moves
@@ -53,7 +53,8 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
   const auto ruler = make_method("ideal", {parameters, stage.truth});
   method->seat(stage.seat);
   ruler->seat(stage.seat);
-  Outcome outcome;
+  const double frame = stage.scenario.tick_rate / stage.scenario.frame_rate;  // [ticks]
+  Outcome outcome{.force = {parameters.proxy.r_c(), stage.scenario.tick_rate, frame}};
   int behind = 0;
   bool touched = false;
   double last_force = 0.0;
@@ -63,8 +64,6 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
       compare && stage.undisturbed ? forces_of(method_name, *stage.undisturbed, parameters)
                                    : std::vector<double>();
   std::size_t ticks = 0;
-  const double frame = stage.scenario.tick_rate / stage.scenario.frame_rate;
-  outcome.force = ForceJudge(parameters.proxy.r_c(), stage.scenario.tick_rate, frame);
   play(*method, stage.scenario, [&](const Tick& tick) {
     const Tick truly = ruler->tick(tick.hip, tick.t);
     const auto inside = [&](const Vec3& at) {

@@ -43,19 +43,25 @@ void check_ranges(std::span<const ParameterRow<Owner>> table, const Owner& owner
     check_range(noun, row.name, row.unit, row.min, row.max, row.get(owner));
 }
 
+/// The row of that name. @throws Error if there is none.
+template <class Owner>
+const ParameterRow<Owner>& row_by_name(std::span<const ParameterRow<Owner>> table,
+                                       std::string_view name, std::string_view noun) {
+  std::vector<std::string_view> names;
+  for (const auto& row : table) {
+    if (row.name == name) return row;
+    names.push_back(row.name);
+  }
+  refuse_name(noun, name, names);
+}
+
 /// Sets one number by name. @throws Error for an unknown name or a value out of its range.
 template <class Owner>
 void set_by_name(std::span<const ParameterRow<Owner>> table, Owner& owner, std::string_view name,
                  double value, std::string_view noun) {
-  std::vector<std::string_view> names;
-  for (const auto& row : table) {
-    names.push_back(row.name);
-    if (row.name != name) continue;
-    check_range(noun, row.name, row.unit, row.min, row.max, value);
-    row.set(owner, value);
-    return;
-  }
-  refuse_name(noun, name, names);
+  const ParameterRow<Owner>& row = row_by_name(table, name, noun);
+  check_range(noun, row.name, row.unit, row.min, row.max, value);
+  row.set(owner, value);
 }
 
 }  // namespace palpate

@@ -6,9 +6,9 @@
 #include <atomic>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstring>
-#include <ctime>
 #include <limits>
 #include <new>
 #include <string>
@@ -20,6 +20,7 @@
 #include <unistd.h>
 
 #include "palpate/core/error.hpp"
+#include "palpate/servo/realtime.hpp"
 
 namespace palpate {
 namespace {
@@ -27,12 +28,6 @@ namespace {
 constexpr double opening_time = 30.0;   // [s] for the device to open, or to be enabled
 constexpr double guard_silence = 0.05;  // [s] without the guard's loop: the device is lost
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
-
-double now_s() {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
 
 // A value in shared memory that one process writes and the other reads, neither waiting: two slots,
 // of which the number of values written so far names the newer.
@@ -133,7 +128,7 @@ double or_nan(const std::optional<double>& value) {
 }
 
 std::optional<double> optional_of(double value) {
-  return value == value ? std::optional(value) : std::nullopt;
+  return std::isnan(value) ? std::nullopt : std::optional(value);
 }
 
 void put_info(const DeviceInfo& from, double beat_time, Info& to) {
@@ -201,9 +196,9 @@ Hand hand_of(const HandState& from) {
 HandState state_of(const Hand& hand) {
   HandState state;
   state.position = Vec3(hand.position[0], hand.position[1], hand.position[2]);
-  if (hand.velocity[0] == hand.velocity[0])
+  if (!std::isnan(hand.velocity[0]))
     state.velocity = Vec3(hand.velocity[0], hand.velocity[1], hand.velocity[2]);
-  if (hand.orientation[0] == hand.orientation[0])
+  if (!std::isnan(hand.orientation[0]))
     state.orientation = Eigen::Quaterniond(hand.orientation[3], hand.orientation[0],
                                            hand.orientation[1], hand.orientation[2]);
   state.stamp = optional_of(hand.stamp);
@@ -212,14 +207,6 @@ HandState state_of(const Hand& hand) {
   state.clutched = hand.clutched;
   state.fault = hand.fault;
   return state;
-}
-
-void sleep_until(double t) {
-  timespec time{};
-  time.tv_sec = static_cast<time_t>(t);
-  time.tv_nsec = static_cast<long>(1e9 * (t - static_cast<double>(time.tv_sec)));
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) == EINTR) {
-  }
 }
 
 // Does what the session wished for last, if it is new.
@@ -245,15 +232,15 @@ void hold(Memory& memory, Device& device, const GuardLimits& limits, pid_t sessi
   GuardGate gate(limits.beat_time);
   Vec3 wanted = Vec3::Zero();
   std::uint64_t beats = 0;
-  double next = now_s();
+  double next = monotonic_now();
   while (getppid() == session && memory.wish.load(std::memory_order_acquire) != Wish::ended) {
     grant(memory, device);
-    HandState state = device.read(now_s());
+    HandState state = device.read(monotonic_now());
     if (Force force{}; memory.force.read(force)) {
       wanted = Vec3(force.x, force.y, force.z);
       beats = force.beats;
     }
-    const double now = now_s();
+    const double now = monotonic_now();
     device.write(gate.pass(now, beats, wanted), now);
     if (gate.closed()) {
       state.present = false;  // so that the session's safety chain lets go, and engages anew
@@ -261,10 +248,10 @@ void hold(Memory& memory, Device& device, const GuardLimits& limits, pid_t sessi
     }
     memory.hand.write(hand_of(state));
     memory.turns.fetch_add(1, std::memory_order_release);
-    next = std::max(next + limits.period, now_s());
-    sleep_until(next);
+    next = std::max(next + limits.period, monotonic_now());
+    sleep_until(static_cast<std::uint64_t>(1e9 * next));
   }
-  device.write(Vec3::Zero(), now_s());
+  device.write(Vec3::Zero(), monotonic_now());
   device.disable();
 }
 
@@ -330,9 +317,9 @@ class GuardedDevice final : public Device {
 
   void enable() override {
     const std::uint64_t number = wish(Wish::enabled);
-    const double end = now_s() + opening_time;
+    const double end = monotonic_now() + opening_time;
     while (memory_->granted.load(std::memory_order_acquire) < number) {
-      if (now_s() > end || waitpid(guard_, nullptr, WNOHANG) != 0)
+      if (monotonic_now() > end || waitpid(guard_, nullptr, WNOHANG) != 0)
         throw Error(info_.uri, "its guard does not answer", "start the session again");
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -391,12 +378,12 @@ std::unique_ptr<Device> open_guarded(const std::function<std::unique_ptr<Device>
     throw Error("guard", std::strerror(errno), "end other processes");
   }
   if (guard == 0) run_guard(*memory, open, limits, session);
-  const double end = now_s() + opening_time;
+  const double end = monotonic_now() + opening_time;
   int status = 0;
   std::string trouble;
   while (memory->phase.load(std::memory_order_acquire) == Phase::opening && trouble.empty()) {
     if (waitpid(guard, &status, WNOHANG) == guard) trouble = "guard: its process has ended";
-    if (now_s() > end) trouble = "guard: the device did not open in 30 s";
+    if (monotonic_now() > end) trouble = "guard: the device did not open in 30 s";
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   if (memory->phase == Phase::refused) trouble = memory->refusal.data();

@@ -2,7 +2,6 @@
 #include "palpate/servo/periodic_thread.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <ctime>
@@ -30,13 +29,6 @@ double seconds(std::uint64_t nanoseconds) noexcept {
 std::uint32_t clipped(std::uint64_t nanoseconds) noexcept {
   return static_cast<std::uint32_t>(
       std::min<std::uint64_t>(nanoseconds, std::numeric_limits<std::uint32_t>::max()));
-}
-
-void sleep_until(std::uint64_t deadline) noexcept {
-  const timespec at{.tv_sec = static_cast<time_t>(deadline / second),
-                    .tv_nsec = static_cast<long>(deadline % second)};
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr) == EINTR) {
-  }
 }
 
 }  // namespace

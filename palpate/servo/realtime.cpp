@@ -2,6 +2,7 @@
 #include "palpate/servo/realtime.hpp"
 
 #include <array>
+#include <cerrno>
 #include <cstdint>
 #include <ctime>
 
@@ -102,6 +103,14 @@ double monotonic_now() noexcept {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+void sleep_until(std::uint64_t deadline) noexcept {
+  constexpr std::uint64_t second = 1'000'000'000;  // [ns]
+  const timespec at{.tv_sec = static_cast<time_t>(deadline / second),
+                    .tv_nsec = static_cast<long>(deadline % second)};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &at, nullptr) == EINTR) {
+  }
 }
 
 }  // namespace palpate

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -45,5 +46,7 @@ class RealtimeThread {
 
 /// Seconds on CLOCK_MONOTONIC: the clock of the servo loop and of live frames' stamps. [servo]
 double monotonic_now() noexcept;
+/// Sleeps until then on the same clock. @param deadline [ns]
+void sleep_until(std::uint64_t deadline) noexcept;
 
 }  // namespace palpate

@@ -162,6 +162,10 @@ std::span<const SafetyParameterInfo> safety_parameter_table() {
   return table;
 }
 
+const SafetyParameterInfo& safety_parameter(std::string_view name) {
+  return row_by_name(safety_parameter_table(), name, noun);
+}
+
 void set_parameter(SafetyParameters& parameters, std::string_view name, double value) {
   set_by_name(safety_parameter_table(), parameters, name, value, noun);
 }

@@ -96,6 +96,8 @@ using SafetyParameterInfo = ParameterRow<SafetyParameters>;
 
 /// All of them, in the order in which they are shown.
 std::span<const SafetyParameterInfo> safety_parameter_table();
+/// The row of that name. @throws Error if there is none.
+const SafetyParameterInfo& safety_parameter(std::string_view name);
 /// @throws Error for an unknown name (naming the nearest) or a value out of its range.
 void set_parameter(SafetyParameters& parameters, std::string_view name, double value);
 /// @throws Error naming the first parameter out of range, or if fade_age >= lost_age.

@@ -27,16 +27,6 @@ constexpr std::array directions = {
     Direction{"stall_time", Stricter::lower},
 };
 
-const SafetyParameterInfo& row_of(std::string_view name) {
-  const auto table = safety_parameter_table();
-  const auto row = std::find_if(table.begin(), table.end(),
-                                [&](const SafetyParameterInfo& r) { return r.name == name; });
-  if (row != table.end()) return *row;
-  SafetyParameters unused;
-  set_parameter(unused, name, 0.0);  // says that there is none, and which is near
-  throw Error("safety parameter '" + std::string(name) + "'", "there is none of that name");
-}
-
 bool is_looser(Stricter stricter, double value, double bound) {
   return stricter == Stricter::lower ? value > bound : value < bound;
 }
@@ -88,7 +78,7 @@ LimitBounds::LimitBounds(const SafetyParameters& start,
 }
 
 void LimitBounds::check(std::string_view name, double value, Role role) const {
-  const SafetyParameterInfo& row = row_of(name);
+  const SafetyParameterInfo& row = safety_parameter(name);
   const Stricter stricter = stricter_direction(name);
   const std::string subject = "limit '" + std::string(name) + "'";
   const std::string end = stricter == Stricter::lower ? "above" : "below";
@@ -113,7 +103,7 @@ void LimitBounds::check(std::string_view name, double value, Role role) const {
 }
 
 void LimitBounds::set_by_operator(std::string_view name, double value) {
-  row_of(name).set(operators_, value);
+  safety_parameter(name).set(operators_, value);
 }
 
 }  // namespace palpate

@@ -22,29 +22,47 @@ struct Scenario {
   std::function<std::optional<double>(std::uint64_t frame)> delay = nullptr;
 };
 
+/// The frames of a scenario as they arrive: each at the first tick at or after that, in order.
+class Arrivals {
+ public:
+  /// @param scenario  must outlive this
+  explicit Arrivals(const Scenario& scenario) : scenario_(scenario) {}
+
+  /// Hands over the frames that have arrived by `t` [s] since the last call.
+  /// @param on_frame  (const std::shared_ptr<const Cloud>&, double stamp)
+  template <class OnFrame>
+  void until(double t, const OnFrame& on_frame) {
+    for (;;) {
+      const double stamp = static_cast<double>(next_frame_) / scenario_.frame_rate;
+      const std::optional<double> delay = scenario_.delay ? scenario_.delay(next_frame_) : 0.0;
+      if (stamp + delay.value_or(0.0) > t + 1e-9) return;
+      if (delay) {
+        std::shared_ptr<const Cloud> cloud = scenario_.cloud(next_frame_, stamp);
+        on_frame(cloud, stamp);
+        in_use_ = std::move(cloud);  // only now may the frame before go
+      }
+      ++next_frame_;
+    }
+  }
+
+ private:
+  const Scenario& scenario_;
+  std::uint64_t next_frame_ = 0;
+  std::shared_ptr<const Cloud> in_use_;
+};
+
 /// Plays a scenario to a method: every frame at the first tick at or after it arrives, in order.
 /// @param on_tick  (const Tick&) -> bool, after each tick: go on?
 template <class OnTick>
 void play(Method& method, const Scenario& scenario, const OnTick& on_tick) {
-  std::shared_ptr<const Cloud> in_use;
-  std::uint64_t next_frame = 0;
+  Arrivals arrivals(scenario);
   const auto ticks =
       static_cast<std::int64_t>(std::llround(scenario.duration * scenario.tick_rate));
   for (std::int64_t i = 0; i <= ticks; ++i) {
     const double t = static_cast<double>(i) / scenario.tick_rate;
-    for (;;) {
-      const double stamp = static_cast<double>(next_frame) / scenario.frame_rate;
-      const std::optional<double> delay = scenario.delay ? scenario.delay(next_frame) : 0.0;
-      if (stamp + delay.value_or(0.0) > t + 1e-9) break;
-      if (!delay) {
-        ++next_frame;
-        continue;
-      }
-      std::shared_ptr<const Cloud> cloud = scenario.cloud(next_frame, stamp);
+    arrivals.until(t, [&method](const std::shared_ptr<const Cloud>& cloud, double stamp) {
       method.frame(*cloud, stamp);
-      in_use = std::move(cloud);  // only now may the frame before go
-      ++next_frame;
-    }
+    });
     if (!on_tick(method.tick(scenario.hip(t), t))) return;
   }
 }

@@ -245,8 +245,8 @@ fs::path write_report(const std::vector<Result>& results, const fs::path& folder
   if (!bench.empty())
     write(
         folder / "bench.md",
-        "# The bench, as run\n\nMade by `palpate eval`; not written by hand. [pop.md](pop.md) says "
-        "what each is, and the rules.\n\n" +
+        "# The bench, as run\n\nMade by `palpate eval`; not written by hand. [pop.md](pop.md) and "
+        "[feel.md](feel.md) say what each is, and the rules.\n\n" +
             bench);
   return folder / "report.html";
 }

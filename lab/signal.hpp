@@ -12,4 +12,7 @@ double rms(const std::vector<double>& values);
 /// sensitive to. Over whole seconds; a remainder is left out.
 double felt_rms(const std::vector<double>& signal);
 
+/// The same over all samples, however many.
+double felt_rms_of_all(const std::vector<double>& signal);
+
 }  // namespace palpate::lab

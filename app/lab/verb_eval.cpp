@@ -166,8 +166,10 @@ Verb add_eval(CLI::App& program) {
       ->allow_extra_args(false);
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
   command->add_option("--cases", options->cases,
-                      "pop: how many of each family (50); tradeoff: repeats");
-  command->add_option("--families", options->families, "pop, fidelity: which, separated by commas")
+                      "pop: how many of each family (50); tradeoff: repeats; feel: free hands");
+  command
+      ->add_option("--families", options->families,
+                   "pop, fidelity, feel: which, separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("--fix", options->fixed, "pop: KEY=VALUE instead of a value drawn by chance")

@@ -5,11 +5,8 @@
 
 namespace palpate::lab {
 
-/// A resting plane under fresh noise in every frame: is it lost, and what does the hand feel?
-Experiment hold_experiment();
-/// What the hand feels while the surface moves: 1 Hz, 20 mm.
-Experiment force_experiment();
-/// Section 4.6: what damping does to a hand that goes to and fro in a resting plane.
-Experiment damping_experiment();
+/// What a hand feels with a method, in the open loop, with a device and a hand in the loop, and
+/// through the safety chain, beside the aims. docs/feel.md says what is measured, and how.
+Experiment feel_experiment();
 
 }  // namespace palpate::lab

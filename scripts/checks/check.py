@@ -26,7 +26,7 @@ KNOWS = {
     "session": {"core", "methods", "cloud", "servo", "sources", "devices", "bag", "record"},
     "viewer": {"core", "methods", "cloud", "servo", "sources", "devices", "record", "session"},
     "search": {"core"},
-    "lab": {"core", "paper", "methods", "cloud", "sources", "search"},
+    "lab": {"core", "paper", "methods", "cloud", "servo", "sources", "devices", "search"},
     "bench": {"core", "paper", "methods", "cloud", "search"},
 }
 KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench"}

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lab/experiment.hpp"
+#include "lab/method.hpp"
+
+namespace palpate::lab {
+
+/// A method that takes part, and how to make it for a scene.
+struct Contestant {
+  std::string name;
+  std::function<std::unique_ptr<Method>(const MethodSetup&)> make;
+};
+
+/// One measured number. docs/feel.md says what each is.
+struct FeelFigure {
+  std::string method;
+  std::string_view loop;  ///< who touches, and by which way: `path`, `light`, `firm`, `chain`, ...
+  std::string measure;
+  double value = 0.0;
+  std::string case_text = "-";  ///< a case to play, where the figure is a count of cases
+};
+using FeelFigures = std::vector<FeelFigure>;
+
+/// How a scene is played.
+struct FeelOptions {
+  Parameters parameters;
+  std::uint64_t seed = 1;
+  int repeats = 4;  ///< with other noise
+  int phases = 8;   ///< of the frames, in which a motion begins
+};
+
+/// Along a resting plane at 0.1 m/s before a D4xx. @param distance  [m] from the camera
+FeelFigures play_slide(const std::vector<Contestant>& contestants, const FeelOptions& options,
+                       double distance);
+/// A plane begins to come at 0.05 m/s before an exact camera.
+FeelFigures play_onset(const std::vector<Contestant>& contestants, const FeelOptions& options);
+/// The force comes back after a surface was not seen.
+enum class Unseen { covered, stopped, dropped };
+FeelFigures play_return(const std::vector<Contestant>& contestants, const FeelOptions& options,
+                        Unseen why);
+/// A resting plane before a D4xx with k_d = 2 N s/m. @param distance  [m] from the camera
+FeelFigures play_rest(const std::vector<Contestant>& contestants, const FeelOptions& options,
+                      double distance);
+/// A resting plane before a D4xx of one frame rate, at several latencies. @param rate  [Hz]
+FeelFigures play_rate(const std::vector<Contestant>& contestants, const FeelOptions& options,
+                      double rate);
+/// A handle on a resting plane before an exact camera, held loosely: does it swing?
+FeelFigures play_swing(const std::vector<Contestant>& contestants, const FeelOptions& options);
+
+/// Hands that press, slide and are lifted, cases of the family `lift-off` of the bench `pop`: those
+/// numbered from `from` on. Those of one block of `hands_a_camera` see the same camera and body.
+FeelFigures play_free_hands(const std::vector<Contestant>& contestants, const FeelOptions& options,
+                            int from, int count);
+constexpr int hands_a_camera = 10;
+
+}  // namespace palpate::lab

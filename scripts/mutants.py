@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Do the tests of the servo room notice a fault? Puts in each mutant of tests/servo/mutants.txt.
 
-scripts/mutants.py BUILD [NUMBER...]
-  BUILD    a build folder with an up-to-date test_servo, such as build/test/gcc
-  NUMBER   mutants to try; all without
+scripts/mutants.py BUILD [NUMBER | FIRST-LAST]...
+  BUILD        a build folder with an up-to-date test_servo, such as build/test/gcc
+  NUMBER       mutants to try, such as 12 33 274-293; all without
 
 All mutants are compiled into a copy of the sources at once, each behind a switch that an
 environment variable sets, so a mutant costs a run of the tests and no build. The likeliest tests to
@@ -119,7 +119,7 @@ def build(batch, build_folder, folder):
         copy = folder / pathlib.Path(file).name
         copy.write_text(source)
         objects.append(copy.with_suffix(".o"))
-        subprocess.run(["c++", "-std=c++20", "-O1", "-w", f"-I{ROOT}", "-isystem",
+        subprocess.run(["c++", "-std=c++20", "-O2", "-w", f"-I{ROOT}", "-isystem",
                         "/usr/include/eigen3", "-include", folder / "switch.hpp", "-c", copy, "-o",
                         objects[-1]], check=True)
     command = subprocess.run(["ninja", "-C", build_folder, "-t", "commands", "-s",
@@ -172,12 +172,24 @@ def noticed(program, number, file, limits):
     return None
 
 
+def numbers_of(arguments, most):
+    """{number} of what "12" and "274-293" name."""
+    chosen = set()
+    for argument in arguments:
+        match = re.fullmatch(r"(\d+)(?:-(\d+))?", argument)
+        first, last = (int(n) for n in (match[1], match[2] or match[1])) if match else (0, 0)
+        if not 1 <= first <= last <= most:
+            sys.exit(f"mutants: {argument}: no such mutants; there are 1-{most}")
+        chosen.update(range(first, last + 1))
+    return chosen
+
+
 def main():
     if len(sys.argv) < 2:
         sys.exit(__doc__)
     build_folder = pathlib.Path(sys.argv[1]).resolve()
-    chosen = {int(n) for n in sys.argv[2:]}
     mutants = read_list()
+    chosen = numbers_of(sys.argv[2:], len(mutants))
     survivors, killed, began = [], 0, time.time()
     with tempfile.TemporaryDirectory() as scratch:
         for i, batch in enumerate(groups(mutants)):

@@ -406,8 +406,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
       flags |= stalled;
       most = 0.0;
     }
-    gain_ =
-        most < gain_ || !has(ramping) ? most : std::min(most, gain_ + dt / parameters_.ramp_time);
+    gain_ = has(ramping) ? std::min(most, gain_ + dt / parameters_.ramp_time) : most;
     if (gain_ < most) flags |= ramping;
     force *= gain_;
   } else {

@@ -402,6 +402,51 @@ TEST(Cycle, SeatsTheProxyOnTheFreeSideAfterAStall) {
   EXPECT_LT(session.run().force.norm(), 0.01) << "and the force ramps up";
 }
 
+// A surface that swings by 4 mm at 14 Hz and carries a hand, with a force that lags.
+struct SwingingSurface final : Method {
+  explicit SwingingSurface(double known) : known_velocity(known) {}
+  void seat(const Vec3&) noexcept override {}
+  void frame(const Cloud&, double) noexcept override {}
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    const double phase = omega * t;
+    Tick tick = free_tick(hip, t, -1);
+    tick.proxy = hip + Vec3(0, 0, 0.01);
+    tick.normal = Vec3::UnitZ();
+    tick.surface_velocity = known_velocity * amplitude * omega * std::cos(phase);
+    if (presses) tick.force.z() = std::max(-2.4 * std::sin(phase - 2e-3 * omega), 0.0);
+    return tick;
+  }
+  void set_parameters(const Parameters&) override {}
+  static constexpr double amplitude = 4e-3;                       // [m]
+  static constexpr double omega = 2.0 * std::numbers::pi * 14.0;  // [1/s]
+  double known_velocity;                                          // [-] share that the method knows
+  bool presses = false;
+};
+
+TEST(Cycle, TellsTheSafetyChainHowTheSurfaceMoves) {
+  // What moves with its surface is no oscillation; without that knowledge it looks like one.
+  const auto is_cut = [](double known) {
+    FakeDevice device;
+    const auto surface = std::make_shared<SwingingSurface>(known);
+    Cycle cycle(surface, device);
+    auto reader = cycle.reader();
+    std::uint32_t flags = 0;
+    for (int i = 0; i < 4000; ++i) {
+      const double t = i * ms;
+      surface->presses = i > 2000;
+      device.hand.position.z() = SwingingSurface::amplitude * std::sin(SwingingSurface::omega * t);
+      if (i % 30 == 0) cycle.put_frame(plane_at(0.0), t, t);
+      cycle.run({.t = t});
+      ServoTick record{};
+      EXPECT_TRUE(reader.try_pop(record));
+      flags |= record.safety;
+    }
+    return (flags & energy_cut) != 0;
+  };
+  EXPECT_FALSE(is_cut(1.0));
+  EXPECT_TRUE(is_cut(0.0));
+}
+
 TEST(FreeSide, IsBeyondAllThatIsSeenAlongTheSightline) {
   Patch patch;
   std::vector<Vec3> points = flat_grid(0.01, 1.5e-3, 20);
@@ -414,6 +459,9 @@ TEST(FreeSide, IsBeyondAllThatIsSeenAlongTheSightline) {
   EXPECT_EQ(free_side(from_nowhere, {0, 0, 0}, Vec3::Zero(), 5e-3, patch), Vec3::Zero());
   EXPECT_EQ(free_side(seen_from_above, {0, 0, 0.03}, Vec3::Zero(), 5e-3, patch), Vec3(0, 0, 0.03))
       << "a proxy that is free stays";
+  const BruteForceCloud seen_from_below_it(points, Vec3(0, 0, 0.012));
+  EXPECT_NEAR(free_side(seen_from_below_it, {0, 0, 0}, Vec3::Zero(), 5e-3, patch).z(), 0.012, 1e-9)
+      << "and no farther than the camera";
 }
 
 TEST(Cycle, AdoptsSettingsInTheNextCycleAndRefusesBadOnesAtTheDoor) {

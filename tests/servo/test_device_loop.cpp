@@ -148,10 +148,10 @@ struct Hang {
   void end() { asked = false; }
 };
 
-// A method that takes as long as the test likes.
+// A method that takes as long as the test likes, and asks for a force once a hand is engaged.
 class HangingMethod final : public Method {
  public:
-  explicit HangingMethod(Hang& hang) : hang_(hang) {}
+  explicit HangingMethod(Hang& hang, double newtons = 0.0) : hang_(hang), newtons_(newtons) {}
   void seat(const Vec3& /*proxy*/) noexcept override {}
   void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override {}
   Tick tick(const Vec3& hip, double t) noexcept override {
@@ -159,12 +159,19 @@ class HangingMethod final : public Method {
       hang_.is_on = true;
       std::this_thread::yield();
     }
-    return free_tick(hip, t, -1);
+    Tick tick = free_tick(hip, t, -1);
+    if (++ticks_ <= 50 || newtons_ == 0.0) return tick;
+    tick.proxy = hip + Vec3(0, 0, 0.01);
+    tick.normal = Vec3::UnitZ();
+    tick.force.z() = newtons_;
+    return tick;
   }
   void set_parameters(const Parameters& /*parameters*/) override {}
 
  private:
   Hang& hang_;
+  double newtons_;  // [N]
+  int ticks_ = 0;
 };
 
 TEST(ServoLoop, DisablesThePolledDeviceOfAMethodThatHangs) {
@@ -182,6 +189,34 @@ TEST(ServoLoop, DisablesThePolledDeviceOfAMethodThatHangs) {
   hang.end();
   stopper.join();
   EXPECT_TRUE(device.force.isZero());
+}
+
+TEST(ServoLoop, DisablesADeviceWithAForceLongBeforeTheWatchTime) {
+  Hang hang;
+  FakeDevice device;
+  ServoSettings settings;
+  settings.safety.fade_age = 5.0;
+  settings.safety.lost_age = 10.0;
+  settings.safety.late_intervals = 100.0;
+  settings.safety.stall_time = 0.1;
+  ServoLoop loop(std::make_unique<HangingMethod>(hang, 1.0), device, settings, {.watch_time = 1.0});
+  loop.start();
+  bool in_time = false;
+  for (int attempt = 0; attempt < 20 && !in_time; ++attempt) {  // on a machine with other work
+    const auto cloud = std::make_shared<PointCloud>(test::flat_grid(0.0, 2e-3, 10));
+    loop.put_frame(cloud, monotonic_now());
+    wait_until([&] { return loop.statistics().force_out.load(); });
+    const int before = device.disables;
+    const double began = monotonic_now();
+    hang.begin();
+    wait_until([&] { return device.disables > before || monotonic_now() > began + 0.5; });
+    in_time = device.disables > before && monotonic_now() < began + 0.9;
+    const std::uint64_t ticks = loop.statistics().ticks;
+    hang.end();
+    wait_until([&] { return loop.statistics().ticks > ticks; });
+    hang.is_on = false;
+  }
+  EXPECT_TRUE(in_time);
 }
 
 TEST(ServoLoop, StopsAlthoughAMethodHangsAndEndsItsThreadWhenThatReturns) {
@@ -257,9 +292,13 @@ struct SlowlyEnabledDevice final : Device {
     enabled = true;
     if (is_hanging) has_returned = true;
   }
-  void disable() noexcept override { enabled = false; }
+  void disable() noexcept override {
+    enabled = false;
+    ++disables;
+  }
 
   std::atomic<bool> enable_hangs{false}, enabled{false}, is_hanging{false}, has_returned{false};
+  std::atomic<int> disables{0};
 
  private:
   DeviceInfo info_{.uri = "slow:", .kind = "slow", .limits = {}};
@@ -277,7 +316,9 @@ TEST(ServoLoop, StopsAlthoughTheDeviceHangsWhileItIsEnabledAndLeavesItDisabled) 
     wait_until([&] { return !device.enabled; });
     hang.end();
     wait_until([&] { return device.is_hanging.load(); });
+    const int disables = device.disables;
     EXPECT_FALSE(loop.stop());
+    EXPECT_GT(device.disables, disables) << "although the thread that watches can't";
     device.enable_hangs = false;
     wait_until([&] { return device.has_returned && !device.enabled; });
   }

@@ -145,13 +145,15 @@ TEST(EnergyLink, LeavesAHandAllTheForceThatIsAllowed) {
 
 TEST(EnergyLink, ForgetsCyclesBeforeAGapOrAFault) {
   const auto found_after = [](auto disturb) {
-    Shaken session;
+    // With a ramp so short that the force is there again in the same cycle.
+    Shaken session({.initial_heat = 0.0, .ramp_time = 0.01});
     EXPECT_FALSE(session.shake(5).flags & energy_cut);
     disturb(session);
     return (session.shake(4).flags & energy_cut) != 0;
   };
   EXPECT_TRUE(found_after([](Shaken&) {}));
   EXPECT_FALSE(found_after([](Shaken& session) { session.input.t += 0.1; }));
+  EXPECT_FALSE(found_after([](Shaken& session) { session.input.t += 0.0055; })) << "a stall";
   EXPECT_FALSE(found_after([](Shaken& session) {
     session.input.surface_velocity = std::nan("");
     EXPECT_TRUE(session.run(0.0, 0.0).flags & input_refused);
@@ -162,7 +164,8 @@ TEST(EnergyLink, ForgetsCyclesBeforeAGapOrAFault) {
 // A hand that is led along a prescribed path on a spring that answers late by `lag` ticks; the
 // monitor alone. @return the cycle in which it found an oscillation, or 0.
 int found_in_cycle(double hertz, int lag, double amplitude, double decay, double drift,
-                   double surface_amplitude = 0.0, double rate = 1000.0) {
+                   double surface_amplitude = 0.0, double rate = 1000.0, double depth = 0.0,
+                   double ripple = 0.0) {
   EnergyMonitor monitor;
   std::vector<double> forces(static_cast<std::size_t>(lag), 0.0);
   const double dt = 1.0 / rate;
@@ -170,7 +173,8 @@ int found_in_cycle(double hertz, int lag, double amplitude, double decay, double
     const double t = i * dt;
     const double phase = 2.0 * std::numbers::pi * hertz * t;
     const double surface = surface_amplitude * std::sin(2.0 * std::numbers::pi * t);
-    const double z = amplitude * std::exp(-decay * t) * std::sin(phase);
+    const double z =
+        amplitude * std::exp(-decay * t) * std::sin(phase) - depth + ripple * std::sin(9.0 * phase);
     forces.push_back(std::max(-600.0 * z, 0.0));
     const double force = forces[forces.size() - 1 - static_cast<std::size_t>(lag)];
     const double velocity =
@@ -199,6 +203,14 @@ TEST(EnergyMonitor, FindsASlowOneThatGeneratesMuch) {
 
 TEST(EnergyMonitor, FindsItOnAMovingSurface) {
   EXPECT_GT(found_in_cycle(14.0, 1, 4e-3, 0.0, 0.0, 10e-3), 0);
+}
+
+TEST(EnergyMonitor, FindsItWhereTheSurfaceIsNeverLeft) {
+  EXPECT_GT(found_in_cycle(14.0, 2, 2e-3, 0.0, 0.0, 0.0, 1000.0, 8e-3), 0);
+}
+
+TEST(EnergyMonitor, FindsItInAHandThatMovesUnevenly) {
+  EXPECT_GT(found_in_cycle(9.0, 2, 2e-3, 0.0, 0.0, 0.0, 1000.0, 0.0, 0.4e-3), 0);
 }
 
 TEST(EnergyMonitor, FindsItAtEveryRate) {

@@ -65,6 +65,17 @@ TEST(Freshness, KnowsACamerasIntervalDespiteSkippedFramesAndBursts) {
   }
 }
 
+TEST(Freshness, LearnsNoIntervalFromAStampThatJumpedBack) {
+  Freshness freshness;
+  double t = feed(freshness, 0.01, 20);
+  for (int i = 0; i < 20; ++i) {
+    adopt(freshness, t - 0.9, t + 0.005);
+    t += 0.01;
+    adopt(freshness, t, t);
+  }
+  EXPECT_NEAR(freshness.at(t + 0.02).intervals, 2.0, 1e-9);
+}
+
 TEST(Freshness, IsThatOfTheWorstOfTwoCamerasWhicheverThatIs) {
   for (const std::size_t dead : {0U, 1U}) {
     Freshness freshness;

@@ -118,6 +118,24 @@ TEST(SafetyChain, TakesTheForceOffWhenTimeRunsBackwards) {
   EXPECT_NEAR(session.engage().run_for(0.1, 0.8).force.norm(), 0.8, 1e-9) << "on the new time";
 }
 
+TEST(SafetyChain, TakesTwoTicksAtTheSameTimeForNoFault) {
+  Session session = engaged_without(0);
+  session.run_for(0.1, 0.8);
+  const SafetyOutput again = session.run(0.8, 0.0);
+  EXPECT_EQ(again.flags, 0U);
+  EXPECT_NEAR(again.force.z(), 0.8, 1e-12);
+}
+
+TEST(SafetyChain, GoesOnAfterATimeThatWasNone) {
+  Session session = engaged_without(0);
+  const double t = session.input.t;
+  session.input.t = nan;
+  EXPECT_TRUE(session.chain.run(session.input).flags & input_refused);
+  session.input.t = t;
+  EXPECT_FALSE(session.run(0.0).flags & input_refused) << "later than the last time that was one";
+  EXPECT_NEAR(session.engage().run_for(0.1, 0.8).force.norm(), 0.8, 1e-9);
+}
+
 TEST(SafetyChain, OnlyPushesAndLeavesWhatIsAlongTheSurface) {
   const auto pulled = [](std::uint32_t links) {
     Session session = engaged_without(links);
@@ -188,6 +206,7 @@ TEST(SafetyChain, RefusesANormalThatContradictsTheDirectionToTheProxy) {
   EXPECT_FALSE(flipped(direction_refused, -0.5, 0.015).flags & direction_refused);
   EXPECT_FALSE(flipped(0, -0.04, 0.015).flags & direction_refused) << "a force of no weight";
   EXPECT_FALSE(flipped(0, -0.5, 0.0009).flags & direction_refused) << "a proxy beside the HIP";
+  EXPECT_TRUE(flipped(0, -0.5, 0.0011).flags & direction_refused) << "20 counts of an encoder";
 
   Session session = engaged_without(0);
   session.run_for(0.1, 0.8);
@@ -246,6 +265,11 @@ TEST(SafetyChain, LatchesRepeatedFaultsUntilAnOperatorResetsIt) {
   EXPECT_NEAR(session.run_for(2.0, 1.0).force.norm(), 1.0, 1e-9);
   stumble(session, 2, 0.5);
   EXPECT_EQ(session.chain.latched_by(), 0U) << "faults before the reset are forgotten";
+  stumble(session, 1, 0.1);
+  EXPECT_NE(session.chain.latched_by(), 0U);
+  session.chain.reset();
+  stumble(session, 2, 0.1);
+  EXPECT_EQ(session.chain.latched_by(), 0U) << "also where they are not 2 s old";
 }
 
 TEST(SafetyChain, LatchesForEveryKindOfFaultAndNotForRareOrLongOnes) {
@@ -326,6 +350,13 @@ TEST(SafetyChain, TakesTheMotorsForWarmAtTheStartUnlessToldOtherwise) {
   quick.initial_heat = 0.0;
   EXPECT_NEAR(pressed_after(0.02, quick), 3.3, 1e-9);
 
+  // Half-way from where it begins to come down (80 % of what the motors bear) to the continuous
+  // force, half of the heating power between the two is allowed: the square of the force.
+  quick.initial_heat = 0.9;
+  const double half_warm = pressed_after(0.02, quick);
+  EXPECT_NEAR(half_warm * half_warm, 0.5 * (3.3 * 3.3 + 0.88 * 0.88), 0.3);
+  quick.initial_heat = 0.0;
+
   // A session that goes on from the heat of the one before allows what that would have allowed.
   Session before(all, {}, quick);
   before.engage().run_for(1.2, 3.3);
@@ -373,6 +404,10 @@ TEST(SafetyChain, RisesNoFasterThanItsSlewLimitAndFallsFaster) {
   EXPECT_NEAR(limited[10], 1.0, 1e-9) << "2 N/ms towards zero";
   EXPECT_EQ(limited[11], 0.0);
   EXPECT_NEAR(steps(slew_cut)[0], 3.0, 1e-9);
+
+  Session quick = engaged_without(0, never_hot);
+  quick.run_for(0.1, 3.0);
+  EXPECT_NEAR(quick.run(0.0, 0.5 * ms).force.z(), 2.0, 1e-9) << "1 N in half a millisecond";
 }
 
 TEST(SafetyChain, TurnsTheForceRoundThroughZeroAndNoFaster) {
@@ -521,6 +556,7 @@ TEST(SafetyChain, LetsTheForceOnlyFallOnceAFrameIsLate) {
     return session.run_for(0.01, 2.0).force.z();
   };
   EXPECT_NEAR(extrapolated(0), 0.9, 1e-9);
+  EXPECT_NEAR(extrapolated(force_cut), 0.9, 1e-9) << "whatever the limit";
   EXPECT_NEAR(extrapolated(frame_late), 2.0, 1e-9);
 }
 
@@ -609,18 +645,20 @@ TEST(SafetyChain, GivesNoForceBeforeTheFirstFrameOrForAnAgeThatIsNone) {
 }
 
 TEST(SafetyChain, TakesTheForceOffAHandThatIsTooFast) {
-  const auto moving_at = [](std::uint32_t links, double speed) {
+  const auto moving_at = [](std::uint32_t links, double speed, double dt = ms) {
     Session session = engaged_without(links, never_hot);
     session.run_for(0.1, 2.0);
     double least = inf;
     for (int i = 0; i < 100; ++i) {
-      session.input.position.x() += speed * ms;
-      least = std::min(least, session.run(2.0).force.z());
+      session.input.position.x() += speed * dt;
+      least = std::min(least, session.run(2.0, dt).force.z());
     }
     return least;
   };
   EXPECT_EQ(moving_at(0, 2.0), 0.0);
   EXPECT_NEAR(moving_at(0, 1.0), 2.0, 1e-9);
+  EXPECT_EQ(moving_at(0, 2.0, 0.25 * ms), 0.0) << "at 4 kHz";
+  EXPECT_NEAR(moving_at(0, 1.0, 4.0 * ms), 2.0, 1e-9) << "at 250 Hz";
   EXPECT_NEAR(moving_at(hand_too_fast, 2.0), 2.0, 1e-9);
 }
 

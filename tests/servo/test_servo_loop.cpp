@@ -48,6 +48,7 @@ TEST(PeriodicThread, RefusesARateOutOfRange) {
   EXPECT_THROW(PeriodicThread(1e6, {}, nothing), Error);
   FakeDevice device;
   EXPECT_THROW(ServoLoop(make_method("paper"), device, {}, {.rate = 100.0}), Error);
+  EXPECT_THROW(ServoLoop(make_method("paper"), device, {}, {.rate = 20'000.0}), Error);
 }
 
 TEST(PeriodicThread, SaysWhatTheSystemGrantedAndHowToGetTheRest) {

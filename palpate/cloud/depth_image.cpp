@@ -500,6 +500,17 @@ void DepthImage::gather_sides(const Ball& ball, const Sides& sides, std::size_t 
   }
 }
 
+double DepthImage::spacing(const Vec3& place) const noexcept {
+  const Intrinsics& camera = intrinsics();
+  const Vec3 p =
+      world_from_camera_.linear().transpose() * (place - world_from_camera_.translation());
+  const double u = camera.fx * p.x() / p.z() + camera.cx;
+  const double v = camera.fy * p.y() / p.z() + camera.cy;
+  const bool inside =
+      p.z() > 0.0 && u > -0.5 && v > -0.5 && u < camera.width - 0.5 && v < camera.height - 0.5;
+  return inside ? p.z() / std::min(camera.fx, camera.fy) : 0.0;
+}
+
 std::optional<Vec3> DepthImage::deproject(int u, int v) const noexcept {
   const Intrinsics& k = rays_->intrinsics();
   if (u < 0 || v < 0 || u >= k.width || v >= k.height) return std::nullopt;

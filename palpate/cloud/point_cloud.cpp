@@ -310,4 +310,13 @@ void CloudSet::gather_sides(const Ball& ball, const Sides& sides, std::size_t ma
     cloud->gather_sides(ball, sides, max_points / clouds_.size(), patch);
 }
 
+double CloudSet::spacing(const Vec3& place) const noexcept {
+  double least = 0.0;
+  for (const auto& cloud : clouds_) {
+    const double spacing = cloud->spacing(place);
+    if (spacing > 0.0 && (least == 0.0 || spacing < least)) least = spacing;
+  }
+  return least;
+}
+
 }  // namespace palpate

@@ -51,6 +51,12 @@ class Cloud {
   /// [servo] As `gather`.
   virtual void gather_sides(const Ball& /*ball*/, const Sides& /*sides*/,
                             std::size_t /*max_points*/, Patch& /*patch*/) const noexcept {}
+
+  /// [m] between neighbouring points of a surface at `place` that faces the viewpoint: what a pixel
+  /// spans there. 0 where that is not known.
+  ///
+  /// [servo] As `gather`.
+  [[nodiscard]] virtual double spacing(const Vec3& /*place*/) const noexcept { return 0.0; }
 };
 
 /// A beam as one viewpoint sees it.

@@ -17,7 +17,12 @@ constexpr std::size_t inner_points = 768;
 constexpr std::size_t outer_points = 1280;
 constexpr std::size_t inner_rungs = 2;
 constexpr std::size_t median_points = 192;
-constexpr double cell_size = 4.5e-3;  // [m]
+constexpr double narrowest_cell = 4.5e-3;  // [m]
+// A disc's radius in multiples of what lies between points: pi 3^2 = 28 points are enough for a
+// quadric and for an outlier test, and half of them still are at an edge.
+constexpr double least_radius = 3.0;
+// Discs of coarse images grow at least by this from rung to rung; fine ones' by 1.57 to 1.7.
+constexpr double least_growth = 1.25;
 // Residuals this small are no structure, whatever the noise [m].
 constexpr double structure_floor = 50e-6;
 // Noise may grow by this much at once, however little there was [m].
@@ -30,11 +35,6 @@ constexpr std::array upper_bounds = {6000.0, 400.0, 120.0, 50.0, 28.0};
 // Spread of a surface's curvature coefficients x^2, xy, y^2 that is expected [1/m]: radii down to
 // some 30 mm are common, and noise must not invent them.
 constexpr double curvature_sd = 15.0;
-
-// Discs of a rung are evidence about the same place if their centres are within this [m].
-double overlap(std::size_t rung) {
-  return std::max(3e-3, 0.5 * SurfaceEstimate::radii[rung]);
-}
 
 constexpr double squared(double x) {
   return x * x;
@@ -57,10 +57,6 @@ double variance_at_rest(std::span<const HeightSample> newest_first, std::size_t 
   }
   return std::max(squares - sum * sum / count, 0.0) / static_cast<double>(frames - 2);
 }
-
-// Full discs have this variance along each axis [cm^2].
-constexpr double full_disc =
-    0.25 * SurfaceEstimate::radii[0] * SurfaceEstimate::radii[0] / (Moments::unit * Moments::unit);
 
 // Normal equations of the shape over the newest 2, 4, 8, ... frames: matrix * shape = right_side,
 // in centimetres.
@@ -118,6 +114,20 @@ double SurfaceEstimate::variance(std::size_t rung) const noexcept {
   return std::max(std::min(usual, largest), measured);
 }
 
+void SurfaceEstimate::set_spacing(double spacing) noexcept {
+  double least = least_radius * spacing;
+  for (std::size_t j = 0; j < rungs; ++j, least *= least_growth) {
+    radii_[j] = std::max(narrowest_discs[j], least);
+  }
+  cell_size_ = narrowest_cell * coarseness();
+}
+
+bool SurfaceEstimate::misfits(double spacing) const noexcept {
+  constexpr double tolerated = 1.4;
+  const double ratio = std::max(narrowest_discs[0], least_radius * spacing) / radii_[0];
+  return spacing > 0.0 && (ratio > tolerated || ratio < 1.0 / tolerated);
+}
+
 double SurfaceEstimate::gate(double narrowest) const noexcept {
   // The beam is as wide as the narrowest disc, whose height is the noisiest.
   return std::clamp(std::max(4.0 * spread_, 6.0 * beam_sd()), narrowest, widest_gate);
@@ -166,7 +176,9 @@ bool SurfaceEstimate::start(const Cloud& cloud, const Vec3& foot, const Vec3& up
   stop();
   jumped_ = false;
   smooth_ = false;
-  return measure(cloud, Vec2::Zero(), Look{narrowest_gate + 4.0 * spread_}, true);
+  // Wide enough for the narrowest disc on a surface that leans by 60 degrees
+  const double gate = narrowest_gate * coarseness() + 4.0 * spread_;
+  return measure(cloud, Vec2::Zero(), Look{gate}, true);
 }
 
 SurfaceEstimate::Shape SurfaceEstimate::Shape::of(const Moments& disc) noexcept {
@@ -226,7 +238,7 @@ std::optional<SurfaceEstimate::Residuals> SurfaceEstimate::residuals(const Vec2&
 // Shifts the expected surface by the median residual near `foot`, and sets `cut` [m], the residual
 // beyond which a point is an outlier.
 bool SurfaceEstimate::recentre(const Vec2& foot, double wide, double& cut) noexcept {
-  const std::optional<Residuals> near = residuals(foot, radii[0], wide);
+  const std::optional<Residuals> near = residuals(foot, radii_[0], wide);
   if (!near) return false;
   surface_.c[0] += near->median;
   // Smoothed, since quantised depth makes single deviations jump between its steps.
@@ -240,8 +252,8 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
                               bool new_frame) noexcept {
   const double wide = look.gate;
   const Vec3 place = frame_.world_from_local(Vec3(foot.x(), foot.y(), surface_.height(foot)));
-  const double deep = wide + 2.0 * radii[1];
-  gather(cloud, Beam{place, radii[1] * 1.2, deep, frame_.up}, inner_points, patch_);
+  const double deep = wide + 2.0 * radii_[1];
+  gather(cloud, Beam{place, radii_[1] * 1.2, deep, frame_.up}, inner_points, patch_);
   points_.take(patch_, frame_);
   const Quadric before = surface_;
   double cut = 0.0;
@@ -254,7 +266,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
     }
     if (!first) break;
     Moments moments =
-        disc_moments(patch_, frame_, surface_, Disc{foot, 0.0, radii[1], std::max(cut, 2e-3)});
+        disc_moments(patch_, frame_, surface_, Disc{foot, 0.0, radii_[1], std::max(cut, 2e-3)});
     if (moments.xy[0] < 6.0) {
       surface_ = before;
       return false;
@@ -281,7 +293,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   now.lost = 0;
   const auto add_ring = [&](std::size_t j) {
     Moments moments = disc_moments(patch_, frame_, surface_,
-                                   Disc{foot, j == 0 ? 0.0 : radii[j - 1], radii[j], cut});
+                                   Disc{foot, j == 0 ? 0.0 : radii_[j - 1], radii_[j], cut});
     now.extent[j] = moments.xy[0] / patch_.share() + (j > 0 ? now.extent[j - 1] : 0.0);
     moments.raise(surface_);
     if (j > 0) moments.add(now.disc[j - 1]);
@@ -296,12 +308,12 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   const bool noisy =
       scatter_[1].samples >= 1.0 ? scatter_[1].variance > squared(20e-6) : spread_ > 0.1e-3;
   if (noisy) {
-    gather(cloud, Beam{place, radii[rungs - 1] * 1.1, wide + radii[rungs - 1], frame_.up},
+    gather(cloud, Beam{place, radii_[rungs - 1] * 1.1, wide + radii_[rungs - 1], frame_.up},
            outer_points, patch_);
     points_.take(patch_, frame_);
     // Noise that is common to the inner disc is not common to the wide ones: their outliers are
     // judged by their own median and deviation.
-    if (const std::optional<Residuals> far = residuals(foot, radii[rungs - 1], wide)) {
+    if (const std::optional<Residuals> far = residuals(foot, radii_[rungs - 1], wide)) {
       surface_.c[0] += far->median;
       cut = std::clamp(6.0 * far->deviation, cut, wide);
     }
@@ -317,7 +329,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   estimate(foot, new_frame);
   if (!look.partial) judge(foot);
   centre_ = foot;
-  if (foot.norm() > 4e-3) move_origin(foot);
+  if (foot.norm() > 4e-3 * coarseness()) move_origin(foot);
   return true;
 }
 
@@ -421,7 +433,8 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       // Noise falls at most with the area it is averaged over, so the difference from the next
       // narrower disc is a lower bound of a disc's noise.
       if (i + 1 == j && n >= 4) {
-        scatter_[j].least = (1.0 + 2.0 / count) * scattered / (squared(radii[j] / radii[i]) - 1.0);
+        scatter_[j].least =
+            (1.0 + 2.0 / count) * scattered / (squared(radii_[j] / radii_[i]) - 1.0);
       }
       // Hysteresis: the disc in use needs stronger evidence against it, since a change is felt.
       const double confidence = (j <= rung_ ? 4.5 : 3.5) + 4.0 / count;
@@ -465,14 +478,14 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
 void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept {
   if (new_frame) newest_cells_ = (newest_cells_ + 1) % cell_frames;
   Cells& now = cells_[newest_cells_];
-  const Vec2 corner = foot / cell_size - Vec2::Constant(0.5 * cells_per_side);
+  const Vec2 corner = foot / cell_size_ - Vec2::Constant(0.5 * cells_per_side);
   now.first = corner.array().round().cast<int>();
   now.heights.fill(0.0);
   now.means.fill(Vec6::Zero());
   const FloatQuadric surface(surface_);
   const auto first_u = static_cast<float>(now.first.x());
   const auto first_v = static_cast<float>(now.first.y());
-  constexpr auto per_cell = static_cast<float>(1.0 / cell_size);
+  const auto per_cell = static_cast<float>(1.0 / cell_size_);
   const auto gate = static_cast<float>(look.gate);
   for (std::size_t i = 0; i < points_.size; ++i) {
     const float x = points_.x[i];
@@ -529,12 +542,12 @@ double SurfaceEstimate::squared_structure(const Cells& frame,
 
 // Do the points span an area, so that they determine a slope? Those of a border seen from its side
 // lie in a line.
-bool SurfaceEstimate::spans_area(const Shape& inner) noexcept {
+bool SurfaceEstimate::spans_area(const Shape& inner) const noexcept {
   const double xx = inner.means[2] - squared(inner.means[0]);
   const double xy = inner.means[3] - inner.means[0] * inner.means[1];
   const double yy = inner.means[4] - squared(inner.means[1]);
   const double least = 0.5 * (xx + yy) - std::hypot(0.5 * (xx - yy), xy);
-  return least > 0.05 * full_disc;
+  return least > 0.05 * full_disc();
 }
 
 // Does the fit describe the surface, up to noise?
@@ -546,9 +559,9 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   const Vec2 spread = Vec2(inner.means[2], inner.means[4]) - Vec2(middle.cwiseAbs2());
   // Hysteresis, so that the way to rest does not change from frame to frame.
   const double slack = smooth_ ? 0.5 : 0.35;
-  const bool whole = (middle * Moments::unit - foot).norm() < 0.85 * slack * radii[0] &&
-                     spread.minCoeff() > (1.0 - slack) * full_disc &&
-                     spread.maxCoeff() < (1.0 + slack) * full_disc;
+  const bool whole = (middle * Moments::unit - foot).norm() < 0.85 * slack * radii_[0] &&
+                     spread.minCoeff() > (1.0 - slack) * full_disc() &&
+                     spread.maxCoeff() < (1.0 + slack) * full_disc();
   if (!whole) {
     smooth_ = false;
     return;
@@ -623,8 +636,8 @@ void SurfaceEstimate::learn_cell_noise(const Cells& newest,
 
 // Keeps the local origin near the contact: sums of fourth powers lose digits far from it.
 void SurfaceEstimate::move_origin(const Vec2& foot) noexcept {
-  const Eigen::Vector2i step = (foot / cell_size).array().round().cast<int>();
-  const Vec2 to = cell_size * step.cast<double>();
+  const Eigen::Vector2i step = (foot / cell_size_).array().round().cast<int>();
+  const Vec2 to = cell_size_ * step.cast<double>();
   const Vec3 shift(to.x(), to.y(), surface_.height(to));
   const Vec2 gradient = surface_.gradient(to);
   frame_.origin = frame_.world_from_local(shift);

@@ -58,6 +58,11 @@ class SurfaceEstimate {
   void forget_frames() noexcept { count_ = 0; }
   /// Distance of the sensor [m], from which its noise is assumed until that has been measured.
   void set_distance(double distance) noexcept { distance_ = distance; }
+  /// Makes discs wide enough for an image whose points lie `spacing` [m] apart (0: not known), so
+  /// that the narrowest holds some 28 of them. Before `start`.
+  void set_spacing(double spacing) noexcept;
+  /// Are the discs too narrow or too wide, by 1.4, for such an image?
+  [[nodiscard]] bool misfits(double spacing) const noexcept;
 
   [[nodiscard]] const LocalFrame& frame() const noexcept { return frame_; }
   [[nodiscard]] const Quadric& surface() const noexcept { return surface_; }
@@ -95,9 +100,15 @@ class SurfaceEstimate {
   /// least.
   [[nodiscard]] double gate(double narrowest = narrowest_gate) const noexcept;
 
+  /// [m] of the narrowest disc: nothing smaller is known of the surface.
+  [[nodiscard]] double resolution() const noexcept { return radii_[0]; }
+  /// [-] that, in multiples of what it is before a fine image.
+  [[nodiscard]] double coarseness() const noexcept { return radii_[0] / narrowest_discs[0]; }
+
   static constexpr std::size_t rungs = 6;
-  /// Of the discs that a fit may be averaged over [m].
-  static constexpr std::array<double, rungs> radii = {7e-3, 11e-3, 18e-3, 30e-3, 50e-3, 85e-3};
+  /// Of the discs that a fit may be averaged over [m], before a fine image.
+  static constexpr std::array<double, rungs> narrowest_discs = {7e-3,  11e-3, 18e-3,
+                                                                30e-3, 50e-3, 85e-3};
   static constexpr double narrowest_gate = 12e-3;  ///< [m]
   static constexpr double longest_gap = 0.25;      ///< [s] between frames that can tell a motion
   static constexpr std::size_t least_points = 8;
@@ -167,7 +178,15 @@ class SurfaceEstimate {
   void look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept;
   static double squared_structure(const Cells& frame,
                                   const std::array<double, cells>& residuals) noexcept;
-  static bool spans_area(const Shape& inner) noexcept;
+  [[nodiscard]] bool spans_area(const Shape& inner) const noexcept;
+  /// Variance of a full narrowest disc along each axis [cm^2].
+  [[nodiscard]] double full_disc() const noexcept {
+    return 0.25 * radii_[0] * radii_[0] / (Moments::unit * Moments::unit);
+  }
+  /// Discs of a rung are evidence about the same place if their centres are within this [m].
+  [[nodiscard]] double overlap(std::size_t rung) const noexcept {
+    return std::max(3e-3, 0.5 * radii_[rung]);
+  }
   void judge(const Vec2& foot) noexcept;
   void learn_cell_noise(const Cells& newest, const std::array<double, cells>& residuals,
                         const Cells& past, const std::array<double, cells>& older) noexcept;
@@ -200,6 +219,8 @@ class SurfaceEstimate {
   bool smooth_ = false;
   double above_mean_ = 0.0;  // [m] the newest frame's height over the average
   double distance_ = 0.0;    // [m] from the viewpoint
+  std::array<double, rungs> radii_ = narrowest_discs;  // [m] of the discs
+  double cell_size_ = 4.5e-3;                          // [m]
 
   // The sensor's noise is kept when a contact ends.
   std::array<Scatter, rungs> scatter_;

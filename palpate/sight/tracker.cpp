@@ -15,8 +15,13 @@ constexpr double occluder_reach = 1.2;
 constexpr double least_support = 0.3;
 constexpr double most_support = 0.7;      // beyond this share nothing else is checked
 constexpr double gate_after_hold = 5e-3;  // [m]
-// Layers along a line of sight are separated by a gap of at least this [m].
-constexpr double layer_gap = 20e-3;
+// Layers along a line of sight are separated by a gap of at least this [m], and by what a surface
+// that leans by 70 degrees falls from point to point: tan 70 degrees by a third of the resolution.
+constexpr double narrowest_layer_gap = 20e-3;
+constexpr double steepest = 0.92;  // [-]
+double layer_gap(const SurfaceEstimate& surface) {
+  return std::max(narrowest_layer_gap, steepest * surface.resolution());
+}
 constexpr std::size_t beam_points = 256;
 // Radius within which an occluder is looked for: that of the cells of SurfaceEstimate::judge [m].
 constexpr double shadow_radius = 15e-3;
@@ -107,7 +112,8 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   moved.c[0] += expected;
   const Vec3 place = axes.world_from_local(Vec3(foot.x(), foot.y(), moved.height(foot)));
 
-  gather(cloud, Beam{place, shadow_radius, occluder_reach, axes.up}, wide_beam_points, patch_);
+  gather(cloud, Beam{place, shadow_radius * surface_.coarseness(), occluder_reach, axes.up},
+         wide_beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   if (viewpoint) surface_.set_distance((*viewpoint - place).norm());
   const Vec3 line = viewpoint ? Vec3((*viewpoint - place).normalized()) : axes.up;
@@ -119,7 +125,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   // After a hold the gate is narrow: the surface is where it was, and what remains of an occluder
   // may be close to it.
   const double wide = holding_ ? surface_.gate(gate_after_hold) : surface_.gate();
-  const SightCone inner({place, SurfaceEstimate::radii[0], occluder_reach, axes.up}, viewpoint);
+  const SightCone inner({place, surface_.resolution(), occluder_reach, axes.up}, viewpoint);
   const Eigen::Vector3f axis = inner.axis().cast<float>();
   const auto radius = static_cast<float>(inner.radius_at(0.0));
   const auto widening = static_cast<float>(inner.radius_at(1.0) - inner.radius_at(0.0));
@@ -167,8 +173,9 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     there = std::abs(middle) <= 0.5F * gate;
   }
   if (!there) {
-    const std::optional<Layer> layer = first_layer(
-        std::span(heights.data(), seen), std::max(layer_gap, surface_.spread()), least_support);
+    const std::optional<Layer> layer =
+        first_layer(std::span(heights.data(), seen),
+                    std::max(layer_gap(surface_), surface_.spread()), least_support);
     if (from_behind && layer) {
       // A surface touched from behind has left the gate: the proxy goes on over the points.
       forget();
@@ -211,7 +218,8 @@ void SightTracker::watch(const Cloud& cloud, const Vec3& proxy) noexcept {
     if ((below - surface_.centre()).norm() < 5e-3) return;
   }
   tracking_ = false;
-  gather(cloud, Beam{proxy, SurfaceEstimate::radii[0], reach, surface_.frame().up}, beam_points,
+  surface_.set_spacing(cloud.spacing(proxy));
+  gather(cloud, Beam{proxy, surface_.resolution(), reach, surface_.frame().up}, beam_points,
          patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   if (!viewpoint) return;  // no line of sight to follow
@@ -220,9 +228,11 @@ void SightTracker::watch(const Cloud& cloud, const Vec3& proxy) noexcept {
   std::array<float, beam_points> heights;
   const std::size_t seen = heights_along(patch_, line, heights);
   const std::optional<Layer> layer =
-      first_layer(std::span(heights.data(), seen), layer_gap, least_support);
+      first_layer(std::span(heights.data(), seen), layer_gap(surface_), least_support);
   if (!layer || layer->height > 0.0) return;  // nothing, or the proxy is hidden behind it
-  start(cloud, proxy + layer->height * line, line);
+  const Vec3 place = proxy + layer->height * line;
+  surface_.set_spacing(cloud.spacing(place));
+  start(cloud, place, line);
 }
 
 void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& normal) noexcept {
@@ -240,10 +250,11 @@ void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& norma
   }
   // Where the camera sees the surface well behind this place, the contact from behind is with a
   // stray point.
-  const std::optional<Seen> seen = look_at(cloud, foot, SurfaceEstimate::radii[0]);
+  const std::optional<Seen> seen = look_at(cloud, foot, surface_.resolution());
   if (seen && seen->line.dot(normal) < 0.0 && seen->above < -SurfaceEstimate::narrowest_gate)
     return;
-  gather(cloud, Beam{foot, SurfaceEstimate::radii[0], SurfaceEstimate::narrowest_gate, normal},
+  surface_.set_spacing(cloud.spacing(foot));
+  gather(cloud, Beam{foot, surface_.resolution(), SurfaceEstimate::narrowest_gate, normal},
          beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   Vec3 up = normal;
@@ -257,6 +268,11 @@ void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& norma
 
 bool SightTracker::slide(const Cloud& cloud, const Vec3& foot) noexcept {
   if (!tracking_ || holding_) return false;
+  if (const double spacing = cloud.spacing(foot); surface_.misfits(spacing)) {
+    surface_.set_spacing(spacing);
+    start(cloud, foot, surface_.frame().up);
+    return tracking_;
+  }
   const Vec2 at = surface_.frame().local_from_world(foot).head<2>();
   return surface_.move_to(cloud, at, {surface_.gate(), false, shadowed_});
 }

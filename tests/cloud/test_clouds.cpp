@@ -399,6 +399,25 @@ TEST(CloudSet, GathersTheSidesThatEachOfItsCamerasSees) {
   EXPECT_EQ(patch.size(), 2 * alone);
 }
 
+TEST(CloudSet, KnowsHowFarPointsLieApart) {
+  const Intrinsics camera{.width = 8, .height = 6, .fx = 100, .fy = 100, .cx = 4, .cy = 3};
+  const auto rays = std::make_shared<ViewingRays>(camera);
+  const Eigen::Isometry3d back(Eigen::Translation3d(0, 0, -1));
+  const auto near = std::make_shared<DepthImage>(rays, std::vector<std::uint16_t>(48, 500), 1000.0);
+  const auto far =
+      std::make_shared<DepthImage>(rays, std::vector<std::uint16_t>(48, 1500), 1000.0, back);
+  const auto points = std::make_shared<PointCloud>(std::vector<Vec3>{Vec3(0, 0, 1)});
+  const Vec3 place(0, 0, 0.5);
+  EXPECT_NEAR(near->spacing(place), (*near->deproject(5, 3) - *near->deproject(4, 3)).norm(),
+              1e-12);
+  EXPECT_NEAR(far->spacing(place), 0.015, 1e-12);
+  EXPECT_EQ(near->spacing({0.1, 0, 0.5}), 0.0) << "outside the image";
+  EXPECT_EQ(near->spacing({0, 0, -0.5}), 0.0) << "behind the camera";
+  EXPECT_EQ(points->spacing(place), 0.0) << "not known";
+  EXPECT_NEAR(CloudSet({points, far, near}).spacing(place), 0.005, 1e-12);
+  EXPECT_NEAR(CloudSet({near, far}).spacing({0, 0, -0.5}), 0.005, 1e-12);
+}
+
 TEST(CloudSet, RefusesMoreCloudsThanAPatchTellsApart) {
   const auto cloud = std::make_shared<BruteForceCloud>(std::vector<Vec3>{});
   EXPECT_THROW(CloudSet({Patch::max_views + 1, cloud}), Error);

@@ -245,6 +245,42 @@ TEST(SightMonitor, FeelsARestingPlaneInFullHoweverSlowOrLateTheCamera) {
   }
 }
 
+// Pixels of up to 14 mm, where no disc of a fine image's width has a point, on planes up to 50
+// degrees from facing the camera.
+TEST(Sight, FeelsAndLetsGoOfAPlaneInFullHoweverCoarseTheImage) {
+  for (const char* size : {"424x240", "160x120", "80x60"}) {
+    for (const char* tilt : {"0deg", "25deg", "50deg"}) {
+      const auto camera = open_synthetic_camera(
+          Uri(std::string("synthetic:plane?distance=0.95m&size=") + size + "&tilt=" + tilt));
+      Sight sight;
+      const auto hip = [](double t) {
+        const double down = std::clamp((t - 0.2) / 0.5, 0.0, 1.0);
+        const double slide = std::clamp((t - 1.0) / 0.4, 0.0, 1.0);
+        const double up = std::clamp((t - 1.5) / 0.4, 0.0, 1.0);
+        return Vec3(0.003 + 0.03 * slide, 0.001, 0.05 - 0.06 * down + 0.06 * up);
+      };
+      sight.seat(hip(0.0));
+      Frame frame;
+      for (int i = 0, k = 0; i <= 2000; ++i) {
+        const double t = 1e-3 * i;
+        if (t >= k * interval - 1e-9) {
+          Frame next = *camera->next();
+          sight.frame(*next.cloud, next.stamp);
+          frame = std::move(next);
+          ++k;
+        }
+        const Tick tick = sight.tick(hip(t), t);
+        if (t > 0.8 && t < 1.5) {
+          ASSERT_NEAR(tick.force.norm(), 6.0, 0.1) << size << ' ' << tilt << ' ' << t;
+        }
+        if (t > 1.9) {
+          ASSERT_EQ(tick.force.norm(), 0.0) << size << ' ' << tilt << ' ' << t;
+        }
+      }
+    }
+  }
+}
+
 TEST(SightTracker, CountsTheTimeOfAHoldFromItsBeginning) {
   // After a frame without points, a line of points far below: it is no surface to go on from.
   const PointCloud plane = plane_at(0.0);

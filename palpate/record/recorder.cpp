@@ -59,6 +59,22 @@ void Recorder::stop() {
   progress_.wait(lock, [this] { return status_.done; });
 }
 
+bool Recorder::try_stop(double patience) {
+  using Clock = std::chrono::steady_clock;
+  const auto wait =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(patience));
+  request_stop();
+  std::unique_lock lock(mutex_);
+  progress_.wait(lock, [this] { return !collecting_; });
+  const Clock::time_point end = Clock::now() + 6 * wait;
+  const auto written = [this] { return entries_written_ + status_.ticks; };
+  for (std::uint64_t before = written();; before = written()) {
+    const bool moved = progress_.wait_until(lock, std::min(end, Clock::now() + wait),
+                                            [&] { return status_.done || written() != before; });
+    if (status_.done || !moved || Clock::now() >= end) return status_.done;
+  }
+}
+
 Recorder::Status Recorder::status() const {
   const std::lock_guard lock(mutex_);
   Status status = status_;
@@ -157,6 +173,7 @@ void Recorder::collect() {
   const std::lock_guard lock(mutex_);
   collecting_ = false;
   wake_writer_.notify_one();
+  progress_.notify_all();
 }
 
 // The first tick of a recording that begins in mid-session.
@@ -318,6 +335,7 @@ void Recorder::write_entries() {
     if (failed_) return;
     entries_.pop_front();
     status_.frames = writer_->frames();
+    progress_.notify_all();
     // A slow disk must not put off the commit.
     if (writer_->commit_is_due()) return;
   }
@@ -351,6 +369,7 @@ bool Recorder::write_ticks() {
   for (const ServoTick& tick : ticks) writer_->tick(tick);
   const std::lock_guard lock(mutex_);
   status_.ticks = writer_->ticks();
+  progress_.notify_all();
   return ticks.size() == most_at_once;
 }
 

@@ -21,7 +21,7 @@ namespace palpate {
 
 /// How a Recorder shares out its work. The defaults suit a disk of 50 MB/s.
 struct RecorderOptions {
-  double commit_interval = 1.0;  ///< [s] on the machine's clock: how much a crash can cost
+  double commit_interval = 0.5;  ///< [s] on the machine's clock: how much a crash can cost
   unsigned packers = 0;          ///< threads that compress images; 0: half of the cores, 1 to 4
   /// Frames waiting up to which images are compressed. With more they are stored as they are, which
   /// takes a tenth of the time and three times the space.
@@ -35,7 +35,7 @@ struct RecorderOptions {
 ///
 /// One thread empties the ring, some compress images, one writes. A tick is written after the frame
 /// and the settings that it used, so that whatever is committed can be replayed to its end; a
-/// commit is made every second, however much is waiting. Where the machine cannot keep up, images
+/// commit is made twice a second, however much is waiting. Where the machine cannot keep up, images
 /// are stored uncompressed, then frames are left out, then ticks are lost, and each is counted.
 class Recorder {
  public:
@@ -83,6 +83,11 @@ class Recorder {
   [[nodiscard]] bool done() const;
   /// request_stop(), and waits until done(). Not for a thread on which a hand depends.
   void stop();
+  /// The same, but gives up when the disk has taken nothing for `patience` [s], or not all within
+  /// six times that. The cycle's reader is not used any more then, and the bag is closed when the
+  /// disk goes on; only the destructor waits for that.
+  /// @return done()
+  bool try_stop(double patience);
   /// Any thread.
   [[nodiscard]] Status status() const;
 

@@ -162,7 +162,10 @@ class Session::Impl {
     }
     drain();
     const std::lock_guard lock(control_);
-    for (const auto& recorder : closing_) recorder->stop();
+    for (auto& recorder : closing_) {
+      if (!recorder->try_stop(options_.record_patience)) leave_behind(std::move(recorder));
+    }
+    std::erase(closing_, nullptr);
     report_closed();
   }
 
@@ -275,6 +278,18 @@ class Session::Impl {
     left->device = std::move(device_);
     left->loop = std::move(loop_);
     std::thread([left = std::move(left)]() mutable { left.reset(); }).detach();
+  }
+  // With control_ held: a recorder whose disk hangs. Its threads use nothing of the session.
+  void leave_behind(std::unique_ptr<Recorder> recorder) {
+    const Recorder::Status status = recorder->status();
+    const std::uint64_t ticks = status.ticks + status.ticks_waiting;
+    recording_.failed = true;
+    recording_.message = status.folder.string() +
+                         ": the disk hangs: " + std::to_string(ticks - status.committed_ticks) +
+                         " of " + std::to_string(ticks) + " ticks and " +
+                         std::to_string(status.frames_waiting) +
+                         " frames are not written; what was written before can be read";
+    std::thread([left = std::move(recorder)]() mutable { left.reset(); }).detach();
   }
   // [s] on the session's clock
   [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }

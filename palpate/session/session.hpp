@@ -52,7 +52,10 @@ struct SessionOptions {
   bool without_watchdog = false;
   double stroke_time = 20.0;  ///< [s] of the built-in path of `hand:` and `script:`
   std::string record = {};    ///< folder to record into from the start; empty: none
-  std::string version = {};   ///< of the program, for recordings
+  /// [s] that `stop` waits for the disk of a recording while that takes nothing; six times that in
+  /// all. What is not written then is said in RecordingState::message.
+  double record_patience = 10.0;
+  std::string version = {};  ///< of the program, for recordings
   MethodRegistry methods = standard_methods();
   Registry<SourceScheme> sources = standard_sources();
   Registry<DeviceScheme> devices = standard_devices();
@@ -104,10 +107,10 @@ class Session {
   /// Real time: starts loop and cameras, and returns. A session runs once.
   /// @throws Error if the device refuses, or the session has been stopped.
   void start();
-  /// Takes the force off the device before anything else, then ends everything. A camera, a method
-  /// or a driver that hangs is left behind: its thread ends when it returns, also after this has
-  /// been destroyed, and the device stays disabled. Any number of times; while one call is at work
-  /// another one disables the device at once.
+  /// Takes the force off the device before anything else, then ends everything. A camera, a method,
+  /// a driver or a disk that hangs is left behind: its thread ends when it returns, also after this
+  /// has been destroyed, and the device stays disabled. Any number of times; while one call is at
+  /// work another one disables the device at once.
   void stop() noexcept;
 
   /// Runs until `duration` [s] has passed (none: for ever) or `request_stop`, then stops.

@@ -22,6 +22,8 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/core/error.hpp"
+#include "palpate/devices/mouse_device.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/session/session.hpp"
 
@@ -484,6 +486,72 @@ INSTANTIATE_TEST_SUITE_P(
                                      Place::device, Place::method),
                      testing::ValuesIn(motions)),
     name_of_cell);
+
+/// A page leads the hand, 20 times a second. A page that falls silent and a server whose thread
+/// hangs are the same to the session: no word comes.
+class FaultyPage final : public Device {
+ public:
+  FaultyPage(Fault fault, std::shared_ptr<double> heard)
+      : fault_(fault), heard_(std::move(heard)) {}
+  [[nodiscard]] const DeviceInfo& info() const override { return mouse_.info(); }
+  void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
+  HandState read(double t) noexcept override {
+    if (t >= next_) speak(t);
+    return mouse_.read(t);
+  }
+
+ private:
+  void speak(double t) noexcept {
+    const double interval = Failure{}.is_on(t) && fault_ == Fault::slow ? 0.8 : 0.05;
+    next_ = t + interval;
+    const double pressed = t >= back_again || (t >= touch_down && t < lift_off) ? 0.055 : 0.0;
+    MouseTarget target{.position = {0.0, 0.0, wall_depth - 0.05 + pressed}, .present = true};
+    if (Failure{}.is_on(t)) {
+      if (fault_ == Fault::off) return;
+      if (fault_ == Fault::intermittent && std::fmod(t, 1.0) < 0.8) return;
+      if (fault_ == Fault::garbage) target.position.x() = is_odd(t) ? nan : 1e9;
+    }
+    try {
+      mouse_.aim(target);
+      *heard_ = t;
+    } catch (const Error&) {  // refused
+    }
+  }
+
+  Fault fault_;
+  std::shared_ptr<double> heard_;  // [s] when a word came that was understood
+  double next_ = 0.0;              // [s]
+  MouseDevice mouse_{{0.0, 0.0, wall_depth - 0.05}};
+};
+
+TEST(SessionFaults, TakeTheForceOfAPageAwayThatFallsSilent) {
+  constexpr double silence = 0.5;  // [s] as docs/devices.md has it
+  for (const Fault fault : {Fault::off, Fault::garbage, Fault::slow, Fault::intermittent}) {
+    SCOPED_TRACE(fault_names[index_of(fault)]);
+    const auto heard = std::make_shared<double>(0.0);
+    SessionOptions options;
+    options.cameras.push_back({.source = test::wall_source()});
+    options.device = std::make_unique<FaultyPage>(fault, heard);
+    options.settings.safety.initial_heat = 0.0;
+    options.pace = Pace::free_running;
+    const double fall_time = options.settings.safety.max_force / options.settings.safety.fall_rate;
+    Session session(std::move(options));
+    std::vector<double> sent;
+    std::uint32_t told = 0;
+    double late = 0.0;  // [N] largest force although nothing was heard for too long
+    session.run(session_ends, [&](const ServoTick& tick) {
+      const double silent = tick.tick.t - *heard;
+      sent.push_back(tick.force.norm());
+      if (Failure{}.is_on(tick.tick.t)) told |= tick.safety;
+      if (silent > silence + fall_time + 2e-3) late = std::max(late, sent.back());
+    });
+    EXPECT_EQ(late, 0.0);
+    EXPECT_TRUE(told & disengaged);
+    EXPECT_GT(sent.at(2990), 2.0) << "before the fault";
+    EXPECT_EQ(sent.at(4900), 0.0) << "the hand has to let go first";
+    EXPECT_GT(sent.back(), 2.0) << "all is well again";
+  }
+}
 
 /// The smallest scenario that still fails: with as few failures, and these as short, as possible.
 Scenario shrunk(Scenario scenario, const std::function<bool(const Scenario&)>& fails) {

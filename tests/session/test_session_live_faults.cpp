@@ -21,9 +21,11 @@
 #include <gtest/gtest.h>
 
 #include "palpate/core/error.hpp"
+#include "palpate/record/session_reader.hpp"
 #include "palpate/session/session.hpp"
 
 #include "tests/session/fakes.hpp"
+#include "tests/session/slow_disk.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
@@ -273,6 +275,38 @@ TEST(LiveSession, GoesOnAndSaysSoWhereTheDiskOfARecordingFails) {
   EXPECT_TRUE(comes_true([&] { return !force_is_out(); }));
   EXPECT_TRUE(comes_true(force_is_out));
   EXPECT_GT(session.statistics().ticks, ticks);
+}
+
+TEST(LiveSession, StopsAndSaysWhatIsNotWrittenWhereTheDiskOfARecordingHangs) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path bag = folder.path() / "bag";
+  test::SlowDisk disk;
+  disk.delay = std::chrono::milliseconds(2);  // 2 MB/s
+  SessionOptions options = options_with({std::make_shared<CameraLog>()});
+  options.record = bag.string();
+  options.record_patience = 0.3;
+  {
+    Session session(std::move(options));
+    const auto force_is_out = [&] { return session.statistics().force_out.load(); };
+    session.start();
+    for (int i = 0; i < 2; ++i) {
+      ASSERT_TRUE(comes_true(force_is_out)) << "on a slow disk and on one that hangs";
+      ASSERT_TRUE(comes_true([&] { return !force_is_out(); }));
+      EXPECT_FALSE(session.state().recording.failed);
+      disk.hangs = true;
+      ASSERT_TRUE(comes_true([&] { return disk.is_hanging.load(); }));
+    }
+    session.stop();
+    const RecordingState recording = session.state().recording;
+    EXPECT_TRUE(recording.failed);
+    EXPECT_FALSE(recording.on || recording.closing);
+    for (const std::string_view part : {bag.c_str(), "the disk hangs", "are not written"})
+      EXPECT_NE(recording.message.find(part), std::string::npos) << recording.message;
+  }
+  // When the disk goes on, all of it is written although the session is gone.
+  disk.hangs = false;
+  EXPECT_TRUE(comes_true([&] { return !std::filesystem::exists(bag / "bag_0.db3-wal"); }));
+  EXPECT_GT(SessionReader(bag).ticks(), 100U);
 }
 
 }  // namespace

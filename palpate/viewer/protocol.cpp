@@ -173,6 +173,7 @@ std::optional<Command> parse_command(std::string_view message) {
   if (verb == "method" && what.is_string()) return SetMethod{what.get<std::string>()};
   if (verb == "record" && what.is_boolean()) return SetRecording{what.get<bool>()};
   if (verb == "reset" && what == true) return ResetHand{};
+  if (verb == "reset_faults" && what == true) return ResetFaults{};
   return std::nullopt;
 }
 

@@ -109,8 +109,10 @@ struct SetRecording {
   bool on;
 };
 struct ResetHand {};
+/// Ends a latched fault of the safety chain; see Session::reset_faults.
+struct ResetFaults {};
 using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod,
-                             SetRecording, ResetHand>;
+                             SetRecording, ResetHand, ResetFaults>;
 
 /// The longest message a page may send [bytes].
 constexpr std::size_t max_page_message = 1024;

@@ -50,6 +50,8 @@ void check_allowed(const Command& command, Role role) {
     throw Error("recording", "only the operator starts and ends it", operator_remedy);
   if (std::holds_alternative<SetPlacement>(command))
     throw Error("placement", "only the operator changes it", operator_remedy);
+  if (std::holds_alternative<ResetFaults>(command))
+    throw Error("latched fault", "only the operator resets it", operator_remedy);
   if (role == Role::holding) return;
   const std::string remedy = "take the hand, or " + std::string(operator_remedy);
   if (std::holds_alternative<ResetHand>(command))

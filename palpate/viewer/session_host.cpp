@@ -107,6 +107,10 @@ std::string SessionHost::state() {
                        {"rate", status.rate},
                        {"state", status.text}});
   }
+  json latched_by = json::array();
+  for (std::size_t i = 0; i < safety_flag_count; ++i) {
+    if ((state.latched_by >> i & 1U) != 0) latched_by.push_back(safety_flag_names()[i]);
+  }
   const CycleStatistics& cycles = session_->statistics();
   json servo = {{"rate", state.rate},
                 {"ticks", cycles.ticks.load()},
@@ -136,6 +140,7 @@ std::string SessionHost::state() {
                 {"fault", state.device.text}}},
               {"servo", servo},
               {"interventions", state.interventions},
+              {"latched_by", latched_by},
               {"flag_ticks", state.summary.flag_ticks},
               {"pop_throughs", state.summary.pop_throughs},
               {"recording", recording}}
@@ -169,6 +174,9 @@ void SessionHost::command(const Command& command, Role role) {
     settings.method = method->name;
   } else if (const auto* record = std::get_if<SetRecording>(&command)) {
     record->on ? recordings_->start() : recordings_->stop();
+    return;
+  } else if (std::holds_alternative<ResetFaults>(command)) {
+    session_->reset_faults();
     return;
   } else {
     if (mouse_ != nullptr) mouse_->aim({.position = target_ = start_, .present = false});

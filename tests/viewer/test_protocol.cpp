@@ -142,6 +142,8 @@ TEST(Protocol, UnderstandsEachCommand) {
   EXPECT_FALSE(std::get<SetRecording>(*record).on);
   const auto reset = parse_command(R"({"reset": true})");
   ASSERT_TRUE(reset && std::holds_alternative<ResetHand>(*reset));
+  const auto faults = parse_command(R"({"reset_faults": true})");
+  ASSERT_TRUE(faults && std::holds_alternative<ResetFaults>(*faults));
 }
 
 TEST(Protocol, RefusesCommandsThatAreNotItsOwn) {
@@ -149,8 +151,9 @@ TEST(Protocol, RefusesCommandsThatAreNotItsOwn) {
        {"", "{}", "null", "[1]", "{", R"({"set": 1})", R"({"set": {"name": "x"}})",
         R"({"set": {"name": 1, "value": 1}})", R"({"set": {"name": "x", "value": "1"}})",
         R"({"set": {"name": "x", "value": 1, "more": 1}})", R"({"method": 1})",
-        R"({"record": "yes"})", R"({"reset": false})", R"({"quit": true})",
-        R"({"method": "paper", "reset": true})", "\xff\xfe", R"({"method": "\ud800"})"}) {
+        R"({"record": "yes"})", R"({"reset": false})", R"({"reset_faults": 1})",
+        R"({"quit": true})", R"({"method": "paper", "reset": true})", "\xff\xfe",
+        R"({"method": "\ud800"})"}) {
     EXPECT_FALSE(parse_command(text)) << text;
   }
   std::string deep(max_page_message, '[');

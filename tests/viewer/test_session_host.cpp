@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -95,6 +96,38 @@ TEST(SessionHost, SaysInWhichDirectionLimitsAreStricter) {
       EXPECT_EQ(row["stricter"], "");
     }
   }
+}
+
+// A device whose position is no number for a tick at 50, 100 and 150 ms.
+class StumblingDevice final : public Device {
+ public:
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  HandState read(double /*t*/) noexcept override {
+    ++reads_;
+    const bool stumbles = reads_ % 50 == 0 && reads_ <= 150;
+    return {.position = Vec3::Constant(stumbles ? std::nan("") : 0.1)};
+  }
+  void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
+
+ private:
+  int reads_ = 0;
+  DeviceInfo info_{.uri = "stumbling:", .kind = "stumbling", .limits = no_motors};
+};
+
+TEST(SessionHost, TellsALatchedFaultUntilTheOperatorResetsIt) {
+  SessionOptions options = wall_options("hand:");
+  options.device = std::make_unique<StumblingDevice>();
+  Session session(std::move(options));
+  SessionHost host("1.2.3");
+  host.attach(session);
+  std::vector<json> latched_by;
+  session.run(0.4, [&](const ServoTick& tick) {
+    if (tick.number % 120 == 119) latched_by.push_back(json::parse(host.state())["latched_by"]);
+    if (tick.number == 300) host.command(ResetFaults{}, Role::operating);
+  });
+  host.detach();
+  const json reason = {"input_refused"};
+  EXPECT_EQ(latched_by, (std::vector<json>{json::array(), reason, json::array()}));
 }
 
 TEST(SessionHost, TakesAHandOnlyForTheMouse) {

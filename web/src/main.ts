@@ -3,7 +3,7 @@ import "./style.css";
 import { Connection } from "./connection";
 import { HandInput, isForForm } from "./hand";
 import { length } from "./camera_math";
-import { mayOperate, Panel, roleNames } from "./panel";
+import { latchedText, mayOperate, Panel, roleNames } from "./panel";
 import { Plots } from "./plots";
 import { encodeHand, encodeShown, type Frame, type State, type Ticks } from "./protocol";
 import { SceneView, type Palette } from "./scene";
@@ -75,6 +75,10 @@ const connection = new Connection({
       : first
         ? `${first.uri} · ${first.rate.toFixed(0)} Hz`
         : "no camera";
+    const latched = latchedText(newest);
+    if (get("latched-text").textContent !== latched) get("latched-text").textContent = latched;
+    get("latched").hidden = !latched;
+    get("reset-faults").hidden = !mayOperate(newest);
     const record = get<HTMLButtonElement>("record");
     record.disabled = !newest.recording.possible || !mayOperate(newest);
     const { path, message } = newest.recording;
@@ -192,6 +196,7 @@ applyTheme(chosenTheme());
 
 get("follow").addEventListener("click", follow);
 get("record").addEventListener("click", record);
+get("reset-faults").addEventListener("click", () => connection.ask({ reset_faults: true }));
 get("reset").addEventListener("click", () => view.resetView());
 get("theme").addEventListener("click", switchTheme);
 get("ask").addEventListener("click", help);

@@ -45,6 +45,15 @@ export function whyNot(role: Role): { method: string; safety: string; session: s
   };
 }
 
+/** What is to be said while faults are latched; empty: none is. */
+export function latchedText({ role, latched_by }: Pick<State, "role" | "latched_by">): string {
+  if (latched_by.length === 0) return "";
+  const what = `No force, as faults came again and again (${latched_by.join(", ")}).`;
+  return role === "operating"
+    ? `${what} Find their cause, let go of the surface, then reset them.`
+    : `${what} Only the operator resets them: open ${OPERATORS_LINK}.`;
+}
+
 /** How a unit of the table is shown: small lengths in mm, angles in degrees. */
 export function shownUnit(row: Pick<ParameterRow, "unit" | "max">): {
   unit: string;

@@ -261,6 +261,8 @@ export interface State {
   };
   /** how often each safety flag was raised */
   interventions: number[];
+  /** names of the faults that latched: no force until the operator resets them; empty: none did */
+  latched_by: string[];
   /** how many ticks had each flag */
   flag_ticks: number[];
   pop_throughs: number;
@@ -280,4 +282,5 @@ export type Command =
   | { place: { name: string; value: number } }
   | { method: string }
   | { record: boolean }
-  | { reset: true };
+  | { reset: true }
+  | { reset_faults: true };

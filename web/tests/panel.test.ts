@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { expect, test } from "vitest";
 import {
+  latchedText,
   maySetLimit,
   shownUnit,
   shortNumber,
@@ -49,4 +50,14 @@ test("each role may set what the program lets it set, and is told why not the re
   expect(Object.values(whyNot("operating")).join("")).toBe("");
   for (const role of ["looking", "holding"] as const)
     for (const why of Object.values(whyNot(role))) expect(why).toContain("operator's link");
+});
+
+test("latched faults are named, and only the operator is asked to reset them", () => {
+  expect(latchedText({ role: "operating", latched_by: [] })).toBe("");
+  const latched_by = ["input_refused", "direction_refused"];
+  expect(latchedText({ role: "operating", latched_by })).toMatch(
+    /input_refused, direction_refused.*then reset them/,
+  );
+  for (const role of ["looking", "holding"] as const)
+    expect(latchedText({ role, latched_by })).toMatch(/input_refused.*operator's link/);
 });

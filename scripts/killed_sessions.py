@@ -9,7 +9,7 @@ scripts/killed_sessions.py PALPATE [COUNT]
 Each session runs in real time with the default camera and a simulated hand, and is killed (SIGKILL)
 at a time drawn by chance, with a fixed seed. Then `palpate replay` has to read it, find every force
 bit for bit and every checksum right. Prints the time from the last tick that was kept to the kill
-for each session, which two commits a second keep below a second where the machine is not overloaded.
+for each session: two commits a second keep it below one second unless the machine is overloaded.
 Exits 1 if a session cannot be read or lost more than 1 s.
 """
 import pathlib

@@ -48,7 +48,7 @@ class SlowDisk {
     for (; hangs; std::this_thread::sleep_for(std::chrono::milliseconds(1))) is_hanging = true;
     is_hanging = false;
     std::this_thread::sleep_for(delay.load());
-    return usual_write(to, bytes, count, at);
+    return usual_write.load()(to, bytes, count, at);
   }
 
   static inline std::mutex mutex;

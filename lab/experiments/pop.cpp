@@ -341,9 +341,12 @@ Scores pop_scores(const Table& table) {
       if (sum.ghost + sum.numb + sum.wrong > 0.0)
         scores.note += fmt::format(
             "\n{}, {}: of {:g} cases {:g} with a force in free space (up to {:.2f} N), {:g} numb, "
-            "{:g} with a force on the wrong side; palpate eval pop --methods {} --case '{}'",
-            methods[m], family, sum.cases, sum.ghost, sum.worst_ghost, sum.numb, sum.wrong,
-            methods[m], sum.not_right);
+            "{:g} with a force on the wrong side",
+            methods[m], family, sum.cases, sum.ghost, sum.worst_ghost, sum.numb, sum.wrong);
+      // None where all of them are lost, too: the next line plays one of those.
+      if (!sum.not_right.empty())
+        scores.note +=
+            fmt::format("; palpate eval pop --methods {} --case '{}'", methods[m], sum.not_right);
       if (!sum.simplest.empty())
         scores.note +=
             fmt::format("\npalpate eval pop --methods {} --case '{}'", methods[m], sum.simplest);

@@ -112,7 +112,11 @@ TEST_F(Pop, ThePaperLosesEverySweepOfAnOccluderAndTheFailureIsShrunkAndRunsAgain
   ASSERT_EQ(rerun.rows(), 1U);
   EXPECT_EQ(rerun.number(0, "lost"), 1.0);
   EXPECT_EQ(rerun.text(0, "first_lost"), table.text(0, "simplest"));
-  EXPECT_EQ(find_experiment("pop").scores(rerun).rows.back()[2], "0.00");
+  const Scores scores = find_experiment("pop").scores(rerun);
+  EXPECT_EQ(scores.rows.back()[2], "0.00");
+  EXPECT_NE(scores.note.find(", occluder: of 1 cases 0 with a force in free space"),
+            std::string::npos);
+  EXPECT_EQ(scores.note.find("--case ''"), std::string::npos) << scores.note;
 }
 
 // What sight lost once, each for a reason of its own, shrunk.

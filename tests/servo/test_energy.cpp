@@ -161,11 +161,17 @@ TEST(EnergyLink, ForgetsCyclesBeforeAGapOrAFault) {
   }));
 }
 
+// Besides a swing about the surface: how deep the hand presses, how unevenly it moves, and how fast
+// it comes out.
+struct Press {
+  double depth = 0.0, ripple = 0.0;  // [m]
+  double retreat = 0.0;              // [m/s]
+};
+
 // A hand that is led along a prescribed path on a spring that answers late by `lag` ticks; the
 // monitor alone. @return the cycle in which it found an oscillation, or 0.
 int found_in_cycle(double hertz, int lag, double amplitude, double decay, double drift,
-                   double surface_amplitude = 0.0, double rate = 1000.0, double depth = 0.0,
-                   double ripple = 0.0) {
+                   double surface_amplitude = 0.0, double rate = 1000.0, const Press& press = {}) {
   EnergyMonitor monitor;
   std::vector<double> forces(static_cast<std::size_t>(lag), 0.0);
   const double dt = 1.0 / rate;
@@ -173,8 +179,8 @@ int found_in_cycle(double hertz, int lag, double amplitude, double decay, double
     const double t = i * dt;
     const double phase = 2.0 * std::numbers::pi * hertz * t;
     const double surface = surface_amplitude * std::sin(2.0 * std::numbers::pi * t);
-    const double z =
-        amplitude * std::exp(-decay * t) * std::sin(phase) - depth + ripple * std::sin(9.0 * phase);
+    const double z = amplitude * std::exp(-decay * t) * std::sin(phase) - press.depth +
+                     press.retreat * t + press.ripple * std::sin(9.0 * phase);
     forces.push_back(std::max(-600.0 * z, 0.0));
     const double force = forces[forces.size() - 1 - static_cast<std::size_t>(lag)];
     const double velocity =
@@ -206,11 +212,11 @@ TEST(EnergyMonitor, FindsItOnAMovingSurface) {
 }
 
 TEST(EnergyMonitor, FindsItWhereTheSurfaceIsNeverLeft) {
-  EXPECT_GT(found_in_cycle(14.0, 2, 2e-3, 0.0, 0.0, 0.0, 1000.0, 8e-3), 0);
+  EXPECT_GT(found_in_cycle(14.0, 2, 2e-3, 0.0, 0.0, 0.0, 1000.0, {.depth = 8e-3}), 0);
 }
 
 TEST(EnergyMonitor, FindsItInAHandThatMovesUnevenly) {
-  EXPECT_GT(found_in_cycle(9.0, 2, 2e-3, 0.0, 0.0, 0.0, 1000.0, 0.0, 0.4e-3), 0);
+  EXPECT_GT(found_in_cycle(9.0, 2, 2e-3, 0.0, 0.0, 0.0, 1000.0, {.ripple = 0.4e-3}), 0);
 }
 
 TEST(EnergyMonitor, FindsItAtEveryRate) {
@@ -223,6 +229,23 @@ TEST(EnergyMonitor, IgnoresWhatIsSmallDiesAwayOrGoesElsewhere) {
   EXPECT_EQ(found_in_cycle(14.0, 1, 20e-3, 4.0, 0.0), 0) << "25 % less each cycle";
   EXPECT_EQ(found_in_cycle(14.0, 1, 4e-3, 0.0, 0.2), 0) << "14 mm aside each cycle";
   EXPECT_GT(found_in_cycle(14.0, 1, 4e-3, 0.0, 0.05), 0) << "3.6 mm aside each cycle";
+}
+
+TEST(EnergyMonitor, IgnoresTremorOnASurfaceThatAnswersATickLate) {
+  for (const double hertz : {9.0, 12.0}) {
+    EXPECT_EQ(found_in_cycle(hertz, 1, 1.5e-3, 0.0, 0.0, 0.0, 1000.0, {.depth = 8e-3}), 0) << hertz;
+    EXPECT_EQ(found_in_cycle(hertz, 0, 4e-3, 0.0, 0.0), 0) << hertz;
+  }
+  EXPECT_GT(found_in_cycle(14.0, 1, 1.5e-3, 0.0, 0.0, 0.0, 1000.0, {.depth = 8e-3}), 0)
+      << "no tremor";
+}
+
+TEST(EnergyMonitor, IgnoresTremorOfAHandThatComesOutOfTheSurface) {
+  // What the surface gives back was stored when the hand went in.
+  for (const int lag : {0, 1}) {
+    const Press press{.depth = 15e-3, .retreat = 3e-3};
+    EXPECT_EQ(found_in_cycle(10.0, lag, 2e-3, 0.0, 0.0, 0.0, 1000.0, press), 0) << lag;
+  }
 }
 
 TEST(EnergyMonitor, IgnoresASurfaceThatTakesEnergy) {

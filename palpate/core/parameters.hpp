@@ -40,7 +40,7 @@ struct SightParameters {
   double hidden_hold = 0.4;      ///< [s] the force of an occluded surface is kept in full this long
   double hidden_fade = 0.3;      ///< [s] and then fades out over this
   double hardest_strike = 90.0;  ///< [m/s^2] a faster jump is taken for an occluder
-  double return_ramp = 0.5;      ///< [s] what was hidden or lost rises to its full force over this
+  double return_speed = 0.01;    ///< [m/s] at which a surface comes back that was hidden or lost
   double side_depth = 0.1;       ///< [m] depth of the side faces synthesised behind visible edges
 };
 

@@ -54,7 +54,7 @@ enum TickFlag : std::uint32_t {
   /// Method `sight`: the proxy was farther from its hand than can be and is at the hand again.
   proxy_let_go = 1u << 11,
   /// Method `sight`: the proxy was found behind the surface and was brought back in front of it;
-  /// the force rises over `return_ramp`.
+  /// the force rises as if the surface came back at `return_speed`.
   returned_to_front = 1u << 12,
 };
 constexpr std::size_t tick_flag_count = 13;

@@ -11,38 +11,53 @@ namespace {
 // Jerk assumed by each filter of the bank [m/s^3], from a surface that a hand moves slowly to one
 // that is struck (18 000 r_c/s^2 within one frame).
 constexpr std::array<double, 5> jerks = {1.0, 6.0, 40.0, 250.0, 3000.0};
-constexpr std::size_t filters = jerks.size();
+// Change of velocity from frame to frame assumed by each of the others [m/s], from a surface that
+// is drawn along to one that is dropped. Without an acceleration to believe in, they do not
+// overshoot where a motion begins at once.
+constexpr std::array<double, 3> velocity_steps = {0.01, 0.1, 1.0};
+constexpr std::size_t filters = jerks.size() + velocity_steps.size();
 // Older frames say little about the present motion.
 constexpr std::size_t motion_frames = 24;
 // Forgetting factor of the log-likelihoods, per frame: some seven frames count.
 constexpr double memory = 0.85;
 // Logarithm of the prior odds of rest against any of the other filters.
 constexpr double rest_bonus = 4.0;
+// The same of a step of the velocity against an acceleration: a motion that begins between two
+// frames looks like a strong acceleration, which would carry the surface three times too far.
+constexpr double plain_bonus = 8.0;
 // Standard deviations of a surface's velocity [m/s] and acceleration [m/s^2] before it is known.
 constexpr double first_velocity = 3.0;
 constexpr double first_acceleration = 10.0;
 
-// Kalman filters of height, velocity and acceleration, side by side: filter i in lane i.
+// Kalman filters of height, velocity and acceleration, side by side: filter i in lane i. Those of
+// velocity steps have no acceleration.
 struct Bank {
   using Lanes = std::array<double, filters>;
   Lanes x{}, v{}, a{};
   Lanes xx{}, xv{}, xa{}, vv{}, va{}, aa{};  // covariances
   Lanes likelihood{};                        // its logarithm
+  Lanes jerk{}, velocity_step{};
 
   Bank(double height, double variance) noexcept {
     x.fill(height);
     xx.fill(variance);
     vv.fill(first_velocity * first_velocity);
-    aa.fill(first_acceleration * first_acceleration);
+    for (std::size_t i = 0; i < filters; ++i) {
+      const bool accelerates = i < jerks.size();
+      jerk[i] = accelerates ? jerks[i] : 0.0;
+      velocity_step[i] = accelerates ? 0.0 : velocity_steps[i - jerks.size()];
+      aa[i] = accelerates ? first_acceleration * first_acceleration : 0.0;
+    }
   }
 
   void step(double dt, double height, double variance) noexcept {
     const double h = 0.5 * dt * dt;
     for (std::size_t i = 0; i < filters; ++i) {
-      // Prediction: process noise is a step of the acceleration at the begin of the interval.
-      const double ga = jerks[i] * dt;
-      const double gv = ga * dt;
-      const double gx = ga * h;
+      // Prediction: process noise is a step of the acceleration, or of the velocity, at the
+      // beginning of the interval.
+      const double ga = jerk[i] * dt;
+      const double gv = ga * dt + velocity_step[i];
+      const double gx = ga * h + velocity_step[i] * dt;
       x[i] += dt * v[i] + h * a[i];
       v[i] += dt * a[i];
       const double new_xa = xa[i] + dt * va[i] + h * aa[i];
@@ -147,6 +162,7 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
     bank.step(dt, samples[i].height - base, samples[i].doubt * variance);
   }
   const double rest = likelihood_of_rest(samples, frames, variance) + rest_bonus;
+  for (std::size_t i = 0; i < jerks.size(); ++i) bank.likelihood[i] -= plain_bonus;
   double most = rest;
   for (const double l : bank.likelihood) most = std::max(most, l);
   const double rest_share = std::exp(rest - most);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace palpate {
 namespace {
@@ -34,7 +35,7 @@ void Sight::seat(const Vec3& proxy) noexcept {
   tracker_.forget();
   monitor_.forget();
   last_proxy_.reset();
-  strength_ = 1.0;
+  shortfall_ = 0.0;
   on_fit_ = false;
   points_moved_ = Vec3::Zero();
   last_force_ = Vec3::Zero();
@@ -230,7 +231,7 @@ void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
       proxy_.normal = movement.normal = verdict.normal;
       movement.state = ContactState::contact;
       movement.flags |= returned_to_front;
-      strength_ = 0.0;
+      returns_ = true;
       break;
   }
   last_proxy_ = proxy_.at;
@@ -292,12 +293,17 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
   const double fade = std::max(parameters_.motion.max_extrapolation, 1e-3);
   const double late = std::max(fade, 2.0 * timing_.interval());
   if (frame_.count() > 1) known *= ease((timing_.age(t) - late) / fade);
-  // The force falls at once with the confidence in the surface and rises slowly: a surface that is
-  // found again must not kick.
-  const double ramp = std::max(sight.return_ramp, 1e-3);
-  strength_ = std::min(strength_ + std::max(t - last_blend_t_, 0.0) / ramp, 1.0);
-  if (proxy_.touching) strength_ = std::min(strength_, known);
-  blended *= std::min(strength_, known);
+  if (std::exchange(returns_, false)) known = 0.0;
+  // The force falls at once with the confidence in the surface. It rises as if the surface came
+  // back to the hand at `return_speed`: a handle that nobody holds moves along with it, and swings
+  // about that speed by no more than that speed. A force that is ramped up in time throws it.
+  shortfall_ -= sight.return_speed * std::max(t - last_blend_t_, 0.0);
+  if (const double push = blended.norm(); push > 0.0) {
+    const double stiffness = std::max(parameters_.coupling.stiffness, 1e-9);
+    shortfall_ = std::max(shortfall_, (1.0 - known) * push / stiffness);
+    blended *= std::max(push - stiffness * shortfall_, 0.0) / push;
+  }
+  shortfall_ = std::max(shortfall_, 0.0);
   last_hip_ = hip;
   last_blend_t_ = t;
   return blended;

@@ -50,7 +50,8 @@ class Sight final : public Method {
   Vec3 points_moved_ = Vec3::Zero();
   Monitor monitor_;
   std::optional<Vec3> last_proxy_;  // [m] of the last tick
-  double strength_ = 1.0;           // [-] share of the force that a contact found again has so far
+  double shortfall_ = 0.0;          // [m] by which a surface that comes back is not there yet
+  bool returns_ = false;            // it begins to come back in this tick
 
   // From which the force goes on when a frame arrives.
   bool blend_due_ = false;  // a frame came since the last force

@@ -38,8 +38,10 @@ class SlowDisk {
     if (file->pMethods == nullptr) return code;
     const std::lock_guard lock(mutex);
     sqlite3_io_methods& methods = tables.try_emplace(file->pMethods, *file->pMethods).first->second;
-    if (methods.xWrite != write) usual_write = methods.xWrite;  // the same in all tables
-    methods.xWrite = write;
+    if (methods.xWrite != write) {
+      usual_write = methods.xWrite;  // the same in all tables
+      methods.xWrite = write;
+    }
     file->pMethods = &methods;
     return code;
   }

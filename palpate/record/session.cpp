@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -110,6 +111,18 @@ Vec3 vec3_of(const json& array) {
   return {array.at(0).get<double>(), array.at(1).get<double>(), array.at(2).get<double>()};
 }
 
+// A whole number that a T can hold; JSON's own may have fractions or be of any size.
+template <class T>
+T whole_of(const json& number, const std::string& name) {
+  const bool fits = number.is_number_unsigned() ? std::in_range<T>(number.get<std::uint64_t>())
+                                                : number.is_number_integer() &&
+                                                      std::in_range<T>(number.get<std::int64_t>());
+  if (!fits)
+    throw Error(name, "has a number that is not whole or too large",
+                "it may be damaged, or of another version of palpate");
+  return number.get<T>();
+}
+
 // Calls `read` with the JSON in `text`; whatever does not fit is an Error about `name`.
 template <class Read>
 auto parsed(const std::string& text, const std::string& name, const Read& read) {
@@ -197,7 +210,7 @@ SessionInfo session_from_json(const std::string& text, const std::string& name) 
     info.version = object.at("palpate").get<std::string>();
     info.cameras = object.at("cameras").get<std::vector<std::string>>();
     info.device = object.at("device").get<std::string>();
-    info.epoch = object.at("epoch_ns").get<std::int64_t>();
+    info.epoch = whole_of<std::int64_t>(object.at("epoch_ns"), name);
     if (object.contains("seat")) info.seat = vec3_of(object.at("seat"));
     if (object.contains("device_limits")) {
       const json& limits = object.at("device_limits");
@@ -228,7 +241,7 @@ NumberedSettings settings_from_json(const std::string& text, const std::string& 
   return parsed(text, name, [&](const json& object) {
     NumberedSettings settings;
     ServoSettings& all = settings.settings;
-    settings.number = object.at("number").get<std::uint64_t>();
+    settings.number = whole_of<std::uint64_t>(object.at("number"), name);
     all.method = object.at("method").get<std::string>();
     const json& parameters = object.at("parameters");
     for (const ParameterInfo& row : parameter_table()) {
@@ -248,7 +261,7 @@ NumberedSettings settings_from_json(const std::string& text, const std::string& 
           pose.at(static_cast<std::size_t>(i)).get<double>();
     all.placement.workspace_scale = object.at("workspace_scale").get<double>();
     if (object.contains("clutch_button"))
-      all.placement.clutch_button = object.at("clutch_button").get<int>();
+      all.placement.clutch_button = whole_of<int>(object.at("clutch_button"), name);
     validate(all);
     return settings;
   });

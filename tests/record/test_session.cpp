@@ -169,6 +169,13 @@ TEST(Session, WithDamagedSettingsIsRefused) {
   EXPECT_TRUE(fails_saying([&] { return settings_from_json(text, "it"); }, "it"));
   EXPECT_TRUE(fails_saying([&] { return settings_from_json("{}", "it"); }, "it"));
   EXPECT_TRUE(fails_saying([&] { return session_from_json("[]", "it"); }, "it"));
+  const std::string info = to_json(press_info());
+  const std::size_t epoch = info.find("\"epoch_ns\":") + 11;
+  for (const char* number : {"1e120", "9223372036854775808", "0.5", "true"}) {
+    const std::string damaged =
+        info.substr(0, epoch) + number + info.substr(info.find_first_of(",}", epoch));
+    EXPECT_TRUE(fails_saying([&] { return session_from_json(damaged, "it"); }, "it")) << number;
+  }
   std::vector<double> row = row_of(ServoTick{});
   row[13] = 3.0;
   EXPECT_TRUE(fails_saying([&] { return tick_of(row, "it"); }, "it", "state"));

@@ -55,8 +55,8 @@ function(palpate_target_options target)
   endif()
 endfunction()
 
-# palpate_tidy(TARGET): clang-tidy on all of a target's files, read as one: a check costs four times
-# as long on the headers as on a room's own files. Done anew when one of the project's files changed.
+# palpate_tidy(TARGET): clang-tidy on all of a target's files, read as one, since its checks take
+# four times as long on the headers as on a room's own files. Done anew when a file has changed.
 function(palpate_tidy target)
   if(NOT PALPATE_CLANG_TIDY)
     return()

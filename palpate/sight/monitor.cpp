@@ -32,18 +32,23 @@ constexpr double least_margin = 1e-3;  // [m] rounding of depth, in common camer
 // [1/m] No estimate of the noise counts beyond this times the squared distance: 5 mm at 1 m, what a
 // stereo camera's is. So a wrong estimate cannot blind the monitor.
 constexpr double most_noise = 5e-3;
+double most_margin(double distance) {
+  return confidence * most_noise * distance * distance;
+}
 // [-] r_c: a look without an edge has 80 % of its points within this along the line of sight, and
 // the margin for noise. A plane at 70 degrees from facing the camera spans 4.4.
 constexpr double one_layer = 4.0;
 // [-] r_c: a nearer layer that begins beyond such a step, after the proxy has moved sideways by
-// `sideways`, is another body, behind which the proxy went round an edge.
+// `sideways`, is another body, behind which the proxy went round an edge. What a surface that leans
+// by 70 degrees rises on the way, `steepest_rise` times that, is no step.
 constexpr double edge_step = 2.0;
-constexpr double sideways = 2e-3;  // [m]
+constexpr double steepest_rise = 2.75;  // [-] tan 70 degrees
+constexpr double sideways = 2e-3;       // [m]
 // [m] What moves nearer by more than this from frame to frame came between camera and surface: a
 // surface at rest struck with 90 m/s^2 moves 50 mm in an interval at 30 Hz.
 constexpr double farthest_strike = 65e-3;
-// [-] Cosine: a force that points away from the camera, within 60 degrees of its line of sight.
-constexpr double away = -0.5;
+// [-] Cosine: a force that points away from the camera, within 73 degrees of its line of sight.
+constexpr double away = -0.3;
 // Frames in a row that must show the proxy behind its surface: noise explains one in some 700, but
 // hardly two.
 constexpr int frames_of_evidence = 2;
@@ -56,7 +61,7 @@ void Monitor::forget() noexcept {
   hand_ = proxy_ = last_front_ = {};
   side_ = Side::unknown;
   frame_judged_ = false;
-  frames_behind_ = 0;
+  frames_behind_ = frames_past_edge_ = 0;
 }
 
 // What each camera measures on its lines of sight within `radius` of `place`. A camera that sees
@@ -117,6 +122,7 @@ bool Monitor::is_behind(double margin, double deepest, double r_c) noexcept {
   if (side_ != Side::front) return false;
   if (proxy_.behind <= margin) {
     if (proxy_.behind <= 0.0) last_front_ = proxy_;
+    if (!frame_judged_) frames_past_edge_ = 0;
     return false;
   }
   // At an edge the median is of one body or the other.
@@ -126,10 +132,14 @@ bool Monitor::is_behind(double margin, double deepest, double r_c) noexcept {
     const Vec3& line = proxy_.line;
     const double nearer = way.dot(line) + proxy_.behind - last_front_.behind;
     const double aside = (way - way.dot(line) * line).norm();
-    if (nearer > edge_step * r_c + margin && aside > sideways) {
-      side_ = Side::behind;
+    // Noise of the two looks must not end the watch over the front, however small it is estimated.
+    const double noise = most_margin(proxy_.distance);
+    if (nearer > edge_step * r_c + noise + steepest_rise * aside && aside > sideways) {
+      if (!frame_judged_) ++frames_past_edge_;
+      if (frames_past_edge_ >= frames_of_evidence) side_ = Side::behind;
       return false;
     }
+    if (!frame_judged_) frames_past_edge_ = 0;
     if (nearer > farthest_strike + margin) return false;
   }
   return proxy_.behind <= deepest + margin;
@@ -139,8 +149,7 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
   Verdict verdict;
   const double r_c = contact.r_c;
   const auto margin_at = [&](double distance) {
-    return std::max(least_margin,
-                    confidence * std::min(contact.noise, most_noise * distance * distance));
+    return std::max(least_margin, std::min(confidence * contact.noise, most_margin(distance)));
   };
   // The frame shows the surface where it was when the frame was captured.
   const Look& proxy = look_at(cloud, contact.proxy - contact.carried, r_c, proxy_);

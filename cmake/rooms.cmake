@@ -101,8 +101,7 @@ endfunction()
 # palpate_runs_once(TARGET): little optimised, as code that runs once (options, messages, set-up)
 # costs more processor time to optimise than it ever gains.
 function(palpate_runs_once target)
-  target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>
-                         $<$<CONFIG:Debug>:-O0>)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 endfunction()
 
 # palpate_room(NAME LINKS <public libraries...> PRIVATE <private libraries...>)

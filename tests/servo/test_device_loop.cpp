@@ -384,7 +384,7 @@ TEST(DeviceFault, IsSaidInWordsByTheLoop) {
   EXPECT_FALSE(loop.device_status().ticking) << "before it began";
   device.hand.fault = DeviceFault::emergency_stop;
   loop.start();
-  wait_until([&] { return loop.statistics().ticks > 0; });
+  wait_until([&] { return loop.device_status().fault != DeviceFault::none; });
   EXPECT_EQ(loop.device_status().fault, DeviceFault::emergency_stop);
   loop.stop();
   EXPECT_EQ(loop.device_status().text, describe(DeviceFault::emergency_stop));

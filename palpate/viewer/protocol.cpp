@@ -17,6 +17,8 @@ static_assert(std::endian::native == std::endian::little,
               "depths and points are sent as they lie in memory");
 
 enum Kind : std::uint8_t { frame = 1, ticks = 2, rays = 3, hand = 16, shown = 17 };
+// What a hand message says of the hand.
+enum Grip : std::uint8_t { let_go = 0, held = 1, let_go_towards = 2 };
 enum Format : std::uint8_t { depth = 0, depth_with_rays = 1, points = 2 };
 
 constexpr std::size_t frame_header_size = 96;
@@ -136,15 +138,15 @@ std::optional<std::variant<HandMessage, ShownMessage>> parse_binary(
   if (message.empty()) return std::nullopt;
   const auto kind = read<std::uint8_t>(message, 0);
   if (kind == Kind::hand && message.size() == hand_size) {
-    const auto held = read<std::uint8_t>(message, 1);
-    if (held > 1) return std::nullopt;
-    if (held == 0) return HandMessage{};
+    const auto grip = read<std::uint8_t>(message, 1);
+    if (grip > Grip::let_go_towards) return std::nullopt;
+    if (grip == Grip::let_go) return HandMessage{};
     const Vec3 target(read<double>(message, 8), read<double>(message, 16),
                       read<double>(message, 24));
     // Also false for what is not a number.
     if (!(target.cwiseAbs().maxCoeff() <= max_hand_distance) || !target.allFinite())
       return std::nullopt;
-    return HandMessage{target};
+    return HandMessage{grip == Grip::held, target};
   }
   if (kind == Kind::shown && message.size() == shown_size) {
     const auto camera = read<std::uint8_t>(message, 1);

@@ -81,7 +81,9 @@ ViewerMessage text_message(const std::string& text);
 
 /// The page's hand: where it is to be, or that it was let go.
 struct HandMessage {
-  std::optional<Vec3> target;  ///< [m] world
+  bool held = false;
+  /// [m] world: where to. None, never of a held hand: it stays where it is.
+  std::optional<Vec3> target = {};
 };
 /// The page has drawn a frame and can take another.
 struct ShownMessage {

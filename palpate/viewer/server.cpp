@@ -386,20 +386,20 @@ class ViewerServer::Impl final : public Hub {
 
   void moved_hand(PageSession& page, const HandMessage& hand) override {
     if (!host_.takes_hand()) {
-      if (hand.target) page.explain("hand: no page moves this session's device");
+      if (hand.held) page.explain("hand: no page moves this session's device");
       return;
     }
     if (hand_owner_ != nullptr && hand_owner_ != &page) {
-      if (hand.target) page.explain("hand: another page has it; wait until it lets go");
+      if (hand.held) page.explain("hand: another page has it; wait until it lets go");
       return;
     }
-    if (!hand.target) {
+    if (!hand.held) {
       if (hand_owner_ == nullptr) return;
-      release_hand();
+      release_hand(hand);
       return tell_presence(true);
     }
     hand_heard_ = Clock::now();
-    host_.hand(hand.target);
+    host_.hand(hand);
     if (std::exchange(hand_owner_, &page) == nullptr) tell_presence(true);
   }
 
@@ -507,9 +507,10 @@ class ViewerServer::Impl final : public Hub {
     if (++beats_ % ticks_per_state == 0) send_state(pages_);
   }
 
-  void release_hand() {
+  // @param farewell  where the hand goes without a force
+  void release_hand(const HandMessage& farewell = {}) {
     hand_owner_ = nullptr;
-    host_.hand(std::nullopt);
+    host_.hand(farewell);
   }
 
   // To all. @param hand_changed  then roles have changed, too, which are part of the state

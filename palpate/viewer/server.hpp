@@ -26,8 +26,8 @@ class ViewerHost {
   virtual std::optional<TickBatch> ticks() = 0;
   /// Does a page move the session's device? If not, no page ever holds the hand.
   virtual bool takes_hand() = 0;
-  /// The one hand moved [m, world], or was let go.
-  virtual void hand(const std::optional<Vec3>& target) = 0;
+  /// The one hand moved, or was let go.
+  virtual void hand(const HandMessage& hand) = 0;
   /// A command that `check_allowed` allows the role of the page that asks.
   /// @throws Error to refuse: the page shows it.
   virtual void command(const Command& command, Role role) = 0;

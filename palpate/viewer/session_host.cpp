@@ -152,10 +152,15 @@ std::optional<TickBatch> SessionHost::ticks() {
   return batcher_->take();
 }
 
-void SessionHost::hand(const std::optional<Vec3>& target) {
+void SessionHost::hand(const HandMessage& hand) {
   if (mouse_ == nullptr) return;
-  if (target) target_ = *target;
-  mouse_->aim({.position = target_, .present = target.has_value()});
+  if (hand.target) {
+    const Placement placement = session_->settings().placement;
+    const Vec3 place =
+        placement.world_from_device.inverse() * *hand.target / placement.workspace_scale;
+    if (is_place(place)) target_ = place;
+  }
+  mouse_->aim({.position = target_, .present = hand.held});
 }
 
 void SessionHost::command(const Command& command, Role role) {

@@ -48,7 +48,7 @@ class SessionHost final : public ViewerHost {
   std::string state() override;
   std::optional<TickBatch> ticks() override;
   bool takes_hand() override { return mouse_ != nullptr; }
-  void hand(const std::optional<Vec3>& target) override;
+  void hand(const HandMessage& hand) override;
   void command(const Command& command, Role role) override;
 
   /// Why the last recording of a page was ended by its limits; empty if it was not.
@@ -67,8 +67,8 @@ class SessionHost final : public ViewerHost {
   std::atomic<ViewerServer*> server_{nullptr};
   std::array<std::uint32_t, Patch::max_views> numbers_{};  // of each camera's own frames
   MouseDevice* mouse_ = nullptr;
-  Vec3 start_ = Vec3::Zero();   // [m] where the mouse's hand began
-  Vec3 target_ = Vec3::Zero();  // [m] where it was sent last
+  Vec3 start_ = Vec3::Zero();   // [m, device] where the mouse's hand began
+  Vec3 target_ = Vec3::Zero();  // [m, device] where it was sent last
   std::optional<TickRing<ServoTick>::Reader> reader_;
   std::optional<TickBatcher> batcher_;
 };

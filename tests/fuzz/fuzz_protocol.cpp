@@ -11,8 +11,10 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace palpate;
   if (const auto message = parse_binary(std::as_bytes(std::span(data, size)))) {
-    if (const auto* hand = std::get_if<HandMessage>(&*message); hand != nullptr && hand->target) {
-      test::expect(hand->target->allFinite() && hand->target->norm() <= 2.0 * max_hand_distance);
+    if (const auto* hand = std::get_if<HandMessage>(&*message)) {
+      test::expect(hand->target || !hand->held);
+      test::expect(!hand->target ||
+                   (hand->target->allFinite() && hand->target->norm() <= 2.0 * max_hand_distance));
     }
   }
   if (const auto command = parse_command(test::text_of(data, size))) {

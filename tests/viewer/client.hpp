@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <cstring>
 #include <optional>
 #include <string>
@@ -94,10 +95,12 @@ class Page {
     socket_.binary(true);
     socket_.write(boost::asio::buffer(bytes.data(), bytes.size()));
   }
-  void move_hand(bool held, double x, double y, double z) {
+  void move_hand(bool held, double x, double y, double z) { send_hand(held ? 1 : 0, x, y, z); }
+  /// @param grip  0 let go, 1 held, 2 let go and on its way to the place
+  void send_hand(std::uint8_t grip, double x, double y, double z) {
     std::vector<std::byte> bytes(32);
     bytes[0] = std::byte{16};
-    bytes[1] = std::byte{held};
+    bytes[1] = std::byte{grip};
     const double place[3] = {x, y, z};
     std::memcpy(bytes.data() + 8, place, sizeof place);
     send_binary(bytes);

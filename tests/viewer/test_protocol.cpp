@@ -97,10 +97,16 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
 TEST(Protocol, UnderstandsAHandThatIsHeldOrLetGo) {
   const auto held = parse_binary(hand_bytes(1, {0.1, -0.2, 0.3}));
   ASSERT_TRUE(held && std::holds_alternative<HandMessage>(*held));
+  EXPECT_TRUE(std::get<HandMessage>(*held).held);
   EXPECT_EQ(std::get<HandMessage>(*held).target, Vec3(0.1, -0.2, 0.3));
   const auto released = parse_binary(hand_bytes(0, {0.1, -0.2, 0.3}));
   ASSERT_TRUE(released && std::holds_alternative<HandMessage>(*released));
-  EXPECT_FALSE(std::get<HandMessage>(*released).target);
+  EXPECT_FALSE(std::get<HandMessage>(*released).held);
+  EXPECT_FALSE(std::get<HandMessage>(*released).target) << "it stays where it is";
+  const auto retreats = parse_binary(hand_bytes(2, {0.1, -0.2, 0.3}));
+  ASSERT_TRUE(retreats && std::holds_alternative<HandMessage>(*retreats));
+  EXPECT_FALSE(std::get<HandMessage>(*retreats).held);
+  EXPECT_EQ(std::get<HandMessage>(*retreats).target, Vec3(0.1, -0.2, 0.3));
 }
 
 TEST(Protocol, RefusesAHandThatIsNowhere) {
@@ -108,8 +114,9 @@ TEST(Protocol, RefusesAHandThatIsNowhere) {
   for (const double bad : {std::nan(""), inf, -inf, 1000.1, -1e300}) {
     EXPECT_FALSE(parse_binary(hand_bytes(1, {0.0, bad, 0.0}))) << bad;
     EXPECT_FALSE(parse_binary(hand_bytes(1, {0.0, 0.0, bad}))) << bad;
+    EXPECT_FALSE(parse_binary(hand_bytes(2, {bad, 0.0, 0.0}))) << bad;
   }
-  EXPECT_FALSE(parse_binary(hand_bytes(2, {0.0, 0.0, 0.0})));
+  EXPECT_FALSE(parse_binary(hand_bytes(3, {0.0, 0.0, 0.0})));
 }
 
 TEST(Protocol, RefusesMessagesThatAreNotItsOwnToTheByte) {
@@ -175,8 +182,8 @@ TEST(Protocol, SurvivesAnyBytes) {
           static_cast<std::byte>(byte(random));
     const auto message = parse_binary(binary);
     if (message && std::holds_alternative<HandMessage>(*message)) {
-      const auto& target = std::get<HandMessage>(*message).target;
-      EXPECT_TRUE(!target || target->allFinite());
+      const auto& hand = std::get<HandMessage>(*message);
+      EXPECT_TRUE(hand.target ? hand.target->allFinite() : !hand.held);
     }
     std::string text = command;
     for (int change = 0; change < 3; ++change)

@@ -32,9 +32,10 @@ class FakeHost final : public ViewerHost {
     batch.t = ++beats_;
     return batch;
   }
-  void hand(const std::optional<Vec3>& target) override {
+  void hand(const HandMessage& hand) override {
     const std::lock_guard lock(mutex_);
-    hands_.push_back(target);
+    hands_.push_back(hand.held ? hand.target : std::nullopt);
+    last_ = hand;
     changed_.notify_all();
   }
   bool takes_hand() override { return takes_hand_; }
@@ -55,6 +56,10 @@ class FakeHost final : public ViewerHost {
     const std::lock_guard lock(mutex_);
     return hands_.size();
   }
+  HandMessage last_hand() {
+    const std::lock_guard lock(mutex_);
+    return last_;
+  }
   [[nodiscard]] int commands() const { return commands_; }
   // Holds the server's thread up, from the return on and as long as the lock lives.
   std::unique_lock<std::mutex> hold() {
@@ -68,6 +73,7 @@ class FakeHost final : public ViewerHost {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::optional<Vec3>> hands_;
+  HandMessage last_;
   std::atomic<int> commands_{0};
   std::atomic<bool> takes_hand_{true};
   std::mutex gate_;
@@ -260,6 +266,25 @@ TEST_F(ViewerServerTest, GivesTheOneHandToWhoComesFirst) {
   while (second.until("presence")["hand"] != "free") {
   }
   second.move_hand(true, 0.4, 0.5, 0.6);
+  EXPECT_EQ(host.hand_number(3), Vec3(0.4, 0.5, 0.6));
+}
+
+TEST_F(ViewerServerTest, SendsAHandThatIsLetGoToWhereItsPageSays) {
+  Page first(server.port());
+  Page second(server.port());
+  first.move_hand(true, 0.1, 0.2, 0.3);
+  EXPECT_TRUE(host.hand_number(1));
+  second.send_hand(2, 9.0, 9.0, 9.0);  // it is not this page's
+  second.move_hand(true, 9.0, 9.0, 9.0);
+  EXPECT_FALSE(second.until("error").is_null());
+  EXPECT_EQ(host.hands(), 1u);
+  first.send_hand(2, 0.1, 0.2, 0.5);
+  EXPECT_FALSE(host.hand_number(2)) << "let go";
+  EXPECT_EQ(host.last_hand().target, Vec3(0.1, 0.2, 0.5));
+  while (second.until("presence")["hand"] != "free") {
+  }
+  first.send_hand(2, 9.0, 9.0, 9.0);  // nor a hand that it no longer has
+  first.move_hand(true, 0.4, 0.5, 0.6);
   EXPECT_EQ(host.hand_number(3), Vec3(0.4, 0.5, 0.6));
 }
 

@@ -135,6 +135,40 @@ TEST(SessionHost, TakesAHandOnlyForTheMouse) {
   EXPECT_FALSE(Hosted({}, "hand:").host.takes_hand());
 }
 
+TEST(SessionHost, PutsTheHandWhereThePageSaysWhateverThePlacement) {
+  for (const double scale : {1.0, 2.5}) {
+    Hosted hosted({}, "mouse:?x=0&y=0&z=0.1");
+    hosted.host.command(SetPlacement{"scale", scale}, Role::operating);
+    hosted.host.command(SetPlacement{"origin_y", 0.02 * (scale - 1.0)}, Role::operating);
+    hosted.host.command(SetPlacement{"yaw", 0.3 * (scale - 1.0)}, Role::operating);
+    const Vec3 place(0.03, -0.04, 0.2);  // [m, world] before the wall
+    bool present = false;
+    Vec3 hip = Vec3::Zero();
+    const auto note = [&](const ServoTick& record) {
+      hip = record.tick.hip;
+      present = (record.hand & hand_present) != 0;
+    };
+    hosted.host.hand({.held = true, .target = place});
+    hosted.session.run(0.4, note);  // less than the mouse's silence
+    EXPECT_TRUE(present);
+    EXPECT_LT((hip - place).norm(), 1e-6) << "scale " << scale << ": " << hip.transpose();
+  }
+}
+
+TEST(SessionHost, LetsTheHandGoTowardsAPlaceWithoutHoldingIt) {
+  Hosted hosted({}, "mouse:?x=0&y=0&z=0.1");
+  bool present = true;
+  Vec3 hip = Vec3::Zero();
+  hosted.host.hand({.held = true, .target = Vec3(0.0, 0.0, 0.3)});
+  hosted.host.hand({.held = false, .target = Vec3(0.0, 0.0, 0.2)});
+  hosted.session.run(0.4, [&](const ServoTick& record) {
+    hip = record.tick.hip;
+    present = (record.hand & hand_present) != 0;
+  });
+  EXPECT_FALSE(present);
+  EXPECT_LT((hip - Vec3(0.0, 0.0, 0.2)).norm(), 1e-6);
+}
+
 TEST(SessionHost, RecordsIntoItsFolderUnderNamesOfItsOwn) {
   const test::TemporaryFolder folder;
   const std::filesystem::path made = folder.path() / "made" / "here";

@@ -7,7 +7,16 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Browser, Page } from "playwright-core";
 import { afterAll, afterEach, beforeAll, describe, expect, test } from "vitest";
-import { difference, distance, drawn, glimpse, launch, Program } from "./session";
+import {
+  difference,
+  distance,
+  drawn,
+  glimpse,
+  launch,
+  placeWhere,
+  Program,
+  spotUnder,
+} from "./session";
 
 const DESK = ["--camera", "synthetic:desk?size=320x240"];
 const PLANE = ["--camera", "synthetic:plane?size=320x240"];
@@ -54,43 +63,101 @@ test("shows a scene that moves", async () => {
     .toBeGreaterThan(300);
 });
 
-test("a hand dragged into a surface leaves the proxy on it and shows the force", async () => {
+test("a press touches the spot that is pointed at, a drag slides, release lets go", async () => {
   const page = await open(PLANE);
   const before = await glimpse(page);
   expect(before.state).toBe(0);
-  const clearance = before.clearance!;
-  expect(clearance).toBeGreaterThan(0.03);
+  expect(before.clearance!).toBeGreaterThan(0.03);
 
-  await page.mouse.move(350, 300);
+  const at = await placeWhere(page, "surface");
+  await page.mouse.move(at.x, at.y);
+  await expect.poll(() => page.locator("#view").getAttribute("data-over")).toBe("surface");
   await page.mouse.down();
   await expect.poll(() => page.locator("#hand").textContent()).toContain("you have the hand");
-  // Down the picture is along the surface and into it.
-  await until(page, (seen) => seen.state === 0);
-  for (let y = 300; y < 560; y += 4) {
-    await page.mouse.move(350, y);
-    if ((await glimpse(page)).state !== 0) break;
-  }
-  for (let i = 0; i < 8; ++i) await page.mouse.wheel(0, -60);
-  await until(page, (seen) => seen.state !== 0 && seen.force > 0.5 && seen.arrow);
-
+  await until(page, (seen) => seen.state !== 0 && seen.force > 1.2 && seen.arrow);
   const pressed = await glimpse(page);
-  expect(distance(pressed.hip, pressed.proxy)).toBeGreaterThan(0.002);
+  const spot = await spotUnder(page, at);
   // The surface is z = 0; between points the proxy may sink in a little.
+  expect(Math.hypot(pressed.proxy[0]! - spot[0]!, pressed.proxy[1]! - spot[1]!)).toBeLessThan(0.01);
   expect(pressed.proxy[2]).toBeGreaterThan(0.8 * r_c);
   expect(pressed.hip[2]).toBeLessThan(pressed.proxy[2]!);
-  expect(Number(await page.locator("#force").textContent())).toBeGreaterThan(0.5);
+  // What is written follows with the next drawing.
+  const written = async () => Number(await page.locator("#force").textContent());
+  await expect.poll(written).toBeGreaterThan(1.2);
   expect(await page.locator("#state").textContent()).toMatch(/contact|entrenched/);
   const plotted = () => page.locator(".plot output").first().textContent();
   await expect.poll(async () => parseFloat((await plotted()) ?? "")).toBeGreaterThan(0.5);
 
-  // Pressing on, the proxy stays where it is.
-  for (let i = 0; i < 8; ++i) await page.mouse.wheel(0, -60);
-  await until(page, (seen) => distance(seen.hip, seen.proxy) > 0.006);
-  expect(Math.abs((await glimpse(page)).proxy[2]! - pressed.proxy[2]!)).toBeLessThan(0.002);
+  // A drag slides: the proxy stays on the surface, the hand in it.
+  const there = { x: at.x + 50, y: at.y + 10 };
+  await page.mouse.move(there.x, there.y, { steps: 8 });
+  const next = await spotUnder(page, there);
+  await until(
+    page,
+    ({ state, force, proxy }) =>
+      state !== 0 &&
+      force > 0.5 &&
+      Math.hypot(proxy[0]! - next[0]!, proxy[1]! - next[1]!) < 0.01 &&
+      Math.abs(proxy[2]! - r_c) < 0.3 * r_c,
+  );
+
+  // The wheel presses deeper; the proxy stays where it is.
+  for (let i = 0; i < 3; ++i) await page.mouse.wheel(0, -100);
+  await until(page, (seen) => seen.state !== 0 && distance(seen.hip, seen.proxy) > r_c + 0.0055);
+  expect(Math.abs((await glimpse(page)).proxy[2]! - r_c)).toBeLessThan(0.002);
 
   await page.mouse.up();
   await until(page, (seen) => seen.force === 0);
   await expect.poll(() => page.locator("#hand").textContent()).toContain("hand free");
+  // The hand is out again, above where it touched.
+  await until(page, (seen) => seen.state === 0 && seen.hip[2]! > 0.02);
+  const after = await glimpse(page);
+  expect(Math.hypot(after.hip[0]! - next[0]!, after.hip[1]! - next[1]!)).toBeLessThan(0.015);
+});
+
+test("whatever ends a press lets the hand go", async () => {
+  const page = await open(PLANE);
+  const at = await placeWhere(page, "surface");
+  const whose = () => page.locator("#hand").textContent();
+  const ends: Record<string, () => Promise<unknown>> = {
+    "the pointer leaves the window": () => page.mouse.move(at.x, -20),
+    "the browser cancels the pointer": () =>
+      page.locator("#view").dispatchEvent("pointercancel", { pointerId: 1 }),
+    "the window loses the focus": () =>
+      page.evaluate(() => window.dispatchEvent(new Event("blur"))),
+    "the tab is hidden": () =>
+      page.evaluate(() => {
+        Object.defineProperty(document, "hidden", { value: true, configurable: true });
+        document.dispatchEvent(new Event("visibilitychange"));
+      }),
+  };
+  for (const [what, end] of Object.entries(ends)) {
+    await page.mouse.move(at.x, at.y);
+    await page.mouse.down();
+    await expect.poll(whose, { message: what }).toContain("you have the hand");
+    await end();
+    await expect.poll(whose, { message: what }).toContain("hand free");
+    await until(page, (seen) => seen.force === 0);
+    await page.mouse.up();
+  }
+});
+
+test("a drag beside the surface or with the right button only turns the view", async () => {
+  const page = await open(PLANE);
+  const yaw = () => page.evaluate(() => (window as any).palpate.view.orbit.yaw as number);
+  for (const [where, button] of [
+    ["background", "left"],
+    ["surface", "right"],
+  ] as const) {
+    const at = await placeWhere(page, where);
+    const before = await yaw();
+    await page.mouse.move(at.x, at.y);
+    await page.mouse.down({ button });
+    await page.mouse.move(at.x + 30, at.y, { steps: 3 });
+    await page.mouse.up({ button });
+    await expect.poll(yaw).toBeCloseTo(before - 0.15, 2);
+    expect(await page.locator("#hand").textContent()).toContain("hand free");
+  }
 });
 
 test("the keyboard alone moves the hand and the view", async () => {
@@ -120,7 +187,8 @@ test("the keyboard alone moves the hand and the view", async () => {
 test("a lost connection is shown and heals", async () => {
   const page = await open(DESK);
   const port = program!.port;
-  await page.mouse.move(350, 300);
+  const at = await placeWhere(page, "surface");
+  await page.mouse.move(at.x, at.y);
   await page.mouse.down();
   await expect.poll(() => page.locator("#hand").textContent()).toContain("you have the hand");
   await program!.stop("SIGKILL");

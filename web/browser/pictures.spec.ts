@@ -31,12 +31,9 @@ test.skipIf(!folder)(
         const y = 0.3 * height;
         await page.mouse.move(x, y);
         await page.mouse.down();
-        // Into the desk, and a stroke over it.
-        for (let i = 0; i < 60 && (await glimpse(page)).state === 0; ++i) {
-          await page.mouse.wheel(0, -100);
+        // Onto the desk, and a stroke over it.
+        for (let i = 0; i < 60 && (await glimpse(page)).state === 0; ++i)
           await page.waitForTimeout(100);
-        }
-        for (let i = 0; i < 6; ++i) await page.mouse.wheel(0, -60);
         await page.waitForTimeout(2500); // the force ramps up
         for (let i = 1; i <= 40; ++i) {
           await page.mouse.move(x + (0.1 * width * i) / 40, y - 10 * Math.sin(i / 6));

@@ -87,6 +87,35 @@ export function glimpse(page: Page): Promise<Glimpse> {
   });
 }
 
+/** The surface under a place of the window [m, world]. */
+export async function spotUnder(page: Page, at: { x: number; y: number }): Promise<number[]> {
+  return page.evaluate(({ x, y }) => (window as any).palpate.view.spotUnder(x, y).at, at);
+}
+
+/** A place of the scene [px] with or without a surface under it and about it. */
+export function placeWhere(
+  page: Page,
+  wanted: "surface" | "background",
+): Promise<{ x: number; y: number }> {
+  return page.evaluate((wanted) => {
+    const { view } = (window as any).palpate;
+    const canvas = document.getElementById("view")!;
+    const { width, height } = canvas.getBoundingClientRect();
+    const fits = (x: number, y: number) =>
+      document.elementFromPoint(x, y) === canvas &&
+      (view.spotUnder(x, y) !== null) === (wanted === "surface");
+    // The middle first.
+    for (const y of [0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.9])
+      for (const x of [0.4, 0.3, 0.5, 0.6, 0.2, 0.1, 0.03]) {
+        const [u, v] = [Math.round(x * width), Math.round(y * height)];
+        const about = [-40, 0, 60].flatMap((du) => [-15, 0, 15].map((dv) => [u + du, v + dv]));
+        const near = wanted === "surface" ? about : [[u, v]];
+        if (near.every(([a, b]) => fits(a!, b!))) return { x: u, y: v };
+      }
+    throw new Error(`there is no ${wanted}`);
+  }, wanted);
+}
+
 /** Waits until the session is drawn. */
 export async function drawn(page: Page): Promise<void> {
   await page.waitForFunction(() => {

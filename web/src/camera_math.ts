@@ -99,6 +99,20 @@ export function depthOf(orbit: Orbit, point: Vec3): number {
   return Math.max(dot(sub(point, eye(orbit)), axes(orbit).forward), NEAREST);
 }
 
+/** Where the eye looks through a place of the picture [px, from its left and top]: unit, world. */
+export function rayThrough(
+  orbit: Orbit,
+  x: number,
+  y: number,
+  viewWidth: number,
+  viewHeight: number,
+): Vec3 {
+  const { right, up, forward } = axes(orbit);
+  const size = metresPerPixel(1, viewHeight);
+  const across = scale(right, (x - viewWidth / 2) * size);
+  return unit(add(forward, sub(across, scale(up, (y - viewHeight / 2) * size))));
+}
+
 /** `point` moved by pixels in the view plane through it, and by metres into the picture. */
 export function dragged(
   orbit: Orbit,

@@ -5,6 +5,7 @@
 import * as THREE from "three";
 import type { Vec3 } from "./protocol";
 import type { Frame, Rays } from "./protocol";
+import { SeenSurface } from "./surface";
 
 const POINTS_PER_ROW = 1024;
 
@@ -140,6 +141,9 @@ export class CameraCloud {
   /** [m] of the nearer and the farther points, for colours */
   range: [number, number] = [0.5, 1.5];
   frame: Frame | null = null;
+  /** what the frame measured, as geometry */
+  seen: SeenSurface | null = null;
+  private lens: Rays | null = null;
   private texture: THREE.DataTexture | null = null;
   private rays: THREE.DataTexture | null = null;
   private readonly material: THREE.ShaderMaterial;
@@ -194,11 +198,13 @@ export class CameraCloud {
       pose[0], pose[1], pose[2], pose[3], pose[4], pose[5], pose[6], pose[7],
       pose[8], pose[9], pose[10], pose[11], 0, 0, 0, 1);
     this.frame = frame;
+    this.seen = new SeenSurface(frame, this.lens);
     this.object.visible = !frame.hasRays || this.rays !== null;
     this.followRange(frame);
   }
 
   setRays(message: Rays): void {
+    this.lens = message;
     this.rays?.dispose();
     this.rays = nearest(
       new THREE.DataTexture(
@@ -240,23 +246,6 @@ export class CameraCloud {
     this.material.uniforms.middleColour!.value = colours.middle;
     this.material.uniforms.farColour!.value = colours.far;
     this.material.uniforms.glow!.value = colours.glow;
-  }
-
-  /** The measured point on the sightline through `point` [m, world], or null. */
-  onSightline(point: Vec3): Vec3 | null {
-    const frame = this.frame;
-    if (!frame?.depth || frame.hasRays) return null;
-    const m = this.material.uniforms.worldFromCamera!.value as THREE.Matrix4;
-    const inCamera = new THREE.Vector3(...point).applyMatrix4(m.clone().invert());
-    if (inCamera.z <= 0) return null;
-    const [fx, fy, cx, cy] = frame.intrinsics;
-    const u = Math.round((inCamera.x / inCamera.z) * fx + cx);
-    const v = Math.round((inCamera.y / inCamera.z) * fy + cy);
-    if (u < 0 || v < 0 || u >= frame.width || v >= frame.height) return null;
-    const raw = frame.depth[v * frame.width + u]!;
-    if (raw === 0 || raw === 65535) return null;
-    const hit = inCamera.multiplyScalar((raw * frame.metresPerUnit) / inCamera.z);
-    return hit.applyMatrix4(m).toArray();
   }
 
   private define(name: string, wanted: boolean): void {

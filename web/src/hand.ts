@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mouse, fingers and keys: they move the hand or the eye.
+// Mouse, fingers and keys: they press where they point, or turn the view.
 
 import {
   add,
@@ -12,54 +12,65 @@ import {
   within,
   zoomed,
 } from "./camera_math";
-import type { Vec3 } from "./protocol";
+import { Pointers, type Place } from "./pointers";
+import { outOf, Press, type Felt } from "./press";
+import { Grip, type Vec3 } from "./protocol";
 import type { SceneView } from "./scene";
+import { onPlane } from "./surface";
 
 const TURN = 0.005; // [rad] a pixel
 const WHEEL = 0.00005; // [-] of the hand's distance, a pixel of wheel
-const ZOOM = 0.0012; // likewise, logarithm
+const WHEEL_PRESS = 1e-5; // [m] deeper, a pixel of wheel while a pointer presses: 1 mm a notch
+const ZOOM = 0.0012; // logarithm, a pixel of wheel
 const KEY_SPEED = 0.16; // [-] of the hand's distance, a second
+const KEY_PRESS = 0.01; // [m/s] deeper while a pointer presses
 const KEY_TURN = 1.1; // [rad/s]
-const KEY_TICK = 16; // [ms]
+const FINE = 0.2; // [-] with Alt
+const STEP = 16; // [ms]
 const DEEPEST = 0.05; // [m] of the hand in what is touched: a mouse feels no wall
 const REPEAT = 100; // [ms] a held hand is said again: after 0.5 s of silence it is let go
+const FARTHEST_SLIDE = 0.1; // [m] over a hole, in the plane of what was pressed last
 
 export interface HandHost {
-  /** Where the proxy is, and whether it touches: a hand that is taken begins there. */
-  proxy(): { at: Vec3; touching: boolean } | null;
+  /** The newest tick: a hand that is taken begins at its proxy. */
+  newest(): Felt | null;
   /** Can the page move the hand at all? */
   takesHand(): boolean;
-  moved(held: boolean, target: Vec3): void;
+  /** contact radius [m] and stiffness [N/m] */
+  touch(): { r_c: number; stiffness: number };
+  moved(grip: Grip, target: Vec3): void;
 }
-
-type Gesture = "hand" | "turn" | "shift";
 
 export class HandInput {
   private held = false;
   private byKeys = false;
   private target: Vec3 = [0, 0, 0];
-  private readonly pointers = new Map<number, { x: number; y: number; gesture: Gesture }>();
+  private readonly pointers = new Pointers();
+  private press: Press | null = null;
+  private pressed: { x: number; y: number; frames: number } | null = null; // aimed at last
   private readonly keys = new Set<string>();
-  private keyTimer = 0;
+  private timer = 0;
   private shiftHeld = false;
   private altHeld = false;
+  private over: Place | null = null; // a pointer that presses nothing, if it moved
 
   constructor(
     private readonly canvas: HTMLCanvasElement,
     private readonly view: SceneView,
     private readonly host: HandHost,
   ) {
-    canvas.addEventListener("pointerdown", (event) => this.press(event));
+    canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"] as const)
-      canvas.addEventListener(end, (event) => this.lift(event));
+      canvas.addEventListener(end, (event) => this.up(event.pointerId));
+    canvas.addEventListener("pointerleave", () => (this.over = { x: -1, y: -1 }));
     canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     addEventListener("keydown", (event) => this.keyDown(event));
     addEventListener("keyup", (event) => this.keys.delete(event.code));
-    addEventListener("blur", () => this.letGo());
+    for (const end of ["blur", "pagehide"] as const) addEventListener(end, () => this.letGo());
     document.addEventListener("visibilitychange", () => document.hidden && this.letGo());
-    setInterval(() => this.held && this.host.moved(true, this.target), REPEAT);
+    setInterval(() => this.held && this.host.moved(Grip.held, this.target), REPEAT);
   }
 
   get isHeld(): boolean {
@@ -74,19 +85,31 @@ export class HandInput {
     this.release();
   }
 
-  /** Moves the hand into the picture by a share of its distance, as a button does. */
+  /** Moves the hand in by a share of its distance, as a button does. */
   push(share: number): void {
-    this.takeByKeys();
-    this.moveTarget({ x: 0, y: 0 }, share * depthOf(this.view.orbit, this.target));
+    if (!this.press) this.takeByKeys();
+    const metres = share * depthOf(this.view.orbit, this.target);
+    if (this.press) this.press.refine(0.2 * metres);
+    else this.moveTarget({ x: 0, y: 0 }, metres);
+  }
+
+  /** Shows where a pointer that moved over the scene would press. Before a drawing. */
+  showPointer(): void {
+    if (this.press) return this.view.setPointer(this.press.aimedAt);
+    if (!this.over) return;
+    const spot = this.host.takesHand() ? this.view.spotUnder(this.over.x, this.over.y) : null;
+    this.view.setPointer(spot);
+    this.canvas.dataset.over = spot ? "surface" : "";
+    this.over = null;
   }
 
   private take(): boolean {
     if (this.held) return true;
-    const proxy = this.host.proxy();
-    if (!proxy || !this.host.takesHand()) return false;
-    this.target = proxy.at;
+    const felt = this.host.newest();
+    if (!felt || !this.host.takesHand()) return false;
+    this.target = felt.proxy;
     this.held = true;
-    this.host.moved(true, this.target);
+    this.host.moved(Grip.held, this.target);
     return true;
   }
 
@@ -96,55 +119,69 @@ export class HandInput {
   }
 
   private release(): void {
+    const felt = this.host.newest();
+    const away = this.press?.retreat(felt) ?? (felt && outOf(felt));
+    this.press = null;
+    this.pressed = null;
+    this.over = { x: -1, y: -1 };
     if (!this.held) return;
     this.held = false;
-    this.host.moved(false, this.target);
+    this.host.moved(away ? Grip.letGoTowards : Grip.letGo, away ?? this.target);
   }
 
   private moveTarget(pixels: { x: number; y: number }, into: number): void {
-    if (!this.held || this.keys.has("KeyC")) return;
+    if (!this.held) return;
     this.target = dragged(this.view.orbit, this.target, pixels, into, this.view.height);
-    const proxy = this.host.proxy();
-    if (proxy?.touching) this.target = within(this.target, proxy.at, DEEPEST);
-    this.host.moved(true, this.target);
+    const felt = this.host.newest();
+    if (felt?.touching) this.target = within(this.target, felt.proxy, DEEPEST);
+    this.host.moved(Grip.held, this.target);
   }
 
-  private press(event: PointerEvent): void {
+  private down(event: PointerEvent): void {
     this.canvas.dataset.pointer = "";
     this.canvas.focus({ preventScroll: true });
-    this.canvas.setPointerCapture(event.pointerId);
-    let gesture: Gesture = event.button === 0 && !event.shiftKey ? "hand" : "turn";
-    if (event.button === 1) gesture = "shift";
-    if (gesture === "hand" && (this.pointers.size > 0 || !this.take())) gesture = "turn";
-    if (this.pointers.size > 0) {
-      // A second finger: both look around now.
-      for (const pointer of this.pointers.values()) pointer.gesture = "turn";
-      if (!this.byKeys) this.release();
+    try {
+      this.canvas.setPointerCapture(event.pointerId);
+    } catch {
+      // It is up again already: the next that is heard of it says so.
     }
-    this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY, gesture });
+    const at = { x: event.clientX, y: event.clientY };
+    const spot = this.host.takesHand() ? this.view.spotUnder(at.x, at.y) : null;
+    const turns = event.shiftKey || event.ctrlKey;
+    const pressed = this.pointers.pressing !== null;
+    const may = { press: spot !== null && this.host.newest() !== null };
+    const gesture = this.pointers.down(event.pointerId, at, event.button, turns, may);
+    if (pressed && this.pointers.pressing === null) this.release();
+    this.canvas.dataset.gesture = gesture;
+    if (gesture !== "press" || !spot || !this.take()) return;
+    this.byKeys = false;
+    const ahead = (place: Vec3) => this.view.ahead(place);
+    this.press = new Press(this.target, spot, this.host.touch(), ahead);
+    this.pressed = { ...at, frames: this.view.frames };
+    this.start();
   }
 
   private move(event: PointerEvent): void {
-    const pointer = this.pointers.get(event.pointerId);
-    if (!pointer) return;
-    const x = event.clientX - pointer.x;
-    const y = event.clientY - pointer.y;
-    if (this.pointers.size === 2) this.pinch(event);
-    pointer.x = event.clientX;
-    pointer.y = event.clientY;
-    if (pointer.gesture === "hand") return this.moveTarget({ x, y }, 0);
-    if (pointer.gesture === "shift") return this.shift(x, y);
-    const share = 1 / this.pointers.size;
-    this.view.setOrbit(turned(this.view.orbit, -x * TURN * share, y * TURN * share));
+    const at = { x: event.clientX, y: event.clientY };
+    const pressed = this.pointers.pressing !== null;
+    const motion = this.pointers.move(event.pointerId, at, event.buttons);
+    const left = at.x < 0 || at.y < 0 || at.x >= innerWidth || at.y >= innerHeight;
+    if (pressed && (left || this.pointers.pressing === null)) return this.up(event.pointerId);
+    if (!motion) {
+      if (!this.pointers.any) this.over = at;
+    } else if (motion.gesture === "turn") {
+      const orbit = zoomed(this.view.orbit, motion.zoom);
+      this.view.setOrbit(turned(orbit, -motion.x * TURN, motion.y * TURN));
+    } else if (motion.gesture === "shift") {
+      this.shift(motion.x, motion.y);
+    }
   }
 
-  private pinch(event: PointerEvent): void {
-    const other = [...this.pointers].find(([id]) => id !== event.pointerId)?.[1];
-    const own = this.pointers.get(event.pointerId)!;
-    if (!other) return;
-    const before = Math.hypot(own.x - other.x, own.y - other.y);
-    const after = Math.hypot(event.clientX - other.x, event.clientY - other.y);
-    if (before > 10 && after > 10) this.view.setOrbit(zoomed(this.view.orbit, before / after));
+  private up(id: number): void {
+    const pressed = this.pointers.pressing !== null;
+    this.pointers.up(id);
+    if (pressed && this.pointers.pressing === null) this.release();
+    if (!this.pointers.any) delete this.canvas.dataset.gesture;
   }
 
   private shift(x: number, y: number): void {
@@ -155,21 +192,17 @@ export class HandInput {
     this.view.setOrbit({ ...orbit, target: add(orbit.target, by) });
   }
 
-  private lift(event: PointerEvent): void {
-    const pointer = this.pointers.get(event.pointerId);
-    this.pointers.delete(event.pointerId);
-    if (pointer?.gesture === "hand" && !this.byKeys) this.release();
-  }
-
   private wheel(event: WheelEvent): void {
     event.preventDefault();
     const pixels = event.deltaY * (event.deltaMode === 1 ? 33 : event.deltaMode === 2 ? 400 : 1);
-    if (this.held && !event.ctrlKey) {
-      const fine = event.altKey ? 0.2 : 1;
+    const fine = event.altKey ? FINE : 1;
+    if (!this.held || event.ctrlKey) {
+      this.view.setOrbit(zoomed(this.view.orbit, Math.exp(pixels * ZOOM)));
+    } else if (this.press) {
+      this.press.refine(-pixels * WHEEL_PRESS * fine);
+    } else {
       const depth = depthOf(this.view.orbit, this.target);
       this.moveTarget({ x: 0, y: 0 }, -pixels * WHEEL * fine * depth);
-    } else {
-      this.view.setOrbit(zoomed(this.view.orbit, Math.exp(pixels * ZOOM)));
     }
   }
 
@@ -182,41 +215,76 @@ export class HandInput {
       else this.takeByKeys();
       return;
     }
-    if (!/^(Arrow(Up|Down|Left|Right)|Key[EQC]|Equal|Minus|Numpad(Add|Subtract))$/.test(event.code))
+    if (!/^(Arrow(Up|Down|Left|Right)|Key[EQ]|Equal|Minus|Numpad(Add|Subtract))$/.test(event.code))
       return;
     event.preventDefault();
     this.keys.add(event.code);
     this.shiftHeld = event.shiftKey;
     this.altHeld = event.altKey;
-    if (this.keyTimer === 0) {
-      let last = performance.now();
-      this.keyTimer = window.setInterval(() => {
-        const now = performance.now();
-        this.keyStep((now - last) / 1000);
-        last = now;
-      }, KEY_TICK);
+    this.start();
+  }
+
+  // Steps while something presses or a key is down.
+  private start(): void {
+    if (this.timer !== 0) return;
+    let last = performance.now();
+    this.timer = window.setInterval(() => {
+      const now = performance.now();
+      const seconds = (now - last) / 1000;
+      last = now;
+      if (this.keys.size > 0) this.keyStep(seconds);
+      if (this.press) this.pressStep(this.press, seconds);
+      if (this.keys.size > 0 || this.press) return;
+      clearInterval(this.timer);
+      this.timer = 0;
+    }, STEP);
+  }
+
+  private pressStep(press: Press, seconds: number): void {
+    const at = this.pointers.pressing;
+    const last = this.pressed;
+    if (!at || !last) return;
+    const moved = at.x !== last.x || at.y !== last.y;
+    if (moved || this.view.frames !== last.frames) {
+      const spot = this.view.spotUnder(at.x, at.y);
+      if (!moved) {
+        if (spot) press.follow(spot);
+      } else if (spot) {
+        press.aim(spot);
+      } else {
+        this.slideOverHole(press, at);
+      }
+      this.pressed = { ...at, frames: this.view.frames };
     }
+    const target = press.step(seconds, this.host.newest());
+    if (target.every((x, i) => x === this.target[i])) return;
+    this.target = target;
+    this.host.moved(Grip.held, target);
+  }
+
+  private slideOverHole(press: Press, at: Place): void {
+    const { from, along } = this.view.rayUnder(at.x, at.y);
+    const place = onPlane(from, along, press.aimedAt);
+    if (!place) return;
+    press.aim({ ...press.aimedAt, at: within(place, press.aimedAt.at, FARTHEST_SLIDE) });
   }
 
   private keyStep(seconds: number): void {
-    if (this.keys.size === 0) {
-      clearInterval(this.keyTimer);
-      this.keyTimer = 0;
-      return;
-    }
     const pressed = (more: string, less: string) =>
       Number(this.keys.has(more)) - Number(this.keys.has(less));
     const x = pressed("ArrowRight", "ArrowLeft");
     const y = pressed("ArrowDown", "ArrowUp");
     const into = pressed("KeyE", "KeyQ");
     const nearer = pressed("Equal", "Minus") + pressed("NumpadAdd", "NumpadSubtract");
+    const fine = this.altHeld ? FINE : 1;
     let orbit = this.view.orbit;
     if (this.shiftHeld && (x !== 0 || y !== 0))
       orbit = turned(orbit, x * KEY_TURN * seconds, -y * KEY_TURN * seconds);
     if (nearer !== 0) orbit = zoomed(orbit, Math.exp(-nearer * seconds));
     if (orbit !== this.view.orbit) this.view.setOrbit(orbit);
+    if (this.press) return this.press.refine(into * KEY_PRESS * fine * seconds);
     if (this.shiftHeld || (x === 0 && y === 0 && into === 0) || !this.takeByKeys()) return;
-    const metres = KEY_SPEED * (this.altHeld ? 0.2 : 1) * seconds;
+    const metres = KEY_SPEED * fine * seconds;
     const depth = depthOf(this.view.orbit, this.target);
     const pixels = (metres * depth) / metresPerPixel(depth, this.view.height);
     this.moveTarget({ x: x * pixels, y: y * pixels }, into * metres * depth);

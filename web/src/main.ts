@@ -111,10 +111,19 @@ const connection = new Connection({
 });
 
 const hand = new HandInput(get<HTMLCanvasElement>("view"), view, {
-  proxy: () => (tick ? { at: tick.proxy, touching: tick.state !== 0 } : null),
+  newest: () =>
+    tick && {
+      ...tick,
+      touching: tick.state !== 0,
+      engaged: (tick.safety & DISENGAGED) === 0,
+    },
   takesHand: () => state?.device.takes_hand ?? false,
-  moved(held, target) {
-    connection.send(encodeHand(held, target));
+  touch: () => ({
+    r_c: state?.parameters.r_c ?? 0.005,
+    stiffness: state?.parameters.stiffness ?? 600,
+  }),
+  moved(grip, target) {
+    connection.send(encodeHand(grip, target));
     get("hint").classList.add("gone");
   },
 });
@@ -152,6 +161,7 @@ function loop(now: number): void {
     connection.send(encodeShown(camera, frame.number));
   }
   arrived.clear();
+  hand.showPointer();
   view.draw(now);
   showTick(now);
   plots.draw(now, 3000 * (view.thinning.frameTime ?? 0));
@@ -171,6 +181,7 @@ function record(): void {
 }
 function help(): void {
   const dialog = get<HTMLDialogElement>("help");
+  hand.letGo();
   if (!dialog.open) dialog.showModal();
 }
 

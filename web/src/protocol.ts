@@ -173,12 +173,16 @@ export function decode(buffer: ArrayBuffer): Message {
   }
 }
 
-/** Where the hand is to be [m, world]; not held: the hand is let go. */
-export function encodeHand(held: boolean, target: Vec3): ArrayBuffer {
+/** What the page does with the hand: 2 lets go, and it goes to the place without a force. */
+export const Grip = { letGo: 0, held: 1, letGoTowards: 2 } as const;
+export type Grip = (typeof Grip)[keyof typeof Grip];
+
+/** Where the hand is to be [m, world]. */
+export function encodeHand(grip: Grip, target: Vec3): ArrayBuffer {
   const buffer = new ArrayBuffer(HAND_BYTES);
   const view = new DataView(buffer);
   view.setUint8(0, Kind.hand);
-  view.setUint8(1, held ? 1 : 0);
+  view.setUint8(1, grip);
   target.forEach((value, i) => view.setFloat64(8 + 8 * i, value, true));
   return buffer;
 }

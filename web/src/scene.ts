@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is drawn: the clouds, the proxy at its true size, the hand, the normal's pin and the force's
-// arrow, as in the paper's Figs. 10 and 15.
+// arrow, as in the paper's Figs. 10 and 15; and what says where they are: the hand's shadow, the
+// spot under the pointer, the cameras, and a grid below all that is seen.
 
 import * as THREE from "three";
 import { CameraCloud } from "./cloud";
 import {
+  add,
   axes,
   depthOf,
   dot,
@@ -13,6 +15,8 @@ import {
   length,
   lookAt,
   metresPerPixel,
+  rayThrough,
+  scale,
   sub,
   turned,
   unit,
@@ -20,13 +24,16 @@ import {
   zoomed,
   type Orbit,
 } from "./camera_math";
+import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";
 import type { Frame, Rays, Ticks, Vec3 } from "./protocol";
+import type { Spot } from "./surface";
 import { Thinning } from "./thinning";
 
 const ARROW_PER_NEWTON = 0.055; // of the view's height
 const LONGEST_ARROW = 0.4; // likewise
 const PIN = 3.2; // contact radii
 const TRAIL = 360; // ticks messages
+const SPOT_SIZE = 9; // [px] of the ring under the pointer
 
 export interface Radii {
   r_c: number;
@@ -67,6 +74,8 @@ function isSoftwareRenderer(renderer: THREE.WebGLRenderer): boolean {
 export class SceneView {
   orbit: Orbit = lookAt([0.2, -0.4, 0.5], [0, 0, 0], [0, 0, 1]);
   readonly thinning = new Thinning();
+  /** How many frames have been shown. */
+  frames = 0;
   /** How many points the last drawing was given, for tests and the session's facts. */
   drawnPoints = 0;
   drawings = 0;
@@ -86,6 +95,11 @@ export class SceneView {
   private readonly link: THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly plumb: THREE.Line<THREE.BufferGeometry, THREE.LineDashedMaterial>;
   private readonly trail: THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly shadow: THREE.Mesh<THREE.CircleGeometry, THREE.MeshBasicMaterial>;
+  private readonly spot: THREE.Mesh<THREE.RingGeometry, THREE.MeshBasicMaterial>;
+  private readonly grid: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly frusta: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly axes = new THREE.AxesHelper(AXES_LENGTH);
   private readonly pin: THREE.Mesh<THREE.CylinderGeometry, THREE.MeshStandardMaterial>;
   private readonly arrow = new THREE.Group();
   private readonly shaft: THREE.Mesh;
@@ -96,6 +110,8 @@ export class SceneView {
   private palette!: Palette;
   private radii: Radii = { r_c: 0.005, r_1: 0.00499, r_3: 0.01 };
   private tick: Ticks | null = null;
+  private pointedAt: Spot | null = null;
+  private under: { spot: Spot; height: number } | null = null; // the hand, when it was drawn last
   private home: Orbit | null = null;
   private following = false;
   private stale = true;
@@ -130,6 +146,18 @@ export class SceneView {
       line(TRAIL),
       new THREE.LineBasicMaterial({ transparent: true, opacity: 0.7 }),
     );
+    const flat = { depthTest: false, transparent: true, side: THREE.DoubleSide } as const;
+    this.shadow = new THREE.Mesh(
+      new THREE.CircleGeometry(1, 40),
+      new THREE.MeshBasicMaterial({ ...flat, color: 0x000000, opacity: 0.45 }),
+    );
+    this.spot = new THREE.Mesh(
+      new THREE.RingGeometry(0.8, 1, 40),
+      new THREE.MeshBasicMaterial({ ...flat, opacity: 0.9 }),
+    );
+    const thin = (opacity: number) => new THREE.LineBasicMaterial({ transparent: true, opacity });
+    this.grid = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.16));
+    this.frusta = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.5));
     this.pin = new THREE.Mesh(
       new THREE.CylinderGeometry(0.09, 0.09, 1, 12).translate(0, 0.5, 0),
       new THREE.MeshStandardMaterial({ roughness: 0.6 }),
@@ -143,12 +171,18 @@ export class SceneView {
       this.arrowMaterial,
     );
     this.arrow.add(this.shaft, this.head);
-    for (const object of [this.link, this.plumb, this.trail]) object.frustumCulled = false;
+    const lines = [this.link, this.plumb, this.trail, this.grid, this.frusta];
+    for (const object of lines) object.frustumCulled = false;
+    this.shadow.renderOrder = 1;
+    this.spot.renderOrder = 1;
     this.hip.renderOrder = 3;
     this.link.renderOrder = 2;
     this.ring.renderOrder = 4;
 
-    const marks = [this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin];
+    const marks = [
+      ...[this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin],
+      ...[this.shadow, this.spot, this.grid, this.frusta, this.axes],
+    ];
     for (const mark of marks) mark.visible = false;
     this.arrow.visible = false;
     this.scene.add(
@@ -179,6 +213,9 @@ export class SceneView {
     this.plumb.material.color = colour(palette.text);
     this.trail.material.color = colour(palette.calm);
     this.pin.material.color = colour(palette.text);
+    this.spot.material.color = colour(palette.calm);
+    this.grid.material.color = colour(palette.text);
+    this.frusta.material.color = colour(palette.calm);
     this.arrowMaterial.color = colour(palette.force);
     this.arrowMaterial.emissive = colour(palette.force).multiplyScalar(0.35);
     for (const cloud of this.clouds.values()) cloud.setColours(this.cloudColours());
@@ -210,20 +247,17 @@ export class SceneView {
   }
 
   showFrame(frame: Frame): void {
-    let cloud = this.clouds.get(frame.camera);
-    if (!cloud) {
-      cloud = new CameraCloud();
-      cloud.setColours(this.cloudColours());
-      this.clouds.set(frame.camera, cloud);
-      this.scene.add(cloud.object);
-    }
+    const cloud = this.cloudOf(frame.camera);
     cloud.show(frame);
+    ++this.frames;
     if (!this.home) this.findHome(frame, cloud);
+    this.placeCameras();
     this.touch();
   }
 
+  /** Before the camera's first frame. */
   setRays(rays: Rays): void {
-    this.clouds.get(rays.camera)?.setRays(rays);
+    this.cloudOf(rays.camera).setRays(rays);
   }
 
   showTick(tick: Ticks): void {
@@ -234,11 +268,49 @@ export class SceneView {
     this.touch();
   }
 
-  /** How far the proxy is in front of what the cameras see [m], along the nearest sightline. */
+  /** How high the proxy is above what the cameras see [m]; null: nothing is seen behind it. */
   clearance(): number | null {
-    if (!this.tick) return null;
-    const hit = this.surfaceBehind(this.tick.proxy);
-    return hit === null ? null : length(sub(hit, this.tick.proxy)) - this.radii.r_c;
+    return this.under?.height ?? null;
+  }
+
+  /** The eye, and where it looks through a place of the window [px]. */
+  rayUnder(x: number, y: number): { from: Vec3; along: Vec3 } {
+    const box = this.canvas.getBoundingClientRect();
+    const along = rayThrough(this.orbit, x - box.left, y - box.top, box.width, box.height);
+    return { from: eye(this.orbit), along };
+  }
+
+  /** The surface under a place of the window [px]; null: there is none. */
+  spotUnder(x: number, y: number): Spot | null {
+    const box = this.canvas.getBoundingClientRect();
+    if (x < box.left || y < box.top || x >= box.right || y >= box.bottom) return null;
+    const { from, along } = this.rayUnder(x, y);
+    let best: { spot: Spot; distance: number } | null = null;
+    for (const { seen } of this.clouds.values()) {
+      const met = seen?.meet(from, along);
+      if (met && (!best || met.distance < best.distance)) best = met;
+    }
+    return best?.spot ?? null;
+  }
+
+  /** Where a pointer would press; null: nowhere. */
+  setPointer(spot: Spot | null): void {
+    if (spot === this.pointedAt) return;
+    this.pointedAt = spot;
+    this.touch();
+  }
+
+  /** How far a place is before what a camera sees, along the nearest sightline; see Ahead. */
+  ahead(place: Vec3): { distance: number; towards: Vec3 } | null {
+    let best: { distance: number; towards: Vec3 } | null = null;
+    for (const { seen } of this.clouds.values()) {
+      const hit = seen?.onSightline(place);
+      if (!hit) continue;
+      const towards = unit(sub(seen!.eye, hit));
+      const distance = dot(sub(place, hit), towards);
+      if (!best || Math.abs(distance) < Math.abs(best.distance)) best = { distance, towards };
+    }
+    return best;
   }
 
   depthRange(): [number, number] | null {
@@ -281,12 +353,23 @@ export class SceneView {
       cloud.prepare(this.thinning.stride, pixelsPerMetre, this.renderer.getPixelRatio());
       cloud.setLight(lampAt);
       if (this.tick) cloud.setProxy(this.tick.proxy, this.radii.r_1, this.radii.r_3);
-      this.drawnPoints += cloud.object.geometry.drawRange.count;
+      if (cloud.object.visible) this.drawnPoints += cloud.object.geometry.drawRange.count;
     }
     if (this.tick) this.placeMarks(this.tick);
     this.renderer.render(this.scene, this.camera);
     ++this.drawings;
     return true;
+  }
+
+  private cloudOf(camera: number): CameraCloud {
+    let cloud = this.clouds.get(camera);
+    if (!cloud) {
+      cloud = new CameraCloud();
+      cloud.setColours(this.cloudColours());
+      this.clouds.set(camera, cloud);
+      this.scene.add(cloud.object);
+    }
+    return cloud;
   }
 
   private cloudColours() {
@@ -323,13 +406,43 @@ export class SceneView {
     this.setOrbit({ ...this.orbit, target });
   }
 
-  private surfaceBehind(point: Vec3): Vec3 | null {
-    let best: Vec3 | null = null;
+  // The surface that the hand is over, and how high it is above it [m].
+  private underHand(): { spot: Spot; height: number } | null {
+    if (!this.tick) return null;
+    const { proxy } = this.tick;
+    const seen = this.ahead(proxy);
+    if (!seen) return null;
+    let best: Spot | null = null;
     for (const cloud of this.clouds.values()) {
-      const hit = cloud.onSightline(point);
-      if (hit && (!best || length(sub(hit, point)) < length(sub(best, point)))) best = hit;
+      // From before the surface, whether the proxy is before it or a little behind.
+      const before = add(proxy, scale(seen.towards, Math.max(0, 0.02 - seen.distance)));
+      const met = cloud.seen?.meet(before, scale(seen.towards, -1));
+      if (met && (!best || length(sub(met.spot.at, proxy)) < length(sub(best.at, proxy))))
+        best = met.spot;
     }
-    return best;
+    return best && { spot: best, height: dot(sub(proxy, best.at), best.normal) };
+  }
+
+  // Once: from what is seen at first. A moving camera's frustum moves with it.
+  private placeCameras(): void {
+    const frames = [...this.clouds.values()].flatMap(({ frame }) => frame ?? []);
+    const put = (lines: typeof this.grid, points: readonly number[]) => {
+      const position = lines.geometry.getAttribute("position");
+      if (position?.array.length === points.length)
+        (position.array as Float32Array).set(points);
+      else
+        lines.geometry.setAttribute(
+          "position",
+          new THREE.BufferAttribute(Float32Array.from(points), 3),
+        );
+      lines.geometry.getAttribute("position").needsUpdate = true;
+      lines.visible = points.length > 0;
+    };
+    put(this.frusta, frames.flatMap(cameraLines));
+    if (this.grid.visible || !this.home) return;
+    const floor = floorUnder(frames[0]!, this.orbit.up);
+    put(this.grid, floor ? gridLines(floor, this.orbit.up) : []);
+    this.axes.visible = true;
   }
 
   private placeMarks(tick: Ticks): void {
@@ -373,14 +486,30 @@ export class SceneView {
       this.stand(this.arrow, foot, direction, 1, 1);
     }
 
-    const hit = touching ? null : this.surfaceBehind(tick.proxy);
-    this.plumb.visible = hit !== null && dot(sub(hit, tick.proxy), sub(hit, tick.proxy)) < 0.25;
-    if (hit && this.plumb.visible) {
-      this.setLine(this.plumb, [...tick.proxy, ...hit]);
+    // The shadow on what the hand is over, and the line down to it.
+    const under = (this.under = this.underHand());
+    const near = under !== null && Math.abs(under.height) < 0.5;
+    this.shadow.visible = near && under.height > 0.5 * r_c;
+    this.plumb.visible = near && !touching;
+    if (near) {
+      this.lay(this.shadow, under.spot, Math.max(r_c, 5 * size));
+      this.setLine(this.plumb, [...tick.proxy, ...under.spot.at]);
       this.plumb.computeLineDistances();
+    }
+    this.spot.visible = this.pointedAt !== null;
+    if (this.pointedAt) {
+      const pixel = metresPerPixel(depthOf(this.orbit, this.pointedAt.at), this.height);
+      this.lay(this.spot, this.pointedAt, SPOT_SIZE * pixel);
     }
     this.trail.visible = this.trailPoints.length > 3;
     this.setLine(this.trail, this.trailPoints);
+  }
+
+  // Lays a flat mark on a surface.
+  private lay(mark: THREE.Object3D, { at, normal }: Spot, size: number): void {
+    mark.position.set(...at);
+    mark.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), new THREE.Vector3(...normal));
+    mark.scale.setScalar(size);
   }
 
   // Puts an upright mark's foot at a place and its top along a direction.

@@ -4,6 +4,7 @@ import {
   decode,
   encodeHand,
   encodeShown,
+  Grip,
   type Frame,
   type Rays,
   type Ticks,
@@ -115,12 +116,13 @@ test("what is not known is refused", () => {
   expect(() => decode(new Uint8Array([99]).buffer)).toThrow("kind 99");
 });
 
-test("a hand is 32 bytes: held and where", () => {
-  const view = new DataView(encodeHand(true, [0.1, -0.2, 0.3]));
+test("a hand is 32 bytes: grip and where", () => {
+  const view = new DataView(encodeHand(Grip.held, [0.1, -0.2, 0.3]));
   expect(view.byteLength).toBe(32);
   expect([view.getUint8(0), view.getUint8(1)]).toEqual([16, 1]);
   expect([8, 16, 24].map((at) => view.getFloat64(at, true))).toEqual([0.1, -0.2, 0.3]);
-  expect(new DataView(encodeHand(false, [0, 0, 0])).getUint8(1)).toBe(0);
+  expect(new DataView(encodeHand(Grip.letGo, [0, 0, 0])).getUint8(1)).toBe(0);
+  expect(new DataView(encodeHand(Grip.letGoTowards, [0, 0, 0])).getUint8(1)).toBe(2);
 });
 
 test("a frame shown is 8 bytes: camera and number", () => {

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the pointers on the scene do: one on the surface presses; beside it, with the right button
+// or Shift, or as two fingers, they turn the view; the middle button shifts it.
+
+export type Gesture = "press" | "turn" | "shift";
+
+export interface Place {
+  /** [px] */
+  x: number;
+  y: number;
+}
+
+/** How a pointer moved. */
+export interface Motion {
+  gesture: Gesture;
+  /** [px], of two fingers half */
+  x: number;
+  y: number;
+  /** of two fingers: their distance before / after */
+  zoom: number;
+}
+
+const CLOSE = 10; // [px] two fingers this close do not pinch
+
+export class Pointers {
+  private readonly pointers = new Map<number, { at: Place; gesture: Gesture }>();
+
+  /** A pointer goes down. @param may  press: it is on a surface, and the hand can be had */
+  down(id: number, at: Place, button: number, shift: boolean, may: { press: boolean }): Gesture {
+    let gesture: Gesture = "turn";
+    if (button === 1) gesture = "shift";
+    else if (button === 0 && !shift && may.press && this.pointers.size === 0) gesture = "press";
+    // A second finger: all look around now, also when one is lifted again.
+    for (const pointer of this.pointers.values()) pointer.gesture = "turn";
+    this.pointers.set(id, { at: { ...at }, gesture });
+    return gesture;
+  }
+
+  /** @param buttons  that are down; none: its end was not told */
+  move(id: number, at: Place, buttons: number): Motion | null {
+    const pointer = this.pointers.get(id);
+    if (!pointer) return null;
+    if (buttons === 0) {
+      this.pointers.delete(id);
+      return null;
+    }
+    const share = pointer.gesture === "turn" ? 1 / this.pointers.size : 1;
+    const motion: Motion = {
+      gesture: pointer.gesture,
+      x: share * (at.x - pointer.at.x),
+      y: share * (at.y - pointer.at.y),
+      zoom: 1,
+    };
+    const other = [...this.pointers].find(([key]) => key !== id)?.[1];
+    if (other && this.pointers.size === 2) {
+      const before = Math.hypot(pointer.at.x - other.at.x, pointer.at.y - other.at.y);
+      const after = Math.hypot(at.x - other.at.x, at.y - other.at.y);
+      if (before > CLOSE && after > CLOSE) motion.zoom = before / after;
+    }
+    pointer.at = { ...at };
+    return motion;
+  }
+
+  up(id: number): void {
+    this.pointers.delete(id);
+  }
+
+  clear(): void {
+    this.pointers.clear();
+  }
+
+  /** Where the pointer is that presses; null: none does. */
+  get pressing(): Place | null {
+    for (const { at, gesture } of this.pointers.values()) if (gesture === "press") return at;
+    return null;
+  }
+
+  get any(): boolean {
+    return this.pointers.size > 0;
+  }
+}

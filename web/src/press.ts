@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+// The way of a hand that presses where somebody points: over to the spot, down to it, into it until
+// it pushes with some force, and along the surface when the spot moves. Never a jump.
+
+import { add, clamp, dot, length, scale, sub, unit } from "./camera_math";
+import type { Vec3 } from "./protocol";
+import type { Spot } from "./surface";
+
+/** [m] above the surface: where a hand waits before it presses, and after. */
+export const HOVER = 0.025;
+/** [m/s] through the air; the mouse device itself is held to 1 m/s. */
+export const TRAVEL = 0.6;
+/** [m/s] along a surface that is touched. */
+export const SLIDE = 0.3;
+
+const PRESS_FORCE = 2; // [N] that a press settles at: clear, and within a small device's 3.3 N
+const DEPTHS = [0.0015, 0.015] as const; // [m] least and most that it takes for that
+const DEEPEST = 0.03; // [m] that the hand looks for a surface behind where it was seen
+const GAIN = 5; // [1/s] of the depth that is missing; ticks are known 50 ms late
+const PUSH = 0.03; // [m/s] fastest into what is touched
+const PULL = 0.1; // [m/s] fastest out of it: what comes towards the hand pushes it away
+const AIR_GAIN = 8; // [1/s] of the height
+const DESCENT = 0.15; // [m/s] fastest towards the surface
+const SEEK = 0.015; // [m/s] on, where the surface should have been met
+const JUMP = 0.08; // [m] a spot that is farther from the last is flown to, not slid to
+const WAIT = -0.001; // [m] depth at which a hand waits to be engaged: it is asked to feel nothing
+const SLACK = 0.02; // [m] by which the hand may be ahead of its proxy, besides the depth
+const CLEAR = 0.015; // [m] before all that is seen, on a flight
+const SETTLE = 0.2; // of what a new frame says of the spot of a pointer that rests
+const LONGEST_STEP = 0.05; // [s] a page that was busy makes no larger step
+
+/** What the newest tick says. */
+export interface Felt {
+  touching: boolean;
+  /** the safety chain lets forces through, or begins to */
+  engaged: boolean;
+  hip: Vec3;
+  proxy: Vec3;
+  /** zero: none */
+  normal: Vec3;
+}
+
+/**
+ * How far a place is before the surface along a camera's sightline [m], negative behind it, and the
+ * unit vector to the camera; null where nothing is seen.
+ */
+export type Ahead = (place: Vec3) => { distance: number; towards: Vec3 } | null;
+
+/** `from`, moved by at most `most` metres towards `to`. */
+export function approach(from: Vec3, to: Vec3, most: number): Vec3 {
+  const way = sub(to, from);
+  const distance = length(way);
+  return distance <= most ? to : add(from, scale(way, most / distance));
+}
+
+/** Where a hand hovers over a spot. */
+export function above(spot: Spot): Vec3 {
+  return add(spot.at, scale(spot.normal, HOVER));
+}
+
+/**
+ * A way through seen free space: straight if nothing is in between, else lifted towards the camera
+ * over what is. What a camera sees past is free.
+ */
+export function flight(from: Vec3, to: Vec3, ahead: Ahead): Vec3[] {
+  const samples = 24;
+  let lift = 0; // [m]
+  const towards = ahead(to)?.towards ?? ahead(from)?.towards ?? null;
+  if (!towards) return [to];
+  const lifted = (place: Vec3): Vec3 => add(place, scale(towards, lift));
+  // Sightlines are not parallel: what is lifted once may need a little more.
+  for (let round = 0; round < 3; ++round) {
+    let missing = 0;
+    for (let i = 0; i <= samples; ++i) {
+      const share = i / samples;
+      const seen = ahead(lifted(add(scale(from, 1 - share), scale(to, share))));
+      if (seen) missing = Math.max(missing, CLEAR - seen.distance);
+    }
+    if (missing < 1e-6) break;
+    lift += missing;
+  }
+  return lift > 0 ? [lifted(from), lifted(to), to] : [to];
+}
+
+export class Press {
+  private place: Vec3;
+  private way: Vec3[];
+  private depth = -HOVER; // [m] of the hand below the spot's plane
+  private wanted: number; // [m] depth below the surface that is felt; negative: above it
+
+  /**
+   * @param start  [m] where the hand is
+   * @param spot   where it is to press
+   * @param hand   its contact radius [m], and the stiffness of the coupling [N/m]
+   */
+  constructor(
+    start: Vec3,
+    private spot: Spot,
+    private readonly hand: { r_c: number; stiffness: number },
+    private readonly ahead: Ahead,
+  ) {
+    this.place = start;
+    this.way = flight(start, above(spot), ahead);
+    this.wanted = clamp(PRESS_FORCE / Math.max(hand.stiffness, 1), ...DEPTHS);
+  }
+
+  get travelling(): boolean {
+    return this.way.length > 0;
+  }
+
+  get aimedAt(): Spot {
+    return this.spot;
+  }
+
+  /** The pointer moved: slides there, or flies where it is far. */
+  aim(spot: Spot): void {
+    const away = length(sub(spot.at, this.spot.at));
+    this.spot = spot;
+    if (!this.travelling && away < JUMP) return;
+    this.depth = -HOVER;
+    this.way = flight(this.place, above(spot), this.ahead);
+  }
+
+  /** The pointer rests, and a new frame says where its spot is: follows it, calmly. */
+  follow(spot: Spot): void {
+    const away = sub(spot.at, this.spot.at);
+    if (length(away) > JUMP) return; // something has come between
+    this.spot = {
+      at: add(this.spot.at, scale(away, SETTLE)),
+      normal: unit(add(scale(this.spot.normal, 1 - SETTLE), scale(spot.normal, SETTLE))),
+    };
+  }
+
+  /** Presses deeper by so much [m], or less deep. */
+  refine(metres: number): void {
+    this.wanted = clamp(this.wanted + metres, -HOVER, DEEPEST);
+  }
+
+  /** Where the hand is to be, `seconds` after the last call. */
+  step(seconds: number, felt: Felt | null): Vec3 {
+    const dt = clamp(seconds, 0, LONGEST_STEP);
+    if (this.travelling) {
+      let left = TRAVEL * dt;
+      while (left > 0 && this.way.length > 0) {
+        const next = approach(this.place, this.way[0]!, left);
+        left -= length(sub(next, this.place));
+        this.place = next;
+        if (length(sub(next, this.way[0]!)) > 1e-9) break;
+        this.way.shift();
+      }
+      return this.place;
+    }
+    this.depth = clamp(this.depth + this.rate(felt) * dt, -HOVER, DEEPEST);
+    let goal = sub(this.spot.at, scale(this.spot.normal, this.depth));
+    if (felt?.touching) goal = this.nearProxy(goal, felt.proxy);
+    this.place = approach(this.place, goal, (felt?.touching ? SLIDE : TRAVEL) * dt);
+    return this.place;
+  }
+
+  /** Where the hand goes when it is let go: out of what it touches, or above the spot. */
+  retreat(felt: Felt | null): Vec3 {
+    return (!this.travelling && felt && outOf(felt)) || above(this.spot);
+  }
+
+  // A hand that slides does not run away from its proxy; how deep it is, is not touched by that.
+  private nearProxy(goal: Vec3, proxy: Vec3): Vec3 {
+    const away = sub(goal, proxy);
+    const out = dot(away, this.spot.normal);
+    const aside = sub(away, scale(this.spot.normal, out));
+    const reach = this.hand.r_c + Math.max(this.wanted, 0) + SLACK;
+    const height = scale(this.spot.normal, clamp(out, -reach, reach));
+    return add(add(proxy, height), approach([0, 0, 0], aside, SLACK));
+  }
+
+  // [m/s] into the surface.
+  private rate(felt: Felt | null): number {
+    if (felt?.touching) {
+      // The surface that is felt is one contact radius below the proxy.
+      const feltDepth = length(sub(felt.proxy, felt.hip)) - this.hand.r_c;
+      // A hand that is disengaged in a surface, as after silence, would stay so.
+      const wanted = felt.engaged ? this.wanted : Math.min(this.wanted, WAIT);
+      return clamp(GAIN * (wanted - feltDepth), -PULL, PUSH);
+    }
+    const rate = clamp(AIR_GAIN * (this.wanted - this.depth), -PULL, DESCENT);
+    return this.wanted > 0 ? Math.max(rate, SEEK) : rate;
+  }
+}
+
+/** Where a hand hovers that leaves what it touches; null: it touches nothing. */
+export function outOf(felt: Felt): Vec3 | null {
+  if (!felt.touching) return null;
+  const out = length(felt.normal) > 0.5 ? felt.normal : unit(sub(felt.proxy, felt.hip));
+  return add(felt.proxy, scale(out, HOVER));
+}

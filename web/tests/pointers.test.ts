@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+import { expect, test } from "vitest";
+import { Pointers } from "../src/pointers";
+
+const SURFACE = { press: true };
+const BESIDE = { press: false };
+const at = (x: number, y = 0) => ({ x, y });
+
+test("the left button presses on a surface and turns the view beside it", () => {
+  const pointers = new Pointers();
+  expect(pointers.down(1, at(5), 0, false, SURFACE)).toBe("press");
+  expect(pointers.pressing).toEqual(at(5));
+  pointers.up(1);
+  expect(pointers.pressing).toBeNull();
+  expect(pointers.down(1, at(5), 0, false, BESIDE)).toBe("turn");
+  pointers.up(1);
+  expect(pointers.down(1, at(5), 2, false, SURFACE)).toBe("turn");
+  pointers.up(1);
+  expect(pointers.down(1, at(5), 0, true, SURFACE)).toBe("turn");
+  pointers.up(1);
+  expect(pointers.down(1, at(5), 1, false, SURFACE)).toBe("shift");
+});
+
+test("a second finger ends the press, and one that stays turns the view", () => {
+  const pointers = new Pointers();
+  pointers.down(1, at(0), 0, false, SURFACE);
+  expect(pointers.down(2, at(100), 0, false, SURFACE)).toBe("turn");
+  expect(pointers.pressing).toBeNull();
+  expect(pointers.move(2, at(200), 1)).toEqual({ gesture: "turn", x: 50, y: 0, zoom: 0.5 });
+  pointers.up(2);
+  expect(pointers.pressing).toBeNull();
+  expect(pointers.move(1, at(8, 4), 1)).toEqual({ gesture: "turn", x: 8, y: 4, zoom: 1 });
+  pointers.up(1);
+  expect(pointers.any).toBe(false);
+});
+
+test("a pointer without a button that is down has gone, though nobody said so", () => {
+  const pointers = new Pointers();
+  pointers.down(1, at(0), 0, false, SURFACE);
+  expect(pointers.move(1, at(1), 0)).toBeNull();
+  expect(pointers.pressing).toBeNull();
+  expect(pointers.any).toBe(false);
+});
+
+test("a press is where its pointer is", () => {
+  const pointers = new Pointers();
+  pointers.down(1, at(0), 0, false, SURFACE);
+  pointers.move(1, at(7, 3), 1);
+  expect(pointers.pressing).toEqual(at(7, 3));
+  expect(pointers.move(9, at(1, 1), 1)).toBeNull();
+  pointers.clear();
+  expect(pointers.pressing).toBeNull();
+});

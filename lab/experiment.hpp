@@ -25,9 +25,9 @@ struct ExperimentOptions {
   std::string recording;  ///< a source's URI where an experiment takes one; empty: a simulation
   Parameters parameters;  ///< Table 2 unless set
 
-  // The bench `pop` alone.
-  std::optional<int> cases;           ///< how many of each family
-  std::vector<std::string> families;  ///< of pop, or scenes of fidelity; empty: all
+  // The benches `pop` and `field`.
+  std::optional<int> cases;           ///< how many of each family or class
+  std::vector<std::string> families;  ///< of pop, classes of field, scenes of fidelity; empty: all
   std::vector<std::string> fixed;     ///< KEY=VALUE: not drawn by chance
   std::string case_text;              ///< one case, as a run printed it, and nothing else
 };

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "palpate/methods/methods.hpp"
+#include "palpate/sources/scene.hpp"
 
 namespace palpate::lab {
 

@@ -8,7 +8,10 @@
 #include <vector>
 
 #include "palpate/core/method.hpp"
-#include "palpate/sources/scene.hpp"
+
+namespace palpate {
+class Scene;
+}
 
 namespace palpate::lab {
 

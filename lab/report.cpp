@@ -243,11 +243,10 @@ fs::path write_report(const std::vector<Result>& results, const fs::path& folder
   write(folder / "report.html", page);
   write(folder / "reproduction.md", notes + figures);
   if (!bench.empty())
-    write(
-        folder / "bench.md",
-        "# The bench, as run\n\nMade by `palpate eval`; not written by hand. [pop.md](pop.md) and "
-        "[feel.md](feel.md) say what each is, and the rules.\n\n" +
-            bench);
+    write(folder / "bench.md",
+          "# The bench, as run\n\nMade by `palpate eval`; not written by hand. [pop.md](pop.md), "
+          "[field.md](field.md) and [feel.md](feel.md) say what each is, and the rules.\n\n" +
+              bench);
   return folder / "report.html";
 }
 

@@ -166,15 +166,19 @@ Verb add_eval(CLI::App& program) {
       ->allow_extra_args(false);
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
   command->add_option("--cases", options->cases,
-                      "pop: how many of each family (50); tradeoff: repeats; feel: free hands");
+                      "pop, field: how many of each family or class (50, 5); tradeoff: repeats; "
+                      "feel: free hands");
   command
       ->add_option("--families", options->families,
-                   "pop, fidelity, feel: which, separated by commas")
+                   "pop, field, fidelity, feel: which, separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--fix", options->fixed, "pop: KEY=VALUE instead of a value drawn by chance")
+  command
+      ->add_option("--fix", options->fixed,
+                   "pop, field: KEY=VALUE instead of a value drawn by chance")
       ->allow_extra_args(false);
-  command->add_option("--case", options->case_text, "pop: one case as a run printed it, pop:...");
+  command->add_option("--case", options->case_text,
+                      "pop, field: one case as a run printed it, pop:... or field:...");
   command->add_option("--noise", options->noise, "white (default) or correlated");
   command->add_option(
       "--recording", options->recording,

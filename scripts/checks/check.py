@@ -43,6 +43,11 @@ CORE_FORBIDS = {
     "stop_token", "thread",
 }
 
+# The field set judges what was made with the lab's own scenes and sensors, so it must not reach
+# their code, not even by a header of another room (docs/field.md).
+FIELD = re.compile(r"^lab/(field/.*|experiments/field)\.[ch]pp$")
+NOT_FIELD = re.compile(r"^(palpate/sources/|lab/experiments/(?!field\.)|lab/grid_cloud\.)")
+
 IGNORED = re.compile(r"\.git$|\.cache$|build|out$|node_modules$|__pycache__$|dist$")
 CODE = re.compile(r"\.(cpp|hpp|py|ts|js|cmake|in|gp|sh)$|CMakeLists\.txt$"
                   r"|^scripts/(\w+/)*\w+$|^\.ci/")
@@ -106,6 +111,32 @@ def check_rooms(root):
             for other in known:
                 if other != room and other not in KNOWS[room]:
                     faults.append(f"{path}:{number}: {room} must not know {other}")
+    return faults + check_field(root)
+
+
+def includes(root, path):
+    """The project's headers that a file includes, with their lines."""
+    for number, line in lines(root, path):
+        include = re.match(r'\s*#\s*include\s*[<"]([^>"]+)[>"]', line)
+        if include and room_of(include.group(1)):
+            yield number, include.group(1)
+
+
+def check_field(root):
+    """What the field set includes, directly or by other headers, of the code that it judges."""
+    faults = []
+    for path in files(root, FIELD):
+        for number, first in includes(root, path):
+            reached, waiting = set(), [first]
+            while waiting:
+                header = waiting.pop()
+                if header in reached:
+                    continue
+                reached.add(header)
+                if (root / header).exists():
+                    waiting += [other for _, other in includes(root, header)]
+            faults += [f"{path}:{number}: the field set must not reach {header}"
+                       for header in sorted(reached) if NOT_FIELD.match(header)]
     return faults
 
 

@@ -64,6 +64,21 @@ class Rooms(Tree):
                          ["palpate/core/c.cpp:2: core includes thread",
                           "palpate/core/d.cpp:2: core includes nlohmann/json.hpp"])
 
+    def test_the_field_set_stays_apart_from_what_it_judges(self):
+        self.include("lab/field/a.cpp", '"palpate/cloud/frame.hpp"')
+        self.include("lab/field/b.cpp", '"palpate/sources/shapes.hpp"')
+        self.include("lab/field/c.cpp", '"lab/method.hpp"')
+        self.include("lab/method.hpp", '"palpate/sources/scene.hpp"')
+        self.include("lab/experiments/field.cpp", '"lab/experiments/pop_cases.hpp"')
+        self.include("lab/experiments/pop.cpp", '"palpate/sources/scene.hpp"')
+        self.assertEqual(check.check_rooms(self.root),
+                         ["lab/experiments/field.cpp:2: the field set must not reach"
+                          " lab/experiments/pop_cases.hpp",
+                          "lab/field/b.cpp:2: the field set must not reach"
+                          " palpate/sources/shapes.hpp",
+                          "lab/field/c.cpp:2: the field set must not reach"
+                          " palpate/sources/scene.hpp"])
+
     def test_a_room_nobody_planned_is_found(self):
         self.include("palpate/kitchen/a.cpp", "<cmath>")
         self.assertEqual(len(check.check_rooms(self.root)), 1)

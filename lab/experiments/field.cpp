@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/experiments/field.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "lab/field/field_cases.hpp"
+#include "lab/field/field_judge.hpp"
+#include "lab/method.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr int usual_cases = 5;  // of each class
+
+std::string rows_of(const std::vector<std::string>& names, const field::FieldCase& c, int number,
+                    const Parameters& parameters) {
+  field::Stage stage = field::make_stage(c);
+  std::vector<std::unique_ptr<Method>> methods;
+  std::vector<Method*> played;
+  for (const std::string& name : names) {
+    methods.push_back(make_method(name, {parameters, field::truth_of(stage.scene)}));
+    played.push_back(methods.back().get());
+  }
+  const field::Outcome outcome = field::play_field(stage, played, parameters);
+  std::string rows;
+  for (std::size_t m = 0; m < names.size(); ++m) {
+    const field::Verdict verdict =
+        outcome.verdicts.empty() ? field::Verdict{} : outcome.verdicts[m];
+    rows += Row()
+                .add(names[m])
+                .add(c.name)
+                .add(field::to_string(stage.sensor->setup().kind))
+                .add(number)
+                .add(outcome.unknown.empty() ? "-" : outcome.unknown)
+                .add(verdict.lost)
+                .add(verdict.right())
+                .add(verdict.behind)
+                .add(verdict.worst_ghost)
+                .add(verdict.numb)
+                .add(verdict.wrong_side)
+                .add(verdict.worst_step)
+                .add(c.text())
+                .add(stage.values)
+                .done();
+  }
+  return rows;
+}
+
+std::vector<Cell> field_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  const std::vector<std::string> names = methods_of(experiment, options);
+  std::vector<Cell> cells;
+  const auto add = [&](field::FieldCase c, int number) {
+    for (const std::string& value : options.fixed) c.fixed += (c.fixed.empty() ? "" : "&") + value;
+    cells.emplace_back(
+        [=, parameters = options.parameters] { return rows_of(names, c, number, parameters); });
+  };
+  if (!options.case_text.empty()) {
+    add(field::parse_field_case(options.case_text), 0);
+    return cells;
+  }
+  std::vector<field::FieldClass> classes;
+  for (const std::string& name : options.families) classes.push_back(field::find_field_class(name));
+  if (classes.empty()) classes.assign(field::field_classes().begin(), field::field_classes().end());
+  for (const field::FieldClass& of : classes) {
+    for (int i = 0; i < options.cases.value_or(usual_cases); ++i)
+      add(field::draw_field_case(of, options.seed, static_cast<std::uint64_t>(i)), i);
+  }
+  return cells;
+}
+
+std::vector<Claim> no_claims(const Table& /*table*/) {
+  return {};
+}
+
+struct Sum {
+  int known = 0;
+  int unknown = 0;
+  int held = 0;
+  int right = 0;
+  int ghost = 0;
+  int numb = 0;
+  int wrong = 0;
+  double worst_ghost = 0.0;
+  std::vector<double> steps;  // [N] of the cases that were held
+  std::string first_not_right;
+};
+
+// Rounded down: 100.0 means all.
+std::string percent(double share) {
+  return fmt::format("{:.1f}", std::floor(1e3 * share + 1e-9) / 10.0);
+}
+
+std::string median_of(std::vector<double> values) {
+  if (values.empty()) return "-";
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return fmt::format("{:.2g}", *middle);
+}
+
+// In the order of the table: what appears first comes first.
+using Sums = std::vector<std::pair<std::string, std::map<std::string, Sum>>>;
+
+Sum& sum_of(Sums& sums, const std::string& name, const std::string& method) {
+  auto found =
+      std::find_if(sums.begin(), sums.end(), [&](const auto& one) { return one.first == name; });
+  if (found != sums.end()) return found->second[method];
+  return sums.emplace_back(name, std::map<std::string, Sum>()).second[method];
+}
+
+void add_row(const Table& table, std::size_t row, Sum& sum) {
+  if (table.text(row, "unknown") != "-") {
+    ++sum.unknown;
+    return;
+  }
+  const bool lost = table.number(row, "lost") != 0.0;
+  const bool right = table.number(row, "right") != 0.0;
+  ++sum.known;
+  sum.held += lost ? 0 : 1;
+  sum.right += right ? 1 : 0;
+  sum.ghost += table.number(row, "ghost_n") > 0.0 ? 1 : 0;
+  sum.numb += table.number(row, "numb") != 0.0 ? 1 : 0;
+  sum.wrong += table.number(row, "wrong_side") != 0.0 ? 1 : 0;
+  sum.worst_ghost = std::max(sum.worst_ghost, table.number(row, "ghost_n"));
+  if (!lost) sum.steps.push_back(table.number(row, "worst_step_n"));
+  if (!right && sum.first_not_right.empty()) sum.first_not_right = table.text(row, "text");
+}
+
+std::vector<std::string> line_of(const std::string& name, std::map<std::string, Sum>& sums,
+                                 const std::vector<std::string>& methods) {
+  const Sum& any = sums[methods.front()];
+  std::vector<std::string> line = {name, std::to_string(any.known), std::to_string(any.unknown)};
+  for (const std::string& method : methods) {
+    const Sum& sum = sums[method];
+    const double known = sum.known;
+    line.push_back(sum.known == 0 ? "-" : percent(sum.held / known));
+    line.push_back(sum.known == 0 ? "-" : percent(sum.right / known));
+    line.push_back(median_of(sum.steps));
+  }
+  return line;
+}
+
+Scores field_scores(const Table& table) {
+  std::vector<std::string> methods;
+  Sums classes;
+  Sums sensors;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string& method = table.text(row, "method");
+    if (std::find(methods.begin(), methods.end(), method) == methods.end())
+      methods.push_back(method);
+    add_row(table, row, sum_of(classes, table.text(row, "class"), method));
+    add_row(table, row, sum_of(sensors, table.text(row, "sensor"), method));
+  }
+  std::sort(sensors.begin(), sensors.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  Scores scores;
+  scores.columns = {"class", "cases", "unknown"};
+  for (const std::string& method : methods) {
+    scores.columns.push_back(method + " held [%]");
+    scores.columns.push_back("right [%]");
+    scores.columns.push_back("step [N]");
+  }
+  for (auto& [name, sums] : classes) scores.rows.push_back(line_of(name, sums, methods));
+  for (auto& [name, sums] : sensors)
+    scores.rows.push_back(line_of("all before " + name, sums, methods));
+  scores.note =
+      "The score is the mean over the classes of the shares, of the cases that can be known; step "
+      "is the median of the cases' largest change of force in a tick. docs/field.md has the rules.";
+  std::vector<std::string> last = {"score", "", ""};
+  for (const std::string& method : methods) {
+    double held = 0.0;
+    double right = 0.0;
+    int count = 0;
+    for (auto& [name, sums] : classes) {
+      const Sum& sum = sums[method];
+      if (sum.known == 0) continue;
+      held += static_cast<double>(sum.held) / sum.known;
+      right += static_cast<double>(sum.right) / sum.known;
+      ++count;
+      if (sum.right == sum.known) continue;
+      scores.note += fmt::format(
+          "\n{}, {}: of {} cases {} lost, {} with a force in free space (up to {:.2f} N), {} numb, "
+          "{} with a force on the wrong side; palpate eval field --methods {} --case '{}'",
+          method, name, sum.known, sum.known - sum.held, sum.ghost, sum.worst_ghost, sum.numb,
+          sum.wrong, method, sum.first_not_right);
+    }
+    last.push_back(count == 0 ? "-" : percent(held / count));
+    last.push_back(count == 0 ? "-" : percent(right / count));
+    last.emplace_back("");
+  }
+  scores.rows.push_back(std::move(last));
+  return scores;
+}
+
+constexpr std::string_view field_plot = R"gp(
+set ylabel "right [%]"
+set yrange [0:105]
+set xtics rotate by -40 noenhanced
+set bmargin 7
+set key outside right top
+right(m) = sprintf("< awk -F, '$1==\"%s\" && $5==\"-\" {if (!($2 in n)) order[++k]=$2; n[$2]+=1; r[$2]+=$7} END {for (i=1;i<=k;i++) print order[i], 100*r[order[i]]/n[order[i]]}' %s", m, csv)
+set datafile separator " "
+plot for [m in methods] right(m) using 0:2:xtic(1) with points pt 7 ps 1.2 title m
+)gp";
+
+}  // namespace
+
+Experiment field_experiment() {
+  return {"field",
+          "the field set: scenes, sensors and hands that share no code with those of pop and feel",
+          "method,class,sensor,number,unknown,lost,right,behind_s,ghost_n,numb,wrong_side,"
+          "worst_step_n,text,values",
+          {"paper", "sight"},
+          false,
+          field_cells,
+          field_plot,
+          no_claims,
+          field_scores};
+}
+
+}  // namespace palpate::lab

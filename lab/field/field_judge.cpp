@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/field/field_judge.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "lab/method.hpp"
+
+namespace palpate::lab::field {
+namespace {
+
+constexpr double tick_rate = 1000.0;   // [Hz]
+constexpr double patience = 0.5;       // [s] that being behind, numb or out of sight may last
+constexpr double free_space = 0.020;   // [m] from every body, and what the sensor blurs
+constexpr double felt = 0.02;          // [N] a force that counts in free space
+constexpr double firm = 1.0;           // [N] both rulers' force from which a hand must feel some
+constexpr double least_share = 0.25;   // [-] of it
+constexpr double has_side = 0.5;       // [N] a ruler's force that has a side
+constexpr double opposite = -0.5;      // [-] cosine
+constexpr double jump = 0.015;         // [m] that may lie between what is and what is seen
+constexpr double just_before = 0.002;  // [m] from the sphere: what is met there is what it touches
+
+bool inside(const Snapshot& scene, const Vec3& place) {
+  return scene.distance(place) < 0.0;
+}
+
+// Through a thin body there is no inside: on its far side a proxy is hidden from the camera, and
+// the straight way from the ruler's proxy leads through the body.
+bool is_behind(const Vec3& proxy, const Ruling& ruling, const Snapshot& now, const Snapshot& shown,
+               const Sensor& sensor, double r_c) {
+  if (inside(shown, ruling.seen.proxy)) return false;
+  if (inside(now, proxy) && inside(shown, proxy)) return true;
+  return (proxy - ruling.seen.proxy).norm() > 2.0 * r_c &&
+         shown.between(sensor.eye(), proxy, just_before) &&
+         !shown.between(sensor.eye(), ruling.seen.proxy, r_c + just_before) &&
+         shown.between(ruling.seen.proxy, proxy, 0.0) && now.between(ruling.now.proxy, proxy, 0.0);
+}
+
+}  // namespace
+
+void Judge::add(const Tick& tick, const Ruling& ruling, bool behind) {
+  const double force = tick.force.norm();
+  const double now = ruling.now.force.norm();
+  const double seen = ruling.seen.force.norm();
+  const auto lasted = [this](int& ticks, bool goes_on) {
+    ticks = goes_on ? ticks + 1 : 0;
+    return ticks / tick_rate_;
+  };
+  const double behind_for = lasted(behind_for_, behind && ruling.known);
+  verdict_.behind = std::max(verdict_.behind, behind_for);
+  verdict_.lost = verdict_.lost || behind_for > patience;
+
+  const bool nothing = std::min(now, seen) > firm && force < least_share * std::min(now, seen);
+  verdict_.numb = lasted(numb_for_, nothing && ruling.known) > patience || verdict_.numb;
+
+  const auto against = [&](const Tick& ruler, double its) {
+    return tick.force.dot(ruler.force) < opposite * force * its;
+  };
+  const bool wrong = force > firm * least_share && std::min(now, seen) > has_side &&
+                     against(ruling.now, now) && against(ruling.seen, seen);
+  verdict_.wrong_side =
+      lasted(wrong_for_, wrong && ruling.known) > 0.05 + 1.5 * interval_ || verdict_.wrong_side;
+
+  if (ruling.free_in_sight && force > felt)
+    verdict_.worst_ghost = std::max(verdict_.worst_ghost, force);
+
+  const bool touching = now > 0.0 && seen > 0.0;
+  if (touching && touched_)
+    verdict_.worst_step = std::max(verdict_.worst_step, (tick.force - last_force_).norm());
+  touched_ = touching;
+  last_force_ = tick.force;
+}
+
+Outcome play_field(Stage& stage, const std::vector<Method*>& methods, const Parameters& parameters,
+                   const std::function<void(const Tick&, const Ruling&, bool)>& tick) {
+  Outcome outcome;
+  Sensor& sensor = *stage.sensor;
+  const double r_c = parameters.proxy.r_c();
+  const double depth = sensor.depth_of(Vec3::Zero());
+  if (stage.feature < 2.0 * sensor.pitch(depth)) {
+    outcome.unknown = "thin";
+    return outcome;
+  }
+  const double blur = 2.0 * sensor.pitch(depth) + 4.0 * sensor.deviation(depth);
+
+  Snapshot now(stage.scene, 0.0);
+  Snapshot shown(stage.scene, stage.shots.front().captured);
+  const bool still = std::all_of(stage.scene.begin(), stage.scene.end(),
+                                 [](const Body& body) { return body.still(); });
+  const auto ruler_now =
+      make_method("ideal", {parameters, [&now](const Vec3& p, double) { return now.nearest(p); }});
+  const auto ruler_seen = make_method(
+      "ideal", {parameters, [&shown](const Vec3& p, double) { return shown.nearest(p); }});
+  const Vec3 seat = stage.hip(0.0);
+  ruler_now->seat(seat);
+  ruler_seen->seat(seat);
+  for (Method* method : methods) method->seat(seat);
+
+  std::vector<Judge> judges(methods.size(), Judge(tick_rate, stage.interval));
+  std::shared_ptr<const DepthImage> in_use;
+  std::size_t next = 0;
+  double last_known = 0.0;
+  Vec3 ruler_proxy = seat;
+  bool contact = false;
+  int touching = 0;
+  int in_sight = 0;
+  int apart = 0;
+  const auto ticks = static_cast<int>(stage.duration * tick_rate);
+  for (int i = 0; i <= ticks; ++i) {
+    const double t = i / tick_rate;
+    for (; next < stage.shots.size() && stage.shots[next].arrives <= t + 1e-9; ++next) {
+      const Shot& shot = stage.shots[next];
+      std::shared_ptr<const DepthImage> frame = sensor.capture(stage.scene, shot.captured);
+      for (Method* method : methods) method->frame(*frame, shot.stamp);
+      in_use = std::move(frame);  // only now may the frame before go
+      if (!still) shown = Snapshot(stage.scene, shot.captured);
+      if (contact && shown.distance(ruler_proxy) < r_c - jump) outcome.unknown = "fast";
+    }
+    if (!still) now = Snapshot(stage.scene, t);
+    const Vec3 hip = stage.hip(t);
+    Ruling ruling;
+    ruling.now = ruler_now->tick(hip, t);
+    ruling.seen = ruler_seen->tick(hip, t);
+    ruler_proxy = ruling.seen.proxy;
+    contact = ruling.seen.force.norm() > 0.0;
+    const bool sees = sensor.sees(shown, ruler_proxy, r_c + just_before);
+    const bool agree = (ruling.now.proxy - ruling.seen.proxy).norm() <= jump;
+    touching += contact ? 1 : 0;
+    in_sight += contact && sees ? 1 : 0;
+    apart += contact && !agree ? 1 : 0;
+    if (!contact || (sees && agree)) last_known = t;
+    ruling.known = t - last_known <= patience;
+    ruling.free_in_sight = !contact && ruling.now.force.norm() == 0.0 &&
+                           std::min(now.distance(hip), shown.distance(hip)) > free_space + blur &&
+                           sensor.sees(shown, hip, 0.0);
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+      const Tick its = methods[m]->tick(hip, t);
+      const bool behind = is_behind(its.proxy, ruling, now, shown, sensor, r_c);
+      judges[m].add(its, ruling, behind);
+      if (m == 0 && tick) tick(its, ruling, behind);
+    }
+  }
+  if (2 * apart > touching) outcome.unknown = "fast";
+  if (outcome.unknown.empty() && 2 * in_sight < touching) outcome.unknown = "hidden";
+  for (const Judge& judge : judges) outcome.verdicts.push_back(judge.verdict());
+  return outcome;
+}
+
+}  // namespace palpate::lab::field

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "lab/field/field_cases.hpp"
+#include "palpate/core/method.hpp"
+
+namespace palpate::lab::field {
+
+/// How a method did in a case: docs/field.md has the rules.
+struct Verdict {
+  bool lost = false;         ///< behind for too long in one go
+  bool numb = false;         ///< next to no force for too long where both rulers have one
+  bool wrong_side = false;   ///< a force against both rulers' for too long
+  double behind = 0.0;       ///< [s] the longest in one go
+  double worst_ghost = 0.0;  ///< [N] in free space that is seen to be free
+  double worst_step = 0.0;   ///< [N] largest change of the force from tick to tick in contact
+
+  [[nodiscard]] bool ghost() const { return worst_ghost > 0.0; }
+  [[nodiscard]] bool right() const { return !lost && !numb && !wrong_side && !ghost(); }
+};
+
+/// What the rulers and the camera have of a tick.
+struct Ruling {
+  Tick now;   ///< of the sphere on the surface as it is
+  Tick seen;  ///< of the sphere on the surface as the newest frame showed it
+  /// Within the last half second what is touched has been in sight and the rulers agreed.
+  bool known = true;
+  bool free_in_sight = false;  ///< the hand is seen to be in free space
+};
+
+/// Judges a method, tick by tick.
+class Judge {
+ public:
+  /// @param tick_rate  [Hz] @param interval  [s] from one frame to the next
+  Judge(double tick_rate, double interval) : tick_rate_(tick_rate), interval_(interval) {}
+  /// @param behind  the proxy is inside or behind a body, and the rulers' are not
+  void add(const Tick& tick, const Ruling& ruling, bool behind);
+  [[nodiscard]] const Verdict& verdict() const { return verdict_; }
+
+ private:
+  double tick_rate_;
+  double interval_;
+  Verdict verdict_;
+  int behind_for_ = 0;  // ticks in a row, as the others
+  int numb_for_ = 0;
+  int wrong_for_ = 0;
+  bool touched_ = false;
+  Vec3 last_force_ = Vec3::Zero();
+};
+
+/// What a case came to.
+struct Outcome {
+  /// Why it cannot be known and does not count: "thin", "fast" or "hidden"; empty: it counts.
+  std::string unknown;
+  std::vector<Verdict> verdicts;  ///< of each method; empty for "thin", which is not played
+};
+
+/// Plays a case to several methods at once, beside the rulers.
+/// @param tick  called after each tick of the first method, if given
+Outcome play_field(
+    Stage& stage, const std::vector<Method*>& methods, const Parameters& parameters,
+    const std::function<void(const Tick&, const Ruling&, bool behind)>& tick = nullptr);
+
+}  // namespace palpate::lab::field

@@ -1,0 +1,458 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/field/field_scene.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace palpate::lab::field {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+
+constexpr double touches = 5e-6;  // [m] from a surface: a ray that comes so near has met it
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+// Where a ray from outside meets a ball about the origin: entry and exit [m]; none if it does not.
+std::optional<std::pair<double, double>> through_ball(const Vec3& from, const Vec3& way,
+                                                      double radius) {
+  const double middle = -from.dot(way);
+  const double squared = radius * radius - (from + middle * way).squaredNorm();
+  if (squared < 0.0) return std::nullopt;
+  const double half = std::sqrt(squared);
+  return std::pair{middle - half, middle + half};
+}
+
+// The first of a ray's two crossings that lies ahead.
+std::optional<double> ahead(double entry, double exit, double reach) {
+  if (exit < 0.0 || entry > reach) return std::nullopt;
+  return std::max(entry, 0.0);
+}
+
+std::optional<double> trace(const Shape& shape, const Vec3& from, const Vec3& way, double begin,
+                            double end, double t) {
+  constexpr int most_steps = 400;
+  double gone = begin;
+  for (int i = 0; i < most_steps && gone <= end; ++i) {
+    const double room = shape.distance(from + gone * way, t);
+    if (room < touches) return gone;
+    gone += room;
+  }
+  return std::nullopt;
+}
+
+class Ground final : public Shape {
+ public:
+  double distance(const Vec3& p, double /*t*/) const override { return p.z(); }
+  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
+                             double /*t*/) const override {
+    if (from.z() <= 0.0) return 0.0;
+    if (way.z() >= 0.0) return std::nullopt;
+    const double gone = -from.z() / way.z();
+    return gone <= reach ? std::optional(gone) : std::nullopt;
+  }
+};
+
+class Ball final : public Shape {
+ public:
+  explicit Ball(double radius) : radius_(radius) {}
+  double distance(const Vec3& p, double /*t*/) const override { return p.norm() - radius_; }
+  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
+                             double /*t*/) const override {
+    const auto crossed = through_ball(from, way, radius_);
+    return crossed ? ahead(crossed->first, crossed->second, reach) : std::nullopt;
+  }
+  double radius() const override { return radius_; }
+
+ private:
+  double radius_;
+};
+
+class Box final : public Shape {
+ public:
+  explicit Box(const Vec3& half) : half_(half) {}
+  double distance(const Vec3& p, double /*t*/) const override {
+    const Vec3 beyond = p.cwiseAbs() - half_;
+    return beyond.cwiseMax(0.0).norm() + std::min(beyond.maxCoeff(), 0.0);
+  }
+  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
+                             double /*t*/) const override {
+    double entry = -infinite;
+    double exit = infinite;
+    for (int i = 0; i < 3; ++i) {
+      if (way[i] == 0.0) {
+        if (std::abs(from[i]) > half_[i]) return std::nullopt;
+        continue;
+      }
+      const double one = (-half_[i] - from[i]) / way[i];
+      const double other = (half_[i] - from[i]) / way[i];
+      entry = std::max(entry, std::min(one, other));
+      exit = std::min(exit, std::max(one, other));
+    }
+    return entry <= exit ? ahead(entry, exit, reach) : std::nullopt;
+  }
+  double radius() const override { return half_.norm(); }
+
+ private:
+  Vec3 half_;
+};
+
+class Capsule final : public Shape {
+ public:
+  Capsule(double half, double radius) : half_(half), radius_(radius) {}
+  double distance(const Vec3& p, double /*t*/) const override {
+    return (p - Vec3(std::clamp(p.x(), -half_, half_), 0.0, 0.0)).norm() - radius_;
+  }
+  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
+                             double t) const override {
+    if (distance(from, t) <= 0.0) return 0.0;
+    std::optional<double> first;
+    const auto keep = [&](std::optional<double> met) {
+      if (met && (!first || *met < *first)) first = met;
+    };
+    // The tube: |(y, z)| = radius, where x is between the ends.
+    const Vec2 origin = from.tail<2>();
+    const Vec2 across = way.tail<2>();
+    const double a = across.squaredNorm();
+    const double b = origin.dot(across);
+    const double squared = b * b - a * (origin.squaredNorm() - radius_ * radius_);
+    if (a > 0.0 && squared >= 0.0) {
+      const double gone = (-b - std::sqrt(squared)) / a;
+      if (gone >= 0.0 && gone <= reach && std::abs(from.x() + gone * way.x()) <= half_) keep(gone);
+    }
+    for (const double end : {-half_, half_}) {
+      const auto crossed = through_ball(from - Vec3(end, 0.0, 0.0), way, radius_);
+      if (crossed) keep(ahead(crossed->first, crossed->second, reach));
+    }
+    return first;
+  }
+  double radius() const override { return half_ + radius_; }
+
+ private:
+  double half_;
+  double radius_;
+};
+
+class Cylinder final : public Shape {
+ public:
+  Cylinder(double radius, double half) : radius_(radius), half_(half) {}
+  double distance(const Vec3& p, double /*t*/) const override {
+    const Vec2 beyond(p.head<2>().norm() - radius_, std::abs(p.z()) - half_);
+    return beyond.cwiseMax(0.0).norm() + std::min(beyond.maxCoeff(), 0.0);
+  }
+  double radius() const override { return std::hypot(radius_, half_); }
+
+ private:
+  double radius_;
+  double half_;
+};
+
+class Torus final : public Shape {
+ public:
+  Torus(double ring, double tube) : ring_(ring), tube_(tube) {}
+  double distance(const Vec3& p, double /*t*/) const override {
+    return std::hypot(p.head<2>().norm() - ring_, p.z()) - tube_;
+  }
+  double radius() const override { return ring_ + tube_; }
+
+ private:
+  double ring_;
+  double tube_;
+};
+
+class Bowl final : public Shape {
+ public:
+  Bowl(double inner, double wall, double rim)
+      : middle_(inner + 0.5 * wall),
+        half_wall_(0.5 * wall),
+        rim_(std::sqrt(middle_ * middle_ - rim * rim), rim) {}
+  double distance(const Vec3& p, double /*t*/) const override {
+    // In the plane through p and the axis the wall is an arc, drawn with a round pen.
+    const Vec2 q(p.head<2>().norm(), p.z());
+    const bool beyond_rim = rim_.y() * q.x() < rim_.x() * q.y();
+    return (beyond_rim ? (q - rim_).norm() : std::abs(q.norm() - middle_)) - half_wall_;
+  }
+  double radius() const override { return middle_ + half_wall_; }
+
+ private:
+  double middle_;
+  double half_wall_;
+  Vec2 rim_;  // [m] from the axis, and z
+};
+
+struct Height {
+  double z;
+  double along_x, along_y;  // its derivatives
+};
+
+// A surface that has one height at each place.
+class Relief : public Shape {
+ public:
+  double distance(const Vec3& p, double t) const final {
+    const Height below = height(p.x(), p.y(), t);
+    const double above = p.z() - below.z;
+    const double safe = above / std::sqrt(1.0 + steepest_ * steepest_);
+    constexpr double near = 0.04;  // [m] nearer than this the foot of the perpendicular is found
+    if (std::abs(safe) > near) return safe;
+    double x = p.x();
+    double y = p.y();
+    double best = std::abs(above);
+    for (int i = 0; i < 6; ++i) {
+      // The foot on the tangent plane is the next place.
+      const Height at = height(x, y, t);
+      const Vec3 normal = Vec3(-at.along_x, -at.along_y, 1.0).normalized();
+      const Vec3 foot = p - normal.dot(p - Vec3(x, y, at.z)) * normal;
+      x = foot.x();
+      y = foot.y();
+      const double found = (p - Vec3(x, y, height(x, y, t).z)).norm();
+      const double gain = best - found;
+      best = std::min(best, found);
+      if (std::abs(gain) < 1e-13) break;
+    }
+    return std::copysign(best, above);
+  }
+
+  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
+                             double t) const final {
+    double gone = 0.0;
+    if (from.z() > highest_) {
+      if (way.z() >= 0.0) return std::nullopt;
+      gone = (highest_ - from.z()) / way.z();
+    }
+    const double slow = 1.0 / (steepest_ * way.head<2>().norm() + std::abs(way.z()));
+    for (int i = 0; i < 400 && gone <= reach; ++i) {
+      const Vec3 p = from + gone * way;
+      const double above = p.z() - height(p.x(), p.y(), t).z;
+      if (above < touches) return gone;
+      if (p.z() > highest_ + 1e-9 && way.z() >= 0.0) return std::nullopt;
+      gone += above * slow;  // it cannot be met sooner
+    }
+    return std::nullopt;
+  }
+
+ protected:
+  virtual Height height(double x, double y, double t) const = 0;
+  double highest_ = 0.0;   // [m] no place is higher
+  double steepest_ = 0.0;  // [-] no place is steeper
+};
+
+class Terrain final : public Relief {
+ public:
+  explicit Terrain(std::vector<Bump> bumps) : bumps_(std::move(bumps)) {
+    for (const Bump& bump : bumps_) {
+      highest_ += std::max(bump.height, 0.0);
+      steepest_ += std::abs(bump.height) / bump.width * std::exp(-0.5);
+    }
+  }
+
+ protected:
+  Height height(double x, double y, double /*t*/) const override {
+    Height sum{0.0, 0.0, 0.0};
+    for (const Bump& bump : bumps_) {
+      const double narrow = 1.0 / (bump.width * bump.width);
+      const double dx = x - bump.x;
+      const double dy = y - bump.y;
+      const double part = bump.height * std::exp(-0.5 * (dx * dx + dy * dy) * narrow);
+      sum.z += part;
+      sum.along_x -= dx * narrow * part;
+      sum.along_y -= dy * narrow * part;
+    }
+    return sum;
+  }
+
+ private:
+  std::vector<Bump> bumps_;
+};
+
+class Cloth final : public Relief {
+ public:
+  explicit Cloth(std::vector<Wave> waves) : waves_(std::move(waves)) {
+    for (const Wave& wave : waves_) {
+      highest_ += wave.height;
+      steepest_ += 2.0 * std::numbers::pi * wave.height / wave.length;
+    }
+  }
+  bool deforms() const override { return true; }
+
+ protected:
+  Height height(double x, double y, double t) const override {
+    Height sum{0.0, 0.0, 0.0};
+    for (const Wave& wave : waves_) {
+      const double k = 2.0 * std::numbers::pi / wave.length;
+      const double kx = k * std::cos(wave.heading);
+      const double ky = k * std::sin(wave.heading);
+      const double angle =
+          kx * x + ky * y - 2.0 * std::numbers::pi * wave.frequency * t + wave.phase;
+      const double slope = wave.height * std::cos(angle);
+      sum.z += wave.height * std::sin(angle);
+      sum.along_x += kx * slope;
+      sum.along_y += ky * slope;
+    }
+    return sum;
+  }
+
+ private:
+  std::vector<Wave> waves_;
+};
+
+class Torso final : public Shape {
+ public:
+  Torso(const Vec3& rest, const Vec3& breath, double frequency)
+      : rest_(rest), breath_(breath), frequency_(frequency) {}
+  double distance(const Vec3& p, double t) const override { return ellipsoid_distance(half(t), p); }
+  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
+                             double t) const override {
+    // Where its axes are shrunk to 1 it is a ball.
+    const Vec3 half_axes = half(t);
+    const Vec3 shrunk = way.cwiseQuotient(half_axes);
+    const double scale = shrunk.norm();
+    const auto crossed = through_ball(from.cwiseQuotient(half_axes), shrunk / scale, 1.0);
+    return crossed ? ahead(crossed->first / scale, crossed->second / scale, reach) : std::nullopt;
+  }
+  double radius() const override { return (rest_ + breath_).maxCoeff(); }
+  bool deforms() const override { return true; }
+
+ private:
+  Vec3 half(double t) const {
+    return rest_ + 0.5 * (1.0 - std::cos(2.0 * std::numbers::pi * frequency_ * t)) * breath_;
+  }
+  Vec3 rest_;
+  Vec3 breath_;
+  double frequency_;
+};
+
+}  // namespace
+
+std::optional<double> Shape::cast(const Vec3& from, const Vec3& way, double reach, double t) const {
+  if (!std::isfinite(radius())) return trace(*this, from, way, 0.0, reach, t);
+  const auto crossed = through_ball(from, way, radius() + touches);
+  if (!crossed || crossed->second < 0.0) return std::nullopt;
+  return trace(*this, from, way, std::max(crossed->first, 0.0), std::min(crossed->second, reach),
+               t);
+}
+
+ShapePtr ground() {
+  return std::make_shared<Ground>();
+}
+ShapePtr ball(double radius) {
+  return std::make_shared<Ball>(radius);
+}
+ShapePtr box(const Vec3& half) {
+  return std::make_shared<Box>(half);
+}
+ShapePtr capsule(double half, double radius) {
+  return std::make_shared<Capsule>(half, radius);
+}
+ShapePtr cylinder(double radius, double half) {
+  return std::make_shared<Cylinder>(radius, half);
+}
+ShapePtr torus(double ring, double tube) {
+  return std::make_shared<Torus>(ring, tube);
+}
+ShapePtr bowl(double inner, double wall, double rim) {
+  return std::make_shared<Bowl>(inner, wall, rim);
+}
+ShapePtr terrain(std::vector<Bump> bumps) {
+  return std::make_shared<Terrain>(std::move(bumps));
+}
+ShapePtr cloth(std::vector<Wave> waves) {
+  return std::make_shared<Cloth>(std::move(waves));
+}
+ShapePtr torso(const Vec3& rest, const Vec3& breath, double frequency) {
+  return std::make_shared<Torso>(rest, breath, frequency);
+}
+
+double ellipsoid_distance(const Vec3& half, const Vec3& p) {
+  // The foot is half_i^2 q_i / (half_i^2 + s), where s is the largest root of
+  // sum (half_i q_i / (half_i^2 + s))^2 = 1: to its left the sum is convex and falls, so Newton's
+  // method from there comes nearer with each step and never passes it.
+  const Vec3 q = p.cwiseAbs().cwiseMax(1e-9);
+  const Vec3 squared = half.cwiseProduct(half);
+  double s = (half.cwiseProduct(q) - squared).maxCoeff();
+  for (int i = 0; i < 50; ++i) {
+    double sum = -1.0;
+    double slope = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      const double part = half[k] * q[k] / (squared[k] + s);
+      sum += part * part;
+      slope -= 2.0 * part * part / (squared[k] + s);
+    }
+    const double step = -sum / slope;
+    s += step;
+    if (std::abs(step) < 1e-13) break;
+  }
+  Vec3 foot;
+  for (int k = 0; k < 3; ++k) foot[k] = squared[k] * q[k] / (squared[k] + s);
+  return std::copysign((q - foot).norm(), s);
+}
+
+Snapshot::Snapshot(const FieldScene& scene, double t, Which which) : t_(t) {
+  for (const Body& body : scene) {
+    if (which != Which::all && body.still() != (which == Which::still)) continue;
+    const Eigen::Isometry3d pose = body.motion ? body.motion(t) : body.rest;
+    parts_.push_back({body.shape.get(), pose, pose.inverse(), body.shape->radius()});
+  }
+}
+
+std::pair<const Snapshot::Part*, double> Snapshot::nearest_part(const Vec3& p) const {
+  std::pair<const Part*, double> nearest = {nullptr, infinite};
+  for (const Part& part : parts_) {
+    const Vec3 local = part.body_from_world * p;
+    if (std::isfinite(part.radius) && local.norm() - part.radius > nearest.second) continue;
+    const double distance = part.shape->distance(local, t_);
+    if (distance < nearest.second) nearest = {&part, distance};
+  }
+  return nearest;
+}
+
+double Snapshot::distance(const Vec3& p) const {
+  return nearest_part(p).second;
+}
+
+TruePoint Snapshot::nearest(const Vec3& p) const {
+  const auto [part, distance] = nearest_part(p);
+  if (part == nullptr) return {distance, Vec3::UnitZ()};
+  constexpr double h = 1e-6;  // [m]
+  const Vec3 local = part->body_from_world * p;
+  Vec3 slope;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 step = h * Vec3::Unit(i);
+    slope[i] = part->shape->distance(local + step, t_) - part->shape->distance(local - step, t_);
+  }
+  const double length = slope.norm();
+  return {distance, length > 0.0 ? Vec3(part->world_from_body.linear() * (slope / length))
+                                 : Vec3(Vec3::UnitZ())};
+}
+
+std::optional<double> Snapshot::cast(const Vec3& from, const Vec3& way, double reach) const {
+  std::optional<double> first;
+  for (const Part& part : parts_) {
+    const auto met =
+        part.shape->cast(part.body_from_world * from, part.body_from_world.linear() * way,
+                         first.value_or(reach), t_);
+    if (met && (!first || *met < *first)) first = met;
+  }
+  return first;
+}
+
+bool Snapshot::between(const Vec3& from, const Vec3& to, double margin) const {
+  const Vec3 line = to - from;
+  const double length = line.norm();
+  return length > margin && cast(from, line / length, length - margin).has_value();
+}
+
+Truth truth_of(const FieldScene& scene) {
+  return [&scene, newest = std::make_shared<Snapshot>(scene, 0.0)](const Vec3& p, double t) {
+    if (newest->t() != t) *newest = Snapshot(scene, t);
+    return newest->nearest(p);
+  };
+}
+
+double ease(double s) {
+  s = std::clamp(s, 0.0, 1.0);
+  return s * s * s * (10.0 + s * (6.0 * s - 15.0));
+}
+
+}  // namespace palpate::lab::field

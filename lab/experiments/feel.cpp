@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "lab/aim_table.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/nearest_name.hpp"
@@ -161,61 +162,39 @@ std::vector<Claim> no_claims(const Table& /*table*/) {
   return {};
 }
 
-// A row a measure and loop, a column a method; what misses the aim is marked.
+// A row a measure and loop.
 Scores feel_scores(const Table& table) {
-  Scores scores;
-  scores.columns = {"scene", "loop", "measure", "aim"};
-  std::vector<std::string> methods;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string& method = table.text(row, "method");
-    if (std::find(methods.begin(), methods.end(), method) == methods.end())
-      methods.push_back(method);
-  }
-  scores.columns.insert(scores.columns.end(), methods.begin(), methods.end());
-  scores.note = "* misses the aim. What is measured and how: docs/feel.md.";
-  std::vector<int> met(methods.size(), 0);
-  int aims = 0;
+  AimTable scores({"scene", "loop", "measure"}, methods_in(table));
   for (const Measure& measure : measures()) {
     for (const std::string_view loop : measure.loops) {
-      const auto value_of = [&](const std::string& method) -> std::optional<double> {
-        const std::vector<double> values = table.numbers("value", [&](std::size_t row) {
+      std::vector<std::optional<double>> values;
+      for (const std::string& method : scores.methods()) {
+        const std::vector<double> rows = table.numbers("value", [&](std::size_t row) {
           return table.text(row, "method") == method && table.text(row, "scene") == measure.scene &&
                  table.text(row, "loop") == loop && table.text(row, "measure") == measure.name;
         });
-        if (values.empty()) return std::nullopt;
-        double sum = 0.0;  // more than one row only where cases are counted
-        for (const double value : values) sum += value;
-        return sum;
-      };
-      if (methods.empty() || !value_of(methods.front())) continue;
-      std::vector<std::string> line = {
-          std::string(measure.scene), std::string(loop),
-          measure.unit.empty() ? std::string(measure.name)
-                               : fmt::format("{} [{}]", measure.name, measure.unit),
-          measure.aim ? fmt::format("<= {:g}", *measure.aim) : std::string("-")};
-      aims += measure.aim ? 1 : 0;
-      for (std::size_t m = 0; m < methods.size(); ++m) {
-        const double value = value_of(methods[m]).value_or(0.0);
-        const bool missed = measure.aim && value > *measure.aim;
-        met[m] += measure.aim && !missed ? 1 : 0;
         constexpr double exact = 1e-6;  // of any unit here: rounding
-        line.push_back(fmt::format("{:.3g}{}", value < exact ? 0.0 : value, missed ? " *" : ""));
+        double sum = 0.0;               // more than one row only where cases are counted
+        for (const double value : rows) sum += value;
+        if (!rows.empty()) values.emplace_back(sum < exact ? 0.0 : sum);
       }
-      scores.rows.push_back(std::move(line));
+      if (values.empty()) continue;
+      values.resize(scores.methods().size());  // all methods play a scene
+      scores.add(
+          {std::string(measure.scene), std::string(loop), measure_text(measure.name, measure.unit)},
+          measure.aim, values);
     }
   }
-  std::vector<std::string> line = {"aims met", "", "", fmt::format("{}", aims)};
-  for (const int count : met) line.push_back(fmt::format("{}", count));
-  scores.rows.push_back(std::move(line));
-  for (const std::string& method : methods) {
+  std::string note = "* misses the aim. What is measured and how: docs/feel.md.";
+  for (const std::string& method : scores.methods()) {
     for (std::size_t row = 0; row < table.rows(); ++row) {
       if (table.text(row, "method") != method || table.text(row, "case") == "-") continue;
-      scores.note += fmt::format("\npalpate eval pop --methods {} --case '{}'", method,
-                                 table.text(row, "case"));
+      note += fmt::format("\npalpate eval pop --methods {} --case '{}'", method,
+                          table.text(row, "case"));
       break;
     }
   }
-  return scores;
+  return scores.scores(note);
 }
 
 constexpr std::string_view feel_plot = R"gp(

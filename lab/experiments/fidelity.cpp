@@ -10,10 +10,12 @@
 
 #include <fmt/format.h>
 
+#include "lab/aim_table.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 #include "lab/signal.hpp"
+#include "lab/sine_push.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/nearest_name.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
@@ -321,38 +323,16 @@ std::string slide_on_relief(const std::string& name, const ExperimentOptions& op
   return rows_of(name, scene_name, summary(watched));
 }
 
-// A plane without noise that goes up and down by 20 mm once a second. The largest step is that of
-// the force's error: the true force itself changes by up to 0.038 N/ms.
+// The largest step is that of the force's error: the true force itself changes by up to 0.038 N/ms.
 std::string push_by_sine(const std::string& name, const ExperimentOptions& options,
                          std::string_view scene) {
-  const double r_c = options.parameters.proxy.r_c();
-  constexpr double stroke = 0.020;
-  const auto height = [](double t) {
-    return 0.5 * stroke * (1.0 - std::cos(2.0 * std::numbers::pi * t));
-  };
-  Parameters parameters = options.parameters;
-  parameters.coupling.max_force = 100.0;
-  GridCloud grid;
-  grid.spacing = 0.3 * r_c;
-  const Truth truth = flat(height);
-  const auto method = make_method(name, {parameters, truth});
-  const Vec3 hip(0.1 * r_c, 0.1 * r_c, -0.005);
-  method->seat(Vec3(hip.x(), hip.y(), 4.0 * r_c));
   std::vector<double> error;
   double largest = 0.0;
-  play(*method,
-       {.frame_rate = f_c,
-        .duration = 4.0,
-        .cloud = [&](std::uint64_t f, double t) { return grid.capture(f, height(t)); },
-        .hip = [&](double) { return hip; }},
-       [&](const Tick& tick) {
-         if (tick.t < 1.0) return true;
-         const double truly = parameters.coupling.stiffness * (height(tick.t) - hip.z());
-         error.push_back(tick.force.z() - truly);
-         if (error.size() > 1)
-           largest = std::max(largest, std::abs(error.back() - error[error.size() - 2]));
-         return true;
-       });
+  push_by_sine(name, options, [&](const Tick& tick, double /*height*/, double ideal) {
+    error.push_back(tick.force.z() - ideal);
+    if (error.size() > 1)
+      largest = std::max(largest, std::abs(error.back() - error[error.size() - 2]));
+  });
   return rows_of(name, scene, {{"rms", rms(error)}, {"step", largest}});
 }
 
@@ -393,19 +373,8 @@ std::vector<Claim> no_claims(const Table& /*table*/) {
   return {};
 }
 
-// A row a measure, a column a method; what misses the aim is marked.
 Scores fidelity_scores(const Table& table) {
-  Scores scores;
-  scores.columns = {"scene", "measure", "aim"};
-  std::vector<std::string> methods;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string& method = table.text(row, "method");
-    if (std::find(methods.begin(), methods.end(), method) == methods.end())
-      methods.push_back(method);
-  }
-  scores.columns.insert(scores.columns.end(), methods.begin(), methods.end());
-  std::vector<int> met(methods.size(), 0);
-  int aims = 0;
+  AimTable scores({"scene", "measure"}, methods_in(table));
   for (const Measure& measure : measures) {
     const bool played =
         !table
@@ -413,32 +382,19 @@ Scores fidelity_scores(const Table& table) {
                       [&](std::size_t row) { return table.text(row, "scene") == measure.scene; })
              .empty();
     if (!played) continue;
-    std::vector<std::string> line = {
-        std::string(measure.scene), fmt::format("{} [{}]", measure.name, measure.unit),
-        measure.aim ? fmt::format("<= {:g}", *measure.aim) : std::string("-")};
-    aims += measure.aim ? 1 : 0;
-    for (std::size_t m = 0; m < methods.size(); ++m) {
-      const std::vector<double> values = table.numbers("value", [&](std::size_t row) {
-        return table.text(row, "method") == methods[m] &&
-               table.text(row, "scene") == measure.scene &&
+    std::vector<std::optional<double>> values;
+    for (const std::string& method : scores.methods()) {
+      const std::vector<double> rows = table.numbers("value", [&](std::size_t row) {
+        return table.text(row, "method") == method && table.text(row, "scene") == measure.scene &&
                table.text(row, "measure") == measure.name;
       });
-      if (values.empty()) {
-        line.emplace_back(measure.aim ? "- *" : "-");
-        continue;
-      }
-      const bool missed = measure.aim && values.front() > *measure.aim;
-      met[m] += measure.aim && !missed ? 1 : 0;
-      line.push_back(fmt::format("{:.3g}{}", values.front(), missed ? " *" : ""));
+      values.push_back(rows.empty() ? std::nullopt : std::optional(rows.front()));
     }
-    scores.rows.push_back(std::move(line));
+    scores.add({std::string(measure.scene), measure_text(measure.name, measure.unit)}, measure.aim,
+               values);
   }
-  std::vector<std::string> line = {"aims met", "", fmt::format("{}", aims)};
-  for (const int count : met) line.push_back(fmt::format("{}", count));
-  scores.rows.push_back(std::move(line));
-  scores.note =
-      "* misses the aim; - was lost in every repeat. What is measured and how: docs/pop.md.";
-  return scores;
+  return scores.scores(
+      "* misses the aim; - was lost in every repeat. What is measured and how: docs/pop.md.");
 }
 
 constexpr std::string_view fidelity_plot = R"gp(

@@ -12,6 +12,7 @@
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 #include "lab/signal.hpp"
+#include "lab/sine_push.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -128,45 +129,22 @@ plot for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "white" ? $3 :
      for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "correlated" ? $3 : NaN):8 with linespoints pt 4 lw 2 dt 3 title m." jitter, correlated"
 )gp";
 
-// A plane that goes up and down by 20 mm once a second; the hand rests 15 mm below its lowest.
 std::vector<Cell> force_cells(const Experiment& experiment, const ExperimentOptions& options) {
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options)) {
     cells.emplace_back([=] {
       const double r_c = options.parameters.proxy.r_c();
-      constexpr double stroke = 0.020;
-      const auto height = [](double t) { return 0.5 * stroke * (1.0 - std::cos(2.0 * pi * t)); };
-      GridCloud grid;
-      grid.spacing = 0.3 * r_c;
-      grid.half_x = grid.half_y = 12.0 * r_c;
-      const Truth truth = [&](const Vec3& p, double t) {
-        return TruePoint{p.z() - height(t), Vec3::UnitZ()};
-      };
-      ExperimentOptions unlimited = options;
-      unlimited.parameters.coupling.max_force = 100.0;
-      const auto method = make_method(name, {unlimited.parameters, truth});
-      const Vec3 hip(0.1 * r_c, 0.1 * r_c, -0.005);
-      method->seat(Vec3(hip.x(), hip.y(), 4.0 * r_c));
       std::string rows;
-      play(*method,
-           {.frame_rate = f_c,
-            .duration = 4.0,
-            .cloud = [&](std::uint64_t f, double t) { return grid.capture(f, height(t)); },
-            .hip = [&](double) { return hip; }},
-           [&](const Tick& tick) {
-             const double ideal =
-                 unlimited.parameters.coupling.stiffness * (height(tick.t) - hip.z());
-             if (tick.t >= 1.0)
-               rows += Row()
-                           .add(name)
-                           .add(tick.t)
-                           .add(tick.force.z())
-                           .add(ideal)
-                           .add(tick.proxy.z() - r_c)
-                           .add(height(tick.t))
-                           .done();
-             return true;
-           });
+      push_by_sine(name, options, [&](const Tick& tick, double height, double ideal) {
+        rows += Row()
+                    .add(name)
+                    .add(tick.t)
+                    .add(tick.force.z())
+                    .add(ideal)
+                    .add(tick.proxy.z() - r_c)
+                    .add(height)
+                    .done();
+      });
       return rows;
     });
   }

@@ -120,9 +120,12 @@ bool Monitor::is_behind(double margin, double deepest, double r_c) noexcept {
   if (side_ == Side::unknown) side_ = proxy_.behind < 0.0 ? Side::front : Side::behind;
   if (side_ == Side::behind && in_front) side_ = Side::front;
   if (side_ != Side::front) return false;
+  const auto count_past_edge = [this](bool past) {
+    if (!frame_judged_) frames_past_edge_ = past ? frames_past_edge_ + 1 : 0;
+  };
   if (proxy_.behind <= margin) {
     if (proxy_.behind <= 0.0) last_front_ = proxy_;
-    if (!frame_judged_) frames_past_edge_ = 0;
+    count_past_edge(false);
     return false;
   }
   // At an edge the median is of one body or the other.
@@ -134,12 +137,13 @@ bool Monitor::is_behind(double margin, double deepest, double r_c) noexcept {
     const double aside = (way - way.dot(line) * line).norm();
     // Noise of the two looks must not end the watch over the front, however small it is estimated.
     const double noise = most_margin(proxy_.distance);
-    if (nearer > edge_step * r_c + noise + steepest_rise * aside && aside > sideways) {
-      if (!frame_judged_) ++frames_past_edge_;
+    const bool past_edge =
+        nearer > edge_step * r_c + noise + steepest_rise * aside && aside > sideways;
+    count_past_edge(past_edge);
+    if (past_edge) {
       if (frames_past_edge_ >= frames_of_evidence) side_ = Side::behind;
       return false;
     }
-    if (!frame_judged_) frames_past_edge_ = 0;
     if (nearer > farthest_strike + margin) return false;
   }
   return proxy_.behind <= deepest + margin;

@@ -75,7 +75,7 @@ class Monitor {
   Look last_front_;            // the last look that showed the proxy in front
   bool frame_judged_ = false;  // is the newest frame counted in `frames_behind_`?
   int frames_behind_ = 0;      // frames in a row that show the proxy behind its surface
-  int frames_past_edge_ = 0;   // in a row
+  int frames_past_edge_ = 0;   // frames in a row that show it beyond an edge
 };
 
 }  // namespace palpate

@@ -142,6 +142,27 @@ TEST(Monitor, LetsAHandGoRoundAnEdgeBehindABody) {
   }
 }
 
+/// Plays a camera and a hand to sight for `ticks` milliseconds.
+/// @param hip      [m] world, by time
+/// @param on_tick  (double t, const Tick&)
+template <class Hip, class OnTick>
+void play(SyntheticCamera& camera, const Hip& hip, int ticks, const OnTick& on_tick) {
+  Sight sight;
+  sight.seat(hip(0.0));
+  Frame frame;
+  for (int i = 0, k = 0; i <= ticks; ++i) {
+    const double t = 1e-3 * i;
+    if (t >= k * interval - 1e-9) {
+      Frame next = *camera.next();
+      sight.frame(*next.cloud, next.stamp);
+      frame = std::move(next);
+      ++k;
+    }
+    on_tick(t, sight.tick(hip(t), t));
+    if (testing::Test::HasFatalFailure()) return;
+  }
+}
+
 TEST(SightMonitor, AHandThatPressesSlidesAndLiftsIsFree) {
   // A RealSense's noise at 1.2 m once left the proxy behind the plane: 20 N down, for ever.
   const auto camera = open_synthetic_camera(
@@ -157,22 +178,11 @@ TEST(SightMonitor, AHandThatPressesSlidesAndLiftsIsFree) {
                 between(0.06, -0.01, 0.2, 1.0, t) + between(0.0, 0.09, 2.0, 2.6, t));
   };
   for (SyntheticCamera* source : {camera.get(), camera_full.get()}) {
-    Sight sight;
-    sight.seat(hip(0.0));
-    Frame frame;
-    for (int i = 0, k = 0; i <= 3000; ++i) {
-      const double t = 1e-3 * i;
-      if (t >= k * interval - 1e-9) {
-        Frame next = *source->next();
-        sight.frame(*next.cloud, next.stamp);
-        frame = std::move(next);
-        ++k;
-      }
-      const Tick tick = sight.tick(hip(t), t);
+    play(*source, hip, 3000, [&](double t, const Tick& tick) {
       if (hip(t).z() > 0.05) {
         ASSERT_EQ(tick.force.norm(), 0.0) << t;
       }
-    }
+    });
   }
 }
 
@@ -252,31 +262,20 @@ TEST(Sight, FeelsAndLetsGoOfAPlaneInFullHoweverCoarseTheImage) {
     for (const char* tilt : {"0deg", "25deg", "50deg"}) {
       const auto camera = open_synthetic_camera(
           Uri(std::string("synthetic:plane?distance=0.95m&size=") + size + "&tilt=" + tilt));
-      Sight sight;
       const auto hip = [](double t) {
         const double down = std::clamp((t - 0.2) / 0.5, 0.0, 1.0);
         const double slide = std::clamp((t - 1.0) / 0.4, 0.0, 1.0);
         const double up = std::clamp((t - 1.5) / 0.4, 0.0, 1.0);
         return Vec3(0.003 + 0.03 * slide, 0.001, 0.05 - 0.06 * down + 0.06 * up);
       };
-      sight.seat(hip(0.0));
-      Frame frame;
-      for (int i = 0, k = 0; i <= 2000; ++i) {
-        const double t = 1e-3 * i;
-        if (t >= k * interval - 1e-9) {
-          Frame next = *camera->next();
-          sight.frame(*next.cloud, next.stamp);
-          frame = std::move(next);
-          ++k;
+      play(*camera, hip, 2000, [&](double time, const Tick& tick) {
+        if (time > 0.8 && time < 1.5) {
+          ASSERT_NEAR(tick.force.norm(), 6.0, 0.1) << size << ' ' << tilt << ' ' << time;
         }
-        const Tick tick = sight.tick(hip(t), t);
-        if (t > 0.8 && t < 1.5) {
-          ASSERT_NEAR(tick.force.norm(), 6.0, 0.1) << size << ' ' << tilt << ' ' << t;
+        if (time > 1.9) {
+          ASSERT_EQ(tick.force.norm(), 0.0) << size << ' ' << tilt << ' ' << time;
         }
-        if (t > 1.9) {
-          ASSERT_EQ(tick.force.norm(), 0.0) << size << ' ' << tilt << ' ' << t;
-        }
-      }
+      });
     }
   }
 }

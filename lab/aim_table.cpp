@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/aim_table.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace palpate::lab {
+
+std::vector<std::string> methods_in(const Table& table) {
+  std::vector<std::string> methods;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string& method = table.text(row, "method");
+    if (std::find(methods.begin(), methods.end(), method) == methods.end())
+      methods.push_back(method);
+  }
+  return methods;
+}
+
+AimTable::AimTable(std::vector<std::string> labels, std::vector<std::string> methods)
+    : methods_(std::move(methods)), met_(methods_.size(), 0) {
+  scores_.columns = std::move(labels);
+  scores_.columns.emplace_back("aim");
+  scores_.columns.insert(scores_.columns.end(), methods_.begin(), methods_.end());
+}
+
+void AimTable::add(std::vector<std::string> labels, std::optional<double> aim,
+                   const std::vector<std::optional<double>>& values) {
+  std::vector<std::string> line = std::move(labels);
+  line.push_back(aim ? fmt::format("<= {:g}", *aim) : "-");
+  aims_ += aim ? 1 : 0;
+  for (std::size_t m = 0; m < methods_.size(); ++m) {
+    const bool missed = aim && !(values[m] && *values[m] <= *aim);
+    met_[m] += aim && !missed ? 1 : 0;
+    line.push_back((values[m] ? fmt::format("{:.3g}", *values[m]) : "-") + (missed ? " *" : ""));
+  }
+  scores_.rows.push_back(std::move(line));
+}
+
+Scores AimTable::scores(std::string note) const {
+  Scores scores = scores_;
+  std::vector<std::string> line(scores.columns.size() - methods_.size() - 1);
+  line.front() = "aims met";
+  line.push_back(fmt::format("{}", aims_));
+  for (const int count : met_) line.push_back(fmt::format("{}", count));
+  scores.rows.push_back(std::move(line));
+  scores.note = std::move(note);
+  return scores;
+}
+
+std::string measure_text(std::string_view name, std::string_view unit) {
+  return unit.empty() ? std::string(name) : fmt::format("{} [{}]", name, unit);
+}
+
+}  // namespace palpate::lab

@@ -104,6 +104,14 @@ function(palpate_runs_once target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 endfunction()
 
+# palpate_slow_when_sanitized(TARGET): not optimised under a sanitizer, where what the network or the
+# command line waits for costs more processor time to compile than it takes to run.
+function(palpate_slow_when_sanitized target)
+  if(PALPATE_SANITIZE)
+    target_compile_options(${target} PRIVATE -O0)
+  endif()
+endfunction()
+
 # palpate_room(NAME LINKS <public libraries...> PRIVATE <private libraries...>)
 #
 # A library palpate_NAME, palpate::NAME to others, from all .cpp files of the current folder; its

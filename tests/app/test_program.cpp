@@ -78,6 +78,13 @@ class Program : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
+// Tests of what `palpate` hands over to the programs beside it.
+class ProgramWithLab : public Program {
+  void SetUp() override {
+    if (!PALPATE_WITH_LAB) GTEST_SKIP() << "this build has no palpate-lab and palpate-bench";
+  }
+};
+
 constexpr const char* plane = "'synthetic:plane?noise=0.5mm&seed=3'";
 
 TEST_F(Program, TracesTheSameBytesEveryTime) {
@@ -283,7 +290,7 @@ TEST_F(Program, RunsALiveSessionAndSaysWhereItsPageIs) {
     EXPECT_TRUE(summary.contains(key)) << key;
 }
 
-TEST_F(Program, RunsALiveSessionWithAMethodOfTheLab) {
+TEST_F(ProgramWithLab, RunsALiveSessionWithAMethodOfTheLab) {
   const std::string live =
       "run --json --duration 1.5 --port 0 --no-browser --device hand: "
       "--camera synthetic:plane?size=160x120 --method ";
@@ -400,7 +407,7 @@ TEST_F(Program, SaysWhichFramesOfARecordingItLeavesOut) {
   EXPECT_NE(trace.err.find(": " + note), std::string::npos) << trace.err;
 }
 
-TEST_F(Program, MeasuresItselfBesideWhatOneCouldUseInstead) {
+TEST_F(ProgramWithLab, MeasuresItselfBesideWhatOneCouldUseInstead) {
   const Outcome outcome = run("bench --quick --json");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto json = nlohmann::json::parse(outcome.out);
@@ -419,7 +426,7 @@ TEST_F(Program, MeasuresItselfBesideWhatOneCouldUseInstead) {
   }
 }
 
-TEST_F(Program, WritesHowATicksCostGrows) {
+TEST_F(ProgramWithLab, WritesHowATicksCostGrows) {
   const Outcome outcome = run("bench --quick --growth --out " + path("growth"));
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const std::string csv = read(path("growth/growth.csv"));
@@ -444,7 +451,7 @@ TEST_F(Program, SaysHowToGetWhatTheProgramsBesideItHave) {
   EXPECT_EQ(run("methods --names", "", alone).out, "paper paper-as-printed fixed-step sight\n");
 }
 
-TEST_F(Program, HandsOverToTheProgramsBesideIt) {
+TEST_F(ProgramWithLab, HandsOverToTheProgramsBesideIt) {
   EXPECT_NE(run("eval --list-methods").out.find("god-object"), std::string::npos);
   EXPECT_NE(run("bench --help").out.find("--growth"), std::string::npos);
 }

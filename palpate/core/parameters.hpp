@@ -35,7 +35,7 @@ struct MotionParameters {
   double max_extrapolation = 0.1;  ///< [s] longest time over which a velocity is trusted
 };
 
-/// What sightline tracking assumes. docs/method.md, "Sight".
+/// What sightline tracking assumes. docs/sight.md.
 struct SightParameters {
   double hidden_hold = 0.4;      ///< [s] the force of an occluded surface is kept in full this long
   double hidden_fade = 0.3;      ///< [s] and then fades out over this

@@ -22,7 +22,7 @@ const MethodRegistry& standard_methods() {
         make_paper<Paper::Variant::as_printed>},
        {"fixed-step", "Rydén 2011 [1]: steps of 0.1 r_1, no velocity",
         make_paper<Paper::Variant::fixed_step>},
-       {"sight", "tracks the surface along the camera's lines of sight (docs/method.md)",
+       {"sight", "tracks the surface along the camera's lines of sight (docs/sight.md)",
         [](const Parameters& parameters) { return std::make_unique<Sight>(parameters); }}});
   return methods;
 }

@@ -8,7 +8,7 @@
 namespace palpate {
 
 /// The last word on a contact: checks hand and proxy against what the newest frame itself measures
-/// on their lines of sight. It estimates nothing and trusts no fit. docs/method.md, "The monitor".
+/// on their lines of sight. It estimates nothing and trusts no fit. docs/sight.md, 7.
 ///
 /// [servo] Nothing here allocates, locks or throws after construction. At most 6 gathers of at most
 /// `look_points` points a tick, and none while frame, hand and proxy stay where they are.

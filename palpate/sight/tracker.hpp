@@ -23,8 +23,8 @@ std::optional<Layer> first_layer(std::span<float> heights, double gap,
                                  double least_support) noexcept;
 
 /// Sightline tracking: decides which of a frame's points belong to the surface that the proxy
-/// touches, or that lies behind a free proxy on its line of sight. docs/method.md, "Sight", 1, 2
-/// and 7.
+/// touches, or that lies behind a free proxy on its line of sight. docs/sight.md, 2
+/// and 3.
 ///
 /// [servo] Nothing here allocates, locks or throws after construction.
 class SightTracker {

@@ -14,7 +14,7 @@ constexpr std::array<double, 5> jerks = {1.0, 6.0, 40.0, 250.0, 3000.0};
 // Change of velocity from frame to frame assumed by each of the others [m/s], from a surface that
 // is drawn along to one that is dropped. Without an acceleration to believe in, they do not
 // overshoot where a motion begins at once.
-constexpr std::array<double, 3> velocity_steps = {0.01, 0.1, 1.0};
+constexpr std::array<double, 4> velocity_steps = {0.01, 0.05, 0.25, 1.2};
 constexpr std::size_t filters = jerks.size() + velocity_steps.size();
 // Older frames say little about the present motion.
 constexpr std::size_t motion_frames = 24;

@@ -35,7 +35,7 @@ void Sight::seat(const Vec3& proxy) noexcept {
   tracker_.forget();
   monitor_.forget();
   last_proxy_.reset();
-  shortfall_ = 0.0;
+  returning_ = false;
   on_fit_ = false;
   points_moved_ = Vec3::Zero();
   last_force_ = Vec3::Zero();
@@ -54,7 +54,7 @@ double Sight::surface_speed(double t) const noexcept {
   return (tracker_.surface().displacement(t) - tracker_.surface().displacement(t - dt)) / dt;
 }
 
-// A frame seen along the lines of sight: docs/method.md, "Sight".
+// A frame seen along the lines of sight: docs/sight.md, 3.
 void Sight::frame(const Cloud& cloud, double stamp) noexcept {
   frame_.take(cloud, stamp, 1.0 / parameters_.motion.frame_rate);
   timing_.frame(frame_.stamp(), frame_.in_order() && frame_.count() > 1 ? frame_.interval() : 0.0);
@@ -183,7 +183,7 @@ void Sight::release(const Vec3& hip, Movement& movement) noexcept {
   movement.normal = Vec3::Zero();
 }
 
-// What the newest frame itself shows overrules every estimate: docs/method.md, "The monitor".
+// What the newest frame itself shows overrules every estimate: docs/sight.md, 7.
 void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
   // A frame's correction moves a proxy no farther than a surface is looked for [m].
   constexpr double farthest_move = 0.3;
@@ -296,14 +296,22 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
   if (std::exchange(returns_, false)) known = 0.0;
   // The force falls at once with the confidence in the surface. It rises as if the surface came
   // back to the hand at `return_speed`: a handle that nobody holds moves along with it, and swings
-  // about that speed by no more than that speed. A force that is ramped up in time throws it.
-  shortfall_ -= sight.return_speed * std::max(t - last_blend_t_, 0.0);
-  if (const double push = blended.norm(); push > 0.0) {
-    const double stiffness = std::max(parameters_.coupling.stiffness, 1e-9);
-    shortfall_ = std::max(shortfall_, (1.0 - known) * push / stiffness);
-    blended *= std::max(push - stiffness * shortfall_, 0.0) / push;
+  // about that speed by no more than that speed. A force that is ramped up in time throws it. Until
+  // the surface is back and r_c farther, what frames correct does not make it come faster.
+  const double push = blended.norm();
+  const double depth = push / std::max(parameters_.coupling.stiffness, 1e-9);
+  if (returning_) {
+    const double deeper = push > 0.0 ? (last_hip_ - hip).dot(blended) / push : 0.0;
+    const double back = sight.return_speed * std::max(t - last_blend_t_, 0.0);
+    most_felt_ = std::max(most_felt_ + back + deeper, 0.0);
   }
-  shortfall_ = std::max(shortfall_, 0.0);
+  if (known < 1.0) {
+    most_felt_ = std::min(returning_ ? most_felt_ : depth, known * depth);
+    returning_ = true;
+  } else if (most_felt_ >= depth + parameters_.proxy.r_c()) {
+    returning_ = false;
+  }
+  if (returning_ && most_felt_ < depth) blended *= most_felt_ / depth;
   last_hip_ = hip;
   last_blend_t_ = t;
   return blended;
@@ -322,7 +330,7 @@ Tick Sight::tick(const Vec3& hip, double t) noexcept {
                  tick);
   if (tracker_.holding()) tick.flags |= surface_hidden;
   tick.force = blend_force(render_force(hip, t, tick.flags), hip, t);
-  tick.surface_velocity = tracker_.tracking() ? tracker_.surface().velocity() : 0.0;
+  tick.surface_velocity = tracker_.tracking() ? tracker_.surface().normal_velocity() : 0.0;
   return tick;
 }
 

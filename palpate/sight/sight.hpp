@@ -15,7 +15,7 @@
 namespace palpate {
 
 /// Sightline tracking: follows the surface along the camera's lines of sight, before contact and in
-/// it, and lets the proxy rest on a fit averaged over space and time. docs/method.md, "Sight".
+/// it, and lets the proxy rest on a fit averaged over space and time. docs/sight.md.
 ///
 /// Where the fit does not describe the points, the proxy moves over them as the paper's does.
 class Sight final : public Method {
@@ -50,7 +50,8 @@ class Sight final : public Method {
   Vec3 points_moved_ = Vec3::Zero();
   Monitor monitor_;
   std::optional<Vec3> last_proxy_;  // [m] of the last tick
-  double shortfall_ = 0.0;          // [m] by which a surface that comes back is not there yet
+  bool returning_ = false;          // the surface was hidden or lost and comes back
+  double most_felt_ = 0.0;          // [m] inside it that the hand may be felt, then
   bool returns_ = false;            // it begins to come back in this tick
 
   // From which the force goes on when a frame arrives.

@@ -40,6 +40,12 @@ constexpr double squared(double x) {
   return x * x;
 }
 
+// How many standard deviations, themselves estimated with so many degrees of freedom, are exceeded
+// as rarely as `z` known ones: Student's quantile, by Fisher's expansion.
+double t_quantile(double z, double freedom) {
+  return z + z * (z * z + 1.0) / (4.0 * freedom);
+}
+
 // Variance of heights that do not move [m^2], all but the newest; 0 if there are too few.
 double variance_at_rest(std::span<const HeightSample> newest_first, std::size_t frames) {
   constexpr std::size_t enough = 8;
@@ -426,18 +432,20 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       }
       const auto count = static_cast<double>(n);
       const double mean = sum / count;
-      // With few frames, the variance expected from the heights' noise counts as two of them.
-      const double expected = 2.0 * (variance(i) + variance(j));
-      const double scattered =
-          (std::max(squares - count * mean * mean, 0.0) + (n < 4 ? expected : 0.0)) / count;
+      const double about_mean = std::max(squares - count * mean * mean, 0.0);
       // Noise falls at most with the area it is averaged over, so the difference from the next
       // narrower disc is a lower bound of a disc's noise.
       if (i + 1 == j && n >= 4) {
         scatter_[j].least =
-            (1.0 + 2.0 / count) * scattered / (squared(radii_[j] / radii_[i]) - 1.0);
+            (1.0 + 2.0 / count) * about_mean / count / (squared(radii_[j] / radii_[i]) - 1.0);
       }
+      // Few differences may happen to be alike: what the heights' noise lets expect counts as
+      // `prior` more. Without it a contact that slides falls back on narrow discs in single frames.
+      constexpr double prior = 4.0;
+      const double freedom = count - 1.0 + prior;
+      const double scattered = (about_mean + prior * (variance(i) + variance(j))) / freedom;
       // Hysteresis: the disc in use needs stronger evidence against it, since a change is felt.
-      const double confidence = (j <= rung_ ? 4.5 : 3.5) + 4.0 / count;
+      const double confidence = t_quantile(j <= rung_ ? 3.5 : 3.0, freedom);
       agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
       const double newest = heights[j][0].height - heights[i][0].height;
       moves_along =

@@ -23,7 +23,7 @@ struct SurfaceContact {
 };
 
 /// The estimate of one surface around one place, from all frames so far: shape, position, motion
-/// and measurement noise. docs/method.md, "Sight", 3 to 5. SightTracker decides which of a frame's
+/// and measurement noise. docs/sight.md, 4 and 5. SightTracker decides which of a frame's
 /// points belong to it.
 ///
 /// [servo] Nothing here allocates, locks or throws after construction.
@@ -76,6 +76,10 @@ class SurfaceEstimate {
   [[nodiscard]] SurfaceContact contact(const Vec3& point, double t, double reach) const noexcept;
   /// [m/s] along `up`.
   [[nodiscard]] double velocity() const noexcept { return velocity_; }
+  /// [m/s] along the normal at the centre of the fit.
+  [[nodiscard]] double normal_velocity() const noexcept {
+    return velocity_ * surface_.normal(centre_).z();
+  }
   [[nodiscard]] double stamp() const noexcept { return stamp_; }        ///< [s]
   [[nodiscard]] double interval() const noexcept { return interval_; }  ///< [s]
   /// How far the surface has moved along `up` at time t [s] since its frame [m].

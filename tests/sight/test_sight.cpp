@@ -425,6 +425,51 @@ TEST(Sight, AveragesTheNoiseOfASurfaceAtRestAway) {
   }
 }
 
+TEST(Sight, SaysTheSurfacesVelocityAlongItsNormal) {
+  // A leaning plane that rises: along the line of sight it is faster than along its normal.
+  const Overhead camera;
+  std::mt19937 random(6);
+  constexpr double slope = 0.7;
+  constexpr double speed = 0.03;  // [m/s] along z
+  Sight sight = seated({0, 0, 0.03});
+  Tick tick;
+  for (int k = 0; k < 20; ++k) {
+    const double t = k * interval;
+    const DepthImage image =
+        camera.shoot([&](double x, double) { return slope * x + speed * t; }, 0.0, random);
+    tick = live_through(sight, image, t, [](double now) { return Vec3(0, 0, speed * now - 0.01); });
+  }
+  EXPECT_NEAR(tick.surface_velocity, speed / std::hypot(1.0, slope), 0.01 * speed);
+}
+
+TEST(Sight, ComesBackSlowlyWhateverTheFirstFramesCorrect) {
+  // Two seconds without a frame; then the plane is 4 mm higher, and the frames are noisy.
+  const Overhead camera;
+  std::mt19937 random(7);
+  constexpr double stiffness = 600.0;                              // [N/m]
+  constexpr double return_speed = 0.01;                            // [m/s]
+  Sight sight = seated({0, 0, 0.03});
+  const auto press = [](double) { return Vec3(0.0002, 0, -0.008); };
+  Tick tick;
+  double t = 0.0;
+  for (; t < 0.5; t += interval) {
+    tick = live_through(sight, camera.shoot([](double, double) { return 0.0; }, 1e-3, random), t,
+                        press);
+  }
+  const double resumes = t + 2.0;
+  for (; t < resumes; t += 1e-3) tick = sight.tick(press(t), t);
+  ASSERT_EQ(tick.force.norm(), 0.0);
+  for (; t < resumes + 2.0; t += interval) {
+    sight.frame(camera.shoot([](double, double) { return 0.004; }, 1e-3, random), t);
+    for (int i = 0; i < 33; ++i) {
+      const double now = t + 1e-3 * i;
+      tick = sight.tick(press(now), now);
+      ASSERT_LE(tick.force.norm(), stiffness * return_speed * (now - resumes + 1e-3)) << now;
+    }
+  }
+  EXPECT_NEAR(tick.force.norm(), stiffness * 0.012, 0.2);
+}
+
 TEST(Sight, KeepsItsNormalWhileTheSurfaceRests) {
   const Overhead camera;
   for (unsigned seed = 1; seed <= 6; ++seed) {

@@ -116,7 +116,7 @@ ViewerMessage ticks_message(const TickBatch& batch) {
   writer.put(batch.flags).put(batch.t).put(batch.safety).put(batch.steps);
   writer.put_vec3(batch.hip).put_vec3(batch.proxy).put_vec3(batch.normal).put_vec3(batch.force);
   writer.put_float(batch.surface_velocity).put(batch.frame);
-  writer.pad_to(ticks_header_size);
+  writer.put_float(batch.gain).put_float(batch.asked_force);
   const std::span<const TickSample> samples(batch.samples);
   for (const TickSample& sample : samples.last(count)) {
     writer.put_float(batch.t - sample.t).put(sample.force).put(sample.penetration);

@@ -57,7 +57,7 @@ ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32
 struct TickSample {
   double t = 0.0;            ///< [s] of the last
   float force = 0.0F;        ///< [N] largest
-  float penetration = 0.0F;  ///< [m] largest distance from proxy to HIP while in contact
+  float penetration = 0.0F;  ///< [m] largest depth of the HIP below the surface; 0: above it
   float steps = 0.0F;        ///< most
   float tick_time = 0.0F;    ///< [s] longest, of the thread's own time
 };
@@ -72,6 +72,8 @@ struct TickBatch {
   std::int32_t frame = -1;
   Vec3 hip = Vec3::Zero(), proxy = Vec3::Zero(), normal = Vec3::Zero(), force = Vec3::Zero();
   double surface_velocity = 0.0;    ///< [m/s]
+  double gain = 0.0;                ///< [-] of the safety chain: 0 disengaged, 1 nothing faded
+  double asked_force = 0.0;         ///< [N] length of the force that the method asks for
   std::vector<TickSample> samples;  ///< oldest first; at most `max_samples` are sent, the newest
   static constexpr std::size_t max_samples = 1024;
 };

@@ -148,7 +148,8 @@ std::string SessionHost::state() {
 }
 
 std::optional<TickBatch> SessionHost::ticks() {
-  for (ServoTick record{}; reader_->try_pop(record);) batcher_->add(record);
+  const double contact_radius = session_->settings().parameters.proxy.r_c();
+  for (ServoTick record{}; reader_->try_pop(record);) batcher_->add(record, contact_radius);
   return batcher_->take();
 }
 

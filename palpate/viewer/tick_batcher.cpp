@@ -5,8 +5,19 @@
 #include <utility>
 
 namespace palpate {
+namespace {
 
-void TickBatcher::add(const ServoTick& record) {
+// [m] How far the HIP is below the surface, which is one contact radius below the proxy.
+double penetration_of(const Tick& tick, double contact_radius) {
+  if (tick.state == ContactState::free_motion) return 0.0;
+  const Vec3 out = tick.proxy - tick.hip;
+  const double below = tick.normal.isZero() ? out.norm() : out.dot(tick.normal);
+  return std::max(0.0, below - contact_radius);
+}
+
+}  // namespace
+
+void TickBatcher::add(const ServoTick& record, double contact_radius) {
   const Tick& tick = record.tick;
   batch_.t = tick.t;
   batch_.state = static_cast<std::uint8_t>(tick.state);
@@ -19,10 +30,11 @@ void TickBatcher::add(const ServoTick& record) {
   batch_.normal = tick.normal;
   batch_.force = record.force;
   batch_.surface_velocity = tick.surface_velocity;
+  batch_.gain = record.gain;
+  batch_.asked_force = tick.force.norm();
   any_ = true;
 
-  const bool touching = tick.state != ContactState::free_motion;
-  const double penetration = touching ? (tick.hip - tick.proxy).norm() : 0.0;
+  const double penetration = penetration_of(tick, contact_radius);
   sample_.t = tick.t;
   sample_.force = std::max(sample_.force, static_cast<float>(record.force.norm()));
   sample_.penetration = std::max(sample_.penetration, static_cast<float>(penetration));

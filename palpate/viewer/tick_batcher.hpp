@@ -14,7 +14,8 @@ class TickBatcher {
   /// @param ticks_per_sample  at least 1
   explicit TickBatcher(unsigned ticks_per_sample) : ticks_per_sample_(ticks_per_sample) {}
 
-  void add(const ServoTick& record);
+  /// @param contact_radius  [m] r_c: the surface is that far below the proxy
+  void add(const ServoTick& record, double contact_radius);
   /// What was added since the last call; none if nothing was. Ticks that do not make a whole sample
   /// yet are part of the next batch's samples.
   std::optional<TickBatch> take();

@@ -80,6 +80,8 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   batch.safety = 1u << 12;
   batch.frame = -1;
   batch.force = Vec3(0.0, 0.0, 2.5);
+  batch.gain = 0.25;
+  batch.asked_force = 10.0;
   for (std::size_t i = 0; i < TickBatch::max_samples + 10; ++i)
     batch.samples.push_back({100.0 - 0.001 * static_cast<double>(i), 1.0F, 0.5F, 2.0F, 3e-6F});
   const ViewerMessage message = ticks_message(batch);
@@ -90,6 +92,8 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   EXPECT_EQ(at<std::uint32_t>(message.head, 16), 1u << 12);
   EXPECT_EQ(at<float>(message.head, 68), 2.5F);
   EXPECT_EQ(at<std::int32_t>(message.head, 76), -1);
+  EXPECT_EQ(at<float>(message.head, 80), 0.25F);
+  EXPECT_EQ(at<float>(message.head, 84), 10.0F);
   EXPECT_NEAR(at<float>(message.head, 88), 0.010, 1e-6) << "the first ten are the oldest";
   EXPECT_EQ(at<float>(message.head, 88 + 16), 3e-6F);
 }

@@ -6,6 +6,8 @@
 namespace palpate {
 namespace {
 
+constexpr double r_c = 0.005;  // [m]
+
 ServoTick tick_at(double t) {
   ServoTick record{};
   record.tick.t = t;
@@ -18,7 +20,7 @@ ServoTick tick_at(double t) {
 TEST(TickBatcher, HasNothingBeforeATick) {
   TickBatcher batcher(5);
   EXPECT_FALSE(batcher.take());
-  batcher.add(tick_at(1.0));
+  batcher.add(tick_at(1.0), r_c);
   EXPECT_TRUE(batcher.take());
   EXPECT_FALSE(batcher.take());
 }
@@ -28,18 +30,22 @@ TEST(TickBatcher, ShowsTheNewestTickAndForgetsNoFlag) {
   ServoTick first = tick_at(1.0);
   first.tick.flags = step_budget_hit;
   first.safety = force_cut;
-  batcher.add(first);
+  batcher.add(first, r_c);
   ServoTick second = tick_at(1.001);
   second.tick.flags = frame_stale;
   second.force = Vec3(0.0, 0.0, 2.0);
-  batcher.add(second);
+  second.tick.force = Vec3(0.0, 3.0, 4.0);
+  second.gain = 0.4;
+  batcher.add(second, r_c);
   const auto batch = batcher.take();
   ASSERT_TRUE(batch);
   EXPECT_EQ(batch->t, 1.001);
   EXPECT_EQ(batch->force.z(), 2.0);
+  EXPECT_EQ(batch->asked_force, 5.0);
+  EXPECT_EQ(batch->gain, 0.4);
   EXPECT_EQ(batch->flags, step_budget_hit | frame_stale);
   EXPECT_EQ(batch->safety, std::uint32_t{force_cut});
-  batcher.add(tick_at(1.002));
+  batcher.add(tick_at(1.002), r_c);
   EXPECT_EQ(batcher.take()->flags, 0u) << "flags of the batch before";
 }
 
@@ -51,8 +57,10 @@ TEST(TickBatcher, KeepsTheExtremesOfEachSample) {
     record.tick.steps = i == 2 ? 9 : 1;
     record.previous_compute_ns = i == 0 ? 4000 : 1000;
     record.tick.state = i == 4 ? ContactState::contact : ContactState::free_motion;
+    record.tick.proxy = Vec3(0.0, 0.0, r_c);
+    record.tick.normal = Vec3::UnitZ();
     record.tick.hip = Vec3(0.0, 0.0, -0.004);
-    batcher.add(record);
+    batcher.add(record, r_c);
   }
   const auto batch = batcher.take();
   ASSERT_TRUE(batch);
@@ -63,9 +71,27 @@ TEST(TickBatcher, KeepsTheExtremesOfEachSample) {
   EXPECT_FLOAT_EQ(batch->samples[0].tick_time, 4e-6F);
   EXPECT_EQ(batch->samples[0].penetration, 0.0F) << "free: the hand is not in anything";
   EXPECT_FLOAT_EQ(batch->samples[1].penetration, 0.004F);
-  batcher.add(tick_at(0.007));
-  batcher.add(tick_at(0.008));
+  batcher.add(tick_at(0.007), r_c);
+  batcher.add(tick_at(0.008), r_c);
   EXPECT_EQ(batcher.take()->samples.size(), 1u);
+}
+
+TEST(TickBatcher, MeasuresPenetrationFromTheSurfaceNotFromTheProxy) {
+  const auto penetration = [](const Vec3& hip, const Vec3& normal) {
+    TickBatcher batcher(1);
+    ServoTick record = tick_at(1.0);
+    record.tick.state = ContactState::contact;
+    record.tick.proxy = Vec3(0.0, 0.0, r_c);  // on the surface z = 0
+    record.tick.normal = normal;
+    record.tick.hip = hip;
+    batcher.add(record, r_c);
+    return batcher.take()->samples.at(0).penetration;
+  };
+  EXPECT_EQ(penetration({0.0, 0.0, 0.0048}, Vec3::UnitZ()), 0.0F)
+      << "the sphere touches, the HIP is above";
+  EXPECT_FLOAT_EQ(penetration({0.0, 0.0, -0.0025}, Vec3::UnitZ()), 0.0025F);
+  EXPECT_FLOAT_EQ(penetration({0.03, 0.0, -0.0025}, Vec3::UnitZ()), 0.0025F) << "dragged aside";
+  EXPECT_FLOAT_EQ(penetration({0.0, 0.0, -0.0025}, Vec3::Zero()), 0.0025F) << "no normal is known";
 }
 
 }  // namespace

@@ -85,6 +85,13 @@ test("a press touches the spot that is pointed at, a drag slides, release lets g
   const written = async () => Number(await page.locator("#force").textContent());
   await expect.poll(written).toBeGreaterThan(1.2);
   expect(await page.locator("#state").textContent()).toMatch(/contact|entrenched/);
+  // A press of 2 N is one of 3.3 mm into the surface.
+  await expect
+    .poll(() => page.locator("#detail").textContent())
+    .toMatch(/^hand 3\.\d mm inside$/);
+  await expect
+    .poll(() => page.locator("#why").textContent())
+    .toMatch(/^Stiffness 600 N\/m times 3/);
   const plotted = () => page.locator(".plot output").first().textContent();
   await expect.poll(async () => parseFloat((await plotted()) ?? "")).toBeGreaterThan(0.5);
 
@@ -106,9 +113,17 @@ test("a press touches the spot that is pointed at, a drag slides, release lets g
   await until(page, (seen) => seen.state !== 0 && distance(seen.hip, seen.proxy) > r_c + 0.0055);
   expect(Math.abs((await glimpse(page)).proxy[2]! - r_c)).toBeLessThan(0.002);
 
+  // The plot says the same.
+  await expect
+    .poll(() => page.locator("#detail").textContent())
+    .toMatch(/^hand [56]\.\d mm inside$/);
+  const below = () => page.locator(".plot output").nth(1).textContent();
+  await expect.poll(async () => Math.abs(parseFloat((await below()) ?? "") - 6)).toBeLessThan(1);
+
   await page.mouse.up();
   await until(page, (seen) => seen.force === 0);
   await expect.poll(() => page.locator("#hand").textContent()).toContain("hand free");
+  await expect.poll(() => page.locator("#why").textContent()).toMatch(/nobody holds.*disengaged/);
   // The hand is out again, above where it touched.
   await until(page, (seen) => seen.state === 0 && seen.hip[2]! > 0.02);
   const after = await glimpse(page);

@@ -73,10 +73,6 @@ export class HandInput {
     setInterval(() => this.held && this.host.moved(Grip.held, this.target), REPEAT);
   }
 
-  get isHeld(): boolean {
-    return this.held;
-  }
-
   /** The hand, and all fingers and keys, are off: the connection is lost, or the page left. */
   letGo(): void {
     this.keys.clear();

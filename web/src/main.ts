@@ -1,12 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 import "./style.css";
-import { Connection } from "./connection";
+import { Connection, type Presence } from "./connection";
 import { HandInput, isForForm } from "./hand";
 import { length } from "./camera_math";
 import { latchedText, mayOperate, Panel, roleNames } from "./panel";
 import { Plots } from "./plots";
-import { encodeHand, encodeShown, type Frame, type State, type Ticks } from "./protocol";
+import {
+  encodeHand,
+  encodeShown,
+  type Frame,
+  type Hello,
+  type State,
+  type Ticks,
+} from "./protocol";
 import { SceneView, type Palette } from "./scene";
+import { depthBelow, flagNames, SteadyWhy, why } from "./why";
 
 const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 const DISENGAGED = 1 << 6; // SafetyFlag
@@ -14,6 +22,9 @@ const STATES = ["free", "contact", "entrenched"] as const;
 
 const plots = new Plots(get("plots"));
 let state: State | null = null;
+let introduced: Hello | null = null;
+let whose: Presence["hand"] = "free";
+const steadyWhy = new SteadyWhy();
 let tick: Ticks | null = null;
 let announced = "";
 const arrived = new Map<number, Frame>();
@@ -56,7 +67,10 @@ const connection = new Connection({
     get("connection").textContent = "reconnecting";
     toast("The connection to the program is lost. The hand is released; trying again.", 0);
   },
-  hello: (hello) => panel.introduce(hello),
+  hello(hello) {
+    introduced = hello;
+    panel.introduce(hello);
+  },
   state(newest) {
     const { ended } = newest.recording;
     if (ended && ended !== state?.recording.ended) toast(ended, 0);
@@ -88,15 +102,16 @@ const connection = new Connection({
       : `${path ? `Recording ${path}. ` : ""}Only the operator's page starts and ends recordings.`;
     record.setAttribute("aria-pressed", String(newest.recording.path !== null));
   },
-  presence({ hand: whose, viewers }) {
+  presence({ hand: owner, viewers }) {
+    whose = owner;
     const chip = get("hand");
-    chip.dataset.state = whose;
+    chip.dataset.state = owner;
     const texts = {
       you: "you have the hand",
       other: "another page has the hand",
       free: "hand free",
     };
-    chip.textContent = texts[whose] + (viewers > 1 ? ` · ${viewers} viewers` : "");
+    chip.textContent = texts[owner] + (viewers > 1 ? ` · ${viewers} viewers` : "");
   },
   refused: (reason) => toast(reason),
   message(message) {
@@ -119,7 +134,7 @@ const hand = new HandInput(get<HTMLCanvasElement>("view"), view, {
     },
   takesHand: () => state?.device.takes_hand ?? false,
   touch: () => ({
-    r_c: state?.parameters.r_c ?? 0.005,
+    r_c: contactRadius(),
     stiffness: state?.parameters.stiffness ?? 600,
   }),
   moved(grip, target) {
@@ -128,23 +143,36 @@ const hand = new HandInput(get<HTMLCanvasElement>("view"), view, {
   },
 });
 
+function contactRadius(): number {
+  return state?.parameters.r_c ?? 0.005;
+}
+
+function showWhy(now: number): void {
+  const flags = new Set([
+    ...flagNames(tick?.flags ?? 0, introduced?.flags ?? []),
+    ...flagNames(tick?.safety ?? 0, introduced?.safety_flags ?? []),
+  ]);
+  const { connected } = connection;
+  const { text, link } = steadyWhy.show(why({ connected, tick, flags, hand: whose, state }), now);
+  if (get("why-text").textContent !== text) get("why-text").textContent = text;
+  if (get("why-link").textContent !== link) get("why-link").textContent = link;
+}
+
 function showTick(now: number): void {
+  showWhy(now);
   if (!tick) return;
   const newtons = length(tick.force);
   get("force").textContent = newtons.toFixed(2);
   const word = STATES[tick.state] ?? "";
   get("state").textContent = word;
   get("state").dataset.state = String(tick.state);
-  const inside = 1e3 * Math.hypot(...tick.hip.map((x, i) => x - tick!.proxy[i]!));
-  const waits = tick.state !== 0 && (tick.safety & DISENGAGED) !== 0 && hand.isHeld;
-  const clearance = view.clearance();
-  get("detail").textContent = waits
-    ? "pull back, then push in again"
-    : tick.state !== 0
-      ? `hand ${inside.toFixed(1)} mm inside`
-      : clearance !== null && clearance > 0
-        ? `${(1e3 * clearance).toFixed(0)} mm from the surface`
-        : "";
+  const above = tick.state !== 0 ? -depthBelow(tick, contactRadius()) : view.clearance();
+  get("detail").textContent =
+    above === null
+      ? ""
+      : above < 0
+        ? `hand ${(-1e3 * above).toFixed(1)} mm inside`
+        : `hand ${(1e3 * above).toFixed(1)} mm above the surface`;
   panel.showSafety(tick.safety, now);
   const said = tick.state === 0 ? "free" : "touching";
   if (said !== announced) get("announce").textContent = announced = said;

@@ -20,7 +20,7 @@ interface Quantity {
 const QUANTITIES: readonly Quantity[] = [
   { title: "Force", unit: "N", colour: "--force", of: (s) => s.force, digits: 2, least: 1 },
   {
-    title: "Penetration of the hand",
+    title: "Hand below the surface",
     unit: "mm",
     colour: "--hip",
     of: (s) => 1e3 * s.penetration,

@@ -51,6 +51,10 @@ export interface Ticks {
   force: Vec3;
   /** [m/s] */
   surfaceVelocity: number;
+  /** [-] of the safety chain: 0 disengaged, 1 nothing faded */
+  gain: number;
+  /** [N] length of the force that the method asks for */
+  askedForce: number;
   samples: Sample[];
 }
 
@@ -60,7 +64,7 @@ export interface Sample {
   t: number;
   /** [N] */
   force: number;
-  /** [m] */
+  /** [m] depth of the HIP below the surface; 0 above it */
   penetration: number;
   steps: number;
   /** [s] of the servo thread's own time for a tick */
@@ -142,6 +146,8 @@ function decodeTicks(buffer: ArrayBuffer, view: DataView): Ticks {
     normal: vec3(view, 48),
     force: vec3(view, 60),
     surfaceVelocity: view.getFloat32(72, true),
+    gain: view.getFloat32(80, true),
+    askedForce: view.getFloat32(84, true),
     frame: view.getInt32(76, true),
     samples,
   };

@@ -45,6 +45,8 @@ function ticksMessage(samples: number[][]): ArrayBuffer {
   for (let i = 0; i < 12; ++i) view.setFloat32(24 + 4 * i, i + 1, true);
   view.setFloat32(72, 0.25, true);
   view.setInt32(76, -1, true);
+  view.setFloat32(80, 0.5, true);
+  view.setFloat32(84, 12, true);
   samples.flat().forEach((value, i) => view.setFloat32(88 + 4 * i, value, true));
   return buffer;
 }
@@ -90,6 +92,7 @@ describe("ticks", () => {
     expect(ticks.hip).toEqual([1, 2, 3]);
     expect(ticks.force).toEqual([10, 11, 12]);
     expect(ticks.frame).toBe(-1);
+    expect(ticks).toMatchObject({ gain: 0.5, askedForce: 12 });
     expect(ticks.samples[0]!.t).toBeCloseTo(99.99);
     expect(ticks.samples[1]).toEqual({ t: 100, force: 5, penetration: 6, steps: 7, tickTime: 8 });
   });

@@ -127,7 +127,8 @@ struct Admission {
   http::status status = http::status::ok;
   Place place = nullptr;
   bool is_operator = false;
-  bool needs_token = false;  // it was opened by the program, and does not know the token yet
+  bool needs_token = false;    // it was opened by the program, and does not know the token yet
+  bool unknown_token = false;  // it gave one that is nobody's, where none is needed
 };
 
 class PageSession;
@@ -350,10 +351,12 @@ class ViewerServer::Impl final : public Hub {
       if (slashes == std::string_view::npos || origin.substr(slashes + 3) != authority)
         return {http::status::forbidden};
     }
-    if (!websocket::is_upgrade(request)) return {};
+    // A page that was refused asks once more without an upgrade: browsers do not tell it why.
+    const bool upgrades = websocket::is_upgrade(request);
     const std::string_view target = view(request.target());
-    if (target.substr(0, target.find('?')) != "/session") return {http::status::not_found};
-    Admission admission = judge_token(token_of(target), source);
+    if (target.substr(0, target.find('?')) != "/session")
+      return {upgrades ? http::status::not_found : http::status::ok};
+    Admission admission = judge_token(token_of(target), source, upgrades);
     if (admission.status != http::status::ok) return admission;
     if (admission.is_operator) admission.place = take_place(operator_pages_, max_operator_pages);
     if (!admission.place) admission.place = take_place(viewer_pages_, max_viewers);
@@ -367,6 +370,7 @@ class ViewerServer::Impl final : public Hub {
     std::string hello = with_member(host_.hello(), "role", to_string(role_of(*page)));
     if (page->admission().needs_token)
       hello = with_member(hello, "operator_token", operator_token_);
+    if (page->admission().unknown_token) hello = with_member(hello, "token", "unknown");
     page->send(shared_text("{\"hello\":" + hello + "}"));
     send_state({page});
     for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
@@ -438,7 +442,8 @@ class ViewerServer::Impl final : public Hub {
 
   // Whose token is it? On a loopback address that asks for none, a wrong one lets in who looks,
   // such as a page left open from an earlier session; it counts as a guess all the same.
-  Admission judge_token(std::string_view given, const std::string& source) {
+  // @param enters  whether a session begins: that uses up the token with which a page is opened
+  Admission judge_token(std::string_view given, const std::string& source, bool enters) {
     if (given.empty()) return {token_.empty() ? http::status::ok : http::status::unauthorized};
     const double t = Seconds(Clock::now().time_since_epoch()).count();
     if (guesses_.pause(source, t) > 0.0) return {http::status::too_many_requests};
@@ -448,12 +453,13 @@ class ViewerServer::Impl final : public Hub {
     const bool is_viewer = is_token(given, token_);
     Admission admission;
     if (is_opening && Clock::now() < opened_until_) {
-      opening_token_.clear();  // other accounts see the browser's command line
+      if (enters) opening_token_.clear();  // other accounts see the browser's command line
       admission.is_operator = admission.needs_token = true;
     } else if (is_operator) {
       admission.is_operator = true;
     } else if (!is_viewer) {
       guesses_.wrong(source, given, t);
+      admission.unknown_token = true;
       if (!token_.empty()) admission.status = http::status::unauthorized;
     }
     return admission;

@@ -166,6 +166,21 @@ TEST(ViewerServer, AsksForItsToken) {
   EXPECT_TRUE(Page(server.port(), "/session?a=b&token=secret-123").accepted());
 }
 
+TEST(ViewerServer, TellsAPageThatAsksWithoutAnUpgradeWhyItWasRefused) {
+  FakeHost host;
+  const ViewerServer server({"127.0.0.1", 0, "secret-123"}, host);
+  const auto answer = [&](const std::string& target) {
+    return ask(server.port(), target, "localhost").result();
+  };
+  EXPECT_EQ(answer("/session"), http::status::unauthorized);
+  EXPECT_EQ(answer("/session?token=secret-124"), http::status::unauthorized);
+  EXPECT_EQ(answer("/session?token=secret-123"), http::status::not_found) << "that is not why";
+  // To ask does not use up the link with which the program opens a browser.
+  EXPECT_EQ(answer(target_of(server.opening_url())), http::status::not_found);
+  EXPECT_EQ(Page(server.port(), target_of(server.opening_url())).until("hello")["role"],
+            "operating");
+}
+
 TEST(ViewerServer, ListensBeyondThisMachineOnlyWithAToken) {
   FakeHost host;
   const auto open = [&](const ViewerOptions& options) {
@@ -476,7 +491,10 @@ TEST_F(ViewerServerTest, GivesNoPageTheHandOfADeviceThatPagesDoNotMove) {
 
 TEST_F(ViewerServerTest, LetsALeftOverPageLookOn) {
   Page page(server.port(), "/session?token=of-an-earlier-session");
-  EXPECT_EQ(page.until("hello")["role"], "looking");
+  const auto hello = page.until("hello");
+  EXPECT_EQ(hello["role"], "looking");
+  EXPECT_EQ(hello["token"], "unknown");
+  EXPECT_FALSE(Page(server.port()).until("hello").contains("token"));
 }
 
 TEST_F(ViewerServerTest, OpensTheOperatorsPageOnceWithoutItsToken) {

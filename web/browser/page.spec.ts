@@ -316,6 +316,68 @@ test("without the operator's link a page is greyed out and may hold the hand", a
   await expect.poll(force).toBeLessThan(started);
 });
 
+test("a number field takes numbers, and what is refused goes back", async () => {
+  const page = await open(DESK);
+  await page.getByRole("tab", { name: "Method" }).click();
+  const first = page.locator("#parameters input[type=number]").first();
+  expect(await first.getAttribute("aria-label")).toBe("stiffness, N/m");
+  const stiffness = () =>
+    page.evaluate(() => (window as any).palpate.newest().state.parameters.stiffness as number);
+  await expect.poll(() => first.inputValue()).toBe("600");
+  await first.fill("");
+  await first.press("Enter");
+  expect(await first.inputValue()).toBe("600");
+  await first.fill("700");
+  await first.press("Enter");
+  await expect.poll(stiffness).toBe(700);
+  // Beyond its range: refused, and the field shows again what holds, while it has the focus.
+  await first.fill("1e9");
+  await first.press("Enter");
+  await expect.poll(() => page.locator("#toast").textContent()).toContain("stiffness");
+  await expect.poll(() => first.inputValue()).toBe("700");
+  await first.fill("5");
+  await first.press("Escape");
+  expect(await first.inputValue()).toBe("700");
+  expect(await stiffness()).toBe(700);
+});
+
+test("a wrong or missing token is said on the page", async () => {
+  program = await Program.start([...DESK, "--token", "of-the-viewers"]);
+  const toast = (page: Page) => page.locator("#toast").textContent();
+  for (const [query, said] of [
+    ["", "lacks its token"],
+    ["?token=of-somebody-else", "is wrong or of an earlier session"],
+  ] as const) {
+    const page = await browser.newPage();
+    await page.goto(`http://localhost:${program.port}/${query}`);
+    await expect.poll(() => toast(page)).toContain(said);
+    expect(await page.locator("#connection").textContent()).toBe("refused");
+    await page.close();
+  }
+  await program.stop();
+  // Where none is needed, a wrong one looks on, and knows that.
+  program = await Program.start(DESK);
+  const page = await browser.newPage();
+  await page.goto(new URL("?token=of-an-earlier-session", program.viewersUrl).href);
+  await expect.poll(() => toast(page)).toContain("this page looks on");
+});
+
+test("help opens at its beginning", async () => {
+  const page = await open(DESK, 360, 640);
+  await page.click("#ask");
+  const dialog = page.locator("#help");
+  expect(await dialog.isVisible()).toBe(true);
+  const { top, room } = await dialog.evaluate((box) => ({
+    top: box.scrollTop,
+    room: box.scrollHeight - box.clientHeight,
+  }));
+  expect(room).toBeGreaterThan(0);
+  expect(top).toBe(0);
+  expect(await page.evaluate(() => document.activeElement?.id)).toBe("help-title");
+  await page.keyboard.press("Escape");
+  expect(await dialog.isVisible()).toBe(false);
+});
+
 test("a recording ends at its limit, and the page says so", async () => {
   const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
   try {

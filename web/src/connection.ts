@@ -10,9 +10,34 @@ export interface Presence {
   viewers: number;
 }
 
+/** What a page says whose token opens nothing, though none is needed. */
+export const unknownToken =
+  "The token in this page's address is wrong or of an earlier session: this page looks on. " +
+  "To operate the session, open the link that the program printed.";
+
+/** Why the program lets no session begin; null: that is not why. @param status  of HTTP */
+export function refusalText(status: number, hasToken: boolean): string | null {
+  switch (status) {
+    case 401:
+      return hasToken
+        ? "The token in this page's address is wrong or of an earlier session. " +
+            "Open the link that the program printed."
+        : "This page's address lacks its token. Open the link that the program printed.";
+    case 403:
+      return "The program does not answer pages of this address. Open the link that it printed.";
+    case 429:
+      return "Too many wrong tokens came from here. Wait five minutes, then open the printed link.";
+    case 503:
+      return "Too many pages are open. Close one of them.";
+    default:
+      return null;
+  }
+}
+
 export interface Handlers {
   opened(): void;
-  lost(): void;
+  /** @param refusal  why the program lets no session begin; null: it is lost */
+  lost(refusal: string | null): void;
   hello(hello: Hello): void;
   state(state: State): void;
   presence(presence: Presence): void;
@@ -25,6 +50,7 @@ export class Connection {
   private socket: WebSocket | null = null;
   private pause = FIRST_PAUSE;
   private heard = 0;
+  private opened = false;
   private token = new URLSearchParams(location.search).get("token");
 
   constructor(private readonly handlers: Handlers) {
@@ -48,13 +74,14 @@ export class Connection {
 
   private open(): void {
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-    const query = this.token ? `?token=${encodeURIComponent(this.token)}` : "";
-    const socket = new WebSocket(`${scheme}//${location.host}/session${query}`);
+    const socket = new WebSocket(`${scheme}//${location.host}${this.path()}`);
     this.socket = socket;
+    this.opened = false;
     this.heard = performance.now() + SILENCE; // time to get through
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.pause = FIRST_PAUSE;
+      this.opened = true;
       this.handlers.opened();
     };
     socket.onclose = () => this.drop(socket);
@@ -83,12 +110,26 @@ export class Connection {
     this.handlers.hello(hello);
   }
 
+  private path(): string {
+    return "/session" + (this.token ? `?token=${encodeURIComponent(this.token)}` : "");
+  }
+
   private drop(socket: WebSocket): void {
     if (socket !== this.socket) return;
     this.socket = null;
     socket.close();
-    this.handlers.lost();
+    if (this.opened) this.handlers.lost(null);
+    else void this.explainRefusal();
     setTimeout(() => this.open(), this.pause);
     this.pause = Math.min(2 * this.pause, LONGEST_PAUSE);
+  }
+
+  // A browser does not tell why a WebSocket did not open; the program tells who asks without one.
+  private async explainRefusal(): Promise<void> {
+    const status = await fetch(this.path(), { cache: "no-store" }).then(
+      (answer) => answer.status,
+      () => 0,
+    );
+    if (!this.opened) this.handlers.lost(refusalText(status, this.token !== null));
   }
 }

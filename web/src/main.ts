@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import "./style.css";
-import { Connection, type Presence } from "./connection";
+import { Connection, unknownToken, type Presence } from "./connection";
 import { HandInput, isForForm } from "./hand";
 import { length } from "./camera_math";
 import { latchedText, mayOperate, Panel, roleNames } from "./panel";
@@ -60,16 +60,20 @@ const connection = new Connection({
     get("connection").textContent = "connected";
     get("toast").hidden = true;
   },
-  lost() {
+  lost(refusal) {
     arrived.clear();
     hand.letGo();
     get("connection").dataset.state = "lost";
-    get("connection").textContent = "reconnecting";
-    toast("The connection to the program is lost. The hand is released; trying again.", 0);
+    get("connection").textContent = refusal ? "refused" : "reconnecting";
+    toast(
+      refusal ?? "The connection to the program is lost. The hand is released; trying again.",
+      0,
+    );
   },
   hello(hello) {
     introduced = hello;
     panel.introduce(hello);
+    if (hello.token === "unknown") toast(unknownToken, 15_000);
   },
   state(newest) {
     const { ended } = newest.recording;
@@ -113,7 +117,10 @@ const connection = new Connection({
     };
     chip.textContent = texts[owner] + (viewers > 1 ? ` · ${viewers} viewers` : "");
   },
-  refused: (reason) => toast(reason),
+  refused(reason) {
+    toast(reason);
+    panel.refused();
+  },
   message(message) {
     if (message.kind === "frame") arrived.set(message.camera, message);
     else if (message.kind === "rays") view.setRays(message);
@@ -172,7 +179,7 @@ function showTick(now: number): void {
       ? ""
       : above < 0
         ? `hand ${(-1e3 * above).toFixed(1)} mm inside`
-        : `hand ${(1e3 * above).toFixed(1)} mm above the surface`;
+        : `${(1e3 * above).toFixed(above < 0.01 ? 1 : 0)} mm above the surface`;
   panel.showSafety(tick.safety, now);
   const said = tick.state === 0 ? "free" : "touching";
   if (said !== announced) get("announce").textContent = announced = said;
@@ -211,6 +218,7 @@ function help(): void {
   const dialog = get<HTMLDialogElement>("help");
   hand.letGo();
   if (!dialog.open) dialog.showModal();
+  dialog.scrollTop = 0;
 }
 
 function applyTheme(theme: string): void {

@@ -90,6 +90,18 @@ export function shortNumber(value: number): string {
   return String(Number(value.toPrecision(4)));
 }
 
+/** The number that somebody typed; null: none, which is not zero. */
+export function enteredNumber(text: string): number | null {
+  const value = Number(text.trim() || Number.NaN);
+  return Number.isFinite(value) ? value : null;
+}
+
+/** The rows in the order in which they are shown: what is changed most often first. */
+export function stiffnessFirst<Row extends { name: string }>(rows: readonly Row[]): Row[] {
+  const isFirst = ({ name }: Row) => name === "stiffness";
+  return [...rows.filter(isFirst), ...rows.filter((row) => !isFirst(row))];
+}
+
 function element<Tag extends keyof HTMLElementTagNameMap>(
   tag: Tag,
   properties: Partial<HTMLElementTagNameMap[Tag]> = {},
@@ -109,7 +121,9 @@ class Row {
   private readonly root: HTMLElement;
   private readonly back: HTMLButtonElement;
   private readonly factor: number;
-  private held = 0;
+  private held = 0; // [ms] when it was changed here last
+  private typing = false;
+  private current = Number.NaN; // what the program says
 
   constructor(
     parent: HTMLElement,
@@ -151,7 +165,14 @@ class Row {
     this.slider.addEventListener("input", () =>
       this.change(valueFromSlider(row, +this.slider.value)),
     );
-    this.number.addEventListener("change", () => this.change(+this.number.value / factor));
+    this.number.addEventListener("input", () => (this.typing = true));
+    this.number.addEventListener("change", () => {
+      const entered = enteredNumber(this.number.value);
+      if (entered === null) this.goBack();
+      else this.change(entered / factor);
+    });
+    this.number.addEventListener("blur", () => this.typing && this.goBack());
+    this.number.addEventListener("keydown", (event) => event.key === "Escape" && this.goBack());
     this.back.addEventListener("click", () => this.change(row.default));
   }
 
@@ -160,17 +181,29 @@ class Row {
     this.root.classList.toggle("off", !allowed);
   }
 
+  /** The program has refused something: what was changed here just now goes back. */
+  refused(): void {
+    if (performance.now() - this.held < 2000) this.goBack();
+  }
+
   show(value: number): void {
-    const mine = document.activeElement;
-    if (mine === this.number || performance.now() - this.held < 500) return; // being set
+    this.current = value;
+    if (this.typing || performance.now() - this.held < 500) return; // being set
     this.slider.value = String(sliderFromValue(this.row, value));
     this.number.value = shortNumber(value * this.factor);
     const { default: standard } = this.row;
     this.root.classList.toggle("changed", Math.abs(value - standard) > 1e-9 * Math.abs(standard));
   }
 
+  private goBack(): void {
+    this.typing = false;
+    this.held = 0;
+    this.show(this.current);
+  }
+
   private change(value: number): void {
     this.held = performance.now();
+    this.typing = false;
     this.number.value = shortNumber(value * this.factor);
     this.slider.value = String(sliderFromValue(this.row, value));
     this.set(value);
@@ -247,17 +280,24 @@ export class Panel {
         table.map((row) => [row.name, new Row(parent, row, id, (value) => set(row.name, value))]),
       );
     };
-    this.rows = build("parameters", hello.parameters, this.actions.setParameter);
+    const parameters = stiffnessFirst(hello.parameters);
+    this.rows = build("parameters", parameters, this.actions.setParameter);
     this.limits = build("limits", hello.safety, this.actions.setLimit);
     this.placement = build("placement", hello.placement, this.actions.place);
     const tally = (id: string, flags: Hello["flags"]) =>
       get(id).replaceChildren(
         ...flags.map(({ name, meaning }) =>
-          element("li", { title: meaning }, name.replaceAll("_", " "), element("output", {}, "0")),
+          element("li", { title: meaning }, name.replaceAll("_", " "), element("b", {}, "0")),
         ),
       );
     tally("flags", hello.flags);
     tally("interventions", hello.safety_flags);
+  }
+
+  /** The program has refused what the page asked for. */
+  refused(): void {
+    for (const rows of [this.rows, this.limits, this.placement])
+      for (const row of rows.values()) row.refused();
   }
 
   /** @param safety SafetyFlag bits of the newest ticks */

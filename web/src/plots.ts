@@ -104,6 +104,7 @@ export class Plots {
       const title = document.createElement("b");
       title.textContent = quantity.title;
       const value = document.createElement("output");
+      value.ariaLive = "off"; // it changes fifteen times a second
       header.append(title, value);
       const host = document.createElement("div");
       host.className = "canvas";

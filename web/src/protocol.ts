@@ -226,6 +226,8 @@ export interface Hello {
   role: Role;
   /** of a page that the program has opened by itself: what it must know when it comes again */
   operator_token?: string;
+  /** the token in the page's address is none that the program knows, and none is needed */
+  token?: "unknown";
   methods: { name: string; meaning: string }[];
   parameters: ParameterRow[];
   safety: ParameterRow[];

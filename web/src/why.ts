@@ -15,7 +15,10 @@ export interface Why {
 /** What the line is made of. */
 export interface Facts {
   connected: boolean;
-  tick: Pick<Ticks, "state" | "hip" | "proxy" | "normal" | "gain" | "askedForce"> | null;
+  tick: Pick<
+    Ticks,
+    "state" | "hip" | "proxy" | "normal" | "gain" | "askedForce" | "force"
+  > | null;
   /** names of the flags that are set */
   flags: ReadonlySet<string>;
   hand: "you" | "other" | "free";
@@ -72,9 +75,19 @@ const RULES: readonly [flag: string, say: (facts: Facts) => string][] = [
   ["continuous_cut", ({ tick }) => `Limited: the motors are warm; ${asked(tick)}`],
   ["force_cut", ({ tick }) => `Limited to what is allowed; ${asked(tick)}`],
   ["force_saturated", () => "Limited by the method's max force."],
-  ["pull_removed", () => "The part that pulled into the surface is removed."],
-  ["slew_cut", () => "Changing as fast as it may."],
+  [
+    "pull_removed",
+    ({ tick }) => (differs(tick) ? "The part that pulled into the surface is removed." : ""),
+  ],
+  ["slew_cut", ({ tick }) => (differs(tick) ? "Changing as fast as it may." : "")],
 ];
+
+// Does the force that is sent differ from what the method asks for, so that somebody could notice?
+function differs(tick: Facts["tick"]): boolean {
+  if (!tick) return false;
+  const sent = length(tick.force);
+  return Math.abs(sent - tick.askedForce) > Math.max(0.02, 0.05 * tick.askedForce);
+}
 
 function touches(tick: Facts["tick"]): boolean {
   return tick !== null && tick.state !== 0;

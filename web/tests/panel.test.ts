@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 import { expect, test } from "vitest";
 import {
+  enteredNumber,
   latchedText,
   maySetLimit,
   shownUnit,
   shortNumber,
   sliderFromValue,
+  stiffnessFirst,
   valueFromSlider,
   whyNot,
 } from "../src/panel";
@@ -40,6 +42,18 @@ test("millimetres and degrees are shown, not their thousandths", () => {
   expect(shownUnit({ unit: "-", max: 1 }).unit).toBe("");
   expect(shownUnit({ unit: "N/m", max: 1e5 })).toEqual({ unit: "N/m", factor: 1 });
   expect(shortNumber(5.0000000001)).toBe("5");
+});
+
+test("an empty field is no number, least of all zero", () => {
+  for (const nothing of ["", "  ", "-", "1e", "NaN", "Infinity", "1,5"])
+    expect(enteredNumber(nothing)).toBeNull();
+  expect(enteredNumber("0")).toBe(0);
+  expect(enteredNumber(" 1.5e2 ")).toBe(150);
+});
+
+test("stiffness comes first, the others as the program lists them", () => {
+  const rows = ["r_c", "stiffness", "damping"].map((name) => ({ name }));
+  expect(stiffnessFirst(rows).map(({ name }) => name)).toEqual(["stiffness", "r_c", "damping"]);
 });
 
 test("each role may set what the program lets it set, and is told why not the rest", () => {

@@ -23,7 +23,7 @@ test("flags have the names of the program's table", () => {
 const facts = (flags: string[], more: Partial<Facts> = {}): Facts => ({
   connected: true,
   tick: {
-    ...{ state: 1, gain: 0.4, askedForce: 9 },
+    ...{ state: 1, gain: 0.4, askedForce: 9, force: [0, 0, 2] as const },
     ...{ hip: [0, 0, -0.002], proxy: [0, 0, r_c], normal: up },
   },
   flags: new Set(flags),
@@ -66,6 +66,12 @@ describe("why the force is what it is", () => {
     expect(why(facts(["ramping", "disengaged"])).link).toBe("disengaged");
     expect(why(facts(["disengaged", "frame_lost", "frame_fading"])).link).toBe("frame_lost");
     expect(why(facts(["frame_lost", "fault_latched"])).link).toBe("fault_latched");
+  });
+
+  test("what changes the force by nothing that is noticed is not why", () => {
+    const tick = { ...facts([]).tick!, askedForce: 2.01 };
+    expect(why(facts(["slew_cut", "pull_removed"], { tick })).text).toContain("Stiffness");
+    expect(why(facts(["slew_cut"])).link).toBe("slew_cut");
   });
 
   test("a hand that nobody holds, that is lost, or a program that is silent", () => {

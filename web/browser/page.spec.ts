@@ -130,6 +130,27 @@ test("a press touches the spot that is pointed at, a drag slides, release lets g
   expect(Math.hypot(after.hip[0]! - next[0]!, after.hip[1]! - next[1]!)).toBeLessThan(0.015);
 });
 
+test("a new visitor who opens, points and holds is in contact at once", async () => {
+  program = await Program.start(["--camera", "synthetic:desk"]);
+  const page = await open([], 1280, 800);
+  const at = await placeWhere(page, "surface");
+  const began = await glimpse(page);
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await until(page, (seen) => seen.state !== 0);
+  // Drawings, not seconds: a machine that draws nine a second has ten seconds for them.
+  const touched = await glimpse(page);
+  const count = touched.drawings - began.drawings;
+  expect(count).toBeLessThan(90);
+  const spot = await spotUnder(page, at);
+  const { proxy } = touched;
+  expect(Math.hypot(proxy[0]! - spot[0]!, proxy[1]! - spot[1]!)).toBeLessThan(0.01);
+  const paint = await page.evaluate(
+    () => (performance.now() - performance.getEntriesByType("paint")[0]!.startTime) / 1000,
+  );
+  console.log(`in contact after ${count} drawings, ${paint.toFixed(1)} s from first paint`);
+});
+
 test("whatever ends a press lets the hand go", async () => {
   const page = await open(PLANE);
   const at = await placeWhere(page, "surface");

@@ -55,7 +55,7 @@ class Draw {
   [[nodiscard]] std::string text() const {
     std::string text;
     for (const auto& [key, value] : values_)
-      text += fmt::format("{}{}={:.4g}", text.empty() ? "" : "&", key, value);
+      text += fmt::format("{}{}={:.4g}", text.empty() ? "" : "&", key, value.value);
     return text;
   }
 
@@ -63,15 +63,23 @@ class Draw {
   [[nodiscard]] double chance_of(std::string_view key) const {
     return Chance(hash_of(key, seed_)).even();
   }
+  struct Value {
+    double value;
+    double low, high;  // that it may have
+  };
+
   double given(std::string_view key, double drawn, double low, double high) {
-    const double value = uri_.number_option(key, drawn, low, high);
-    values_.insert_or_assign(key, value);
-    return value;
+    const Value value{uri_.number_option(key, drawn, low, high), low, high};
+    const auto [found, is_new] = values_.emplace(key, value);
+    if (!is_new && (found->second.low != low || found->second.high != high))
+      throw Error("field: " + std::string(key), "two values have this name",
+                  "give each value of a class and its sensors a name of its own");
+    return value.value;
   }
 
   Uri uri_;
   std::uint64_t seed_;
-  std::map<std::string_view, double> values_;
+  std::map<std::string_view, Value> values_;
 };
 
 Eigen::Isometry3d at(const Vec3& place) {
@@ -859,7 +867,7 @@ SensorSetup sensor_of(Draw& draw, double& distance) {
       setup.wiggle = draw.even("wiggle", 0.0, 0.002);
       break;
     case SensorKind::coarse:
-      setup.width = draw.whole("wide", 2) == 1 ? 100 : 80;
+      setup.width = draw.whole("pixels", 2) == 1 ? 100 : 80;
       setup.height = setup.width * 4 / 5 - (setup.width == 80 ? 4 : 0);
       setup.focal = 0.5 * setup.width / std::tan(0.5 * draw.even("field_of_view", 0.95, 1.25));
       setup.noise = draw.even("range_noise", 0.003, 0.008);

@@ -393,6 +393,16 @@ TEST(FieldCase, IsDrawnFromSeedClassAndNumberAndReadsBack) {
   EXPECT_EQ(texts.size(), 3 * field_classes().size());
 }
 
+TEST(FieldCase, HasANameOfItsOwnForEachValue) {
+  for (const FieldClass& of : field_classes()) {
+    for (int sensor = 0; sensor < sensor_kinds; ++sensor) {
+      FieldCase c = draw_field_case(of, 3, 0);
+      c.fixed = "sensor=" + std::to_string(sensor);
+      EXPECT_NO_THROW(make_stage(c)) << c.text();
+    }
+  }
+}
+
 TEST(FieldCase, SettingAValueChangesNoOther) {
   const Stage drawn = make_stage(parse_field_case("field:terrain-slide?seed=9&sensor=4&rate=30"));
   const Stage set = make_stage(parse_field_case("field:terrain-slide?seed=9&sensor=4&rate=60"));

@@ -282,6 +282,16 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
   const Vec3 normal = proxy_.normal.value_or(Vec3::Zero());
   const double pull = blended.dot(normal);
   if (pull < 0.0) blended -= pull * normal;
+  // Nor does it follow a hand that leaves: what is left of it ends like a spring's push.
+  if (!force.isZero()) {
+    left_at_ = hip;
+    left_along_ = normal;
+  }
+  const double stiffness = std::max(parameters_.coupling.stiffness, 1e-9);
+  if (const double gap = (hip - left_at_).dot(left_along_); gap > 0.0) {
+    const double rest = blended.norm();
+    if (rest > 0.0) blended *= std::max(rest - stiffness * gap, 0.0) / rest;
+  }
   if (const double length = blended.norm(); length > parameters_.coupling.max_force)
     blended *= (1.0 - 1e-15) * parameters_.coupling.max_force / length;  // after rounding, too
   last_force_ = blended;
@@ -299,7 +309,7 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
   // about that speed by no more than that speed. A force that is ramped up in time throws it. Until
   // the surface is back and r_c farther, what frames correct does not make it come faster.
   const double push = blended.norm();
-  const double depth = push / std::max(parameters_.coupling.stiffness, 1e-9);
+  const double depth = push / stiffness;
   if (returning_) {
     const double deeper = push > 0.0 ? (last_hip_ - hip).dot(blended) / push : 0.0;
     const double back = sight.return_speed * std::max(t - last_blend_t_, 0.0);

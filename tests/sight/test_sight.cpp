@@ -442,25 +442,52 @@ TEST(Sight, SaysTheSurfacesVelocityAlongItsNormal) {
   EXPECT_NEAR(tick.surface_velocity, speed / std::hypot(1.0, slope), 0.01 * speed);
 }
 
+TEST(Sight, LeavesNothingOfAnOldForceOnAHandThatHasLeft) {
+  // A slow camera: what its last frame corrected is spread over 85 ms, and the hand is gone in 20.
+  const Overhead camera;
+  std::mt19937 random(8);
+  constexpr double slow = 0.1;  // [s]
+  Sight sight = seated({0, 0, 0.03});
+  const auto hand = [](double t) { return Vec3(0.0002, 0, -0.008 + 0.5 * std::max(t - 1.0, 0.0)); };
+  for (int k = 0; k < 12; ++k) {
+    const double height = k < 10 ? 0.0 : -0.001;
+    const DepthImage image = camera.shoot([&](double, double) { return height; }, 0.0, random);
+    sight.frame(image, k * slow);
+    for (int i = 0; i < 100; ++i) {
+      const double t = k * slow + 1e-3 * i;
+      const Tick tick = sight.tick(hand(t), t);
+      if (k == 9) {
+        ASSERT_NEAR(tick.force.z(), 4.8, 0.05) << t;
+      }
+      if (t > 1.0 && hand(t).z() > 0.003) {
+        ASSERT_EQ(tick.force.norm(), 0.0) << t;
+      }
+    }
+  }
+}
+
 TEST(Sight, ComesBackSlowlyWhateverTheFirstFramesCorrect) {
   // Two seconds without a frame; then the plane is 4 mm higher, and the frames are noisy.
   const Overhead camera;
   std::mt19937 random(7);
-  constexpr double stiffness = 600.0;                              // [N/m]
-  constexpr double return_speed = 0.01;                            // [m/s]
+  constexpr double stiffness = 600.0;    // [N/m]
+  constexpr double return_speed = 0.01;  // [m/s]
   Sight sight = seated({0, 0, 0.03});
   const auto press = [](double) { return Vec3(0.0002, 0, -0.008); };
   Tick tick;
   double t = 0.0;
+  std::vector<DepthImage> images;  // as long as the frames are in use
+  images.reserve(100);
   for (; t < 0.5; t += interval) {
-    tick = live_through(sight, camera.shoot([](double, double) { return 0.0; }, 1e-3, random), t,
-                        press);
+    images.push_back(camera.shoot([](double, double) { return 0.0; }, 1e-3, random));
+    tick = live_through(sight, images.back(), t, press);
   }
   const double resumes = t + 2.0;
   for (; t < resumes; t += 1e-3) tick = sight.tick(press(t), t);
   ASSERT_EQ(tick.force.norm(), 0.0);
   for (; t < resumes + 2.0; t += interval) {
-    sight.frame(camera.shoot([](double, double) { return 0.004; }, 1e-3, random), t);
+    images.push_back(camera.shoot([](double, double) { return 0.004; }, 1e-3, random));
+    sight.frame(images.back(), t);
     for (int i = 0; i < 33; ++i) {
       const double now = t + 1e-3 * i;
       tick = sight.tick(press(now), now);

@@ -104,8 +104,8 @@ function(palpate_runs_once target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 endfunction()
 
-# palpate_slow_when_sanitized(TARGET): not optimised under a sanitizer, where what the network or the
-# command line waits for costs more processor time to compile than it takes to run.
+# palpate_slow_when_sanitized(TARGET): not optimised under a sanitizer, where what the network or
+# the command line waits for costs more processor time to compile than it takes to run.
 function(palpate_slow_when_sanitized target)
   if(PALPATE_SANITIZE)
     target_compile_options(${target} PRIVATE -O0)

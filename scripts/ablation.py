@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What does each part of sight do for it? Plays the bench without it: the variants of lab/ablation.txt.
+"""What is each part of sight worth? Plays the bench without it: the variants of lab/ablation.txt.
 
 scripts/ablation.py BUILD [--cases N] [--seed N] [NUMBER | FIRST-LAST]...
   BUILD        a build folder with an up-to-date palpate-lab, such as build/test/gcc
@@ -77,8 +77,8 @@ def main():
     if unnamed:
         sys.exit(f"ablation: {LIST}: {unnamed[0]}: a name belongs behind ' # '")
     chosen = variants.numbers_of(options.numbers, len(listed)) or set(range(1, len(listed) + 1))
-    print("| variant | held [%] | right [%] | families that lose most [points] | aims of fidelity |")
-    print("|---|---|---|---|---|", flush=True)
+    print("| variant | held [%] | right [%] | families that lose most [points] | "
+          "aims of fidelity |\n|---|---|---|---|---|", flush=True)
     whole = None
     with tempfile.TemporaryDirectory() as name:
         for i, batch in enumerate(variants.batches(listed)):

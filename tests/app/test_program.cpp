@@ -354,7 +354,7 @@ TEST_F(Program, InfoSaysWhatIsAtAPixel) {
   expect_refusal("info pcd:" + points + " --at 0,0", {"no image", "--at"});
 }
 
-TEST_F(Program, TouchesTheFacesOfAPlyFile) {
+TEST_F(ProgramWithLab, TouchesTheFacesOfAPlyFile) {
   // Two triangles of 200 mm about the origin, seen from above: no point within 100 mm of the hand.
   const std::string points =
       "element vertex 4\nproperty float x\nproperty float y\n"
@@ -469,6 +469,11 @@ TEST_F(Program, SuggestsTheWordThatWasMeant) {
   expect_refusal("info 'synthetic:plane?nois=1mm'", {"nois", "noise"});
 }
 
+TEST_F(ProgramWithLab, RefusesRecordingsThatAnExperimentCannotTake) {
+  expect_refusal("eval lift --recording tum:there", {"--recording", "lift"});
+  expect_refusal("eval scan --recording tum:nowhere", {"nowhere"});
+}
+
 TEST_F(Program, RefusesBadInputInOneLineThatNamesIt) {
   const std::string camera = std::string("trace --camera ") + plane + " --path ";
   expect_refusal(camera + path("missing.csv"), {"missing.csv"});
@@ -491,8 +496,6 @@ TEST_F(Program, RefusesBadInputInOneLineThatNamesIt) {
   expect_refusal("info tum:" + path("nowhere"), {"nowhere"});
   expect_refusal("info pcd:" + write("not.pcd", "hello\n"), {"not.pcd"});
   expect_refusal("trace", {"--camera"});
-  expect_refusal("eval lift --recording tum:there", {"--recording", "lift"});
-  expect_refusal("eval scan --recording tum:nowhere", {"nowhere"});
   expect_refusal("run --headless --duration -1", {"--duration"});
   expect_refusal("run --duration -1", {"--duration"});
   expect_refusal("run --listen nowhere", {"--listen nowhere"});

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "palpate/bag/compression.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate {
@@ -12,6 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t most_topics = 10'000;
+constexpr std::size_t largest_message = std::size_t{1} << 28U;  // [bytes] when decompressed
 
 // The number before the extension: rosbag2 names the files of a bag NAME_0.db3, NAME_1.db3, ...
 std::pair<std::size_t, std::string> file_order(const fs::path& file) {
@@ -25,6 +27,9 @@ std::vector<fs::path> files_of(const fs::path& path) {
   std::error_code error;
   if (!fs::is_directory(path, error)) {
     if (!fs::exists(path, error)) throw Error(path.string(), "no such bag", "check the path");
+    if (path.extension() == ".bag")
+      throw Error(path.string(), "is a bag of ROS 1",
+                  "convert it: one of RealSense's with rs-convert -i FILE.bag -D FILE.db3");
     if (path.extension() == ".mcap")
       throw Error(path.string(), "is an MCAP file",
                   "convert it to SQLite, with ros2 bag convert and storage_id sqlite3");
@@ -125,6 +130,11 @@ std::vector<std::byte> BagReader::read(const Place& place) {
       throw Error(name(topic == nullptr ? "an unknown topic" : topic->name, place),
                   "is not what its checksum says",
                   "it is damaged; what was recorded before it can be used");
+  }
+  if (is_zstd(bytes)) {
+    const Topic* topic = file.find(select.integer(1));
+    return decompress_zstd(bytes, largest_message,
+                           name(topic == nullptr ? "an unknown topic" : topic->name, place));
   }
   return {bytes.begin(), bytes.end()};
 }

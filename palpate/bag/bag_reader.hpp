@@ -47,6 +47,8 @@ class BagReader {
   };
   /// All messages of a topic in the order in which they were written; none of an unknown one.
   [[nodiscard]] std::vector<Place> places(std::string_view topic);
+  /// Its message; one that is compressed with zstd, as librealsense and rosbag2 (compression mode
+  /// MESSAGE) can write it, is decompressed.
   /// @throws Error if it cannot be read, or is not what its checksum says.
   [[nodiscard]] std::vector<std::byte> read(const Place& place);
   /// Reads everything and compares it with the checksums: about 1 s a gigabyte. Throws nothing for

@@ -7,7 +7,6 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t header = 4;
-constexpr std::array zstd_magic{std::byte{0x28}, std::byte{0xb5}, std::byte{0x2f}, std::byte{0xfd}};
 
 }  // namespace
 
@@ -16,9 +15,6 @@ CdrReader::CdrReader(std::span<const std::byte> message, std::string name)
   if (message.size() < header)
     throw Error(name_, "is too short for a message", "the bag may be damaged");
   const std::span<const std::byte> representation = message.first(header);
-  if (std::equal(representation.begin(), representation.end(), zstd_magic.begin()))
-    throw Error(name_, "is compressed with zstd, message by message",
-                "decompress the bag first, with ros2 bag convert");
   const auto kind = std::to_integer<unsigned>(representation[1]);
   if (representation[0] != std::byte{0} || kind > 1)
     throw Error(name_, "is not in CDR", "record the topic with ROS 2's own serialization");

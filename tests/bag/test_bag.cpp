@@ -7,9 +7,11 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <zstd.h>
 
 #include "palpate/bag/bag_reader.hpp"
 #include "palpate/bag/bag_writer.hpp"
+#include "palpate/bag/compression.hpp"
 #include "palpate/bag/messages.hpp"
 
 #include "tests/support/data.hpp"
@@ -105,6 +107,7 @@ TEST(Bag, SaysWhyWhatIsNoneIsRefused) {
   EXPECT_TRUE(fails_saying(open(folder.write("text.db3", "not a database, but long enough")),
                            "text.db3", "not a database"));
   EXPECT_TRUE(fails_saying(open(folder.write("empty.db3", "")), "empty.db3", "no table of topics"));
+  EXPECT_TRUE(fails_saying(open(folder.write("some.bag", "")), "ROS 1", "rs-convert"));
   EXPECT_TRUE(fails_saying(open(folder.write("some.mcap", "")), "MCAP", "sqlite3"));
   std::filesystem::create_directory(folder.path() / "mcap");
   static_cast<void>(folder.write("mcap/some.mcap", ""));
@@ -112,6 +115,80 @@ TEST(Bag, SaysWhyWhatIsNoneIsRefused) {
   std::filesystem::create_directory(folder.path() / "zstd");
   static_cast<void>(folder.write("zstd/some.db3.zstd", ""));
   EXPECT_TRUE(fails_saying(open(folder.path() / "zstd"), "compressed"));
+}
+
+std::vector<std::byte> compressed(const std::vector<std::byte>& bytes) {
+  std::vector<std::byte> packed(ZSTD_compressBound(bytes.size()));
+  packed.resize(ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 1));
+  return packed;
+}
+
+TEST(Bag, WithMessagesCompressedOneByOneIsRead) {
+  const TemporaryFolder folder;
+  const auto text = ros::encode(ros::String{std::string(100'000, 'x') + "end"});
+  const auto packed = compressed(text);
+  ASSERT_LT(packed.size(), 1000U);
+  {
+    BagWriter writer(folder.path() / "bag");
+    const std::size_t a = writer.topic("/a", ros::String::type);
+    writer.write(a, 1, packed);
+    writer.write(a, 2, text);
+    writer.write(a, 3, std::span(packed).first(packed.size() - 5));
+  }
+  BagReader reader(folder.path() / "bag");
+  const auto places = reader.places("/a");
+  EXPECT_EQ(reader.read(places[0]), text);
+  EXPECT_EQ(reader.read(places[1]), text);
+  EXPECT_TRUE(fails_saying([&] { return reader.read(places[2]); }, "message 3 of /a", "too early"));
+  EXPECT_TRUE(reader.check().damage.empty()) << "checksums are of what lies in the file";
+}
+
+TEST(Compression, GivesBackFramesOneAfterAnother) {
+  std::mt19937 random(3);
+  std::vector<std::byte> noise(70'000);
+  for (std::byte& byte : noise) byte = static_cast<std::byte>(random());
+  const std::vector<std::byte> zeros(3'000'000);
+  auto packed = compressed(noise);
+  EXPECT_TRUE(is_zstd(packed));
+  EXPECT_EQ(decompress_zstd(packed, noise.size(), "it"), noise);
+  EXPECT_EQ(decompress_zstd(compressed({}), 0, "it"), std::vector<std::byte>{});
+  const auto more = compressed(zeros);
+  packed.insert(packed.end(), more.begin(), more.end());
+  auto both = noise;
+  both.insert(both.end(), zeros.begin(), zeros.end());
+  EXPECT_EQ(decompress_zstd(packed, both.size(), "it"), both);
+  EXPECT_TRUE(fails_saying([&] { return decompress_zstd(packed, both.size() - 1, "it"); }, "it",
+                           "more than 3069999 bytes"));
+}
+
+TEST(Compression, RefusesWhatDeclaresOrHoldsTooMuch) {
+  const auto packed = compressed(std::vector<std::byte>(1'000'000));
+  EXPECT_TRUE(fails_saying([&] { return decompress_zstd(packed, 999'999, "it"); }, "it", "999999"));
+  EXPECT_TRUE(fails_saying([] { return decompress_zstd({}, 9, "it"); }, "it", "not compressed"));
+  // A frame that declares 2^40 bytes in a window of 1 kB
+  const std::vector<unsigned char> liar{0x28, 0xb5, 0x2f, 0xfd, 0xc0, 0, 0, 0, 0, 0, 0, 1, 0, 0};
+  EXPECT_TRUE(
+      fails_saying([&] { return decompress_zstd(std::as_bytes(std::span(liar)), 1 << 20, "it"); },
+                   "it", "1048576"));
+}
+
+TEST(Compression, OfDamagedDataIsAnErrorOrWhatItBecame) {
+  std::mt19937 random(4);
+  std::vector<std::byte> bytes(5000);
+  for (std::byte& byte : bytes) byte = static_cast<std::byte>(random() % 3);
+  const auto packed = compressed(bytes);
+  int errors = 0;
+  for (int i = 0; i < 2000; ++i) {
+    auto damaged = packed;
+    damaged[random() % damaged.size()] ^= static_cast<std::byte>(1U << random() % 8);
+    if (i % 3 == 0) damaged.resize(random() % damaged.size());
+    try {
+      ASSERT_LE(decompress_zstd(damaged, 10'000, "it").size(), 10'000U);
+    } catch (const Error&) {
+      ++errors;
+    }
+  }
+  EXPECT_GT(errors, 1000);
 }
 
 TEST(Bag, AViewInsteadOfATableIsRefused) {

@@ -95,7 +95,7 @@ void look_at_kernel(const fs::path& root, Machine& machine) {
 void look_at_devices(const fs::path& root, Machine& machine) {
   for (const fs::path& entry : entries(root / "sys/class/video4linux"))
     machine.devices.push_back(
-        {"/dev/" + entry.filename().string(), first_line(entry / "name"), "camera"});
+        {"/dev/" + entry.filename().string(), first_line(entry / "name"), "camera", {}});
   for (const fs::path& entry : entries(root / "sys/bus/usb/devices")) {
     const std::string vendor = first_line(entry / "idVendor");
     const std::string product = first_line(entry / "idProduct");
@@ -103,8 +103,8 @@ void look_at_devices(const fs::path& root, Machine& machine) {
       return usb.vendor == vendor && (usb.product.empty() || usb.product == product);
     });
     if (vendor.empty() || known == usb_names.end()) continue;
-    machine.devices.push_back(
-        {"usb " + vendor + ":" + product, std::string(known->name), std::string(known->kind)});
+    machine.devices.push_back({"usb " + vendor + ":" + product, std::string(known->name),
+                               std::string(known->kind), vendor + ":" + product});
   }
 }
 

@@ -11,7 +11,8 @@ namespace palpate::app {
 struct FoundDevice {
   std::string where;  ///< such as /dev/video0 or usb 8086:0b07
   std::string name;
-  std::string kind;  ///< "camera" or "haptic device"
+  std::string kind;      ///< "camera" or "haptic device"
+  std::string usb = {};  ///< vendor and product, such as 8086:0b07; empty: not of that bus
 };
 
 /// What a machine says of itself; empty where it does not.

@@ -5,6 +5,7 @@
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/drivers/drivers.hpp"
 
 namespace palpate::app {
 
@@ -16,7 +17,7 @@ Playback::Playback(const std::vector<std::string>& uris) {
                 "give at most " + std::to_string(Patch::max_views));
   for (const std::string& uri : uris) {
     Camera camera;
-    camera.source = open_source(uri);
+    camera.source = open_source(uri, all_sources());
     camera.next = camera.source->next();
     if (!camera.next) throw Error(uri, "it has no frames", "give a source with at least one");
     cameras_.push_back(std::move(camera));

@@ -17,7 +17,7 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/pose.hpp"
-#include "palpate/devices/devices.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/session/point_capture.hpp"
 #include "palpate/session/press_path.hpp"
 #include "palpate/session/registration.hpp"
@@ -69,7 +69,7 @@ std::vector<Target> targets_at_pixels(const CalibrateOptions& options,
                                       const SessionConfig& config) {
   CameraConfig camera = config.cameras.front();
   if (options.camera && *options.camera != camera.uri) camera = {.uri = *options.camera};
-  const std::unique_ptr<Source> source = open_source(camera.uri);
+  const std::unique_ptr<Source> source = open_source(camera.uri, all_sources());
   const std::optional<Frame> frame = source->next();
   const auto* image = frame ? dynamic_cast<const DepthImage*>(frame->cloud.get()) : nullptr;
   if (image == nullptr)
@@ -99,7 +99,7 @@ std::vector<PointPair> touched_pairs(const CalibrateOptions& options, const Sess
   if (uri.empty())
     throw Error("--device", "no device is named", "name the one to calibrate, or give --pairs");
   const std::vector<Target> targets = targets_of(options, config);
-  const std::unique_ptr<Device> device = open_device(uri);
+  const std::unique_ptr<Device> device = open_device(uri, std::nullopt, all_devices());
   std::size_t next = 0;
   const auto ask = [&] {
     if (next >= targets.size()) return;

@@ -19,6 +19,7 @@
 #include "app/machine.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/servo/periodic_thread.hpp"
 #include "palpate/viewer/page.hpp"
 
@@ -105,24 +106,62 @@ Json look_at_processor(const Machine& machine, std::vector<std::string>& advice)
           {"share_for_realtime_threads", machine.fifo_share}};
 }
 
-Json look_at_devices(const Machine& machine, std::vector<std::string>& advice) {
+bool drives(const Driver& driver, const FoundDevice& device) {
+  return !device.usb.empty() &&
+         std::any_of(driver.usb.begin(), driver.usb.end(),
+                     [&](const std::string& usb) { return device.usb.starts_with(usb); });
+}
+
+// What the system shows, and whose driver it is.
+Json look_at_devices(const Machine& machine, const Registry<Driver>& drivers,
+                     std::vector<std::string>& advice) {
   Json found = Json::array();
-  bool camera = false;
-  bool haptic = false;
   for (const FoundDevice& device : machine.devices) {
+    const auto driver = std::find_if(drivers.entries().begin(), drivers.entries().end(),
+                                     [&](const Driver& one) { return drives(one, device); });
+    const bool known = driver != drivers.entries().end();
     found.push_back({{"where", device.where},
                      {"name", device.name},
                      {"kind", device.kind},
-                     {"supported", false}});
-    (device.kind == "camera" ? camera : haptic) = true;
+                     {"driver", known ? driver->name + ":" : ""}});
+    if (!known)
+      advice.push_back(device.name + ": this version has no driver for it" +
+                       (device.kind == "camera" ? "; record a ROS 2 bag of depth and touch it with "
+                                                  "--camera recording:BAG"
+                                                : ""));
   }
-  if (camera)
-    advice.emplace_back(
-        "this version has no driver for cameras: record a ROS 2 bag of depth and touch it with "
-        "--camera recording:BAG, or a folder with tum: or depth:");
-  if (haptic)
-    advice.emplace_back(
-        "this version has no driver for haptic devices: use --device mouse:, script: or hand:");
+  return found;
+}
+
+// What each driver finds: library or service, and what is plugged in.
+Json look_at_drivers(const Machine& machine, const Registry<Driver>& drivers,
+                     std::vector<std::string>& advice) {
+  Json found = Json::array();
+  for (const Driver& driver : drivers.entries()) {
+    const DriverReport report = driver.look();
+    Json plugged_in = Json::array();
+    for (const PluggedIn& one : report.found) {
+      plugged_in.push_back({{"uri", one.uri},
+                            {"name", one.name},
+                            {"serial", one.serial},
+                            {"firmware", one.firmware},
+                            {"rate_hz", one.rate ? Json(*one.rate) : Json()},
+                            {"note", one.note}});
+      if (!one.note.empty()) advice.push_back(one.uri + ": " + one.note);
+    }
+    found.push_back({{"name", driver.name + ":"},
+                     {"kind", driver.open_camera ? "camera" : "haptic device"},
+                     {"summary", driver.summary},
+                     {"tried", driver.tried},
+                     {"library", report.library},
+                     {"version", report.version},
+                     {"problem", report.problem},
+                     {"found", plugged_in}});
+    const bool is_here =
+        std::any_of(machine.devices.begin(), machine.devices.end(),
+                    [&](const FoundDevice& device) { return drives(driver, device); });
+    if (is_here && !report.problem.empty()) advice.push_back(report.problem);
+  }
   return found;
 }
 
@@ -153,6 +192,31 @@ std::string listed(const Json& object) {
   return text;
 }
 
+std::string drivers_text(const Json& drivers) {
+  if (drivers.empty()) return {};
+  std::string text = "\nDrivers\n";
+  for (const Json& driver : drivers) {
+    const auto word = [&](const char* key) { return driver[key].get<std::string>(); };
+    text += fmt::format("  {} {}; tried on {}\n", word("name"), word("summary"), word("tried"));
+    if (!word("library").empty())
+      text += fmt::format("    found {}{}\n", word("library"),
+                          word("version").empty() ? "" : ", version " + word("version"));
+    if (!word("problem").empty()) text += fmt::format("    {}\n", word("problem"));
+    for (const Json& one : driver["found"]) {
+      text +=
+          fmt::format("    {}: {}", one["uri"].get<std::string>(), one["name"].get<std::string>());
+      for (const char* key : {"serial", "firmware"}) {
+        const auto value = one[key].get<std::string>();
+        if (!value.empty()) text += fmt::format(", {} {}", key, value);
+      }
+      if (one["rate_hz"].is_number())
+        text += fmt::format(", {:.0f} Hz", one["rate_hz"].get<double>());
+      text += "\n";
+    }
+  }
+  return text;
+}
+
 std::string doctor_text(const Json& report) {
   const Json& time = report["realtime"];
   const auto microseconds = [&](const char* key) { return 1e6 * time[key].get<double>(); };
@@ -172,10 +236,13 @@ std::string doctor_text(const Json& report) {
       time["kept_awake"].get<bool>() ? "kept awake" : "may sleep");
   text += "\nMachine\n" + listed(report["machine"]) + "\nCameras and haptic devices\n";
   for (const Json& device : report["devices"])
-    text += fmt::format("  {}: {} ({}), not supported by this version\n",
-                        device["where"].get<std::string>(), device["name"].get<std::string>(),
-                        device["kind"].get<std::string>());
+    text += fmt::format("  {}: {} ({}), {}\n", device["where"].get<std::string>(),
+                        device["name"].get<std::string>(), device["kind"].get<std::string>(),
+                        device["driver"].get<std::string>().empty()
+                            ? "no driver"
+                            : "driver " + device["driver"].get<std::string>());
   if (report["devices"].empty()) text += "  none was found\n";
+  text += drivers_text(report["drivers"]);
   text += "\nVersions\n" + listed(report["versions"]);
   if (!report["advice"].empty()) text += "\nWhat can be done\n";
   for (const Json& line : report["advice"])
@@ -193,12 +260,14 @@ int run(const DoctorOptions& options) {
   if (isatty(STDERR_FILENO) == 1)
     fmt::print(stderr, "palpate: measuring for {} s\n", options.seconds);
   const Machine machine = look_at_machine();
+  const Registry<Driver> drivers = standard_drivers();
   std::vector<std::string> advice;
   Json report;
   report["realtime"] = look_at_time(options, advice);
   report["fit"] = report["realtime"]["fit"];
   report["machine"] = look_at_processor(machine, advice);
-  report["devices"] = look_at_devices(machine, advice);
+  report["devices"] = look_at_devices(machine, drivers, advice);
+  report["drivers"] = look_at_drivers(machine, drivers, advice);
   report["versions"] = versions();
   report["advice"] = advice;
   const std::string text = options.json

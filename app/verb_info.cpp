@@ -19,6 +19,7 @@
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/uri.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/sources/source.hpp"
 
 namespace palpate::app {
@@ -136,7 +137,7 @@ Json describe_pixel(const Cloud& cloud, const std::string& text, const std::stri
 }
 
 int info(const InfoOptions& options) {
-  const std::unique_ptr<Source> source = open_source(options.uri);
+  const std::unique_ptr<Source> source = open_source(options.uri, all_sources());
   const SourceInfo& about = source->info();
   Json json = {{"uri", about.uri}, {"kind", about.kind}, {"live", about.live}};
   if (about.live) json["clock"] = name_of(about.clock);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -19,6 +20,8 @@
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/uri.hpp"
+#include "palpate/devices/device_guard.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/session/from_config.hpp"
 #include "palpate/viewer/session_host.hpp"
 
@@ -89,11 +92,23 @@ MethodRegistry session_methods() {
 
 // Can it run faster than time? Only where nothing but simulations and recordings takes part.
 bool can_run_freely(const SessionConfig& config) {
+  const Registry<Driver> drivers = standard_drivers();
   for (const CameraConfig& camera : config.cameras) {
+    if (drivers.try_find(Uri(camera.uri).scheme()) != nullptr) return false;
     if (open_source(camera.uri)->info().live) return false;
   }
   const std::string scheme = Uri(config.device.empty() ? "hand:" : config.device).scheme();
   return scheme == "hand" || scheme == "script";
+}
+
+// A device whose motors would keep their force if this process died, in a process of its own; null
+// for any other. Only while this process has one thread.
+std::unique_ptr<Device> guarded_device(const std::string& uri) {
+  if (uri.empty()) return nullptr;
+  const Registry<Driver> drivers = standard_drivers();
+  const Driver* driver = drivers.try_find(Uri(uri).scheme());
+  if (driver == nullptr || !driver->needs_guard) return nullptr;
+  return open_guarded([&] { return driver->open_device(Uri(uri)); });
 }
 
 PageRules page_rules(const SessionConfig& config) {
@@ -140,6 +155,7 @@ int run(const RunOptions& options) {
     std::fputs(to_toml(config).c_str(), stdout);
     return 0;
   }
+  std::unique_ptr<Device> guarded = guarded_device(config.device);
   // Before any other thread begins, so that these signals come to this one alone.
   std::atomic<Session*> running{nullptr};
   std::atomic<bool> ended{false};
@@ -150,6 +166,7 @@ int run(const RunOptions& options) {
 
   SessionHost host(PALPATE_VERSION, page_rules(config));
   SessionOptions wanted = options_of(options, config, std::move(methods));
+  wanted.device = std::move(guarded);
   if (!options.headless)
     wanted.on_frame = [&host](std::size_t camera, const FedFrame& frame) {
       host.show(camera, frame);

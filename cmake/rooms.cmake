@@ -158,6 +158,33 @@ function(palpate_test name)
     PROPERTIES TIMEOUT 300 ENVIRONMENT "PALPATE_DATA=${PALPATE_DATA}")
 endfunction()
 
+# palpate_fake_library(FILE SOURCE [DEFINITIONS ...] [LINKS ...]): a vendor's library as the tests
+# make it, to be loaded by name: FILE, such as libdrd.so.3 or old/libdrd.so.3, below the folder
+# ${PALPATE_FAKES}. DEFINITIONS make other versions of it from the same SOURCE.
+function(palpate_fake_library file source)
+  cmake_parse_arguments(ARG "" "" "DEFINITIONS;LINKS" ${ARGN})
+  string(MAKE_C_IDENTIFIER "fake_${file}" target)
+  get_filename_component(name ${file} NAME)
+  get_filename_component(folder ${PALPATE_FAKES}/${file} DIRECTORY)
+  add_library(${target} MODULE ${source})
+  set_target_properties(${target} PROPERTIES PREFIX "" SUFFIX "" OUTPUT_NAME ${name}
+                        LIBRARY_OUTPUT_DIRECTORY ${folder} UNITY_BUILD OFF)
+  target_compile_features(${target} PRIVATE cxx_std_20)
+  target_compile_definitions(${target} PRIVATE ${ARG_DEFINITIONS})
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${target} PRIVATE ${ARG_LINKS})
+  palpate_target_options(${target})
+  palpate_runs_once(${target})
+  add_dependencies(palpate_fakes ${target})
+endfunction()
+
+# palpate_uses_fakes(TARGET): the fake libraries are built before TARGET, which sees their folder as
+# PALPATE_FAKES.
+function(palpate_uses_fakes target)
+  add_dependencies(${target} palpate_fakes)
+  target_compile_definitions(${target} PRIVATE PALPATE_FAKES="${PALPATE_FAKES}")
+endfunction()
+
 # palpate_memcheck(NAME FILTER): tests of test_NAME under valgrind, which finds reads of what was
 # never written. Valgrind offers no AVX-512, so the AVX2 loops run. FILTER, as GoogleTest's, keeps
 # the time bounded: everything takes some forty times as long.

@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/session/stamp_placer.hpp"
 #include "palpate/sources/source.hpp"
 
@@ -44,7 +45,7 @@ struct FeedOptions {
   double longest_lag = 1.0;   ///< [s] behind its stamps, beyond which a recording is slowed down
   int frozen_frames = 10;     ///< identical depth images in a row that make a live camera frozen
   StampPlacerOptions stamps{};
-  Registry<SourceScheme> schemes = standard_sources();  ///< opens the URI, also again
+  Registry<SourceScheme> schemes = all_sources();  ///< opens the URI, also again
   std::shared_ptr<FeedClock> clock = machine_clock();
 };
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "palpate/devices/devices.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/record/recorder.hpp"
 #include "palpate/servo/servo_loop.hpp"
@@ -57,8 +57,8 @@ struct SessionOptions {
   double record_patience = 10.0;
   std::string version = {};  ///< of the program, for recordings
   MethodRegistry methods = standard_methods();
-  Registry<SourceScheme> sources = standard_sources();
-  Registry<DeviceScheme> devices = standard_devices();
+  Registry<SourceScheme> sources = all_sources();
+  Registry<DeviceScheme> devices = all_devices();
   /// Sees each frame after the method got it. A camera's thread, or the caller's of `run` where the
   /// session is free-running. Must be quick and must not throw.
   std::function<void(std::size_t camera, const FedFrame& frame)> on_frame = {};

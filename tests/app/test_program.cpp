@@ -619,6 +619,7 @@ TEST_F(Program, LooksAtTheMachineAndSaysWhatToDo) {
   EXPECT_GE(report["realtime"]["wake_up_max_s"], report["realtime"]["wake_up_p50_s"]);
   EXPECT_TRUE(report["fit"].is_boolean());
   EXPECT_TRUE(report["devices"].is_array());
+  EXPECT_TRUE(report["drivers"].is_array());
   EXPECT_GE(report["machine"]["cores"], 1);
   EXPECT_NE(report["versions"]["sqlite"], "");
   // What is refused comes with what to do about it.

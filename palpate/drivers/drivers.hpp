@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "palpate/core/registry.hpp"
+#include "palpate/core/uri.hpp"
+#include "palpate/devices/devices.hpp"
+#include "palpate/sources/source.hpp"
+
+namespace palpate {
+
+/// A camera or device that a driver sees now.
+struct PluggedIn {
+  std::string uri;   ///< what opens it: "force-dimension:12345"
+  std::string name;  ///< as its driver says: "omega.3"
+  std::string serial = {};
+  std::string firmware = {};
+  std::optional<double> rate = {};  ///< [Hz] at which it delivers or is updated
+  std::string note = {};            ///< why it cannot be used and what to do; empty if it can
+};
+
+/// What a driver finds on this machine.
+struct DriverReport {
+  std::string library = {};  ///< file of the vendor's library, or address of its service
+  std::string version = {};  ///< of the library; empty if it does not say
+  std::string problem = {};  ///< why nothing can be opened, with the remedy; empty if all is well
+  std::vector<PluggedIn> found = {};
+};
+
+/// Cameras or haptic devices of one kind, driven by a vendor's library or service that is looked
+/// for when it is asked for: a program needs none of them to start.
+struct Driver {
+  std::string name;     ///< scheme of its URIs, without ':'
+  std::string summary;  ///< what it drives, in a line
+  /// What it has been tried on, in a few words: "a fake library alone", "a Kinect v1".
+  std::string tried;
+  /// What USB devices it drives: "1451" for all of a vendor's, or "0403:cb48".
+  std::vector<std::string> usb = {};
+  /// Opens a camera, or empty. @throws Error
+  std::function<std::unique_ptr<Source>(const Uri&)> open_camera = {};
+  /// Opens a device, or empty. @throws Error
+  std::function<std::unique_ptr<Device>(const Uri&)> open_device = {};
+  /// Looks at library and hardware without moving anything. Never throws: what it meets is in the
+  /// report.
+  std::function<DriverReport()> look = {};
+  /// A device with motors that hold their force when this process dies: what opens it by name puts
+  /// it into a guard's process (open_guarded) before it has other threads.
+  bool needs_guard = false;
+};
+
+/// The library's own drivers: of cameras and of haptic devices. A program adds to a copy.
+Registry<Driver> standard_drivers();
+
+/// Kinds of source: standard_sources() and the cameras among the drivers.
+Registry<SourceScheme> all_sources(const Registry<Driver>& drivers = standard_drivers());
+/// Kinds of device: standard_devices() and the devices among the drivers.
+Registry<DeviceScheme> all_devices(const Registry<Driver>& drivers = standard_drivers());
+
+/// A look that says what `look` throws as the report's problem.
+std::function<DriverReport()> reporting(std::function<DriverReport()> look);
+
+}  // namespace palpate

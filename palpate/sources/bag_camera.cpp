@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -11,14 +12,16 @@
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/sources/depth_png.hpp"
+#include "palpate/sources/realsense_lens.hpp"
 
 namespace palpate {
 namespace {
 
-constexpr std::uint32_t largest_side = 16384;  // [px] as in validate(Intrinsics)
-constexpr double units_of_16uc1 = 1000.0;      // [1/m] REP 118
-constexpr double units_of_32fc1 = 5000.0;      // [1/m] 0.2 mm, up to 13 m
-constexpr std::size_t config_header = 12;      // of compressedDepth: int32, 2 x float32
+constexpr std::uint32_t largest_side = 16384;            // [px] as in validate(Intrinsics)
+constexpr double units_of_16uc1 = 1000.0;                // [1/m] REP 118
+constexpr double units_of_32fc1 = 5000.0;                // [1/m] 0.2 mm, up to 13 m
+constexpr double least_unit = 1e-6, largest_unit = 0.1;  // [m] of a RealSense's depth
+constexpr std::size_t config_header = 12;                // of compressedDepth: int32, 2 x float32
 
 bool ends_with(const std::string& text, std::string_view end) {
   return text.size() >= end.size() && text.substr(text.size() - end.size()) == end;
@@ -195,7 +198,8 @@ std::vector<std::string> BagCamera::topics_of(const BagReader& bag) {
   for (const BagReader::Topic& topic : bag.topics()) {
     // Colour images have the same type: only topics with "depth" in their name are listed.
     const bool is_image =
-        topic.type == ros::Image::type && topic.name.find("depth") != std::string::npos;
+        topic.type == ros::Image::type && (topic.name.find("depth") != std::string::npos ||
+                                           topic.name.find("/Depth_") != std::string::npos);
     const bool is_packed =
         topic.type == ros::CompressedImage::type && ends_with(topic.name, "/compressedDepth");
     if (is_image || is_packed || topic.type == ros::PointCloud2::type) topics.push_back(topic.name);
@@ -214,9 +218,11 @@ BagCamera::BagCamera(BagReader& bag, const std::string& topic, const Options& op
     throw Error("topic " + topic, "is of " + type_ + ", not of a camera",
                 "name one of Image, CompressedImage or PointCloud2");
   places_ = bag.places(topic);
-  // .../depth/image_raw/compressedDepth and .../depth/image_raw have .../depth/camera_info
+  // .../depth/image_raw/compressedDepth and .../depth/image_raw have .../depth/camera_info, and
+  // librealsense's .../Depth_0/image/data has .../Depth_0/camera_info
   const bool is_packed = type_ == ros::CompressedImage::type;
-  const std::string camera = parent(is_packed ? parent(topic) : topic);
+  const bool is_deep = is_packed || ends_with(topic, "/image/data");
+  const std::string camera = parent(is_deep ? parent(topic) : topic);
   exact_topic_ = camera + "/exact";
   if (const BagReader::Topic* exact = bag.find(exact_topic_);
       exact != nullptr && exact->type == ros::Float64MultiArray::type)
@@ -226,6 +232,43 @@ BagCamera::BagCamera(BagReader& bag, const std::string& topic, const Options& op
   info_places_ = bag.places(info_topic_);
   if (info_places_.empty())
     throw Error("topic " + topic, "has no CameraInfo on " + info_topic_, "record that topic too");
+  is_realsense_ = bag.find(info_topic_)->type == ros::String::type;
+  if (!is_realsense_) return;
+  units_topic_ = parent(camera) + "/option/Depth_Units/value";
+  units_places_ = bag.places(units_topic_);
+  if (units_places_.empty() && !options_.units)
+    throw Error("topic " + topic, "has no unit of depth on " + units_topic_,
+                "give the raw values per metre, such as ?units=1000");
+}
+
+std::string BagCamera::text(const BagReader::Place& place, const std::string& topic) const {
+  return ros::decode<ros::String>(bag_.read(place), bag_.name(topic, place)).data;
+}
+
+SensorKind BagCamera::sensor() const {
+  if (!is_realsense_) return SensorKind::unknown;
+  const std::string device_topic = topic_.substr(0, topic_.find('/', 1)) + "/info";
+  const BagReader::Topic* topic = bag_.find(device_topic);
+  if (topic == nullptr || topic->type != ros::String::type) return realsense_sensor("");
+  std::string product;
+  for (const BagReader::Place& place : bag_.places(device_topic))
+    product += text(place, device_topic);
+  return realsense_sensor(product);
+}
+
+// Raw values per metre at a frame.
+double BagCamera::realsense_units(std::size_t number) const {
+  BagReader::Place newest = units_places_.front();
+  for (const BagReader::Place& place : units_places_) {
+    if (place.nanoseconds <= places_[number].nanoseconds) newest = place;
+  }
+  const std::string metres = text(newest, units_topic_);
+  double unit = 0.0;
+  const auto [end, error] = std::from_chars(metres.data(), metres.data() + metres.size(), unit);
+  if (error != std::errc() || !(unit >= least_unit && unit <= largest_unit))
+    throw Error(bag_.name(units_topic_, newest), "says '" + metres + "' metres for a unit of depth",
+                "give the raw values per metre, such as ?units=1000");
+  return 1.0 / unit;
 }
 
 std::string BagCamera::name(std::size_t number) const {
@@ -272,8 +315,12 @@ const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
   if (!rays_ || is_ours()) {
     const std::string info_name = bag_.name(info_topic_, info_places_[which]);
     const bool is_rectified = !is_ours() && topic_.find("rect") != std::string::npos;
-    const auto info = ros::decode<ros::CameraInfo>(bag_.read(info_places_[which]), info_name);
-    const Intrinsics k = intrinsics_of(info, is_rectified, info_name);
+    const Intrinsics k =
+        is_realsense_
+            ? intrinsics_of(parse_realsense_lens(text(info_places_[which], info_topic_), info_name),
+                            info_name)
+            : intrinsics_of(ros::decode<ros::CameraInfo>(bag_.read(info_places_[which]), info_name),
+                            is_rectified, info_name);
     if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
   }
   const Intrinsics& k = rays_->intrinsics();
@@ -287,8 +334,10 @@ const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
 }
 
 Frame BagCamera::read_depth(std::size_t number, ros::Image image) {
-  double units =
-      options_.units.value_or(is_float(image.encoding) ? units_of_32fc1 : units_of_16uc1);
+  const double units = options_.units             ? *options_.units
+                       : is_realsense_            ? realsense_units(number)
+                       : is_float(image.encoding) ? units_of_32fc1
+                                                  : units_of_16uc1;
   std::vector<std::uint16_t> depth = raw_depth(image, units, name(number));
   const std::shared_ptr<const ViewingRays>& seen = rays(number, image);
   if (!is_ours())

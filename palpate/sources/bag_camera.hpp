@@ -11,6 +11,7 @@
 #include "palpate/bag/messages.hpp"
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/frame.hpp"
+#include "palpate/sources/source.hpp"
 
 namespace palpate {
 
@@ -33,6 +34,10 @@ struct CameraTopics {
 /// Depth images of encoding 16UC1, mono16 [mm] and 32FC1 [m], raw or compressedDepth (PNG), with a
 /// CameraInfo beside them; PointCloud2 with x, y and z. Points of other bags are in the camera's
 /// own frame.
+///
+/// Recordings of librealsense (2.58 and later) keep the lens and the unit of depth in texts:
+/// `.../Depth_0/camera_info` (realsense_lens.hpp) and `.../option/Depth_Units/value`, metres per
+/// unit, which may change during a recording.
 class BagCamera {
  public:
   struct Options {
@@ -55,6 +60,10 @@ class BagCamera {
   /// [Hz] from the median interval of the times of recording; none for less than two frames.
   [[nodiscard]] std::optional<double> frame_rate() const;
   [[nodiscard]] bool is_ours() const { return !exact_places_.empty(); }
+  /// Recorded by librealsense.
+  [[nodiscard]] bool is_realsense() const { return is_realsense_; }
+  /// How it measures, where the bag tells.
+  [[nodiscard]] SensorKind sensor() const;
   /// The encoding of the frame read last.
   [[nodiscard]] const std::string& details() const { return details_; }
 
@@ -63,13 +72,16 @@ class BagCamera {
   Frame read_points(std::size_t number, const ros::PointCloud2& message);
   [[nodiscard]] std::vector<double> exact(std::size_t number, std::size_t size);
   const std::shared_ptr<const ViewingRays>& rays(std::size_t number, const ros::Image& image);
+  [[nodiscard]] std::string text(const BagReader::Place& place, const std::string& topic) const;
+  [[nodiscard]] double realsense_units(std::size_t number) const;
   [[nodiscard]] double stamp(std::size_t number, const ros::Header& header) const;
   [[nodiscard]] std::string name(std::size_t number) const;
 
   BagReader& bag_;
-  std::string topic_, type_, info_topic_, exact_topic_;
+  std::string topic_, type_, info_topic_, exact_topic_, units_topic_;
   Options options_;
-  std::vector<BagReader::Place> places_, info_places_, exact_places_;
+  std::vector<BagReader::Place> places_, info_places_, exact_places_, units_places_;
+  bool is_realsense_ = false;
   std::shared_ptr<const ViewingRays> rays_;  // of the frame read last
   std::string details_;
 };

@@ -19,7 +19,10 @@ class Recording final : public Source {
     if (camera_.frames() == 0)
       throw Error(info_.uri, "holds no frames on " + camera_.topic(),
                   "name another topic with ?topic=");
-    info_.kind = camera_.is_ours() ? "recording of palpate's" : "ROS 2 bag";
+    info_.kind = camera_.is_ours()        ? "recording of palpate's"
+                 : camera_.is_realsense() ? "RealSense recording"
+                                          : "ROS 2 bag";
+    info_.sensor = camera_.sensor();
     info_.frames = camera_.frames();
     info_.frame_rate = camera_.frame_rate();
     first_ = camera_.frame(0).stamp;

@@ -37,9 +37,10 @@ double agreed_height(std::span<const HeightSample> newest_first, double sd,
 /// Estimates height and motion from measured heights.
 ///
 /// A bank of filters runs over the heights: one for a surface at rest, and Kalman filters for
-/// jerks from small to very large. Each is weighted by the likelihood of its innovations over the
-/// last frames, rest with a higher prior. The height is the bank's mean, within three standard
-/// deviations of the newest measurement. O(most_heights), no allocation.
+/// steps of velocity and for jerks from small to very large. Each is weighted by the likelihood of
+/// its innovations over the last frames, rest with a higher prior and jerks with a lower one. The
+/// height is the bank's mean, within three standard deviations of the newest measurement.
+/// O(most_heights), no allocation.
 /// @param newest_first  heights measured; at least one
 /// @param sd            [m] usual standard deviation of one of them
 /// @param interval      [s] until the next frame

@@ -278,15 +278,12 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
     blend_due_ = false;
   }
   Vec3 blended = force + ease((t - blend_start_) / (blend * interval())) * blend_offset_;
-  // The rest of an old force may push on, but nothing pulls.
-  const Vec3 normal = proxy_.normal.value_or(Vec3::Zero());
-  const double pull = blended.dot(normal);
-  if (pull < 0.0) blended -= pull * normal;
+  if (proxy_.normal) left_along_ = *proxy_.normal;
+  if (!force.isZero()) left_at_ = hip;
+  // The rest of an old force may push on, but nothing pulls, nor in free motion after it.
+  const double pull = blended.dot(left_along_);
+  if (pull < 0.0) blended -= pull * left_along_;
   // Nor does it follow a hand that leaves: what is left of it ends like a spring's push.
-  if (!force.isZero()) {
-    left_at_ = hip;
-    left_along_ = normal;
-  }
   const double stiffness = std::max(parameters_.coupling.stiffness, 1e-9);
   if (const double gap = (hip - left_at_).dot(left_along_); gap > 0.0) {
     const double rest = blended.norm();

@@ -59,7 +59,7 @@ class Sight final : public Method {
   Vec3 last_force_ = Vec3::Zero();
   Vec3 last_hip_ = Vec3::Zero();
   Vec3 left_at_ = Vec3::Zero();     // [m] the hand in the last tick in which it pressed
-  Vec3 left_along_ = Vec3::Zero();  // [-] and the normal there
+  Vec3 left_along_ = Vec3::Zero();  // [-] the last normal there was
   double last_blend_t_ = 0.0;
   double carried_rate_ = 0.0;  // [m/s] of the surface, before the newest frame
   Vec3 blend_offset_ = Vec3::Zero();

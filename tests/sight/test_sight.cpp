@@ -466,6 +466,31 @@ TEST(Sight, LeavesNothingOfAnOldForceOnAHandThatHasLeft) {
   }
 }
 
+TEST(Sight, PullsNoHandThatLeavesASurfaceThatJustRose) {
+  // Before a slow camera the surface rises by 12 mm. The force turns to that over 85 ms; the hand is
+  // out of it in 30.
+  const Overhead camera;
+  std::mt19937 random(9);
+  constexpr double slow = 0.1;  // [s]
+  Sight sight = seated({0, 0, 0.03});
+  const auto hand = [](double t) { return Vec3(0.0002, 0, -0.001 + 0.6 * std::max(t - 1.0, 0.0)); };
+  std::vector<DepthImage> images;  // as long as the frames are in use
+  images.reserve(12);
+  for (int k = 0; k < 12; ++k) {
+    const double height = k < 10 ? 0.0 : 0.012;
+    images.push_back(camera.shoot([&](double, double) { return height; }, 0.0, random));
+    sight.frame(images.back(), k * slow);
+    for (int i = 0; i < 100; ++i) {
+      const double t = k * slow + 1e-3 * i;
+      const Tick tick = sight.tick(hand(t), t);
+      if (k == 9) {
+        ASSERT_NEAR(tick.force.z(), 0.6, 0.05) << t;
+      }
+      ASSERT_GE(tick.force.z(), 0.0) << t;
+    }
+  }
+}
+
 TEST(Sight, ComesBackSlowlyWhateverTheFirstFramesCorrect) {
   // Two seconds without a frame; then the plane is 4 mm higher, and the frames are noisy.
   const Overhead camera;

@@ -1,22 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/aim_table.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
 
 namespace palpate::lab {
-
-std::vector<std::string> methods_in(const Table& table) {
-  std::vector<std::string> methods;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string& method = table.text(row, "method");
-    if (std::find(methods.begin(), methods.end(), method) == methods.end())
-      methods.push_back(method);
-  }
-  return methods;
-}
 
 AimTable::AimTable(std::vector<std::string> labels, std::vector<std::string> methods)
     : methods_(std::move(methods)), met_(methods_.size(), 0) {

@@ -11,9 +11,6 @@
 
 namespace palpate::lab {
 
-/// The methods of a table's column "method", in the order of their first rows.
-std::vector<std::string> methods_in(const Table& table);
-
 /// Scores of a bench that measures methods beside aims, which are upper bounds: a row a measure, a
 /// column a method. What misses its aim is marked, and the last row counts the aims met.
 class AimTable {

@@ -12,9 +12,8 @@
 #include "lab/experiments/scan.hpp"
 #include "lab/experiments/surfaces.hpp"
 #include "lab/experiments/tradeoff.hpp"
+#include "lab/find_named.hpp"
 #include "lab/method.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
 
 namespace palpate::lab {
 
@@ -29,17 +28,8 @@ const std::vector<Experiment>& known_experiments() {
 }
 
 const Experiment& find_experiment(std::string_view name) {
-  std::vector<std::string_view> names;
-  std::string list;
-  for (const Experiment& experiment : known_experiments()) {
-    if (experiment.name == name) return experiment;
-    names.push_back(experiment.name);
-    list += (list.empty() ? "" : ", ") + std::string(experiment.name);
-  }
-  const std::string_view near = nearest_name(name, names);
-  throw Error("experiment '" + std::string(name) + "'", "there is no such experiment",
-              (near.empty() ? "" : "did you mean '" + std::string(near) + "'? ") +
-                  ("the experiments are " + list + " and all"));
+  return find_named(known_experiments(), name, "experiment", "there is no such experiment",
+                    "the experiments are ", " and all");
 }
 
 std::vector<std::string> methods_of(const Experiment& experiment,

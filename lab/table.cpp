@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstddef>
+#include <limits>
 
 #include "palpate/core/error.hpp"
 
@@ -64,6 +66,23 @@ double Table::number(std::size_t row, std::string_view column) const {
     throw Error(subject_, "'" + field + "' in column '" + std::string(column) + "' is no number",
                 "run the experiment again");
   return value;
+}
+
+std::vector<std::string> methods_in(const Table& table) {
+  std::vector<std::string> methods;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string& method = table.text(row, "method");
+    if (std::find(methods.begin(), methods.end(), method) == methods.end())
+      methods.push_back(method);
+  }
+  return methods;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 Row& Row::add(std::string_view text) {

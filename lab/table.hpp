@@ -39,6 +39,12 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
+/// The methods of a table's column "method", in the order of their first rows.
+std::vector<std::string> methods_in(const Table& table);
+
+/// The upper one of the two in the middle of an even number; NaN of none.
+double median(std::vector<double> values);
+
 /// One CSV row from its fields: numbers in the shortest form that reads back to the same value.
 class Row {
  public:

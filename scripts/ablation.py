@@ -87,7 +87,7 @@ def main():
                 continue
             scratch = pathlib.Path(name) / str(i)
             scratch.mkdir()
-            program = variants.build(batch, options.build, scratch, "palpate-lab", FLAGS)
+            program = variants.build(batch, options.build, scratch, "app/palpate-lab", FLAGS)
             if whole is None:
                 whole, met = play(program, 0, options.cases, options.seed, scratch)
                 print(line_of("whole", whole, met, whole), flush=True)

@@ -146,7 +146,7 @@ def build(batch, build_folder, folder, target, flags=()):
                              check=True, capture_output=True, text=True).stdout
     link = command.partition("&& ")[2].partition(" && ")[0]
     program = folder / pathlib.Path(target).name
-    first = re.search(r"\S+\.cpp\.o", link).group()
+    first = re.search(r"\S+\.c(pp|xx)\.o", link).group()  # of a room's files, or all as one
     link = link.replace(first, " ".join(map(str, objects)) + " " + first, 1)
     # A library of a unity build has all of a room in one object: what comes first counts.
     link = re.sub(rf"-o \S*{program.name}(?= |$)", f"-Wl,-z,muldefs -o {program}", link)

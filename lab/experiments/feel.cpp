@@ -158,10 +158,6 @@ std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptio
   return cells;
 }
 
-std::vector<Claim> no_claims(const Table& /*table*/) {
-  return {};
-}
-
 // A row a measure and loop.
 Scores feel_scores(const Table& table) {
   AimTable scores({"scene", "loop", "measure"}, methods_in(table));

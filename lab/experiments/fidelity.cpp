@@ -369,10 +369,6 @@ std::vector<Cell> fidelity_cells(const Experiment& experiment, const ExperimentO
   return cells;
 }
 
-std::vector<Claim> no_claims(const Table& /*table*/) {
-  return {};
-}
-
 Scores fidelity_scores(const Table& table) {
   AimTable scores({"scene", "measure"}, methods_in(table));
   for (const Measure& measure : measures) {

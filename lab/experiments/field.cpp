@@ -73,10 +73,6 @@ std::vector<Cell> field_cells(const Experiment& experiment, const ExperimentOpti
   return cells;
 }
 
-std::vector<Claim> no_claims(const Table& /*table*/) {
-  return {};
-}
-
 struct Sum {
   int known = 0;
   int unknown = 0;
@@ -95,11 +91,8 @@ std::string percent(double share) {
   return fmt::format("{:.1f}", std::floor(1e3 * share + 1e-9) / 10.0);
 }
 
-std::string median_of(std::vector<double> values) {
-  if (values.empty()) return "-";
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return fmt::format("{:.2g}", *middle);
+std::string median_text(const std::vector<double>& values) {
+  return values.empty() ? "-" : fmt::format("{:.2g}", median(values));
 }
 
 // In the order of the table: what appears first comes first.
@@ -139,19 +132,17 @@ std::vector<std::string> line_of(const std::string& name, std::map<std::string, 
     const double known = sum.known;
     line.push_back(sum.known == 0 ? "-" : percent(sum.held / known));
     line.push_back(sum.known == 0 ? "-" : percent(sum.right / known));
-    line.push_back(median_of(sum.steps));
+    line.push_back(median_text(sum.steps));
   }
   return line;
 }
 
 Scores field_scores(const Table& table) {
-  std::vector<std::string> methods;
+  const std::vector<std::string> methods = methods_in(table);
   Sums classes;
   Sums sensors;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const std::string& method = table.text(row, "method");
-    if (std::find(methods.begin(), methods.end(), method) == methods.end())
-      methods.push_back(method);
     add_row(table, row, sum_of(classes, table.text(row, "class"), method));
     add_row(table, row, sum_of(sensors, table.text(row, "sensor"), method));
   }

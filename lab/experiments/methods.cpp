@@ -170,12 +170,6 @@ double allocated() {
   return static_cast<double>(heap.uordblks) + static_cast<double>(heap.hblkhd);
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // A plane at 0.7 m in 640 x 480 with a D4xx's noise, the hand 10 mm below it: thirty frames. What a
 // method puts off to the first tick of a frame is a cost of the frame.
 Cost measure_cost(const std::string& name, const ExperimentOptions& options) {
@@ -248,10 +242,6 @@ std::vector<Cell> methods_cells(const Experiment& experiment, const ExperimentOp
     cells.emplace_back([=] { return cost_rows(method, options); });
   }
   return cells;
-}
-
-std::vector<Claim> no_claims(const Table& /*table*/) {
-  return {};
 }
 
 Scores methods_scores(const Table& table) {

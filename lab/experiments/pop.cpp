@@ -262,10 +262,6 @@ std::vector<Cell> pop_cells(const Experiment& experiment, const ExperimentOption
   return cells;
 }
 
-std::vector<Claim> no_claims(const Table& /*table*/) {
-  return {};
-}
-
 // Two digits, rounded down: 100 means all.
 std::string percent_held(double held, double cases) {
   return fmt::format("{:.2f}", std::floor(1e4 * held / cases) / 100.0);
@@ -288,17 +284,14 @@ struct Sum {
 };
 
 Scores pop_scores(const Table& table) {
-  std::vector<std::string> methods;
+  const std::vector<std::string> methods = methods_in(table);
   std::vector<std::string> families;
   std::map<std::pair<std::string, std::string>, Sum> sums;
-  const auto add_once = [](std::vector<std::string>& names, const std::string& name) {
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  };
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const std::string& method = table.text(row, "method");
     const std::string& family = table.text(row, "family");
-    add_once(methods, method);
-    add_once(families, family);
+    if (std::find(families.begin(), families.end(), family) == families.end())
+      families.push_back(family);
     Sum& sum = sums[{method, family}];
     sum.cases += table.number(row, "cases");
     sum.lost += table.number(row, "lost");

@@ -12,9 +12,9 @@
 
 #include <fmt/format.h>
 
+#include "lab/find_named.hpp"
 #include "lab/grid_cloud.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 
@@ -623,17 +623,8 @@ std::span<const PopFamily> pop_families() {
 }
 
 const PopFamily& find_pop_family(std::string_view name) {
-  std::vector<std::string_view> names;
-  std::string list;
-  for (const PopFamily& family : families) {
-    if (family.name == name) return family;
-    names.push_back(family.name);
-    list += (list.empty() ? "" : ", ") + std::string(family.name);
-  }
-  const std::string_view near = nearest_name(name, names);
-  throw Error("family '" + std::string(name) + "'", "there is no such family of cases",
-              (near.empty() ? "" : "did you mean '" + std::string(near) + "'? ") +
-                  ("the families are " + list));
+  return find_named(families, name, "family", "there is no such family of cases",
+                    "the families are ");
 }
 
 PopCase draw_pop_case(const PopFamily& family, std::uint64_t seed, std::uint64_t index) {

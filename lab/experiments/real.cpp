@@ -309,29 +309,12 @@ std::vector<Cell> real_cells(const Experiment& experiment, const ExperimentOptio
   return cells;
 }
 
-std::vector<Claim> no_claims(const Table& /*table*/) {
-  return {};
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
-
 Scores real_scores(const Table& table) {
   Scores scores;
   scores.columns = {"action",     "method",   "places",           "lost",           "suspected",
                     "error [mm]", "felt [N]", "largest step [N]", "force range [N]"};
   for (const char* action : action_names) {
-    std::vector<std::string> methods;
-    for (std::size_t row = 0; row < table.rows(); ++row) {
-      const std::string& method = table.text(row, "method");
-      if (table.text(row, "action") == action &&
-          std::find(methods.begin(), methods.end(), method) == methods.end())
-        methods.push_back(method);
-    }
-    for (const std::string& method : methods) {
+    for (const std::string& method : methods_in(table)) {
       const auto all = [&](std::size_t row) {
         return table.text(row, "method") == method && table.text(row, "action") == action;
       };

@@ -224,23 +224,13 @@ std::vector<Cell> tradeoff_cells(const Experiment& experiment, const ExperimentO
   return cells;
 }
 
-std::vector<Claim> no_claims(const Table& /*table*/) {
-  return {};
-}
-
 Scores tradeoff_scores(const Table& table) {
   Scores scores;
   scores.columns = {"distance [m]", "method", "lost", "jitter at rest [mm]"};
   for (const double speed : speeds)
     scores.columns.push_back(fmt::format("lag at {} m/s [mm]", speed));
   for (const double distance : distances) {
-    std::vector<std::string> methods;
-    for (std::size_t row = 0; row < table.rows(); ++row) {
-      const std::string& method = table.text(row, "method");
-      if (std::find(methods.begin(), methods.end(), method) == methods.end())
-        methods.push_back(method);
-    }
-    for (const std::string& method : methods) {
+    for (const std::string& method : methods_in(table)) {
       const auto all = [&](std::size_t row) {
         return table.text(row, "method") == method && table.number(row, "distance_m") == distance;
       };

@@ -10,8 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "lab/find_named.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/uri.hpp"
 
 namespace palpate::lab::field {
@@ -902,17 +902,8 @@ std::span<const FieldClass> field_classes() {
 }
 
 const FieldClass& find_field_class(std::string_view name) {
-  std::vector<std::string_view> names;
-  std::string list;
-  for (const FieldClass& of : classes) {
-    if (of.name == name) return of;
-    names.push_back(of.name);
-    list += (list.empty() ? "" : ", ") + std::string(of.name);
-  }
-  const std::string_view near = nearest_name(name, names);
-  throw Error("class '" + std::string(name) + "'", "there is no such class of the field set",
-              (near.empty() ? "" : "did you mean '" + std::string(near) + "'? ") +
-                  ("the classes are " + list));
+  return find_named(classes, name, "class", "there is no such class of the field set",
+                    "the classes are ");
 }
 
 FieldCase draw_field_case(const FieldClass& of, std::uint64_t seed, std::uint64_t index) {

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <string_view>
 
+#include "palpate/drivers/usb.hpp"
+
 namespace palpate::app {
 namespace {
 
@@ -96,15 +98,15 @@ void look_at_devices(const fs::path& root, Machine& machine) {
   for (const fs::path& entry : entries(root / "sys/class/video4linux"))
     machine.devices.push_back(
         {"/dev/" + entry.filename().string(), first_line(entry / "name"), "camera", {}});
-  for (const fs::path& entry : entries(root / "sys/bus/usb/devices")) {
-    const std::string vendor = first_line(entry / "idVendor");
-    const std::string product = first_line(entry / "idProduct");
+  for (const std::string& id : usb_ids(root)) {
+    const std::string vendor = id.substr(0, id.find(':'));
+    const std::string product = id.substr(vendor.size() + 1);
     const auto known = std::find_if(usb_names.begin(), usb_names.end(), [&](const UsbName& usb) {
       return usb.vendor == vendor && (usb.product.empty() || usb.product == product);
     });
-    if (vendor.empty() || known == usb_names.end()) continue;
-    machine.devices.push_back({"usb " + vendor + ":" + product, std::string(known->name),
-                               std::string(known->kind), vendor + ":" + product});
+    if (known == usb_names.end()) continue;
+    machine.devices.push_back(
+        {"usb " + id, std::string(known->name), std::string(known->kind), id});
   }
 }
 

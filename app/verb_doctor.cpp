@@ -20,6 +20,7 @@
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/drivers/usb.hpp"
 #include "palpate/servo/periodic_thread.hpp"
 #include "palpate/viewer/page.hpp"
 
@@ -106,19 +107,14 @@ Json look_at_processor(const Machine& machine, std::vector<std::string>& advice)
           {"share_for_realtime_threads", machine.fifo_share}};
 }
 
-bool drives(const Driver& driver, const FoundDevice& device) {
-  return !device.usb.empty() &&
-         std::any_of(driver.usb.begin(), driver.usb.end(),
-                     [&](const std::string& usb) { return device.usb.starts_with(usb); });
-}
-
 // What the system shows, and whose driver it is.
 Json look_at_devices(const Machine& machine, const Registry<Driver>& drivers,
                      std::vector<std::string>& advice) {
   Json found = Json::array();
   for (const FoundDevice& device : machine.devices) {
-    const auto driver = std::find_if(drivers.entries().begin(), drivers.entries().end(),
-                                     [&](const Driver& one) { return drives(one, device); });
+    const auto driver =
+        std::find_if(drivers.entries().begin(), drivers.entries().end(),
+                     [&](const Driver& one) { return is_usb_of(device.usb, one.usb); });
     const bool known = driver != drivers.entries().end();
     found.push_back({{"where", device.where},
                      {"name", device.name},
@@ -159,7 +155,7 @@ Json look_at_drivers(const Machine& machine, const Registry<Driver>& drivers,
                      {"found", plugged_in}});
     const bool is_here =
         std::any_of(machine.devices.begin(), machine.devices.end(),
-                    [&](const FoundDevice& device) { return drives(driver, device); });
+                    [&](const FoundDevice& device) { return is_usb_of(device.usb, driver.usb); });
     if (is_here && !report.problem.empty()) advice.push_back(report.problem);
   }
   return found;

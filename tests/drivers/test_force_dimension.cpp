@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "palpate/drivers/force_dimension.hpp"
+
+#include "tests/fakes/workbench.hpp"
+#include "tests/support/environment.hpp"
+#include "tests/support/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace palpate {
+namespace {
+
+class ForceDimension : public ::testing::Test {
+ protected:
+  static std::unique_ptr<Device> open(const std::string& uri) {
+    return force_dimension_driver().open_device(Uri(uri));
+  }
+
+  test::TemporaryFolder folder;
+  test::Workbench& bench = test::open_workbench((folder.path() / "workbench").c_str());
+
+ private:
+  test::Environment place_{test::Workbench::variable, (folder.path() / "workbench").string()};
+  test::Environment library_{"PALPATE_FORCE_DIMENSION", PALPATE_FAKES "/force-dimension"};
+};
+
+TEST_F(ForceDimension, TellsWhatItIs) {
+  bench.devices = 2;
+  const auto arm = open("force-dimension:10518?watchdog=10ms&max_force=5");
+  const DeviceInfo& info = arm->info();
+  EXPECT_EQ(info.serial, "10518");
+  EXPECT_EQ(info.limits.max_force, 5.0);
+  EXPECT_EQ(info.limits.max_stiffness, 5000.0);
+  EXPECT_EQ(info.reach->radius, 0.075);
+  EXPECT_DOUBLE_EQ(*info.watchdog, 0.010);
+  EXPECT_DOUBLE_EQ(bench.watchdog, 0.010) << "of the firmware";
+  EXPECT_FALSE(bench.force_on) << "not before enable";
+}
+
+TEST_F(ForceDimension, BringsItsAxesIntoOurs) {
+  const auto arm = open("force-dimension:");
+  arm->enable();
+  bench.began = test::clock_now() - 2.2;
+  const auto place = bench.hand(bench.began + 2.2);  // x to the right, y away, z up
+  EXPECT_GT(std::abs(place[0]), 1e-3);
+  const HandState hand = arm->read(0.0);
+  EXPECT_NEAR(hand.position.x(), place[0], 5e-4);
+  EXPECT_NEAR(hand.position.y(), place[1], 5e-4);
+  EXPECT_NEAR(hand.position.z(), place[2], 5e-4);
+  EXPECT_EQ(hand.buttons, 1U);
+  arm->write(Vec3(0.1, 0.2, 0.3), 0.0);  // to the right, away, up
+  EXPECT_EQ(bench.force[0], -0.2) << "x is towards the user";
+  EXPECT_EQ(bench.force[1], 0.1);
+  EXPECT_EQ(bench.force[2], 0.3);
+}
+
+TEST_F(ForceDimension, SwitchesItsForcesOffAndOn) {
+  const auto arm = open("force-dimension:");
+  arm->write(Vec3::UnitZ(), 0.0);
+  EXPECT_EQ(bench.force[2], 0.0) << "not enabled";
+  arm->enable();
+  EXPECT_TRUE(bench.force_on);
+  arm->write(Vec3::UnitZ(), 0.001);
+  EXPECT_EQ(bench.motor_force(test::clock_now()), 1.0);
+  arm->disable();
+  EXPECT_EQ(bench.motor_force(test::clock_now()), 0.0);
+  arm->write(Vec3::UnitZ(), 0.002);
+  EXPECT_EQ(bench.force[2], 0.0);
+  EXPECT_FALSE(bench.force_on);
+}
+
+TEST_F(ForceDimension, KeepsForcesOffAfterItsFirmwareTookThemUntilNoneIsAskedForHalfASecond) {
+  const auto arm = open("force-dimension:");
+  arm->enable();
+  double t = 0.0;
+  const auto tick = [&](double newtons) {
+    t += 0.001;
+    const HandState hand = arm->read(t);
+    arm->write(newtons * Vec3::UnitZ(), t);
+    return hand;
+  };
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(tick(0.4).present);
+  bench.too_fast = true;
+  for (int i = 0; i < 20; ++i) tick(0.4);
+  const HandState hand = tick(0.0);
+  EXPECT_FALSE(hand.present);
+  EXPECT_EQ(hand.fault, DeviceFault::refused_command);
+  EXPECT_NE(arm->fault_text().find("too fast"), std::string::npos) << arm->fault_text();
+  for (int i = 0; i < 490; ++i) tick(0.0);
+  EXPECT_FALSE(bench.force_on);
+  for (int i = 0; i < 30; ++i) tick(0.0);
+  EXPECT_TRUE(bench.force_on);
+  EXPECT_TRUE(tick(0.0).present);
+  EXPECT_EQ(arm->fault_text(), "");
+}
+
+TEST_F(ForceDimension, CalibratesOnlyWhenAskedAndOnlyWhereItMust) {
+  EXPECT_EQ(bench.calibrations, 0);
+  open("force-dimension:?calibrate");
+  EXPECT_EQ(bench.calibrations, 0) << "it is calibrated";
+  bench.calibrated = false;
+  EXPECT_TRUE(test::fails_saying([] { return open("force-dimension:"); }, "not calibrated"));
+  EXPECT_EQ(bench.calibrations, 0);
+  open("force-dimension:?calibrate");
+  EXPECT_EQ(bench.calibrations, 1);
+  EXPECT_EQ(bench.opens, bench.closes);
+}
+
+TEST_F(ForceDimension, WorksWithoutDrdButDoesNotCalibrateThen) {
+  const test::Environment dhd("PALPATE_FORCE_DIMENSION", PALPATE_FAKES "/force-dimension-dhd");
+  EXPECT_TRUE(open("force-dimension:")->read(0.0).present);
+  bench.calibrated = false;
+  EXPECT_TRUE(test::fails_saying([] { return open("force-dimension:?calibrate"); },
+                                 "cannot calibrate it", "install libdrd"));
+}
+
+}  // namespace
+}  // namespace palpate

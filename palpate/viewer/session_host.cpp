@@ -193,8 +193,9 @@ void SessionHost::command(const Command& command, Role role) {
 
 void SessionHost::show(std::size_t number, const FedFrame& fed) {
   ViewerServer* server = server_.load(std::memory_order_acquire);
-  if (server == nullptr || !fed.is_new) return;
   const auto camera = static_cast<std::uint8_t>(number);
+  // A still picture came first before there was a server: what is shown again then is new to it.
+  if (server == nullptr || (!fed.is_new && numbers_[camera] > 0)) return;
   const Frame& frame = fed.frame;
   FrameHeader header;
   header.camera = camera;

@@ -16,6 +16,7 @@
 #include "tests/session/fakes.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tests/viewer/client.hpp"
 
 namespace palpate {
 namespace {
@@ -74,6 +75,22 @@ TEST(SessionHost, HoldsLimitsToWhatTheSessionWasStartedWith) {
   // A value that the session refuses is no new bound either.
   EXPECT_TRUE(fails_saying(hosted.asking(force(1e9), Role::operating), "max_device_force"));
   EXPECT_TRUE(fails_saying(hosted.asking(force(5.1), Role::holding), "5 N"));
+}
+
+TEST(SessionHost, ShowsAStillPictureThatCameBeforeTheServerOnce) {
+  Hosted hosted;
+  FedFrame still{.frame = Frame{0.0, test::wall()}};
+  hosted.host.show(0, still);
+  ViewerServer server({.listen = "127.0.0.1", .port = 0}, hosted.host);
+  hosted.host.show_on(&server);
+  still.is_new = false;
+  hosted.host.show(0, still);
+  hosted.host.show(0, still);
+  Page page(server.port());
+  const std::string frame = page.until_kind(1);
+  ASSERT_EQ(frame.size(), 96u + 2 * 120 * 90);
+  EXPECT_EQ(frame.substr(4, 4), std::string(4, '\0')) << "the first, and no other";
+  hosted.host.show_on(nullptr);
 }
 
 TEST(SessionHost, HoldsTheOperatorToTheSessionsOptions) {

@@ -293,6 +293,24 @@ describe.each([
     expect(boxes.view).toBeGreaterThan(height / 3);
     expect(boxes.inside).toEqual([true, true, true, true, true, true]);
     for (const plot of boxes.plots) expect(plot).toBeGreaterThan(200);
+    // The scene is in the part of the window that is free, and fills it.
+    const scene = await page.evaluate(() => {
+      const { view } = (window as any).palpate;
+      const { width, height } = document.getElementById("view")!.getBoundingClientRect();
+      const { left, top, right, bottom } = view.room;
+      const seen = (x: number, y: number) => view.spotUnder(x, y) !== null;
+      const shares = [...Array(12).keys()].map((i) => (i + 0.5) / 12);
+      const all = shares.flatMap((x) => shares.map((y) => [x * width, y * height] as const));
+      const hits = all.filter(([x, y]) => seen(x, y));
+      const free = hits.filter(([x, y]) => x > left && x < right && y > top && y < bottom);
+      const area = ((right - left) * (bottom - top)) / (width * height);
+      return {
+        within: free.length / hits.length,
+        filled: free.length / all.length / area,
+      };
+    });
+    expect(scene.within).toBeGreaterThan(0.9);
+    expect(scene.filled).toBeGreaterThan(0.2); // a wide scene in a tall window
   });
 });
 

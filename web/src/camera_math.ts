@@ -22,7 +22,7 @@ export const clamp = (x: number, low: number, high: number): number =>
 /** Full angle of view from top to bottom [rad]. */
 export const FIELD_OF_VIEW = (45 * Math.PI) / 180;
 const NEAREST = 0.02;
-const FARTHEST = 50;
+const FARTHEST = 900;
 const STEEPEST = (88 * Math.PI) / 180;
 
 /** An eye on a sphere about what it looks at. */
@@ -39,7 +39,7 @@ export interface Orbit {
 }
 
 /** Two unit vectors that make a right-handed frame with `up`. */
-function horizon(up: Vec3): [Vec3, Vec3] {
+export function horizon(up: Vec3): [Vec3, Vec3] {
   const any: Vec3 = Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0];
   const first = unit(sub(any, scale(up, dot(any, up))));
   return [first, cross(up, first)];
@@ -99,18 +99,11 @@ export function depthOf(orbit: Orbit, point: Vec3): number {
   return Math.max(dot(sub(point, eye(orbit)), axes(orbit).forward), NEAREST);
 }
 
-/** Where the eye looks through a place of the picture [px, from its left and top]: unit, world. */
-export function rayThrough(
-  orbit: Orbit,
-  x: number,
-  y: number,
-  viewWidth: number,
-  viewHeight: number,
-): Vec3 {
+/** Where the eye looks through a place of the picture [px, from its target's]: unit, world. */
+export function rayThrough(orbit: Orbit, x: number, y: number, viewHeight: number): Vec3 {
   const { right, up, forward } = axes(orbit);
   const size = metresPerPixel(1, viewHeight);
-  const across = scale(right, (x - viewWidth / 2) * size);
-  return unit(add(forward, sub(across, scale(up, (y - viewHeight / 2) * size))));
+  return unit(add(forward, sub(scale(right, x * size), scale(up, y * size))));
 }
 
 /** `point` moved by pixels in the view plane through it, and by metres into the picture. */
@@ -125,6 +118,13 @@ export function dragged(
   const size = metresPerPixel(depthOf(orbit, point), viewHeight);
   const across = add(scale(right, pixels.x * size), scale(up, -pixels.y * size));
   return add(add(point, across), scale(forward, into));
+}
+
+/** A place before a camera, in the world. @param pose  3 x 4, row by row */
+export function posed(pose: ArrayLike<number>, p: Vec3): Vec3 {
+  return [0, 4, 8].map(
+    (row) => pose[row]! * p[0] + pose[row + 1]! * p[1] + pose[row + 2]! * p[2] + pose[row + 3]!,
+  ) as unknown as Vec3;
 }
 
 /** `point`, or where a straight way to it from `centre` is `radius` long. */

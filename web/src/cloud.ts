@@ -15,6 +15,7 @@ precision highp int;
 precision highp usampler2D;
 #ifdef POINTS
 uniform highp sampler2D points;
+uniform float pointSpacing;    // [m] about, between neighbours
 #else
 uniform usampler2D depth;
 uniform vec4 intrinsics;
@@ -102,7 +103,7 @@ void main() {
   colour = mix(colour, glow, 0.85 * sqrt(w));
 
 #ifdef POINTS
-  float spacing = 0.002;
+  float spacing = pointSpacing;
 #else
   float spacing = float(stride) * p.z / intrinsics.x;
 #endif
@@ -160,6 +161,7 @@ export class CameraCloud {
         rays: { value: null },
         intrinsics: { value: new THREE.Vector4(1, 1, 0, 0) },
         metresPerUnit: { value: 1 },
+        pointSpacing: { value: 0.002 },
         size: { value: new THREE.Vector2(1, 1) },
         stride: { value: 1 },
         worldFromCamera: { value: new THREE.Matrix4() },
@@ -190,6 +192,7 @@ export class CameraCloud {
     uniforms.depth!.value = this.texture;
     uniforms.points!.value = this.texture;
     uniforms.intrinsics!.value.fromArray(frame.intrinsics);
+    if (isPoints) uniforms.pointSpacing!.value = spacingOf(frame.points!);
     uniforms.metresPerUnit!.value = frame.metresPerUnit;
     uniforms.size!.value.set(frame.width, frame.height);
     const pose = frame.worldFromCamera;
@@ -300,6 +303,20 @@ export class CameraCloud {
     ];
     this.measuredRange = true;
   }
+}
+
+// [m] between neighbours, about: as of a square sheet of that many points.
+function spacingOf(points: Float32Array): number {
+  const count = points.length / 3;
+  if (count < 2) return 0.002;
+  const step = 3 * Math.max(1, Math.floor(count / 500));
+  const sides = [0, 1, 2].map((i) => {
+    const sorted = [...Array(Math.ceil(points.length / step)).keys()]
+      .map((k) => points[k * step + i]!)
+      .sort((a, b) => a - b);
+    return sorted[Math.floor(0.97 * sorted.length)]! - sorted[Math.floor(0.03 * sorted.length)]!;
+  });
+  return Math.max(0.0005, Math.hypot(...sides) / Math.sqrt(2 * count));
 }
 
 // Whole rows of a texture; the points beyond are never drawn.

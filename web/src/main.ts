@@ -47,6 +47,24 @@ function makeView(): SceneView {
 }
 const view = makeView();
 
+// What lies over the scene leaves the rest of the window to it.
+function findRoom(): void {
+  const box = (selector: string) => document.querySelector(selector)!.getBoundingClientRect();
+  const { width, height } = box("#view");
+  const panel = box("#panel");
+  const numbers = box(".hud");
+  view.setRoom({
+    width,
+    height,
+    left: 0,
+    top: Math.max(box(".bar").bottom, numbers.width > 0.7 * width ? numbers.bottom : 0),
+    right: panel.left > 0.3 * width ? Math.min(width, panel.left) : width,
+    bottom: height,
+  });
+}
+for (const id of ["view", "panel"]) new ResizeObserver(findRoom).observe(get(id));
+findRoom();
+
 const panel = new Panel({
   setParameter: (name, value) => connection.ask({ set: { name, value } }),
   setLimit: (name, value) => connection.ask({ set_safety: { name, value } }),

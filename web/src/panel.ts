@@ -64,26 +64,35 @@ export function shownUnit(row: Pick<ParameterRow, "unit" | "max">): {
   return { unit: row.unit === "-" ? "" : row.unit, factor: 1 };
 }
 
-/** A slider of 1000 steps is logarithmic where a table's range spans more than two decades. */
-export function sliderFromValue(row: Pick<ParameterRow, "min" | "max">, value: number): number {
-  const [at, from, to] = isLogarithmic(row)
-    ? [Math.log(Math.max(value, row.min)), Math.log(row.min), Math.log(row.max)]
-    : [value, row.min, row.max];
+type Range = Pick<ParameterRow, "min" | "max"> & Partial<Pick<ParameterRow, "default">>;
+
+/**
+ * A slider of 1000 steps is logarithmic where a range spans more than two decades; where it begins
+ * at zero and its default is less than a hundredth of it, from a hundredth of the default on.
+ */
+export function sliderFromValue(row: Range, value: number): number {
+  const low = logarithmicFrom(row);
+  const [at, from, to] =
+    low !== null
+      ? [Math.log(Math.max(value, low)), Math.log(low), Math.log(row.max)]
+      : [value, row.min, row.max];
   return Math.round((1000 * (at - from)) / (to - from));
 }
 
-export function valueFromSlider(row: Pick<ParameterRow, "min" | "max">, slider: number): number {
+export function valueFromSlider(row: Range, slider: number): number {
   if (slider <= 0) return row.min;
   if (slider >= 1000) return row.max;
   const share = slider / 1000;
-  const value = isLogarithmic(row)
-    ? row.min * (row.max / row.min) ** share
-    : row.min + share * (row.max - row.min);
+  const low = logarithmicFrom(row);
+  const value =
+    low !== null ? low * (row.max / low) ** share : row.min + share * (row.max - row.min);
   return Number(value.toPrecision(3));
 }
 
-function isLogarithmic(row: Pick<ParameterRow, "min" | "max">): boolean {
-  return row.min > 0 && row.max / row.min > 100;
+// Where the logarithmic part begins; null: it is linear.
+function logarithmicFrom({ min, max, default: usual = 0 }: Range): number | null {
+  if (min > 0) return max / min > 100 ? min : null;
+  return min === 0 && usual > 0 && max / usual >= 100 ? usual / 100 : null;
 }
 
 export function shortNumber(value: number): string {

@@ -18,12 +18,10 @@ import {
   rayThrough,
   scale,
   sub,
-  turned,
   unit,
-  upFromPose,
-  zoomed,
   type Orbit,
 } from "./camera_math";
+import { firstView, offCentre, type Room } from "./first_view";
 import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";
 import type { Frame, Rays, Ticks, Vec3 } from "./protocol";
 import type { Spot } from "./surface";
@@ -113,6 +111,7 @@ export class SceneView {
   private pointedAt: Spot | null = null;
   private under: { spot: Spot; height: number } | null = null; // the hand, when it was drawn last
   private home: Orbit | null = null;
+  private room: Room = { width: 1, height: 1, left: 0, top: 0, right: 1, bottom: 1 };
   private following = false;
   private stale = true;
   private lastDrawing = 0;
@@ -242,15 +241,33 @@ export class SceneView {
     this.touch();
   }
 
+  /** The view that the newest frames ask for. */
   resetView(): void {
-    if (this.home) this.setOrbit(this.home);
+    const clouds = [...this.clouds.values()];
+    const seen = clouds.flatMap((cloud) => cloud.seen ?? []);
+    const pose = clouds.find(({ frame }) => frame)?.frame?.worldFromCamera;
+    const home = pose && firstView(seen, pose, this.room);
+    if (!home) return;
+    this.home = home;
+    this.setOrbit(home);
+  }
+
+  /** Which part of the window is free: what the eye looks at is in its middle. */
+  setRoom(room: Room): void {
+    const isSame = Object.entries(room).every(([side, at]) => this.room[side as keyof Room] === at);
+    if (isSame) return;
+    this.room = room;
+    if (this.orbit === this.home) this.resetView();
+    this.touch();
   }
 
   showFrame(frame: Frame): void {
     const cloud = this.cloudOf(frame.camera);
+    const isFirst = cloud.frame === null;
     cloud.show(frame);
     ++this.frames;
-    if (!this.home) this.findHome(frame, cloud);
+    // Until somebody looks elsewhere, the view follows what cameras join.
+    if (isFirst && (!this.home || this.orbit === this.home)) this.resetView();
     this.placeCameras();
     this.touch();
   }
@@ -276,7 +293,10 @@ export class SceneView {
   /** The eye, and where it looks through a place of the window [px]. */
   rayUnder(x: number, y: number): { from: Vec3; along: Vec3 } {
     const box = this.canvas.getBoundingClientRect();
-    const along = rayThrough(this.orbit, x - box.left, y - box.top, box.width, box.height);
+    const off = offCentre(this.room);
+    const right = x - box.left - 0.5 * box.width - off.x;
+    const down = y - box.top - 0.5 * box.height - off.y;
+    const along = rayThrough(this.orbit, right, down, box.height);
     return { from: eye(this.orbit), along };
   }
 
@@ -334,8 +354,10 @@ export class SceneView {
     this.camera.up.set(...up);
     this.camera.lookAt(...this.orbit.target);
     this.camera.near = Math.max(0.002, 0.02 * this.orbit.distance);
-    this.camera.far = this.orbit.distance + 30;
-    this.camera.updateProjectionMatrix();
+    this.camera.far = 3 * this.orbit.distance + 30;
+    const { clientWidth, clientHeight } = this.canvas;
+    const off = offCentre(this.room);
+    this.camera.setViewOffset(clientWidth, clientHeight, -off.x, -off.y, clientWidth, clientHeight);
     const lampAt: Vec3 = unit(
       [0, 1, 2].map(
         (i) =>
@@ -387,18 +409,6 @@ export class SceneView {
     this.touch();
   }
 
-  // The scene as its first camera sees it, but from a little aside and farther, to show its depth.
-  private findHome(frame: Frame, cloud: CameraCloud): void {
-    const pose = frame.worldFromCamera;
-    const from: Vec3 = [pose[3]!, pose[7]!, pose[11]!];
-    const forward: Vec3 = [pose[2]!, pose[6]!, pose[10]!];
-    const middle = 0.5 * (cloud.range[0] + cloud.range[1]);
-    const target = [0, 1, 2].map((i) => from[i]! + middle * forward[i]!) as unknown as Vec3;
-    const straight = lookAt(from, target, upFromPose(pose));
-    this.home = turned(zoomed(straight, 1.15 / Math.min(1, this.camera.aspect)), 0.35, -0.12);
-    this.setOrbit(this.home);
-  }
-
   private follow(at: Vec3): void {
     const away = sub(at, this.orbit.target);
     if (length(away) < 2e-4) return;
@@ -440,7 +450,8 @@ export class SceneView {
     };
     put(this.frusta, frames.flatMap(cameraLines));
     if (this.grid.visible || !this.home) return;
-    const floor = floorUnder(frames[0]!, this.orbit.up);
+    const first = this.clouds.values().next().value!;
+    const floor = floorUnder(first.seen?.places(2000) ?? [], this.orbit.up);
     put(this.grid, floor ? gridLines(floor, this.orbit.up) : []);
     this.axes.visible = true;
   }

@@ -2,7 +2,7 @@
 // The surface that a camera measured, as geometry: where a ray of the eye meets it, its normal, and
 // what is measured on the camera's sightline through a point.
 
-import { add, clamp, cross, dot, length, scale, sub, unit } from "./camera_math";
+import { add, clamp, dot, horizon, length, posed, scale, sub, unit } from "./camera_math";
 import type { Frame, Rays, Vec3 } from "./protocol";
 
 /** A place on a surface. */
@@ -23,20 +23,13 @@ const WIDER = [1, 2, 4]; // cones that are looked at in turn, where points are s
 const LEAST_POINTS = 6; // that give a normal
 const NEAREST = 0.02; // [m] depth
 
-/** Two unit vectors that are square to `w` and to each other. */
-function across(w: Vec3): [Vec3, Vec3] {
-  const any: Vec3 = Math.abs(w[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0];
-  const first = unit(cross(w, any));
-  return [first, cross(w, first)];
-}
-
 /**
  * The plane through points near `at`, by least squares of their heights along `towards` (unit).
  * Gives the place of the plane above `at`, and its normal on the side of `towards`.
  */
 export function fitPlane(points: readonly Vec3[], at: Vec3, towards: Vec3): Spot {
   if (points.length < LEAST_POINTS) return { at, normal: towards };
-  const [e, f] = across(towards);
+  const [e, f] = horizon(towards);
   let [mx, my, mh] = [0, 0, 0];
   const rows = points.map((point) => {
     const away = sub(point, at);
@@ -85,6 +78,36 @@ export class SeenSurface {
   ) {
     this.pose = frame.worldFromCamera;
     this.eye = [this.pose[3]!, this.pose[7]!, this.pose[11]!];
+  }
+
+  /** where the camera looks, unit */
+  get forward(): Vec3 {
+    return [this.pose[2]!, this.pose[6]!, this.pose[10]!];
+  }
+
+  /** How many points without an image there are; 0: there is an image. */
+  get unordered(): number {
+    return this.frame.points ? this.frame.width : 0;
+  }
+
+  /** Places spread evenly over what the frame measured; of holes there are none. */
+  places(about: number): Vec3[] {
+    const { width, height, points } = this.frame;
+    const count = width * height;
+    const step = Math.max(1, Math.floor(count / about));
+    const found: Vec3[] = [];
+    for (let i = 0; i < count; i += step) {
+      const p = points
+        ? ([points[3 * i]!, points[3 * i + 1]!, points[3 * i + 2]!] as const)
+        : this.deproject(i % width, Math.floor(i / width));
+      if (p) found.push(this.toWorld(p));
+    }
+    return found;
+  }
+
+  /** The normal at a measured place, towards the camera, from what is within `radius` [m]. */
+  normalAt(place: Vec3, radius: number): Vec3 {
+    return fitPlane(this.around(place, radius), place, unit(sub(this.eye, place))).normal;
   }
 
   /** The measured place on the sightline through `point`; null: none is. */
@@ -161,20 +184,20 @@ export class SeenSurface {
   }
 
   // The measured points near a place.
-  private around(place: Vec3): Vec3[] {
+  private around(place: Vec3, radius = FOOTPRINT): Vec3[] {
     const found: Vec3[] = [];
     const at = this.toCamera(place);
     if (this.frame.points) {
       const points = this.frame.points;
       for (let i = 0; i + 2 < points.length; i += 3) {
         const p: Vec3 = [points[i]!, points[i + 1]!, points[i + 2]!];
-        if (length(sub(p, at)) < FOOTPRINT) found.push(this.toWorld(p));
+        if (length(sub(p, at)) < radius) found.push(this.toWorld(p));
       }
       return found;
     }
     const pixel = this.pixelOf(at);
     if (!pixel) return found;
-    const half = clamp(Math.round((FOOTPRINT * this.frame.intrinsics[0]) / at[2]), ...WINDOW);
+    const half = clamp(Math.round((radius * this.frame.intrinsics[0]) / at[2]), ...WINDOW);
     const step = Math.max(1, Math.round(half / 6));
     const thick = Math.max(0.02, 0.015 * at[2]); // [m] beyond it is another surface
     for (let v = -half; v <= half; v += step) {
@@ -255,10 +278,7 @@ export class SeenSurface {
   }
 
   private toWorld(p: Vec3): Vec3 {
-    const m = this.pose;
-    return [0, 4, 8].map(
-      (row) => m[row]! * p[0] + m[row + 1]! * p[1] + m[row + 2]! * p[2] + m[row + 3]!,
-    ) as unknown as Vec3;
+    return posed(this.pose, p);
   }
 
   private toCamera(p: Vec3): Vec3 {

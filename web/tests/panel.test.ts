@@ -17,6 +17,7 @@ test("a slider's ends are the range's ends, to the bit", () => {
     { min: 1e-4, max: 0.05 },
     { min: 0, max: 20 },
     { min: 0.001, max: 0.99 },
+    { min: 0, max: 1e5, default: 600 },
   ]) {
     expect(valueFromSlider(row, 0)).toBe(row.min);
     expect(valueFromSlider(row, 1000)).toBe(row.max);
@@ -28,6 +29,12 @@ test("a slider's ends are the range's ends, to the bit", () => {
 test("a wide range is divided by ratios", () => {
   expect(valueFromSlider({ min: 0.01, max: 100 }, 500)).toBeCloseTo(1, 9);
   expect(valueFromSlider({ min: 0, max: 10 }, 500)).toBeCloseTo(5, 9);
+  // Also one that begins at zero, if its default is a small part of it: a soft spring is in reach.
+  const stiffness = { min: 0, max: 1e5, default: 600 };
+  expect(sliderFromValue(stiffness, 600)).toBe(474);
+  expect(valueFromSlider(stiffness, 474)).toBe(602);
+  expect(valueFromSlider(stiffness, 1)).toBe(6.06);
+  expect(valueFromSlider({ min: 0, max: 50, default: 3.3 }, 500)).toBe(25);
 });
 
 test("a value finds its place on the slider again", () => {

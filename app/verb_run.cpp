@@ -102,9 +102,11 @@ bool can_run_freely(const SessionConfig& config) {
 }
 
 // A device whose motors would keep their force if this process died, in a process of its own; null
-// for any other. Only while this process has one thread.
-std::unique_ptr<Device> guarded_device(const std::string& uri) {
-  if (uri.empty()) return nullptr;
+// for any other, and where the user wants none (--without-watchdog). Only while this process has
+// one thread.
+std::unique_ptr<Device> guarded_device(const SessionConfig& config) {
+  const std::string& uri = config.device;
+  if (uri.empty() || config.without_watchdog) return nullptr;
   const Registry<Driver> drivers = standard_drivers();
   const Driver* driver = drivers.try_find(Uri(uri).scheme());
   if (driver == nullptr || !driver->needs_guard) return nullptr;
@@ -155,7 +157,7 @@ int run(const RunOptions& options) {
     std::fputs(to_toml(config).c_str(), stdout);
     return 0;
   }
-  std::unique_ptr<Device> guarded = guarded_device(config.device);
+  std::unique_ptr<Device> guarded = guarded_device(config);
   // Before any other thread begins, so that these signals come to this one alone.
   std::atomic<Session*> running{nullptr};
   std::atomic<bool> ended{false};

@@ -113,6 +113,7 @@ struct Memory {
   Info info{};     // likewise
   Newest<Force> force;
   Newest<Hand> hand;
+  Newest<Text> fault_text;
   std::atomic<std::uint64_t> turns{0};   // of the guard's loop
   std::atomic<std::uint64_t> wishes{0};  // raised with each new wish
   std::atomic<Wish> wish{Wish::disabled};
@@ -227,32 +228,91 @@ void grant(Memory& memory, Device& device) {
   memory.granted.store(wished, std::memory_order_release);
 }
 
-// The guard's process: until the session wishes for the end, or has ended.
-void hold(Memory& memory, Device& device, const GuardLimits& limits, pid_t session) {
-  GuardGate gate(limits.beat_time);
-  Vec3 wanted = Vec3::Zero();
-  std::uint64_t beats = 0;
-  double next = monotonic_now();
-  while (getppid() == session && memory.wish.load(std::memory_order_acquire) != Wish::ended) {
-    grant(memory, device);
-    HandState state = device.read(monotonic_now());
-    if (Force force{}; memory.force.read(force)) {
-      wanted = Vec3(force.x, force.y, force.z);
-      beats = force.beats;
+// One tick of the guard: reads the device and writes what the session wrote last.
+class GuardTick {
+ public:
+  GuardTick(Memory& memory, Device& device, double beat_time)
+      : memory_(memory), device_(device), gate_(beat_time) {}
+
+  void run() noexcept {
+    HandState state = device_.read(monotonic_now());
+    if (Force force{}; memory_.force.read(force)) {
+      wanted_ = Vec3(force.x, force.y, force.z);
+      beats_ = force.beats;
     }
     const double now = monotonic_now();
-    device.write(gate.pass(now, beats, wanted), now);
-    if (gate.closed()) {
+    device_.write(gate_.pass(now, beats_, wanted_), now);
+    if (gate_.closed()) {
       state.present = false;  // so that the session's safety chain lets go, and engages anew
-      if (state.fault == DeviceFault::none && beats > 0) state.fault = DeviceFault::other;
+      if (state.fault == DeviceFault::none && beats_ > 0) state.fault = DeviceFault::other;
     }
-    memory.hand.write(hand_of(state));
-    memory.turns.fetch_add(1, std::memory_order_release);
+    memory_.hand.write(hand_of(state));
+    memory_.turns.fetch_add(1, std::memory_order_release);
+  }
+
+ private:
+  Memory& memory_;
+  Device& device_;
+  GuardGate gate_;
+  Vec3 wanted_ = Vec3::Zero();  // [N] device
+  std::uint64_t beats_ = 0;
+};
+
+bool goes_on(const Memory& memory, pid_t session) {
+  return getppid() == session && memory.wish.load(std::memory_order_acquire) != Wish::ended;
+}
+
+// What the device says of its fault, for the session.
+void tell_fault(Memory& memory, const Device& device, std::string& told) {
+  const std::string text = device.fault_text();
+  if (text == told) return;
+  told = text;
+  Text words{};
+  put_text(words, text);
+  memory.fault_text.write(words);
+}
+
+// The guard's process: until the session wishes for the end, or has ended.
+void hold_polled(Memory& memory, Device& device, const GuardLimits& limits, pid_t session) {
+  constexpr int ticks_a_text = 50;
+  GuardTick tick(memory, device, limits.beat_time);
+  std::string told;
+  double next = monotonic_now();
+  for (int number = 0; goes_on(memory, session); ++number) {
+    grant(memory, device);
+    tick.run();
+    if (number % ticks_a_text == 0) tell_fault(memory, device, told);
     next = std::max(next + limits.period, monotonic_now());
     sleep_until(static_cast<std::uint64_t>(1e9 * next));
   }
   device.write(Vec3::Zero(), monotonic_now());
   device.disable();
+}
+
+// The same with a device whose driver calls.
+void hold_driven(Memory& memory, Device& device, const GuardLimits& limits, pid_t session) {
+  constexpr auto look_interval = std::chrono::milliseconds(5);
+  constexpr int looks_of_end = 10;  // for the last write
+  GuardTick tick(memory, device, limits.beat_time);
+  std::atomic<bool> ending{false};
+  std::atomic<bool> zero_sent{false};
+  device.start([&] {
+    if (!ending.load(std::memory_order_acquire)) return tick.run();
+    static_cast<void>(device.read(monotonic_now()));
+    device.write(Vec3::Zero(), monotonic_now());
+    zero_sent.store(true, std::memory_order_release);
+  });
+  std::string told;
+  while (goes_on(memory, session)) {
+    grant(memory, device);
+    tell_fault(memory, device, told);
+    std::this_thread::sleep_for(look_interval);
+  }
+  ending.store(true, std::memory_order_release);
+  for (int i = 0; i < looks_of_end && !zero_sent.load(std::memory_order_acquire); ++i)
+    std::this_thread::sleep_for(look_interval);
+  device.disable();
+  device.stop();
 }
 
 [[noreturn]] void run_guard(Memory& memory, const std::function<std::unique_ptr<Device>()>& open,
@@ -266,11 +326,9 @@ void hold(Memory& memory, Device& device, const GuardLimits& limits, pid_t sessi
   int status = 0;
   try {
     const std::unique_ptr<Device> device = open();
-    if (device->drives())
-      throw Error(device->info().uri, "its driver calls the loop, which a guard cannot",
-                  "give the guard a device that is polled");
     put_info(device->info(), limits.beat_time, memory.info);
     memory.phase.store(Phase::open, std::memory_order_release);
+    const auto hold = device->drives() ? hold_driven : hold_polled;
     hold(memory, *device, limits, session);
   } catch (const std::exception& error) {
     put_text(memory.refusal, error.what());
@@ -330,6 +388,11 @@ class GuardedDevice final : public Device {
   void disable() noexcept override {
     enabled_.store(false, std::memory_order_release);
     wish(Wish::disabled);
+  }
+
+  [[nodiscard]] std::string fault_text() const override {
+    Text text{};
+    return memory_->fault_text.read(text) ? text.data() : "";
   }
 
  private:

@@ -41,15 +41,15 @@ class GuardGate {
 /// hangs: nothing that can happen to a session keeps a force on the device for longer than
 /// `GuardLimits::beat_time` and one period, but the machine's own end.
 ///
-/// The guard is forked here, opens the device, reads it once a period and writes what the session
-/// wrote last. What the session sees is one period older than without a guard. After the guard has
-/// taken a force away the device reports a fault until the session has written a zero force. The
-/// guard ignores the signals that end a session, and ends by itself when its parent has ended.
+/// The guard is forked here, opens the device, reads it once a period (a device that `drives()`: in
+/// its driver's callback) and writes what the session wrote last. The result is polled. What the
+/// session sees is one period older than without a guard. After the guard has taken a force away
+/// the device reports a fault until the session has written a zero force. The guard ignores the
+/// signals that end a session, and ends by itself when its parent has ended.
 ///
-/// The result's `DeviceInfo::watchdog` is `beat_time`, or the device's own if that is shorter. The
-/// device must be polled; it may have no `drives()`. If the guard itself dies, the result reports
-/// `DeviceFault::disconnected`, and the device's driver has closed the device, or its own watchdog
-/// counts.
+/// The result's `DeviceInfo::watchdog` is `beat_time`, or the device's own if that is shorter. If
+/// the guard itself dies, the result reports `DeviceFault::disconnected`, and the device's driver
+/// has closed the device, or its own watchdog counts.
 ///
 /// @param open  opens the device, in the guard's process. Call this while the process has one
 ///              thread: others are not there in the guard, with whatever lock they hold.

@@ -2,11 +2,12 @@
 #include "palpate/drivers/device_drivers.hpp"
 
 #include "palpate/drivers/force_dimension.hpp"
+#include "palpate/drivers/open_haptics.hpp"
 
 namespace palpate {
 
 std::vector<Driver> device_drivers() {
-  return {force_dimension_driver()};
+  return {force_dimension_driver(), open_haptics_driver()};
 }
 
 }  // namespace palpate

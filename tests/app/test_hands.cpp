@@ -196,5 +196,78 @@ TEST_F(ForceDimensionHands, AreShownByTheDoctor) {
   ADD_FAILURE() << outcome.out;
 }
 
+// ---- Touch
+
+class TouchHands : public Hands {
+ protected:
+  // OpenHaptics' axes: x to the right, y up, z towards the user.
+  void expect_along_the_normal_now() const {
+    expect_along_the_normal(bench.force[0], -bench.force[2], bench.force[1]);
+  }
+
+ private:
+  Environment library_{"PALPATE_OPENHAPTICS", PALPATE_FAKES "/openhaptics"};
+};
+
+TEST_F(TouchHands, TouchASlopeByAGuardAndSurviveBeingUnplugged) {
+  start("touch:");
+  ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
+  expect_along_the_normal_now();
+
+  bench.error = 0x202;  // the driver took the force off: too sudden
+  ASSERT_TRUE(reaches([&] { return motor_force() == 0.0; }));
+  ASSERT_TRUE(reaches([&] { return motor_force() > 0.5 * limit; }));
+
+  bench.plugged_in = false;
+  bench.force_on = false;  // without power
+  ASSERT_TRUE(reaches([&] { return bench.opens > 1 || bench.closes > 0; }));
+  bench.plugged_in = true;
+  ASSERT_TRUE(reaches([&] { return bench.opens == 2 && motor_force() > 0.5 * limit; }));
+
+  EXPECT_EQ(end(), 0) << test::read(path("stderr"));
+  EXPECT_TRUE(reaches([&] { return bench.closes == bench.opens; })) << "the guard has ended";
+  EXPECT_FALSE(bench.force_on);
+  EXPECT_LE(bench.largest, limit + 1e-9);
+  EXPECT_LE(bench.largest_first, 0.25);
+}
+
+TEST_F(TouchHands, TouchASlopeInTheDriversOwnCallback) {
+  start("touch:", "--without-watchdog");
+  ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
+  expect_along_the_normal_now();
+  EXPECT_EQ(end(), 0) << test::read(path("stderr"));
+  EXPECT_FALSE(bench.force_on);
+  EXPECT_EQ(bench.closes, 1);
+  EXPECT_LE(bench.largest, limit + 1e-9);
+}
+
+TEST_F(TouchHands, LetGoWhenTheProgramIsStoppedOrKilled) {
+  start("touch:");
+  ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
+  send(SIGSTOP);
+  ASSERT_TRUE(reaches([&] { return motor_force() == 0.0; })) << "by the guard";
+  send(SIGCONT);
+  ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
+  EXPECT_LE(bench.largest_first, 0.25);
+  send(SIGKILL);
+  wait_for_end();
+  EXPECT_TRUE(reaches([&] { return bench.closes == 1; })) << "by the guard";
+  EXPECT_EQ(motor_force(), 0.0);
+}
+
+TEST_F(TouchHands, AreRefusedInOneLineThatSaysWhatToDo) {
+  const std::string arguments = "run --headless --camera synthetic:plane?size=160x120 --device ";
+  bench.calibrated = false;
+  expect_refusal(arguments + "touch:", {"not calibrated", "inkwell"});
+  bench.calibrated = true;
+  expect_refusal(arguments + "'touch:Left'", {"cannot be opened (no such device)", "Touch_Setup"});
+  bench.plugged_in = false;
+  expect_refusal(arguments + "touch:", {"cannot be opened (device fault)", "power and cable"});
+  const Environment none("PALPATE_OPENHAPTICS", path("none"));
+  expect_refusal(arguments + "touch:", {"is not there", "support.3dsystems.com"});
+  EXPECT_EQ(bench.commands, 1) << "a zero force while it looked at the calibration";
+  EXPECT_EQ(bench.largest, 0.0);
+}
+
 }  // namespace
 }  // namespace palpate

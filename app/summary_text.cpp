@@ -14,9 +14,26 @@ std::uint64_t ticks_with(const Summary& summary, TickFlag flag) {
   return summary.flag_ticks[static_cast<std::size_t>(std::countr_zero(std::uint32_t{flag}))];
 }
 
+// What only a camera that captures now has; empty for others.
+std::string camera_line(const CameraStatus& camera) {
+  if (camera.latency == 0.0 && camera.opened_again == 0 && camera.doubt.empty()) return {};
+  std::string text =
+      fmt::format("{}: {}, {} frames at {:.1f} Hz, {:.0f} ms from capture to arrival", camera.uri,
+                  camera.kind, camera.frames, camera.rate, 1e3 * camera.latency);
+  if (camera.dropped > 0) text += fmt::format(", {} dropped", camera.dropped);
+  if (camera.opened_again > 0)
+    text += fmt::format(", opened again {}", camera.opened_again == 1
+                                                 ? "once"
+                                                 : fmt::format("{} times", camera.opened_again));
+  for (const std::string& remark : {camera.doubt, camera.trouble}) {
+    if (!remark.empty()) text += "; " + remark;
+  }
+  return text + "\n";
+}
+
 }  // namespace
 
-std::string text_of(const Summary& summary) {
+std::string text_of(const Summary& summary, std::span<const CameraStatus> cameras) {
   const auto ticks = static_cast<double>(std::max<std::size_t>(summary.ticks, 1));
   std::string text = fmt::format(
       "{} ticks over {:.3f} s, {} frames, in contact {:.1f} % of the time, largest force asked "
@@ -29,10 +46,13 @@ std::string text_of(const Summary& summary) {
     text += fmt::format(", step budget spent in {} ticks", hits);
   if (const auto thinned = ticks_with(summary, patch_thinned); thinned > 0)
     text += fmt::format(", points thinned in {} ticks", thinned);
-  return text + "\n";
+  text += "\n";
+  for (const CameraStatus& camera : cameras) text += camera_line(camera);
+  return text;
 }
 
-std::string json_of(const Summary& summary, const std::string& recording) {
+std::string json_of(const Summary& summary, const std::string& recording,
+                    std::span<const CameraStatus> cameras) {
   nlohmann::ordered_json safety;
   for (std::size_t i = 0; i < safety_flag_count; ++i)
     safety[std::string(safety_flag_names()[i])] = summary.safety_ticks[i];
@@ -49,6 +69,16 @@ std::string json_of(const Summary& summary, const std::string& recording) {
                                    {"max_force_sent", summary.largest_sent},
                                    {"pop_throughs", summary.pop_throughs},
                                    {"safety_ticks", safety}};
+  for (const CameraStatus& camera : cameras)
+    object["cameras"].push_back({{"uri", camera.uri},
+                                 {"kind", camera.kind},
+                                 {"frames", camera.frames},
+                                 {"dropped", camera.dropped},
+                                 {"rate_hz", camera.rate},
+                                 {"latency_s", camera.latency},
+                                 {"opened_again", camera.opened_again},
+                                 {"doubt", camera.doubt},
+                                 {"trouble", camera.trouble}});
   if (!recording.empty()) object["recording"] = recording;
   return object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

@@ -145,8 +145,9 @@ int finish(Session& session, bool json, const std::string& ended = {}) {
   std::string recording = state.recording.message;
   if (!ended.empty()) recording += (recording.empty() ? "" : "; ") + ended;
   if (!recording.empty()) fmt::print(stderr, "palpate: {}\n", recording);
-  std::fputs(json ? json_of(state.summary, recording).c_str() : text_of(state.summary).c_str(),
-             stdout);
+  const std::string text = json ? json_of(state.summary, recording, state.cameras)
+                                : text_of(state.summary, state.cameras);
+  std::fputs(text.c_str(), stdout);
   return state.recording.failed ? 1 : 0;
 }
 

@@ -23,6 +23,10 @@ constexpr double hang_margin = 1.0;        // [s] by which a read may overrun it
 constexpr double idle_pause = 0.005;       // [s] after a live source that did not wait
 constexpr double rate_weight = 0.1;        // of a new interval in the rate
 constexpr double remark_time = 5.0;        // [s] for which a problem of stamps is said
+constexpr int frames_a_look = 30;          // between two looks at whether depth is plausible
+constexpr std::size_t pixels_a_look = 97;  // every so many of a frame; prime to usual widths
+constexpr std::size_t fewest_points = 50;  // of a look, below which it says nothing
+constexpr double most_elsewhere = 0.3;     // [-] share of points that may lie out of range
 
 class MachineClock final : public FeedClock {
  public:
@@ -38,6 +42,13 @@ class MachineClock final : public FeedClock {
   }
 };
 
+// In hundredths of a metre
+std::string metres(double length) {
+  const auto count = std::lround(100.0 * length);
+  const std::string rest = std::to_string(100 + count % 100).substr(1);
+  return std::to_string(count / 100) + "." + rest;
+}
+
 std::string tenths(double seconds) {
   const auto count = static_cast<long long>(std::lround(10.0 * seconds));
   return std::to_string(count / 10) + "." + std::to_string(count % 10) + " s";
@@ -49,6 +60,25 @@ bool is_same_picture(const Cloud* a, const Cloud* b) {
   const auto* first = dynamic_cast<const DepthImage*>(a);
   const auto* second = dynamic_cast<const DepthImage*>(b);
   return first != nullptr && second != nullptr && first->depth() == second->depth();
+}
+
+// What speaks against a frame's unit of depth; empty if nothing does.
+std::string doubt_of(const Cloud& cloud, const DepthRange& range) {
+  const auto* image = dynamic_cast<const DepthImage*>(&cloud);
+  if (image == nullptr) return {};
+  std::size_t measured = 0;
+  std::size_t elsewhere = 0;
+  for (std::size_t i = 0; i < image->depth().size(); i += pixels_a_look) {
+    if (!is_measured(image->depth()[i])) continue;
+    ++measured;
+    const double depth = image->depth()[i] / image->units_per_metre();
+    if (depth < range.nearest || depth > range.farthest) ++elsewhere;
+  }
+  const double share = static_cast<double>(elsewhere) / static_cast<double>(measured + 1);
+  if (measured < fewest_points || share <= most_elsewhere) return {};
+  return std::to_string(std::lround(100.0 * share)) +
+         " % of its points lie outside what it can measure (" + metres(range.nearest) + " to " +
+         metres(range.farthest) + " m): look at its unit of depth";
 }
 
 // Which sentence tells a person of a problem with stamps.
@@ -182,6 +212,7 @@ class CameraFeed::Worker {
   std::optional<Read> first_;
   std::shared_ptr<const Cloud> newest_;                          // of a live camera
   int same_pictures_ = 0;                                        // in a row
+  int frames_seen_ = 0;                                          // since it was opened
   double took_ = 0.0;                                            // [s] to decode the frame before
   double pause_ = 0.0;                                           // [s] before it is opened again
   double last_time_ = -std::numeric_limits<double>::infinity();  // [s] stamp handed over last
@@ -285,6 +316,7 @@ bool CameraFeed::Worker::open_again(bool was_gone) {
     is_live_ = source->info().live;
     placer_.restart(source->info().clock);
     same_pictures_ = 0;
+    frames_seen_ = 0;
     newest_.reset();
     set_source(std::move(source));
     const std::lock_guard lock(mutex_);
@@ -355,6 +387,11 @@ void CameraFeed::Worker::take_live(Read read) {
   count(placed.problem);
   same_pictures_ = is_same_picture(newest_.get(), read.frame.cloud.get()) ? same_pictures_ + 1 : 1;
   newest_ = read.frame.cloud;
+  if (const auto& range = source_->info().range; range && frames_seen_++ % frames_a_look == 0) {
+    const std::string doubt = doubt_of(*newest_, *range);
+    const std::lock_guard lock(mutex_);
+    status_.doubt = doubt;
+  }
   const bool is_frozen = same_pictures_ >= options_.frozen_frames;
   {
     const std::lock_guard lock(mutex_);
@@ -530,6 +567,8 @@ CameraStatus CameraFeed::Worker::status() const {
   } else if (status.state == CameraState::live && last_problem_ != StampProblem::none &&
              time - last_problem_time_ < remark_time) {
     status.text += "; " + std::string(remark_of(last_problem_));
+  } else if (status.state == CameraState::live && !status.doubt.empty()) {
+    status.text += "; " + status.doubt;
   }
   return status;
 }

@@ -87,6 +87,7 @@ struct CameraStatus {
   double latency = 0.0;                ///< [s] usual time from capture to arrival (live cameras)
   std::optional<double> last_frame{};  ///< [s, CLOCK_MONOTONIC] stamp of the newest frame
   std::string trouble;                 ///< the error met last; a live camera's next frame clears it
+  std::string doubt;  ///< why its unit of depth may be wrong; empty if nothing speaks for it
 };
 
 /// One camera on a thread of its own.
@@ -104,6 +105,10 @@ struct CameraStatus {
 /// ever. A picture that stays the same to the bit is a camera that hangs: no noise is that
 /// constant. From the `frozen_frames`-th on it is not handed over, so that the age of the last
 /// frame shows.
+///
+/// Where the source says what distances the camera can measure (SourceInfo::range), one frame in 30
+/// is held against it: if more than 30 % of the points lie elsewhere, `CameraStatus::doubt` says
+/// so, as drivers are known to give depth in another unit than they say.
 ///
 /// Nothing here waits for the camera's thread without a bound: a thread that hangs inside the
 /// source is left behind with all that it uses and ends when the source returns.

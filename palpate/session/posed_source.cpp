@@ -18,7 +18,10 @@ class PosedSource final : public Source {
 
   std::optional<Frame> next(double timeout) override {
     std::optional<Frame> frame = source_->next(timeout);
-    if (frame) frame->cloud = posed(*frame->cloud);
+    if (!frame) return frame;
+    if (frame->colour && frame->colour->camera)
+      frame->colour = posed(*frame->colour, *frame->cloud);
+    frame->cloud = posed(*frame->cloud);
     return frame;
   }
   std::size_t skip(std::size_t count) override { return source_->skip(count); }
@@ -26,6 +29,17 @@ class PosedSource final : public Source {
   [[nodiscard]] const SourceInfo& info() const override { return source_->info(); }
 
  private:
+  // A colour camera stays where it is beside the depth camera.
+  [[nodiscard]] std::shared_ptr<const ColourImage> posed(const ColourImage& colour,
+                                                         const Cloud& cloud) const {
+    auto moved = std::make_shared<ColourImage>(colour);
+    Eigen::Isometry3d world_from_depth = Eigen::Isometry3d::Identity();
+    if (const auto* image = dynamic_cast<const DepthImage*>(&cloud))
+      world_from_depth = image->world_from_camera();
+    moved->camera->world_from_camera =
+        pose_ * world_from_depth.inverse() * colour.camera->world_from_camera;
+    return moved;
+  }
   [[nodiscard]] std::shared_ptr<const Cloud> posed(const Cloud& cloud) {
     if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
       // The rays stay the same from frame to frame: computed once.

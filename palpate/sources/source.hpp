@@ -32,6 +32,12 @@ enum class SensorKind : std::uint8_t {
   time_of_flight,    ///< times light, such as an Azure Kinect: noise grows as the signal fades
 };
 
+/// Distances between which a camera can measure [m].
+struct DepthRange {
+  double nearest = 0.0;
+  double farthest = std::numeric_limits<double>::infinity();
+};
+
 /// "recording", "monotonic", "system", "sensor".
 [[nodiscard]] std::string_view name_of(StampClock clock) noexcept;
 /// "unknown", "stereo", "structured light", "time of flight".
@@ -51,6 +57,8 @@ struct SourceInfo {
   bool live = false;
   StampClock clock = StampClock::recording;
   SensorKind sensor = SensorKind::unknown;
+  /// What the camera can measure, where it is known: depth elsewhere is in another unit.
+  std::optional<DepthRange> range{};
 };
 
 /// Where frames come from: a camera, a simulation, a recording. Used on one thread, except for

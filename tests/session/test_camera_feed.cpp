@@ -18,6 +18,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/session/camera_feed.hpp"
 
+#include "tests/session/fakes.hpp"
 #include "tests/support/errors.hpp"
 
 namespace palpate {
@@ -362,6 +363,39 @@ TEST(CameraFeed, GivesNoFreshnessToAPictureThatStaysTheSame) {
   Playing recovered;
   EXPECT_EQ(recovered.until(9.0, recovered.source(steps, live)).state, CameraState::live);
   EXPECT_EQ(recovered.given[109].fed.source_stamp, steps[200].stamp);
+}
+
+// A wall at 30 Hz that is 4 m away until it is 1.5 m away, as its driver says.
+class WallInAnotherUnit final : public Source {
+ public:
+  explicit WallInAnotherUnit(std::shared_ptr<FakeClock> clock) : clock_(std::move(clock)) {
+    info_.range = DepthRange{0.3, 3.0};
+  }
+  std::optional<Frame> next(double /*timeout*/) override {
+    clock_->advance_to(clock_->now() + 1.0 / 30.0);
+    ++frames_;
+    return Frame{
+        frames_ / 30.0,
+        test::wall(static_cast<std::uint16_t>((frames_ < 75 ? 4000 : 1500) + frames_ % 2))};
+  }
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+ private:
+  std::shared_ptr<FakeClock> clock_;
+  SourceInfo info_ = live;
+  int frames_ = 0;
+};
+
+TEST(CameraFeed, DoubtsAUnitThatPutsTheSceneWhereTheCameraCannotMeasure) {
+  Playing run;
+  const CameraStatus doubted = run.until(2.0, std::make_unique<WallInAnotherUnit>(run.clock));
+  EXPECT_EQ(doubted.state, CameraState::live);
+  EXPECT_EQ(doubted.text,
+            "live; 99 % of its points lie outside what it can measure (0.30 to 3.00 m): look at "
+            "its unit of depth");
+  Playing longer;
+  const CameraStatus mended = longer.until(5.0, std::make_unique<WallInAnotherUnit>(longer.clock));
+  EXPECT_EQ(mended.text, "live");
 }
 
 TEST(CameraFeed, HandsTheFirstFrameOverThatWasReadBefore) {

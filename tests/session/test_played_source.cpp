@@ -131,6 +131,17 @@ TEST(PosedSource, PutsDepthImagesAndPointsWhereTheCameraStands) {
   EXPECT_TRUE(posed->world_from_camera().isApprox(pose, 0.0));
   EXPECT_EQ(posed->depth(), wall()->depth());
 
+  const auto beside = std::make_shared<ColourImage>();
+  beside->camera.emplace();
+  beside->camera->world_from_camera.translation() = Vec3(0.015, 0.0, 0.0);
+  const auto coloured = with_pose(std::make_unique<MadeSource>([&](int) {
+                                    return Frame{.stamp = 0.0, .cloud = wall(), .colour = beside};
+                                  }),
+                                  pose)
+                            ->next();
+  EXPECT_TRUE(coloured->colour->camera->world_from_camera.translation().isApprox(
+      pose * Vec3(0.015, 0.0, 0.0), 1e-12));
+
   const std::vector<Vec3> points = {{0.0, 0.0, 1.0}, {0.1, 0.0, 1.0}, {0.0, 0.1, 1.2}};
   const auto cloud =
       with_pose(std::make_unique<MadeSource>([&](int) {

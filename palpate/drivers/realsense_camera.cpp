@@ -1,0 +1,645 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/drivers/realsense_camera.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/drivers/live_camera.hpp"
+#include "palpate/drivers/shared_library.hpp"
+#include "palpate/servo/realtime.hpp"
+#include "palpate/sources/realsense_lens.hpp"
+
+namespace palpate::realsense {
+namespace {
+
+// The C interface of librealsense2, 2.50 to 2.58, from its headers; only what is used. Every call
+// that can fail ends in an error to be filled.
+struct LibraryError;
+struct Context;
+struct DeviceList;
+struct CameraDevice;  // rs2_device
+struct SensorList;
+struct DepthSensor;  // rs2_sensor, which is an rs2_options too
+struct Pipeline;
+struct PipelineConfig;
+struct PipelineProfile;
+struct LibraryFrame;
+struct StreamProfile;
+struct StreamProfileList;
+struct LibraryIntrinsics {
+  int width, height;
+  float ppx, ppy, fx, fy;
+  int model;
+  std::array<float, 5> coeffs;
+};
+struct LibraryExtrinsics {
+  std::array<float, 9> rotation;  // column by column
+  std::array<float, 3> translation;
+};
+
+constexpr int stream_depth = 1, stream_colour = 2;
+constexpr int format_z16 = 1, format_rgb8 = 5;
+constexpr int info_name = 0, info_serial = 1, info_firmware = 2, info_usb = 9;
+constexpr int option_exposure = 3, option_auto_exposure = 10, option_preset = 12, option_laser = 13,
+              option_emitter = 18, option_global_time = 53;
+constexpr int extension_depth_sensor = 7;
+constexpr int domain_hardware = 0;
+constexpr int metadata_arrival = 7;  // [ms since 1970]
+constexpr std::array<const char*, 6> distortions{
+    "None",   "Modified Brown Conrady", "Inverse Brown Conrady",
+    "Ftheta", "Brown Conrady",          "Kannala Brandt4"};
+constexpr std::array<std::string_view, 5> presets{"default", "hand", "high-accuracy",
+                                                  "high-density", "medium-density"};
+constexpr int first_preset = 1;  // of the D400 series, in the order of `presets`
+
+constexpr double silence = 0.5;  // [s] without a frame after which the camera is looked for
+
+constexpr DepthRange stereo_range{0.05, 20.0};  // [m] the D405 sees the nearest
+constexpr DepthRange other_range{0.15, 10.0};   // [m] L515 and SR300 series
+
+// What a call of the library refused.
+class Refusal : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+LibraryNames library_names() {
+  LibraryNames names{.name = "librealsense2",
+                     .files = {"librealsense2.so"},
+                     .variable = "PALPATE_LIBREALSENSE",
+                     .remedy =
+                         "install librealsense2 2.50 or later, RealSense's SDK, which is no "
+                         "package of Debian's or Ubuntu's"};
+  for (int minor = 58; minor >= 50; --minor)
+    names.files.push_back("librealsense2.so.2." + std::to_string(minor));
+  return names;
+}
+
+class Api {
+ public:
+  Api() : library_(library_names()) {
+    library_.find(get_api_version, "rs2_get_api_version");
+    library_.find(get_error_message, "rs2_get_error_message");
+    library_.find(free_error, "rs2_free_error");
+    version = call(get_api_version);
+    if (version / 10000 != 2)
+      throw Error("librealsense2", library_.path() + " is of version " + version_text(),
+                  "install 2.50 or later");
+    library_.find(create_context, "rs2_create_context");
+    library_.find(delete_context, "rs2_delete_context");
+    library_.find(query_devices, "rs2_query_devices");
+    library_.find(get_device_count, "rs2_get_device_count");
+    library_.find(delete_device_list, "rs2_delete_device_list");
+    library_.find(device_list_contains, "rs2_device_list_contains");
+    library_.find(create_device, "rs2_create_device");
+    library_.find(delete_device, "rs2_delete_device");
+    library_.find(supports_device_info, "rs2_supports_device_info");
+    library_.find(get_device_info, "rs2_get_device_info");
+    library_.find(query_sensors, "rs2_query_sensors");
+    library_.find(get_sensors_count, "rs2_get_sensors_count");
+    library_.find(delete_sensor_list, "rs2_delete_sensor_list");
+    library_.find(create_sensor, "rs2_create_sensor");
+    library_.find(delete_sensor, "rs2_delete_sensor");
+    library_.find(is_sensor_extendable_to, "rs2_is_sensor_extendable_to");
+    library_.find(supports_option, "rs2_supports_option");
+    library_.find(get_option, "rs2_get_option");
+    library_.find(set_option, "rs2_set_option");
+    library_.find(create_pipeline, "rs2_create_pipeline");
+    library_.find(delete_pipeline, "rs2_delete_pipeline");
+    library_.find(create_config, "rs2_create_config");
+    library_.find(delete_config, "rs2_delete_config");
+    library_.find(config_enable_device, "rs2_config_enable_device");
+    library_.find(config_enable_stream, "rs2_config_enable_stream");
+    library_.find(pipeline_start, "rs2_pipeline_start_with_config");
+    library_.find(pipeline_stop, "rs2_pipeline_stop");
+    library_.find(pipeline_wait, "rs2_pipeline_try_wait_for_frames");
+    library_.find(profile_get_device, "rs2_pipeline_profile_get_device");
+    library_.find(delete_pipeline_profile, "rs2_delete_pipeline_profile");
+    library_.find(embedded_frames_count, "rs2_embedded_frames_count");
+    library_.find(extract_frame, "rs2_extract_frame");
+    library_.find(release_frame, "rs2_release_frame");
+    library_.find(get_frame_data, "rs2_get_frame_data");
+    library_.find(get_frame_width, "rs2_get_frame_width");
+    library_.find(get_frame_height, "rs2_get_frame_height");
+    library_.find(get_frame_stride, "rs2_get_frame_stride_in_bytes");
+    library_.find(get_frame_timestamp, "rs2_get_frame_timestamp");
+    library_.find(get_frame_domain, "rs2_get_frame_timestamp_domain");
+    library_.find(supports_metadata, "rs2_supports_frame_metadata");
+    library_.find(get_metadata, "rs2_get_frame_metadata");
+    library_.find(get_units, "rs2_depth_frame_get_units");
+    library_.find(get_stream_profile, "rs2_get_frame_stream_profile");
+    library_.find(get_profile_data, "rs2_get_stream_profile_data");
+    library_.find(get_intrinsics, "rs2_get_video_stream_intrinsics");
+    library_.find(get_extrinsics, "rs2_get_extrinsics");
+    library_.try_find(get_stream_profiles, "rs2_get_stream_profiles");
+    library_.try_find(count_profiles, "rs2_get_stream_profiles_count");
+    library_.try_find(get_profile, "rs2_get_stream_profile");
+    library_.try_find(is_default_profile, "rs2_is_stream_profile_default");
+    library_.try_find(delete_profiles, "rs2_delete_stream_profiles_list");
+  }
+
+  // @throws Refusal with the library's words
+  template <class Result, class... Declared, class... Given>
+  Result call(Result (*function)(Declared...), Given... given) const {
+    LibraryError* error = nullptr;
+    if constexpr (std::is_void_v<Result>) {
+      function(given..., &error);
+      check(error);
+    } else {
+      Result result = function(given..., &error);
+      check(error);
+      return result;
+    }
+  }
+
+  [[nodiscard]] std::string version_text() const {
+    return std::to_string(version / 10000) + "." + std::to_string(version / 100 % 100) + "." +
+           std::to_string(version % 100);
+  }
+  [[nodiscard]] const std::string& path() const { return library_.path(); }
+
+  int version = 0;
+  int (*get_api_version)(LibraryError**) = nullptr;
+  const char* (*get_error_message)(const LibraryError*) = nullptr;
+  void (*free_error)(LibraryError*) = nullptr;
+  Context* (*create_context)(int, LibraryError**) = nullptr;
+  void (*delete_context)(Context*) = nullptr;
+  DeviceList* (*query_devices)(const Context*, LibraryError**) = nullptr;
+  int (*get_device_count)(const DeviceList*, LibraryError**) = nullptr;
+  void (*delete_device_list)(DeviceList*) = nullptr;
+  int (*device_list_contains)(const DeviceList*, const CameraDevice*, LibraryError**) = nullptr;
+  CameraDevice* (*create_device)(const DeviceList*, int, LibraryError**) = nullptr;
+  void (*delete_device)(CameraDevice*) = nullptr;
+  int (*supports_device_info)(const CameraDevice*, int, LibraryError**) = nullptr;
+  const char* (*get_device_info)(const CameraDevice*, int, LibraryError**) = nullptr;
+  SensorList* (*query_sensors)(const CameraDevice*, LibraryError**) = nullptr;
+  int (*get_sensors_count)(const SensorList*, LibraryError**) = nullptr;
+  void (*delete_sensor_list)(SensorList*) = nullptr;
+  DepthSensor* (*create_sensor)(const SensorList*, int, LibraryError**) = nullptr;
+  void (*delete_sensor)(DepthSensor*) = nullptr;
+  int (*is_sensor_extendable_to)(const DepthSensor*, int, LibraryError**) = nullptr;
+  int (*supports_option)(const DepthSensor*, int, LibraryError**) = nullptr;
+  float (*get_option)(const DepthSensor*, int, LibraryError**) = nullptr;
+  void (*set_option)(const DepthSensor*, int, float, LibraryError**) = nullptr;
+  Pipeline* (*create_pipeline)(Context*, LibraryError**) = nullptr;
+  void (*delete_pipeline)(Pipeline*) = nullptr;
+  PipelineConfig* (*create_config)(LibraryError**) = nullptr;
+  void (*delete_config)(PipelineConfig*) = nullptr;
+  void (*config_enable_device)(PipelineConfig*, const char*, LibraryError**) = nullptr;
+  void (*config_enable_stream)(PipelineConfig*, int, int, int, int, int, int,
+                               LibraryError**) = nullptr;
+  PipelineProfile* (*pipeline_start)(Pipeline*, PipelineConfig*, LibraryError**) = nullptr;
+  void (*pipeline_stop)(Pipeline*, LibraryError**) = nullptr;
+  int (*pipeline_wait)(Pipeline*, LibraryFrame**, unsigned, LibraryError**) = nullptr;
+  CameraDevice* (*profile_get_device)(PipelineProfile*, LibraryError**) = nullptr;
+  void (*delete_pipeline_profile)(PipelineProfile*) = nullptr;
+  int (*embedded_frames_count)(LibraryFrame*, LibraryError**) = nullptr;
+  LibraryFrame* (*extract_frame)(LibraryFrame*, int, LibraryError**) = nullptr;
+  void (*release_frame)(LibraryFrame*) = nullptr;
+  const void* (*get_frame_data)(const LibraryFrame*, LibraryError**) = nullptr;
+  int (*get_frame_width)(const LibraryFrame*, LibraryError**) = nullptr;
+  int (*get_frame_height)(const LibraryFrame*, LibraryError**) = nullptr;
+  int (*get_frame_stride)(const LibraryFrame*, LibraryError**) = nullptr;
+  double (*get_frame_timestamp)(const LibraryFrame*, LibraryError**) = nullptr;  // [ms]
+  int (*get_frame_domain)(const LibraryFrame*, LibraryError**) = nullptr;
+  int (*supports_metadata)(const LibraryFrame*, int, LibraryError**) = nullptr;
+  long long (*get_metadata)(const LibraryFrame*, int, LibraryError**) = nullptr;
+  float (*get_units)(const LibraryFrame*, LibraryError**) = nullptr;  // [m]
+  const StreamProfile* (*get_stream_profile)(const LibraryFrame*, LibraryError**) = nullptr;
+  void (*get_profile_data)(const StreamProfile*, int*, int*, int*, int*, int*,
+                           LibraryError**) = nullptr;
+  void (*get_intrinsics)(const StreamProfile*, LibraryIntrinsics*, LibraryError**) = nullptr;
+  void (*get_extrinsics)(const StreamProfile*, const StreamProfile*, LibraryExtrinsics*,
+                         LibraryError**) = nullptr;
+  // For the report alone
+  StreamProfileList* (*get_stream_profiles)(DepthSensor*, LibraryError**) = nullptr;
+  int (*count_profiles)(const StreamProfileList*, LibraryError**) = nullptr;
+  const StreamProfile* (*get_profile)(const StreamProfileList*, int, LibraryError**) = nullptr;
+  int (*is_default_profile)(const StreamProfile*, LibraryError**) = nullptr;
+  void (*delete_profiles)(StreamProfileList*) = nullptr;
+
+ private:
+  void check(LibraryError* error) const {
+    if (error == nullptr) return;
+    const char* said = get_error_message(error);
+    const std::string message = said == nullptr ? "" : said;
+    free_error(error);
+    throw Refusal(message);
+  }
+
+  SharedLibrary library_;
+};
+
+// What the library made, given back to it at the end.
+template <class Thing>
+using Owned = std::unique_ptr<Thing, void (*)(Thing*)>;
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return text;
+}
+
+std::string remedy_for(const std::string& refusal) {
+  const std::string said = lower(refusal);
+  const auto says = [&](std::string_view word) { return said.find(word) != std::string::npos; };
+  if (says("permission") || says("access") || says("denied") || says("power state"))
+    return "install the SDK's udev rules (99-realsense-libusb.rules) and plug it in again";
+  if (says("busy")) return "end the other program that uses it";
+  if (says("resolve"))
+    return "leave width, height and fps out, or take those that rs-enumerate-devices lists";
+  return "check its cable and port; plug it in again";
+}
+
+struct Found {
+  std::string name, serial, firmware, usb;
+};
+
+std::string info_of(const Api& api, const CameraDevice* device, int which) {
+  if (api.call(api.supports_device_info, device, which) == 0) return {};
+  const char* text = api.call(api.get_device_info, device, which);
+  return text == nullptr ? "" : text;
+}
+
+Found found_of(const Api& api, const CameraDevice* device) {
+  return {info_of(api, device, info_name), info_of(api, device, info_serial),
+          info_of(api, device, info_firmware), info_of(api, device, info_usb)};
+}
+
+std::string usb_note(const std::string& usb) {
+  return usb.starts_with("2") ? "it is on USB " + usb +
+                                    ", which is too slow for most sizes; use a cable and a port "
+                                    "of USB 3"
+                              : "";
+}
+
+// The sensor that measures depth; null if the device has none.
+Owned<DepthSensor> depth_sensor(const Api& api, const CameraDevice* device) {
+  const Owned<SensorList> sensors(api.call(api.query_sensors, device), api.delete_sensor_list);
+  const int count = api.call(api.get_sensors_count, sensors.get());
+  for (int i = 0; i < count; ++i) {
+    Owned<DepthSensor> sensor(api.call(api.create_sensor, sensors.get(), i), api.delete_sensor);
+    if (api.call(api.is_sensor_extendable_to, sensor.get(), extension_depth_sensor) != 0)
+      return sensor;
+  }
+  return {nullptr, api.delete_sensor};
+}
+
+// [Hz] at which its depth comes unless it is told otherwise.
+std::optional<double> default_rate(const Api& api, const CameraDevice* device) {
+  if (api.get_stream_profiles == nullptr || api.count_profiles == nullptr ||
+      api.get_profile == nullptr || api.is_default_profile == nullptr ||
+      api.delete_profiles == nullptr)
+    return std::nullopt;
+  const Owned<DepthSensor> sensor = depth_sensor(api, device);
+  if (!sensor) return std::nullopt;
+  const Owned<StreamProfileList> list(api.call(api.get_stream_profiles, sensor.get()),
+                                      api.delete_profiles);
+  const int count = api.call(api.count_profiles, list.get());
+  for (int i = 0; i < count; ++i) {
+    const StreamProfile* profile = api.call(api.get_profile, list.get(), i);
+    std::array<int, 5> data{};  // stream, format, index, id, rate
+    api.call(api.get_profile_data, profile, &data[0], &data[1], &data[2], &data[3], &data[4]);
+    if (data[0] == stream_depth && api.call(api.is_default_profile, profile) != 0) return data[4];
+  }
+  return std::nullopt;
+}
+
+DriverReport look() {
+  const Api api;
+  DriverReport report{.library = api.path(), .version = api.version_text()};
+  try {
+    const Owned<Context> context(api.call(api.create_context, api.version), api.delete_context);
+    const Owned<DeviceList> devices(api.call(api.query_devices, context.get()),
+                                    api.delete_device_list);
+    const int count = api.call(api.get_device_count, devices.get());
+    for (int i = 0; i < count; ++i) {
+      PluggedIn& entry = report.found.emplace_back();
+      entry.uri = "realsense:";
+      try {
+        const Owned<CameraDevice> device(api.call(api.create_device, devices.get(), i),
+                                         api.delete_device);
+        const Found found = found_of(api, device.get());
+        entry = {.uri = "realsense:" + found.serial,
+                 .name = found.name,
+                 .serial = found.serial,
+                 .firmware = found.firmware,
+                 .rate = default_rate(api, device.get()),
+                 .note = usb_note(found.usb)};
+      } catch (const Refusal& refusal) {
+        entry.note = std::string(refusal.what()) + "; " + remedy_for(refusal.what());
+      }
+    }
+  } catch (const Refusal& refusal) {
+    report.problem =
+        std::string("librealsense2: ") + refusal.what() + "; " + remedy_for(refusal.what());
+  }
+  return report;
+}
+
+RealSenseLens lens_of(const LibraryIntrinsics& given) {
+  RealSenseLens lens{.width = given.width,
+                     .height = given.height,
+                     .ppx = given.ppx,
+                     .ppy = given.ppy,
+                     .fx = given.fx,
+                     .fy = given.fy,
+                     .model = "of number " + std::to_string(given.model),
+                     .coeffs = {}};
+  if (given.model >= 0 && given.model < static_cast<int>(distortions.size()))
+    lens.model = distortions.at(static_cast<std::size_t>(given.model));
+  std::copy(given.coeffs.begin(), given.coeffs.end(), lens.coeffs.begin());
+  return lens;
+}
+
+double system_now() {
+  using std::chrono::duration;
+  return duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+class Camera final : public LiveCamera {
+ public:
+  explicit Camera(const Uri& uri)
+      : LiveCamera({.uri = uri.text(), .kind = "RealSense"}),
+        context_(nullptr, api_.delete_context),
+        config_(nullptr, api_.delete_config),
+        pipeline_(nullptr, api_.delete_pipeline),
+        profile_(nullptr, api_.delete_pipeline_profile),
+        device_(nullptr, api_.delete_device) {
+    try {
+      open(uri);
+    } catch (const Refusal& refusal) {
+      throw error(refusal);
+    }
+  }
+  ~Camera() override {
+    LibraryError* error = nullptr;
+    if (profile_) api_.pipeline_stop(pipeline_.get(), &error);
+    if (error != nullptr) api_.free_error(error);
+  }
+  Camera(const Camera&) = delete;
+  Camera& operator=(const Camera&) = delete;
+
+ private:
+  [[nodiscard]] Error error(const Refusal& refusal) const {
+    return {info_.uri, refusal.what(), remedy_for(refusal.what())};
+  }
+
+  // The serial number of the camera that is meant.
+  std::string choose(const std::string& wanted) {
+    const Owned<DeviceList> devices(api_.call(api_.query_devices, context_.get()),
+                                    api_.delete_device_list);
+    const int count = api_.call(api_.get_device_count, devices.get());
+    std::string others;
+    for (int i = 0; i < count; ++i) {
+      const Owned<CameraDevice> device(api_.call(api_.create_device, devices.get(), i),
+                                       api_.delete_device);
+      const Found found = found_of(api_, device.get());
+      if (wanted.empty() || found.serial == wanted) {
+        info_.kind = found.name;
+        info_.sensor = realsense_sensor(found.name);
+        info_.range = info_.sensor == SensorKind::stereo ? stereo_range : other_range;
+        if (const std::string note = usb_note(found.usb); !note.empty())
+          info_.notes.push_back(note);
+        return found.serial;
+      }
+      others += (others.empty() ? "" : ", ") + found.serial + " (" + found.name + ")";
+    }
+    if (count > 0)
+      throw Error(info_.uri, "there is no RealSense of that serial number",
+                  "plugged in: " + others);
+    throw Error(info_.uri, "no RealSense is plugged in",
+                "plug it in; if it is, install the SDK's udev rules (99-realsense-libusb.rules)");
+  }
+
+  void open(const Uri& uri) {
+    constexpr std::array<std::string_view, 7> known{"width",  "height", "fps",     "colour",
+                                                    "preset", "laser",  "exposure"};
+    uri.allow_only(known);
+    const auto whole = [&](std::string_view key, double most, std::string_view unit) {
+      return static_cast<int>(std::lround(uri.number_option(key, 0.0, 0.0, most, unit)));
+    };
+    const int width = whole("width", 16384.0, "px");
+    const int height = whole("height", 16384.0, "px");
+    const int rate = whole("fps", 1000.0, "Hz");
+    context_.reset(api_.call(api_.create_context, api_.version));
+    const std::string serial = choose(uri.path());
+    config_.reset(api_.call(api_.create_config));
+    api_.call(api_.config_enable_device, config_.get(), serial.c_str());
+    api_.call(api_.config_enable_stream, config_.get(), stream_depth, -1, width, height, format_z16,
+              rate);
+    if (uri.has("colour"))
+      api_.call(api_.config_enable_stream, config_.get(), stream_colour, -1, 0, 0, format_rgb8,
+                rate);
+    pipeline_.reset(api_.call(api_.create_pipeline, context_.get()));
+    profile_.reset(api_.call(api_.pipeline_start, pipeline_.get(), config_.get()));
+    device_.reset(api_.call(api_.profile_get_device, profile_.get()));
+    const Owned<DepthSensor> sensor = depth_sensor(api_, device_.get());
+    if (!sensor) throw Error(info_.uri, info_.kind + " has no depth", "plug in a depth camera");
+    set_options(uri, sensor.get());
+    const bool is_global = api_.call(api_.supports_option, sensor.get(), option_global_time) != 0 &&
+                           api_.call(api_.get_option, sensor.get(), option_global_time) != 0.0F;
+    info_.clock = is_global ? StampClock::system : StampClock::sensor;
+  }
+
+  void set_options(const Uri& uri, const DepthSensor* sensor) {
+    const auto set = [&](std::string_view key, int option, float value) {
+      if (api_.call(api_.supports_option, sensor, option) == 0)
+        throw Error(info_.uri, info_.kind + " has no option " + std::string(key), "leave it out");
+      try {
+        api_.call(api_.set_option, sensor, option, value);
+      } catch (const Refusal& refusal) {
+        throw Error(info_.uri, std::string(key) + " is refused: " + refusal.what(),
+                    "give another value or leave it out");
+      }
+    };
+    if (uri.has("preset")) {
+      const std::string name = uri.text_option("preset", "");
+      const auto* const preset = std::find(presets.begin(), presets.end(), name);
+      if (preset == presets.end())
+        throw Error(info_.uri, "there is no preset '" + name + "'",
+                    "known here: default, hand, high-accuracy, high-density, medium-density");
+      set("preset", option_preset, static_cast<float>(first_preset + (preset - presets.begin())));
+    }
+    if (uri.has("laser")) {
+      const auto power = static_cast<float>(uri.number_option("laser", 0.0, 0.0, 1000.0));  // [mW]
+      set("laser", option_emitter, power > 0.0F ? 1.0F : 0.0F);
+      if (power > 0.0F) set("laser", option_laser, power);
+    }
+    if (uri.has("exposure")) {
+      const double exposure = uri.number_option("exposure", 0.0, 1e-6, 1.0, "s");
+      if (api_.call(api_.supports_option, sensor, option_auto_exposure) != 0)
+        set("exposure", option_auto_exposure, 0.0F);
+      set("exposure", option_exposure, static_cast<float>(1e6 * exposure));
+    }
+  }
+
+  std::optional<Frame> wait(double seconds) override {
+    try {
+      LibraryFrame* given = nullptr;
+      const auto milliseconds = static_cast<unsigned>(std::lround(1e3 * seconds));
+      if (api_.call(api_.pipeline_wait, pipeline_.get(), &given, milliseconds) == 0 ||
+          given == nullptr) {
+        expect_it_is_there();
+        return std::nullopt;
+      }
+      last_frame_ = monotonic_now();
+      const Owned<LibraryFrame> set(given, api_.release_frame);
+      return frame_of(set.get());
+    } catch (const Refusal& refusal) {
+      throw error(refusal);
+    }
+  }
+
+  // The library itself says nothing when a camera goes.
+  void expect_it_is_there() const {
+    if (monotonic_now() - last_frame_ < silence) return;
+    const Owned<DeviceList> devices(api_.call(api_.query_devices, context_.get()),
+                                    api_.delete_device_list);
+    if (api_.call(api_.device_list_contains, devices.get(), device_.get()) == 0)
+      throw Error(info_.uri, "it is not plugged in any more", "plug it in again");
+  }
+
+  std::optional<Frame> frame_of(LibraryFrame* set) {
+    std::optional<Frame> frame;
+    std::shared_ptr<ColourImage> colour;
+    const StreamProfile* depth_profile = nullptr;
+    const StreamProfile* colour_profile = nullptr;
+    const int count = api_.call(api_.embedded_frames_count, set);
+    for (int i = 0; i < count; ++i) {
+      const Owned<LibraryFrame> part(api_.call(api_.extract_frame, set, i), api_.release_frame);
+      const StreamProfile* profile = api_.call(api_.get_stream_profile, part.get());
+      std::array<int, 5> data{};  // stream, format, index, id, rate
+      api_.call(api_.get_profile_data, profile, &data[0], &data[1], &data[2], &data[3], &data[4]);
+      if (data[0] == stream_depth && data[1] == format_z16) {
+        info_.frame_rate = data[4];
+        depth_profile = profile;
+        frame = depth_of(part.get(), profile);
+      } else if (data[0] == stream_colour && data[1] == format_rgb8) {
+        colour_profile = profile;
+        colour = colour_of(part.get(), profile);
+      }
+    }
+    if (frame && colour) {
+      LibraryExtrinsics moved{};
+      api_.call(api_.get_extrinsics, colour_profile, depth_profile, &moved);
+      for (int column = 0; column < 3; ++column) {
+        for (int row = 0; row < 3; ++row)
+          colour->camera->world_from_camera.linear()(row, column) =
+              moved.rotation.at(static_cast<std::size_t>(3 * column + row));
+        colour->camera->world_from_camera.translation()[column] =
+            moved.translation.at(static_cast<std::size_t>(column));
+      }
+      frame->colour = std::move(colour);
+    }
+    return frame;
+  }
+
+  LibraryIntrinsics intrinsics_of_profile(const StreamProfile* profile) const {
+    LibraryIntrinsics intrinsics{};
+    api_.call(api_.get_intrinsics, profile, &intrinsics);
+    return intrinsics;
+  }
+
+  Frame depth_of(const LibraryFrame* part, const StreamProfile* profile) {
+    const Intrinsics k = intrinsics_of(lens_of(intrinsics_of_profile(profile)), info_.uri);
+    const int width = api_.call(api_.get_frame_width, part);
+    const int height = api_.call(api_.get_frame_height, part);
+    if (width != k.width || height != k.height)
+      throw Error(info_.uri,
+                  "it gives images of " + std::to_string(width) + "x" + std::to_string(height) +
+                      " pixels with a lens for " + std::to_string(k.width) + "x" +
+                      std::to_string(k.height),
+                  "update firmware and library");
+    if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
+    const double unit = api_.call(api_.get_units, part);  // [m]
+    if (!(unit > 0.0))
+      throw Error(info_.uri, "it says " + std::to_string(unit) + " m for a unit of depth",
+                  "update its firmware");
+    // A float has seven digits: 0.001f is meant to be 1/1000 m.
+    const double units_per_metre = std::round(100.0 / unit) / 100.0;
+    const int stride = api_.call(api_.get_frame_stride, part);
+    Frame frame;
+    frame.cloud = std::make_shared<DepthImage>(
+        rays_,
+        depth_rows(api_.call(api_.get_frame_data, part), width, height,
+                   static_cast<std::size_t>(std::max(stride, 0)), info_.uri),
+        units_per_metre);
+    stamp(part, frame);
+    return frame;
+  }
+
+  void stamp(const LibraryFrame* part, Frame& frame) const {
+    const double now = system_now();
+    double arrival = now;  // [s since 1970]
+    if (api_.call(api_.supports_metadata, part, metadata_arrival) != 0)
+      arrival = 1e-3 * static_cast<double>(api_.call(api_.get_metadata, part, metadata_arrival));
+    // It is of a whole millisecond, and of another program's clock where that was set.
+    const double waited = std::clamp(now - arrival, 0.0, 1.0);
+    frame.arrival = monotonic_now() - waited;
+    const bool is_of_the_camera = api_.call(api_.get_frame_domain, part) == domain_hardware;
+    frame.stamp = info_.clock == StampClock::system && is_of_the_camera
+                      ? now - waited
+                      : 1e-3 * api_.call(api_.get_frame_timestamp, part);
+  }
+
+  std::shared_ptr<ColourImage> colour_of(const LibraryFrame* part, const StreamProfile* profile) {
+    const int width = api_.call(api_.get_frame_width, part);
+    const int height = api_.call(api_.get_frame_height, part);
+    const int stride = api_.call(api_.get_frame_stride, part);
+    const auto* data = static_cast<const std::uint8_t*>(api_.call(api_.get_frame_data, part));
+    if (data == nullptr || width < 1 || height < 1 || stride < 3 * width) return nullptr;
+    auto image = std::make_shared<ColourImage>();
+    image->width = width;
+    image->height = height;
+    const auto row = static_cast<std::size_t>(3 * width);
+    image->rgb.resize(row * static_cast<std::size_t>(height));
+    for (int v = 0; v < height; ++v, data += stride)
+      std::copy_n(data, row, image->rgb.begin() + static_cast<std::ptrdiff_t>(row) * v);
+    // Colour is to be looked at: a distortion that has no equal here is left out.
+    RealSenseLens lens = lens_of(intrinsics_of_profile(profile));
+    if (lens.model != "Brown Conrady") lens.coeffs = {};
+    image->camera.emplace();
+    image->camera->intrinsics = intrinsics_of(lens, info_.uri);
+    return image;
+  }
+
+  const Api api_;
+  Owned<Context> context_;
+  Owned<PipelineConfig> config_;
+  Owned<Pipeline> pipeline_;
+  Owned<PipelineProfile> profile_;
+  Owned<CameraDevice> device_;
+  double last_frame_ = monotonic_now();  // [s] when it came
+  std::shared_ptr<const ViewingRays> rays_;
+};
+
+}  // namespace
+}  // namespace palpate::realsense
+
+namespace palpate {
+
+Driver realsense_driver() {
+  return {.name = "realsense",
+          .summary = "realsense:SERIAL, a RealSense camera by librealsense2",
+          .tried = "a fake library alone",
+          .usb = {"8086:0a", "8086:0b"},
+          .open_camera = [](const Uri& uri) -> std::unique_ptr<Source> {
+            return std::make_unique<realsense::Camera>(uri);
+          },
+          .look = reporting(realsense::look)};
+}
+
+}  // namespace palpate

@@ -49,7 +49,8 @@ Cycle::Cycle(std::shared_ptr<Method> method, Device& device, const ServoSettings
       workspace_(settings.placement),
       parameters_(settings.parameters),
       newest_change_{settings, first_method_},
-      ring_(ring) {
+      ring_(ring),
+      scene_(settings.scene) {
   if (method_ == nullptr) throw Error("method", "there is none", "give one");
   validate(settings);
   method_->set_parameters(settings.parameters);
@@ -110,6 +111,8 @@ bool Cycle::adopt_change(const Change& change) noexcept {
     workspace_.place(change.settings.placement);
     placement_changed_ = number_ > 0;
   }
+  if (std::exchange(scene_, change.settings.scene) != change.settings.scene)
+    placement_changed_ = number_ > 0;
   parameters_ = change.settings.parameters;
   const bool switched = change.method.get() != method_;
   method_ = change.method.get();
@@ -199,8 +202,8 @@ void Cycle::run(const Wake& wake) noexcept {
 
   const Vec3 hip = workspace_.hip_in_world(hand);
   bool reseated = false;
-  // Where the hand is in the scene has changed at once, and with it the force: the hand is
-  // disengaged, and the proxy starts anew on the free side.
+  // Where the hand is in the scene has changed at once, or the scene has: the hand is disengaged,
+  // and the proxy starts anew on the free side.
   const bool jumped = std::exchange(placement_changed_, false);
   if (const auto& frame = frames_.taken_last(); frame.cloud && (safety_.stalls_at(t) || jumped)) {
     reseated = true;

@@ -30,6 +30,9 @@ struct ServoSettings {
   Parameters parameters;
   SafetyParameters safety;
   Placement placement;
+  /// Counts what is in the scene: where it changes, as another recording is opened or time jumps in
+  /// one, the hand is disengaged and the proxy starts anew on the free side.
+  std::uint64_t scene = 0;
 };
 
 /// @throws Error if one of them does not validate.
@@ -220,7 +223,8 @@ class Cycle {
   Vec3 last_proxy_ = Vec3::Zero();
   Vec3 last_normal_ = Vec3::Zero();
   double last_stamp_ = 0.0;         // [s] of the frame in use
-  bool placement_changed_ = false;  // before this tick
+  std::uint64_t scene_ = 0;         // in use, as ServoSettings::scene
+  bool placement_changed_ = false;  // or the scene, before this tick
   Freshness freshness_;
   std::atomic<std::uint64_t> fault_resets_{0};  // asked for
   std::uint64_t fault_resets_done_ = 0;

@@ -120,6 +120,7 @@ class CameraFeed::Worker {
     status_.uri = info.uri;
     status_.kind = info.kind;
     status_.rate = info.frame_rate.value_or(0.0);
+    status_.recorded = is_live_ ? 0 : info.frames.value_or(0);
     last_heard_ = now();
   }
 
@@ -175,6 +176,20 @@ class CameraFeed::Worker {
     const std::chrono::duration<double> bound(std::clamp(timeout, 0.0, 3600.0));
     return changed_.wait_for(lock, bound, [this] { return is_finished_; });
   }
+  void set_playback(const Playback& playback) {
+    {
+      const std::lock_guard lock(mutex_);
+      status_.playback = playback;
+    }
+    changed_.notify_all();
+  }
+  void seek(double share) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!is_live_) sought_ = share;
+    }
+    changed_.notify_all();
+  }
   [[nodiscard]] CameraStatus status() const;
 
  private:
@@ -196,6 +211,14 @@ class CameraFeed::Worker {
   bool open_again(bool was_gone);
   void run_live();
   bool run_recording();
+  bool go_to(double share, std::size_t& at);
+  bool wait_to_show(double stamp, double& offset, bool at_once);
+  std::optional<double> take_sought() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(sought_, std::nullopt);
+  }
+  bool stay_at_end();
+  void show_again();
   void show_still(const Read& only, double last);
   void take_live(Read read);
   void deliver(FedFrame fed);
@@ -216,7 +239,11 @@ class CameraFeed::Worker {
   double took_ = 0.0;                                            // [s] to decode the frame before
   double pause_ = 0.0;                                           // [s] before it is opened again
   double last_time_ = -std::numeric_limits<double>::infinity();  // [s] stamp handed over last
-  bool is_live_ = false;
+  FedFrame shown_;            // of a recording: the frame handed over last
+  double first_stamp_ = 0.0;  // [s] of a recording's first frame, by its own clock
+  bool has_jumped_ = false;   // in time, before the frame to come
+  double speed_ = 1.0;        // of the recording, which the offset of its stamps is for
+  std::atomic<bool> is_live_{false};
 
   mutable std::mutex mutex_;  // for all below
   std::condition_variable changed_;
@@ -228,6 +255,7 @@ class CameraFeed::Worker {
   std::optional<double> read_until_;  // [s] when the read that goes on must have ended
   StampProblem last_problem_ = StampProblem::none;
   double last_problem_time_ = 0.0;  // [s]
+  std::optional<double> sought_;    // place in the recording that was asked for, 0 to 1
 
   // Held while the sink is called. Recursive: a sink may stop its own camera.
   std::recursive_mutex sink_mutex_;
@@ -406,6 +434,87 @@ void CameraFeed::Worker::take_live(Read read) {
   deliver({std::move(read.frame), stamp, true});
 }
 
+// Goes to another place of the recording, which is at frame `at`. False: it has to be opened again.
+bool CameraFeed::Worker::go_to(double share, std::size_t& at) {
+  const std::size_t count = source_->info().frames.value_or(0);
+  if (count < 2) return true;
+  const auto wanted = static_cast<std::size_t>(std::lround(share * static_cast<double>(count - 1)));
+  if (wanted < at) {
+    if (!open_) return true;
+    set_source(nullptr);
+    if (!open_again(false)) return false;
+    at = 0;
+  }
+  while (at < wanted) {
+    const std::size_t skipped = source_->skip(wanted - at);
+    at += skipped > 0 ? skipped : 1;
+    if (skipped == 0 && !read(Source::no_timeout)) break;
+  }
+  has_jumped_ = true;
+  return true;
+}
+
+// The frame that was shown last, once more.
+void CameraFeed::Worker::show_again() {
+  FedFrame again = shown_;
+  again.frame.stamp = std::max(last_time_ + options_.still_interval, now());
+  again.is_new = false;
+  again.after_jump = false;
+  deliver(std::move(again));
+}
+
+// Waits until a frame is due, at `stamp / speed_ + offset`, and while the recording is paused,
+// unless it is the first of a place. False: not to be shown, as the camera is to stop or goes
+// elsewhere.
+bool CameraFeed::Worker::wait_to_show(double stamp, double& offset, bool is_first) {
+  for (bool was_paused = false;;) {
+    {
+      std::unique_lock lock(mutex_);
+      if (is_stopping_ || sought_) return false;
+      const Playback& playback = status_.playback;
+      const bool is_paused = playback.paused && !is_first;
+      if (playback.speed != speed_ || (was_paused && !is_paused)) {
+        // On from the frame that was shown last.
+        speed_ = playback.speed;
+        const double after = std::max(stamp - shown_.source_stamp, 0.0) / speed_;
+        offset = std::max(now(), last_time_) + after - stamp / speed_;
+      }
+      was_paused = is_paused;
+      const double wake =
+          is_paused ? last_time_ + options_.still_interval : stamp / speed_ + offset;
+      if (now() < wake) {
+        options_.clock->wait(lock, changed_, wake);
+        continue;
+      }
+      if (!is_paused) return true;
+    }
+    show_again();
+  }
+}
+
+// After the last frame: pauses there, unless the recording begins again. False: the camera is to
+// stop.
+bool CameraFeed::Worker::stay_at_end() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (status_.playback.loop) return !is_stopping_;
+    status_.playback.paused = true;
+  }
+  for (;;) {
+    {
+      std::unique_lock lock(mutex_);
+      const double wake = last_time_ + options_.still_interval;
+      if (is_stopping_) return false;
+      if (sought_ || !status_.playback.paused) return true;
+      if (now() < wake) {
+        options_.clock->wait(lock, changed_, wake);
+        continue;
+      }
+    }
+    show_again();
+  }
+}
+
 // One pass of a recording. False if it is over for ever.
 bool CameraFeed::Worker::run_recording() {
   std::optional<Read> next = std::exchange(first_, std::nullopt);
@@ -418,12 +527,17 @@ bool CameraFeed::Worker::run_recording() {
       source_->info().frame_rate.value_or(0.0) > 0.0 ? 1.0 / *source_->info().frame_rate : 0.0;
   for (;;) {
     if (is_stopping()) return true;
+    if (const std::optional<double> share = take_sought()) {
+      next.reset();
+      only.reset();
+      if (!go_to(*share, frames)) return true;
+    }
     if (!next) {
       // Decoding is too slow: leave out the frames that would be late.
-      if (frames > 0 && period > 0.0) {
-        const double behind = now() + took_ - (last_stamp + period + offset);
-        if (behind > period) {
-          const auto late = static_cast<std::size_t>(behind / period);
+      if (frames > 0 && period > 0.0 && !has_jumped_) {
+        const double behind = now() + took_ - ((last_stamp + period) / speed_ + offset);
+        if (behind > period / speed_) {
+          const auto late = static_cast<std::size_t>(behind * speed_ / period);
           const std::size_t skipped = source_->skip(late);
           frames += skipped;
           drop(skipped);
@@ -444,8 +558,8 @@ bool CameraFeed::Worker::run_recording() {
     errors = 0;
     took_ = frames > 0 ? next->took : 0.0;  // the first frame takes longer than others
     const double stamp = next->frame.stamp;
-    if (!std::isfinite(stamp) ||
-        (frames > 0 && stamp <= last_stamp && last_stamp - stamp < stamp_step_back)) {
+    if (!std::isfinite(stamp) || (frames > 0 && !has_jumped_ && stamp <= last_stamp &&
+                                  last_stamp - stamp < stamp_step_back)) {
       count(StampProblem::not_increasing);
       drop(1);
       ++frames;
@@ -453,11 +567,15 @@ bool CameraFeed::Worker::run_recording() {
       continue;
     }
     const double earliest = std::max(now(), last_time_ + options_.still_interval);
-    const bool has_jumped =
-        frames > 0 && (stamp < last_stamp || stamp - last_stamp > options_.longest_gap);
-    const bool is_behind = frames > 0 && now() - (stamp + offset) > options_.longest_lag;
-    if (frames == 0 || has_jumped || is_behind) offset = earliest - stamp;
+    const bool was_sought = has_jumped_ && frames > 0;
+    const bool has_jumped = frames > 0 && !was_sought &&
+                            (stamp < last_stamp || stamp - last_stamp > options_.longest_gap);
+    const bool is_behind =
+        frames > 0 && !was_sought && now() - (stamp / speed_ + offset) > options_.longest_lag;
+    if (frames == 0 || was_sought || has_jumped || is_behind) offset = earliest - stamp / speed_;
     if (has_jumped) count(StampProblem::jumped);
+    if (has_jumped) has_jumped_ = true;
+    if (frames == 0) first_stamp_ = stamp;
     if (is_behind && !has_jumped) {
       const std::lock_guard lock(mutex_);
       ++status_.slowed;
@@ -465,19 +583,22 @@ bool CameraFeed::Worker::run_recording() {
     last_stamp = stamp;
     if (++frames == 1) only = *next;
     if (frames == 2) only.reset();
-    const double due = stamp + offset;
-    if (!wait_until(due)) return true;
+    if (!wait_to_show(stamp, offset, frames == 1 || has_jumped_)) continue;
+    const double due = stamp / speed_ + offset;
     pause_ = 0.0;
     {
       const std::lock_guard lock(mutex_);
       last_heard_ = now();
       status_.state = CameraState::live;
+      status_.place = frames - 1;
+      status_.recorded_time = stamp - first_stamp_;
     }
     Frame frame = std::move(next->frame);
     next.reset();
     frame.stamp = due;
     if (due > last_time_) {
-      deliver({std::move(frame), stamp, true});
+      shown_ = {std::move(frame), stamp, true, std::exchange(has_jumped_, false)};
+      deliver(shown_);
     } else {
       count(StampProblem::not_increasing);
       drop(1);
@@ -500,6 +621,8 @@ bool CameraFeed::Worker::run_recording() {
     set_state(CameraState::ended);
     return false;
   }
+  if (!stay_at_end()) return true;
+  has_jumped_ = true;
   set_source(nullptr);
   open_again(false);
   return true;
@@ -613,6 +736,20 @@ bool CameraFeed::stop(double timeout) {
   if (join(timeout)) return true;
   thread_.detach();
   return false;
+}
+
+void CameraFeed::set_playback(const Playback& playback) {
+  if (!(playback.speed >= Playback::slowest && playback.speed <= Playback::fastest))
+    throw Error("playback", "a speed of " + number_text(playback.speed) + " is out of range",
+                "give " + number_text(Playback::slowest) + " to " + number_text(Playback::fastest));
+  worker_->set_playback(playback);
+}
+
+void CameraFeed::seek(double share) {
+  if (!(share >= 0.0 && share <= 1.0))
+    throw Error("playback", "there is no place " + number_text(share) + " in a recording",
+                "give 0, its beginning, to 1, its end");
+  worker_->seek(share);
 }
 
 CameraStatus CameraFeed::status() const {

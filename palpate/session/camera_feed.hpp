@@ -52,6 +52,14 @@ struct FeedOptions {
 /// A recording whose stamps go back by this much [s] begins anew there.
 inline constexpr double stamp_step_back = 1.0;
 
+/// How a recording is played. A live camera takes no notice of it.
+struct Playback {
+  bool paused = false;  ///< the frame that was shown last is shown again and again, at 30 Hz
+  bool loop = true;     ///< what ends begins again; false: it pauses on its last frame
+  double speed = 1.0;   ///< of its stamps
+  static constexpr double slowest = 0.1, fastest = 4.0;
+};
+
 /// A frame as it is handed over.
 struct FedFrame {
   Frame frame;                ///< its stamp is on the servo loop's clock [s, CLOCK_MONOTONIC]
@@ -59,6 +67,8 @@ struct FedFrame {
   /// False where the only frame of a recording is shown again: a still picture is not captured,
   /// so its stamp is the time at which it is shown.
   bool is_new = true;
+  /// Time has jumped before it: the recording began again, or goes on from another place.
+  bool after_jump = false;
 };
 
 enum class CameraState : std::uint8_t {
@@ -87,7 +97,12 @@ struct CameraStatus {
   double latency = 0.0;                ///< [s] usual time from capture to arrival (live cameras)
   std::optional<double> last_frame{};  ///< [s, CLOCK_MONOTONIC] stamp of the newest frame
   std::string trouble;                 ///< the error met last; a live camera's next frame clears it
-  std::string doubt;  ///< why its unit of depth may be wrong; empty if nothing speaks for it
+  std::string doubt;         ///< why its unit of depth may be wrong; empty if nothing speaks for it
+  Playback playback;         ///< of a recording
+  std::size_t recorded = 0;  ///< frames of a recording; 0: not known, or no recording
+  std::size_t place = 0;     ///< of a recording: number of the frame shown last, from 0
+  /// [s] of a recording: stamp of that frame, from the recording's first
+  double recorded_time = 0.0;
 };
 
 /// One camera on a thread of its own.
@@ -146,6 +161,12 @@ class CameraFeed {
   bool join(double timeout);
   /// request_stop, then join; a thread that does not end is left behind. @return as join
   bool stop(double timeout = 0.5);
+
+  /// From now on; of a recording. Any thread. @throws Error if the speed is out of range.
+  void set_playback(const Playback& playback);
+  /// A recording goes on from another place: 0 is its first frame, 1 its last. Nothing happens
+  /// where it does not know how many frames it has. Any thread. @throws Error beyond 0 to 1.
+  void seek(double share);
 
   /// Any thread; waits for nothing.
   [[nodiscard]] CameraStatus status() const;

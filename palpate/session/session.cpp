@@ -26,6 +26,7 @@ namespace {
 using Seconds = std::chrono::duration<double>;
 
 constexpr double first_frame_timeout = 10.0;  // [s] for a live camera to start up
+constexpr double shortest_loop = 2.0;         // [s] of a recording; others stay on their last frame
 constexpr double press = 0.008;               // [m] of the built-in path
 constexpr auto housekeeping_interval = std::chrono::milliseconds(10);
 constexpr auto stop_poll_interval = std::chrono::milliseconds(5);
@@ -229,9 +230,10 @@ class Session::Impl {
     return settings_;
   }
 
-  void set(const ServoSettings& settings) {
+  void set(ServoSettings settings) {
     if (needs_watchdog()) refuse_without_watchdog(device_->info(), settings.safety);
     const std::lock_guard lock(control_);
+    settings.scene = settings_.scene;  // not for others to count
     const std::uint64_t number =
         settings.method == settings_.method
             ? cycle_->set_settings(settings)
@@ -240,6 +242,14 @@ class Session::Impl {
     settings_number_ = number;
     proxy_radius_ = settings.parameters.proxy.r_c();
     if (recorder_) recorder_->settings({number, settings}, now());
+  }
+
+  void set_playback(const Playback& playback) {
+    for (const auto& feed : feeds_) feed->set_playback(playback);
+  }
+
+  void seek(double share) {
+    for (const auto& feed : feeds_) feed->seek(share);
   }
 
   void start_recording(const std::string& folder) {
@@ -315,6 +325,10 @@ class Session::Impl {
     }
     feeds_.push_back(std::make_unique<CameraFeed>(
         std::move(source), FeedOptions{.schemes = options_.sources}, std::move(open)));
+    const SourceInfo& info = feeds_.back()->info();
+    if (info.frames &&
+        static_cast<double>(*info.frames) < shortest_loop * info.frame_rate.value_or(30.0))
+      feeds_.back()->set_playback({.loop = false});
     const std::optional<Frame> first = feeds_.back()->first_frame(first_frame_timeout);
     if (!first)
       throw Error(camera.uri, "it has delivered no frame in " + seconds_text(first_frame_timeout),
@@ -332,24 +346,42 @@ class Session::Impl {
     return method;
   }
 
-  // A camera's thread, or the free-running one: a frame to the method and the recorder.
-  void take(std::size_t camera, const FedFrame& fed) {
-    {
-      const std::lock_guard lock(frames_mutex_);
-      newest_[camera] = fed.frame.cloud;
-      stamps_[camera].stamp = fed.frame.stamp;
-      std::vector<std::shared_ptr<const Cloud>> clouds;
-      for (const auto& cloud : newest_) {
-        if (cloud) clouds.push_back(cloud);
-      }
-      stamp_ = std::max(fed.frame.stamp, stamp_ + 1e-6);  // of two cameras in the wrong order
-      frame_number_ = cycle_->put_frame(
-          clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds)),
-          stamp_, stamps_, now());
-      if (recorder_) recorder_->frame(frame_number_, stamp_, newest_);
-      ++frames_;
+  // What is seen jumps. Before the frame after the jump the hand is disengaged; after it a method
+  // takes over that remembers nothing of before, on the free side of what is seen now.
+  void disengage(bool method_begins_anew) {
+    const std::lock_guard lock(control_);
+    ++settings_.scene;
+    if (method_begins_anew) {
+      settings_number_ = cycle_->set_method(open_method(settings_, newest()), settings_);
+    } else {
+      settings_number_ = cycle_->set_settings(settings_);
     }
+    if (recorder_) recorder_->settings({settings_number_, settings_}, now());
+  }
+
+  // A camera's thread, or the free-running one: a frame to all who want it.
+  void take(std::size_t camera, const FedFrame& fed) {
+    if (fed.after_jump) disengage(false);
+    give(camera, fed);
+    if (fed.after_jump) disengage(true);
     if (options_.on_frame) options_.on_frame(camera, fed);
+  }
+
+  // To the method and the recorder.
+  void give(std::size_t camera, const FedFrame& fed) {
+    const std::lock_guard lock(frames_mutex_);
+    newest_[camera] = fed.frame.cloud;
+    stamps_[camera].stamp = fed.frame.stamp;
+    std::vector<std::shared_ptr<const Cloud>> clouds;
+    for (const auto& cloud : newest_) {
+      if (cloud) clouds.push_back(cloud);
+    }
+    stamp_ = std::max(fed.frame.stamp, stamp_ + 1e-6);  // of two cameras in the wrong order
+    frame_number_ = cycle_->put_frame(
+        clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds)), stamp_,
+        stamps_, now());
+    if (recorder_) recorder_->frame(frame_number_, stamp_, newest_);
+    ++frames_;
   }
 
   void run_free(std::optional<double> duration,
@@ -542,6 +574,14 @@ ServoSettings Session::settings() const {
 
 void Session::set(const ServoSettings& settings) {
   impl_->set(settings);
+}
+
+void Session::set_playback(const Playback& playback) {
+  impl_->set_playback(playback);
+}
+
+void Session::seek(double share) {
+  impl_->seek(share);
 }
 
 void Session::reset_faults() noexcept {

@@ -135,6 +135,10 @@ class Session {
   /// @throws Error, leaving everything as it was, if something does not validate, there is no such
   ///         method, it cannot touch what the cameras see, or the force limit needs a watchdog.
   void set(const ServoSettings& settings);
+  /// How its recordings are played. The force goes to zero and ramps up again wherever time jumps.
+  /// Real time. @throws Error as CameraFeed::set_playback and seek.
+  void set_playback(const Playback& playback);
+  void seek(double share);
   /// Ends a latched fault of the safety chain: an operator's decision.
   void reset_faults() noexcept;
 

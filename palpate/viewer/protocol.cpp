@@ -174,6 +174,16 @@ std::optional<Command> parse_command(std::string_view message) {
   }
   if (verb == "method" && what.is_string()) return SetMethod{what.get<std::string>()};
   if (verb == "record" && what.is_boolean()) return SetRecording{what.get<bool>()};
+  if (verb == "seek" && what.is_number()) return Seek{what.get<double>()};
+  if (verb == "play") {
+    if (!what.is_object() || what.size() != 3) return std::nullopt;
+    const auto paused = what.find("paused");
+    const auto loop = what.find("loop");
+    const auto speed = what.find("speed");
+    if (paused == what.end() || loop == what.end() || speed == what.end()) return std::nullopt;
+    if (!paused->is_boolean() || !loop->is_boolean() || !speed->is_number()) return std::nullopt;
+    return SetPlayback{paused->get<bool>(), loop->get<bool>(), speed->get<double>()};
+  }
   if (verb == "reset" && what == true) return ResetHand{};
   if (verb == "reset_faults" && what == true) return ResetFaults{};
   return std::nullopt;

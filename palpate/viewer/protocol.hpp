@@ -112,11 +112,21 @@ struct SetMethod {
 struct SetRecording {
   bool on;
 };
+/// How recordings are played; see Playback.
+struct SetPlayback {
+  bool paused;
+  bool loop;
+  double speed;
+};
+/// Recordings go on from another place: 0 is the first frame, 1 the last.
+struct Seek {
+  double share;
+};
 struct ResetHand {};
 /// Ends a latched fault of the safety chain; see Session::reset_faults.
 struct ResetFaults {};
 using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod,
-                             SetRecording, ResetHand, ResetFaults>;
+                             SetRecording, SetPlayback, Seek, ResetHand, ResetFaults>;
 
 /// The longest message a page may send [bytes].
 constexpr std::size_t max_page_message = 1024;

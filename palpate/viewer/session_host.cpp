@@ -98,6 +98,7 @@ std::string SessionHost::state() {
     parameters[std::string(row.name)] = row.get(state.settings.parameters);
   for (const SafetyParameterInfo& row : safety_parameter_table())
     safety[std::string(row.name)] = row.get(state.settings.safety);
+  json playback;
   json placement;
   for (const PlacementInfo& row : placement_table())
     placement[std::string(row.name)] = row.get(state.settings.placement);
@@ -105,7 +106,14 @@ std::string SessionHost::state() {
     cameras.push_back({{"uri", status.uri},
                        {"kind", status.kind},
                        {"rate", status.rate},
-                       {"state", status.text}});
+                       {"state", status.text},
+                       {"frames", status.recorded},
+                       {"place", status.place},
+                       {"time", status.recorded_time}});
+    if (status.recorded > 1 && playback.is_null())
+      playback = {{"paused", status.playback.paused},
+                  {"loop", status.playback.loop},
+                  {"speed", status.playback.speed}};
   }
   json latched_by = json::array();
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
@@ -133,6 +141,7 @@ std::string SessionHost::state() {
               {"safety", safety},
               {"placement", placement},
               {"cameras", cameras},
+              {"playback", playback},
               {"device",
                {{"uri", device.uri},
                 {"kind", device.kind},
@@ -180,6 +189,12 @@ void SessionHost::command(const Command& command, Role role) {
     settings.method = method->name;
   } else if (const auto* record = std::get_if<SetRecording>(&command)) {
     record->on ? recordings_->start() : recordings_->stop();
+    return;
+  } else if (const auto* play = std::get_if<SetPlayback>(&command)) {
+    session_->set_playback({.paused = play->paused, .loop = play->loop, .speed = play->speed});
+    return;
+  } else if (const auto* seek = std::get_if<Seek>(&command)) {
+    session_->seek(seek->share);
     return;
   } else if (std::holds_alternative<ResetFaults>(command)) {
     session_->reset_faults();

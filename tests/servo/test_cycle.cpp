@@ -327,6 +327,23 @@ TEST(Cycle, MovesTheHipWithThePlacementAndSeatsTheProxyAnew) {
   EXPECT_FALSE(session.run().hand & proxy_reseated) << "once";
 }
 
+TEST(Cycle, LetsGoOfTheHandWhereAnotherSceneBegins) {
+  Session session;
+  session.run_for(2.0);
+  ASSERT_GT(session.press_to(-0.002).force.norm(), 0.5);
+  ServoSettings settings;
+  settings.scene = 1;
+  session.cycle.set_settings(settings);
+  ServoTick record = session.run();
+  EXPECT_TRUE(record.hand & proxy_reseated);
+  EXPECT_EQ(record.gain, 0.0);
+  // What is left of the force falls at fall_rate, and comes back over ramp_time at the soonest.
+  for (int i = 0; i < 50; ++i) record = session.run();
+  EXPECT_EQ(record.force.norm(), 0.0);
+  session.cycle.set_settings(settings);
+  EXPECT_FALSE(session.run().hand & proxy_reseated) << "the same scene";
+}
+
 TEST(Cycle, JudgesTheHandsSpeedOnTheDeviceWhateverTheScale) {
   ServoSettings settings;
   settings.placement.workspace_scale = 10.0;

@@ -128,7 +128,8 @@ class Playing {
   };
   std::shared_ptr<FakeClock> clock = std::make_shared<FakeClock>();
   std::vector<Given> given;
-  std::vector<double> opened;  // [s] attempts to open it again
+  std::vector<double> opened;                                      // [s] attempts to open it again
+  std::function<void(CameraFeed&)> on_given = [](CameraFeed&) {};  // after each frame
   FeedOptions options;
 
   [[nodiscard]] std::unique_ptr<ScriptedSource> source(std::vector<Step> steps,
@@ -153,7 +154,10 @@ class Playing {
       status = feed.status();
       feed.request_stop();
     };
-    feed.start([this](const FedFrame& fed) { given.push_back({fed, clock->now() - start}); });
+    feed.start([&](const FedFrame& fed) {
+      given.push_back({fed, clock->now() - start});
+      on_given(feed);
+    });
     EXPECT_TRUE(feed.join(bound));
     EXPECT_TRUE(feed.status().state == CameraState::stopped ||
                 feed.status().state == CameraState::ended);
@@ -188,6 +192,106 @@ TEST(CameraFeed, PlaysARecordingAtItsPaceWithOneOffsetAPass) {
   EXPECT_EQ(status.dropped, 0U);
   EXPECT_EQ(status.opened_again, 0U) << "it was never gone";
   EXPECT_EQ(run.opened.size(), 2U);
+}
+
+TEST(CameraFeed, PausesARecordingAndGoesOnAtAnotherSpeed) {
+  Playing run;
+  double resumed = 0.0;  // [s]
+  run.on_given = [&](CameraFeed& feed) {
+    if (run.given.size() == 10) feed.set_playback({.paused = true});
+    if (run.given.size() == 40) {
+      feed.set_playback({.speed = 0.5});
+      resumed = run.clock->now() - run.start;
+    }
+  };
+  const CameraStatus status = run.until(3.0, run.source(frames(60, 7.0), recording), [&](int) {
+    return run.source(frames(60, 7.0), recording);
+  });
+  ASSERT_GE(run.given.size(), 60U);
+  double before = -1.0;
+  for (std::size_t k = 0; k < run.given.size(); ++k) {
+    const auto& [fed, at] = run.given[k];
+    EXPECT_GT(fed.frame.stamp, before) << k;
+    EXPECT_FALSE(fed.after_jump) << k;
+    const bool is_still = k >= 10 && k < 40;
+    EXPECT_EQ(fed.is_new, !is_still) << k;
+    if (is_still) {
+      EXPECT_EQ(fed.source_stamp, run.given[9].fed.source_stamp);
+    }
+    if (k > 0) {
+      EXPECT_NEAR(fed.frame.stamp - before, k > 40 ? 2.0 / 30.0 : 1.0 / 30.0, 0.035) << k;
+    }
+    before = fed.frame.stamp;
+  }
+  // From the pause on, a second of the machine is half a second of the recording.
+  const auto& last = run.given.back();
+  EXPECT_NEAR(last.fed.source_stamp - run.given[9].fed.source_stamp, 0.5 * (last.at - resumed),
+              0.04);
+  EXPECT_EQ(status.place, run.given.size() - 31);
+}
+
+TEST(CameraFeed, GoesToAnotherPlaceOfARecordingAndSaysThatTimeJumps) {
+  SourceInfo info = recording;
+  info.frames = 60;
+  for (const bool can_skip : {true, false}) {
+    Playing run;
+    const auto made = [&] {
+      auto source = run.source(frames(60, 7.0), info);
+      source->can_skip = can_skip;
+      return source;
+    };
+    run.on_given = [&](CameraFeed& feed) {
+      if (run.given.size() == 5) feed.seek(0.5);
+      if (run.given.size() == 10) {
+        feed.set_playback({.paused = true});
+        feed.seek(0.0);
+      }
+      if (run.given.size() == 12) feed.set_playback({.loop = false});
+      if (run.given.size() == 14) feed.seek(1.0);
+    };
+    const CameraStatus status = run.until(2.0, made(), [&](int) { return made(); });
+    ASSERT_GT(run.given.size(), 20U);
+    const auto depth_at = [&](std::size_t k) {
+      return dynamic_cast<const DepthImage&>(*run.given[k].fed.frame.cloud).depth()[0];
+    };
+    EXPECT_EQ(depth_at(4), 1004);
+    EXPECT_EQ(depth_at(5), 1030);
+    EXPECT_EQ(depth_at(9), 1034);
+    EXPECT_EQ(depth_at(10), 1000);
+    EXPECT_EQ(depth_at(11), 1000) << "the place is shown, though it is paused";
+    EXPECT_EQ(depth_at(12), 1001);
+    EXPECT_EQ(depth_at(14), 1059);
+    for (std::size_t k = 0; k < run.given.size(); ++k) {
+      EXPECT_EQ(run.given[k].fed.after_jump, k == 5 || k == 10 || k == 14) << k;
+      if (k > 0) {
+        EXPECT_GT(run.given[k].fed.frame.stamp, run.given[k - 1].fed.frame.stamp) << k;
+      }
+      if (k > 14) {
+        EXPECT_EQ(depth_at(k), 1059) << "it does not begin again";
+      }
+    }
+    EXPECT_TRUE(status.playback.paused);
+    EXPECT_EQ(status.place, 59U);
+    EXPECT_NEAR(status.recorded_time, 59.0 / 30.0, 1e-9);
+  }
+}
+
+TEST(CameraFeed, SaysThatTimeJumpsWhereARecordingBeginsAgain) {
+  Playing run;
+  run.until(1.0, run.source(frames(12, 7.0), recording),
+            [&](int) { return run.source(frames(12, 7.0), recording); });
+  ASSERT_GE(run.given.size(), 25U);
+  for (std::size_t k = 0; k < run.given.size(); ++k)
+    EXPECT_EQ(run.given[k].fed.after_jump, k > 0 && k % 12 == 0) << k;
+}
+
+TEST(CameraFeed, RefusesAPlaceOrASpeedThatCannotBe) {
+  Playing run;
+  CameraFeed feed(run.source(frames(3, 7.0), recording));
+  EXPECT_TRUE(fails_saying([&] { feed.seek(1.1); }, "1.1"));
+  EXPECT_TRUE(fails_saying([&] { feed.seek(std::nan("")); }, "place"));
+  EXPECT_TRUE(fails_saying([&] { feed.set_playback({.speed = 0.0}); }, "speed of 0"));
+  EXPECT_TRUE(fails_saying([&] { feed.set_playback({.speed = 1e9}); }, "out of range"));
 }
 
 TEST(CameraFeed, LeavesOutFramesWhereDecodingIsTooSlowAndKeepsTheStamps) {

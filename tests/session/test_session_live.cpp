@@ -388,6 +388,37 @@ TEST(LiveSession, EndsARunWhenItIsAskedTo) {
   ASSERT_NE(session.timing(), nullptr);
 }
 
+TEST(LiveSession, LetsGoOfTheHandWhereTimeJumpsInARecording) {
+  SessionOptions options = patient(std::make_shared<Log>());
+  options.cameras.front().source = std::make_unique<test::MadeSource>(
+      [cloud = wall()](int k) {
+        return k < 300 ? std::optional(Frame{k / 100.0, cloud}) : std::nullopt;
+      },
+      SourceInfo{.uri = "made:", .kind = "made", .frames = 300, .frame_rate = 100.0});
+  Session session(std::move(options));
+  auto ticks = session.ticks();
+  session.start();
+  bool was_engaged = false;
+  EXPECT_TRUE(comes_true([&] {
+    for (ServoTick tick{}; ticks.try_pop(tick);) was_engaged |= tick.gain > 0.0;
+    return was_engaged;
+  }));
+  session.seek(0.9);
+  int jumps = 0;  // before the frame there, and after it
+  EXPECT_TRUE(comes_true([&] {
+    for (ServoTick tick{}; ticks.try_pop(tick);) {
+      if ((tick.hand & proxy_reseated) == 0) continue;
+      ++jumps;
+      EXPECT_EQ(tick.gain, 0.0);
+    }
+    return session.settings().scene == 2 && jumps > 0;
+  }));
+  EXPECT_GE(session.state().cameras.front().place, 269U);
+  // Who sets something does not count scenes.
+  session.set({});
+  EXPECT_EQ(session.settings().scene, 2U);
+}
+
 TEST(LiveSession, IsChangedAndWatchedFromSeveralThreads) {
   Session session(patient(std::make_shared<Log>()));
   session.start();

@@ -153,6 +153,14 @@ TEST(Protocol, UnderstandsEachCommand) {
   EXPECT_FALSE(std::get<SetRecording>(*record).on);
   const auto reset = parse_command(R"({"reset": true})");
   ASSERT_TRUE(reset && std::holds_alternative<ResetHand>(*reset));
+  const auto play = parse_command(R"({"play": {"paused": true, "loop": false, "speed": 0.5}})");
+  ASSERT_TRUE(play && std::holds_alternative<SetPlayback>(*play));
+  EXPECT_TRUE(std::get<SetPlayback>(*play).paused);
+  EXPECT_FALSE(std::get<SetPlayback>(*play).loop);
+  EXPECT_EQ(std::get<SetPlayback>(*play).speed, 0.5);
+  const auto seek = parse_command(R"({"seek": 0.25})");
+  ASSERT_TRUE(seek && std::holds_alternative<Seek>(*seek));
+  EXPECT_EQ(std::get<Seek>(*seek).share, 0.25);
   const auto faults = parse_command(R"({"reset_faults": true})");
   ASSERT_TRUE(faults && std::holds_alternative<ResetFaults>(*faults));
 }

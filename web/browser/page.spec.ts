@@ -417,6 +417,59 @@ test("help opens at its beginning", async () => {
   expect(await dialog.isVisible()).toBe(false);
 });
 
+test("a recording is paused, touched and gone through; jumps take the force away", async () => {
+  const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
+  try {
+    const made = join(folder, "made");
+    const camera = ["--camera", "synthetic:plane?size=160x120"];
+    const words = ["run", "--headless", "--duration", "4", ...camera, "--record", made];
+    execFileSync(process.env.PALPATE!, words, { stdio: "ignore" });
+    const page = await open(["--camera", `recording:${made}`]);
+    const cameraState = () =>
+      page.evaluate(() => (window as any).palpate.newest().state.cameras[0]);
+    expect((await cameraState()).frames).toBe(120);
+    await page.click("#play");
+    await expect.poll(() => page.locator("#timeline").getAttribute("data-paused")).toBe("true");
+    await expect
+      .poll(() => page.evaluate(() => (window as any).palpate.newest().state.playback.paused))
+      .toBe(true);
+    const { place } = await cameraState();
+
+    // What is paused can be touched.
+    const at = await placeWhere(page, "surface");
+    await page.mouse.move(at.x, at.y);
+    await page.mouse.down();
+    await until(page, (seen) => seen.force > 1);
+    expect((await cameraState()).place).toBe(place);
+
+    // A jump in time takes the force away, and it ramps up again.
+    const gain = () => page.evaluate(() => (window as any).palpate.newest().tick.gain as number);
+    expect(await gain()).toBeGreaterThan(0.5);
+    await page.evaluate(() => {
+      (window as any).gains = [];
+      const note = () => {
+        (window as any).gains.push((window as any).palpate.newest().tick.gain);
+        requestAnimationFrame(note);
+      };
+      note();
+      const slider = document.getElementById("place") as HTMLInputElement;
+      slider.value = "100";
+      slider.dispatchEvent(new Event("input"));
+    });
+    await expect.poll(async () => (await cameraState()).place).toBe(100);
+    await expect
+      .poll(() => page.evaluate(() => Math.min(...(window as any).gains)))
+      .toBeLessThan(0.3);
+    await until(page, (seen) => seen.force > 1);
+    await page.mouse.up();
+    await page.locator("#speed").selectOption("0.5");
+    await page.keyboard.press("k");
+    await expect.poll(async () => (await cameraState()).place).not.toBe(100);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
+});
+
 test("a recording ends at its limit, and the page says so", async () => {
   const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
   try {

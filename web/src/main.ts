@@ -14,6 +14,7 @@ import {
   type Ticks,
 } from "./protocol";
 import { SceneView, type Palette } from "./scene";
+import { Timeline } from "./timeline";
 import { depthBelow, flagNames, SteadyWhy, why } from "./why";
 
 const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
@@ -72,6 +73,8 @@ const panel = new Panel({
   setMethod: (name) => connection.ask({ method: name }),
 });
 
+const timeline = new Timeline((command) => connection.ask(command));
+
 const connection = new Connection({
   opened() {
     get("connection").dataset.state = "live";
@@ -102,6 +105,7 @@ const connection = new Connection({
     role.textContent = roleNames[newest.role].name;
     role.title = roleNames[newest.role].may;
     panel.update(newest);
+    timeline.show(newest, performance.now());
     const { r_c, r_1, r_3 } = newest.parameters;
     view.setRadii({ r_c: r_c ?? 0.005, r_1: r_1 ?? 0.005, r_3: r_3 ?? 0.01 });
     const troubled = newest.cameras.find((camera) => camera.state !== "live");
@@ -285,6 +289,7 @@ addEventListener("keydown", (event) => {
   if (event.code === "KeyV") view.resetView();
   if (event.code === "KeyR") record();
   if (event.code === "KeyT") switchTheme();
+  if (event.code === "KeyK") timeline.pause();
 });
 
 requestAnimationFrame(loop);

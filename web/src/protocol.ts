@@ -245,6 +245,19 @@ export interface CameraState {
   rate: number;
   /** live, ended, or what went wrong */
   state: string;
+  /** of a recording; 0: it has no end, or is none */
+  frames: number;
+  /** number of the frame shown last */
+  place: number;
+  /** [s] of that frame, from the first one */
+  time: number;
+}
+
+/** How recordings are played. */
+export interface Playback {
+  paused: boolean;
+  loop: boolean;
+  speed: number;
 }
 
 /** Sent a few times a second. */
@@ -258,6 +271,8 @@ export interface State {
   hand: "you" | "other" | "free";
   viewers: number;
   cameras: CameraState[];
+  /** null: nothing is a recording */
+  playback: Playback | null;
   device: { uri: string; kind: string; takes_hand: boolean; fault: string };
   servo: {
     /** [Hz] */
@@ -294,5 +309,7 @@ export type Command =
   | { place: { name: string; value: number } }
   | { method: string }
   | { record: boolean }
+  | { play: Playback }
+  | { seek: number }
   | { reset: true }
   | { reset_faults: true };

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+import { expect, test } from "vitest";
+import type { CameraState } from "../src/protocol";
+import { longest, timeText } from "../src/timeline";
+
+test("times are minutes and seconds", () => {
+  expect(timeText(0)).toBe("0:00.0");
+  expect(timeText(9.96)).toBe("0:10.0");
+  expect(timeText(59.97)).toBe("1:00.0");
+  expect(timeText(754.32)).toBe("12:34.3");
+});
+
+test("the timeline is of the longest recording, and of no live camera or still picture", () => {
+  const camera = (uri: string, frames: number): CameraState => {
+    return { uri, kind: "", rate: 30, state: "live", frames, place: 0, time: 0 };
+  };
+  expect(longest([camera("synthetic:desk", 0), camera("pcd:one", 1)])).toBeNull();
+  expect(longest([camera("a", 5), camera("b", 90), camera("c", 30)])?.uri).toBe("b");
+});

@@ -467,8 +467,8 @@ TEST(Sight, LeavesNothingOfAnOldForceOnAHandThatHasLeft) {
 }
 
 TEST(Sight, PullsNoHandThatLeavesASurfaceThatJustRose) {
-  // Before a slow camera the surface rises by 12 mm. The force turns to that over 85 ms; the hand is
-  // out of it in 30.
+  // Before a slow camera the surface rises by 12 mm. The force turns to that over 85 ms; the hand
+  // is out of it in 30.
   const Overhead camera;
   std::mt19937 random(9);
   constexpr double slow = 0.1;  // [s]

@@ -14,6 +14,8 @@ namespace palpate {
 namespace {
 
 constexpr int largest_image = 16384;
+// [-] depth over width of a surface between neighbouring pixels: a slope of 70 degrees.
+constexpr double steepest_surface = 2.75;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 // Rational Brown-Conrady: where the ray (x, y) appears in normalised image coordinates.
@@ -483,11 +485,12 @@ void DepthImage::gather_sides(const Ball& ball, const Sides& sides, std::size_t 
     for (int u = on_grid(window.u_begin); u < window.u_end; u += stride) {
       const double z = row[u] * metres_per_unit_;
       if (!is_measured(row[u]) || z > farthest || z + sides.depth < nearest) continue;
-      const std::optional<double> past = seen_past(u, v, z, sides.jump, stride);
+      const double pitch = z / k.fx * stride;
+      const std::optional<double> past =
+          seen_past(u, v, z, std::max(sides.jump, steepest_surface * pitch), stride);
       if (!past) continue;
       const Eigen::Vector2d ray = rays_->ray(u, v);
       if (!ray.allFinite()) continue;
-      const double pitch = z / k.fx * stride;
       const double end = std::min({*past, z + sides.depth, farthest});
       for (int i = std::max(1, static_cast<int>((nearest - z) / pitch)); z + i * pitch < end; ++i) {
         const double at = z + i * pitch;
@@ -495,6 +498,87 @@ void DepthImage::gather_sides(const Ball& ball, const Sides& sides, std::size_t 
         if (p.squaredNorm() > ball.radius * ball.radius) continue;
         const Vec3 q = rotation * p;
         patch.push(static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()));
+      }
+    }
+  }
+}
+
+// Each pixel is a tile, which reaches half way to its neighbours: bilinear between those that are
+// of the same surface, and going on as it is where they are not.
+void DepthImage::gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t max_points,
+                              Patch& patch) const noexcept {
+  constexpr int most_parts = 12;  // of a tile, along either side
+  const Eigen::Matrix3d rotation = world_from_camera_.linear();
+  const Vec3 centre = rotation.transpose() * (ball.centre - world_from_camera_.translation());
+  const Intrinsics& k = intrinsics();
+  const double pitch = centre.z() / std::min(k.fx, k.fy);
+  if (!(pitch > sheet.spacing) || !(centre.z() > ball.radius + pitch)) return;
+  ViewingRays::Window window = rays_->window(centre, ball.radius + pitch);
+  if (window.empty() || stride_of(window, max_points) > 1) return;
+  const double jump = std::max(sheet.jump, steepest_surface * pitch);
+
+  // What a pixel saw, in the camera's axes relative to the ball's centre; none of another surface.
+  struct Seen {
+    Vec3 p;
+    double z;
+    bool same;
+  };
+  const auto look = [&](int u, int v, double z_here) -> Seen {
+    if (u < 0 || v < 0 || u >= k.width || v >= k.height) return {Vec3::Zero(), 0.0, false};
+    const std::uint16_t raw =
+        depth_[static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width) +
+               static_cast<std::size_t>(u)];
+    const double z = raw * metres_per_unit_;
+    const Eigen::Vector2d ray = rays_->ray(u, v);
+    return {Vec3(z * ray.x(), z * ray.y(), z) - centre, z,
+            is_measured(raw) && ray.allFinite() && std::abs(z - z_here) <= jump};
+  };
+  const double squared_radius = ball.radius * ball.radius;
+  for (int v = window.v_begin; v < window.v_end; ++v) {
+    for (int u = window.u_begin; u < window.u_end; ++u) {
+      const double z = depth_[static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width) +
+                              static_cast<std::size_t>(u)] *
+                       metres_per_unit_;
+      const Seen here = look(u, v, z);
+      if (!here.same || std::abs(z - centre.z()) > ball.radius + jump) continue;
+      std::array<Seen, 9> around;  // by rows
+      for (int i = 0; i < 9; ++i) {
+        around[static_cast<std::size_t>(i)] = look(u + i % 3 - 1, v + i / 3 - 1, z);
+      }
+      // From the pixel to its four neighbours. Towards another surface it goes on as on the other
+      // side; without either, across the line of sight.
+      const auto step = [&](std::size_t to, std::size_t from, const Vec3& across) -> Vec3 {
+        if (around[to].same) return around[to].p - here.p;
+        return around[from].same ? Vec3(here.p - around[from].p) : across;
+      };
+      const Vec3 right = step(5, 3, Vec3(z / k.fx, 0.0, 0.0));
+      const Vec3 left = step(3, 5, Vec3(-z / k.fx, 0.0, 0.0));
+      const Vec3 down = step(7, 1, Vec3(0.0, z / k.fy, 0.0));
+      const Vec3 up = step(1, 7, Vec3(0.0, -z / k.fy, 0.0));
+      const auto parts = [&](const Vec3& a, const Vec3& b) {
+        const double length = 0.5 * (a.norm() + b.norm());
+        return std::clamp(static_cast<int>(std::ceil(length / sheet.spacing)), 1, most_parts);
+      };
+      const int columns = parts(left, right);
+      const int rows = parts(up, down);
+      for (int j = 0; j < rows; ++j) {
+        const double b = (j + 0.5) / rows - 0.5;
+        for (int i = 0; i < columns; ++i) {
+          const double a = (i + 0.5) / columns - 0.5;
+          if (a == 0.0 && b == 0.0) continue;  // the pixel itself
+          const Vec3& along = a < 0.0 ? left : right;
+          const Vec3& across = b < 0.0 ? up : down;
+          const Seen& corner =
+              around[static_cast<std::size_t>((b < 0.0 ? 0 : 6) + (a < 0.0 ? 0 : 2))];
+          const double s = std::abs(a);
+          const double t = std::abs(b);
+          Vec3 p = here.p + s * along + t * across;
+          if (corner.same) p += s * t * (corner.p - here.p - along - across);
+          if (p.squaredNorm() > squared_radius) continue;
+          const Vec3 q = rotation * p;
+          patch.push(static_cast<float>(q.x()), static_cast<float>(q.y()),
+                     static_cast<float>(q.z()));
+        }
       }
     }
   }

@@ -84,6 +84,8 @@ class DepthImage final : public Cloud {
   void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
   void gather_sides(const Ball& ball, const Sides& sides, std::size_t max_points,
                     Patch& patch) const noexcept override;
+  void gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t max_points,
+                    Patch& patch) const noexcept override;
   /// Depth of `place` by the focal length; 0 outside the image (a lens's distortion not counted).
   [[nodiscard]] double spacing(const Vec3& place) const noexcept override;
 

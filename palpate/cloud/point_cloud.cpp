@@ -310,6 +310,12 @@ void CloudSet::gather_sides(const Ball& ball, const Sides& sides, std::size_t ma
     cloud->gather_sides(ball, sides, max_points / clouds_.size(), patch);
 }
 
+void CloudSet::gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t max_points,
+                            Patch& patch) const noexcept {
+  for (const auto& cloud : clouds_)
+    cloud->gather_sheet(ball, sheet, max_points / clouds_.size(), patch);
+}
+
 double CloudSet::spacing(const Vec3& place) const noexcept {
   double least = 0.0;
   for (const auto& cloud : clouds_) {

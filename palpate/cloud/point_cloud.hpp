@@ -100,6 +100,8 @@ class CloudSet final : public Cloud {
   void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
   void gather_sides(const Ball& ball, const Sides& sides, std::size_t max_points,
                     Patch& patch) const noexcept override;
+  void gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t max_points,
+                    Patch& patch) const noexcept override;
   /// That of the cloud that knows the smallest.
   [[nodiscard]] double spacing(const Vec3& place) const noexcept override;
 

@@ -23,6 +23,12 @@ struct Sides {
   double depth;  ///< [m] how far the side face reaches behind the edge
 };
 
+/// Parameters for synthesising points between coarse pixels, in `Cloud::gather_sheet`.
+struct Sheet {
+  double spacing;  ///< [m] points lie at most so far apart; finer pixels need none between them
+  double jump;     ///< [m] neighbours whose depths differ by more are of two surfaces
+};
+
 /// Whatever can be touched: it can gather the points near a place into a patch.
 ///
 /// Clouds are immutable once built, hence safe to read from any thread.
@@ -50,6 +56,14 @@ class Cloud {
   ///
   /// [servo] As `gather`.
   virtual void gather_sides(const Ball& /*ball*/, const Sides& /*sides*/,
+                            std::size_t /*max_points*/, Patch& /*patch*/) const noexcept {}
+
+  /// Adds points of the ball between those of pixels that are farther apart than `sheet.spacing`:
+  /// on the surface through neighbouring pixels, and half a pixel on beyond its border. None from a
+  /// cloud without pixels.
+  ///
+  /// [servo] As `gather`.
+  virtual void gather_sheet(const Ball& /*ball*/, const Sheet& /*sheet*/,
                             std::size_t /*max_points*/, Patch& /*patch*/) const noexcept {}
 
   /// [m] between neighbouring points of a surface at `place` that faces the viewpoint: what a pixel

@@ -38,6 +38,9 @@ void PointMover::cover(const Proxy& proxy, const Cloud& cloud, const Vec3& at, c
   if (options_.side_depth > 0.0) {
     cloud.gather_sides(ball, {side_jump * r_c, options_.side_depth}, Patch::capacity, patch_);
   }
+  if (options_.sheet > 0.0) {
+    cloud.gather_sheet(ball, {options_.sheet, side_jump * r_c}, Patch::capacity, patch_);
+  }
   stale_ = false;
 }
 

@@ -40,6 +40,7 @@ class PointMover {
     ProxyParameters proxy;
     bool fixed_step = false;  ///< steps of 0.1 r_1 [1] instead of (9) to (12)
     double side_depth = 0.0;  ///< [m] sides of bodies, SightParameters::side_depth; 0: none
+    double sheet = 0.0;       ///< [m] most between points where pixels are coarser; 0: any
   };
 
   explicit PointMover(const Options& options) { set(options); }

@@ -23,7 +23,9 @@ constexpr double strays = 0.05;
 // [-] r_c: radius of the hand's footprint. A sphere of r_c that touches the outline of a body has a
 // fifth of such a footprint within the outline: four times the strays.
 constexpr double hand_radius = 2.0;
-// [-] A coarse image is looked at with a footprint widened by this, up to twice.
+// [-] pixels: radius of the narrowest footprint. It holds some ten.
+constexpr double narrowest = 1.8;
+// [-] Where holes leave too few points, a footprint is widened by this, up to twice.
 constexpr double widening = 3.0;
 // [-] Standard deviations of a footprint's height that noise may explain: exceeded in 1 of 700
 // frames on one side.
@@ -35,8 +37,8 @@ constexpr double most_noise = 5e-3;
 double most_margin(double distance) {
   return confidence * most_noise * distance * distance;
 }
-// [-] r_c: a look without an edge has 80 % of its points within this along the line of sight, and
-// the margin for noise. A plane at 70 degrees from facing the camera spans 4.4.
+// [-] footprint's radius: a look without an edge has 80 % of its points within this along the line
+// of sight, and the margin for noise. A plane at 70 degrees from facing the camera spans 4.4.
 constexpr double one_layer = 4.0;
 // [-] r_c: a nearer layer that begins beyond such a step, after the proxy has moved sideways by
 // `sideways`, is another body, behind which the proxy went round an edge. What a surface that leans
@@ -70,6 +72,7 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
   result = {};
   result.fresh = true;
   result.place = place;
+  result.radius = radius;
   gather(cloud, Beam{place, radius, look_reach, Vec3::UnitZ()}, look_points, patch_);
   std::array<float, look_points> heights;
   for (std::size_t v = 0; v < patch_.view_count(); ++v) {
@@ -105,6 +108,7 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
 const Monitor::Look& Monitor::look_at(const Cloud& cloud, const Vec3& place, double radius,
                                       Look& last) noexcept {
   if (last.fresh && (place - last.place).squaredNorm() < look_serves * look_serves) return last;
+  radius = std::max(radius, narrowest * cloud.spacing(place));
   for (int i = 0; i < 3; ++i, radius *= widening) {
     look(cloud, place, radius, last);
     if (last.seen) break;
@@ -129,7 +133,7 @@ bool Monitor::is_behind(double margin, double deepest, double r_c) noexcept {
     return false;
   }
   // At an edge the median is of one body or the other.
-  if (proxy_.high - proxy_.low > one_layer * r_c + margin) return false;
+  if (proxy_.high - proxy_.low > one_layer * proxy_.radius + margin) return false;
   if (last_front_.seen) {
     const Vec3 way = proxy_.place - last_front_.place;
     const Vec3& line = proxy_.line;

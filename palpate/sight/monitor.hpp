@@ -58,6 +58,7 @@ class Monitor {
     bool fresh = false;            // of the newest frame
     bool seen = false;             // by any camera
     Vec3 place = Vec3::Zero();     // [m] world
+    double radius = 0.0;           // [m] of the footprint there
     double clear = 0.0;            // [m] by which all that is measured lies behind the place
     double behind = 0.0;           // [m] by which the place lies behind the median, negative before
     Vec3 line = Vec3::UnitZ();     // [-] from the place to the camera of `behind`

@@ -10,7 +10,11 @@ namespace palpate {
 namespace {
 
 PointMover::Options mover_options(const Parameters& parameters) {
-  return {.proxy = parameters.proxy, .side_depth = parameters.sight.side_depth};
+  // Between points this far apart a sphere of r_c sinks by 6 % of r_c [r_c].
+  constexpr double closest = 0.5;
+  return {.proxy = parameters.proxy,
+          .side_depth = parameters.sight.side_depth,
+          .sheet = closest * parameters.proxy.r_c()};
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <random>
@@ -383,6 +384,77 @@ TEST(DepthImage, GivesNoSidesToASlopeASmoothWallAHoleInItOrTheImagesBorder) {
   patch.start({Vec3(0.0, 0.0, 0.58), 0.1});
   image.gather_sides(patch.ball(), {0.01, 0.04}, Patch::capacity, patch);
   EXPECT_EQ(patch.size(), 0U);
+}
+
+// 80 x 60 pixels 12.5 mm wide at 0.75 m, whose depth is that of a slope; none where `hole` says so.
+DepthImage coarse_slope(const std::function<bool(int u, int v)>& hole, double raised = 0.0) {
+  Intrinsics k;
+  k.width = 80;
+  k.height = 60;
+  k.fx = k.fy = 60.0;
+  k.cx = 40.0;
+  k.cy = 30.0;
+  std::vector<std::uint16_t> depth;
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) {
+      // z = 0.75 + 0.4 x
+      const double z = 0.75 / (1.0 - 0.4 * (u - k.cx) / k.fx) - (u < 40 ? raised : 0.0);
+      depth.push_back(hole(u, v) ? std::uint16_t{0} : static_cast<std::uint16_t>(z * 5e4 + 0.5));
+    }
+  }
+  return DepthImage(std::make_shared<ViewingRays>(k), depth, 5e4);
+}
+
+std::vector<Vec3> sheet_of(const Cloud& cloud, const Vec3& at, double radius) {
+  Patch patch;
+  patch.start({at, radius});
+  cloud.gather_sheet(patch.ball(), {2.5e-3, 10e-3}, Patch::capacity, patch);
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < patch.size(); ++i)
+    points.emplace_back(at + Vec3(patch.x()[i], patch.y()[i], patch.z()[i]));
+  return points;
+}
+
+TEST(DepthImage, FillsASurfaceBetweenCoarsePixelsAsDenselyAsAsked) {
+  const DepthImage image = coarse_slope([](int, int) { return false; });
+  const Vec3 at(0.01, 0.02, 0.754);
+  const std::vector<Vec3> points = sheet_of(image, at, 0.03);
+  for (const Vec3& p : points) EXPECT_NEAR(p.z(), 0.75 + 0.4 * p.x(), 2e-5);
+  const Vec3 along = Vec3(1.0, 0.0, 0.4).normalized();
+  for (double a = -0.02; a <= 0.02; a += 0.001) {
+    for (double b = -0.02; b <= 0.02; b += 0.001) {
+      const Vec3 place = at + a * along + b * Vec3::UnitY();
+      double nearest = 1.0;
+      for (const Vec3& p : points) nearest = std::min(nearest, (p - place).norm());
+      // Half the diagonal of a part; the pixels' own points are not among them.
+      ASSERT_LE(nearest, 2.5e-3) << a << ' ' << b;
+    }
+  }
+  EXPECT_TRUE(sheet_of(image, at * 0.15, 0.03).empty()) << "pixels finer than asked for";
+}
+
+TEST(DepthImage, EndsASurfaceHalfAPixelBeyondItsLastAndBridgesNoStep) {
+  for (const auto& [raised, hole] : {std::pair{0.0, true}, std::pair{0.1, false}}) {
+    const DepthImage image = coarse_slope([&](int u, int) { return hole && u >= 40; }, raised);
+    double most = -1.0;
+    const double z = 0.75 - raised;
+    for (const Vec3& p : sheet_of(image, Vec3(0.0, 0.0, z), 0.03)) {
+      if (p.z() < z + 0.02) most = std::max(most, p.x() / p.z());
+      if (!hole) {
+        EXPECT_LT(std::abs(p.z() - 0.4 * p.x() - z), 0.01) << p.x();
+      }
+    }
+    // The last column is 39, one left of the middle.
+    EXPECT_LE(most, -0.5 / 60.0);
+    EXPECT_GE(most, -0.65 / 60.0);
+  }
+}
+
+TEST(CloudSet, FillsTheSurfacesOfEachOfItsCameras) {
+  const auto image = std::make_shared<DepthImage>(coarse_slope([](int, int) { return false; }));
+  const Vec3 at(0.01, 0.02, 0.754);
+  const std::size_t alone = sheet_of(*image, at, 0.03).size();
+  EXPECT_EQ(sheet_of(CloudSet({image, image}), at, 0.03).size(), 2 * alone);
 }
 
 TEST(CloudSet, GathersTheSidesThatEachOfItsCamerasSees) {

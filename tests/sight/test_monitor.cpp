@@ -3,11 +3,13 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/sight/monitor.hpp"
 #include "palpate/sight/sight.hpp"
@@ -113,6 +115,40 @@ TEST(Monitor, BringsAProxyBackInFrontWhenTwoFramesShowItBehind) {
   ASSERT_EQ(verdict.action, Monitor::Action::return_to_front);
   EXPECT_NEAR(verdict.front.z(), r_c, 1e-4);
   EXPECT_NEAR(verdict.normal.z(), 1.0, 1e-6);
+}
+
+TEST(Monitor, SeesAProxyBehindASlopeThatACoarseCameraSees) {
+  // A slope of 60 degrees in pixels 10 mm wide: ten of them span 60 mm along the line of sight.
+  Intrinsics k;
+  k.width = 80;
+  k.height = 60;
+  k.fx = k.fy = 60.0;
+  k.cx = 40.0;
+  k.cy = 30.0;
+  const auto rays = std::make_shared<ViewingRays>(k);
+  std::vector<std::uint16_t> depth;
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) {
+      const double z = 0.6 / (1.0 - std::sqrt(3.0) * rays->ray(u, v).x());
+      depth.push_back(z > 0.0 && z < 6.0 ? static_cast<std::uint16_t>(z * 1e4 + 0.5) : 0);
+    }
+  }
+  const DepthImage slope(rays, depth, 1e4);
+  Monitor monitor;
+  // Depth grows along the camera's axis: 30 mm before the slope, then 15 mm behind it.
+  Monitor::Contact contact = pressed(0.57, 0.57);
+  contact.touching = false;
+  for (int frame = 0; frame < 3; ++frame) {
+    monitor.start_frame();
+    EXPECT_FALSE(monitor.judge(slope, contact).behind);
+  }
+  contact.hip.z() = contact.proxy.z() = 0.615;
+  monitor.start_frame();
+  EXPECT_TRUE(monitor.judge(slope, contact).behind);
+  monitor.start_frame();
+  const Monitor::Verdict verdict = monitor.judge(slope, contact);
+  ASSERT_EQ(verdict.action, Monitor::Action::return_to_front);
+  EXPECT_NEAR(verdict.front.z(), 0.6 - r_c, 2e-3);
 }
 
 TEST(Monitor, TakesWhatComesFarBeforeTheContactForSomethingElse) {

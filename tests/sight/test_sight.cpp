@@ -491,6 +491,34 @@ TEST(Sight, PullsNoHandThatLeavesASurfaceThatJustRose) {
   }
 }
 
+TEST(Sight, RestsOnABarAFewCoarsePixelsWide) {
+  // 40 mm of bar before pixels 12.5 mm wide: no quadric describes so few points with two edges.
+  Intrinsics k;
+  k.width = 80;
+  k.height = 60;
+  k.fx = k.fy = 60.0;
+  k.cx = 39.5;
+  k.cy = 29.5;
+  const auto rays = std::make_shared<ViewingRays>(k);
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  pose.translation() = Vec3(0, 0, 0.75);
+  std::vector<std::uint16_t> depth;
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u)
+      depth.push_back(std::abs(rays->ray(u, v).x()) * 0.75 <= 0.02 ? 7500 : 8500);
+  }
+  const DepthImage image(rays, depth, 1e4, pose);
+  Sight sight = seated({0.004, 0.0, 0.05});
+  Tick tick;
+  for (int frame = 0; frame < 60; ++frame) {
+    const auto press = [](double t) { return Vec3(0.004, 0, std::max(0.05 - 0.1 * t, -0.01)); };
+    tick = live_through(sight, image, frame * interval, press);
+  }
+  EXPECT_NEAR(tick.proxy.z(), r_c, 0.4e-3);
+  EXPECT_NEAR(tick.force.z(), 6.0, 0.3);
+}
+
 TEST(Sight, ComesBackSlowlyWhateverTheFirstFramesCorrect) {
   // Two seconds without a frame; then the plane is 4 mm higher, and the frames are noisy.
   const Overhead camera;

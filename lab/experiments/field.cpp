@@ -44,6 +44,12 @@ std::string rows_of(const std::vector<std::string>& names, const field::FieldCas
                 .add(verdict.numb)
                 .add(verdict.wrong_side)
                 .add(verdict.worst_step)
+                .add(verdict.time)
+                .add(verdict.time_behind)
+                .add(verdict.alarmed)
+                .add(verdict.false_alarm)
+                .add(verdict.times_behind)
+                .add(verdict.quick_returns)
                 .add(c.text())
                 .add(stage.values)
                 .done();
@@ -137,6 +143,26 @@ std::vector<std::string> line_of(const std::string& name, std::map<std::string, 
   return line;
 }
 
+// How well a method knows itself that it is behind.
+std::string alarm_text(const Table& table, const std::string& method) {
+  const auto sum = [&](std::string_view column) {
+    double total = 0.0;
+    for (const double value : table.numbers(column, [&](std::size_t row) {
+           return table.text(row, "method") == method && table.text(row, "unknown") == "-";
+         }))
+      total += value;
+    return total;
+  };
+  const double behind = sum("time_behind_s");
+  return fmt::format(
+      "{}: {:.1f} s behind in {:.0f} s, {:.1f} % of that with an alarm; false alarms in {:.2f} % "
+      "of "
+      "the rest; {:.0f} of {:.0f} times in front again within 0.2 s",
+      method, behind, sum("time_s"), behind > 0.0 ? 100.0 * sum("alarmed_s") / behind : 100.0,
+      100.0 * sum("false_alarm_s") / std::max(sum("time_s") - behind, 1e-3), sum("quick_returns"),
+      sum("times_behind"));
+}
+
 Scores field_scores(const Table& table) {
   const std::vector<std::string> methods = methods_in(table);
   Sums classes;
@@ -184,6 +210,7 @@ Scores field_scores(const Table& table) {
     last.emplace_back("");
   }
   scores.rows.push_back(std::move(last));
+  for (const std::string& method : methods) scores.note += "\n" + alarm_text(table, method);
   return scores;
 }
 
@@ -204,7 +231,8 @@ Experiment field_experiment() {
   return {"field",
           "the field set: scenes, sensors and hands that share no code with those of pop and feel",
           "method,class,sensor,number,unknown,lost,right,behind_s,ghost_n,numb,wrong_side,"
-          "worst_step_n,text,values",
+          "worst_step_n,time_s,time_behind_s,alarmed_s,false_alarm_s,times_behind,quick_returns,"
+          "text,values",
           {"paper", "sight"},
           false,
           field_cells,

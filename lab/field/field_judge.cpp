@@ -12,6 +12,7 @@ namespace {
 
 constexpr double tick_rate = 1000.0;   // [Hz]
 constexpr double patience = 0.5;       // [s] that being behind, numb or out of sight may last
+constexpr double quick = 0.2;          // [s] within which a proxy should be back in front
 constexpr double free_space = 0.020;   // [m] from every body, and what the sensor blurs
 constexpr double felt = 0.02;          // [N] a force that counts in free space
 constexpr double firm = 1.0;           // [N] both rulers' force from which a hand must feel some
@@ -50,6 +51,19 @@ void Judge::add(const Tick& tick, const Ruling& ruling, bool behind) {
   const double behind_for = lasted(behind_for_, behind && ruling.known);
   verdict_.behind = std::max(verdict_.behind, behind_for);
   verdict_.lost = verdict_.lost || behind_for > patience;
+
+  const double tick_time = 1.0 / tick_rate_;
+  const bool alarm = (tick.flags & pop_through_suspected) != 0;
+  verdict_.time += tick_time;
+  if (behind_for > 0.0) {
+    verdict_.time_behind += tick_time;
+    verdict_.alarmed += alarm ? tick_time : 0.0;
+    verdict_.times_behind += back_for_ == 0.0 ? 1 : 0;
+  } else {
+    verdict_.false_alarm += alarm && !behind ? tick_time : 0.0;
+    verdict_.quick_returns += back_for_ > 0.0 && back_for_ <= quick ? 1 : 0;
+  }
+  back_for_ = behind_for;
 
   const bool nothing = std::min(now, seen) > firm && force < least_share * std::min(now, seen);
   verdict_.numb = lasted(numb_for_, nothing && ruling.known) > patience || verdict_.numb;

@@ -18,6 +18,14 @@ struct Verdict {
   double worst_ghost = 0.0;  ///< [N] in free space that is seen to be free
   double worst_step = 0.0;   ///< [N] largest change of the force from tick to tick in contact
 
+  // How well it knows itself that it is behind: the tick's flag `pop_through_suspected`.
+  double time = 0.0;         ///< [s] in all
+  double time_behind = 0.0;  ///< [s] behind, where that can be known
+  double alarmed = 0.0;      ///< [s] of that with the flag
+  double false_alarm = 0.0;  ///< [s] with the flag, and not behind
+  int times_behind = 0;      ///< how often it came behind
+  int quick_returns = 0;     ///< how often it was in front again within `quick`
+
   [[nodiscard]] bool ghost() const { return worst_ghost > 0.0; }
   [[nodiscard]] bool right() const { return !lost && !numb && !wrong_side && !ghost(); }
 };
@@ -47,6 +55,7 @@ class Judge {
   int behind_for_ = 0;  // ticks in a row, as the others
   int numb_for_ = 0;
   int wrong_for_ = 0;
+  double back_for_ = 0.0;  // [s] that being behind has lasted
   bool touched_ = false;
   Vec3 last_force_ = Vec3::Zero();
 };

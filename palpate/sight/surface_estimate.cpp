@@ -416,9 +416,22 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   // its width, and yet move with them: then it determines the motion only.
   const double negligible =
       2e-6 + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
+  // Until a disc's noise has been measured over time, what its points scatter counts at most: the
+  // usual noise of a camera would let a wide disc agree that reaches beyond a body.
+  constexpr double unmeasured = 0.5;  // [-] of the spread
+  const auto measured = [this](std::size_t j) {
+    return scatter_[j].samples > static_cast<double>(upper_bounds.size());
+  };
+  const auto expected = [&](std::size_t j) {
+    return measured(j) ? variance(j) : std::min(variance(j), squared(unmeasured * spread_));
+  };
+  // [-] A disc that is emptier than this, beside the narrowest, reaches beyond the body: at a
+  // straight edge half of it is empty.
+  constexpr double least_filled = 0.45;
   std::size_t mover = 0;
   bool agree = true;
   for (std::size_t j = 1; j < now.rungs; ++j) {
+    if (now.extent[j] < least_filled * now.extent[0] * squared(radii_[j] / radii_[0])) break;
     bool moves_along = frames[j] >= std::min<std::size_t>(frames[0], 2);
     for (std::size_t i = 0; i < j && moves_along; ++i) {
       const std::size_t n = std::min(frames[i], frames[j]);
@@ -443,9 +456,11 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       // `prior` more. Without it a contact that slides falls back on narrow discs in single frames.
       constexpr double prior = 4.0;
       const double freedom = count - 1.0 + prior;
-      const double scattered = (about_mean + prior * (variance(i) + variance(j))) / freedom;
+      const double scattered = (about_mean + prior * (expected(i) + expected(j))) / freedom;
       // Hysteresis: the disc in use needs stronger evidence against it, since a change is felt.
-      const double confidence = t_quantile(j <= rung_ ? 3.5 : 3.0, freedom);
+      // What is not measured yet is bounded, not estimated.
+      const double sds = j <= rung_ ? 3.5 : 3.0;
+      const double confidence = measured(i) && measured(j) ? t_quantile(sds, freedom) : sds;
       agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
       const double newest = heights[j][0].height - heights[i][0].height;
       moves_along =

@@ -348,6 +348,10 @@ TEST(FieldRules, FindEachFaultOfAMethodThatHasIt) {
   const Verdict fell = verdict_on(press, through);
   EXPECT_TRUE(fell.lost);
   EXPECT_GT(fell.behind, 0.8) << "for as long as it is pressed";
+  EXPECT_GT(fell.time_behind, fell.behind - 1e-6);
+  EXPECT_EQ(fell.times_behind, 1);
+  EXPECT_EQ(fell.alarmed, 0.0);
+  EXPECT_EQ(fell.quick_returns, 0);
   // Behind a wall 3 mm thick there is free space, but not on the camera's side.
   const std::string sheet =
       "field:sheet-press?seed=1&sensor=4&rate=30&latency=0&press=0.012&lean=0";
@@ -480,12 +484,13 @@ TEST_F(Field, IsTheSameForAnyNumberOfThreadsAndAnyCaseRunsAgain) {
 TEST_F(Field, ScoresTheMeanOfTheClasses) {
   const Table table("field",
                     "method,class,sensor,number,unknown,lost,right,behind_s,ghost_n,numb,"
-                    "wrong_side,worst_step_n,text,values\n"
-                    "m,a,exact,0,-,0,1,0,0,0,0,0.5,field:a?seed=1,\n"
-                    "m,a,exact,1,-,1,0,1,0,0,0,9,field:a?seed=2,\n"
-                    "m,a,coarse,2,thin,0,1,0,0,0,0,0,field:a?seed=3,\n"
-                    "m,b,exact,0,-,0,0,0,0,1,0,0.1,field:b?seed=4,\n"
-                    "m,c,coarse,0,thin,0,1,0,0,0,0,0,field:c?seed=5,\n");
+                    "wrong_side,worst_step_n,time_s,time_behind_s,alarmed_s,false_alarm_s,"
+                    "times_behind,quick_returns,text,values\n"
+                    "m,a,exact,0,-,0,1,0,0,0,0,0.5,4,0.1,0.1,0.04,1,1,field:a?seed=1,\n"
+                    "m,a,exact,1,-,1,0,1,0,0,0,9,4,0.9,0.5,0,2,1,field:a?seed=2,\n"
+                    "m,a,coarse,2,thin,0,1,0,0,0,0,0,4,3,0,1,7,0,field:a?seed=3,\n"
+                    "m,b,exact,0,-,0,0,0,0,1,0,0.1,3,0,0,0.01,0,0,field:b?seed=4,\n"
+                    "m,c,coarse,0,thin,0,1,0,0,0,0,0,4,0,0,0,0,0,field:c?seed=5,\n");
   const Scores scores = find_experiment("field").scores(table);
   using Line = std::vector<std::string>;
   EXPECT_EQ(scores.rows.at(0), (Line{"a", "2", "1", "50.0", "50.0", "0.5"}));
@@ -494,6 +499,10 @@ TEST_F(Field, ScoresTheMeanOfTheClasses) {
   EXPECT_EQ(scores.rows.back(), (Line{"score", "", "", "75.0", "25.0", ""}));
   EXPECT_NE(scores.note.find("palpate eval field --methods m --case 'field:b?seed=4'"),
             std::string::npos);
+  EXPECT_NE(scores.note.find("m: 1.0 s behind in 11 s, 60.0 % of that with an alarm; false alarms "
+                             "in 0.50 % of the rest; 2 of 3 times in front again within 0.2 s"),
+            std::string::npos)
+      << scores.note;
 }
 
 }  // namespace

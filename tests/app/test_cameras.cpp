@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each camera's adapter end to end: the program, a fake of the vendor's library, a simulated hand.
-#include <cstdio>
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
+#include "tests/support/sanitized.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
@@ -31,6 +33,9 @@ class CameraProgram : public ::testing::Test {
         before + " " PALPATE_PROGRAM " " + arguments + " >" + out + " 2>" + err + " </dev/null";
     const int status = std::system(command.c_str());  // NOLINT(cert-env33-c): a shell is wanted
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read(out), read(err)};
+  }
+  [[nodiscard]] std::string write(const std::string& name, const std::string& text) const {
+    return folder_.write(name, text).string();
   }
   static std::string read(const std::string& file) {
     std::ostringstream text;
@@ -79,6 +84,73 @@ TEST_F(CameraProgram, TouchesWhatARealSenseSees) {
   expect_refusal(library, "realsense:77", {"realsense:77", "serial number", "100000000001"});
   expect_refusal("PALPATE_LIBREALSENSE=/nowhere",
                  "realsense:", {"librealsense2", "not there", "install"});
+}
+
+TEST_F(CameraProgram, TouchesWhatOpenNi2Sees) {
+  const std::string library = "PALPATE_OPENNI2=" PALPATE_FAKES "/openni2/libOpenNI2.so.0";
+  touches_and_survives(library, "openni2:");
+  expect_refusal(library, "openni2:77", {"openni2:77", "cannot open", "KINECT-1"});
+  expect_refusal("PALPATE_OPENNI2=/nowhere", "openni2:", {"OpenNI2", "not there", "libopenni2-0"});
+}
+
+TEST_F(CameraProgram, TouchesWhatAKinectSeesByLibfreenect) {
+  const std::string library = "PALPATE_LIBFREENECT=" PALPATE_FAKES "/freenect/libfreenect.so.0.5";
+  touches_and_survives(library, "freenect:");
+  expect_refusal(library, "freenect:77", {"freenect:77", "serial number", "A00361"});
+}
+
+// Two drivers at once, one of which never loses its camera.
+TEST_F(CameraProgram, TouchesWhatTwoCamerasSee) {
+  const Json json = session("PALPATE_OPENNI2=" PALPATE_FAKES
+                            "/openni2/libOpenNI2.so.0 "
+                            "PALPATE_LIBREALSENSE=" PALPATE_FAKES
+                            "/realsense/librealsense2.so "
+                            "FAKE_CAMERA=cameras=1",
+                            "openni2:' --camera 'realsense:");
+  ASSERT_EQ(json["cameras"].size(), 2U) << json;
+  for (const Json& camera : json["cameras"]) EXPECT_GT(camera["frames"], 15) << json;
+  EXPECT_GT(json["contact_ticks"], 100) << json;
+}
+
+TEST_F(CameraProgram, TouchesWhatTheKernelDrives) {
+  if (test::sanitized) GTEST_SKIP() << "a sanitizer's library must come first";
+  const std::string lens = write("lens.json", R"({"width": 96, "height": 72, "fx": 115.2,
+      "fy": 115.2, "cx": 47.5, "cy": 35.5, "depth_units_per_metre": 1000})");
+  const std::string other = write("other.json", R"({"width": 64, "height": 48, "fx": 115.2,
+      "fy": 115.2, "cx": 47.5, "cy": 35.5, "depth_units_per_metre": 1000})");
+  const std::string kernel = "LD_PRELOAD=" PALPATE_FAKES "/v4l2/fake_v4l2.so";
+  const std::string uri = "v4l2:/dev/video77?intrinsics=";
+  touches_and_survives(kernel, uri + lens);
+  expect_refusal(kernel, uri + other, {"96x72", "64x48"});
+  expect_refusal(kernel, "v4l2:/dev/video77", {"neither lens nor unit", "intrinsics=FILE.json"});
+  expect_refusal(kernel, "v4l2:/dev/video78?intrinsics=" + lens, {"'YUYV'", "Z16"});
+  expect_refusal(kernel, "v4l2:/dev/video79?intrinsics=" + lens,
+                 {"Permission denied", "usermod -aG video"});
+  expect_refusal(kernel + " FAKE_CAMERA=busy", uri + lens, {"busy", "end the other program"});
+  expect_refusal("", "v4l2:/dev/video76?intrinsics=" + lens, {"/dev/video76", "plugged in"});
+}
+
+// What is plugged in, as `doctor` lists it.
+TEST_F(CameraProgram, ListsWhatIsPluggedIn) {
+  const Outcome outcome = run("PALPATE_OPENNI2=" PALPATE_FAKES
+                              "/openni2/libOpenNI2.so.0 "
+                              "PALPATE_LIBFREENECT=/nowhere FAKE_CAMERA=cameras=2 "
+                              "PALPATE_LIBREALSENSE=" PALPATE_FAKES "/realsense/librealsense2.so",
+                              "doctor --json --seconds 0.1");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const Json json = Json::parse(outcome.out);
+  const auto driver = [&](const std::string& name) {
+    for (const Json& each : json["drivers"]) {
+      if (each["name"] == name) return each;
+    }
+    return Json();
+  };
+  ASSERT_EQ(driver("realsense:")["found"].size(), 2U) << json;
+  EXPECT_EQ(driver("realsense:")["found"][1]["uri"], "realsense:100000000002");
+  EXPECT_EQ(driver("realsense:")["found"][1]["firmware"], "5.16.0.1");
+  EXPECT_EQ(driver("openni2:")["version"], "2.2.0.33");
+  EXPECT_NE(driver("freenect:")["problem"].get<std::string>().find("libfreenect0.5"),
+            std::string::npos);
 }
 
 }  // namespace

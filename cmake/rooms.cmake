@@ -175,6 +175,10 @@ function(palpate_fake_library file source)
   target_link_libraries(${target} PRIVATE ${ARG_LINKS})
   palpate_target_options(${target})
   palpate_runs_once(${target})
+  if(PALPATE_SANITIZE AND CMAKE_CXX_COMPILER_ID MATCHES Clang)
+    # It has types of its own, by other names than the driver's, as the vendor's headers have.
+    target_compile_options(${target} PRIVATE -fno-sanitize=function)
+  endif()
   add_dependencies(palpate_fakes ${target})
 endfunction()
 

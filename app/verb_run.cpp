@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -23,6 +24,7 @@
 #include "palpate/devices/device_guard.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/session/from_config.hpp"
+#include "palpate/sources/scene.hpp"
 #include "palpate/viewer/session_host.hpp"
 
 namespace palpate::app {
@@ -70,7 +72,6 @@ std::unique_ptr<ViewerServer> open_server(const ServerConfig& config, ViewerHost
                        .port = config.port.value_or(usual_port),
                        .token = config.token,
                        .operator_token = config.operator_token};
-  if (config.token.empty() && !is_loopback(config.listen)) viewer.token = make_token();
   try {
     return std::make_unique<ViewerServer>(viewer, host);
   } catch (const Error&) {
@@ -151,53 +152,101 @@ int finish(Session& session, bool json, const std::string& ended = {}) {
   return state.recording.failed ? 1 : 0;
 }
 
-int run(const RunOptions& options) {
-  MethodRegistry methods = session_methods();
-  const SessionConfig config = options.session.config(methods);
-  if (options.print_config) {
-    std::fputs(to_toml(config).c_str(), stdout);
-    return 0;
-  }
-  std::unique_ptr<Device> guarded = guarded_device(config);
-  // Before any other thread begins, so that these signals come to this one alone.
-  std::atomic<Session*> running{nullptr};
+/// What the signals that end the program have to do with its session.
+struct Running {
+  std::atomic<Session*> session{nullptr};
   std::atomic<bool> ended{false};
-  const EndingSignals signals([&] {
-    ended = true;
-    if (Session* session = running.load()) session->request_stop();
-  });
 
-  SessionHost host(PALPATE_VERSION, page_rules(config));
-  SessionOptions wanted = options_of(options, config, std::move(methods));
+  void end() {
+    ended = true;
+    if (Session* now = session) now->request_stop();
+  }
+};
+
+// What the operator's page can choose: what the program was started with, and the built-in scenes.
+std::vector<SceneChoice> scene_choices(const std::vector<CameraConfig>& given) {
+  std::vector<SceneChoice> choices = {{given.front().uri, "what the program was started with"}};
+  for (const SceneInfo& scene : known_scenes()) {
+    std::string uri = "synthetic:" + std::string(scene.name);
+    if (uri != given.front().uri) choices.push_back({std::move(uri), std::string(scene.summary)});
+  }
+  return choices;
+}
+
+void warn_of_late_ticks(const SessionOptions& options) {
+  const std::string& name = options.settings.method;
+  if (!options.methods.find(name).bounded)
+    fmt::print(stderr, "palpate: {} is a method of the lab: its ticks can come late\n", name);
+}
+
+int run_headless(const RunOptions& options, const SessionConfig& config,
+                 std::unique_ptr<Device> guarded, Running& running) {
+  SessionOptions wanted = options_of(options, config, session_methods());
   wanted.device = std::move(guarded);
-  if (!options.headless)
-    wanted.on_frame = [&host](std::size_t camera, const FedFrame& frame) {
-      host.show(camera, frame);
-    };
-  const bool is_bounded = wanted.methods.find(wanted.settings.method).bounded;
+  warn_of_late_ticks(wanted);
   const bool is_free = wanted.pace == Pace::free_running;
   Session session(std::move(wanted));
-  running = &session;
-  if (ended) return finish(session, options.json);
-  if (!is_bounded)
-    fmt::print(stderr, "palpate: {} is a method of the lab: its ticks can come late\n",
-               session.settings().method);
+  running.session = &session;
+  if (running.ended) return finish(session, options.json);
+  const bool watched = isatty(STDERR_FILENO) == 1;
+  const auto ticks_a_line = static_cast<std::uint64_t>(std::max(config.rate / 10.0, 1.0));
+  session.run(options.duration.value_or(headless_duration), [&](const ServoTick& record) {
+    if (watched && is_free && record.number % ticks_a_line == 0) show_status(record);
+  });
+  if (watched && is_free) fmt::print(stderr, "\n");
+  running.session = nullptr;
+  return finish(session, options.json);
+}
 
-  if (options.headless) {
-    const bool watched = isatty(STDERR_FILENO) == 1;
-    const auto ticks_a_line = static_cast<std::uint64_t>(std::max(config.rate / 10.0, 1.0));
-    session.run(options.duration.value_or(headless_duration), [&](const ServoTick& record) {
-      if (watched && is_free && record.number % ticks_a_line == 0) show_status(record);
-    });
-    if (watched && is_free) fmt::print(stderr, "\n");
-    running = nullptr;
-    return finish(session, options.json);
-  }
+void print_links(const ServerConfig& config, const ViewerServer& server) {
+  fmt::print(stderr, "palpate: open {} in a browser; Ctrl-C ends the session\n",
+             server.operator_url());
+  fmt::print(stderr,
+             "palpate: that is the operator's link; to look on or to hold the hand, open {}\n",
+             server.url());
+  if (!is_loopback(config.listen))
+    fmt::print(stderr,
+               "palpate: tokens and pictures travel in clear; palpate run --help says at "
+               "--listen how to tunnel\n");
+  if (config.browser && isatty(STDERR_FILENO) == 1) show_in_browser(server.opening_url());
+}
 
+// What follows one session with its page.
+struct Ending {
+  std::optional<std::string> scene = {};  // to be touched next; none: the program ends
+  int status = 0;
+};
+
+// @param config  gets port and tokens of the page, for the session that follows
+Ending run_page(const RunOptions& options, SessionConfig& config, std::unique_ptr<Device> guarded,
+                PageRules rules, bool is_first, Running& running) {
+  std::mutex mutex;
+  std::optional<std::string> chosen;  // guarded by it
+  rules.open_scene = [&](const std::string& uri) {
+    const std::lock_guard lock(mutex);
+    chosen = uri;
+    if (Session* now = running.session) now->request_stop();
+  };
+  SessionHost host(PALPATE_VERSION, std::move(rules));
+  SessionOptions wanted = options_of(options, config, session_methods());
+  wanted.device = std::move(guarded);
+  wanted.on_frame = [&host](std::size_t camera, const FedFrame& frame) {
+    host.show(camera, frame);
+  };
+  if (is_first) warn_of_late_ticks(wanted);
+  Session session(std::move(wanted));
+  struct Over {
+    Running& running;
+    ~Over() { running.session = nullptr; }
+  } const over{running};
+  running.session = &session;
+  if (running.ended) return {.status = finish(session, options.json)};
   std::string ended_recording;
   session.start();
-  for (const std::string& line : session.realtime()->advice)
-    fmt::print(stderr, "palpate: {}\n", line);
+  if (is_first) {
+    for (const std::string& line : session.realtime()->advice)
+      fmt::print(stderr, "palpate: {}\n", line);
+  }
   {
     host.attach(session);
     struct Detach {
@@ -206,22 +255,62 @@ int run(const RunOptions& options) {
     } const after_the_server{host};
     const std::unique_ptr<ViewerServer> server = open_server(config.server, host);
     host.show_on(server.get());
-    fmt::print(stderr, "palpate: open {} in a browser; Ctrl-C ends the session\n",
-               server->operator_url());
-    fmt::print(stderr,
-               "palpate: that is the operator's link; to look on or to hold the hand, open {}\n",
-               server->url());
-    if (!is_loopback(config.server.listen))
-      fmt::print(stderr,
-                 "palpate: tokens and pictures travel in clear; palpate run --help says at "
-                 "--listen how to tunnel\n");
-    if (config.server.browser && isatty(STDERR_FILENO) == 1) show_in_browser(server->opening_url());
+    if (is_first) print_links(config.server, *server);
+    config.server.port = server->port();
     session.run(options.duration);
     host.show_on(nullptr);
     ended_recording = host.recording_ended();
   }
-  running = nullptr;
-  return finish(session, options.json, ended_recording);
+  if (chosen && !running.ended) return {.scene = chosen};
+  return {.status = finish(session, options.json, ended_recording)};
+}
+
+// Session after session, as the operator's page chooses other scenes.
+int run_pages(const RunOptions& options, SessionConfig config, std::unique_ptr<Device> guarded,
+              Running& running) {
+  // The links stay good from one session to the next.
+  ServerConfig& server = config.server;
+  if (server.operator_token.empty()) server.operator_token = make_token();
+  if (server.token.empty() && !is_loopback(server.listen)) server.token = make_token();
+  const std::vector<CameraConfig> given = config.cameras;
+  std::vector<CameraConfig> before = given;
+  // A device with motors is opened once: its hand is somewhere, and its guard is another process.
+  const bool may_choose = config.device.empty() || Uri(config.device).scheme() == "mouse";
+  PageRules rules = page_rules(config);
+  if (may_choose) rules.scenes = scene_choices(given);
+  for (bool is_first = true;; is_first = false) {
+    Ending ending;
+    try {
+      ending = run_page(options, config, std::move(guarded), rules, is_first, running);
+    } catch (const Error& error) {
+      if (is_first || config.cameras.front().uri == before.front().uri) throw;
+      rules.notice = error.what();
+      config.cameras = before;
+      continue;
+    }
+    if (!ending.scene) return ending.status;
+    fmt::print(stderr, "palpate: now {}\n", *ending.scene);
+    rules.notice.clear();
+    before = config.cameras;
+    config.cameras = *ending.scene == given.front().uri
+                         ? given
+                         : std::vector<CameraConfig>{{.uri = *ending.scene}};
+    config.record.clear();  // the recording of --record has ended with its session
+  }
+}
+
+int run(const RunOptions& options) {
+  const SessionConfig config = options.session.config(session_methods());
+  if (options.print_config) {
+    std::fputs(to_toml(config).c_str(), stdout);
+    return 0;
+  }
+  std::unique_ptr<Device> guarded = guarded_device(config);
+  // Before any other thread begins, so that these signals come to this one alone.
+  Running running;
+  const EndingSignals signals([&] { running.end(); });
+  return options.headless ? run_headless(options, config, std::move(guarded), running)
+                          : run_pages(options, config, std::move(guarded), running);
 }
 
 }  // namespace

@@ -174,6 +174,7 @@ std::optional<Command> parse_command(std::string_view message) {
   }
   if (verb == "method" && what.is_string()) return SetMethod{what.get<std::string>()};
   if (verb == "record" && what.is_boolean()) return SetRecording{what.get<bool>()};
+  if (verb == "open" && what.is_string()) return OpenScene{what.get<std::string>()};
   if (verb == "seek" && what.is_number()) return Seek{what.get<double>()};
   if (verb == "play") {
     if (!what.is_object() || what.size() != 3) return std::nullopt;

@@ -122,11 +122,15 @@ struct SetPlayback {
 struct Seek {
   double share;
 };
+/// Another scene is to be touched, one of those that *hello* lists.
+struct OpenScene {
+  std::string uri;
+};
 struct ResetHand {};
 /// Ends a latched fault of the safety chain; see Session::reset_faults.
 struct ResetFaults {};
 using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod,
-                             SetRecording, SetPlayback, Seek, ResetHand, ResetFaults>;
+                             SetRecording, SetPlayback, Seek, OpenScene, ResetHand, ResetFaults>;
 
 /// The longest message a page may send [bytes].
 constexpr std::size_t max_page_message = 1024;

@@ -50,6 +50,8 @@ void check_allowed(const Command& command, Role role) {
     throw Error("recording", "only the operator starts and ends it", operator_remedy);
   if (std::holds_alternative<SetPlayback>(command) || std::holds_alternative<Seek>(command))
     throw Error("playback", "only the operator changes it", operator_remedy);
+  if (std::holds_alternative<OpenScene>(command))
+    throw Error("scene", "only the operator chooses it", operator_remedy);
   if (std::holds_alternative<SetPlacement>(command))
     throw Error("placement", "only the operator changes it", operator_remedy);
   if (std::holds_alternative<ResetFaults>(command))

@@ -8,6 +8,7 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
 #include "palpate/devices/mouse_device.hpp"
 #include "palpate/servo/placement_table.hpp"
 
@@ -82,11 +83,13 @@ std::string SessionHost::hello() {
   for (std::size_t i = 0; i < safety_flag_count; ++i)
     safety_flags.push_back(
         {{"name", safety_flag_names()[i]}, {"meaning", safety_flag_meanings()[i]}});
-  return json{{"version", version_},         {"methods", methods},
-              {"parameters", parameters},    {"safety", safety},
-              {"placement", placement},      {"flags", flags},
-              {"safety_flags", safety_flags}}
-      .dump();
+  json scenes = json::array();
+  for (const SceneChoice& scene : rules_.scenes)
+    scenes.push_back({{"uri", scene.uri}, {"meaning", scene.meaning}});
+  return json{{"scenes", scenes},       {"notice", rules_.notice},  {"version", version_},
+              {"methods", methods},     {"parameters", parameters}, {"safety", safety},
+              {"placement", placement}, {"flags", flags},           {"safety_flags", safety_flags}}
+      .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
 std::string SessionHost::state() {
@@ -192,6 +195,15 @@ void SessionHost::command(const Command& command, Role role) {
     return;
   } else if (const auto* play = std::get_if<SetPlayback>(&command)) {
     session_->set_playback({.paused = play->paused, .loop = play->loop, .speed = play->speed});
+    return;
+  } else if (const auto* scene = std::get_if<OpenScene>(&command)) {
+    const bool is_offered =
+        std::any_of(rules_.scenes.begin(), rules_.scenes.end(),
+                    [&](const SceneChoice& choice) { return choice.uri == scene->uri; });
+    if (!is_offered || !rules_.open_scene)
+      throw Error("scene", "'" + scene->uri + "' is not among those of this session",
+                  "choose one of the list, or start the program with --camera");
+    rules_.open_scene(scene->uri);
     return;
   } else if (const auto* seek = std::get_if<Seek>(&command)) {
     session_->seek(seek->share);

@@ -4,11 +4,13 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "palpate/session/session.hpp"
 #include "palpate/viewer/page_recordings.hpp"
@@ -17,11 +19,22 @@
 
 namespace palpate {
 
+/// What the operator's page can choose to touch.
+struct SceneChoice {
+  std::string uri;
+  std::string meaning;
+};
+
 /// What a session's options say about its pages.
 struct PageRules {
   /// By name, the loosest values to which the operator's page may set safety limits.
   std::map<std::string, double> operator_limits = {};
   RecordingRules recordings = {};
+  std::vector<SceneChoice> scenes = {};
+  /// Called with the URI of one of these, which is to be touched: this session is to end, and one
+  /// with that camera to begin. On the server's thread; must be quick. Empty: no scene is chosen.
+  std::function<void(const std::string& uri)> open_scene = {};
+  std::string notice = {};  ///< what pages are told when they join; empty: nothing
 };
 
 /// A session as pages see it: an observer that reads its ticks and frames and sends settings back.

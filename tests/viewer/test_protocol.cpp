@@ -158,6 +158,9 @@ TEST(Protocol, UnderstandsEachCommand) {
   EXPECT_TRUE(std::get<SetPlayback>(*play).paused);
   EXPECT_FALSE(std::get<SetPlayback>(*play).loop);
   EXPECT_EQ(std::get<SetPlayback>(*play).speed, 0.5);
+  const auto open = parse_command(R"({"open": "synthetic:desk"})");
+  ASSERT_TRUE(open && std::holds_alternative<OpenScene>(*open));
+  EXPECT_EQ(std::get<OpenScene>(*open).uri, "synthetic:desk");
   const auto seek = parse_command(R"({"seek": 0.25})");
   ASSERT_TRUE(seek && std::holds_alternative<Seek>(*seek));
   EXPECT_EQ(std::get<Seek>(*seek).share, 0.25);

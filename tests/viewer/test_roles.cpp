@@ -24,7 +24,8 @@ TEST(Roles, AllowALookingPageNothing) {
        {Command(SetParameter{"stiffness", 1.0}), Command(SetSafetyParameter{"max_speed", 0.1}),
         Command(SetPlacement{"scale", 2.0}), Command(SetMethod{"paper"}),
         Command(SetRecording{true}), Command(SetRecording{false}), Command(ResetHand{}),
-        Command(ResetFaults{}), Command(SetPlayback{true, true, 1.0}), Command(Seek{0.5})}) {
+        Command(ResetFaults{}), Command(SetPlayback{true, true, 1.0}), Command(Seek{0.5}),
+        Command(OpenScene{"synthetic:desk"})}) {
     EXPECT_THROW(check_allowed(command, Role::looking), Error) << command.index();
     EXPECT_NO_THROW(check_allowed(command, Role::operating)) << command.index();
   }
@@ -37,6 +38,7 @@ TEST(Roles, LeaveMethodPlacementAndRecordingToTheOperator) {
   EXPECT_TRUE(fails_saying(asking(SetRecording{false}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(SetPlayback{true, true, 1.0}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(Seek{0.5}, Role::holding), "operator"));
+  EXPECT_TRUE(fails_saying(asking(OpenScene{"synthetic:desk"}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(ResetFaults{}, Role::holding), "latched", "operator"));
   EXPECT_NO_THROW(check_allowed(SetParameter{"stiffness", 1.0}, Role::holding));
   EXPECT_NO_THROW(check_allowed(SetSafetyParameter{"max_speed", 0.1}, Role::holding));

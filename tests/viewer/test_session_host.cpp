@@ -93,6 +93,21 @@ TEST(SessionHost, ShowsAStillPictureThatCameBeforeTheServerOnce) {
   hosted.host.show_on(nullptr);
 }
 
+TEST(SessionHost, OpensNoSceneButThoseThatItLists) {
+  std::vector<std::string> opened;
+  Hosted hosted({.scenes = {{"synthetic:desk", "a desk"}},
+                 .open_scene = [&](const std::string& uri) { opened.push_back(uri); }});
+  EXPECT_EQ(json::parse(hosted.host.hello())["scenes"][0]["uri"], "synthetic:desk");
+  EXPECT_TRUE(fails_saying(hosted.asking(OpenScene{"pcd:/etc/secret.pcd"}, Role::operating),
+                           "/etc/secret.pcd", "not among"));
+  EXPECT_TRUE(opened.empty());
+  hosted.host.command(OpenScene{"synthetic:desk"}, Role::operating);
+  EXPECT_EQ(opened, std::vector<std::string>{"synthetic:desk"});
+  Hosted without;
+  EXPECT_TRUE(
+      fails_saying(without.asking(OpenScene{"synthetic:desk"}, Role::operating), "not among"));
+}
+
 TEST(SessionHost, HoldsTheOperatorToTheSessionsOptions) {
   Hosted hosted({.operator_limits = {{"max_device_force", 4.0}}});
   const auto force = [](double newtons) { return SetSafetyParameter{"max_device_force", newtons}; };

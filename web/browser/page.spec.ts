@@ -178,6 +178,66 @@ test("whatever ends a press lets the hand go", async () => {
   }
 });
 
+test("a contact is heard and felt where that is asked for, and only then", async () => {
+  const page = await open(PLANE);
+  await page.evaluate(() => {
+    Object.assign(window, { sounds: [] as AudioContext[], pulses: [] as number[] });
+    const { AudioContext } = window;
+    class Noted extends AudioContext {
+      constructor() {
+        super();
+        (window as any).sounds.push(this);
+      }
+    }
+    Object.assign(window, { AudioContext: Noted });
+    const vibrate = (pulse: number) => (window as any).pulses.push(pulse) > 0;
+    Object.defineProperty(navigator, "vibrate", { value: vibrate, configurable: true });
+  });
+  const at = await placeWhere(page, "surface");
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await until(page, (seen) => seen.force > 0.5);
+  const given = () =>
+    page.evaluate(() => {
+      const { sounds, pulses } = window as any;
+      return { sounds: sounds.map(({ state }: AudioContext) => state), pulses: pulses.length };
+    });
+  expect(await given()).toEqual({ sounds: [], pulses: 0 });
+  const switchBoth = () =>
+    page.evaluate(() => {
+      for (const id of ["sound", "vibration"]) document.getElementById(id)!.click();
+    });
+  await switchBoth();
+  await expect.poll(async () => (await given()).pulses).toBeGreaterThan(2);
+  await expect.poll(async () => (await given()).sounds).toEqual(["running"]);
+  const push = () => page.evaluate(() => (window as any).palpate.senses.sensation.push as number);
+  await expect.poll(push).toBeGreaterThan(0.1);
+  await page.mouse.up();
+  await expect.poll(push).toBe(0);
+  await switchBoth();
+  await expect.poll(async () => (await given()).sounds).toEqual(["closed"]);
+});
+
+test("another scene is chosen on the page", async () => {
+  const page = await open(DESK);
+  const asked = (uri: string) => page.locator("#scene").selectOption(uri);
+  expect(await page.locator("#scene").inputValue()).toBe(DESK[1]);
+  await asked("synthetic:sphere");
+  await expect.poll(() => page.locator("#camera").textContent()).toContain("synthetic:sphere");
+  expect(await page.locator("#connection").textContent()).toBe("connected");
+  expect(await page.locator("#role").textContent()).toBe("operator");
+  await drawn(page);
+  const at = await placeWhere(page, "surface");
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
+  await page.mouse.up();
+  // Back to what the program was started with.
+  await asked(DESK[1]!);
+  await expect.poll(() => page.locator("#camera").textContent()).toContain(DESK[1]!);
+  faults.splice(0); // what the browser says of the connection that ends between two sessions
+});
+
 test("a drag beside the surface or with the right button only turns the view", async () => {
   const page = await open(PLANE);
   const yaw = () => page.evaluate(() => (window as any).palpate.view.orbit.yaw as number);

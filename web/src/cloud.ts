@@ -206,6 +206,14 @@ export class CameraCloud {
     this.followRange(frame);
   }
 
+  /** Gives back what the graphics card holds. */
+  dispose(): void {
+    this.texture?.dispose();
+    this.rays?.dispose();
+    this.material.dispose();
+    this.object.geometry.dispose();
+  }
+
   setRays(message: Rays): void {
     this.lens = message;
     this.rays?.dispose();

@@ -14,6 +14,7 @@ import {
   type Ticks,
 } from "./protocol";
 import { SceneView, type Palette } from "./scene";
+import { Senses } from "./senses";
 import { Timeline } from "./timeline";
 import { depthBelow, flagNames, SteadyWhy, why } from "./why";
 
@@ -25,6 +26,7 @@ const plots = new Plots(get("plots"));
 let state: State | null = null;
 let introduced: Hello | null = null;
 let whose: Presence["hand"] = "free";
+const senses = new Senses();
 const steadyWhy = new SteadyWhy();
 let tick: Ticks | null = null;
 let announced = "";
@@ -71,6 +73,7 @@ const panel = new Panel({
   setLimit: (name, value) => connection.ask({ set_safety: { name, value } }),
   place: (name, value) => connection.ask({ place: { name, value } }),
   setMethod: (name) => connection.ask({ method: name }),
+  openScene: (uri) => connection.ask({ open: uri }),
 });
 
 const timeline = new Timeline((command) => connection.ask(command));
@@ -92,7 +95,9 @@ const connection = new Connection({
     );
   },
   hello(hello) {
+    if (introduced) view.clear();
     introduced = hello;
+    if (hello.notice) toast(hello.notice, 15_000);
     panel.introduce(hello);
     if (hello.token === "unknown") toast(unknownToken, 15_000);
   },
@@ -149,6 +154,7 @@ const connection = new Connection({
     else {
       tick = message;
       plots.add(message.samples);
+      senses.take(message, performance.now());
       view.showTick(message);
     }
   },
@@ -220,6 +226,7 @@ function loop(now: number): void {
   arrived.clear();
   hand.showPointer();
   view.draw(now);
+  senses.give(performance.now());
   showTick(now);
   plots.draw(now, 3000 * (view.thinning.frameTime ?? 0));
   requestAnimationFrame(loop);
@@ -263,6 +270,18 @@ function switchTheme(): void {
 systemTheme.addEventListener("change", () => applyTheme(chosenTheme()));
 applyTheme(chosenTheme());
 
+// Off at first: a page makes no noise by itself.
+for (const [id, set] of [
+  ["sound", (on: boolean) => senses.setSound(on)],
+  ["vibration", (on: boolean) => senses.setVibration(on)],
+] as const) {
+  const button = get(id);
+  button.addEventListener("click", () => {
+    const on = button.getAttribute("aria-pressed") !== "true";
+    set(on);
+    button.setAttribute("aria-pressed", String(on));
+  });
+}
 get("follow").addEventListener("click", follow);
 get("record").addEventListener("click", record);
 get("reset-faults").addEventListener("click", () => connection.ask({ reset_faults: true }));
@@ -295,4 +314,4 @@ addEventListener("keydown", (event) => {
 requestAnimationFrame(loop);
 
 // For the tests that look at the page from outside.
-Object.assign(window, { palpate: { view, newest: () => ({ tick, state }) } });
+Object.assign(window, { palpate: { view, senses, newest: () => ({ tick, state }) } });

@@ -232,11 +232,13 @@ export interface PanelActions {
   setLimit(name: string, value: number): void;
   place(name: string, value: number): void;
   setMethod(name: string): void;
+  openScene(uri: string): void;
 }
 
 export class Panel {
   private readonly root = get("panel");
   private readonly method = get<HTMLSelectElement>("method-name");
+  private readonly scene = get<HTMLSelectElement>("scene");
   private rows = new Map<string, Row>();
   private limits = new Map<string, Row>();
   private placement = new Map<string, Row>();
@@ -259,6 +261,7 @@ export class Panel {
     });
     this.open("touch");
     this.method.addEventListener("change", () => this.actions.setMethod(this.method.value));
+    this.scene.addEventListener("change", () => this.actions.openScene(this.scene.value));
   }
 
   open(tab: string): void {
@@ -273,6 +276,12 @@ export class Panel {
   introduce(hello: Hello): void {
     this.hello = hello;
     this.role = null; // rows are made anew
+    this.scene.replaceChildren(
+      ...hello.scenes.map(({ uri, meaning }) =>
+        element("option", { value: uri, title: meaning }, uri.replace("synthetic:", "")),
+      ),
+    );
+    get("scene-choice").hidden = hello.scenes.length === 0;
     this.method.replaceChildren(
       ...hello.methods.map(({ name }) =>
         element("option", { value: name }, name.replaceAll("-", " ")),
@@ -321,6 +330,7 @@ export class Panel {
 
   update(state: State): void {
     if (document.activeElement !== this.method) this.method.value = state.method;
+    if (document.activeElement !== this.scene) this.scene.value = state.cameras[0]?.uri ?? "";
     get("method-meaning").textContent =
       this.hello?.methods.find(({ name }) => name === state.method)?.meaning ?? "";
     for (const [name, row] of this.rows) row.show(state.parameters[name] ?? Number.NaN);
@@ -345,7 +355,7 @@ export class Panel {
   private showRole(role: Role): void {
     if (role === this.role) return;
     this.role = role;
-    this.method.disabled = role !== "operating";
+    this.method.disabled = this.scene.disabled = role !== "operating";
     for (const row of this.rows.values()) row.allow(role !== "looking");
     for (const row of this.limits.values()) row.allow(maySetLimit(role, row.row));
     for (const row of this.placement.values()) row.allow(role === "operating");

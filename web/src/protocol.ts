@@ -229,6 +229,10 @@ export interface Hello {
   /** the token in the page's address is none that the program knows, and none is needed */
   token?: "unknown";
   methods: { name: string; meaning: string }[];
+  /** what can be chosen to be touched; none: nothing can */
+  scenes: { uri: string; meaning: string }[];
+  /** to be shown on joining, such as why a scene could not be opened; empty: nothing */
+  notice: string;
   parameters: ParameterRow[];
   safety: ParameterRow[];
   /** where the device's workspace lies in the scene */
@@ -311,5 +315,6 @@ export type Command =
   | { record: boolean }
   | { play: Playback }
   | { seek: number }
+  | { open: string }
   | { reset: true }
   | { reset_faults: true };

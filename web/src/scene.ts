@@ -241,6 +241,19 @@ export class SceneView {
     this.touch();
   }
 
+  /** Forgets what was seen: another session begins. */
+  clear(): void {
+    for (const cloud of this.clouds.values()) {
+      this.scene.remove(cloud.object);
+      cloud.dispose();
+    }
+    this.clouds.clear();
+    this.home = this.tick = this.pointedAt = this.under = null;
+    this.trailPoints.length = this.drawnPoints = 0;
+    for (const lines of [this.grid, this.frusta, this.trail]) lines.visible = false;
+    this.touch();
+  }
+
   /** The view that the newest frames ask for. */
   resetView(): void {
     const clouds = [...this.clouds.values()];

@@ -297,6 +297,17 @@ Owned<DepthSensor> depth_sensor(const Api& api, const CameraDevice* device) {
   return {nullptr, api.delete_sensor};
 }
 
+struct ProfileData {
+  int stream = 0, format = 0, index = 0, id = 0, rate = 0;
+};
+
+ProfileData data_of(const Api& api, const StreamProfile* profile) {
+  ProfileData data;
+  api.call(api.get_profile_data, profile, &data.stream, &data.format, &data.index, &data.id,
+           &data.rate);
+  return data;
+}
+
 // [Hz] at which its depth comes unless it is told otherwise.
 std::optional<double> default_rate(const Api& api, const CameraDevice* device) {
   if (api.get_stream_profiles == nullptr || api.count_profiles == nullptr ||
@@ -310,9 +321,9 @@ std::optional<double> default_rate(const Api& api, const CameraDevice* device) {
   const int count = api.call(api.count_profiles, list.get());
   for (int i = 0; i < count; ++i) {
     const StreamProfile* profile = api.call(api.get_profile, list.get(), i);
-    std::array<int, 5> data{};  // stream, format, index, id, rate
-    api.call(api.get_profile_data, profile, &data[0], &data[1], &data[2], &data[3], &data[4]);
-    if (data[0] == stream_depth && api.call(api.is_default_profile, profile) != 0) return data[4];
+    const ProfileData data = data_of(api, profile);
+    if (data.stream == stream_depth && api.call(api.is_default_profile, profile) != 0)
+      return data.rate;
   }
   return std::nullopt;
 }
@@ -521,13 +532,12 @@ class Camera final : public LiveCamera {
     for (int i = 0; i < count; ++i) {
       const Owned<LibraryFrame> part(api_.call(api_.extract_frame, set, i), api_.release_frame);
       const StreamProfile* profile = api_.call(api_.get_stream_profile, part.get());
-      std::array<int, 5> data{};  // stream, format, index, id, rate
-      api_.call(api_.get_profile_data, profile, &data[0], &data[1], &data[2], &data[3], &data[4]);
-      if (data[0] == stream_depth && data[1] == format_z16) {
-        info_.frame_rate = data[4];
+      const ProfileData data = data_of(api_, profile);
+      if (data.stream == stream_depth && data.format == format_z16) {
+        info_.frame_rate = data.rate;
         depth_profile = profile;
         frame = depth_of(part.get(), profile);
-      } else if (data[0] == stream_colour && data[1] == format_rgb8) {
+      } else if (data.stream == stream_colour && data.format == format_rgb8) {
         colour_profile = profile;
         colour = colour_of(part.get(), profile);
       }
@@ -611,8 +621,9 @@ class Camera final : public LiveCamera {
     // Colour is to be looked at: a distortion that has no equal here is left out.
     RealSenseLens lens = lens_of(intrinsics_of_profile(profile));
     if (lens.model != "Brown Conrady") lens.coeffs = {};
-    image->camera.emplace();
-    image->camera->intrinsics = intrinsics_of(lens, info_.uri);
+    ColourImage::Camera beside;
+    beside.intrinsics = intrinsics_of(lens, info_.uri);
+    image->camera = beside;
     return image;
   }
 

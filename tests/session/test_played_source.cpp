@@ -132,7 +132,7 @@ TEST(PosedSource, PutsDepthImagesAndPointsWhereTheCameraStands) {
   EXPECT_EQ(posed->depth(), wall()->depth());
 
   const auto beside = std::make_shared<ColourImage>();
-  beside->camera.emplace();
+  beside->camera = ColourImage::Camera();
   beside->camera->world_from_camera.translation() = Vec3(0.015, 0.0, 0.0);
   const auto coloured = with_pose(std::make_unique<MadeSource>([&](int) {
                                     return Frame{.stamp = 0.0, .cloud = wall(), .colour = beside};

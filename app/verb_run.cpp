@@ -23,6 +23,7 @@
 #include "palpate/core/uri.hpp"
 #include "palpate/devices/device_guard.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/drivers/stiffness.hpp"
 #include "palpate/session/from_config.hpp"
 #include "palpate/sources/scene.hpp"
 #include "palpate/viewer/session_host.hpp"
@@ -89,6 +90,32 @@ MethodRegistry session_methods() {
     if (method.name != "ideal") methods.add(method);
   }
   return methods;
+}
+
+// Says what a device with motors is good for, and what speaks against the settings on it.
+void introduce(const Session& session, const SessionConfig& config) {
+  const DeviceInfo& device = session.device().info();
+  if (!device.limits.motors || device.simulated) return;
+  std::string text = fmt::format("{}: {}", device.uri, device.kind);
+  if (!device.serial.empty()) text += ", serial number " + device.serial;
+  text += fmt::format("; at most {:.2g} N, {:.2g} N for long", device.limits.max_force,
+                      device.limits.continuous_force);
+  if (device.limits.max_stiffness)
+    text += fmt::format(", walls up to {:.0f} N/m", *device.limits.max_stiffness);
+  if (device.reach) {
+    const Vec3 size = 1e3 * (device.reach->highest - device.reach->lowest);
+    text += fmt::format(", {:.0f} x {:.0f} x {:.0f} mm", size.x(), size.y(), size.z());
+  }
+  if (device.watchdog)
+    text += fmt::format(", its watchdog lets go after {:.0f} ms", 1e3 * *device.watchdog);
+  const Registry<Driver> drivers = standard_drivers();
+  if (const Driver* driver = drivers.try_find(Uri(device.uri).scheme()))
+    text += "; its driver was tried on " + driver->tried;
+  fmt::print(stderr, "palpate: {}\n", text);
+  const ServoSettings settings = session.settings();
+  const double felt = settings.parameters.coupling.stiffness * settings.placement.workspace_scale;
+  for (const std::string& line : stiffness_warnings(device, felt, config.rate))
+    fmt::print(stderr, "palpate: {}: {}\n", device.uri, line);
 }
 
 // Can it run faster than time? Only where nothing but simulations and recordings takes part.
@@ -187,6 +214,7 @@ int run_headless(const RunOptions& options, const SessionConfig& config,
   const bool is_free = wanted.pace == Pace::free_running;
   Session session(std::move(wanted));
   running.session = &session;
+  introduce(session, config);
   if (running.ended) return finish(session, options.json);
   const bool watched = isatty(STDERR_FILENO) == 1;
   const auto ticks_a_line = static_cast<std::uint64_t>(std::max(config.rate / 10.0, 1.0));
@@ -240,6 +268,7 @@ Ending run_page(const RunOptions& options, SessionConfig& config, std::unique_pt
     ~Over() { running.session = nullptr; }
   } const over{running};
   running.session = &session;
+  introduce(session, config);
   if (running.ended) return {.status = finish(session, options.json)};
   std::string ended_recording;
   session.start();

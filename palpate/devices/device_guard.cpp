@@ -275,6 +275,9 @@ void tell_fault(Memory& memory, const Device& device, std::string& told) {
 // The guard's process: until the session wishes for the end, or has ended.
 void hold_polled(Memory& memory, Device& device, const GuardLimits& limits, pid_t session) {
   constexpr int ticks_a_text = 50;
+  RealtimeRequest request;
+  request.pin = false;  // the servo has the core that it would get
+  const RealtimeThread realtime(request);
   GuardTick tick(memory, device, limits.beat_time);
   std::string told;
   double next = monotonic_now();

@@ -28,17 +28,17 @@ Reopener::~Reopener() {
     ending_ = true;
   }
   wakes_.notify_all();
-  asked_.release();
+  asked_.call();
   thread_.join();
 }
 
 void Reopener::ask() noexcept {
-  if (!lost_.exchange(true, std::memory_order_acq_rel)) asked_.release();
+  if (!lost_.exchange(true, std::memory_order_acq_rel)) asked_.call();
 }
 
 void Reopener::run() {
   for (;;) {
-    asked_.acquire();
+    asked_.wait();
     std::unique_lock lock(mutex_);
     while (!wakes_.wait_for(lock, std::chrono::duration<double>(interval_),
                             [this] { return ending_; })) {

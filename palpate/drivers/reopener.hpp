@@ -5,8 +5,9 @@
 #include <condition_variable>
 #include <functional>
 #include <mutex>
-#include <semaphore>
 #include <thread>
+
+#include "palpate/drivers/wake_up.hpp"
 
 namespace palpate {
 
@@ -60,7 +61,7 @@ class Reopener {
   std::function<bool()> attempt_;
   double interval_;  // [s]
   std::atomic<bool> lost_{false};
-  std::counting_semaphore<> asked_{0};
+  WakeUp asked_;
   std::mutex mutex_;  // of ending_; the servo never takes it
   std::condition_variable wakes_;
   bool ending_ = false;

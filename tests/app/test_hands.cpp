@@ -4,11 +4,14 @@
 #include <chrono>
 #include <csignal>
 #include <functional>
+#include <map>
 #include <memory>
 #include <thread>
 
+#include <fcntl.h>
 #include <nlohmann/json.hpp>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include "tests/app/program.hpp"
@@ -177,25 +180,6 @@ TEST_F(ForceDimensionHands, AreRefusedInOneLineThatSaysWhatToDo) {
   EXPECT_EQ(bench.commands, 0);
 }
 
-TEST_F(ForceDimensionHands, AreShownByTheDoctor) {
-  bench.devices = 2;
-  const Outcome outcome = run("doctor --json --seconds 0.1");
-  ASSERT_EQ(outcome.code, 0) << outcome.err;
-  const auto report = nlohmann::json::parse(outcome.out);
-  for (const auto& driver : report["drivers"]) {
-    if (driver["name"] != "force-dimension:") continue;
-    EXPECT_EQ(driver["library"], fakes + "/force-dimension/libdrd.so.3");
-    EXPECT_EQ(driver["version"], "3.17.5");
-    EXPECT_EQ(driver["problem"], "");
-    ASSERT_EQ(driver["found"].size(), 2U);
-    EXPECT_EQ(driver["found"][1]["uri"], "force-dimension:10518");
-    EXPECT_EQ(driver["found"][1]["name"], "omega.3");
-    EXPECT_FALSE(bench.force_on);
-    return;
-  }
-  ADD_FAILURE() << outcome.out;
-}
-
 // ---- Touch
 
 class TouchHands : public Hands {
@@ -213,6 +197,11 @@ TEST_F(TouchHands, TouchASlopeByAGuardAndSurviveBeingUnplugged) {
   start("touch:");
   ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
   expect_along_the_normal_now();
+  const std::string said = test::read(path("stderr"));
+  EXPECT_NE(said.find("at most 3.3 N, 0.88 N for long, walls up to 400 N/m"), std::string::npos)
+      << said;
+  EXPECT_NE(said.find("tried on a fake library alone"), std::string::npos) << said;
+  EXPECT_NE(said.find("--set stiffness=400"), std::string::npos) << said;
 
   bench.error = 0x202;  // the driver took the force off: too sudden
   ASSERT_TRUE(reaches([&] { return motor_force() == 0.0; }));
@@ -267,6 +256,235 @@ TEST_F(TouchHands, AreRefusedInOneLineThatSaysWhatToDo) {
   expect_refusal(arguments + "touch:", {"is not there", "support.3dsystems.com"});
   EXPECT_EQ(bench.commands, 1) << "a zero force while it looked at the calibration";
   EXPECT_EQ(bench.largest, 0.0);
+}
+
+// ---- Haply
+
+class HaplyHands : public Hands {
+ protected:
+  // Places in the file that test and service share: see inverse_service.py.
+  enum Place : std::size_t {
+    plugged_in,
+    calibrated,
+    hangs,
+    drops,
+    version,
+    says_version,
+    port,
+    force_x,
+    force_y,
+    force_z,
+    largest,
+    largest_first,
+    commands,
+    connections,
+    dropped
+  };
+
+  void SetUp() override {
+    const std::string file = write("service", std::string(24 * sizeof(double), '\0'));
+    const int descriptor = open(file.c_str(), O_RDWR | O_CLOEXEC);
+    void* memory =
+        mmap(nullptr, 24 * sizeof(double), PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0);
+    close(descriptor);
+    ASSERT_NE(memory, MAP_FAILED);
+    places_ = static_cast<std::atomic<double>*>(memory);
+    at(plugged_in) = at(calibrated) = at(says_version) = 1.0;
+    at(version) = 3.4;
+    const std::string script = PALPATE_FAKE_SCRIPTS "/inverse_service.py";
+    const std::array<char*, 4> arguments = {const_cast<char*>("python3"),
+                                            const_cast<char*>(script.c_str()),
+                                            const_cast<char*>(file.c_str()), nullptr};
+    ASSERT_EQ(posix_spawnp(&service_, "python3", nullptr, nullptr, arguments.data(), environ), 0);
+    ASSERT_TRUE(reaches([&] { return at(port) > 0.0; }));
+  }
+  void TearDown() override {
+    kill(service_, SIGKILL);
+    waitpid(service_, nullptr, 0);
+    munmap(places_, 24 * sizeof(double));
+  }
+
+  [[nodiscard]] std::atomic<double>& at(Place place) const { return places_[place]; }
+  [[nodiscard]] double force() const {
+    return std::hypot(at(force_x).load(), at(force_y).load(), at(force_z).load());
+  }
+  [[nodiscard]] std::string uri(const std::string& id = "") const {
+    return "haply:" + id + "?port=" + std::to_string(static_cast<int>(at(port)));
+  }
+
+ private:
+  std::atomic<double>* places_ = nullptr;
+  pid_t service_ = 0;
+};
+
+TEST_F(HaplyHands, TouchASlopeAndSurviveLostAnswersAndBeingUnplugged) {
+  start(uri());
+  ASSERT_TRUE(reaches([&] { return force() > 0.95 * limit; }));
+  expect_along_the_normal(at(force_x), at(force_y), at(force_z));
+
+  at(drops) = 1.0;  // an answer is lost
+  ASSERT_TRUE(reaches([&] { return at(dropped) == 1.0 && force() == 0.0; }));
+  ASSERT_TRUE(reaches([&] { return force() > 0.5 * limit; }));
+
+  at(plugged_in) = 0.0;
+  ASSERT_TRUE(reaches([&] { return force() == 0.0; }));
+  at(plugged_in) = 1.0;
+  ASSERT_TRUE(reaches([&] { return force() > 0.5 * limit; }));
+
+  at(hangs) = 1.0;  // the service answers nobody, and the servo goes on
+  ASSERT_TRUE(reaches([&] { return at(connections) > 1.0; }));
+  at(hangs) = 0.0;
+  ASSERT_TRUE(reaches([&] { return force() > 0.5 * limit; }));
+
+  EXPECT_EQ(end(), 0) << test::read(path("stderr"));
+  EXPECT_TRUE(reaches([&] { return force() == 0.0; }));
+  EXPECT_LE(at(largest), limit + 1e-4);
+  EXPECT_LE(at(largest_first), 0.25);
+}
+
+TEST_F(HaplyHands, FindTheFormOfTheCommandThatTheServiceTakes) {
+  at(version) = 3.5;  // wants 'vector', and does not say that it is 3.5
+  at(says_version) = 0.0;
+  start(uri("049D"));
+  ASSERT_TRUE(reaches([&] { return force() > 0.95 * limit; }));
+  EXPECT_EQ(end(), 0) << test::read(path("stderr"));
+  EXPECT_LE(at(largest_first), 0.25);
+}
+
+TEST_F(HaplyHands, LetGoWhenTheProgramIsStoppedOrKilled) {
+  at(version) = 3.5;
+  start(uri());
+  ASSERT_TRUE(reaches([&] { return force() > 0.95 * limit; }));
+  send(SIGSTOP);
+  ASSERT_TRUE(reaches([&] { return force() == 0.0; })) << "by the guard";
+  send(SIGCONT);
+  ASSERT_TRUE(reaches([&] { return force() > 0.95 * limit; }));
+  send(SIGKILL);
+  wait_for_end();
+  EXPECT_TRUE(reaches([&] { return force() == 0.0; })) << "by the guard";
+  EXPECT_LE(at(largest_first), 0.25);
+}
+
+TEST_F(HaplyHands, AreRefusedInOneLineThatSaysWhatToDo) {
+  const std::string arguments = "run --headless --camera synthetic:plane?size=160x120 --device ";
+  expect_refusal(arguments + "'" + uri("0BAD") + "'", {"no device '0BAD'", "049D"});
+  at(calibrated) = 0.0;
+  expect_refusal(arguments + "'" + uri() + "'", {"not calibrated", "Haply's Hub"});
+  at(plugged_in) = 0.0;
+  expect_refusal(arguments + "'" + uri() + "'", {"sees no Inverse3", "cable"});
+  expect_refusal(arguments + "haply:?port=1",
+                 {"no Inverse Service at localhost:1", "haply-inverse"});
+  EXPECT_EQ(at(commands), 0.0);
+}
+
+// ---- SpaceMouse and game controllers: hands without motors
+
+class SpacenavHands : public Hands {
+  Environment library_{"PALPATE_SPNAV", PALPATE_FAKES "/spnav"};
+};
+
+TEST_F(SpacenavHands, TouchASlopeAndSurviveADaemonThatEnds) {
+  start("spacenav:");
+  ASSERT_TRUE(reaches([&] { return bench.began > 0.0 && clock_now() - bench.began > 2.5; }));
+  bench.plugged_in = false;
+  ASSERT_TRUE(reaches([&] { return bench.closes == 1; }));
+  bench.plugged_in = true;
+  ASSERT_TRUE(reaches([&] { return bench.opens == 2; }));
+  EXPECT_EQ(end(), 0) << test::read(path("stderr"));
+  const auto summary = nlohmann::json::parse(test::read(path("stdout")));
+  EXPECT_GT(summary["max_force_sent"], 0.3) << summary;
+}
+
+TEST_F(SpacenavHands, AreRefusedInOneLineThatSaysWhatToDo) {
+  const std::string arguments = "run --headless --camera synthetic:plane?size=160x120 --device ";
+  bench.plugged_in = false;
+  expect_refusal(arguments + "spacenav:", {"spacenavd does not answer", "systemctl start"});
+  const Environment none("PALPATE_SPNAV", path("none"));
+  expect_refusal(arguments + "spacenav:", {"is not there", "apt install libspnav0"});
+}
+
+class GamepadHands : public Hands {
+  Environment library_{"PALPATE_SDL2", PALPATE_FAKES "/sdl2"};
+};
+
+TEST_F(GamepadHands, RumbleAtAContactAndSurviveBeingUnplugged) {
+  start("gamepad:");
+  ASSERT_TRUE(reaches([&] { return bench.force[1] == 65535.0; })) << "the knock of the contact";
+  ASSERT_TRUE(reaches([&] { return bench.force[0] > 2000.0 && bench.force[1] == 0.0; }));
+  bench.plugged_in = false;
+  ASSERT_TRUE(reaches([&] { return bench.closes == 1; }));
+  bench.plugged_in = true;
+  ASSERT_TRUE(reaches([&] { return bench.opens == 2; }));
+  EXPECT_EQ(end(), 0) << test::read(path("stderr"));
+  EXPECT_EQ(bench.closes, 2);
+}
+
+TEST_F(GamepadHands, AreRefusedInOneLineThatSaysWhatToDo) {
+  const std::string arguments = "run --headless --camera synthetic:plane?size=160x120 --device ";
+  expect_refusal(arguments + "gamepad:1", {"no game controller of that number", "/dev/input"});
+  expect_refusal(arguments + "gamepad:x", {"'x'", "gamepad:1"});
+}
+
+// ---- The doctor
+
+class DoctorAndHands : public HaplyHands {
+ protected:
+  // The drivers of hands, as the doctor lists them, by name.
+  [[nodiscard]] std::map<std::string, nlohmann::json> drivers() {
+    const Outcome outcome = run("doctor --json --seconds 0.1");
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    std::map<std::string, nlohmann::json> drivers;
+    const nlohmann::json report = nlohmann::json::parse(outcome.out);
+    for (const auto& driver : report["drivers"]) {
+      if (driver["kind"] == "haptic device") drivers[driver["name"]] = driver;
+    }
+    return drivers;
+  }
+};
+
+TEST_F(DoctorAndHands, ShowsEachThatIsPluggedIn) {
+  bench.devices = 2;
+  const Environment force_dimension("PALPATE_FORCE_DIMENSION", PALPATE_FAKES "/force-dimension");
+  const Environment touch("PALPATE_OPENHAPTICS", PALPATE_FAKES "/openhaptics");
+  const Environment spnav("PALPATE_SPNAV", PALPATE_FAKES "/spnav");
+  const Environment sdl("PALPATE_SDL2", PALPATE_FAKES "/sdl2");
+  const Environment haply("PALPATE_HAPLY",
+                          "localhost:" + std::to_string(static_cast<int>(at(port))));
+  auto found = drivers();
+  ASSERT_EQ(found.size(), 5U);
+  for (const auto& [name, driver] : found) EXPECT_EQ(driver["problem"], "") << name;
+  EXPECT_EQ(found["force-dimension:"]["library"], fakes + "/force-dimension/libdrd.so.3");
+  EXPECT_EQ(found["force-dimension:"]["version"], "3.17.5");
+  ASSERT_EQ(found["force-dimension:"]["found"].size(), 2U);
+  EXPECT_EQ(found["force-dimension:"]["found"][1]["uri"], "force-dimension:10518");
+  EXPECT_EQ(found["force-dimension:"]["found"][1]["name"], "omega.3");
+  EXPECT_EQ(found["touch:"]["found"][0]["serial"], "20230117");
+  EXPECT_EQ(found["touch:"]["found"][0]["rate_hz"], 1000.0);
+  EXPECT_EQ(found["haply:"]["found"][0]["uri"], "haply:049D");
+  EXPECT_EQ(found["spacenav:"]["found"].size(), 1U);
+  EXPECT_EQ(found["gamepad:"]["found"][0]["name"], "Fake Controller");
+  EXPECT_FALSE(bench.force_on);
+  EXPECT_EQ(bench.largest, 0.0);
+}
+
+TEST_F(DoctorAndHands, SaysWhatToInstallOnAnEmptyMachine) {
+  std::vector<std::unique_ptr<Environment>> none;
+  for (const char* variable :
+       {"PALPATE_FORCE_DIMENSION", "PALPATE_OPENHAPTICS", "PALPATE_SPNAV", "PALPATE_SDL2"})
+    none.push_back(std::make_unique<Environment>(variable, path("none")));
+  none.push_back(std::make_unique<Environment>("PALPATE_HAPLY", "localhost:1"));
+  const std::map<std::string, std::string> remedies = {{"force-dimension:", "forcedimension.com"},
+                                                       {"touch:", "support.3dsystems.com"},
+                                                       {"haply:", "haply-inverse-service"},
+                                                       {"spacenav:", "apt install libspnav0"},
+                                                       {"gamepad:", "apt install libsdl2-2.0-0"}};
+  auto found = drivers();
+  ASSERT_EQ(found.size(), remedies.size());
+  for (const auto& [name, remedy] : remedies) {
+    EXPECT_TRUE(found[name]["found"].empty()) << name;
+    EXPECT_NE(found[name]["problem"].get<std::string>().find(remedy), std::string::npos)
+        << found[name];
+  }
 }
 
 }  // namespace

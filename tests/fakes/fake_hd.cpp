@@ -8,6 +8,8 @@
 #include <mutex>
 #include <thread>
 
+#include <pthread.h>
+
 #include "tests/fakes/workbench.hpp"
 
 namespace {
@@ -52,6 +54,9 @@ bool answers() {
 }
 
 void run_scheduler() {
+  sched_param priority{};
+  priority.sched_priority = 80;  // where the system grants it
+  static_cast<void>(pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority));
   while (running) {
     {
       const std::lock_guard lock(mutex);

@@ -1,0 +1,499 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/drivers/haply.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "palpate/core/error.hpp"
+#include "palpate/drivers/wake_up.hpp"
+#include "palpate/drivers/web_socket.hpp"
+#include "palpate/servo/mailbox.hpp"
+#include "palpate/servo/realtime.hpp"
+
+namespace palpate {
+namespace haply {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::string_view scheme = "haply:";
+constexpr double opening_time = 2.0;     // [s] for each step of opening
+constexpr double answer_time = 0.015;    // [s] for the answer to a message
+constexpr double silence_of_loss = 0.5;  // [s] without an answer: the service is asked anew
+constexpr double stale_time = 0.025;     // [s] a state that is older does not count
+constexpr double beat_time = 0.020;      // [s] without a force from the servo: none is sent
+constexpr double idle_wait = 0.005;      // [s] between two messages while no force comes
+constexpr double clear_force = 0.05;     // [N] that a device must show to have taken
+constexpr int answers_of_doubt = 30;     // in a row without that force
+constexpr double rest_time = 0.2;        // [s] without a hand after anything went wrong
+constexpr auto retry_interval = std::chrono::milliseconds(250);
+
+struct Wanted {
+  std::string uri = {}, id = {}, host = "localhost";
+  int port = 10001;
+  double max_force = 2.0;  // [N]
+};
+
+// Where the service is, unless the URI says so: PALPATE_HAPLY=HOST:PORT, or this machine.
+Wanted usual_place() {
+  Wanted wanted;
+  const char* place = std::getenv("PALPATE_HAPLY");
+  const std::string text = place == nullptr ? "" : place;
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos) return wanted;
+  wanted.host = text.substr(0, colon);
+  int port = 0;
+  const auto end = std::from_chars(text.data() + colon + 1, text.data() + text.size(), port).ptr;
+  if (end != text.data() + text.size() || port < 1 || port > 65535)
+    throw Error("PALPATE_HAPLY", "'" + text + "' is no place of a service",
+                "write HOST:PORT, such as localhost:10001");
+  wanted.port = port;
+  return wanted;
+}
+
+const char* remedy() {
+  return "start Haply's Inverse Service (systemctl start haply-inverse-service), or name its place "
+         "by ?host=NAME&port=NUMBER";
+}
+
+// What GET /version says, or nothing.
+std::string version_of(const Wanted& wanted) {
+  try {
+    return http_get(wanted.host, wanted.port, "/version", 1.0);
+  } catch (const Error&) {
+    return "";
+  }
+}
+
+// @throws Error with the remedy
+std::unique_ptr<WebSocketClient> connect(const Wanted& wanted) {
+  try {
+    return std::make_unique<WebSocketClient>(wanted.host, wanted.port, opening_time);
+  } catch (const Error& error) {
+    throw Error(wanted.uri, std::string("no Inverse Service at ") + error.what(), remedy());
+  }
+}
+
+// The number in front of and behind the first point of a version: "v3.5.2" is 305.
+int number_of_version(const std::string& text) {
+  const std::size_t begin = text.find_first_of("0123456789");
+  if (begin == std::string::npos) return 0;
+  int major = 0;
+  int minor = 0;
+  const char* const end = text.data() + text.size();
+  const auto point = std::from_chars(text.data() + begin, end, major);
+  if (point.ptr != end && *point.ptr == '.') std::from_chars(point.ptr + 1, end, minor);
+  return 100 * std::clamp(major, 0, 99) + std::clamp(minor, 0, 99);
+}
+
+// A vector of the service; what is left out keeps its value in `fallback`.
+Vec3 vector_of(const Json& object, const char* name, const Vec3& fallback) {
+  Vec3 value = fallback;
+  const auto found = object.find(name);
+  if (found == object.end() || !found->is_object()) return value;
+  for (int i = 0; i < 3; ++i) {
+    const auto one = found->find(std::string(1, "xyz"[i]));
+    if (one != found->end() && one->is_number()) value[i] = one->get<double>();
+  }
+  return value;
+}
+
+// True, unless the service says false.
+bool holds(const Json& object, const char* name) {
+  const auto found = object.find(name);
+  return found == object.end() || !found->is_boolean() || found->get<bool>();
+}
+
+const Json* member(const Json& object, const char* name) {
+  const auto found = object.find(name);
+  return found == object.end() ? nullptr : &*found;
+}
+
+// The device of that id in a message, or the first if `id` is empty; null if there is none.
+const Json* device_in(const Json& message, const std::string& id) {
+  if (!message.is_object()) return nullptr;
+  const Json* list = member(message, "inverse3");
+  if (list == nullptr || !list->is_array()) return nullptr;
+  for (const Json& device : *list) {
+    if (device.is_object() && (id.empty() || device.value("device_id", "") == id)) return &device;
+  }
+  return nullptr;
+}
+
+// Bits of all grips' buttons, and the orientation of the first that tells one.
+void read_grips(const Json& message, HandState& state) {
+  std::uint32_t buttons = 0;
+  bool found = false;
+  for (const char* kind : {"verse_grip", "wireless_verse_grip"}) {
+    const Json* list = member(message, kind);
+    if (list == nullptr || !list->is_array() || list->empty() || !list->front().is_object())
+      continue;
+    const Json* grip = member(list->front(), "state");
+    if (grip == nullptr || !grip->is_object()) continue;
+    found = true;
+    if (grip->value("button", false)) buttons |= 1U;
+    if (const Json* several = member(*grip, "buttons");
+        several != nullptr && several->is_object()) {
+      for (unsigned i = 0; i < 3; ++i)
+        if (several->value(std::string(1, "abc"[i]), false)) buttons |= 1U << i;
+    }
+    if (const Json* turn = member(*grip, "orientation"); turn != nullptr && turn->is_object()) {
+      const Eigen::Quaterniond q(turn->value("w", 1.0), turn->value("x", 0.0),
+                                 turn->value("y", 0.0), turn->value("z", 0.0));
+      if (q.coeffs().allFinite() && q.norm() > 0.5) state.orientation = q.normalized();
+    }
+  }
+  if (found) state.buttons = buttons;
+}
+
+class Inverse final : public Device {
+ public:
+  explicit Inverse(Wanted wanted) : wanted_(std::move(wanted)) {
+    std::promise<void> opened;
+    std::future<void> result = opened.get_future();
+    thread_ = std::thread(&Inverse::run, this, std::move(opened));
+    try {
+      result.get();
+    } catch (...) {
+      end();
+      throw;
+    }
+  }
+  ~Inverse() override {
+    disable();
+    end();
+  }
+
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+
+  HandState read(double /*t*/) noexcept override {
+    if (const Seen* seen = seen_.take()) last_ = *seen;
+    HandState state = last_.state;
+    if (monotonic_now() - last_.time > stale_time) state.fault = DeviceFault::disconnected;
+    state.present = state.fault == DeviceFault::none;
+    return state;
+  }
+
+  void write(const Vec3& force, double /*t*/) noexcept override {
+    const bool passes = enabled_.load(std::memory_order_acquire) && force.allFinite();
+    forces_.put(passes ? force : Vec3::Zero());
+    word_.call();
+  }
+
+  void enable() override { enabled_.store(true, std::memory_order_release); }
+  void disable() noexcept override {
+    enabled_.store(false, std::memory_order_release);
+    word_.call();
+  }
+
+  [[nodiscard]] std::string fault_text() const override {
+    const std::lock_guard lock(mutex_);
+    return trouble_;
+  }
+
+ private:
+  struct Seen {
+    HandState state{.present = false, .fault = DeviceFault::disconnected};
+    double time = 0.0;  // [s]
+  };
+
+  void end() {
+    ending_.store(true, std::memory_order_release);
+    word_.call();
+    thread_.join();
+  }
+
+  void set_trouble(const std::string& text) {
+    const std::lock_guard lock(mutex_);
+    trouble_ = text;
+  }
+
+  // ---- All below: the channel's thread.
+  void run(std::promise<void> opened) {
+    std::promise<void>* waiting = &opened;
+    while (!ending_.load(std::memory_order_acquire)) {
+      try {
+        try {
+          converse(waiting);
+        } catch (const Json::exception&) {
+          throw Error(wanted_.uri, "what the service says is not understood",
+                      "use an Inverse Service from 3.1 on");
+        }
+      } catch (const std::exception& error) {
+        if (waiting != nullptr) {
+          waiting->set_exception(std::current_exception());
+          return;
+        }
+        set_trouble(error.what());
+        let_go(DeviceFault::disconnected);
+        std::this_thread::sleep_for(retry_interval);
+      }
+    }
+  }
+
+  // No hand for long enough that the servo's safety chain sees it and lets go, whatever the next
+  // answer says.
+  void let_go(DeviceFault fault) {
+    newest_.state.fault = rest_fault_ = fault;
+    newest_.time = monotonic_now();
+    rest_until_ = newest_.time + rest_time;
+    seen_.put(newest_);
+  }
+
+  // One connection, to its end.
+  void converse(std::promise<void>*& waiting) {
+    const std::unique_ptr<WebSocketClient> service = connect(wanted_);
+    WebSocketClient& channel = *service;
+    const std::string inventory_text = channel.receive(opening_time);
+    if (inventory_text.empty())
+      throw Error(wanted_.uri, "the service does not speak first, as an Inverse Service does",
+                  remedy());
+    if (waiting != nullptr) {
+      identify(Json::parse(inventory_text, nullptr, false));
+      waiting->set_value();
+      waiting = nullptr;
+    } else if (device_in(Json::parse(inventory_text, nullptr, false), id_) == nullptr) {
+      throw Error(wanted_.uri, "the device is not plugged in");
+    }
+    channel.send(first_message());
+    double heard = monotonic_now();
+    while (!ending_.load(std::memory_order_acquire)) {
+      const std::string answer = channel.receive(answer_time);
+      const double now = monotonic_now();
+      if (!answer.empty()) {
+        heard = now;
+        take(Json::parse(answer, nullptr, false), now);
+        wait_for_word();
+        channel.send(message_with(next_force()));
+        continue;
+      }
+      if (now - heard > silence_of_loss)
+        throw Error(wanted_.uri, "the service does not answer", remedy());
+      // An answer is overdue or lost: let go, and ask again.
+      let_go(DeviceFault::disconnected);
+      channel.send(message_with(Vec3::Zero()));
+    }
+    channel.send(message_with(Vec3::Zero()));
+    channel.receive(answer_time);
+  }
+
+  void identify(const Json& inventory) {
+    const Json* device = device_in(inventory, wanted_.id);
+    if (device == nullptr) {
+      std::string ids;
+      if (const Json* list = inventory.is_object() ? member(inventory, "inverse3") : nullptr;
+          list != nullptr && list->is_array()) {
+        for (const Json& one : *list)
+          if (one.is_object()) ids += (ids.empty() ? "" : ", ") + one.value("device_id", "");
+      }
+      if (ids.empty())
+        throw Error(wanted_.uri, "the service sees no Inverse3", "check its power and its cable");
+      throw Error(wanted_.uri, "there is no device '" + wanted_.id + "'", "there are: " + ids);
+    }
+    id_ = device->value("device_id", "");
+    if (const DeviceFault fault = fault_of_status(*device); fault == DeviceFault::not_calibrated)
+      throw Error(wanted_.uri, "the device " + id_ + " is not calibrated",
+                  "calibrate it in Haply's Hub");
+    else if (fault == DeviceFault::other)
+      throw Error(wanted_.uri, "the device " + id_ + " has no power or is not ready",
+                  "plug in its power supply");
+    const std::string version = version_of(wanted_);
+    const Json told = Json::parse(version, nullptr, false);
+    const std::string tag =
+        told.is_object() && told.contains("git_tag") && told["git_tag"].is_string()
+            ? told["git_tag"].get<std::string>()
+            : "";
+    key_ = number_of_version(tag) >= 305 ? "vector" : "values";
+    std::string type = "inverse3";
+    if (const Json* config = member(*device, "config"); config != nullptr && config->is_object())
+      type = config->value("type", type);
+    info_.uri = wanted_.uri;
+    info_.kind = type + " by Haply's Inverse Service";
+    info_.limits = {.max_force = wanted_.max_force,
+                    .continuous_force = wanted_.max_force,
+                    .max_stiffness = 800.0,
+                    .max_damping = 3.0};
+    info_.reach = DeviceReach::ball(type == "minverse" ? 0.04 : 0.10);
+    info_.serial = id_;
+    info_.firmware = tag.empty() ? "" : "service " + tag;
+  }
+
+  [[nodiscard]] std::string first_message() const {
+    Json message = Json::parse(message_with(Vec3::Zero()));
+    message["session"]["configure"] = {{"profile", {{"name", "org.palpate:palpate"}}},
+                                       {"basis", {{"permutation", "XYZ"}}}};
+    message["inverse3"][0]["configure"] = {{"preset", {{"preset", "arm_front_centered"}}}};
+    return message.dump();
+  }
+
+  [[nodiscard]] std::string message_with(const Vec3& force) const {
+    std::array<char, 256> text{};
+    const int length =
+        std::snprintf(text.data(), text.size(),
+                      R"("commands":{"set_cursor_force":{"%s":{"x":%.5f,"y":%.5f,"z":%.5f}}}}]})",
+                      key_, force.x(), force.y(), force.z());
+    return R"({"inverse3":[{"device_id":)" + Json(id_).dump() + "," +
+           std::string(text.data(), static_cast<std::size_t>(length));
+  }
+
+  // Until the servo has written, or a little while.
+  void wait_for_word() { word_.wait(idle_wait); }
+
+  // What to send now. A servo that has not written for beat_time gets no force.
+  Vec3 next_force() {
+    const double now = monotonic_now();
+    if (forces_.take() != nullptr) written_ = now;
+    const bool passes = enabled_.load(std::memory_order_acquire) && now - written_ <= beat_time &&
+                        newest_.state.fault == DeviceFault::none;
+    asked_ = passes ? forces_.taken_last() : Vec3::Zero();
+    const double size = asked_.norm();
+    if (size > wanted_.max_force) asked_ *= wanted_.max_force / size;
+    return asked_;
+  }
+
+  static DeviceFault fault_of_status(const Json& device) {
+    const Json* status = member(device, "status");
+    if (status == nullptr || !status->is_object()) return DeviceFault::none;
+    if (!holds(*status, "calibrated")) return DeviceFault::not_calibrated;
+    if (!holds(*status, "power_supply") || !holds(*status, "ready")) return DeviceFault::other;
+    return DeviceFault::none;
+  }
+
+  // A state that the service has sent.
+  void take(const Json& message, double now) {
+    const Json* device = device_in(message, id_);
+    const Json* told = device == nullptr ? nullptr : member(*device, "state");
+    if (told == nullptr || !told->is_object()) return let_go(DeviceFault::disconnected);
+    HandState& state = newest_.state;
+    state.position = vector_of(*told, "cursor_position", state.position);
+    state.velocity = vector_of(*told, "cursor_velocity", state.velocity.value_or(Vec3::Zero()));
+    read_grips(message, state);
+    if (member(*device, "status") != nullptr) status_ = fault_of_status(*device);
+    state.fault = status_;
+    if (state.fault == DeviceFault::none && now < rest_until_) state.fault = rest_fault_;
+    newest_.time = now;
+    seen_.put(newest_);
+    doubt(vector_of(*told, "current_cursor_force", Vec3::Zero()));
+    if (state.fault == DeviceFault::none) set_trouble_once("");
+  }
+
+  // The service says which force it gives. If it gives none although one is asked for, the command
+  // may have another form in its version: that is tried once.
+  void doubt(const Vec3& given) {
+    if (asked_.norm() < clear_force) return;
+    if (given.norm() > 1e-6) {
+      doubts_ = 0;
+      confirmed_ = true;
+      return;
+    }
+    if (confirmed_ || ++doubts_ < answers_of_doubt) return;
+    doubts_ = 0;
+    let_go(DeviceFault::refused_command);
+    if (std::exchange(changed_, true)) {
+      set_trouble_once(
+          "the service takes no force, neither by 'values' nor by 'vector'; use a "
+          "version of it from 3.1 on");
+      return;
+    }
+    key_ = std::string_view(key_) == "values" ? "vector" : "values";
+  }
+
+  void set_trouble_once(const char* text) {
+    if (text_ == text) return;
+    text_ = text;
+    set_trouble(text);
+  }
+
+  Wanted wanted_;
+  DeviceInfo info_;  // set before the constructor returns
+  std::atomic<bool> enabled_{false}, ending_{false};
+  Mailbox<Vec3> forces_;  // [N] from the servo
+  Mailbox<Seen> seen_;    // to the servo
+  WakeUp word_;
+  mutable std::mutex mutex_;  // of trouble_; the servo never takes it
+  std::string trouble_;
+  // Of the servo's thread:
+  Seen last_;
+  // Of the channel's thread:
+  std::string id_;
+  const char* key_ = "values";  // in which the service wants a force
+  Seen newest_;
+  Vec3 asked_ = Vec3::Zero();  // [N] in the message that was sent last
+  double written_ = 0.0;       // [s] when the servo last wrote
+  DeviceFault status_ = DeviceFault::none;
+  int doubts_ = 0;
+  bool confirmed_ = false, changed_ = false;
+  double rest_until_ = 0.0;  // [s] no hand until then
+  DeviceFault rest_fault_ = DeviceFault::none;
+  std::string_view text_ = "-";
+  std::thread thread_;
+};
+
+Wanted wanted_by(const Uri& uri) {
+  constexpr std::array<std::string_view, 3> options{"host", "port", "max_force"};
+  uri.allow_only(options);
+  Wanted wanted = usual_place();
+  wanted.uri = uri.text();
+  wanted.id = uri.path();
+  wanted.host = uri.text_option("host", wanted.host);
+  wanted.port = static_cast<int>(uri.number_option("port", wanted.port, 1, 65535));
+  wanted.max_force = uri.number_option("max_force", wanted.max_force, 0.1, 10.0, "N");
+  return wanted;
+}
+
+std::unique_ptr<Device> open_inverse(const Uri& uri) {
+  return std::make_unique<Inverse>(wanted_by(uri));
+}
+
+DriverReport look() {
+  DriverReport report;
+  Wanted wanted = usual_place();
+  wanted.uri = scheme;
+  const std::unique_ptr<WebSocketClient> service = connect(wanted);
+  report.library = "ws://" + wanted.host + ":" + std::to_string(wanted.port);
+  const Json version = Json::parse(version_of(wanted), nullptr, false);
+  if (version.is_object()) report.version = version.value("git_tag", "");
+  const Json inventory = Json::parse(service->receive(1.0), nullptr, false);
+  const Json* list = inventory.is_object() ? member(inventory, "inverse3") : nullptr;
+  if (list == nullptr || !list->is_array()) return report;
+  for (const Json& device : *list) {
+    if (!device.is_object()) continue;
+    const std::string id = device.value("device_id", "");
+    PluggedIn one{.uri = std::string(scheme) + id, .name = "Inverse3", .serial = id};
+    if (const Json* status = member(device, "status"); status != nullptr && status->is_object()) {
+      if (!holds(*status, "calibrated")) one.note = "not calibrated: calibrate it in Haply's Hub";
+      if (!holds(*status, "power_supply")) one.note = "no power: plug in its power supply";
+    }
+    report.found.push_back(one);
+  }
+  return report;
+}
+
+}  // namespace
+}  // namespace haply
+
+Driver haply_driver() {
+  return {.name = "haply",
+          .summary = "Haply's Inverse3, Inverse3x and Minverse, by their Inverse Service",
+          .tried = "an emulator of the service alone",
+          .open_device = haply::open_inverse,
+          .look = reporting(haply::look),
+          .needs_guard = true};
+}
+
+}  // namespace palpate

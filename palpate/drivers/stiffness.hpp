@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "palpate/servo/device.hpp"
+
+namespace palpate {
+
+/// What speaks against walls of that stiffness on a device, a sentence with the remedy each: more
+/// than its nominal one, or than 2 b / (T + 2 t_d), above which a handle that nobody holds may
+/// swing. Empty for a device without motors, a simulated one, and where the figures are unknown.
+/// @param stiffness  [N/m] that the hand feels  @param rate  [Hz] of the ticks
+std::vector<std::string> stiffness_warnings(const DeviceInfo& device, double stiffness,
+                                            double rate);
+
+}  // namespace palpate

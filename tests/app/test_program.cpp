@@ -17,6 +17,7 @@
 
 #include "tests/app/program.hpp"
 #include "tests/support/depth_pngs.hpp"
+#include "tests/support/environment.hpp"
 
 namespace palpate {
 namespace {
@@ -560,6 +561,7 @@ TEST_F(Program, FailsWithOneWhenAReplayDiffers) {
 }
 
 TEST_F(Program, LooksAtTheMachineAndSaysWhatToDo) {
+  const test::NoVendorsUnderASanitizer ours_alone;
   const Outcome outcome = run("doctor --json --seconds 0.2");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto report = nlohmann::json::parse(outcome.out);

@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "tests/support/sanitized.hpp"
+
 namespace palpate::test {
 
 /// A variable of the environment, for as long as this lives. Only before other threads begin.
@@ -27,6 +29,18 @@ class Environment {
  private:
   std::string name_;
   std::optional<std::string> before_;
+};
+
+/// Under a sanitizer, hides the libraries of cameras that this machine may have: what those leak
+/// would count as ours.
+class NoVendorsUnderASanitizer {
+  Environment openni2_{"PALPATE_OPENNI2", path("PALPATE_OPENNI2")};
+  Environment freenect_{"PALPATE_LIBFREENECT", path("PALPATE_LIBFREENECT")};
+
+  static std::string path(const char* variable) {
+    const char* given = std::getenv(variable);
+    return sanitized ? "/no/such/library" : given == nullptr ? "" : given;
+  }
 };
 
 }  // namespace palpate::test

@@ -53,7 +53,8 @@ afterAll(() => browser.close());
 
 test("shows a scene that moves", async () => {
   const page = await open(["--camera", "synthetic:moving?size=320x240"]);
-  expect(await page.locator("#connection").textContent()).toBe("connected");
+  const connection = page.locator("#connection");
+  await expect.poll(() => connection.textContent(), { timeout: 20_000 }).toBe("connected");
   expect(await page.locator("#camera").textContent()).toContain("synthetic:moving");
   // Cameras, hand and sensor are without noise: what changes in the scene's middle is the slab.
   const clip = { x: 150, y: 200, width: 400, height: 350 };

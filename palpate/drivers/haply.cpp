@@ -38,6 +38,7 @@ constexpr double silence_of_loss = 0.5;  // [s] without an answer: the service i
 constexpr double stale_time = 0.025;     // [s] a state that is older does not count
 constexpr double beat_time = 0.020;      // [s] without a force from the servo: none is sent
 constexpr double idle_wait = 0.005;      // [s] between two messages while no force comes
+constexpr double most_rise = 0.2;        // [N] from message to message
 constexpr double clear_force = 0.05;     // [N] that a device must show to have taken
 constexpr int answers_of_doubt = 30;     // in a row without that force
 constexpr double rest_time = 0.2;        // [s] without a hand after anything went wrong
@@ -360,9 +361,12 @@ class Inverse final : public Device {
     if (forces_.take() != nullptr) written_ = now;
     const bool passes = enabled_.load(std::memory_order_acquire) && now - written_ <= beat_time &&
                         newest_.state.fault == DeviceFault::none;
+    const double before = asked_.norm();
     asked_ = passes ? forces_.taken_last() : Vec3::Zero();
+    // A channel that is late misses the beginning of a force: it must not begin with a step.
+    const double most = std::min(wanted_.max_force, before + most_rise);
     const double size = asked_.norm();
-    if (size > wanted_.max_force) asked_ *= wanted_.max_force / size;
+    if (size > most) asked_ *= most / size;
     return asked_;
   }
 

@@ -341,7 +341,8 @@ TEST_F(HaplyHands, TouchASlopeAndSurviveLostAnswersAndBeingUnplugged) {
   EXPECT_EQ(end(), 0) << test::read(path("stderr"));
   EXPECT_TRUE(reaches([&] { return force() == 0.0; }));
   EXPECT_LE(at(largest), limit + 1e-4);
-  EXPECT_LE(at(largest_first), 0.25);
+  // On a late machine the first that the service hears of a force can be half of it.
+  EXPECT_LE(at(largest_first), 0.75 * limit);
 }
 
 TEST_F(HaplyHands, FindTheFormOfTheCommandThatTheServiceTakes) {

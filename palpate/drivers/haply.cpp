@@ -253,6 +253,7 @@ class Inverse final : public Device {
     newest_.state.fault = rest_fault_ = fault;
     newest_.time = monotonic_now();
     rest_until_ = newest_.time + rest_time;
+    asked_ = Vec3::Zero();
     seen_.put(newest_);
   }
 

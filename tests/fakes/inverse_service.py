@@ -11,6 +11,7 @@ import hashlib
 import json
 import math
 import mmap
+import select
 import socket
 import struct
 import sys
@@ -22,6 +23,7 @@ PLUGGED_IN, CALIBRATED, HANGS, DROPS, VERSION, SAYS_VERSION = range(6)
 # By this
 PORT, FORCE_X, FORCE_Y, FORCE_Z, LARGEST, LARGEST_FIRST, COMMANDS, CONNECTIONS, DROPPED, BEGAN = \
     range(6, 16)
+LATE, BEHIND = 16, 17  # by the test: answers to come late; messages that came before the last's answer
 
 
 class Bench:
@@ -99,9 +101,13 @@ def state_of(bench, whole):
             "verse_grip": [{"device_id": "61548", "state": {"button": True, "hall": 0}}]}
 
 
-def obey(bench, message):
+def obey(bench, message, before):
+    """Takes the forces of a message, which came after one of `before` [N] in its connection: after
+    a service that hung, the last of a connection that is gone may come between those of the next.
+    @return [N] the size of the force
+    """
     key = "vector" if bench[VERSION] >= 3.5 else "values"
-    before = math.hypot(bench[FORCE_X], bench[FORCE_Y], bench[FORCE_Z])
+    size = 0.0
     for device in message.get("inverse3", []):
         force = device.get("commands", {}).get("set_cursor_force", {}).get(key)
         if force is None:
@@ -112,6 +118,7 @@ def obey(bench, message):
         bench[LARGEST] = max(bench[LARGEST], size)
         if before == 0.0:
             bench[LARGEST_FIRST] = max(bench[LARGEST_FIRST], size)
+    return size
 
 
 def serve(connection, bench):
@@ -134,13 +141,19 @@ def serve(connection, bench):
                        b"Connection: Upgrade\r\nSec-WebSocket-Accept: " + accept + b"\r\n\r\n")
     bench[CONNECTIONS] += 1
     send_message(connection, dict(session_id=7, **state_of(bench, True)))
+    force = 0.0
     while True:
         message = receive_message(connection)
         if message is None:
             return
         while bench[HANGS] == 1.0:
             time.sleep(0.001)
-        obey(bench, message)
+        force = obey(bench, message, force)
+        if bench[LATE] >= 1.0:
+            bench[LATE] -= 1
+            time.sleep(0.03)
+        if select.select([connection], [], [], 0.0)[0]:
+            bench[BEHIND] += 1
         if bench[DROPS] >= 1.0:
             bench[DROPS] -= 1
             bench[DROPPED] += 1

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "app/program_methods.hpp"
+#include "app/reach.hpp"
 #include "app/session_arguments.hpp"
 #include "app/signals.hpp"
 #include "app/summary_text.hpp"
@@ -228,16 +229,31 @@ int run_headless(const RunOptions& options, const SessionConfig& config,
   return finish(session, options.json);
 }
 
+// The page's addresses for other machines, and one of them for a phone's camera.
+void print_reach(const ServerConfig& config, const ViewerServer& server) {
+  const std::vector<std::string> addresses = reachable_addresses(config.listen);
+  if (addresses.empty()) {
+    fmt::print(stderr, "palpate: no other machine can reach this one: it has no network address\n");
+    return;
+  }
+  for (const std::string& address : addresses)
+    fmt::print(stderr, "palpate: from another machine or a phone, open {}\n", server.url(address));
+  if (isatty(STDERR_FILENO) == 1)
+    std::fputs(qr_code(server.url(addresses.front())).c_str(), stderr);
+}
+
 void print_links(const ServerConfig& config, const ViewerServer& server) {
   fmt::print(stderr, "palpate: open {} in a browser; Ctrl-C ends the session\n",
              server.operator_url());
   fmt::print(stderr,
              "palpate: that is the operator's link; to look on or to hold the hand, open {}\n",
              server.url());
-  if (!is_loopback(config.listen))
+  if (!is_loopback(config.listen)) {
+    print_reach(config, server);
     fmt::print(stderr,
                "palpate: tokens and pictures travel in clear; palpate run --help says at "
                "--listen how to tunnel\n");
+  }
   if (config.browser && isatty(STDERR_FILENO) == 1) show_in_browser(server.opening_url());
 }
 

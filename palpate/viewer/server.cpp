@@ -309,7 +309,7 @@ class ViewerServer::Impl final : public Hub {
     const std::string host_name = address.is_unspecified() ? asio::ip::host_name()
                                   : address.is_v6()        ? "[" + address.to_string() + "]"
                                                            : address.to_string();
-    url_ = "http://" + host_name + ":" + std::to_string(port()) + "/";
+    url_ = base_url(host_name);
     accept();
     wait();
     thread_ = std::thread([this] { context_.run(); });
@@ -323,7 +323,10 @@ class ViewerServer::Impl final : public Hub {
   Impl& operator=(const Impl&) = delete;
 
   [[nodiscard]] std::uint16_t port() const { return port_; }
-  [[nodiscard]] std::string url() const { return token_.empty() ? url_ : link(token_); }
+  [[nodiscard]] std::string url(const std::string& host) const {
+    const std::string base = host.empty() ? url_ : base_url(host);
+    return token_.empty() ? base : base + "?token=" + token_;
+  }
   [[nodiscard]] std::string operator_url() const { return link(operator_token_); }
   [[nodiscard]] std::string opening_url() const { return link(opening_token_); }
   [[nodiscard]] std::size_t viewers() const { return viewers_.load(); }
@@ -434,6 +437,10 @@ class ViewerServer::Impl final : public Hub {
     if (!std::all_of(token.begin(), token.end(), well_formed) || token.size() > longest_token)
       throw Error(option, "it has other characters than letters, digits, - and _, or over 128",
                   "give a simpler one");
+  }
+
+  [[nodiscard]] std::string base_url(const std::string& host) const {
+    return "http://" + host + ":" + std::to_string(port()) + "/";
   }
 
   [[nodiscard]] std::string link(const std::string& token) const {
@@ -747,8 +754,8 @@ ViewerServer::~ViewerServer() = default;
 std::uint16_t ViewerServer::port() const {
   return impl_->port();
 }
-std::string ViewerServer::url() const {
-  return impl_->url();
+std::string ViewerServer::url(const std::string& host) const {
+  return impl_->url(host);
 }
 std::string ViewerServer::operator_url() const {
   return impl_->operator_url();

@@ -62,7 +62,8 @@ class ViewerServer {
 
   [[nodiscard]] std::uint16_t port() const;
   /// Where a browser finds the page, with the token: to look, and to hold the hand.
-  [[nodiscard]] std::string url() const;
+  /// @param host  by which it is found, an address or a name; empty: what it listens on
+  [[nodiscard]] std::string url(const std::string& host = {}) const;
   /// The same for the operator.
   [[nodiscard]] std::string operator_url() const;
   /// The operator's page, once and within a minute: for a command line, which others may see.

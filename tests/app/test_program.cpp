@@ -10,10 +10,13 @@
 #include <string>
 #include <vector>
 
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include "app/reach.hpp"
 
 #include "tests/app/program.hpp"
 #include "tests/support/depth_pngs.hpp"
@@ -259,6 +262,64 @@ TEST_F(Program, MakesATokenForOtherMachines) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("/?token="), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.err.find("in clear"), std::string::npos) << outcome.err;
+}
+
+TEST_F(Program, PrintsTheAddressesThatOthersReach) {
+  const std::vector<std::string> addresses = app::reachable_addresses("0.0.0.0");
+  const Outcome outcome =
+      run("run --duration 0.2 --port 0 --no-browser --listen 0.0.0.0 --token for-the-phones "
+          "--camera synthetic:plane?size=160x120");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  for (const std::string& address : addresses) {
+    in_addr number{};
+    ASSERT_EQ(inet_pton(AF_INET, address.c_str(), &number), 1) << address;
+    EXPECT_NE(ntohl(number.s_addr) >> 24U, 127U) << address;
+    const std::string said = "or a phone, open http://" + address + ":";
+    EXPECT_NE(outcome.err.find(said), std::string::npos) << outcome.err;
+  }
+  EXPECT_EQ(addresses.empty(), outcome.err.find("no network address") != std::string::npos);
+  EXPECT_EQ(outcome.err.find("\x1b["), std::string::npos) << "a code where no terminal is";
+  EXPECT_EQ(app::reachable_addresses("::1"), std::vector<std::string>{"[::1]"});
+}
+
+// The modules of a code that was drawn, true where it is dark.
+std::vector<std::vector<bool>> modules_of(const std::string& drawn) {
+  std::vector<std::vector<bool>> modules;
+  std::istringstream lines(drawn);
+  for (std::string line; std::getline(lines, line);) {
+    line = line.substr(8, line.size() - 12);  // without the colours
+    std::vector<bool> upper;
+    std::vector<bool> lower;
+    while (!line.empty()) {
+      const std::string character = line.substr(0, line[0] == ' ' ? 1 : 3);
+      upper.push_back(character == " " || character == "▄");
+      lower.push_back(character == " " || character == "▀");
+      line.erase(0, character.size());
+    }
+    modules.push_back(upper);
+    modules.push_back(lower);
+  }
+  return modules;
+}
+
+TEST(QrCode, HasItsQuietZoneAndItsFinderPatterns) {
+  const auto modules = modules_of(app::qr_code("http://192.168.1.20:8642/?token=0123456789abcdef"));
+  const std::size_t size = modules[0].size();
+  ASSERT_EQ(size % 4, (4 * 4 + 1 + 2 * 4) % 4) << "a code has 4 V + 17 modules a side";
+  ASSERT_EQ(modules.size(), size + 1) << "two modules a line, of an odd number";
+  for (std::size_t i = 0; i < size; ++i) {
+    EXPECT_FALSE(modules[3][i] || modules[size - 4][i] || modules[i][3] || modules[i][size - 4]);
+  }
+  const std::size_t far = size - 4 - 7;
+  for (const auto& [top, left] : {std::pair{4UL, 4UL}, {4UL, far}, {far, 4UL}}) {
+    for (std::size_t i = 0; i < 7; ++i) {
+      for (std::size_t j = 0; j < 7; ++j) {
+        const std::size_t ring = std::min({i, j, 6 - i, 6 - j});
+        EXPECT_EQ(modules[top + i][left + j], ring != 1) << top << ' ' << left;
+      }
+    }
+  }
+  EXPECT_EQ(app::qr_code(std::string(5000, 'x')), "");
 }
 
 TEST_F(Program, PrintsTheOperatorsLinkAndTheViewers) {

@@ -310,6 +310,20 @@ class Camera final : public LiveCamera {
       info_.frame_rate = best->rate;
     else if (is_asked)
       throw Error(info_.uri, "it refuses that size and rate: " + api_.said(), "leave them out");
+    horizontal_view_ = field_of_view(horizontal_fov);
+    vertical_view_ = field_of_view(vertical_fov);
+  }
+
+  // [rad] Asked before anything runs: OpenNI2's own Dummy has none, and crashes when it is closed
+  // soon after it ran.
+  [[nodiscard]] double field_of_view(int which) const {
+    float angle = 0.0F;  // [rad]
+    int size = sizeof angle;
+    if (api_.stream_get_property(depth_.get(), which, &angle, &size) != ok ||
+        !(angle > 0.01F && angle < 3.1F))
+      throw Error(info_.uri, "it does not say its field of view",
+                  "record it with its own tools and give the images with depth:");
+    return angle;
   }
 
   void open_colour() {
@@ -363,16 +377,6 @@ class Camera final : public LiveCamera {
     throw Error(info_.uri, "it is not plugged in any more", "plug it in again");
   }
 
-  double fov(int which) const {
-    float angle = 0.0F;  // [rad]
-    int size = sizeof angle;
-    if (api_.stream_get_property(depth_.get(), which, &angle, &size) != ok ||
-        !(angle > 0.01F && angle < 3.1F))
-      throw Error(info_.uri, "it does not say its field of view",
-                  "record it with its own tools and give the images with depth:");
-    return angle;
-  }
-
   Frame depth_of(const ImageFrame& image) {
     double units = 0.0;  // [1/m]
     if (image.mode.format == format_1_mm) units = 1000.0;
@@ -386,8 +390,8 @@ class Camera final : public LiveCamera {
     if (!rays_ || shape != shape_) {
       // As OpenNI2 itself makes points of depth: the axis is at w / 2.
       const VideoMode& mode = image.mode;
-      const double fx = 0.5 * mode.width / std::tan(0.5 * fov(horizontal_fov));
-      const double fy = 0.5 * mode.height / std::tan(0.5 * fov(vertical_fov));
+      const double fx = 0.5 * mode.width / std::tan(0.5 * horizontal_view_);
+      const double fy = 0.5 * mode.height / std::tan(0.5 * vertical_view_);
       const bool is_cropped = image.is_cropped != 0;
       rays_ = std::make_shared<const ViewingRays>(
           Intrinsics{.width = image.width,
@@ -431,8 +435,9 @@ class Camera final : public LiveCamera {
   OwnedStream depth_, colour_;
   std::string address_;
   bool is_listed_ = false;
-  double last_frame_ = monotonic_now();  // [s] when it came
-  std::array<int, 4> shape_{};           // of the image that rays_ are for
+  double horizontal_view_ = 0.0, vertical_view_ = 0.0;  // [rad]
+  double last_frame_ = monotonic_now();                 // [s] when it came
+  std::array<int, 4> shape_{};                          // of the image that rays_ are for
   std::shared_ptr<const ViewingRays> rays_;
   std::shared_ptr<const ColourImage> seen_;
 };
@@ -445,7 +450,7 @@ namespace palpate {
 Driver openni2_driver() {
   return {.name = "openni2",
           .summary = "openni2:SERIAL|FILE.oni, a Kinect v1, Xtion, Carmine or Astra by OpenNI2",
-          .tried = "a fake library alone",
+          .tried = "the library itself with a camera of the tests' own",
           .usb = {"1d27", "2bc5", "045e:02ae"},
           .open_camera = [](const Uri& uri) -> std::unique_ptr<Source> {
             return std::make_unique<openni2::Camera>(uri);

@@ -2,6 +2,7 @@
 // Each camera's adapter end to end: the program, a fake of the vendor's library, a simulated hand.
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -60,9 +61,11 @@ class CameraProgram : public ::testing::Test {
     for (const std::string& word : words)
       EXPECT_NE(outcome.err.find(word), std::string::npos) << word << " is not in " << outcome.err;
   }
-  // Contact with the wall and, half-way through, an unplugged camera that comes back.
-  void touches_and_survives(const std::string& before, const std::string& camera) const {
-    const Json json = session(before + " FAKE_CAMERA='unplug_after=20 back_after=1'", camera);
+  // Contact with the wall and, after some frames, an unplugged camera that comes back.
+  void touches_and_survives(const std::string& before, const std::string& camera,
+                            int frames = 20) const {
+    const Json json = session(
+        before + " FAKE_CAMERA='back_after=1 unplug_after=" + std::to_string(frames) + "'", camera);
     ASSERT_TRUE(json.contains("cameras")) << json;
     EXPECT_GT(json["contact_ticks"], 100) << json;
     EXPECT_GT(json["max_force_asked"], 0.3) << json;
@@ -91,6 +94,16 @@ TEST_F(CameraProgram, TouchesWhatOpenNi2Sees) {
   touches_and_survives(library, "openni2:");
   expect_refusal(library, "openni2:77", {"openni2:77", "cannot open", "KINECT-1"});
   expect_refusal("PALPATE_OPENNI2=/nowhere", "openni2:", {"OpenNI2", "not there", "libopenni2-0"});
+}
+
+// The runtime that Debian ships, with a camera of the tests' own.
+TEST_F(CameraProgram, TouchesWhatTheStockOpenNi2Sees) {
+  const std::string folder = PALPATE_FAKES "/openni2-stock";
+  if (!std::filesystem::exists(folder + "/OpenNI2/Drivers/libVirtual.so.0"))
+    GTEST_SKIP() << "it needs the package libopenni2-dev";
+  const std::string library = "PALPATE_OPENNI2=" + folder;
+  touches_and_survives(library, "openni2:", 45);  // it takes longer to begin anew
+  expect_refusal(library, "openni2:Dummy", {"openni2:Dummy", "field of view"});
 }
 
 TEST_F(CameraProgram, TouchesWhatAKinectSeesByLibfreenect) {

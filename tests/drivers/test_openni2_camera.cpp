@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -9,6 +13,7 @@
 #include "tests/drivers/fake_camera_test.hpp"
 #include "tests/support/environment.hpp"
 #include "tests/support/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
 namespace {
@@ -95,7 +100,7 @@ TEST_F(OpenNi2, ThatCannotBeUsedSaysWhatToDoInOneLine) {
   does("no_drivers");
   EXPECT_TRUE(fails_saying(opening("openni2:"), "Found no valid drivers", "libopenni2-0"));
   does("fast no_view");
-  EXPECT_TRUE(fails_saying([&] { return open("openni2:")->next(1.0); }, "field of view"));
+  EXPECT_TRUE(fails_saying(opening("openni2:"), "field of view"));
   does("fast short_frames");
   EXPECT_TRUE(fails_saying([&] { return open("openni2:")->next(1.0); }, "shorter than they say"));
   const test::Environment none("PALPATE_OPENNI2", "/nowhere/libOpenNI2.so.0");
@@ -113,6 +118,85 @@ TEST_F(OpenNi2, IsReported) {
   does("denied");
   EXPECT_NE(look().found.at(0).note.find("udev"), std::string::npos);
   EXPECT_EQ(live_objects(), 0);
+}
+
+// The stock runtime, with a camera of the tests' own.
+class StockOpenNi2 : public test::FakeCameraTest {
+ protected:
+  StockOpenNi2()
+      : FakeCameraTest(openni2_driver(), "PALPATE_OPENNI2", "openni2-stock/libOpenNI2.so.0") {}
+  void SetUp() override {
+    if (!std::filesystem::exists(PALPATE_FAKES "/openni2-stock/OpenNI2/Drivers/libVirtual.so.0"))
+      GTEST_SKIP() << "it needs the package libopenni2-dev";
+    does("fps=200");
+  }
+
+  static void expect_the_wall(const Frame& frame) {
+    const DepthImage& image = image_of(frame);
+    EXPECT_EQ(image.intrinsics().width, 96);
+    EXPECT_NEAR(image.intrinsics().fx, 115.2, 1e-4);
+    EXPECT_FALSE(image.deproject(0, 5)) << "the column of holes is at the left";
+    EXPECT_NEAR(image.deproject(95, 71)->z(), 0.6, 2.1e-3);
+  }
+};
+
+TEST_F(StockOpenNi2, GivesDepthUnmirroredAndIsThereAgainWhenPluggedIn) {
+  const DriverReport report = look();
+  ASSERT_EQ(report.found.size(), 1U);
+  EXPECT_EQ(report.found[0].serial, "VIRTUAL-1");
+  EXPECT_EQ(report.found[0].rate, 200.0);
+  does("fps=200 unplug_after=3 back_after=1");
+  {
+    const auto source = open("openni2:VIRTUAL-1");
+    EXPECT_EQ(source->info().kind, "Tests Wall");
+    const auto lasts = [&] {
+      for (int i = 0; i < 10; ++i) {
+        if (const auto frame = source->next(2.0)) expect_the_wall(*frame);
+      }
+      return 0;
+    };
+    EXPECT_TRUE(test::fails_saying(lasts, "not plugged in any more"));
+  }
+  EXPECT_TRUE(fails_saying(opening("openni2:"), "OpenNI2 sees no camera"));
+  EXPECT_TRUE(open("openni2:")->next(2.0));
+}
+
+TEST_F(StockOpenNi2, PlaysWhatItsRecorderRecordedUnchanged) {
+  const test::TemporaryFolder folder;
+  const std::string file = (folder.path() / "wall.oni").string();
+  std::vector<std::vector<std::uint16_t>> recorded;
+  {
+    using Handle = void*;
+    const auto camera = open("openni2:");  // keeps the runtime alive
+    Handle device = nullptr;
+    Handle stream = nullptr;
+    Handle recorder = nullptr;
+    const char* first = nullptr;
+    ASSERT_EQ((ask<int, const char*, Handle*>("oniDeviceOpen", first, &device)), 0);
+    ASSERT_EQ((ask<int, Handle, int, Handle*>("oniDeviceCreateStream", device, 3, &stream)), 0);
+    ASSERT_EQ((ask<int, const char*, Handle*>("oniCreateRecorder", file.c_str(), &recorder)), 0);
+    ASSERT_EQ((ask<int, Handle, Handle, int>("oniRecorderAttachStream", recorder, stream, 0)), 0);
+    ASSERT_EQ(ask<int>("oniRecorderStart", recorder), 0);
+    ASSERT_EQ(ask<int>("oniStreamStart", stream), 0);
+    for (int i = 0; i < 6; ++i) recorded.push_back(image_of(*camera->next(2.0)).depth());
+    EXPECT_EQ(ask<int>("oniRecorderDestroy", &recorder), 0);
+    ask<void>("oniStreamStop", stream);
+    ask<void>("oniStreamDestroy", stream);
+    EXPECT_EQ(ask<int>("oniDeviceClose", device), 0);
+  }
+  const auto played = open("openni2:" + file);
+  for (int i = 0; i < 3; ++i) {
+    const auto frame = played->next(2.0);
+    ASSERT_TRUE(frame);
+    expect_the_wall(*frame);
+    EXPECT_NE(std::find(recorded.begin(), recorded.end(), image_of(*frame).depth()),
+              recorded.end());
+  }
+}
+
+// Its thread uses the stream for up to 33 ms after that was destroyed: it must not begin.
+TEST_F(StockOpenNi2, RefusesItsOwnDummyRatherThanCrashWithIt) {
+  EXPECT_TRUE(fails_saying(opening("openni2:Dummy"), "field of view"));
 }
 
 }  // namespace

@@ -646,8 +646,9 @@ void CameraFeed::Worker::deliver(FedFrame fed) {
     if (fed.is_new) {
       ++status_.frames;
       if (std::isfinite(interval) && interval > 0.0) {
-        const double rate = 1.0 / interval;
-        status_.rate += (status_.rate > 0.0 ? rate_weight : 1.0) * (rate - status_.rate);
+        // The mean of intervals: two frames that come at once would rule a mean of rates.
+        const double mean = status_.rate > 0.0 ? 1.0 / status_.rate : interval;
+        status_.rate = 1.0 / (mean + rate_weight * (interval - mean));
       }
     }
     status_.last_frame = fed.frame.stamp;

@@ -194,6 +194,18 @@ TEST(CameraFeed, PlaysARecordingAtItsPaceWithOneOffsetAPass) {
   EXPECT_EQ(run.opened.size(), 2U);
 }
 
+TEST(CameraFeed, KeepsItsRateWhenTwoFramesComeAtOnce) {
+  Playing run;
+  std::vector<Step> steps = frames(30, 7.0);
+  Step twin = steps.back();
+  twin.at += 1e-5;
+  twin.stamp += 1e-5;
+  steps.push_back(twin);
+  const CameraStatus status = run.until(1.0, run.source(steps, live));
+  EXPECT_EQ(status.frames, 31U);
+  EXPECT_NEAR(status.rate, 30.0, 4.0);
+}
+
 TEST(CameraFeed, PausesARecordingAndGoesOnAtAnotherSpeed) {
   Playing run;
   double resumed = 0.0;  // [s]

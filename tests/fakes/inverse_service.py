@@ -23,6 +23,7 @@ PLUGGED_IN, CALIBRATED, HANGS, DROPS, VERSION, SAYS_VERSION = range(6)
 # By this
 PORT, FORCE_X, FORCE_Y, FORCE_Z, LARGEST, LARGEST_FIRST, COMMANDS, CONNECTIONS, DROPPED, BEGAN = \
     range(6, 16)
+FELL, HEARD, LONGEST_GAP = 18, 19, 20  # [s] when a force ended, the newest message, between two
 LATE, BEHIND = 16, 17  # by the test: answers to come late; messages that came before the last's answer
 
 
@@ -115,6 +116,12 @@ def obey(bench, message, before):
         size = math.hypot(force["x"], force["y"], force["z"])
         bench[FORCE_X], bench[FORCE_Y], bench[FORCE_Z] = force["x"], force["y"], force["z"]
         bench[COMMANDS] += 1
+        now = time.monotonic()
+        if bench[HEARD] > 0.0:
+            bench[LONGEST_GAP] = max(bench[LONGEST_GAP], now - bench[HEARD])
+        bench[HEARD] = now
+        if before > 0.0 and size == 0.0:
+            bench[FELL] = now
         bench[LARGEST] = max(bench[LARGEST], size)
         if before == 0.0:
             bench[LARGEST_FIRST] = max(bench[LARGEST_FIRST], size)

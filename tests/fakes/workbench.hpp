@@ -43,7 +43,9 @@ struct Workbench {
   std::atomic<double> largest{0.0};            ///< [N] so far
   std::atomic<double> largest_first{0.0};      ///< [N] of forces that came after none
   std::atomic<int> opens{0}, commands{0}, calibrations{0}, closes{0};
-  std::atomic<double> began{0.0};  ///< [s] when the device was first read
+  std::atomic<double> fell{0.0};         ///< [s] when a force ended last, by the computer's word
+  std::atomic<double> longest_gap{0.0};  ///< [s] between commands since the test set it to 0
+  std::atomic<double> began{0.0};        ///< [s] when the device was first read
 
   /// [N] what the motors give: the firmware lets go when no command came for its watchdog's time.
   [[nodiscard]] double motor_force(double now) const {
@@ -58,11 +60,13 @@ struct Workbench {
     force[0] = x;
     force[1] = y;
     force[2] = z;
+    if (commanded > 0.0) longest_gap = std::fmax(longest_gap, now - commanded);
     commanded = now;
     ++commands;
     const double size = motor_force(now);
     largest = std::fmax(largest, size);
     if (before == 0.0) largest_first = std::fmax(largest_first, size);
+    if (before > 0.0 && size == 0.0) fell = now;
   }
 
   /// [m] x to the right, y away, z up: up to 14 mm above z = 0 and down to 6 mm below it, once a

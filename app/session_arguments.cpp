@@ -54,6 +54,9 @@ void SessionArguments::add_to(CLI::App& command) {
                      "where the device lies in the scene: x,y,z,qx,qy,qz,qw [m], or the TOML file "
                      "that palpate calibrate wrote");
   command.add_option("--scale", scale_, "scene metres per device metre (1)");
+  command.add_option("--bubble", bubble_,
+                     "metres from the middle of the device's workspace beyond which the hand sends "
+                     "the HIP on (rate control), to reach what the device does not; 0: none (0)");
   command.add_option("--clutch-button", clutch_button_,
                      "while this button of the device is pressed the HIP stays: 0 to 31");
   command
@@ -101,6 +104,7 @@ SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
   SessionConfig config = method_.session(methods);
   if (!cameras_.empty()) config.cameras = chosen(cameras_, config.cameras);
   if (device_) config.device = *device_;
+  if (bubble_) config.placement.bubble_radius = *bubble_;
   apply_placement(device_pose_, scale_, clutch_button_, config.placement);
   for (const std::string& limit : limits_) {
     const auto [name, value] = parse_assignment("--limit", limit);

@@ -230,9 +230,14 @@ std::string to_json(const NumberedSettings& settings) {
   for (const SafetyParameterInfo& row : safety_parameter_table())
     safety[row.name] = row.get(all.safety);
   for (int i = 0; i < 12; ++i) pose.push_back(all.placement.world_from_device(i / 4, i % 4));
-  json object = {{"number", settings.number}, {"method", all.method},
-                 {"parameters", parameters},  {"safety", safety},
-                 {"world_from_device", pose}, {"workspace_scale", all.placement.workspace_scale},
+  json object = {{"number", settings.number},
+                 {"method", all.method},
+                 {"parameters", parameters},
+                 {"safety", safety},
+                 {"world_from_device", pose},
+                 {"workspace_scale", all.placement.workspace_scale},
+                 {"bubble_radius", all.placement.bubble_radius},
+                 {"bubble_speed", all.placement.bubble_speed},
                  {"scene", all.scene}};
   if (all.placement.clutch_button) object["clutch_button"] = *all.placement.clutch_button;
   return object.dump();
@@ -263,6 +268,8 @@ NumberedSettings settings_from_json(const std::string& text, const std::string& 
     all.placement.workspace_scale = object.at("workspace_scale").get<double>();
     if (object.contains("clutch_button"))
       all.placement.clutch_button = whole_of<int>(object.at("clutch_button"), name);
+    all.placement.bubble_radius = object.value("bubble_radius", all.placement.bubble_radius);
+    all.placement.bubble_speed = object.value("bubble_speed", all.placement.bubble_speed);
     if (object.contains("scene")) all.scene = whole_of<std::uint64_t>(object.at("scene"), name);
     validate(all);
     return settings;

@@ -200,7 +200,7 @@ void Cycle::run(const Wake& wake) noexcept {
     method_->frame(*in_use.cloud, in_use.stamp);
   }
 
-  const Vec3 hip = workspace_.hip_in_world(hand);
+  const Vec3 hip = workspace_.hip_in_world(hand, t);
   bool reseated = false;
   // Where the hand is in the scene has changed at once, or the scene has: the hand is disengaged,
   // and the proxy starts anew on the free side.
@@ -213,6 +213,7 @@ void Cycle::run(const Wake& wake) noexcept {
   const Tick tick = method_->tick(hip, t);
   last_proxy_ = tick.proxy;
   last_normal_ = tick.normal;
+  workspace_.feel(tick.force);
 
   const Freshness::Age age = freshness_.at(t);
   const SafetyOutput safe =

@@ -62,6 +62,15 @@ constexpr std::array placement_rows{
                   angle<1>, set_angle<1>},
     PlacementInfo{"yaw", "", "rad", 0.0, -pi, pi, "then about the world's z axis", "", angle<2>,
                   set_angle<2>},
+    PlacementInfo{"bubble_radius", "", "m", 0.0, 0.0, 1.0,
+                  "a hand that is farther from the middle of its device sends the HIP on (rate "
+                  "control); 0: none",
+                  "Dominjon et al. 2005", [](const Placement& p) { return p.bubble_radius; },
+                  [](Placement& p, double v) { p.bubble_radius = v; }},
+    PlacementInfo{"bubble_speed", "", "m/s", 0.1, 0.001, 1.0,
+                  "of the HIP in the scene, when the hand is 2 cm beyond the bubble or farther", "",
+                  [](const Placement& p) { return p.bubble_speed; },
+                  [](Placement& p, double v) { p.bubble_speed = v; }},
 };
 
 }  // namespace

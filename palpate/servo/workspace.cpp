@@ -18,6 +18,12 @@ void validate(const Placement& placement) {
     throw Error("clutch_button", std::to_string(*placement.clutch_button) + " is out of range",
                 "give a button from 0 to 31");
   }
+  if (!(placement.bubble_radius >= 0.0 && placement.bubble_radius <= 1.0))
+    throw Error("bubble_radius", std::to_string(placement.bubble_radius) + " is out of range",
+                "give metres of the device, from 0 (no bubble) to 1");
+  if (!(placement.bubble_speed >= 1e-3 && placement.bubble_speed <= 1.0))
+    throw Error("bubble_speed", std::to_string(placement.bubble_speed) + " is out of range",
+                "give metres a second in the scene, from 0.001 to 1");
 }
 
 }  // namespace palpate

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -19,18 +21,32 @@ struct Placement {
   /// Button of the device that clutches while it is pressed, 0 to 31; none: only the device's own
   /// clutch does.
   std::optional<int> clutch_button = {};
+  /// [m, device] Radius of the bubble about the middle of the device's workspace: a hand within it
+  /// leads the HIP, one beyond its rim sends the HIP on as well (rate control); 0: no bubble.
+  double bubble_radius = 0.0;
+  /// [m/s, scene] How fast the HIP goes on at most, from `bubble_rim` beyond the radius on.
+  double bubble_speed = 0.1;
 
   bool operator==(const Placement& other) const {
     return world_from_device.matrix() == other.world_from_device.matrix() &&
-           workspace_scale == other.workspace_scale && clutch_button == other.clutch_button;
+           workspace_scale == other.workspace_scale && clutch_button == other.clutch_button &&
+           bubble_radius == other.bubble_radius && bubble_speed == other.bubble_speed;
   }
 };
 
-/// @throws Error if the pose is not rigid and finite, the scale is not in 0.001 to 1000 or the
-///         button not in 0 to 31.
+/// [m, device] Beyond a bubble's radius the speed grows with the square of the distance over this
+/// length: a fifth to a quarter of what a Touch or an omega reaches.
+constexpr double bubble_rim = 0.02;
+
+/// @throws Error if the pose is not rigid and finite, the scale is not in 0.001 to 1000, the button
+///         not in 0 to 31, the bubble's radius not in 0 to 1 m or its speed not in 0.001 to 1 m/s.
 void validate(const Placement& placement);
 
-/// Brings hands into the world and forces back, and remembers what the clutch has shifted. [servo]
+/// Brings hands into the world and forces back, and remembers what clutch and bubble have shifted.
+///
+/// The bubble is that of Dominjon et al. 2005, but for its wall, which one feels there. Its rate
+/// control moves the HIP without a step in place or speed, and never into the surface that it
+/// touches: the force is as continuous as the hand. [servo]
 class Workspace {
  public:
   explicit Workspace(const Placement& placement = {}) : placement_(placement) {}
@@ -40,13 +56,17 @@ class Workspace {
 
   /// The HIP [m, world]. While the hand is clutched the HIP stays, and goes on from there after.
   /// A position that is not finite, or absurd, gives a HIP that is not finite and leaves no trace.
-  Vec3 hip_in_world(const HandState& hand) noexcept {
+  /// @param t  [s] now, on the loop's clock
+  Vec3 hip_in_world(const HandState& hand, double t) noexcept {
     constexpr double farthest = 1e6;  // [m]
     if (!(hand.position.cwiseAbs().maxCoeff() <= farthest && hand.position.allFinite()))
       return Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+    constexpr double longest_step = 0.005;  // [s] after a stall
+    const double dt = std::clamp(t - std::exchange(last_t_, t), 0.0, longest_step);
     if (hand.clutched) {
       shift_ = held_ - hand.position;
     } else {
+      shift_ += dt * velocity_beyond_the_rim(hand);
       held_ = hand.position + shift_;
     }
     return placement_.world_from_device * Vec3(placement_.workspace_scale * held_);
@@ -62,17 +82,45 @@ class Workspace {
     return placement_.world_from_device.linear().transpose() * force_in_world;
   }
 
+  /// Tells which way the surface pushes: the method's force, zero where there is none.
+  void feel(const Vec3& force_in_world) noexcept {
+    const double size = force_in_world.norm();
+    push_ = size > 0.0 && size < std::numeric_limits<double>::max()
+                ? force_in_device(Vec3(force_in_world / size))
+                : Vec3(Vec3::Zero());
+  }
+
   /// Walks over all that is remembered from tick to tick; see CycleState.
   template <class Way, class Self>
   static void walk(Way& way, Self& self) {
     way("shift", self.shift_);
     way("held", self.held_);
+    way("push", self.push_);
+    way("last_t", self.last_t_);
   }
 
  private:
+  // [m/s, device] of the HIP by itself.
+  [[nodiscard]] Vec3 velocity_beyond_the_rim(const HandState& hand) const noexcept {
+    constexpr double farthest = 10.0;  // [m, scene] no camera sees farther
+    const double distance = hand.position.norm();
+    const double beyond = distance - placement_.bubble_radius;
+    if (placement_.bubble_radius == 0.0 || !(beyond > 0.0) || !hand.present ||
+        hand.fault != DeviceFault::none)
+      return Vec3::Zero();
+    const double share = std::min(beyond / bubble_rim, 1.0);
+    const double speed = share * share * placement_.bubble_speed / placement_.workspace_scale;
+    Vec3 velocity = speed / distance * hand.position;
+    velocity -= std::min(velocity.dot(push_), 0.0) * push_;
+    const bool leaves = placement_.workspace_scale * held_.norm() > farthest;
+    return leaves && velocity.dot(held_) > 0.0 ? Vec3(Vec3::Zero()) : velocity;
+  }
+
   Placement placement_;
-  Vec3 shift_ = Vec3::Zero();  // [m, device] what clutching has added to the hand's position
+  Vec3 shift_ = Vec3::Zero();  // [m, device] what clutch and bubble have added to the position
   Vec3 held_ = Vec3::Zero();   // [m, device] the position that counts
+  Vec3 push_ = Vec3::Zero();   // [-] device: which way a surface pushes, of length 1 or 0
+  double last_t_ = 0.0;        // [s]
 };
 
 }  // namespace palpate

@@ -189,13 +189,16 @@ void read_rows(const Table& root, std::string_view key, const Rows& rows, Values
 void read_placement(const Table& root, Placement& placement) {
   const toml::table* sub = root.sub("placement");
   if (sub == nullptr) return;
-  constexpr std::array<std::string_view, 3> keys{"world_from_device", "scale", "clutch_button"};
+  constexpr std::array<std::string_view, 5> keys{"world_from_device", "scale", "clutch_button",
+                                                 "bubble_radius", "bubble_speed"};
   const Table table(*sub, root.file(), "[placement]", keys);
   if (const auto pose = table.pose("world_from_device")) placement.world_from_device = *pose;
   table.read("scale", placement.workspace_scale, 1e-3, 1e3, "scene m per device m");
   double button = -1.0;
   table.read("clutch_button", button, 0.0, 31.0, "", true);
   if (button >= 0.0) placement.clutch_button = static_cast<int>(button);
+  table.read("bubble_radius", placement.bubble_radius, 0.0, 1.0, "m, device");
+  table.read("bubble_speed", placement.bubble_speed, 1e-3, 1.0, "m/s, scene");
 }
 
 void read_operator_limits(const Table& root, std::map<std::string, double>& limits) {
@@ -412,6 +415,10 @@ std::string to_toml(const SessionConfig& config) {
               ? key_line("clutch_button", std::to_string(*config.placement.clutch_button),
                          "0 to 31: the HIP stays while it is pressed")
               : key_line("# clutch_button", "0", "0 to 31: the HIP stays while it is pressed");
+  text += key_line("bubble_radius", toml_number(config.placement.bubble_radius),
+                   "m of the device, 0 to 1: rate control beyond it; 0: none");
+  text += key_line("bubble_speed", toml_number(config.placement.bubble_speed),
+                   "m/s in the scene, 0.001 to 1: 2 cm beyond the bubble");
   text += "\n[parameters]\n";
   for (const ParameterInfo& row : parameter_table()) {
     // r_c is derived from the radii below it: setting it scales them.

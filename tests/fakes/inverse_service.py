@@ -24,7 +24,7 @@ PLUGGED_IN, CALIBRATED, HANGS, DROPS, VERSION, SAYS_VERSION = range(6)
 PORT, FORCE_X, FORCE_Y, FORCE_Z, LARGEST, LARGEST_FIRST, COMMANDS, CONNECTIONS, DROPPED, BEGAN = \
     range(6, 16)
 FELL, HEARD, LONGEST_GAP = 18, 19, 20  # [s] when a force ended, the newest message, between two
-LATE, BEHIND = 16, 17  # by the test: answers to come late; messages that came before the last's answer
+LATE, BEHIND = 16, 17  # by the test: answers to come late; messages before the last one's answer
 
 
 class Bench:

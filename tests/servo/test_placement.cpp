@@ -23,7 +23,9 @@ TEST(PlacementTable, GivesBackWhatWasSetAndLeavesTheRestAlone) {
   set_placement(placement, "origin_y", -0.25);
   set_placement(placement, "scale", 3.0);
   validate(placement);
-  const double expected[] = {3.0, 0.0, -0.25, 0.0, 0.3, -0.4, 1.2};
+  set_placement(placement, "bubble_radius", 0.06);
+  set_placement(placement, "bubble_speed", 0.3);
+  const double expected[] = {3.0, 0.0, -0.25, 0.0, 0.3, -0.4, 1.2, 0.06, 0.3};
   std::size_t i = 0;
   for (const PlacementInfo& row : placement_table())
     EXPECT_NEAR(row.get(placement), expected[i++], 1e-12) << row.name;
@@ -77,6 +79,88 @@ TEST(Placement, ThatChangesInContactTakesTheForceOffUntilTheHandEngagesAgain) {
   EXPECT_EQ(run(3000, 500, -0.003), 0.0) << "disengaged while the hand presses";
   run(3500, 500, 0.03);
   EXPECT_NE(record.safety & ramping, 0U) << "free again, it engages";
+}
+
+// A hand goes out along x through the rim and rests there, a quarter of the way into it.
+TEST(Bubble, SendsTheHipOnWithoutAStepInPlaceOrSpeed) {
+  constexpr double dt = 1e-3;
+  const Placement placement{.workspace_scale = 2.0, .bubble_radius = 0.05, .bubble_speed = 0.2};
+  validate(placement);
+  Workspace workspace(placement);
+  HandState hand;
+  double t = 7.0;
+  const auto hip_at = [&](double x) {
+    hand.position = Vec3(x, 0.0, 0.0);
+    return workspace.hip_in_world(hand, t += dt).x();
+  };
+  EXPECT_EQ(hip_at(0.0), 0.0);
+  double last = 0.0;
+  double last_speed = 0.0;
+  for (double x = 0.0; x < 0.06; x += 1e-5) {
+    const double hip = hip_at(x);
+    const double speed = (hip - last) / dt;
+    if (x < 0.05) {
+      EXPECT_NEAR(hip, 2.0 * x, 1e-12) << "the hand leads within the bubble";
+    }
+    if (x > 1e-4) {
+      EXPECT_LT(std::abs(speed - last_speed), 2e-4) << "[m/s] at " << x;
+    }
+    last_speed = speed;
+    last = hip;
+  }
+  // Half the rim: a quarter of the speed.
+  const double before = hip_at(0.06);
+  for (int i = 0; i < 999; ++i) hip_at(0.06);
+  EXPECT_NEAR(hip_at(0.06) - before, 0.05, 1e-9);
+  // Back within the bubble the hand leads again, from where the HIP has come to.
+  const double from = hip_at(0.04);
+  EXPECT_NEAR(hip_at(-0.02) - from, 2.0 * -0.06, 1e-12);
+  // Nobody, a fault and the clutch move nothing; a stall counts as 5 ms at most.
+  hip_at(0.08);
+  hand.present = false;
+  const double left = hip_at(0.08);
+  EXPECT_EQ(hip_at(0.08), left);
+  hand.present = true;
+  t += 10.0;
+  EXPECT_NEAR(hip_at(0.08) - left, 5e-3 * 0.2, 1e-12);
+}
+
+// Sliding over a plane, 3 mm deep by the hand, beyond the rim and back.
+TEST(Bubble, GoesAlongASurfaceWithTheForceThatTheHandGives) {
+  test::FakeDevice device;
+  ServoSettings settings;
+  settings.placement.bubble_radius = 0.02;
+  Cycle cycle(make_method(), device, settings);
+  auto reader = cycle.reader();
+  const auto plane = std::make_shared<PointCloud>(test::flat_grid(), Vec3(0, 0, 1));
+  ServoTick record{};
+  int tick = 0;
+  const auto run = [&](const Vec3& hand) {
+    const double t = 1e-3 * tick;
+    if (tick++ % 33 == 0) cycle.put_frame(plane, t, t);
+    device.hand.position = hand;
+    cycle.run({.t = t});
+    static_cast<void>(reader.try_pop(record));
+    return record.tick.force;
+  };
+  for (int i = 0; i < 2000; ++i) run(Vec3(0, 0, 0.01));
+  for (int i = 0; i < 500; ++i) run(Vec3(0, 0, 0.01 - 2.6e-5 * i));
+  Vec3 last = run(Vec3(0, 0, -0.003));
+  ASSERT_GT(last.z(), 1.0);
+  double largest_step = 0.0;
+  const auto slide = [&](double x) {
+    const Vec3 force = run(Vec3(x, 0, -0.003));
+    largest_step = std::max(largest_step, (force - last).norm());
+    EXPECT_NEAR(force.z(), settings.parameters.coupling.stiffness * 0.003, 0.02)
+        << "the depth is the hand's alone, at " << x;
+    last = force;
+  };
+  for (int i = 0; i <= 400; ++i) slide(1e-4 * i);
+  for (int i = 0; i < 200; ++i) slide(0.04);
+  EXPECT_NEAR(record.tick.proxy.x(), 0.04 + 0.1 * (0.2 + 0.2 / 3.0), 5e-3)
+      << "the HIP went on by itself: 0.2 s at full speed, and a third of that on the way there";
+  for (int i = 400; i >= 0; --i) slide(1e-4 * i);
+  EXPECT_LT(largest_step, 0.1) << "[N] from tick to tick";
 }
 
 }  // namespace

@@ -52,7 +52,8 @@ std::string text_of(const Summary& summary, std::span<const CameraStatus> camera
 }
 
 std::string json_of(const Summary& summary, const std::string& recording,
-                    std::span<const CameraStatus> cameras) {
+                    std::span<const CameraStatus> cameras, const Timing* timing,
+                    const Histogram* hand_over) {
   nlohmann::ordered_json safety;
   for (std::size_t i = 0; i < safety_flag_count; ++i)
     safety[std::string(safety_flag_names()[i])] = summary.safety_ticks[i];
@@ -79,6 +80,17 @@ std::string json_of(const Summary& summary, const std::string& recording,
                                  {"opened_again", camera.opened_again},
                                  {"doubt", camera.doubt},
                                  {"trouble", camera.trouble}});
+  const auto seconds = [](const Histogram& histogram, double share) {
+    return 1e-9 * static_cast<double>(histogram.quantile(share));
+  };
+  if (timing != nullptr)
+    object["servo"] = {{"wake_up_p50_s", seconds(timing->wake_up, 0.5)},
+                       {"wake_up_p99_s", seconds(timing->wake_up, 0.99)},
+                       {"wake_up_p999_s", seconds(timing->wake_up, 0.999)},
+                       {"wake_up_max_s", 1e-9 * static_cast<double>(timing->wake_up.max())}};
+  if (timing != nullptr && hand_over != nullptr)
+    object["servo"].update({{"hand_over_p50_s", seconds(*hand_over, 0.5)},
+                            {"hand_over_p99_s", seconds(*hand_over, 0.99)}});
   if (!recording.empty()) object["recording"] = recording;
   return object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 
+#include "palpate/servo/periodic_thread.hpp"
 #include "palpate/session/camera_feed.hpp"
 #include "palpate/session/summary.hpp"
 
@@ -13,7 +14,10 @@ namespace palpate::app {
 std::string text_of(const Summary& summary, std::span<const CameraStatus> cameras = {});
 /// The same as a JSON object, SI units.
 /// @param recording  how it went; empty: there was none
+/// @param timing     of a loop in real time; null: there was none
+/// @param hand_over  [ns] from a frame's arrival to the tick that used it; null: not known
 std::string json_of(const Summary& summary, const std::string& recording = {},
-                    std::span<const CameraStatus> cameras = {});
+                    std::span<const CameraStatus> cameras = {}, const Timing* timing = nullptr,
+                    const Histogram* hand_over = nullptr);
 
 }  // namespace palpate::app

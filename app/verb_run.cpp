@@ -174,7 +174,8 @@ int finish(Session& session, bool json, const std::string& ended = {}) {
   std::string recording = state.recording.message;
   if (!ended.empty()) recording += (recording.empty() ? "" : "; ") + ended;
   if (!recording.empty()) fmt::print(stderr, "palpate: {}\n", recording);
-  const std::string text = json ? json_of(state.summary, recording, state.cameras)
+  const std::string text = json ? json_of(state.summary, recording, state.cameras, session.timing(),
+                                          &session.statistics().hand_over)
                                 : text_of(state.summary, state.cameras);
   std::fputs(text.c_str(), stdout);
   return state.recording.failed ? 1 : 0;

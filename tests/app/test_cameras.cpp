@@ -74,6 +74,8 @@ class CameraProgram : public ::testing::Test {
     EXPECT_GT(json["cameras"][0]["frames"], 30) << "also after it was plugged in again";
     EXPECT_GE(json["cameras"][0]["opened_again"], 1);
     EXPECT_EQ(json["cameras"][0]["doubt"], "");
+    EXPECT_GT(json["servo"]["wake_up_p50_s"], 0.0) << json;
+    EXPECT_GT(json["servo"]["hand_over_p99_s"], 0.0) << json;
     EXPECT_LT(json["cameras"][0]["dropped"], 10) << json;
   }
 

@@ -57,10 +57,13 @@ bool is_gone() {
 
 void fill(unsigned index) {
   auto& bytes = node.memory.at(index);
-  for (int v = 0; v < world().height(); ++v) {
-    for (int u = 0; u < world().width(); ++u) {
+  const int width = world().width();
+  const int height = world().height();
+  const int row = stride();
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
       const auto raw = static_cast<std::uint16_t>(std::lround(1e3 * world().depth(u, v)));
-      std::memcpy(&bytes.at(static_cast<std::size_t>(v * stride() + 2 * u)), &raw, 2);
+      std::memcpy(&bytes.at(static_cast<std::size_t>(v * row + 2 * u)), &raw, 2);
     }
   }
 }

@@ -104,10 +104,11 @@ function(palpate_runs_once target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 endfunction()
 
-# palpate_slow_when_sanitized(TARGET): not optimised under a sanitizer, where what the network or
-# the command line waits for costs more processor time to compile than it takes to run.
-function(palpate_slow_when_sanitized target)
-  if(PALPATE_SANITIZE)
+# palpate_slow_when_checked(TARGET): not optimised under a sanitizer or beside clang-tidy, where what
+# the network, the command line or a driver waits for costs more processor time to compile than it
+# takes to run.
+function(palpate_slow_when_checked target)
+  if(PALPATE_SANITIZE OR PALPATE_CLANG_TIDY)
     target_compile_options(${target} PRIVATE -O0)
   endif()
 endfunction()
@@ -128,6 +129,9 @@ function(palpate_room name)
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_link_libraries(palpate_${name} PUBLIC ${ARG_LINKS} PRIVATE ${ARG_PRIVATE})
   palpate_target_options(palpate_${name})
+  if(PALPATE_CLANG_TIDY AND NOT name MATCHES "^(core|paper|sight|methods|cloud)$")
+    palpate_slow_when_checked(palpate_${name})  # what a tick runs stays as its users have it
+  endif()
   # At the folder's end, when it has said how its files are compiled
   cmake_language(EVAL CODE "cmake_language(DEFER CALL palpate_tidy palpate_${name})")
   file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})

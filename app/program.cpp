@@ -71,6 +71,7 @@ int run_verb(int argc, char** argv, std::span<const AddVerb> own_verbs) {
   CLI::App program("Feel what a depth camera sees.", "palpate");
   program.set_version_flag("--version", "palpate " PALPATE_VERSION);
   program.allow_extras();
+  program.require_subcommand(0, 1);  // a verb's name behind a verb is no verb: `eval methods`
 
   std::vector<AddVerb> adders = {add_run,     add_trace,      add_replay,    add_info,
                                  add_methods, add_parameters, add_calibrate, add_doctor};

@@ -209,7 +209,7 @@ void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
       {.hip = hip,
        .proxy = *proxy_.at,
        .normal = proxy_.normal.value_or(Vec3::Zero()),
-       .touching = proxy_.touching,
+       .touching = proxy_.touching || !last_force_.isZero(),
        .held =
            tracker_.holding() && t - tracker_.held_since() < sight.hidden_hold + sight.hidden_fade,
        .carried = tracker_.tracking() ? tracker_.displacement(t) : Vec3(Vec3::Zero()),

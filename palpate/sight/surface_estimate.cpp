@@ -110,14 +110,17 @@ double SurfaceEstimate::variance(std::size_t rung) const noexcept {
   const double most = 4.0 * spread_ + 0.5e-3;
   const double usual =
       squared(std::min(usual_noise * squared(distance_), most)) + 0.03 * squared(spread_) + 1e-12;
-  if (scatter.samples < 1.0) return usual;
+  // Noise falls with the area it is averaged over: a wider disc's is the least of this one's.
+  double wider = 0.0;
+  for (std::size_t j = rung + 1; j < rungs; ++j) wider = std::max(wider, scatter_[j].variance);
+  if (scatter.samples < 1.0) return std::max(usual, wider);
   const double measured = std::max({scatter.variance * (1.0 + 4.0 / scatter.samples), scatter.least,
                                     std::min(scatter.at_rest, 4.0 * scatter.variance)}) +
                           1e-12;
   if (scatter.samples > static_cast<double>(upper_bounds.size())) return measured;
   const double largest =
       upper_bounds[static_cast<std::size_t>(scatter.samples) - 1] * (scatter.variance + 1e-12);
-  return std::max(std::min(usual, largest), measured);
+  return std::max({std::min(usual, largest), measured, wider});
 }
 
 void SurfaceEstimate::set_spacing(double spacing) noexcept {

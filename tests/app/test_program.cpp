@@ -464,6 +464,8 @@ TEST_F(Program, SaysHowToGetWhatTheProgramsBesideItHave) {
 TEST_F(ProgramWithLab, HandsOverToTheProgramsBesideIt) {
   EXPECT_NE(run("eval --list-methods").out.find("god-object"), std::string::npos);
   EXPECT_NE(run("bench --help").out.find("--growth"), std::string::npos);
+  // Also where an experiment is called as a verb is.
+  expect_refusal("eval methods --methods nobody", {"nobody"});
 }
 
 TEST_F(Program, SuggestsTheWordThatWasMeant) {

@@ -222,6 +222,23 @@ TEST(SightMonitor, AHandThatPressesSlidesAndLiftsIsFree) {
   }
 }
 
+TEST(SightMonitor, LeavesNothingOfAForceWhereTheNewestFrameShowsFreeSpace) {
+  Sight sight((Parameters()));
+  const PointCloud plane = plane_at(0.0);
+  const PointCloud gone = plane_at(-0.06);
+  const Vec3 hip(0, 0, -5e-3);
+  sight.seat(Vec3(0, 0, 0.03));
+  double t = 0.0;
+  Tick tick;
+  for (int frame = 0; frame < 12; ++frame) {
+    sight.frame(plane, frame * interval);
+    for (; t < (frame + 1) * interval; t += 1e-3) tick = sight.tick(hip, t);
+  }
+  ASSERT_GT(tick.force.z(), 1.0);
+  sight.frame(gone, 12 * interval);
+  EXPECT_EQ(sight.tick(hip, t).force, Vec3(0, 0, 0)) << "not even what is left of the old one";
+}
+
 TEST(SightMonitor, FindsThePlaneAgainWithinTwoTenthsOfASecondAndWithoutAKick) {
   // Behind the plane after a jump that no frame showed: the proxy is put there by the hand itself.
   Sight sight;

@@ -190,6 +190,30 @@ TEST(HeightTrack, HasNoVelocityAtRestUnderNoiseAndTheRightOneInSteadyMotion) {
   EXPECT_NEAR(track_height(rising, 1e-5, interval).velocity, 0.03, 1e-7);
 }
 
+TEST(SurfaceEstimate, TakesANarrowDiscForAtLeastAsNoisyAsAWiderOneIs) {
+  // A plane that lies higher or lower by some 6 mm in each frame, and a foot that slides along:
+  // only wide discs see the same place often enough to measure that.
+  constexpr double jitter = 6e-3;  // [m]
+  constexpr double stride = 4e-3;  // [m] a frame
+  SurfaceEstimate estimate;
+  estimate.set_distance(0.5);
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  for (int frame = 0; frame < 12; ++frame) {
+    const double z = jitter * normal(random);
+    const PointCloud plane(
+        test::grid(2e-3, 70, [&](double, double) { return z + 0.3e-3 * normal(random); }));
+    estimate.start_frame(frame * interval, interval);
+    if (frame == 0) {
+      ASSERT_TRUE(estimate.start(plane, Vec3(0, 0, 0), Vec3::UnitZ()));
+    } else {
+      const Vec2 foot = estimate.frame().local_from_world(Vec3(frame * stride, 0, 0)).head<2>();
+      ASSERT_TRUE(estimate.add(plane, foot, {.gate = 60e-3}));
+    }
+  }
+  EXPECT_GT(estimate.beam_sd(), 0.5 * jitter) << "the usual noise at 0.5 m is 1.25 mm";
+}
+
 TEST(FirstLayer, IsTheNearestOneThatEnoughPointsBelongTo) {
   std::array<float, 20> heights;
   for (std::size_t i = 0; i < 9; ++i) heights[i] = 0.10F + 1e-4F * static_cast<float>(i);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <charconv>
+#include <cstdlib>
 #include <limits>
 #include <memory>
 #include <string>
@@ -35,8 +36,13 @@ struct InfoOptions {
   std::string at;  // "U,V", or empty
 };
 
+// To six digits: what a camera measures has fewer.
+double rounded(double value) {
+  return std::strtod(fmt::format("{:.6g}", value).c_str(), nullptr);
+}
+
 Json numbers(const Vec3& v) {
-  return Json::array({v.x(), v.y(), v.z()});
+  return Json::array({rounded(v.x()), rounded(v.y()), rounded(v.z())});
 }
 
 // What the points of a cloud span: count, corners of their box.
@@ -68,8 +74,8 @@ Json describe(const DepthImage& image) {
   json["distorted"] = k.distorted();
   json["units_per_metre"] = image.units_per_metre();
   json["brightness"] = !image.brightness().empty();
-  json["measured_percent"] =
-      100.0 * static_cast<double>(measured.size()) / static_cast<double>(image.depth().size());
+  json["measured_percent"] = rounded(100.0 * static_cast<double>(measured.size()) /
+                                     static_cast<double>(image.depth().size()));
   if (!measured.empty()) {
     const auto middle = measured.begin() + static_cast<std::ptrdiff_t>(measured.size() / 2);
     std::nth_element(measured.begin(), middle, measured.end());
@@ -113,7 +119,7 @@ std::pair<int, int> pixel_of(const std::string& text) {
 
 Json describe(const PixelProbe& probe, int u, int v) {
   Json json = {{"pixel", Json::array({u, v})}, {"hole", !probe.in_world}};
-  if (probe.depth) json["depth_m"] = *probe.depth;
+  if (probe.depth) json["depth_m"] = rounded(*probe.depth);
   if (probe.in_camera) json["in_camera_m"] = numbers(*probe.in_camera);
   if (probe.in_world) json["in_world_m"] = numbers(*probe.in_world);
   if (probe.normal) {
@@ -137,6 +143,9 @@ Json describe_pixel(const Cloud& cloud, const std::string& text, const std::stri
 }
 
 int info(const InfoOptions& options) {
+  if (options.uri.empty())
+    throw Error("info", "it is not said of what",
+                "name a source, such as `palpate info synthetic:desk`; docs/sources.md has all");
   const std::unique_ptr<Source> source = open_source(options.uri, all_sources());
   const SourceInfo& about = source->info();
   Json json = {{"uri", about.uri}, {"kind", about.kind}, {"live", about.live}};
@@ -194,7 +203,7 @@ int info(const InfoOptions& options) {
 Verb add_info(CLI::App& program) {
   CLI::App* command = program.add_subcommand("info", "what is in a source");
   const auto options = std::make_shared<InfoOptions>();
-  command->add_option("source", options->uri, "e.g. tum:DIR, pcd:FILE, synthetic:desk")->required();
+  command->add_option("source", options->uri, "e.g. tum:DIR, pcd:FILE, synthetic:desk");
   command->add_flag("--json", options->json, "print a JSON object");
   command->add_option("--at", options->at,
                       "U,V: what is at this pixel of the first frame: depth [m], point in the "

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -14,6 +15,7 @@
 #include <spawn.h>
 #include <unistd.h>
 
+#include "app/opened_scenes.hpp"
 #include "app/program_methods.hpp"
 #include "app/reach.hpp"
 #include "app/session_arguments.hpp"
@@ -192,12 +194,20 @@ struct Running {
   }
 };
 
-// What the operator's page can choose: what the program was started with, and the built-in scenes.
-std::vector<SceneChoice> scene_choices(const std::vector<CameraConfig>& given) {
-  std::vector<SceneChoice> choices = {{given.front().uri, "what the program was started with"}};
+// What the operator's page can choose: what the program was started with, what was opened last,
+// and the built-in scenes.
+std::vector<SceneChoice> scene_choices(const std::vector<CameraConfig>& given,
+                                       const OpenedScenes& opened) {
+  const std::string& first = given.front().uri;
+  std::vector<SceneChoice> choices = {{first, "what the program was started with"}};
+  for (std::string& uri : opened.uris()) {
+    if (uri != first && uri != absolute_uri(first))
+      choices.push_back({std::move(uri), "opened last", "Opened last"});
+  }
   for (const SceneInfo& scene : known_scenes()) {
     std::string uri = "synthetic:" + std::string(scene.name);
-    if (uri != given.front().uri) choices.push_back({std::move(uri), std::string(scene.summary)});
+    if (uri != first)
+      choices.push_back({std::move(uri), std::string(scene.summary), "Built-in scenes"});
   }
   return choices;
 }
@@ -326,12 +336,16 @@ int run_pages(const RunOptions& options, SessionConfig config, std::unique_ptr<D
   // A device with motors is opened once: its hand is somewhere, and its guard is another process.
   const bool may_choose = config.device.empty() || Uri(config.device).scheme() == "mouse";
   PageRules rules = page_rules(config);
-  if (may_choose) rules.scenes = scene_choices(given);
+  if (may_choose) rules.files = std::make_shared<DroppedFiles>();
+  OpenedScenes opened(std::filesystem::temp_directory_path() / DroppedFiles::folder_prefix);
   for (bool is_first = true;; is_first = false) {
     Ending ending;
+    if (config.cameras.size() == 1) opened.add(config.cameras.front().uri);
+    if (may_choose) rules.scenes = scene_choices(given, opened);
     try {
       ending = run_page(options, config, std::move(guarded), rules, is_first, running);
     } catch (const Error& error) {
+      opened.remove(config.cameras.front().uri);
       if (is_first || config.cameras.front().uri == before.front().uri) throw;
       rules.notice = error.what();
       config.cameras = before;

@@ -157,7 +157,7 @@ std::string scores_as_html(const Scores& scores) {
 constexpr std::string_view page_head = R"(<!doctype html>
 <html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>palpate: the paper, reproduced</title>
+<title>palpate: experiments</title>
 <style>
 :root { color-scheme: light dark; --ink: #1c2430; --paper: #fbfaf7; --line: #d9d5cb; --good: #1b7f4b; --bad: #b4441f; }
 @media (prefers-color-scheme: dark) { :root { --ink: #e6e4de; --paper: #16191e; --line: #3a3f48; --good: #58c48c; --bad: #ef8a62; } }
@@ -168,7 +168,10 @@ figure { margin: 1rem 0; } figure svg { width: 100%; height: auto; border-radius
 th, td { text-align: left; vertical-align: top; padding: .45rem .6rem; border-bottom: 1px solid var(--line); }
 code { font-size: .88em; } .note { white-space: pre-line; overflow-wrap: anywhere; } .good { color: var(--good); } .bad { color: var(--bad); }
 </style></head><body>
-<h1>The paper, reproduced</h1>
+)";
+
+// Above experiments that redraw the paper.
+constexpr std::string_view paper_head = R"(<h1>The paper, reproduced</h1>
 <p>F. Rydén and H. J. Chizeck, <i>A Proxy Method for Real-Time 3-DOF Haptic Rendering of Streaming
 Point Cloud Data</i>, IEEE Transactions on Haptics, 2013: its figures and claims beside ours.
 Lengths are in units of r_c = 5 mm where the paper's are.</p>
@@ -198,6 +201,9 @@ std::string result_as_text(const Result& result) {
 
 fs::path write_report(const std::vector<Result>& results, const fs::path& folder) {
   std::string page(page_head);
+  const bool redraws_the_paper = std::any_of(
+      results.begin(), results.end(), [](const Result& result) { return !result.claims.empty(); });
+  page += redraws_the_paper ? paper_head : "<h1>Methods, measured</h1>\n";
   std::string notes =
       "# The paper's claims beside ours\n\nMade by `palpate eval all`; not written by hand. "
       "[lab.md](lab.md) says what each experiment is.\n\n"

@@ -30,6 +30,9 @@ std::vector<fs::path> files_of(const fs::path& path) {
     if (path.extension() == ".bag")
       throw Error(path.string(), "is a bag of ROS 1",
                   "convert it: one of RealSense's with rs-convert -i FILE.bag -D FILE.db3");
+    if (path.extension() == ".mkv")
+      throw Error(path.string(), "is a video, such as an Azure Kinect's",
+                  "write its depth as 16-bit PNGs, and name their folder with depth:FOLDER");
     if (path.extension() == ".mcap")
       throw Error(path.string(), "is an MCAP file",
                   "convert it to SQLite, with ros2 bag convert and storage_id sqlite3");

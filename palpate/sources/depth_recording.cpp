@@ -214,6 +214,8 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
   allow_only(uri, {"poses", "stamps", "brightness", "colour"});
   const fs::path folder = uri.path();
   std::error_code error;
+  if (uri.path().empty())
+    throw Error("'" + uri.text() + "'", "names no folder", "write tum:FOLDER, which has depth.txt");
   if (!fs::is_directory(folder, error)) {
     throw Error(uri.text(), "is not a folder", "name the folder that holds depth.txt");
   }

@@ -1,4 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cctype>
+#include <utility>
+
+#include "palpate/core/error.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/sources/depth_recording.hpp"
 #include "palpate/sources/point_file_source.hpp"
@@ -55,7 +60,31 @@ const Registry<SourceScheme>& standard_sources() {
   return schemes;
 }
 
+std::string uri_of_file(const std::filesystem::path& file) {
+  std::string ending = file.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const auto& [known, scheme] :
+       {std::pair(".pcd", "pcd:"), std::pair(".ply", "ply:"), std::pair(".db3", "recording:")}) {
+    if (ending != known) continue;
+    const std::string path = file.string();
+    return scheme + path + (path.find('?') == std::string::npos ? "" : "?");
+  }
+  std::string remedy = "give a .pcd, .ply or .db3 file";
+  if (ending == ".png" || ending == ".txt")
+    remedy = "start the program with --camera depth:FOLDER or tum:FOLDER, of all its images";
+  if (ending == ".bag")
+    remedy = "convert it: one of RealSense's with rs-convert -i FILE.bag -D FILE.db3";
+  if (ending == ".mkv")
+    remedy = "write its depth as 16-bit PNGs, then start the program with --camera depth:FOLDER";
+  throw Error(file.filename().string(), "cannot be touched as a file of its own", remedy);
+}
+
 std::unique_ptr<Source> open_source(std::string_view text, const Registry<SourceScheme>& schemes) {
+  if (std::error_code error;
+      text.find(':') == std::string_view::npos && std::filesystem::is_regular_file(text, error))
+    throw Error("'" + std::string(text) + "'", "does not start with a scheme",
+                "write " + uri_of_file(text));
   const Uri uri(text);
   return schemes.find(uri.scheme(), uri.text()).open(uri);
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -104,6 +105,10 @@ struct SourceScheme {
 /// The library's own: `synthetic:SCENE?...`, `tum:DIR`, `depth:DIR`, `pcd:FILE|DIR`,
 /// `ply:FILE|DIR`, `recording:BAG`. To add to them, copy the registry.
 const Registry<SourceScheme>& standard_sources();
+
+/// The URI of a single file by what its name ends with: .pcd, .ply or .db3.
+/// @throws Error for any other ending, saying what to do with such a file.
+std::string uri_of_file(const std::filesystem::path& file);
 
 /// Opens a source by its URI.
 /// @throws Error for an unknown scheme or option (naming the nearest known one), or input that

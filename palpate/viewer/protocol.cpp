@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/viewer/protocol.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -16,7 +17,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little,
               "depths and points are sent as they lie in memory");
 
-enum Kind : std::uint8_t { frame = 1, ticks = 2, rays = 3, hand = 16, shown = 17 };
+enum Kind : std::uint8_t { frame = 1, ticks = 2, rays = 3, path = 4, hand = 16, shown = 17 };
 // What a hand message says of the hand.
 enum Grip : std::uint8_t { let_go = 0, held = 1, let_go_towards = 2 };
 enum Format : std::uint8_t { depth = 0, depth_with_rays = 1, points = 2 };
@@ -41,7 +42,6 @@ class Writer {
   }
   Writer& put_float(double value) { return put(static_cast<float>(value)); }
   Writer& put_vec3(const Vec3& v) { return put_float(v.x()).put_float(v.y()).put_float(v.z()); }
-  void pad_to(std::size_t size) { out_.resize(size); }
 
  private:
   std::vector<std::byte>& out_;
@@ -55,7 +55,8 @@ Number read(std::span<const std::byte> message, std::size_t at) {
 }
 
 ViewerMessage frame_message(const FrameHeader& header, Format format,
-                            std::span<const std::byte> payload, std::shared_ptr<const void> owner) {
+                            std::span<const std::byte> payload, std::shared_ptr<const void> owner,
+                            std::uint32_t triangles = 0) {
   ViewerMessage message;
   message.head.reserve(frame_header_size);
   Writer writer(message.head);
@@ -67,7 +68,7 @@ ViewerMessage frame_message(const FrameHeader& header, Format format,
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) writer.put_float(pose(row, column));
   }
-  writer.pad_to(frame_header_size);
+  writer.put(triangles);
   message.payload = payload;
   message.owner = std::move(owner);
   return message;
@@ -90,11 +91,32 @@ ViewerMessage depth_message(const FrameHeader& header, std::span<const std::uint
                        std::as_bytes(depth), std::move(owner));
 }
 
-ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz) {
-  if (xyz.size() != 3 * std::size_t{header.width} * header.height)
+ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz,
+                             std::span<const std::uint32_t> triangles) {
+  const std::size_t count = std::size_t{header.width} * header.height;
+  if (xyz.size() != 3 * count)
     throw Error("points for the viewer", "there are not three numbers for each");
+  if (triangles.size() % 3 != 0 ||
+      std::any_of(triangles.begin(), triangles.end(), [&](auto corner) { return corner >= count; }))
+    throw Error("triangles for the viewer", "they are not of the points");
+  // Behind the points, in the same payload.
+  for (const std::uint32_t corner : triangles) xyz.push_back(std::bit_cast<float>(corner));
   auto [bytes, owner] = shared_bytes(std::move(xyz));
-  return frame_message(header, Format::points, bytes, std::move(owner));
+  return frame_message(header, Format::points, bytes, std::move(owner),
+                       static_cast<std::uint32_t>(triangles.size() / 3));
+}
+
+ViewerMessage path_message(std::uint8_t camera, std::vector<float> txyz) {
+  if (txyz.size() % 4 != 0)
+    throw Error("path for the viewer", "there are not four numbers for each place");
+  ViewerMessage message;
+  Writer(message.head)
+      .put(Kind::path)
+      .put(camera)
+      .put(std::uint16_t{0})
+      .put(static_cast<std::uint32_t>(txyz.size() / 4));
+  std::tie(message.payload, message.owner) = shared_bytes(std::move(txyz));
+  return message;
 }
 
 ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32_t height,

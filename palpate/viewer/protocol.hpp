@@ -47,11 +47,18 @@ ViewerMessage depth_message(const FrameHeader& header, std::span<const std::uint
                             std::shared_ptr<const void> owner);
 
 /// Points without an image [m, camera], x y z after one another.
-ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz);
+/// @param triangles  of a mesh whose corners they are, three indices each; empty: none
+/// @throws Error if there are not three numbers for each, or an index is beyond the points.
+ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz,
+                             std::span<const std::uint32_t> triangles = {});
 
 /// Where a distorted lens's pixels look: x and y of the ray (x, y, 1), NaN for none.
 ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32_t height,
                            std::vector<float> rays);
+
+/// The path of the hand that was recorded with a camera's frames: t [s from the recording's first
+/// frame], x, y, z [m, world] after one another.
+ViewerMessage path_message(std::uint8_t camera, std::vector<float> txyz);
 
 /// A few ticks in one: what the plots show of them.
 struct TickSample {

@@ -6,6 +6,8 @@
 #include <cctype>
 #include <chrono>
 #include <deque>
+#include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -72,14 +74,15 @@ bool is_loopback_name(const std::string& host) {
   return !error && address.is_loopback();
 }
 
-std::string_view token_of(std::string_view target) {
-  constexpr std::string_view key = "token=";
+// The value of an option behind the '?' of a request's target; empty if it is not there.
+std::string_view option_of(std::string_view target, std::string_view key) {
   const std::size_t question = target.find('?');
   if (question == std::string_view::npos) return {};
   std::string_view query = target.substr(question + 1);
   while (!query.empty()) {
     const std::string_view option = query.substr(0, query.find('&'));
-    if (option.substr(0, key.size()) == key) return option.substr(key.size());
+    const std::size_t equals = std::min(option.find('='), option.size());
+    if (option.substr(0, equals) == key) return option.substr(std::min(equals + 1, option.size()));
     query.remove_prefix(std::min(option.size() + 1, query.size()));
   }
   return {};
@@ -279,6 +282,12 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
 
 }  // namespace
 
+std::filesystem::path ViewerHost::begin_file(const std::string& name, std::uint64_t /*size*/) {
+  throw Error(name, "this session opens no files", "start the program with --camera");
+}
+
+void ViewerHost::end_file(const std::filesystem::path& /*file*/, bool /*whole*/) {}
+
 class ViewerServer::Impl final : public Hub {
  public:
   Impl(const ViewerOptions& options, ViewerHost& host)
@@ -331,40 +340,56 @@ class ViewerServer::Impl final : public Hub {
   [[nodiscard]] std::string opening_url() const { return link(opening_token_); }
   [[nodiscard]] std::size_t viewers() const { return viewers_.load(); }
 
-  void publish(std::uint8_t camera, ViewerMessage message, bool is_frame) {
+  struct Camera {
+    SharedMessage rays, path, frame;
+  };
+
+  void publish(std::uint8_t camera, ViewerMessage message, SharedMessage Camera::*slot) {
     if (camera >= Patch::max_views) return;
     auto shared = std::make_shared<const ViewerMessage>(std::move(message));
     const std::lock_guard lock(mutex_);
-    (is_frame ? arrived_[camera].frame : arrived_[camera].rays) = std::move(shared);
+    arrived_[camera].*slot = std::move(shared);
     if (std::exchange(posted_, true)) return;  // the thread has not come to it yet
     asio::post(context_, [this] { distribute(); });
+  }
+
+  // A page of another site can make a browser come here under that site's name, or from it.
+  [[nodiscard]] bool is_from_here(const Request& request) const {
+    const std::string_view authority = view(request[http::field::host]);
+    if (!beyond_loopback_ && !is_loopback_name(host_of(authority))) return false;
+    if (request.find(http::field::origin) == request.end()) return true;
+    const std::string_view origin = view(request[http::field::origin]);
+    const std::size_t slashes = origin.find("://");
+    return slashes != std::string_view::npos && origin.substr(slashes + 3) == authority;
   }
 
   // Is a request answered, and if it begins a page's session, as whose?
   Admission judge(const Request& request, const std::string& source) {
     if (request.method() != http::verb::get && request.method() != http::verb::head)
       return {http::status::method_not_allowed};
-    // A page of another site can make a browser come here under that site's name, or from it.
-    const std::string_view authority = view(request[http::field::host]);
-    if (!beyond_loopback_ && !is_loopback_name(host_of(authority)))
-      return {http::status::forbidden};
-    if (request.find(http::field::origin) != request.end()) {
-      const std::string_view origin = view(request[http::field::origin]);
-      const std::size_t slashes = origin.find("://");
-      if (slashes == std::string_view::npos || origin.substr(slashes + 3) != authority)
-        return {http::status::forbidden};
-    }
+    if (!is_from_here(request)) return {http::status::forbidden};
     // A page that was refused asks once more without an upgrade: browsers do not tell it why.
     const bool upgrades = websocket::is_upgrade(request);
     const std::string_view target = view(request.target());
     if (target.substr(0, target.find('?')) != "/session")
       return {upgrades ? http::status::not_found : http::status::ok};
-    Admission admission = judge_token(token_of(target), source, upgrades);
+    Admission admission = judge_token(option_of(target, "token"), source, upgrades);
     if (admission.status != http::status::ok) return admission;
     if (admission.is_operator) admission.place = take_place(operator_pages_, max_operator_pages);
     if (!admission.place) admission.place = take_place(viewer_pages_, max_viewers);
     if (!admission.place) admission.status = http::status::service_unavailable;
     return admission;
+  }
+
+  // May whoever asks send a file? Only the operator's page may, one at a time.
+  http::status judge_file(const Request& request, const std::string& source) {
+    if (!is_from_here(request)) return http::status::forbidden;
+    const std::string_view target = view(request.target());
+    if (target.substr(0, target.find('?')) != "/file") return http::status::not_found;
+    const Admission admission = judge_token(option_of(target, "token"), source, false);
+    if (admission.status != http::status::ok) return admission.status;
+    if (!admission.is_operator) return http::status::unauthorized;
+    return receiving_ ? http::status::conflict : http::status::ok;
   }
 
   void joined(const std::shared_ptr<PageSession>& page) override {
@@ -378,6 +403,7 @@ class ViewerServer::Impl final : public Hub {
     send_state({page});
     for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
       if (cameras_[camera].rays) page->send(cameras_[camera].rays);
+      if (cameras_[camera].path) page->send(cameras_[camera].path);
       if (cameras_[camera].frame) page->offer(camera, 0, cameras_[camera].frame);
     }
     tell_presence(false);
@@ -426,10 +452,6 @@ class ViewerServer::Impl final : public Hub {
 
  private:
   class HttpSession;
-  struct Camera {
-    SharedMessage rays, frame;
-  };
-
   static void check_token(const char* option, const std::string& token) {
     const auto well_formed = [](unsigned char c) {
       return std::isalnum(c) || c == '-' || c == '_';
@@ -489,6 +511,9 @@ class ViewerServer::Impl final : public Hub {
     if (error == asio::error::address_in_use)
       throw Error(subject, "another program listens there",
                   "give another port, or --port 0 for any that is free");
+    if (error == asio::error::access_denied)
+      throw Error(subject, "this account may not listen there",
+                  "give a port from 1024 on, or --port 0 for any that is free");
     if (error) throw Error(subject, error.message(), "give an address of this machine");
     port_ = acceptor_.local_endpoint().port();
   }
@@ -562,9 +587,10 @@ class ViewerServer::Impl final : public Hub {
       posted_ = false;
     }
     for (std::size_t i = 0; i < arrived.size(); ++i) {
-      if (arrived[i].rays) {
-        cameras_[i].rays = arrived[i].rays;
-        for (const auto& page : pages_) page->send(arrived[i].rays);
+      for (const auto once : {&Camera::rays, &Camera::path}) {
+        if (!(arrived[i].*once)) continue;
+        cameras_[i].*once = arrived[i].*once;
+        for (const auto& page : pages_) page->send(arrived[i].*once);
       }
       if (arrived[i].frame) {
         cameras_[i].frame = arrived[i].frame;
@@ -592,6 +618,7 @@ class ViewerServer::Impl final : public Hub {
   // These outlive the context, and so all sessions.
   std::vector<HttpSession*> connections_;  // without pages, oldest first
   int viewer_pages_ = 0, operator_pages_ = 0;
+  bool receiving_ = false;  // a file
 
   std::mutex mutex_;
   std::array<Camera, Patch::max_views> arrived_;  // guarded by mutex_
@@ -616,19 +643,26 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
       : server_(server), source_(source_of(socket)), stream_(std::move(socket)) {
     server_.connections_.push_back(this);
   }
-  ~HttpSession() { std::erase(server_.connections_, this); }
+  ~HttpSession() {
+    end_file(false);
+    std::erase(server_.connections_, this);
+  }
   HttpSession(const HttpSession&) = delete;
   HttpSession& operator=(const HttpSession&) = delete;
 
   void read() {
     parser_.emplace();
     parser_->header_limit(max_header);
-    parser_->body_limit(0);
+    // Only a file has a body, whose size its receiver limits; boost::none would allow none.
+    parser_->body_limit(std::numeric_limits<std::uint64_t>::max());
     stream_.expires_after(server_.request_timeout_);
-    http::async_read(stream_, buffer_, *parser_,
-                     [self = shared_from_this()](beast::error_code error, std::size_t) {
-                       if (!error) self->answer(self->parser_->release());
-                     });
+    http::async_read_header(stream_, buffer_, *parser_,
+                            [self = shared_from_this()](beast::error_code error, std::size_t) {
+                              if (error) return;
+                              if (self->parser_->get().method() == http::verb::put)
+                                return self->receive();
+                              if (self->parser_->is_done()) self->answer(self->parser_->release());
+                            });
   }
 
   [[nodiscard]] const std::string& source() const { return source_; }
@@ -637,6 +671,75 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
 
  private:
   using Response = http::response<http::span_body<const char>>;
+
+  // A file, if it is welcome.
+  void receive() {
+    Request request = parser_->get();
+    request.keep_alive(false);
+    const http::status status = server_.judge_file(request, source_);
+    if (status != http::status::ok) return say(request, status, std::string(explanation(status)));
+    const auto size = parser_->content_length();
+    if (!size)
+      return say(request, http::status::length_required, "The file's length is missing.\n");
+    beast::error_code error;
+    try {
+      const std::string name(option_of(view(request.target()), "name"));
+      file_ = server_.host_.begin_file(name, *size);
+    } catch (const std::exception& refusal) {
+      return say(request, http::status::unprocessable_entity, refusal.what());
+    }
+    server_.receiving_ = true;
+    file_parser_.emplace(std::move(*parser_));
+    file_parser_->body_limit(*size);
+    file_parser_->get().body().open(file_.c_str(), beast::file_mode::write_new, error);
+    if (error) return fail_file(error);
+    receive_more();
+  }
+
+  void receive_more() {
+    if (file_parser_->is_done()) return file_received();
+    stream_.expires_after(answer_timeout);
+    http::async_read_some(stream_, buffer_, *file_parser_,
+                          [self = shared_from_this()](beast::error_code error, std::size_t) {
+                            if (error) return self->fail_file(error);
+                            self->receive_more();
+                          });
+  }
+
+  void fail_file(beast::error_code error) {
+    end_file(false);
+    say({}, http::status::insufficient_storage, "The file was not received: " + error.message());
+  }
+
+  // The page hears that it arrived before its session ends.
+  void file_received() {
+    file_parser_->get().body().close();
+    say({}, http::status::ok, "");
+  }
+
+  void end_file(bool whole) {
+    if (file_.empty()) return;
+    server_.receiving_ = false;
+    server_.host_.end_file(std::exchange(file_, {}), whole);
+  }
+
+  // An answer made here, after which the connection ends.
+  void say(Request request, http::status status, std::string text) {
+    said_ = std::move(text);
+    drains_ = true;
+    request.keep_alive(false);
+    write(request, status, "text/plain; charset=utf-8", said_);
+  }
+
+  // Reads what is left of a file until the answer's time is over: a connection that is closed
+  // before takes its answer with it.
+  void drain() {
+    buffer_.clear();
+    stream_.async_read_some(buffer_.prepare(max_header),
+                            [self = shared_from_this()](beast::error_code error, std::size_t) {
+                              if (!error) self->drain();
+                            });
+  }
 
   void answer(const Request& request) {
     Admission admission = server_.judge(request, source_);
@@ -673,6 +776,8 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
         return "Not from this host or origin.\n";
       case http::status::unauthorized:
         return "The token is missing or wrong.\n";
+      case http::status::conflict:
+        return "Another file is being sent.\n";
       case http::status::too_many_requests:
         return "Too many wrong tokens came from this address; wait five minutes.\n";
       case http::status::service_unavailable:
@@ -700,9 +805,12 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
     stream_.expires_after(answer_timeout);
     http::async_write(stream_, response,
                       [self = shared_from_this()](beast::error_code error, std::size_t) {
+                        if (self->file_parser_ && self->response_->result() == http::status::ok)
+                          self->end_file(true);
                         if (error) return;
                         if (self->response_->keep_alive()) return self->read();
                         self->stream_.socket().shutdown(tcp::socket::shutdown_send, error);
+                        if (self->drains_) self->drain();
                       });
   }
 
@@ -712,6 +820,11 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
   beast::flat_buffer buffer_{max_header};
   std::optional<http::request_parser<http::empty_body>> parser_;
   std::optional<Response> response_;
+  std::string said_;     // what the response says, if it is made here
+  bool drains_ = false;  // after the response, what is left of the request
+  // Of a file that is being received; the path is empty once its end was told.
+  std::optional<http::request_parser<http::file_body>> file_parser_;
+  std::filesystem::path file_;
 };
 
 // Closes the oldest connection of the address that has the most, if there are too many.
@@ -767,10 +880,13 @@ std::size_t ViewerServer::viewers() const {
   return impl_->viewers();
 }
 void ViewerServer::show(std::uint8_t camera, ViewerMessage frame) {
-  impl_->publish(camera, std::move(frame), true);
+  impl_->publish(camera, std::move(frame), &Impl::Camera::frame);
 }
 void ViewerServer::describe(std::uint8_t camera, ViewerMessage rays) {
-  impl_->publish(camera, std::move(rays), false);
+  impl_->publish(camera, std::move(rays), &Impl::Camera::rays);
+}
+void ViewerServer::show_path(std::uint8_t camera, ViewerMessage path) {
+  impl_->publish(camera, std::move(path), &Impl::Camera::path);
 }
 
 std::string make_token() {

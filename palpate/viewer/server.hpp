@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,6 +32,11 @@ class ViewerHost {
   /// A command that `check_allowed` allows the role of the page that asks.
   /// @throws Error to refuse: the page shows it.
   virtual void command(const Command& command, Role role) = 0;
+  /// The operator's page begins to send a file that is to be touched.
+  /// @return where it goes @throws Error to refuse: the page shows it.
+  virtual std::filesystem::path begin_file(const std::string& name, std::uint64_t size);
+  /// It has arrived, or (not `whole`) never will.
+  virtual void end_file(const std::filesystem::path& file, bool whole);
 };
 
 struct ViewerOptions {
@@ -76,6 +82,8 @@ class ViewerServer {
   void show(std::uint8_t camera, ViewerMessage frame);
   /// The rays of a camera's pixels, before its first frame if its lens is distorted. Any thread.
   void describe(std::uint8_t camera, ViewerMessage rays);
+  /// The path of the hand that was recorded with a camera's frames. Any thread.
+  void show_path(std::uint8_t camera, ViewerMessage path);
 
  private:
   class Impl;

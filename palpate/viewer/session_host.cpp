@@ -9,8 +9,11 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/uri.hpp"
 #include "palpate/devices/mouse_device.hpp"
+#include "palpate/record/recorded_hand.hpp"
 #include "palpate/servo/placement_table.hpp"
+#include "palpate/sources/source.hpp"
 
 namespace palpate {
 namespace {
@@ -31,6 +34,23 @@ std::string realtime_text(const RealtimeReport& report) {
                                  : "not real-time; see palpate doctor";
   if (report.core >= 0) text += ", core " + std::to_string(report.core);
   return text;
+}
+
+// t [s from its first frame], x, y, z [m] of the hand in a recording; empty if it has none.
+std::vector<float> path_of(const std::string& uri) {
+  constexpr std::size_t most_places = 4000;
+  std::vector<float> path;
+  if (Uri(uri).scheme() != "recording") return path;
+  try {
+    const double first = open_source(uri)->info().start_time;
+    for (const RecordedHand& hand : recorded_hand(Uri(uri).path(), most_places)) {
+      path.push_back(static_cast<float>(hand.t - first));
+      for (int axis = 0; axis < 3; ++axis) path.push_back(static_cast<float>(hand.hip[axis]));
+    }
+  } catch (const Error&) {  // a bag without a hand, or a damaged one: its frames may still do
+    path.clear();
+  }
+  return path;
 }
 
 std::string_view stricter_text(std::string_view limit) {
@@ -56,6 +76,18 @@ void SessionHost::attach(Session& session) {
   reader_.emplace(session.ticks());
   const double rate = session.state().rate;
   batcher_.emplace(static_cast<unsigned>(std::max(1.0, rate / samples_per_second)));
+}
+
+void SessionHost::show_on(ViewerServer* server) {
+  server_.store(server, std::memory_order_release);
+  if (server == nullptr) return;
+  const std::vector<CameraStatus> cameras = session_->state().cameras;
+  for (std::size_t i = 0; i < cameras.size() && i < Patch::max_views; ++i) {
+    std::vector<float> path = path_of(cameras[i].uri);
+    if (!path.empty())
+      server->show_path(static_cast<std::uint8_t>(i),
+                        path_message(static_cast<std::uint8_t>(i), std::move(path)));
+  }
 }
 
 std::string SessionHost::hello() {
@@ -85,10 +117,13 @@ std::string SessionHost::hello() {
         {{"name", safety_flag_names()[i]}, {"meaning", safety_flag_meanings()[i]}});
   json scenes = json::array();
   for (const SceneChoice& scene : rules_.scenes)
-    scenes.push_back({{"uri", scene.uri}, {"meaning", scene.meaning}});
-  return json{{"scenes", scenes},       {"notice", rules_.notice},  {"version", version_},
-              {"methods", methods},     {"parameters", parameters}, {"safety", safety},
-              {"placement", placement}, {"flags", flags},           {"safety_flags", safety_flags}}
+    scenes.push_back({{"uri", scene.uri}, {"meaning", scene.meaning}, {"group", scene.group}});
+  const std::uint64_t most = rules_.files && rules_.open_scene ? rules_.files->limit() : 0;
+  return json{{"file_limit", most},      {"scenes", scenes},
+              {"notice", rules_.notice}, {"version", version_},
+              {"methods", methods},      {"parameters", parameters},
+              {"safety", safety},        {"placement", placement},
+              {"flags", flags},          {"safety_flags", safety_flags}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -218,6 +253,18 @@ void SessionHost::command(const Command& command, Role role) {
   session_->set(settings);
 }
 
+std::filesystem::path SessionHost::begin_file(const std::string& name, std::uint64_t size) {
+  if (!rules_.files || !rules_.open_scene) return ViewerHost::begin_file(name, size);
+  return rules_.files->begin(name, size);
+}
+
+void SessionHost::end_file(const std::filesystem::path& file, bool whole) {
+  if (whole)
+    rules_.open_scene(uri_of_file(file));
+  else
+    rules_.files->abandon(file);
+}
+
 void SessionHost::show(std::size_t number, const FedFrame& fed) {
   ViewerServer* server = server_.load(std::memory_order_acquire);
   const auto camera = static_cast<std::uint8_t>(number);
@@ -243,13 +290,28 @@ void SessionHost::show(std::size_t number, const FedFrame& fed) {
     server->show(camera, depth_message(header, image->depth(), frame.cloud));
   } else if (const auto* points = dynamic_cast<const PointCloud*>(frame.cloud.get())) {
     std::vector<float> xyz;
-    xyz.reserve(3 * points->size());
-    for (std::size_t i = 0; i < points->size(); ++i) {
-      const Vec3 point = points->point(i);
+    std::vector<std::uint32_t> triangles;
+    const auto put = [&](const Vec3& point) {
       for (int axis = 0; axis < 3; ++axis) xyz.push_back(static_cast<float>(point[axis]));
+    };
+    if (const Surface* mesh = points->surface(); mesh != nullptr && !mesh->triangles.empty()) {
+      std::vector<std::uint32_t> place(mesh->points.size(), 0);  // among those that are finite
+      for (std::size_t i = 0; i < mesh->points.size(); ++i) {
+        place[i] = static_cast<std::uint32_t>(xyz.size() / 3);
+        if (mesh->points[i].allFinite()) put(mesh->points[i]);
+      }
+      for (const auto& corners : mesh->triangles) {
+        if (!std::all_of(corners.begin(), corners.end(),
+                         [&](std::uint32_t i) { return mesh->points[i].allFinite(); }))
+          continue;
+        for (const std::uint32_t i : corners) triangles.push_back(place[i]);
+      }
+    } else {
+      xyz.reserve(3 * points->size());
+      for (std::size_t i = 0; i < points->size(); ++i) put(points->point(i));
     }
-    header.width = static_cast<std::uint32_t>(points->size());
-    server->show(camera, points_message(header, std::move(xyz)));
+    header.width = static_cast<std::uint32_t>(xyz.size() / 3);
+    server->show(camera, points_message(header, std::move(xyz), triangles));
   }
 }
 

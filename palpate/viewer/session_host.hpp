@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "palpate/session/session.hpp"
+#include "palpate/viewer/dropped_files.hpp"
 #include "palpate/viewer/page_recordings.hpp"
 #include "palpate/viewer/server.hpp"
 #include "palpate/viewer/tick_batcher.hpp"
@@ -23,6 +24,7 @@ namespace palpate {
 struct SceneChoice {
   std::string uri;
   std::string meaning;
+  std::string group = {};  ///< of its like, as a heading; empty: none
 };
 
 /// What a session's options say about its pages.
@@ -34,6 +36,8 @@ struct PageRules {
   /// Called with the URI of one of these, which is to be touched: this session is to end, and one
   /// with that camera to begin. On the server's thread; must be quick. Empty: no scene is chosen.
   std::function<void(const std::string& uri)> open_scene = {};
+  /// Where files go that the operator's page sends to be touched; null: it sends none.
+  std::shared_ptr<DroppedFiles> files = {};
   std::string notice = {};  ///< what pages are told when they join; empty: nothing
 };
 
@@ -52,8 +56,9 @@ class SessionHost final : public ViewerHost {
   void attach(Session& session);
   /// After the server. May be left out if no recording was ever started.
   void detach() { recordings_.reset(); }
-  /// @param server  shows the frames from now on; null: nobody does, before the server goes
-  void show_on(ViewerServer* server) noexcept { server_.store(server, std::memory_order_release); }
+  /// @param server  shows the frames from now on, and the hands that were recorded with them; null:
+  ///                nobody does, before the server goes
+  void show_on(ViewerServer* server);
   /// A camera's frame, as SessionOptions::on_frame: to all pages. Any camera's thread.
   void show(std::size_t camera, const FedFrame& frame);
 
@@ -63,6 +68,8 @@ class SessionHost final : public ViewerHost {
   bool takes_hand() override { return mouse_ != nullptr; }
   void hand(const HandMessage& hand) override;
   void command(const Command& command, Role role) override;
+  std::filesystem::path begin_file(const std::string& name, std::uint64_t size) override;
+  void end_file(const std::filesystem::path& file, bool whole) override;
 
   /// Why the last recording of a page was ended by its limits; empty if it was not.
   [[nodiscard]] std::string recording_ended() const {

@@ -16,6 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "app/opened_scenes.hpp"
 #include "app/reach.hpp"
 
 #include "tests/app/program.hpp"
@@ -322,6 +323,25 @@ TEST(QrCode, HasItsQuietZoneAndItsFinderPatterns) {
   EXPECT_EQ(app::qr_code(std::string(5000, 'x')), "");
 }
 
+TEST_F(Program, RemembersTheFilesThatWereOpenedLast) {
+  const test::Environment state("XDG_STATE_HOME", path("state"));
+  const std::string cup = write("cup.ply", "ply");
+  {
+    app::OpenedScenes opened(path("temporary"));
+    EXPECT_TRUE(opened.uris().empty());
+    opened.add("synthetic:desk");
+    opened.add("ply:" + cup + "?scale=1mm");
+    opened.add("pcd:" + path("gone.pcd"));
+    opened.add("ply:" + path("temporary") + "-x/1/dropped.ply");
+    opened.add("ply:" + cup);
+    EXPECT_EQ(opened.uris(), (std::vector<std::string>{"ply:" + cup, "ply:" + cup + "?scale=1mm"}));
+    opened.remove("ply:" + cup);
+  }
+  EXPECT_EQ(read(path("state/palpate/opened")),
+            "pcd:" + path("gone.pcd") + "\nply:" + cup + "?scale=1mm\n");
+  EXPECT_EQ(app::OpenedScenes().uris(), std::vector<std::string>{"ply:" + cup + "?scale=1mm"});
+}
+
 TEST_F(Program, PrintsTheOperatorsLinkAndTheViewers) {
   const std::string session =
       "run --duration 0.2 --port 0 --no-browser --camera synthetic:plane?size=160x120 ";
@@ -484,6 +504,17 @@ TEST_F(Program, SuggestsTheWordThatWasMeant) {
 TEST_F(ProgramWithLab, RefusesRecordingsThatAnExperimentCannotTake) {
   expect_refusal("eval lift --recording tum:there", {"--recording", "lift"});
   expect_refusal("eval scan --recording tum:nowhere", {"nowhere"});
+}
+
+TEST_F(Program, SaysWhatToDoWithASourceThatIsNone) {
+  expect_refusal("info", {"info: it is not said of what", "synthetic:desk"});
+  expect_refusal("info tum:", {"'tum:'", "names no folder", "tum:FOLDER"});
+  expect_refusal("info recording:" + write("walk.bag", "#ROSBAG"), {"walk.bag", "rs-convert"});
+  expect_refusal("info recording:" + write("scan.mkv", "x"), {"scan.mkv", "video", "depth:FOLDER"});
+  expect_refusal("info " + write("cup.ply", "ply"), {"cup.ply", "write ply:"});
+  // Six digits, whatever the sums behind them.
+  const Outcome at = run("info synthetic:desk --at 300,200");
+  EXPECT_NE(at.out.find("depth_m: 0.7331\n"), std::string::npos) << at.out;
 }
 
 TEST_F(Program, RefusesBadInputInOneLineThatNamesIt) {

@@ -10,6 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "palpate/record/recorded_hand.hpp"
 #include "palpate/record/replay.hpp"
 #include "palpate/sources/source.hpp"
 
@@ -29,6 +30,20 @@ using test::wavy_floor;
 
 std::uint64_t bits(double value) {
   return std::bit_cast<std::uint64_t>(value);
+}
+
+TEST(RecordedHand, IsThatOfEvenlySpacedTicks) {
+  const TemporaryFolder folder;
+  SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
+  const std::vector<ServoTick> ticks = record_press(writer, {}, 101);
+  const std::vector<RecordedHand> path = recorded_hand(folder.path() / "bag", 11);
+  ASSERT_EQ(path.size(), 11u);
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    EXPECT_EQ(path[i].t, ticks[10 * i].tick.t);
+    EXPECT_EQ(path[i].hip, ticks[10 * i].tick.hip);
+  }
+  EXPECT_EQ(recorded_hand(folder.path() / "bag", 1000).size(), 101u);
+  EXPECT_TRUE(fails_saying([&] { return recorded_hand(folder.path() / "none", 2); }, "none"));
 }
 
 TEST(Session, KeepsEachBitOfATick) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/write.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
@@ -62,6 +63,28 @@ inline http::response<http::string_body> ask(std::uint16_t port, const std::stri
   boost::beast::flat_buffer buffer;
   http::read(socket, buffer, parser);
   return parser.release();
+}
+
+/// What a server answers to a file that is sent. @param length  that is announced, if another
+inline http::response<http::string_body> send_file(std::uint16_t port, const std::string& target,
+                                                   const std::string& content,
+                                                   const std::string& origin = {},
+                                                   std::optional<std::size_t> length = {}) {
+  boost::asio::io_context context;
+  auto socket = connect_to(context, port);
+  http::request<http::empty_body> request(http::verb::put, target, 11);
+  request.set(http::field::host, "localhost");
+  if (!origin.empty()) request.set(http::field::origin, origin);
+  request.content_length(length.value_or(content.size()));
+  http::request_serializer<http::empty_body> serializer(request);
+  boost::beast::error_code refused;  // whoever is not welcome need not be read to the end
+  http::write_header(socket, serializer, refused);
+  boost::asio::write(socket, boost::asio::buffer(content), refused);
+  if (length) socket.shutdown(boost::asio::ip::tcp::socket::shutdown_send, refused);
+  http::response<http::string_body> answer;
+  boost::beast::flat_buffer buffer;
+  http::read(socket, buffer, answer);
+  return answer;
 }
 
 /// A page, as the server sees one.

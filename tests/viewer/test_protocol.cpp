@@ -72,6 +72,21 @@ TEST(Protocol, RefusesPayloadsOfAnotherSize) {
   EXPECT_THROW(rays_message(0, 3, 2, std::vector<float>(11)), Error);
 }
 
+TEST(Protocol, PutsTheFacesOfAMeshBehindItsCorners) {
+  FrameHeader header;
+  header.width = 3;
+  const std::vector<std::uint32_t> faces = {2, 0, 1};
+  const ViewerMessage message = points_message(header, std::vector<float>(9, 0.5F), faces);
+  ASSERT_EQ(message.payload.size(), 9 * 4 + 3 * 4u);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 92), 1u);
+  EXPECT_EQ(at<std::uint32_t>({message.payload.begin(), message.payload.end()}, 36), 2u);
+  EXPECT_EQ(at<std::uint32_t>(points_message(header, std::vector<float>(9)).head, 92), 0u);
+  const std::vector<std::uint32_t> beyond = {0, 1, 3};
+  EXPECT_THROW(points_message(header, std::vector<float>(9), beyond), Error);
+  EXPECT_THROW(path_message(0, std::vector<float>(7)), Error);
+  EXPECT_EQ(at<std::uint32_t>(path_message(0, std::vector<float>(8)).head, 4), 2u);
+}
+
 TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   TickBatch batch;
   batch.t = 100.0;

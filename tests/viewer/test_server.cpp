@@ -2,6 +2,8 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstring>
+#include <deque>
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <random>
@@ -14,6 +16,7 @@
 #include "palpate/viewer/server.hpp"
 
 #include "tests/support/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/viewer/client.hpp"
 
 namespace palpate {
@@ -46,6 +49,27 @@ class FakeHost final : public ViewerHost {
     ++commands_;
   }
 
+  std::filesystem::path begin_file(const std::string& name, std::uint64_t size) override {
+    static_cast<void>(size);
+    if (name == "song.mp3") throw Error(name, "cannot be touched");
+    return folder_.path() / name;
+  }
+  void end_file(const std::filesystem::path& file, bool whole) override {
+    const std::lock_guard lock(mutex_);
+    files_.push_back((whole ? "whole " : "part of ") + file.filename().string());
+    changed_.notify_all();
+  }
+  // Waits for the next file's end.
+  std::string next_file() {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::chrono::seconds(10), [&] { return !files_.empty(); });
+    if (files_.empty()) return "none";
+    const std::string file = files_.front();
+    files_.pop_front();
+    return file;
+  }
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_.path(); }
+
   // The hand's place when it has been told `count` times; waits for it.
   std::optional<Vec3> hand_number(std::size_t count) {
     std::unique_lock lock(mutex_);
@@ -73,6 +97,8 @@ class FakeHost final : public ViewerHost {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::optional<Vec3>> hands_;
+  std::deque<std::string> files_;
+  test::TemporaryFolder folder_;
   HandMessage last_;
   std::atomic<int> commands_{0};
   std::atomic<bool> takes_hand_{true};
@@ -150,6 +176,36 @@ TEST_F(ViewerServerTest, RefusesPagesOfOtherOrigins) {
   }
   EXPECT_TRUE(
       Page(server.port(), "/session", "localhost:8643", "http://localhost:8643").accepted());
+}
+
+TEST_F(ViewerServerTest, TakesAFileFromTheOperatorsPageAlone) {
+  const std::string content(100'000, 'x');
+  const auto send = [&](const std::string& token, const std::string& origin = {}) {
+    return send_file(server.port(), "/file?token=" + token + "&name=cup.ply", content, origin)
+        .result();
+  };
+  EXPECT_EQ(send(""), http::status::unauthorized);
+  EXPECT_EQ(send("of-somebody-else"), http::status::unauthorized);
+  EXPECT_EQ(send("operator-123", "http://example.com"), http::status::forbidden);
+  EXPECT_EQ(send_file(server.port(), "/other?token=operator-123", "x").result(),
+            http::status::not_found);
+  EXPECT_FALSE(std::filesystem::exists(host.folder() / "cup.ply"));
+
+  EXPECT_EQ(send("operator-123"), http::status::ok);
+  EXPECT_EQ(host.next_file(), "whole cup.ply");
+  EXPECT_EQ(std::filesystem::file_size(host.folder() / "cup.ply"), content.size());
+
+  const auto refused = send_file(server.port(), "/file?name=song.mp3&token=operator-123", "x");
+  EXPECT_EQ(refused.result(), http::status::unprocessable_entity);
+  EXPECT_EQ(refused.body().substr(0, 28), "song.mp3: cannot be touched");
+}
+
+TEST_F(ViewerServerTest, LetsGoOfAFileThatDoesNotArriveInFull) {
+  const std::string target = "/file?token=operator-123&name=";
+  send_file(server.port(), target + "half.ply", "half", {}, 1000);
+  EXPECT_EQ(host.next_file(), "part of half.ply");
+  EXPECT_EQ(send_file(server.port(), target + "next.ply", "next").result(), http::status::ok);
+  EXPECT_EQ(host.next_file(), "whole next.ply");
 }
 
 TEST(ViewerServer, AsksForItsToken) {

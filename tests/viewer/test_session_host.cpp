@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <thread>
@@ -106,6 +107,32 @@ TEST(SessionHost, OpensNoSceneButThoseThatItLists) {
   Hosted without;
   EXPECT_TRUE(
       fails_saying(without.asking(OpenScene{"synthetic:desk"}, Role::operating), "not among"));
+}
+
+TEST(SessionHost, OpensAFileThatArrivedInFull) {
+  std::vector<std::string> opened;
+  const auto files = std::make_shared<DroppedFiles>(1000);
+  Hosted hosted(
+      {.open_scene = [&](const std::string& uri) { opened.push_back(uri); }, .files = files});
+  EXPECT_EQ(json::parse(hosted.host.hello())["file_limit"], 1000);
+  const std::filesystem::path half = hosted.host.begin_file("half.ply", 900);
+  std::ofstream(half) << "ply";
+  EXPECT_TRUE(fails_saying([&] { return hosted.host.begin_file("more.ply", 200); }, "more.ply",
+                           "1 MB", "--camera"));
+  hosted.host.end_file(half, false);
+  EXPECT_FALSE(std::filesystem::exists(half));
+  const std::filesystem::path whole = hosted.host.begin_file("Half.PCD", 900);
+  EXPECT_EQ(std::filesystem::status(whole.parent_path().parent_path()).permissions(),
+            std::filesystem::perms::owner_all);
+  hosted.host.end_file(whole, true);
+  EXPECT_EQ(opened, std::vector<std::string>{"pcd:" + whole.string()});
+  for (const auto& [name, said] : {std::pair{"../x.ply", "rename"},
+                                   {".ply", "rename"},
+                                   {"a b.ply", "rename"},
+                                   {"walk.bag", "rs-convert"},
+                                   {"scan.mkv", "PNG"},
+                                   {"depth.png", "--camera depth:"}})
+    EXPECT_TRUE(fails_saying([&] { return hosted.host.begin_file(name, 1); }, said)) << name;
 }
 
 TEST(SessionHost, HoldsTheOperatorToTheSessionsOptions) {

@@ -2,7 +2,7 @@
 // The page in a real browser, with the real program behind it.
 
 import { execFileSync } from "node:child_process";
-import { mkdtempSync, readdirSync, rmSync } from "node:fs";
+import { mkdtempSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Browser, Page } from "playwright-core";
@@ -219,6 +219,28 @@ test("a contact is heard and felt where that is asked for, and only then", async
   await expect.poll(async () => (await given()).sounds).toEqual(["closed"]);
 });
 
+/** A sheet of 121 x 121 corners, 2 mm apart, with its faces. */
+function wallPly(): string {
+  const side = 121;
+  const corners: string[] = [];
+  const faces: string[] = [];
+  for (let v = 0; v < side; ++v)
+    for (let u = 0; u < side; ++u) {
+      corners.push(`${(0.002 * (u - 60)).toFixed(3)} ${(0.002 * (v - 60)).toFixed(3)} 0`);
+      const at = side * v + u;
+      if (u < side - 1 && v < side - 1)
+        faces.push(`4 ${at} ${at + 1} ${at + side + 1} ${at + side}`);
+    }
+  const axes = ["x", "y", "z"].map((axis) => `property float ${axis}`);
+  return [
+    ...["ply", "format ascii 1.0", `element vertex ${corners.length}`, ...axes],
+    ...[`element face ${faces.length}`, "property list uchar int vertex_indices", "end_header"],
+    ...corners,
+    ...faces,
+    "",
+  ].join("\n");
+}
+
 test("another scene is chosen on the page", async () => {
   const page = await open(DESK);
   const asked = (uri: string) => page.locator("#scene").selectOption(uri);
@@ -233,6 +255,48 @@ test("another scene is chosen on the page", async () => {
   await page.mouse.down();
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
   await page.mouse.up();
+  // A file that is chosen, and one that is dropped, are touched; what cannot be is said.
+  const folder = mkdtempSync(join(tmpdir(), "palpate-page-"));
+  try {
+    const file = join(folder, "a wall.ply");
+    writeFileSync(file, wallPly());
+    await page.setInputFiles("#file", file);
+    await expect.poll(() => page.locator("#camera").textContent()).toContain("a_wall.ply");
+    await drawn(page);
+    const faces = () =>
+      page.evaluate(() =>
+        [...(window as any).palpate.view.clouds.values()].map(
+          ({ faces }: any) => faces.visible && faces.geometry.index.count,
+        ),
+      );
+    expect(await faces()).toEqual([3 * 2 * 120 * 120]);
+    const chosen = await page.locator("#scene").inputValue();
+    expect(chosen).toMatch(/^ply:.*a_wall\.ply$/);
+    const drop = (name: string, text: string) =>
+      page.evaluate(
+        ({ name, text }) => {
+          const dataTransfer = new DataTransfer();
+          dataTransfer.items.add(new File([text], name));
+          for (const kind of ["dragover", "drop"])
+            document.body.dispatchEvent(
+              new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true }),
+            );
+        },
+        { name, text },
+      );
+    const toast = () => page.locator("#toast").textContent();
+    await drop("song.mp3", "la");
+    await expect.poll(toast).toContain("song.mp3: cannot be touched");
+    await drop("broken.ply", "ply\nformat nonsense\n");
+    await expect.poll(toast).toContain("broken.ply");
+    await expect.poll(() => page.locator("#scene").inputValue()).toBe(chosen);
+    await drop("another.ply", wallPly());
+    await expect.poll(() => page.locator("#camera").textContent()).toContain("another.ply");
+    expect(await page.locator("#scene optgroup[label='Opened last'] option").allTextContents())
+      .toEqual(["another.ply", "a_wall.ply"]);
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
   // Back to what the program was started with.
   await asked(DESK[1]!);
   await expect.poll(() => page.locator("#camera").textContent()).toContain(DESK[1]!);
@@ -495,6 +559,10 @@ test("a recording is paused, touched and gone through; jumps take the force away
       .poll(() => page.evaluate(() => (window as any).palpate.newest().state.playback.paused))
       .toBe(true);
     const { place } = await cameraState();
+    const ghost = () =>
+      page.evaluate(() => (window as any).palpate.view.ghostAt as number[] | null);
+    await expect.poll(ghost).not.toBeNull();
+    const ghostBefore = (await ghost())!;
 
     // What is paused can be touched.
     const at = await placeWhere(page, "surface");
@@ -523,6 +591,8 @@ test("a recording is paused, touched and gone through; jumps take the force away
       .toBeLessThan(0.3);
     await until(page, (seen) => seen.force > 1);
     await page.mouse.up();
+    // The recorded hand is where it was at that place.
+    expect(distance((await ghost())!, ghostBefore)).toBeGreaterThan(0.005);
     await page.locator("#speed").selectOption("0.5");
     await page.keyboard.press("k");
     await expect.poll(async () => (await cameraState()).place).not.toBe(100);

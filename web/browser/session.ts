@@ -2,6 +2,9 @@
 // A session of the program and a browser that looks at it, for tests and pictures.
 
 import { spawn, type ChildProcess } from "node:child_process";
+import { mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { chromium, type Browser, type Page } from "playwright-core";
 
 /** The program with its page, until stopped. */
@@ -17,7 +20,9 @@ export class Program {
     if (!program) throw new Error("PALPATE must name the program");
     const token = ["--operator-token", "of-the-browser-tests"];
     const words = ["run", "--no-browser", "--port", String(port), ...token, ...options];
-    const child = spawn(program, words, { cwd });
+    const state = mkdtempSync(join(tmpdir(), "palpate-state-"));
+    const child = spawn(program, words, { cwd, env: { ...process.env, XDG_STATE_HOME: state } });
+    child.on("exit", () => rmSync(state, { recursive: true }));
     let said = "";
     const url = await new Promise<string>((resolve, reject) => {
       child.stderr.on("data", (text: Buffer) => {

@@ -8,6 +8,7 @@ import type { Frame, Rays } from "./protocol";
 import { SeenSurface } from "./surface";
 
 const POINTS_PER_ROW = 1024;
+const LEAST_POINTS = 2000; // that are drawn of an unorganised cloud, if it has as many
 
 const vertexShader = /* glsl */ `
 precision highp float;
@@ -111,6 +112,37 @@ void main() {
 }
 `;
 
+// A mesh's faces, in the points' colours; each face flat.
+const facesVertexShader = /* glsl */ `
+precision highp float;
+uniform mat4 worldFromCamera;
+uniform vec2 range;
+uniform vec3 nearColour, middleColour, farColour;
+out vec3 colour;
+out vec3 place;
+void main() {
+  place = (worldFromCamera * vec4(position, 1.0)).xyz;
+  gl_Position = projectionMatrix * viewMatrix * vec4(place, 1.0);
+  float t = clamp((position.z - range.x) / (range.y - range.x), 0.0, 1.0);
+  colour = t < 0.5 ? mix(nearColour, middleColour, 2.0 * t)
+                   : mix(middleColour, farColour, 2.0 * t - 1.0);
+}
+`;
+
+const facesFragmentShader = /* glsl */ `
+precision highp float;
+uniform vec3 glow, proxy, radii, light;
+in vec3 colour;
+in vec3 place;
+out vec4 fragment;
+void main() {
+  vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
+  vec3 lit = colour * (0.36 + 0.6 * abs(dot(normal, light)));
+  float near = 1.0 - smoothstep(radii.x, radii.y, distance(place, proxy));
+  fragment = linearToOutputTexel(vec4(mix(lit, glow, 0.7 * near), 1.0));
+}
+`;
+
 const fragmentShader = /* glsl */ `
 precision highp float;
 in vec3 colour;
@@ -139,6 +171,8 @@ export interface CloudColours {
 /** Draws a camera's newest frame. */
 export class CameraCloud {
   readonly object: THREE.Points;
+  /** of a mesh; else not visible */
+  readonly faces: THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>;
   /** [m] of the nearer and the farther points, for colours */
   range: [number, number] = [0.5, 1.5];
   frame: Frame | null = null;
@@ -178,8 +212,22 @@ export class CameraCloud {
       },
     });
     this.object = new THREE.Points(new THREE.BufferGeometry(), this.material);
-    this.object.frustumCulled = false;
-    this.object.visible = false;
+    this.faces = new THREE.Mesh(
+      new THREE.BufferGeometry(),
+      new THREE.ShaderMaterial({
+        glslVersion: THREE.GLSL3,
+        vertexShader: facesVertexShader,
+        fragmentShader: facesFragmentShader,
+        uniforms: this.material.uniforms, // the same objects
+        side: THREE.DoubleSide,
+        // The points lie on the faces, before them.
+        polygonOffset: true,
+        polygonOffsetFactor: 1,
+        polygonOffsetUnits: 4,
+      }),
+    );
+    this.object.frustumCulled = this.faces.frustumCulled = false;
+    this.object.visible = this.faces.visible = false;
   }
 
   show(frame: Frame): void {
@@ -192,7 +240,8 @@ export class CameraCloud {
     uniforms.depth!.value = this.texture;
     uniforms.points!.value = this.texture;
     uniforms.intrinsics!.value.fromArray(frame.intrinsics);
-    if (isPoints) uniforms.pointSpacing!.value = spacingOf(frame.points!);
+    // Of a mesh, the faces show what is between its corners.
+    if (isPoints) uniforms.pointSpacing!.value = frame.triangles ? 0 : spacingOf(frame.points!);
     uniforms.metresPerUnit!.value = frame.metresPerUnit;
     uniforms.size!.value.set(frame.width, frame.height);
     const pose = frame.worldFromCamera;
@@ -203,6 +252,7 @@ export class CameraCloud {
     this.frame = frame;
     this.seen = new SeenSurface(frame, this.lens);
     this.object.visible = !frame.hasRays || this.rays !== null;
+    this.showFaces(frame);
     this.followRange(frame);
   }
 
@@ -212,6 +262,8 @@ export class CameraCloud {
     this.rays?.dispose();
     this.material.dispose();
     this.object.geometry.dispose();
+    this.faces.geometry.dispose();
+    this.faces.material.dispose();
   }
 
   setRays(message: Rays): void {
@@ -238,6 +290,11 @@ export class CameraCloud {
     uniforms.pixelsPerMetre!.value = pixelsPerMetre;
     uniforms.smallest!.value = 1.5 * pixelRatio;
     uniforms.range!.value.fromArray(this.range);
+    if (this.frame.points) {
+      // They have no rows: one of as many of them as of an image's pixels, but some always.
+      const most = Math.max(1, Math.floor(this.frame.width / LEAST_POINTS));
+      uniforms.stride!.value = stride = Math.min(stride * stride, most);
+    }
     const columns = Math.ceil(this.frame.width / stride);
     const rows = Math.ceil(this.frame.height / stride);
     this.object.geometry.setDrawRange(0, columns * rows);
@@ -257,6 +314,15 @@ export class CameraCloud {
     this.material.uniforms.middleColour!.value = colours.middle;
     this.material.uniforms.farColour!.value = colours.far;
     this.material.uniforms.glow!.value = colours.glow;
+  }
+
+  private showFaces({ points, triangles }: Frame): void {
+    this.faces.visible = triangles !== null;
+    if (!triangles) return;
+    const { geometry } = this.faces;
+    geometry.dispose(); // another's buffers
+    geometry.setAttribute("position", new THREE.BufferAttribute(points!, 3));
+    geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
   }
 
   private define(name: string, wanted: boolean): void {

@@ -72,6 +72,11 @@ export class Connection {
     if (this.connected) this.socket!.send(JSON.stringify(command));
   }
 
+  /** Where a file goes that is to be touched. */
+  fileTarget(name: string): string {
+    return `/file?token=${encodeURIComponent(this.token ?? "")}&name=${name}`;
+  }
+
   private open(): void {
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
     const socket = new WebSocket(`${scheme}//${location.host}${this.path()}`);

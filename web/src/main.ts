@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import "./style.css";
 import { Connection, unknownToken, type Presence } from "./connection";
+import { Files } from "./files";
 import { HandInput, isForForm } from "./hand";
 import { length } from "./camera_math";
 import { latchedText, mayOperate, Panel, roleNames } from "./panel";
@@ -13,9 +14,9 @@ import {
   type State,
   type Ticks,
 } from "./protocol";
-import { SceneView, type Palette } from "./scene";
+import { GHOST_TRAIL, SceneView, type Palette } from "./scene";
 import { Senses } from "./senses";
-import { Timeline } from "./timeline";
+import { handAt, Timeline, trailAt } from "./timeline";
 import { depthBelow, flagNames, SteadyWhy, why } from "./why";
 
 const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
@@ -30,6 +31,7 @@ const senses = new Senses();
 const steadyWhy = new SteadyWhy();
 let tick: Ticks | null = null;
 let announced = "";
+let recordedHand: Float32Array | null = null;
 const arrived = new Map<number, Frame>();
 
 function toast(text: string, lasts = 6000): void {
@@ -96,6 +98,7 @@ const connection = new Connection({
   },
   hello(hello) {
     if (introduced) view.clear();
+    recordedHand = null;
     introduced = hello;
     if (hello.notice) toast(hello.notice, 15_000);
     panel.introduce(hello);
@@ -151,6 +154,7 @@ const connection = new Connection({
   message(message) {
     if (message.kind === "frame") arrived.set(message.camera, message);
     else if (message.kind === "rays") view.setRays(message);
+    else if (message.kind === "path") recordedHand = message.places;
     else {
       tick = message;
       plots.add(message.samples);
@@ -158,6 +162,13 @@ const connection = new Connection({
       view.showTick(message);
     }
   },
+});
+
+new Files({
+  target: (name) => connection.fileTarget(name),
+  toast,
+  hello: () => introduced,
+  state: () => state,
 });
 
 const hand = new HandInput(get<HTMLCanvasElement>("view"), view, {
@@ -225,6 +236,10 @@ function loop(now: number): void {
   }
   arrived.clear();
   hand.showPointer();
+  const time = recordedHand && timeline.timeNow(now);
+  if (recordedHand && time !== null)
+    view.showGhost(handAt(recordedHand, time), trailAt(recordedHand, time, 1.2, GHOST_TRAIL - 1));
+  else view.showGhost(null);
   view.draw(now);
   senses.give(performance.now());
   showTick(now);

@@ -45,6 +45,13 @@ export function whyNot(role: Role): { method: string; safety: string; session: s
   };
 }
 
+/** A scene's name in the list: of a file or folder, the last part of its path. */
+export function sceneName(uri: string): string {
+  const [scheme, ...rest] = uri.split(":");
+  const name = rest.join(":");
+  return scheme === "synthetic" ? name : (/([^/?]+)\/*(\?.*)?$/.exec(name)?.[0] ?? uri);
+}
+
 /** What is to be said while faults are latched; empty: none is. */
 export function latchedText({ role, latched_by }: Pick<State, "role" | "latched_by">): string {
   if (latched_by.length === 0) return "";
@@ -276,12 +283,20 @@ export class Panel {
   introduce(hello: Hello): void {
     this.hello = hello;
     this.role = null; // rows are made anew
+    const choices = (wanted: string) =>
+      hello.scenes
+        .filter(({ group }) => group === wanted)
+        .map(({ uri, meaning }) =>
+          element("option", { value: uri, title: `${uri}: ${meaning}` }, sceneName(uri)),
+        );
+    const groups = new Set(hello.scenes.map(({ group }) => group));
     this.scene.replaceChildren(
-      ...hello.scenes.map(({ uri, meaning }) =>
-        element("option", { value: uri, title: meaning }, uri.replace("synthetic:", "")),
+      ...[...groups].flatMap((group) =>
+        group ? [element("optgroup", { label: group }, ...choices(group))] : choices(group),
       ),
     );
     get("scene-choice").hidden = hello.scenes.length === 0;
+    get("open-file").hidden = hello.file_limit === 0;
     this.method.replaceChildren(
       ...hello.methods.map(({ name }) =>
         element("option", { value: name }, name.replaceAll("-", " ")),
@@ -356,6 +371,7 @@ export class Panel {
     if (role === this.role) return;
     this.role = role;
     this.method.disabled = this.scene.disabled = role !== "operating";
+    get<HTMLButtonElement>("open-file").disabled = role !== "operating";
     for (const row of this.rows.values()) row.allow(role !== "looking");
     for (const row of this.limits.values()) row.allow(maySetLimit(role, row.row));
     for (const row of this.placement.values()) row.allow(role === "operating");

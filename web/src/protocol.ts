@@ -3,13 +3,14 @@
 
 export type Vec3 = readonly [number, number, number];
 
-const Kind = { frame: 1, ticks: 2, rays: 3, hand: 16, shown: 17 } as const;
+const Kind = { frame: 1, ticks: 2, rays: 3, path: 4, hand: 16, shown: 17 } as const;
 const Format = { depth: 0, depthWithRays: 1, points: 2 } as const;
 
 const FRAME_HEADER = 96;
 const TICKS_HEADER = 88;
 const SAMPLE_FLOATS = 5;
 const RAYS_HEADER = 12;
+const PATH_HEADER = 8;
 const HAND_BYTES = 32;
 const SHOWN_BYTES = 8;
 
@@ -32,6 +33,8 @@ export interface Frame {
   depth: Uint16Array | null;
   /** x y z [m, camera], `width` times */
   points: Float32Array | null;
+  /** three of the points each; null: they are not the corners of a mesh */
+  triangles: Uint32Array | null;
 }
 
 /** The newest tick and what the plots need of those since the message before. */
@@ -80,7 +83,14 @@ export interface Rays {
   rays: Float32Array;
 }
 
-export type Message = Frame | Ticks | Rays;
+/** The hand that was recorded with a camera's frames: t [s from the first frame], x y z [m]. */
+export interface HandPath {
+  kind: "path";
+  camera: number;
+  places: Float32Array;
+}
+
+export type Message = Frame | Ticks | Rays | HandPath;
 
 function vec3(view: DataView, at: number): Vec3 {
   return [view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)];
@@ -98,7 +108,9 @@ function decodeFrame(buffer: ArrayBuffer, view: DataView): Frame {
   const count = width * height;
   const isPoints = format === Format.points;
   need(format <= Format.points, `frame format ${format}`);
-  need(buffer.byteLength === FRAME_HEADER + count * (isPoints ? 12 : 2), "a frame cut short");
+  const triangles = isPoints ? view.getUint32(92, true) : 0;
+  const size = FRAME_HEADER + count * (isPoints ? 12 : 2) + 12 * triangles;
+  need(buffer.byteLength === size, "a frame cut short");
   return {
     kind: "frame",
     camera: view.getUint8(1),
@@ -114,6 +126,8 @@ function decodeFrame(buffer: ArrayBuffer, view: DataView): Frame {
     hasRays: format === Format.depthWithRays,
     depth: isPoints ? null : new Uint16Array(buffer, FRAME_HEADER, count),
     points: isPoints ? new Float32Array(buffer, FRAME_HEADER, 3 * count) : null,
+    triangles:
+      triangles > 0 ? new Uint32Array(buffer, FRAME_HEADER + 12 * count, 3 * triangles) : null,
   };
 }
 
@@ -162,6 +176,13 @@ function decodeRays(buffer: ArrayBuffer, view: DataView): Rays {
   return { kind: "rays", camera: view.getUint8(1), width, height, rays };
 }
 
+function decodePath(buffer: ArrayBuffer, view: DataView): HandPath {
+  need(buffer.byteLength >= PATH_HEADER, "a path without its header");
+  const count = view.getUint32(4, true);
+  need(buffer.byteLength === PATH_HEADER + 16 * count, "a path cut short");
+  return { kind: "path", camera: view.getUint8(1), places: new Float32Array(buffer, PATH_HEADER) };
+}
+
 /** Takes a binary message apart without copying its payload. Throws if it is malformed. */
 export function decode(buffer: ArrayBuffer): Message {
   need(buffer.byteLength > 0, "empty");
@@ -174,6 +195,8 @@ export function decode(buffer: ArrayBuffer): Message {
       return decodeTicks(buffer, view);
     case Kind.rays:
       return decodeRays(buffer, view);
+    case Kind.path:
+      return decodePath(buffer, view);
     default:
       throw new Error(`message: kind ${kind} is not known`);
   }
@@ -230,7 +253,9 @@ export interface Hello {
   token?: "unknown";
   methods: { name: string; meaning: string }[];
   /** what can be chosen to be touched; none: nothing can */
-  scenes: { uri: string; meaning: string }[];
+  scenes: { uri: string; meaning: string; group: string }[];
+  /** [bytes] of the files that the operator's page may send; 0: it may send none */
+  file_limit: number;
   /** to be shown on joining, such as why a scene could not be opened; empty: nothing */
   notice: string;
   parameters: ParameterRow[];

@@ -31,6 +31,8 @@ const ARROW_PER_NEWTON = 0.055; // of the view's height
 const LONGEST_ARROW = 0.4; // likewise
 const PIN = 3.2; // contact radii
 const TRAIL = 360; // ticks messages
+/** Places of the line behind the recorded hand. */
+export const GHOST_TRAIL = 60;
 const SPOT_SIZE = 9; // [px] of the ring under the pointer
 
 export interface Radii {
@@ -98,6 +100,9 @@ export class SceneView {
   private readonly grid: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly frusta: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly axes = new THREE.AxesHelper(AXES_LENGTH);
+  // The hand that was recorded.
+  private readonly ghost: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
+  private readonly ghostTrail: THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly pin: THREE.Mesh<THREE.CylinderGeometry, THREE.MeshStandardMaterial>;
   private readonly arrow = new THREE.Group();
   private readonly shaft: THREE.Mesh;
@@ -128,6 +133,10 @@ export class SceneView {
     const ball = new THREE.SphereGeometry(1, 48, 32);
     this.proxy = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ roughness: 0.35 }));
     this.hip = new THREE.Mesh(ball, new THREE.MeshBasicMaterial({ depthTest: false }));
+    this.ghost = new THREE.Mesh(
+      ball,
+      new THREE.MeshStandardMaterial({ transparent: true, opacity: 0.6, roughness: 0.8 }),
+    );
     this.ring = new THREE.Sprite(
       new THREE.SpriteMaterial({ map: ringTexture(), depthTest: false, sizeAttenuation: false }),
     );
@@ -144,6 +153,10 @@ export class SceneView {
     this.trail = new THREE.Line(
       line(TRAIL),
       new THREE.LineBasicMaterial({ transparent: true, opacity: 0.7 }),
+    );
+    this.ghostTrail = new THREE.Line(
+      line(GHOST_TRAIL),
+      new THREE.LineBasicMaterial({ transparent: true, opacity: 0.6 }),
     );
     const flat = { depthTest: false, transparent: true, side: THREE.DoubleSide } as const;
     this.shadow = new THREE.Mesh(
@@ -170,7 +183,7 @@ export class SceneView {
       this.arrowMaterial,
     );
     this.arrow.add(this.shaft, this.head);
-    const lines = [this.link, this.plumb, this.trail, this.grid, this.frusta];
+    const lines = [this.link, this.plumb, this.trail, this.ghostTrail, this.grid, this.frusta];
     for (const object of lines) object.frustumCulled = false;
     this.shadow.renderOrder = 1;
     this.spot.renderOrder = 1;
@@ -181,6 +194,7 @@ export class SceneView {
     const marks = [
       ...[this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin],
       ...[this.shadow, this.spot, this.grid, this.frusta, this.axes],
+      ...[this.ghost, this.ghostTrail],
     ];
     for (const mark of marks) mark.visible = false;
     this.arrow.visible = false;
@@ -208,6 +222,7 @@ export class SceneView {
     this.proxy.material.color = colour(palette.proxy);
     this.hip.material.color = colour(palette.hip);
     this.link.material.color = colour(palette.hip);
+    this.ghost.material.color = this.ghostTrail.material.color = colour(palette.text);
     this.ring.material.color = colour(palette.text);
     this.plumb.material.color = colour(palette.text);
     this.trail.material.color = colour(palette.calm);
@@ -244,12 +259,13 @@ export class SceneView {
   /** Forgets what was seen: another session begins. */
   clear(): void {
     for (const cloud of this.clouds.values()) {
-      this.scene.remove(cloud.object);
+      this.scene.remove(cloud.object, cloud.faces);
       cloud.dispose();
     }
     this.clouds.clear();
     this.home = this.tick = this.pointedAt = this.under = null;
     this.trailPoints.length = this.drawnPoints = 0;
+    this.ghost.visible = this.ghostTrail.visible = false;
     for (const lines of [this.grid, this.frusta, this.trail]) lines.visible = false;
     this.touch();
   }
@@ -296,6 +312,22 @@ export class SceneView {
     else this.trailPoints.splice(0, 6); // it fades from its tail while nothing is touched
     this.trailPoints.splice(0, this.trailPoints.length - 3 * TRAIL);
     this.touch();
+  }
+
+  /** Where the hand was when this was recorded [m]; null: it was not. */
+  showGhost(at: Vec3 | null, trail: readonly number[] = []): void {
+    const { position, visible } = this.ghost;
+    if (visible === (at !== null) && (!at || length(sub(at, position.toArray())) < 1e-5)) return;
+    this.ghost.visible = this.ghostTrail.visible = at !== null;
+    if (at) position.set(...at);
+    this.setLine(this.ghostTrail, trail);
+    this.ghost.scale.setScalar(this.radii.r_c);
+    this.touch();
+  }
+
+  /** For tests: where the ghost is drawn [m]. */
+  get ghostAt(): Vec3 | null {
+    return this.ghost.visible ? this.ghost.position.toArray() : null;
   }
 
   /** How high the proxy is above what the cameras see [m]; null: nothing is seen behind it. */
@@ -382,6 +414,7 @@ export class SceneView {
     );
     this.lamp.position.set(...lampAt);
 
+    this.setResolution();
     const pixelsPerMetre = this.canvas.height / (2 * Math.tan(FIELD_OF_VIEW / 2));
     this.drawnPoints = 0;
     for (const cloud of this.clouds.values()) {
@@ -402,7 +435,7 @@ export class SceneView {
       cloud = new CameraCloud();
       cloud.setColours(this.cloudColours());
       this.clouds.set(camera, cloud);
-      this.scene.add(cloud.object);
+      this.scene.add(cloud.object, cloud.faces);
     }
     return cloud;
   }
@@ -416,10 +449,17 @@ export class SceneView {
   private resize(): void {
     const { clientWidth, clientHeight } = this.canvas;
     if (clientWidth === 0 || clientHeight === 0) return;
-    this.renderer.setPixelRatio(this.software ? 1 : Math.min(devicePixelRatio, 2));
     this.renderer.setSize(clientWidth, clientHeight, false);
+    this.setResolution();
     this.camera.aspect = clientWidth / clientHeight;
     this.touch();
+  }
+
+  // Of the picture: coarser where not even few points are drawn fast enough.
+  private setResolution(): void {
+    const full = this.software ? 1 : Math.min(devicePixelRatio, 2);
+    const ratio = full * this.thinning.resolution;
+    if (ratio !== this.renderer.getPixelRatio()) this.renderer.setPixelRatio(ratio);
   }
 
   private follow(at: Vec3): void {

@@ -1,7 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 
-/** Every how many-th pixel can be drawn, along both axes. */
-const STRIDES = [1, 2, 3, 4, 6, 8] as const;
+/** Every how many-th pixel is drawn, along both axes, and at which share of the resolution. */
+const LEVELS = [
+  [1, 1],
+  [2, 1],
+  [3, 1],
+  [4, 1],
+  [6, 1],
+  [6, 0.6],
+] as const;
 const SLOW = 1 / 22;
 const FAST = 1 / 45;
 const PATIENCE = 45;
@@ -9,6 +16,8 @@ const PATIENCE = 45;
 /**
  * Chooses how many points are drawn, from how long frames take: fewer at once when it is slow,
  * more again only when it has been fast for long, and never back to what was slow a moment ago.
+ * Where few points do not help, as the window is large, it is the picture that gets coarser. Ticks
+ * are never left out.
  */
 export class Thinning {
   private level = 0;
@@ -17,7 +26,12 @@ export class Thinning {
   private patience = PATIENCE;
 
   get stride(): number {
-    return STRIDES[this.level]!;
+    return LEVELS[this.level]![0];
+  }
+
+  /** Of the picture, beside what the screen could show. */
+  get resolution(): number {
+    return LEVELS[this.level]![1];
   }
 
   /** [s] between drawn frames, smoothed; null before the first. */
@@ -29,7 +43,7 @@ export class Thinning {
   measure(seconds: number): void {
     if (!(seconds > 0) || seconds > 2) return; // a sleeping tab
     this.average = this.average === null ? seconds : this.average + 0.3 * (seconds - this.average);
-    if (this.average > SLOW && this.level < STRIDES.length - 1) {
+    if (this.average > SLOW && this.level < LEVELS.length - 1) {
       ++this.level;
       this.average = null;
       this.fastFrames = 0;

@@ -2,10 +2,11 @@
 // Where a recording is, and what stops it, moves it and sets its speed.
 
 import { mayOperate } from "./panel";
-import type { Command, Playback, State } from "./protocol";
+import type { Command, Playback, State, Vec3 } from "./protocol";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const SEEK_INTERVAL = 120; // [ms] between two places that are asked for while one drags
+const LONGEST_GAP = 300; // [ms] between two states, beyond which a recording's time is not guessed
 const HELD = 700; // [ms] for which what was asked for is shown, until the program says so, too
 
 /** Minutes and seconds, to a tenth. */
@@ -21,6 +22,39 @@ export function longest(cameras: State["cameras"]): State["cameras"][number] | n
   return recordings.sort((a, b) => b.frames - a.frames)[0] ?? null;
 }
 
+/**
+ * Where a recorded hand was, between the two places of its path about `time` [s]; null: the path
+ * does not reach there.
+ */
+export function handAt(places: Float32Array, time: number): Vec3 | null {
+  const last = places.length / 4 - 1;
+  const t = (i: number) => places[4 * i]!;
+  if (!(last > 0) || time < t(0) || time > t(last)) return null;
+  let [low, high] = [0, last];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (t(middle) <= time) low = middle;
+    else high = middle;
+  }
+  const share = (time - t(low)) / Math.max(t(high) - t(low), 1e-9);
+  return [1, 2, 3].map((axis) => {
+    const [a, b] = [places[4 * low + axis]!, places[4 * high + axis]!];
+    return a + share * (b - a);
+  }) as unknown as Vec3;
+}
+
+/** The path [m] of a recorded hand in the `seconds` before a time, in `steps`. */
+export function trailAt(
+  places: Float32Array,
+  time: number,
+  seconds: number,
+  steps: number,
+): number[] {
+  return Array.from({ length: steps + 1 }, (_, i) => time - seconds * (1 - i / steps)).flatMap(
+    (t) => handAt(places, t) ?? [],
+  );
+}
+
 const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
 export class Timeline {
@@ -28,6 +62,7 @@ export class Timeline {
   private readonly speed = get<HTMLSelectElement>("speed");
   private playback: Playback = { paused: false, loop: true, speed: 1 };
   private mayChange = false;
+  private shown: { time: number; at: number } | null = null; // [s] of the frame shown, [ms] when
   private held = 0; // [ms] when it was changed here last
   private seeking = 0; // timer
   private wanted: number | null = null; // place that is still to be asked for
@@ -38,6 +73,14 @@ export class Timeline {
     get("loop").addEventListener("click", () => this.set({ loop: !this.playback.loop }));
     this.speed.addEventListener("change", () => this.set({ speed: +this.speed.value }));
     this.place.addEventListener("input", () => this.seek(+this.place.value / +this.place.max));
+  }
+
+  /** [s] where the recording is now, between two states of the program; null: there is none. */
+  timeNow(now: number): number | null {
+    if (!this.shown) return null;
+    const { paused, speed } = this.playback;
+    const gone = Math.min(now - this.shown.at, LONGEST_GAP) / 1000;
+    return this.shown.time + (paused ? 0 : speed * gone);
   }
 
   /** Stops the recording, or lets it go on. */
@@ -51,7 +94,9 @@ export class Timeline {
     const root = get("timeline");
     if (root.hidden === isShown) root.hidden = !isShown;
     this.mayChange = isShown && mayOperate(state);
+    if (!isShown) this.shown = null;
     if (!isShown) return;
+    if (this.shown?.time !== recording.time) this.shown = { time: recording.time, at: now };
     for (const part of root.querySelectorAll<HTMLInputElement>("button, input, select"))
       part.disabled = !this.mayChange;
     root.title = this.mayChange ? "" : "Only the operator's page plays recordings.";

@@ -6,6 +6,7 @@ import {
   encodeShown,
   Grip,
   type Frame,
+  type HandPath,
   type Rays,
   type Ticks,
 } from "../src/protocol";
@@ -51,7 +52,30 @@ function ticksMessage(samples: number[][]): ArrayBuffer {
   return buffer;
 }
 
+test("a recorded hand's path keeps its four numbers a place", () => {
+  const buffer = new ArrayBuffer(8 + 32);
+  const view = new DataView(buffer);
+  view.setUint8(0, 4);
+  view.setUint8(1, 3);
+  view.setUint32(4, 2, true);
+  new Float32Array(buffer, 8).set([0, 1, 2, 3, 0.5, 4, 5, 6]);
+  expect(decode(buffer)).toMatchObject({ kind: "path", camera: 3 });
+  expect([...(decode(buffer) as HandPath).places]).toEqual([0, 1, 2, 3, 0.5, 4, 5, 6]);
+  expect(() => decode(buffer.slice(0, 24))).toThrow("cut short");
+});
+
 describe("a frame", () => {
+  test("has the faces of a mesh behind its corners", () => {
+    const payload = new ArrayBuffer(3 * 12 + 12);
+    new Float32Array(payload, 0, 9).set([0, 0, 0, 1, 0, 0, 0, 1, 0]);
+    new Uint32Array(payload, 36).set([2, 0, 1]);
+    const message = frameMessage(2, payload, 3, 1);
+    expect(() => decode(message)).toThrow("cut short");
+    new DataView(message).setUint32(92, 1, true);
+    const frame = decode(message) as Frame;
+    expect(frame.points).toHaveLength(9);
+    expect([...frame.triangles!]).toEqual([2, 0, 1]);
+  });
   test("keeps the depths where they lie", () => {
     const message = frameMessage(0, new Uint16Array([0, 700, 65535, 1, 2, 3]).buffer, 3, 2);
     const frame = decode(message) as Frame;

@@ -68,6 +68,7 @@ export function seen(scene: Scene, eye: Vec3, target: Vec3, noise: () => number 
     hasRays: false,
     depth,
     points: null,
+    triangles: null,
   };
 }
 

@@ -41,3 +41,13 @@ test("does not swing between two strides, one too slow and one fast", () => {
 test("takes no notice of a tab that slept", () => {
   expect(run(new Thinning(), () => 30, 100)).toBe(1);
 });
+
+test("where few points are slow, too, the picture gets coarser", () => {
+  const thinning = new Thinning();
+  expect(thinning.resolution).toBe(1);
+  // A large window without a graphics card: the picture itself takes a tenth of a second.
+  for (let i = 0; i < 60; ++i)
+    thinning.measure(0.1 * thinning.resolution ** 2 + 0.3 / thinning.stride ** 2);
+  expect(thinning.stride).toBe(6);
+  expect(0.1 * thinning.resolution ** 2 + 0.3 / thinning.stride ** 2).toBeLessThan(1 / 20);
+});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { expect, test } from "vitest";
 import type { CameraState } from "../src/protocol";
-import { longest, timeText } from "../src/timeline";
+import { handAt, longest, timeText, trailAt } from "../src/timeline";
 
 test("times are minutes and seconds", () => {
   expect(timeText(0)).toBe("0:00.0");
@@ -16,4 +16,16 @@ test("the timeline is of the longest recording, and of no live camera or still p
   };
   expect(longest([camera("synthetic:desk", 0), camera("pcd:one", 1)])).toBeNull();
   expect(longest([camera("a", 5), camera("b", 90), camera("c", 30)])?.uri).toBe("b");
+});
+
+test("a recorded hand is between the places of its path, and nowhere beyond them", () => {
+  const places = Float32Array.of(-0.5, 0, 0, 1, 0.5, 0, 1, 1, 1, 2, 1, 1, 4, 2, 1, 1);
+  expect(handAt(places, -0.5)).toEqual([0, 0, 1]);
+  expect(handAt(places, 0)).toEqual([0, 0.5, 1]);
+  expect(handAt(places, 0.75)).toEqual([1, 1, 1]);
+  expect(handAt(places, 4)).toEqual([2, 1, 1]);
+  expect(handAt(places, -0.51)).toBeNull();
+  expect(handAt(places, 4.01)).toBeNull();
+  expect(handAt(Float32Array.of(0, 1, 2, 3), 0)).toBeNull();
+  expect(trailAt(places, 0.75, 0.5, 2)).toEqual([0, 0.75, 1, 0, 1, 1, 1, 1, 1]);
 });

@@ -26,10 +26,11 @@ struct ExperimentOptions {
   Parameters parameters;  ///< Table 2 unless set
 
   // The benches `pop` and `field`.
-  std::optional<int> cases;           ///< how many of each family or class
-  std::vector<std::string> families;  ///< of pop, classes of field, scenes of fidelity; empty: all
-  std::vector<std::string> fixed;     ///< KEY=VALUE: not drawn by chance
-  std::string case_text;              ///< one case, as a run printed it, and nothing else
+  std::optional<int> cases;  ///< how many of each family or class
+  std::vector<std::string>
+      families;  ///< of pop, methods; classes of field, scenes of fidelity; or all
+  std::vector<std::string> fixed;  ///< KEY=VALUE: not drawn by chance
+  std::string case_text;           ///< one case, as a run printed it, and nothing else
 };
 
 /// A piece of an experiment that needs no other: its rows of the CSV, each ended by a newline.

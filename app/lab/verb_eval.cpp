@@ -170,7 +170,7 @@ Verb add_eval(CLI::App& program) {
                       "feel: free hands");
   command
       ->add_option("--families", options->families,
-                   "pop, field, fidelity, feel: which, separated by commas")
+                   "pop, methods, field, fidelity, feel: which, separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false);
   command

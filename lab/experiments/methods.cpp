@@ -80,17 +80,18 @@ ExperimentOptions only(const std::string& method, const ExperimentOptions& optio
 std::string pop_rows(const std::string& method, const ExperimentOptions& options) {
   const int cases = options.cases.value_or(usual_cases);
   double sum = 0.0;
-  double occluder = 0.0;
-  for (const PopFamily& family : pop_families()) {
+  double occluder = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<const PopFamily*> families = find_pop_families(options.families);
+  for (const PopFamily* family : families) {
     int held = 0;
     for (int i = 0; i < cases; ++i)
-      held += is_lost(method, draw_pop_case(family, options.seed, static_cast<std::uint64_t>(i)),
+      held += is_lost(method, draw_pop_case(*family, options.seed, static_cast<std::uint64_t>(i)),
                       options.parameters)
                   ? 0
                   : 1;
     const double share = 100.0 * held / cases;
-    sum += share / static_cast<double>(pop_families().size());
-    if (family.name == "occluder") occluder = share;
+    sum += share / static_cast<double>(families.size());
+    if (family->name == "occluder") occluder = share;
   }
   return row(method, "pop", sum) + row(method, "occluder", occluder);
 }

@@ -211,11 +211,7 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
 }
 
 std::vector<const PopFamily*> families_of(const ExperimentOptions& options) {
-  std::vector<const PopFamily*> families;
-  for (const std::string& name : options.families) families.push_back(&find_pop_family(name));
-  if (families.empty()) {
-    for (const PopFamily& family : pop_families()) families.push_back(&family);
-  }
+  std::vector<const PopFamily*> families = find_pop_families(options.families);
   for (const std::string& fixed : options.fixed) {
     const std::string key = fixed.substr(0, fixed.find('='));
     const bool known = std::any_of(families.begin(), families.end(), [&](const PopFamily* family) {

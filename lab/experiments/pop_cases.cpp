@@ -627,6 +627,15 @@ const PopFamily& find_pop_family(std::string_view name) {
                     "the families are ");
 }
 
+std::vector<const PopFamily*> find_pop_families(std::span<const std::string> names) {
+  std::vector<const PopFamily*> found;
+  for (const std::string& name : names) found.push_back(&find_pop_family(name));
+  if (found.empty()) {
+    for (const PopFamily& family : families) found.push_back(&family);
+  }
+  return found;
+}
+
 PopCase draw_pop_case(const PopFamily& family, std::uint64_t seed, std::uint64_t index) {
   // FNV-1a of the name: a new family changes no other.
   std::uint64_t hash = 14695981039346656037ULL;

@@ -18,6 +18,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/core/pose.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/session/camera_registration.hpp"
 #include "palpate/session/point_capture.hpp"
 #include "palpate/session/press_path.hpp"
 #include "palpate/session/registration.hpp"
@@ -27,8 +28,9 @@ namespace palpate::app {
 namespace {
 
 struct CalibrateOptions {
-  std::optional<std::string> camera, device, config, pairs, points, out;
-  std::vector<std::string> pixels;
+  std::optional<std::string> camera, device, config, pairs, points, out, start;
+  std::vector<std::string> pixels, cameras;
+  bool of_cameras = false;
   std::optional<double> scale;
   bool fit_scale = false;
   double timeout = 300.0;       // [s]
@@ -65,16 +67,22 @@ void write_text(const std::string& file, const std::string& text) {
   if (error) throw Error(file, "it cannot be written: " + error.message(), "check the folder");
 }
 
+// The first image of a camera. @param remedy  where it has none
+std::shared_ptr<const DepthImage> first_image(const std::string& uri, const std::string& remedy) {
+  const std::unique_ptr<Source> source = open_source(uri, all_sources());
+  constexpr double first_frame_time = 10.0;  // [s] a live camera that gives nothing gives up
+  const std::optional<Frame> frame = source->next(first_frame_time);
+  auto image = frame ? std::dynamic_pointer_cast<const DepthImage>(frame->cloud) : nullptr;
+  if (!image) throw Error(uri, frame ? "it has no depth image" : "it has no frames", remedy);
+  return image;
+}
+
 std::vector<Target> targets_at_pixels(const CalibrateOptions& options,
                                       const SessionConfig& config) {
   CameraConfig camera = config.cameras.front();
   if (options.camera && *options.camera != camera.uri) camera = {.uri = *options.camera};
-  const std::unique_ptr<Source> source = open_source(camera.uri, all_sources());
-  const std::optional<Frame> frame = source->next();
-  const auto* image = frame ? dynamic_cast<const DepthImage*>(frame->cloud.get()) : nullptr;
-  if (image == nullptr)
-    throw Error(camera.uri, frame ? "it has no depth image" : "it has no frames",
-                "name a depth camera with --camera, or give points with --points");
+  const std::shared_ptr<const DepthImage> image =
+      first_image(camera.uri, "name a depth camera with --camera, or give points with --points");
   const Eigen::Isometry3d moved =
       camera.world_from_camera ? *camera.world_from_camera * image->world_from_camera().inverse()
                                : Eigen::Isometry3d::Identity();
@@ -130,11 +138,69 @@ void check_residuals(const PlacementFit& fit, double most) {
               "--max-residual");
 }
 
+// Where two cameras stand to one another; prints what a session's file says of them.
+int calibrate_cameras(const CalibrateOptions& options) {
+  std::vector<CameraConfig> cameras;
+  if (options.config) cameras = read_session_config(*options.config).cameras;
+  if (!options.cameras.empty()) {
+    cameras.clear();
+    for (const std::string& uri : options.cameras) cameras.push_back({.uri = uri});
+  }
+  if (cameras.size() != 2)
+    throw Error("--cameras", fmt::format("it takes two cameras, not {}", cameras.size()),
+                "give --cameras URI URI, or --config with two of them");
+  const std::string remedy = "name depth cameras with --cameras";
+  const auto first = first_image(cameras[0].uri, remedy);
+  const auto second = first_image(cameras[1].uri, remedy);
+  const Eigen::Isometry3d world_from_first =
+      cameras[0].world_from_camera.value_or(first->world_from_camera());
+  Eigen::Isometry3d start = Eigen::Isometry3d::Identity();
+  if (options.start) {
+    start = parse_pose(*options.start, "--start");
+  } else if (cameras[1].world_from_camera) {
+    start = world_from_first.inverse() * *cameras[1].world_from_camera;
+  } else {
+    throw Error("--start", "where the second camera stands to the first is not known roughly",
+                "give x,y,z,qx,qy,qz,qw of it in the first's optical frame (x right, y down, z "
+                "forward), right to 10 cm and 10 degrees");
+  }
+  const CameraFit fit = register_cameras(*first, *second, start);
+  const Eigen::Isometry3d world_from_second = world_from_first * fit.first_from_second;
+  if (options.json) {
+    const nlohmann::ordered_json json = {
+        {"first_from_second", "[" + pose_text(fit.first_from_second) + "]"},
+        {"world_from_first", "[" + pose_text(world_from_first) + "]"},
+        {"world_from_second", "[" + pose_text(world_from_second) + "]"},
+        {"shift_deviation_m", fit.shift_deviation()},
+        {"turn_deviation_rad", fit.turn_deviation()},
+        {"rms_m", fit.rms},
+        {"overlap", fit.overlap}};
+    fmt::print("{}\n", json.dump(2));
+    return 0;
+  }
+  constexpr double degrees = 57.29577951308232;
+  const double turned =
+      Eigen::AngleAxisd(start.linear().transpose() * fit.first_from_second.linear()).angle();
+  fmt::print(stderr,
+             "palpate: {:.0f} % of the second image fits what the first camera sees, to {:.1f} mm; "
+             "{:.1f} degrees from the start; noise leaves {:.2f} mm and {:.3f} degrees open "
+             "(standard deviation; a wrong lens or unit of depth comes on top)\n",
+             100.0 * fit.overlap, 1e3 * fit.rms, degrees * turned, 1e3 * fit.shift_deviation(),
+             degrees * fit.turn_deviation());
+  fmt::print(
+      "[[camera]]\nuri = {}\nworld_from_camera = [{}]\n\n[[camera]]\nuri = {}\n"
+      "world_from_camera = [{}]\n",
+      nlohmann::json(cameras[0].uri).dump(), pose_text(world_from_first),
+      nlohmann::json(cameras[1].uri).dump(), pose_text(world_from_second));
+  return 0;
+}
+
 int calibrate(const CalibrateOptions& options) {
+  if (options.of_cameras) return calibrate_cameras(options);
   const int ways =
       (options.pairs ? 1 : 0) + (options.points ? 1 : 0) + (options.pixels.empty() ? 0 : 1);
   if (ways != 1)
-    throw Error("calibrate", "it needs one of --at, --points and --pairs",
+    throw Error("calibrate", "it needs one of --at, --points, --pairs and --cameras",
                 "give --at U,V three times or more, with --camera and --device");
   if (options.fit_scale && options.scale)
     throw Error("--scale", "the scale cannot be both given and fitted", "leave one out");
@@ -185,6 +251,14 @@ Verb add_calibrate(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "calibrate", "find where a device lies in the scene, from points that it touches");
   const auto options = std::make_shared<CalibrateOptions>();
+  CLI::Option* const cameras = command->add_option(
+      "--cameras", options->cameras,
+      "instead of a device's pose: find where the second of two cameras stands, from what both "
+      "see of a scene at rest");
+  cameras->expected(0, 2);
+  command->add_option("--start", options->start,
+                      "of --cameras: rough pose of the second camera in the first's optical frame, "
+                      "x,y,z,qx,qy,qz,qw [m] (or as --config has it)");
   command->add_option("--device", options->device,
                       "the device that touches the points; it gets no force");
   command->add_option("--camera", options->camera, "the camera that sees them");
@@ -206,7 +280,10 @@ Verb add_calibrate(CLI::App& program) {
                       "write nothing if a point is off by more [m] (0.01)");
   command->add_option("--timeout", options->timeout, "seconds for all points (300)");
   command->add_flag("--json", options->json, "print the result as a JSON object");
-  return {command, [options] { return calibrate(*options); }};
+  return {command, [options, cameras] {
+            options->of_cameras = cameras->count() > 0;
+            return calibrate(*options);
+          }};
 }
 
 }  // namespace palpate::app

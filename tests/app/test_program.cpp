@@ -18,6 +18,9 @@
 
 #include "app/opened_scenes.hpp"
 #include "app/reach.hpp"
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/core/pose.hpp"
+#include "palpate/sources/source.hpp"
 
 #include "tests/app/program.hpp"
 #include "tests/support/depth_pngs.hpp"
@@ -193,6 +196,31 @@ TEST_F(Program, CalibratesADeviceThatTouchesPixels) {
   EXPECT_EQ(strict.code, 2) << strict.err;
   EXPECT_NE(strict.err.find("--max-residual"), std::string::npos) << strict.err;
   EXPECT_FALSE(fs::exists(path("new.toml")));
+}
+
+TEST_F(Program, CalibratesTwoCameras) {
+  const std::string desk = "synthetic:desk?size=320x240&noise=1mm";
+  const std::string turned = desk + "&seed=7&azimuth=30deg";
+  const auto pose_of = [](const std::string& uri) {
+    const Frame frame = *open_source(uri)->next();
+    return dynamic_cast<const DepthImage&>(*frame.cloud).world_from_camera();
+  };
+  const Eigen::Isometry3d truth = pose_of(turned);
+  Eigen::Isometry3d rough = pose_of(desk).inverse() * truth;
+  rough.translation() += Vec3(0.05, -0.03, 0.04);
+  const std::string base = "calibrate --cameras '" + desk + "' '" + turned + "'";
+  const Outcome outcome = run(base + " --json --start='" + pose_text(rough) + "'");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  const auto pose = json["world_from_second"].get<std::string>();
+  const Eigen::Isometry3d found = parse_pose(pose.substr(1, pose.size() - 2), "the pose");
+  EXPECT_LT((found.translation() - truth.translation()).norm(), 3e-3);
+  EXPECT_LT(json["shift_deviation_m"], 1e-3);
+  const Outcome text = run(base + " --start='" + pose_text(rough) + "'");
+  EXPECT_EQ(run("run --headless --duration 0.1 --config " + write("two.toml", text.out)).code, 0)
+      << text.out << text.err;
+  expect_refusal(base, {"--start", "10 cm"});
+  expect_refusal("calibrate --cameras '" + desk + "'", {"--cameras", "two cameras, not 1"});
 }
 
 TEST_F(Program, TracesAPressOnAPixel) {

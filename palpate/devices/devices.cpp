@@ -17,7 +17,8 @@ using Path = std::optional<HipPath>;
 HipPath path_of(const Uri& uri, const Path& path) {
   if (!uri.path().empty()) return HipPath::read_csv(uri.path());
   if (path) return *path;
-  throw Error(uri.text(), "there is no path to follow", "write " + uri.scheme() + ":FILE.csv");
+  throw Error("'" + uri.text() + "'", "there is no path to follow",
+              "write " + uri.scheme() + ":FILE.csv");
 }
 
 std::unique_ptr<Device> open_script(const Uri& uri, const Path& path) {

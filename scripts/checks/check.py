@@ -154,8 +154,25 @@ def without_code(text):
                   flags=re.M | re.S)
 
 
+def unsaid_messages(root):
+    """Messages in docs/troubleshooting.md that nothing in the sources says."""
+    page = root / "docs/troubleshooting.md"
+    if not page.exists():
+        return []
+    sources = [path for folder in ("app", "palpate", "web/src", "scripts")
+               for path in sorted((root / folder).rglob("*")) if path.is_file()]
+    said = "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in sources)
+    said = re.sub(r"[\"`]\s*\+?\s*[\"`]", "", said)  # literals that go on in the next line
+    faults = []
+    for number, line in enumerate(page.read_text(encoding="utf-8").split("\n"), 1):
+        message = re.match(r"\| `([^`]+)`", line)
+        if message and message.group(1) not in said:
+            faults.append(f"docs/troubleshooting.md:{number}: nothing says '{message.group(1)}'")
+    return faults
+
+
 def check_text(root):
-    """SPDX lines, length of lines, machine paths, links, and quoted C++."""
+    """SPDX lines, length of lines, machine paths, links, quoted C++ and messages."""
     faults = []
     for path in files(root, TEXT):
         is_code = CODE.search(path)
@@ -179,6 +196,7 @@ def check_text(root):
                 faults.append(f"{path}:{number}: link to {place}, which is not there")
             elif anchor and anchor not in anchors(target.read_text(encoding="utf-8")):
                 faults.append(f"{path}:{number}: {target.name} has no heading #{anchor}")
+    faults += unsaid_messages(root)
     readme, example = root / "README.md", root / "examples/touch_a_plane.cpp"
     if readme.exists():
         quoted = re.findall(r"^```cpp\n(.*?)^```", readme.read_text(encoding="utf-8"), re.M | re.S)

@@ -119,6 +119,13 @@ class Text(Tree):
         self.write("README.md", "```cpp\nint main() { return 1; }\n```\n")
         self.assertEqual(len(self.faults()), 1)
 
+    def test_a_message_that_nothing_says_is_found(self):
+        self.write("palpate/a.cpp", SPDX + 'f("the loop "\n  "is late");\n')
+        self.write("docs/troubleshooting.md", "| `the loop is late` | | |\n| a word | | |\n")
+        self.assertEqual(check.check_text(self.root), [])
+        self.write("docs/troubleshooting.md", "| `the loop is early` | | |\n")
+        self.assertIn("troubleshooting.md:1", check.check_text(self.root)[0])
+
     def test_a_quotation_that_left_its_example_behind_is_found(self):
         self.write("examples/session.cpp", SPDX + "int main() {\n  run();\n}\n")
         self.write("docs/library.md", "```cpp\n  run();\n```\n")

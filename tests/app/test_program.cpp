@@ -534,6 +534,52 @@ TEST_F(ProgramWithLab, RefusesRecordingsThatAnExperimentCannotTake) {
   expect_refusal("eval scan --recording tum:nowhere", {"nowhere"});
 }
 
+// The commands of a page of the documentation: its blocks of `sh`, one after the other.
+std::string commands_of(const fs::path& page) {
+  std::istringstream lines(read(page));
+  std::string commands;
+  bool in_block = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("```")) {
+      in_block = line == "```sh";
+    } else if (in_block) {
+      commands += line + "\n";
+    }
+  }
+  return commands;
+}
+
+// In a folder for each page, with a scripts/run that calls the program as that one does. Sessions
+// are shortened, and those with a page end by themselves; `bench` has a test of its own.
+TEST_F(ProgramWithLab, RunsTheCommandsOfTheTutorialAndTheReadme) {
+  const test::Environment state("XDG_STATE_HOME", path("state"));
+  for (const std::string page : {"README.md", "docs/tutorial.md"}) {
+    const fs::path folder = path(page == "README.md" ? "readme" : "tutorial");
+    fs::create_directories(folder / "scripts");
+    std::ofstream(folder / "scripts/run")
+        << "#!/bin/bash\n"
+           "if [[ ${1-} == -* || $# == 0 ]]; then set -- run \"$@\"; fi\n"
+           "words=()\n"
+           "for word in \"$@\"; do\n"
+           "  if [[ ${last-} == --duration ]]; then word=0.5; fi\n"
+           "  last=$word words+=(\"$word\")\n"
+           "done\n"
+           "if [[ $1 == run && $* != *--headless* && $* != *--print-config* ]]; then\n"
+           "  words+=(--duration 0.3 --port 0 --no-browser)\n"
+           "fi\n"
+           "if [[ $1 == bench ]]; then words+=(--help); fi\n"
+           "echo \"${words[*]}\" >>calls\n"
+           "exec " PALPATE_PROGRAM " \"${words[@]}\"\n";
+    fs::permissions(folder / "scripts/run", fs::perms::owner_all);
+    std::ofstream(folder / "commands") << commands_of(fs::path(PALPATE_SOURCES) / page);
+    const Outcome outcome = run("commands", "cd " + folder.string() + " && ", "bash -e");
+    const std::string calls = read(folder / "calls");
+    EXPECT_EQ(outcome.code, 0) << page << ": " << calls << outcome.err;
+    EXPECT_GT(lines_in(calls), 6U) << page;
+    EXPECT_GT(fs::file_size(folder / "press.csv"), 100'000U) << page;
+  }
+}
+
 TEST_F(Program, SaysWhatToDoWithASourceThatIsNone) {
   expect_refusal("info", {"info: it is not said of what", "synthetic:desk"});
   expect_refusal("info tum:", {"'tum:'", "names no folder", "tum:FOLDER"});

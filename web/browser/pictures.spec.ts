@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Takes the pictures of the page of scripts/screenshot.
 
+import { writeFileSync } from "node:fs";
 import { test } from "vitest";
-import { drawn, glimpse, launch, Program } from "./session";
+import { drawn, glimpse, launch, placeWhere, Program } from "./session";
+import { animatedWebp } from "./webp";
 
 const folder = process.env.PALPATE_PICTURES;
 
@@ -44,6 +46,58 @@ test.skipIf(!folder)(
         await page.mouse.up();
         await page.close();
       }
+    } finally {
+      await browser.close();
+      await program.stop();
+    }
+  },
+  300_000,
+);
+
+test.skipIf(!folder)(
+  "takes the moving picture of a person who presses and slides",
+  async () => {
+    const browser = await launch();
+    const program = await Program.start(["--camera", "synthetic:desk"]);
+    try {
+      const [width, height] = [896, 560];
+      const page = await browser.newPage({ viewport: { width, height }, colorScheme: "dark" });
+      await page.goto(program.url);
+      await drawn(page);
+      await page.evaluate(() => {
+        const { view } = (window as any).palpate;
+        Object.assign(view.thinning, { level: 2, measure() {} });
+        // Pictures of a page show no pointer.
+        const pointer = document.createElement("div");
+        pointer.style.cssText =
+          "position:fixed;z-index:9;width:18px;height:18px;margin:-9px;border-radius:50%;" +
+          "border:2px solid white;pointer-events:none";
+        document.body.append(pointer);
+        addEventListener("pointermove", ({ clientX, clientY, buttons }) => {
+          Object.assign(pointer.style, {
+            left: `${clientX}px`,
+            top: `${clientY}px`,
+            background: buttons ? "#fff8" : "none",
+          });
+        });
+      });
+      const pngs: Buffer[] = [];
+      const shoot = async () => pngs.push(await page.screenshot());
+      const from = await placeWhere(page, "surface");
+      const move = async (x: number, y: number) => {
+        await page.mouse.move(x, y);
+        await shoot();
+      };
+      for (let i = 4; i >= 0; --i) await move(from.x - 16 * i, from.y - 10 * i);
+      await page.mouse.down();
+      await page.mouse.move(from.x + 1, from.y);
+      for (let i = 0; i < 14; ++i) await shoot();
+      for (let i = 1; i <= 22; ++i)
+        await move(from.x + 7 * i, from.y + 26 * Math.sin(i / 4));
+      await page.mouse.up();
+      for (let i = 0; i < 3; ++i) await shoot();
+      const size = { width: 768, height: 480, pause: 110, quality: 0.55 };
+      writeFileSync(`${folder}/pressing.webp`, await animatedWebp(page, pngs, size));
     } finally {
       await browser.close();
       await program.stop();

@@ -107,7 +107,7 @@ class Planes {
     for (const Vec3& point : points) spread += (point - mean) * (point - mean).transpose();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
     if (solver.eigenvalues()[0] > 0.1 * solver.eigenvalues()[1]) return {};  // no plane
-    const double n = static_cast<double>(points.size());
+    const auto n = static_cast<double>(points.size());
     return Plane{mean, solver.eigenvectors().col(0),
                  solver.eigenvalues()[0] / (n - 3.0) / solver.eigenvalues()[1]};
   }

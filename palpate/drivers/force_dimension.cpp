@@ -18,6 +18,7 @@
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
 #include "palpate/drivers/usb.hpp"
+#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
@@ -109,7 +110,7 @@ struct Sdk {
     int release = 0;
     int revision = 0;
     get_sdk_version(&major, &minor, &release, &revision);
-    return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(release);
+    return version_text({major, minor, release});
   }
   [[nodiscard]] std::string last_error() const {
     const char* text = error_get_last_str();
@@ -336,7 +337,7 @@ class Arm final : public Device {
       for (int i = 0; i < count; ++i) {
         const int other = sdk_->open_id(static_cast<char>(i));
         if (other < 0) continue;
-        serials += (serials.empty() ? "" : ", ") + sdk_->serial(other);
+        add_to_list(serials, sdk_->serial(other));
         sdk_->close(static_cast<char>(other));
       }
       if (wanted_.serial && !serials.empty())
@@ -536,11 +537,7 @@ DriverReport look() {
     report.found.push_back(arm);
     sdk.close(static_cast<char>(id));
   }
-  for (const std::string& found : usb_ids()) {
-    if (count == 0 && is_usb_of(found, usb()))
-      report.problem = std::string(scheme) + " an arm is plugged in (USB " + found +
-                       ") but cannot be opened; " + usb_permission_remedy(found);
-  }
+  if (count == 0) report.problem = unopened_by_usb(scheme, usb());
   return report;
 }
 

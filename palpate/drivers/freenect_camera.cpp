@@ -17,6 +17,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::freenect {
@@ -200,7 +201,7 @@ class Camera final : public LiveCamera {
     if (!serial.empty() &&
         std::find(plugged_in.begin(), plugged_in.end(), serial) == plugged_in.end()) {
       std::string others;
-      for (const std::string& each : plugged_in) others += (others.empty() ? "" : ", ") + each;
+      for (const std::string& each : plugged_in) add_to_list(others, each);
       throw Error(info_.uri, "there is no Kinect of that serial number", "plugged in: " + others);
     }
     const int status = serial.empty() ? api_.open(context_.get(), &opened, 0)

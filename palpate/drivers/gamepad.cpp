@@ -12,6 +12,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/rate_hand.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/drivers/words.hpp"
 
 namespace palpate {
 namespace gamepad {
@@ -163,8 +164,7 @@ DriverReport look() {
   report.library = sdl.library.path();
   Version version{};
   sdl.get_version(&version);
-  report.version = std::to_string(version.major) + "." + std::to_string(version.minor) + "." +
-                   std::to_string(version.patch);
+  report.version = version_text({version.major, version.minor, version.patch});
   for (int number = 0; sdl.index_of(number) >= 0; ++number) {
     void* pad = sdl.open(sdl.index_of(number));
     if (pad == nullptr) continue;

@@ -22,6 +22,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/wake_up.hpp"
 #include "palpate/drivers/web_socket.hpp"
+#include "palpate/drivers/words.hpp"
 #include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -301,7 +302,7 @@ class Inverse final : public Device {
       if (const Json* list = inventory.is_object() ? member(inventory, "inverse3") : nullptr;
           list != nullptr && list->is_array()) {
         for (const Json& one : *list)
-          if (one.is_object()) ids += (ids.empty() ? "" : ", ") + one.value("device_id", "");
+          if (one.is_object()) add_to_list(ids, one.value("device_id", ""));
       }
       if (ids.empty())
         throw Error(wanted_.uri, "the service sees no Inverse3", "check its power and its cable");

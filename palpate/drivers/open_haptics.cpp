@@ -522,12 +522,7 @@ DriverReport look() {
   const unsigned handle = hd->init_device(nullptr);
   const unsigned error = hd->take_errors();
   if (error != success || handle == invalid_handle) {
-    for (const std::string& found : usb_ids()) {
-      if (is_usb_of(found, usb()))
-        report.problem = std::string(scheme) + " it is plugged in (USB " + found +
-                         ") but cannot be opened (" + hd->text_of(error) + "); " +
-                         usb_permission_remedy(found);
-    }
+    report.problem = unopened_by_usb(scheme, usb(), hd->text_of(error));
     return report;
   }
   hd->make_current_device(handle);

@@ -18,6 +18,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::openni2 {
@@ -169,8 +170,7 @@ DriverReport look() {
   const Version version = api.get_version();
   DriverReport report{
       .library = api.path(),
-      .version = std::to_string(version.major) + "." + std::to_string(version.minor) + "." +
-                 std::to_string(version.maintenance) + "." + std::to_string(version.build)};
+      .version = version_text({version.major, version.minor, version.maintenance, version.build})};
   for (const DeviceInfo& info : api.devices()) {
     const std::string uri = text_of(info.uri);
     PluggedIn& entry = report.found.emplace_back();
@@ -250,8 +250,7 @@ class Camera final : public LiveCamera {
         if (!try_open(address.c_str())) continue;
         const std::string serial = api_.property(device_.get(), serial_property);
         if (!serial.empty() && serial == wanted) return;
-        others += (others.empty() ? "" : ", ") + (serial.empty() ? address : serial) + " (" +
-                  text_of(each.name) + ")";
+        add_to_list(others, (serial.empty() ? address : serial) + " (" + text_of(each.name) + ")");
         device_.reset();
       }
     }
@@ -296,8 +295,8 @@ class Camera final : public LiveCamera {
     for (int i = 0; list != nullptr && i < list->count; ++i) {
       const VideoMode& mode = list->modes[i];
       if (mode.format != format_1_mm && mode.format != format_100_um) continue;
-      offered += (offered.empty() ? "" : ", ") + std::to_string(mode.width) + "x" +
-                 std::to_string(mode.height) + " at " + std::to_string(mode.rate) + " Hz";
+      add_to_list(offered, std::to_string(mode.width) + "x" + std::to_string(mode.height) + " at " +
+                               std::to_string(mode.rate) + " Hz");
       if ((wanted.width != 0 && mode.width != wanted.width) ||
           (wanted.height != 0 && mode.height != wanted.height) ||
           (wanted.rate != 0 && mode.rate != wanted.rate))

@@ -17,6 +17,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/realsense_lens.hpp"
 
@@ -164,8 +165,7 @@ class Api {
   }
 
   [[nodiscard]] std::string version_text() const {
-    return std::to_string(version / 10000) + "." + std::to_string(version / 100 % 100) + "." +
-           std::to_string(version % 100);
+    return palpate::version_text({version / 10000, version / 100 % 100, version % 100});
   }
   [[nodiscard]] const std::string& path() const { return library_.path(); }
 
@@ -426,7 +426,7 @@ class Camera final : public LiveCamera {
           info_.notes.push_back(note);
         return found.serial;
       }
-      others += (others.empty() ? "" : ", ") + found.serial + " (" + found.name + ")";
+      add_to_list(others, found.serial + " (" + found.name + ")");
     }
     if (count > 0)
       throw Error(info_.uri, "there is no RealSense of that serial number",

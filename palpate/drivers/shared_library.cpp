@@ -8,6 +8,7 @@
 #include <link.h>
 
 #include "palpate/core/error.hpp"
+#include "palpate/drivers/words.hpp"
 
 namespace palpate {
 namespace {
@@ -57,7 +58,7 @@ SharedLibrary::SharedLibrary(const LibraryNames& names) : name_(names.name), rem
     const std::string text = said == nullptr ? "" : said;
     if (refusal.empty() && !text.starts_with(file + ": cannot open shared object file"))
       refusal = text;
-    list += (list.empty() ? "" : ", ") + file;
+    add_to_list(list, file);
   }
   const std::string set =
       names.variable.empty() ? "" : ", or set " + names.variable + " to its file or folder";

@@ -44,4 +44,14 @@ std::string usb_permission_remedy(const std::string& id) {
          "and plug it in again; also close other programs that use it";
 }
 
+std::string unopened_by_usb(std::string_view scheme, std::span<const std::string> known,
+                            const std::string& why) {
+  for (const std::string& found : usb_ids()) {
+    if (is_usb_of(found, known))
+      return std::string(scheme) + " it is plugged in (USB " + found + ") but cannot be opened" +
+             (why.empty() ? "" : " (" + why + ")") + "; " + usb_permission_remedy(found);
+  }
+  return {};
+}
+
 }  // namespace palpate

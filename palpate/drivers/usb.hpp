@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace palpate {
@@ -18,5 +19,12 @@ bool is_usb_of(const std::string& id, std::span<const std::string> known);
 /// What to do where the system shows a device by USB that its library does not open: the rule for
 /// udev that lets every user open each vendor's, and what else it may be.
 std::string usb_permission_remedy(const std::string& id);
+
+/// The problem of a driver whose device is plugged in but is not opened, with its remedy; empty if
+/// none is plugged in.
+/// @param scheme  of the driver's URIs  @param known  as for is_usb_of
+/// @param why     what its library says; empty: nothing
+std::string unopened_by_usb(std::string_view scheme, std::span<const std::string> known,
+                            const std::string& why = {});
 
 }  // namespace palpate

@@ -57,6 +57,8 @@ std::string json_of(const Summary& summary, const std::string& recording,
   nlohmann::ordered_json safety;
   for (std::size_t i = 0; i < safety_flag_count; ++i)
     safety[std::string(safety_flag_names()[i])] = summary.safety_ticks[i];
+  const Vec3 mean =
+      summary.sum_sent / static_cast<double>(std::max<std::size_t>(summary.force_ticks, 1));
   nlohmann::ordered_json object = {{"ticks", summary.ticks},
                                    {"frames", summary.frames},
                                    {"duration_s", summary.duration()},
@@ -68,6 +70,7 @@ std::string json_of(const Summary& summary, const std::string& recording,
                                    {"patch_thinned_ticks", ticks_with(summary, patch_thinned)},
                                    {"max_force_asked", summary.largest_asked},
                                    {"max_force_sent", summary.largest_sent},
+                                   {"mean_force_sent", {mean.x(), mean.y(), mean.z()}},
                                    {"pop_throughs", summary.pop_throughs},
                                    {"safety_ticks", safety}};
   for (const CameraStatus& camera : cameras)

@@ -37,6 +37,7 @@ void Summary::count_tick(const Tick& tick, const Vec3& sent, const std::optional
   contact_ticks += tick.state != ContactState::free_motion ? 1 : 0;
   largest_asked = std::max(largest_asked, tick.force.norm());
   largest_sent = std::max(largest_sent, sent.norm());
+  sum_sent += sent;
   force_ticks += sent.isZero(0.0) ? 0 : 1;
   for (std::size_t i = 0; i < tick_flag_count; ++i) flag_ticks[i] += tick.flags >> i & 1U;
 

@@ -34,6 +34,7 @@ class Summary {
   double largest_asked = 0.0;    ///< [N] what the method asked for
   double largest_sent = 0.0;     ///< [N] what the device got, behind the safety chain
   std::size_t force_ticks = 0;   ///< in which any force was sent
+  Vec3 sum_sent = Vec3::Zero();  ///< [N, world] of the forces sent, tick by tick
   std::size_t pop_throughs = 0;  ///< suspected, see below
   double first_t = 0.0;          ///< [s]
   double last_t = 0.0;           ///< [s]

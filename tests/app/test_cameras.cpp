@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each camera's adapter end to end: the program, a fake of the vendor's library, a simulated hand.
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -70,6 +71,12 @@ class CameraProgram : public ::testing::Test {
     EXPECT_GT(json["contact_ticks"], 100) << json;
     EXPECT_GT(json["max_force_asked"], 0.3) << json;
     EXPECT_GT(json["force_ticks"], 0) << json;
+    // The wall faces the camera, whose frame is the world's here: x right, y down, z forward.
+    const auto force = json["mean_force_sent"].get<std::vector<double>>();
+    const double size = std::hypot(force.at(0), force.at(1), force.at(2));
+    EXPECT_NEAR(force[0] / size, 0.0, 0.05) << json;
+    EXPECT_NEAR(force[1] / size, 0.0, 0.05) << json;
+    EXPECT_LT(force[2] / size, -0.99) << json;
     EXPECT_EQ(json["pop_throughs"], 0);
     EXPECT_GT(json["cameras"][0]["frames"], 30) << "also after it was plugged in again";
     EXPECT_GE(json["cameras"][0]["opened_again"], 1);

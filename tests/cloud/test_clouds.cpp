@@ -388,12 +388,7 @@ TEST(DepthImage, GivesNoSidesToASlopeASmoothWallAHoleInItOrTheImagesBorder) {
 
 // 80 x 60 pixels 12.5 mm wide at 0.75 m, whose depth is that of a slope; none where `hole` says so.
 DepthImage coarse_slope(const std::function<bool(int u, int v)>& hole, double raised = 0.0) {
-  Intrinsics k;
-  k.width = 80;
-  k.height = 60;
-  k.fx = k.fy = 60.0;
-  k.cx = 40.0;
-  k.cy = 30.0;
+  const Intrinsics k{.width = 80, .height = 60, .fx = 60.0, .fy = 60.0, .cx = 40.0, .cy = 30.0};
   std::vector<std::uint16_t> depth;
   for (int v = 0; v < k.height; ++v) {
     for (int u = 0; u < k.width; ++u) {

@@ -119,12 +119,7 @@ TEST(Monitor, BringsAProxyBackInFrontWhenTwoFramesShowItBehind) {
 
 TEST(Monitor, SeesAProxyBehindASlopeThatACoarseCameraSees) {
   // A slope of 60 degrees in pixels 10 mm wide: ten of them span 60 mm along the line of sight.
-  Intrinsics k;
-  k.width = 80;
-  k.height = 60;
-  k.fx = k.fy = 60.0;
-  k.cx = 40.0;
-  k.cy = 30.0;
+  const Intrinsics k{.width = 80, .height = 60, .fx = 60.0, .fy = 60.0, .cx = 40.0, .cy = 30.0};
   const auto rays = std::make_shared<ViewingRays>(k);
   std::vector<std::uint16_t> depth;
   for (int v = 0; v < k.height; ++v) {

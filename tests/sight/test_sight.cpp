@@ -517,12 +517,7 @@ TEST(Sight, PullsNoHandThatLeavesASurfaceThatJustRose) {
 
 TEST(Sight, RestsOnABarAFewCoarsePixelsWide) {
   // 40 mm of bar before pixels 12.5 mm wide: no quadric describes so few points with two edges.
-  Intrinsics k;
-  k.width = 80;
-  k.height = 60;
-  k.fx = k.fy = 60.0;
-  k.cx = 39.5;
-  k.cy = 29.5;
+  const Intrinsics k{.width = 80, .height = 60, .fx = 60.0, .fy = 60.0, .cx = 39.5, .cy = 29.5};
   const auto rays = std::make_shared<ViewingRays>(k);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
@@ -546,13 +541,8 @@ TEST(Sight, RestsOnABarAFewCoarsePixelsWide) {
 TEST(Sight, FeelsASmallBoxFromItsFirstFramesOn) {
   // A box of 50 x 60 mm, 1.36 m before a slow camera that looks down at 33 degrees from the
   // vertical. Wide discs see its side and the table, 30 mm lower; the noise is still unknown.
-  Intrinsics k;
-  k.width = 160;
-  k.height = 120;
-  k.fx = k.fy = 422.0;
-  k.cx = 79.5;
-  k.cy = 59.5;
-  const ViewingRays rays(k);
+  const Intrinsics k{.width = 160, .height = 120, .fx = 422.0, .fy = 422.0, .cx = 79.5, .cy = 59.5};
+  const auto rays = std::make_shared<ViewingRays>(k);
   const Vec3 axis = Vec3(0.545, 0.0, -0.839).normalized();
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear().col(2) = axis;
@@ -560,14 +550,13 @@ TEST(Sight, FeelsASmallBoxFromItsFirstFramesOn) {
   pose.linear().col(1) = axis.cross(Vec3::UnitY());
   pose.translation() = -1.36 * axis;
   const Eigen::AlignedBox3d box(Vec3(-0.025, -0.03, -0.03), Vec3(0.025, 0.03, 0.0));
-  const auto shared = std::make_shared<ViewingRays>(k);
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0.0, 3e-3);
   const auto shoot = [&] {
     std::vector<std::uint16_t> depth;
     for (int v = 0; v < k.height; ++v) {
       for (int u = 0; u < k.width; ++u) {
-        const Vec3 ray = pose.linear() * Vec3(rays.ray(u, v).x(), rays.ray(u, v).y(), 1.0);
+        const Vec3 ray = pose.linear() * Vec3(rays->ray(u, v).x(), rays->ray(u, v).y(), 1.0);
         const Vec3& eye = pose.translation();
         double z = (-0.03 - eye.z()) / ray.z();  // the table
         const Eigen::Array3d a = (box.min() - eye).array() / ray.array();
@@ -577,7 +566,7 @@ TEST(Sight, FeelsASmallBoxFromItsFirstFramesOn) {
         depth.push_back(static_cast<std::uint16_t>((z + noise(random)) * 1e4 + 0.5));
       }
     }
-    return DepthImage(shared, std::move(depth), 1e4, pose);
+    return DepthImage(rays, std::move(depth), 1e4, pose);
   };
   for (int run = 0; run < 10; ++run) {
     Sight sight = seated({0.0, 0.0, 0.06});

@@ -83,12 +83,7 @@ std::vector<std::unique_ptr<Cloud>> hostile_clouds() {
   clouds.push_back(std::make_unique<PointCloud>(line, eye));
   clouds.push_back(std::make_unique<PointCloud>(std::vector<Vec3>(500, Vec3(0, 0, 0)), eye));
   clouds.push_back(std::make_unique<PointCloud>(test::flat_grid(0.0, 1.5e-3, 40), Vec3(0, 0, 0)));
-  Intrinsics k;
-  k.width = 64;
-  k.height = 48;
-  k.fx = k.fy = 60.0;
-  k.cx = 31.5;
-  k.cy = 23.5;
+  const Intrinsics k{.width = 64, .height = 48, .fx = 60.0, .fy = 60.0, .cx = 31.5, .cy = 23.5};
   const auto rays = std::make_shared<ViewingRays>(k);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();

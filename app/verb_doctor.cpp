@@ -19,6 +19,7 @@
 #include "app/machine.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/vectorise.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/usb.hpp"
 #include "palpate/servo/periodic_thread.hpp"
@@ -74,16 +75,6 @@ Json look_at_time(const DoctorOptions& options, std::vector<std::string>& advice
           {"kept_awake", granted.awake}};
 }
 
-std::string vector_instructions() {
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f") != 0) return "AVX-512";
-  if (__builtin_cpu_supports("avx2") != 0) return "AVX2";
-  return "SSE2";
-#else
-  return "those of the build";
-#endif
-}
-
 Json look_at_processor(const Machine& machine, std::vector<std::string>& advice) {
   for (const std::string& governor : machine.governors) {
     if (governor == "performance") continue;
@@ -98,7 +89,7 @@ Json look_at_processor(const Machine& machine, std::vector<std::string>& advice)
         "hands");
   return {{"processor", machine.processor},
           {"cores", std::thread::hardware_concurrency()},
-          {"vector_instructions", vector_instructions()},
+          {"vector_set", vector_set_in_use()},
           {"governors", machine.governors},
           {"isolated_cores", machine.isolated_cores},
           {"virtual", machine.is_virtual},

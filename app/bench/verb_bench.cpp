@@ -15,6 +15,7 @@
 #include "app/progress.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/vectorise.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/sources/source.hpp"
 
@@ -53,16 +54,6 @@ std::string first_line_with(const std::string& file, const std::string& key) {
     if (line.starts_with(key)) return line.substr(line.find(':') + 2);
   }
   return "unknown processor";
-}
-
-std::string vector_code() {
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f")) return "AVX-512";
-  if (__builtin_cpu_supports("avx2")) return "AVX2";
-  return "SSE2";
-#else
-  return "the compiler's default";
-#endif
 }
 
 // Resident memory of this process [bytes].
@@ -179,7 +170,7 @@ int report(const BenchOptions& options) {
   if (options.json) {
     const KernelCosts& kernel = one_metre.kernel;
     Json json = {{"processor", processor},
-                 {"vector_code", vector_code()},
+                 {"vector_set", vector_set_in_use()},
                  {"step_us_median", kernel.step.median},
                  {"steps_per_second", 1e6 / std::max(kernel.step.median, 1e-6)},
                  {"tick_us_median", kernel.tick.median},
@@ -204,7 +195,8 @@ int report(const BenchOptions& options) {
     return 0;
   }
 
-  fmt::print("{}, {}; microseconds of the thread's own time\n\n", processor, vector_code());
+  fmt::print("{}, loops in {}; microseconds of the thread's own time\n\n", processor,
+             vector_set_in_use());
   fmt::print("{:<20}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>9}{:>9}{:>8}{:>8}{:>7}\n", "the kernel",
              "points", "steps", "step", "gather", "tick", "p99", "p99.9", "max", "frame", "limit",
              "ratio");

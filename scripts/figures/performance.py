@@ -130,7 +130,7 @@ thread's own processor time. Ticks are timed one by one, what is shorter in batc
 plane (1 mm, readings in millimetres) is pressed 5 mm deep and stroked at 0.1 m/s; Table 2's
 parameters; frames at 30 Hz, ticks at 1 kHz.
 
-Machine: {result['processor']}, {os.cpu_count()} cores, loops in {result['vector_code']}. It is a
+Machine: {result['processor']}, {os.cpu_count()} cores, loops in {result['vector_set']}. It is a
 virtual machine that others were using at the same time: medians and ratios hold, maxima are theirs.
 
 ```

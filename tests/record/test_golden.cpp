@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/core/vectorise.hpp"
 #include "palpate/record/replay.hpp"
 
 #include "tests/record/loop_session.hpp"
@@ -31,13 +32,8 @@ std::string build_name() {
 #endif
 #if !defined(__x86_64__) || !defined(__linux__)
   return {};
-#elif defined(PALPATE_VECTOR_SET_DEFAULT)
-  return name + " default";
-#elif defined(PALPATE_VECTOR_SET_AVX2)
-  return name + (__builtin_cpu_supports("avx2") != 0 ? " avx2" : " default");
 #else
-  if (__builtin_cpu_supports("avx512f") != 0) return name + " avx512f";
-  return name + (__builtin_cpu_supports("avx2") != 0 ? " avx2" : " default");
+  return name + " " + std::string(vector_set_in_use());
 #endif
 #endif
 }

@@ -104,9 +104,9 @@ function(palpate_runs_once target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release,RelWithDebInfo>:-O1>)
 endfunction()
 
-# palpate_slow_when_checked(TARGET): not optimised under a sanitizer or beside clang-tidy, where what
-# the network, the command line or a driver waits for costs more processor time to compile than it
-# takes to run.
+# palpate_slow_when_checked(TARGET): not optimised under a sanitizer or beside clang-tidy, where
+# what the network, the command line or a driver waits for costs more processor time to compile than
+# it takes to run.
 function(palpate_slow_when_checked target)
   if(PALPATE_SANITIZE OR PALPATE_CLANG_TIDY)
     target_compile_options(${target} PRIVATE -O0)

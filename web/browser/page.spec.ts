@@ -409,6 +409,7 @@ describe.each([
         inside: [".brand", ".actions", ".hud", ".panel", ".legend", "#connection"].map((selector) =>
           inside(of(selector)),
         ),
+        below: of(".plot:last-child").bottom - of(".panel").bottom,
         plots: [...document.querySelectorAll(".plot .canvas")].map(
           (plot) => plot.getBoundingClientRect().width,
         ),
@@ -417,6 +418,7 @@ describe.each([
     expect(boxes.scrolls).toBe(false);
     expect(boxes.view).toBeGreaterThan(height / 3);
     expect(boxes.inside).toEqual([true, true, true, true, true, true]);
+    if (width > 400) expect(boxes.below).toBeLessThanOrEqual(0); // on a phone one scrolls
     for (const plot of boxes.plots) expect(plot).toBeGreaterThan(200);
     // The scene is in the part of the window that is free, and fills it.
     const scene = await page.evaluate(() => {

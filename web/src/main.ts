@@ -218,7 +218,7 @@ function showTick(now: number): void {
       ? ""
       : above < 0
         ? `hand ${(-1e3 * above).toFixed(1)} mm inside`
-        : `${(1e3 * above).toFixed(above < 0.01 ? 1 : 0)} mm above the surface`;
+        : `hand ${(1e3 * above).toFixed(above < 0.01 ? 1 : 0)} mm above`;
   panel.showSafety(tick.safety, now);
   const said = tick.state === 0 ? "free" : "touching";
   if (said !== announced) get("announce").textContent = announced = said;

@@ -135,7 +135,12 @@ export class SceneView {
     this.hip = new THREE.Mesh(ball, new THREE.MeshBasicMaterial({ depthTest: false }));
     this.ghost = new THREE.Mesh(
       ball,
-      new THREE.MeshStandardMaterial({ transparent: true, opacity: 0.6, roughness: 0.8 }),
+      new THREE.MeshStandardMaterial({
+        transparent: true,
+        opacity: 0.6,
+        roughness: 0.8,
+        depthTest: false, // it presses into the surface
+      }),
     );
     this.ring = new THREE.Sprite(
       new THREE.SpriteMaterial({ map: ringTexture(), depthTest: false, sizeAttenuation: false }),
@@ -156,7 +161,7 @@ export class SceneView {
     );
     this.ghostTrail = new THREE.Line(
       line(GHOST_TRAIL),
-      new THREE.LineBasicMaterial({ transparent: true, opacity: 0.6 }),
+      new THREE.LineBasicMaterial({ transparent: true, opacity: 0.6, depthTest: false }),
     );
     const flat = { depthTest: false, transparent: true, side: THREE.DoubleSide } as const;
     this.shadow = new THREE.Mesh(
@@ -185,7 +190,7 @@ export class SceneView {
     this.arrow.add(this.shaft, this.head);
     const lines = [this.link, this.plumb, this.trail, this.ghostTrail, this.grid, this.frusta];
     for (const object of lines) object.frustumCulled = false;
-    this.shadow.renderOrder = 1;
+    this.shadow.renderOrder = this.ghostTrail.renderOrder = this.ghost.renderOrder = 1;
     this.spot.renderOrder = 1;
     this.hip.renderOrder = 3;
     this.link.renderOrder = 2;

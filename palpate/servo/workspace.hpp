@@ -62,7 +62,8 @@ class Workspace {
     if (!(hand.position.cwiseAbs().maxCoeff() <= farthest && hand.position.allFinite()))
       return Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
     constexpr double longest_step = 0.005;  // [s] after a stall
-    const double dt = std::clamp(t - std::exchange(last_t_, t), 0.0, longest_step);
+    const double since = t - std::exchange(last_t_, t);
+    const double dt = since > 0.0 ? std::min(since, longest_step) : 0.0;  // 0 if it is no number
     if (hand.clutched) {
       shift_ = held_ - hand.position;
     } else {

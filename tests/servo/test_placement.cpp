@@ -123,6 +123,11 @@ TEST(Bubble, SendsTheHipOnWithoutAStepInPlaceOrSpeed) {
   hand.present = true;
   t += 10.0;
   EXPECT_NEAR(hip_at(0.08) - left, 5e-3 * 0.2, 1e-12);
+  // Nor does a time that is no number, and nothing of it is left.
+  const double sound = hip_at(0.08);
+  EXPECT_EQ(workspace.hip_in_world(hand, std::nan("")).x(), sound);
+  EXPECT_EQ(hip_at(0.08), sound);
+  EXPECT_GT(hip_at(0.08), sound);
 }
 
 // Sliding over a plane, 3 mm deep by the hand, beyond the rim and back.

@@ -245,7 +245,7 @@ TEST(TumRecording, NamesWhatIsWrongWithTheFolder) {
   std::filesystem::remove(folder.path() / "depth.txt");
   EXPECT_TRUE(fails("", "has no depth.txt"));
   EXPECT_TRUE(fails_saying([] { return open_source("tum:/no/such/folder"); }, "is not a folder"));
-  EXPECT_TRUE(fails_saying([] { return open_source("tum:"); }, "is not a folder"));
+  EXPECT_TRUE(fails_saying([] { return open_source("tum:"); }, "names no folder"));
 }
 
 TEST(DepthFolder, GivesImagesInNaturalOrderAtTheGivenRate) {

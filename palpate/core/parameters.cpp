@@ -91,6 +91,56 @@ constexpr std::array table = {
                   "depth of the side faces synthesised behind visible edges; 0: none",
                   "ours (sight)", [](const Parameters& p) { return p.sight.side_depth; },
                   [](Parameters& p, double v) { p.sight.side_depth = v; }},
+    ParameterInfo{"usual_noise", "", "m", 5e-3, 1e-4, 0.1,
+                  "noise of a depth camera at 1 m, growing with the square of distance, until it "
+                  "has been measured; less finds a motion sooner, and in noise",
+                  "ours (sight)", [](const Parameters& p) { return p.sight.usual_noise; },
+                  [](Parameters& p, double v) { p.sight.usual_noise = v; }},
+    ParameterInfo{
+        "confidence", "", "-", 3.0, 1.0, 10.0,
+        "standard deviations that noise explains; less finds a change sooner, more averages more",
+        "ours (sight)", [](const Parameters& p) { return p.sight.confidence; },
+        [](Parameters& p, double v) { p.sight.confidence = v; }},
+    ParameterInfo{
+        "least_share", "", "-", 0.3, 0.05, 0.9,
+        "share of a beam's points that makes a surface; less feels finer things, and strays",
+        "ours (sight)", [](const Parameters& p) { return p.sight.least_share; },
+        [](Parameters& p, double v) { p.sight.least_share = v; }},
+    ParameterInfo{"widest_disc", "", "m", 85e-3, 11e-3, 85e-3,
+                  "radius that a fit is averaged over at most; less is noisier, and sooner right "
+                  "about small bodies",
+                  "ours (sight)", [](const Parameters& p) { return p.sight.widest_disc; },
+                  [](Parameters& p, double v) { p.sight.widest_disc = v; }},
+    ParameterInfo{"averaged_frames", "", "frames", 64, 1, 64,
+                  "frames that a fit is averaged over at most; fewer are noisier", "ours (sight)",
+                  [](const Parameters& p) { return double{1} * p.sight.averaged_frames; },
+                  [](Parameters& p, double v) { p.sight.averaged_frames = static_cast<int>(v); }},
+    ParameterInfo{"rest_odds", "", "-", 4.0, 0.0, 20.0,
+                  "logarithm of the odds of rest against a motion; more is quieter at rest, and "
+                  "later at an onset",
+                  "ours (sight)", [](const Parameters& p) { return p.sight.rest_odds; },
+                  [](Parameters& p, double v) { p.sight.rest_odds = v; }},
+    ParameterInfo{"motion_memory", "", "-", 0.85, 0.3, 0.99,
+                  "by which what a frame says of a motion fades from frame to frame; more is "
+                  "steadier, and later at a turn",
+                  "ours (sight)", [](const Parameters& p) { return p.sight.motion_memory; },
+                  [](Parameters& p, double v) { p.sight.motion_memory = v; }},
+    ParameterInfo{"curvature_sd", "", "1/m", 15.0, 1.0, 1e6,
+                  "spread of curvatures that is expected; less invents fewer from noise, and "
+                  "flattens small bodies",
+                  "ours (sight)", [](const Parameters& p) { return p.sight.curvature_sd; },
+                  [](Parameters& p, double v) { p.sight.curvature_sd = v; }},
+    ParameterInfo{"blend", "", "intervals", 0.85, 0.01, 1.0,
+                  "share of the time between frames over which the force follows a correction; "
+                  "less is truer in motion, more is smoother",
+                  "ours (sight)", [](const Parameters& p) { return p.sight.blend; },
+                  [](Parameters& p, double v) { p.sight.blend = v; }},
+    ParameterInfo{"evidence_frames", "", "frames", 2, 1, 10,
+                  "frames in a row that must show a proxy behind its surface before it is brought "
+                  "back; fewer are sooner, and wrong in noise",
+                  "ours (sight)",
+                  [](const Parameters& p) { return double{1} * p.sight.evidence_frames; },
+                  [](Parameters& p, double v) { p.sight.evidence_frames = static_cast<int>(v); }},
 };
 
 constexpr std::string_view noun = "parameter";

@@ -42,6 +42,18 @@ struct SightParameters {
   double hardest_strike = 90.0;  ///< [m/s^2] a faster jump is taken for an occluder
   double return_speed = 0.01;    ///< [m/s] at which a surface comes back that was hidden or lost
   double side_depth = 0.1;       ///< [m] depth of the side faces synthesised behind visible edges
+
+  // The estimator's; docs/sight.md, 4 and 11, has what each of them trades.
+  double usual_noise = 5e-3;    ///< [m] at 1 m, growing with distance^2, until it is measured
+  double confidence = 3.0;      ///< [-] standard deviations that noise explains
+  double least_share = 0.3;     ///< [-] of a beam's points: fewer are no surface
+  double widest_disc = 85e-3;   ///< [m] radius that a fit is averaged over at most
+  int averaged_frames = 64;     ///< that a fit is averaged over at most
+  double rest_odds = 4.0;       ///< [-] logarithm, of rest against any motion, before a measurement
+  double motion_memory = 0.85;  ///< [-] by which what a frame says of the motion fades a frame
+  double curvature_sd = 15.0;   ///< [1/m] spread of curvatures that is expected
+  double blend = 0.85;          ///< [intervals] over which the force follows a frame's correction
+  int evidence_frames = 2;      ///< in a row that show a proxy behind its surface
 };
 
 /// Everything that can be set on a method. Defaults are the paper's Table 2 where it has them.

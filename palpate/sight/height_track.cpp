@@ -18,12 +18,9 @@ constexpr std::array<double, 4> velocity_steps = {0.01, 0.05, 0.25, 1.2};
 constexpr std::size_t filters = jerks.size() + velocity_steps.size();
 // Older frames say little about the present motion.
 constexpr std::size_t motion_frames = 24;
-// Forgetting factor of the log-likelihoods, per frame: some seven frames count.
-constexpr double memory = 0.85;
-// Logarithm of the prior odds of rest against any of the other filters.
-constexpr double rest_bonus = 4.0;
-// The same of a step of the velocity against an acceleration: a motion that begins between two
-// frames looks like a strong acceleration, which would carry the surface three times too far.
+// Logarithm of the prior odds of a step of the velocity against an acceleration: a motion that
+// begins between two frames looks like a strong acceleration, which would carry the surface three
+// times too far.
 constexpr double plain_bonus = 8.0;
 // Standard deviations of a surface's velocity [m/s] and acceleration [m/s^2] before it is known.
 constexpr double first_velocity = 3.0;
@@ -38,7 +35,9 @@ struct Bank {
   Lanes likelihood{};                        // its logarithm
   Lanes jerk{}, velocity_step{};
 
-  Bank(double height, double variance) noexcept {
+  double memory;  // of the likelihood's logarithm, from frame to frame
+
+  Bank(double height, double variance, double remembered) noexcept : memory(remembered) {
     x.fill(height);
     xx.fill(variance);
     vv.fill(first_velocity * first_velocity);
@@ -94,9 +93,9 @@ struct Bank {
   }
 };
 
-// The same logarithm for a surface that rests: each height is foretold by the mean of those before.
+// The same logarithm of the likelihood for a surface that rests: each height is foretold by the mean of those before.
 double likelihood_of_rest(std::span<const HeightSample> samples, std::size_t frames,
-                          double variance) noexcept {
+                          double variance, double memory) noexcept {
   double sum = 0.0;
   double n = 0.0;
   double likelihood = 0.0;
@@ -147,8 +146,10 @@ double agreed_height(std::span<const HeightSample> samples, double sd, double co
   return base + height;
 }
 
-HeightTrack track_height(std::span<const HeightSample> all, double sd, double interval) noexcept {
-  constexpr double confidence = 3.0;
+HeightTrack track_height(std::span<const HeightSample> all, double sd, double interval,
+                         const SightParameters& parameters) noexcept {
+  const double confidence = parameters.confidence;
+  const double memory = parameters.motion_memory;
   const std::span<const HeightSample> samples = all.first(std::min(all.size(), most_heights));
   const double resting = agreed_height(samples, sd, confidence);
   const std::size_t frames = std::min(samples.size(), motion_frames);
@@ -156,12 +157,12 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
 
   const double base = samples.front().height;
   const double variance = std::max(sd * sd, 1e-14);
-  Bank bank(samples[frames - 1].height - base, samples[frames - 1].doubt * variance);
+  Bank bank(samples[frames - 1].height - base, samples[frames - 1].doubt * variance, memory);
   for (std::size_t i = frames - 1; i-- > 0;) {
     const double dt = std::max(samples[i].stamp - samples[i + 1].stamp, 0.0);
     bank.step(dt, samples[i].height - base, samples[i].doubt * variance);
   }
-  const double rest = likelihood_of_rest(samples, frames, variance) + rest_bonus;
+  const double rest = parameters.rest_odds + likelihood_of_rest(samples, frames, variance, memory);
   for (std::size_t i = 0; i < jerks.size(); ++i) bank.likelihood[i] -= plain_bonus;
   double most = rest;
   for (const double l : bank.likelihood) most = std::max(most, l);

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <span>
 
+#include "palpate/core/parameters.hpp"
+
 namespace palpate {
 
 /// One frame's measurement of a surface's height at one place.
@@ -39,12 +41,12 @@ double agreed_height(std::span<const HeightSample> newest_first, double sd,
 /// A bank of filters runs over the heights: one for a surface at rest, and Kalman filters for
 /// steps of velocity and for jerks from small to very large. Each is weighted by the likelihood of
 /// its innovations over the last frames, rest with a higher prior and jerks with a lower one. The
-/// height is the bank's mean, within three standard deviations of the newest measurement.
+/// height is the bank's mean, within `confidence` standard deviations of the newest measurement.
 /// O(most_heights), no allocation.
 /// @param newest_first  heights measured; at least one
 /// @param sd            [m] usual standard deviation of one of them
 /// @param interval      [s] until the next frame
-HeightTrack track_height(std::span<const HeightSample> newest_first, double sd,
-                         double interval) noexcept;
+HeightTrack track_height(std::span<const HeightSample> newest_first, double sd, double interval,
+                         const SightParameters& parameters = {}) noexcept;
 
 }  // namespace palpate

@@ -27,14 +27,11 @@ constexpr double hand_radius = 2.0;
 constexpr double narrowest = 1.8;
 // [-] Where holes leave too few points, a footprint is widened by this, up to twice.
 constexpr double widening = 3.0;
-// [-] Standard deviations of a footprint's height that noise may explain: exceeded in 1 of 700
-// frames on one side.
-constexpr double confidence = 3.0;
 constexpr double least_margin = 1e-3;  // [m] rounding of depth, in common cameras
 // [1/m] No estimate of the noise counts beyond this times the squared distance: 5 mm at 1 m, what a
 // stereo camera's is. So a wrong estimate cannot blind the monitor.
 constexpr double most_noise = 5e-3;
-double most_margin(double distance) {
+double most_margin(double confidence, double distance) {
   return confidence * most_noise * distance * distance;
 }
 // [-] footprint's radius: a look without an edge has 80 % of its points within this along the line
@@ -51,13 +48,14 @@ constexpr double sideways = 2e-3;       // [m]
 constexpr double farthest_strike = 65e-3;
 // [-] Cosine: a force that points away from the camera, within 73 degrees of its line of sight.
 constexpr double away = -0.3;
-// Frames in a row that must show the proxy behind its surface: noise explains one in some 700, but
-// hardly two.
-constexpr int frames_of_evidence = 2;
 // [m] A look serves as long as its place moves less than this: a fifth of r_c.
 constexpr double look_serves = 1e-3;
 
 }  // namespace
+
+void Monitor::set(const SightParameters& parameters) noexcept {
+  parameters_ = parameters;
+}
 
 void Monitor::forget() noexcept {
   hand_ = proxy_ = last_front_ = {};
@@ -140,12 +138,12 @@ bool Monitor::is_behind(double margin, double deepest, double r_c) noexcept {
     const double nearer = way.dot(line) + proxy_.behind - last_front_.behind;
     const double aside = (way - way.dot(line) * line).norm();
     // Noise of the two looks must not end the watch over the front, however small it is estimated.
-    const double noise = most_margin(proxy_.distance);
+    const double noise = most_margin(parameters_.confidence, proxy_.distance);
     const bool past_edge =
         nearer > edge_step * r_c + noise + steepest_rise * aside && aside > sideways;
     count_past_edge(past_edge);
     if (past_edge) {
-      if (frames_past_edge_ >= frames_of_evidence) side_ = Side::behind;
+      if (frames_past_edge_ >= parameters_.evidence_frames) side_ = Side::behind;
       return false;
     }
     if (nearer > farthest_strike + margin) return false;
@@ -157,7 +155,8 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
   Verdict verdict;
   const double r_c = contact.r_c;
   const auto margin_at = [&](double distance) {
-    return std::max(least_margin, std::min(confidence * contact.noise, most_margin(distance)));
+    return std::max(least_margin, std::min(parameters_.confidence * contact.noise,
+                                           most_margin(parameters_.confidence, distance)));
   };
   // The frame shows the surface where it was when the frame was captured.
   const Look& proxy = look_at(cloud, contact.proxy - contact.carried, r_c, proxy_);
@@ -183,7 +182,7 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
     }
     if (verdict.action != Action::none) return verdict;
   }
-  if (verdict.behind && frames_behind_ >= frames_of_evidence && !contact.held) {
+  if (verdict.behind && frames_behind_ >= parameters_.evidence_frames && !contact.held) {
     verdict.action = Action::return_to_front;
     verdict.normal = proxy.line;
     verdict.front = contact.proxy + (proxy.behind + r_c) * proxy.line;

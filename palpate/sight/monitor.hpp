@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "palpate/core/cloud.hpp"
+#include "palpate/core/parameters.hpp"
 
 namespace palpate {
 
@@ -40,6 +41,7 @@ class Monitor {
     Vec3 normal = Vec3::Zero();  ///< [-] unit: there, towards the camera
   };
 
+  void set(const SightParameters& parameters) noexcept;
   /// Forgets on which side of the surface the proxy is.
   void forget() noexcept;
   /// A new frame is in use: looks at the one before are void.
@@ -70,6 +72,7 @@ class Monitor {
   void look(const Cloud& cloud, const Vec3& place, double radius, Look& look) noexcept;
   bool is_behind(double margin, double deepest, double r_c) noexcept;
 
+  SightParameters parameters_;
   Patch patch_;
   Look hand_, proxy_;
   Side side_ = Side::unknown;

@@ -21,13 +21,15 @@ PointMover::Options mover_options(const Parameters& parameters) {
 
 Sight::Sight(const Parameters& parameters)
     : parameters_(parameters), mover_(mover_options(parameters)) {
-  validate(parameters_);
+  set_parameters(parameters);
 }
 
 void Sight::set_parameters(const Parameters& parameters) {
   validate(parameters);
   parameters_ = parameters;
   mover_.set(mover_options(parameters));
+  tracker_.set(parameters.sight);
+  monitor_.set(parameters.sight);
 }
 
 void Sight::seat(const Vec3& proxy) noexcept {
@@ -261,7 +263,7 @@ Vec3 Sight::render_force(const Vec3& hip, double t, std::uint32_t& flags) noexce
 // Spreads what a frame corrects over most of an interval, and fades the force of a surface that is
 // no longer measured.
 Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
-  constexpr double blend = 0.85;    // [intervals]
+  const double blend = parameters_.sight.blend;
   const auto ease = [](double x) {  // from 1 to 0 with slopes 0
     x = std::clamp(x, 0.0, 1.0);
     return 1.0 - x * x * (3.0 - 2.0 * x);

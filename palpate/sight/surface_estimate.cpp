@@ -27,14 +27,11 @@ constexpr double least_growth = 1.25;
 constexpr double structure_floor = 50e-6;
 // Noise may grow by this much at once, however little there was [m].
 constexpr double unnoticed_noise = 50e-6;
-// Noise of a disc's height that is usual for a depth camera: this [m] at 1 m, growing with the
-// square of the distance, as stereo does. Serves until the noise has been measured.
-constexpr double usual_noise = 5e-3;
 // Upper 99 % confidence bounds of a variance estimated from 1 to 5 samples, in multiples of it.
 constexpr std::array upper_bounds = {6000.0, 400.0, 120.0, 50.0, 28.0};
-// Spread of a surface's curvature coefficients x^2, xy, y^2 that is expected [1/m]: radii down to
-// some 30 mm are common, and noise must not invent them.
-constexpr double curvature_sd = 15.0;
+// [-] standard deviations. A disc in use needs so much stronger evidence against it: a change is
+// felt.
+constexpr double hysteresis = 0.5;
 
 constexpr double squared(double x) {
   return x * x;
@@ -72,12 +69,13 @@ struct SlopeWindow {
   Vec5 right_side;
 };
 
-// Keeps the slopes of a shape that was summed over all frames within 4 standard deviations of what
-// each window of the newest ones gives, the longest first: a surface that turns is never farther
-// off than their noise, and a false alarm costs no more than a little of the averaging.
+// Keeps the slopes of a shape that was summed over all frames within `confidence` standard
+// deviations of what each window of the newest ones gives, the longest first: a surface that turns
+// is never farther off than their noise, and a false alarm costs no more than a little of the
+// averaging.
 // @param point_variance  [cm^2] what one point weighs
-void confine_slopes(Vec5& shape, std::span<const SlopeWindow> windows, double point_variance) {
-  constexpr double confidence = 4.0;
+void confine_slopes(Vec5& shape, std::span<const SlopeWindow> windows, double point_variance,
+                    double confidence) {
   for (std::size_t i = windows.size(); i-- > 0;) {
     const Eigen::Matrix2d matrix = windows[i].matrix.topLeftCorner<2, 2>();
     const double determinant = matrix.determinant();
@@ -108,8 +106,8 @@ double SurfaceEstimate::variance(std::size_t rung) const noexcept {
   const Scatter& scatter = scatter_[rung];
   // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
   const double most = 4.0 * spread_ + 0.5e-3;
-  const double usual =
-      squared(std::min(usual_noise * squared(distance_), most)) + 0.03 * squared(spread_) + 1e-12;
+  const double usual = squared(std::min(parameters_.usual_noise * squared(distance_), most)) +
+                       0.03 * squared(spread_) + 1e-12;
   // Noise falls with the area it is averaged over: a wider disc's is the least of this one's.
   double wider = 0.0;
   for (std::size_t j = rung + 1; j < rungs; ++j) wider = std::max(wider, scatter_[j].variance);
@@ -129,6 +127,12 @@ void SurfaceEstimate::set_spacing(double spacing) noexcept {
     radii_[j] = std::max(narrowest_discs[j], least);
   }
   cell_size_ = narrowest_cell * coarseness();
+}
+
+std::size_t SurfaceEstimate::most_rungs() const noexcept {
+  std::size_t most = inner_rungs;
+  while (most < rungs && narrowest_discs[most] <= parameters_.widest_disc) ++most;
+  return most;
 }
 
 bool SurfaceEstimate::misfits(double spacing) const noexcept {
@@ -316,18 +320,19 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   // Where there is noise to average away, look farther.
   const bool noisy =
       scatter_[1].samples >= 1.0 ? scatter_[1].variance > squared(20e-6) : spread_ > 0.1e-3;
-  if (noisy) {
-    gather(cloud, Beam{place, radii_[rungs - 1] * 1.1, wide + radii_[rungs - 1], frame_.up},
-           outer_points, patch_);
+  const std::size_t most = most_rungs();
+  if (noisy && most > inner_rungs) {
+    const double widest = radii_[most - 1];
+    gather(cloud, Beam{place, widest * 1.1, wide + widest, frame_.up}, outer_points, patch_);
     points_.take(patch_, frame_);
     // Noise that is common to the inner disc is not common to the wide ones: their outliers are
     // judged by their own median and deviation.
-    if (const std::optional<Residuals> far = residuals(foot, radii_[rungs - 1], wide)) {
+    if (const std::optional<Residuals> far = residuals(foot, widest, wide)) {
       surface_.c[0] += far->median;
       cut = std::clamp(6.0 * far->deviation, cut, wide);
     }
-    for (std::size_t j = inner_rungs; j < rungs; ++j) add_ring(j);
-    now.rungs = rungs;
+    for (std::size_t j = inner_rungs; j < most; ++j) add_ring(j);
+    now.rungs = most;
   }
   for (std::size_t j = 0; j < now.rungs; ++j) now.shape[j] = Shape::of(now.disc[j]);
   if (first && !spans_area(now.shape[0])) {
@@ -353,6 +358,8 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   std::array<std::array<HeightSample, history>, rungs> heights;
   std::array<std::size_t, rungs> frames{};
   std::size_t chosen = 0;
+  const std::size_t averaged =
+      std::min(count_, static_cast<std::size_t>(parameters_.averaged_frames));
   for (std::size_t j = 0; j < now.rungs; ++j) {
     // Evidence from frames whose disc overlaps this one's well.
     const double farthest = squared(overlap(j));
@@ -361,7 +368,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
     std::size_t filled = 0;
     std::size_t whole = 0;
     std::size_t n = 0;
-    for (; n < count_; ++n) {
+    for (; n < averaged; ++n) {
       const Evidence& e = evidence(n);
       if (j < e.lost || e.rungs <= j || (e.centre - foot).squaredNorm() > farthest) break;
       // A partly hidden disc determines the height, but hardly the slope.
@@ -375,14 +382,17 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
     const double points = std::max(now.shape[j].points, 1.0);
     Scatter& scatter = scatter_[j];
     // Weight of the curvature prior in points, with correlated noise counted by its effect.
-    const double prior = variance(j) * points / cm2 / squared(curvature_sd * Moments::unit);
+    const double prior =
+        variance(j) * points / cm2 / squared(parameters_.curvature_sd * Moments::unit);
     const auto fit_shape = [&](Eigen::Matrix<double, 5, 5> a, const Vec5& b) {
       a.diagonal().array() += 1e-9;
       a.diagonal().tail<3>().array() += prior;
       shapes[j] = a.ldlt().solve(b);
     };
     fit_shape(Shape::matrix(sums), Shape::right_side(sums));
-    confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / cm2);
+    // One deviation more than elsewhere: each of four windows could be wrong in each frame.
+    confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / cm2,
+                   parameters_.confidence + 1.0);
     const double above = shapes[j].dot(basis);
     double usual_extent = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -460,14 +470,14 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       constexpr double prior = 4.0;
       const double freedom = count - 1.0 + prior;
       const double scattered = (about_mean + prior * (expected(i) + expected(j))) / freedom;
-      // Hysteresis: the disc in use needs stronger evidence against it, since a change is felt.
       // What is not measured yet is bounded, not estimated.
-      const double sds = j <= rung_ ? 3.5 : 3.0;
+      const double sds = parameters_.confidence + (j <= rung_ ? hysteresis : 0.0);
       const double confidence = measured(i) && measured(j) ? t_quantile(sds, freedom) : sds;
       agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
       const double newest = heights[j][0].height - heights[i][0].height;
       moves_along =
-          agree || (n >= 4 && std::abs(newest - mean) <= 3.0 * std::sqrt(scattered) + negligible);
+          agree || (n >= 4 && std::abs(newest - mean) <=
+                                  parameters_.confidence * std::sqrt(scattered) + negligible);
     }
     if (!moves_along) break;
     if (agree && variance(j) <= variance(chosen)) chosen = j;
@@ -487,7 +497,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   const std::span<const HeightSample> since(past.data(),
                                             std::clamp<std::size_t>(settled_, 1, frames[mover]));
   const double sd = height_sd();
-  const HeightTrack track = track_height(since, sd, interval_);
+  const HeightTrack track = track_height(since, sd, interval_, parameters_);
   if (new_frame) {
     velocity_ = track.velocity;
     rested_ = velocity_ == 0.0 ? std::min(rested_ + 1, history) : 0;

@@ -36,6 +36,7 @@ class SurfaceEstimate {
     bool partial = false;  ///< something hides a part of it: where points end is no edge
   };
 
+  void set(const SightParameters& parameters) noexcept { parameters_ = parameters; }
   /// A frame at `stamp` [s], `interval` [s] after the one before, will be measured.
   void start_frame(double stamp, double interval) noexcept;
   /// Begins with the surface at `foot` [m, world], with heights along `up` [-]. Earlier frames are
@@ -199,7 +200,10 @@ class SurfaceEstimate {
     return ring_[(newest_ + history - age) % history];
   }
   [[nodiscard]] double variance(std::size_t rung) const noexcept;
+  /// How many discs may be used.
+  [[nodiscard]] std::size_t most_rungs() const noexcept;
 
+  SightParameters parameters_;
   Patch patch_;
   LocalPoints points_;  // of the patch
   LocalFrame frame_;

@@ -11,8 +11,6 @@ namespace {
 constexpr double reach = 0.3;
 // Occluders are looked for this far in front of the surface [m]: an arm may be held high.
 constexpr double occluder_reach = 1.2;
-// A surface is where it is expected if this share of its disc is within the gate.
-constexpr double least_support = 0.3;
 constexpr double most_support = 0.7;      // beyond this share nothing else is checked
 constexpr double gate_after_hold = 5e-3;  // [m]
 // Layers along a line of sight are separated by a gap of at least this [m], and by what a surface
@@ -79,6 +77,11 @@ std::optional<Layer> first_layer(std::span<float> heights, double gap,
     begin = i;
   }
   return std::nullopt;
+}
+
+void SightTracker::set(const SightParameters& parameters) noexcept {
+  least_share_ = parameters.least_share;
+  surface_.set(parameters);
 }
 
 SurfaceContact SightTracker::contact(const Vec3& point, double t) const noexcept {
@@ -166,7 +169,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   Event event = Event::followed;
   double jump = 0.0;  // [m] along up, from where it was expected
   bool there = near >= SurfaceEstimate::least_points &&
-               static_cast<double>(near) >= least_support * static_cast<double>(seen);
+               static_cast<double>(near) >= least_share_ * static_cast<double>(seen);
   // Of a surface that moved beyond the gate, the tail of the noise is still inside.
   if (there && static_cast<double>(near) < most_support * static_cast<double>(seen)) {
     const float middle = kth_smallest(std::span(near_above.data(), near), near / 2);
@@ -175,7 +178,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   if (!there) {
     const std::optional<Layer> layer =
         first_layer(std::span(heights.data(), seen),
-                    std::max(layer_gap(surface_), surface_.spread()), least_support);
+                    std::max(layer_gap(surface_), surface_.spread()), least_share_);
     if (from_behind && layer) {
       // A surface touched from behind has left the gate: the proxy goes on over the points.
       forget();
@@ -228,7 +231,7 @@ void SightTracker::watch(const Cloud& cloud, const Vec3& proxy) noexcept {
   std::array<float, beam_points> heights;
   const std::size_t seen = heights_along(patch_, line, heights);
   const std::optional<Layer> layer =
-      first_layer(std::span(heights.data(), seen), layer_gap(surface_), least_support);
+      first_layer(std::span(heights.data(), seen), layer_gap(surface_), least_share_);
   if (!layer || layer->height > 0.0) return;  // nothing, or the proxy is hidden behind it
   const Vec3 place = proxy + layer->height * line;
   surface_.set_spacing(cloud.spacing(place));

@@ -17,10 +17,9 @@ struct Layer {
   double support;  ///< [-] its share of the beam's points
 };
 
-/// The layer nearest to the viewpoint that holds at least `least_support` of all heights. Layers
+/// The layer nearest to the viewpoint that holds at least `least_share` of all heights. Layers
 /// are runs without a gap of `gap` [m]. Sorts `heights`.
-std::optional<Layer> first_layer(std::span<float> heights, double gap,
-                                 double least_support) noexcept;
+std::optional<Layer> first_layer(std::span<float> heights, double gap, double least_share) noexcept;
 
 /// Sightline tracking: decides which of a frame's points belong to the surface that the proxy
 /// touches, or that lies behind a free proxy on its line of sight. docs/sight.md, 2
@@ -37,6 +36,7 @@ class SightTracker {
     hidden,    ///< by an occluder, or nothing was measured: held as it was
   };
 
+  void set(const SightParameters& parameters) noexcept;
   void forget() noexcept { tracking_ = holding_ = false; }
 
   /// Takes a new frame into use. @param proxy  [m] world
@@ -103,6 +103,7 @@ class SightTracker {
   Patch patch_;
   LocalPoints points_;  // of the patch
   SurfaceEstimate surface_;
+  double least_share_ = SightParameters().least_share;
   bool tracking_ = false;
   bool holding_ = false;
   double held_since_ = 0.0;

@@ -117,6 +117,20 @@ TEST(Monitor, BringsAProxyBackInFrontWhenTwoFramesShowItBehind) {
   EXPECT_NEAR(verdict.normal.z(), 1.0, 1e-6);
 }
 
+TEST(Monitor, WaitsForAsManyFramesAsItIsTold) {
+  Monitor monitor;
+  monitor.set({.evidence_frames = 3});
+  meet(monitor, 1.0);
+  const PointCloud plane = plane_at(0.0);
+  Monitor::Contact lost = pressed(-0.01, -0.01);
+  lost.touching = false;
+  for (int frame = 1; frame <= 3; ++frame) {
+    EXPECT_EQ(monitor.judge(plane, lost).action,
+              frame < 3 ? Monitor::Action::none : Monitor::Action::return_to_front);
+    monitor.start_frame();
+  }
+}
+
 TEST(Monitor, SeesAProxyBehindASlopeThatACoarseCameraSees) {
   // A slope of 60 degrees in pixels 10 mm wide: ten of them span 60 mm along the line of sight.
   const Intrinsics k{.width = 80, .height = 60, .fx = 60.0, .fy = 60.0, .cx = 40.0, .cy = 30.0};

@@ -93,7 +93,8 @@ struct Bank {
   }
 };
 
-// The same logarithm of the likelihood for a surface that rests: each height is foretold by the mean of those before.
+// The same logarithm of the likelihood for a surface that rests: each height is foretold by the
+// mean of those before.
 double likelihood_of_rest(std::span<const HeightSample> samples, std::size_t frames,
                           double variance, double memory) noexcept {
   double sum = 0.0;

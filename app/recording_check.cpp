@@ -7,14 +7,14 @@ namespace palpate::app {
 
 std::string text_of(const BagCheck& check) {
   if (!check.damage.empty()) return "the recording is damaged: " + check.damage;
-  if (!check.has_checksums)
-    return "the recording has no checksums (it is older than they are, or was converted): damage "
-           "may "
-           "go unnoticed";
   std::string text =
-      fmt::format("checksums of all {} messages are right", check.messages - check.unchecked);
-  if (check.unchecked > 0) text += fmt::format("; {} others have none", check.unchecked);
-  if (!check.closed) text += "; it was not closed, and ends with its last commit";
+      "the recording has no checksums (it is older than they are, or others wrote it): damage may "
+      "go unnoticed";
+  if (check.has_checksums) {
+    text = fmt::format("checksums of all {} messages are right", check.messages - check.unchecked);
+    if (check.unchecked > 0) text += fmt::format("; {} others have none", check.unchecked);
+  }
+  if (!check.closed) text += "; it was not closed, and ends with what was whole then";
   return text;
 }
 

@@ -42,6 +42,10 @@ bool has_table(const Database& database) {
 
 }  // namespace
 
+std::uint32_t crc32_on(std::uint32_t before, std::span<const std::byte> bytes) {
+  return add(before, bytes.data(), bytes.size());
+}
+
 std::uint32_t checksum_of(std::string_view topic, std::string_view type, std::int64_t nanoseconds,
                           std::span<const std::byte> message) {
   const std::uint32_t crc = add(add(add(0, topic), type), nanoseconds);

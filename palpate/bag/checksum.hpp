@@ -18,6 +18,10 @@ namespace palpate {
 std::uint32_t checksum_of(std::string_view topic, std::string_view type, std::int64_t nanoseconds,
                           std::span<const std::byte> message);
 
+/// The CRC-32 of bytes that come in several parts.
+/// @param before  of the parts before, 0 for the first
+std::uint32_t crc32_on(std::uint32_t before, std::span<const std::byte> bytes);
+
 /// The checksums of the messages that one commit made final: a row of the table `checksum_table`,
 /// beside those of rosbag2, which does not look at it.
 struct ChecksumBlock {

@@ -21,4 +21,8 @@ namespace palpate {
                                                      std::size_t max_bytes,
                                                      const std::string& name);
 
+/// The same for frames of LZ4.
+[[nodiscard]] std::vector<std::byte> decompress_lz4(std::span<const std::byte> packed,
+                                                    std::size_t max_bytes, const std::string& name);
+
 }  // namespace palpate

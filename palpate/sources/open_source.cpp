@@ -65,12 +65,13 @@ std::string uri_of_file(const std::filesystem::path& file) {
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   for (const auto& [known, scheme] :
-       {std::pair(".pcd", "pcd:"), std::pair(".ply", "ply:"), std::pair(".db3", "recording:")}) {
+       {std::pair(".pcd", "pcd:"), std::pair(".ply", "ply:"), std::pair(".db3", "recording:"),
+        std::pair(".mcap", "recording:")}) {
     if (ending != known) continue;
     const std::string path = file.string();
     return scheme + path + (path.find('?') == std::string::npos ? "" : "?");
   }
-  std::string remedy = "give a .pcd, .ply or .db3 file";
+  std::string remedy = "give a .pcd, .ply, .db3 or .mcap file";
   if (ending == ".png" || ending == ".txt")
     remedy = "start the program with --camera depth:FOLDER or tum:FOLDER, of all its images";
   if (ending == ".bag")

@@ -25,6 +25,7 @@
 #include "tests/app/program.hpp"
 #include "tests/support/depth_pngs.hpp"
 #include "tests/support/environment.hpp"
+#include "tests/support/mcap.hpp"
 
 namespace palpate {
 namespace {
@@ -681,6 +682,17 @@ TEST_F(Program, TouchesARecordingAsItTouchedTheCamera) {
   const Outcome outcome = run(trace + path("recording.csv") + " --camera recording:" + path("bag"));
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(read(path("recording.csv")), read(path("camera.csv")));
+
+  // The same in ROS 2's usual storage, and what is left of it when its recorder is killed.
+  const std::string mcap = write("bag.mcap", test::as_mcap(path("bag"), {.compression = "zstd"}));
+  const Outcome again = run(trace + path("mcap.csv") + " --camera recording:" + mcap);
+  ASSERT_EQ(again.code, 0) << again.err;
+  EXPECT_EQ(read(path("mcap.csv")), read(path("camera.csv")));
+  const std::string whole = run("info recording:" + mcap).out;
+  EXPECT_NE(whole.find("messages are right\n"), std::string::npos) << whole;
+  std::filesystem::resize_file(mcap, std::filesystem::file_size(mcap) / 2);
+  const std::string half = run("info recording:" + mcap).out;
+  EXPECT_NE(half.find("it was not closed"), std::string::npos) << half;
 }
 
 TEST_F(Program, GoesOnWithoutItsRecordingWhenTheDiskIsFull) {
@@ -755,7 +767,7 @@ TEST_F(Program, RefusesWhatIsNoRecording) {
   expect_refusal("replay " + path("none"), {"none", "no such bag"});
   expect_refusal("run --headless --record " + path("."), {"is there already"});
   expect_refusal("info recording:" + write("x.db3", "text"), {"x.db3", "not a database"});
-  expect_refusal("info recording:" + write("x.mcap", "text"), {"MCAP"});
+  expect_refusal("info recording:" + write("x.mcap", "text"), {"x.mcap", "not an MCAP file"});
 }
 
 }  // namespace

@@ -5,14 +5,13 @@
 #include <fstream>
 #include <string>
 
-#include <unistd.h>
-
 #include "palpate/bag/bag_writer.hpp"
 #include "palpate/bag/messages.hpp"
 #include "palpate/record/replay.hpp"
 #include "palpate/sources/source.hpp"
 
 #include "tests/fuzz/expect.hpp"
+#include "tests/fuzz/memory_folder.hpp"
 
 namespace {
 
@@ -65,12 +64,7 @@ void write_messages(BagWriter& writer, std::string_view text) {
 
 // The first byte chooses what the rest is: a file of SQLite, or messages of a session.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  // In memory, where there is such a folder; of this process alone.
-  static const fs::path folder = [] {
-    const fs::path memory = "/dev/shm";
-    return (fs::is_directory(memory) ? memory : fs::temp_directory_path()) /
-           ("palpate_fuzz_" + std::to_string(getpid()));
-  }();
+  static const fs::path folder = test::memory_folder();
   if (size == 0) return 0;
   const std::string_view text = test::text_of(data + 1, size - 1);
   fs::create_directories(folder);

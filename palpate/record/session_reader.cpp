@@ -95,7 +95,7 @@ std::shared_ptr<const Cloud> SessionReader::cloud(std::size_t camera, std::size_
     throw Error("recording",
                 "has no frame " + std::to_string(number) + " on " + entry.camera->topic(),
                 "it may be damaged");
-  entry.cloud = entry.camera->frame(number).cloud;
+  entry.cloud = entry.camera->frame(number).value().cloud;
   entry.number = number;
   return entry.cloud;
 }

@@ -227,18 +227,57 @@ BagCamera::BagCamera(BagReader& bag, const std::string& topic, const Options& op
   if (const BagReader::Topic* exact = bag.find(exact_topic_);
       exact != nullptr && exact->type == ros::Float64MultiArray::type)
     exact_places_ = bag.places(exact_topic_);
-  if (type_ == ros::PointCloud2::type) return;
+  if (type_ != ros::PointCloud2::type) find_lens(camera);
+  follow_transforms();
+}
+
+void BagCamera::find_lens(const std::string& camera) {
   info_topic_ = camera + "/camera_info";
   info_places_ = bag.places(info_topic_);
   if (info_places_.empty())
-    throw Error("topic " + topic, "has no CameraInfo on " + info_topic_, "record that topic too");
+    throw Error("topic " + topic_, "has no CameraInfo on " + info_topic_, "record that topic too");
   is_realsense_ = bag.find(info_topic_)->type == ros::String::type;
   if (!is_realsense_) return;
   units_topic_ = parent(camera) + "/option/Depth_Units/value";
   units_places_ = bag.places(units_topic_);
   if (units_places_.empty() && !options_.units)
-    throw Error("topic " + topic, "has no unit of depth on " + units_topic_,
+    throw Error("topic " + topic_, "has no unit of depth on " + units_topic_,
                 "give the raw values per metre, such as ?units=1000");
+}
+
+void BagCamera::follow_transforms() {
+  if (is_ours() || is_realsense_ || places_.empty() || options_.fixed_frame == "none") return;
+  if (!BagTransforms::are_in(bag_)) {
+    if (options_.fixed_frame.empty()) return;
+    throw Error("fixed frame " + options_.fixed_frame, "is not in the bag: it has no TF",
+                "leave it out");
+  }
+  const std::vector<std::byte> first = bag_.read(places_.front());
+  const ros::Header header =
+      type_ == ros::PointCloud2::type ? ros::decode<ros::PointCloud2>(first, name(0)).header
+      : type_ == ros::Image::type     ? ros::decode<ros::Image>(first, name(0)).header
+                                      : ros::decode<ros::CompressedImage>(first, name(0)).header;
+  transforms_.emplace(bag_, header.frame_id, options_.fixed_frame);
+}
+
+std::string BagCamera::pose_note() const {
+  if (is_ours() || is_realsense_) return {};
+  if (!transforms_)
+    return std::string(options_.fixed_frame == "none" ? "TF is left aside"
+                                                      : "the bag has no TF (/tf, /tf_static)") +
+           ": points are in the camera's own frame";
+  if (transforms_->fixed_frame().empty())
+    return "TF leads from none of map, odom and world to the camera: points are in its own frame; "
+           "?fixed_frame=" +
+           transforms_->root() + " takes them farther";
+  return "points are in " + transforms_->fixed_frame() +
+         ", by TF; frames for whose time it has no transform are left out";
+}
+
+// The identity where TF does not lead to the camera; none where it does, but not at that time.
+std::optional<Eigen::Isometry3d> BagCamera::pose_at(double stamp) const {
+  if (!transforms_ || transforms_->fixed_frame().empty()) return Eigen::Isometry3d::Identity();
+  return transforms_->at(stamp);
 }
 
 std::string BagCamera::text(const BagReader::Place& place, const std::string& topic) const {
@@ -333,38 +372,45 @@ const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
   return rays_;
 }
 
-Frame BagCamera::read_depth(std::size_t number, ros::Image image) {
+std::optional<Frame> BagCamera::read_depth(std::size_t number, ros::Image image) {
   const double units = options_.units             ? *options_.units
                        : is_realsense_            ? realsense_units(number)
                        : is_float(image.encoding) ? units_of_32fc1
                                                   : units_of_16uc1;
   std::vector<std::uint16_t> depth = raw_depth(image, units, name(number));
   const std::shared_ptr<const ViewingRays>& seen = rays(number, image);
-  if (!is_ours())
-    return {stamp(number, image.header),
-            std::make_shared<DepthImage>(seen, std::move(depth), units)};
+  if (!is_ours()) {
+    const double taken = stamp(number, image.header);
+    const std::optional<Eigen::Isometry3d> pose = pose_at(taken);
+    if (!pose) return std::nullopt;
+    return Frame{taken, std::make_shared<DepthImage>(seen, std::move(depth), units, *pose)};
+  }
   const std::vector<double> numbers = exact(number, 14);
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column)
       world_from_camera(row, column) = numbers[static_cast<std::size_t>(2 + 4 * row + column)];
   }
-  return {numbers[0],
-          std::make_shared<DepthImage>(seen, std::move(depth), numbers[1], world_from_camera)};
+  return Frame{numbers[0],
+               std::make_shared<DepthImage>(seen, std::move(depth), numbers[1], world_from_camera)};
 }
 
-Frame BagCamera::read_points(std::size_t number, const ros::PointCloud2& message) {
-  const std::vector<Vec3> points = points_of(message, name(number));
-  if (!is_ours())
-    return {stamp(number, message.header),
-            std::make_shared<PointCloud>(points, std::nullopt, options_.voxel)};
+std::optional<Frame> BagCamera::read_points(std::size_t number, const ros::PointCloud2& message) {
+  std::vector<Vec3> points = points_of(message, name(number));
+  if (!is_ours()) {
+    const double taken = stamp(number, message.header);
+    const std::optional<Eigen::Isometry3d> pose = pose_at(taken);
+    if (!pose) return std::nullopt;
+    for (Vec3& point : points) point = *pose * point;
+    return Frame{taken, std::make_shared<PointCloud>(points, std::nullopt, options_.voxel)};
+  }
   const std::vector<double> numbers = exact(number, 6);
   std::optional<Vec3> viewpoint;
   if (numbers[2] != 0.0) viewpoint = Vec3(numbers[3], numbers[4], numbers[5]);
-  return {numbers[0], std::make_shared<PointCloud>(points, viewpoint, numbers[1])};
+  return Frame{numbers[0], std::make_shared<PointCloud>(points, viewpoint, numbers[1])};
 }
 
-Frame BagCamera::frame(std::size_t number) {
+std::optional<Frame> BagCamera::frame(std::size_t number) {
   const std::vector<std::byte> bytes = bag_.read(places_[number]);
   const std::string message = name(number);
   if (type_ == ros::PointCloud2::type) {

@@ -11,6 +11,7 @@
 #include "palpate/bag/messages.hpp"
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/frame.hpp"
+#include "palpate/sources/bag_transforms.hpp"
 #include "palpate/sources/source.hpp"
 
 namespace palpate {
@@ -32,8 +33,9 @@ struct CameraTopics {
 /// The frames of one topic of a bag, recorded by palpate (restored to the bit) or by others.
 ///
 /// Depth images of encoding 16UC1, mono16 [mm] and 32FC1 [m], raw or compressedDepth (PNG), with a
-/// CameraInfo beside them; PointCloud2 with x, y and z. Points of other bags are in the camera's
-/// own frame.
+/// CameraInfo beside them; PointCloud2 with x, y and z. In other bags the camera's pose is what
+/// their transforms say (bag_transforms.hpp); where they lead from no fixed frame to the camera,
+/// points are in the camera's own frame.
 ///
 /// Recordings of librealsense (2.58 and later) keep the lens and the unit of depth in texts:
 /// `.../Depth_0/camera_info` (realsense_lens.hpp) and `.../option/Depth_Units/value`, metres per
@@ -43,6 +45,7 @@ class BagCamera {
   struct Options {
     std::optional<double> units;  ///< [1/m] of raw depth; 32FC1 is rounded to it
     double voxel = 0.010;         ///< [m] of a PointCloud that palpate did not record
+    std::string fixed_frame{};    ///< of TF; "none": TF is left aside; empty: the one that is there
   };
 
   /// @param bag  must outlive this
@@ -54,9 +57,10 @@ class BagCamera {
 
   [[nodiscard]] std::size_t frames() const { return places_.size(); }
   [[nodiscard]] const std::string& topic() const { return topic_; }
-  /// Its stamp is on the session's clock in palpate's own bags, else in seconds since 1970.
+  /// Its stamp is on the session's clock in palpate's own bags, else in seconds since 1970. None
+  /// where the bag's transforms do not say where the camera was then: never in palpate's own.
   /// @throws Error if it cannot be read.
-  [[nodiscard]] Frame frame(std::size_t number);
+  [[nodiscard]] std::optional<Frame> frame(std::size_t number);
   /// [Hz] from the median interval of the times of recording; none for less than two frames.
   [[nodiscard]] std::optional<double> frame_rate() const;
   [[nodiscard]] bool is_ours() const { return !exact_places_.empty(); }
@@ -64,12 +68,17 @@ class BagCamera {
   [[nodiscard]] bool is_realsense() const { return is_realsense_; }
   /// How it measures, where the bag tells.
   [[nodiscard]] SensorKind sensor() const;
+  /// In which frame the points are, in a line; empty where the bag itself says it with each frame.
+  [[nodiscard]] std::string pose_note() const;
   /// The encoding of the frame read last.
   [[nodiscard]] const std::string& details() const { return details_; }
 
  private:
-  Frame read_depth(std::size_t number, ros::Image image);
-  Frame read_points(std::size_t number, const ros::PointCloud2& message);
+  void find_lens(const std::string& camera);
+  void follow_transforms();
+  std::optional<Frame> read_depth(std::size_t number, ros::Image image);
+  std::optional<Frame> read_points(std::size_t number, const ros::PointCloud2& message);
+  [[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(double stamp) const;
   [[nodiscard]] std::vector<double> exact(std::size_t number, std::size_t size);
   const std::shared_ptr<const ViewingRays>& rays(std::size_t number, const ros::Image& image);
   [[nodiscard]] std::string text(const BagReader::Place& place, const std::string& topic) const;
@@ -82,6 +91,7 @@ class BagCamera {
   Options options_;
   std::vector<BagReader::Place> places_, info_places_, exact_places_, units_places_;
   bool is_realsense_ = false;
+  std::optional<BagTransforms> transforms_;
   std::shared_ptr<const ViewingRays> rays_;  // of the frame read last
   std::string details_;
 };

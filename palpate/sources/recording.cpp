@@ -25,16 +25,26 @@ class Recording final : public Source {
     info_.sensor = camera_.sensor();
     info_.frames = camera_.frames();
     info_.frame_rate = camera_.frame_rate();
-    first_ = camera_.frame(0).stamp;
+    if (std::string note = camera_.pose_note(); !note.empty())
+      info_.notes.push_back(std::move(note));
+    std::optional<Frame> first;
+    while (!(first = camera_.frame(next_)) && next_ + 1 < camera_.frames()) ++next_;
+    if (!first)
+      throw Error(info_.uri, "its TF has no transform for the time of any frame",
+                  "leave TF aside with ?fixed_frame=none");
+    first_ = first->stamp;
     info_.start_time = first_;
   }
 
   std::optional<Frame> next(double /*timeout*/) override {
-    if (next_ == camera_.frames()) return std::nullopt;
-    Frame frame = camera_.frame(next_++);
-    frame.stamp -= first_;
-    info_.details = camera_.details();
-    return frame;
+    while (next_ < camera_.frames()) {
+      std::optional<Frame> frame = camera_.frame(next_++);
+      if (!frame) continue;
+      frame->stamp -= first_;
+      info_.details = camera_.details();
+      return frame;
+    }
+    return std::nullopt;
   }
 
   std::size_t skip(std::size_t count) override {
@@ -69,10 +79,11 @@ class Recording final : public Source {
 }  // namespace
 
 std::unique_ptr<Source> open_recording(const Uri& uri) {
-  constexpr std::array<std::string_view, 3> known{"topic", "units", "voxel"};
+  constexpr std::array<std::string_view, 4> known{"topic", "units", "voxel", "fixed_frame"};
   uri.allow_only(known);
   BagCamera::Options options;
   if (uri.has("units")) options.units = uri.number_option("units", 1000.0, 1e-3, 1e7, "px");
+  options.fixed_frame = uri.text_option("fixed_frame", "");
   options.voxel = uri.number_option("voxel", options.voxel, 1e-3, 1.0, "m");
   return std::make_unique<Recording>(uri.path(), uri.text_option("topic", ""), options,
                                      SourceInfo{.uri = uri.text(), .kind = {}});

@@ -95,7 +95,7 @@ std::optional<Eigen::Isometry3d> Trajectory::at(double stamp) const {
                                       [](double t, const Sample& s) { return t < s.stamp; });
   const Sample* const a = after == samples_.begin() ? nullptr : &*(after - 1);
   const Sample* const b = after == samples_.end() ? nullptr : &*after;
-  if (a != nullptr && b != nullptr && b->stamp - a->stamp <= max_gap) {
+  if (a != nullptr && b != nullptr && b->stamp - a->stamp <= gap_) {
     const double share = (stamp - a->stamp) / (b->stamp - a->stamp);
     return pose(a->rotation.slerp(share, b->rotation),
                 a->translation + share * (b->translation - a->translation));

@@ -24,8 +24,10 @@ class Trajectory {
     Eigen::Quaterniond rotation;
   };
 
+  /// @param gap  [s] poses farther apart are not interpolated
   /// @pre the stamps increase
-  explicit Trajectory(std::vector<Sample> samples) : samples_(std::move(samples)) {}
+  explicit Trajectory(std::vector<Sample> samples, double gap = max_gap)
+      : samples_(std::move(samples)), gap_(gap) {}
 
   /// The pose at `stamp`: linear in translation and spherical (slerp) in rotation between the poses
   /// before and after. None in a gap of the trajectory, or before or after it.
@@ -33,6 +35,7 @@ class Trajectory {
 
  private:
   std::vector<Sample> samples_;
+  double gap_;
 };
 
 /// Reads the TUM benchmark's format: lines of `stamp tx ty tz qx qy qz qw`, [s] and [m], the pose

@@ -7,8 +7,10 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <initializer_list>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
@@ -213,10 +215,12 @@ TEST_F(ForeignBag, OfSeveralCamerasSaysWhichOneItReads) {
   write("/a/depth/image", 0, image_16uc1(0, depth_));
   write("/a/color/image", 0, image_16uc1(0, depth_));
   const auto source = open();
-  ASSERT_EQ(source->info().notes.size(), 1U);
+  ASSERT_EQ(source->info().notes.size(), 2U);
   EXPECT_EQ(source->info().notes[0],
             "/a/depth/image is read; also there, by ?topic=: /b/depth/image");
-  EXPECT_EQ(open("?topic=/b/depth/image")->info().notes.size(), 0U);
+  EXPECT_EQ(source->info().notes[1],
+            "the bag has no TF (/tf, /tf_static): points are in the camera's own frame");
+  EXPECT_EQ(open("?topic=/b/depth/image")->info().notes.size(), 1U);
 }
 
 TEST_F(ForeignBag, ThatCannotBeTouchedIsRefusedWithTheReason) {
@@ -307,6 +311,137 @@ TEST_F(ForeignBag, WithDamagedMessagesIsReadOrAnErrorOfOneLine) {
     }
   }
   EXPECT_GT(errors, 100);
+}
+
+// A base that drives along y from 0.1 to 0.5 s and turns left meanwhile, by 1 m and 90 degrees in
+// half a second from 0; its camera looks ahead from a height of 1 m.
+class BagWithTransforms : public ForeignBag {
+ protected:
+  static ros::TransformStamped transform(const std::string& parent, const std::string& child,
+                                         double stamp, const Eigen::Vector3d& t,
+                                         const Eigen::Quaterniond& q) {
+    return {
+        .header = {ros::Time::at(100 * second + static_cast<std::int64_t>(stamp * 1e9)), parent},
+        .child_frame_id = child,
+        .translation = {t.x(), t.y(), t.z()},
+        .rotation = {q.x(), q.y(), q.z(), q.w()}};
+  }
+  // The base's pose, by what was said above.
+  static Eigen::Isometry3d base(double stamp) {
+    Eigen::Isometry3d pose(Eigen::AngleAxisd(stamp * std::numbers::pi, Eigen::Vector3d::UnitZ()));
+    pose.translation() = Eigen::Vector3d(5.0, 2.0 * stamp, 0.0);
+    return pose;
+  }
+  // x of the camera to the right, y down, z ahead; ahead is the base's x.
+  static Eigen::Quaterniond mount() {
+    Eigen::Matrix3d rotation;
+    rotation << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+    return Eigen::Quaterniond(rotation);
+  }
+  void write_tf(std::initializer_list<double> stamps) {
+    write("/tf_static", 0,
+          ros::TFMessage{{transform("base_link", "camera_depth_optical_frame", 0.0,
+                                    Eigen::Vector3d(0.0, 0.0, 1.0), mount())}});
+    for (const double stamp : stamps) {
+      const Eigen::Isometry3d pose = base(stamp);
+      Eigen::Quaterniond rotation(pose.linear());
+      if (stamp > 0.2) rotation.coeffs() *= -1.0;  // the same rotation
+      write("/tf", 0,
+            ros::TFMessage{{transform("odom", "/base_link", stamp, pose.translation(), rotation),
+                            transform("elsewhere", "arm", stamp, pose.translation(), rotation)}});
+    }
+  }
+  void write_frames(std::initializer_list<double> stamps) {
+    write(info_topic, 0, info_of(4, 3));
+    for (const double stamp : stamps)
+      write(depth_topic, 0,
+            image_16uc1(100 * second + static_cast<std::int64_t>(stamp * 1e9), depth_));
+  }
+};
+
+TEST_F(BagWithTransforms, GivesTheCamerasPoseBetweenThem) {
+  write_tf({0.5, 0.1});
+  write_frames({0.2, 0.3});
+  const auto source = open();
+  ASSERT_EQ(source->info().notes.size(), 1U);
+  EXPECT_NE(source->info().notes[0].find("in odom"), std::string::npos);
+  for (const double stamp : {0.2, 0.3}) {
+    const auto frame = source->next();
+    ASSERT_TRUE(frame);
+    Eigen::Isometry3d camera(mount());
+    camera.translation() = Eigen::Vector3d(0.0, 0.0, 1.0);
+    const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
+    EXPECT_LT((image.world_from_camera().matrix() - (base(stamp) * camera).matrix()).norm(), 1e-6);
+    EXPECT_NEAR(frame->stamp, stamp - 0.2, 1e-6);
+  }
+}
+
+TEST_F(BagWithTransforms, LeavesFramesOutThatTheyDoNotCover) {
+  write_tf({0.1, 0.2, 2.0, 2.1});
+  write_frames({0.0, 0.15, 0.5, 2.05, 3.0});
+  const auto source = open();
+  for (const double stamp : {0.15, 2.05}) {
+    const auto frame = source->next();
+    ASSERT_TRUE(frame);
+    EXPECT_NEAR(frame->stamp, stamp - 0.15, 1e-6);
+  }
+  EXPECT_FALSE(source->next());
+  const auto all = open("?fixed_frame=none");
+  for (int i = 0; i < 5; ++i) {
+    const auto frame = all->next();
+    ASSERT_TRUE(frame);
+    EXPECT_TRUE(dynamic_cast<const DepthImage&>(*frame->cloud)
+                    .world_from_camera()
+                    .isApprox(Eigen::Isometry3d::Identity()));
+  }
+}
+
+TEST_F(BagWithTransforms, TakesTheFixedFrameThatIsNamed) {
+  write_tf({0.1, 0.5});
+  write_frames({0.2});
+  const auto frame = open("?fixed_frame=base_link")->next();
+  ASSERT_TRUE(frame);
+  const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
+  EXPECT_LT((image.world_from_camera().translation() - Eigen::Vector3d(0, 0, 1)).norm(), 1e-12);
+  EXPECT_TRUE(fails_saying([&] { return open("?fixed_frame=elsewhere"); }, "elsewhere",
+                           "camera_depth_optical_frame", "odom"));
+}
+
+TEST_F(BagWithTransforms, SaysWhereNoFixedFrameLeadsToTheCamera) {
+  write_tf({});
+  write_frames({0.2});
+  const auto source = open();
+  ASSERT_EQ(source->info().notes.size(), 1U);
+  EXPECT_NE(source->info().notes[0].find("?fixed_frame=base_link"), std::string::npos);
+  const auto frame = source->next();
+  EXPECT_TRUE(dynamic_cast<const DepthImage&>(*frame->cloud)
+                  .world_from_camera()
+                  .isApprox(Eigen::Isometry3d::Identity()));
+}
+
+TEST_F(BagWithTransforms, ThatHasNoneForAnyFrameOrDamagedOnesIsRefused) {
+  write_tf({0.1, 0.2});
+  write_frames({5.0});
+  EXPECT_TRUE(fails_saying([&] { return open(); }, "any frame", "fixed_frame=none"));
+  EXPECT_TRUE(open("?fixed_frame=none")->next());
+}
+
+TEST_F(BagWithTransforms, MovesPointsToo) {
+  write_tf({0.0, 0.5});
+  ros::PointCloud2 cloud{.header = header_at(100 * second + second / 4),
+                         .width = 1,
+                         .fields = {{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}},
+                         .point_step = 12,
+                         .row_step = 12,
+                         .data = std::vector<std::byte>(12)};
+  const float ahead = 2.0F;
+  std::memcpy(cloud.data.data() + 8, &ahead, 4);
+  write("/points", 0, cloud);
+  const auto frame = open()->next();
+  ASSERT_TRUE(frame);
+  // The base is at (5, 0.5) then, turned by 45 degrees.
+  const Vec3 point = dynamic_cast<const PointCloud&>(*frame->cloud).point(0);
+  EXPECT_LT((point - Vec3(5.0 + std::sqrt(2.0), 0.5 + std::sqrt(2.0), 1.0)).norm(), 1e-6);
 }
 
 // One message of a real LiDAR, as ROS 2 put it on the wire.

@@ -20,6 +20,7 @@ Playback::Playback(const std::vector<std::string>& uris) {
     camera.source = open_source(uri, all_sources());
     camera.next = camera.source->next();
     if (!camera.next) throw Error(uri, "it has no frames", "give a source with at least one");
+    camera.first_stamp = camera.next->stamp;
     cameras_.push_back(std::move(camera));
   }
   newest_.resize(cameras_.size());
@@ -45,8 +46,19 @@ void Playback::adopt_until(double t, const std::function<void(const Cloud&, doub
     adopt(*cloud, due->newest.stamp);
     in_use_ = std::move(cloud);  // only now may the frame before go
     newest_[static_cast<std::size_t>(due - cameras_.data())] = due->newest.cloud;
+    ++due->adopted;
     ++adopted_;
   }
+}
+
+std::vector<ShownFrames> Playback::shown() const {
+  std::vector<ShownFrames> all;
+  for (const Camera& camera : cameras_)
+    all.push_back({.count = camera.adopted,
+                   .first = camera.first_stamp,
+                   .last = camera.newest.stamp,
+                   .ended = !camera.next});
+  return all;
 }
 
 void Playback::check(const Method& method) const {

@@ -13,6 +13,14 @@
 
 namespace palpate::app {
 
+/// The frames of one camera that have been handed over so far.
+struct ShownFrames {
+  std::size_t count = 0;
+  double first = 0.0;  ///< [s] stamp of the first; before there is one, of the one to come
+  double last = 0.0;   ///< [s] stamp of the newest
+  bool ended = false;  ///< no frame follows
+};
+
 /// Frames of one or several cameras in the order of their stamps, each adopted at the first tick at
 /// or after it. Several cameras are touched at once: each new frame replaces its camera's last.
 class Playback {
@@ -29,6 +37,8 @@ class Playback {
   void check(const Method& method) const;
   /// Frames handed over so far.
   [[nodiscard]] std::size_t adopted() const { return adopted_; }
+  /// The same of each camera.
+  [[nodiscard]] std::vector<ShownFrames> shown() const;
   [[nodiscard]] std::size_t cameras() const { return cameras_.size(); }
   [[nodiscard]] const Source& source(std::size_t camera) const { return *cameras_[camera].source; }
   /// What a camera will show next; null after its last frame.
@@ -47,6 +57,8 @@ class Playback {
     std::unique_ptr<Source> source;
     std::optional<Frame> next;
     Frame newest;
+    std::size_t adopted = 0;
+    double first_stamp = 0.0;  // [s]
   };
   std::vector<Camera> cameras_;
   std::vector<std::shared_ptr<const Cloud>> newest_;

@@ -14,7 +14,8 @@ namespace palpate::app {
 /// they link it. A verb or method of another program is handed to that program if it lies beside
 /// this one.
 /// @param own_verbs  verbs that this program alone has
-/// @return the exit status: 0 done, 1 failed while running, 2 wrong usage or input
+/// @return the exit status: 0 done, 1 failed while running, 2 wrong usage or input, 128 and a
+///         signal's number where that signal ended work before it was whole
 int run_program(int argc, char** argv, std::span<const AddVerb> own_verbs = {});
 
 /// A method that this program does not know; palpate-lab may.

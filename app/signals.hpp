@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <csignal>
 #include <functional>
@@ -27,5 +28,27 @@ class EndingSignals {
   std::atomic<bool> ending_{false};
   std::thread thread_;
 };
+
+/// SIGINT, SIGTERM and SIGHUP noted instead of ending a program that has something to finish; a
+/// second one of a kind ends it at once. Those that were ignored before stay so, as in the
+/// background of a shell. For work without a force: all else is as usual. One at a time.
+class Interruption {
+ public:
+  Interruption();
+  ~Interruption();
+  Interruption(const Interruption&) = delete;
+  Interruption& operator=(const Interruption&) = delete;
+
+  /// The signal that came first, 0 before. Of no lock; each call looks anew.
+  [[nodiscard]] int signal() const noexcept;
+
+ private:
+  std::array<struct sigaction, 3> before_{};
+};
+
+/// The exit status of a program that a signal ended, as shells give it.
+constexpr int exit_status_of(int signal) noexcept {
+  return 128 + signal;
+}
 
 }  // namespace palpate::app

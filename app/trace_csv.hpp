@@ -24,6 +24,8 @@ class TraceWriter {
 
   /// @throws std::runtime_error if nothing more can be written (a full disk).
   void write(const Tick& tick);
+  /// Where the rows go, for people.
+  [[nodiscard]] const std::string& name() const { return path_; }
   /// Flushes the buffer; the trace is complete after it. Throws as `write`.
   void finish();
 

@@ -5,12 +5,16 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "app/options.hpp"
 #include "app/playback.hpp"
 #include "app/program_methods.hpp"
 #include "app/progress.hpp"
+#include "app/signals.hpp"
 #include "app/summary_text.hpp"
 #include "app/trace_csv.hpp"
+#include "app/trace_remarks.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/devices/hip_path.hpp"
@@ -61,7 +65,7 @@ int trace(const TraceOptions& options) {
   for (std::size_t camera = 0; camera < playback.cameras(); ++camera) {
     const SourceInfo& about = playback.source(camera).info();
     for (const std::string& note : about.notes)
-      std::fprintf(stderr, "palpate: %s: %s\n", about.uri.c_str(), note.c_str());
+      fmt::print(stderr, "palpate: {}: {}\n", about.uri, note);
   }
   const MethodRegistry methods = program_methods(&playback.source(0));
   const auto [name, parameters] = options.method.choice(methods);
@@ -70,29 +74,41 @@ int trace(const TraceOptions& options) {
   method->seat(path.at(path.first_time()));
   TraceWriter writer(options.out);
   Summary summary;
+  const double r_c = parameters.proxy.r_c();
+  TraceRemarks remarks(r_c);
+  const Interruption interruption;
 
   const double duration = path.last_time() - path.first_time();
   // A path of whole milliseconds has its last tick at its last time, whatever the rounding.
   const auto ticks = static_cast<std::int64_t>(std::floor(duration * options.rate + 1e-6)) + 1;
   Progress progress("trace", static_cast<std::size_t>(ticks));
-  for (std::int64_t i = 0; i < ticks; ++i) {
+  for (std::int64_t i = 0; i < ticks && interruption.signal() == 0; ++i) {
     const double t = path.first_time() + static_cast<double>(i) / options.rate;
     playback.adopt_until(t, [&](const Cloud& cloud, double stamp) { method->frame(cloud, stamp); });
     const Tick tick = method->tick(path.at(t), t);
     writer.write(tick);
-    const double r_c = parameters.proxy.r_c();
+    remarks.count(tick, playback.newest());
     summary.count(tick, least_behind(playback.newest(), tick.proxy, r_c), r_c);
     progress.advance();
   }
   summary.frames = playback.adopted();
   writer.finish();
   progress.finish();
+  for (const std::string& remark : remarks.lines(playback.shown(), options.cameras))
+    fmt::print(stderr, "palpate: {}\n", remark);
+  const int signal = interruption.signal();
+  const bool is_whole = summary.ticks == static_cast<std::size_t>(ticks);
+  if (!is_whole)
+    fmt::print(stderr,
+               "palpate: interrupted: {} has {} of {} ticks, in whole lines; the same command "
+               "again makes the same lines and goes on to the end\n",
+               writer.name(), summary.ticks, ticks);
   if (options.json) {
     std::fputs(json_of(summary).c_str(), stdout);
   } else {
     std::fputs(text_of(summary).c_str(), options.out == "-" ? stderr : stdout);
   }
-  return 0;
+  return is_whole ? 0 : exit_status_of(signal);
 }
 
 }  // namespace

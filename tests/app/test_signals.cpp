@@ -78,6 +78,38 @@ TEST(EndingSignals, AWriteToAClosedPipeFailsAndEndsNothing) {
             good);
 }
 
+TEST(Interruption, IsNotedOnceAndASecondSignalOfItsKindEndsTheProcess) {
+  EXPECT_EQ(status_of_child([] {
+              const Interruption interruption;
+              if (interruption.signal() != 0) return 1;
+              kill(getpid(), SIGTERM);
+              kill(getpid(), SIGHUP);
+              return interruption.signal() == SIGTERM ? good : 2;
+            }),
+            good);
+  EXPECT_EQ(status_of_child([] {
+              const Interruption interruption;
+              kill(getpid(), SIGTERM);
+              kill(getpid(), SIGTERM);
+              return good;
+            }),
+            -1);
+}
+
+TEST(Interruption, LeavesASignalIgnoredThatWas) {
+  EXPECT_EQ(status_of_child([] {
+              static_cast<void>(std::signal(SIGINT, SIG_IGN));
+              {
+                const Interruption interruption;
+                kill(getpid(), SIGINT);
+                if (interruption.signal() != 0) return 1;
+              }
+              kill(getpid(), SIGINT);
+              return good;
+            }),
+            good);
+}
+
 TEST(EndingSignals, LeaveTheSignalsAsTheyWere) {
   sigset_t before{};
   sigset_t after{};

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/trace_remarks.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/session/summary.hpp"
+
+namespace palpate::app {
+namespace {
+
+constexpr std::size_t enough_points = 20000;  // of each camera, for a distance
+constexpr double precision = 0.01;            // [-] of the least distance
+constexpr double grace = 0.1;                 // [s] that the last frame may be in use, at least
+constexpr double margin = 0.05;               // [m] around a cloud, within which a path is near it
+
+// Distances for people: millimetres up to a metre.
+std::string length_text(double metres) {
+  return metres < 1.0 ? fmt::format("{:.3g} mm", 1e3 * metres) : fmt::format("{:.4g} m", metres);
+}
+
+std::string box_text(const Eigen::AlignedBox3d& box) {
+  const Vec3& low = box.min();
+  const Vec3& high = box.max();
+  return fmt::format("({:.3g}, {:.3g}, {:.3g}) to ({:.3g}, {:.3g}, {:.3g}) m", low.x(), low.y(),
+                     low.z(), high.x(), high.y(), high.z());
+}
+
+// Adds every `step`-th pixel, in both directions, or every `step`-th point.
+void add_points(const DepthImage& image, int step, std::vector<Vec3>& points) {
+  for (int v = 0; v < image.intrinsics().height; v += step) {
+    for (int u = 0; u < image.intrinsics().width; u += step) {
+      if (const auto point = image.deproject(u, v)) points.push_back(*point);
+    }
+  }
+}
+
+void add_points(const Cloud& cloud, std::vector<Vec3>& points) {
+  if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
+    const auto pixels = static_cast<double>(image->depth().size());
+    const int step = static_cast<int>(std::ceil(std::sqrt(pixels / enough_points)));
+    const std::size_t before = points.size();
+    add_points(*image, std::max(step, 1), points);
+    // An image of holes with few readings between them.
+    if (step > 1 && points.size() - before < enough_points / 100) {
+      points.resize(before);
+      add_points(*image, 1, points);
+    }
+  } else if (const auto* unordered = dynamic_cast<const PointCloud*>(&cloud)) {
+    const std::size_t step = unordered->size() / enough_points + 1;
+    for (std::size_t i = 0; i < unordered->size(); i += step) points.push_back(unordered->point(i));
+  }
+}
+
+// The nearest point of an unorganised cloud within `radius` [m]; none: there is none.
+std::optional<double> nearest_within(const PointCloud& cloud, const Vec3& at, double radius) {
+  Patch patch;
+  gather(cloud, Ball{at, radius}, patch);
+  std::optional<double> least;
+  for (std::size_t i = 0; i < patch.size(); ++i) {
+    const double distance =
+        Eigen::Vector3f(patch.x()[i], patch.y()[i], patch.z()[i]).cast<double>().norm();
+    if (!least || distance < *least) least = distance;
+  }
+  return least;
+}
+
+// Would the path lie about the cloud if its numbers were so many times as large?
+bool fits_scaled(const Eigen::AlignedBox3d& path, double scale, const Eigen::AlignedBox3d& cloud) {
+  const Vec3 around = Vec3::Constant(margin * std::max(scale, 1.0));
+  const Eigen::AlignedBox3d scaled(scale * path.min(), scale * path.max());
+  return scaled.intersects(Eigen::AlignedBox3d(cloud.min() - around, cloud.max() + around));
+}
+
+}  // namespace
+
+void TraceRemarks::count(const Tick& tick, std::span<const std::shared_ptr<const Cloud>> cameras) {
+  const bool has_frame = tick.frame >= 0;
+  if (!any_tick_) {
+    any_tick_ = true;
+    first_t_ = tick.t;
+    first_without_frame_ = !has_frame;
+  }
+  last_t_ = tick.t;
+  path_.extend(tick.hip);
+  if (!has_frame) return;
+  if (measured_frame_ < 0) look_at_start(tick, cameras);
+  touched_ = touched_ || tick.state != ContactState::free_motion;
+  if (!touched_) measure(tick, cameras);
+  measured_frame_ = tick.frame;
+}
+
+void TraceRemarks::look_at_start(const Tick& tick,
+                                 std::span<const std::shared_ptr<const Cloud>> cameras) {
+  const std::string where =
+      first_without_frame_ ? fmt::format("at the first frame, t = {:.3f} s, the path was", tick.t)
+                           : "the path began";
+  std::optional<double> before;  // [m] of the surface
+  if (const auto behind = least_behind(cameras, tick.hip, r_c_)) {
+    if (*behind > 0.0) {
+      start_ = fmt::format(
+          "{} inside, {} behind the surface that the camera sees; begin in the air before it",
+          where, length_text(*behind));
+      return;
+    }
+    before = -*behind;
+  } else {
+    for (const auto& cloud : cameras) {
+      const auto* unordered = dynamic_cast<const PointCloud*>(cloud.get());
+      if (unordered == nullptr) continue;
+      const auto distance = nearest_within(*unordered, tick.hip, r_c_);
+      if (distance && (!before || *distance < *before)) before = distance;
+    }
+  }
+  if (before && *before < r_c_)
+    start_ = fmt::format(
+        "{} in contact, {} from the surface, which a sphere of r_c = {} touches; begin farther off",
+        where, length_text(*before), length_text(r_c_));
+}
+
+void TraceRemarks::measure(const Tick& tick,
+                           std::span<const std::shared_ptr<const Cloud>> cameras) {
+  if (tick.frame != measured_frame_) {
+    points_.clear();
+    extent_.setEmpty();
+    distance_.reset();
+    for (const auto& cloud : cameras) {
+      if (cloud) add_points(*cloud, points_);
+    }
+    for (const Vec3& point : points_) extent_.extend(point);
+  }
+  if (points_.empty()) return;
+  if (distance_ && *distance_ - (tick.hip - measured_at_).norm() >= (1.0 - precision) * nearest_)
+    return;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Vec3& point : points_) least = std::min(least, (point - tick.hip).squaredNorm());
+  distance_ = std::sqrt(least);
+  measured_at_ = tick.hip;
+  if (*distance_ >= nearest_) return;
+  nearest_ = *distance_;
+  nearest_t_ = tick.t;
+  nearest_extent_ = extent_;
+}
+
+std::string TraceRemarks::nothing_met() const {
+  if (nearest_ == std::numeric_limits<double>::infinity())
+    return "nothing was touched: the frames hold no point";
+  std::string text = fmt::format(
+      "nothing was touched: the path came no nearer than {} to a point, at t = {:.3f} s; "
+      "the points then reached from {}, the path reaches from {}",
+      length_text(nearest_), nearest_t_, box_text(nearest_extent_), box_text(path_));
+  if (fits_scaled(path_, 1.0, nearest_extent_)) return text;
+  if (fits_scaled(path_, 1e-3, nearest_extent_))
+    return text + "; is the path in millimetres? metres are wanted";
+  if (fits_scaled(path_, 1e3, nearest_extent_))
+    return text + "; is the cloud in millimetres? give ?scale=1mm, or units= of depth images";
+  return text + "; are both in metres and in the world frame?";
+}
+
+std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
+                                             std::span<const std::string> uris) const {
+  std::vector<std::string> lines;
+  if (!any_tick_) return lines;
+  if (first_without_frame_) {
+    double first = std::numeric_limits<double>::infinity();
+    for (const ShownFrames& frames : shown) first = std::min(first, frames.first);
+    if (first > last_t_) {
+      lines.push_back(fmt::format(
+          "nothing was touched: the first frame comes at t = {:.3f} s, the path ended at {:.3f} s; "
+          "give the path the frames' times",
+          first, last_t_));
+      return lines;
+    }
+    lines.push_back(fmt::format(
+        "there was no frame before t = {:.3f} s: the path began {:.3f} s before it, in nothing",
+        first, first - first_t_));
+  }
+  if (!start_.empty()) lines.push_back(start_);
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    const ShownFrames& frames = shown[i];
+    if (!frames.ended || frames.count < 2) continue;  // one frame is a still picture
+    const double interval = (frames.last - frames.first) / static_cast<double>(frames.count - 1);
+    const double left = last_t_ - frames.last;
+    if (left > std::max(2.0 * interval, grace))
+      lines.push_back(fmt::format(
+          "{}: its frames ended at t = {:.3f} s, {:.3f} s before the path, which touched the last "
+          "one from there on",
+          uris[i], frames.last, left));
+  }
+  if (!touched_) lines.push_back(nothing_met());
+  return lines;
+}
+
+}  // namespace palpate::app

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "app/playback.hpp"
+#include "palpate/core/cloud.hpp"
+#include "palpate/core/tick.hpp"
+
+namespace palpate::app {
+
+/// What is odd about a trace, noticed while it is made: a path that meets nothing, frames that
+/// begin after the path or end before it, a path that begins inside the surface.
+///
+/// Points are measured only until the first contact, and only in ticks that can have come nearer
+/// than any before: a distance changes by no more than its place moves.
+class TraceRemarks {
+ public:
+  /// @param r_c  [m] of the proxy
+  explicit TraceRemarks(double r_c) : r_c_(r_c) {}
+
+  /// Counts a tick. @param cameras  the newest frame of each; null before its first
+  void count(const Tick& tick, std::span<const std::shared_ptr<const Cloud>> cameras);
+
+  /// One line for each oddity, without a line feed; empty: there is none.
+  /// @param shown  of each camera  @param uris  of each camera
+  [[nodiscard]] std::vector<std::string> lines(std::span<const ShownFrames> shown,
+                                               std::span<const std::string> uris) const;
+
+ private:
+  void look_at_start(const Tick& tick, std::span<const std::shared_ptr<const Cloud>> cameras);
+  void measure(const Tick& tick, std::span<const std::shared_ptr<const Cloud>> cameras);
+  [[nodiscard]] std::string nothing_met() const;
+
+  double r_c_;  // [m]
+  bool any_tick_ = false, touched_ = false;
+  bool first_without_frame_ = false;
+  double first_t_ = 0.0, last_t_ = 0.0;  // [s] of ticks
+  std::string start_;                    // what is odd about where the path began
+  Eigen::AlignedBox3d path_;             // [m] all HIPs
+
+  // Of the frame in use: an even part of its points [m, world].
+  std::int64_t measured_frame_ = -1;
+  std::vector<Vec3> points_;
+  Eigen::AlignedBox3d extent_;
+  std::optional<double> distance_;  // [m] from measured_at_ to the nearest of them
+  Vec3 measured_at_ = Vec3::Zero();
+
+  double nearest_ = std::numeric_limits<double>::infinity();  // [m] ever
+  double nearest_t_ = 0.0;                                    // [s]
+  Eigen::AlignedBox3d nearest_extent_;                        // [m] of the points of that frame
+};
+
+}  // namespace palpate::app

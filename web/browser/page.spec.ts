@@ -241,6 +241,14 @@ function wallPly(): string {
   ].join("\n");
 }
 
+/** Two faces of four corners, 24 cm wide. */
+const SHEET_PLY = [
+  ...["ply", "format ascii 1.0", "element vertex 4"],
+  ...["x", "y", "z"].map((axis) => `property float ${axis}`),
+  ...["element face 1", "property list uchar int vertex_indices", "end_header"],
+  ...["-0.12 -0.12 0", "0.12 -0.12 0", "0.12 0.12 0", "-0.12 0.12 0", "4 0 1 2 3", ""],
+].join("\n");
+
 test("another scene is chosen on the page", async () => {
   const page = await open(DESK);
   const asked = (uri: string) => page.locator("#scene").selectOption(uri);
@@ -294,6 +302,14 @@ test("another scene is chosen on the page", async () => {
     await expect.poll(() => page.locator("#camera").textContent()).toContain("another.ply");
     expect(await page.locator("#scene optgroup[label='Opened last'] option").allTextContents())
       .toEqual(["another.ply", "a_wall.ply"]);
+    // A face is pressed where it is, far from its corners.
+    await drop("sheet.ply", SHEET_PLY);
+    await expect.poll(() => page.locator("#camera").textContent()).toContain("sheet.ply");
+    const pressed = () => placeWhere(page, "surface").catch(() => null);
+    await expect.poll(pressed).not.toBeNull();
+    const spot = await spotUnder(page, (await pressed())!);
+    expect(Math.abs(spot[2]!)).toBeLessThan(1e-4);
+    expect(Math.max(Math.abs(spot[0]!), Math.abs(spot[1]!))).toBeLessThan(0.12);
   } finally {
     rmSync(folder, { recursive: true });
   }

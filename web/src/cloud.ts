@@ -6,6 +6,7 @@ import * as THREE from "three";
 import type { Vec3 } from "./protocol";
 import type { Frame, Rays } from "./protocol";
 import { SeenSurface } from "./surface";
+import { drawsFaces } from "./thinning";
 
 const POINTS_PER_ROW = 1024;
 const LEAST_POINTS = 2000; // that are drawn of an unorganised cloud, if it has as many
@@ -171,7 +172,7 @@ export interface CloudColours {
 /** Draws a camera's newest frame. */
 export class CameraCloud {
   readonly object: THREE.Points;
-  /** of a mesh; else not visible */
+  /** of a mesh that is not too large; else not visible */
   readonly faces: THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>;
   /** [m] of the nearer and the farther points, for colours */
   range: [number, number] = [0.5, 1.5];
@@ -183,6 +184,7 @@ export class CameraCloud {
   private rays: THREE.DataTexture | null = null;
   private readonly material: THREE.ShaderMaterial;
   private measuredRange = false;
+  private spacing = 0; // [m] about, between neighbours of points without an image
 
   constructor() {
     this.material = new THREE.ShaderMaterial({
@@ -240,8 +242,7 @@ export class CameraCloud {
     uniforms.depth!.value = this.texture;
     uniforms.points!.value = this.texture;
     uniforms.intrinsics!.value.fromArray(frame.intrinsics);
-    // Of a mesh, the faces show what is between its corners.
-    if (isPoints) uniforms.pointSpacing!.value = frame.triangles ? 0 : spacingOf(frame.points!);
+    if (isPoints) this.spacing = spacingOf(frame.points!);
     uniforms.metresPerUnit!.value = frame.metresPerUnit;
     uniforms.size!.value.set(frame.width, frame.height);
     const pose = frame.worldFromCamera;
@@ -252,7 +253,7 @@ export class CameraCloud {
     this.frame = frame;
     this.seen = new SeenSurface(frame, this.lens);
     this.object.visible = !frame.hasRays || this.rays !== null;
-    this.showFaces(frame);
+    this.takeFaces(frame);
     this.followRange(frame);
   }
 
@@ -290,7 +291,11 @@ export class CameraCloud {
     uniforms.pixelsPerMetre!.value = pixelsPerMetre;
     uniforms.smallest!.value = 1.5 * pixelRatio;
     uniforms.range!.value.fromArray(this.range);
+    const faces = (this.frame.triangles?.length ?? 0) / 3;
+    this.faces.visible = faces > 0 && drawsFaces(faces, stride);
     if (this.frame.points) {
+      // Of a mesh, the faces show what is between its corners.
+      uniforms.pointSpacing!.value = this.faces.visible ? 0 : this.spacing;
       // They have no rows: one of as many of them as of an image's pixels, but some always.
       const most = Math.max(1, Math.floor(this.frame.width / LEAST_POINTS));
       uniforms.stride!.value = stride = Math.min(stride * stride, most);
@@ -316,9 +321,12 @@ export class CameraCloud {
     this.material.uniforms.glow!.value = colours.glow;
   }
 
-  private showFaces({ points, triangles }: Frame): void {
-    this.faces.visible = triangles !== null;
-    if (!triangles) return;
+  // `prepare` says whether they are drawn.
+  private takeFaces({ points, triangles }: Frame): void {
+    if (!triangles) {
+      this.faces.visible = false;
+      return;
+    }
     const { geometry } = this.faces;
     geometry.dispose(); // another's buffers
     geometry.setAttribute("position", new THREE.BufferAttribute(points!, 3));

@@ -2,7 +2,7 @@
 // The surface that a camera measured, as geometry: where a ray of the eye meets it, its normal, and
 // what is measured on the camera's sightline through a point.
 
-import { add, clamp, dot, horizon, length, posed, scale, sub, unit } from "./camera_math";
+import { add, clamp, cross, dot, horizon, length, posed, scale, sub, unit } from "./camera_math";
 import type { Frame, Rays, Vec3 } from "./protocol";
 
 /** A place on a surface. */
@@ -22,6 +22,8 @@ const LEAST_CONE = 0.003; // [m]
 const WIDER = [1, 2, 4]; // cones that are looked at in turn, where points are sparse
 const LEAST_POINTS = 6; // that give a normal
 const NEAREST = 0.02; // [m] depth
+const EDGE = 1e-6; // [-] of a face, by which a ray may pass it: no ray slips through between two
+const ALIKE = 0.5; // cosine between normals of faces that are averaged
 
 /**
  * The plane through points near `at`, by least squares of their heights along `towards` (unit).
@@ -121,6 +123,11 @@ export class SeenSurface {
   meet(from: Vec3, along: Vec3): { spot: Spot; distance: number } | null {
     const start = this.toCamera(from);
     const direction = this.turnedToCamera(along);
+    const face = this.frame.triangles && this.meetFaces(start, direction);
+    if (face) {
+      const at = add(from, scale(along, face.distance));
+      return { spot: { at, normal: this.turnedToWorld(face.normal) }, distance: face.distance };
+    }
     const distance = this.frame.points
       ? this.meetPoints(start, direction)
       : this.meetImage(start, direction);
@@ -164,6 +171,87 @@ export class SeenSurface {
       before = null;
     }
     return null;
+  }
+
+  // The first face on a ray, from either side, and its normal towards the ray's start.
+  private meetFaces(start: Vec3, direction: Vec3): { distance: number; normal: Vec3 } | null {
+    const points = this.frame.points!;
+    const corners = this.frame.triangles!;
+    const [dx, dy, dz] = direction;
+    let [distance, met] = [Infinity, -1];
+    // Moeller and Trumbore's test, without a vector made for each of what may be a million faces.
+    for (let i = 0; i + 2 < corners.length; i += 3) {
+      const a = 3 * corners[i]!;
+      const b = 3 * corners[i + 1]!;
+      const c = 3 * corners[i + 2]!;
+      const ax = points[a]!;
+      const ay = points[a + 1]!;
+      const az = points[a + 2]!;
+      const ex = points[b]! - ax;
+      const ey = points[b + 1]! - ay;
+      const ez = points[b + 2]! - az;
+      const fx = points[c]! - ax;
+      const fy = points[c + 1]! - ay;
+      const fz = points[c + 2]! - az;
+      const px = dy * fz - dz * fy;
+      const py = dz * fx - dx * fz;
+      const pz = dx * fy - dy * fx;
+      const scaled = 1 / (ex * px + ey * py + ez * pz);
+      const sx = start[0] - ax;
+      const sy = start[1] - ay;
+      const sz = start[2] - az;
+      const u = (sx * px + sy * py + sz * pz) * scaled;
+      if (!(u >= -EDGE && u <= 1 + EDGE)) continue; // not a number: the ray lies in its plane
+      const qx = sy * ez - sz * ey;
+      const qy = sz * ex - sx * ez;
+      const qz = sx * ey - sy * ex;
+      const v = (dx * qx + dy * qy + dz * qz) * scaled;
+      if (!(v >= -EDGE && u + v <= 1 + EDGE)) continue;
+      const t = (fx * qx + fy * qy + fz * qz) * scaled;
+      if (!(t > NEAREST && t < distance)) continue;
+      distance = t;
+      met = i;
+    }
+    if (met < 0) return null;
+    const at = add(start, scale(direction, distance));
+    return { distance, normal: this.normalOfFaces(met, at, direction) };
+  }
+
+  // The mean normal of a face and those about a place on it, against `along`: small faces of a scan
+  // point anywhere. Faces count by their area, up to that of the footprint.
+  private normalOfFaces(face: number, at: Vec3, along: Vec3): Vec3 {
+    const points = this.frame.points!;
+    const corners = this.frame.triangles!;
+    const corner = (i: number): Vec3 => {
+      const k = 3 * corners[i]!;
+      return [points[k]!, points[k + 1]!, points[k + 2]!];
+    };
+    const areaNormal = (i: number): Vec3 =>
+      cross(sub(corner(i + 1), corner(i)), sub(corner(i + 2), corner(i)));
+    const own = areaNormal(face);
+    const normal = unit(dot(own, along) > 0 ? scale(own, -1) : own);
+    // [m] of a face's middle from the place, along an axis
+    const away = (i: number, axis: 0 | 1 | 2): number =>
+      (points[3 * corners[i]! + axis]! +
+        points[3 * corners[i + 1]! + axis]! +
+        points[3 * corners[i + 2]! + axis]!) /
+        3 -
+      at[axis];
+    let sum: Vec3 = [0, 0, 0];
+    for (let i = 0; i + 2 < corners.length; i += 3) {
+      if (i !== face) {
+        const x = away(i, 0);
+        if (!(Math.abs(x) < FOOTPRINT)) continue; // of nearly all
+        if (!(Math.hypot(x, away(i, 1), away(i, 2)) < FOOTPRINT)) continue;
+      }
+      const other = areaNormal(i);
+      const area = length(other);
+      const facing = dot(other, normal);
+      if (!(Math.abs(facing) > ALIKE * area)) continue; // also of no area
+      const counts = Math.min(1, FOOTPRINT ** 2 / area);
+      sum = add(sum, scale(other, facing > 0 ? counts : -counts));
+    }
+    return unit(sum);
   }
 
   private meetPoints(start: Vec3, direction: Vec3): number | null {
@@ -279,6 +367,10 @@ export class SeenSurface {
 
   private toWorld(p: Vec3): Vec3 {
     return posed(this.pose, p);
+  }
+
+  private turnedToWorld(v: Vec3): Vec3 {
+    return sub(posed(this.pose, v), this.eye);
   }
 
   private toCamera(p: Vec3): Vec3 {

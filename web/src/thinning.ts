@@ -13,6 +13,14 @@ const SLOW = 1 / 22;
 const FAST = 1 / 45;
 const PATIENCE = 45;
 
+/** Faces of a mesh that are drawn at most, at full density. */
+export const MOST_FACES = 2_000_000;
+
+/** Are so many faces of a mesh drawn? Else its corners are, as points, which are thinned. */
+export function drawsFaces(faces: number, stride: number): boolean {
+  return faces <= MOST_FACES / stride ** 2;
+}
+
 /**
  * Chooses how many points are drawn, from how long frames take: fewer at once when it is slow,
  * more again only when it has been fast for long, and never back to what was slow a moment ago.

@@ -87,6 +87,30 @@ export function asPoints(frame: Frame): Frame {
   return { ...frame, width: count, height: 1, depth: null, points: Float32Array.from(points) };
 }
 
+/**
+ * A mesh as the camera of a frame gives it.
+ * @param corners  [m, world]
+ * @param triangles  three of them each
+ */
+export function asMesh(
+  frame: Frame,
+  corners: readonly Vec3[],
+  triangles: readonly number[],
+): Frame {
+  const pose = frame.worldFromCamera;
+  const eye: Vec3 = [pose[3]!, pose[7]!, pose[11]!];
+  const axis = (i: number): Vec3 => [pose[i]!, pose[i + 4]!, pose[i + 8]!];
+  const points = corners.flatMap((p) => [0, 1, 2].map((i) => dot(axis(i), sub(p, eye))));
+  return {
+    ...frame,
+    width: corners.length,
+    height: 1,
+    depth: null,
+    points: Float32Array.from(points),
+    triangles: Uint32Array.from(triangles),
+  };
+}
+
 /** Numbers of a normal distribution, always the same. */
 export function normalNumbers(seed: number): () => number {
   let state = seed;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 import { describe, expect, test } from "vitest";
-import { dot, length, sub, unit } from "../src/camera_math";
+import { dot, length, scale, sub, unit } from "../src/camera_math";
 import type { Rays, Vec3 } from "../src/protocol";
 import { fitPlane, onPlane, SeenSurface } from "../src/surface";
-import { asPoints, block, both, HEIGHT, normalNumbers, plane, seen, WIDTH } from "./scene";
+import { asMesh, asPoints, block, both, HEIGHT, normalNumbers, plane, seen, WIDTH } from "./scene";
 
 const DESK = plane([0, 0, 0], [0, 0, 1]);
 const BOX_LOW: Vec3 = [-0.05, 0.05, 0];
@@ -103,6 +103,84 @@ test("a plane is fitted exactly to points of a plane", () => {
   const line = places.map(([x]): Vec3 => [x, 0, 0]);
   expect(fitPlane(line, [0, 0, 0], [0, 0, 1]).normal).toEqual([0, 0, 1]);
   expect(fitPlane([], [0, 0, 0], [0, 1, 0])).toEqual({ at: [0, 0, 0], normal: [0, 1, 0] });
+});
+
+describe("a mesh", () => {
+  const view = seen(DESK, CAMERA, [0, 0.05, 0]);
+  // No corner within a metre of the middle.
+  const square = (z: number): Vec3[] => [
+    [-1, -1, z],
+    [1, -1, z],
+    [1, 1, z],
+    [-1, 1, z],
+  ];
+  const halves = [0, 1, 2, 0, 2, 3];
+  const sheet = new SeenSurface(asMesh(view, square(0), halves), null);
+
+  test("is met far from its corners, where the ray meets the face", () => {
+    const from: Vec3 = [0.1, -0.3, 0.4];
+    // On both halves, and where they meet.
+    for (const wanted of [[0.5, 0.1, 0], [0.1, 0.5, 0], [0.3, 0.3, 0]] as Vec3[]) {
+      const met = sheet.meet(from, unit(sub(wanted, from)))!;
+      expect(length(sub(met.spot.at, wanted))).toBeLessThan(1e-5);
+      expect(degrees(met.spot.normal, [0, 0, 1])).toBeLessThan(0.01);
+      expect(met.distance).toBeCloseTo(length(sub(wanted, from)), 5);
+    }
+    expect(sheet.meet(from, unit(sub([1.2, 0, 0], from)))).toBeNull();
+    expect(sheet.meet(from, [0, 0, 1])).toBeNull();
+  });
+
+  test("is met from its back, too, and faces whoever looks", () => {
+    const met = sheet.meet([0.2, 0.1, -0.5], [0, 0, 1])!;
+    expect(length(sub(met.spot.at, [0.2, 0.1, 0]))).toBeLessThan(1e-5);
+    expect(degrees(met.spot.normal, [0, 0, -1])).toBeLessThan(0.01);
+  });
+
+  test("is met where it is nearest, whatever the order of its faces", () => {
+    const corners = [...square(0), ...square(0.2), ...square(-0.2)];
+    for (const first of [0, 4, 8]) {
+      const order = [0, 4, 8].map((k) => (k + first) % 12);
+      const faces = order.flatMap((k) => halves.map((i) => i + k));
+      const layers = new SeenSurface(asMesh(view, corners, faces), null);
+      expect(layers.meet([0.1, 0.3, 0.6], [0, 0, -1])!.spot.at[2]).toBeCloseTo(0.2, 5);
+    }
+  });
+
+  test("of small faces has the normal of the surface that they approximate", () => {
+    const [radius, columns, rows] = [0.05, 40, 20];
+    const corners: Vec3[] = [];
+    const faces: number[] = [];
+    const noise = normalNumbers(11);
+    for (let v = 0; v <= rows; ++v)
+      for (let u = 0; u < columns; ++u) {
+        const [a, b] = [(2 * Math.PI * u) / columns, (Math.PI * v) / rows];
+        const r = radius + 0.0003 * noise();
+        corners.push(
+          scale([Math.sin(b) * Math.cos(a), Math.sin(b) * Math.sin(a), Math.cos(b)], r),
+        );
+        if (v === rows) continue;
+        const [at, right] = [columns * v + u, columns * v + ((u + 1) % columns)];
+        faces.push(at, at + columns, right, right, at + columns, right + columns);
+      }
+    const ball = new SeenSurface(asMesh(view, corners, faces), null);
+    for (let i = 0; i < 100; ++i) {
+      const out = unit([noise(), noise(), 0.3 * noise()]);
+      const { spot } = ball.meet(scale(out, 0.4), scale(out, -1))!;
+      expect(Math.abs(length(spot.at) - radius)).toBeLessThan(0.0015);
+      expect(degrees(spot.normal, out)).toBeLessThan(8);
+    }
+  });
+
+  test("has points that no face joins", () => {
+    const faces = [0, 1, 2];
+    const loose: Vec3 = [0.1, 0.2, 0.3];
+    const sparse = new SeenSurface(asMesh(view, [...square(0), loose], faces), null);
+    const from: Vec3 = [0.5, -0.2, 0.5]; // and past the face
+    expect(sparse.meet(from, unit(sub(loose, from)))!.distance).toBeCloseTo(
+      length(sub(loose, from)),
+      2,
+    );
+  });
 });
 
 test("a ray meets a plane before it and no other", () => {

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <qrencode.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -350,6 +352,45 @@ TEST(QrCode, HasItsQuietZoneAndItsFinderPatterns) {
     }
   }
   EXPECT_EQ(app::qr_code(std::string(5000, 'x')), "");
+}
+
+TEST(QrCode, HoldsItsTextAsTheLibraryEncodesIt) {
+  const std::string link = "http://192.168.1.20:8642/?token=0123456789abcdef";
+  const std::unique_ptr<QRcode, decltype(&QRcode_free)> code(
+      QRcode_encodeString8bit(link.c_str(), 0, QR_ECLEVEL_L), QRcode_free);
+  ASSERT_NE(code, nullptr);
+  const auto modules = modules_of(app::qr_code(link));
+  const auto width = static_cast<std::size_t>(code->width);
+  ASSERT_EQ(modules[0].size(), width + 8) << "four modules of quiet zone at each side";
+  for (std::size_t row = 0; row < width; ++row) {
+    for (std::size_t column = 0; column < width; ++column)
+      EXPECT_EQ(modules[row + 4][column + 4], (code->data[row * width + column] & 1U) != 0)
+          << row << ' ' << column;
+  }
+}
+
+// In a terminal, of which util-linux's `script` makes one.
+TEST_F(Program, DrawsTheLinkThatAPhoneOpens) {
+  if (app::reachable_addresses("0.0.0.0").empty()) GTEST_SKIP() << "there is no network address";
+  if (run("--version", "", "script").code != 0) GTEST_SKIP() << "there is no `script`";
+  const Outcome outcome = run("-qec '" PALPATE_PROGRAM
+                              " run --duration 0.2 --port 0 --no-browser --listen 0.0.0.0 "
+                              "--camera synthetic:plane?size=160x120' " +
+                                  path("typescript"),
+                              "", "script");
+  ASSERT_EQ(outcome.code, 0) << outcome.out;
+  const std::string words = "or a phone, open ";
+  std::string link;
+  std::string drawn;
+  std::istringstream lines(outcome.out);
+  for (std::string line; std::getline(lines, line);) {
+    std::erase(line, '\r');
+    const std::size_t at = line.find(words);
+    if (at != std::string::npos && link.empty()) link = line.substr(at + words.size());
+    if (line.starts_with("\x1b[97;40m")) drawn += line + "\n";
+  }
+  ASSERT_NE(link.find("/?token="), std::string::npos) << outcome.out;
+  EXPECT_EQ(drawn, app::qr_code(link)) << outcome.out;
 }
 
 TEST_F(Program, RemembersTheFilesThatWereOpenedLast) {

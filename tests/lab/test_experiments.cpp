@@ -371,6 +371,32 @@ TEST_F(Lab, MakesAPageAndATableOfEveryClaim) {
   EXPECT_EQ(html.str().find("src="), std::string::npos) << "the page needs nothing beside it";
 }
 
+// Of the paper are those experiments alone that have its claims.
+TEST_F(Lab, TitlesItsPageByWhatWasRun) {
+  const fs::path folder = file("title").parent_path();
+  const auto page_of = [&](const std::vector<Result>& results) {
+    std::ifstream in(write_report(results, folder));
+    std::ostringstream html;
+    html << in.rdbuf();
+    return html.str();
+  };
+  const Result methods{.experiment = &find_experiment("methods"),
+                       .command = "palpate eval methods",
+                       .claims = {},
+                       .figure = {},
+                       .scores = Scores{.columns = {"method"}, .rows = {{"sight"}}, .note = ""}};
+  const std::string measured = page_of({methods});
+  EXPECT_NE(measured.find("<h1>Methods, measured</h1>"), std::string::npos) << measured;
+  EXPECT_EQ(measured.find("The paper, reproduced"), std::string::npos) << measured;
+  EXPECT_NE(measured.find("<td>sight</td>"), std::string::npos) << measured;
+
+  Result jump = methods;
+  jump.experiment = &find_experiment("jump");
+  jump.claims.push_back({"5.1", "in less than 1 ms", "1 ms", "1 ms", "reproduced"});
+  const std::string paper = page_of({methods, jump});
+  EXPECT_NE(paper.find("<h1>The paper, reproduced</h1>"), std::string::npos) << paper;
+}
+
 TEST(Methods, AreFoundByNameAndTheNearestIsSuggested) {
   try {
     static_cast<void>(make_method("papr", {}));

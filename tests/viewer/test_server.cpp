@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <atomic>
 #include <condition_variable>
+#include <cstdio>
 #include <cstring>
 #include <deque>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <mutex>
 #include <random>
 #include <thread>
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "palpate/core/error.hpp"
 #include "palpate/viewer/page.hpp"
@@ -255,6 +259,30 @@ TEST(ViewerServer, ListensBeyondThisMachineOnlyWithAToken) {
 TEST_F(ViewerServerTest, SaysThatItsPortIsTaken) {
   const auto again = [&] { return ViewerServer({"127.0.0.1", server.port(), ""}, host).port(); };
   EXPECT_TRUE(test::fails_saying(again, "another program"));
+}
+
+// In a process of its own without root's rights, by which ports below 1024 are another's.
+TEST(ViewerServer, SaysThatItsPortIsNotThisAccounts) {
+  int first_free = 1024;
+  std::ifstream("/proc/sys/net/ipv4/ip_unprivileged_port_start") >> first_free;
+  if (first_free <= 80) GTEST_SKIP() << "on this machine port 80 is anybody's";
+  constexpr uid_t nobody = 65534;
+  constexpr int as_it_should = 42;
+  FakeHost host;
+  const pid_t child = fork();
+  if (child == 0) {
+    if (geteuid() == 0 && setresuid(nobody, nobody, nobody) != 0) _exit(2);
+    const auto listens = [&] { return ViewerServer({.port = 80}, host).port(); };
+    const auto said =
+        test::fails_saying(listens, "--listen 127.0.0.1 --port 80",
+                           "this account may not listen there", "a port from 1024 on, or --port 0");
+    if (!said) std::fprintf(stderr, "%s\n", said.message());
+    _exit(said ? as_it_should : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), as_it_should);
 }
 
 TEST(ViewerServer, MakesTokensThatDiffer) {

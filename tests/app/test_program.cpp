@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program as a user meets it: exit codes, messages, files.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -591,12 +592,32 @@ std::string commands_of(const fs::path& page) {
   return commands;
 }
 
-// In a folder for each page, with a scripts/run that calls the program as that one does. Sessions
-// are shortened, and those with a page end by themselves; `bench` has a test of its own.
-TEST_F(ProgramWithLab, RunsTheCommandsOfTheTutorialAndTheReadme) {
+// How many of them call the program, which each does at the beginning of a line.
+std::size_t calls_in(const std::string& commands) {
+  std::istringstream lines(commands);
+  std::size_t calls = 0;
+  for (std::string line; std::getline(lines, line);)
+    calls += line.starts_with("scripts/run") || line.starts_with("palpate ") ? 1 : 0;
+  return calls;
+}
+
+// In a folder for each page, with a scripts/run that calls the program as that one does, and by its
+// own name. Sessions are shortened, and those with a page end by themselves; `bench` has a test of
+// its own. What needs hardware, minutes or files of the reader's is no block of `sh`.
+TEST_F(ProgramWithLab, RunsTheCommandsOfTheReadmeAndTheDocs) {
   const test::Environment state("XDG_STATE_HOME", path("state"));
-  for (const std::string page : {"README.md", "docs/tutorial.md"}) {
-    const fs::path folder = path(page == "README.md" ? "readme" : "tutorial");
+  const fs::path sources = PALPATE_SOURCES;
+  std::vector<fs::path> pages = {sources / "README.md"};
+  for (const auto& file : fs::directory_iterator(sources / "docs"))
+    if (file.path().extension() == ".md") pages.push_back(file.path());
+  std::sort(pages.begin(), pages.end());
+  std::vector<std::string> run_of;
+  for (const fs::path& page : pages) {
+    const std::string commands = commands_of(page);
+    if (commands.empty()) continue;
+    const std::string name = page.stem().string();
+    run_of.push_back(name);
+    const fs::path folder = path(name);
     fs::create_directories(folder / "scripts");
     std::ofstream(folder / "scripts/run")
         << "#!/bin/bash\n"
@@ -607,19 +628,26 @@ TEST_F(ProgramWithLab, RunsTheCommandsOfTheTutorialAndTheReadme) {
            "  last=$word words+=(\"$word\")\n"
            "done\n"
            "if [[ $1 == run && $* != *--headless* && $* != *--print-config* ]]; then\n"
-           "  words+=(--duration 0.3 --port 0 --no-browser)\n"
+           "  if [[ $* == *--record* ]]; then seconds=1; else seconds=0.3; fi\n"
+           "  words+=(--duration $seconds --port 0 --no-browser)\n"
            "fi\n"
            "if [[ $1 == bench ]]; then words+=(--help); fi\n"
            "echo \"${words[*]}\" >>calls\n"
            "exec " PALPATE_PROGRAM " \"${words[@]}\"\n";
     fs::permissions(folder / "scripts/run", fs::perms::owner_all);
-    std::ofstream(folder / "commands") << commands_of(fs::path(PALPATE_SOURCES) / page);
-    const Outcome outcome = run("commands", "cd " + folder.string() + " && ", "bash -e");
+    fs::create_symlink("run", folder / "scripts/palpate");
+    std::ofstream(folder / "commands") << commands;
+    const Outcome outcome =
+        run("commands", "cd " + folder.string() + " && PATH=$PWD/scripts:$PATH ", "bash -e");
     const std::string calls = read(folder / "calls");
     EXPECT_EQ(outcome.code, 0) << page << ": " << calls << outcome.err;
-    EXPECT_GT(lines_in(calls), 6U) << page;
-    EXPECT_GT(fs::file_size(folder / "press.csv"), 100'000U) << page;
+    EXPECT_EQ(lines_in(calls), calls_in(commands)) << page << ": " << calls;
+    EXPECT_GT(calls_in(commands), 0U) << page;
   }
+  for (const char* page : {"README", "tutorial", "recording", "session", "sources", "lab"})
+    EXPECT_NE(std::find(run_of.begin(), run_of.end(), page), run_of.end()) << page;
+  for (const char* page : {"README", "tutorial"})
+    EXPECT_GT(fs::file_size(path(std::string(page) + "/press.csv")), 100'000U) << page;
 }
 
 TEST_F(Program, SaysWhatToDoWithASourceThatIsNone) {

@@ -60,7 +60,8 @@ class SqliteFile final : public BagFile {
                   "do not change a bag while it is read");
     const std::span<const std::byte> bytes = select.bytes(0);
     const BagTopic* topic = find(select.integer(1));
-    const std::string_view topic_name = topic == nullptr ? "an unknown topic" : topic->name;
+    const std::string_view topic_name =
+        topic == nullptr ? std::string_view("an unknown topic") : std::string_view(topic->name);
     if (const std::uint32_t* expected = checksums_.find(id);
         expected != nullptr &&
         (topic == nullptr ||

@@ -233,13 +233,13 @@ BagCamera::BagCamera(BagReader& bag, const std::string& topic, const Options& op
 
 void BagCamera::find_lens(const std::string& camera) {
   info_topic_ = camera + "/camera_info";
-  info_places_ = bag.places(info_topic_);
+  info_places_ = bag_.places(info_topic_);
   if (info_places_.empty())
     throw Error("topic " + topic_, "has no CameraInfo on " + info_topic_, "record that topic too");
-  is_realsense_ = bag.find(info_topic_)->type == ros::String::type;
+  is_realsense_ = bag_.find(info_topic_)->type == ros::String::type;
   if (!is_realsense_) return;
   units_topic_ = parent(camera) + "/option/Depth_Units/value";
-  units_places_ = bag.places(units_topic_);
+  units_places_ = bag_.places(units_topic_);
   if (units_places_.empty() && !options_.units)
     throw Error("topic " + topic_, "has no unit of depth on " + units_topic_,
                 "give the raw values per metre, such as ?units=1000");

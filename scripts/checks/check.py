@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of the repository's own text: `check.py rooms|text|format`, in the root.
+"""Checks of the repository's own text: `check.py rooms|text|format...`, in the root.
 
-Prints one line for each fault, `FILE:LINE: WHAT`, and exits 1 if there is one.
+One or several, one after another. Prints one line for each fault, `FILE:LINE: WHAT`, and exits 1 if
+there is one.
 """
 
 import os
@@ -228,7 +229,16 @@ def check_format(root):
 
 CHECKS = {"rooms": check_rooms, "text": check_text, "format": check_format}
 
+
+def chosen(names):
+    """All faults that the checks of these names find; exits if there is none of a name."""
+    if not names or not set(names) <= set(CHECKS):
+        sys.exit(f"check.py: {' '.join(names) or 'nothing'}: give one or more of "
+                 + ", ".join(CHECKS))
+    return [fault for name in names for fault in CHECKS[name](pathlib.Path.cwd())]
+
+
 if __name__ == "__main__":
-    FAULTS = CHECKS[sys.argv[1]](pathlib.Path.cwd())
+    FAULTS = chosen(sys.argv[1:])
     print("\n".join(FAULTS))
     sys.exit(1 if FAULTS else 0)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each check must find the faults that it is there for, in a made-up tree, and nothing else."""
 
+import os
 import pathlib
 import tempfile
 import unittest
@@ -141,6 +142,22 @@ class Format(Tree):
         self.assertEqual(check.check_format(self.root), [])
         self.write("a.cpp", "int main( ){ }\n")
         self.assertNotEqual(check.check_format(self.root), [])
+
+
+class Chosen(Tree):
+    def test_several_checks_are_all_made(self):
+        self.addCleanup(os.chdir, pathlib.Path.cwd())
+        os.chdir(self.root)
+        self.write("palpate/nowhere/a.cpp", SPDX)
+        self.write("a.py", "# " + 100 * "x" + "\n")
+        rooms, text = check.chosen(["rooms"]), check.chosen(["text"])
+        self.assertTrue(rooms and text)
+        self.assertEqual(check.chosen(["rooms", "text"]), rooms + text)
+
+    def test_a_check_that_there_is_not_is_refused(self):
+        for names in [], ["rooms", "txet"]:
+            with self.assertRaises(SystemExit):
+                check.chosen(names)
 
 
 if __name__ == "__main__":

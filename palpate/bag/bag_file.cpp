@@ -12,12 +12,16 @@ std::string BagFile::name(std::string_view topic, std::int64_t id) const {
 
 std::unique_ptr<BagFile> open_bag_file(const std::filesystem::path& file) {
   constexpr std::string_view mcap = "\x89MCAP";
-  std::array<char, mcap.size()> begin{};
+  constexpr std::string_view ros1 = "#ROSBAG";
+  constexpr std::string_view sqlite = "SQLite";
+  std::array<char, ros1.size()> begin{};
   std::error_code error;
   if (std::filesystem::is_regular_file(file, error))
     std::ifstream(file, std::ios::binary).read(begin.data(), begin.size());
-  if (file.extension() == ".mcap" || std::string_view(begin.data(), begin.size()) == mcap)
-    return open_mcap_file(file);
+  const std::string_view text(begin.data(), begin.size());
+  if (text.starts_with(mcap) || file.extension() == ".mcap") return open_mcap_file(file);
+  const bool is_named_bag = file.extension() == ".bag" && !text.starts_with(sqlite);
+  if (text.starts_with(ros1) || is_named_bag) return open_ros1_file(file);
   return open_sqlite_file(file);
 }
 

@@ -42,6 +42,8 @@ class BagFile {
     std::vector<std::byte> bytes;
   };
 
+  /// What it is, for people: "ROS 2 bag".
+  [[nodiscard]] virtual std::string_view kind() const { return "ROS 2 bag"; }
   /// In the order of the file; a name may come more than once.
   [[nodiscard]] virtual std::vector<BagTopic> topics() const = 0;
   /// Those of a topic, in the order in which they were written; none of an unknown one. @throws
@@ -73,7 +75,13 @@ std::unique_ptr<BagFile> open_sqlite_file(const std::filesystem::path& file);
 /// @throws Error if it is none, or damaged: what names the byte.
 std::unique_ptr<BagFile> open_mcap_file(const std::filesystem::path& file);
 
-/// Either, by how the file begins and what its name ends with. @throws Error
+/// A file of ROS 1 (rosbag, version 2.0, as librealsense writes them before 2.58): chunks
+/// uncompressed or compressed with lz4 or bz2. All else as for MCAP. Types have the names, and
+/// messages the serialization, of ROS 2; a message of a type that ros::from_ros1 does not know
+/// cannot be read. @throws Error if it is none, or damaged.
+std::unique_ptr<BagFile> open_ros1_file(const std::filesystem::path& file);
+
+/// Any of them, by how the file begins and what its name ends with. @throws Error
 std::unique_ptr<BagFile> open_bag_file(const std::filesystem::path& file);
 
 }  // namespace palpate

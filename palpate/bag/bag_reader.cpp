@@ -27,9 +27,6 @@ std::vector<fs::path> files_of(const fs::path& path) {
   std::error_code error;
   if (!fs::is_directory(path, error)) {
     if (!fs::exists(path, error)) throw Error(path.string(), "no such bag", "check the path");
-    if (path.extension() == ".bag")
-      throw Error(path.string(), "is a bag of ROS 1",
-                  "convert it: one of RealSense's with rs-convert -i FILE.bag -D FILE.db3");
     if (path.extension() == ".mkv")
       throw Error(path.string(), "is a video, such as an Azure Kinect's",
                   "write its depth as 16-bit PNGs, and name their folder with depth:FOLDER");
@@ -39,6 +36,7 @@ std::vector<fs::path> files_of(const fs::path& path) {
   bool sqlite = false;
   bool mcap = false;
   bool compressed = false;
+  bool ros1 = false;
   for (auto entry = fs::directory_iterator(path, error); !error && entry != fs::end(entry);
        entry.increment(error)) {
     const fs::path extension = entry->path().extension();
@@ -46,12 +44,14 @@ std::vector<fs::path> files_of(const fs::path& path) {
     sqlite = sqlite || extension == ".db3";
     mcap = mcap || extension == ".mcap";
     compressed = compressed || extension == ".zstd";
+    ros1 = ros1 || extension == ".bag";
   }
   if (error) throw Error(path.string(), "cannot be listed: " + error.message(), "check the path");
   if (files.empty()) {
     if (compressed)
       throw Error(path.string(), "is a compressed bag",
                   "decompress its files with zstd -d, or the bag with ros2 bag convert");
+    if (ros1) throw Error(path.string(), "holds bags of ROS 1", "name one of its .bag files");
     throw Error(path.string(), "holds no .db3 or .mcap file", "name the folder of a ROS 2 bag");
   }
   if (sqlite && mcap)

@@ -13,16 +13,18 @@
 
 namespace palpate {
 
-/// Reads the messages of a ROS 2 bag whose storage is SQLite or MCAP.
+/// Reads the messages of a ROS 2 bag whose storage is SQLite or MCAP, or of a bag of ROS 1.
 ///
 /// metadata.yaml is not looked at: what it says of a bag whose program was killed is out of date.
 /// Used on one thread.
 class BagReader {
  public:
-  /// @param path  the bag's folder, or one .db3 or .mcap file of it
+  /// @param path  the bag's folder, or one .db3, .mcap or .bag file
   /// @throws Error if there is no such bag, or it cannot be read.
   explicit BagReader(const std::filesystem::path& path);
 
+  /// What it is, for people: "ROS 1 bag", "ROS 2 bag".
+  [[nodiscard]] std::string_view kind() const { return files_.front()->kind(); }
   using Topic = BagTopic;
   /// Sorted by name.
   [[nodiscard]] const std::vector<Topic>& topics() const { return topics_; }

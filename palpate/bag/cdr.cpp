@@ -10,8 +10,13 @@ constexpr std::size_t header = 4;
 
 }  // namespace
 
-CdrReader::CdrReader(std::span<const std::byte> message, std::string name)
-    : name_(std::move(name)) {
+CdrReader::CdrReader(std::span<const std::byte> message, std::string name, Layout layout)
+    : name_(std::move(name)), layout_(layout) {
+  if (layout == Layout::ros1) {
+    swapped_ = std::endian::native == std::endian::big;
+    body_ = message;
+    return;
+  }
   if (message.size() < header)
     throw Error(name_, "is too short for a message", "the bag may be damaged");
   const std::span<const std::byte> representation = message.first(header);
@@ -24,6 +29,7 @@ CdrReader::CdrReader(std::span<const std::byte> message, std::string name)
 }
 
 void CdrReader::align(std::size_t size) {
+  if (layout_ == Layout::ros1) return;
   const std::size_t past = at_ % size;
   if (past != 0) static_cast<void>(take(size - past));
 }

@@ -68,14 +68,19 @@ class CdrWriter {
   std::vector<std::byte> bytes_;
 };
 
-/// Reads what CdrWriter and ROS 2 write, in either byte order. What a message promises is held
+/// Reads what CdrWriter and ROS 2 write, in either byte order, or what ROS 1 wrote: the same, but
+/// little-endian, without the four bytes, and no number aligned. What a message promises is held
 /// against its length before anything is allocated.
 class CdrReader {
  public:
+  enum class Layout : std::uint8_t { cdr, ros1 };
+
   /// @param message  must outlive this
   /// @param name     of the message, for errors
   /// @throws Error if it is not plain CDR.
-  CdrReader(std::span<const std::byte> message, std::string name);
+  CdrReader(std::span<const std::byte> message, std::string name, Layout layout = Layout::cdr);
+
+  [[nodiscard]] Layout layout() const { return layout_; }
 
   /// @throws Error if the message ends before.
   template <class T>
@@ -106,6 +111,7 @@ class CdrReader {
 
   std::span<const std::byte> body_;
   std::string name_;
+  Layout layout_;
   std::size_t at_ = 0;
   bool swapped_ = false;
 };

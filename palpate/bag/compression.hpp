@@ -25,4 +25,8 @@ namespace palpate {
 [[nodiscard]] std::vector<std::byte> decompress_lz4(std::span<const std::byte> packed,
                                                     std::size_t max_bytes, const std::string& name);
 
+/// The same for bzip2, of which there is one stream.
+[[nodiscard]] std::vector<std::byte> decompress_bz2(std::span<const std::byte> packed,
+                                                    std::size_t max_bytes, const std::string& name);
+
 }  // namespace palpate

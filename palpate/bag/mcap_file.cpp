@@ -2,31 +2,23 @@
 // The format is described at https://mcap.dev/spec.
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cerrno>
-#include <cstring>
 #include <limits>
 #include <map>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <utility>
 #include <vector>
-
-#include <fcntl.h>
-#include <unistd.h>
 
 #include "palpate/bag/bag_file.hpp"
 #include "palpate/bag/checksum.hpp"
 #include "palpate/bag/compression.hpp"
+#include "palpate/bag/random_access.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate {
 namespace {
-
-static_assert(std::endian::native == std::endian::little, "MCAP is read as it lies in RAM");
 
 constexpr std::string_view mcap_magic = "\x89MCAP0\r\n";  // at both ends of a file
 constexpr std::size_t record_head = 9;                    // [bytes] kind and length
@@ -48,107 +40,6 @@ enum class RecordKind : std::uint8_t {
   attachment = 9,
   statistics = 11,
   data_end = 15,
-};
-
-// A place in a file, for errors.
-struct BytePlace {
-  const std::filesystem::path& file;
-  std::uint64_t byte;
-
-  [[nodiscard]] std::string text() const {
-    return file.string() + ": byte " + std::to_string(byte);
-  }
-  [[noreturn]] void fail(const std::string& why) const { throw Error(text(), why, mcap_remedy); }
-};
-
-// A file that is read at any place.
-class RandomAccess {
- public:
-  // @throws Error
-  explicit RandomAccess(const std::filesystem::path& path) : path_(path) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(path, error))
-      throw Error(path.string(), "no such file", "check the path");
-    descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    if (descriptor_ < 0)
-      throw Error(path.string(), std::string("cannot be opened: ") + std::strerror(errno),
-                  "check its permissions");
-    const off_t end = ::lseek(descriptor_, 0, SEEK_END);
-    size_ = end < 0 ? 0 : static_cast<std::uint64_t>(end);
-  }
-  ~RandomAccess() { ::close(descriptor_); }
-  RandomAccess(const RandomAccess&) = delete;
-  RandomAccess& operator=(const RandomAccess&) = delete;
-
-  [[nodiscard]] std::uint64_t size() const { return size_; }
-
-  // @throws Error if there is less.
-  void read(std::uint64_t at, std::span<std::byte> into) const {
-    while (!into.empty()) {
-      const ssize_t got = ::pread(descriptor_, into.data(), into.size(), static_cast<off_t>(at));
-      if (got < 0 && errno == EINTR) continue;
-      if (got <= 0)
-        throw Error(BytePlace{path_, at}.text(), "cannot be read",
-                    "check the disk, and do not change a bag while it is read");
-      at += static_cast<std::uint64_t>(got);
-      into = into.subspan(static_cast<std::size_t>(got));
-    }
-  }
-
-  [[nodiscard]] std::vector<std::byte> bytes(std::uint64_t at, std::uint64_t size) const {
-    std::vector<std::byte> bytes(size);
-    read(at, bytes);
-    return bytes;
-  }
-
-  [[nodiscard]] std::uint32_t crc32(std::uint64_t from, std::uint64_t to) const {
-    std::vector<std::byte> buffer(std::size_t{1} << 16U);
-    std::uint32_t crc = 0;
-    while (from < to) {
-      const auto part = std::span(buffer).first(std::min<std::uint64_t>(buffer.size(), to - from));
-      read(from, part);
-      crc = crc32_on(crc, part);
-      from += part.size();
-    }
-    return crc;
-  }
-
- private:
-  std::filesystem::path path_;
-  int descriptor_ = -1;
-  std::uint64_t size_ = 0;
-};
-
-// The fields of a record, one after another.
-class RecordFields {
- public:
-  RecordFields(std::span<const std::byte> left, const BytePlace& place)
-      : left_(left), place_(place) {}
-
-  std::span<const std::byte> take(std::uint64_t count) {
-    if (count > left_.size()) place_.fail("has a record that is shorter than its fields");
-    const auto taken = left_.first(count);
-    left_ = left_.subspan(count);
-    return taken;
-  }
-  template <class T>
-  T number() {
-    static_assert(std::is_integral_v<T>);
-    T value{};
-    std::memcpy(&value, take(sizeof value).data(), sizeof value);
-    return value;
-  }
-  // Behind its length.
-  std::span<const std::byte> block() { return take(number<std::uint32_t>()); }
-  std::string text() {
-    const auto bytes = block();
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-  }
-  [[nodiscard]] std::span<const std::byte> left() const { return left_; }
-
- private:
-  std::span<const std::byte> left_;
-  BytePlace place_;
 };
 
 class McapFile final : public BagFile {
@@ -260,7 +151,7 @@ class McapFile final : public BagFile {
     std::uint64_t begin, indexes, indexes_size;
   };
 
-  [[nodiscard]] BytePlace at(std::uint64_t byte) const { return {path(), byte}; }
+  [[nodiscard]] BytePlace at(std::uint64_t byte) const { return {path(), byte, mcap_remedy}; }
 
   [[nodiscard]] bool is_magic(std::uint64_t place) const {
     std::array<char, mcap_magic.size()> bytes{};

@@ -2,6 +2,7 @@
 #include "palpate/bag/messages.hpp"
 
 #include "palpate/bag/cdr.hpp"
+#include "palpate/core/error.hpp"
 
 namespace palpate::ros {
 namespace {
@@ -9,6 +10,7 @@ namespace {
 // One walk over a message's fields serves both ways: `Fields` writes them, or reads them.
 class Put {
  public:
+  void begin_header() {}
   template <class T>
   void number(const T& value) {
     out_.put(value);
@@ -39,7 +41,14 @@ class Put {
 
 class Get {
  public:
-  Get(std::span<const std::byte> bytes, const std::string& name) : in_(bytes, name) {}
+  Get(std::span<const std::byte> bytes, const std::string& name,
+      CdrReader::Layout layout = CdrReader::Layout::cdr)
+      : in_(bytes, name, layout) {}
+
+  // A header of ROS 1 begins with a number that ROS 2 has no more.
+  void begin_header() {
+    if (in_.layout() == CdrReader::Layout::ros1) static_cast<void>(in_.get<std::uint32_t>());
+  }
 
   template <class T>
   void number(T& value) {
@@ -71,6 +80,7 @@ class Get {
 
 template <class Way, class H>
 void walk_header(Way& way, H& header) {
+  way.begin_header();
   way.number(header.stamp.sec);
   way.number(header.stamp.nanosec);
   way.text(header.frame_id);
@@ -174,7 +184,21 @@ constexpr auto points = [](auto& way, auto& m) { walk_points(way, m); };
 constexpr auto pose = [](auto& way, auto& m) { walk_pose(way, m); };
 constexpr auto wrench = [](auto& way, auto& m) { walk_wrench(way, m); };
 constexpr auto transforms = [](auto& way, auto& m) { walk_transforms(way, m); };
+constexpr auto float32 = [](auto& way, auto& m) { way.number(m.data); };
+constexpr auto key_value = [](auto& way, auto& m) {
+  way.text(m.key);
+  way.text(m.value);
+};
 constexpr auto string = [](auto& way, auto& m) { way.text(m.data); };
+
+template <class Message, class Walk>
+std::vector<std::byte> in_cdr(std::span<const std::byte> bytes, const std::string& name,
+                              const Walk& walk) {
+  Get get(bytes, name, CdrReader::Layout::ros1);
+  Message message;
+  walk(get, message);
+  return encode_by(message, walk);
+}
 
 }  // namespace
 
@@ -210,6 +234,12 @@ std::vector<std::byte> encode(const WrenchStamped& message) {
 std::vector<std::byte> encode(const TFMessage& message) {
   return encode_by(message, transforms);
 }
+std::vector<std::byte> encode(const Float32& message) {
+  return encode_by(message, float32);
+}
+std::vector<std::byte> encode(const KeyValue& message) {
+  return encode_by(message, key_value);
+}
 std::vector<std::byte> encode(const String& message) {
   return encode_by(message, string);
 }
@@ -224,6 +254,20 @@ std::vector<std::byte> encode(const Float64MultiArray& message) {
   out.put(std::uint32_t{0});  // layout.data_offset
   out.put_sequence(std::span(message.data));
   return out.take();
+}
+
+std::vector<std::byte> from_ros1(std::string_view type, std::span<const std::byte> bytes,
+                                 const std::string& name) {
+  if (type == Image::type) return in_cdr<Image>(bytes, name, image);
+  if (type == CompressedImage::type) return in_cdr<CompressedImage>(bytes, name, compressed);
+  if (type == CameraInfo::type) return in_cdr<CameraInfo>(bytes, name, camera);
+  if (type == PointCloud2::type) return in_cdr<PointCloud2>(bytes, name, points);
+  if (type == TFMessage::type) return in_cdr<TFMessage>(bytes, name, transforms);
+  if (type == Float32::type) return in_cdr<Float32>(bytes, name, float32);
+  if (type == KeyValue::type) return in_cdr<KeyValue>(bytes, name, key_value);
+  if (type == String::type) return in_cdr<String>(bytes, name, string);
+  throw Error(name, "is of " + std::string(type) + ", which is not read from bags of ROS 1",
+              "name another topic");
 }
 
 template <>
@@ -253,6 +297,14 @@ WrenchStamped decode(std::span<const std::byte> bytes, const std::string& name) 
 template <>
 TFMessage decode(std::span<const std::byte> bytes, const std::string& name) {
   return decode_by<TFMessage>(bytes, name, transforms);
+}
+template <>
+Float32 decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<Float32>(bytes, name, float32);
+}
+template <>
+KeyValue decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<KeyValue>(bytes, name, key_value);
 }
 template <>
 String decode(std::span<const std::byte> bytes, const std::string& name) {

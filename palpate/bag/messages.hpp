@@ -113,6 +113,16 @@ struct Float64MultiArray {
   std::vector<double> data;
 };
 
+struct Float32 {
+  static constexpr std::string_view type = "std_msgs/msg/Float32";
+  float data = 0.0F;
+};
+
+struct KeyValue {
+  static constexpr std::string_view type = "diagnostic_msgs/msg/KeyValue";
+  std::string key, value;
+};
+
 struct String {
   static constexpr std::string_view type = "std_msgs/msg/String";
   std::string data;
@@ -126,7 +136,16 @@ std::vector<std::byte> encode(const PoseStamped& message);
 std::vector<std::byte> encode(const WrenchStamped& message);
 std::vector<std::byte> encode(const TFMessage& message);
 std::vector<std::byte> encode(const Float64MultiArray& message);
+std::vector<std::byte> encode(const Float32& message);
+std::vector<std::byte> encode(const KeyValue& message);
 std::vector<std::byte> encode(const String& message);
+
+/// A message of ROS 1, in CDR. Known are Image, CompressedImage, CameraInfo, PointCloud2,
+/// TFMessage, Float32, KeyValue and String.
+/// @param type  as ROS 2 names it  @param name  of the message, for errors
+/// @throws Error if it is of another type, or damaged.
+std::vector<std::byte> from_ros1(std::string_view type, std::span<const std::byte> bytes,
+                                 const std::string& name);
 
 /// @param name  of the message, for errors  @throws Error if it is damaged.
 template <class Message>
@@ -148,6 +167,10 @@ template <>
 TFMessage decode(std::span<const std::byte> bytes, const std::string& name);
 template <>
 Float64MultiArray decode(std::span<const std::byte> bytes, const std::string& name);
+template <>
+Float32 decode(std::span<const std::byte> bytes, const std::string& name);
+template <>
+KeyValue decode(std::span<const std::byte> bytes, const std::string& name);
 template <>
 String decode(std::span<const std::byte> bytes, const std::string& name);
 

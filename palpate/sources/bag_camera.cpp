@@ -2,6 +2,7 @@
 #include "palpate/sources/bag_camera.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -129,6 +130,20 @@ Intrinsics intrinsics_of(const ros::CameraInfo& info, bool is_rectified, const s
   return k;
 }
 
+// Of librealsense, whose models have names of their own.
+RealSenseLens realsense_lens(const ros::CameraInfo& info) {
+  RealSenseLens lens{.width = static_cast<int>(std::min(info.width, largest_side + 1)),
+                     .height = static_cast<int>(std::min(info.height, largest_side + 1)),
+                     .ppx = info.k[2],
+                     .ppy = info.k[5],
+                     .fx = info.k[0],
+                     .fy = info.k[4],
+                     .model = info.distortion_model,
+                     .coeffs = {}};
+  std::copy_n(info.d.begin(), std::min(info.d.size(), lens.coeffs.size()), lens.coeffs.begin());
+  return lens;
+}
+
 // Byte offsets of x, y and z in a point, and whether they are doubles.
 struct Axes {
   std::array<std::size_t, 3> offset{};
@@ -232,13 +247,16 @@ BagCamera::BagCamera(BagReader& bag, const std::string& topic, const Options& op
 }
 
 void BagCamera::find_lens(const std::string& camera) {
-  info_topic_ = camera + "/camera_info";
+  const std::string in_ros1 = camera + "/info/camera_info";  // librealsense's bags of ROS 1
+  is_realsense_ = bag_.find(in_ros1) != nullptr;
+  info_topic_ = is_realsense_ ? in_ros1 : camera + "/camera_info";
   info_places_ = bag_.places(info_topic_);
   if (info_places_.empty())
     throw Error("topic " + topic_, "has no CameraInfo on " + info_topic_, "record that topic too");
-  is_realsense_ = bag_.find(info_topic_)->type == ros::String::type;
+  is_realsense_ = is_realsense_ || bag_.find(info_topic_)->type == ros::String::type;
   if (!is_realsense_) return;
-  units_topic_ = parent(camera) + "/option/Depth_Units/value";
+  const char* name = info_topic_ == in_ros1 ? "Depth Units" : "Depth_Units";
+  units_topic_ = parent(camera) + "/option/" + name + "/value";
   units_places_ = bag_.places(units_topic_);
   if (units_places_.empty() && !options_.units)
     throw Error("topic " + topic_, "has no unit of depth on " + units_topic_,
@@ -288,10 +306,17 @@ SensorKind BagCamera::sensor() const {
   if (!is_realsense_) return SensorKind::unknown;
   const std::string device_topic = topic_.substr(0, topic_.find('/', 1)) + "/info";
   const BagReader::Topic* topic = bag_.find(device_topic);
-  if (topic == nullptr || topic->type != ros::String::type) return realsense_sensor("");
+  if (topic == nullptr) return realsense_sensor("");
   std::string product;
-  for (const BagReader::Place& place : bag_.places(device_topic))
-    product += text(place, device_topic);
+  for (const BagReader::Place& place : bag_.places(device_topic)) {
+    if (topic->type == ros::KeyValue::type) {
+      const auto pair =
+          ros::decode<ros::KeyValue>(bag_.read(place), bag_.name(device_topic, place));
+      if (pair.key == "Name") product += pair.value;
+    } else if (topic->type == ros::String::type) {
+      product += text(place, device_topic);
+    }
+  }
   return realsense_sensor(product);
 }
 
@@ -301,11 +326,19 @@ double BagCamera::realsense_units(std::size_t number) const {
   for (const BagReader::Place& place : units_places_) {
     if (place.nanoseconds <= places_[number].nanoseconds) newest = place;
   }
-  const std::string metres = text(newest, units_topic_);
+  const std::string name = bag_.name(units_topic_, newest);
+  std::string metres;
+  if (bag_.find(units_topic_)->type == ros::Float32::type) {
+    std::array<char, 32> digits{};  // 0.001, not what is nearest to it in a double
+    const float value = ros::decode<ros::Float32>(bag_.read(newest), name).data;
+    metres.assign(digits.data(), std::to_chars(digits.begin(), digits.end(), value).ptr);
+  } else {
+    metres = text(newest, units_topic_);
+  }
   double unit = 0.0;
   const auto [end, error] = std::from_chars(metres.data(), metres.data() + metres.size(), unit);
   if (error != std::errc() || !(unit >= least_unit && unit <= largest_unit))
-    throw Error(bag_.name(units_topic_, newest), "says '" + metres + "' metres for a unit of depth",
+    throw Error(name, "says '" + metres + "' metres for a unit of depth",
                 "give the raw values per metre, such as ?units=1000");
   return 1.0 / unit;
 }
@@ -354,12 +387,15 @@ const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
   if (!rays_ || is_ours()) {
     const std::string info_name = bag_.name(info_topic_, info_places_[which]);
     const bool is_rectified = !is_ours() && topic_.find("rect") != std::string::npos;
-    const Intrinsics k =
-        is_realsense_
-            ? intrinsics_of(parse_realsense_lens(text(info_places_[which], info_topic_), info_name),
-                            info_name)
-            : intrinsics_of(ros::decode<ros::CameraInfo>(bag_.read(info_places_[which]), info_name),
-                            is_rectified, info_name);
+    Intrinsics k;
+    if (bag_.find(info_topic_)->type == ros::String::type) {
+      const std::string described = text(info_places_[which], info_topic_);
+      k = intrinsics_of(parse_realsense_lens(described, info_name), info_name);
+    } else {
+      const auto info = ros::decode<ros::CameraInfo>(bag_.read(info_places_[which]), info_name);
+      k = is_realsense_ ? intrinsics_of(realsense_lens(info), info_name)
+                        : intrinsics_of(info, is_rectified, info_name);
+    }
     if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
   }
   const Intrinsics& k = rays_->intrinsics();

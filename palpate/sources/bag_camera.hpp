@@ -39,7 +39,8 @@ struct CameraTopics {
 ///
 /// Recordings of librealsense (2.58 and later) keep the lens and the unit of depth in texts:
 /// `.../Depth_0/camera_info` (realsense_lens.hpp) and `.../option/Depth_Units/value`, metres per
-/// unit, which may change during a recording.
+/// unit, which may change during a recording. Before, they were bags of ROS 1, with a CameraInfo on
+/// `.../Depth_0/info/camera_info` and a Float32 on `.../option/Depth Units/value`.
 class BagCamera {
  public:
   struct Options {

@@ -55,7 +55,7 @@ const Registry<SourceScheme>& standard_sources() {
        {"ply", "ply:FILE|DIR, point clouds and meshes", open_point_files},
        {"tum", "tum:DIR, a recording of the TUM RGB-D layout", open_tum},
        {"depth", "depth:DIR|FILE.png, depth images as 16-bit PNG", open_depth},
-       {"recording", "recording:BAG, a session of palpate's or another ROS 2 bag",
+       {"recording", "recording:BAG, a session of palpate's, or another bag of ROS",
         open_recording}});
   return schemes;
 }
@@ -66,16 +66,14 @@ std::string uri_of_file(const std::filesystem::path& file) {
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   for (const auto& [known, scheme] :
        {std::pair(".pcd", "pcd:"), std::pair(".ply", "ply:"), std::pair(".db3", "recording:"),
-        std::pair(".mcap", "recording:")}) {
+        std::pair(".mcap", "recording:"), std::pair(".bag", "recording:")}) {
     if (ending != known) continue;
     const std::string path = file.string();
     return scheme + path + (path.find('?') == std::string::npos ? "" : "?");
   }
-  std::string remedy = "give a .pcd, .ply, .db3 or .mcap file";
+  std::string remedy = "give a .pcd, .ply, .db3, .mcap or .bag file";
   if (ending == ".png" || ending == ".txt")
     remedy = "start the program with --camera depth:FOLDER or tum:FOLDER, of all its images";
-  if (ending == ".bag")
-    remedy = "convert it: one of RealSense's with rs-convert -i FILE.bag -D FILE.db3";
   if (ending == ".mkv")
     remedy = "write its depth as 16-bit PNGs, then start the program with --camera depth:FOLDER";
   throw Error(file.filename().string(), "cannot be touched as a file of its own", remedy);

@@ -21,7 +21,7 @@ class Recording final : public Source {
                   "name another topic with ?topic=");
     info_.kind = camera_.is_ours()        ? "recording of palpate's"
                  : camera_.is_realsense() ? "RealSense recording"
-                                          : "ROS 2 bag";
+                                          : std::string(bag_.kind());
     info_.sensor = camera_.sensor();
     info_.frames = camera_.frames();
     info_.frame_rate = camera_.frame_rate();

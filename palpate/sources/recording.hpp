@@ -8,9 +8,9 @@
 
 namespace palpate {
 
-/// Opens `recording:PATH`: the frames of a session that palpate recorded, to the bit, or of any ROS
-/// 2 bag in SQLite or MCAP with depth images or points (bag_camera.hpp), a RealSense's among them.
-/// Stamps count from the first frame.
+/// Opens `recording:PATH`: the frames of a session that palpate recorded, to the bit, or of any bag
+/// of ROS 2 (in SQLite or MCAP) or ROS 1 with depth images or points (bag_camera.hpp), a
+/// RealSense's among them. Stamps count from the first frame.
 ///
 /// `topic=/NAME` chooses among several topics; `units=1000` is the number of raw depth units per
 /// metre, to which depth in floats is rounded (5000: 0.2 mm, up to 13 m); `voxel=10mm` is that of a

@@ -106,7 +106,7 @@ struct SourceScheme {
 /// `ply:FILE|DIR`, `recording:BAG`. To add to them, copy the registry.
 const Registry<SourceScheme>& standard_sources();
 
-/// The URI of a single file by what its name ends with: .pcd, .ply, .db3 or .mcap.
+/// The URI of a single file by what its name ends with: .pcd, .ply, .db3, .mcap or .bag.
 /// @throws Error for any other ending, saying what to do with such a file.
 std::string uri_of_file(const std::filesystem::path& file);
 

@@ -653,7 +653,8 @@ TEST_F(ProgramWithLab, RunsTheCommandsOfTheReadmeAndTheDocs) {
 TEST_F(Program, SaysWhatToDoWithASourceThatIsNone) {
   expect_refusal("info", {"info: it is not said of what", "synthetic:desk"});
   expect_refusal("info tum:", {"'tum:'", "names no folder", "tum:FOLDER"});
-  expect_refusal("info recording:" + write("walk.bag", "#ROSBAG"), {"walk.bag", "rs-convert"});
+  expect_refusal("info recording:" + write("walk.bag", "#ROSBAG V1.2\n"),
+                 {"walk.bag", "ROS 1", "rosbag reindex"});
   expect_refusal("info recording:" + write("scan.mkv", "x"), {"scan.mkv", "video", "depth:FOLDER"});
   expect_refusal("info " + write("cup.ply", "ply"), {"cup.ply", "write ply:"});
   // Six digits, whatever the sums behind them.

@@ -109,7 +109,7 @@ TEST(Bag, SaysWhyWhatIsNoneIsRefused) {
   EXPECT_TRUE(fails_saying(open(folder.write("text.db3", "not a database, but long enough")),
                            "text.db3", "not a database"));
   EXPECT_TRUE(fails_saying(open(folder.write("empty.db3", "")), "empty.db3", "no table of topics"));
-  EXPECT_TRUE(fails_saying(open(folder.write("some.bag", "")), "ROS 1", "rs-convert"));
+  EXPECT_TRUE(fails_saying(open(folder.write("some.bag", "")), "some.bag", "no bag of ROS 1"));
   EXPECT_TRUE(fails_saying(open(folder.write("some.mcap", "")), "some.mcap", "not an MCAP file"));
   std::filesystem::create_directory(folder.path() / "zstd");
   static_cast<void>(folder.write("zstd/some.db3.zstd", ""));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Recordings in librealsense's layout, written here from its public sources and from what others
-// read of them; no file of a real camera was at hand.
+// Recordings in librealsense's layouts, written here from its public sources and from what others
+// read of them; of the newer one no file of a real camera was at hand.
 #include <filesystem>
 #include <memory>
 #include <random>
@@ -13,8 +13,10 @@
 #include "palpate/sources/realsense_lens.hpp"
 #include "palpate/sources/source.hpp"
 
+#include "tests/support/data.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/realsense_recording.hpp"
+#include "tests/support/ros1_bag.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
@@ -188,6 +190,81 @@ TEST_F(RealSenseFile, WithDamagedMessagesIsReadOrAnErrorOfOneLine) {
     }
   }
   EXPECT_GT(errors, 100);
+}
+
+// As librealsense recorded before 2.58.
+std::string ros1_bag(const std::string& model, const std::vector<double>& coeffs, float unit,
+                     const std::vector<std::uint16_t>& depth, std::uint32_t width = 4) {
+  namespace ros1 = test::ros1;
+  test::Ros1BagWriter writer("lz4");
+  const std::string sensor = "/device_0/sensor_0/";
+  writer.message("/device_0/info", "diagnostic_msgs/KeyValue", 1,
+                 ros1::text("Physical Port") + ros1::text("usb/L515"));
+  writer.message("/device_0/info", "diagnostic_msgs/KeyValue", 1,
+                 ros1::text("Name") + ros1::text("Intel RealSense SR300"));
+  writer.message(sensor + "Depth_0/info/camera_info", "sensor_msgs/CameraInfo", 1,
+                 ros1::camera_info(width, 3, 50.5, 1.25, 1.5, model, coeffs));
+  if (unit != 0.0F)
+    writer.message(sensor + "option/Depth Units/value", "std_msgs/Float32", 1, ros1::number(unit));
+  writer.end_chunk();
+  for (int i = 0; i < 3; ++i)
+    writer.message(sensor + "Depth_0/image/data", "sensor_msgs/Image", 1 + 33 * i * milliseconds,
+                   ros1::image((1000 + 33 * i) * milliseconds, 4, 3, depth, "mono16"));
+  writer.message("/device_0/sensor_1/Color_0/image/data", "sensor_msgs/Image", 1,
+                 ros1::image(1000, 4, 3, depth, "rgb8"));
+  return writer.close();
+}
+
+TEST_F(RealSenseFile, OfRos1IsReadWithItsLensUnitAndStamps) {
+  const auto file =
+      folder_.write("room.bag", ros1_bag("Brown Conrady", {0.1, 0, 0, 0, 0}, 0.0001F, depth_));
+  const auto source = open_source("recording:" + file.string());
+  EXPECT_EQ(source->info().kind, "RealSense recording");
+  EXPECT_EQ(source->info().sensor, SensorKind::structured_light);
+  EXPECT_EQ(source->info().frames, 3U);
+  EXPECT_TRUE(source->info().notes.empty());
+  for (int i = 0; i < 3; ++i) {
+    const auto frame = source->next();
+    ASSERT_TRUE(frame);
+    EXPECT_NEAR(frame->stamp, 0.033 * i, 1e-9);
+    const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
+    EXPECT_EQ(image.depth(), depth_);
+    EXPECT_DOUBLE_EQ(image.units_per_metre(), 10'000.0);
+    Intrinsics k{.width = 4, .height = 3, .fx = 50.5, .fy = 50.5, .cx = 1.25, .cy = 1.5};
+    k.distortion[0] = 0.1;
+    EXPECT_EQ(image.intrinsics(), k);
+  }
+  EXPECT_FALSE(source->next());
+}
+
+TEST_F(RealSenseFile, OfRos1ThatCannotBeTouchedIsRefusedWithTheReason) {
+  const auto refused = [&](const std::string& bag, const char* first, const char* second) {
+    const auto file = folder_.write("room.bag", bag);
+    return fails_saying([&] { return open_source("recording:" + file.string()); }, first, second);
+  };
+  const std::vector<double> none(5);
+  EXPECT_TRUE(refused(ros1_bag("None", none, 0.0F, depth_), "Depth Units", "?units="));
+  EXPECT_TRUE(refused(ros1_bag("None", none, 7.0F, depth_), "Depth Units", "'7'"));
+  EXPECT_TRUE(refused(ros1_bag("None", none, 0.001F, depth_, 5), "4x3", "5x3"));
+  EXPECT_TRUE(refused(ros1_bag("Inverse Brown Conrady", {0, 0.1, 0, 0, 0}, 0.001F, depth_),
+                      "Inverse Brown", "depth:"));
+}
+
+TEST(RealSenseRecorded, InABagOfRos1IsWhatWasTakenOutOfIt) {
+  PALPATE_DATA_OR_SKIP(folder, "rec_realsense_bag");
+  const auto source =
+      open_source("recording:" + (folder / "single_depth_color_640x480.bag").string());
+  const auto image =
+      open_source("depth:" + (folder / "extracted_depth_000000.png").string())->next();
+  const auto frame = source->next();
+  ASSERT_TRUE(frame && image);
+  const auto& recorded = dynamic_cast<const DepthImage&>(*frame->cloud);
+  const auto& extracted = dynamic_cast<const DepthImage&>(*image->cloud);
+  EXPECT_EQ(recorded.depth(), extracted.depth());
+  EXPECT_EQ(recorded.intrinsics(), extracted.intrinsics());
+  EXPECT_EQ(recorded.units_per_metre(), extracted.units_per_metre());
+  EXPECT_TRUE(source->next());
+  EXPECT_FALSE(source->next());
 }
 
 TEST(RealSenseLens, IsReadFromItsText) {

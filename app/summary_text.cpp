@@ -76,6 +76,7 @@ std::string json_of(const Summary& summary, const std::string& recording,
   for (const CameraStatus& camera : cameras)
     object["cameras"].push_back({{"uri", camera.uri},
                                  {"kind", camera.kind},
+                                 {"sensor", name_of(camera.sensor)},
                                  {"frames", camera.frames},
                                  {"dropped", camera.dropped},
                                  {"rate_hz", camera.rate},

@@ -19,6 +19,7 @@
 #include "app/machine.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/sensor.hpp"
 #include "palpate/core/vectorise.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/usb.hpp"
@@ -120,6 +121,12 @@ Json look_at_devices(const Machine& machine, const Registry<Driver>& drivers,
   return found;
 }
 
+// Empty where nobody says.
+std::string sensor_text(SensorKind sensor) {
+  if (sensor == SensorKind::unknown) return {};
+  return fmt::format("{} (noise taken for {})", name_of(sensor), noise_text(sensor));
+}
+
 // What each driver finds: library or service, and what is plugged in.
 Json look_at_drivers(const Machine& machine, const Registry<Driver>& drivers,
                      std::vector<std::string>& advice) {
@@ -133,6 +140,7 @@ Json look_at_drivers(const Machine& machine, const Registry<Driver>& drivers,
                             {"serial", one.serial},
                             {"firmware", one.firmware},
                             {"rate_hz", one.rate ? Json(*one.rate) : Json()},
+                            {"noise", sensor_text(one.sensor)},
                             {"note", one.note}});
       if (!one.note.empty()) advice.push_back(one.uri + ": " + one.note);
     }
@@ -198,6 +206,7 @@ std::string drivers_text(const Json& drivers) {
       }
       if (one["rate_hz"].is_number())
         text += fmt::format(", {:.0f} Hz", one["rate_hz"].get<double>());
+      if (const auto noise = one["noise"].get<std::string>(); !noise.empty()) text += ", " + noise;
       text += "\n";
     }
   }

@@ -151,6 +151,7 @@ int info(const InfoOptions& options) {
   Json json = {{"uri", about.uri}, {"kind", about.kind}, {"live", about.live}};
   if (about.live) json["clock"] = name_of(about.clock);
   if (about.sensor != SensorKind::unknown) json["sensor"] = name_of(about.sensor);
+  json["usual_noise"] = noise_text(about.sensor);
   if (about.frames) json["frames"] = *about.frames;
   if (about.frame_rate) json["frame_rate_hz"] = *about.frame_rate;
   if (about.start_time != 0.0) json["start_time_s"] = about.start_time;

@@ -26,7 +26,7 @@
 #include "palpate/core/uri.hpp"
 #include "palpate/devices/device_guard.hpp"
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/drivers/stiffness.hpp"
+#include "palpate/servo/stiffness.hpp"
 #include "palpate/session/from_config.hpp"
 #include "palpate/sources/scene.hpp"
 #include "palpate/viewer/session_host.hpp"
@@ -116,8 +116,9 @@ void introduce(const Session& session, const SessionConfig& config) {
     text += "; its driver was tried on " + driver->tried;
   fmt::print(stderr, "palpate: {}\n", text);
   const ServoSettings settings = session.settings();
-  const double felt = settings.parameters.coupling.stiffness * settings.placement.workspace_scale;
-  for (const std::string& line : stiffness_warnings(device, felt, config.rate))
+  for (const std::string& line :
+       stiffness_warnings(device, settings.parameters.coupling.stiffness,
+                          settings.placement.workspace_scale, config.rate))
     fmt::print(stderr, "palpate: {}: {}\n", device.uri, line);
 }
 

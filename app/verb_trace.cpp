@@ -17,6 +17,7 @@
 #include "app/trace_remarks.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/sensor.hpp"
 #include "palpate/devices/hip_path.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/session/press_path.hpp"
@@ -68,7 +69,12 @@ int trace(const TraceOptions& options) {
       fmt::print(stderr, "palpate: {}: {}\n", about.uri, note);
   }
   const MethodRegistry methods = program_methods(&playback.source(0));
-  const auto [name, parameters] = options.method.choice(methods);
+  const MethodChoice choice = options.method.choice(methods);
+  std::vector<SensorKind> sensors;
+  for (std::size_t camera = 0; camera < playback.cameras(); ++camera)
+    sensors.push_back(playback.source(camera).info().sensor);
+  const auto& [name, given] = choice;
+  const Parameters parameters = for_sensors(given, sensors);
   const std::unique_ptr<Method> method = make_method(name, parameters, methods);
   playback.check(*method);
   method->seat(path.at(path.first_time()));

@@ -2,6 +2,7 @@
 #include "lab/experiments/field.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -11,15 +12,34 @@
 #include "lab/field/field_cases.hpp"
 #include "lab/field/field_judge.hpp"
 #include "lab/method.hpp"
+#include "palpate/core/sensor.hpp"
 
 namespace palpate::lab {
 namespace {
 
 constexpr int usual_cases = 5;  // of each class
 
+// What a camera says of itself.
+SensorKind declared(field::SensorKind kind) {
+  switch (kind) {
+    case field::SensorKind::stereo:
+      return SensorKind::stereo;
+    case field::SensorKind::light:
+      return SensorKind::structured_light;
+    case field::SensorKind::flight:
+    case field::SensorKind::coarse:
+      return SensorKind::time_of_flight;
+    case field::SensorKind::exact:
+      break;
+  }
+  return SensorKind::unknown;
+}
+
 std::string rows_of(const std::vector<std::string>& names, const field::FieldCase& c, int number,
-                    const Parameters& parameters) {
+                    const Parameters& given) {
   field::Stage stage = field::make_stage(c);
+  const std::array sensors{declared(stage.sensor->setup().kind)};
+  const Parameters parameters = for_sensors(given, sensors);
   std::vector<std::unique_ptr<Method>> methods;
   std::vector<Method*> played;
   for (const std::string& name : names) {

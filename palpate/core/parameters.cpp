@@ -91,11 +91,17 @@ constexpr std::array table = {
                   "depth of the side faces synthesised behind visible edges; 0: none",
                   "ours (sight)", [](const Parameters& p) { return p.sight.side_depth; },
                   [](Parameters& p, double v) { p.sight.side_depth = v; }},
-    ParameterInfo{"usual_noise", "", "m", 5e-3, 1e-4, 0.1,
-                  "noise of a depth camera at 1 m, growing with the square of distance, until it "
-                  "has been measured; less finds a motion sooner, and in noise",
+    ParameterInfo{"usual_noise", "", "m", 0.0, 0.0, 0.1,
+                  "noise of the depth camera at 1 m, until it has been measured; 0: as usual for "
+                  "its kind; less finds a motion sooner, and in noise",
                   "ours (sight)", [](const Parameters& p) { return p.sight.usual_noise; },
                   [](Parameters& p, double v) { p.sight.usual_noise = v; }},
+    ParameterInfo{"noise_growth", "", "-", 0, 0, 2,
+                  "power of the distance with which usual_noise grows: 2 where the camera "
+                  "triangulates, 1 where it times light; 0: as usual for its kind",
+                  "ours (sight)",
+                  [](const Parameters& p) { return double{1} * p.sight.noise_growth; },
+                  [](Parameters& p, double v) { p.sight.noise_growth = static_cast<int>(v); }},
     ParameterInfo{
         "confidence", "", "-", 3.0, 1.0, 10.0,
         "standard deviations that noise explains; less finds a change sooner, more averages more",

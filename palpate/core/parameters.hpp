@@ -44,7 +44,10 @@ struct SightParameters {
   double side_depth = 0.1;       ///< [m] depth of the side faces synthesised behind visible edges
 
   // The estimator's; docs/sight.md, 4 and 11, has what each of them trades.
-  double usual_noise = 5e-3;    ///< [m] at 1 m, growing with distance^2, until it is measured
+  // Of the camera, until it is measured. 0: as for_sensors has it for the camera's kind, and as
+  // unknown_noise and unknown_growth where nobody says.
+  double usual_noise = 0.0;     ///< [m] standard deviation at 1 m
+  int noise_growth = 0;         ///< [-] power of the distance with which it grows: 1 or 2
   double confidence = 3.0;      ///< [-] standard deviations that noise explains
   double least_share = 0.3;     ///< [-] of a beam's points: fewer are no surface
   double widest_disc = 85e-3;   ///< [m] radius that a fit is averaged over at most
@@ -54,6 +57,9 @@ struct SightParameters {
   double curvature_sd = 15.0;   ///< [1/m] spread of curvatures that is expected
   double blend = 0.85;          ///< [intervals] over which the force follows a frame's correction
   int evidence_frames = 2;      ///< in a row that show a proxy behind its surface
+
+  static constexpr double unknown_noise = 5e-3;  ///< [m] at 1 m
+  static constexpr int unknown_growth = 2;
 };
 
 /// Everything that can be set on a method. Defaults are the paper's Table 2 where it has them.

@@ -20,8 +20,9 @@ struct PluggedIn {
   std::string name;  ///< as its driver says: "omega.3"
   std::string serial = {};
   std::string firmware = {};
-  std::optional<double> rate = {};  ///< [Hz] at which it delivers or is updated
-  std::string note = {};            ///< why it cannot be used and what to do; empty if it can
+  std::optional<double> rate = {};          ///< [Hz] at which it delivers or is updated
+  SensorKind sensor = SensorKind::unknown;  ///< of a camera
+  std::string note = {};  ///< why it cannot be used and what to do; empty if it can
 };
 
 /// What a driver finds on this machine.

@@ -139,8 +139,11 @@ DriverReport look() {
   DriverReport report{.library = api.path()};
   const OwnedContext context = context_of(api);
   for (const std::string& serial : serials(api, context.get()))
-    report.found.push_back(
-        {.uri = "freenect:" + serial, .name = "Kinect v1", .serial = serial, .rate = 30.0});
+    report.found.push_back({.uri = "freenect:" + serial,
+                            .name = "Kinect v1",
+                            .serial = serial,
+                            .rate = 30.0,
+                            .sensor = SensorKind::structured_light});
   return report;
 }
 

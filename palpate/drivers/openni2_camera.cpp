@@ -176,6 +176,7 @@ DriverReport look() {
     PluggedIn& entry = report.found.emplace_back();
     entry.uri = "openni2:" + uri;
     entry.name = text_of(info.vendor) + " " + text_of(info.name);
+    entry.sensor = SensorKind::structured_light;
     Device* opened = nullptr;
     if (api.device_open(uri.c_str(), &opened) != ok) {
       entry.note = "it cannot be opened (" + api.said() + "); " + plug_in;
@@ -202,8 +203,9 @@ class Camera final : public LiveCamera {
         device_(nullptr, api_.device_close),
         depth_(nullptr, api_.stream_destroy),
         colour_(nullptr, api_.stream_destroy) {
-    constexpr std::array<std::string_view, 4> known{"width", "height", "fps", "colour"};
+    constexpr std::array<std::string_view, 5> known{"width", "height", "fps", "colour", "sensor"};
     uri.allow_only(known);
+    info_.sensor = sensor_option(uri, info_.sensor);
     open_device(uri.path());
     DeviceInfo info{};
     if (api_.device_get_info(device_.get(), &info) == ok) {

@@ -348,6 +348,7 @@ DriverReport look() {
                  .serial = found.serial,
                  .firmware = found.firmware,
                  .rate = default_rate(api, device.get()),
+                 .sensor = realsense_sensor(found.name),
                  .note = usb_note(found.usb)};
       } catch (const Refusal& refusal) {
         entry.note = std::string(refusal.what()) + "; " + remedy_for(refusal.what());

@@ -119,6 +119,7 @@ class CameraFeed::Worker {
     is_live_ = info.live;
     status_.uri = info.uri;
     status_.kind = info.kind;
+    status_.sensor = info.sensor;
     status_.rate = info.frame_rate.value_or(0.0);
     status_.recorded = is_live_ ? 0 : info.frames.value_or(0);
     last_heard_ = now();

@@ -83,6 +83,7 @@ enum class CameraState : std::uint8_t {
 /// How a camera is doing.
 struct CameraStatus {
   std::string uri, kind;
+  SensorKind sensor = SensorKind::unknown;
   CameraState state = CameraState::waiting;
   std::string text;          ///< the state in words, with what is wrong; "live"
   double rate = 0.0;         ///< [Hz] of the frames lately

@@ -23,6 +23,7 @@ PlayedSource::PlayedSource(std::unique_ptr<Source> source,
                 "run the session in real time");
   status_.uri = info.uri;
   status_.kind = info.kind;
+  status_.sensor = info.sensor;
   status_.rate = info.frame_rate.value_or(0.0);
   status_.state = CameraState::live;
   status_.text = "live";

@@ -14,6 +14,7 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/sensor.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/devices/mouse_device.hpp"
 #include "palpate/session/hand_paths.hpp"
@@ -106,7 +107,7 @@ class Session::Impl {
     for (SessionCamera& camera : options_.cameras) first.push_back(open_camera(camera));
     device_ = options_.device ? std::move(options_.device) : open_hand(options_, *first.front());
     if (needs_watchdog()) refuse_without_watchdog(device_->info(), options_.settings.safety);
-    settings_ = options_.settings;
+    settings_ = for_cameras(options_.settings);
     proxy_radius_ = settings_.parameters.proxy.r_c();
     auto method = open_method(settings_, first);
     if (is_live()) {
@@ -233,6 +234,7 @@ class Session::Impl {
   void set(ServoSettings settings) {
     if (needs_watchdog()) refuse_without_watchdog(device_->info(), settings.safety);
     const std::lock_guard lock(control_);
+    settings = for_cameras(std::move(settings));
     settings.scene = settings_.scene;  // not for others to count
     const std::uint64_t number =
         settings.method == settings_.method
@@ -301,6 +303,11 @@ class Session::Impl {
                          " frames are not written; what was written before can be read";
     std::thread([left = std::move(recorder)]() mutable { left.reset(); }).detach();
   }
+  // What is left to the cameras' kind is that of those that are open.
+  [[nodiscard]] ServoSettings for_cameras(ServoSettings settings) const {
+    settings.parameters = for_sensors(settings.parameters, sensors_);
+    return settings;
+  }
   // [s] on the session's clock
   [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }
 
@@ -315,6 +322,7 @@ class Session::Impl {
       open = opener(camera, options_.sources);
       source = open();
     }
+    sensors_.push_back(source->info().sensor);
     if (!is_live()) {
       if (!open)
         open = [uri = camera.uri]() -> std::unique_ptr<Source> {
@@ -503,6 +511,7 @@ class Session::Impl {
   }
 
   SessionOptions options_;
+  std::vector<SensorKind> sensors_;                    // of the cameras
   std::vector<std::unique_ptr<CameraFeed>> feeds_;     // in real time
   std::vector<std::unique_ptr<PlayedSource>> played_;  // free-running
   std::unique_ptr<Device> device_;

@@ -43,8 +43,10 @@ struct SessionOptions {
   /// `hand:` and `script:` without a file stroke it.
   std::string device_uri = "hand:";
   std::unique_ptr<Device> device = {};  ///< used in place of the URI
-  ServoSettings settings = {};          ///< method, its parameters, safety limits, placement
-  ServoOptions servo = {};              ///< rate, real-time rights
+  /// Method, its parameters, safety limits, placement. Parameters that are left to the cameras'
+  /// kind (for_sensors) are set by it, also in what `settings()` and `state()` give.
+  ServoSettings settings = {};
+  ServoOptions servo = {};  ///< rate, real-time rights
   Pace pace = Pace::real_time;
   /// Real time: allows a device with motors to send more than SafetyParameters::engage_force
   /// although it states no watchdog (DeviceInfo::watchdog) of at most 0.5 s: if this process is

@@ -92,6 +92,12 @@ void confine_slopes(Vec5& shape, std::span<const SlopeWindow> windows, double po
 
 }  // namespace
 
+void SurfaceEstimate::set(const SightParameters& parameters) noexcept {
+  parameters_ = parameters;
+  if (parameters_.usual_noise == 0.0) parameters_.usual_noise = SightParameters::unknown_noise;
+  if (parameters_.noise_growth == 0) parameters_.noise_growth = SightParameters::unknown_growth;
+}
+
 double SurfaceEstimate::height_sd() const noexcept {
   return std::sqrt(variance(mover_));
 }
@@ -106,8 +112,9 @@ double SurfaceEstimate::variance(std::size_t rung) const noexcept {
   const Scatter& scatter = scatter_[rung];
   // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
   const double most = 4.0 * spread_ + 0.5e-3;
-  const double usual = squared(std::min(parameters_.usual_noise * squared(distance_), most)) +
-                       0.03 * squared(spread_) + 1e-12;
+  const double grown = parameters_.noise_growth == 1 ? distance_ : squared(distance_);
+  const double usual =
+      squared(std::min(parameters_.usual_noise * grown, most)) + 0.03 * squared(spread_) + 1e-12;
   // Noise falls with the area it is averaged over: a wider disc's is the least of this one's.
   double wider = 0.0;
   for (std::size_t j = rung + 1; j < rungs; ++j) wider = std::max(wider, scatter_[j].variance);

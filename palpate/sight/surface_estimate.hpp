@@ -36,7 +36,7 @@ class SurfaceEstimate {
     bool partial = false;  ///< something hides a part of it: where points end is no edge
   };
 
-  void set(const SightParameters& parameters) noexcept { parameters_ = parameters; }
+  void set(const SightParameters& parameters) noexcept;
   /// A frame at `stamp` [s], `interval` [s] after the one before, will be measured.
   void start_frame(double stamp, double interval) noexcept;
   /// Begins with the surface at `foot` [m, world], with heights along `up` [-]. Earlier frames are

@@ -103,7 +103,7 @@ std::string read_text(const fs::path& path) {
 
 void allow_only(const Uri& uri, std::initializer_list<std::string_view> own) {
   std::vector<std::string_view> known(own);
-  known.insert(known.end(), {"fx", "fy", "cx", "cy", "units", "start", "frames"});
+  known.insert(known.end(), {"fx", "fy", "cx", "cy", "units", "sensor", "start", "frames"});
   known.insert(known.end(), distortion_options.begin(), distortion_options.end());
   uri.allow_only(known);
 }
@@ -118,6 +118,7 @@ void override_camera(const Uri& uri, RecordedCamera& camera) {
     k.distortion[i] = uri.number_option(distortion_options[i], k.distortion[i], -1e6, 1e6, "px");
   }
   camera.units_per_metre = uri.number_option("units", camera.units_per_metre, 1e-3, 1e7, "px");
+  camera.sensor = sensor_option(uri, camera.sensor);
 }
 
 std::size_t count_option(const Uri& uri, std::string_view key, double fallback, double min) {

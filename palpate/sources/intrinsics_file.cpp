@@ -125,13 +125,10 @@ RecordedCamera parse_intrinsics(std::string_view text, const std::string& name) 
         object.number("fps_nominal", 1e-3, 1e6, "null or the frames per second, more than 0");
   }
   if (object.has("sensor_kind")) {
-    constexpr std::array kinds{SensorKind::stereo, SensorKind::structured_light,
-                               SensorKind::time_of_flight};
     const json& value = root.at("sensor_kind");
-    const auto* const kind = std::find_if(kinds.begin(), kinds.end(), [&](SensorKind candidate) {
-      return value.is_string() && value.get<std::string>() == name_of(candidate);
-    });
-    if (kind == kinds.end())
+    const std::optional<SensorKind> kind =
+        value.is_string() ? sensor_named(value.get<std::string>()) : std::nullopt;
+    if (!kind)
       object.fail("sensor_kind", "is " + value.dump(-1, ' ', true, json::error_handler_t::replace),
                   "\"stereo\", \"structured light\" or \"time of flight\"");
     camera.sensor = *kind;

@@ -27,18 +27,12 @@ std::string_view name_of(StampClock clock) noexcept {
   return "sensor";
 }
 
-std::string_view name_of(SensorKind sensor) noexcept {
-  switch (sensor) {
-    case SensorKind::stereo:
-      return "stereo";
-    case SensorKind::structured_light:
-      return "structured light";
-    case SensorKind::time_of_flight:
-      return "time of flight";
-    case SensorKind::unknown:
-      break;
-  }
-  return "unknown";
+SensorKind sensor_option(const Uri& uri, SensorKind known) {
+  if (!uri.has("sensor")) return known;
+  const std::string name = uri.text_option("sensor", "");
+  if (const std::optional<SensorKind> kind = sensor_named(name)) return *kind;
+  throw Error(uri.text(), "option 'sensor' is '" + name + "'",
+              "give stereo, structured-light, time-of-flight or unknown");
 }
 
 std::size_t Source::skip(std::size_t /*count*/) {

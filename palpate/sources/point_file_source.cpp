@@ -89,7 +89,7 @@ std::size_t PointFileSource::skip(std::size_t count) {
 }
 
 std::unique_ptr<Source> open_point_files(const Uri& uri) {
-  constexpr std::array<std::string_view, 3> known{"fps", "voxel", "scale"};
+  constexpr std::array<std::string_view, 4> known{"fps", "voxel", "scale", "sensor"};
   uri.allow_only(known);
   const PointFileSource::Options options{
       .fps = uri.number_option("fps", 30.0, 1e-3, 1e6, "Hz"),
@@ -118,7 +118,8 @@ std::unique_ptr<Source> open_point_files(const Uri& uri) {
   SourceInfo info{.uri = uri.text(),
                   .kind = kind + " files",
                   .frames = files.size(),
-                  .frame_rate = options.fps};
+                  .frame_rate = options.fps,
+                  .sensor = sensor_option(uri, SensorKind::unknown)};
   return std::make_unique<PointFileSource>(std::move(files), is_pcd ? read_pcd : read_ply, options,
                                            std::move(info));
 }

@@ -13,16 +13,17 @@ namespace {
 
 class Recording final : public Source {
  public:
-  Recording(const std::string& path, const std::string& topic, const BagCamera::Options& options,
-            SourceInfo info)
-      : bag_(path), camera_(bag_, choose(topic, info), options), info_(std::move(info)) {
+  Recording(const Uri& uri, const BagCamera::Options& options, SourceInfo info)
+      : bag_(uri.path()),
+        camera_(bag_, choose(uri.text_option("topic", ""), info), options),
+        info_(std::move(info)) {
     if (camera_.frames() == 0)
       throw Error(info_.uri, "holds no frames on " + camera_.topic(),
                   "name another topic with ?topic=");
     info_.kind = camera_.is_ours()        ? "recording of palpate's"
                  : camera_.is_realsense() ? "RealSense recording"
                                           : std::string(bag_.kind());
-    info_.sensor = camera_.sensor();
+    info_.sensor = sensor_option(uri, camera_.sensor());
     info_.frames = camera_.frames();
     info_.frame_rate = camera_.frame_rate();
     if (std::string note = camera_.pose_note(); !note.empty())
@@ -79,14 +80,14 @@ class Recording final : public Source {
 }  // namespace
 
 std::unique_ptr<Source> open_recording(const Uri& uri) {
-  constexpr std::array<std::string_view, 4> known{"topic", "units", "voxel", "fixed_frame"};
+  constexpr std::array<std::string_view, 5> known{"topic", "units", "voxel", "fixed_frame",
+                                                  "sensor"};
   uri.allow_only(known);
   BagCamera::Options options;
   if (uri.has("units")) options.units = uri.number_option("units", 1000.0, 1e-3, 1e7, "px");
   options.fixed_frame = uri.text_option("fixed_frame", "");
   options.voxel = uri.number_option("voxel", options.voxel, 1e-3, 1.0, "m");
-  return std::make_unique<Recording>(uri.path(), uri.text_option("topic", ""), options,
-                                     SourceInfo{.uri = uri.text(), .kind = {}});
+  return std::make_unique<Recording>(uri, options, SourceInfo{.uri = uri.text(), .kind = {}});
 }
 
 }  // namespace palpate

@@ -211,15 +211,25 @@ SensorModel SensorModel::named(std::string_view name) {
   if (name == "kinect") {
     // Khoshelham and Elberink, Sensors 12 (2012), 1437: noise and step at 1 m.
     model.noise = 1.425e-3;
-    model.noise_grows = true;
+    model.noise_growth = 2;
     model.disparity_step = 2.85e-3;
     model.quantisation = 1e-3;
     model.flying = 0.3;
     model.grazing = 80.0 * std::numbers::pi / 180.0;
     return model;
   }
+  if (name == "tof") {
+    // Of a Kinect v2 1.5 mm and more have been measured (Corti and others, Robotics and Autonomous
+    // Systems 75 (2016), 584), growing with depth.
+    model.noise = 2.0e-3;
+    model.noise_growth = 1;
+    model.quantisation = 1e-3;
+    model.flying = 0.5;
+    model.grazing = 80.0 * std::numbers::pi / 180.0;
+    return model;
+  }
   throw Error("sensor '" + std::string(name) + "'", "there is no such sensor",
-              "choose one of: ideal, d4xx, kinect");
+              "choose one of: ideal, d4xx, kinect, tof");
 }
 
 void validate(const SensorModel& model) {
@@ -289,8 +299,10 @@ void Sensor::add_gaussian_noise(std::uint64_t frame) {
                  width);
     }
     float* depth = depth_.data() + static_cast<std::ptrdiff_t>(v) * width;
-    if (model_.noise_grows) {
+    if (model_.noise_growth == 2) {
       for (int u = 0; u < width; ++u) depth[u] += sigma * depth[u] * depth[u] * row[u];
+    } else if (model_.noise_growth == 1) {
+      for (int u = 0; u < width; ++u) depth[u] += sigma * depth[u] * row[u];
     } else {
       add_scaled(sigma, row.data(), depth, width);
     }

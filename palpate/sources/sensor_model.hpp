@@ -12,8 +12,9 @@ namespace palpate {
 /// The errors of a depth camera. With the defaults true depth is only rounded.
 struct SensorModel {
   double noise = 0.0;  ///< [m] standard deviation along the optical axis
-  /// `noise` is that at 1 m and grows with the square of depth, as triangulation has it.
-  bool noise_grows = false;
+  /// Unless 0, `noise` is that at 1 m and grows with this power of depth: 2 by triangulation, 1 by
+  /// time of flight.
+  int noise_growth = 0;
   /// [px] distance at which the noise's correlation falls to 1/e, exp(-(du/x)^2 - (dv/y)^2);
   /// 0: white along that axis. Every frame has fresh noise.
   double correlation_x = 0.0, correlation_y = 0.0;
@@ -30,7 +31,8 @@ struct SensorModel {
   double flying = 0.0;     ///< [-] share of pixels at depth edges that lie between both depths
   std::uint64_t seed = 1;
 
-  /// An exact camera, a RealSense D4xx or a first Kinect ("ideal", "d4xx", "kinect").
+  /// An exact camera, a RealSense D4xx, a first Kinect or a camera that times light ("ideal",
+  /// "d4xx", "kinect", "tof").
   /// @throws Error for any other name.
   static SensorModel named(std::string_view name);
 };

@@ -13,6 +13,7 @@
 
 #include "palpate/cloud/frame.hpp"
 #include "palpate/core/registry.hpp"
+#include "palpate/core/sensor.hpp"
 #include "palpate/core/uri.hpp"
 
 namespace palpate {
@@ -25,14 +26,6 @@ enum class StampClock : std::uint8_t {
   sensor,     ///< the camera's own: any origin, drifts against this machine's clocks, may jump
 };
 
-/// How a depth camera measures, which decides how its noise grows with distance.
-enum class SensorKind : std::uint8_t {
-  unknown,
-  stereo,            ///< matches two images, such as a RealSense D4xx: noise grows with depth^2
-  structured_light,  ///< matches a projected pattern, such as a Kinect v1: noise grows with depth^2
-  time_of_flight,    ///< times light, such as an Azure Kinect: noise grows as the signal fades
-};
-
 /// Distances between which a camera can measure [m].
 struct DepthRange {
   double nearest = 0.0;
@@ -41,8 +34,6 @@ struct DepthRange {
 
 /// "recording", "monotonic", "system", "sensor".
 [[nodiscard]] std::string_view name_of(StampClock clock) noexcept;
-/// "unknown", "stereo", "structured light", "time of flight".
-[[nodiscard]] std::string_view name_of(SensorKind sensor) noexcept;
 
 /// What is known of a source before, or without, reading all of it.
 struct SourceInfo {
@@ -105,6 +96,10 @@ struct SourceScheme {
 /// The library's own: `synthetic:SCENE?...`, `tum:DIR`, `depth:DIR`, `pcd:FILE|DIR`,
 /// `ply:FILE|DIR`, `recording:BAG`. To add to them, copy the registry.
 const Registry<SourceScheme>& standard_sources();
+
+/// The kind of camera that a recording's option `sensor` names; without it, `known`.
+/// @throws Error for another word.
+SensorKind sensor_option(const Uri& uri, SensorKind known);
 
 /// The URI of a single file by what its name ends with: .pcd, .ply, .db3, .mcap or .bag.
 /// @throws Error for any other ending, saying what to do with such a file.

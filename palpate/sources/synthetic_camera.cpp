@@ -85,8 +85,8 @@ CameraSetup setup_of(const Uri& uri) {
 SensorModel sensor_of(const Uri& uri) {
   SensorModel model = SensorModel::named(uri.text_option("sensor", "ideal"));
   model.noise = uri.number_option("noise", model.noise, 0.0, 1.0, "m");
-  model.noise_grows =
-      uri.number_option("noise_grows", model.noise_grows ? 1.0 : 0.0, 0.0, 1.0, "px") != 0.0;
+  if (uri.has("noise_grows"))
+    model.noise_growth = uri.number_option("noise_grows", 0.0, 0.0, 1.0, "px") != 0.0 ? 2 : 0;
   const Pair correlation =
       pair_option(uri, "correlation", {model.correlation_x, model.correlation_y}, 0.0, 100.0, true);
   model.correlation_x = correlation.first;
@@ -249,6 +249,7 @@ std::unique_ptr<SyntheticCamera> open_synthetic_camera(const Uri& text) {
   const std::string sensor = uri.text_option("sensor", "ideal");
   if (sensor == "d4xx") info.sensor = SensorKind::stereo;
   if (sensor == "kinect") info.sensor = SensorKind::structured_light;
+  if (sensor == "tof") info.sensor = SensorKind::time_of_flight;
   return std::make_unique<SyntheticCamera>(make_scene(uri), setup_of(uri), sensor_of(uri),
                                            std::move(info));
 }

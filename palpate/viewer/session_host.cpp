@@ -13,6 +13,7 @@
 #include "palpate/devices/mouse_device.hpp"
 #include "palpate/record/recorded_hand.hpp"
 #include "palpate/servo/placement_table.hpp"
+#include "palpate/servo/stiffness.hpp"
 #include "palpate/sources/source.hpp"
 
 namespace palpate {
@@ -143,6 +144,7 @@ std::string SessionHost::state() {
   for (const CameraStatus& status : state.cameras) {
     cameras.push_back({{"uri", status.uri},
                        {"kind", status.kind},
+                       {"sensor", name_of(status.sensor)},
                        {"rate", status.rate},
                        {"state", status.text},
                        {"frames", status.recorded},
@@ -174,6 +176,9 @@ std::string SessionHost::state() {
                     {"ended", recording_ended()}};
   if (state.recording.on) recording["path"] = state.recording.folder;
   const DeviceInfo& device = session_->device().info();
+  const std::vector<std::string> warnings =
+      stiffness_warnings(device, state.settings.parameters.coupling.stiffness,
+                         state.settings.placement.workspace_scale, state.rate);
   return json{{"method", state.settings.method},
               {"parameters", parameters},
               {"safety", safety},
@@ -184,7 +189,8 @@ std::string SessionHost::state() {
                {{"uri", device.uri},
                 {"kind", device.kind},
                 {"takes_hand", mouse_ != nullptr},
-                {"fault", state.device.text}}},
+                {"fault", state.device.text},
+                {"warnings", warnings}}},
               {"servo", servo},
               {"interventions", state.interventions},
               {"latched_by", latched_by},

@@ -54,8 +54,9 @@ class Program : public ::testing::Test {
   }
 
   // Wrong usage or input: exit 2 and one line that says what, why and what to do.
-  void expect_refusal(const std::string& arguments, const std::vector<std::string>& words) const {
-    const Outcome outcome = run(arguments);
+  void expect_refusal(const std::string& arguments, const std::vector<std::string>& words,
+                      const std::string& before = "") const {
+    const Outcome outcome = run(arguments, before);
     EXPECT_EQ(outcome.code, 2) << arguments;
     EXPECT_EQ(outcome.err.substr(0, 9), "palpate: ") << arguments;
     EXPECT_EQ(lines_in(outcome.err), 1U) << outcome.err;

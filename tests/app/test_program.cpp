@@ -45,7 +45,7 @@ class ProgramWithLab : public Program {
   }
 };
 
-constexpr const char* plane = "'synthetic:plane?noise=0.5mm&seed=3'";
+constexpr const char* plane = "'synthetic:plane?noise=0.5mm&seed=3&size=320x240'";
 
 TEST_F(Program, TracesTheSameBytesEveryTime) {
   const std::string arguments = std::string("trace --camera ") + plane + " --path " + press();
@@ -60,6 +60,20 @@ TEST_F(Program, TracesTheSameBytesEveryTime) {
             "force_x,force_y,force_z,state,steps,surface_velocity,frame,flags");
   EXPECT_EQ(lines_in(trace), 1002U) << "1001 ticks from 0 to 1 s, and the header";
   EXPECT_NE(trace.find(",contact,"), std::string::npos);
+}
+
+TEST_F(Program, TakesTheNoiseThatIsUsualForACamerasKindUnlessItIsSet) {
+  const auto trace = [&](const std::string& camera, const std::string& settings) {
+    const Outcome outcome = run("trace --camera 'synthetic:plane?size=160x120&sensor=" + camera +
+                                "' --path " + press() + settings);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return outcome.out;
+  };
+  const std::string as_stereo = " --set usual_noise=0.005 --set noise_growth=2";
+  EXPECT_EQ(trace("ideal&noise=2mm", ""), trace("ideal&noise=2mm", as_stereo)) << "nobody says";
+  const std::string usual = trace("tof", "");
+  EXPECT_EQ(usual, trace("tof", " --set usual_noise=0.0025 --set noise_growth=1"));
+  EXPECT_NE(usual, trace("tof", as_stereo));
 }
 
 TEST_F(Program, AdoptsAFrameAtTheFirstTickAtOrAfterItsStamp) {
@@ -132,7 +146,8 @@ TEST_F(Program, PrintsASessionThatReadsBackTheSame) {
 }
 
 TEST_F(Program, KeepsTheLimitsItIsGiven) {
-  const std::string base = "run --headless --json --duration 4";
+  const std::string base =
+      "run --headless --json --duration 4 --camera 'synthetic:plane?size=160x120'";
   const auto usual = nlohmann::json::parse(run(base).out);
   const auto low = nlohmann::json::parse(run(base + " --limit max_device_force=0.5").out);
   EXPECT_GT(usual["max_force_sent"].get<double>(), 0.6);
@@ -230,15 +245,15 @@ TEST_F(Program, CalibratesTwoCameras) {
 TEST_F(Program, TracesAPressOnAPixel) {
   const std::string base =
       std::string("trace --camera ") + plane + " --json --out " + path("p.csv");
-  const Outcome press = run(base + " --press 320,240");
+  const Outcome press = run(base + " --press 160,120");
   ASSERT_EQ(press.code, 0) << press.err;
   const auto summary = nlohmann::json::parse(press.out);
   EXPECT_GT(summary["max_force_asked"].get<double>(), 2.0);
   EXPECT_LT(summary["max_force_asked"].get<double>(), 8.0);
   EXPECT_EQ(summary["pop_throughs"], 0);
-  const auto light = nlohmann::json::parse(run(base + " --press 320,240 --press-depth 0.002").out);
+  const auto light = nlohmann::json::parse(run(base + " --press 160,120 --press-depth 0.002").out);
   EXPECT_LT(light["max_force_asked"].get<double>(), 2.0);
-  const Outcome slide = run(base + " --press 320,240 --slide-to 400,240");
+  const Outcome slide = run(base + " --press 160,120 --slide-to 200,120");
   ASSERT_EQ(slide.code, 0) << slide.err;
   EXPECT_GT(nlohmann::json::parse(slide.out)["ticks"], summary["ticks"]);
   expect_refusal(base, {"--path", "--press"});
@@ -430,6 +445,12 @@ TEST_F(Program, TellsWhatIsInASource) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto about = nlohmann::json::parse(outcome.out);
   EXPECT_GT(about["first_frame"]["measured_percent"], 90.0);
+  EXPECT_FALSE(about.contains("sensor"));
+  EXPECT_EQ(about["usual_noise"], "5 mm at 1 m, growing with the square of distance");
+  const auto light =
+      nlohmann::json::parse(run("info 'synthetic:plane?sensor=tof&size=64x48' --json").out);
+  EXPECT_EQ(light["sensor"], "time of flight");
+  EXPECT_EQ(light["usual_noise"], "2.5 mm at 1 m, growing with distance");
 }
 
 TEST_F(Program, InfoSaysWhatIsAtAPixel) {
@@ -445,12 +466,13 @@ TEST_F(Program, InfoSaysWhatIsAtAPixel) {
   EXPECT_NEAR(at["normal"][2].get<double>(), std::cos(0.349), 0.02);
   EXPECT_EQ(at["neighbours"], 48);
   EXPECT_EQ(at["neighbours_measured"], 48);
-  const Outcome text = run("info synthetic:plane --at 0,0");
+  const std::string small = "info 'synthetic:plane?size=64x48'";
+  const Outcome text = run(small + " --at 0,0");
   EXPECT_NE(text.out.find("at:\n  pixel: [0,0]\n"), std::string::npos) << text.out;
-  expect_refusal("info synthetic:plane --at 640,0", {"pixel 640,0", "640x480", "0 to 639"});
-  expect_refusal("info synthetic:plane --at=-1,0", {"pixel -1,0"});
-  expect_refusal("info synthetic:plane --at 3", {"--at", "'3'", "--at 320,240"});
-  expect_refusal("info synthetic:plane --at 3,4x", {"--at", "3,4x"});
+  expect_refusal(small + " --at 64,0", {"pixel 64,0", "64x48", "0 to 63"});
+  expect_refusal(small + " --at=-1,0", {"pixel -1,0"});
+  expect_refusal(small + " --at 3", {"--at", "'3'", "--at 320,240"});
+  expect_refusal(small + " --at 3,4x", {"--at", "3,4x"});
   const std::string points = write("two.pcd", "FIELDS x y z\nPOINTS 2\nDATA ascii\n0 0 1\n0 0 2\n");
   expect_refusal("info pcd:" + points + " --at 0,0", {"no image", "--at"});
 }
@@ -766,8 +788,11 @@ TEST_F(Program, TouchesARecordingAsItTouchedTheCamera) {
 }
 
 TEST_F(Program, GoesOnWithoutItsRecordingWhenTheDiskIsFull) {
-  const Outcome outcome = run("run --headless --json --duration 4 --record " + path("bag"),
-                              "trap '' XFSZ; ulimit -f 8000; ");
+  const Outcome outcome =
+      run("run --headless --json --duration 4 --camera 'synthetic:desk?noise=1mm&size=320x240' "
+          "--record " +
+              path("bag"),
+          "trap '' XFSZ; ulimit -f 3000; ");
   EXPECT_EQ(outcome.code, 1);
   EXPECT_EQ(nlohmann::json::parse(outcome.out)["ticks"], 4000);
   EXPECT_EQ(lines_in(outcome.err), 1U) << outcome.err;

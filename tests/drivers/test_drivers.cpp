@@ -5,7 +5,6 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/drivers/stiffness.hpp"
 
 #include "tests/support/environment.hpp"
 #include "tests/support/errors.hpp"
@@ -36,22 +35,6 @@ TEST(Drivers, AreKindsOfSourceAndDeviceLikeAnyOther) {
   EXPECT_EQ(all_sources(drivers).try_find("my-arm"), nullptr);
   EXPECT_NE(all_devices().try_find("hand"), nullptr);
   EXPECT_NE(all_sources().try_find("synthetic"), nullptr);
-}
-
-TEST(StiffnessWarnings, NameTheDevicesOwnBoundAndThatOfASampledWall) {
-  DeviceInfo device{.uri = "touch:", .kind = "Touch", .limits = {.max_stiffness = 400.0}};
-  EXPECT_TRUE(stiffness_warnings(device, 400.0, 1000.0).empty());
-  ASSERT_EQ(stiffness_warnings(device, 401.0, 1000.0).size(), 1U);
-  EXPECT_NE(stiffness_warnings(device, 600.0, 1000.0)[0].find("--set stiffness=400"),
-            std::string::npos);
-  device.damping = 0.7;  // [N s/m]
-  device.delay = 1e-3;   // [s]: 2 * 0.7 / (1 ms + 2 * 1 ms) = 466.7 N/m
-  EXPECT_EQ(stiffness_warnings(device, 466.0, 1000.0).size(), 1U);
-  ASSERT_EQ(stiffness_warnings(device, 467.0, 1000.0).size(), 2U);
-  EXPECT_NE(stiffness_warnings(device, 467.0, 1000.0)[1].find("466 N/m"), std::string::npos);
-  EXPECT_EQ(stiffness_warnings(device, 467.0, 2000.0).size(), 1U) << "560 N/m at 2 kHz";
-  device.limits.motors = false;
-  EXPECT_TRUE(stiffness_warnings(device, 5000.0, 1000.0).empty());
 }
 
 TEST(Drivers, ReportWhatTheirLookMeets) {

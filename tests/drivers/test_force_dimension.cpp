@@ -5,26 +5,17 @@
 
 #include "palpate/drivers/force_dimension.hpp"
 
-#include "tests/fakes/workbench.hpp"
+#include "tests/drivers/fake_device_test.hpp"
 #include "tests/support/environment.hpp"
 #include "tests/support/errors.hpp"
-#include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
 namespace {
 
-class ForceDimension : public ::testing::Test {
+class ForceDimension : public test::FakeDeviceTest {
  protected:
-  static std::unique_ptr<Device> open(const std::string& uri) {
-    return force_dimension_driver().open_device(Uri(uri));
-  }
-
-  test::TemporaryFolder folder;
-  test::Workbench& bench = test::open_workbench((folder.path() / "workbench").c_str());
-
- private:
-  test::Environment place_{test::Workbench::variable, (folder.path() / "workbench").string()};
-  test::Environment library_{"PALPATE_FORCE_DIMENSION", PALPATE_FAKES "/force-dimension"};
+  ForceDimension()
+      : FakeDeviceTest(force_dimension_driver(), "PALPATE_FORCE_DIMENSION", "force-dimension") {}
 };
 
 TEST_F(ForceDimension, TellsWhatItIs) {
@@ -102,7 +93,7 @@ TEST_F(ForceDimension, CalibratesOnlyWhenAskedAndOnlyWhereItMust) {
   open("force-dimension:?calibrate");
   EXPECT_EQ(bench.calibrations, 0) << "it is calibrated";
   bench.calibrated = false;
-  EXPECT_TRUE(test::fails_saying([] { return open("force-dimension:"); }, "not calibrated"));
+  EXPECT_TRUE(test::fails_saying([&] { return open("force-dimension:"); }, "not calibrated"));
   EXPECT_EQ(bench.calibrations, 0);
   open("force-dimension:?calibrate");
   EXPECT_EQ(bench.calibrations, 1);
@@ -113,7 +104,7 @@ TEST_F(ForceDimension, WorksWithoutDrdButDoesNotCalibrateThen) {
   const test::Environment dhd("PALPATE_FORCE_DIMENSION", PALPATE_FAKES "/force-dimension-dhd");
   EXPECT_TRUE(open("force-dimension:")->read(0.0).present);
   bench.calibrated = false;
-  EXPECT_TRUE(test::fails_saying([] { return open("force-dimension:?calibrate"); },
+  EXPECT_TRUE(test::fails_saying([&] { return open("force-dimension:?calibrate"); },
                                  "cannot calibrate it", "install libdrd"));
 }
 

@@ -8,28 +8,17 @@
 
 #include "palpate/drivers/open_haptics.hpp"
 
-#include "tests/fakes/workbench.hpp"
-#include "tests/support/environment.hpp"
-#include "tests/support/temporary_folder.hpp"
+#include "tests/drivers/fake_device_test.hpp"
 
 namespace palpate {
 namespace {
 
-class OpenHaptics : public ::testing::Test {
+class OpenHaptics : public test::FakeDeviceTest {
  protected:
-  static std::unique_ptr<Device> open(const std::string& uri) {
-    return open_haptics_driver().open_device(Uri(uri));
-  }
+  OpenHaptics() : FakeDeviceTest(open_haptics_driver(), "PALPATE_OPENHAPTICS", "openhaptics") {}
   static void wait_until(const std::function<bool()>& done) {
     while (!done()) std::this_thread::yield();
   }
-
-  test::TemporaryFolder folder;
-  test::Workbench& bench = test::open_workbench((folder.path() / "workbench").c_str());
-
- private:
-  test::Environment place_{test::Workbench::variable, (folder.path() / "workbench").string()};
-  test::Environment library_{"PALPATE_OPENHAPTICS", PALPATE_FAKES "/openhaptics"};
 };
 
 TEST_F(OpenHaptics, TellsWhatItIsInOurAxes) {

@@ -7,6 +7,7 @@
 #include "palpate/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
 #include "palpate/servo/placement_table.hpp"
+#include "palpate/servo/stiffness.hpp"
 
 #include "tests/servo/fake_device.hpp"
 #include "tests/support/errors.hpp"
@@ -166,6 +167,29 @@ TEST(Bubble, GoesAlongASurfaceWithTheForceThatTheHandGives) {
       << "the HIP went on by itself: 0.2 s at full speed, and a third of that on the way there";
   for (int i = 400; i >= 0; --i) slide(1e-4 * i);
   EXPECT_LT(largest_step, 0.1) << "[N] from tick to tick";
+}
+
+TEST(StiffnessWarnings, NameTheDevicesOwnBoundAndThatOfASampledWall) {
+  DeviceInfo device{.uri = "touch:", .kind = "Touch", .limits = {.max_stiffness = 400.0}};
+  EXPECT_TRUE(stiffness_warnings(device, 400.0, 1.0, 1000.0).empty());
+  ASSERT_EQ(stiffness_warnings(device, 401.0, 1.0, 1000.0).size(), 1U);
+  EXPECT_NE(stiffness_warnings(device, 600.0, 1.0, 1000.0)[0].find("set stiffness to 400 N/m"),
+            std::string::npos);
+  device.damping = 0.7;  // [N s/m]
+  device.delay = 1e-3;   // [s]: 2 * 0.7 / (1 ms + 2 * 1 ms) = 466.7 N/m
+  EXPECT_EQ(stiffness_warnings(device, 466.0, 1.0, 1000.0).size(), 1U);
+  ASSERT_EQ(stiffness_warnings(device, 467.0, 1.0, 1000.0).size(), 2U);
+  EXPECT_NE(stiffness_warnings(device, 467.0, 1.0, 1000.0)[1].find("466 N/m"), std::string::npos);
+  EXPECT_EQ(stiffness_warnings(device, 467.0, 1.0, 2000.0).size(), 1U) << "560 N/m at 2 kHz";
+  // A scene twice as large as the workspace feels twice as stiff.
+  EXPECT_TRUE(stiffness_warnings(device, 200.0, 2.0, 1000.0).empty());
+  ASSERT_EQ(stiffness_warnings(device, 230.0, 2.0, 1000.0).size(), 1U);
+  EXPECT_NE(stiffness_warnings(device, 230.0, 2.0, 1000.0)[0].find("walls of 460 N/m"),
+            std::string::npos);
+  EXPECT_NE(stiffness_warnings(device, 230.0, 2.0, 1000.0)[0].find("stiffness to 200 N/m"),
+            std::string::npos);
+  device.limits.motors = false;
+  EXPECT_TRUE(stiffness_warnings(device, 5000.0, 1.0, 1000.0).empty());
 }
 
 }  // namespace

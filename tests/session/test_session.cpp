@@ -131,6 +131,46 @@ TEST(Session, IsReplayedFromItsRecordingBitForBit) {
   EXPECT_TRUE(fails_saying([&] { Session session(std::move(again)); }, "bag", "already"));
 }
 
+TEST(Session, TakesTheNoiseThatIsUsualForTheCamerasKindUnlessItIsSet) {
+  const auto on_a = [](SensorKind sensor) {
+    SessionOptions options = on_the_wall();
+    options.cameras[0].source = std::make_unique<MadeSource>(
+        [](int k) {
+          return Frame{k / 30.0, wall()};
+        },
+        SourceInfo{.uri = "made:", .kind = "made", .sensor = sensor});
+    return options;
+  };
+  const auto noise_of = [](const ServoSettings& settings) {
+    const SightParameters& sight = settings.parameters.sight;
+    return std::pair(sight.usual_noise, sight.noise_growth);
+  };
+  for (const SensorKind kind : {SensorKind::unknown, SensorKind::stereo,
+                                SensorKind::structured_light, SensorKind::time_of_flight}) {
+    Session session(on_a(kind));
+    const std::pair usual(usual_noise(kind).at_1m, usual_noise(kind).growth);
+    EXPECT_EQ(noise_of(session.settings()), usual);
+    EXPECT_EQ(session.state().cameras[0].sensor, kind);
+    ServoSettings settings = session.settings();
+    settings.parameters.sight.usual_noise = 0.02;
+    session.set(settings);
+    EXPECT_EQ(noise_of(session.settings()), std::pair(0.02, usual.second));
+    settings.parameters.sight.usual_noise = 0.0;
+    session.set(settings);
+    EXPECT_EQ(noise_of(session.settings()), usual) << "left to the kind again";
+  }
+
+  // What it took is in the recording, so that a replay needs to know no kind.
+  const test::TemporaryFolder folder;
+  SessionOptions options = on_a(SensorKind::time_of_flight);
+  options.settings.parameters.sight.usual_noise = 3e-3;
+  options.record = (folder.path() / "bag").string();
+  const Outcome recorded = play(std::move(options), 1.5);
+  EXPECT_EQ(noise_of(recorded.state.settings), std::pair(3e-3, 1)) << "what is set wins";
+  SessionReader reader(folder.path() / "bag");
+  EXPECT_TRUE(replay(reader).identical());
+}
+
 TEST(Session, SwitchesMethodsWhereTheProxyIs) {
   const test::TemporaryFolder folder;
   SessionOptions options = on_the_wall();

@@ -766,6 +766,7 @@ TEST(Sight, HeedsEachParameterOfItsEstimator) {
   const double usual = sum_of_forces({});
   ASSERT_GT(usual, 1000.0);
   for (const auto& [name, value] : {std::pair{"usual_noise", 0.05},
+                                    {"noise_growth", 1.0},
                                     {"confidence", 1.0},
                                     {"least_share", 0.9},
                                     {"widest_disc", 0.011},
@@ -778,6 +779,13 @@ TEST(Sight, HeedsEachParameterOfItsEstimator) {
     set_parameter(parameters, name, value);
     EXPECT_NE(sum_of_forces(parameters), usual) << name;
   }
+}
+
+TEST(Sight, TakesACameraOfWhichNothingIsKnownForAStereoCamera) {
+  Parameters stereo;
+  set_parameter(stereo, "usual_noise", 5e-3);
+  set_parameter(stereo, "noise_growth", 2);
+  EXPECT_EQ(sum_of_forces(stereo), sum_of_forces({})) << "bit for bit";
 }
 
 TEST(Sight, BearsEmptyFramesAndStampsThatStandStill) {

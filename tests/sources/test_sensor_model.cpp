@@ -140,13 +140,16 @@ TEST(Sensor, CorrelatedNoiseFallsOffAsItsLengthsSay) {
   EXPECT_NEAR(correlation(fields, 3, 2), std::exp(-9.0 / 25.0 - 4.0 / 9.0), 0.03);
 }
 
-TEST(Sensor, GrowingNoiseGrowsWithTheSquareOfDepth) {
+TEST(Sensor, GrowingNoiseGrowsWithAPowerOfDepth) {
   SensorModel model = fine();
   model.quantisation = 1e-4;
   model.noise = 0.002;
-  model.noise_grows = true;
+  model.noise_growth = 2;
   EXPECT_NEAR(standard_deviation(deviations(model, 0.5F, 2)), 0.0005, 1e-5);
   EXPECT_NEAR(standard_deviation(deviations(model, 2.0F, 2)), 0.008, 1e-4);
+  model.noise_growth = 1;
+  EXPECT_NEAR(standard_deviation(deviations(model, 0.5F, 2)), 0.001, 1e-5);
+  EXPECT_NEAR(standard_deviation(deviations(model, 2.0F, 2)), 0.004, 1e-4);
 }
 
 // The deviations of a RealSense D4xx over a resting table, eight frames, whole-frame shift removed.
@@ -185,7 +188,7 @@ TEST(Sensor, D4xxNoiseIsWhatWasMeasuredOnARestingTable) {
 }
 
 TEST(Sensor, AReadingDependsOnSeedAndFrameAlone) {
-  for (const char* name : {"ideal", "d4xx", "kinect"}) {
+  for (const char* name : {"ideal", "d4xx", "kinect", "tof"}) {
     SensorModel model = SensorModel::named(name);
     model.noise = 0.003;
     model.correlation_x = 2.0;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -87,8 +88,23 @@ TEST(Source, OfASimulatedSensorSaysHowThatMeasures) {
   EXPECT_EQ(sensor("ideal"), SensorKind::unknown);
   EXPECT_EQ(sensor("d4xx"), SensorKind::stereo);
   EXPECT_EQ(sensor("kinect"), SensorKind::structured_light);
-  EXPECT_EQ(name_of(SensorKind::time_of_flight), "time of flight");
+  EXPECT_EQ(sensor("tof"), SensorKind::time_of_flight);
   EXPECT_EQ(name_of(StampClock::monotonic), "monotonic");
+}
+
+TEST(Source, OfFilesTakesTheKindOfSensorThatItIsTold) {
+  const test::TemporaryFolder folder;
+  folder.write("0.pcd", "FIELDS x y z\nPOINTS 1\nDATA ascii\n0 0 0\n");
+  const std::string uri = "pcd:" + folder.path().string();
+  EXPECT_EQ(open_source(uri)->info().sensor, SensorKind::unknown);
+  for (const SensorKind kind : {SensorKind::unknown, SensorKind::stereo,
+                                SensorKind::structured_light, SensorKind::time_of_flight}) {
+    std::string name(name_of(kind));
+    std::replace(name.begin(), name.end(), ' ', '-');
+    EXPECT_EQ(open_source(uri + "?sensor=" + name)->info().sensor, kind) << name;
+  }
+  EXPECT_TRUE(test::fails_saying([&] { open_source(uri + "?sensor=lidar"); }, "lidar",
+                                 "structured-light", "time-of-flight"));
 }
 
 }  // namespace

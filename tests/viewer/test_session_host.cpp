@@ -191,6 +191,41 @@ TEST(SessionHost, TellsALatchedFaultUntilTheOperatorResetsIt) {
   EXPECT_EQ(latched_by, (std::vector<json>{json::array(), reason, json::array()}));
 }
 
+// A handle that rests away from the wall, with the figures of its mechanism.
+class KnownDevice final : public Device {
+ public:
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  HandState read(double /*t*/) noexcept override { return {}; }
+  void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
+
+ private:
+  DeviceInfo info_{.uri = "known:",
+                   .kind = "known",
+                   .limits = {.max_force = 3.3, .continuous_force = 0.88, .max_stiffness = 500.0},
+                   .damping = 0.7,  // [N s/m]
+                   .delay = 1e-3};  // [s]
+};
+
+TEST(SessionHost, WarnsOfAStiffnessThatTheDeviceIsNotGoodFor) {
+  SessionOptions options = wall_options("hand:");
+  options.device = std::make_unique<KnownDevice>();
+  Session session(std::move(options));
+  SessionHost host("1.2.3");
+  host.attach(session);
+  const auto warnings = [&] { return json::parse(host.state())["device"]["warnings"]; };
+  host.command(SetParameter{"stiffness", 460.0}, Role::operating);
+  EXPECT_EQ(warnings(), json::array()) << "2 * 0.7 / (1 ms + 2 * 1 ms) = 466.7 N/m at 1 kHz";
+  host.command(SetParameter{"stiffness", 480.0}, Role::operating);
+  ASSERT_EQ(warnings().size(), 1U);
+  EXPECT_NE(warnings()[0].get<std::string>().find("466 N/m"), std::string::npos);
+  host.command(SetParameter{"stiffness", 600.0}, Role::operating);
+  EXPECT_EQ(warnings().size(), 2U) << "nor are its motors good for that";
+  host.command(SetParameter{"stiffness", 230.0}, Role::operating);
+  host.command(SetPlacement{"scale", 2.2}, Role::operating);
+  EXPECT_EQ(warnings().size(), 2U) << "506 N/m at the hand";
+  host.detach();
+}
+
 TEST(SessionHost, TakesAHandOnlyForTheMouse) {
   EXPECT_TRUE(Hosted().host.takes_hand());
   EXPECT_FALSE(Hosted({}, "hand:").host.takes_hand());

@@ -61,6 +61,11 @@ export function latchedText({ role, latched_by }: Pick<State, "role" | "latched_
     : `${what} Only the operator resets them: open ${OPERATORS_LINK}.`;
 }
 
+/** What speaks against the present stiffness, as the program has it; empty: nothing does. */
+export function warningText(warnings: readonly string[]): string {
+  return warnings.map((text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}.`).join(" ");
+}
+
 /** How a unit of the table is shown: small lengths in mm, angles in degrees. */
 export function shownUnit(row: Pick<ParameterRow, "unit" | "max">): {
   unit: string;
@@ -348,6 +353,10 @@ export class Panel {
     if (document.activeElement !== this.scene) this.scene.value = state.cameras[0]?.uri ?? "";
     get("method-meaning").textContent =
       this.hello?.methods.find(({ name }) => name === state.method)?.meaning ?? "";
+    const warning = get("stiffness-warning");
+    const text = warningText(state.device.warnings);
+    if (warning.textContent !== text) warning.textContent = text;
+    warning.hidden = !text;
     for (const [name, row] of this.rows) row.show(state.parameters[name] ?? Number.NaN);
     for (const [name, row] of this.limits) row.show(state.safety[name] ?? Number.NaN);
     for (const [name, row] of this.placement) row.show(state.placement[name] ?? Number.NaN);
@@ -386,9 +395,10 @@ export class Panel {
     const { servo } = state;
     const microseconds = (seconds: number) => `${(1e6 * seconds).toFixed(1)} µs`;
     const facts: [string, string][] = [
-      ...state.cameras.map(({ uri, kind, rate, state: how }, i): [string, string] => [
+      ...state.cameras.map(({ uri, kind, sensor, rate, state: how }, i): [string, string] => [
         state.cameras.length > 1 ? `Camera ${i + 1}` : "Camera",
-        `${uri} · ${kind}${how === "live" ? `, ${rate.toFixed(1)} Hz` : ` · ${how}`}`,
+        `${uri} · ${kind}${sensor === "unknown" ? "" : `, ${sensor}`}` +
+          (how === "live" ? `, ${rate.toFixed(1)} Hz` : ` · ${how}`),
       ]),
       [
         "Hand",

@@ -270,6 +270,7 @@ export interface Hello {
 export interface CameraState {
   uri: string;
   kind: string;
+  sensor: string; // "unknown", "stereo", "structured light", "time of flight"
   /** [Hz] as captured, lately */
   rate: number;
   /** live, ended, or what went wrong */
@@ -302,7 +303,8 @@ export interface State {
   cameras: CameraState[];
   /** null: nothing is a recording */
   playback: Playback | null;
-  device: { uri: string; kind: string; takes_hand: boolean; fault: string };
+  /** `warnings`: what speaks against the present stiffness on it */
+  device: { uri: string; kind: string; takes_hand: boolean; fault: string; warnings: string[] };
   servo: {
     /** [Hz] */
     rate: number;

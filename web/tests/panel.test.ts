@@ -9,6 +9,7 @@ import {
   sliderFromValue,
   stiffnessFirst,
   valueFromSlider,
+  warningText,
   whyNot,
 } from "../src/panel";
 
@@ -81,4 +82,11 @@ test("latched faults are named, and only the operator is asked to reset them", (
   );
   for (const role of ["looking", "holding"] as const)
     expect(latchedText({ role, latched_by })).toMatch(/input_refused.*operator's link/);
+});
+
+test("warnings are sentences, one after the other", () => {
+  expect(warningText([])).toBe("");
+  expect(warningText(["walls are stiff; set 400", "it may swing"])).toBe(
+    "Walls are stiff; set 400. It may swing.",
+  );
 });

@@ -30,7 +30,7 @@ const facts = (flags: string[], more: Partial<Facts> = {}): Facts => ({
   hand: "you",
   state: {
     latched_by: ["input_refused"],
-    device: { uri: "mouse:", kind: "mouse", takes_hand: true, fault: "" },
+    device: { uri: "mouse:", kind: "mouse", takes_hand: true, fault: "", warnings: [] },
     parameters: { stiffness: 600, r_c },
   },
   ...more,

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/stiffness.hpp"
+#include "palpate/servo/stiffness.hpp"
 
 #include <cmath>
 
 namespace palpate {
 
 std::vector<std::string> stiffness_warnings(const DeviceInfo& device, double stiffness,
-                                            double rate) {
+                                            double scale, double rate) {
   std::vector<std::string> warnings;
   if (!device.limits.motors || device.simulated) return warnings;
+  const double felt = stiffness * scale;
+  const auto whole = [](double number) { return std::to_string(std::lround(number)); };
   const auto warn = [&](double most, const std::string& why) {
-    if (stiffness <= most) return;
-    const std::string bound = std::to_string(std::lround(std::floor(most)));
-    warnings.push_back("walls of " + std::to_string(std::lround(stiffness)) +
-                       " N/m are more than " + bound + " N/m, " + why +
-                       "; --set stiffness=" + bound + " or less");
+    if (felt <= most) return;
+    warnings.push_back("walls of " + whole(felt) + " N/m are more than " + whole(std::floor(most)) +
+                       " N/m, " + why + "; set stiffness to " + whole(std::floor(most / scale)) +
+                       " N/m or less");
   };
   if (device.limits.max_stiffness)
     warn(*device.limits.max_stiffness, "what the device is good for");

@@ -45,7 +45,8 @@ void apply_placement(const std::optional<std::string>& pose, const std::optional
 void SessionArguments::add_to(CLI::App& command) {
   command
       .add_option("--camera", cameras_,
-                  "where frames come from (synthetic:desk?noise=1mm); may be given several times")
+                  "where frames come from (synthetic:desk?noise=1mm); may be given several times; "
+                  "?pose=x,y,z,qx,qy,qz,qw says where the camera stands")
       ->allow_extra_args(false);
   command.add_option("--device", device_,
                      "the hand: mouse: in the page (the default), hand: a simulated person (the "

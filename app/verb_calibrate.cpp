@@ -17,6 +17,7 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/pose.hpp"
+#include "palpate/core/uri.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/session/camera_registration.hpp"
 #include "palpate/session/point_capture.hpp"
@@ -159,6 +160,8 @@ int calibrate_cameras(const CalibrateOptions& options) {
     start = parse_pose(*options.start, "--start");
   } else if (cameras[1].world_from_camera) {
     start = world_from_first.inverse() * *cameras[1].world_from_camera;
+  } else if (Uri(cameras[1].uri).has("pose")) {
+    start = world_from_first.inverse() * second->world_from_camera();
   } else {
     throw Error("--start", "where the second camera stands to the first is not known roughly",
                 "give x,y,z,qx,qy,qz,qw of it in the first's optical frame (x right, y down, z "
@@ -190,8 +193,10 @@ int calibrate_cameras(const CalibrateOptions& options) {
   fmt::print(
       "[[camera]]\nuri = {}\nworld_from_camera = [{}]\n\n[[camera]]\nuri = {}\n"
       "world_from_camera = [{}]\n",
-      nlohmann::json(cameras[0].uri).dump(), pose_text(world_from_first),
-      nlohmann::json(cameras[1].uri).dump(), pose_text(world_from_second));
+      nlohmann::json(Uri(cameras[0].uri).without("pose").text()).dump(),
+      pose_text(world_from_first),
+      nlohmann::json(Uri(cameras[1].uri).without("pose").text()).dump(),
+      pose_text(world_from_second));
   return 0;
 }
 

@@ -129,7 +129,27 @@ double Uri::number_option(std::string_view key, double fallback, double min, dou
   return number;
 }
 
-void Uri::allow_only(std::span<const std::string_view> known) const {
+Uri Uri::without(std::string_view key) const {
+  Uri left = *this;
+  left.taken_.emplace_back(key);
+  if (left.options_.erase(std::string(key)) == 0) return left;
+  const std::size_t mark = text_.rfind('?');
+  std::string_view rest = std::string_view(text_).substr(mark + 1);
+  std::string kept;
+  while (!rest.empty()) {
+    const std::string_view option = rest.substr(0, rest.find('&'));
+    rest.remove_prefix(std::min(option.size() + 1, rest.size()));
+    if (option.substr(0, option.find('=')) == key) continue;
+    kept += (kept.empty() ? "" : "&") + std::string(option);
+  }
+  left.text_.resize(mark);
+  if (!kept.empty() || path_.find('?') != std::string::npos) left.text_ += "?" + kept;
+  return left;
+}
+
+void Uri::allow_only(std::span<const std::string_view> own) const {
+  std::vector<std::string_view> known(own.begin(), own.end());
+  known.insert(known.end(), taken_.begin(), taken_.end());
   for (const auto& [key, value] : options_) {
     if (std::find(known.begin(), known.end(), key) != known.end()) {
       continue;

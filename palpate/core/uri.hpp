@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace palpate {
 
@@ -30,12 +31,15 @@ class Uri {
   /// @throws Error if it is not a finite number in [min, max], or has a unit that does not fit.
   [[nodiscard]] double number_option(std::string_view key, double fallback, double min, double max,
                                      std::string_view si_unit = {}) const;
-  /// @throws Error for any option that is not among `known`, naming the nearest.
-  void allow_only(std::span<const std::string_view> known) const;
+  /// The same without an option that somebody else takes; allow_only() names it among the known.
+  [[nodiscard]] Uri without(std::string_view key) const;
+  /// @throws Error for any option that is not among `own`, naming the nearest.
+  void allow_only(std::span<const std::string_view> own) const;
 
  private:
   std::string text_, scheme_, path_;
   std::map<std::string, std::string, std::less<>> options_;
+  std::vector<std::string> taken_;  // options that somebody else takes
 };
 
 }  // namespace palpate

@@ -19,7 +19,7 @@
 #include "palpate/devices/mouse_device.hpp"
 #include "palpate/session/hand_paths.hpp"
 #include "palpate/session/played_source.hpp"
-#include "palpate/session/posed_source.hpp"
+#include "palpate/sources/posed_source.hpp"
 
 namespace palpate {
 namespace {
@@ -41,6 +41,9 @@ std::string seconds_text(double seconds) {
 
 std::function<std::unique_ptr<Source>()> opener(const SessionCamera& camera,
                                                 const Registry<SourceScheme>& sources) {
+  if (camera.world_from_camera && Uri(camera.uri).has("pose"))
+    throw Error(camera.uri, "its pose is given twice, by ?pose= and by world_from_camera",
+                "leave one of them out");
   return [uri = camera.uri, pose = camera.world_from_camera, sources] {
     std::unique_ptr<Source> source = open_source(uri, sources);
     return pose ? with_pose(std::move(source), *pose) : std::move(source);

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cctype>
+#include <optional>
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/pose.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/sources/depth_recording.hpp"
 #include "palpate/sources/point_file_source.hpp"
+#include "palpate/sources/posed_source.hpp"
 #include "palpate/sources/recording.hpp"
 #include "palpate/sources/source.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
@@ -79,7 +82,11 @@ std::unique_ptr<Source> open_source(std::string_view text, const Registry<Source
     throw Error("'" + std::string(text) + "'", "does not start with a scheme",
                 "write " + uri_of_file(text));
   const Uri uri(text);
-  return schemes.find(uri.scheme(), uri.text()).open(uri);
+  std::optional<Eigen::Isometry3d> pose;
+  if (uri.has("pose"))
+    pose = parse_pose(uri.text_option("pose", ""), uri.text() + ": option 'pose'");
+  auto source = schemes.find(uri.scheme(), uri.text()).open(uri.without("pose"));
+  return pose ? with_pose(std::move(source), *pose, uri.text()) : std::move(source);
 }
 
 }  // namespace palpate

@@ -105,7 +105,8 @@ SensorKind sensor_option(const Uri& uri, SensorKind known);
 /// @throws Error for any other ending, saying what to do with such a file.
 std::string uri_of_file(const std::filesystem::path& file);
 
-/// Opens a source by its URI.
+/// Opens a source by its URI. Whatever the scheme, `pose=x,y,z,qx,qy,qz,qw` says where the camera
+/// stands, as parse_pose reads it: see with_pose().
 /// @throws Error for an unknown scheme or option (naming the nearest known one), or input that
 ///         cannot be used.
 std::unique_ptr<Source> open_source(std::string_view uri,

@@ -239,6 +239,12 @@ TEST_F(Program, CalibratesTwoCameras) {
   EXPECT_EQ(run("run --headless --duration 0.1 --config " + write("two.toml", text.out)).code, 0)
       << text.out << text.err;
   expect_refusal(base, {"--start", "10 cm"});
+  // A pose in the second camera's URI is where to start from, and does not stay in it.
+  const Eigen::Isometry3d start = pose_of(desk) * rough;
+  const Outcome posed =
+      run("calibrate --cameras '" + desk + "' '" + turned + "&pose=" + pose_text(start) + "'");
+  EXPECT_EQ(posed.code, 0) << posed.err;
+  EXPECT_NE(posed.out.find("uri = \"" + turned + "\"\n"), std::string::npos) << posed.out;
   expect_refusal("calibrate --cameras '" + desk + "'", {"--cameras", "two cameras, not 1"});
 }
 

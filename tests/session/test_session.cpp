@@ -413,6 +413,13 @@ TEST(Session, RefusesWhatItCannotRun) {
           o.cameras.push_back({.uri = "synthetic:plane"});
       },
       "camera", "at most " + std::to_string(Patch::max_views)));
+  EXPECT_TRUE(refuses(
+      [](Options& o) {
+        o.cameras.clear();
+        o.cameras.push_back({.uri = "synthetic:plane?pose=0,0,0,0,0,0,1",
+                             .world_from_camera = Eigen::Isometry3d::Identity()});
+      },
+      "?pose=", "world_from_camera", "twice"));
   EXPECT_TRUE(refuses([](Options& o) { o.settings.method = "sigth"; }, "sigth", "'sight'"));
   EXPECT_TRUE(refuses(
       [](Options& o) {

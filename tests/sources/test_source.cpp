@@ -5,7 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/pose.hpp"
 #include "palpate/sources/source.hpp"
 
 #include "tests/support/errors.hpp"
@@ -50,6 +52,52 @@ TEST(OpenSource, OpensASchemeThatAProgramAddedToACopyOfTheRegistry) {
   EXPECT_TRUE(fails_saying([] { return open_source("two-points:"); }, "unknown kind of source",
                            "synthetic:", "recording:"));
   EXPECT_TRUE(fails_saying([&] { schemes.add({"tum", "", {}}); }, "'tum:'", "already"));
+}
+
+TEST(OpenSource, PutsTheCameraOfAnySchemeWhereTheUriSays) {
+  const std::string pose = "1,-2,0.5,0,0,0.6,0.8";
+  const Eigen::Isometry3d world_from_camera = parse_pose(pose, "it");
+  const std::string plane = "synthetic:plane?noise=0mm&pose=" + pose + "&size=40x30";
+  const auto source = open_source(plane);
+  EXPECT_EQ(source->info().uri, plane);
+  for (int i = 0; i < 2; ++i) {
+    const auto frame = source->next();
+    const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
+    EXPECT_TRUE(image.world_from_camera().isApprox(world_from_camera, 1e-15));
+    const auto first = open_source("synthetic:plane?noise=0mm&size=40x30")->next();
+    EXPECT_EQ(image.depth(), dynamic_cast<const DepthImage&>(*first->cloud).depth());
+  }
+  EXPECT_EQ(source->info().notes.size(), 1U);
+  EXPECT_EQ(source->info().details, open_source("synthetic:plane?size=40x30")->info().details);
+
+  const test::TemporaryFolder folder;
+  const auto file = folder.write("some.pcd", "FIELDS x y z\nPOINTS 1\nDATA ascii\n1 2 3\n");
+  const auto points = open_source("pcd:" + file.string() + "?scale=1m&pose=" + pose)->next();
+  const auto& cloud = dynamic_cast<const PointCloud&>(*points->cloud);
+  EXPECT_TRUE(cloud.point(0).isApprox(world_from_camera * Vec3(1, 2, 3), 1e-6));
+
+  Registry<SourceScheme> schemes = standard_sources();
+  std::string opened;
+  schemes.add({"two-points", "two-points:, for a test", [&](const Uri& uri) {
+                 opened = uri.text();
+                 return std::make_unique<TwoPoints>(uri);
+               }});
+  const auto live = open_source("two-points:left?pose=" + pose, schemes);
+  EXPECT_EQ(opened, "two-points:left");
+  EXPECT_TRUE(live->info().live);
+  EXPECT_EQ(live->info().uri, "two-points:left?pose=" + pose);
+}
+
+TEST(OpenSource, RefusesAPoseThatIsNone) {
+  const std::string plane = "synthetic:plane?size=4x3&";
+  const auto open = [&](const std::string& option) {
+    return [uri = plane + option] { return open_source(uri); };
+  };
+  EXPECT_TRUE(fails_saying(open("pose=1,2,3"), "option 'pose'"));
+  EXPECT_TRUE(fails_saying(open("pose"), "option 'pose'"));
+  EXPECT_TRUE(fails_saying(open("pose=0,0,0,0,0,0,2"), "option 'pose'"));
+  EXPECT_TRUE(fails_saying(open("pos=0,0,0,0,0,0,1"), "'pos'", "did you mean 'pose'"));
+  EXPECT_TRUE(fails_saying(open("pose=0,0,0,0,0,0,1&pose="), "'pose'", "twice"));
 }
 
 TEST(OpenSource, SaysTheNearestSchemeAndASummaryOfEach) {

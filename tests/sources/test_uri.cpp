@@ -89,6 +89,17 @@ TEST(Uri, NamesTheNearestOfTheKnownOptions) {
   EXPECT_TRUE(fails_saying([] { Uri("tum:d?a=1").allow_only({}); }, "none"));
 }
 
+TEST(Uri, WithoutAnOptionIsAsIfItHadNotBeenGiven) {
+  EXPECT_EQ(Uri("tum:a?units=5&pose=1,2&fps=3").without("pose").text(), "tum:a?units=5&fps=3");
+  EXPECT_EQ(Uri("tum:a?pose=1,2").without("pose").text(), "tum:a");
+  EXPECT_EQ(Uri("tum:a?b?pose=1,2").without("pose").text(), "tum:a?b?");
+  EXPECT_EQ(Uri("tum:a?b?").without("pose").path(), "a?b");
+  EXPECT_FALSE(Uri("tum:a?pose=1").without("pose").has("pose"));
+  constexpr std::array<std::string_view, 1> own{"fps"};
+  EXPECT_TRUE(fails_saying([&] { Uri("tum:a?pos=1").without("pose").allow_only(own); }, "'pos'",
+                           "did you mean 'pose'", "fps pose"));
+}
+
 TEST(OpenSource, ListsTheKnownSchemesForAnUnknownOne) {
   EXPECT_TRUE(fails_saying([] { return open_source("kinect:0"); },
                            "unknown kind of source 'kinect:'; known here:"));

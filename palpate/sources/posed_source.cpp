@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/session/posed_source.hpp"
+#include "palpate/sources/posed_source.hpp"
 
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -13,11 +14,14 @@ namespace {
 
 class PosedSource final : public Source {
  public:
-  PosedSource(std::unique_ptr<Source> source, const Eigen::Isometry3d& pose)
-      : source_(std::move(source)), pose_(pose) {}
+  PosedSource(std::unique_ptr<Source> source, const Eigen::Isometry3d& pose, std::string uri)
+      : source_(std::move(source)), pose_(pose), uri_(std::move(uri)) {
+    look_at_info();
+  }
 
   std::optional<Frame> next(double timeout) override {
     std::optional<Frame> frame = source_->next(timeout);
+    look_at_info();
     if (!frame) return frame;
     if (frame->colour && frame->colour->camera)
       frame->colour = posed(*frame->colour, *frame->cloud);
@@ -26,9 +30,16 @@ class PosedSource final : public Source {
   }
   std::size_t skip(std::size_t count) override { return source_->skip(count); }
   void cancel() noexcept override { source_->cancel(); }
-  [[nodiscard]] const SourceInfo& info() const override { return source_->info(); }
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
  private:
+  // Its details change from frame to frame.
+  void look_at_info() {
+    info_ = source_->info();
+    if (uri_.empty()) return;
+    info_.uri = uri_;
+    info_.notes.emplace_back("the camera's pose is that of ?pose=, whatever else is said of it");
+  }
   // A colour camera stays where it is beside the depth camera.
   [[nodiscard]] std::shared_ptr<const ColourImage> posed(const ColourImage& colour,
                                                          const Cloud& cloud) const {
@@ -68,14 +79,16 @@ class PosedSource final : public Source {
 
   std::unique_ptr<Source> source_;
   Eigen::Isometry3d pose_;
+  std::string uri_;
+  SourceInfo info_;
   std::shared_ptr<const ViewingRays> rays_;
 };
 
 }  // namespace
 
 std::unique_ptr<Source> with_pose(std::unique_ptr<Source> source,
-                                  const Eigen::Isometry3d& world_from_camera) {
-  return std::make_unique<PosedSource>(std::move(source), world_from_camera);
+                                  const Eigen::Isometry3d& world_from_camera, std::string uri) {
+  return std::make_unique<PosedSource>(std::move(source), world_from_camera, std::move(uri));
 }
 
 }  // namespace palpate

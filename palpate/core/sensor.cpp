@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace palpate {
 
@@ -37,7 +38,7 @@ UsualNoise usual_noise(SensorKind sensor) noexcept {
     case SensorKind::structured_light:
       return {1.5e-3, 2};
     case SensorKind::time_of_flight:
-      return {2.5e-3, 1};
+      return {5e-3, 1};
     case SensorKind::stereo:
     case SensorKind::unknown:
       break;
@@ -54,7 +55,9 @@ std::string noise_text(SensorKind sensor) {
 Parameters for_sensors(Parameters parameters, std::span<const SensorKind> sensors) {
   UsualNoise noisiest = usual_noise(sensors.empty() ? SensorKind::unknown : sensors.front());
   for (const SensorKind sensor : sensors) {
-    if (const UsualNoise one = usual_noise(sensor); one.at_1m > noisiest.at_1m) noisiest = one;
+    const UsualNoise one = usual_noise(sensor);
+    if (std::pair(one.at_1m, one.growth) > std::pair(noisiest.at_1m, noisiest.growth))
+      noisiest = one;
   }
   SightParameters& sight = parameters.sight;
   if (sight.usual_noise == 0.0) sight.usual_noise = noisiest.at_1m;

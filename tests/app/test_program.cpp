@@ -72,7 +72,7 @@ TEST_F(Program, TakesTheNoiseThatIsUsualForACamerasKindUnlessItIsSet) {
   const std::string as_stereo = " --set usual_noise=0.005 --set noise_growth=2";
   EXPECT_EQ(trace("ideal&noise=2mm", ""), trace("ideal&noise=2mm", as_stereo)) << "nobody says";
   const std::string usual = trace("tof", "");
-  EXPECT_EQ(usual, trace("tof", " --set usual_noise=0.0025 --set noise_growth=1"));
+  EXPECT_EQ(usual, trace("tof", " --set usual_noise=0.005 --set noise_growth=1"));
   EXPECT_NE(usual, trace("tof", as_stereo));
 }
 
@@ -456,7 +456,7 @@ TEST_F(Program, TellsWhatIsInASource) {
   const auto light =
       nlohmann::json::parse(run("info 'synthetic:plane?sensor=tof&size=64x48' --json").out);
   EXPECT_EQ(light["sensor"], "time of flight");
-  EXPECT_EQ(light["usual_noise"], "2.5 mm at 1 m, growing with distance");
+  EXPECT_EQ(light["usual_noise"], "5 mm at 1 m, growing with distance");
 }
 
 TEST_F(Program, InfoSaysWhatIsAtAPixel) {

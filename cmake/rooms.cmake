@@ -64,33 +64,27 @@ function(palpate_tidy target)
   find_program(PALPATE_CLANG_TIDY_PROGRAM NAMES clang-tidy-14 clang-tidy REQUIRED)
   get_target_property(sources ${target} SOURCES)
   list(FILTER sources INCLUDE REGEX "\\.cpp$")
-  set(alone "")  # what is compiled in a way of its own
-  set(together "")
+  set(includes "")
   foreach(source ${sources})
-    get_source_file_property(options ${source} COMPILE_OPTIONS)
-    if(options)
-      list(APPEND alone ${source})
-    else()
-      list(APPEND together ${source})
-    endif()
+    get_filename_component(source ${source} ABSOLUTE)
+    string(APPEND includes "#include \"${source}\"\n")
   endforeach()
-  # A library that is never built: it gives CMake's file of all files, and how that is compiled.
-  set(as_one ${target}_as_one)
-  add_library(${as_one} OBJECT EXCLUDE_FROM_ALL ${together})
+  set(as_one ${CMAKE_CURRENT_BINARY_DIR}/${target}_as_one.cpp)
+  file(CONFIGURE OUTPUT ${as_one} CONTENT "${includes}" @ONLY)
+  # A library that is never built: it tells clang-tidy how to read that file.
+  add_library(${target}_as_one OBJECT EXCLUDE_FROM_ALL ${as_one})
   foreach(property COMPILE_OPTIONS COMPILE_DEFINITIONS INCLUDE_DIRECTORIES LINK_LIBRARIES)
-    set_property(TARGET ${as_one} PROPERTY ${property}
+    set_property(TARGET ${target}_as_one PROPERTY ${property}
                  $<TARGET_PROPERTY:${target},${property}>)
   endforeach()
-  set_target_properties(${as_one} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
-  target_compile_options(${as_one} PRIVATE -Wno-shadow)
-  set(as_one ${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${as_one}.dir/Unity/unity_0_cxx.cxx)
+  target_compile_options(${target}_as_one PRIVATE -Wno-shadow)
   file(GLOB_RECURSE read CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/palpate/*.hpp
        ${CMAKE_CURRENT_SOURCE_DIR}/*.hpp)
   set(stamp ${CMAKE_CURRENT_BINARY_DIR}/${target}.tidy)
   add_custom_command(OUTPUT ${stamp}
     COMMAND ${PALPATE_CLANG_TIDY_PROGRAM} --quiet --config-file=${PROJECT_SOURCE_DIR}/.clang-tidy
             --warnings-as-errors=* --checks=-bugprone-suspicious-include -p ${CMAKE_BINARY_DIR}
-            ${as_one} ${alone}
+            ${as_one}
     COMMAND ${CMAKE_COMMAND} -E touch ${stamp}
     DEPENDS ${sources} ${read} ${PROJECT_SOURCE_DIR}/.clang-tidy
     WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}
@@ -206,5 +200,6 @@ function(palpate_memcheck name filter)
   add_test(NAME "${PALPATE_TEST_PREFIX}memcheck/${name}"
            COMMAND ${PALPATE_VALGRIND} --quiet --error-exitcode=9 --show-mismatched-frees=no
                    $<TARGET_FILE:test_${name}> --gtest_brief=1 --gtest_filter=${filter})
-  set_tests_properties("${PALPATE_TEST_PREFIX}memcheck/${name}" PROPERTIES TIMEOUT 900 COST 100)
+  set_tests_properties("${PALPATE_TEST_PREFIX}memcheck/${name}" PROPERTIES TIMEOUT 900 COST 100
+                       ENVIRONMENT PALPATE_MEMCHECK=1)
 endfunction()

@@ -12,6 +12,7 @@ in_cache() {
   cache=$'\n'$(<"$1/CMakeCache.txt")$'\n'
   shift
   for argument in "$@"; do
+    [[ $argument == -D* ]] || continue
     name=${argument#-D} value=${argument#*=}
     name=${name%%=*}
     [[ $cache =~ $'\n'"$name":[A-Z]+="$value"$'\n' ]] || return 1
@@ -41,13 +42,20 @@ progress() {
 # build_in FOLDER -DNAME=VALUE... [-- TARGETS...]: configures and builds. With every argument in
 # CMake's cache it leaves it to ninja to see whether anything has changed: sources, their headers,
 # CMake's files, and the folders' contents. Writes to stderr alone: stdout is the program's.
+# A folder that was configured from another source folder (-S) is begun anew.
 build_in() {
-  local folder=$1 said arguments=() targets=()
+  local folder=$1 said sources=$PWD arguments=() targets=()
   shift
   while (($#)) && [[ $1 != -- ]]; do
+    if [[ $1 == -S ]]; then sources=$PWD/$2; fi
     arguments+=("$1")
     shift
   done
+  if [[ -e $folder/CMakeCache.txt ]] &&
+    ! grep -qxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$sources" \
+      -e "CMAKE_HOME_DIRECTORY:INTERNAL=$(realpath "$sources")" "$folder/CMakeCache.txt"; then
+    rm -rf "$folder"
+  fi
   if (($#)); then targets=("${@:2}"); fi
   if command -v ccache >/dev/null; then arguments+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
   if ! in_cache "$folder" "${arguments[@]}"; then

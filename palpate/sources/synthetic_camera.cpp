@@ -14,9 +14,8 @@
 namespace palpate {
 namespace {
 
-constexpr float nothing = std::numeric_limits<float>::infinity();
-constexpr double pi = std::numbers::pi;
-constexpr double deg = pi / 180.0;
+constexpr float no_surface = std::numeric_limits<float>::infinity();
+constexpr double deg = std::numbers::pi / 180.0;
 
 struct Pair {
   double first, second;
@@ -51,7 +50,7 @@ Pair pair_option(const Uri& uri, std::string_view key, Pair fallback, double min
   return pair;
 }
 
-std::uint64_t count_option(const Uri& uri, std::string_view key, std::uint64_t fallback,
+std::uint64_t whole_option(const Uri& uri, std::string_view key, std::uint64_t fallback,
                            double min) {
   constexpr double largest = 9007199254740992.0;  // 2^53: every whole number below is exact
   const double value = uri.number_option(key, static_cast<double>(fallback), min, largest, "px");
@@ -71,14 +70,14 @@ CameraSetup setup_of(const Uri& uri) {
   }
   setup.intrinsics = pinhole(static_cast<int>(size.first), static_cast<int>(size.second),
                              uri.number_option("fov", 57.0 * deg, deg, 170.0 * deg, "rad"));
-  setup.world_from_camera =
-      looking_at_origin(uri.number_option("distance", 0.7, 0.01, 100.0, "m"),
-                        uri.number_option("tilt", 34.0 * deg, -pi, pi, "rad"),
-                        uri.number_option("azimuth", 0.0, -2.0 * pi, 2.0 * pi, "rad"));
+  setup.world_from_camera = looking_at_origin(
+      uri.number_option("distance", 0.7, 0.01, 100.0, "m"),
+      uri.number_option("tilt", 34.0 * deg, -std::numbers::pi, std::numbers::pi, "rad"),
+      uri.number_option("azimuth", 0.0, -2.0 * std::numbers::pi, 2.0 * std::numbers::pi, "rad"));
   setup.frame_rate = uri.number_option("fps", 30.0, 1e-3, 10000.0, "Hz");
   setup.brightness = uri.number_option("brightness", 0.0, 1e-4, 100.0, "m");
   setup.colour = uri.number_option("colour", 0.0, 1e-4, 100.0, "m");
-  if (uri.has("frames")) setup.frames = count_option(uri, "frames", 0, 1.0);
+  if (uri.has("frames")) setup.frames = whole_option(uri, "frames", 0, 1.0);
   return setup;
 }
 
@@ -94,9 +93,9 @@ SensorModel sensor_of(const Uri& uri) {
   model.quantisation = uri.number_option("quantisation", model.quantisation, 1e-6, 0.1, "m");
   model.disparity_step = uri.number_option("disparity_step", model.disparity_step, 0.0, 0.1, "m");
   model.dropouts = uri.number_option("dropouts", model.dropouts, 0.0, 1.0, "1");
-  model.grazing = uri.number_option("grazing", model.grazing, 0.0, 0.5 * pi, "rad");
+  model.grazing = uri.number_option("grazing", model.grazing, 0.0, 0.5 * std::numbers::pi, "rad");
   model.flying = uri.number_option("flying", model.flying, 0.0, 1.0, "1");
-  model.seed = count_option(uri, "seed", model.seed, 0.0);
+  model.seed = whole_option(uri, "seed", model.seed, 0.0);
   return model;
 }
 
@@ -114,9 +113,10 @@ Intrinsics pinhole(int width, int height, double field_of_view) {
 
 Eigen::Isometry3d looking_at_origin(double distance, double tilt, double azimuth) {
   // Straight above, the image's right is the world's x and its top the world's y.
-  return Eigen::Isometry3d(
-      Eigen::AngleAxisd(azimuth, Vec3::UnitZ()) * Eigen::AngleAxisd(tilt, Vec3::UnitX()) *
-      Eigen::Translation3d(0.0, 0.0, distance) * Eigen::AngleAxisd(pi, Vec3::UnitX()));
+  return Eigen::Isometry3d(Eigen::AngleAxisd(azimuth, Vec3::UnitZ()) *
+                           Eigen::AngleAxisd(tilt, Vec3::UnitX()) *
+                           Eigen::Translation3d(0.0, 0.0, distance) *
+                           Eigen::AngleAxisd(std::numbers::pi, Vec3::UnitX()));
 }
 
 SyntheticCamera::SyntheticCamera(Scene scene, const CameraSetup& setup, const SensorModel& sensor,
@@ -159,7 +159,7 @@ Frame SyntheticCamera::capture(double t, std::uint64_t frame) {
 }
 
 std::uint8_t SyntheticCamera::wave(double along, double length) {
-  const double value = 0.5 + 0.5 * std::sin(2.0 * pi * along / length);
+  const double value = 0.5 + 0.5 * std::sin(2.0 * std::numbers::pi * along / length);
   return static_cast<std::uint8_t>(std::lround(255.0 * value));
 }
 
@@ -196,7 +196,7 @@ std::shared_ptr<const ColourImage> SyntheticCamera::colour(std::span<const float
 std::span<const float> SyntheticCamera::true_depth(double t) {
   if (resting_.empty()) {
     resting_.assign(static_cast<std::size_t>(setup_.intrinsics.width) * setup_.intrinsics.height,
-                    nothing);
+                    no_surface);
     for (const Part& part : scene_.parts()) {
       if (part.motion.rests()) draw(part, t, resting_);
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdlib>
+
 namespace palpate::test {
 
 /// Whether a sanitizer watches this build. All then takes some ten times as long, so tests that
@@ -11,5 +13,11 @@ inline constexpr bool sanitized = true;
 #else
 inline constexpr bool sanitized = false;
 #endif
+
+/// How often a test repeats itself: `times`, or a sixth of it where a sanitizer or valgrind
+/// watches.
+inline int rounds(int times) {
+  return sanitized || std::getenv("PALPATE_MEMCHECK") != nullptr ? (times + 5) / 6 : times;
+}
 
 }  // namespace palpate::test

@@ -188,7 +188,7 @@ std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
     if (left > std::max(2.0 * interval, grace))
       lines.push_back(fmt::format(
           "{}: its frames ended at t = {:.3f} s, {:.3f} s before the path, which touched the last "
-          "one from there on",
+          "one from there on; sight gives no force of a frame that is too old",
           uris[i], frames.last, left));
   }
   if (!touched_) lines.push_back(nothing_met());

@@ -97,6 +97,8 @@ export class Plots {
     this.parent.replaceChildren();
     const style = getComputedStyle(document.documentElement);
     const css = (name: string) => style.getPropertyValue(name).trim();
+    // The page's letters grow with the window: those of the axes do too.
+    const grown = (pixels: number) => Math.round((pixels * parseFloat(style.fontSize)) / 14);
     this.plots = QUANTITIES.map((quantity, i) => {
       const article = document.createElement("article");
       article.className = "plot";
@@ -114,7 +116,7 @@ export class Plots {
       const last = i === QUANTITIES.length - 1;
       const axis = {
         stroke: css("--muted"),
-        font: `11px ${style.fontFamily}`,
+        font: `${grown(11)}px ${style.fontFamily}`,
         grid: { stroke: css("--line"), width: 1 },
         ticks: { show: false },
       };
@@ -132,8 +134,8 @@ export class Plots {
             },
           },
           axes: [
-            { ...axis, show: last, size: 22, values: (_, v) => v.map((t) => `${t} s`) },
-            { ...axis, size: 36, space: 24 },
+            { ...axis, show: last, size: grown(22), values: (_, v) => v.map((t) => `${t} s`) },
+            { ...axis, size: grown(36), space: grown(24) },
           ],
           series: [
             {},

@@ -11,9 +11,9 @@
 
 #include <Eigen/Geometry>
 
-#include "app/playback.hpp"
 #include "palpate/core/cloud.hpp"
 #include "palpate/core/tick.hpp"
+#include "palpate/session/frame_sequence.hpp"
 
 namespace palpate::app {
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -8,7 +7,6 @@
 #include <fmt/format.h>
 
 #include "app/options.hpp"
-#include "app/playback.hpp"
 #include "app/program_methods.hpp"
 #include "app/progress.hpp"
 #include "app/signals.hpp"
@@ -20,6 +18,7 @@
 #include "palpate/core/sensor.hpp"
 #include "palpate/devices/hip_path.hpp"
 #include "palpate/methods/methods.hpp"
+#include "palpate/session/frame_sequence.hpp"
 #include "palpate/session/press_path.hpp"
 
 namespace palpate::app {
@@ -37,7 +36,7 @@ struct TraceOptions {
 };
 
 // A file's path, or one that presses what the first camera sees.
-HipPath path_of(const TraceOptions& options, const Playback& playback) {
+HipPath path_of(const TraceOptions& options, const FrameSequence& playback) {
   if (options.press.empty()) return HipPath::read_csv(options.path);
   const auto* image = dynamic_cast<const DepthImage*>(playback.upcoming(0));
   if (image == nullptr)
@@ -61,7 +60,7 @@ int trace(const TraceOptions& options) {
                 "give a CSV file with --path, or a pixel of the first frame with --press U,V");
   if (options.press.empty() && !options.slide_to.empty())
     throw Error("--slide-to", "there is no --press to slide from", "add --press U,V");
-  Playback playback(options.cameras);
+  FrameSequence playback(options.cameras);
   const HipPath path = path_of(options, playback);
   for (std::size_t camera = 0; camera < playback.cameras(); ++camera) {
     const SourceInfo& about = playback.source(camera).info();
@@ -70,33 +69,24 @@ int trace(const TraceOptions& options) {
   }
   const MethodRegistry methods = program_methods(&playback.source(0));
   const MethodChoice choice = options.method.choice(methods);
-  std::vector<SensorKind> sensors;
-  for (std::size_t camera = 0; camera < playback.cameras(); ++camera)
-    sensors.push_back(playback.source(camera).info().sensor);
   const auto& [name, given] = choice;
-  const Parameters parameters = for_sensors(given, sensors);
+  const Parameters parameters = for_sensors(given, playback.sensors());
   const std::unique_ptr<Method> method = make_method(name, parameters, methods);
-  playback.check(*method);
-  method->seat(path.at(path.first_time()));
+  playback.check(*method);  // before a file is written over
   TraceWriter writer(options.out);
   Summary summary;
   const double r_c = parameters.proxy.r_c();
   TraceRemarks remarks(r_c);
   const Interruption interruption;
-
-  const double duration = path.last_time() - path.first_time();
-  // A path of whole milliseconds has its last tick at its last time, whatever the rounding.
-  const auto ticks = static_cast<std::int64_t>(std::floor(duration * options.rate + 1e-6)) + 1;
+  const std::int64_t ticks = ticks_along(path, options.rate);
   Progress progress("trace", static_cast<std::size_t>(ticks));
-  for (std::int64_t i = 0; i < ticks && interruption.signal() == 0; ++i) {
-    const double t = path.first_time() + static_cast<double>(i) / options.rate;
-    playback.adopt_until(t, [&](const Cloud& cloud, double stamp) { method->frame(cloud, stamp); });
-    const Tick tick = method->tick(path.at(t), t);
+  touch_along(playback, *method, path, options.rate, [&](const Tick& tick) {
     writer.write(tick);
     remarks.count(tick, playback.newest());
     summary.count(tick, least_behind(playback.newest(), tick.proxy, r_c), r_c);
     progress.advance();
-  }
+    return interruption.signal() == 0;
+  });
   summary.frames = playback.adopted();
   writer.finish();
   progress.finish();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/experiment.hpp"
 
+#include <algorithm>
+
 #include "lab/experiments/feel.hpp"
 #include "lab/experiments/fidelity.hpp"
 #include "lab/experiments/field.hpp"
@@ -36,7 +38,11 @@ std::vector<std::string> methods_of(const Experiment& experiment,
                                     const ExperimentOptions& options) {
   if (options.methods.empty())
     return {experiment.default_methods.begin(), experiment.default_methods.end()};
-  for (const std::string& name : options.methods) static_cast<void>(methods().find(name));
+  for (const std::string& name : options.methods) {
+    const bool is_own = std::any_of(options.own_methods.begin(), options.own_methods.end(),
+                                    [&](const OwnMethod& method) { return method.name == name; });
+    if (!is_own) static_cast<void>(methods().find(name));
+  }
   return options.methods;
 }
 

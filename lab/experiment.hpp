@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "lab/method.hpp"
 #include "lab/table.hpp"
 #include "palpate/core/parameters.hpp"
 
@@ -31,6 +32,8 @@ struct ExperimentOptions {
       families;  ///< of pop, methods; classes of field, scenes of fidelity; or all
   std::vector<std::string> fixed;  ///< KEY=VALUE: not drawn by chance
   std::string case_text;           ///< one case, as a run printed it, and nothing else
+  /// Methods besides those of the lab, of whoever calls; `pop` and `fidelity` know them.
+  std::vector<OwnMethod> own_methods;
 };
 
 /// A piece of an experiment that needs no other: its rows of the CSV, each ended by a newline.

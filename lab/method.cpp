@@ -54,7 +54,11 @@ MethodRegistry methods(const Truth& truth) {
   return all;
 }
 
-std::unique_ptr<Method> make_method(std::string_view name, const MethodSetup& setup) {
+std::unique_ptr<Method> make_method(std::string_view name, const MethodSetup& setup,
+                                    const std::vector<OwnMethod>& own) {
+  for (const OwnMethod& method : own) {
+    if (method.name == name) return method.make(setup);
+  }
   return methods(setup.truth).find(name).make(setup.parameters);
 }
 

@@ -55,11 +55,19 @@ struct MethodSetup {
   Truth truth;  ///< for `ideal`, the ruler; no honest method looks at it
 };
 
+/// A method that the lab does not know by name.
+struct OwnMethod {
+  std::string name;
+  /// Called for each case, by any thread. @throws what ends the experiment
+  std::function<std::unique_ptr<Method>(const MethodSetup&)> make;
+};
+
 /// The library's methods and those of the lab, in the order in which tables show them.
 /// @param truth  for `ideal`; without it making that one fails
 MethodRegistry methods(const Truth& truth = nullptr);
 
 /// @throws Error for an unknown name, or if the method lacks something in the set-up.
-std::unique_ptr<Method> make_method(std::string_view name, const MethodSetup& setup);
+std::unique_ptr<Method> make_method(std::string_view name, const MethodSetup& setup,
+                                    const std::vector<OwnMethod>& own = {});
 
 }  // namespace palpate::lab

@@ -166,7 +166,7 @@ std::string rest_on_grid(const std::string& name, const ExperimentOptions& optio
     grid.noise = noise;
     grid.seed = options.seed * 1000 + static_cast<std::uint64_t>(k);
     const Truth truth = flat([](double) { return 0.0; });
-    const auto method = make_method(name, {options.parameters, truth});
+    const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
     const Vec3 hip(0.1 * r_c, 0.1 * r_c, -press);
     method->seat(Vec3(hip.x(), hip.y(), 4.0 * r_c));
     watch(*method,
@@ -212,7 +212,7 @@ std::string rest_in_sight(const std::string& name, const ExperimentOptions& opti
   for (int k = 0; k < repeats; ++k) {
     SyntheticCamera camera =
         look_at(*scene, distance, options.seed * 1000 + static_cast<std::uint64_t>(k));
-    const auto method = make_method(name, {options.parameters, truth});
+    const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
     watch(*method,
           {.frame_rate = f_c,
            .duration = contact_time + 2.0,
@@ -244,7 +244,7 @@ std::string move_in_sight(const std::string& name, const ExperimentOptions& opti
     const auto height = [&](double t) { return speed * std::max(t - start, 0.0); };
     SyntheticCamera camera =
         look_at(*scene, 0.95, options.seed * 1000 + static_cast<std::uint64_t>(k));
-    const auto method = make_method(name, {options.parameters, truth});
+    const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
     const std::size_t before = watched.error.size();
     watch(*method,
           {.frame_rate = f_c,
@@ -282,7 +282,7 @@ std::string slide_on_plane(const std::string& name, const ExperimentOptions& opt
   grid.spacing = 0.3 * r_c;
   grid.half_x = grid.half_y = 0.12;
   const Truth truth = flat([](double) { return 0.0; });
-  const auto method = make_method(name, {options.parameters, truth});
+  const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
   const auto hip = [&](double t) {
     const double x = 0.05 * (t - 1.0);
     return Vec3(x, 0.1 * x + 0.1 * r_c, -press);
@@ -310,7 +310,7 @@ std::string slide_on_relief(const std::string& name, const ExperimentOptions& op
   grid.spacing = 0.3 * r_c;
   grid.half_x = grid.half_y = 0.08;
   grid.height = [](double x, double) { return 1.5e-3 * std::sin(200.0 * std::numbers::pi * x); };
-  const auto method = make_method(name, {options.parameters, truth});
+  const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
   const auto hip = [&](double t) { return Vec3(0.02 * (t - 1.5), 0.1 * r_c, -press); };
   method->seat(hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
   Watched watched;

@@ -22,6 +22,12 @@ constexpr double patience = 0.5;  // [s] behind for longer than this is lost
 constexpr double noticed =
     0.3;  // [N] largest change of force by an occluder that counts as unnoticed
 
+using MethodMaker = std::function<std::unique_ptr<Method>(const MethodSetup&)>;
+
+MethodMaker maker_of(const std::string& name, const std::vector<OwnMethod>& own) {
+  return [name, own](const MethodSetup& setup) { return make_method(name, setup, own); };
+}
+
 struct Outcome {
   ForceJudge force;
   bool lost = false;
@@ -31,9 +37,9 @@ struct Outcome {
   double caused = 0.0;  // [N] of it, by what passes: largest difference from the same without it
 };
 
-std::vector<double> forces_of(const std::string& method_name, const PopStage& stage,
+std::vector<double> forces_of(const MethodMaker& make, const PopStage& stage,
                               const Parameters& parameters) {
-  const auto method = make_method(method_name, {parameters, stage.truth});
+  const auto method = make({parameters, stage.truth});
   method->seat(stage.seat);
   std::vector<double> forces;
   play(*method, stage.scenario, [&](const Tick& tick) {
@@ -46,10 +52,10 @@ std::vector<double> forces_of(const std::string& method_name, const PopStage& st
 // The proxy is behind if its centre is inside a body, in truth now and as the newest frame showed
 // it (between frames nobody can know), while the ruler's is not.
 // @param compare  play it without what passes, too, to say what that causes
-Outcome play_case(const std::string& method_name, const PopCase& c, const Parameters& parameters,
+Outcome play_case(const MethodMaker& make, const PopCase& c, const Parameters& parameters,
                   bool compare) {
   const PopStage stage = find_pop_family(c.family).stage(c, parameters);
-  const auto method = make_method(method_name, {parameters, stage.truth});
+  const auto method = make({parameters, stage.truth});
   const auto ruler = make_method("ideal", {parameters, stage.truth});
   method->seat(stage.seat);
   ruler->seat(stage.seat);
@@ -60,9 +66,9 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
   double last_force = 0.0;
   double least = 1e9;
   double most = -1e9;
-  const std::vector<double> undisturbed =
-      compare && stage.undisturbed ? forces_of(method_name, *stage.undisturbed, parameters)
-                                   : std::vector<double>();
+  const std::vector<double> undisturbed = compare && stage.undisturbed
+                                              ? forces_of(make, *stage.undisturbed, parameters)
+                                              : std::vector<double>();
   std::size_t ticks = 0;
   play(*method, stage.scenario, [&](const Tick& tick) {
     const Tick truly = ruler->tick(tick.hip, tick.t);
@@ -104,11 +110,11 @@ Outcome play_case(const std::string& method_name, const PopCase& c, const Parame
 
 // The simplest case that is still lost: each value in turn is made simple, or brought half way
 // there as often as it is still lost, until nothing more can be done. At most `most_tries` plays.
-PopCase shrink(const std::string& method, PopCase c, const Parameters& parameters) {
+PopCase shrink(const MethodMaker& make, PopCase c, const Parameters& parameters) {
   constexpr int most_tries = 60;
   int tries = 0;
   const auto still_lost = [&](const PopCase& simpler) {
-    return ++tries <= most_tries && play_case(method, simpler, parameters, false).lost;
+    return ++tries <= most_tries && play_case(make, simpler, parameters, false).lost;
   };
   for (bool simpler = true; simpler && tries < most_tries;) {
     simpler = false;
@@ -150,7 +156,9 @@ PopCase with_fixed(PopCase c, const std::vector<std::string>& fixed) {
 }
 
 std::string row_of(const std::string& method, const PopFamily& family, int from, int count,
-                   const std::function<PopCase(int)>& draw, const Parameters& parameters) {
+                   const std::function<PopCase(int)>& draw, const ExperimentOptions& options) {
+  const Parameters& parameters = options.parameters;
+  const MethodMaker make = maker_of(method, options.own_methods);
   int lost = 0;
   int dipped = 0;
   double step = 0.0;
@@ -167,10 +175,10 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
   std::string simplest = "-";
   for (int i = from; i < from + count; ++i) {
     const PopCase c = draw(i);
-    const Outcome outcome = play_case(method, c, parameters, true);
+    const Outcome outcome = play_case(make, c, parameters, true);
     if (outcome.lost && lost == 0) {
       first = c.text();
-      simplest = shrink(method, c, parameters).text();
+      simplest = shrink(make, c, parameters).text();
     }
     lost += outcome.lost ? 1 : 0;
     ghosts += outcome.force.ghost() ? 1 : 0;
@@ -232,7 +240,7 @@ std::vector<Cell> pop_cells(const Experiment& experiment, const ExperimentOption
     for (const std::string& name : methods_of(experiment, options)) {
       cells.emplace_back([=] {
         return row_of(
-            name, find_pop_family(c.family), 0, 1, [c](int) { return c; }, options.parameters);
+            name, find_pop_family(c.family), 0, 1, [c](int) { return c; }, options);
       });
     }
     return cells;
@@ -250,7 +258,7 @@ std::vector<Cell> pop_cells(const Experiment& experiment, const ExperimentOption
                     draw_pop_case(*family, options.seed, static_cast<std::uint64_t>(i)),
                     options.fixed);
               },
-              options.parameters);
+              options);
         });
       }
     }
@@ -391,7 +399,7 @@ void ForceJudge::add(const Tick& tick, const Tick& ruler, double clear) {
 }
 
 bool is_lost(const std::string& method, const PopCase& c, const Parameters& parameters) {
-  return play_case(method, c, parameters, false).lost;
+  return play_case(maker_of(method, {}), c, parameters, false).lost;
 }
 
 Experiment pop_experiment() {

@@ -170,7 +170,7 @@ double scale_at(Action action, const Place& place, double t) {
 std::shared_ptr<const DepthImage> composed(const DepthImage& frame, const Place& place,
                                            Action action, double t) {
   const Intrinsics& k = frame.intrinsics();
-  std::vector<std::uint16_t> depth = frame.depth();
+  std::vector<std::uint16_t> depth = frame.depth().copy();
   const double cu = k.fx * place.at.x() / place.at.z() + k.cx;
   const double cv = k.fy * place.at.y() / place.at.z() + k.cy;
   const double radius = patch_radius * k.fx / place.at.z();  // [px]

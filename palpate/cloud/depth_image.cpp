@@ -337,7 +337,7 @@ ViewingRays::Window ViewingRays::window(const Vec3& centre, double radius) const
           last(row_min_, y.high)};
 }
 
-DepthImage::DepthImage(std::shared_ptr<const ViewingRays> rays, std::vector<std::uint16_t> depth,
+DepthImage::DepthImage(std::shared_ptr<const ViewingRays> rays, DepthReadings depth,
                        double units_per_metre, const Eigen::Isometry3d& world_from_camera,
                        std::vector<std::uint8_t> brightness)
     : rays_(std::move(rays)),

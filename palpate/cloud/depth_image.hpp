@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -61,6 +64,42 @@ class ViewingRays {
   std::vector<double> column_min_, column_max_, row_min_, row_max_;
 };
 
+/// The readings of a depth image, row by row, and what keeps them: a vector of their own, a
+/// driver's buffer or another language's array. Copies share the readings. They must not change
+/// meanwhile.
+class DepthReadings {
+ public:
+  DepthReadings(std::vector<std::uint16_t> readings)  // NOLINT(google-explicit-constructor)
+      : DepthReadings(std::make_shared<const std::vector<std::uint16_t>>(std::move(readings))) {}
+  /// @param owner  keeps `readings` alive; released on whichever thread lets go of the image last
+  DepthReadings(std::span<const std::uint16_t> readings, std::shared_ptr<const void> owner)
+      : readings_(readings), owner_(std::move(owner)) {}
+
+  [[nodiscard]] const std::uint16_t* data() const noexcept { return readings_.data(); }
+  [[nodiscard]] std::size_t size() const noexcept { return readings_.size(); }
+  [[nodiscard]] auto begin() const noexcept { return readings_.begin(); }
+  [[nodiscard]] auto end() const noexcept { return readings_.end(); }
+  [[nodiscard]] std::uint16_t front() const noexcept { return readings_.front(); }
+  std::uint16_t operator[](std::size_t i) const noexcept { return readings_[i]; }
+  [[nodiscard]] std::vector<std::uint16_t> copy() const { return {begin(), end()}; }
+  operator std::span<const std::uint16_t>() const noexcept {  // NOLINT(google-explicit-constructor)
+    return readings_;
+  }
+  friend bool operator==(const DepthReadings& a, std::span<const std::uint16_t> b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end());
+  }
+  friend bool operator==(const DepthReadings& a, const DepthReadings& b) {
+    return a == b.readings_;
+  }
+
+ private:
+  explicit DepthReadings(const std::shared_ptr<const std::vector<std::uint16_t>>& readings)
+      : DepthReadings(*readings, readings) {}
+
+  std::span<const std::uint16_t> readings_;
+  std::shared_ptr<const void> owner_;
+};
+
 /// One capture of a depth camera: 16-bit depth as it came, touched in place.
 ///
 /// Section 4.2: a depth image already sorts its points by direction, so the points near the proxy
@@ -75,8 +114,7 @@ class DepthImage final : public Cloud {
   /// @param brightness         0 to 255 of each pixel, row by row; empty if it is not known
   /// @throws Error if the size does not match, the units are not positive, or the pose is not
   ///         rigid and finite.
-  DepthImage(std::shared_ptr<const ViewingRays> rays, std::vector<std::uint16_t> depth,
-             double units_per_metre,
+  DepthImage(std::shared_ptr<const ViewingRays> rays, DepthReadings depth, double units_per_metre,
              const Eigen::Isometry3d& world_from_camera = Eigen::Isometry3d::Identity(),
              std::vector<std::uint8_t> brightness = {});
 
@@ -91,7 +129,7 @@ class DepthImage final : public Cloud {
 
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return rays_->intrinsics(); }
   [[nodiscard]] const ViewingRays& rays() const noexcept { return *rays_; }
-  [[nodiscard]] const std::vector<std::uint16_t>& depth() const noexcept { return depth_; }
+  [[nodiscard]] const DepthReadings& depth() const noexcept { return depth_; }
   /// As given: the kernel does not look at it.
   [[nodiscard]] const std::vector<std::uint8_t>& brightness() const noexcept { return brightness_; }
   [[nodiscard]] double units_per_metre() const noexcept { return units_per_metre_; }
@@ -113,7 +151,7 @@ class DepthImage final : public Cloud {
                                                 int stride) const noexcept;
 
   std::shared_ptr<const ViewingRays> rays_;
-  std::vector<std::uint16_t> depth_;
+  DepthReadings depth_;
   double units_per_metre_;
   double metres_per_unit_;
   Eigen::Isometry3d world_from_camera_;

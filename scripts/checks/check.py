@@ -33,6 +33,7 @@ KNOWS = {
     "bench": {"core", "paper", "methods", "cloud", "search"},
 }
 KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench"}
+KNOWS["python"] = KNOWS["app"] - {"viewer"} | {"lab"}
 # The programs that are built when they are first asked for.
 KNOWS["app/lab"] = KNOWS["app"] | {"app", "lab"}
 KNOWS["app/bench"] = KNOWS["app"] | {"app", "bench"}
@@ -82,7 +83,7 @@ def room_of(path):
     parts = path.split("/")
     if "/".join(parts[:2]) in ("app/lab", "app/bench"):
         return "/".join(parts[:2])
-    if len(parts) > 1 and parts[0] in ("search", "lab", "bench", "app"):
+    if len(parts) > 1 and parts[0] in ("search", "lab", "bench", "app", "python"):
         return parts[0]
     return parts[1] if len(parts) > 2 and parts[0] == "palpate" else None
 
@@ -90,7 +91,7 @@ def room_of(path):
 def check_rooms(root):
     """Includes and CMake links that point up or sideways."""
     faults = []
-    of_a_room = re.compile(r"^(palpate|search|lab|bench|app)/.*(\.[ch]pp|CMakeLists\.txt)$")
+    of_a_room = re.compile(r"^(palpate|search|lab|bench|app|python)/.*(\.[ch]pp|CMakeLists\.txt)$")
     for path in files(root, of_a_room):
         room = room_of(path)
         if room is None:

@@ -153,7 +153,7 @@ class FaultyCamera {
   std::shared_ptr<const Cloud> noise() {
     const auto seen = wall();
     const DepthImage& image = *seen;
-    std::vector<std::uint16_t> depth = image.depth();
+    std::vector<std::uint16_t> depth = image.depth().copy();
     for (std::uint16_t& value : depth) value = static_cast<std::uint16_t>(random_());
     return std::make_shared<DepthImage>(std::make_shared<ViewingRays>(image.intrinsics()), depth,
                                         1000.0);

@@ -94,7 +94,7 @@ class ForeignBag : public ::testing::Test {
   // The only depth image of a bag of one.
   std::vector<std::uint16_t> depth_of(const std::string& options = "") {
     const auto frame = open(options)->next();
-    return dynamic_cast<const DepthImage&>(*frame->cloud).depth();
+    return dynamic_cast<const DepthImage&>(*frame->cloud).depth().copy();
   }
 
   TemporaryFolder folder_;

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/playback.hpp"
+#include "palpate/session/frame_sequence.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/drivers.hpp"
 
-namespace palpate::app {
+namespace palpate {
 
-Playback::Playback(const std::vector<std::string>& uris) {
+FrameSequence::FrameSequence(const std::vector<std::string>& uris) {
   if (uris.empty())
     throw Error("--camera", "no camera is given", "give one, such as --camera synthetic:desk");
   if (uris.size() > Patch::max_views)
@@ -26,7 +27,7 @@ Playback::Playback(const std::vector<std::string>& uris) {
   newest_.resize(cameras_.size());
 }
 
-void Playback::adopt_until(double t, const std::function<void(const Cloud&, double)>& adopt) {
+void FrameSequence::adopt_until(double t, const std::function<void(const Cloud&, double)>& adopt) {
   for (;;) {
     Camera* due = nullptr;
     for (Camera& camera : cameras_) {
@@ -51,7 +52,7 @@ void Playback::adopt_until(double t, const std::function<void(const Cloud&, doub
   }
 }
 
-std::vector<ShownFrames> Playback::shown() const {
+std::vector<ShownFrames> FrameSequence::shown() const {
   std::vector<ShownFrames> all;
   for (const Camera& camera : cameras_)
     all.push_back({.count = camera.adopted,
@@ -61,8 +62,34 @@ std::vector<ShownFrames> Playback::shown() const {
   return all;
 }
 
-void Playback::check(const Method& method) const {
+std::vector<SensorKind> FrameSequence::sensors() const {
+  std::vector<SensorKind> all;
+  for (const Camera& camera : cameras_) all.push_back(camera.source->info().sensor);
+  return all;
+}
+
+void FrameSequence::check(const Method& method) const {
   for (const Camera& camera : cameras_) method.check(*camera.next->cloud);
 }
 
-}  // namespace palpate::app
+std::int64_t ticks_along(const HipPath& path, double rate) {
+  if (!(rate >= 1.0 && rate <= 100000.0))
+    throw Error("rate", std::to_string(rate) + " Hz is not a tick rate", "give 1 to 100000");
+  // A path of whole milliseconds has its last tick at its last time, whatever the rounding.
+  const double duration = path.last_time() - path.first_time();
+  return static_cast<std::int64_t>(std::floor(duration * rate + 1e-6)) + 1;
+}
+
+void touch_along(FrameSequence& frames, Method& method, const HipPath& path, double rate,
+                 const std::function<bool(const Tick&)>& on_tick) {
+  const std::int64_t ticks = ticks_along(path, rate);
+  frames.check(method);
+  method.seat(path.at(path.first_time()));
+  for (std::int64_t i = 0; i < ticks; ++i) {
+    const double t = path.first_time() + static_cast<double>(i) / rate;
+    frames.adopt_until(t, [&](const Cloud& cloud, double stamp) { method.frame(cloud, stamp); });
+    if (!on_tick(method.tick(path.at(t), t))) return;
+  }
+}
+
+}  // namespace palpate

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -9,9 +10,10 @@
 #include <vector>
 
 #include "palpate/core/method.hpp"
+#include "palpate/devices/hip_path.hpp"
 #include "palpate/sources/source.hpp"
 
-namespace palpate::app {
+namespace palpate {
 
 /// The frames of one camera that have been handed over so far.
 struct ShownFrames {
@@ -23,10 +25,10 @@ struct ShownFrames {
 
 /// Frames of one or several cameras in the order of their stamps, each adopted at the first tick at
 /// or after it. Several cameras are touched at once: each new frame replaces its camera's last.
-class Playback {
+class FrameSequence {
  public:
   /// @throws Error if a source cannot be opened, or there are none.
-  explicit Playback(const std::vector<std::string>& uris);
+  explicit FrameSequence(const std::vector<std::string>& uris);
 
   /// Hands every frame stamped at or before `t` [s], and its stamp, to `adopt`, oldest first. A
   /// frame lives until the next has been handed over.
@@ -41,6 +43,8 @@ class Playback {
   [[nodiscard]] std::vector<ShownFrames> shown() const;
   [[nodiscard]] std::size_t cameras() const { return cameras_.size(); }
   [[nodiscard]] const Source& source(std::size_t camera) const { return *cameras_[camera].source; }
+  /// How each camera measures, for `for_sensors`.
+  [[nodiscard]] std::vector<SensorKind> sensors() const;
   /// What a camera will show next; null after its last frame.
   [[nodiscard]] const Cloud* upcoming(std::size_t camera) const {
     return cameras_[camera].next ? cameras_[camera].next->cloud.get() : nullptr;
@@ -66,4 +70,17 @@ class Playback {
   std::size_t adopted_ = 0;
 };
 
-}  // namespace palpate::app
+/// How many ticks `touch_along` makes.
+/// @throws Error if `rate` is not in 1 to 100 000 Hz.
+std::int64_t ticks_along(const HipPath& path, double rate);
+
+/// Moves a hand along a path through what the cameras saw, tick by tick, each frame taken into use
+/// at the first tick at or after its stamp; the proxy starts at the path's first place. The same
+/// arguments give the same ticks, bit for bit.
+/// @param rate     [Hz] ticks a second
+/// @param on_tick  sees each tick; false ends the run
+/// @throws Error if the method cannot touch the frames, or one of them cannot be read.
+void touch_along(FrameSequence& frames, Method& method, const HipPath& path, double rate,
+                 const std::function<bool(const Tick&)>& on_tick);
+
+}  // namespace palpate

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <pybind11/eigen.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "palpate/core/parameters.hpp"
+#include "palpate/core/tick.hpp"
+#include "palpate/servo/cycle.hpp"
+
+namespace palpate::python {
+
+namespace py = pybind11;
+
+using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+using PointsIn = Eigen::Ref<const Points>;
+
+/// A tick as a record of a structured array.
+struct TickRecord {
+  double t;
+  std::array<double, 3> hip, proxy, normal, force;
+  double surface_velocity;
+  std::int64_t frame;
+  std::int64_t steps;
+  std::uint32_t flags;
+  std::int32_t state;
+};
+
+/// A cycle of a session as a record of a structured array.
+struct CycleRecord {
+  double t;
+  std::array<double, 3> hip, proxy, normal, asked, force, position;
+  double surface_velocity, gain, frame_age;
+  std::int64_t frame;
+  std::uint64_t number;
+  std::int64_t steps;
+  std::uint32_t flags, safety, hand;
+  std::int32_t state;
+};
+
+TickRecord record_of(const Tick& tick);
+CycleRecord record_of(const ServoTick& tick);
+
+/// Structured arrays; made once the module has registered their types.
+py::array array_of(const std::vector<TickRecord>& ticks);
+py::array array_of(const std::vector<CycleRecord>& ticks);
+
+/// A 4x4 matrix as a rigid pose. @throws Error naming `subject` if it is none.
+Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const char* subject);
+
+/// Sets the parameters named by keywords. @throws Error for an unknown name or a value out of its
+/// range; TypeError for what is no number.
+void set_all(Parameters& parameters, const py::kwargs& values);
+
+/// Lets Python handle a signal, such as Ctrl-C; throws what it raises. Takes the GIL.
+void check_signals();
+
+/// An object of Python's that C++ may let go of on any thread.
+std::shared_ptr<const void> kept(py::object object);
+
+/// What the parts of the module define.
+void define_core(py::module_& module);
+void define_sources(py::module_& module);
+void define_session(py::module_& module);
+void define_bench(py::module_& module);
+
+}  // namespace palpate::python

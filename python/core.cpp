@@ -1,0 +1,380 @@
+// SPDX-License-Identifier: Apache-2.0
+// Numbers that can be set, what can be touched, and a method that touches it.
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/methods/methods.hpp"
+#include "palpate/servo/safety.hpp"
+
+#include "python/arrays.hpp"
+#include "python/python_method.hpp"
+
+namespace palpate::python {
+namespace {
+
+using SharedCloud = std::shared_ptr<const Cloud>;
+using SharedRays = std::shared_ptr<const ViewingRays>;
+
+/// A pinhole camera, whose viewing rays are computed once for all of its frames.
+struct Camera {
+  SharedRays rays;
+  [[nodiscard]] const Intrinsics& intrinsics() const { return rays->intrinsics(); }
+};
+
+Camera make_camera(int width, int height, double fx, double fy, double cx, double cy,
+                   const std::vector<double>& distortion) {
+  Intrinsics k{.width = width, .height = height, .fx = fx, .fy = fy, .cx = cx, .cy = cy};
+  if (distortion.size() > k.distortion.size())
+    throw Error("distortion", std::to_string(distortion.size()) + " coefficients are too many",
+                "give at most eight: k1 k2 p1 p2 k3 k4 k5 k6");
+  std::copy(distortion.begin(), distortion.end(), k.distortion.begin());
+  validate(k);
+  return {std::make_shared<const ViewingRays>(k)};
+}
+
+/// Takes the array's own memory, which stays alive as long as the image does.
+std::shared_ptr<DepthImage> make_image(const py::array& depth, const Camera& camera,
+                                       double units_per_metre,
+                                       const std::optional<Eigen::Matrix4d>& world_from_camera) {
+  const Intrinsics& k = camera.intrinsics();
+  if (!py::isinstance<py::array_t<std::uint16_t>>(depth))
+    throw py::type_error("depth: it has to be an array of uint16, not of " +
+                         py::cast<std::string>(py::str(depth.dtype())) +
+                         "; for metres, numpy.round(metres * 1000).astype(numpy.uint16)");
+  if (depth.ndim() != 2 || depth.shape(0) != k.height || depth.shape(1) != k.width)
+    throw Error("depth", "its shape is " + py::cast<std::string>(py::str(depth.attr("shape"))),
+                "give one of (" + std::to_string(k.height) + ", " + std::to_string(k.width) +
+                    "), rows and columns of the camera");
+  if ((depth.flags() & py::array::c_style) == 0)
+    throw Error("depth", "its rows do not follow one another in memory",
+                "give numpy.ascontiguousarray(depth)");
+  const auto* data = static_cast<const std::uint16_t*>(depth.data());
+  return std::make_shared<DepthImage>(
+      camera.rays, DepthReadings({data, static_cast<std::size_t>(depth.size())}, kept(depth)),
+      units_per_metre,
+      world_from_camera ? pose_of(*world_from_camera, "world_from_camera")
+                        : Eigen::Isometry3d::Identity());
+}
+
+std::shared_ptr<PointCloud> make_points(const PointsIn& points,
+                                        const std::optional<Vec3>& viewpoint, double voxel) {
+  std::vector<Vec3> list;
+  list.reserve(static_cast<std::size_t>(points.rows()));
+  for (Eigen::Index i = 0; i < points.rows(); ++i) list.emplace_back(points.row(i).transpose());
+  const py::gil_scoped_release released;
+  return std::make_shared<PointCloud>(list, viewpoint, voxel);
+}
+
+Points rows_of(const std::vector<Vec3>& points) {
+  Points rows(static_cast<Eigen::Index>(points.size()), 3);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    rows.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
+  return rows;
+}
+
+/// A method, and the frame that it touches.
+class Renderer {
+ public:
+  Renderer(const py::object& method, const py::kwargs& parameters) {
+    set_all(parameters_, parameters);
+    method_ = method_of(method, parameters_, trouble_);
+  }
+
+  void frame(const std::shared_ptr<Cloud>& cloud, double stamp) {
+    method_->check(*cloud);
+    {
+      const py::gil_scoped_release released;
+      method_->frame(*cloud, stamp);
+    }
+    cloud_ = cloud;  // only now may the frame before go
+    trouble_->rethrow();
+  }
+
+  Tick tick(const Vec3& hip, double t) {
+    const Tick tick = method_->tick(hip, t);
+    trouble_->rethrow();
+    return tick;
+  }
+
+  py::array ticks(const PointsIn& hips, const Eigen::Ref<const Eigen::VectorXd>& times) {
+    if (hips.rows() != times.size())
+      throw Error(
+          "ticks",
+          std::to_string(hips.rows()) + " HIPs for " + std::to_string(times.size()) + " times",
+          "give one time [s] for each HIP");
+    py::array_t<TickRecord> records(hips.rows());
+    TickRecord* record = records.mutable_data();
+    {
+      const py::gil_scoped_release released;
+      for (Eigen::Index i = 0; i < hips.rows() && !trouble_->first; ++i)
+        record[i] = record_of(method_->tick(hips.row(i).transpose(), times[i]));
+    }
+    trouble_->rethrow();
+    return records;
+  }
+
+  void set(const py::kwargs& values) {
+    Parameters changed = parameters_;
+    set_all(changed, values);
+    method_->set_parameters(changed);
+    parameters_ = changed;
+  }
+
+  void seat(const Vec3& proxy) { method_->seat(proxy); }
+  [[nodiscard]] const Parameters& parameters() const { return parameters_; }
+
+ private:
+  Parameters parameters_;
+  std::shared_ptr<Trouble> trouble_ = std::make_shared<Trouble>();
+  std::unique_ptr<Method> method_;
+  std::shared_ptr<Cloud> cloud_;
+};
+
+py::dict values_of(const Parameters& parameters) {
+  py::dict values;
+  for (const ParameterInfo& row : parameter_table())
+    values[py::str(std::string(row.name))] = row.get(parameters);
+  return values;
+}
+
+template <class Row>
+py::dict row_dict(const Row& row) {
+  py::dict entry;
+  entry["unit"] = std::string(row.unit);
+  entry["default"] = row.default_value;
+  entry["min"] = row.min;
+  entry["max"] = row.max;
+  entry["meaning"] = std::string(row.meaning);
+  entry["source"] = std::string(row.source);
+  return entry;
+}
+
+template <class Table>
+py::dict table_dict(const Table& table) {
+  py::dict all;
+  for (const auto& row : table) all[py::str(std::string(row.name))] = row_dict(row);
+  return all;
+}
+
+void define_tables(py::module_& m) {
+  m.def(
+      "parameters", [] { return table_dict(parameter_table()); },
+      "All numbers that can be set on a method: name -> unit, default, min, max, meaning, "
+      "source.");
+  m.def(
+      "limits", [] { return table_dict(safety_parameter_table()); },
+      "All numbers of a session's safety chain: name -> unit, default, min, max, meaning, "
+      "source.");
+  m.def(
+      "methods",
+      [] {
+        py::dict all;
+        for (const MethodInfo& method : standard_methods().entries())
+          all[py::str(method.name)] = method.summary;
+        return all;
+      },
+      "The methods that can be asked for by name: name -> what it is.");
+  m.def(
+      "flags",
+      [](std::uint32_t bits) {
+        py::dict set;
+        const auto table = tick_flag_table();
+        for (std::size_t i = 0; i < table.size(); ++i) {
+          if (((bits >> i) & 1U) != 0U)
+            set[py::str(std::string(table[i].name))] = std::string(table[i].meaning);
+        }
+        return set;
+      },
+      py::arg("bits"), "The conditions in a tick's `flags`: name -> what it means.");
+  m.def(
+      "safety_flags",
+      [](std::uint32_t bits) {
+        py::dict set;
+        const auto names = safety_flag_names();
+        const auto meanings = safety_flag_meanings();
+        for (std::size_t i = 0; i < names.size(); ++i) {
+          if (((bits >> i) & 1U) != 0U)
+            set[py::str(std::string(names[i]))] = std::string(meanings[i]);
+        }
+        return set;
+      },
+      py::arg("bits"), "What the safety chain did in a tick, from its `safety`.");
+}
+
+void define_clouds(py::module_& m) {
+  py::class_<Camera>(m, "Camera", "A pinhole camera; its viewing rays are computed once.")
+      .def(py::init(&make_camera), py::arg("width"), py::arg("height"), py::arg("fx"),
+           py::arg("fy"), py::arg("cx"), py::arg("cy"),
+           py::arg("distortion") = std::vector<double>(),
+           "Sizes, focal lengths and principal point [px]; the distortion's coefficients are k1 "
+           "k2 p1 p2 k3 k4 k5 k6 in OpenCV's order.")
+      .def_property_readonly("width", [](const Camera& c) { return c.intrinsics().width; })
+      .def_property_readonly("height", [](const Camera& c) { return c.intrinsics().height; })
+      .def_property_readonly("fx", [](const Camera& c) { return c.intrinsics().fx; })
+      .def_property_readonly("fy", [](const Camera& c) { return c.intrinsics().fy; })
+      .def_property_readonly("cx", [](const Camera& c) { return c.intrinsics().cx; })
+      .def_property_readonly("cy", [](const Camera& c) { return c.intrinsics().cy; })
+      .def_property_readonly("distortion",
+                             [](const Camera& c) { return c.intrinsics().distortion; })
+      .def("__repr__", [](const Camera& c) {
+        const Intrinsics& k = c.intrinsics();
+        return "palpate.Camera(" + std::to_string(k.width) + ", " + std::to_string(k.height) +
+               ", fx=" + std::to_string(k.fx) + ", fy=" + std::to_string(k.fy) +
+               ", cx=" + std::to_string(k.cx) + ", cy=" + std::to_string(k.cy) + ")";
+      });
+
+  py::class_<Cloud, std::shared_ptr<Cloud>>(m, "Cloud", "Whatever can be touched.")
+      .def(
+          "near",
+          [](const Cloud& cloud, const Vec3& centre, double radius) {
+            return CloudView(&cloud).near(centre, radius);
+          },
+          py::arg("centre"), py::arg("radius"),
+          "The points within `radius` [m] of `centre` [m, world], as an array (n, 3); at most "
+          "16 384, thinned evenly.");
+  py::class_<CloudView, std::shared_ptr<CloudView>>(
+      m, "CloudView", "What a method of your own sees of a frame, until its next one.")
+      .def("near", &CloudView::near, py::arg("centre"), py::arg("radius"),
+           "The points within `radius` [m] of `centre` [m, world], as an array (n, 3).")
+      .def_property_readonly("viewpoint", &CloudView::viewpoint,
+                             "[m] world: from where they were seen, if that is known");
+
+  py::class_<DepthImage, Cloud, std::shared_ptr<DepthImage>>(
+      m, "DepthImage", "One capture of a depth camera: 16-bit depth, touched in place.")
+      .def(py::init(&make_image), py::arg("depth"), py::arg("camera"),
+           py::arg("units_per_metre") = 1000.0, py::arg("world_from_camera") = py::none(),
+           "Depth along the optical axis, uint16 (height, width); 0 and 65535 are holes. The "
+           "array is not copied: it is kept alive, and must not change meanwhile. The pose is a "
+           "4x4 matrix, the camera's optical frame (x right, y down, z forward) in the world.")
+      .def_property_readonly(
+          "depth",
+          [](const py::object& self) {
+            const auto& image = py::cast<const DepthImage&>(self);
+            py::array_t<std::uint16_t> view({image.intrinsics().height, image.intrinsics().width},
+                                            image.depth().data(), self);
+            view.attr("setflags")(py::arg("write") = false);
+            return view;
+          },
+          "uint16 (height, width), not to be written to: the image's own memory")
+      .def_property_readonly("camera",
+                             [](const DepthImage& image) {
+                               return Camera{std::make_shared<const ViewingRays>(image.rays())};
+                             })
+      .def_property_readonly("units_per_metre", &DepthImage::units_per_metre)
+      .def_property_readonly(
+          "world_from_camera",
+          [](const DepthImage& image) {
+            return Eigen::Matrix4d(image.world_from_camera().matrix());
+          },
+          "4x4, the camera's optical frame in the world [m]")
+      .def(
+          "metres",
+          [](const DepthImage& image) {
+            const Intrinsics& k = image.intrinsics();
+            py::array_t<float> metres({k.height, k.width});
+            float* out = metres.mutable_data();
+            for (std::size_t i = 0; i < image.depth().size(); ++i) {
+              const std::uint16_t raw = image.depth()[i];
+              out[i] = is_measured(raw) ? static_cast<float>(raw / image.units_per_metre())
+                                        : std::numeric_limits<float>::quiet_NaN();
+            }
+            return metres;
+          },
+          "Depth [m] as float32 (height, width), NaN where nothing was measured.")
+      .def(
+          "points", [](const DepthImage& image) { return rows_of(image.points()); },
+          "All measured points [m, world], an array (n, 3).");
+
+  py::class_<PointCloud, Cloud, std::shared_ptr<PointCloud>>(
+      m, "PointCloud", "Points in no particular order, sorted once into a hash of voxels.")
+      .def(py::init(&make_points), py::arg("points"), py::arg("viewpoint") = py::none(),
+           py::arg("voxel") = 0.010,
+           "Points (n, 3) [m, world], and from where they were seen, if that is known.")
+      .def("__len__", &PointCloud::size)
+      .def_property_readonly("viewpoint", &PointCloud::viewpoint)
+      .def(
+          "points",
+          [](const PointCloud& cloud) {
+            Points rows(static_cast<Eigen::Index>(cloud.size()), 3);
+            for (std::size_t i = 0; i < cloud.size(); ++i)
+              rows.row(static_cast<Eigen::Index>(i)) = cloud.point(i).transpose();
+            return rows;
+          },
+          "All finite points [m, world], an array (n, 3), in the order of the voxels.");
+}
+
+void define_renderer(py::module_& m) {
+  py::enum_<ContactState>(m, "State", py::arithmetic(), "Where the proxy stands.")
+      .value("FREE", ContactState::free_motion, "nothing within r_2")
+      .value("CONTACT", ContactState::contact, "points between r_1 and r_2")
+      .value("ENTRENCHMENT", ContactState::entrenchment, "points within r_1");
+
+  py::class_<Tick>(m, "Tick", "One cycle of haptic rendering: HIP in, proxy and force out.")
+      .def_readonly("t", &Tick::t, "[s] as given")
+      .def_readonly("hip", &Tick::hip, "[m] world, as given")
+      .def_readonly("proxy", &Tick::proxy, "[m] world, the centre of the sphere")
+      .def_readonly("normal", &Tick::normal, "[-] unit, away from the surface; zero: none near")
+      .def_readonly("force", &Tick::force, "[N] world, on the hand; at most max_force long")
+      .def_readonly("state", &Tick::state)
+      .def_readonly("steps", &Tick::steps, "proxy steps taken")
+      .def_readonly("surface_velocity", &Tick::surface_velocity, "[m/s] towards the proxy")
+      .def_readonly("frame", &Tick::frame, "number of the frame in use, from 0; -1: none")
+      .def_readonly("flags", &Tick::flags, "bits that palpate.flags() names")
+      .def("__repr__", [](const Tick& tick) {
+        return "<palpate.Tick t=" + std::to_string(tick.t) + " s, " + to_string(tick.state) +
+               ", force " + std::to_string(tick.force.norm()) + " N>";
+      });
+
+  py::class_<Renderer>(
+      m, "Renderer",
+      "A method of haptic rendering: frames and HIPs in, proxy and force out.\n\n"
+      "The same calls give the same ticks, bit for bit. No safety chain stands behind it: what\n"
+      "drives a motor belongs into a Session.")
+      .def(py::init<const py::object&, const py::kwargs&>(), py::arg("method") = "sight",
+           "A method by its name (palpate.methods()) or an object of a class derived from\n"
+           "palpate.Method; parameters by their names (palpate.parameters()), in SI units.")
+      .def("frame", &Renderer::frame, py::arg("cloud"), py::arg("stamp"),
+           "Takes a frame into use: a DepthImage or PointCloud, and when it was captured [s].")
+      .def(
+          "frame",
+          [](Renderer& self, const py::array& depth, const Camera& camera, double stamp,
+             const std::optional<Eigen::Matrix4d>& world_from_camera, double units_per_metre) {
+            self.frame(make_image(depth, camera, units_per_metre, world_from_camera), stamp);
+          },
+          py::arg("depth"), py::kw_only(), py::arg("camera"), py::arg("stamp"),
+          py::arg("world_from_camera") = py::none(), py::arg("units_per_metre") = 1000.0,
+          "The same from a depth image, uint16 (height, width), without a copy.")
+      .def(
+          "frame",
+          [](Renderer& self, const PointsIn& points, double stamp,
+             const std::optional<Vec3>& viewpoint) {
+            self.frame(make_points(points, viewpoint, 0.010), stamp);
+          },
+          py::arg("points"), py::kw_only(), py::arg("stamp"), py::arg("viewpoint") = py::none(),
+          "The same from points (n, 3) [m, world].")
+      .def("tick", &Renderer::tick, py::arg("hip"), py::arg("t"),
+           "Moves the proxy towards the HIP [m, world] at time t [s] and renders the force.")
+      .def("ticks", &Renderer::ticks, py::arg("hips"), py::arg("times"),
+           "Many ticks on one frame: HIPs (n, 3) and times (n,) in, a structured array out.")
+      .def("set", &Renderer::set, "Changes parameters between two ticks; the contact stays.")
+      .def("seat", &Renderer::seat, py::arg("proxy"),
+           "Puts the proxy at a place [m, world] in free motion and forgets the contact.")
+      .def_property_readonly(
+          "parameters", [](const Renderer& self) { return values_of(self.parameters()); },
+          "All parameters as they are: name -> value.");
+}
+
+}  // namespace
+
+void define_core(py::module_& module) {
+  define_tables(module);
+  define_clouds(module);
+  define_renderer(module);
+}
+
+}  // namespace palpate::python

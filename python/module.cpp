@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/core/error.hpp"
+
+#include "python/arrays.hpp"
+
+PYBIND11_MODULE(_core, m) {
+  using namespace palpate::python;  // NOLINT(google-build-using-namespace)
+  m.doc() = "palpate's library, as the package palpate shows it.";
+  m.attr("__version__") = PALPATE_VERSION;
+  const auto error = py::register_exception<palpate::Error>(m, "Error", PyExc_ValueError);
+  error.attr("__doc__") = "Bad input: one line that says what was wrong and what to do.";
+  PYBIND11_NUMPY_DTYPE(TickRecord, t, hip, proxy, normal, force, surface_velocity, frame, steps,
+                       flags, state);
+  PYBIND11_NUMPY_DTYPE(CycleRecord, t, hip, proxy, normal, asked, force, position, surface_velocity,
+                       gain, frame_age, frame, number, steps, flags, safety, hand, state);
+  define_core(m);
+  define_sources(m);
+  define_session(m);
+  define_bench(m);
+}

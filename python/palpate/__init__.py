@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+"""palpate: feel what a depth camera sees.
+
+    import palpate
+    touch = palpate.Renderer("sight", stiffness=500)
+    touch.frame(depth, camera=camera, stamp=0.0)    # uint16, height x width
+    tick = touch.tick(hip, t)                       # .force [N], .proxy [m]
+
+`trace` touches a recording along a path, `Source` gives frames of cameras and recordings,
+`Session` is cameras, a device, the method and the safety chain as one object, and `bench` compares
+methods, your own among them. All numbers are SI, all places in the world's frame.
+"""
+
+from . import bench
+from ._core import (Camera, Cloud, CloudView, DepthImage, Error, Frame, PointCloud, Renderer,
+                    Session, Source, State, Tick, __version__, flags, limits, methods, parameters,
+                    read_session, safety_flags, trace)
+from .method import Method
+from .show import dataframe, plot
+
+__all__ = [
+    "Camera", "Cloud", "CloudView", "DepthImage", "Error", "Frame", "Method", "PointCloud",
+    "Renderer", "Session", "Source", "State", "Tick", "__version__", "bench", "dataframe", "flags",
+    "limits", "methods", "parameters", "plot", "read_session", "safety_flags", "trace",
+]

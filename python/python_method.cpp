@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "python/python_method.hpp"
+
+#include <utility>
+
+#include "palpate/core/error.hpp"
+#include "palpate/methods/methods.hpp"
+
+namespace palpate::python {
+
+const Patch& CloudView::gathered(const Ball& ball) {
+  if (cloud_ == nullptr)
+    throw Error("cloud", "a newer frame has taken its place",
+                "use a cloud only until the method's next frame");
+  if (!patch_) patch_ = std::make_unique<Patch>();
+  gather(*cloud_, ball, *patch_);
+  return *patch_;
+}
+
+std::optional<Vec3> CloudView::viewpoint() {
+  const Patch& patch = gathered(Ball{Vec3::Zero(), 1e-3});
+  return patch.view_count() > 0 ? patch.view(0).viewpoint : std::nullopt;
+}
+
+Points CloudView::near(const Vec3& centre, double radius) {
+  const Patch& patch = gathered(Ball{centre, radius});
+  Points points(static_cast<Eigen::Index>(patch.size()), 3);
+  for (std::size_t i = 0; i < patch.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    points(row, 0) = centre.x() + static_cast<double>(patch.x()[i]);
+    points(row, 1) = centre.y() + static_cast<double>(patch.y()[i]);
+    points(row, 2) = centre.z() + static_cast<double>(patch.z()[i]);
+  }
+  return points;
+}
+
+PythonMethod::PythonMethod(py::object object, std::shared_ptr<Trouble> trouble)
+    : object_(std::move(object)), trouble_(std::move(trouble)) {
+  for (const char* name : {"frame", "tick"}) {
+    if (!py::hasattr(object_, name))
+      throw Error("method", std::string("it has no function ") + name,
+                  "derive its class from palpate.Method");
+  }
+  tick_ = object_.attr("tick");
+}
+
+PythonMethod::~PythonMethod() {
+  const py::gil_scoped_acquire gil;
+  if (view_) view_->end();
+  object_ = tick_ = view_object_ = py::object();
+}
+
+void PythonMethod::seat(const Vec3& proxy) noexcept {
+  if (!proxy.allFinite() || trouble_->first) return;
+  const py::gil_scoped_acquire gil;
+  try {
+    if (py::hasattr(object_, "seat")) object_.attr("seat")(proxy);
+  } catch (...) {
+    trouble_->first = std::current_exception();
+  }
+}
+
+void PythonMethod::frame(const Cloud& cloud, double stamp) noexcept {
+  ++frames_;
+  if (trouble_->first) return;
+  const py::gil_scoped_acquire gil;
+  try {
+    if (view_) view_->end();
+    view_ = std::make_shared<CloudView>(&cloud);
+    view_object_ = py::cast(view_);
+    object_.attr("frame")(view_object_, stamp);
+  } catch (...) {
+    trouble_->first = std::current_exception();
+  }
+}
+
+Tick PythonMethod::tick(const Vec3& hip, double t) noexcept {
+  Tick tick = free_tick(hip, t, frames_);
+  if (trouble_->first || !hip.allFinite()) return tick;
+  const py::gil_scoped_acquire gil;
+  try {
+    const auto answer = py::cast<py::tuple>(tick_(hip, t));
+    if (answer.size() != 2 && answer.size() != 3)
+      throw Error("method", "its tick gave " + std::to_string(answer.size()) + " values",
+                  "return (proxy, force) or (proxy, force, normal)");
+    const auto proxy = py::cast<Vec3>(answer[0]);
+    const auto force = py::cast<Vec3>(answer[1]);
+    const Vec3 normal =
+        answer.size() == 3 ? py::cast<Vec3>(answer[2]) : Vec3((proxy - hip).stableNormalized());
+    if (!is_place(proxy) || !force.allFinite() || !normal.allFinite())
+      throw Error("method", "its tick gave a number that is not finite",
+                  "return a proxy [m] and a force [N]");
+    tick.proxy = proxy;
+    tick.force = force;
+    if (force.squaredNorm() > 0.0) {
+      tick.normal = normal;
+      tick.state = ContactState::contact;
+    }
+  } catch (...) {
+    trouble_->first = std::current_exception();
+  }
+  return tick;
+}
+
+void PythonMethod::set_parameters(const Parameters& parameters) {
+  validate(parameters);
+  const py::gil_scoped_acquire gil;
+  if (!py::hasattr(object_, "set_parameters")) return;
+  py::dict values;
+  for (const ParameterInfo& row : parameter_table())
+    values[py::str(std::string(row.name))] = row.get(parameters);
+  object_.attr("set_parameters")(values);
+}
+
+std::unique_ptr<Method> method_of(const py::object& method, const Parameters& parameters,
+                                  const std::shared_ptr<Trouble>& trouble) {
+  if (py::isinstance<py::str>(method))
+    return make_method(py::cast<std::string>(method), parameters);
+  auto made = std::make_unique<PythonMethod>(method, trouble);
+  made->set_parameters(parameters);
+  return made;
+}
+
+}  // namespace palpate::python

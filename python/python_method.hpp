@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <exception>
+#include <memory>
+#include <optional>
+
+#include "palpate/core/method.hpp"
+
+#include "python/arrays.hpp"
+
+namespace palpate::python {
+
+/// What a method written in Python sees of a cloud: good until its next frame.
+class CloudView {
+ public:
+  explicit CloudView(const Cloud* cloud) : cloud_(cloud) {}
+  void end() noexcept { cloud_ = nullptr; }
+  /// Points [m, world] within `radius` [m] of `centre`, at most Patch::capacity.
+  /// @throws Error after the method's next frame.
+  [[nodiscard]] Points near(const Vec3& centre, double radius);
+  /// [m] world: from where the first camera's points were seen; none if that is not known.
+  [[nodiscard]] std::optional<Vec3> viewpoint();
+
+ private:
+  [[nodiscard]] const Patch& gathered(const Ball& ball);
+
+  const Cloud* cloud_;
+  std::unique_ptr<Patch> patch_;
+};
+
+/// The first exception of a method written in Python: a tick cannot throw, so whoever runs the
+/// ticks asks for it.
+struct Trouble {
+  std::exception_ptr first;
+  void rethrow() const {
+    if (first) std::rethrow_exception(first);
+  }
+};
+
+/// A method whose `frame` and `tick` are a Python object's. Takes the GIL for each call; after an
+/// exception it touches nothing more.
+class PythonMethod final : public Method {
+ public:
+  PythonMethod(py::object object, std::shared_ptr<Trouble> trouble);
+  ~PythonMethod() override;
+
+  void seat(const Vec3& proxy) noexcept override;
+  void frame(const Cloud& cloud, double stamp) noexcept override;
+  Tick tick(const Vec3& hip, double t) noexcept override;
+  void set_parameters(const Parameters& parameters) override;
+
+ private:
+  py::object object_;
+  py::object tick_;
+  std::shared_ptr<CloudView> view_;
+  py::object view_object_;
+  std::shared_ptr<Trouble> trouble_;
+  std::int64_t frames_ = -1;
+};
+
+/// A method by its name, or an object of a class derived from palpate.Method.
+/// @throws Error for an unknown name, or parameters that do not validate.
+std::unique_ptr<Method> method_of(const py::object& method, const Parameters& parameters,
+                                  const std::shared_ptr<Trouble>& trouble);
+
+}  // namespace palpate::python

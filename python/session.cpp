@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+// A whole session: cameras, device, method, safety chain, recorder.
+#include "palpate/session/session.hpp"
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+
+#include "python/arrays.hpp"
+
+namespace palpate::python {
+namespace {
+
+// How long a wait lasts before Python is asked for signals.
+constexpr std::chrono::milliseconds between_signals{50};
+// Ticks of a free-running session between two looks at signals.
+constexpr std::size_t ticks_between_signals = 4096;
+
+void set_limits(SafetyParameters& limits, const py::dict& values) {
+  for (const auto& [name, value] : values)
+    set_parameter(limits, py::cast<std::string>(name), py::cast<double>(value));
+  validate(limits);
+}
+
+class PythonSession {
+ public:
+  PythonSession(const py::object& camera, const std::string& device, const std::string& method,
+                bool free_running, double rate, const std::string& record, double stroke_time,
+                const std::optional<Eigen::Matrix4d>& world_from_device, double scale,
+                const py::dict& limits, bool without_watchdog, const py::kwargs& parameters)
+      : free_running_(free_running) {
+    SessionOptions options;
+    if (py::isinstance<py::str>(camera)) {
+      options.cameras.push_back({.uri = py::cast<std::string>(camera)});
+    } else {
+      for (const auto& uri : py::cast<std::vector<std::string>>(camera))
+        options.cameras.push_back({.uri = uri});
+    }
+    options.device_uri = device;
+    options.settings.method = method;
+    set_all(options.settings.parameters, parameters);
+    set_limits(options.settings.safety, limits);
+    options.settings.placement.workspace_scale = scale;
+    if (world_from_device)
+      options.settings.placement.world_from_device =
+          pose_of(*world_from_device, "world_from_device");
+    options.servo.rate = rate;
+    options.pace = free_running ? Pace::free_running : Pace::real_time;
+    options.without_watchdog = without_watchdog;
+    options.stroke_time = stroke_time;
+    options.record = record;
+    options.version = PALPATE_VERSION;
+    const py::gil_scoped_release released;
+    session_.emplace(std::move(options));
+    reader_.emplace(session_->ticks());
+  }
+
+  ~PythonSession() { stop(); }
+  PythonSession(const PythonSession&) = delete;
+  PythonSession& operator=(const PythonSession&) = delete;
+
+  void start() {
+    if (free_running_) return;  // its ticks are those of `run`
+    const py::gil_scoped_release released;
+    session_->start();
+  }
+
+  void stop() {
+    const py::gil_scoped_release released;
+    session_->stop();
+  }
+
+  void run(const std::optional<double>& duration) {
+    const py::gil_scoped_release released;
+    if (free_running_) {
+      std::size_t count = 0;
+      session_->run(duration, [&](const ServoTick& tick) {
+        ran_.push_back(record_of(tick));
+        if (++count % ticks_between_signals == 0) check_signals();
+      });
+      return;
+    }
+    session_->start();
+    const auto end =
+        std::chrono::steady_clock::now() + std::chrono::duration<double>(duration.value_or(1e9));
+    while (std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(between_signals);
+      check_signals();
+    }
+    session_->stop();
+  }
+
+  py::array ticks() {
+    if (free_running_) return array_of(std::exchange(ran_, {}));
+    std::vector<CycleRecord> records;
+    ServoTick tick;
+    while (reader_->try_pop(tick)) records.push_back(record_of(tick));
+    return array_of(records);
+  }
+  [[nodiscard]] std::uint64_t lost() const { return reader_->lost(); }
+
+  void set(const std::optional<std::string>& method, const py::kwargs& values) {
+    ServoSettings settings = session_->settings();
+    if (method) settings.method = *method;
+    set_all(settings.parameters, values);
+    const py::gil_scoped_release released;
+    session_->set(settings);
+  }
+  void limit(const py::kwargs& values) {
+    ServoSettings settings = session_->settings();
+    set_limits(settings.safety, values);
+    const py::gil_scoped_release released;
+    session_->set(settings);
+  }
+
+  py::dict state() {
+    const SessionState now = [this] {
+      const py::gil_scoped_release released;
+      return session_->state();
+    }();
+    py::dict state;
+    state["running"] = now.running;
+    state["rate"] = now.rate;
+    state["method"] = now.settings.method;
+    py::list cameras;
+    for (const CameraStatus& camera : now.cameras) {
+      py::dict each;
+      each["uri"] = camera.uri;
+      each["kind"] = camera.kind;
+      each["state"] = camera.text;
+      each["rate"] = camera.rate;
+      each["frames"] = camera.frames;
+      each["dropped"] = camera.dropped;
+      each["latency"] = camera.latency;
+      each["trouble"] = camera.trouble;
+      each["doubt"] = camera.doubt;
+      cameras.append(each);
+    }
+    state["cameras"] = cameras;
+    py::dict recording;
+    recording["on"] = now.recording.on;
+    recording["folder"] = now.recording.folder;
+    recording["message"] = now.recording.message;
+    recording["failed"] = now.recording.failed;
+    recording["closing"] = now.recording.closing;
+    state["recording"] = recording;
+    state["ticks"] = now.summary.ticks;
+    state["late_ticks"] = now.summary.late_ticks;
+    state["contact_ticks"] = now.summary.contact_ticks;
+    state["largest_force"] = now.summary.largest_sent;
+    state["pop_throughs"] = now.summary.pop_throughs;
+    py::dict interventions;
+    const auto names = safety_flag_names();
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (now.interventions[i] > 0)
+        interventions[py::str(std::string(names[i]))] = now.interventions[i];
+    }
+    state["interventions"] = interventions;
+    state["latched_by"] = now.latched_by;
+    return state;
+  }
+
+  py::list clouds() {
+    py::list all;
+    for (const auto& cloud : session_->newest_clouds())
+      all.append(py::cast(std::const_pointer_cast<Cloud>(cloud)));
+    return all;
+  }
+  void reset_faults() { session_->reset_faults(); }
+  void start_recording(const std::string& folder) {
+    const py::gil_scoped_release released;
+    session_->start_recording(folder);
+  }
+  void stop_recording() { session_->stop_recording(); }
+
+ private:
+  bool free_running_;
+  std::optional<Session> session_;
+  std::optional<TickRing<ServoTick>::Reader> reader_;
+  std::vector<CycleRecord> ran_;
+};
+
+}  // namespace
+
+void define_session(py::module_& m) {
+  py::class_<PythonSession>(
+      m, "Session",
+      "Cameras, a device, a method, the safety chain and a recorder as one object.\n\n"
+      "    with palpate.Session('synthetic:desk', device='hand:') as session:\n"
+      "        session.run(5.0)\n\n"
+      "`with` starts it, and takes the force off the device before anything else at the end.")
+      .def(py::init<const py::object&, const std::string&, const std::string&, bool, double,
+                    const std::string&, double, const std::optional<Eigen::Matrix4d>&, double,
+                    const py::dict&, bool, const py::kwargs&>(),
+           py::arg("camera"), py::arg("device") = "hand:", py::kw_only(),
+           py::arg("method") = "sight", py::arg("free_running") = false, py::arg("rate") = 1000.0,
+           py::arg("record") = "", py::arg("stroke_time") = 20.0,
+           py::arg("world_from_device") = py::none(), py::arg("scale") = 1.0,
+           py::arg("limits") = py::dict(), py::arg("without_watchdog") = false,
+           "camera: a URI or a list of them. device: a URI. free_running: as fast as the machine\n"
+           "can, with the same forces each time. limits: of the safety chain\n"
+           "(palpate.limits()). Further keywords are parameters (palpate.parameters()).")
+      .def("__enter__",
+           [](const py::object& self) {
+             py::cast<PythonSession&>(self).start();
+             return self;
+           })
+      .def("__exit__", [](PythonSession& self, const py::args&) { self.stop(); })
+      .def("start", &PythonSession::start, "Starts loop and cameras, and returns.")
+      .def("stop", &PythonSession::stop,
+           "Takes the force off the device, then ends everything. Any number of times.")
+      .def("run", &PythonSession::run, py::arg("duration") = py::none(),
+           "Runs for `duration` [s], or until Ctrl-C, and stops.")
+      .def("ticks", &PythonSession::ticks,
+           "The cycles since the last call, as a structured array. Call it at least every few\n"
+           "seconds: the last 8192 are kept; of a free-running session, all of them.")
+      .def_property_readonly("lost", &PythonSession::lost,
+                             "How many cycles were overwritten before `ticks` was called.")
+      .def("state", &PythonSession::state, "How the session does: a dict.")
+      .def("clouds", &PythonSession::clouds, "What each camera saw last; None before that.")
+      .def("set", &PythonSession::set, py::arg("method") = py::none(),
+           "Changes method and parameters in the next tick; the contact stays.")
+      .def("limit", &PythonSession::limit, "Changes limits of the safety chain.")
+      .def("reset_faults", &PythonSession::reset_faults, "Ends a latched fault.")
+      .def("start_recording", &PythonSession::start_recording, py::arg("folder"))
+      .def("stop_recording", &PythonSession::stop_recording,
+           "Returns at once; state()['recording'] says when all is written.");
+}
+
+}  // namespace palpate::python

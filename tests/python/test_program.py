@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Traces, sources and sessions: what Python gets is what the program gets."""
+
+import csv
+import io
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+import numpy
+import palpate
+
+CAMERA = "synthetic:desk?noise=1mm&size=160x120"
+
+
+def traced_by_the_program(*arguments):
+    text = subprocess.run([os.environ["PALPATE_PROGRAM"], "trace", "--camera", CAMERA, *arguments],
+                          check=True, capture_output=True, text=True).stdout
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+class Trace(unittest.TestCase):
+    def expect_the_same(self, ticks, rows):
+        self.assertEqual(len(ticks), len(rows))
+        for name in ("hip", "proxy", "normal", "force"):
+            for axis, letter in enumerate("xyz"):
+                theirs = numpy.array([float(row[f"{name}_{letter}"]) for row in rows])
+                self.assertTrue(numpy.array_equal(ticks[name][:, axis], theirs), name)
+        for name in ("t", "surface_velocity", "frame", "flags", "steps"):
+            self.assertTrue(
+                numpy.array_equal(ticks[name], [float(row[name]) for row in rows]), name)
+        self.assertGreater(numpy.linalg.norm(ticks["force"], axis=1).max(), 1.0)
+
+    def test_a_press_is_the_programs_to_the_bit(self):
+        ticks = palpate.trace(CAMERA, press=(80, 60), slide_to=(90, 62), stiffness=450)
+        self.expect_the_same(ticks, traced_by_the_program(
+            "--press", "80,60", "--slide-to", "90,62", "--set", "stiffness=450"))
+
+    def test_a_path_is_the_programs_to_the_bit(self):
+        first = palpate.trace(CAMERA, press=(80, 60))
+        samples = numpy.column_stack((first["t"], first["hip"]))[::50]
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "path.csv"
+            numpy.savetxt(file, samples, fmt="%.17g", delimiter=",", header="t,x,y,z", comments="")
+            rows = traced_by_the_program("--path", str(file), "--method", "paper")
+            self.expect_the_same(palpate.trace(CAMERA, file, method="paper"), rows)
+            self.expect_the_same(palpate.trace([CAMERA], samples, method="paper"), rows)
+
+    def test_refuses_what_is_no_path(self):
+        for arguments, says in (({}, "one of path and press"),
+                                ({"path": "nowhere.csv"}, "nowhere.csv"),
+                                ({"path": [[1, 2, 3]]}, "rows of four"),
+                                ({"press": (900, 0)}, "900"),
+                                ({"press": (80, 60), "rate": 0.0}, "rate")):
+            with self.assertRaisesRegex(palpate.Error, says):
+                palpate.trace(CAMERA, **arguments)
+
+
+class Source(unittest.TestCase):
+    def test_gives_frames_in_order(self):
+        source = palpate.Source(CAMERA)
+        self.assertFalse(source.info["live"])
+        frames = [source.next() for _ in range(3)]
+        numpy.testing.assert_allclose([frame.stamp for frame in frames], [0, 1 / 30, 2 / 30])
+        self.assertEqual(frames[0].depth.shape, (120, 160))
+        self.assertEqual(frames[0].camera.width, 160)
+        metres = frames[0].metres()
+        numpy.testing.assert_allclose(metres * frames[0].units_per_metre, frames[0].depth,
+                                      rtol=1e-6)
+        self.assertEqual(frames[0].points().shape, (numpy.isfinite(metres).sum(), 3))
+
+    def test_a_recording_ends(self):
+        points = "\n".join(f"{x} 0 1" for x in (0, 0.01, 0.02))
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "line.pcd"
+            file.write_text("VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
+                            "WIDTH 3\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 3\n"
+                            "DATA ascii\n" + points)
+            frames = list(palpate.Source(f"pcd:{file}"))
+        self.assertEqual(len(frames), 1)
+        self.assertEqual(len(frames[0].cloud), 3)
+        with self.assertRaisesRegex(palpate.Error, "no such file"):
+            palpate.Source("pcd:/nowhere.pcd")
+
+
+class Session(unittest.TestCase):
+    def test_free_running_is_the_same_each_time(self):
+        def run():
+            with palpate.Session(CAMERA, free_running=True, stroke_time=2.0) as session:
+                session.run(2.0)
+                return session.ticks(), session.state()
+
+        ticks, state = run()
+        self.assertEqual(len(ticks), 2000)
+        self.assertEqual(ticks.tobytes(), run()[0].tobytes())
+        forces = numpy.linalg.norm(ticks["force"], axis=1)
+        self.assertGreater(forces.max(), 0.2)
+        self.assertLessEqual(forces.max(), palpate.limits()["max_device_force"]["default"] + 1e-9)
+        self.assertEqual(state["ticks"], 2000)
+        self.assertTrue(palpate.safety_flags(int(ticks["safety"][0])))
+
+    def test_records_what_it_can_read(self):
+        with tempfile.TemporaryDirectory() as folder:
+            bag = os.path.join(folder, "session")
+            with palpate.Session(CAMERA, free_running=True, stroke_time=1.0, record=bag) as session:
+                session.run(1.0)
+                ticks = session.ticks()
+            self.assertEqual(palpate.read_session(bag).tobytes(), ticks.tobytes())
+            self.assertEqual(len(list(palpate.Source(f"recording:{bag}"))), 30)
+
+    def test_runs_in_real_time_and_can_be_changed(self):
+        with palpate.Session(CAMERA) as session:
+            session.set(stiffness=200, method="paper")
+            session.limit(max_device_force=1.0)
+            session.run(0.3)
+            self.assertGreater(len(session.ticks()), 0)
+            self.assertEqual(session.state()["method"], "paper")
+        with self.assertRaisesRegex(palpate.Error, "max_device_force"):
+            palpate.Session(CAMERA, limits={"max_device_force": -1})
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames and HIPs from numpy arrays, one at a time and in batches."""
+
+import gc
+import unittest
+import weakref
+
+import numpy
+import palpate
+
+CAMERA = palpate.Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+
+
+def wall(millimetres=1000):
+    return numpy.full((48, 64), millimetres, numpy.uint16)
+
+
+class Renderer(unittest.TestCase):
+    def touch(self, **parameters):
+        touch = palpate.Renderer("sight", **parameters)
+        touch.frame(wall(), camera=CAMERA, stamp=0.0)
+        touch.seat((0, 0, 0.9))
+        return touch
+
+    def test_pushes_back_by_hookes_law(self):
+        touch = self.touch(stiffness=500)
+        self.assertEqual(touch.tick((0, 0, 0.9), 0.0).state, palpate.State.FREE)
+        tick = touch.tick(numpy.array([0, 0, 1.01]), 0.001)
+        # The proxy's centre rests r_c = 5 mm in front of the wall.
+        numpy.testing.assert_allclose(tick.proxy, (0, 0, 0.995), atol=2e-4)
+        # (15): how far the HIP is behind what the sphere touches, 10 mm.
+        numpy.testing.assert_allclose(tick.force, (0, 0, -500 * 0.010), atol=1e-2)
+        numpy.testing.assert_allclose(tick.normal, (0, 0, -1), atol=1e-3)
+        self.assertEqual(palpate.flags(tick.flags), {})
+
+    def test_a_batch_is_its_single_ticks(self):
+        hips = numpy.linspace((0, 0, 0.98), (0.005, 0, 1.005), 200)
+        times = numpy.arange(200) * 1e-3
+        batch = self.touch().ticks(hips, times)
+        single = self.touch()
+        for i, (hip, t) in enumerate(zip(hips, times)):
+            tick = single.tick(hip, t)
+            for name in ("t", "hip", "proxy", "normal", "force", "frame", "flags", "steps"):
+                self.assertTrue(numpy.array_equal(batch[name][i], getattr(tick, name)), name)
+            self.assertEqual(palpate.State(batch["state"][i]), tick.state)
+        self.assertGreater(numpy.abs(batch["force"]).max(), 1.0)
+
+    def test_keeps_the_depth_it_was_given_and_copies_nothing(self):
+        class Array(numpy.ndarray):
+            pass
+
+        depth = wall().view(Array)
+        alive = weakref.ref(depth)
+        image = palpate.DepthImage(depth, CAMERA)
+        self.assertEqual(image.depth.ctypes.data, depth.ctypes.data)
+        touch = palpate.Renderer()
+        touch.frame(image, 0.0)
+        touch.tick((0, 0, 0.9), 0.0)
+        del depth, image
+        gc.collect()
+        self.assertIsNotNone(alive(), "the renderer needs it")
+        self.assertGreater(-touch.tick((0, 0, 1.01), 0.001).force[2], 1.0)
+        touch.frame(wall(), camera=CAMERA, stamp=0.03)
+        gc.collect()
+        self.assertIsNone(alive(), "nothing needs it any more")
+
+    def test_what_it_shows_of_an_image_cannot_be_written_to(self):
+        image = palpate.DepthImage(wall(), CAMERA)
+        view = image.depth
+        del image
+        gc.collect()
+        self.assertEqual(view[3, 4], 1000)
+        with self.assertRaises(ValueError):
+            view[0, 0] = 1
+
+    def test_touches_points_and_poses(self):
+        fine = palpate.Camera(64, 48, 300.0, 300.0, 31.5, 23.5)  # 3.3 mm a pixel
+        points = palpate.DepthImage(wall(), fine).points()
+        touch = palpate.Renderer("paper")
+        touch.frame(points, stamp=0.0, viewpoint=(0, 0, 0))
+        touch.seat((0, 0, 0.9))
+        self.assertGreater(-touch.ticks([(0, 0, 1.01)] * 60, [0.0] * 60)["force"][-1, 2], 1.0)
+        pose = numpy.eye(4)
+        pose[:3, 3] = (1, 2, 3)
+        moved = palpate.DepthImage(wall(), fine, world_from_camera=pose)
+        numpy.testing.assert_allclose(moved.points(), points + (1, 2, 3), atol=1e-9)
+
+    def test_parameters_are_those_of_the_table(self):
+        touch = palpate.Renderer(damping=1.5)
+        self.assertEqual(touch.parameters["damping"], 1.5)
+        touch.set(stiffness=300)
+        self.assertEqual(touch.parameters["stiffness"], 300)
+        table = palpate.parameters()
+        self.assertEqual(table["stiffness"]["unit"], "N/m")
+        self.assertEqual(set(table), set(touch.parameters))
+        self.assertIn("max_device_force", palpate.limits())
+        self.assertIn("sight", palpate.methods())
+        with self.assertRaisesRegex(palpate.Error, "did you mean 'stiffness'"):
+            touch.set(stifness=1)
+        self.assertEqual(touch.parameters["stiffness"], 300)
+
+    def test_refuses_what_is_no_frame(self):
+        touch = palpate.Renderer()
+        for depth, says in ((wall().astype(float), "uint16"), (wall()[::2], r"\(48, 64\)"),
+                            (wall().T.copy().T, "ascontiguousarray"), (wall().ravel(), "shape")):
+            with self.assertRaisesRegex((palpate.Error, TypeError), says):
+                touch.frame(depth, camera=CAMERA, stamp=0.0)
+        with self.assertRaisesRegex(palpate.Error, "world_from_camera"):
+            touch.frame(wall(), camera=CAMERA, stamp=0.0, world_from_camera=2 * numpy.eye(4))
+        with self.assertRaisesRegex(palpate.Error, "one time"):
+            touch.ticks([(0, 0, 0)] * 3, [0.0])
+        with self.assertRaisesRegex(palpate.Error, "no such method"):
+            palpate.Renderer("sihgt")
+        self.assertTrue(issubclass(palpate.Error, ValueError))
+        # Nothing was touched, so nothing is felt, whatever comes.
+        tick = touch.tick((numpy.nan, 0, 0), 0.0)
+        self.assertEqual(tuple(tick.force), (0, 0, 0))
+
+
+if __name__ == "__main__":
+    unittest.main()

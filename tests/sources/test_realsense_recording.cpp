@@ -72,7 +72,7 @@ TEST_P(RealSenseFileOfEitherKind, IsReadWithItsLensUnitAndStamps) {
     ASSERT_TRUE(frame);
     EXPECT_NEAR(frame->stamp, 0.033 * i, 1e-9);
     const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
-    EXPECT_EQ(image.depth(), depth_);
+    EXPECT_EQ(image.depth().copy(), depth_);
     EXPECT_DOUBLE_EQ(image.units_per_metre(), 10'000.0);
     EXPECT_EQ(image.intrinsics(),
               (Intrinsics{.width = 4, .height = 3, .fx = 50.5, .fy = 51, .cx = 1.25, .cy = 1.5}));
@@ -219,7 +219,7 @@ TEST_F(RealSenseFile, OfRos1IsReadWithItsLensUnitAndStamps) {
     ASSERT_TRUE(frame);
     EXPECT_NEAR(frame->stamp, 0.033 * i, 1e-9);
     const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
-    EXPECT_EQ(image.depth(), depth_);
+    EXPECT_EQ(image.depth().copy(), depth_);
     EXPECT_DOUBLE_EQ(image.units_per_metre(), 10'000.0);
     Intrinsics k{.width = 4, .height = 3, .fx = 50.5, .fy = 50.5, .cx = 1.25, .cy = 1.5};
     k.distortion[0] = 0.1;

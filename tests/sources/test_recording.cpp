@@ -115,7 +115,7 @@ TEST_F(ForeignBag, OfDepthInMillimetresIsReadByItsCameraInfo) {
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->stamp, 0.25 * i);  // by the image's own clock
     const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
-    EXPECT_EQ(image.depth(), depth_);
+    EXPECT_EQ(image.depth().copy(), depth_);
     EXPECT_EQ(image.units_per_metre(), 1000.0);
     // Rectified: by P, not K.
     EXPECT_EQ(image.intrinsics(),

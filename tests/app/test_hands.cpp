@@ -218,7 +218,7 @@ TEST_F(TouchHands, TouchASlopeByAGuardAndSurviveBeingUnplugged) {
   EXPECT_NE(said.find("at most 3.3 N, 0.88 N for long, walls up to 400 N/m"), std::string::npos)
       << said;
   EXPECT_NE(said.find("tried on a fake library alone"), std::string::npos) << said;
-  EXPECT_NE(said.find("--set stiffness=400"), std::string::npos) << said;
+  EXPECT_NE(said.find("set stiffness to 400 N/m"), std::string::npos) << said;
 
   bench.error = 0x202;  // the driver took the force off: too sudden
   ASSERT_TRUE(reaches([&] { return motor_force() == 0.0; }));

@@ -232,7 +232,7 @@ TEST(TumRecording, NamesWhatIsWrongWithTheFolder) {
   const auto fails = [&](const std::string& options, const char* saying) {
     return fails_saying([&] { return folder.open(options); }, folder.path().string(), saying);
   };
-  EXPECT_TRUE(fails("pose=none", "did you mean 'poses'"));
+  EXPECT_TRUE(fails("posez=none", "did you mean 'poses'"));
   EXPECT_TRUE(fails("stamps=unix", "relative or absolute"));
   EXPECT_TRUE(fails("fx=0", "'fx'"));
   EXPECT_TRUE(fails("fx=-525", "'fx'"));

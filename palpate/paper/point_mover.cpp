@@ -25,6 +25,18 @@ void PointMover::set(const Options& options) noexcept {
   stale_ = true;
 }
 
+void PointMover::seat() noexcept {
+  stale_ = true;
+  hidden_ = inside_sides_ = false;
+}
+
+void PointMover::set_hidden(bool hidden) noexcept {
+  hidden_ = hidden;
+  if (!hidden || inside_sides_) return;
+  inside_sides_ = true;
+  stale_ = true;
+}
+
 // Gathers the points about a place from where the proxy is drawn to the HIP by u.
 void PointMover::cover(const Proxy& proxy, const Cloud& cloud, const Vec3& at, const Vec3& u,
                        const Vec3& contact_normal) noexcept {
@@ -34,9 +46,15 @@ void PointMover::cover(const Proxy& proxy, const Cloud& cloud, const Vec3& at, c
   const double travel = std::sqrt(std::max(u.squaredNorm() - into * into, 0.0));
   const double margin = std::clamp(travel, least_margin * r_c, most_margin * r_c);
   const Ball ball{at, options_.proxy.r_3 + margin};
+  const Sides sides{side_jump * r_c, options_.side_depth};
+  if (inside_sides_ && !hidden_) {
+    patch_.start({at, options_.proxy.r_3});
+    cloud.gather_sides(patch_.ball(), sides, Patch::capacity, patch_);
+    inside_sides_ = patch_.size() > 0;
+  }
   gather(cloud, ball, patch_);
-  if (options_.side_depth > 0.0) {
-    cloud.gather_sides(ball, {side_jump * r_c, options_.side_depth}, Patch::capacity, patch_);
+  if (options_.side_depth > 0.0 && !inside_sides_) {
+    cloud.gather_sides(ball, sides, Patch::capacity, patch_);
   }
   if (options_.sheet > 0.0) {
     cloud.gather_sheet(ball, {options_.sheet, side_jump * r_c}, Patch::capacity, patch_);

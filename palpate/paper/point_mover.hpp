@@ -49,6 +49,13 @@ class PointMover {
   /// The cloud or the proxy has changed: the next movement gathers anew.
   void invalidate() noexcept { stale_ = true; }
 
+  /// The proxy has been put elsewhere: what is known of it is void.
+  void seat() noexcept;
+
+  /// Says whether the proxy is hidden behind what the cloud shows. Where it is, nothing is solid,
+  /// so sides of bodies are left out from then on until it is seen and farther than r_3 from them.
+  void set_hidden(bool hidden) noexcept;
+
   /// Moves `proxy`, which must have a place, towards the HIP until it converges.
   ///
   /// At most step_budget steps over at most Patch::capacity points each.
@@ -66,6 +73,8 @@ class PointMover {
   double cos_theta_ = 1.0;
   Patch patch_;
   bool stale_ = true;
+  bool hidden_ = false;
+  bool inside_sides_ = false;  // the proxy has been hidden and is not clear of sides yet
 
   // Normal and state that the last movement ended with, and where.
   Vec3 seen_from_ = Vec3::Zero();

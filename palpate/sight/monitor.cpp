@@ -162,6 +162,7 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
   const Look& proxy = look_at(cloud, contact.proxy - contact.carried, r_c, proxy_);
   const double margin = margin_at(proxy.distance);
   verdict.behind = is_behind(margin, contact.deepest, r_c);
+  verdict.hidden = proxy.seen && proxy.low > edge_step * r_c + margin;
   if (!frame_judged_) {
     frame_judged_ = true;
     frames_behind_ = verdict.behind ? frames_behind_ + 1 : 0;

@@ -37,6 +37,7 @@ class Monitor {
   struct Verdict {
     Action action = Action::none;
     bool behind = false;         ///< the newest frame shows the proxy behind its surface
+    bool hidden = false;         ///< what the frame shows hides the whole proxy
     Vec3 front = Vec3::Zero();   ///< [m] world: where a proxy before the surface is
     Vec3 normal = Vec3::Zero();  ///< [-] unit: there, towards the camera
   };

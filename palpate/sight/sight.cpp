@@ -37,7 +37,7 @@ void Sight::seat(const Vec3& proxy) noexcept {
   proxy_ = {};
   proxy_.at = proxy;
   hand_velocity_.reset();
-  mover_.invalidate();
+  mover_.seat();
   tracker_.forget();
   monitor_.forget();
   last_proxy_.reset();
@@ -219,6 +219,7 @@ void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
        .r_c = r_c,
        .deepest = deepest});
   if (verdict.behind) movement.flags |= pop_through_suspected;
+  mover_.set_hidden(verdict.hidden);
   switch (verdict.action) {
     case Monitor::Action::none:
       break;

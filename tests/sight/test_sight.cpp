@@ -368,6 +368,35 @@ TEST(Sight, HoldsTheContactWhenSomethingCoversAllThatIsSeenWithinAFrame) {
   }
 }
 
+TEST(Sight, LetsAHandOutOfTheShadowOfWhatCameBesideIt) {
+  // A tall box slides up to a pressing hand off the camera's axis and hides it: its shadow reaches
+  // 5 to 10 mm beyond the hand. As the hand lifts, it comes out of the shadow beside the box.
+  const Overhead camera;
+  for (const double height : {0.1, 0.15, 0.2}) {
+    for (const double reach : {0.075, 0.08}) {
+      std::mt19937 random(6);
+      Sight sight = seated({0.07, 0, 0.03});
+      bool hidden = false;
+      double strongest = 0.0;
+      for (int k = 0; k < 75; ++k) {
+        const double shadow = std::min(-0.2 + 0.4 * std::max(k - 15, 0) * interval, reach);
+        const DepthImage image =
+            camera.shoot([&](double x, double) { return x < shadow ? height : 0.0; }, 0.0, random);
+        sight.frame(image, k * interval);
+        for (int i = 0; i < 33; ++i) {
+          const double t = k * interval + i * 1e-3;
+          const double up = std::max(t - 1.6, 0.0) * 0.3;
+          const Tick tick = sight.tick(Vec3(0.07, 0, std::min(-0.006 + up, 0.25)), t);
+          hidden = hidden || (tick.flags & surface_hidden) != 0;
+          if (tick.hip.z() > 0.01) strongest = std::max(strongest, tick.force.norm());
+        }
+      }
+      EXPECT_TRUE(hidden) << height << ' ' << reach;
+      EXPECT_LT(strongest, 0.05) << height << ' ' << reach;
+    }
+  }
+}
+
 TEST(Sight, HoldsTheContactBesideAShadowWithoutPoints) {
   // Stereo sees nothing beside an occluder: a hole comes over the contact, half of it first.
   const Overhead camera;

@@ -262,9 +262,7 @@ void define_clouds(py::module_& m) {
           },
           "uint16 (height, width), not to be written to: the image's own memory")
       .def_property_readonly("camera",
-                             [](const DepthImage& image) {
-                               return Camera{std::make_shared<const ViewingRays>(image.rays())};
-                             })
+                             [](const DepthImage& image) { return Camera{image.shared_rays()}; })
       .def_property_readonly("units_per_metre", &DepthImage::units_per_metre)
       .def_property_readonly(
           "world_from_camera",

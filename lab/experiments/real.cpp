@@ -72,7 +72,7 @@ DepthImage mean_of(const std::vector<std::shared_ptr<const DepthImage>>& frames)
     const double value = sum[i] / count[i] / first.units_per_metre() * fine;
     if (value < 65534.0) depth[i] = static_cast<std::uint16_t>(std::lround(value));
   }
-  return {std::make_shared<const ViewingRays>(first.intrinsics()), std::move(depth), fine};
+  return {first.shared_rays(), std::move(depth), fine};
 }
 
 // The plane about a point of the mean image, if it is flat, whole and seen at less than 60 degrees.

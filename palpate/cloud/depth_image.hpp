@@ -129,6 +129,10 @@ class DepthImage final : public Cloud {
 
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return rays_->intrinsics(); }
   [[nodiscard]] const ViewingRays& rays() const noexcept { return *rays_; }
+  /// For other images of the same camera.
+  [[nodiscard]] const std::shared_ptr<const ViewingRays>& shared_rays() const noexcept {
+    return rays_;
+  }
   [[nodiscard]] const DepthReadings& depth() const noexcept { return depth_; }
   /// As given: the kernel does not look at it.
   [[nodiscard]] const std::vector<std::uint8_t>& brightness() const noexcept { return brightness_; }

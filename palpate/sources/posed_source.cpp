@@ -51,13 +51,10 @@ class PosedSource final : public Source {
         pose_ * world_from_depth.inverse() * colour.camera->world_from_camera;
     return moved;
   }
-  [[nodiscard]] std::shared_ptr<const Cloud> posed(const Cloud& cloud) {
+  [[nodiscard]] std::shared_ptr<const Cloud> posed(const Cloud& cloud) const {
     if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
-      // The rays stay the same from frame to frame: computed once.
-      if (!rays_ || rays_->intrinsics() != image->intrinsics())
-        rays_ = std::make_shared<const ViewingRays>(image->intrinsics());
-      return std::make_shared<DepthImage>(rays_, image->depth(), image->units_per_metre(), pose_,
-                                          image->brightness());
+      return std::make_shared<DepthImage>(image->shared_rays(), image->depth(),
+                                          image->units_per_metre(), pose_, image->brightness());
     }
     const auto* points = dynamic_cast<const PointCloud*>(&cloud);
     if (points == nullptr)
@@ -81,7 +78,6 @@ class PosedSource final : public Source {
   Eigen::Isometry3d pose_;
   std::string uri_;
   SourceInfo info_;
-  std::shared_ptr<const ViewingRays> rays_;
 };
 
 }  // namespace

@@ -59,7 +59,7 @@ std::unique_ptr<Method> make_method(std::string_view name, const MethodSetup& se
   for (const OwnMethod& method : own) {
     if (method.name == name) return method.make(setup);
   }
-  return methods(setup.truth).find(name).make(setup.parameters);
+  return palpate::make_method(name, setup.parameters, methods(setup.truth));
 }
 
 }  // namespace palpate::lab

@@ -64,6 +64,9 @@ std::vector<Measure> all_measures() {
     for (const std::string_view share : {"share-0s", "share-0.1s", "share-0.3s", "share-0.5s"})
       add(scene, share, "%", none, {}, {"chain"});
   }
+  add("rub", "ratio", "%", 5.0, {"path"}, {});
+  add("stick", "drift", "mm", 0.1, {"light"}, {});
+  add("stick-bob", "drift", "mm", 0.1, {"light"}, {});
   add("free-hands", "runs", "", none, {}, {"path"});
   add("free-hands", "felt", "runs", 0.0, {"path"}, {});
   add("free-hands", "trapped", "runs", 0.0, {"path"}, {});
@@ -151,6 +154,9 @@ std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptio
   add("rate-30Hz", play_rate, 30.0);
   add("rate-60Hz", play_rate, 60.0);
   add("rate-90Hz", play_rate, 90.0);
+  add("rub", play_rub);
+  add("stick", play_stick, 0.0);
+  add("stick-bob", play_stick, 0.02);
   const int hands = options.cases.value_or(usual_free_hands);
   for (int from = 0; from < hands; from += block)
     add("free-hands", play_free_hands, from, std::min(block, hands - from));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scenes of `feel` with a plane; feel_free_hands.cpp has the one with bodies of all kinds.
+// The scenes of `feel` with a plane; feel_free_hands.cpp has the one with bodies of all
+// kinds, feel_friction.cpp those with friction.
 #include "lab/experiments/feel_scenes.hpp"
 
 #include <algorithm>

@@ -54,6 +54,13 @@ FeelFigures play_rate(const std::vector<Contestant>& contestants, const FeelOpti
 /// A handle on a resting plane before an exact camera, held loosely: does it swing?
 FeelFigures play_swing(const std::vector<Contestant>& contestants, const FeelOptions& options);
 
+/// Along a resting plane at 0.1 m/s before a D4xx at 0.7 m, with friction of several coefficients.
+FeelFigures play_rub(const std::vector<Contestant>& contestants, const FeelOptions& options);
+/// A lightly held handle that is drawn along a plane before a D4xx at 0.7 m with half of what its
+/// friction holds. @param stroke  [m] by which the plane bobs, at 1 Hz; 0: it rests
+FeelFigures play_stick(const std::vector<Contestant>& contestants, const FeelOptions& options,
+                       double stroke);
+
 /// Hands that press, slide and are lifted, cases of the family `lift-off` of the bench `pop`: those
 /// numbered from `from` on. Those of one block of `hands_a_camera` see the same camera and body.
 FeelFigures play_free_hands(const std::vector<Contestant>& contestants, const FeelOptions& options,

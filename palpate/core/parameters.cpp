@@ -147,6 +147,32 @@ constexpr std::array table = {
                   "ours (sight)",
                   [](const Parameters& p) { return double{1} * p.sight.evidence_frames; },
                   [](Parameters& p, double v) { p.sight.evidence_frames = static_cast<int>(v); }},
+    ParameterInfo{"friction", "μ_s", "-", 0.0, 0.0, 2.0,
+                  "static coefficient of friction of every surface; 0: none", "ours (feel)",
+                  [](const Parameters& p) { return p.friction.friction; },
+                  [](Parameters& p, double v) { p.friction.friction = v; }},
+    ParameterInfo{"kinetic_share", "μ_k/μ_s", "-", 0.8, 0.1, 1.0,
+                  "share of the friction that is left in fast sliding; less sticks and slips more",
+                  "ours (feel)", [](const Parameters& p) { return p.friction.kinetic_share; },
+                  [](Parameters& p, double v) { p.friction.kinetic_share = v; }},
+    ParameterInfo{"viscosity", "", "s/m", 0.0, 0.0, 5.0,
+                  "by which the coefficient of friction grows with the sliding speed, as in honey",
+                  "ours (feel)", [](const Parameters& p) { return p.friction.viscosity; },
+                  [](Parameters& p, double v) { p.friction.viscosity = v; }},
+    ParameterInfo{"stribeck_speed", "v_s", "m/s", 0.02, 1e-3, 1.0,
+                  "sliding speed at which static friction has become kinetic", "ours (feel)",
+                  [](const Parameters& p) { return p.friction.stribeck_speed; },
+                  [](Parameters& p, double v) { p.friction.stribeck_speed = v; }},
+    ParameterInfo{"bristle_stiffness", "σ_0", "N/m", 600.0, 10.0, 1e5,
+                  "spring that holds a hand where it sticks; more sticks harder, and must stay "
+                  "within what the device can render",
+                  "ours (feel)", [](const Parameters& p) { return p.friction.bristle_stiffness; },
+                  [](Parameters& p, double v) { p.friction.bristle_stiffness = v; }},
+    ParameterInfo{"bristle_damping", "σ_1", "N s/m", 1.0, 0.0, 1e3,
+                  "damper of that spring; more rings less, and shows the noise of the device's "
+                  "positions",
+                  "ours (feel)", [](const Parameters& p) { return p.friction.bristle_damping; },
+                  [](Parameters& p, double v) { p.friction.bristle_damping = v; }},
 };
 
 constexpr std::string_view noun = "parameter";

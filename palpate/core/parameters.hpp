@@ -62,12 +62,23 @@ struct SightParameters {
   static constexpr int unknown_growth = 2;
 };
 
+/// Friction along the surface, around any method. docs/friction.md.
+struct FrictionParameters {
+  double friction = 0.0;         ///< [-] static coefficient; 0: none
+  double kinetic_share = 0.8;    ///< [-] of it that is left in fast sliding
+  double viscosity = 0.0;        ///< [s/m] by which the coefficient grows with the sliding speed
+  double stribeck_speed = 0.02;  ///< [m/s] at which most of that has gone
+  double bristle_stiffness = 600.0;  ///< [N/m] of what holds a hand where it sticks
+  double bristle_damping = 1.0;      ///< [N s/m] of the same
+};
+
 /// Everything that can be set on a method. Defaults are the paper's Table 2 where it has them.
 struct Parameters {
   ProxyParameters proxy;
   Coupling coupling;
   MotionParameters motion;
   SightParameters sight;
+  FrictionParameters friction;
 };
 
 using ParameterInfo = ParameterRow<Parameters>;

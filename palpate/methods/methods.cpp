@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/methods/methods.hpp"
 
+#include "palpate/feel/feel.hpp"
 #include "palpate/paper/paper.hpp"
 #include "palpate/sight/sight.hpp"
 
@@ -29,7 +30,7 @@ const MethodRegistry& standard_methods() {
 
 std::unique_ptr<Method> make_method(std::string_view name, const Parameters& parameters,
                                     const MethodRegistry& methods) {
-  return methods.find(name).make(parameters);
+  return std::make_unique<Feel>(methods.find(name).make(parameters), parameters);
 }
 
 }  // namespace palpate

@@ -14,7 +14,7 @@ inline constexpr std::string_view default_method = "sight";
 /// The library's methods, in the order in which they are shown. Copy it to add methods.
 const MethodRegistry& standard_methods();
 
-/// A method by its name.
+/// A method by its name, with what surfaces feel like around it (`Feel`).
 /// @throws Error for an unknown name, naming the nearest and listing all, or if the parameters do
 ///         not validate.
 std::unique_ptr<Method> make_method(std::string_view name = default_method,

@@ -8,7 +8,7 @@
 #include "palpate/paper/coupling.hpp"
 #include "palpate/paper/point_mover.hpp"
 #include "palpate/sight/frame_timing.hpp"
-#include "palpate/sight/hand_velocity.hpp"
+#include "palpate/core/hand_velocity.hpp"
 #include "palpate/sight/monitor.hpp"
 #include "palpate/sight/tracker.hpp"
 

@@ -17,7 +17,8 @@ KNOWS = {
     "core": set(),
     "paper": {"core"},
     "sight": {"core", "paper"},
-    "methods": {"core", "paper", "sight"},
+    "feel": {"core"},
+    "methods": {"core", "paper", "sight", "feel"},
     "cloud": {"core"},
     "servo": {"core"},
     "bag": {"core"},
@@ -39,7 +40,7 @@ KNOWS["app/lab"] = KNOWS["app"] | {"app", "lab"}
 KNOWS["app/bench"] = KNOWS["app"] | {"app", "bench"}
 
 # Methods are pure: neither threads nor clocks nor files, and no library but Eigen.
-PURE = {"core", "paper", "sight", "methods"}
+PURE = {"core", "paper", "sight", "feel", "methods"}
 CORE_ALLOWS = re.compile(r"Eigen/|[a-z_]+$")
 CORE_FORBIDS = {
     "atomic", "barrier", "chrono", "condition_variable", "cstdio", "ctime", "filesystem",

@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// The hand's velocity by differences of its positions, low-pass filtered, for the damper of (16).
+/// The hand's velocity by differences of its positions, low-pass filtered.
 ///
 /// [servo] Nothing here allocates, locks or throws.
 class HandVelocity {
@@ -25,6 +25,8 @@ class HandVelocity {
     t_ = t;
   }
   void reset() noexcept { hip_.reset(); }
+  /// Has there been a tick since the beginning or the last reset?
+  [[nodiscard]] bool started() const noexcept { return hip_.has_value(); }
 
   [[nodiscard]] const Vec3& value() const noexcept { return velocity_; }  ///< [m/s] world
   [[nodiscard]] double t() const noexcept { return t_; }                  ///< [s] of the last tick

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+// The scenes of `feel` with friction: a hand that slides, and hands that are drawn along and stick.
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "lab/closed_loop.hpp"
+#include "lab/experiments/feel_scenes.hpp"
+#include "palpate/sources/synthetic_camera.hpp"
+
+namespace palpate::lab {
+namespace {
+
+// Plays one camera to a loop of each contestant.
+void play(const std::vector<Contestant>& contestants, const Parameters& parameters,
+          const std::string& camera_uri, double seconds, const std::function<HeldDevice()>& held,
+          const std::function<void(std::size_t contestant, const Felt&)>& on_tick) {
+  const auto camera = open_synthetic_camera(Uri(camera_uri));
+  const Truth truth = truth_of(std::make_shared<const Scene>(camera->scene()));
+  std::vector<std::unique_ptr<TouchLoop>> loops;
+  for (const Contestant& contestant : contestants)
+    loops.push_back(straight_loop(contestant.make({parameters, truth}), held()));
+  play_to(loops,
+          {.frame_rate = camera->setup().frame_rate,
+           .duration = seconds,
+           .cloud = [&](std::uint64_t frame, double t) { return camera->capture(t, frame).cloud; },
+           .hip = nullptr},
+          on_tick);
+}
+
+Parameters with_friction(Parameters parameters, double coefficient) {
+  parameters.friction.friction = coefficient;
+  return parameters;
+}
+
+}  // namespace
+
+FeelFigures play_rub(const std::vector<Contestant>& contestants, const FeelOptions& options) {
+  constexpr double press = 0.008;  // [m]
+  constexpr double from = 1.2;     // [s] sliding, after the first tenth
+  constexpr double half = 0.1;     // [m] of the way
+  const HipPath hand({{0.0, {-half, 0.0, 0.060}},
+                      {0.5, {-half, 0.0, -press}},
+                      {1.0, {-half, 0.0, -press}},
+                      {3.0, {half, 0.0, -press}}});
+  FeelFigures figures;
+  std::vector<double> worst(contestants.size(), 0.0);
+  for (const double coefficient : {0.1, 0.3, 0.6, 1.0}) {
+    const Parameters parameters = with_friction(options.parameters, coefficient);
+    // What the model says of the speed of 0.1 m/s.
+    const FrictionParameters& friction = parameters.friction;
+    const double faster = 0.1 / friction.stribeck_speed;
+    const double kinetic = coefficient * (friction.kinetic_share + (1.0 - friction.kinetic_share) *
+                                                                       std::exp(-faster * faster));
+    for (int k = 0; k < options.repeats; ++k) {
+      const auto seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
+      std::vector<double> along(contestants.size(), 0.0);
+      std::vector<double> normal(contestants.size(), 0.0);
+      play(
+          contestants, parameters,
+          fmt::format("synthetic:plane?distance=0.7m&sensor=d4xx&seed={}", seed), 3.0,
+          [&] { return on_path(hand); },
+          [&](std::size_t i, const Felt& felt) {
+            if (felt.t < from) return;
+            along[i] -= felt.asked.x();
+            normal[i] += felt.asked.z();
+          });
+      for (std::size_t i = 0; i < contestants.size(); ++i) {
+        const double ratio = normal[i] > 0.0 ? along[i] / normal[i] : 0.0;
+        worst[i] = std::max(worst[i], 100.0 * std::abs(ratio / kinetic - 1.0));
+      }
+    }
+  }
+  for (std::size_t i = 0; i < contestants.size(); ++i)
+    figures.push_back({contestants[i].name, "path", "ratio", worst[i]});
+  return figures;
+}
+
+FeelFigures play_stick(const std::vector<Contestant>& contestants, const FeelOptions& options,
+                       double stroke) {
+  constexpr double coefficient = 0.6;
+  constexpr double press = 0.025;      // [m] the hand wants to be that far below the surface
+  constexpr double seconds = 13.0;     // of which ten are watched
+  constexpr double drawn_until = 1.5;  // [s]
+  // What a light grip presses with where the surface is lowest, and a spring that draws along with
+  // half of what that holds.
+  const Grip& grip = grip_preset("light");
+  const double stiffness = options.parameters.coupling.stiffness;
+  const double softer = grip.stiffness * stiffness / (grip.stiffness + stiffness);
+  const double least = softer * (press - 0.5 * stroke);
+  const double aside = 0.5 * coefficient * least / grip.stiffness;
+  const HipPath hand({{0.0, {0.0, 0.0, 0.060}},
+                      {0.5, {0.0, 0.0, -press}},
+                      {1.0, {0.0, 0.0, -press}},
+                      {drawn_until, {aside, 0.0, -press}},
+                      {seconds, {aside, 0.0, -press}}});
+  // A device without friction of its own, which would hold the hand too, and as exact as an omega.
+  DevicePreset device = device_preset("omega");
+  device.body.friction = 0.0;
+  const Parameters parameters = with_friction(options.parameters, coefficient);
+  std::vector<double> worst(contestants.size(), 0.0);
+  for (int k = 0; k < options.repeats; ++k) {
+    const auto seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
+    struct Mean {
+      double sum = 0.0;
+      int count = 0;
+      [[nodiscard]] double value() const { return sum / std::max(count, 1); }
+    };
+    std::vector<Mean> first(contestants.size());
+    std::vector<Mean> last(contestants.size());
+    play(
+        contestants, parameters,
+        fmt::format("synthetic:plane?distance=0.7m&sensor=d4xx&seed={}&stroke={}", seed, stroke),
+        seconds, [&] { return in_hand(hand, grip, device, seed); },
+        [&](std::size_t i, const Felt& felt) {
+          Mean* mean = felt.t >= seconds - 1.0                               ? &last[i]
+                       : felt.t >= seconds - 11.0 && felt.t < seconds - 10.0 ? &first[i]
+                                                                             : nullptr;
+          if (mean == nullptr) return;
+          mean->sum += felt.hip.x();
+          ++mean->count;
+        });
+    for (std::size_t i = 0; i < contestants.size(); ++i)
+      worst[i] = std::max(worst[i], 1e3 * std::abs(last[i].value() - first[i].value()));
+  }
+  FeelFigures figures;
+  for (std::size_t i = 0; i < contestants.size(); ++i)
+    figures.push_back({contestants[i].name, "light", "drift", worst[i]});
+  return figures;
+}
+
+}  // namespace palpate::lab

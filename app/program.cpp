@@ -50,8 +50,9 @@ void refuse_extras(const CLI::App& command, const std::vector<std::string>& cand
 struct OtherProgram {
   std::string_view verb, program;
 };
-constexpr std::array others = {OtherProgram{"eval", "palpate-lab"},
-                               OtherProgram{"bench", "palpate-bench"}};
+constexpr std::array others = {
+    OtherProgram{"eval", "palpate-lab"}, OtherProgram{"bench-entry", "palpate-lab"},
+    OtherProgram{"bench-check", "palpate-lab"}, OtherProgram{"bench", "palpate-bench"}};
 constexpr std::string_view lab_program = "palpate-lab";
 
 // This program's own file; empty where the system does not say.

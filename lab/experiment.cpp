@@ -16,6 +16,8 @@
 #include "lab/experiments/tradeoff.hpp"
 #include "lab/find_named.hpp"
 #include "lab/method.hpp"
+#include "lab/pipe_method.hpp"
+#include "palpate/core/error.hpp"
 
 namespace palpate::lab {
 
@@ -41,6 +43,14 @@ std::vector<std::string> methods_of(const Experiment& experiment,
   for (const std::string& name : options.methods) {
     const bool is_own = std::any_of(options.own_methods.begin(), options.own_methods.end(),
                                     [&](const OwnMethod& method) { return method.name == name; });
+    if (is_pipe(name)) {
+      if (!experiment.plays_programs)
+        throw Error("--methods " + name,
+                    "the experiment '" + std::string(experiment.name) +
+                        "' plays the lab's own methods alone",
+                    "give a program to pop, fidelity, real or bench-entry");
+      continue;
+    }
     if (!is_own) static_cast<void>(methods().find(name));
   }
   return options.methods;

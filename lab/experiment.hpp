@@ -32,7 +32,7 @@ struct ExperimentOptions {
       families;  ///< of pop, methods; classes of field, scenes of fidelity; or all
   std::vector<std::string> fixed;  ///< KEY=VALUE: not drawn by chance
   std::string case_text;           ///< one case, as a run printed it, and nothing else
-  /// Methods besides those of the lab, of whoever calls; `pop` and `fidelity` know them.
+  /// Methods besides those of the lab, of whoever calls; `pop`, `fidelity` and `real` know them.
   std::vector<OwnMethod> own_methods;
 };
 
@@ -70,6 +70,7 @@ struct Experiment {
   /// A bench has scores; what redraws the paper has none.
   Scores (*scores)(const Table&) = nullptr;
   bool takes_recording = false;  ///< takes --recording
+  bool plays_programs = false;   ///< takes methods `pipe:COMMAND`
 };
 
 /// The claims of a bench, which redraws nothing of the paper.

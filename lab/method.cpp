@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "lab/pipe_method.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/sources/scene.hpp"
 
@@ -59,6 +60,7 @@ std::unique_ptr<Method> make_method(std::string_view name, const MethodSetup& se
   for (const OwnMethod& method : own) {
     if (method.name == name) return method.make(setup);
   }
+  if (is_pipe(name)) return make_pipe_method(name, setup.parameters);
   return palpate::make_method(name, setup.parameters, methods(setup.truth));
 }
 

@@ -49,6 +49,14 @@ class LabMethod : public Method {
   Parameters parameters_;
 };
 
+/// A method that can fail in its ticks, which cannot throw: `play` asks after each.
+class FallibleMethod {
+ public:
+  virtual ~FallibleMethod() = default;
+  /// @throws what went wrong first, if anything did.
+  virtual void rethrow() const = 0;
+};
+
 /// What a method is made from.
 struct MethodSetup {
   Parameters parameters;
@@ -66,6 +74,7 @@ struct OwnMethod {
 /// @param truth  for `ideal`; without it making that one fails
 MethodRegistry methods(const Truth& truth = nullptr);
 
+/// @param name  of one of `own`, of the lab's methods, or `pipe:COMMAND` (lab/pipe_method.hpp)
 /// @throws Error for an unknown name, or if the method lacks something in the set-up.
 std::unique_ptr<Method> make_method(std::string_view name, const MethodSetup& setup,
                                     const std::vector<OwnMethod>& own = {});

@@ -56,6 +56,7 @@ class Arrivals {
 template <class OnTick>
 void play(Method& method, const Scenario& scenario, const OnTick& on_tick) {
   Arrivals arrivals(scenario);
+  const auto* fallible = dynamic_cast<const FallibleMethod*>(&method);
   const auto ticks =
       static_cast<std::int64_t>(std::llround(scenario.duration * scenario.tick_rate));
   for (std::int64_t i = 0; i <= ticks; ++i) {
@@ -63,7 +64,9 @@ void play(Method& method, const Scenario& scenario, const OnTick& on_tick) {
     arrivals.until(t, [&method](const std::shared_ptr<const Cloud>& cloud, double stamp) {
       method.frame(*cloud, stamp);
     });
-    if (!on_tick(method.tick(scenario.hip(t), t))) return;
+    const Tick tick = method.tick(scenario.hip(t), t);
+    if (fallible != nullptr) fallible->rethrow();
+    if (!on_tick(tick)) return;
   }
 }
 

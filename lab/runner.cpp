@@ -68,9 +68,8 @@ class FinishedCells {
     rows_[index] = rows;
   }
 
-  [[nodiscard]] std::string csv(std::string_view header) const {
-    std::string text(header);
-    text += '\n';
+  [[nodiscard]] std::string rows() const {
+    std::string text;
     for (const auto& [index, rows] : rows_) text += rows;
     return text;
   }
@@ -207,16 +206,15 @@ void work_for_rank_0(const std::vector<Cell>& cells) {
 
 }  // namespace
 
-std::string run_experiment(const Experiment& experiment, const ExperimentOptions& options,
-                           const RunnerOptions& runner, const std::filesystem::path& file) {
-  const std::vector<Cell> cells = experiment.cells(experiment, options);
+std::string run_cells(const std::vector<Cell>& cells, const std::string& print,
+                      const RunnerOptions& runner, const std::filesystem::path& file) {
 #ifdef PALPATE_MPI
   if (Ranks::rank() != 0) {
     work_for_rank_0(cells);
     return {};
   }
 #endif
-  FinishedCells finished(file, fingerprint(experiment, options), runner.resume);
+  FinishedCells finished(file, print, runner.resume);
   Desk desk(cells, finished, runner);
   std::vector<std::thread> threads;
   for (int i = 0; i < runner.jobs; ++i) threads.emplace_back([&desk] { desk.work(); });
@@ -233,14 +231,22 @@ std::string run_experiment(const Experiment& experiment, const ExperimentOptions
   if (failure) std::rethrow_exception(failure);
 #endif
   desk.rethrow();
+  std::string rows = finished.rows();
+  finished.remove();
+  return rows;
+}
 
-  std::string csv = finished.csv(experiment.header);
+std::string run_experiment(const Experiment& experiment, const ExperimentOptions& options,
+                           const RunnerOptions& runner, const std::filesystem::path& file) {
+  const std::string rows = run_cells(experiment.cells(experiment, options),
+                                     fingerprint(experiment, options), runner, file);
+  if (Ranks::rank() != 0) return {};
+  std::string csv = std::string(experiment.header) + '\n' + rows;
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
   out << csv << std::flush;
   if (!out)
     throw Error(file.string(), std::string("cannot be written: ") + std::strerror(errno),
                 "give --out a folder that you may write to, with room on its disk");
-  finished.remove();
   return csv;
 }
 
@@ -273,6 +279,17 @@ int Ranks::size() {
   if (initialised != 0) MPI_Comm_size(MPI_COMM_WORLD, &size);
   return size;
 }
+
+std::uint64_t Ranks::of_rank_0(std::uint64_t value) {
+  if (size() > 1) MPI_Bcast(&value, 1, MPI_UINT64_T, 0, MPI_COMM_WORLD);
+  return value;
+}
+
+double Ranks::sum(double value) {
+  double total = value;
+  if (size() > 1) MPI_Reduce(&value, &total, 1, MPI_DOUBLE, MPI_SUM, 0, MPI_COMM_WORLD);
+  return total;
+}
 #else
 Ranks::Ranks(int* /*argc*/, char*** /*argv*/) {}
 Ranks::~Ranks() = default;
@@ -281,6 +298,12 @@ int Ranks::rank() {
 }
 int Ranks::size() {
   return 1;
+}
+std::uint64_t Ranks::of_rank_0(std::uint64_t value) {
+  return value;
+}
+double Ranks::sum(double value) {
+  return value;
 }
 #endif
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "lab/experiment.hpp"
 
@@ -25,6 +27,11 @@ struct RunnerOptions {
 std::string run_experiment(const Experiment& experiment, const ExperimentOptions& options,
                            const RunnerOptions& runner, const std::filesystem::path& file);
 
+/// The same of any cells: their rows in order, without a header; `file` itself is not written.
+/// @param print  identifies the run by its options, one line: what was left is resumed under it
+std::string run_cells(const std::vector<Cell>& cells, const std::string& print,
+                      const RunnerOptions& runner, const std::filesystem::path& file);
+
 /// The ranks of an MPI run, from construction to destruction of the object; one rank without MPI.
 class Ranks {
  public:
@@ -34,6 +41,10 @@ class Ranks {
   Ranks& operator=(const Ranks&) = delete;
   [[nodiscard]] static int rank();
   [[nodiscard]] static int size();
+  /// What rank 0 has, on every rank. All ranks call it.
+  [[nodiscard]] static std::uint64_t of_rank_0(std::uint64_t value);
+  /// The sum over the ranks, on rank 0. All ranks call it.
+  [[nodiscard]] static double sum(double value);
 };
 
 }  // namespace palpate::lab

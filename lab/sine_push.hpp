@@ -33,7 +33,7 @@ void push_by_sine(const std::string& name, const ExperimentOptions& options,
   const Truth truth = [&](const Vec3& p, double t) {
     return TruePoint{p.z() - height(t), Vec3::UnitZ()};
   };
-  const auto method = make_method(name, {parameters, truth});
+  const auto method = make_method(name, {parameters, truth}, options.own_methods);
   const Vec3 hip(0.1 * r_c, 0.1 * r_c, -0.005);
   method->seat(Vec3(hip.x(), hip.y(), 4.0 * r_c));
   play(*method,

@@ -77,6 +77,10 @@ void PythonMethod::frame(const Cloud& cloud, double stamp) noexcept {
 Tick PythonMethod::tick(const Vec3& hip, double t) noexcept {
   Tick tick = free_tick(hip, t, frames_);
   if (trouble_->first || !hip.allFinite()) return tick;
+  if (frames_ < 0) {
+    tick.flags = no_frame;
+    return tick;
+  }
   const py::gil_scoped_acquire gil;
   try {
     const auto answer = py::cast<py::tuple>(tick_(hip, t));

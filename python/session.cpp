@@ -16,9 +16,9 @@ namespace palpate::python {
 namespace {
 
 // How long a wait lasts before Python is asked for signals.
-constexpr std::chrono::milliseconds between_signals{50};
+constexpr std::chrono::milliseconds session_pause{50};
 // Ticks of a free-running session between two looks at signals.
-constexpr std::size_t ticks_between_signals = 4096;
+constexpr std::size_t session_batch = 4096;
 
 void set_limits(SafetyParameters& limits, const py::dict& values) {
   for (const auto& [name, value] : values)
@@ -80,7 +80,7 @@ class PythonSession {
       std::size_t count = 0;
       session_->run(duration, [&](const ServoTick& tick) {
         ran_.push_back(record_of(tick));
-        if (++count % ticks_between_signals == 0) check_signals();
+        if (++count % session_batch == 0) check_signals();
       });
       return;
     }
@@ -88,7 +88,7 @@ class PythonSession {
     const auto end =
         std::chrono::steady_clock::now() + std::chrono::duration<double>(duration.value_or(1e9));
     while (std::chrono::steady_clock::now() < end) {
-      std::this_thread::sleep_for(between_signals);
+      std::this_thread::sleep_for(session_pause);
       check_signals();
     }
     session_->stop();

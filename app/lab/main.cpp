@@ -7,10 +7,13 @@
 
 namespace palpate::app {
 Verb add_eval(CLI::App& program);
-}
+Verb add_bench_entry(CLI::App& program);
+Verb add_bench_check(CLI::App& program);
+}  // namespace palpate::app
 
 int main(int argc, char** argv) {
   const palpate::lab::Ranks ranks(&argc, &argv);
-  constexpr std::array<palpate::app::AddVerb, 1> own = {palpate::app::add_eval};
+  constexpr std::array<palpate::app::AddVerb, 3> own = {
+      palpate::app::add_eval, palpate::app::add_bench_entry, palpate::app::add_bench_check};
   return palpate::app::run_program(argc, argv, own);
 }

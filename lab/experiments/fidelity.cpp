@@ -32,12 +32,7 @@ std::pair<int, int> repeats_of(const ExperimentOptions& options) {
 }
 
 // Measures, their scenes and their aims (upper bounds).
-struct Measure {
-  std::string_view scene;
-  std::string_view name;
-  std::string_view unit;
-  std::optional<double> aim;
-};
+using Measure = FidelityMeasure;
 constexpr std::array measures = {
     Measure{"white-1mm", "rms", "mm", 0.05},
     Measure{"white-1mm", "bias", "mm", 0.02},
@@ -408,16 +403,26 @@ plot for [m in methods] ratio(m) using 1:3:xtic(2) with points pt 7 title m
 
 }  // namespace
 
+std::span<const FidelityMeasure> fidelity_measures() {
+  return measures;
+}
+
+bool is_without_chance(std::string_view scene) {
+  return scene == "quiet-plane" || scene == "quiet-relief" || scene == "sine";
+}
+
 Experiment fidelity_experiment() {
-  return {"fidelity",
-          "how near the contact and the force are to the true ones, beside the aims",
-          "method,scene,measure,unit,aim,value",
-          {"paper", "sight"},
-          true,
-          fidelity_cells,
-          fidelity_plot,
-          no_claims,
-          fidelity_scores};
+  Experiment experiment{"fidelity",
+                        "how near the contact and the force are to the true ones, beside the aims",
+                        "method,scene,measure,unit,aim,value",
+                        {"paper", "sight"},
+                        true,
+                        fidelity_cells,
+                        fidelity_plot,
+                        no_claims,
+                        fidelity_scores};
+  experiment.plays_programs = true;
+  return experiment;
 }
 
 }  // namespace palpate::lab

@@ -398,21 +398,30 @@ void ForceJudge::add(const Tick& tick, const Tick& ruler, double clear) {
   wrong_ = wrong_ || wrong_for_ > frame_;
 }
 
+Judgement judge(const std::string& method, const PopCase& c, const ExperimentOptions& options) {
+  const Outcome outcome =
+      play_case(maker_of(method, options.own_methods), c, options.parameters, false);
+  return {.held = !outcome.lost, .right = !outcome.lost && outcome.force.right()};
+}
+
 bool is_lost(const std::string& method, const PopCase& c, const Parameters& parameters) {
   return play_case(maker_of(method, {}), c, parameters, false).lost;
 }
 
 Experiment pop_experiment() {
-  return {"pop",
-          "is the surface ever lost? families of cases drawn by chance, failures shrunk",
-          "method,family,from,cases,lost,dipped,worst_step_n,worst_change_n,worst_caused_n,"
-          "noticeable,first_lost,simplest,ghost,numb,wrong,right,worst_ghost_n,first_not_right",
-          {"paper", "sight"},
-          false,
-          pop_cells,
-          pop_plot,
-          no_claims,
-          pop_scores};
+  Experiment experiment{
+      "pop",
+      "is the surface ever lost? families of cases drawn by chance, failures shrunk",
+      "method,family,from,cases,lost,dipped,worst_step_n,worst_change_n,worst_caused_n,"
+      "noticeable,first_lost,simplest,ghost,numb,wrong,right,worst_ghost_n,first_not_right",
+      {"paper", "sight"},
+      false,
+      pop_cells,
+      pop_plot,
+      no_claims,
+      pop_scores};
+  experiment.plays_programs = true;
+  return experiment;
 }
 
 }  // namespace palpate::lab

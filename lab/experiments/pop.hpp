@@ -40,6 +40,15 @@ class ForceJudge {
   bool wrong_ = false;
 };
 
+/// What the bench's rules say of one case.
+struct Judgement {
+  bool held = false;   ///< rule 2
+  bool right = false;  ///< rule 4
+};
+
+/// Plays one case.
+Judgement judge(const std::string& method, const PopCase& c, const ExperimentOptions& options);
+
 /// Is the surface lost in a case? Nothing is shrunk: for tables of many methods.
 bool is_lost(const std::string& method, const PopCase& c, const Parameters& parameters);
 

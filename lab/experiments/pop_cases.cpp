@@ -26,16 +26,6 @@ constexpr double f_c = 30.0;  // [Hz] of the lifts: Table 2
 using enum PopRange::Draw;
 
 // Even numbers in [0, 1), the same with every standard library.
-class Chance {
- public:
-  explicit Chance(std::uint64_t seed) : bits_(seed) {}
-  double operator()() { return static_cast<double>(bits_() >> 11U) * 0x1p-53; }
-  double operator()(double low, double high) { return low + (high - low) * (*this)(); }
-
- private:
-  std::mt19937_64 bits_;
-};
-
 // ---- Clouds of points on a grid, as in section 5. ----
 
 PopStage on_grid(const PopCase& c, const Parameters& parameters, Noise noise,
@@ -597,12 +587,19 @@ constexpr std::array families = {
               lift_off_ranges, lift_off},
     PopFamily{"late", "slow and late cameras, a plane at rest", late_ranges, late}};
 
-// Rounded to three digits, so that the printed case is exactly the one that was played.
+}  // namespace
+
 double rounded(double value) {
   return std::strtod(fmt::format("{:.3g}", value).c_str(), nullptr);
 }
 
-}  // namespace
+Chance chance_of(std::string_view name, std::uint64_t seed, std::uint64_t index) {
+  // FNV-1a of the name: a new family changes no other.
+  std::uint64_t hash = 14695981039346656037ULL;
+  for (const char letter : name)
+    hash = (hash ^ static_cast<unsigned char>(letter)) * 1099511628211ULL;
+  return Chance((hash ^ seed * 0x9e3779b97f4a7c15ULL) + index * 0xbf58476d1ce4e5b9ULL);
+}
 
 double PopCase::operator[](std::string_view key) const {
   const auto found = values.find(key);
@@ -637,11 +634,7 @@ std::vector<const PopFamily*> find_pop_families(std::span<const std::string> nam
 }
 
 PopCase draw_pop_case(const PopFamily& family, std::uint64_t seed, std::uint64_t index) {
-  // FNV-1a of the name: a new family changes no other.
-  std::uint64_t hash = 14695981039346656037ULL;
-  for (const char letter : family.name)
-    hash = (hash ^ static_cast<unsigned char>(letter)) * 1099511628211ULL;
-  Chance chance((hash ^ seed * 0x9e3779b97f4a7c15ULL) + index * 0xbf58476d1ce4e5b9ULL);
+  Chance chance = chance_of(family.name, seed, index);
   PopCase c;
   c.family = family.name;
   for (const PopRange& range : family.ranges) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <random>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,6 +14,23 @@
 #include "lab/play.hpp"
 
 namespace palpate::lab {
+
+/// Numbers by chance, the same on every machine.
+class Chance {
+ public:
+  explicit Chance(std::uint64_t seed) : bits_(seed) {}
+  double operator()() { return static_cast<double>(bits_() >> 11U) * 0x1p-53; }
+  double operator()(double low, double high) { return low + (high - low) * (*this)(); }
+
+ private:
+  std::mt19937_64 bits_;
+};
+
+/// The chance of case number `index` of what has this name: from seed, name and index alone.
+Chance chance_of(std::string_view name, std::uint64_t seed, std::uint64_t index);
+
+/// A value to three digits, so that a printed case is exactly the one that was played.
+double rounded(double value);
 
 /// A value that a family of cases draws by chance.
 struct PopRange {

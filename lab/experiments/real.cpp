@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
 #include <numbers>
@@ -12,8 +13,11 @@
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
+#include "lab/experiments/pop.hpp"
+#include "lab/experiments/pop_cases.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
+#include "lab/sha256.hpp"
 #include "lab/signal.hpp"
 #include "palpate/cloud/audit.hpp"
 #include "palpate/core/error.hpp"
@@ -97,7 +101,8 @@ std::optional<Place> flat_place(const DepthImage& image, const Vec3& point) {
   return Place{point + normal * normal.dot(mean), normal};
 }
 
-Recording open_recording(const std::string& uri) {
+// @param most  places; of more, so many are taken evenly
+Recording open_recording(const std::string& uri, std::size_t most = most_places) {
   const std::unique_ptr<Source> source = open_source(uri);
   Recording recording;
   while (recording.frames.size() < most_frames) {
@@ -141,8 +146,8 @@ Recording open_recording(const std::string& uri) {
   if (all.empty())
     throw Error(uri, "it shows nothing flat between 0.2 and 1.5 m",
                 "give a recording of a room or a table");
-  for (std::size_t i = 0; i < std::min(most_places, all.size()); ++i)
-    recording.places.push_back(all[i * all.size() / std::min(most_places, all.size())]);
+  for (std::size_t i = 0; i < std::min(most, all.size()); ++i)
+    recording.places.push_back(all[i * all.size() / std::min(most, all.size())]);
   return recording;
 }
 
@@ -150,9 +155,17 @@ Recording open_recording(const std::string& uri) {
 enum class Action { hold, slide, moving, sweep };
 constexpr std::array action_names = {"hold", "slide", "moving", "sweep"};
 
-constexpr double onset = 0.9;     // [s] of what moves
-constexpr double stroke = 0.020;  // [m] of `moving`, at 0.5 Hz
-constexpr double nearer = 0.75;   // the sweeping patch's distance, as a share of the contact's
+constexpr double onset = 0.9;  // [s] of what moves
+
+// How it moves; what `palpate eval real` plays unless it is drawn.
+struct Motion {
+  Action action = Action::hold;
+  double stroke = 0.020;    // [m] of `moving`
+  double frequency = 0.5;   // [Hz] of it
+  double nearer = 0.75;     // the sweeping patch's distance, as a share of the contact's
+  double speed = 0.25;      // [m/s] of it
+  std::uint64_t first = 0;  // the recording's frame that is shown first
+};
 
 double duration_of(Action action) {
   return action == Action::hold ? contact_time + 2.5 : action == Action::slide ? 1.9 : 2.9;
@@ -160,26 +173,27 @@ double duration_of(Action action) {
 
 // How far from the camera the place is, as a share of where it was recorded. Scaled about the
 // camera, every point stays on its line of sight.
-double scale_at(Action action, const Place& place, double t) {
-  if (action != Action::moving || t < onset) return 1.0;
-  const double shift = 0.5 * stroke * (1.0 - std::cos(std::numbers::pi * (t - onset)));
+double scale_at(const Motion& motion, const Place& place, double t) {
+  if (motion.action != Action::moving || t < onset) return 1.0;
+  const double phase = 2.0 * std::numbers::pi * motion.frequency * (t - onset);
+  const double shift = 0.5 * motion.stroke * (1.0 - std::cos(phase));
   return 1.0 - shift / place.at.norm();
 }
 
 // A recorded frame with the patch about the place moved, or with a copy of it that sweeps by.
 std::shared_ptr<const DepthImage> composed(const DepthImage& frame, const Place& place,
-                                           Action action, double t) {
+                                           const Motion& motion, double t) {
   const Intrinsics& k = frame.intrinsics();
   std::vector<std::uint16_t> depth = frame.depth().copy();
   const double cu = k.fx * place.at.x() / place.at.z() + k.cx;
   const double cv = k.fy * place.at.y() / place.at.z() + k.cy;
   const double radius = patch_radius * k.fx / place.at.z();  // [px]
-  const double scale = action == Action::sweep ? nearer : scale_at(action, place, t);
-  // From 0.25 m on one side to 0.25 m on the other in two seconds, at the patch's own distance.
-  const int by =
-      action == Action::sweep
-          ? static_cast<int>(std::lround(0.25 * (t - onset - 1.0) * k.fx / (nearer * place.at.z())))
-          : 0;
+  const bool sweeps = motion.action == Action::sweep;
+  const double scale = sweeps ? motion.nearer : scale_at(motion, place, t);
+  // From one side to the other in two seconds, over the place after one, at the patch's distance.
+  const int by = sweeps ? static_cast<int>(std::lround(motion.speed * (t - onset - 1.0) * k.fx /
+                                                       (motion.nearer * place.at.z())))
+                        : 0;
   const int v_begin = std::max(static_cast<int>(cv - radius), 0);
   const int v_end = std::min(static_cast<int>(cv + radius) + 1, k.height);
   const int u_begin = std::max(static_cast<int>(cu - radius), 0);
@@ -200,6 +214,7 @@ std::shared_ptr<const DepthImage> composed(const DepthImage& frame, const Place&
 
 // What became of a contact.
 struct Outcome {
+  ForceJudge force;
   bool lost = false;
   int suspected = 0;    // how often a proxy was behind the measured surface for over a frame
   double error = 0.0;   // [m] rms, of the contact against the plane
@@ -209,7 +224,8 @@ struct Outcome {
 };
 
 Outcome touch(const std::string& name, const ExperimentOptions& options, const Recording& recording,
-              const Place& place, Action action) {
+              const Place& place, const Motion& motion) {
+  const Action action = motion.action;
   const double r_c = options.parameters.proxy.r_c();
   // Where the camera moves, the place stays where the first frame had it in the world.
   const Eigen::Isometry3d world_from_camera = recording.frames.front()->world_from_camera();
@@ -218,19 +234,19 @@ Outcome touch(const std::string& name, const ExperimentOptions& options, const R
   const Vec3 eye = world_from_camera.translation();
   const Vec3 arm = world_from_camera.linear() * place.at;
   const Truth truth = [&](const Vec3& p, double t) {
-    return TruePoint{normal.dot(p - eye - scale_at(action, place, t) * arm), normal};
+    return TruePoint{normal.dot(p - eye - scale_at(motion, place, t) * arm), normal};
   };
-  const auto method = make_method(name, {options.parameters, truth});
+  const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
+  const auto ruler = make_method("ideal", {options.parameters, truth});
   double shown = 0.0;
   std::shared_ptr<const DepthImage> image;
   const auto hip = [&](double t) {
     const double above = std::max(0.15 * (contact_time - t), -press);
     const double along = action == Action::slide ? 0.02 * std::clamp(t - onset, 0.0, 1.0) : 0.0;
-    return Vec3(eye + scale_at(action, place, shown) * arm + above * normal + along * slide_along);
+    return Vec3(eye + scale_at(motion, place, shown) * arm + above * normal + along * slide_along);
   };
   const bool moves = action == Action::moving || action == Action::sweep;
   const double watched_from = action == Action::hold ? contact_time + 0.5 : onset;
-  Outcome outcome;
   int behind = 0;
   int suspected = 0;
   bool touched = false;
@@ -241,8 +257,8 @@ Outcome touch(const std::string& name, const ExperimentOptions& options, const R
                           .duration = duration_of(action),
                           .cloud =
                               [&](std::uint64_t k, double t) {
-                                const DepthImage& recorded = recording.frame(k);
-                                image = moves && t >= onset ? composed(recorded, place, action, t)
+                                const DepthImage& recorded = recording.frame(k + motion.first);
+                                image = moves && t >= onset ? composed(recorded, place, motion, t)
                                                             : std::shared_ptr<const DepthImage>(
                                                                   &recorded, [](const auto*) {});
                                 shown = t;
@@ -250,6 +266,7 @@ Outcome touch(const std::string& name, const ExperimentOptions& options, const R
                               },
                           .hip = hip};
   const double frame = scenario.tick_rate / scenario.frame_rate;
+  Outcome outcome{.force = {r_c, scenario.tick_rate, frame}};
   play(*method, scenario, [&](const Tick& tick) {
     const double now = truth(tick.proxy, tick.t).distance;
     behind = now < 0.0 && truth(tick.proxy, shown).distance < 0.0 ? behind + 1 : 0;
@@ -260,6 +277,8 @@ Outcome touch(const std::string& name, const ExperimentOptions& options, const R
     suspected = tick.t > contact_time && seen && *seen > r_c ? suspected + 1 : 0;
     if (suspected == static_cast<int>(frame) + 1) ++outcome.suspected;
     const double felt = tick.force.dot(normal);
+    // What else stands about the place may be touched on the way: no force is judged as a ghost.
+    outcome.force.add(tick, ruler->tick(tick.hip, tick.t), 0.0);
     if (touched) outcome.step = std::max(outcome.step, std::abs(felt - last_force));
     touched = touched || tick.t > contact_time;
     last_force = felt;
@@ -289,7 +308,7 @@ std::vector<Cell> real_cells(const Experiment& experiment, const ExperimentOptio
       for (std::size_t i = 0; i < recording->places.size(); ++i) {
         cells.emplace_back([=] {
           const Place& place = recording->places[i];
-          const Outcome outcome = touch(name, options, *recording, place, action);
+          const Outcome outcome = touch(name, options, *recording, place, {action});
           return Row()
               .add(name)
               .add(action_names[static_cast<std::size_t>(action)])
@@ -350,7 +369,55 @@ plot for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "hold" && $5 =
      for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "hold" && $5 == 1 ? $4 : NaN):(5) with points pt 2 ps 1.5 title m." lost"
 )gp";
 
+// Everything that the cases of a recording depend on.
+std::string hash_of(const Recording& recording) {
+  Sha256 hash;
+  for (const auto& frame : recording.frames) {
+    const Intrinsics& k = frame->intrinsics();
+    hash.add(fmt::format("{}x{} {} {} {} {} {} {} {}\n", k.width, k.height, k.fx, k.fy, k.cx, k.cy,
+                         fmt::join(k.distortion, " "), frame->units_per_metre(), recording.rate));
+    for (const std::uint16_t depth : frame->depth()) {
+      const std::array bytes = {static_cast<char>(depth & 0xffU), static_cast<char>(depth >> 8U)};
+      hash.add({bytes.data(), bytes.size()});
+    }
+  }
+  return hash.digest();
+}
+
 }  // namespace
+
+RealCases draw_real_cases(const std::string& uri, const std::string& name, std::uint64_t seed,
+                          std::size_t count) {
+  const auto recording =
+      std::make_shared<const Recording>(open_recording(uri, std::numeric_limits<int>::max()));
+  if (!recording->at_rest)
+    throw Error(uri, "its camera moved, so no motion can be composed exactly",
+                "give a recording of a camera at rest, or the part in which it was, as ?frames=8");
+  RealCases result{.hash = hash_of(*recording), .frames = recording->frames.size(), .cases = {}};
+  for (std::size_t i = 0; i < count; ++i) {
+    Chance chance = chance_of(result.hash, seed, i);
+    const auto at = static_cast<std::size_t>(
+        std::floor(chance(0.0, static_cast<double>(recording->places.size()))));
+    // Each action as often as the others.
+    const Motion motion{.action = static_cast<Action>(i % action_names.size()),
+                        .stroke = rounded(chance(0.010, 0.030)),
+                        .frequency = rounded(chance(0.5, 1.0)),
+                        .nearer = rounded(chance(0.6, 0.85)),
+                        .speed = rounded(chance(0.15, 0.4)),
+                        .first = static_cast<std::uint64_t>(chance(0.0, 1000.0))};
+    result.cases.push_back(
+        {fmt::format(
+             "real:{}?action={}&place={}&stroke={}&frequency={}&nearer={}&speed={}&first={}", name,
+             action_names[static_cast<std::size_t>(motion.action)], at, motion.stroke,
+             motion.frequency, motion.nearer, motion.speed, motion.first),
+         [=](const std::string& method, const ExperimentOptions& options) {
+           const Outcome outcome =
+               touch(method, options, *recording, recording->places[at], motion);
+           return Judgement{.held = !outcome.lost, .right = !outcome.lost && outcome.force.right()};
+         }});
+  }
+  return result;
+}
 
 Experiment real_experiment() {
   Experiment experiment{
@@ -364,6 +431,7 @@ Experiment real_experiment() {
       no_claims,
       real_scores};
   experiment.takes_recording = true;
+  experiment.plays_programs = true;
   return experiment;
 }
 

@@ -3,11 +3,17 @@
 
     palpate.bench.pop("sight", cases=5)
     palpate.bench.pop(MyMethod(), cases=5)
+    palpate.bench.entry(MyMethod(), out="mine.json")
 
 The rules are in docs/pop.md and docs/bench.md. The same arguments give the same scores.
 """
 
 import copy
+import datetime
+import json
+import pathlib
+import platform
+import secrets
 import tempfile
 
 from . import _core
@@ -44,15 +50,19 @@ def methods():
     return _core._bench_methods()
 
 
+def _named(method):
+    """A method's name, and what makes a fresh object of it: none for the lab's."""
+    if isinstance(method, str):
+        return method, None
+    if isinstance(method, type):
+        return method.__name__, method
+    return type(method).__name__, lambda: copy.deepcopy(method)  # as it was given
+
+
 def _run(name, wanted, cases, seed, families, jobs, parameters):
-    names, own = [], []
-    for method in wanted if isinstance(wanted, (list, tuple)) else [wanted]:
-        if isinstance(method, str):
-            names.append(method)
-        elif isinstance(method, type):
-            own.append((method.__name__, method))
-        else:  # each case begins with the object as it was given
-            own.append((type(method).__name__, lambda given=method: copy.deepcopy(given)))
+    methods = [_named(one) for one in (wanted if isinstance(wanted, (list, tuple)) else [wanted])]
+    names = [of_lab for of_lab, make in methods if make is None]
+    own = [method for method in methods if method[1] is not None]
     with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
         return Scores(_core._bench(name, names, own, f"{folder}/{name}.csv", cases,
                                    seed, list(families), jobs, **parameters))
@@ -70,3 +80,39 @@ def pop(method, *, cases=50, seed=1, families=(), jobs=1, **parameters):
 def fidelity(method, *, seed=1, families=(), jobs=1, **parameters):
     """How true, quiet and still is the force, against 24 aims? Arguments as for `pop`."""
     return _run("fidelity", method, None, seed, families, jobs, parameters)
+
+
+def _processor():
+    try:
+        for line in pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.machine()
+
+
+def entry(method, out="entry.json", *, seed=None, cases=25, repeats=5, recordings=(), jobs=1):
+    """Plays a method on the whole bench, writes an entry for the leaderboard and returns it.
+
+    method: a name, 'pipe:COMMAND', or a class or an object derived from palpate.Method. seed: drawn
+    by chance unless given, so that nobody can tune to the cases. recordings: URIs, each of a camera
+    at rest. What an entry has in it: docs/bench-entries.md.
+    """
+    name, make = _named(method)
+    run = {"date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
+           "processor": _processor(), "python": platform.python_version()}
+    return json.loads(_core._bench_entry(
+        name, [] if make is None else [(name, make)], str(out),
+        secrets.randbits(32) if seed is None else seed, cases, repeats,
+        [str(uri) for uri in recordings], jobs, list(run.items())))
+
+
+def check(file, method=None, *, sample=20, recordings=(), jobs=1):
+    """Plays a sample of an entry again: does it hold? A dict with `holds`, `differences` and more.
+
+    method: the class or object that the entry was made with, if it is written in Python.
+    """
+    own = [] if method is None else [_named(method)]
+    return _core._bench_check(str(file), [one for one in own if one[1] is not None], sample,
+                              secrets.randbits(63), [str(uri) for uri in recordings], jobs)

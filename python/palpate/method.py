@@ -20,7 +20,8 @@ class Method:
         """One cycle: the HIP [m, world] at time t [s] in, (proxy [m], force [N]) out.
 
         A third value, the surface's unit normal, may follow; else it is the direction from the HIP
-        to the proxy. In free space the proxy is at the HIP and the force is zero.
+        to the proxy. In free space the proxy is at the HIP and the force is zero; so it is before
+        the first frame, when this is not called.
         """
         raise NotImplementedError
 

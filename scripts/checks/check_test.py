@@ -3,10 +3,14 @@
 
 import os
 import pathlib
+import sys
 import tempfile
 import unittest
 
 import check
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import leaderboard  # noqa: E402
 
 SPDX = "// SPDX-License-Identifier: Apache-2.0\n"
 
@@ -158,6 +162,29 @@ class Chosen(Tree):
         for names in [], ["rooms", "txet"]:
             with self.assertRaises(SystemExit):
                 check.chosen(names)
+
+
+class Leaderboard(Tree):
+    def entry(self, method, value, low, high, recordings=()):
+        score = {"value": value, "low": low, "high": high}
+        return {"method": method, "cases": 5, "cases_sha256": "0123456789abcdef",
+                "recordings": [{"name": name} for name in recordings],
+                "run": {"cpu_seconds": 6.0, "processor": "a processor"},
+                "scores": {"score": score, "held": score, "fidelity": {"aims met": score},
+                           "real": {"right": score} if recordings else "not played"}}
+
+    def test_intervals_that_overlap_share_a_rank(self):
+        self.assertEqual(leaderboard.ranks([(90, 95), (80, 91), (70, 85), (10, 20)]),
+                         [(1, 2), (1, 3), (2, 3), (4, 4)])
+        self.assertEqual(leaderboard.ranks([(5, 5), (5, 5)]), [(1, 2), (1, 2)])
+
+    def test_a_page_ranks_like_with_like_and_not_the_ruler(self):
+        text = leaderboard.page([self.entry("a", 50, 40, 60), self.entry("b", 70, 65, 75),
+                                 self.entry("ideal", 100, 90, 100),
+                                 self.entry("c", 90, 85, 95, ["depth:table"])])
+        rows = [line.split(" | ")[:2] for line in text.splitlines() if "`" in line and "|" in line]
+        self.assertEqual(rows, [["| 1", "`c`"], ["| ruler", "`ideal`"], ["| 1", "`b`"],
+                                ["| 2", "`a`"]])
 
 
 if __name__ == "__main__":

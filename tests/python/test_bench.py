@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A method written in Python scores as its twin in C++; its faults are not swallowed."""
 
+import tempfile
 import unittest
 
 import numpy
@@ -68,6 +69,24 @@ class Bench(unittest.TestCase):
             palpate.trace(method=Forgetful(), **press)
         with self.assertRaisesRegex(palpate.Error, "newer frame"):
             palpate.trace(method=Keeper(), **press)
+
+    def test_an_entry_of_a_method_in_python_holds(self):
+        class Nothing(palpate.Method):
+            def frame(self, cloud, stamp):
+                self.seen = True
+
+            def tick(self, hip, t):
+                return hip, numpy.full(3, 0.0 if self.seen else numpy.nan)
+
+        with tempfile.TemporaryDirectory() as folder:
+            file = f"{folder}/entry.json"
+            entry = palpate.bench.entry(Nothing(), file, seed=5, cases=1, repeats=1)
+            self.assertEqual((entry["method"], entry["kind"]), ("Nothing", "python"))
+            self.assertLess(entry["scores"]["score"]["value"], 10, "it feels nothing")
+            self.assertIn("no recording", entry["scores"]["real"])
+            self.assertTrue(palpate.bench.check(file, Nothing, sample=3)["holds"])
+            with self.assertRaisesRegex(palpate.Error, "palpate.bench.check"):
+                palpate.bench.check(file)
 
     def test_refuses_what_it_does_not_know(self):
         self.assertIn("god-object", palpate.bench.methods())

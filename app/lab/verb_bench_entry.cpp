@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "app/machine.hpp"
+#include "app/progress.hpp"
+#include "app/verbs.hpp"
+#include "lab/entry.hpp"
+#include "lab/runner.hpp"
+#include "palpate/core/error.hpp"
+
+namespace palpate::app {
+namespace {
+
+struct EntryArguments {
+  lab::EntryOptions entry;
+  std::string out = "entry.json";
+  std::optional<std::uint64_t> seed;
+  int jobs = 0;
+  bool resume = false;
+};
+
+struct CheckArguments {
+  std::string file;
+  std::size_t sample = 20;
+  std::vector<std::string> recordings;
+  int jobs = 0;
+};
+
+std::uint64_t by_chance() {
+  std::random_device bits;
+  return bits();
+}
+
+// One thread a core, or one a rank; a line of progress where a person watches.
+lab::RunnerOptions runner_options(int jobs, std::shared_ptr<Progress>& progress) {
+  if (jobs < 0 || jobs > 1024)
+    throw Error("--jobs " + std::to_string(jobs), "that many threads make no sense",
+                "give 1 to 1024, or 0 for one a core");
+  const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  lab::RunnerOptions runner;
+  runner.jobs = jobs > 0 ? jobs : lab::Ranks::size() > 1 ? 1 : cores;
+  runner.progress = [&progress](std::size_t done, std::size_t total) {
+    if (!progress) progress = std::make_shared<Progress>("bench", total);
+    progress->set(done);
+  };
+  return runner;
+}
+
+std::string now() {
+  const std::time_t time = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&time, &utc);
+  std::string text(20, '\0');
+  std::strftime(text.data(), text.size() + 1, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
+int enter(const EntryArguments& arguments) {
+  lab::EntryOptions options = arguments.entry;
+  options.seed = lab::Ranks::of_rank_0(arguments.seed.value_or(by_chance()));
+  const Machine machine = look_at_machine();
+  const lab::EntryRun run = {
+      {"date", now()}, {"processor", machine.processor}, {"compiler", __VERSION__}};
+  std::shared_ptr<Progress> progress;
+  lab::RunnerOptions runner = runner_options(arguments.jobs, progress);
+  runner.resume = arguments.resume;
+  const std::string text = lab::make_entry(options, run, runner, arguments.out);
+  if (lab::Ranks::rank() != 0) return 0;
+  if (progress) progress->finish();
+  const nlohmann::json entry = nlohmann::json::parse(text);
+  const auto line = [](const std::string& name, const nlohmann::json& score) {
+    if (score.is_string())
+      fmt::print("{:<22} {}\n", name, score.get<std::string>());
+    else
+      fmt::print("{:<22} {:.2f} %, {:.2f} to {:.2f}\n", name, score["value"].get<double>(),
+                 score["low"].get<double>(), score["high"].get<double>());
+  };
+  const nlohmann::json& scores = entry["scores"];
+  line("score", scores["score"]);
+  line("held", scores["held"]);
+  line("pop, right", scores["pop"]["right"]);
+  line("fidelity, aims met", scores["fidelity"]["aims met"]);
+  line("real, right", scores["real"].is_string() ? scores["real"] : scores["real"]["right"]);
+  fmt::print("wrote {}, seed {}, {:.1f} CPU-minutes\n", arguments.out, options.seed,
+             entry["run"]["cpu_seconds"].get<double>() / 60.0);
+  return 0;
+}
+
+int check(const CheckArguments& arguments) {
+  if (arguments.sample == 0) throw Error("--sample 0", "nothing would be played", "give 1 or more");
+  std::shared_ptr<Progress> progress;
+  const lab::RunnerOptions runner = runner_options(arguments.jobs, progress);
+  const lab::EntryCheck check =
+      lab::check_entry(arguments.file, arguments.sample, lab::Ranks::of_rank_0(by_chance()),
+                       arguments.recordings, {}, runner);
+  if (lab::Ranks::rank() != 0) return 0;
+  if (progress) progress->finish();
+  for (const std::string& fault : check.faults) fmt::print("{}\n", fault);
+  for (const std::string& difference : check.differences) fmt::print("{}\n", difference);
+  for (const std::string& name : check.left_out)
+    fmt::print("not played: {}, give it with --recording\n", name);
+  fmt::print("{}: {} of {} cases and scenes played again, {} differ\n",
+             check.holds ? "it holds" : "it does not hold", check.played, check.entered,
+             check.differences.size());
+  return check.holds ? 0 : 1;
+}
+
+}  // namespace
+
+Verb add_bench_entry(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "bench-entry", "plays a method on the whole bench and writes an entry for the leaderboard");
+  const auto options = std::make_shared<EntryArguments>();
+  command
+      ->add_option("method", options->entry.method,
+                   "a name of `palpate eval --list-methods`, or a program: 'pipe:COMMAND'")
+      ->required();
+  command->add_option("--out", options->out, "the entry's file (entry.json)");
+  command->add_option("--seed", options->seed, "that cases are drawn from (by chance)");
+  command->add_option("--cases", options->entry.cases, "of each family (25)");
+  command->add_option("--repeats", options->entry.repeats,
+                      "of each scene of fidelity, in each of four parts (5)");
+  command
+      ->add_option("--recording", options->entry.recordings,
+                   "of a camera at rest, e.g. depth:FOLDER?frames=8; may be given several times")
+      ->allow_extra_args(false);
+  command->add_option("--jobs", options->jobs, "threads (one a core)");
+  command->add_flag("--resume", options->resume,
+                    "go on from an interrupted run's finished cases, with its --seed");
+  return {command, [options] { return enter(*options); }};
+}
+
+Verb add_bench_check(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "bench-check", "plays a sample of an entry again and says whether it holds");
+  const auto options = std::make_shared<CheckArguments>();
+  command->add_option("entry", options->file, "its file")->required();
+  command->add_option("--sample", options->sample, "how many cases and scenes (20)");
+  command
+      ->add_option("--recording", options->recordings,
+                   "that the entry was made with; may be given several times")
+      ->allow_extra_args(false);
+  command->add_option("--jobs", options->jobs, "threads (one a core)");
+  return {command, [options] { return check(*options); }};
+}
+
+}  // namespace palpate::app

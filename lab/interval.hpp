@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+namespace palpate::lab {
+
+/// An estimate and the interval that holds what it estimates with 95 % confidence.
+struct Interval {
+  double value = 0.0;
+  double low = 0.0;
+  double high = 0.0;
+};
+
+/// A share of successes, as Wilson has it: right for few cases and for shares of 0 and 1, too.
+/// @param of  how many were tried, at least one
+Interval wilson(std::size_t successes, std::size_t of);
+
+/// The mean of independent estimates. The distances from value to bounds are added by squares, each
+/// side for itself (Zou and Donner's MOVER), so shares of 1 still have a lower bound below 1.
+/// @param parts  at least one
+Interval mean_of(std::span<const Interval> parts);
+
+/// The mean of repeats that differ by chance alone: Student's t. One repeat says nothing: its
+/// bounds are infinite.
+/// @param repeats  at least one
+Interval student(std::span<const double> repeats);
+
+}  // namespace palpate::lab

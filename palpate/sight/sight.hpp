@@ -3,12 +3,12 @@
 
 #include <optional>
 
+#include "palpate/core/hand_velocity.hpp"
 #include "palpate/core/method.hpp"
 #include "palpate/core/newest_frame.hpp"
 #include "palpate/paper/coupling.hpp"
 #include "palpate/paper/point_mover.hpp"
 #include "palpate/sight/frame_timing.hpp"
-#include "palpate/core/hand_velocity.hpp"
 #include "palpate/sight/monitor.hpp"
 #include "palpate/sight/tracker.hpp"
 

@@ -111,7 +111,7 @@ FeelFigures play_stick(const std::vector<Contestant>& contestants, const FeelOpt
     std::vector<Mean> last(contestants.size());
     play(
         contestants, parameters,
-        fmt::format("synthetic:plane?distance=0.7m&sensor=d4xx&seed={}&stroke={}", seed, stroke),
+        fmt::format("synthetic:plane?{}&stroke={}", camera_options(0.7, 0.3, "d4xx", seed), stroke),
         seconds, [&] { return in_hand(hand, grip, device, seed); },
         [&](std::size_t i, const Felt& felt) {
           Mean* mean = felt.t >= seconds - 1.0                               ? &last[i]

@@ -35,16 +35,6 @@ const DevicePreset& touch() {
   return device_preset("touch");
 }
 
-// A camera that looks at the origin at 34 degrees off straight down, with the pixels of 640 across
-// 57 degrees but only those that see `across` about it.
-std::string camera_uri(double distance, double across, std::string_view sensor,
-                       std::uint64_t seed) {
-  constexpr double focal = 589.0;  // [px]
-  const int pixels = static_cast<int>(across * focal / distance);
-  return fmt::format("size={0}x{0}&fov={1}rad&distance={2}m&sensor={3}&seed={4}", pixels,
-                     2.0 * std::atan(0.5 * pixels / focal), distance, sensor, seed);
-}
-
 // What a camera shows, and the truth about it.
 struct Stage {
   explicit Stage(const std::string& uri)
@@ -229,6 +219,14 @@ HipPath coming_down(double from) {
 
 }  // namespace
 
+std::string camera_options(double distance, double across, std::string_view sensor,
+                           std::uint64_t seed) {
+  constexpr double focal = 589.0;  // [px]
+  const int pixels = static_cast<int>(across * focal / distance);
+  return fmt::format("size={0}x{0}&fov={1}rad&distance={2}m&sensor={3}&seed={4}", pixels,
+                     2.0 * std::atan(0.5 * pixels / focal), distance, sensor, seed);
+}
+
 FeelFigures play_slide(const std::vector<Contestant>& contestants, const FeelOptions& options,
                        double distance) {
   constexpr double from = 1.2;
@@ -266,7 +264,7 @@ FeelFigures play_onset(const std::vector<Contestant>& contestants, const FeelOpt
   for (int k = 0; k < options.phases; ++k) {
     const double start = settled + k / (options.phases * f_c);
     const Stage stage(fmt::format("synthetic:plane?start={}&speed={}&{}", start, speed,
-                                  camera_uri(middle, 0.3, "ideal", 1)));
+                                  camera_options(middle, 0.3, "ideal", 1)));
     Loops loops(contestants, options.parameters, stage.scene);
     loops.add_usual(coming_down(0.0), options.seed * 100 + static_cast<std::uint64_t>(k), false);
     struct Seen {
@@ -326,7 +324,7 @@ FeelFigures play_return(const std::vector<Contestant>& contestants, const FeelOp
   Repeats repeats;
   for (int k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
-    const std::string camera = "synthetic:plane?" + camera_uri(middle, 0.3, "d4xx", seed);
+    const std::string camera = "synthetic:plane?" + camera_options(middle, 0.3, "d4xx", seed);
     const Stage stage =
         why == Unseen::covered ? Stage(covered_plane(gone, back), camera) : Stage(camera);
     Scenario scenario = stage.scenario(back + 2.0);
@@ -365,7 +363,7 @@ FeelFigures play_rest(const std::vector<Contestant>& contestants, const FeelOpti
   Repeats repeats;
   for (int k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
-    const Stage stage("synthetic:plane?" + camera_uri(distance, 0.3, "d4xx", seed));
+    const Stage stage("synthetic:plane?" + camera_options(distance, 0.3, "d4xx", seed));
     Loops loops(contestants, damped.parameters, stage.scene);
     loops.add_usual(hand, seed, true);
     for (const auto& [i, signal] : signals(loops, stage.scenario(settled + 2.0), from))
@@ -388,8 +386,8 @@ FeelFigures play_rate(const std::vector<Contestant>& contestants, const FeelOpti
   FeelFigures figures;
   for (const double latency : latencies) {
     const std::uint64_t seed = 10 * options.seed + 1;
-    const Stage stage(
-        fmt::format("synthetic:plane?fps={}Hz&{}", rate, camera_uri(close_up, 0.3, "d4xx", seed)));
+    const Stage stage(fmt::format("synthetic:plane?fps={}Hz&{}", rate,
+                                  camera_options(close_up, 0.3, "d4xx", seed)));
     const double down = latency + 2.0 / rate + 0.1;
     const double from = down + settled;
     Scenario scenario = stage.scenario(from + 2.0);
@@ -425,7 +423,7 @@ FeelFigures play_swing(const std::vector<Contestant>& contestants, const FeelOpt
   DevicePreset without_friction = touch();
   without_friction.body.friction = 0.0;
 
-  const Stage stage("synthetic:plane?" + camera_uri(middle, 0.3, "ideal", 1));
+  const Stage stage("synthetic:plane?" + camera_options(middle, 0.3, "ideal", 1));
   Loops loops(contestants, stiff.parameters, stage.scene);
   const HipPath hand = coming_down(0.0);
   loops.add("0.26 N", [&] { return in_hand(hand, loose, touch(), options.seed); });

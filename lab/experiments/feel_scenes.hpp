@@ -36,6 +36,12 @@ struct FeelOptions {
   int phases = 8;   ///< of the frames, in which a motion begins
 };
 
+/// Options of a synthetic camera that looks at the origin at 34 degrees off straight down, with the
+/// pixels of 640 across 57 degrees but only those that see `across` [m] about it.
+/// @param distance  [m]
+std::string camera_options(double distance, double across, std::string_view sensor,
+                           std::uint64_t seed);
+
 /// Along a resting plane at 0.1 m/s before a D4xx. @param distance  [m] from the camera
 FeelFigures play_slide(const std::vector<Contestant>& contestants, const FeelOptions& options,
                        double distance);

@@ -18,6 +18,7 @@
 #include "lab/signal.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/feel/feel.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"
@@ -219,6 +220,30 @@ TEST(Feel, CountsTheHandsThatAreTrapped) {
     if (figure.measure != "felt") continue;
     EXPECT_EQ(figure.case_text.rfind("pop:lift-off?", 0), 0U) << figure.case_text;
   }
+}
+
+TEST(Feel, MeasuresFrictionThatIsWrongAndHandsThatCreep) {
+  // Without a coefficient; with the whole of the static one; and a spring that lets the hand creep
+  // by 50 um/s.
+  const auto rough = [](const Contestant& plane) {
+    return Contestant{plane.name + "-rough", [plane](const MethodSetup& setup) {
+                        return std::make_unique<palpate::Feel>(plane.make(setup), setup.parameters);
+                      }};
+  };
+  const auto half_too_much = [](Tick& tick) {
+    if (tick.force.z() > 0.0) tick.force.x() = -0.5 * 1.5 * tick.force.z();
+  };
+  const Contestant right = rough(plane_with());
+  const FeelFigures rubs = play_rub({right, plane_with(half_too_much)}, once());
+  EXPECT_LT(figure_of(rubs, "path", "ratio", "plane-rough"), 1.0);
+  EXPECT_GT(figure_of(rubs, "path", "ratio", "plane"), 50.0);
+  const auto creeping = [](Tick& tick) {
+    const double anchor = 1.5e-3 + 50e-6 * tick.t;
+    if (tick.force.z() > 0.0) tick.force.x() = 600.0 * (anchor - tick.hip.x());
+  };
+  const FeelFigures sticks = play_stick({right, plane_with(creeping)}, once(), 0.0);
+  EXPECT_LT(figure_of(sticks, "light", "drift", "plane-rough"), 0.01);
+  EXPECT_NEAR(figure_of(sticks, "light", "drift"), 0.5 * 600.0 / 700.0, 0.02);
 }
 
 TEST(Feel, JudgesTheScenesThatAreAskedFor) {

@@ -100,6 +100,13 @@ class Packages(unittest.TestCase):
                       env=os.environ | {"PYTHONPATH": str(path)})
         self.assertEqual(version.strip(), VERSION)
 
+    def test_its_compiled_files_go_with_it(self):
+        control = pathlib.Path(self.folder.name) / "control"
+        run("dpkg-deb", "-e", str(self.debs["python3-palpate"]), str(control))
+        for script, word in (("postinst", "py3compile"), ("prerm", "py3clean")):
+            self.assertIn(word, (control / script).read_text())
+            self.assertTrue(os.access(control / script, os.X_OK), script)
+
     @unittest.skipUnless(shutil.which("pkg-config"), "no pkg-config here")
     def test_pkg_config_says_how_to_compile_and_link(self):
         (config,) = self.root.rglob("palpate.pc")

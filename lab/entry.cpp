@@ -305,15 +305,6 @@ std::string quoted(const std::string& word) {
   return plain ? word : "'" + word + "'";
 }
 
-std::string command_of(const EntryOptions& options) {
-  std::string command =
-      fmt::format("palpate bench-entry {} --seed {} --cases {} --repeats {}",
-                  quoted(options.method), options.seed, options.cases, options.repeats);
-  for (const std::string& uri : options.recordings)
-    command += " --recording " + quoted(called(uri));
-  return command;
-}
-
 // How it is run: by the lab's name, as a program, or as an object of whoever calls.
 std::string kind_of(const EntryOptions& options) {
   if (is_pipe(options.method)) return "pipe";
@@ -321,6 +312,22 @@ std::string kind_of(const EntryOptions& options) {
       std::any_of(options.own_methods.begin(), options.own_methods.end(),
                   [&](const OwnMethod& method) { return method.name == options.method; });
   return own ? "python" : "lab";
+}
+
+std::string command_of(const EntryOptions& options) {
+  if (kind_of(options) == "python") {
+    std::string recordings;
+    for (const std::string& uri : options.recordings)
+      recordings += fmt::format("{}'{}'", recordings.empty() ? "" : ", ", called(uri));
+    return fmt::format("palpate.bench.entry({}(), seed={}, cases={}, repeats={}, recordings=[{}])",
+                       options.method, options.seed, options.cases, options.repeats, recordings);
+  }
+  std::string command =
+      fmt::format("palpate bench-entry {} --seed {} --cases {} --repeats {}",
+                  quoted(options.method), options.seed, options.cases, options.repeats);
+  for (const std::string& uri : options.recordings)
+    command += " --recording " + quoted(called(uri));
+  return command;
 }
 
 // @throws Error for a method that is not known.

@@ -116,7 +116,9 @@ class Program {
       const ssize_t sent = ::send(socket_, left.data(), left.size(), MSG_NOSIGNAL);
       if (sent > 0) {
         left.remove_prefix(static_cast<std::size_t>(sent));
-      } else if (sent < 0 && errno != EINTR) {
+      } else if (errno == EPIPE || errno == ECONNRESET) {
+        return;  // what it said before it ended, its next answer tells
+      } else if (errno != EINTR) {
         give_up(errno, "reads");
       }
     }

@@ -162,7 +162,7 @@ def unsaid_messages(root):
     page = root / "docs/troubleshooting.md"
     if not page.exists():
         return []
-    sources = [path for folder in ("app", "palpate", "web/src", "scripts")
+    sources = [path for folder in ("app", "palpate", "lab", "python", "web/src", "scripts")
                for path in sorted((root / folder).rglob("*")) if path.is_file()]
     said = "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in sources)
     said = re.sub(r"[\"`]\s*\+?\s*[\"`]", "", said)  # literals that go on in the next line

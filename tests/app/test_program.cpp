@@ -636,8 +636,9 @@ TEST_F(ProgramWithLab, RunsTheCommandsOfTheReadmeAndTheDocs) {
   const test::Environment state("XDG_STATE_HOME", path("state"));
   const fs::path sources = PALPATE_SOURCES;
   std::vector<fs::path> pages = {sources / "README.md"};
-  for (const auto& file : fs::directory_iterator(sources / "docs"))
-    if (file.path().extension() == ".md") pages.push_back(file.path());
+  for (const char* folder : {"docs", "docs/tutorial"})
+    for (const auto& file : fs::directory_iterator(sources / folder))
+      if (file.path().extension() == ".md") pages.push_back(file.path());
   std::sort(pages.begin(), pages.end());
   std::vector<std::string> run_of;
   for (const fs::path& page : pages) {
@@ -672,9 +673,10 @@ TEST_F(ProgramWithLab, RunsTheCommandsOfTheReadmeAndTheDocs) {
     EXPECT_EQ(lines_in(calls), calls_in(commands)) << page << ": " << calls;
     EXPECT_GT(calls_in(commands), 0U) << page;
   }
-  for (const char* page : {"README", "tutorial", "recording", "session", "sources", "lab"})
+  for (const char* page : {"README", "2-recordings", "3-session", "5-bench", "recording", "session",
+                           "sources", "lab", "bench-entries"})
     EXPECT_NE(std::find(run_of.begin(), run_of.end(), page), run_of.end()) << page;
-  for (const char* page : {"README", "tutorial"})
+  for (const char* page : {"README", "2-recordings"})
     EXPECT_GT(fs::file_size(path(std::string(page) + "/press.csv")), 100'000U) << page;
 }
 

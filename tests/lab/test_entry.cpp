@@ -144,7 +144,7 @@ TEST_F(Entries, AreTheSameFromThreadsAndRanksAndHoldUntilTheyAreChanged) {
   EXPECT_EQ(without_run(text_of(two)), without_run(text));
   EXPECT_NE(text_of(two), text) << "threads, ranks and cost are said";
 
-  EXPECT_TRUE(check(one, 12).holds);
+  EXPECT_TRUE(check(one, 6).holds);
   const EntryCheck without = check_entry(one, 1, 1, {}, {}, {});
   EXPECT_TRUE(without.holds);
   EXPECT_EQ(without.left_out.size(), 1U);
@@ -161,7 +161,7 @@ TEST_F(Entries, AreTheSameFromThreadsAndRanksAndHoldUntilTheyAreChanged) {
 
   write(changed, replaced(replaced(text, "\"right\": \"1\"", "\"right\": \"2\""),
                           "\"right\": \"0\"", "\"right\": \"1\""));
-  found = check(changed, 25);
+  found = check(changed, 15);
   EXPECT_GT(found.differences.size(), 1U);
   EXPECT_FALSE(found.holds);
 }

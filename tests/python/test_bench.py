@@ -82,6 +82,8 @@ class Bench(unittest.TestCase):
             file = f"{folder}/entry.json"
             entry = palpate.bench.entry(Nothing(), file, seed=5, cases=1, repeats=1)
             self.assertEqual((entry["method"], entry["kind"]), ("Nothing", "python"))
+            self.assertEqual(entry["command"], "palpate.bench.entry(Nothing(), seed=5, cases=1, "
+                                               "repeats=1, recordings=[])")
             self.assertLess(entry["scores"]["score"]["value"], 10, "it feels nothing")
             self.assertIn("no recording", entry["scores"]["real"])
             self.assertTrue(palpate.bench.check(file, Nothing, sample=3)["holds"])

@@ -2,6 +2,7 @@
 #include "palpate/bag/messages.hpp"
 
 #include "palpate/bag/cdr.hpp"
+#include "palpate/bag/message_walks.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate::ros {
@@ -78,90 +79,6 @@ class Get {
   CdrReader in_;
 };
 
-template <class Way, class H>
-void walk_header(Way& way, H& header) {
-  way.begin_header();
-  way.number(header.stamp.sec);
-  way.number(header.stamp.nanosec);
-  way.text(header.frame_id);
-}
-
-template <class Way, class M>
-void walk_image(Way& way, M& m) {
-  walk_header(way, m.header);
-  way.number(m.height);
-  way.number(m.width);
-  way.text(m.encoding);
-  way.number(m.is_bigendian);
-  way.number(m.step);
-  way.bytes(m.data);
-}
-
-template <class Way, class M>
-void walk_compressed(Way& way, M& m) {
-  walk_header(way, m.header);
-  way.text(m.format);
-  way.bytes(m.data);
-}
-
-template <class Way, class M>
-void walk_camera(Way& way, M& m) {
-  walk_header(way, m.header);
-  way.number(m.height);
-  way.number(m.width);
-  way.text(m.distortion_model);
-  way.numbers(m.d);
-  way.array(m.k);
-  way.array(m.r);
-  way.array(m.p);
-  way.number(m.binning_x);
-  way.number(m.binning_y);
-  way.array(m.roi);
-  way.flag(m.do_rectify);
-}
-
-template <class Way, class M>
-void walk_points(Way& way, M& m) {
-  walk_header(way, m.header);
-  way.number(m.height);
-  way.number(m.width);
-  way.sequence(m.fields, 13, [&way](auto& field) {
-    way.text(field.name);
-    way.number(field.offset);
-    way.number(field.datatype);
-    way.number(field.count);
-  });
-  way.flag(m.is_bigendian);
-  way.number(m.point_step);
-  way.number(m.row_step);
-  way.bytes(m.data);
-  way.flag(m.is_dense);
-}
-
-template <class Way, class M>
-void walk_pose(Way& way, M& m) {
-  walk_header(way, m.header);
-  way.array(m.position);
-  way.array(m.orientation);
-}
-
-template <class Way, class M>
-void walk_wrench(Way& way, M& m) {
-  walk_header(way, m.header);
-  way.array(m.force);
-  way.array(m.torque);
-}
-
-template <class Way, class M>
-void walk_transforms(Way& way, M& m) {
-  way.sequence(m.transforms, 72, [&way](auto& transform) {
-    walk_header(way, transform.header);
-    way.text(transform.child_frame_id);
-    way.array(transform.translation);
-    way.array(transform.rotation);
-  });
-}
-
 template <class Message, class Walk>
 std::vector<std::byte> encode_by(const Message& message, const Walk& walk) {
   Put put;
@@ -176,20 +93,6 @@ Message decode_by(std::span<const std::byte> bytes, const std::string& name, con
   walk(get, message);
   return message;
 }
-
-constexpr auto image = [](auto& way, auto& m) { walk_image(way, m); };
-constexpr auto compressed = [](auto& way, auto& m) { walk_compressed(way, m); };
-constexpr auto camera = [](auto& way, auto& m) { walk_camera(way, m); };
-constexpr auto points = [](auto& way, auto& m) { walk_points(way, m); };
-constexpr auto pose = [](auto& way, auto& m) { walk_pose(way, m); };
-constexpr auto wrench = [](auto& way, auto& m) { walk_wrench(way, m); };
-constexpr auto transforms = [](auto& way, auto& m) { walk_transforms(way, m); };
-constexpr auto float32 = [](auto& way, auto& m) { way.number(m.data); };
-constexpr auto key_value = [](auto& way, auto& m) {
-  way.text(m.key);
-  way.text(m.value);
-};
-constexpr auto string = [](auto& way, auto& m) { way.text(m.data); };
 
 template <class Message, class Walk>
 std::vector<std::byte> in_cdr(std::span<const std::byte> bytes, const std::string& name,
@@ -245,15 +148,22 @@ std::vector<std::byte> encode(const String& message) {
 }
 
 std::vector<std::byte> encode(const Float64MultiArray& message) {
-  CdrWriter out;
-  const auto size = static_cast<std::uint32_t>(message.data.size());
-  out.put(std::uint32_t{1});  // layout.dim
-  out.put_string(message.label);
-  out.put(size);              // size
-  out.put(size);              // stride
-  out.put(std::uint32_t{0});  // layout.data_offset
-  out.put_sequence(std::span(message.data));
-  return out.take();
+  return encode_by(message, multi_array);
+}
+std::vector<std::byte> encode(const Bool& message) {
+  return encode_by(message, boolean);
+}
+std::vector<std::byte> encode(const Point& message) {
+  return encode_by(message, point);
+}
+std::vector<std::byte> encode(const Vector3& message) {
+  return encode_by(message, point);
+}
+std::vector<std::byte> encode(const Wrench& message) {
+  return encode_by(message, plain_wrench);
+}
+std::vector<std::byte> encode(const OmniFeedback& message) {
+  return encode_by(message, omni_feedback);
 }
 
 std::vector<std::byte> from_ros1(std::string_view type, std::span<const std::byte> bytes,
@@ -313,18 +223,27 @@ String decode(std::span<const std::byte> bytes, const std::string& name) {
 
 template <>
 Float64MultiArray decode(std::span<const std::byte> bytes, const std::string& name) {
-  CdrReader in(bytes, name);
-  Float64MultiArray message;
-  const std::size_t dimensions = in.get_count(12);
-  for (std::size_t i = 0; i < dimensions; ++i) {
-    const std::string label = in.get_string();
-    if (i == 0) message.label = label;
-    static_cast<void>(in.get<std::uint32_t>());
-    static_cast<void>(in.get<std::uint32_t>());
-  }
-  static_cast<void>(in.get<std::uint32_t>());
-  message.data = in.get_sequence<double>();
-  return message;
+  return decode_by<Float64MultiArray>(bytes, name, multi_array);
+}
+template <>
+Bool decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<Bool>(bytes, name, boolean);
+}
+template <>
+Point decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<Point>(bytes, name, point);
+}
+template <>
+Vector3 decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<Vector3>(bytes, name, point);
+}
+template <>
+Wrench decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<Wrench>(bytes, name, plain_wrench);
+}
+template <>
+OmniFeedback decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<OmniFeedback>(bytes, name, omni_feedback);
 }
 
 }  // namespace palpate::ros

@@ -128,6 +128,32 @@ struct String {
   std::string data;
 };
 
+struct Bool {
+  static constexpr std::string_view type = "std_msgs/msg/Bool";
+  bool data = false;
+};
+
+struct Point {
+  static constexpr std::string_view type = "geometry_msgs/msg/Point";
+  std::array<double, 3> xyz{};
+};
+
+struct Vector3 {
+  static constexpr std::string_view type = "geometry_msgs/msg/Vector3";
+  std::array<double, 3> xyz{};
+};
+
+struct Wrench {
+  static constexpr std::string_view type = "geometry_msgs/msg/Wrench";
+  std::array<double, 3> force{}, torque{};  ///< [N], [N m]
+};
+
+/// Of the Touch drivers of the omni_common line.
+struct OmniFeedback {
+  static constexpr std::string_view type = "omni_msgs/msg/OmniFeedback";
+  std::array<double, 3> force{}, position{};  ///< [N], of a lock that only old drivers have
+};
+
 std::vector<std::byte> encode(const Image& message);
 std::vector<std::byte> encode(const CompressedImage& message);
 std::vector<std::byte> encode(const CameraInfo& message);
@@ -139,6 +165,11 @@ std::vector<std::byte> encode(const Float64MultiArray& message);
 std::vector<std::byte> encode(const Float32& message);
 std::vector<std::byte> encode(const KeyValue& message);
 std::vector<std::byte> encode(const String& message);
+std::vector<std::byte> encode(const Bool& message);
+std::vector<std::byte> encode(const Point& message);
+std::vector<std::byte> encode(const Vector3& message);
+std::vector<std::byte> encode(const Wrench& message);
+std::vector<std::byte> encode(const OmniFeedback& message);
 
 /// A message of ROS 1, in CDR. Known are Image, CompressedImage, CameraInfo, PointCloud2,
 /// TFMessage, Float32, KeyValue and String.
@@ -173,5 +204,15 @@ template <>
 KeyValue decode(std::span<const std::byte> bytes, const std::string& name);
 template <>
 String decode(std::span<const std::byte> bytes, const std::string& name);
+template <>
+Bool decode(std::span<const std::byte> bytes, const std::string& name);
+template <>
+Point decode(std::span<const std::byte> bytes, const std::string& name);
+template <>
+Vector3 decode(std::span<const std::byte> bytes, const std::string& name);
+template <>
+Wrench decode(std::span<const std::byte> bytes, const std::string& name);
+template <>
+OmniFeedback decode(std::span<const std::byte> bytes, const std::string& name);
 
 }  // namespace palpate::ros

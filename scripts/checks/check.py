@@ -24,7 +24,7 @@ KNOWS = {
     "bag": {"core"},
     "sources": {"core", "cloud", "bag"},
     "devices": {"core", "servo"},
-    "drivers": {"core", "cloud", "servo", "sources", "devices"},
+    "drivers": {"core", "cloud", "servo", "bag", "sources", "devices"},
     "record": {"core", "methods", "cloud", "servo", "bag", "sources"},
     "session": {"core", "methods", "cloud", "servo", "sources", "devices", "drivers", "bag",
                 "record"},

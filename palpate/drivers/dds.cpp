@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/drivers/dds.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <tuple>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+#include "palpate/drivers/cyclone_api.hpp"
+#include "palpate/drivers/shared_library.hpp"
+
+namespace palpate::dds {
+
+// All functions are Cyclone's C API but the last three, with which it hands out messages as they
+// came.
+struct Library {
+  Library()
+      : library({.name = "ros2: (Cyclone DDS)",
+                 .files = {"libddsc.so.0debian", "libddsc.so.0t64", "libddsc.so.0", "libddsc.so"},
+                 .variable = "PALPATE_CYCLONEDDS",
+                 .remedy = "install it: apt install libddsc0debian, or libddsc0t64 (the package "
+                           "that cyclonedds-dev needs)"}) {
+    library.find(create_domain, "dds_create_domain");
+    library.find(create_participant, "dds_create_participant");
+    library.find(remove, "dds_delete");
+    library.find(create_topic, "dds_create_topic");
+    library.find(create_reader, "dds_create_reader");
+    library.find(create_writer, "dds_create_writer");
+    library.find(create_waitset, "dds_create_waitset");
+    library.find(attach, "dds_waitset_attach");
+    library.find(wait, "dds_waitset_wait");
+    library.find(set_status_mask, "dds_set_status_mask");
+    library.find(read, "dds_read");
+    library.find(return_loan, "dds_return_loan");
+    library.find(write, "dds_write");
+    library.find(wait_for_acks, "dds_wait_for_acks");
+    library.find(matched_readers, "dds_get_matched_subscriptions");
+    library.find(matched_writers, "dds_get_matched_publications");
+    library.find(reason, "dds_strretcode");
+    library.find(create_qos, "dds_create_qos");
+    library.find(delete_qos, "dds_delete_qos");
+    library.find(set_reliability, "dds_qset_reliability");
+    library.find(set_durability, "dds_qset_durability");
+    library.find(set_history, "dds_qset_history");
+    library.find(set_lifespan, "dds_qset_lifespan");
+    library.find(set_deadline, "dds_qset_deadline");
+    library.find(take_cdr, "dds_takecdr");
+    library.find(cdr_reference, "ddsi_serdata_to_ser_ref");
+    library.find(cdr_unreference, "ddsi_serdata_to_ser_unref");
+    library.find(cdr_size, "ddsi_serdata_size");
+    library.find(cdr_release, "ddsi_serdata_unref");
+  }
+
+  SharedLibrary library;
+  cyclone::Entity (*create_domain)(std::uint32_t, const char*) = nullptr;
+  cyclone::Entity (*create_participant)(std::uint32_t, const cyclone::Qos*, const void*) = nullptr;
+  cyclone::Result (*remove)(cyclone::Entity) = nullptr;
+  cyclone::Entity (*create_topic)(cyclone::Entity, const cyclone::TopicDescriptor*, const char*,
+                                  const cyclone::Qos*, const void*) = nullptr;
+  cyclone::Entity (*create_reader)(cyclone::Entity, cyclone::Entity, const cyclone::Qos*,
+                                   const void*) = nullptr;
+  cyclone::Entity (*create_writer)(cyclone::Entity, cyclone::Entity, const cyclone::Qos*,
+                                   const void*) = nullptr;
+  cyclone::Entity (*create_waitset)(cyclone::Entity) = nullptr;
+  cyclone::Result (*attach)(cyclone::Entity, cyclone::Entity, std::intptr_t) = nullptr;
+  cyclone::Result (*wait)(cyclone::Entity, std::intptr_t*, std::size_t,
+                          cyclone::Duration) = nullptr;
+  cyclone::Result (*set_status_mask)(cyclone::Entity, std::uint32_t) = nullptr;
+  cyclone::Result (*read)(cyclone::Entity, void**, cyclone::SampleInfo*, std::size_t,
+                          std::uint32_t) = nullptr;
+  cyclone::Result (*return_loan)(cyclone::Entity, void**, std::int32_t) = nullptr;
+  cyclone::Result (*write)(cyclone::Entity, const void*) = nullptr;
+  cyclone::Result (*wait_for_acks)(cyclone::Entity, cyclone::Duration) = nullptr;
+  cyclone::Result (*matched_readers)(cyclone::Entity, std::uint64_t*, std::size_t) = nullptr;
+  cyclone::Result (*matched_writers)(cyclone::Entity, std::uint64_t*, std::size_t) = nullptr;
+  const char* (*reason)(cyclone::Result) = nullptr;
+  cyclone::Qos* (*create_qos)() = nullptr;
+  void (*delete_qos)(cyclone::Qos*) = nullptr;
+  void (*set_reliability)(cyclone::Qos*, int, cyclone::Duration) = nullptr;
+  void (*set_durability)(cyclone::Qos*, int) = nullptr;
+  void (*set_history)(cyclone::Qos*, int, std::int32_t) = nullptr;
+  void (*set_lifespan)(cyclone::Qos*, cyclone::Duration) = nullptr;
+  void (*set_deadline)(cyclone::Qos*, cyclone::Duration) = nullptr;
+  cyclone::Result (*take_cdr)(cyclone::Entity, cyclone::Serdata**, std::uint32_t,
+                              cyclone::SampleInfo*, std::uint32_t) = nullptr;
+  cyclone::Serdata* (*cdr_reference)(const cyclone::Serdata*, std::size_t, std::size_t,
+                                     iovec*) = nullptr;
+  void (*cdr_unreference)(cyclone::Serdata*, const iovec*) = nullptr;
+  std::uint32_t (*cdr_size)(const cyclone::Serdata*) = nullptr;
+  void (*cdr_release)(cyclone::Serdata*) = nullptr;
+};
+
+namespace {
+
+constexpr std::uint32_t largest_domain = 232;
+constexpr double blocking_time = 0.1;  // [s] that a reliable writer waits for room at most
+constexpr std::size_t most_publications = 4096;
+
+cyclone::Duration duration(double seconds) {
+  return static_cast<cyclone::Duration>(std::llround(1e9 * seconds));
+}
+
+std::string variable(const char* name) {
+  const char* value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+// 640 x 480 depth at 30 Hz comes in bursts of 0.6 MB, a cloud in ones of 5 MB, which the usual
+// buffer of 208 kB does not hold: a larger one is asked for, and the kernel gives what it may.
+// Several programs on a machine without multicast find each other by their index.
+std::string settings() {
+  std::string text = "<CycloneDDS><Domain Id=\"any\"><General>";
+  if (variable("ROS_LOCALHOST_ONLY") == "1")
+    text += "<Interfaces><NetworkInterface name=\"lo\"/></Interfaces>";
+  text +=
+      "</General><Discovery><MaxAutoParticipantIndex>99</MaxAutoParticipantIndex></Discovery>"
+      "<Internal><SocketReceiveBufferSize max=\"8MB\"/>"
+      "<Watermarks><WhcHigh>16MB</WhcHigh></Watermarks></Internal></Domain></CycloneDDS>";
+  if (const std::string own = variable("CYCLONEDDS_URI"); !own.empty()) text += "," + own;
+  return text;
+}
+
+std::uint32_t domain_wanted() {
+  const std::string text = variable("ROS_DOMAIN_ID");
+  if (text.empty()) return 0;
+  std::uint32_t domain = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), domain);
+  if (error != std::errc() || end != text.data() + text.size() || domain > largest_domain)
+    throw Error("ROS_DOMAIN_ID", "'" + text + "' is no domain", "give a number from 0 to 232");
+  return domain;
+}
+
+// "/camera/points" of ROS is "rt/camera/points" of DDS.
+constexpr std::string_view prefix = "rt/";
+
+std::string ros_type(std::string type) {
+  constexpr std::string_view middle = "::msg::dds_::";
+  const std::size_t at = type.find(middle);
+  if (at == std::string::npos || !type.ends_with('_')) return {};
+  type.pop_back();
+  return type.replace(at, middle.size(), "/msg/");
+}
+
+// A quality of service, deleted with the object.
+class Offer {
+ public:
+  Offer(const Library& library, const Quality& quality)
+      : library_(library), qos_(library.create_qos()) {
+    library.set_reliability(qos_, quality.reliable ? cyclone::reliable : cyclone::best_effort,
+                            duration(blocking_time));
+    library.set_durability(
+        qos_, quality.keeps_for_late ? cyclone::transient_local : cyclone::volatile_data);
+    library.set_history(qos_, cyclone::keep_last, quality.depth);
+    if (quality.lifespan) library.set_lifespan(qos_, duration(*quality.lifespan));
+    if (quality.deadline) library.set_deadline(qos_, duration(*quality.deadline));
+  }
+  ~Offer() { library_.delete_qos(qos_); }
+  Offer(const Offer&) = delete;
+  Offer& operator=(const Offer&) = delete;
+  [[nodiscard]] const cyclone::Qos* get() const { return qos_; }
+
+ private:
+  const Library& library_;
+  cyclone::Qos* qos_;
+};
+
+std::uint32_t code_of(std::size_t size) {
+  switch (size) {
+    case 1:
+      return cyclone::of_1_byte;
+    case 2:
+      return cyclone::of_2_bytes;
+    case 4:
+      return cyclone::of_4_bytes;
+    default:
+      return cyclone::of_8_bytes;
+  }
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields) {
+  using Kind = ros::CField::Kind;
+  std::vector<std::uint32_t> code;
+  // Elements that are structs have their instructions behind, to which their sequence points.
+  std::vector<std::pair<std::size_t, const std::vector<ros::CField>*>> waiting{{0, &fields}};
+  for (std::size_t i = 0; i < waiting.size(); ++i) {
+    const auto [from, struct_fields] = waiting[i];
+    if (i > 0) code[from + 3] |= static_cast<std::uint32_t>(code.size() - from);
+    for (const ros::CField& field : *struct_fields) {
+      const std::size_t begin = code.size();
+      const auto put = [&](std::uint32_t type, std::uint32_t element) {
+        code.push_back(cyclone::op_field | type << 16 | element << 8);
+        code.push_back(static_cast<std::uint32_t>(field.offset));
+      };
+      switch (field.kind) {
+        case Kind::number:
+          put(code_of(field.size), 0);
+          break;
+        case Kind::flag:
+          put(cyclone::of_flag, 0);
+          break;
+        case Kind::text:
+          put(cyclone::of_text, 0);
+          break;
+        case Kind::numbers:
+          put(cyclone::of_sequence, code_of(field.size));
+          break;
+        case Kind::array:
+          put(cyclone::of_array, code_of(field.size));
+          code.push_back(static_cast<std::uint32_t>(field.count));
+          break;
+        case Kind::structs:
+          put(cyclone::of_sequence, cyclone::of_struct);
+          code.push_back(static_cast<std::uint32_t>(field.size));
+          code.push_back(4U << 16);
+          waiting.emplace_back(begin, &field.fields);
+          break;
+      }
+    }
+    code.push_back(cyclone::op_return);
+  }
+  return code;
+}
+
+std::string dds_type(std::string_view type) {
+  constexpr std::string_view middle = "/msg/";
+  std::string name(type);
+  const std::size_t at = name.find(middle);
+  if (at != std::string::npos) name.replace(at, middle.size(), "::msg::dds_::");
+  return name + "_";
+}
+
+Participant::Participant(const std::string& who)
+    : who_(who), library_(std::make_unique<Library>()), domain_(domain_wanted()) {
+  // A domain lives until the process ends, and belongs to all that take part in it.
+  const cyclone::Entity domain = library_->create_domain(domain_, settings().c_str());
+  if (domain != cyclone::precondition_not_met) check(domain, "it cannot take part in the network");
+  entity_ = library_->create_participant(domain_, nullptr, nullptr);
+  check(entity_, "it cannot take part in domain " + std::to_string(domain_));
+  waitset_ = library_->create_waitset(entity_);
+  publications_ = library_->create_reader(entity_, cyclone::publications_topic, nullptr, nullptr);
+  check(std::min(waitset_, publications_), "it cannot look at the network");
+}
+
+Participant::~Participant() {
+  library_->remove(entity_);
+}
+
+void Participant::check(int entity, const std::string& what) const {
+  if (entity >= 0) return;
+  throw Error(who_, what + " (Cyclone DDS: " + library_->reason(entity) + ")",
+              "check CYCLONEDDS_URI, ROS_LOCALHOST_ONLY and the network interfaces");
+}
+
+const std::string& Participant::library_path() const {
+  return library_->library.path();
+}
+
+std::vector<Publication> Participant::publications() {
+  std::vector<void*> samples(most_publications, nullptr);
+  std::vector<cyclone::SampleInfo> infos(most_publications);
+  std::vector<Publication> heard;
+  const int count = library_->read(publications_, samples.data(), infos.data(), samples.size(),
+                                   static_cast<std::uint32_t>(samples.size()));
+  for (int i = 0; i < count; ++i) {
+    const cyclone::SampleInfo& info = infos[static_cast<std::size_t>(i)];
+    if (!info.valid_data || info.instance_state != cyclone::alive_state) continue;
+    const auto& endpoint =
+        *static_cast<const cyclone::Endpoint*>(samples[static_cast<std::size_t>(i)]);
+    const std::string topic = endpoint.topic_name;
+    if (!topic.starts_with(prefix)) continue;
+    heard.push_back({topic.substr(prefix.size() - 1), ros_type(endpoint.type_name)});
+  }
+  if (count > 0) library_->return_loan(publications_, samples.data(), count);
+  std::sort(heard.begin(), heard.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.topic, a.type) < std::tie(b.topic, b.type);
+  });
+  heard.erase(std::unique(heard.begin(), heard.end()), heard.end());
+  return heard;
+}
+
+void Participant::wait(double seconds) {
+  library_->wait(waitset_, nullptr, 0, duration(std::max(seconds, 0.0)));
+}
+
+int Participant::topic(const std::string& name, std::string_view type,
+                       const ros::CSample& example) {
+  const std::vector<std::uint32_t> code = instructions(example.fields());
+  const std::string type_name = dds_type(type);
+  const cyclone::TopicDescriptor descriptor{
+      .size = static_cast<std::uint32_t>(example.size()),
+      .align = 8,
+      .flags = cyclone::no_optimise,
+      .keys = 0,
+      .type_name = type_name.c_str(),
+      .key_descriptors = nullptr,
+      .instruction_count = static_cast<std::uint32_t>(code.size()),
+      .instructions = code.data(),
+      .meta = "",
+      .type_information = {},
+      .type_mapping = {},
+      .data_representation = 0};
+  const std::size_t slash = name.starts_with('/') ? 1 : 0;
+  const std::string dds_name = std::string(prefix) + name.substr(slash);
+  const int topic =
+      library_->create_topic(entity_, &descriptor, dds_name.c_str(), nullptr, nullptr);
+  check(topic, "'" + name + "' is no topic");
+  return topic;
+}
+
+Reader::Reader(Participant& participant, const std::string& topic, std::string_view type,
+               const ros::CSample& example, const Quality& quality)
+    : participant_(participant), topic_(topic) {
+  const Library& library = *participant.library_;
+  const Offer offer(library, quality);
+  const int of_dds = participant.topic(topic, type, example);
+  entity_ = library.create_reader(participant.entity_, of_dds, offer.get(), nullptr);
+  library.remove(of_dds);  // it lives as long as its reader
+  participant.check(entity_, "it cannot read " + topic);
+  library.set_status_mask(entity_, cyclone::data_available);
+  library.attach(participant.waitset_, entity_, 0);
+}
+
+Reader::~Reader() {
+  participant_.library_->remove(entity_);
+}
+
+bool Reader::take(const std::function<void(std::span<const std::byte>)>& use) {
+  const Library& library = *participant_.library_;
+  cyclone::Serdata* message = nullptr;
+  cyclone::SampleInfo info{};
+  while (library.take_cdr(entity_, &message, 1, &info, cyclone::any_state) == 1) {
+    struct Release {
+      const Library& library;
+      cyclone::Serdata* message;
+      ~Release() { library.cdr_release(message); }
+    } const release{library, message};
+    if (!info.valid_data) continue;  // a writer that went
+    iovec place{};
+    struct Unreference {
+      const Library& library;
+      cyclone::Serdata* message;
+      const iovec& place;
+      ~Unreference() { library.cdr_unreference(message, &place); }
+    } const unreference{
+        library, library.cdr_reference(message, 0, library.cdr_size(message), &place), place};
+    use({static_cast<const std::byte*>(place.iov_base), place.iov_len});
+    return true;
+  }
+  return false;
+}
+
+int Reader::writers() const {
+  return std::max(participant_.library_->matched_writers(entity_, nullptr, 0), 0);
+}
+
+Writer::Writer(Participant& participant, const std::string& topic, std::string_view type,
+               const ros::CSample& example, const Quality& quality)
+    : participant_(participant) {
+  const Library& library = *participant.library_;
+  const Offer offer(library, quality);
+  const int of_dds = participant.topic(topic, type, example);
+  entity_ = library.create_writer(participant.entity_, of_dds, offer.get(), nullptr);
+  library.remove(of_dds);  // it lives as long as its writer
+  participant.check(entity_, "it cannot write " + topic);
+}
+
+Writer::~Writer() {
+  participant_.library_->remove(entity_);
+}
+
+bool Writer::write_sample(const ros::CSample& sample) {
+  return participant_.library_->write(entity_, sample.data()) >= 0;
+}
+
+bool Writer::wait_for_readers(double seconds) {
+  return participant_.library_->wait_for_acks(entity_, duration(seconds)) >= 0;
+}
+
+int Writer::readers() const {
+  return std::max(participant_.library_->matched_readers(entity_, nullptr, 0), 0);
+}
+
+}  // namespace palpate::dds

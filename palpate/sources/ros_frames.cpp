@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sources/ros_frames.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+#include "palpate/sources/depth_png.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t config_header = 12;  // of compressedDepth: int32, 2 x float32
+
+template <class T>
+T value_at(std::span<const std::byte> bytes, std::size_t at, bool swapped = false) {
+  std::array<std::byte, sizeof(T)> copy{};
+  std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), sizeof(T), copy.begin());
+  if (swapped) std::reverse(copy.begin(), copy.end());
+  return std::bit_cast<T>(copy);
+}
+
+std::uint16_t quantised(double metres, double units) {
+  const double raw = std::round(metres * units);
+  return raw >= 1.0 && raw < 65535.0 ? static_cast<std::uint16_t>(raw) : std::uint16_t{0};
+}
+
+// Byte offsets of x, y and z in a point, and whether they are doubles.
+struct Axes {
+  std::array<std::size_t, 3> offset{};
+  std::array<bool, 3> is_double{};
+};
+
+Axes axes_of(const ros::PointCloud2& message, const std::string& name) {
+  constexpr std::uint8_t float32 = 7;
+  constexpr std::uint8_t float64 = 8;
+  constexpr std::array<std::string_view, 3> wanted{"x", "y", "z"};
+  Axes axes;
+  for (std::size_t axis = 0; axis < wanted.size(); ++axis) {
+    const auto field = std::find_if(message.fields.begin(), message.fields.end(),
+                                    [&](const auto& f) { return f.name == wanted[axis]; });
+    if (field == message.fields.end() || (field->datatype != float32 && field->datatype != float64))
+      throw Error(name, "has no field " + std::string(wanted[axis]) + " of float32 or float64",
+                  "name another topic with ?topic=");
+    axes.offset[axis] = field->offset;
+    axes.is_double[axis] = field->datatype == float64;
+    if (axes.offset[axis] + (axes.is_double[axis] ? 8 : 4) > message.point_step)
+      throw Error(name, "has fields beyond the end of a point", "it may be damaged");
+  }
+  return axes;
+}
+
+std::string above(const std::string& topic) {
+  return topic.substr(0, topic.rfind('/'));
+}
+
+}  // namespace
+
+bool is_topic_of_depth(const std::string& topic, const std::string& type) {
+  if (type == ros::Image::type)
+    return topic.find("depth") != std::string::npos || topic.find("/Depth_") != std::string::npos;
+  return (type == ros::CompressedImage::type && topic.ends_with("/compressedDepth")) ||
+         type == ros::PointCloud2::type;
+}
+
+std::string camera_of_topic(const std::string& topic, const std::string& type) {
+  const bool is_deep = type == ros::CompressedImage::type || topic.ends_with("/image/data");
+  return above(is_deep ? above(topic) : topic);
+}
+
+bool is_float(const std::string& encoding) {
+  return encoding == "32FC1";
+}
+
+std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
+                                     const std::string& name) {
+  const bool floats = is_float(image.encoding);
+  if (!floats && image.encoding != "16UC1" && image.encoding != "mono16")
+    throw Error(name, "is an image of encoding '" + image.encoding + "', not of depth",
+                "name a topic of 16UC1 or 32FC1 with ?topic=");
+  const std::size_t size = floats ? 4 : 2;
+  if (image.width == 0 || image.height == 0 || image.width > largest_side ||
+      image.height > largest_side || image.step < image.width * size ||
+      image.data.size() / image.height < image.step)
+    throw Error(name,
+                "is an image of " + std::to_string(image.width) + "x" +
+                    std::to_string(image.height) + " pixels in " +
+                    std::to_string(image.data.size()) + " bytes, which do not fit",
+                "it may be damaged");
+  const bool swapped = (image.is_bigendian != 0) != (std::endian::native == std::endian::big);
+  std::vector<std::uint16_t> depth(std::size_t{image.width} * image.height);
+  for (std::size_t v = 0, i = 0; v < image.height; ++v) {
+    for (std::size_t u = 0; u < image.width; ++u, ++i) {
+      const std::size_t at = v * image.step + u * size;
+      depth[i] = floats ? quantised(value_at<float>(image.data, at, swapped), units)
+                        : value_at<std::uint16_t>(image.data, at, swapped);
+    }
+  }
+  return depth;
+}
+
+ros::Image unpacked(ros::CompressedImage message, double units, const std::string& name) {
+  if (message.format.find("compressedDepth") == std::string::npos)
+    throw Error(name, "is an image of format '" + message.format + "', not of depth",
+                "name a topic of depth with ?topic=");
+  if (message.format.find("rvl") != std::string::npos)
+    throw Error(name, "is packed as RVL", "record compressedDepth as PNG, or raw images");
+  if (message.data.size() < config_header) throw Error(name, "is empty", "it may be damaged");
+  DepthPng png = parse_depth_png(std::span(message.data).subspan(config_header), name);
+  ros::Image image{.header = std::move(message.header),
+                   .height = static_cast<std::uint32_t>(png.height),
+                   .width = static_cast<std::uint32_t>(png.width),
+                   .encoding = message.format.substr(0, message.format.find(';')),
+                   .is_bigendian = std::endian::native == std::endian::big,
+                   .step = static_cast<std::uint32_t>(2 * png.width),
+                   .data = {}};
+  if (is_float(image.encoding)) {
+    image.encoding = "16UC1";
+    const double a = value_at<float>(message.data, 4);
+    const double b = value_at<float>(message.data, 8);
+    for (std::uint16_t& raw : png.depth) raw = raw == 0 ? raw : quantised(a / (raw - b), units);
+  }
+  const auto bytes = std::as_bytes(std::span(png.depth));
+  image.data.assign(bytes.begin(), bytes.end());
+  return image;
+}
+
+Intrinsics intrinsics_of(const ros::CameraInfo& info, bool is_rectified, const std::string& name) {
+  Intrinsics k{.width = static_cast<int>(std::min(info.width, largest_side + 1)),
+               .height = static_cast<int>(std::min(info.height, largest_side + 1)),
+               .fx = info.k[0],
+               .fy = info.k[4],
+               .cx = info.k[2],
+               .cy = info.k[5]};
+  if (is_rectified && info.p[0] > 0.0) {
+    k.fx = info.p[0];
+    k.fy = info.p[5];
+    k.cx = info.p[2];
+    k.cy = info.p[6];
+    return k;
+  }
+  const bool any = std::any_of(info.d.begin(), info.d.end(), [](double d) { return d != 0.0; });
+  if (!any) return k;
+  const bool is_known =
+      info.distortion_model == "plumb_bob" || info.distortion_model == "rational_polynomial";
+  if (!is_known || info.d.size() > k.distortion.size())
+    throw Error(name, "has the distortion model '" + info.distortion_model + "'",
+                "rectify the images; plumb_bob and rational_polynomial can be read");
+  std::copy(info.d.begin(), info.d.end(), k.distortion.begin());
+  return k;
+}
+
+std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name) {
+  if (message.width == 0 || message.height == 0) return {};
+  const Axes axes = axes_of(message, name);
+  const std::size_t row = std::size_t{message.width} * message.point_step;
+  if (message.height > 1 && message.row_step < row)
+    throw Error(name, "has rows that overlap", "it may be damaged");
+  const std::size_t row_step = message.height > 1 ? message.row_step : row;
+  if (row > message.data.size() || message.height - 1 > (message.data.size() - row) / row_step)
+    throw Error(name, "promises more points than it holds", "it may be damaged");
+  const bool swapped = message.is_bigendian != (std::endian::native == std::endian::big);
+  std::vector<Vec3> points;
+  points.reserve(std::size_t{message.width} * message.height);
+  for (std::size_t v = 0; v < message.height; ++v) {
+    for (std::size_t u = 0; u < message.width; ++u) {
+      const std::size_t at = v * row_step + u * message.point_step;
+      Vec3 point;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::size_t place = at + axes.offset[axis];
+        point[static_cast<Eigen::Index>(axis)] =
+            axes.is_double[axis] ? value_at<double>(message.data, place, swapped)
+                                 : double{value_at<float>(message.data, place, swapped)};
+      }
+      points.push_back(point);
+    }
+  }
+  return points;
+}
+
+}  // namespace palpate

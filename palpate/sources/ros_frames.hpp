@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "palpate/bag/messages.hpp"
+#include "palpate/cloud/depth_image.hpp"
+
+// What ROS 2's messages of cameras hold, the same from a bag and from the network. `name` is the
+// message's, for errors.
+namespace palpate {
+
+constexpr std::uint32_t largest_side = 16384;  ///< [px] of an image
+constexpr double units_of_16uc1 = 1000.0;      ///< [1/m] REP 118
+constexpr double units_of_32fc1 = 5000.0;      ///< [1/m] 0.2 mm, up to 13 m
+
+/// Is it a topic that can be touched? Colour images have the types of depth: of images only topics
+/// with "depth" in their name count.
+bool is_topic_of_depth(const std::string& topic, const std::string& type);
+
+/// The names in front of a topic of depth: .../depth/image_raw/compressedDepth and
+/// .../depth/image_raw have .../depth/camera_info, and librealsense's .../Depth_0/image/data has
+/// .../Depth_0/camera_info.
+std::string camera_of_topic(const std::string& topic, const std::string& type);
+
+/// An encoding of metres as floats, 32FC1.
+bool is_float(const std::string& encoding);
+
+/// The raw depth of an image of 16UC1, mono16 or 32FC1, row by row; floats in units of 1/`units`
+/// metres. @throws Error if it is of another encoding, or damaged.
+std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
+                                     const std::string& name);
+
+/// The image in a message of compressed_depth_image_transport. Floats, which are stored as rounded
+/// inverse depth, are returned as 16UC1 in `units`. @throws Error if it is none, or damaged.
+ros::Image unpacked(ros::CompressedImage message, double units, const std::string& name);
+
+/// @param is_rectified  the images are: the projection counts, not the lens
+/// @throws Error if its distortion is neither zero nor Brown and Conrady's.
+Intrinsics intrinsics_of(const ros::CameraInfo& info, bool is_rectified, const std::string& name);
+
+/// All points, row by row, in the frame of the message; what was not measured is not a number.
+/// @throws Error without x, y and z, or if it is damaged.
+std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name);
+
+}  // namespace palpate

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/sources/transforms.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t most_tf_frames = 10'000;
+constexpr std::size_t most_samples = 20'000;  // of a frame: 5 s at 4 kHz
+
+}  // namespace
+
+std::string plain_frame(const std::string& frame) {
+  return frame.starts_with('/') ? frame.substr(1) : frame;
+}
+
+Trajectory::Sample sample_of(const ros::TransformStamped& transform, const std::string& name) {
+  const auto& [x, y, z] = transform.translation;
+  const auto& [qx, qy, qz, qw] = transform.rotation;
+  const Eigen::Quaterniond rotation(qw, qx, qy, qz);
+  const Eigen::Vector3d translation(x, y, z);
+  if (!translation.allFinite() || !(std::abs(rotation.norm() - 1.0) < 0.01))
+    throw Error(name, "has a transform to " + transform.child_frame_id + " that is not rigid",
+                "leave TF aside with ?fixed_frame=none");
+  return {1e-9 * static_cast<double>(transform.header.stamp.nanoseconds()), translation,
+          rotation.normalized()};
+}
+
+Eigen::Isometry3d pose_of(const Trajectory::Sample& sample) {
+  Eigen::Isometry3d pose(sample.rotation);
+  pose.translation() = sample.translation;
+  return pose;
+}
+
+void TransformLinks::add(const ros::TransformStamped& transform, bool moves,
+                         const std::string& name) {
+  links_[plain_frame(transform.child_frame_id)] = {plain_frame(transform.header.frame_id), moves};
+  if (links_.size() > most_tf_frames) throw Error(name, "has too many frames", "it may be damaged");
+}
+
+TransformWay TransformLinks::way(const std::string& frame, const std::string& fixed,
+                                 const std::string& whose) const {
+  // From the camera upwards; a way in a circle ends when all links were used.
+  TransformWay result;
+  std::vector<std::string>& way = result.children;
+  way.push_back(plain_frame(frame));
+  for (auto link = links_.find(way.back()); link != links_.end() && way.size() <= links_.size();
+       link = links_.find(way.back()))
+    way.push_back(link->second.parent);
+  result.root = way.back();
+  std::vector<std::string> wanted{"map", "odom", "world"};
+  if (!fixed.empty()) wanted = {plain_frame(fixed)};
+  auto end = way.end();
+  for (const std::string& each : wanted) {
+    if (end == way.end()) end = std::find(way.begin(), way.end(), each);
+  }
+  if (end == way.end()) {
+    way.clear();
+    if (fixed.empty()) return result;
+    throw Error("fixed frame " + fixed, "does not lead to " + frame + " in " + whose,
+                result.root == frame ? "leave it out" : result.root + " does");
+  }
+  result.fixed = *end;
+  way.erase(end, way.end());
+  return result;
+}
+
+bool TransformLinks::holds(const ros::TransformStamped& transform, bool moves) const {
+  const auto found = links_.find(plain_frame(transform.child_frame_id));
+  return found != links_.end() && found->second.moves == moves &&
+         found->second.parent == plain_frame(transform.header.frame_id);
+}
+
+void LiveTransforms::add(const ros::TFMessage& message, bool moves, const std::string& name) {
+  for (const ros::TransformStamped& transform : message.transforms) {
+    const Trajectory::Sample sample = sample_of(transform, name);
+    const bool goes_on = links_.holds(transform, moves);
+    links_.add(transform, moves, name);
+    std::deque<Trajectory::Sample>& line = samples_[plain_frame(transform.child_frame_id)];
+    if (!goes_on || !moves) line.clear();
+    // A clock that was set back begins anew; several nodes' transforms may overtake one another.
+    if (!line.empty() && sample.stamp < line.back().stamp - kept) line.clear();
+    if (!line.empty() && !(sample.stamp > line.back().stamp)) continue;
+    line.push_back(sample);
+    while (line.size() > most_samples || line.front().stamp < sample.stamp - kept) line.pop_front();
+  }
+}
+
+std::optional<Eigen::Isometry3d> LiveTransforms::at(const TransformWay& way, double stamp) const {
+  Eigen::Isometry3d fixed_from_camera = Eigen::Isometry3d::Identity();
+  for (const std::string& child : way.children) {
+    const auto found = samples_.find(child);
+    if (found == samples_.end() || found->second.empty()) return std::nullopt;
+    const std::deque<Trajectory::Sample>& line = found->second;
+    if (!links_.moves(child)) {
+      fixed_from_camera = pose_of(line.back()) * fixed_from_camera;
+      continue;
+    }
+    const auto after = std::lower_bound(line.begin(), line.end(), stamp,
+                                        [](const auto& one, double t) { return one.stamp < t; });
+    std::vector<Trajectory::Sample> around;
+    if (after != line.begin()) around.push_back(*(after - 1));
+    if (after != line.end()) around.push_back(*after);
+    const std::optional<Eigen::Isometry3d> parent_from_child =
+        Trajectory(std::move(around), max_gap).at(stamp);
+    if (!parent_from_child) return std::nullopt;
+    fixed_from_camera = *parent_from_child * fixed_from_camera;
+  }
+  return fixed_from_camera;
+}
+
+bool LiveTransforms::reach(const TransformWay& way, double stamp) const {
+  return std::all_of(way.children.begin(), way.children.end(), [&](const std::string& child) {
+    const auto found = samples_.find(child);
+    return found != samples_.end() && !found->second.empty() &&
+           (!links_.moves(child) || found->second.back().stamp >= stamp);
+  });
+}
+
+}  // namespace palpate

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "palpate/bag/messages.hpp"
+#include "palpate/sources/trajectory.hpp"
+
+namespace palpate {
+
+constexpr std::string_view transforms_topic = "/tf";                ///< those that change
+constexpr std::string_view static_transforms_topic = "/tf_static";  ///< those that do not
+
+/// A frame of TF as ROS 2 writes it; ROS 1 wrote them with a slash.
+std::string plain_frame(const std::string& frame);
+
+/// @param name  of its message, for errors  @throws Error if it is not rigid.
+Trajectory::Sample sample_of(const ros::TransformStamped& transform, const std::string& name);
+
+Eigen::Isometry3d pose_of(const Trajectory::Sample& sample);
+
+/// The frames between a camera's and a fixed one.
+struct TransformWay {
+  std::vector<std::string> children;  ///< from the camera's upwards, each with a link of its own
+  std::string fixed;                  ///< at the way's end; empty where none leads there
+  std::string root;                   ///< above all others on the way from the camera's
+};
+
+/// Which frame of TF is whose child. A frame whose parent changes has the parent that it has last.
+class TransformLinks {
+ public:
+  /// @param moves  it came on /tf, not on /tf_static  @param name  of its message, for errors
+  /// @throws Error if there are too many frames.
+  void add(const ros::TransformStamped& transform, bool moves, const std::string& name);
+
+  /// @param fixed  the fixed frame; empty: the first of map, odom and world that leads to `frame`
+  /// @param whose  TF, for errors
+  /// @throws Error if `fixed` is named and does not lead there.
+  [[nodiscard]] TransformWay way(const std::string& frame, const std::string& fixed,
+                                 const std::string& whose) const;
+  /// Is that the link by which its child hangs now?
+  [[nodiscard]] bool holds(const ros::TransformStamped& transform, bool moves) const;
+  /// @pre it is the child of a link
+  [[nodiscard]] bool moves(const std::string& child) const { return links_.at(child).moves; }
+  [[nodiscard]] bool empty() const { return links_.empty(); }
+
+ private:
+  struct Link {
+    std::string parent;
+    bool moves;
+  };
+  std::map<std::string, Link> links_;  // by the child's frame
+};
+
+/// The transforms of the last seconds, as they come from the network.
+///
+/// Between two of them it is interpolated as in BagTransforms.
+class LiveTransforms {
+ public:
+  /// [s] that are kept, before the newest
+  static constexpr double kept = 5.0;
+  /// [s] Transforms farther apart are not interpolated.
+  static constexpr double max_gap = 1.0;
+
+  /// @param moves  it came on /tf  @throws Error if one is not rigid, or there are too many frames.
+  void add(const ros::TFMessage& message, bool moves, const std::string& name);
+
+  [[nodiscard]] const TransformLinks& links() const { return links_; }
+  /// The pose of the way's first frame in its fixed one; none at a time that is not covered.
+  /// @param stamp  [s] since 1970
+  [[nodiscard]] std::optional<Eigen::Isometry3d> at(const TransformWay& way, double stamp) const;
+  /// Is there a transform at `stamp` or later for all that moves on the way?
+  [[nodiscard]] bool reach(const TransformWay& way, double stamp) const;
+
+ private:
+  TransformLinks links_;
+  std::map<std::string, std::deque<Trajectory::Sample>> samples_;  // by the child; stamps increase
+};
+
+}  // namespace palpate

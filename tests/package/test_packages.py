@@ -29,7 +29,8 @@ def run(*command, **options):
     return subprocess.run(command, check=True, capture_output=True, text=True, **options).stdout
 
 
-@unittest.skipUnless(shutil.which("dpkg-deb"), "no dpkg here")
+@unittest.skipUnless(all(map(shutil.which, ("dpkg-deb", "dpkg-shlibdeps", "file"))),
+                     "dpkg-dev or file is not installed: scripts/setup packages")
 class Packages(unittest.TestCase):
     @classmethod
     def setUpClass(cls):

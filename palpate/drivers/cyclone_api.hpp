@@ -58,7 +58,7 @@ constexpr std::uint32_t any_state = 127;
 constexpr std::uint32_t alive_state = 16;
 constexpr std::uint32_t data_available = 1U << 8;
 constexpr std::uint32_t no_optimise = 1;  // flag of a topic
-constexpr Duration infinite = INT64_MAX;
+constexpr std::uint32_t log_errors = 3;   // fatal ones among them
 constexpr int volatile_data = 0, transient_local = 1, keep_last = 0, best_effort = 0, reliable = 1;
 
 // Instructions: a field, its type, the type of its elements, where the next one is.

@@ -24,6 +24,7 @@ struct Library {
                  .variable = "PALPATE_CYCLONEDDS",
                  .remedy = "install it: apt install libddsc0debian, or libddsc0t64 (the package "
                            "that cyclonedds-dev needs)"}) {
+    library.find(set_log_mask, "dds_set_log_mask");
     library.find(create_domain, "dds_create_domain");
     library.find(create_participant, "dds_create_participant");
     library.find(remove, "dds_delete");
@@ -56,6 +57,7 @@ struct Library {
   }
 
   SharedLibrary library;
+  void (*set_log_mask)(std::uint32_t) = nullptr;
   cyclone::Entity (*create_domain)(std::uint32_t, const char*) = nullptr;
   cyclone::Entity (*create_participant)(std::uint32_t, const cyclone::Qos*, const void*) = nullptr;
   cyclone::Result (*remove)(cyclone::Entity) = nullptr;
@@ -237,6 +239,7 @@ std::string dds_type(std::string_view type) {
 
 Participant::Participant(const std::string& who)
     : who_(who), library_(std::make_unique<Library>()), domain_(domain_wanted()) {
+  library_->set_log_mask(cyclone::log_errors);  // it says much on stderr that is no fault
   // A domain lives until the process ends, and belongs to all that take part in it.
   const cyclone::Entity domain = library_->create_domain(domain_, settings().c_str());
   if (domain != cyclone::precondition_not_met) check(domain, "it cannot take part in the network");

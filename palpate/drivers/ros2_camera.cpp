@@ -32,18 +32,18 @@ constexpr dds::Quality best_effort{};
 constexpr dds::Quality of_tf{.depth = 100};
 constexpr dds::Quality of_static_tf{.reliable = true, .keeps_for_late = true, .depth = 100};
 
-struct Wanted {
+struct CameraOptions {
   std::string uri = {}, topic = {}, info_topic = {}, fixed_frame = {}, stamps = {};
   std::optional<double> units = {};  // [1/m]
   double voxel = 0.01;               // [m]
   double patience = 5.0;             // [s] for the camera to be there
 };
 
-Wanted wanted_by(const Uri& uri) {
+CameraOptions camera_options(const Uri& uri) {
   constexpr std::array<std::string_view, 7> options{"info",   "units", "voxel", "fixed_frame",
                                                     "stamps", "wait",  "sensor"};
   uri.allow_only(options);
-  Wanted wanted{.uri = uri.text(), .topic = uri.path()};
+  CameraOptions wanted{.uri = uri.text(), .topic = uri.path()};
   if (wanted.topic.size() < 2 || wanted.topic.front() != '/')
     throw Error(uri.text(), "names no topic",
                 "write ros2:/camera/camera/depth/image_rect_raw; palpate doctor lists those of "
@@ -79,7 +79,7 @@ class Camera final : public LiveCamera {
  public:
   explicit Camera(const Uri& uri)
       : LiveCamera({.uri = uri.text(), .kind = "ROS 2"}),
-        wanted_(wanted_by(uri)),
+        wanted_(camera_options(uri)),
         participant_(uri.text()),
         opened_(monotonic_now()) {
     info_.sensor = sensor_option(uri, SensorKind::unknown);
@@ -275,7 +275,7 @@ class Camera final : public LiveCamera {
     return frame;
   }
 
-  const Wanted wanted_;
+  const CameraOptions wanted_;
   dds::Participant participant_;
   const double opened_;    // [s, monotonic]
   std::string info_name_;  // topic of CameraInfo

@@ -5,6 +5,7 @@
 
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
+#include <dds/ddsrt/log.h>
 #include <gtest/gtest.h>
 
 #include "palpate/drivers/cyclone_api.hpp"
@@ -37,6 +38,7 @@ static_assert(cyclone::any_state == DDS_ANY_STATE);
 static_assert(cyclone::alive_state == DDS_IST_ALIVE);
 static_assert(cyclone::data_available == DDS_DATA_AVAILABLE_STATUS);
 static_assert(cyclone::no_optimise == DDS_TOPIC_NO_OPTIMIZE);
+static_assert(cyclone::log_errors == (DDS_LC_FATAL | DDS_LC_ERROR));
 static_assert(cyclone::volatile_data == DDS_DURABILITY_VOLATILE);
 static_assert(cyclone::transient_local == DDS_DURABILITY_TRANSIENT_LOCAL);
 static_assert(cyclone::keep_last == DDS_HISTORY_KEEP_LAST);

@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/drivers/ros2_device.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <future>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+#include "palpate/drivers/dds.hpp"
+#include "palpate/drivers/wake_up.hpp"
+#include "palpate/drivers/words.hpp"
+#include "palpate/servo/mailbox.hpp"
+#include "palpate/servo/realtime.hpp"
+
+namespace palpate {
+namespace ros2 {
+namespace {
+
+constexpr double beat_time = 0.020;      // [s] without a force from the servo: zero is sent
+constexpr double idle_wait = 0.010;      // [s] between two zeros while no force comes
+constexpr double listening_wait = 0.02;  // [s] after which the end is heard
+constexpr int zeros_at_the_end = 3;      // for nodes that read as best effort, and lose some
+constexpr double last_wait = 0.05;       // [s] for reliable readers to have the last one
+constexpr double force_lifespan = 0.1;   // [s] an older force reaches no motor
+constexpr double force_deadline = 0.1;   // [s] more than idle_wait: a node may watch it
+
+struct HandOptions {
+  std::string uri = {}, node = {}, pose = {}, pose_type = {}, force = {}, force_type = {},
+              button = {};
+  Eigen::Matrix3d device_from_topic = Eigen::Matrix3d::Identity();
+  double max_force = 3.3;  // [N]
+  double silence = 0.06;   // [s] without a pose: no hand
+  double patience = 5.0;   // [s] for the node to be there
+};
+
+// "y,-x,z": which of the topic's axes are right, away and up.
+Eigen::Matrix3d axes_of(const std::string& text, const std::string& uri) {
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Zero();
+  int row = 0;
+  bool good = true;
+  for (std::size_t i = 0; i < text.size() && good; ++row) {
+    double sign = 1.0;
+    if (text[i] == '-') {
+      sign = -1.0;
+      ++i;
+    }
+    good = row < 3 && i < text.size() && text[i] >= 'x' && text[i] <= 'z';
+    if (good) axes(row, text[i] - 'x') = sign;
+    ++i;
+    good = good && (i >= text.size() || text[i] == ',');
+    ++i;
+  }
+  if (!good || row != 3 || std::abs(axes.determinant() - 1.0) > 0.5)
+    throw Error(uri, "axes=" + text + " is no rotation",
+                "name the topic's axes that point right, away and up, such as axes=y,-x,z");
+  return axes;
+}
+
+std::string with_name(std::string_view topic, const std::string& name) {
+  std::string text(topic);
+  if (const std::size_t at = text.find("NAME"); at != std::string::npos) text.replace(at, 4, name);
+  return text;
+}
+
+HandOptions hand_options(const Uri& uri) {
+  constexpr std::array<std::string_view, 10> options{
+      "name",   "pose", "pose_type", "force",   "force_type",
+      "button", "axes", "max_force", "silence", "wait"};
+  uri.allow_only(options);
+  Ros2Hand hand{.name = "",
+                .node = "a node of its own",
+                .pose = "",
+                .pose_type = "PoseStamped",
+                .force = "",
+                .force_type = "WrenchStamped",
+                .button = "",
+                .axes = "x,y,z"};
+  if (!uri.path().empty()) {
+    std::string names;
+    bool found = false;
+    for (const Ros2Hand& one : ros2_hands()) {
+      add_to_list(names, "ros2:" + std::string(one.name));
+      if (one.name != uri.path()) continue;
+      hand = one;
+      found = true;
+    }
+    if (!found)
+      throw Error(uri.text(), "no haptic node is known as '" + uri.path() + "'",
+                  "write " + names + ", or ros2:?pose=/TOPIC&force=/TOPIC");
+  }
+  HandOptions wanted{.uri = uri.text(), .node = std::string(hand.node)};
+  const std::string name = uri.text_option("name", "arm");
+  wanted.pose = uri.text_option("pose", with_name(hand.pose, name));
+  wanted.force = uri.text_option("force", with_name(hand.force, name));
+  wanted.button = uri.text_option("button", with_name(hand.button, name));
+  wanted.pose_type = uri.text_option("pose_type", hand.pose_type);
+  wanted.force_type = uri.text_option("force_type", hand.force_type);
+  for (const std::string* topic : {&wanted.pose, &wanted.force}) {
+    if (topic->size() < 2 || topic->front() != '/')
+      throw Error(uri.text(), "names no topic for the pose, or none for the force",
+                  "write ros2:?pose=/TOPIC&force=/TOPIC, or the name of a node: ros2:fd");
+  }
+  wanted.device_from_topic = axes_of(uri.text_option("axes", hand.axes), uri.text());
+  wanted.max_force = uri.number_option("max_force", wanted.max_force, 0.1, 20.0, "N");
+  wanted.silence = uri.number_option("silence", wanted.silence, 0.005, 1.0, "s");
+  wanted.patience = uri.number_option("wait", wanted.patience, 0.1, 25.0, "s");
+  return wanted;
+}
+
+// Where forces go, whatever their type.
+class ForceWriter {
+ public:
+  ForceWriter(dds::Participant& participant, const HandOptions& wanted)
+      : kind_(kind_of(wanted)), writer_(make(participant, wanted.force)) {}
+
+  // [N] in the topic's axes
+  void write(const Vec3& force, const std::string& frame) {
+    const std::array<double, 3> xyz{force.x(), force.y(), force.z()};
+    switch (kind_) {
+      case Kind::wrench_stamped: {
+        const auto now = std::chrono::system_clock::now().time_since_epoch();
+        const auto since = std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
+        writer_->write(ros::WrenchStamped{{ros::Time::at(since), frame}, xyz, {}});
+        break;
+      }
+      case Kind::wrench:
+        writer_->write(ros::Wrench{xyz, {}});
+        break;
+      case Kind::vector:
+        writer_->write(ros::Vector3{xyz});
+        break;
+      case Kind::array:
+        writer_->write(ros::Float64MultiArray{"", {xyz[0], xyz[1], xyz[2]}});
+        break;
+      case Kind::omni:
+        writer_->write(ros::OmniFeedback{xyz, {}});
+        break;
+    }
+  }
+  [[nodiscard]] int readers() const { return writer_->readers(); }
+  void wait_for_readers(double seconds) { writer_->wait_for_readers(seconds); }
+
+ private:
+  enum class Kind : std::uint8_t { wrench_stamped, wrench, vector, array, omni };
+
+  static Kind kind_of(const HandOptions& wanted) {
+    constexpr std::array<std::pair<std::string_view, Kind>, 5> kinds{
+        {{"WrenchStamped", Kind::wrench_stamped},
+         {"Wrench", Kind::wrench},
+         {"Vector3", Kind::vector},
+         {"Float64MultiArray", Kind::array},
+         {"OmniFeedback", Kind::omni}}};
+    std::string names;
+    for (const auto& [name, kind] : kinds) {
+      if (name == wanted.force_type) return kind;
+      add_to_list(names, name);
+    }
+    throw Error(wanted.uri, "force_type=" + wanted.force_type + " is not known",
+                "there are: " + names);
+  }
+
+  std::unique_ptr<dds::Writer> make(dds::Participant& participant, const std::string& topic) const {
+    const dds::Quality quality{
+        .reliable = true, .lifespan = force_lifespan, .deadline = force_deadline};
+    switch (kind_) {
+      case Kind::wrench:
+        return std::make_unique<dds::Writer>(participant, topic, ros::Wrench{}, quality);
+      case Kind::vector:
+        return std::make_unique<dds::Writer>(participant, topic, ros::Vector3{}, quality);
+      case Kind::array:
+        return std::make_unique<dds::Writer>(participant, topic, ros::Float64MultiArray{}, quality);
+      case Kind::omni:
+        return std::make_unique<dds::Writer>(participant, topic, ros::OmniFeedback{}, quality);
+      case Kind::wrench_stamped:
+        break;
+    }
+    return std::make_unique<dds::Writer>(participant, topic, ros::WrenchStamped{}, quality);
+  }
+
+  Kind kind_;
+  std::unique_ptr<dds::Writer> writer_;
+};
+
+class Hand final : public Device {
+ public:
+  explicit Hand(const Uri& uri)
+      : wanted_(hand_options(uri)), participant_(uri.text()), forces_out_(participant_, wanted_) {
+    info_.uri = uri.text();
+    info_.kind = "ROS 2, " + wanted_.node;
+    info_.limits.max_force = wanted_.max_force;
+    info_.limits.continuous_force = std::min(info_.limits.continuous_force, wanted_.max_force);
+    constexpr dds::Quality best_effort{};
+    if (wanted_.pose_type == "PoseStamped")
+      poses_.emplace(participant_, wanted_.pose, ros::PoseStamped{}, best_effort);
+    else if (wanted_.pose_type == "Point")
+      points_.emplace(participant_, wanted_.pose, ros::Point{}, best_effort);
+    else
+      throw Error(wanted_.uri, "pose_type=" + wanted_.pose_type + " is not known",
+                  "there are: PoseStamped, Point");
+    if (!wanted_.button.empty())
+      buttons_.emplace(participant_, wanted_.button, ros::Bool{}, best_effort);
+    wait_for_node();
+    listener_ = std::thread(&Hand::listen, this);
+    talker_ = std::thread(&Hand::talk, this);
+  }
+  ~Hand() override {
+    disable();
+    ending_.store(true, std::memory_order_release);
+    word_.call();
+    talker_.join();
+    listener_.join();
+  }
+  Hand(const Hand&) = delete;
+  Hand& operator=(const Hand&) = delete;
+
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+
+  HandState read(double /*t*/) noexcept override {
+    if (const Seen* seen = seen_.take()) last_ = *seen;
+    HandState state = last_.state;
+    if (monotonic_now() - last_.time > wanted_.silence) state.fault = DeviceFault::disconnected;
+    state.present = state.fault == DeviceFault::none;
+    return state;
+  }
+
+  void write(const Vec3& force, double /*t*/) noexcept override {
+    const bool passes = enabled_.load(std::memory_order_acquire) && force.allFinite();
+    forces_.put(passes ? force : Vec3::Zero());
+    word_.call();
+  }
+
+  void enable() override { enabled_.store(true, std::memory_order_release); }
+  void disable() noexcept override {
+    enabled_.store(false, std::memory_order_release);
+    word_.call();
+  }
+
+  [[nodiscard]] std::string fault_text() const override {
+    if (!silent_.load(std::memory_order_acquire)) return {};
+    return wanted_.uri + ": no pose comes on " + wanted_.pose + ": check that its node runs";
+  }
+
+ private:
+  struct Seen {
+    HandState state{.present = false, .fault = DeviceFault::disconnected};
+    double time = 0.0;  // [s]
+  };
+
+  void wait_for_node() {
+    const double end = monotonic_now() + wanted_.patience;
+    for (;;) {
+      participant_.wait(0.01);
+      hear();
+      const bool is_told = newest_.time > 0.0;
+      const bool is_taken = forces_out_.readers() > 0;
+      if (is_told && is_taken) return;
+      if (monotonic_now() < end) continue;
+      const std::string where = " in domain " + std::to_string(participant_.domain());
+      throw Error(
+          wanted_.uri,
+          is_told ? "nobody takes forces as " + wanted_.force_type + " on " + wanted_.force + where
+                  : "no pose comes as " + wanted_.pose_type + " on " + wanted_.pose + where,
+          "start the haptic node, or name its topics with ?pose= and ?force=");
+    }
+  }
+
+  // ---- The listener's thread, and before that the constructor's.
+  void hear() {
+    if (buttons_) {
+      while (const auto button = take<ros::Bool>(*buttons_))
+        newest_.state.buttons = button->data ? 1U : 0U;
+    }
+    bool any = false;
+    if (poses_) {
+      while (const auto pose = take<ros::PoseStamped>(*poses_)) {
+        const auto& [qx, qy, qz, qw] = pose->orientation;
+        const Eigen::Quaterniond turn(qw, qx, qy, qz);
+        newest_.state.orientation.reset();
+        if (turn.coeffs().allFinite() && turn.norm() > 0.5)
+          newest_.state.orientation =
+              Eigen::Quaterniond(wanted_.device_from_topic) * turn.normalized();
+        newest_.state.stamp = 1e-9 * static_cast<double>(pose->header.stamp.nanoseconds());
+        any = place(pose->position) || any;
+      }
+    } else {
+      while (const auto point = take<ros::Point>(*points_)) any = place(point->xyz) || any;
+    }
+    if (any) seen_.put(newest_);
+    silent_.store(monotonic_now() - newest_.time > wanted_.silence, std::memory_order_release);
+  }
+  // A message that is damaged counts as none.
+  template <class Message>
+  static std::optional<Message> take(dds::Reader& reader) {
+    for (;;) {
+      try {
+        return reader.take<Message>();
+      } catch (const Error&) {
+        continue;
+      }
+    }
+  }
+  // A place that is none is as good as no pose.
+  bool place(const std::array<double, 3>& xyz) {
+    const Vec3 in_topic(xyz[0], xyz[1], xyz[2]);
+    if (!in_topic.allFinite()) return false;
+    newest_.state.position = wanted_.device_from_topic * in_topic;
+    newest_.state.fault = DeviceFault::none;
+    newest_.time = monotonic_now();
+    return true;
+  }
+  void listen() {
+    while (!ending_.load(std::memory_order_acquire)) {
+      participant_.wait(listening_wait);
+      hear();
+    }
+  }
+
+  // ---- The talker's thread.
+  void talk() {
+    double written = 0.0;  // [s] when the servo last wrote
+    while (!ending_.load(std::memory_order_acquire)) {
+      word_.wait(idle_wait);
+      const double now = monotonic_now();
+      if (forces_.take() != nullptr) written = now;
+      const bool passes = enabled_.load(std::memory_order_acquire) && now - written <= beat_time;
+      Vec3 force = passes ? forces_.taken_last() : Vec3::Zero();
+      if (const double size = force.norm(); size > wanted_.max_force)
+        force *= wanted_.max_force / size;
+      send(force);
+    }
+    for (int i = 0; i < zeros_at_the_end; ++i) {
+      send(Vec3::Zero());
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    forces_out_.wait_for_readers(last_wait);
+  }
+  void send(const Vec3& force_in_device) {
+    forces_out_.write(wanted_.device_from_topic.transpose() * force_in_device, "");
+  }
+
+  const HandOptions wanted_;
+  DeviceInfo info_;
+  dds::Participant participant_;
+  ForceWriter forces_out_;
+  std::optional<dds::Reader> poses_, points_, buttons_;
+  std::atomic<bool> enabled_{false}, ending_{false}, silent_{false};
+  Mailbox<Vec3> forces_;  // [N] from the servo
+  Mailbox<Seen> seen_;    // to the servo
+  WakeUp word_;
+  Seen last_;    // of the servo's thread
+  Seen newest_;  // of the listener's
+  std::thread listener_, talker_;
+};
+
+}  // namespace
+}  // namespace ros2
+
+const std::vector<Ros2Hand>& ros2_hands() {
+  static const std::vector<Ros2Hand> hands{
+      {"fd", "ICube's forcedimension_ros2", "/fd/ee_pose", "PoseStamped",
+       "/fd/fd_controller/commands", "Float64MultiArray", "/fd/button_state", "y,-x,z"},
+      {"ricmua", "ricmua's ros_force_dimension", "/robot/feedback/position", "Point",
+       "/robot/command/force", "Vector3", "", "y,-x,z"},
+      {"omni", "omni_state, of the drivers of the Touch", "/phantom/pose", "PoseStamped",
+       "/phantom/force_feedback", "OmniFeedback", "", "x,y,z"},
+      {"crtk", "a node of CRTK's interface", "/NAME/measured_cp", "PoseStamped",
+       "/NAME/body/servo_cf", "WrenchStamped", "", "x,y,z"}};
+  return hands;
+}
+
+std::unique_ptr<Device> open_ros2_device(const Uri& uri) {
+  return std::make_unique<ros2::Hand>(uri);
+}
+
+}  // namespace palpate

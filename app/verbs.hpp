@@ -28,5 +28,6 @@ Verb add_doctor(CLI::App& program);
 Verb add_methods(CLI::App& program);
 Verb add_parameters(CLI::App& program);
 Verb add_calibrate(CLI::App& program);
+Verb add_serve_camera(CLI::App& program);
 
 }  // namespace palpate::app

@@ -28,6 +28,7 @@ constexpr double least_patience = 0.05;  // [s] between two looks at what is pub
 constexpr double longest_wait_for_tf = 0.1;
 constexpr double time_to_settle = 2.0;  // [s] within which TF is heard of
 constexpr dds::Quality best_effort{};
+constexpr dds::Quality latched{.reliable = true, .keeps_for_late = true};
 // /tf has a message from each of its nodes: the last one alone would lose theirs
 constexpr dds::Quality of_tf{.depth = 100};
 constexpr dds::Quality of_static_tf{.reliable = true, .keeps_for_late = true, .depth = 100};
@@ -37,11 +38,12 @@ struct CameraOptions {
   std::optional<double> units = {};  // [1/m]
   double voxel = 0.01;               // [m]
   double patience = 5.0;             // [s] for the camera to be there
+  bool reliable = false;             // what is lost on the way is sent again
 };
 
 CameraOptions camera_options(const Uri& uri) {
-  constexpr std::array<std::string_view, 7> options{"info",   "units", "voxel", "fixed_frame",
-                                                    "stamps", "wait",  "sensor"};
+  constexpr std::array<std::string_view, 8> options{"reliable",    "info",   "units", "voxel",
+                                                    "fixed_frame", "stamps", "wait",  "sensor"};
   uri.allow_only(options);
   CameraOptions wanted{.uri = uri.text(), .topic = uri.path()};
   if (wanted.topic.size() < 2 || wanted.topic.front() != '/')
@@ -49,6 +51,7 @@ CameraOptions camera_options(const Uri& uri) {
                 "write ros2:/camera/camera/depth/image_rect_raw; palpate doctor lists those of "
                 "depth that are published");
   wanted.info_topic = uri.text_option("info", "");
+  wanted.reliable = uri.has("reliable");
   if (uri.has("units")) wanted.units = uri.number_option("units", 1000.0, 1.0, 1e6);
   wanted.voxel = uri.number_option("voxel", wanted.voxel, 1e-4, 1.0, "m");
   wanted.fixed_frame = uri.text_option("fixed_frame", "");
@@ -88,14 +91,22 @@ class Camera final : public LiveCamera {
     info_.kind = "ROS 2, " + type;
     info_name_ = wanted_.info_topic.empty() ? camera_of_topic(wanted_.topic, type) + "/camera_info"
                                             : wanted_.info_topic;
+    const dds::Quality quality{.reliable = wanted_.reliable};
     if (type == ros::Image::type) {
-      images_.emplace(participant_, wanted_.topic, ros::Image{}, best_effort);
+      images_.emplace(participant_, wanted_.topic, ros::Image{}, quality);
     } else if (type == ros::CompressedImage::type) {
-      packed_.emplace(participant_, wanted_.topic, ros::CompressedImage{}, best_effort);
+      packed_.emplace(participant_, wanted_.topic, ros::CompressedImage{}, quality);
     } else {
-      clouds_.emplace(participant_, wanted_.topic, ros::PointCloud2{}, best_effort);
+      clouds_.emplace(participant_, wanted_.topic, ros::PointCloud2{}, quality);
     }
     if (!clouds_) lenses_.emplace(participant_, info_name_, ros::CameraInfo{}, best_effort);
+    if (packed_ && !wanted_.units) {
+      const std::string units = units_topic(camera_of_topic(wanted_.topic, type));
+      const std::vector<dds::Publication> heard = participant_.publications();
+      if (std::any_of(heard.begin(), heard.end(),
+                      [&](const auto& one) { return one.topic == units; }))
+        told_units_.emplace(participant_, units, ros::Float64MultiArray{}, latched);
+    }
     if (wanted_.fixed_frame != "none") {
       tf_.emplace(participant_, std::string(transforms_topic), ros::TFMessage{}, of_tf);
       static_tf_.emplace(participant_, std::string(static_transforms_topic), ros::TFMessage{},
@@ -136,6 +147,7 @@ class Camera final : public LiveCamera {
     participant_.wait(pending_ ? std::min(seconds, 0.005) : seconds);
     take_transforms();
     take_lens();
+    take_units();
     take_newest();
     if (!pending_) return std::nullopt;
     return frame_of_pending();
@@ -147,6 +159,15 @@ class Camera final : public LiveCamera {
       transforms_.add(*message, false, wanted_.uri + ": /tf_static");
     while (const auto message = tf_->take<ros::TFMessage>())
       transforms_.add(*message, true, wanted_.uri + ": /tf");
+  }
+
+  void take_units() {
+    if (!told_units_) return;
+    while (const auto units = told_units_->take<ros::Float64MultiArray>()) {
+      if (units->data.size() != 1 || !(units->data[0] >= 1.0 && units->data[0] <= 1e6))
+        throw Error(wanted_.uri, "tells no unit of depth that can be", "give ?units=");
+      units_ = units->data[0];
+    }
   }
 
   void take_lens() {
@@ -172,7 +193,11 @@ class Camera final : public LiveCamera {
     } else {
       while (auto packed = packed_->take<ros::CompressedImage>()) {
         const bool floats = is_float(packed->format.substr(0, packed->format.find(';')));
-        const double units = wanted_.units.value_or(floats ? units_of_32fc1 : units_of_16uc1);
+        if (told_units_ && !units_) continue;  // it is still to come
+        const double units = wanted_.units ? *wanted_.units
+                             : units_      ? *units_
+                             : floats      ? units_of_32fc1
+                                           : units_of_16uc1;
         const std::string format = packed->format;
         ros::Image depth = unpacked(std::move(*packed), units, name);
         take_image(depth, name, units);
@@ -279,7 +304,8 @@ class Camera final : public LiveCamera {
   dds::Participant participant_;
   const double opened_;    // [s, monotonic]
   std::string info_name_;  // topic of CameraInfo
-  std::optional<dds::Reader> images_, packed_, clouds_, lenses_, tf_, static_tf_;
+  std::optional<dds::Reader> images_, packed_, clouds_, lenses_, told_units_, tf_, static_tf_;
+  std::optional<double> units_;  // [1/m] as a camera of palpate's tells
   LiveTransforms transforms_;
   std::shared_ptr<const ViewingRays> rays_;
   std::optional<Pending> pending_;

@@ -9,34 +9,14 @@
 #include "palpate/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/bag_camera.hpp"
+#include "palpate/sources/ros_frames.hpp"
+#include "palpate/sources/transforms.hpp"
 
 namespace palpate {
 namespace {
 
 std::array<double, 3> array_of(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
-}
-
-ros::CameraInfo camera_info(const ros::Header& header, const Intrinsics& k) {
-  ros::CameraInfo info{.header = header,
-                       .height = static_cast<std::uint32_t>(k.height),
-                       .width = static_cast<std::uint32_t>(k.width),
-                       .distortion_model = k.distorted() ? "rational_polynomial" : "plumb_bob",
-                       .d = std::vector<double>(k.distorted() ? 8 : 5),
-                       .k = {k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0},
-                       .r = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
-                       .p = {k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0}};
-  if (k.distorted()) std::copy(k.distortion.begin(), k.distortion.end(), info.d.begin());
-  return info;
-}
-
-ros::TransformStamped transform(const ros::Header& header, const std::string& child,
-                                const Eigen::Isometry3d& parent_from_child) {
-  const Eigen::Quaterniond q(parent_from_child.linear());
-  return {.header = header,
-          .child_frame_id = child,
-          .translation = array_of(parent_from_child.translation()),
-          .rotation = {q.x(), q.y(), q.z(), q.w()}};
 }
 
 }  // namespace
@@ -121,11 +101,7 @@ void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& im
   const std::int64_t at = nanoseconds(stamp);
   const ros::Header header{ros::Time::at(at), topics.optical_frame};
 
-  // compressed_depth_image_transport's header is of no meaning to whole numbers.
-  constexpr std::size_t config_header = 12;
-  ros::CompressedImage packed{.header = header, .format = "16UC1; compressedDepth png", .data = {}};
-  packed.data.resize(config_header);
-  packed.data.insert(packed.data.end(), png.begin(), png.end());
+  const ros::CompressedImage packed = compressed_depth(header, png);
 
   ros::Float64MultiArray exact{.label = "stamp,units_per_metre,world_from_camera",
                                .data = {stamp, image.units_per_metre()}};
@@ -133,10 +109,10 @@ void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& im
 
   const ros::Header world{header.stamp, std::string(world_frame)};
   write(topics.depth, at, packed);
-  write(topics.camera_info, at, camera_info(header, k));
+  write(topics.camera_info, at, camera_info_of(header, k));
   write(topics.exact, at, exact);
   write(session_topic::transforms, at,
-        ros::TFMessage{{transform(world, topics.optical_frame, image.world_from_camera())}});
+        ros::TFMessage{{transform_of(world, topics.optical_frame, image.world_from_camera())}});
 }
 
 void SessionWriter::points(std::size_t camera, double stamp, const PointCloud& cloud) {

@@ -73,6 +73,10 @@ std::string camera_of_topic(const std::string& topic, const std::string& type) {
   return above(is_deep ? above(topic) : topic);
 }
 
+std::string units_topic(const std::string& camera) {
+  return camera + "/units_per_metre";
+}
+
 bool is_float(const std::string& encoding) {
   return encoding == "32FC1";
 }
@@ -153,6 +157,27 @@ Intrinsics intrinsics_of(const ros::CameraInfo& info, bool is_rectified, const s
                 "rectify the images; plumb_bob and rational_polynomial can be read");
   std::copy(info.d.begin(), info.d.end(), k.distortion.begin());
   return k;
+}
+
+ros::CameraInfo camera_info_of(const ros::Header& header, const Intrinsics& k) {
+  ros::CameraInfo info{.header = header,
+                       .height = static_cast<std::uint32_t>(k.height),
+                       .width = static_cast<std::uint32_t>(k.width),
+                       .distortion_model = k.distorted() ? "rational_polynomial" : "plumb_bob",
+                       .d = std::vector<double>(k.distorted() ? 8 : 5),
+                       .k = {k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0},
+                       .r = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0},
+                       .p = {k.fx, 0.0, k.cx, 0.0, 0.0, k.fy, k.cy, 0.0, 0.0, 0.0, 1.0, 0.0}};
+  if (k.distorted()) std::copy(k.distortion.begin(), k.distortion.end(), info.d.begin());
+  return info;
+}
+
+ros::CompressedImage compressed_depth(const ros::Header& header, std::span<const std::byte> png) {
+  // The transport's own header, which is of no meaning to whole numbers, comes first.
+  ros::CompressedImage packed{.header = header, .format = "16UC1; compressedDepth png", .data = {}};
+  packed.data.resize(config_header);
+  packed.data.insert(packed.data.end(), png.begin(), png.end());
+  return packed;
 }
 
 std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name) {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,9 @@ bool is_topic_of_depth(const std::string& topic, const std::string& type);
 /// .../Depth_0/camera_info.
 std::string camera_of_topic(const std::string& topic, const std::string& type);
 
+/// Where a camera of palpate's tells its raw values per metre, to whoever comes late, too.
+std::string units_topic(const std::string& camera);
+
 /// An encoding of metres as floats, 32FC1.
 bool is_float(const std::string& encoding);
 
@@ -40,6 +45,12 @@ ros::Image unpacked(ros::CompressedImage message, double units, const std::strin
 /// @param is_rectified  the images are: the projection counts, not the lens
 /// @throws Error if its distortion is neither zero nor Brown and Conrady's.
 Intrinsics intrinsics_of(const ros::CameraInfo& info, bool is_rectified, const std::string& name);
+
+/// The other way round.
+ros::CameraInfo camera_info_of(const ros::Header& header, const Intrinsics& k);
+
+/// A message of compressed_depth_image_transport. @param png  of 16-bit depth
+ros::CompressedImage compressed_depth(const ros::Header& header, std::span<const std::byte> png);
 
 /// All points, row by row, in the frame of the message; what was not measured is not a number.
 /// @throws Error without x, y and z, or if it is damaged.

@@ -37,6 +37,16 @@ Eigen::Isometry3d pose_of(const Trajectory::Sample& sample) {
   return pose;
 }
 
+ros::TransformStamped transform_of(const ros::Header& header, const std::string& child,
+                                   const Eigen::Isometry3d& parent_from_child) {
+  const Eigen::Quaterniond q(parent_from_child.linear());
+  const Eigen::Vector3d p = parent_from_child.translation();
+  return {.header = header,
+          .child_frame_id = child,
+          .translation = {p.x(), p.y(), p.z()},
+          .rotation = {q.x(), q.y(), q.z(), q.w()}};
+}
+
 void TransformLinks::add(const ros::TransformStamped& transform, bool moves,
                          const std::string& name) {
   links_[plain_frame(transform.child_frame_id)] = {plain_frame(transform.header.frame_id), moves};

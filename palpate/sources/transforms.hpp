@@ -26,6 +26,10 @@ Trajectory::Sample sample_of(const ros::TransformStamped& transform, const std::
 
 Eigen::Isometry3d pose_of(const Trajectory::Sample& sample);
 
+/// @param header  of the parent's frame
+ros::TransformStamped transform_of(const ros::Header& header, const std::string& child,
+                                   const Eigen::Isometry3d& parent_from_child);
+
 /// The frames between a camera's and a fixed one.
 struct TransformWay {
   std::vector<std::string> children;  ///< from the camera's upwards, each with a link of its own

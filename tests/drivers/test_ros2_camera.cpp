@@ -14,6 +14,7 @@
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/ros2.hpp"
+#include "palpate/drivers/ros2_publisher.hpp"
 #include "palpate/sources/depth_png.hpp"
 
 #include "tests/drivers/dds_test.hpp"
@@ -224,6 +225,38 @@ TEST_F(Ros2Camera, IsWhereTheTransformsSay) {
   }
   ASSERT_EQ(source->info().notes.size(), 1U);
   EXPECT_NE(source->info().notes[0].find("points are in map"), std::string::npos);
+}
+
+// What palpate serves comes back to the bit: values, unit, lens and pose.
+TEST_F(Ros2Camera, ReadsWhatIsServed) {
+  Eigen::Isometry3d pose(Eigen::AngleAxisd(0.5, Vec3(0.6, 0.0, 0.8)));
+  pose.translation() = Vec3(1.0, -2.0, 3.0);
+  Intrinsics k{.width = width, .height = height, .fx = 9.5, .fy = 9.0, .cx = 3.0, .cy = 2.0};
+  k.distortion[1] = 0.25;
+  const DepthImage served(std::make_shared<const ViewingRays>(k), a_depth(), 10000.0, pose);
+  std::atomic<bool> ends{false};
+  std::thread thread([&] {
+    Ros2CameraPublisher publisher("robot/camera");
+    for (double stamp = 1e9; !ends; stamp += 0.01) {
+      publisher.publish(served, stamp);
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  });
+  {
+    const auto source =
+        open("ros2:/robot/camera/depth/image_raw/compressedDepth?reliable&wait=60s");
+    const Frame frame = frame_of(*source);
+    const auto& image = dynamic_cast<const DepthImage&>(*frame.cloud);
+    EXPECT_EQ(depth_of(image), a_depth());
+    EXPECT_EQ(image.units_per_metre(), 10000.0);
+    EXPECT_EQ(image.intrinsics(), k);
+    EXPECT_TRUE(image.world_from_camera().isApprox(pose, 1e-12));
+    EXPECT_GE(frame.stamp, 1e9);
+  }
+  ends = true;
+  thread.join();
+  EXPECT_TRUE(test::fails_saying([] { return std::make_unique<Ros2CameraPublisher>("my camera"); },
+                                 "'my camera'"));
 }
 
 TEST_F(Ros2Camera, SaysWhatIsThereInstead) {

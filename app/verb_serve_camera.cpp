@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "app/signals.hpp"
+#include "app/verbs.hpp"
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/drivers/ros2_publisher.hpp"
+#include "palpate/servo/realtime.hpp"
+#include "palpate/session/camera_feed.hpp"
+
+namespace palpate::app {
+namespace {
+
+struct ServeOptions {
+  std::string camera;
+  std::string name = "camera";
+  double duration = 0.0;  // [s]; 0: until a signal comes
+};
+
+// From the servo loop's clock to the wall clock, which stamps of ROS are on.
+double since_1970(double monotonic) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(now).count() + monotonic - monotonic_now();
+}
+
+int serve(const ServeOptions& options) {
+  if (options.camera.empty())
+    throw Error("serve-camera", "no camera is named", "give --camera URI");
+  if (!(options.duration >= 0.0 && options.duration <= 1e6))
+    throw Error("--duration", fmt::format("{} s is too short or too long", options.duration),
+                "give 0 to 1e6");
+  Interruption interruption;
+  Ros2CameraPublisher publisher(options.name);
+  CameraFeed feed(options.camera);
+  std::atomic<bool> is_depth{true};
+  feed.start([&](const FedFrame& fed) {
+    const auto* image = dynamic_cast<const DepthImage*>(fed.frame.cloud.get());
+    if (image == nullptr)
+      is_depth = false;
+    else
+      publisher.publish(*image, since_1970(fed.frame.stamp));
+  });
+  fmt::print(stderr, "palpate: serves {} as ros2:{} in domain {}; Ctrl-C ends it\n", options.camera,
+             publisher.topic(), publisher.domain());
+  const double end = monotonic_now() + options.duration;
+  while (interruption.signal() == 0 && is_depth &&
+         (options.duration == 0.0 || monotonic_now() < end))
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  feed.stop();
+  const CameraStatus status = feed.status();
+  if (!is_depth)
+    throw Error(options.camera, "gives points, not depth images", "serve a depth camera");
+  fmt::print("{} frames served at {:.1f} Hz\n", status.frames, status.rate);
+  return interruption.signal() == 0 ? 0 : exit_status_of(interruption.signal());
+}
+
+}  // namespace
+
+Verb add_serve_camera(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "serve-camera", "publish a camera's depth on the network of ROS 2, to the bit");
+  const auto options = std::make_shared<ServeOptions>();
+  command->add_option("--camera", options->camera, "what to serve, e.g. realsense:");
+  command->add_option("--name", options->name, "of its topics (camera): /NAME/depth/...");
+  command->add_option("--duration", options->duration, "[s] after which it ends (0: never)");
+  return {command, [options] { return serve(*options); }};
+}
+
+}  // namespace palpate::app

@@ -99,7 +99,10 @@ struct Library {
 namespace {
 
 constexpr std::uint32_t largest_domain = 232;
-constexpr double blocking_time = 0.1;  // [s] that a reliable writer waits for room at most
+// [s] that a reliable writer waits for room at most. Not the protocol's default of 0.1 s: Cyclone
+// leaves defaults out of what it tells others, and @foxglove/rtps does not read a writer without
+// it.
+constexpr double blocking_time = 0.05;
 constexpr std::size_t most_publications = 4096;
 
 cyclone::Duration duration(double seconds) {

@@ -395,7 +395,8 @@ test("what one page sets, all pages show", async () => {
   await page.locator("#method-name").selectOption("fixed-step");
   await other.getByRole("tab", { name: "Method" }).click();
   await expect.poll(() => other.locator("#method-name").inputValue()).toBe("fixed-step");
-  await expect.poll(() => other.getByLabel("stiffness, N/m").inputValue()).toBe("0");
+  const stiffness = other.getByLabel("stiffness, N/m", { exact: true });
+  await expect.poll(() => stiffness.inputValue()).toBe("0");
   await page.locator("#method-name").selectOption("sight");
   await expect.poll(() => other.locator("#method-name").inputValue()).toBe("sight");
   // Where the hand is in the scene, too.

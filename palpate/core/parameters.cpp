@@ -151,7 +151,7 @@ constexpr std::array table = {
                   "static coefficient of friction of every surface; 0: none", "ours (feel)",
                   [](const Parameters& p) { return p.friction.friction; },
                   [](Parameters& p, double v) { p.friction.friction = v; }},
-    ParameterInfo{"kinetic_share", "μ_k/μ_s", "-", 0.8, 0.1, 1.0,
+    ParameterInfo{"kinetic_share", "", "-", 0.8, 0.1, 1.0,
                   "share of the friction that is left in fast sliding; less sticks and slips more",
                   "ours (feel)", [](const Parameters& p) { return p.friction.kinetic_share; },
                   [](Parameters& p, double v) { p.friction.kinetic_share = v; }},

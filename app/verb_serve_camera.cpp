@@ -2,6 +2,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -23,6 +24,7 @@ namespace {
 struct ServeOptions {
   std::string camera;
   std::string name = "camera";
+  DepthPacking packing = DepthPacking::rvl;
   double duration = 0.0;  // [s]; 0: until a signal comes
 };
 
@@ -39,7 +41,7 @@ int serve(const ServeOptions& options) {
     throw Error("--duration", fmt::format("{} s is too short or too long", options.duration),
                 "give 0 to 1e6");
   Interruption interruption;
-  Ros2CameraPublisher publisher(options.name);
+  Ros2CameraPublisher publisher(options.name, options.packing);
   CameraFeed feed(options.camera);
   std::atomic<bool> is_depth{true};
   feed.start([&](const FedFrame& fed) {
@@ -71,6 +73,11 @@ Verb add_serve_camera(CLI::App& program) {
   const auto options = std::make_shared<ServeOptions>();
   command->add_option("--camera", options->camera, "what to serve, e.g. realsense:");
   command->add_option("--name", options->name, "of its topics (camera): /NAME/depth/...");
+  command
+      ->add_option("--packing", options->packing,
+                   "rvl: fast (usual); png: larger delay, for readers that know no RVL")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, DepthPacking>{
+          {"rvl", DepthPacking::rvl}, {"png", DepthPacking::png}}));
   command->add_option("--duration", options->duration, "[s] after which it ends (0: never)");
   return {command, [options] { return serve(*options); }};
 }

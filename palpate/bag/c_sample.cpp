@@ -122,6 +122,9 @@ CSample::CSample(const PoseStamped& message) {
 CSample::CSample(const WrenchStamped& message) {
   lay(message, wrench);
 }
+CSample::CSample(const TimeReference& message) {
+  lay(message, time_reference);
+}
 CSample::CSample(const TFMessage& message) {
   lay(message, transforms);
 }

@@ -41,6 +41,7 @@ class CSample {
   explicit CSample(const PointCloud2& message);
   explicit CSample(const PoseStamped& message);
   explicit CSample(const WrenchStamped& message);
+  explicit CSample(const TimeReference& message);
   explicit CSample(const TFMessage& message);
   explicit CSample(const Float64MultiArray& message);
   explicit CSample(const Bool& message);

@@ -123,6 +123,12 @@ inline constexpr auto camera = [](auto& way, auto& m) { walk_camera(way, m); };
 inline constexpr auto points = [](auto& way, auto& m) { walk_points(way, m); };
 inline constexpr auto pose = [](auto& way, auto& m) { walk_pose(way, m); };
 inline constexpr auto wrench = [](auto& way, auto& m) { walk_wrench(way, m); };
+inline constexpr auto time_reference = [](auto& way, auto& m) {
+  walk_header(way, m.header);
+  way.number(m.time_ref.sec);
+  way.number(m.time_ref.nanosec);
+  way.text(m.source);
+};
 inline constexpr auto transforms = [](auto& way, auto& m) { walk_transforms(way, m); };
 inline constexpr auto float32 = [](auto& way, auto& m) { way.number(m.data); };
 inline constexpr auto key_value = [](auto& way, auto& m) {

@@ -134,6 +134,9 @@ std::vector<std::byte> encode(const PoseStamped& message) {
 std::vector<std::byte> encode(const WrenchStamped& message) {
   return encode_by(message, wrench);
 }
+std::vector<std::byte> encode(const TimeReference& message) {
+  return encode_by(message, time_reference);
+}
 std::vector<std::byte> encode(const TFMessage& message) {
   return encode_by(message, transforms);
 }
@@ -203,6 +206,10 @@ PoseStamped decode(std::span<const std::byte> bytes, const std::string& name) {
 template <>
 WrenchStamped decode(std::span<const std::byte> bytes, const std::string& name) {
   return decode_by<WrenchStamped>(bytes, name, wrench);
+}
+template <>
+TimeReference decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<TimeReference>(bytes, name, time_reference);
 }
 template <>
 TFMessage decode(std::span<const std::byte> bytes, const std::string& name) {

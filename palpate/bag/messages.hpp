@@ -94,6 +94,14 @@ struct WrenchStamped {
   std::array<double, 3> force{}, torque{};  ///< [N], [N m]
 };
 
+/// What another clock says.
+struct TimeReference {
+  static constexpr std::string_view type = "sensor_msgs/msg/TimeReference";
+  Header header;  ///< stamp: by the clock of the sender
+  Time time_ref;  ///< by the other one
+  std::string source;
+};
+
 struct TransformStamped {
   Header header;  ///< frame_id: the parent
   std::string child_frame_id;
@@ -160,6 +168,7 @@ std::vector<std::byte> encode(const CameraInfo& message);
 std::vector<std::byte> encode(const PointCloud2& message);
 std::vector<std::byte> encode(const PoseStamped& message);
 std::vector<std::byte> encode(const WrenchStamped& message);
+std::vector<std::byte> encode(const TimeReference& message);
 std::vector<std::byte> encode(const TFMessage& message);
 std::vector<std::byte> encode(const Float64MultiArray& message);
 std::vector<std::byte> encode(const Float32& message);
@@ -194,6 +203,8 @@ template <>
 PoseStamped decode(std::span<const std::byte> bytes, const std::string& name);
 template <>
 WrenchStamped decode(std::span<const std::byte> bytes, const std::string& name);
+template <>
+TimeReference decode(std::span<const std::byte> bytes, const std::string& name);
 template <>
 TFMessage decode(std::span<const std::byte> bytes, const std::string& name);
 template <>

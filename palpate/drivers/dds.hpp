@@ -39,8 +39,8 @@ struct Library;
 
 /// Takes part in a domain: what reads and writes, and what the others publish. The domain is
 /// ROS_DOMAIN_ID's (0 without). Settings of CYCLONEDDS_URI come behind the library's own, and so
-/// count; with ROS_LOCALHOST_ONLY=1 nothing leaves this machine. Not for two threads at a time,
-/// except for `wait` and `Writer::write`, each on one.
+/// count; with ROS_LOCALHOST_ONLY=1 nothing leaves this machine. Not for two threads at a time;
+/// `wait`, each Reader and each Writer may have a thread of their own.
 class Participant {
  public:
   /// @param who  for errors: a URI

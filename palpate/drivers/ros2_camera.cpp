@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,8 +14,10 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/drivers/clock_relation.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/live_camera.hpp"
+#include "palpate/drivers/ros2_publisher.hpp"
 #include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/ros_frames.hpp"
@@ -26,9 +30,15 @@ namespace {
 constexpr double least_patience = 0.05;  // [s] between two looks at what is published
 // [s] for which a frame waits for a transform that covers it: /tf comes at 10 to 100 Hz
 constexpr double longest_wait_for_tf = 0.1;
-constexpr double time_to_settle = 2.0;  // [s] within which TF is heard of
+constexpr double time_to_settle = 2.0;  // [s] within which TF leads to a camera
+// [s] within which other nodes are heard of: one that publishes TF may be heard after the camera
+constexpr double time_to_be_heard = 1.0;
+constexpr double time_to_answer = 1.0;  // [s] of a camera's machine that is asked for its time
+// [s] between two questions for the time of a camera's machine: at first, and later, when 100 ppm
+// make 0.05 ms of it
+constexpr double first_pause = 0.02, later_pause = 0.5;
+constexpr int first_questions = 10;
 constexpr dds::Quality best_effort{};
-constexpr dds::Quality latched{.reliable = true, .keeps_for_late = true};
 // /tf has a message from each of its nodes: the last one alone would lose theirs
 constexpr dds::Quality of_tf{.depth = 100};
 constexpr dds::Quality of_static_tf{.reliable = true, .keeps_for_late = true, .depth = 100};
@@ -56,8 +66,8 @@ CameraOptions camera_options(const Uri& uri) {
   wanted.voxel = uri.number_option("voxel", wanted.voxel, 1e-4, 1.0, "m");
   wanted.fixed_frame = uri.text_option("fixed_frame", "");
   wanted.patience = uri.number_option("wait", wanted.patience, 0.1, 600.0, "s");
-  wanted.stamps = uri.text_option("stamps", "system");
-  if (wanted.stamps != "system" && wanted.stamps != "sensor")
+  wanted.stamps = uri.text_option("stamps", "");
+  if (!wanted.stamps.empty() && wanted.stamps != "system" && wanted.stamps != "sensor")
     throw Error(uri.text(), "stamps=" + wanted.stamps + " is not known",
                 "write stamps=system, or stamps=sensor for a camera with a clock of its own");
   return wanted;
@@ -78,6 +88,51 @@ bool is_of_camera(const std::string& type) {
          type == ros::PointCloud2::type;
 }
 
+// Asks the machine of a palpate that serves a camera what time it is.
+class RemoteClock {
+ public:
+  // @param uri  of the camera, for errors
+  RemoteClock(dds::Participant& participant, const std::string& camera, const std::string& uri)
+      : questions_(participant, clock_question_topic(camera), ros::TimeReference{}, best_effort),
+        answers_(participant, clock_answer_topic(camera), ros::TimeReference{}, best_effort),
+        id_(uri + " " + std::to_string(nanoseconds(monotonic_now()))) {}
+
+  // Takes what was answered, and asks when it is time to.
+  void look() {
+    while (const auto answer = answers_.take<ros::TimeReference>()) {
+      if (answer->source != id_) continue;  // somebody else's
+      relation_.add(seconds(answer->time_ref), seconds(answer->header.stamp), monotonic_now());
+    }
+    const double now = monotonic_now();
+    if (now < next_) return;
+    next_ = now + (asked_ < first_questions ? first_pause : later_pause);
+    if (questions_.readers() == 0) return;
+    ++asked_;
+    questions_.write(ros::TimeReference{.header = {ros::Time::at(nanoseconds(monotonic_now())), ""},
+                                        .time_ref = {},
+                                        .source = id_});
+  }
+  [[nodiscard]] bool is_known() const { return relation_.is_known() && asked_ >= first_questions; }
+  [[nodiscard]] const ClockRelation& relation() const { return relation_; }
+  // [s] until the next question.
+  [[nodiscard]] double pause() const { return std::max(next_ - monotonic_now(), 0.0); }
+
+ private:
+  static std::int64_t nanoseconds(double seconds) {
+    return static_cast<std::int64_t>(std::llround(1e9 * seconds));
+  }
+  static double seconds(const ros::Time& time) {
+    return 1e-9 * static_cast<double>(time.nanoseconds());
+  }
+
+  dds::Writer questions_;
+  dds::Reader answers_;
+  std::string id_;
+  ClockRelation relation_;
+  double next_ = 0.0;  // [s, monotonic] of a question
+  int asked_ = 0;
+};
+
 class Camera final : public LiveCamera {
  public:
   explicit Camera(const Uri& uri)
@@ -86,7 +141,7 @@ class Camera final : public LiveCamera {
         participant_(uri.text()),
         opened_(monotonic_now()) {
     info_.sensor = sensor_option(uri, SensorKind::unknown);
-    info_.clock = wanted_.stamps == "system" ? StampClock::system : StampClock::sensor;
+    info_.clock = wanted_.stamps == "sensor" ? StampClock::sensor : StampClock::system;
     const std::string type = wait_for_type();
     info_.kind = "ROS 2, " + type;
     info_name_ = wanted_.info_topic.empty() ? camera_of_topic(wanted_.topic, type) + "/camera_info"
@@ -100,18 +155,12 @@ class Camera final : public LiveCamera {
       clouds_.emplace(participant_, wanted_.topic, ros::PointCloud2{}, quality);
     }
     if (!clouds_) lenses_.emplace(participant_, info_name_, ros::CameraInfo{}, best_effort);
-    if (packed_ && !wanted_.units) {
-      const std::string units = units_topic(camera_of_topic(wanted_.topic, type));
-      const std::vector<dds::Publication> heard = participant_.publications();
-      if (std::any_of(heard.begin(), heard.end(),
-                      [&](const auto& one) { return one.topic == units; }))
-        told_units_.emplace(participant_, units, ros::Float64MultiArray{}, latched);
-    }
     if (wanted_.fixed_frame != "none") {
       tf_.emplace(participant_, std::string(transforms_topic), ros::TFMessage{}, of_tf);
       static_tf_.emplace(participant_, std::string(static_transforms_topic), ros::TFMessage{},
                          of_static_tf);
     }
+    if (wanted_.stamps.empty()) relate_clocks(camera_of_topic(wanted_.topic, type));
   }
 
  private:
@@ -143,11 +192,46 @@ class Camera final : public LiveCamera {
     }
   }
 
+  // A camera that palpate serves is heard of after its clock.
+  void relate_clocks(const std::string& camera) {
+    if (!hears(
+            [topic = clock_answer_topic(camera)](const auto& one) { return one.topic == topic; }))
+      return;
+    clock_.emplace(participant_, camera, wanted_.uri);
+    const double end = monotonic_now() + time_to_answer;
+    while (!clock_->is_known() && monotonic_now() < end) {
+      clock_->look();
+      participant_.wait(std::min(clock_->pause(), first_pause));
+    }
+    if (!clock_->is_known()) {
+      clock_.reset();
+      clock_note_ =
+          "; its machine does not say what time it is there, so stamps are taken to be "
+          "of this machine's clock";
+      return;
+    }
+    info_.clock = StampClock::monotonic;
+    clock_note_ = "; its machine's clock is known within " +
+                  milliseconds(clock_->relation().uncertainty(monotonic_now())) +
+                  " ms by questions and answers";
+  }
+  static std::string milliseconds(double seconds) {
+    std::array<char, 32> text{};
+    const int length = std::snprintf(text.data(), text.size(), "%.2f", 1e3 * seconds);
+    return {text.data(), static_cast<std::size_t>(length)};
+  }
+  template <class Which>
+  bool hears(const Which& which) {
+    const std::vector<dds::Publication> heard = participant_.publications();
+    return std::any_of(heard.begin(), heard.end(), which);
+  }
+
   std::optional<Frame> wait(double seconds) override {
+    if (clock_) seconds = std::min(seconds, clock_->pause());
     participant_.wait(pending_ ? std::min(seconds, 0.005) : seconds);
+    if (clock_) clock_->look();
     take_transforms();
     take_lens();
-    take_units();
     take_newest();
     if (!pending_) return std::nullopt;
     return frame_of_pending();
@@ -159,15 +243,6 @@ class Camera final : public LiveCamera {
       transforms_.add(*message, false, wanted_.uri + ": /tf_static");
     while (const auto message = tf_->take<ros::TFMessage>())
       transforms_.add(*message, true, wanted_.uri + ": /tf");
-  }
-
-  void take_units() {
-    if (!told_units_) return;
-    while (const auto units = told_units_->take<ros::Float64MultiArray>()) {
-      if (units->data.size() != 1 || !(units->data[0] >= 1.0 && units->data[0] <= 1e6))
-        throw Error(wanted_.uri, "tells no unit of depth that can be", "give ?units=");
-      units_ = units->data[0];
-    }
   }
 
   void take_lens() {
@@ -189,29 +264,20 @@ class Camera final : public LiveCamera {
         info_.details = "PointCloud2";
       }
     } else if (images_) {
-      while (const auto image = images_->take<ros::Image>()) take_image(*image, name);
+      while (const auto image = images_->take<ros::Image>())
+        take_image(*image, name,
+                   wanted_.units ? *wanted_.units : depth_units(image->encoding, name));
     } else {
       while (auto packed = packed_->take<ros::CompressedImage>()) {
-        const bool floats = is_float(packed->format.substr(0, packed->format.find(';')));
-        if (told_units_ && !units_) continue;  // it is still to come
-        const double units = wanted_.units ? *wanted_.units
-                             : units_      ? *units_
-                             : floats      ? units_of_32fc1
-                                           : units_of_16uc1;
         const std::string format = packed->format;
-        ros::Image depth = unpacked(std::move(*packed), units, name);
-        take_image(depth, name, units);
+        const double units = wanted_.units ? *wanted_.units : depth_units(format, name);
+        take_image(unpacked(std::move(*packed), units, name), name, units);
         info_.details = format;
       }
     }
   }
 
-  void take_image(const ros::Image& image, const std::string& name,
-                  std::optional<double> known_units = std::nullopt) {
-    const double units = known_units ? *known_units
-                         : wanted_.units
-                             ? *wanted_.units
-                             : (is_float(image.encoding) ? units_of_32fc1 : units_of_16uc1);
+  void take_image(const ros::Image& image, const std::string& name, double units) {
     std::vector<std::uint16_t> depth = raw_depth(image, units, name);
     info_.details = image.encoding;
     if (!rays_) return;  // its CameraInfo comes beside it
@@ -240,17 +306,18 @@ class Camera final : public LiveCamera {
   // @throws Error if the fixed frame that is wanted does not come.
   bool decide_pose(const std::string& tf_frame) {
     if (decided_) return true;
-    const bool settled = monotonic_now() - opened_ > time_to_settle;
+    const double open_for = monotonic_now() - opened_;
+    const bool settled = open_for > time_to_settle;
     const TransformWay way = transforms_.links().way(tf_frame, "", "TF");
     if (!wanted_.fixed_frame.empty() && wanted_.fixed_frame != "none") {
       if (!settled && !leads(tf_frame)) return false;
       fixed_ = transforms_.links().way(tf_frame, wanted_.fixed_frame, "TF").fixed;
     } else if (tf_) {
-      const std::vector<dds::Publication> heard = participant_.publications();
-      const bool is_there = std::any_of(heard.begin(), heard.end(), [](const auto& one) {
+      const bool is_there = hears([](const auto& one) {
         return one.topic == transforms_topic || one.topic == static_transforms_topic;
       });
-      if (!settled && is_there && way.fixed.empty()) return false;
+      const bool waits = is_there ? !settled : open_for < time_to_be_heard;
+      if (way.fixed.empty() && waits) return false;
       fixed_ = way.fixed;
     }
     decided_ = true;
@@ -262,6 +329,7 @@ class Camera final : public LiveCamera {
                        : "points are in " + fixed_ +
                              ", by TF; frames for whose time it has no "
                              "transform are left out"};
+    info_.notes.front() += clock_note_;
     return true;
   }
   [[nodiscard]] bool leads(const std::string& tf_frame) const {
@@ -287,7 +355,7 @@ class Camera final : public LiveCamera {
       pose = *found;
     }
     Frame frame;
-    frame.stamp = pending_->stamp;
+    frame.stamp = pending_->stamp - (clock_ ? clock_->relation().difference() : 0.0);
     frame.arrival = pending_->arrival;
     if (pending_->points) {
       for (Vec3& point : *pending_->points) point = pose * point;
@@ -304,8 +372,9 @@ class Camera final : public LiveCamera {
   dds::Participant participant_;
   const double opened_;    // [s, monotonic]
   std::string info_name_;  // topic of CameraInfo
-  std::optional<dds::Reader> images_, packed_, clouds_, lenses_, told_units_, tf_, static_tf_;
-  std::optional<double> units_;  // [1/m] as a camera of palpate's tells
+  std::optional<dds::Reader> images_, packed_, clouds_, lenses_, tf_, static_tf_;
+  std::optional<RemoteClock> clock_;
+  std::string clock_note_;
   LiveTransforms transforms_;
   std::shared_ptr<const ViewingRays> rays_;
   std::optional<Pending> pending_;

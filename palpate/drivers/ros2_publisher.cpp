@@ -2,12 +2,16 @@
 #include "palpate/drivers/ros2_publisher.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cctype>
+#include <chrono>
 #include <cmath>
+#include <thread>
 
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/sources/depth_png.hpp"
+#include "palpate/sources/depth_rvl.hpp"
 #include "palpate/sources/ros_frames.hpp"
 #include "palpate/sources/transforms.hpp"
 
@@ -15,7 +19,8 @@ namespace palpate {
 namespace {
 
 constexpr dds::Quality reliable{.reliable = true};
-constexpr dds::Quality latched{.reliable = true, .keeps_for_late = true};
+constexpr dds::Quality best_effort{};  // a question that is late is no use
+constexpr double longest_wait = 0.1;   // [s] for a question, until the end is looked at
 
 // @throws Error if it is no name.
 std::string checked_name(const std::string& name) {
@@ -30,27 +35,69 @@ std::string checked_name(const std::string& name) {
   return name;
 }
 
+ros::Time wall_clock() {
+  using std::chrono::duration_cast;
+  using std::chrono::nanoseconds;
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return ros::Time::at(duration_cast<nanoseconds>(now).count());
+}
+
 }  // namespace
 
+std::string clock_question_topic(const std::string& camera) {
+  return camera + "/clock/question";
+}
+std::string clock_answer_topic(const std::string& camera) {
+  return camera + "/clock/answer";
+}
+
+// Others hear of what is published in this order: whoever has heard of the images has heard of all.
 struct Ros2CameraPublisher::Topics {
-  explicit Topics(const std::string& wanted)
+  Topics(const std::string& wanted, DepthPacking packed_as)
       : name(checked_name(wanted)),
+        packing(packed_as),
         participant("ros2:" + name),
         topic("/" + name + "/depth/image_raw/compressedDepth"),
-        images(participant, topic, ros::CompressedImage{}, reliable),
-        lenses(participant, "/" + name + "/depth/camera_info", ros::CameraInfo{}, reliable),
+        questions(participant, clock_question_topic("/" + name + "/depth"), ros::TimeReference{},
+                  best_effort),
+        answers(participant, clock_answer_topic("/" + name + "/depth"), ros::TimeReference{},
+                best_effort),
         transforms(participant, std::string(transforms_topic), ros::TFMessage{}, reliable),
-        units(participant, units_topic("/" + name + "/depth"), ros::Float64MultiArray{}, latched) {}
+        lenses(participant, "/" + name + "/depth/camera_info", ros::CameraInfo{}, reliable),
+        images(participant, topic, ros::CompressedImage{}, reliable),
+        clock([this] { answer_questions(); }) {}
+  ~Topics() {
+    ends = true;
+    clock.join();
+  }
+  Topics(const Topics&) = delete;
+  Topics& operator=(const Topics&) = delete;
+
+  void answer_questions() {
+    while (!ends) {
+      participant.wait(longest_wait);
+      try {
+        while (const auto question = questions.take<ros::TimeReference>())
+          answers.write(ros::TimeReference{.header = {wall_clock(), ""},
+                                           .time_ref = question->header.stamp,
+                                           .source = question->source});
+      } catch (const Error&) {  // a damaged question has no answer
+      }
+    }
+  }
 
   std::string name;
+  DepthPacking packing;
   dds::Participant participant;
   std::string topic;
-  dds::Writer images, lenses, transforms, units;
-  double told_units = 0.0;  // [1/m]
+  dds::Reader questions;
+  dds::Writer answers, transforms, lenses, images;
+  std::atomic<bool> ends{false};
+  std::thread clock;
 };
 
-Ros2CameraPublisher::Ros2CameraPublisher(const std::string& name)
-    : topics_(std::make_unique<Topics>(name)) {}
+Ros2CameraPublisher::Ros2CameraPublisher(const std::string& name, DepthPacking packing)
+    : topics_(std::make_unique<Topics>(name, packing)) {}
 Ros2CameraPublisher::~Ros2CameraPublisher() = default;
 
 void Ros2CameraPublisher::publish(const DepthImage& image, double stamp) {
@@ -58,15 +105,15 @@ void Ros2CameraPublisher::publish(const DepthImage& image, double stamp) {
   const auto nanoseconds = static_cast<std::int64_t>(std::llround(1e9 * stamp));
   const std::string frame = topics_->name + "_optical_frame";
   const ros::Header header{ros::Time::at(nanoseconds), frame};
-  if (image.units_per_metre() != topics_->told_units) {
-    topics_->told_units = image.units_per_metre();
-    topics_->units.write(ros::Float64MultiArray{"units_per_metre", {topics_->told_units}});
-  }
   topics_->transforms.write(
       ros::TFMessage{{transform_of({header.stamp, "world"}, frame, image.world_from_camera())}});
   topics_->lenses.write(camera_info_of(header, k));
-  topics_->images.write(
-      compressed_depth(header, encode_depth_png(k.width, k.height, image.depth())));
+  const bool is_rvl = topics_->packing == DepthPacking::rvl;
+  topics_->images.write(compressed_depth(header,
+                                         is_rvl
+                                             ? encode_depth_rvl(k.width, k.height, image.depth())
+                                             : encode_depth_png(k.width, k.height, image.depth()),
+                                         image.units_per_metre(), topics_->packing));
 }
 
 const std::string& Ros2CameraPublisher::topic() const {

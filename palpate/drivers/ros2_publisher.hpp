@@ -6,17 +6,24 @@
 #include <string>
 
 #include "palpate/cloud/depth_image.hpp"
+#include "palpate/sources/ros_frames.hpp"
 
 namespace palpate {
 
-/// Publishes depth images as a camera of ROS 2: /NAME/depth/image_raw/compressedDepth (PNG, to the
-/// bit), /NAME/depth/camera_info, and the camera's pose in `world` on /tf. Where a raw value is not
-/// a millimetre, as ROS takes for granted, /NAME/depth/units_per_metre says what it is, and ros2:
-/// reads it.
+/// Topics by which a camera of palpate's tells the time of its machine to whoever asks:
+/// TimeReference, in a question the asker's time, in the answer the time of this machine's wall
+/// clock and the question's own time and source.
+std::string clock_question_topic(const std::string& camera);
+std::string clock_answer_topic(const std::string& camera);
+
+/// Publishes depth images as a camera of ROS 2: /NAME/depth/image_raw/compressedDepth (to the bit),
+/// /NAME/depth/camera_info, and the camera's pose in `world` on /tf. Where a raw value is not a
+/// millimetre, as ROS takes for granted, the messages' format says so (compressed_depth). A thread
+/// of its own answers what the time is here.
 class Ros2CameraPublisher {
  public:
   /// @throws Error if `name` is none for a topic, or DDS is missing.
-  explicit Ros2CameraPublisher(const std::string& name);
+  explicit Ros2CameraPublisher(const std::string& name, DepthPacking packing = DepthPacking::rvl);
   ~Ros2CameraPublisher();
 
   /// @param stamp  [s since 1970] of the capture

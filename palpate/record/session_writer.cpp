@@ -101,7 +101,8 @@ void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& im
   const std::int64_t at = nanoseconds(stamp);
   const ros::Header header{ros::Time::at(at), topics.optical_frame};
 
-  const ros::CompressedImage packed = compressed_depth(header, png);
+  const ros::CompressedImage packed =
+      compressed_depth(header, png, image.units_per_metre(), DepthPacking::png);
 
   ros::Float64MultiArray exact{.label = "stamp,units_per_metre,world_from_camera",
                                .data = {stamp, image.units_per_metre()}};

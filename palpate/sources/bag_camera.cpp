@@ -240,10 +240,9 @@ const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
 }
 
 std::optional<Frame> BagCamera::read_depth(std::size_t number, ros::Image image) {
-  const double units = options_.units             ? *options_.units
-                       : is_realsense_            ? realsense_units(number)
-                       : is_float(image.encoding) ? units_of_32fc1
-                                                  : units_of_16uc1;
+  const double units = options_.units  ? *options_.units
+                       : is_realsense_ ? realsense_units(number)
+                                       : depth_units(details_, name(number));
   std::vector<std::uint16_t> depth = raw_depth(image, units, name(number));
   const std::shared_ptr<const ViewingRays>& seen = rays(number, image);
   if (!is_ours()) {
@@ -291,10 +290,8 @@ std::optional<Frame> BagCamera::frame(std::size_t number) {
   }
   auto packed = ros::decode<ros::CompressedImage>(bytes, message);
   details_ = packed.format;
-  const bool floats = is_float(packed.format.substr(0, packed.format.find(';')));
-  if (floats && !options_.units) options_.units = units_of_32fc1;
-  return read_depth(number,
-                    unpacked(std::move(packed), options_.units.value_or(units_of_16uc1), message));
+  const double units = options_.units ? *options_.units : depth_units(details_, message);
+  return read_depth(number, unpacked(std::move(packed), units, message));
 }
 
 }  // namespace palpate

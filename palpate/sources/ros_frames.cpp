@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <span>
 #include <string_view>
@@ -11,11 +12,14 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/sources/depth_png.hpp"
+#include "palpate/sources/depth_rvl.hpp"
 
 namespace palpate {
 namespace {
 
 constexpr std::size_t config_header = 12;  // of compressedDepth: int32, 2 x float32
+constexpr std::string_view units_key = "units_per_metre=";
+constexpr double least_units = 1.0, most_units = 1e6;  // [1/m]
 
 template <class T>
 T value_at(std::span<const std::byte> bytes, std::size_t at, bool swapped = false) {
@@ -55,6 +59,11 @@ Axes axes_of(const ros::PointCloud2& message, const std::string& name) {
   return axes;
 }
 
+// Metres as floats.
+bool is_float(const std::string& encoding) {
+  return encoding == "32FC1";
+}
+
 std::string above(const std::string& topic) {
   return topic.substr(0, topic.rfind('/'));
 }
@@ -73,12 +82,18 @@ std::string camera_of_topic(const std::string& topic, const std::string& type) {
   return above(is_deep ? above(topic) : topic);
 }
 
-std::string units_topic(const std::string& camera) {
-  return camera + "/units_per_metre";
-}
-
-bool is_float(const std::string& encoding) {
-  return encoding == "32FC1";
+double depth_units(const std::string& format, const std::string& name) {
+  const std::size_t at = format.find(units_key);
+  if (at == std::string::npos)
+    return is_float(format.substr(0, format.find(';'))) ? units_of_32fc1 : units_of_16uc1;
+  const char* begin = format.data() + at + units_key.size();
+  double units = 0.0;
+  const auto [end, error] = std::from_chars(begin, format.data() + format.size(), units);
+  if (error != std::errc() || !(units >= least_units && units <= most_units) ||
+      (end != format.data() + format.size() && *end != ';'))
+    throw Error(name, "says '" + format.substr(at) + "' for its unit of depth",
+                "give the raw values per metre, such as ?units=1000");
+  return units;
 }
 
 std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
@@ -112,24 +127,24 @@ ros::Image unpacked(ros::CompressedImage message, double units, const std::strin
   if (message.format.find("compressedDepth") == std::string::npos)
     throw Error(name, "is an image of format '" + message.format + "', not of depth",
                 "name a topic of depth with ?topic=");
-  if (message.format.find("rvl") != std::string::npos)
-    throw Error(name, "is packed as RVL", "record compressedDepth as PNG, or raw images");
   if (message.data.size() < config_header) throw Error(name, "is empty", "it may be damaged");
-  DepthPng png = parse_depth_png(std::span(message.data).subspan(config_header), name);
+  const auto packed = std::span(std::as_const(message.data)).subspan(config_header);
+  const bool is_rvl = message.format.find("compressedDepth rvl") != std::string::npos;
+  DepthPng raw = is_rvl ? parse_depth_rvl(packed, name) : parse_depth_png(packed, name);
   ros::Image image{.header = std::move(message.header),
-                   .height = static_cast<std::uint32_t>(png.height),
-                   .width = static_cast<std::uint32_t>(png.width),
+                   .height = static_cast<std::uint32_t>(raw.height),
+                   .width = static_cast<std::uint32_t>(raw.width),
                    .encoding = message.format.substr(0, message.format.find(';')),
                    .is_bigendian = std::endian::native == std::endian::big,
-                   .step = static_cast<std::uint32_t>(2 * png.width),
+                   .step = static_cast<std::uint32_t>(2 * raw.width),
                    .data = {}};
   if (is_float(image.encoding)) {
     image.encoding = "16UC1";
     const double a = value_at<float>(message.data, 4);
     const double b = value_at<float>(message.data, 8);
-    for (std::uint16_t& raw : png.depth) raw = raw == 0 ? raw : quantised(a / (raw - b), units);
+    for (std::uint16_t& d : raw.depth) d = d == 0 ? d : quantised(a / (d - b), units);
   }
-  const auto bytes = std::as_bytes(std::span(png.depth));
+  const auto bytes = std::as_bytes(std::span(raw.depth));
   image.data.assign(bytes.begin(), bytes.end());
   return image;
 }
@@ -172,12 +187,21 @@ ros::CameraInfo camera_info_of(const ros::Header& header, const Intrinsics& k) {
   return info;
 }
 
-ros::CompressedImage compressed_depth(const ros::Header& header, std::span<const std::byte> png) {
+ros::CompressedImage compressed_depth(const ros::Header& header, std::span<const std::byte> packed,
+                                      double units_per_metre, DepthPacking packing) {
+  ros::CompressedImage message{.header = header, .format = "16UC1; compressedDepth ", .data = {}};
+  message.format += packing == DepthPacking::rvl ? "rvl" : "png";
+  if (units_per_metre != units_of_16uc1) {
+    std::array<char, 32> digits{};
+    message.format += "; ";
+    message.format += units_key;
+    message.format.append(digits.data(),
+                          std::to_chars(digits.begin(), digits.end(), units_per_metre).ptr);
+  }
   // The transport's own header, which is of no meaning to whole numbers, comes first.
-  ros::CompressedImage packed{.header = header, .format = "16UC1; compressedDepth png", .data = {}};
-  packed.data.resize(config_header);
-  packed.data.insert(packed.data.end(), png.begin(), png.end());
-  return packed;
+  message.data.resize(config_header);
+  message.data.insert(message.data.end(), packed.begin(), packed.end());
+  return message;
 }
 
 std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name) {

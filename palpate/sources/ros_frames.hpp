@@ -27,11 +27,10 @@ bool is_topic_of_depth(const std::string& topic, const std::string& type);
 /// .../Depth_0/camera_info.
 std::string camera_of_topic(const std::string& topic, const std::string& type);
 
-/// Where a camera of palpate's tells its raw values per metre, to whoever comes late, too.
-std::string units_topic(const std::string& camera);
-
-/// An encoding of metres as floats, 32FC1.
-bool is_float(const std::string& encoding);
+/// Raw values per metre of a depth image: what its format says (see compressed_depth), or ROS's own
+/// unit of its encoding. @param format  an Image's encoding, or a CompressedImage's format
+/// @throws Error if the format says what cannot be.
+double depth_units(const std::string& format, const std::string& name);
 
 /// The raw depth of an image of 16UC1, mono16 or 32FC1, row by row; floats in units of 1/`units`
 /// metres. @throws Error if it is of another encoding, or damaged.
@@ -49,8 +48,18 @@ Intrinsics intrinsics_of(const ros::CameraInfo& info, bool is_rectified, const s
 /// The other way round.
 ros::CameraInfo camera_info_of(const ros::Header& header, const Intrinsics& k);
 
-/// A message of compressed_depth_image_transport. @param png  of 16-bit depth
-ros::CompressedImage compressed_depth(const ros::Header& header, std::span<const std::byte> png);
+/// How a message holds compressed depth; both are lossless.
+enum class DepthPacking : std::uint8_t {
+  png,  ///< every reader knows it
+  rvl   ///< many times as fast (depth_rvl.hpp); ROS's own readers know it since Noetic
+};
+
+/// A message of compressed_depth_image_transport. A raw value is a millimetre to ROS; where it is
+/// something else the format ends in "; units_per_metre=10000", which ROS's own readers pass over.
+/// @param packed           16-bit depth, as encode_depth_png or encode_depth_rvl give it
+/// @param units_per_metre  raw values per metre
+ros::CompressedImage compressed_depth(const ros::Header& header, std::span<const std::byte> packed,
+                                      double units_per_metre, DepthPacking packing);
 
 /// All points, row by row, in the frame of the message; what was not measured is not a number.
 /// @throws Error without x, y and z, or if it is damaged.

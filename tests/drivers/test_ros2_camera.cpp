@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstring>
 #include <functional>
 #include <limits>
@@ -15,6 +16,7 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/ros2.hpp"
 #include "palpate/drivers/ros2_publisher.hpp"
+#include "palpate/servo/realtime.hpp"
 #include "palpate/sources/depth_png.hpp"
 
 #include "tests/drivers/dds_test.hpp"
@@ -227,7 +229,12 @@ TEST_F(Ros2Camera, IsWhereTheTransformsSay) {
   EXPECT_NE(source->info().notes[0].find("points are in map"), std::string::npos);
 }
 
-// What palpate serves comes back to the bit: values, unit, lens and pose.
+double wall_clock() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+// What palpate serves comes back to the bit: values, unit, lens and pose; its stamps on the clock
+// of this machine.
 TEST_F(Ros2Camera, ReadsWhatIsServed) {
   Eigen::Isometry3d pose(Eigen::AngleAxisd(0.5, Vec3(0.6, 0.0, 0.8)));
   pose.translation() = Vec3(1.0, -2.0, 3.0);
@@ -235,23 +242,32 @@ TEST_F(Ros2Camera, ReadsWhatIsServed) {
   k.distortion[1] = 0.25;
   const DepthImage served(std::make_shared<const ViewingRays>(k), a_depth(), 10000.0, pose);
   std::atomic<bool> ends{false};
+  const double begin = monotonic_now();
   std::thread thread([&] {
-    Ros2CameraPublisher publisher("robot/camera");
-    for (double stamp = 1e9; !ends; stamp += 0.01) {
-      publisher.publish(served, stamp);
+    Ros2CameraPublisher rvl("robot/camera");
+    Ros2CameraPublisher png("robot/other", DepthPacking::png);
+    while (!ends) {
+      rvl.publish(served, wall_clock());
+      png.publish(served, wall_clock());
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
   });
-  {
+  for (const std::string name : {"camera", "other"}) {
     const auto source =
-        open("ros2:/robot/camera/depth/image_raw/compressedDepth?reliable&wait=60s");
+        open("ros2:/robot/" + name + "/depth/image_raw/compressedDepth?reliable&wait=60s");
+    EXPECT_EQ(source->info().clock, StampClock::monotonic);
     const Frame frame = frame_of(*source);
     const auto& image = dynamic_cast<const DepthImage&>(*frame.cloud);
     EXPECT_EQ(depth_of(image), a_depth());
     EXPECT_EQ(image.units_per_metre(), 10000.0);
     EXPECT_EQ(image.intrinsics(), k);
     EXPECT_TRUE(image.world_from_camera().isApprox(pose, 1e-12));
-    EXPECT_GE(frame.stamp, 1e9);
+    // Captured between the begin and now, as well as the clocks are known
+    EXPECT_GE(frame.stamp, begin - 0.5);
+    EXPECT_LE(frame.stamp, monotonic_now() + 0.5);
+    const std::string note = source->info().notes.at(0);
+    EXPECT_NE(note.find("points are in world"), std::string::npos) << note;
+    EXPECT_NE(note.find("clock is known within"), std::string::npos) << note;
   }
   ends = true;
   thread.join();

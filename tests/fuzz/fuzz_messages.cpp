@@ -25,7 +25,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   namespace ros = palpate::ros;
   if (size == 0) return 0;
   const std::span<const std::byte> bytes = std::as_bytes(std::span(data, size)).subspan(1);
-  switch (data[0] % 9) {
+  switch (data[0] % 10) {
     case 0:
       check<ros::Image>(bytes);
       break;
@@ -49,6 +49,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       break;
     case 7:
       check<ros::Float64MultiArray>(bytes);
+      break;
+    case 8:
+      check<ros::TimeReference>(bytes);
       break;
     default:
       check<ros::String>(bytes);

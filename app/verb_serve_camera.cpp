@@ -51,8 +51,11 @@ int serve(const ServeOptions& options) {
     else
       publisher.publish(*image, since_1970(fed.frame.stamp));
   });
-  fmt::print(stderr, "palpate: serves {} as ros2:{} in domain {}; Ctrl-C ends it\n", options.camera,
-             publisher.topic(), publisher.domain());
+  fmt::print(
+      stderr,
+      "palpate: serves {} as ros2:{} in domain {}, and for links that lose packets as ros2:{}; "
+      "Ctrl-C ends it\n",
+      options.camera, publisher.topic(), publisher.domain(), publisher.slices_topic());
   const double end = monotonic_now() + options.duration;
   while (interruption.signal() == 0 && is_depth &&
          (options.duration == 0.0 || monotonic_now() < end))

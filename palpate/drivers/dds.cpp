@@ -114,6 +114,9 @@ std::string variable(const char* name) {
   return value == nullptr ? "" : value;
 }
 
+// What a link lost is asked for again, and sent again, within milliseconds: with Cyclone's own
+// delays, which spare a network of many readers, a camera's images stay incomplete until they are
+// too old, at 5 % loss all of them.
 // 640 x 480 depth at 30 Hz comes in bursts of 0.6 MB, a cloud in ones of 5 MB, which the usual
 // buffer of 208 kB does not hold: a larger one is asked for, and the kernel gives what it may.
 // Several programs on a machine without multicast find each other by their index.
@@ -124,6 +127,9 @@ std::string settings() {
   text +=
       "</General><Discovery><MaxAutoParticipantIndex>99</MaxAutoParticipantIndex></Discovery>"
       "<Internal><SocketReceiveBufferSize max=\"8MB\"/>"
+      "<NackDelay>3ms</NackDelay><AutoReschedNackDelay>20ms</AutoReschedNackDelay>"
+      "<PreEmptiveAckDelay>2ms</PreEmptiveAckDelay>"
+      "<HeartbeatInterval min=\"1ms\" minsched=\"2ms\">5ms</HeartbeatInterval>"
       "<Watermarks><WhcHigh>16MB</WhcHigh></Watermarks></Internal></Domain></CycloneDDS>";
   if (const std::string own = variable("CYCLONEDDS_URI"); !own.empty()) text += "," + own;
   return text;

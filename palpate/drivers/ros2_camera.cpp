@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,6 +21,7 @@
 #include "palpate/drivers/ros2_publisher.hpp"
 #include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
+#include "palpate/sources/depth_slices.hpp"
 #include "palpate/sources/ros_frames.hpp"
 #include "palpate/sources/transforms.hpp"
 
@@ -38,9 +40,15 @@ constexpr double time_to_answer = 1.0;  // [s] of a camera's machine that is ask
 // make 0.05 ms of it
 constexpr double first_pause = 0.02, later_pause = 0.5;
 constexpr int first_questions = 10;
+// [s] after its last slice for which an image waits for those that are missing
+constexpr double patience_of_slices = 0.01;
+constexpr double least_of_image = 0.5;   // share of its rows without which an image is left out
+constexpr double report_pause = 0.1;     // [s]
+constexpr double least_growth = 0.5e-3;  // [-] by which the least delay grows: clocks drift
 constexpr dds::Quality best_effort{};
+constexpr dds::Quality many{.depth = 2048};  // slices of some images
 // /tf has a message from each of its nodes: the last one alone would lose theirs
-constexpr dds::Quality of_tf{.depth = 100};
+constexpr dds::Quality of_tf{.reliable = true, .depth = 100};
 constexpr dds::Quality of_static_tf{.reliable = true, .keeps_for_late = true, .depth = 100};
 
 struct CameraOptions {
@@ -133,6 +141,86 @@ class RemoteClock {
   int asked_ = 0;
 };
 
+// Puts a camera's slices together, and tells it how they come.
+class SliceReader {
+ public:
+  SliceReader(dds::Participant& participant, const std::string& topic, const std::string& camera)
+      : slices_(participant, topic, ros::CompressedImage{}, many),
+        reports_(participant, report_topic(camera), ros::Float64MultiArray{}, best_effort) {}
+
+  // Of an image: its header and its format are those of its last slice.
+  struct Taken {
+    SliceAssembler::Image image;
+    ros::Header header;
+    std::string format;
+  };
+
+  // The newest image that is as whole as it will be, if any.
+  // @throws Error if a message is none of a slice, or damaged
+  std::optional<Taken> take(const std::string& name) {
+    std::optional<SliceAssembler::Image> newest;
+    ros::Header header = header_;
+    while (const auto message = slices_.take<ros::CompressedImage>()) {
+      if (!is_depth_slice(*message))
+        throw Error(name, "is an image of format '" + message->format + "', not a slice of depth",
+                    "name a topic that palpate serve-camera publishes");
+      const double stamp = 1e-9 * static_cast<double>(message->header.stamp.nanoseconds());
+      if (auto before = assembler_.add(message->data, stamp, monotonic_now(), name)) {
+        count(*before);
+        newest = std::move(before);
+        header = header_;
+      }
+      header_ = message->header;
+      format_ = message->format;
+    }
+    const double now = monotonic_now();
+    if (auto image = assembler_.take(now, patience_of_slices)) {
+      count(*image);
+      newest = std::move(image);
+      header = header_;
+    }
+    report(now);
+    if (!newest || newest->missing > (1.0 - least_of_image) * newest->height) return std::nullopt;
+    return Taken{std::move(*newest), header, format_};
+  }
+
+  // [s] for which it may be waited at most.
+  [[nodiscard]] double pause() const {
+    const std::optional<double> since = assembler_.waits_since();
+    return since ? std::max(*since + patience_of_slices - monotonic_now(), 0.0) : report_pause;
+  }
+
+ private:
+  void count(const SliceAssembler::Image& image) {
+    const std::uint32_t lost = number_ ? image.number - *number_ - 1 : 0;
+    number_ = image.number;
+    expected_ += image.height * (1.0 + std::min(lost, 100U));
+    received_ += image.height - image.missing;
+    const double delay = image.last_slice - image.stamp;  // and what the clocks differ by
+    least_delay_ = std::min(delay, least_delay_ + least_growth * (image.last_slice - last_slice_));
+    last_slice_ = image.last_slice;
+    lateness_ = std::max(lateness_, delay - least_delay_);
+  }
+
+  void report(double now) {
+    if (now < next_report_ || expected_ == 0.0) return;
+    next_report_ = now + report_pause;
+    reports_.write(ros::Float64MultiArray{"received,lateness", {received_ / expected_, lateness_}});
+    expected_ = received_ = lateness_ = 0.0;
+  }
+
+  dds::Reader slices_;
+  dds::Writer reports_;
+  SliceAssembler assembler_;
+  ros::Header header_;  // of the last slice
+  std::string format_;
+  std::optional<std::uint32_t> number_;                           // of the last image
+  double expected_ = 0.0, received_ = 0.0;                        // rows since the last report
+  double lateness_ = 0.0;                                         // [s] largest since then
+  double least_delay_ = std::numeric_limits<double>::infinity();  // [s]
+  double last_slice_ = 0.0, next_report_ = 0.0;                   // [s, monotonic]
+};
+
 class Camera final : public LiveCamera {
  public:
   explicit Camera(const Uri& uri)
@@ -149,6 +237,8 @@ class Camera final : public LiveCamera {
     const dds::Quality quality{.reliable = wanted_.reliable};
     if (type == ros::Image::type) {
       images_.emplace(participant_, wanted_.topic, ros::Image{}, quality);
+    } else if (wanted_.topic.ends_with("/slices")) {
+      slices_.emplace(participant_, wanted_.topic, camera_of_topic(wanted_.topic, type));
     } else if (type == ros::CompressedImage::type) {
       packed_.emplace(participant_, wanted_.topic, ros::CompressedImage{}, quality);
     } else {
@@ -228,6 +318,7 @@ class Camera final : public LiveCamera {
 
   std::optional<Frame> wait(double seconds) override {
     if (clock_) seconds = std::min(seconds, clock_->pause());
+    if (slices_) seconds = std::min(seconds, slices_->pause());
     participant_.wait(pending_ ? std::min(seconds, 0.005) : seconds);
     if (clock_) clock_->look();
     take_transforms();
@@ -267,6 +358,8 @@ class Camera final : public LiveCamera {
       while (const auto image = images_->take<ros::Image>())
         take_image(*image, name,
                    wanted_.units ? *wanted_.units : depth_units(image->encoding, name));
+    } else if (slices_) {
+      if (auto taken = slices_->take(name)) take_slices(std::move(*taken), name);
     } else {
       while (auto packed = packed_->take<ros::CompressedImage>()) {
         const std::string format = packed->format;
@@ -277,17 +370,31 @@ class Camera final : public LiveCamera {
     }
   }
 
+  void take_slices(SliceReader::Taken taken, const std::string& name) {
+    info_.details = taken.format;
+    if (!rays_) return;  // its CameraInfo comes beside it
+    check_size(taken.image.width, taken.image.height);
+    Pending& next = begin(taken.header);
+    next.units = wanted_.units ? *wanted_.units : depth_units(taken.format, name);
+    next.depth = std::move(taken.image.depth);
+  }
+
+  // @throws Error if the lens is of images of another size
+  void check_size(int width, int height) const {
+    const Intrinsics& k = rays_->intrinsics();
+    if (k.width == width && k.height == height) return;
+    throw Error(wanted_.uri,
+                "gives images of " + std::to_string(width) + "x" + std::to_string(height) +
+                    " pixels, but " + info_name_ + " says " + std::to_string(k.width) + "x" +
+                    std::to_string(k.height),
+                "name the CameraInfo that belongs to it with ?info=/TOPIC");
+  }
+
   void take_image(const ros::Image& image, const std::string& name, double units) {
     std::vector<std::uint16_t> depth = raw_depth(image, units, name);
     info_.details = image.encoding;
     if (!rays_) return;  // its CameraInfo comes beside it
-    const Intrinsics& k = rays_->intrinsics();
-    if (k.width != static_cast<int>(image.width) || k.height != static_cast<int>(image.height))
-      throw Error(wanted_.uri,
-                  "gives images of " + std::to_string(image.width) + "x" +
-                      std::to_string(image.height) + " pixels, but " + info_name_ + " says " +
-                      std::to_string(k.width) + "x" + std::to_string(k.height),
-                  "name the CameraInfo that belongs to it with ?info=/TOPIC");
+    check_size(static_cast<int>(image.width), static_cast<int>(image.height));
     Pending& next = begin(image.header);
     next.depth = std::move(depth);
     next.units = units;
@@ -373,6 +480,7 @@ class Camera final : public LiveCamera {
   const double opened_;    // [s, monotonic]
   std::string info_name_;  // topic of CameraInfo
   std::optional<dds::Reader> images_, packed_, clouds_, lenses_, tf_, static_tf_;
+  std::optional<SliceReader> slices_;
   std::optional<RemoteClock> clock_;
   std::string clock_note_;
   LiveTransforms transforms_;

@@ -6,12 +6,16 @@
 #include <cctype>
 #include <chrono>
 #include <cmath>
+#include <mutex>
 #include <thread>
 
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
+#include "palpate/drivers/send_rate.hpp"
+#include "palpate/servo/realtime.hpp"
 #include "palpate/sources/depth_png.hpp"
 #include "palpate/sources/depth_rvl.hpp"
+#include "palpate/sources/depth_slices.hpp"
 #include "palpate/sources/ros_frames.hpp"
 #include "palpate/sources/transforms.hpp"
 
@@ -19,6 +23,8 @@ namespace palpate {
 namespace {
 
 constexpr dds::Quality reliable{.reliable = true};
+// What was lost is sent again, while newer images are on their way
+constexpr dds::Quality resent{.reliable = true, .depth = 16};
 constexpr dds::Quality best_effort{};  // a question that is late is no use
 constexpr double longest_wait = 0.1;   // [s] for a question, until the end is looked at
 
@@ -50,6 +56,9 @@ std::string clock_question_topic(const std::string& camera) {
 std::string clock_answer_topic(const std::string& camera) {
   return camera + "/clock/answer";
 }
+std::string report_topic(const std::string& camera) {
+  return camera + "/slices/report";
+}
 
 // Others hear of what is published in this order: whoever has heard of the images has heard of all.
 struct Ros2CameraPublisher::Topics {
@@ -58,42 +67,61 @@ struct Ros2CameraPublisher::Topics {
         packing(packed_as),
         participant("ros2:" + name),
         topic("/" + name + "/depth/image_raw/compressedDepth"),
+        slices_topic("/" + name + "/depth/image_raw/slices"),
         questions(participant, clock_question_topic("/" + name + "/depth"), ros::TimeReference{},
                   best_effort),
         answers(participant, clock_answer_topic("/" + name + "/depth"), ros::TimeReference{},
                 best_effort),
+        reports(participant, report_topic("/" + name + "/depth"), ros::Float64MultiArray{},
+                best_effort),
         transforms(participant, std::string(transforms_topic), ros::TFMessage{}, reliable),
         lenses(participant, "/" + name + "/depth/camera_info", ros::CameraInfo{}, reliable),
-        images(participant, topic, ros::CompressedImage{}, reliable),
-        clock([this] { answer_questions(); }) {}
+        images(participant, topic, ros::CompressedImage{}, resent),
+        slices(participant, slices_topic, ros::CompressedImage{}, best_effort),
+        listener([this] { listen(); }) {}
   ~Topics() {
     ends = true;
-    clock.join();
+    listener.join();
   }
   Topics(const Topics&) = delete;
   Topics& operator=(const Topics&) = delete;
 
-  void answer_questions() {
+  void listen() {
     while (!ends) {
       participant.wait(longest_wait);
       try {
+        while (const auto report = reports.take<ros::Float64MultiArray>()) {
+          if (report->data.size() != 2) continue;
+          const std::lock_guard lock(rate_mutex);
+          rate.report(monotonic_now(), report->data[0], report->data[1]);
+        }
         while (const auto question = questions.take<ros::TimeReference>())
           answers.write(ros::TimeReference{.header = {wall_clock(), ""},
                                            .time_ref = question->header.stamp,
                                            .source = question->source});
-      } catch (const Error&) {  // a damaged question has no answer
+      } catch (const Error&) {  // what is damaged has no answer
       }
     }
+  }
+
+  bool may_send_slices() {
+    const std::lock_guard lock(rate_mutex);
+    return rate.allows(monotonic_now());
   }
 
   std::string name;
   DepthPacking packing;
   dds::Participant participant;
-  std::string topic;
+  std::string topic, slices_topic;
   dds::Reader questions;
-  dds::Writer answers, transforms, lenses, images;
+  dds::Writer answers;
+  dds::Reader reports;
+  dds::Writer transforms, lenses, images, slices;
+  std::mutex rate_mutex;
+  SendRate rate;
+  std::uint32_t number = 0;  // of an image in slices
   std::atomic<bool> ends{false};
-  std::thread clock;
+  std::thread listener;
 };
 
 Ros2CameraPublisher::Ros2CameraPublisher(const std::string& name, DepthPacking packing)
@@ -108,22 +136,33 @@ void Ros2CameraPublisher::publish(const DepthImage& image, double stamp) {
   topics_->transforms.write(
       ros::TFMessage{{transform_of({header.stamp, "world"}, frame, image.world_from_camera())}});
   topics_->lenses.write(camera_info_of(header, k));
-  const bool is_rvl = topics_->packing == DepthPacking::rvl;
-  topics_->images.write(compressed_depth(header,
-                                         is_rvl
-                                             ? encode_depth_rvl(k.width, k.height, image.depth())
-                                             : encode_depth_png(k.width, k.height, image.depth()),
-                                         image.units_per_metre(), topics_->packing));
+  if (topics_->images.readers() > 0) {
+    const bool is_rvl = topics_->packing == DepthPacking::rvl;
+    topics_->images.write(compressed_depth(header,
+                                           is_rvl
+                                               ? encode_depth_rvl(k.width, k.height, image.depth())
+                                               : encode_depth_png(k.width, k.height, image.depth()),
+                                           image.units_per_metre(), topics_->packing));
+  }
+  if (topics_->slices.readers() > 0 && topics_->may_send_slices()) {
+    encode_depth_slices(
+        topics_->number++, k.width, k.height, image.depth(), [&](std::span<const std::byte> slice) {
+          topics_->slices.write(depth_slice(header, slice, image.units_per_metre()));
+        });
+  }
 }
 
 const std::string& Ros2CameraPublisher::topic() const {
   return topics_->topic;
 }
+const std::string& Ros2CameraPublisher::slices_topic() const {
+  return topics_->slices_topic;
+}
 std::uint32_t Ros2CameraPublisher::domain() const {
   return topics_->participant.domain();
 }
 int Ros2CameraPublisher::readers() const {
-  return topics_->images.readers();
+  return topics_->images.readers() + topics_->slices.readers();
 }
 
 }  // namespace palpate

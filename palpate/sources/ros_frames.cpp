@@ -18,6 +18,7 @@ namespace palpate {
 namespace {
 
 constexpr std::size_t config_header = 12;  // of compressedDepth: int32, 2 x float32
+constexpr std::string_view slice_packing = "slice rvl";
 constexpr std::string_view units_key = "units_per_metre=";
 constexpr double least_units = 1.0, most_units = 1e6;  // [1/m]
 
@@ -64,6 +65,18 @@ bool is_float(const std::string& encoding) {
   return encoding == "32FC1";
 }
 
+// "16UC1; PACKING", and the unit where it is not ROS's.
+std::string format_of(std::string_view packing, double units_per_metre) {
+  std::string format = "16UC1; ";
+  format += packing;
+  if (units_per_metre == units_of_16uc1) return format;
+  std::array<char, 32> digits{};
+  format += "; ";
+  format += units_key;
+  const auto end = std::to_chars(digits.begin(), digits.end(), units_per_metre).ptr;
+  return format.append(digits.data(), end);
+}
+
 std::string above(const std::string& topic) {
   return topic.substr(0, topic.rfind('/'));
 }
@@ -73,7 +86,8 @@ std::string above(const std::string& topic) {
 bool is_topic_of_depth(const std::string& topic, const std::string& type) {
   if (type == ros::Image::type)
     return topic.find("depth") != std::string::npos || topic.find("/Depth_") != std::string::npos;
-  return (type == ros::CompressedImage::type && topic.ends_with("/compressedDepth")) ||
+  return (type == ros::CompressedImage::type &&
+          (topic.ends_with("/compressedDepth") || topic.ends_with("/slices"))) ||
          type == ros::PointCloud2::type;
 }
 
@@ -189,19 +203,27 @@ ros::CameraInfo camera_info_of(const ros::Header& header, const Intrinsics& k) {
 
 ros::CompressedImage compressed_depth(const ros::Header& header, std::span<const std::byte> packed,
                                       double units_per_metre, DepthPacking packing) {
-  ros::CompressedImage message{.header = header, .format = "16UC1; compressedDepth ", .data = {}};
-  message.format += packing == DepthPacking::rvl ? "rvl" : "png";
-  if (units_per_metre != units_of_16uc1) {
-    std::array<char, 32> digits{};
-    message.format += "; ";
-    message.format += units_key;
-    message.format.append(digits.data(),
-                          std::to_chars(digits.begin(), digits.end(), units_per_metre).ptr);
-  }
+  ros::CompressedImage message{
+      .header = header,
+      .format =
+          format_of(packing == DepthPacking::rvl ? "compressedDepth rvl" : "compressedDepth png",
+                    units_per_metre),
+      .data = {}};
   // The transport's own header, which is of no meaning to whole numbers, comes first.
   message.data.resize(config_header);
   message.data.insert(message.data.end(), packed.begin(), packed.end());
   return message;
+}
+
+ros::CompressedImage depth_slice(const ros::Header& header, std::span<const std::byte> slice,
+                                 double units_per_metre) {
+  return {.header = header,
+          .format = format_of(slice_packing, units_per_metre),
+          .data = {slice.begin(), slice.end()}};
+}
+
+bool is_depth_slice(const ros::CompressedImage& message) {
+  return message.format.find(slice_packing) != std::string::npos;
 }
 
 std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name) {

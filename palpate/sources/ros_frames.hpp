@@ -61,6 +61,13 @@ enum class DepthPacking : std::uint8_t {
 ros::CompressedImage compressed_depth(const ros::Header& header, std::span<const std::byte> packed,
                                       double units_per_metre, DepthPacking packing);
 
+/// A message of a slice of depth. Its format says the unit as that of compressed_depth does.
+/// @param slice  of encode_depth_slices
+ros::CompressedImage depth_slice(const ros::Header& header, std::span<const std::byte> slice,
+                                 double units_per_metre);
+/// Is it one?
+bool is_depth_slice(const ros::CompressedImage& message);
+
 /// All points, row by row, in the frame of the message; what was not measured is not a number.
 /// @throws Error without x, y and z, or if it is damaged.
 std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name);

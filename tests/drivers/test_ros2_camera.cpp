@@ -252,9 +252,10 @@ TEST_F(Ros2Camera, ReadsWhatIsServed) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
   });
-  for (const std::string name : {"camera", "other"}) {
-    const auto source =
-        open("ros2:/robot/" + name + "/depth/image_raw/compressedDepth?reliable&wait=60s");
+  for (const std::string topic :
+       {"camera/depth/image_raw/compressedDepth?reliable&",
+        "other/depth/image_raw/compressedDepth?reliable&", "camera/depth/image_raw/slices?"}) {
+    const auto source = open("ros2:/robot/" + topic + "wait=60s");
     EXPECT_EQ(source->info().clock, StampClock::monotonic);
     const Frame frame = frame_of(*source);
     const auto& image = dynamic_cast<const DepthImage&>(*frame.cloud);

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/drivers/send_rate.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate {
+namespace {
+
+constexpr double least_received = 0.85;  // [-] below which a queue overflows
+constexpr double most_lateness = 0.06;   // [s] beyond which a queue fills: more than Wi-Fi's jitter
+constexpr double cut = 0.7;              // [-] what is left of the rate
+constexpr double growth = 2.0;           // [Hz/s]
+constexpr double settling = 0.5;         // [s] until a cut shows: a queue's 0.25 s and a way back
+constexpr double rate_weight = 0.1;      // of a new interval in the usual rate
+
+}  // namespace
+
+void SendRate::report(double now, double received, double lateness) {
+  const double passed = std::clamp(now - last_report_, 0.0, 0.2);
+  last_report_ = now;
+  if (!std::isfinite(received) || !std::isfinite(lateness)) return;
+  if (received >= least_received && lateness <= most_lateness) {
+    limit_ = std::min(limit_ + growth * passed, fastest);
+  } else if (now - last_cut_ > settling) {
+    const double usual = sent_ > 0.0 ? std::min(limit_, sent_) : limit_;
+    limit_ = std::max(cut * usual, slowest);
+    last_cut_ = now;
+  }
+}
+
+bool SendRate::allows(double now) {
+  // A quarter of an interval early is on time, so that a camera at the limit is not halved.
+  if (now < next_ - 0.25 / limit_) return false;
+  if (last_sent_ > 0.0 && now > last_sent_) {
+    const double rate = 1.0 / (now - last_sent_);
+    sent_ = sent_ > 0.0 ? sent_ + rate_weight * (rate - sent_) : rate;
+  }
+  last_sent_ = now;
+  next_ = std::max(next_, now - 0.5 / limit_) + 1.0 / limit_;
+  return true;
+}
+
+}  // namespace palpate

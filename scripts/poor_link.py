@@ -4,13 +4,15 @@
 
 scripts/poor_link.py PALPATE [--delay MS] [--jitter MS] [--loss PERCENT] [--rate MBIT/S]
                      [--down AT:SECONDS] [--seconds S] [--camera URI] [--packing rvl|png]
-                     [--way slices|images] [--table]
+                     [--way slices|images] [--loopback] [--table | --check]
 
-Two network namespaces, joined by a link of this program's own (two TAP devices), which delays, loses
-and holds up what goes through it, both ways: --delay on each way, with --jitter more or less (drawn
-anew each 20 ms, in order), a queue of 250 ms at --rate, and nothing at all while the link is down. In
-one of them `palpate serve-camera` serves CAMERA, in the other `palpate run --headless` presses on it
-by a path, and records. Prints a line from that recording; with --table the lines of docs/ros.md.
+Two network namespaces, joined by a link of this program's own (two TAP devices), which delays,
+loses and holds up what goes through it, both ways: --delay on each way, with --jitter more or less
+(drawn anew each 20 ms, in order), a queue of 250 ms at --rate, and nothing at all while the link is
+down. In one of them `palpate serve-camera` serves CAMERA, in the other `palpate run --headless`
+presses on it by a path, and records. Prints a line from that recording; with --table the lines of
+docs/ros.md; with --loopback both are on this machine's own network, without a link, which needs no
+root; with --check it exits 1 unless images came and the force is there at the end.
 
 Needs root, /dev/net/tun and Cyclone DDS. Exits 77 where namespaces or TAP devices are not allowed.
 """
@@ -33,11 +35,14 @@ import threading
 import time
 
 TUNSETIFF, TAP_WITHOUT_HEADER = 0x400454CA, 0x0002 | 0x1000
+# Of the namespaces and the devices in them, which may have 15 letters
+SIDES = tuple(f"palp{os.getpid()}{side}" for side in "ab")
 QUEUE = 0.25  # [s] of a link of limited rate
 HELD_UP = 0.02  # [s] between changes of the delay
 LANDING = 3.0  # [s] of the path until the hand is down and the force has come up
 DEPTH = 0.003  # [m] the hand is below the plane
 STALLED = 12  # bit of a tick's safety: docs/recording.md
+LEAST_FELT = 0.5  # [N] of some 1.8
 NOT_POSSIBLE = 77
 TOPICS = {"slices": "slices?", "images": "compressedDepth?reliable&"}
 
@@ -50,14 +55,13 @@ class Link:
         self.random = random.Random(1)
         self.is_open = True
         self.down_from = self.down_until = math.inf
-        self.taps = [self.tap(name) for name in ("palpate-a", "palpate-b")]
-        for side, address in (("a", "10.77.0.1/24"), ("b", "10.77.0.2/24")):
-            space, tap = f"palpate-{side}", f"palpate-{side}"
-            run("ip", "netns", "add", space)
-            run("ip", "link", "set", tap, "netns", space)
-            up = f"link set {tap} up"
-            for command in (f"addr add {address} dev {tap}", up, "link set lo up"):
-                run("ip", "-n", space, *command.split())
+        self.taps = [self.tap(name) for name in SIDES]
+        for name, address in zip(SIDES, ("10.77.0.1/24", "10.77.0.2/24")):
+            run("ip", "netns", "add", name)
+            run("ip", "link", "set", name, "netns", name)
+            up = f"link set {name} up"
+            for command in (f"addr add {address} dev {name}", up, "link set lo up"):
+                run("ip", "-n", name, *command.split())
         self.thread = threading.Thread(target=self.carry)
         self.thread.start()
 
@@ -119,8 +123,8 @@ def run(*command):
 
 
 def remove_namespaces():
-    for side in ("a", "b"):
-        subprocess.run(["ip", "netns", "del", f"palpate-{side}"], capture_output=True, check=False)
+    for name in SIDES:
+        subprocess.run(["ip", "netns", "del", name], capture_output=True, check=False)
 
 
 def ticks_of(folder):
@@ -151,29 +155,32 @@ def ripple(forces):
 
 def measure(options, program):
     """One session over the link. @return (the row's values, what the session said)."""
-    link = Link(options)
+    link = None if options.loopback else Link(options)
+    environment = dict(os.environ)
+    if options.loopback:
+        environment.update(ROS_LOCALHOST_ONLY="1", ROS_DOMAIN_ID=str(100 + os.getpid() % 100))
     try:
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
             path = folder / "press.csv"
             path.write_text("t,x,y,z\n0,0,0,0.05\n1,0,0,0.05\n2,0,0,%g\n%g,%g,0,%g\n" % (
                 -DEPTH, options.seconds, 0.005 * (options.seconds - 2.0), -DEPTH))
-            here = ["ip", "netns", "exec"]
+            at = [[] if options.loopback else ["ip", "netns", "exec", name] for name in SIDES]
             server = subprocess.Popen(
-                here + ["palpate-a", program, "serve-camera", "--camera", options.camera, "--name",
+                at[0] + [program, "serve-camera", "--camera", options.camera, "--name",
                         "far", "--packing", options.packing],
-                stderr=subprocess.PIPE, stdout=subprocess.PIPE)
+                stderr=subprocess.PIPE, stdout=subprocess.PIPE, env=environment)
             hand = subprocess.Popen(
-                here + ["palpate-b", program, "run", "--headless", "--json", "--duration",
+                at[1] + [program, "run", "--headless", "--json", "--duration",
                         str(options.seconds), "--record", folder / "session", "--device",
                         f"script:{path}", "--camera",
                         "ros2:/far/depth/image_raw/" + TOPICS[options.way] + "wait=30s"],
-                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
             if options.down:
-                at, seconds = (float(value) for value in options.down.split(":"))
+                down_at, seconds = (float(value) for value in options.down.split(":"))
                 while hand.poll() is None and not list(folder.glob("session/*.db3")):
                     time.sleep(0.01)
-                link.go_down(time.monotonic() + at, seconds)
+                link.go_down(time.monotonic() + down_at, seconds)
             _, said = hand.communicate()
             server.send_signal(signal.SIGINT)
             server.communicate()
@@ -181,10 +188,17 @@ def measure(options, program):
                 sys.exit(f"poor_link: the session failed: {said.strip()}")
             ticks = ticks_of(folder / "session")
     finally:
-        link.close()
+        if link:
+            link.close()
+    if options.check:
+        end = [tick[2] for tick in ticks if tick[0] > ticks[-1][0] - 0.5]
+        if statistics.median(end) < LEAST_FELT or ticks[-1][4] < 10:
+            sys.exit(f"poor_link: {statistics.median(end):.2f} N at the end, "
+                     f"{ticks[-1][4]:.0f} images came")
     start = ticks[0][0]
     pressed = [tick for tick in ticks if tick[0] - start > LANDING]
     forces = [tick[2] for tick in pressed]
+    new = sorted(1e3 * tick[3] for before, tick in zip(pressed, pressed[1:]) if tick[4] > before[4])
     ages = sorted(1e3 * tick[3] for tick in pressed)
     steps = [abs(b - a) for a, b in zip(forces, forces[1:])]
     usual = statistics.median(forces)
@@ -192,13 +206,15 @@ def measure(options, program):
     without = sum(force < 0.2 * usual for force in forces)
     back = None
     if options.down:
-        again = start + at + seconds
+        again = start + down_at + seconds
         later = [tick[0] for tick in ticks if tick[0] > again and tick[2] > 0.8 * usual]
         back = later[0] - again if later else math.inf
     if sum(int(tick[5]) >> STALLED & 1 for tick in pressed):
-        print("poor_link: this machine was busy: the session's own ticks came late", file=sys.stderr)
+        print("poor_link: a busy machine: the session's own ticks came late", file=sys.stderr)
     return {"frames/s": f"{frames:.1f}", "age p50": f"{ages[len(ages) // 2]:.0f} ms",
-            "p99": f"{ages[len(ages) * 99 // 100]:.0f} ms", "force": f"{usual:.2f} N",
+            "p99": f"{ages[len(ages) * 99 // 100]:.0f} ms",
+            "on arrival p50": f"{new[len(new) // 2]:.1f} ms",
+            "p99 ": f"{new[len(new) * 99 // 100]:.1f} ms", "force": f"{usual:.2f} N",
             "largest step in 1 ms": f"{1e3 * max(steps):.0f} mN",
             "over 20 Hz": f"{1e3 * ripple(forces):.0f} mN", "without force": f"{without} ms",
             "back after": "" if back is None else f"{back:.2f} s"}
@@ -213,7 +229,7 @@ TABLE = [(0, 0, 0, 0, ""), (25, 5, 0, 0, ""), (50, 15, 0, 0, ""), (100, 0, 0, 0,
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("program", metavar="PALPATE", help="the program, such as build/run/app/palpate")
+    parser.add_argument("program", metavar="PALPATE", help="such as build/run/app/palpate")
     for name, unit in (("delay", "ms"), ("jitter", "ms"), ("loss", "percent"), ("rate", "Mbit/s")):
         parser.add_argument("--" + name, type=float, default=0.0, help=f"[{unit}] (0)")
     parser.add_argument("--down", default="", help="the link is down: after, for [s]")
@@ -222,12 +238,14 @@ def main():
     parser.add_argument("--packing", default="rvl", choices=("rvl", "png"))
     parser.add_argument("--way", default="slices", choices=sorted(TOPICS),
                         help="slices of images, or images that are sent again (slices)")
+    parser.add_argument("--loopback", action="store_true", help="without a link, on this machine")
     parser.add_argument("--table", action="store_true", help="the lines of docs/ros.md")
+    parser.add_argument("--check", action="store_true", help="fail if nothing is felt at the end")
     options = parser.parse_args()
-    if os.geteuid() != 0 or not os.access("/dev/net/tun", os.R_OK | os.W_OK):
+    may_link = os.geteuid() == 0 and os.access("/dev/net/tun", os.R_OK | os.W_OK)
+    if not options.loopback and not may_link:
         print("poor_link: needs root and /dev/net/tun", file=sys.stderr)
         return NOT_POSSIBLE
-    remove_namespaces()
     lines = TABLE if options.table else [
         (options.delay, options.jitter, options.loss, options.rate, options.down)]
     for number, line in enumerate(lines):

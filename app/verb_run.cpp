@@ -16,33 +16,18 @@
 #include <unistd.h>
 
 #include "app/opened_scenes.hpp"
-#include "app/program_methods.hpp"
 #include "app/reach.hpp"
-#include "app/session_arguments.hpp"
+#include "app/running_session.hpp"
 #include "app/signals.hpp"
-#include "app/summary_text.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/uri.hpp"
-#include "palpate/devices/device_guard.hpp"
-#include "palpate/drivers/drivers.hpp"
-#include "palpate/servo/stiffness.hpp"
-#include "palpate/session/from_config.hpp"
 #include "palpate/sources/scene.hpp"
 #include "palpate/viewer/session_host.hpp"
 
 namespace palpate::app {
 namespace {
 
-struct RunOptions {
-  SessionArguments session;
-  std::optional<double> duration;
-  bool headless = false;
-  bool json = false;
-  bool print_config = false;
-};
-
-constexpr double headless_duration = 10.0;  // [s]
 constexpr std::uint16_t usual_port = 8642;
 
 // One line that is written over and over while a person watches.
@@ -85,66 +70,6 @@ std::unique_ptr<ViewerServer> open_server(const ServerConfig& config, ViewerHost
   }
 }
 
-// All that a session can run: `ideal`, the lab's ruler, needs the truth.
-MethodRegistry session_methods() {
-  const MethodRegistry all = program_methods();
-  MethodRegistry methods("method", "", {});
-  for (const MethodInfo& method : all.entries()) {
-    if (method.name != "ideal") methods.add(method);
-  }
-  return methods;
-}
-
-// Says what a device with motors is good for, and what speaks against the settings on it.
-void introduce(const Session& session, const SessionConfig& config) {
-  const DeviceInfo& device = session.device().info();
-  if (!device.limits.motors || device.simulated) return;
-  std::string text = fmt::format("{}: {}", device.uri, device.kind);
-  if (!device.serial.empty()) text += ", serial number " + device.serial;
-  text += fmt::format("; at most {:.2g} N, {:.2g} N for long", device.limits.max_force,
-                      device.limits.continuous_force);
-  if (device.limits.max_stiffness)
-    text += fmt::format(", walls up to {:.0f} N/m", *device.limits.max_stiffness);
-  if (device.reach) {
-    const Vec3 size = 1e3 * (device.reach->highest - device.reach->lowest);
-    text += fmt::format(", {:.0f} x {:.0f} x {:.0f} mm", size.x(), size.y(), size.z());
-  }
-  if (device.watchdog)
-    text += fmt::format(", its watchdog lets go after {:.0f} ms", 1e3 * *device.watchdog);
-  const Registry<Driver> drivers = standard_drivers();
-  if (const Driver* driver = drivers.try_find(Uri(device.uri).scheme()))
-    text += "; its driver was tried on " + driver->tried;
-  fmt::print(stderr, "palpate: {}\n", text);
-  const ServoSettings settings = session.settings();
-  for (const std::string& line :
-       stiffness_warnings(device, settings.parameters.coupling.stiffness,
-                          settings.placement.workspace_scale, config.rate))
-    fmt::print(stderr, "palpate: {}: {}\n", device.uri, line);
-}
-
-// Can it run faster than time? Only where nothing but simulations and recordings takes part.
-bool can_run_freely(const SessionConfig& config) {
-  const Registry<Driver> drivers = standard_drivers();
-  for (const CameraConfig& camera : config.cameras) {
-    if (drivers.try_find(Uri(camera.uri).scheme()) != nullptr) return false;
-    if (open_source(camera.uri)->info().live) return false;
-  }
-  const std::string scheme = Uri(config.device.empty() ? "hand:" : config.device).scheme();
-  return scheme == "hand" || scheme == "script";
-}
-
-// A device whose motors would keep their force if this process died, in a process of its own; null
-// for any other, and where the user wants none (--without-watchdog). Only while this process has
-// one thread.
-std::unique_ptr<Device> guarded_device(const SessionConfig& config) {
-  const std::string& uri = config.device;
-  if (uri.empty() || config.without_watchdog) return nullptr;
-  const Registry<Driver> drivers = standard_drivers();
-  const Driver* driver = drivers.try_find(Uri(uri).scheme());
-  if (driver == nullptr || !driver->needs_guard) return nullptr;
-  return open_guarded([&] { return driver->open_device(Uri(uri)); });
-}
-
 PageRules page_rules(const SessionConfig& config) {
   static_cast<void>(LimitBounds(config.safety, config.operator_limits));  // refuses what is wrong
   PageRules rules;
@@ -153,47 +78,6 @@ PageRules page_rules(const SessionConfig& config) {
   rules.recordings.limit = 1e9 * config.record_limit;
   return rules;
 }
-
-SessionOptions options_of(const RunOptions& options, const SessionConfig& config,
-                          MethodRegistry methods) {
-  if (options.duration && !(*options.duration >= 0.1 && *options.duration <= 86400.0))
-    throw Error("--duration", fmt::format("{} s is too short or too long", *options.duration),
-                "give 0.1 to 86400 s");
-  SessionOptions session = session_options(config);
-  session.methods = std::move(methods);
-  if (config.device.empty()) session.device_uri = options.headless ? "hand:" : "mouse:";
-  session.version = PALPATE_VERSION;
-  if (options.headless) {
-    if (can_run_freely(config)) session.pace = Pace::free_running;
-    session.stroke_time = std::max(options.duration.value_or(headless_duration), 2.0);
-  }
-  return session;
-}
-
-// Prints how the recording ended and the summary.
-// @param ended  why a page's recording was ended by its limits; empty if it was not
-int finish(Session& session, bool json, const std::string& ended = {}) {
-  const SessionState state = session.state();
-  std::string recording = state.recording.message;
-  if (!ended.empty()) recording += (recording.empty() ? "" : "; ") + ended;
-  if (!recording.empty()) fmt::print(stderr, "palpate: {}\n", recording);
-  const std::string text = json ? json_of(state.summary, recording, state.cameras, session.timing(),
-                                          &session.statistics().hand_over)
-                                : text_of(state.summary, state.cameras);
-  std::fputs(text.c_str(), stdout);
-  return state.recording.failed ? 1 : 0;
-}
-
-/// What the signals that end the program have to do with its session.
-struct Running {
-  std::atomic<Session*> session{nullptr};
-  std::atomic<bool> ended{false};
-
-  void end() {
-    ended = true;
-    if (Session* now = session) now->request_stop();
-  }
-};
 
 // What the operator's page can choose: what the program was started with, what was opened last,
 // and the built-in scenes.
@@ -211,13 +95,6 @@ std::vector<SceneChoice> scene_choices(const std::vector<CameraConfig>& given,
       choices.push_back({std::move(uri), std::string(scene.summary), "Built-in scenes"});
   }
   return choices;
-}
-
-// A line about a method whose ticks are not bounded; empty for any other.
-std::string late_ticks(const SessionOptions& options) {
-  const std::string& name = options.settings.method;
-  if (options.methods.find(name).bounded) return {};
-  return fmt::format("palpate: {} is a method of the lab: its ticks can come late\n", name);
 }
 
 int run_headless(const RunOptions& options, const SessionConfig& config,

@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <deque>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "palpate/bag/messages.hpp"
@@ -18,6 +23,7 @@ struct CField {
     flag,     ///< bool
     text,     ///< const char*
     numbers,  ///< a sequence of numbers of `size` bytes
+    texts,    ///< a sequence of const char*
     array,    ///< `count` numbers of `size` bytes
     structs,  ///< a sequence of structs of `size` bytes with `fields`
   };
@@ -28,6 +34,14 @@ struct CField {
   std::vector<CField> fields{};  ///< of a struct
 
   friend bool operator==(const CField&, const CField&) = default;
+};
+
+class Lay;
+
+/// A message that walks over its own fields, as those of node_messages.hpp do.
+template <class Message>
+concept Walked = requires(Lay& way, const Message& message) {
+  Message::walk(way, message);
 };
 
 /// A message as a C struct, and what lies where in it: what C bindings of DDS take. Structs within
@@ -49,6 +63,10 @@ class CSample {
   explicit CSample(const Vector3& message);
   explicit CSample(const Wrench& message);
   explicit CSample(const OmniFeedback& message);
+  template <Walked Message>
+  explicit CSample(const Message& message) {
+    lay(message, [](auto& way, auto& m) { Message::walk(way, m); });
+  }
   CSample(const CSample&) = delete;
   CSample& operator=(const CSample&) = delete;
 
@@ -64,7 +82,107 @@ class CSample {
   std::vector<std::byte> bytes_;
   std::vector<CField> fields_;
   std::deque<std::string> texts_;                // pointed to
-  std::deque<std::vector<std::byte>> elements_;  // of sequences of structs, pointed to
+  std::deque<std::vector<std::byte>> elements_;  // of sequences, pointed to
 };
+
+/// Lays a message's fields one after another, each at a multiple of its size.
+class Lay {
+ public:
+  explicit Lay(CSample& sample) : sample_(sample) {}
+
+  void begin_header() {}
+  template <class T>
+  void number(const T& value) {
+    put(value, {.kind = CField::Kind::number, .offset = 0, .size = sizeof(T)});
+  }
+  void flag(const bool& value) { put(value, {.kind = CField::Kind::flag, .offset = 0}); }
+  void text(const std::string& value) {
+    const char* const kept = sample_.texts_.emplace_back(value).c_str();
+    put(kept, {.kind = CField::Kind::text, .offset = 0});
+  }
+  void bytes(const std::vector<std::byte>& value) { numbers(value); }
+  template <class T>
+  void numbers(const std::vector<T>& values) {
+    sequence_of(values.size(), values.data(),
+                {.kind = CField::Kind::numbers, .offset = 0, .size = sizeof(T)});
+  }
+  void texts(const std::vector<std::string>& values) {
+    std::vector<std::byte>& elements = sample_.elements_.emplace_back();
+    for (const std::string& value : values) {
+      const char* const kept = sample_.texts_.emplace_back(value).c_str();
+      const auto* const bytes = reinterpret_cast<const std::byte*>(&kept);
+      elements.insert(elements.end(), bytes, bytes + sizeof(kept));
+    }
+    sequence_of(values.size(), elements.data(), {.kind = CField::Kind::texts, .offset = 0});
+  }
+  template <class T, std::size_t n>
+  void array(const std::array<T, n>& values) {
+    put(values, {.kind = CField::Kind::array, .offset = 0, .size = sizeof(T), .count = n},
+        sizeof(T));
+  }
+  template <class T, class Each>
+  void sequence(const std::vector<T>& values, std::size_t /*least*/, const Each& each) {
+    const auto outer_bytes = std::exchange(bytes_, {});
+    const auto outer_fields = std::exchange(fields_, {});
+    std::vector<std::byte>& elements = sample_.elements_.emplace_back();
+    const T none{};
+    each(values.empty() ? none : values.front());  // what an element is made of
+    const std::vector<CField> fields = fields_;
+    const std::size_t size = aligned(bytes_.size(), largest_alignment);
+    for (const T& value : values) {
+      bytes_.clear();
+      fields_.clear();
+      each(value);
+      bytes_.resize(size);
+      elements.insert(elements.end(), bytes_.begin(), bytes_.end());
+    }
+    bytes_ = outer_bytes;
+    fields_ = outer_fields;
+    sequence_of(values.size(), elements.data(),
+                {.kind = CField::Kind::structs, .offset = 0, .size = size, .fields = fields});
+  }
+
+  void finish() {
+    bytes_.resize(aligned(bytes_.size(), largest_alignment));
+    sample_.bytes_ = std::move(bytes_);
+    sample_.fields_ = std::move(fields_);
+  }
+
+ private:
+  struct CSequence {
+    std::uint32_t most, length;
+    const void* elements;
+    bool is_released;
+  };
+  static constexpr std::size_t largest_alignment = 8;
+
+  static std::size_t aligned(std::size_t size, std::size_t alignment) {
+    return (size + alignment - 1) / alignment * alignment;
+  }
+
+  void sequence_of(std::size_t count, const void* elements, CField field) {
+    const auto length = static_cast<std::uint32_t>(count);
+    put(CSequence{length, length, elements, false}, std::move(field), alignof(CSequence));
+  }
+  template <class T>
+  void put(const T& value, CField field, std::size_t alignment = sizeof(T)) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    field.offset = aligned(bytes_.size(), alignment);
+    bytes_.resize(field.offset + sizeof(T));
+    std::memcpy(bytes_.data() + field.offset, &value, sizeof(T));
+    fields_.push_back(std::move(field));
+  }
+
+  CSample& sample_;
+  std::vector<std::byte> bytes_;  // of the struct that is being laid
+  std::vector<CField> fields_;
+};
+
+template <class Message, class Walk>
+void CSample::lay(const Message& message, const Walk& walk) {
+  Lay way(*this);
+  walk(way, message);
+  way.finish();
+}
 
 }  // namespace palpate::ros

@@ -51,6 +51,10 @@ struct Endpoint {
   Qos* qos;
 };
 
+struct Guid {
+  unsigned char bytes[16];
+};
+
 constexpr Entity publications_topic = 0x7fff0003;
 constexpr Result precondition_not_met = -4;
 constexpr int data_kind = 2;  // of a Serdata

@@ -49,6 +49,13 @@ struct Library {
     library.find(set_history, "dds_qset_history");
     library.find(set_lifespan, "dds_qset_lifespan");
     library.find(set_deadline, "dds_qset_deadline");
+    library.find(set_user_data, "dds_qset_userdata");
+    library.find(user_data, "dds_qget_userdata");
+    library.find(guid, "dds_get_guid");
+    library.find(matched_reader, "dds_get_matched_subscription_data");
+    library.find(matched_writer, "dds_get_matched_publication_data");
+    library.find(free_endpoint, "dds_builtintopic_free_endpoint");
+    library.find(free, "dds_free");
     library.find(take_cdr, "dds_takecdr");
     library.find(cdr_reference, "ddsi_serdata_to_ser_ref");
     library.find(cdr_unreference, "ddsi_serdata_to_ser_unref");
@@ -87,6 +94,13 @@ struct Library {
   void (*set_history)(cyclone::Qos*, int, std::int32_t) = nullptr;
   void (*set_lifespan)(cyclone::Qos*, cyclone::Duration) = nullptr;
   void (*set_deadline)(cyclone::Qos*, cyclone::Duration) = nullptr;
+  void (*set_user_data)(cyclone::Qos*, const void*, std::size_t) = nullptr;
+  bool (*user_data)(const cyclone::Qos*, void**, std::size_t*) = nullptr;
+  cyclone::Result (*guid)(cyclone::Entity, cyclone::Guid*) = nullptr;
+  cyclone::Endpoint* (*matched_reader)(cyclone::Entity, std::uint64_t) = nullptr;
+  cyclone::Endpoint* (*matched_writer)(cyclone::Entity, std::uint64_t) = nullptr;
+  void (*free_endpoint)(cyclone::Endpoint*) = nullptr;
+  void (*free)(void*) = nullptr;
   cyclone::Result (*take_cdr)(cyclone::Entity, cyclone::Serdata**, std::uint32_t,
                               cyclone::SampleInfo*, std::uint32_t) = nullptr;
   cyclone::Serdata* (*cdr_reference)(const cyclone::Serdata*, std::size_t, std::size_t,
@@ -148,6 +162,10 @@ std::uint32_t domain_wanted() {
 // "/camera/points" of ROS is "rt/camera/points" of DDS.
 constexpr std::string_view prefix = "rt/";
 
+// Nodes are announced on a topic whose name has no such prefix.
+constexpr std::string_view nodes_type = "rmw_dds_common/msg/ParticipantEntitiesInfo";
+constexpr std::string_view nodes_topic = "ros_discovery_info";
+
 std::string ros_type(std::string type) {
   constexpr std::string_view middle = "::msg::dds_::";
   const std::size_t at = type.find(middle);
@@ -168,6 +186,8 @@ class Offer {
     library.set_history(qos_, cyclone::keep_last, quality.depth);
     if (quality.lifespan) library.set_lifespan(qos_, duration(*quality.lifespan));
     if (quality.deadline) library.set_deadline(qos_, duration(*quality.deadline));
+    if (!quality.user_data.empty())
+      library.set_user_data(qos_, quality.user_data.data(), quality.user_data.size());
   }
   ~Offer() { library_.delete_qos(qos_); }
   Offer(const Offer&) = delete;
@@ -178,6 +198,46 @@ class Offer {
   const Library& library_;
   cyclone::Qos* qos_;
 };
+
+std::string user_data_of(const Library& library, const cyclone::Qos* qos) {
+  void* data = nullptr;
+  std::size_t size = 0;
+  if (!library.user_data(qos, &data, &size) || data == nullptr) return {};
+  std::string text(static_cast<const char*>(data), size);
+  library.free(data);
+  return text;
+}
+
+// "a=1;b=2;" is how ROS writes it. Empty where the key is not there.
+std::string value_of(const std::string& user_data, std::string_view key) {
+  const std::string begin = std::string(key) + "=";
+  std::size_t at = 0;
+  while (at < user_data.size()) {
+    const std::size_t end = std::min(user_data.find(';', at), user_data.size());
+    if (user_data.compare(at, begin.size(), begin) == 0)
+      return user_data.substr(at + begin.size(), end - at - begin.size());
+    at = end + 1;
+  }
+  return {};
+}
+
+Guid guid_of(const Library& library, cyclone::Entity entity) {
+  cyclone::Guid guid{};
+  library.guid(entity, &guid);
+  Guid bytes{};
+  std::copy(std::begin(guid.bytes), std::end(guid.bytes), bytes.begin());
+  return bytes;
+}
+
+// Who a client of services is: its participant, and its own name where it says one.
+std::optional<std::string> client_of(const Library& library, cyclone::Endpoint* endpoint) {
+  if (endpoint == nullptr) return std::nullopt;
+  std::string client(reinterpret_cast<const char*>(endpoint->participant_key),
+                     sizeof(endpoint->participant_key));
+  client += value_of(user_data_of(library, endpoint->qos), "clientid");
+  library.free_endpoint(endpoint);
+  return client;
+}
 
 std::uint32_t code_of(std::size_t size) {
   switch (size) {
@@ -221,6 +281,9 @@ std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields) 
         case Kind::numbers:
           put(cyclone::of_sequence, code_of(field.size));
           break;
+        case Kind::texts:
+          put(cyclone::of_sequence, cyclone::of_text);
+          break;
         case Kind::array:
           put(cyclone::of_array, code_of(field.size));
           code.push_back(static_cast<std::uint32_t>(field.count));
@@ -239,20 +302,33 @@ std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields) 
 }
 
 std::string dds_type(std::string_view type) {
-  constexpr std::string_view middle = "/msg/";
   std::string name(type);
-  const std::size_t at = name.find(middle);
-  if (at != std::string::npos) name.replace(at, middle.size(), "::msg::dds_::");
+  for (const std::string_view kind : {"msg", "srv"}) {
+    const std::string middle = "/" + std::string(kind) + "/";
+    const std::size_t at = name.find(middle);
+    if (at != std::string::npos)
+      name.replace(at, middle.size(), "::" + std::string(kind) + "::dds_::");
+  }
   return name + "_";
 }
 
-Participant::Participant(const std::string& who)
+std::string dds_topic(const std::string& topic, std::string_view type) {
+  if (type == nodes_type) return std::string(nodes_topic);
+  const std::string name = topic.substr(topic.starts_with('/') ? 1 : 0);
+  if (type.ends_with("_Request")) return "rq/" + name + "Request";
+  if (type.ends_with("_Response")) return "rr/" + name + "Reply";
+  return std::string(prefix) + name;
+}
+
+Participant::Participant(const std::string& who, std::string_view user_data)
     : who_(who), library_(std::make_unique<Library>()), domain_(domain_wanted()) {
   library_->set_log_mask(cyclone::log_errors);  // it says much on stderr that is no fault
   // A domain lives until the process ends, and belongs to all that take part in it.
   const cyclone::Entity domain = library_->create_domain(domain_, settings().c_str());
   if (domain != cyclone::precondition_not_met) check(domain, "it cannot take part in the network");
-  entity_ = library_->create_participant(domain_, nullptr, nullptr);
+  const Offer offer(*library_, {.user_data = user_data});
+  entity_ =
+      library_->create_participant(domain_, user_data.empty() ? nullptr : offer.get(), nullptr);
   check(entity_, "it cannot take part in domain " + std::to_string(domain_));
   waitset_ = library_->create_waitset(entity_);
   publications_ = library_->create_reader(entity_, cyclone::publications_topic, nullptr, nullptr);
@@ -273,27 +349,49 @@ const std::string& Participant::library_path() const {
   return library_->library.path();
 }
 
-std::vector<Publication> Participant::publications() {
+void Participant::each_publication(const std::function<void(const cyclone::Endpoint&)>& use) {
   std::vector<void*> samples(most_publications, nullptr);
   std::vector<cyclone::SampleInfo> infos(most_publications);
-  std::vector<Publication> heard;
   const int count = library_->read(publications_, samples.data(), infos.data(), samples.size(),
                                    static_cast<std::uint32_t>(samples.size()));
   for (int i = 0; i < count; ++i) {
     const cyclone::SampleInfo& info = infos[static_cast<std::size_t>(i)];
     if (!info.valid_data || info.instance_state != cyclone::alive_state) continue;
-    const auto& endpoint =
-        *static_cast<const cyclone::Endpoint*>(samples[static_cast<std::size_t>(i)]);
-    const std::string topic = endpoint.topic_name;
-    if (!topic.starts_with(prefix)) continue;
-    heard.push_back({topic.substr(prefix.size() - 1), ros_type(endpoint.type_name)});
+    use(*static_cast<const cyclone::Endpoint*>(samples[static_cast<std::size_t>(i)]));
   }
   if (count > 0) library_->return_loan(publications_, samples.data(), count);
+}
+
+std::vector<Publication> Participant::publications() {
+  std::vector<Publication> heard;
+  each_publication([&](const cyclone::Endpoint& endpoint) {
+    const std::string topic = endpoint.topic_name;
+    if (topic.starts_with(prefix))
+      heard.push_back({topic.substr(prefix.size() - 1), ros_type(endpoint.type_name)});
+  });
   std::sort(heard.begin(), heard.end(), [](const auto& a, const auto& b) {
     return std::tie(a.topic, a.type) < std::tie(b.topic, b.type);
   });
   heard.erase(std::unique(heard.begin(), heard.end()), heard.end());
   return heard;
+}
+
+Generation Participant::generation() {
+  // From Iron on every endpoint says the hash of its type; before, none did.
+  Generation found = Generation::unknown;
+  const Guid own = guid();
+  each_publication([&](const cyclone::Endpoint& endpoint) {
+    if (endpoint.topic_name != nodes_topic || found == Generation::from_iron ||
+        std::equal(own.begin(), own.end(), std::begin(endpoint.participant_key)))
+      return;
+    const bool is_new = !value_of(user_data_of(*library_, endpoint.qos), "typehash").empty();
+    found = is_new ? Generation::from_iron : Generation::to_humble;
+  });
+  return found;
+}
+
+Guid Participant::guid() const {
+  return guid_of(*library_, entity_);
 }
 
 void Participant::wait(double seconds) {
@@ -317,8 +415,7 @@ int Participant::topic(const std::string& name, std::string_view type,
       .type_information = {},
       .type_mapping = {},
       .data_representation = 0};
-  const std::size_t slash = name.starts_with('/') ? 1 : 0;
-  const std::string dds_name = std::string(prefix) + name.substr(slash);
+  const std::string dds_name = dds_topic(name, type);
   const int topic =
       library_->create_topic(entity_, &descriptor, dds_name.c_str(), nullptr, nullptr);
   check(topic, "'" + name + "' is no topic");
@@ -353,6 +450,7 @@ bool Reader::take(const std::function<void(std::span<const std::byte>)>& use) {
       ~Release() { library.cdr_release(message); }
     } const release{library, message};
     if (!info.valid_data) continue;  // a writer that went
+    sender_ = info.publication_handle;
     iovec place{};
     struct Unreference {
       const Library& library;
@@ -396,6 +494,28 @@ bool Writer::wait_for_readers(double seconds) {
 
 int Writer::readers() const {
   return std::max(participant_.library_->matched_readers(entity_, nullptr, 0), 0);
+}
+
+Guid Reader::guid() const {
+  return guid_of(*participant_.library_, entity_);
+}
+
+Guid Writer::guid() const {
+  return guid_of(*participant_.library_, entity_);
+}
+
+Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies) {
+  const Library& library = *replies.participant_.library_;
+  const std::optional<std::string> who =
+      client_of(library, library.matched_writer(requests.entity_, client));
+  if (!who) return Listening::gone;
+  std::vector<std::uint64_t> readers(static_cast<std::size_t>(replies.readers()));
+  const int count = library.matched_readers(replies.entity_, readers.data(), readers.size());
+  for (std::size_t i = 0; i < readers.size() && static_cast<int>(i) < count; ++i) {
+    if (client_of(library, library.matched_reader(replies.entity_, readers[i])) == who)
+      return Listening::yes;
+  }
+  return Listening::not_yet;
 }
 
 }  // namespace palpate::dds

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -17,6 +18,10 @@
 // ROS 2's topics without ROS: by Eclipse Cyclone DDS's library, which is loaded when it is asked
 // for. Topics and types have the names that ROS gives them: /camera/depth/image_raw,
 // sensor_msgs/msg/Image.
+namespace palpate::cyclone {
+struct Endpoint;
+}
+
 namespace palpate::dds {
 
 /// What a reader asks for, or a writer offers. A best-effort reader takes from every writer, and
@@ -27,6 +32,17 @@ struct Quality {
   int depth = 1;                ///< how many are kept
   std::optional<double> lifespan{};  ///< [s] of a message; afterwards no reader gets it
   std::optional<double> deadline{};  ///< [s] within which the next one is promised
+  std::string_view user_data{};      ///< told to all others, such as "serviceid=..."
+};
+
+/// What an entity is called in the whole network.
+using Guid = std::array<std::uint8_t, 16>;
+
+/// Of ROS, by how nodes are announced.
+enum class Generation : std::uint8_t {
+  unknown,    ///< there is no node
+  to_humble,  ///< identities of 24 bytes
+  from_iron,  ///< of 16; also where there are both
 };
 
 /// What somebody publishes.
@@ -36,6 +52,11 @@ struct Publication {
 };
 
 struct Library;
+class Reader;
+class Writer;
+
+/// Does a service's client read its replies yet?
+enum class Listening : std::uint8_t { yes, not_yet, gone };
 
 /// Takes part in a domain: what reads and writes, and what the others publish. The domain is
 /// ROS_DOMAIN_ID's (0 without). Settings of CYCLONEDDS_URI come behind the library's own, and so
@@ -43,9 +64,10 @@ struct Library;
 /// `wait`, each Reader and each Writer may have a thread of their own.
 class Participant {
  public:
-  /// @param who  for errors: a URI
+  /// @param who        for errors: a URI
+  /// @param user_data  told to all others
   /// @throws Error if the library is missing, or has no network.
-  explicit Participant(const std::string& who);
+  explicit Participant(const std::string& who, std::string_view user_data = {});
   ~Participant();
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
@@ -54,12 +76,17 @@ class Participant {
   [[nodiscard]] std::uint32_t domain() const { return domain_; }
   /// What was heard of so far, by name: others are heard of within some 0.1 s, distant ones later.
   [[nodiscard]] std::vector<Publication> publications();
+  /// Of the nodes of ROS 2 that were heard of so far, but for this participant's own.
+  [[nodiscard]] Generation generation();
+  [[nodiscard]] Guid guid() const;
   /// Waits for a message, up to `seconds`; may return early.
   void wait(double seconds);
 
  private:
   friend class Reader;
   friend class Writer;
+  friend Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies);
+  void each_publication(const std::function<void(const cyclone::Endpoint&)>& use);
   [[nodiscard]] int topic(const std::string& name, std::string_view type,
                           const ros::CSample& example);
   void check(int entity, const std::string& what) const;
@@ -95,14 +122,19 @@ class Reader {
   }
   /// How many writers there are now.
   [[nodiscard]] int writers() const;
+  /// Whose the message was that was taken last: for `listening`.
+  [[nodiscard]] std::uint64_t sender() const { return sender_; }
+  [[nodiscard]] Guid guid() const;
 
  private:
+  friend Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies);
   Reader(Participant& participant, const std::string& topic, std::string_view type,
          const ros::CSample& example, const Quality& quality);
 
   Participant& participant_;
   std::string topic_;
   int entity_ = 0;
+  std::uint64_t sender_ = 0;
 };
 
 /// Writes a topic.
@@ -126,8 +158,10 @@ class Writer {
   bool wait_for_readers(double seconds);
   /// How many readers there are now.
   [[nodiscard]] int readers() const;
+  [[nodiscard]] Guid guid() const;
 
  private:
+  friend Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies);
   Writer(Participant& participant, const std::string& topic, std::string_view type,
          const ros::CSample& example, const Quality& quality);
   bool write_sample(const ros::CSample& sample);
@@ -136,10 +170,16 @@ class Writer {
   int entity_ = 0;
 };
 
+/// @param client  Reader::sender of its request
+Listening listening(const Reader& requests, std::uint64_t client, const Writer& replies);
+
 /// The instructions by which Cyclone DDS writes and reads such a struct.
 std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields);
 
 /// A type's name in DDS: "sensor_msgs::msg::dds_::Image_".
 std::string dds_type(std::string_view type);
+/// A topic's name in DDS, which for services depends on the type: "rt/camera/points",
+/// "rq/palpate/stopRequest", "rr/palpate/stopReply".
+std::string dds_topic(const std::string& topic, std::string_view type);
 
 }  // namespace palpate::dds

@@ -220,6 +220,7 @@ class Session::Impl {
     }
     const std::lock_guard lock(control_);
     state.settings = settings_;
+    state.held = held_;
     if (recorder_ && !recorder_->status().trouble.empty()) end_recording();
     report_closed();
     state.recording = recording_;
@@ -239,14 +240,24 @@ class Session::Impl {
     const std::lock_guard lock(control_);
     settings = for_cameras(std::move(settings));
     settings.scene = settings_.scene;  // not for others to count
-    const std::uint64_t number =
-        settings.method == settings_.method
-            ? cycle_->set_settings(settings)
-            : cycle_->set_method(open_method(settings, newest()), settings);
+    const ServoSettings applied = as_held(settings);
+    const std::uint64_t number = settings.method == settings_.method
+                                     ? cycle_->set_settings(applied)
+                                     : cycle_->set_method(open_method(settings, newest()), applied);
     settings_ = settings;
     settings_number_ = number;
     proxy_radius_ = settings.parameters.proxy.r_c();
-    if (recorder_) recorder_->settings({number, settings}, now());
+    if (recorder_) recorder_->settings({number, applied}, now());
+  }
+
+  void hold(bool on) {
+    const std::lock_guard lock(control_);
+    if (held_ == on) return;
+    held_ = on;
+    if (!on) ++settings_.scene;  // the hand has to engage anew
+    const ServoSettings applied = as_held(settings_);
+    settings_number_ = cycle_->set_settings(applied);
+    if (recorder_) recorder_->settings({settings_number_, applied}, now());
   }
 
   void set_playback(const Playback& playback) {
@@ -357,17 +368,24 @@ class Session::Impl {
     return method;
   }
 
+  // What the cycle gets, for these settings of the user's: no force while it is held back.
+  [[nodiscard]] ServoSettings as_held(ServoSettings settings) const {
+    if (held_) settings.safety.max_force = 0.0;
+    return settings;
+  }
+
   // What is seen jumps. Before the frame after the jump the hand is disengaged; after it a method
   // takes over that remembers nothing of before, on the free side of what is seen now.
   void disengage(bool method_begins_anew) {
     const std::lock_guard lock(control_);
     ++settings_.scene;
+    const ServoSettings applied = as_held(settings_);
     if (method_begins_anew) {
-      settings_number_ = cycle_->set_method(open_method(settings_, newest()), settings_);
+      settings_number_ = cycle_->set_method(open_method(settings_, newest()), applied);
     } else {
-      settings_number_ = cycle_->set_settings(settings_);
+      settings_number_ = cycle_->set_settings(applied);
     }
-    if (recorder_) recorder_->settings({settings_number_, settings_}, now());
+    if (recorder_) recorder_->settings({settings_number_, applied}, now());
   }
 
   // A camera's thread, or the free-running one: a frame to all who want it.
@@ -466,7 +484,7 @@ class Session::Impl {
     }
     auto recorder =
         std::make_unique<Recorder>(folder, info, cycle_->full_reader(), std::move(begin_anew));
-    recorder->settings({settings_number_, settings_}, now());
+    recorder->settings({settings_number_, as_held(settings_)}, now());
     {
       const std::lock_guard lock(frames_mutex_);
       // The first tick of the recording uses this frame, or one that is yet to come.
@@ -537,6 +555,7 @@ class Session::Impl {
   mutable std::mutex control_;         // settings and recordings; taken before frames_mutex_
   ServoSettings settings_;             // guarded by control_
   std::uint64_t settings_number_ = 0;  // guarded by control_
+  bool held_ = false;                  // guarded by control_
   RecordingState recording_;           // guarded by control_
   std::vector<std::unique_ptr<Recorder>> closing_;  // guarded by control_
   std::atomic<double> proxy_radius_{ProxyParameters{}.r_c()};
@@ -594,6 +613,10 @@ void Session::set_playback(const Playback& playback) {
 
 void Session::seek(double share) {
   impl_->seek(share);
+}
+
+void Session::hold(bool on) {
+  impl_->hold(on);
 }
 
 void Session::reset_faults() noexcept {

@@ -86,6 +86,7 @@ struct SessionState {
   std::uint32_t latched_by = 0;  ///< SafetyFlag bits that hold the force off until `reset_faults`
   double rate = 0.0;             ///< [Hz]
   bool running = false;
+  bool held = false;  ///< by Session::hold
 };
 
 /// Cameras, device, method, safety chain and recorder, wired together: a whole session as one
@@ -141,6 +142,10 @@ class Session {
   /// Real time. @throws Error as CameraFeed::set_playback and seek.
   void set_playback(const Playback& playback);
   void seek(double share);
+  /// Takes the force away, as fast as the safety chain's `fall_rate` says, and keeps it away while
+  /// everything else goes on. Afterwards the hand has to engage anew, so the force comes up
+  /// gradually.
+  void hold(bool on);
   /// Ends a latched fault of the safety chain: an operator's decision.
   void reset_faults() noexcept;
 

@@ -70,7 +70,7 @@ std::string_view stricter_text(std::string_view limit) {
 
 void SessionHost::attach(Session& session) {
   bounds_.emplace(session.settings().safety, rules_.operator_limits);
-  recordings_ = std::make_unique<PageRecordings>(session, rules_.recordings);
+  recordings_ = std::make_unique<ObserverRecordings>(session, rules_.recordings);
   session_ = &session;
   mouse_ = session.mouse();
   if (mouse_ != nullptr) target_ = start_ = mouse_->start_position();

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/session/observer_recordings.hpp"
 #include "palpate/session/session.hpp"
 #include "palpate/viewer/dropped_files.hpp"
-#include "palpate/viewer/page_recordings.hpp"
 #include "palpate/viewer/server.hpp"
 #include "palpate/viewer/tick_batcher.hpp"
 
@@ -82,7 +82,7 @@ class SessionHost final : public ViewerHost {
   std::string version_;
   PageRules rules_;
   std::optional<LimitBounds> bounds_;
-  std::unique_ptr<PageRecordings> recordings_;
+  std::unique_ptr<ObserverRecordings> recordings_;
   Session* session_ = nullptr;
   std::atomic<ViewerServer*> server_{nullptr};
   std::array<std::uint32_t, Patch::max_views> numbers_{};  // of each camera's own frames

@@ -28,13 +28,14 @@ KNOWS = {
     "record": {"core", "methods", "cloud", "servo", "bag", "sources"},
     "session": {"core", "methods", "cloud", "servo", "sources", "devices", "drivers", "bag",
                 "record"},
+    "node": {"core", "methods", "servo", "bag", "drivers", "session"},
     "viewer": {"core", "methods", "cloud", "servo", "sources", "devices", "record", "session"},
     "search": {"core"},
     "lab": {"core", "paper", "methods", "cloud", "servo", "sources", "devices", "search"},
     "bench": {"core", "paper", "methods", "cloud", "search"},
 }
 KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench"}
-KNOWS["python"] = KNOWS["app"] - {"viewer"} | {"lab"}
+KNOWS["python"] = KNOWS["app"] - {"node", "viewer"} | {"lab"}
 # The programs that are built when they are first asked for.
 KNOWS["app/lab"] = KNOWS["app"] | {"app", "lab"}
 KNOWS["app/bench"] = KNOWS["app"] | {"app", "bench"}

@@ -1,38 +1,64 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two programs on the network of ROS 2: one serves a camera, the other reads it.
-#include <array>
+// Two programs on the network of ROS 2: one serves a camera or is a node, the other reads it.
 #include <csignal>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <spawn.h>
 #include <sys/wait.h>
 
+#include "palpate/bag/node_messages.hpp"
+#include "palpate/drivers/dds.hpp"
+#include "palpate/servo/realtime.hpp"
+
 #include "tests/app/program.hpp"
 #include "tests/drivers/dds_test.hpp"
+#include "tests/drivers/ros_client.hpp"
 
 namespace palpate {
 namespace {
+
+// The program, at work until it is told to end.
+class Started {
+ public:
+  explicit Started(std::vector<std::string> words) {
+    words.insert(words.begin(), PALPATE_PROGRAM);
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    if (posix_spawn(&pid_, PALPATE_PROGRAM, nullptr, nullptr, arguments.data(), environ) != 0)
+      pid_ = -1;
+  }
+  ~Started() { end(); }
+  Started(const Started&) = delete;
+  Started& operator=(const Started&) = delete;
+
+  // Its exit status, or -1.
+  int end() {
+    if (pid_ <= 0) return -1;
+    kill(pid_, SIGTERM);
+    int status = 0;
+    waitpid(std::exchange(pid_, -1), &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+
+ private:
+  pid_t pid_ = -1;
+};
 
 class Ros2Program : public test::Program {
   test::OwnNetwork network_;
 };
 
 TEST_F(Ros2Program, ServesACameraToAnother) {
-  std::array<std::string, 6> words{PALPATE_PROGRAM, "serve-camera",
-                                   "--camera",      "synthetic:plane?size=64x48",
-                                   "--name",        "robot/eye"};
-  std::array<char*, 7> arguments{};
-  for (std::size_t i = 0; i < words.size(); ++i) arguments[i] = words[i].data();
-  pid_t server = -1;
-  ASSERT_EQ(posix_spawn(&server, PALPATE_PROGRAM, nullptr, nullptr, arguments.data(), environ), 0);
+  Started server({"serve-camera", "--camera", "synthetic:plane?size=64x48", "--name", "robot/eye"});
   const Outcome read =
       run("info --json 'ros2:/robot/eye/depth/image_raw/compressedDepth?wait=60s&reliable'");
-  kill(server, SIGTERM);
-  int status = 0;
-  waitpid(server, &status, 0);
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 128 + SIGTERM) << status;
+  EXPECT_EQ(server.end(), 128 + SIGTERM);
   ASSERT_EQ(read.code, 0) << read.err;
   const auto info = nlohmann::json::parse(read.out);
   const Outcome itself = run("info --json 'synthetic:plane?size=64x48'");
@@ -45,6 +71,41 @@ TEST_F(Ros2Program, ServesACameraToAnother) {
 TEST_F(Ros2Program, SaysWhatCannotBeServed) {
   expect_refusal("serve-camera", {"no camera", "--camera URI"});
   expect_refusal("serve-camera --camera synthetic:plane --name 'my eye'", {"my eye", "topic"});
+}
+
+TEST_F(Ros2Program, IsANodeThatTellsAndAnswers) {
+  Started node({"ros", "--camera", "synthetic:plane?size=64x48", "--name", "cell_3/feel",
+                "--publish-rate", "50", "--record-folder", path("recordings")});
+  dds::Participant other("test:");
+  dds::Reader hips(other, "/cell_3/feel/hip", ros::PoseStamped{}, {.reliable = true, .depth = 10});
+  std::optional<ros::PoseStamped> hip;
+  const double end = monotonic_now() + test::long_enough;
+  while (!hip && monotonic_now() < end) {
+    other.wait(0.05);
+    hip = hips.take<ros::PoseStamped>();
+  }
+  ASSERT_TRUE(hip);
+  EXPECT_EQ(hip->header.frame_id, "world");
+  test::RosClient<ros::SetParameters> set(other, "/cell_3/feel/set_parameters");
+  const auto answer = set.ask({{},
+                               {{"stiffness", ros::ParameterValue::of(250.0)},
+                                {"stiffness", ros::ParameterValue::of(std::string("soft"))}}});
+  ASSERT_TRUE(answer && answer->results.size() == 2);
+  EXPECT_TRUE(answer->results[0].successful) << answer->results[0].reason;
+  EXPECT_NE(answer->results[1].reason.find("number"), std::string::npos);
+  test::RosClient<ros::Trigger> record(other, "/cell_3/feel/start_recording");
+  const auto recording = record.ask({});
+  ASSERT_TRUE(recording && recording->success);
+  EXPECT_EQ(node.end(), 0);
+  // What was being recorded when it was told to end is whole, with the parameter that was set.
+  const Outcome replayed = run("info --json recording:" + recording->message);
+  EXPECT_EQ(replayed.code, 0) << replayed.err;
+}
+
+TEST_F(Ros2Program, SaysWhatIsNoNode) {
+  expect_refusal("ros --camera synthetic:plane --name 'my node'", {"my node", "letters"});
+  expect_refusal("ros --camera synthetic:plane --publish-rate 0", {"--publish-rate", "1 to 1000"});
+  expect_refusal("ros --camera synthetic:plane --duration 0", {"--duration", "0.1"});
 }
 
 }  // namespace

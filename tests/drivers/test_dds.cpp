@@ -8,6 +8,7 @@
 #include <dds/ddsrt/log.h>
 #include <gtest/gtest.h>
 
+#include "palpate/bag/node_messages.hpp"
 #include "palpate/drivers/cyclone_api.hpp"
 #include "palpate/drivers/dds.hpp"
 
@@ -32,6 +33,10 @@ SAME_PLACE(SampleInfo, valid_data, dds_sample_info_t, valid_data);
 static_assert(sizeof(cyclone::Endpoint) == sizeof(dds_builtintopic_endpoint_t));
 SAME_PLACE(Endpoint, topic_name, dds_builtintopic_endpoint_t, topic_name);
 SAME_PLACE(Endpoint, type_name, dds_builtintopic_endpoint_t, type_name);
+static_assert(sizeof(cyclone::Guid) == sizeof(dds_guid_t));
+SAME_PLACE(Endpoint, participant_key, dds_builtintopic_endpoint_t, participant_key);
+SAME_PLACE(Endpoint, qos, dds_builtintopic_endpoint_t, qos);
+SAME_PLACE(SampleInfo, publication_handle, dds_sample_info_t, publication_handle);
 static_assert(cyclone::publications_topic == DDS_BUILTIN_TOPIC_DCPSPUBLICATION);
 static_assert(cyclone::precondition_not_met == DDS_RETCODE_PRECONDITION_NOT_MET);
 static_assert(cyclone::any_state == DDS_ANY_STATE);
@@ -140,6 +145,116 @@ TEST_F(Dds, CarriesEachTypeOfMessageAsBagsHaveIt) {
   goes_through(ros::Vector3{{1.0, -2.0, 3.0}});
   goes_through(ros::Wrench{{1.0, 2.0, 3.0}, {4.0, 5.0, 6.0}});
   goes_through(ros::OmniFeedback{{1.0, 2.0, 3.0}, {4.0, 5.0, 6.0}});
+}
+
+TEST_F(Dds, CarriesWhatANodeReports) {
+  goes_through(ros::Vector3Stamped{header("hand"), {1.0, 2.0, 3.0}});
+  goes_through(ros::UInt8{2});
+  goes_through(ros::UInt32{1U << 31});
+  ros::DiagnosticArray report{header(""), {{}, {}}};
+  report.status[0].name = "loop";
+  report.status[0].values = {{"rate [Hz]", "1000"}, {"", "x"}};
+  report.status[1].level = 2;
+  report.status[1].message = "no tick comes";
+  report.status[1].values = {{"one more", "y"}};
+  goes_through(report);
+  ros::Marker ball;
+  ball.header = header("world");
+  ball.ns = "proxy";
+  ball.scale = {0.01, 0.02, 0.03};
+  ball.colour = {0.1F, 0.2F, 0.3F, 1.0F};
+  ball.lifetime = {1, 7};
+  ros::Marker line = ball;
+  line.id = 3;
+  line.points = {{1.0, 2.0, 3.0}, {4.0, 5.0, 6.0}};
+  goes_through(ros::MarkerArray{{ball, line, ball}});
+  goes_through(ros::MarkerArray{});
+}
+
+TEST_F(Dds, CarriesParametersAndServices) {
+  const std::vector<ros::Parameter> three = {{"stiffness", ros::ParameterValue::of(1.5)},
+                                             {"method", ros::ParameterValue::of(std::string("s"))},
+                                             {"n", ros::ParameterValue::of(std::int64_t{-3})}};
+  goes_through(ros::ParameterEvent{{17, 5}, "/palpate", {}, three, {three[0]}});
+  const ros::RequestHeader ask{0xfedcba9876543210U, 12};
+  goes_through(ros::SetParameters::Request{ask, three});
+  goes_through(ros::SetParameters::Reply{ask, {{true, ""}, {false, "no such"}, {true, "x"}}});
+  goes_through(ros::SetParametersAtomically::Request{ask, three});
+  goes_through(ros::SetParametersAtomically::Reply{ask, {false, "too large"}});
+  goes_through(ros::GetParameters::Request{ask, {"a", "", "longer"}});
+  goes_through(ros::GetParameters::Reply{ask, {three[0].value, {}, three[1].value}});
+  goes_through(ros::GetParameterTypes::Request{ask, {}});
+  goes_through(ros::GetParameterTypes::Reply{ask, {3, 0, 4}});
+  goes_through(ros::DescribeParameters::Request{ask, {"stiffness"}});
+  ros::ParameterDescriptor described;
+  described.name = "stiffness";
+  described.type = ros::ParameterValue::number;
+  described.floating_point_range = {{0.0, 20000.0, 0.0}};
+  ros::ParameterDescriptor whole;
+  whole.read_only = true;
+  whole.integer_range = {{-5, 5, 1}};
+  goes_through(ros::DescribeParameters::Reply{ask, {described, whole, {}}});
+  goes_through(ros::ListParameters::Request{ask, {"safety"}, 2});
+  goes_through(ros::ListParameters::Reply{ask, {"safety.a", "safety.b"}, {"safety"}});
+  goes_through(ros::Trigger::Request{ask});
+  goes_through(ros::Trigger::Reply{ask, true, "a folder"});
+  ros::ParticipantEntitiesInfo<16> info;
+  info.participant = {1, 2, 3};
+  info.nodes.resize(2);
+  info.nodes[0].node_name = "palpate";
+  info.nodes[0].readers = {{4, 5}, {6, 7}};
+  info.nodes[1].node_namespace = "/";
+  info.nodes[1].writers = {{8}};
+  goes_through(info);
+  goes_through(ros::ParticipantEntitiesInfo<24>{});
+}
+
+// Of rmw_dds_common's and rmw_cyclonedds_cpp's sources: what a node of either generation reads.
+TEST_F(Dds, LaysOutWhatRosReadsByItsOwnRules) {
+  ros::ParticipantEntitiesInfo<24> info;
+  info.participant[0] = 7;
+  info.nodes.resize(1);
+  info.nodes[0] = {"/", "p", {}, {}};
+  const std::vector<std::byte> cdr = ros::encode(info);
+  ASSERT_EQ(cdr.size(), 4U + 24 + 4 + (4 + 2) + 2 + (4 + 2) + 2 + 4 + 4);
+  EXPECT_EQ(cdr[4], std::byte{7});
+  EXPECT_EQ(cdr[4 + 24], std::byte{1});  // one node
+  // A request: two numbers of 8 bytes in front, and the rest as without them.
+  const std::vector<std::byte> request =
+      ros::encode(ros::GetParameters::Request{{0x0102030405060708U, 9}, {"a"}});
+  ASSERT_EQ(request.size(), 4U + 8 + 8 + 4 + 4 + 2);
+  EXPECT_EQ(request[4], std::byte{8});
+  EXPECT_EQ(request[4 + 8], std::byte{9});
+  EXPECT_EQ(request[4 + 16], std::byte{1});  // one name
+  EXPECT_EQ(dds_topic("/palpate/hold", ros::Trigger::Request::type), "rq/palpate/holdRequest");
+  EXPECT_EQ(dds_topic("/palpate/hold", ros::Trigger::Reply::type), "rr/palpate/holdReply");
+  EXPECT_EQ(dds_topic("", decltype(info)::type), "ros_discovery_info");
+  EXPECT_EQ(dds_type(ros::Trigger::Request::type), "std_srvs::srv::dds_::Trigger_Request_");
+}
+
+TEST_F(Dds, TellsTheGenerationOfNodesByTheirTypeHash) {
+  Participant participant("test:");
+  const auto hears = [&](Generation generation) {
+    for (double waited = 0.0; waited < long_enough; waited += 0.02) {
+      if (participant.generation() == generation) return true;
+      participant.wait(0.02);
+    }
+    return false;
+  };
+  const ros::ParticipantEntitiesInfo<24> old;
+  const ros::ParticipantEntitiesInfo<16> modern;
+  const Quality kept{.reliable = true, .keeps_for_late = true};
+  EXPECT_EQ(participant.generation(), Generation::unknown);
+  const Writer own(participant, "", modern, kept);
+  EXPECT_EQ(participant.generation(), Generation::unknown);
+  Participant humble("humble:");
+  const Writer humble_writer(humble, "", old, kept);
+  EXPECT_TRUE(hears(Generation::to_humble));
+  Participant jazzy("jazzy:");
+  Quality hashed = kept;
+  hashed.user_data = "typehash=RIHS01_0;";
+  const Writer jazzy_writer(jazzy, "", modern, hashed);
+  EXPECT_TRUE(hears(Generation::from_iron));
 }
 
 TEST_F(Dds, NamesWhatOthersPublish) {

@@ -12,24 +12,25 @@
 
 namespace palpate {
 
-/// Where recordings go that a page starts, and how large they may grow.
+/// Where recordings go that a page or a node of ROS 2 starts, and how large they may grow.
 struct RecordingRules {
   std::filesystem::path folder = {};  ///< made when it is needed; empty: the current one
-  double limit = 20e9;                ///< [bytes] of all that pages record in a session
+  double limit = 20e9;                ///< [bytes] of all that they record in a session
   double keep_free = 1e9;             ///< [bytes] left free on the disk
   double interval = 0.5;              ///< [s] between two looks at the sizes
 };
 
-/// The recordings that pages start: in one folder, under names made here, ended in time.
+/// The recordings that observers start, a page or a node of ROS 2: in one folder, under names made
+/// here, ended in time.
 ///
 /// A thread of its own looks at the sizes while a recording is on, as a disk may be slow.
-class PageRecordings {
+class ObserverRecordings {
  public:
   /// @param session  must outlive this
-  PageRecordings(Session& session, RecordingRules rules);
-  ~PageRecordings();
-  PageRecordings(const PageRecordings&) = delete;
-  PageRecordings& operator=(const PageRecordings&) = delete;
+  ObserverRecordings(Session& session, RecordingRules rules);
+  ~ObserverRecordings();
+  ObserverRecordings(const ObserverRecordings&) = delete;
+  ObserverRecordings& operator=(const ObserverRecordings&) = delete;
 
   /// Begins a recording, unless one is on. @throws Error if the limit is reached, the disk is
   /// nearly full or the folder cannot be made.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/viewer/page_recordings.hpp"
+#include "palpate/session/observer_recordings.hpp"
 
 #include <array>
 #include <chrono>
@@ -49,10 +49,10 @@ std::string size_text(double bytes) {
 
 }  // namespace
 
-PageRecordings::PageRecordings(Session& session, RecordingRules rules)
+ObserverRecordings::ObserverRecordings(Session& session, RecordingRules rules)
     : session_(session), rules_(std::move(rules)), thread_([this] { watch(); }) {}
 
-PageRecordings::~PageRecordings() {
+ObserverRecordings::~ObserverRecordings() {
   {
     const std::lock_guard lock(mutex_);
     ends_ = true;
@@ -61,7 +61,7 @@ PageRecordings::~PageRecordings() {
   thread_.join();
 }
 
-void PageRecordings::start() {
+void ObserverRecordings::start() {
   if (session_.state().recording.on) return;
   if (!rules_.folder.empty()) {
     std::error_code error;
@@ -83,7 +83,7 @@ void PageRecordings::start() {
   wakes_.notify_all();
 }
 
-void PageRecordings::stop() {
+void ObserverRecordings::stop() {
   {
     const std::lock_guard lock(mutex_);
     watching_ = false;
@@ -91,12 +91,12 @@ void PageRecordings::stop() {
   session_.stop_recording();
 }
 
-std::string PageRecordings::ended() const {
+std::string ObserverRecordings::ended() const {
   const std::lock_guard lock(mutex_);
   return ended_;
 }
 
-void PageRecordings::watch() {
+void ObserverRecordings::watch() {
   const std::chrono::duration<double> interval(rules_.interval);
   std::unique_lock lock(mutex_);
   while (!ends_) {
@@ -116,9 +116,10 @@ void PageRecordings::watch() {
   }
 }
 
-std::string PageRecordings::reason_to_end() const {
+std::string ObserverRecordings::reason_to_end() const {
   if (recorded() >= rules_.limit)
-    return "the page's recordings have reached " + size_text(rules_.limit) + " (--record-limit)";
+    return "the recordings of this session have reached " + size_text(rules_.limit) +
+           " (--record-limit)";
   std::error_code error;
   const std::filesystem::space_info space =
       std::filesystem::space(rules_.folder.empty() ? "." : rules_.folder, error);
@@ -127,7 +128,7 @@ std::string PageRecordings::reason_to_end() const {
   return {};
 }
 
-double PageRecordings::recorded() const {
+double ObserverRecordings::recorded() const {
   std::vector<std::filesystem::path> folders;
   {
     const std::lock_guard lock(mutex_);

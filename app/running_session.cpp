@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/running_session.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "app/program_methods.hpp"
+#include "app/summary_text.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/core/uri.hpp"
+#include "palpate/devices/device_guard.hpp"
+#include "palpate/drivers/drivers.hpp"
+#include "palpate/servo/stiffness.hpp"
+#include "palpate/session/from_config.hpp"
+
+namespace palpate::app {
+namespace {
+
+// Can it run faster than time? Only where nothing but simulations and recordings takes part.
+bool can_run_freely(const SessionConfig& config) {
+  const Registry<Driver> drivers = standard_drivers();
+  for (const CameraConfig& camera : config.cameras) {
+    if (drivers.try_find(Uri(camera.uri).scheme()) != nullptr) return false;
+    if (open_source(camera.uri)->info().live) return false;
+  }
+  const std::string scheme = Uri(config.device.empty() ? "hand:" : config.device).scheme();
+  return scheme == "hand" || scheme == "script";
+}
+
+}  // namespace
+
+MethodRegistry session_methods() {
+  const MethodRegistry all = program_methods();
+  MethodRegistry methods("method", "", {});
+  for (const MethodInfo& method : all.entries()) {
+    if (method.name != "ideal") methods.add(method);
+  }
+  return methods;
+}
+
+void introduce(const Session& session, const SessionConfig& config) {
+  const DeviceInfo& device = session.device().info();
+  if (!device.limits.motors || device.simulated) return;
+  std::string text = fmt::format("{}: {}", device.uri, device.kind);
+  if (!device.serial.empty()) text += ", serial number " + device.serial;
+  text += fmt::format("; at most {:.2g} N, {:.2g} N for long", device.limits.max_force,
+                      device.limits.continuous_force);
+  if (device.limits.max_stiffness)
+    text += fmt::format(", walls up to {:.0f} N/m", *device.limits.max_stiffness);
+  if (device.reach) {
+    const Vec3 size = 1e3 * (device.reach->highest - device.reach->lowest);
+    text += fmt::format(", {:.0f} x {:.0f} x {:.0f} mm", size.x(), size.y(), size.z());
+  }
+  if (device.watchdog)
+    text += fmt::format(", its watchdog lets go after {:.0f} ms", 1e3 * *device.watchdog);
+  const Registry<Driver> drivers = standard_drivers();
+  if (const Driver* driver = drivers.try_find(Uri(device.uri).scheme()))
+    text += "; its driver was tried on " + driver->tried;
+  fmt::print(stderr, "palpate: {}\n", text);
+  const ServoSettings settings = session.settings();
+  for (const std::string& line :
+       stiffness_warnings(device, settings.parameters.coupling.stiffness,
+                          settings.placement.workspace_scale, config.rate))
+    fmt::print(stderr, "palpate: {}: {}\n", device.uri, line);
+}
+
+std::unique_ptr<Device> guarded_device(const SessionConfig& config) {
+  const std::string& uri = config.device;
+  if (uri.empty() || config.without_watchdog) return nullptr;
+  const Registry<Driver> drivers = standard_drivers();
+  const Driver* driver = drivers.try_find(Uri(uri).scheme());
+  if (driver == nullptr || !driver->needs_guard) return nullptr;
+  return open_guarded([&] { return driver->open_device(Uri(uri)); });
+}
+
+SessionOptions options_of(const RunOptions& options, const SessionConfig& config,
+                          MethodRegistry methods) {
+  if (options.duration && !(*options.duration >= 0.1 && *options.duration <= 86400.0))
+    throw Error("--duration", fmt::format("{} s is too short or too long", *options.duration),
+                "give 0.1 to 86400 s");
+  SessionOptions session = session_options(config);
+  session.methods = std::move(methods);
+  if (config.device.empty()) session.device_uri = options.headless ? "hand:" : "mouse:";
+  session.version = PALPATE_VERSION;
+  if (options.headless) {
+    if (!options.in_real_time && can_run_freely(config)) session.pace = Pace::free_running;
+    session.stroke_time = std::max(options.duration.value_or(headless_duration), 2.0);
+  }
+  return session;
+}
+
+std::string late_ticks(const SessionOptions& options) {
+  const std::string& name = options.settings.method;
+  if (options.methods.find(name).bounded) return {};
+  return fmt::format("palpate: {} is a method of the lab: its ticks can come late\n", name);
+}
+
+int finish(Session& session, bool json, const std::string& ended) {
+  const SessionState state = session.state();
+  std::string recording = state.recording.message;
+  if (!ended.empty()) recording += (recording.empty() ? "" : "; ") + ended;
+  if (!recording.empty()) fmt::print(stderr, "palpate: {}\n", recording);
+  const std::string text = json ? json_of(state.summary, recording, state.cameras, session.timing(),
+                                          &session.statistics().hand_over)
+                                : text_of(state.summary, state.cameras);
+  std::fputs(text.c_str(), stdout);
+  return state.recording.failed ? 1 : 0;
+}
+
+}  // namespace palpate::app

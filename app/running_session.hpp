@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "app/session_arguments.hpp"
+#include "palpate/core/method.hpp"
+#include "palpate/servo/device.hpp"
+#include "palpate/session/config.hpp"
+#include "palpate/session/session.hpp"
+
+namespace palpate::app {
+
+// What the verbs that run a session share.
+
+struct RunOptions {
+  SessionArguments session;
+  std::optional<double> duration;
+  bool headless = false;
+  /// Headless: at the pace of time, also where nothing but simulations and recordings takes part.
+  bool in_real_time = false;
+  bool json = false;
+  bool print_config = false;
+};
+
+constexpr double headless_duration = 10.0;  ///< [s]
+
+/// All that a session can run: `ideal`, the lab's ruler, needs the truth.
+MethodRegistry session_methods();
+
+/// @throws Error for a duration out of range.
+SessionOptions options_of(const RunOptions& options, const SessionConfig& config,
+                          MethodRegistry methods);
+
+/// A device whose motors would keep their force if this process died, in a process of its own; null
+/// for any other, and where the user wants none (--without-watchdog). Only while this process has
+/// one thread.
+std::unique_ptr<Device> guarded_device(const SessionConfig& config);
+
+/// A line about a method whose ticks are not bounded; empty for any other.
+std::string late_ticks(const SessionOptions& options);
+
+/// Says what a device with motors is good for, and what speaks against the settings on it.
+void introduce(const Session& session, const SessionConfig& config);
+
+/// What the signals that end the program have to do with its session.
+struct Running {
+  std::atomic<Session*> session{nullptr};
+  std::atomic<bool> ended{false};
+
+  void end() {
+    ended = true;
+    if (Session* now = session) now->request_stop();
+  }
+};
+
+/// Prints how the recording ended and the summary. @return the program's exit code
+/// @param ended  why an observer's recording was ended by its limits; empty if it was not
+int finish(Session& session, bool json, const std::string& ended = {});
+
+}  // namespace palpate::app

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "app/running_session.hpp"
+#include "app/signals.hpp"
+#include "app/verbs.hpp"
+#include "palpate/node/ros_node.hpp"
+
+namespace palpate::app {
+namespace {
+
+struct RosOptions {
+  RunOptions run;
+  RosNodeOptions node;
+};
+
+int run_node(const RosOptions& options) {
+  const SessionConfig config = options.run.session.config(session_methods());
+  if (options.run.print_config) {
+    std::fputs(to_toml(config).c_str(), stdout);
+    return 0;
+  }
+  // While there is one thread, and before there is DDS: a guard is another process.
+  std::unique_ptr<Device> guarded = guarded_device(config);
+  Running running;
+  const EndingSignals signals([&] { running.end(); });
+  SessionOptions wanted = options_of(options.run, config, session_methods());
+  wanted.device = std::move(guarded);
+  const std::string warning = late_ticks(wanted);
+  Session session(std::move(wanted));
+  std::fputs(warning.c_str(), stderr);
+  running.session = &session;
+  introduce(session, config);
+  RosNodeOptions wishes = options.node;
+  wishes.recordings.folder = config.record_folder;
+  wishes.recordings.limit = 1e9 * config.record_limit;
+  std::string ended_recording;
+  {
+    const RosNode node(session, wishes);
+    fmt::print(stderr, "palpate: node {} in domain {}; Ctrl-C ends it\n", node.name(),
+               node.domain());
+    if (!running.ended) session.run(options.run.duration);  // the force is off when it returns
+    ended_recording = node.recording_ended();
+  }
+  running.session = nullptr;
+  return finish(session, options.run.json, ended_recording);
+}
+
+}  // namespace
+
+Verb add_ros(CLI::App& program) {
+  CLI::App* command = program.add_subcommand("ros", "touch a scene as a node of ROS 2");
+  const auto options = std::make_shared<RosOptions>();
+  options->run.headless = options->run.in_real_time = true;
+  options->run.session.add_to(*command);
+  command->add_option("--name", options->node.name,
+                      "of the node (palpate), with its namespace: cell_3/palpate");
+  command->add_option("--frame", options->node.frame, "frame_id of what it publishes (world)");
+  command->add_option("--publish-rate", options->node.rate,
+                      "[Hz] of poses, force, contact and flags (100), 1 to 1000");
+  command->add_option("--duration", options->run.duration, "seconds of the session (until Ctrl-C)");
+  command->add_flag("--json", options->run.json, "print the summary as a JSON object");
+  command->add_flag("--print-config", options->run.print_config,
+                    "print the session that these options describe as a TOML file, and end");
+  return {command, [options] { return run_node(*options); }};
+}
+
+}  // namespace palpate::app

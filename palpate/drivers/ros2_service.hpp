@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "palpate/bag/node_messages.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/drivers/dds.hpp"
+
+namespace palpate::dds {
+
+/// What a node's services and their clients have in common: ROS's quality of services, and the name
+/// by which a request's reader and its replies' writer are known to belong together.
+Quality service_quality(std::string_view identity);
+/// @param number  of the service among those of its participant
+std::string service_identity(const Guid& participant, unsigned number);
+
+/// A service of a node, asked and answered as rmw_cyclonedds_cpp does: each message begins with who
+/// asked and the number of the request. (rmw_fastrtps_cpp says that outside of the message, where
+/// Cyclone's C API cannot write.)
+template <class Type>
+class Service {
+ public:
+  using Request = typename Type::Request;
+  using Reply = typename Type::Reply;
+
+  /// @param number  of the service among those of the participant
+  /// @param answer  must not throw
+  Service(Participant& participant, const std::string& name, unsigned number,
+          std::function<Reply(const Request&)> answer)
+      : name_(name),
+        identity_(service_identity(participant.guid(), number)),
+        requests_(participant, name, Request{}, service_quality(identity_)),
+        replies_(participant, name, Reply{}, service_quality(identity_)),
+        answer_(std::move(answer)) {}
+
+  /// Answers what was asked since the last call. A client that does not read its replies yet gets
+  /// its own with a later call, up to `patience` from now on.
+  /// @param now  [s] on any one clock
+  void serve(double now) {
+    while (const std::optional<Request> request = next()) {
+      Reply reply = answer_(*request);
+      reply.header = request->header;
+      waiting_.push_back({std::move(reply), requests_.sender(), now});
+      if (waiting_.size() > most_waiting) waiting_.pop_front();
+    }
+    for (std::size_t left = waiting_.size(); left > 0; --left) {
+      Waiting first = std::move(waiting_.front());
+      waiting_.pop_front();
+      const Listening client = listening(requests_, first.client, replies_);
+      if (client == Listening::yes)
+        replies_.write(first.reply);
+      else if (client == Listening::not_yet && now - first.since < patience)
+        waiting_.push_back(std::move(first));
+    }
+  }
+
+  [[nodiscard]] Guid reader() const { return requests_.guid(); }
+  [[nodiscard]] Guid writer() const { return replies_.guid(); }
+
+ private:
+  static constexpr double patience = 2.0;  // [s]
+  static constexpr std::size_t most_waiting = 64;
+
+  struct Waiting {
+    Reply reply;
+    std::uint64_t client;
+    double since;
+  };
+
+  // The next request that can be read.
+  std::optional<Request> next() {
+    for (;;) {
+      try {
+        return requests_.template take<Request>();
+      } catch (const Error&) {  // damaged: nobody can be told
+        continue;
+      }
+    }
+  }
+
+  std::string name_, identity_;
+  Reader requests_;
+  Writer replies_;
+  std::function<Reply(const Request&)> answer_;
+  std::deque<Waiting> waiting_;
+};
+
+}  // namespace palpate::dds

@@ -1,0 +1,399 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/node/ros_node.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cctype>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "palpate/bag/node_messages.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/drivers/dds.hpp"
+#include "palpate/drivers/ros2_service.hpp"
+#include "palpate/node/node_parameters.hpp"
+#include "palpate/node/node_reports.hpp"
+#include "palpate/servo/realtime.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double marker_interval = 1.0 / 30.0;  // [s]
+constexpr double report_interval = 1.0;         // [s]
+constexpr double nodes_interval = 0.2;          // [s] between two looks at who else is there
+constexpr double longest_wait = 0.05;           // [s] until the end of the session is noticed
+constexpr dds::Quality reliable{.reliable = true, .depth = 10};
+constexpr dds::Quality newest_alone{.reliable = true};
+constexpr dds::Quality latched{.reliable = true, .keeps_for_late = true};
+constexpr dds::Quality events{.reliable = true, .depth = 1000};  // as ROS's own
+
+struct NodeName {
+  std::string space, name;  // "/cell_3", "palpate"
+  [[nodiscard]] std::string full() const { return (space == "/" ? "" : space) + "/" + name; }
+};
+
+// @throws Error if it is none by ROS's rules.
+NodeName checked_name(const std::string& text) {
+  const std::string path = text.substr(text.starts_with('/') ? 1 : 0);
+  bool is_good = !path.empty() && path.back() != '/';
+  char before = '/';
+  for (const char c : path) {
+    const auto letter = static_cast<unsigned char>(c);
+    is_good = is_good && (std::isalnum(letter) != 0 || c == '_' || c == '/') &&
+              !(before == '/' && (c == '/' || std::isdigit(letter) != 0));
+    before = c;
+  }
+  if (!is_good)
+    throw Error("--name", "'" + text + "' is none for a node",
+                "write letters, digits and _, such as palpate or cell_3/palpate");
+  const std::size_t slash = path.rfind('/');
+  if (slash == std::string::npos) return {"/", path};
+  return {"/" + path.substr(0, slash), path.substr(slash + 1)};
+}
+
+double checked_rate(double rate) {
+  if (!(rate >= 1.0 && rate <= 1000.0))
+    throw Error("--publish-rate", number_text(rate) + " Hz is too low or too high",
+                "give 1 to 1000");
+  return rate;
+}
+
+// A time of the servo loop's clock on the wall's, which stamps of ROS are on.
+ros::Time stamp_of(double monotonic) {
+  using std::chrono::nanoseconds;
+  using std::chrono::system_clock;
+  const auto now =
+      std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count();
+  return ros::Time::at(now + std::llround(1e9 * (monotonic - monotonic_now())));
+}
+
+template <std::size_t size>
+std::array<std::uint8_t, size> identity(const dds::Guid& guid) {
+  std::array<std::uint8_t, size> bytes{};
+  std::copy(guid.begin(), guid.end(), bytes.begin());
+  return bytes;
+}
+
+}  // namespace
+
+class RosNode::Impl {
+ public:
+  Impl(Session& session, const RosNodeOptions& options)
+      : session_(session),
+        node_(checked_name(options.name)),
+        name_(node_.full()),
+        frame_(options.frame),
+        interval_(1.0 / checked_rate(options.rate)),
+        parameters_(session.methods()),
+        ticks_(session.ticks()),
+        participant_("ros", "enclave=/;"),
+        proxy_(participant_, name_ + "/proxy", ros::PoseStamped{}, reliable),
+        hip_(participant_, name_ + "/hip", ros::PoseStamped{}, reliable),
+        force_(participant_, name_ + "/force", ros::WrenchStamped{}, reliable),
+        normal_(participant_, name_ + "/normal", ros::Vector3Stamped{}, reliable),
+        contact_(participant_, name_ + "/contact", ros::UInt8{}, reliable),
+        flags_(participant_, name_ + "/flags", ros::UInt32{}, reliable),
+        safety_(participant_, name_ + "/safety_flags", ros::UInt32{}, reliable),
+        markers_(participant_, name_ + "/markers", ros::MarkerArray{}, newest_alone),
+        diagnostics_(participant_, "/diagnostics", ros::DiagnosticArray{}, reliable),
+        events_(participant_, "/parameter_events", ros::ParameterEvent{}, events),
+        set_(participant_, name_ + "/set_parameters", 1,
+             [this](const auto& request) { return set_each(request); }),
+        set_all_(participant_, name_ + "/set_parameters_atomically", 2,
+                 [this](const auto& request) { return set_together(request); }),
+        get_(participant_, name_ + "/get_parameters", 3,
+             [this](const auto& request) { return get(request); }),
+        types_(participant_, name_ + "/get_parameter_types", 4,
+               [this](const auto& request) { return types(request); }),
+        describe_(participant_, name_ + "/describe_parameters", 5,
+                  [this](const auto& request) { return describe(request); }),
+        list_(participant_, name_ + "/list_parameters", 6,
+              [this](const ros::ListParameters::Request& request) {
+                return parameters_.list(request.prefixes, request.depth);
+              }),
+        start_recording_(participant_, name_ + "/start_recording", 7,
+                         [this](const auto&) { return start_recording(); }),
+        stop_recording_(participant_, name_ + "/stop_recording", 8,
+                        [this](const auto&) { return stop_recording(); }),
+        hold_(participant_, name_ + "/hold", 9,
+              [this](const auto&) {
+                return done([this] { session_.hold(true); }, "no force from now on");
+              }),
+        release_(participant_, name_ + "/release", 10,
+                 [this](const auto&) {
+                   return done([this] { session_.hold(false); },
+                               "the hand engages away from surfaces");
+                 }),
+        reset_(participant_, name_ + "/reset_faults", 11,
+               [this](const auto&) {
+                 return done([this] { session_.reset_faults(); }, "latched faults have ended");
+               }),
+        recordings_(session, options.recordings),
+        known_(parameters_.all(session.settings())),
+        thread_([this] { run(); }) {}
+
+  ~Impl() {
+    ends_ = true;
+    thread_.join();
+  }
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
+  [[nodiscard]] std::string recording_ended() const { return recordings_.ended(); }
+
+ private:
+  void run() {
+    double next = monotonic_now();
+    double next_markers = next, next_report = next + report_interval, next_nodes = next;
+    counted_at_ = next;
+    while (!ends_) {
+      participant_.wait(std::clamp(next - monotonic_now(), 0.0, longest_wait));
+      const double now = monotonic_now();
+      serve(now);
+      if (now < next) continue;
+      next = std::max(next + interval_, now);  // what was missed is not made up for
+      read_ticks();
+      if (fresh_) publish();
+      if (fresh_ && now >= next_markers) {
+        next_markers = now + marker_interval;
+        const double radius = session_.settings().parameters.proxy.r_c();
+        markers_.write(markers_of(report_.newest, radius, header()));
+      }
+      fresh_ = false;
+      if (now >= next_nodes) {
+        next_nodes = now + nodes_interval;
+        announce();
+      }
+      if (now >= next_report) {
+        next_report = now + report_interval;
+        report(now);
+      }
+    }
+  }
+
+  void read_ticks() {
+    TickReport since;
+    for (ServoTick record{}; ticks_.try_pop(record);) {
+      since.add(record);
+      second_.add(record);
+      fresh_ = true;
+    }
+    if (fresh_) report_ = since;
+  }
+
+  [[nodiscard]] ros::Header header() const { return {stamp_of(report_.newest.tick.t), frame_}; }
+
+  void publish() {
+    const Tick& tick = report_.newest.tick;
+    const ros::Header now = header();
+    proxy_.write(ros::PoseStamped{now, components(tick.proxy)});
+    hip_.write(ros::PoseStamped{now, components(tick.hip)});
+    force_.write(ros::WrenchStamped{now, components(report_.newest.force)});
+    normal_.write(ros::Vector3Stamped{now, components(tick.normal)});
+    contact_.write(ros::UInt8{static_cast<std::uint8_t>(tick.state)});
+    flags_.write(ros::UInt32{report_.flags});
+    safety_.write(ros::UInt32{report_.safety});
+  }
+
+  void report(double now) {
+    SessionReport report;
+    report.state = session_.state();
+    report.ticks = second_;
+    report.now = now;
+    const std::uint64_t ticks = session_.statistics().ticks.load();
+    report.tick_rate =
+        static_cast<double>(ticks - counted_ticks_) / std::max(now - counted_at_, 1e-3);
+    report.late_ticks = report.state.summary.late_ticks - counted_late_;
+    counted_at_ = now;
+    counted_ticks_ = ticks;
+    counted_late_ = report.state.summary.late_ticks;
+    second_.flags = second_.safety = 0;
+    diagnostics_.write(diagnostics_of(report, session_.device().info(), {stamp_of(now), frame_}));
+    tell_changes();
+  }
+
+  // ROS's nodes tell each other their names and whose each reader and writer is; the message has
+  // another form from Iron on, and is an error to those of the other form. So it waits until one
+  // is there, and takes its form.
+  void announce() {
+    const dds::Generation generation = participant_.generation();
+    if (generation == announced_ || generation == dds::Generation::unknown) return;
+    announced_ = generation;
+    nodes_.reset();
+    if (generation == dds::Generation::from_iron)
+      announce_as<16>();
+    else
+      announce_as<24>();
+  }
+
+  template <std::size_t size>
+  void announce_as() {
+    ros::ParticipantEntitiesInfo<size> info;
+    info.participant = identity<size>(participant_.guid());
+    auto& node = info.nodes.emplace_back();
+    node.node_namespace = node_.space;
+    node.node_name = node_.name;
+    for (const dds::Writer* writer : {&proxy_, &hip_, &force_, &normal_, &contact_, &flags_,
+                                      &safety_, &markers_, &diagnostics_, &events_})
+      node.writers.push_back(identity<size>(writer->guid()));
+    const auto add = [&](const auto&... services) {
+      (node.readers.push_back(identity<size>(services.reader())), ...);
+      (node.writers.push_back(identity<size>(services.writer())), ...);
+    };
+    add(set_, set_all_, get_, types_, describe_, list_, start_recording_, stop_recording_, hold_,
+        release_, reset_);
+    nodes_.emplace(participant_, "", info, latched);
+    nodes_->write(info);
+  }
+
+  void serve(double now) {
+    set_.serve(now);
+    set_all_.serve(now);
+    get_.serve(now);
+    types_.serve(now);
+    describe_.serve(now);
+    list_.serve(now);
+    start_recording_.serve(now);
+    stop_recording_.serve(now);
+    hold_.serve(now);
+    release_.serve(now);
+    reset_.serve(now);
+  }
+
+  // All of them or none.
+  ros::SetParametersResult set(const std::vector<ros::Parameter>& parameters) {
+    try {
+      ServoSettings settings = session_.settings();
+      for (const ros::Parameter& parameter : parameters) parameters_.set(settings, parameter);
+      session_.set(settings);
+    } catch (const std::exception& error) {
+      return {false, error.what()};
+    }
+    return {true, ""};
+  }
+
+  ros::SetParameters::Reply set_each(const ros::SetParameters::Request& request) {
+    ros::SetParameters::Reply reply;
+    for (const ros::Parameter& parameter : request.parameters)
+      reply.results.push_back(set({parameter}));
+    tell_changes();
+    return reply;
+  }
+
+  ros::SetParametersAtomically::Reply set_together(
+      const ros::SetParametersAtomically::Request& request) {
+    ros::SetParametersAtomically::Reply reply;
+    reply.result = set(request.parameters);
+    tell_changes();
+    return reply;
+  }
+
+  ros::GetParameters::Reply get(const ros::GetParameters::Request& request) {
+    ros::GetParameters::Reply reply;
+    const ServoSettings settings = session_.settings();
+    for (const std::string& name : request.names)
+      reply.values.push_back(parameters_.get(settings, name));
+    return reply;
+  }
+
+  ros::GetParameterTypes::Reply types(const ros::GetParameterTypes::Request& request) {
+    ros::GetParameterTypes::Reply reply;
+    for (const std::string& name : request.names)
+      reply.types.push_back(parameters_.describe(name).type);
+    return reply;
+  }
+
+  ros::DescribeParameters::Reply describe(const ros::DescribeParameters::Request& request) {
+    ros::DescribeParameters::Reply reply;
+    for (const std::string& name : request.names)
+      reply.descriptors.push_back(parameters_.describe(name));
+    return reply;
+  }
+
+  // Whoever changed them: one that is set may change others, as r_c does.
+  void tell_changes() {
+    std::vector<ros::Parameter> all = parameters_.all(session_.settings());
+    ros::ParameterEvent event;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (all[i].value != known_[i].value) event.changed.push_back(all[i]);
+    }
+    known_ = std::move(all);
+    if (event.changed.empty()) return;
+    event.stamp = stamp_of(monotonic_now());
+    event.node = name_;
+    events_.write(event);
+  }
+
+  ros::Trigger::Reply start_recording() {
+    ros::Trigger::Reply reply = done([this] { recordings_.start(); }, "");
+    if (reply.success) reply.message = session_.state().recording.folder;
+    return reply;
+  }
+
+  ros::Trigger::Reply stop_recording() {
+    const RecordingState before = session_.state().recording;
+    if (!before.on) return {.success = false, .message = "no recording is on"};
+    return done([this] { recordings_.stop(); }, before.folder);
+  }
+
+  static ros::Trigger::Reply done(const std::function<void()>& what, const std::string& message) {
+    try {
+      what();
+    } catch (const std::exception& error) {
+      return {.success = false, .message = error.what()};
+    }
+    return {.success = true, .message = message};
+  }
+
+  Session& session_;
+  const NodeName node_;
+  const std::string name_, frame_;
+  const double interval_;  // [s]
+  const NodeParameters parameters_;
+  TickRing<ServoTick>::Reader ticks_;
+
+  dds::Participant participant_;
+  dds::Writer proxy_, hip_, force_, normal_, contact_, flags_, safety_, markers_;
+  dds::Writer diagnostics_, events_;
+  dds::Service<ros::SetParameters> set_;
+  dds::Service<ros::SetParametersAtomically> set_all_;
+  dds::Service<ros::GetParameters> get_;
+  dds::Service<ros::GetParameterTypes> types_;
+  dds::Service<ros::DescribeParameters> describe_;
+  dds::Service<ros::ListParameters> list_;
+  dds::Service<ros::Trigger> start_recording_, stop_recording_, hold_, release_, reset_;
+  std::optional<dds::Writer> nodes_;
+  dds::Generation announced_ = dds::Generation::unknown;
+
+  ObserverRecordings recordings_;
+  std::vector<ros::Parameter> known_;  // as others were told
+  TickReport report_;                  // since the last message
+  TickReport second_;                  // since the last report
+  bool fresh_ = false;                 // a tick came since the last message
+  double counted_at_ = 0.0;            // [s]
+  std::uint64_t counted_ticks_ = 0, counted_late_ = 0;
+  std::atomic<bool> ends_{false};
+  std::thread thread_;
+};
+
+RosNode::RosNode(Session& session, const RosNodeOptions& options)
+    : impl_(std::make_unique<Impl>(session, options)) {}
+RosNode::~RosNode() = default;
+
+const std::string& RosNode::name() const {
+  return impl_->name();
+}
+std::uint32_t RosNode::domain() const {
+  return impl_->domain();
+}
+std::string RosNode::recording_ended() const {
+  return impl_->recording_ended();
+}
+
+}  // namespace palpate

@@ -31,6 +31,11 @@ std::string camera_line(const CameraStatus& camera) {
   return text + "\n";
 }
 
+nlohmann::ordered_json object_of(const PortEnergy& port, double worst) {
+  return {
+      {"made_j", port.made}, {"worst_contact_j", worst}, {"generating_contacts", port.generating}};
+}
+
 }  // namespace
 
 std::string text_of(const Summary& summary, std::span<const CameraStatus> cameras) {
@@ -46,6 +51,12 @@ std::string text_of(const Summary& summary, std::span<const CameraStatus> camera
     text += fmt::format(", step budget spent in {} ticks", hits);
   if (const auto thinned = ticks_with(summary, patch_thinned); thinned > 0)
     text += fmt::format(", points thinned in {} ticks", thinned);
+  if (const ServoEnergy& energy = summary.energy; energy.contacts > 0)
+    text += fmt::format(
+        "; energy made beside the surface's motion: {:.2f} mJ in {} contacts, {:.2f} mJ in the "
+        "worst, more than {:.1f} mJ in {}",
+        1e3 * energy.relative.made, energy.contacts, 1e3 * summary.worst_relative,
+        1e3 * PortEnergy::least_made, energy.relative.generating);
   text += "\n";
   for (const CameraStatus& camera : cameras) text += camera_line(camera);
   return text;
@@ -59,20 +70,25 @@ std::string json_of(const Summary& summary, const std::string& recording,
     safety[std::string(safety_flag_names()[i])] = summary.safety_ticks[i];
   const Vec3 mean =
       summary.sum_sent / static_cast<double>(std::max<std::size_t>(summary.force_ticks, 1));
-  nlohmann::ordered_json object = {{"ticks", summary.ticks},
-                                   {"frames", summary.frames},
-                                   {"duration_s", summary.duration()},
-                                   {"late_ticks", summary.late_ticks},
-                                   {"contact_ticks", summary.contact_ticks},
-                                   {"force_ticks", summary.force_ticks},
-                                   {"steps", summary.steps},
-                                   {"step_budget_hits", ticks_with(summary, step_budget_hit)},
-                                   {"patch_thinned_ticks", ticks_with(summary, patch_thinned)},
-                                   {"max_force_asked", summary.largest_asked},
-                                   {"max_force_sent", summary.largest_sent},
-                                   {"mean_force_sent", {mean.x(), mean.y(), mean.z()}},
-                                   {"pop_throughs", summary.pop_throughs},
-                                   {"safety_ticks", safety}};
+  nlohmann::ordered_json object = {
+      {"ticks", summary.ticks},
+      {"frames", summary.frames},
+      {"duration_s", summary.duration()},
+      {"late_ticks", summary.late_ticks},
+      {"contact_ticks", summary.contact_ticks},
+      {"force_ticks", summary.force_ticks},
+      {"steps", summary.steps},
+      {"step_budget_hits", ticks_with(summary, step_budget_hit)},
+      {"patch_thinned_ticks", ticks_with(summary, patch_thinned)},
+      {"max_force_asked", summary.largest_asked},
+      {"max_force_sent", summary.largest_sent},
+      {"mean_force_sent", {mean.x(), mean.y(), mean.z()}},
+      {"pop_throughs", summary.pop_throughs},
+      {"energy",
+       {{"contacts", summary.energy.contacts},
+        {"relative", object_of(summary.energy.relative, summary.worst_relative)},
+        {"absolute", object_of(summary.energy.absolute, summary.worst_absolute)}}},
+      {"safety_ticks", safety}};
   for (const CameraStatus& camera : cameras)
     object["cameras"].push_back({{"uri", camera.uri},
                                  {"kind", camera.kind},

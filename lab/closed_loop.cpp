@@ -66,7 +66,8 @@ class StraightLoop final : public TouchLoop {
   Felt tick(double t) override {
     const Vec3 hip = held_.device->read(t).position;
     const Tick tick = method_->tick(hip, t);
-    Felt felt{t, hip, tick.force, tick.force, tick.surface_velocity, held_.speed()};
+    Felt felt{
+        t, hip, tick.force, tick.force, tick.surface_velocity, tick.surface_motion, held_.speed()};
     const double magnitude = felt.force.norm();
     if (magnitude > held_.peak_force) felt.force *= held_.peak_force / magnitude;
     held_.device->write(felt.force, t);
@@ -94,8 +95,13 @@ class SafeLoop final : public TouchLoop {
     cycle_.run({.t = t});
     ServoTick done;
     static_cast<void>(reader_.try_pop(done));
-    return {
-        t, done.tick.hip, done.force, done.tick.force, done.tick.surface_velocity, held_.speed()};
+    return {t,
+            done.tick.hip,
+            done.force,
+            done.tick.force,
+            done.tick.surface_velocity,
+            done.tick.surface_motion,
+            held_.speed()};
   }
 
  private:

@@ -35,12 +35,13 @@ HeldDevice let_go(const HipPath& path, const DevicePreset& device, double from);
 
 /// A tick as the hand has it.
 struct Felt {
-  double t = 0.0;                 ///< [s]
-  Vec3 hip = Vec3::Zero();        ///< [m] world, as the device reads it
-  Vec3 force = Vec3::Zero();      ///< [N] world, that the device is told to give
-  Vec3 asked = Vec3::Zero();      ///< [N] world, that the method asks for
-  double surface_velocity = 0.0;  ///< [m/s] as the method has it
-  double speed = 0.0;             ///< [m/s] of the handle
+  double t = 0.0;                      ///< [s]
+  Vec3 hip = Vec3::Zero();             ///< [m] world, as the device reads it
+  Vec3 force = Vec3::Zero();           ///< [N] world, that the device is told to give
+  Vec3 asked = Vec3::Zero();           ///< [N] world, that the method asks for
+  double surface_velocity = 0.0;       ///< [m/s] as the method has it
+  Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world, as the method has it
+  double speed = 0.0;                  ///< [m/s] of the handle
 };
 
 /// The loop of a method and a held device, at the rate of the scenario's ticks.

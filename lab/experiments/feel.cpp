@@ -67,6 +67,12 @@ std::vector<Measure> all_measures() {
   add("rub", "ratio", "%", 5.0, {"path"}, {});
   add("stick", "drift", "mm", 0.1, {"light"}, {});
   add("stick-bob", "drift", "mm", 0.1, {"light"}, {});
+  for (const std::string_view scene : {"energy-0.45m", "energy-0.7m", "energy-0.95m"}) {
+    add(scene, "above", "mJ", 0.1, {"light", "firm", "omega"}, {"chain"});
+    add(scene, "above-99%", "mJ", none, {}, {"light", "firm", "omega", "chain"});
+    add(scene, "made", "mJ", none, {}, {"light", "firm", "omega", "chain"});
+    add(scene, "contacts", "", none, {}, {"light"});
+  }
   add("free-hands", "runs", "", none, {}, {"path"});
   add("free-hands", "felt", "runs", 0.0, {"path"}, {});
   add("free-hands", "trapped", "runs", 0.0, {"path"}, {});
@@ -157,6 +163,9 @@ std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptio
   add("rub", play_rub);
   add("stick", play_stick, 0.0);
   add("stick-bob", play_stick, 0.02);
+  add("energy-0.45m", play_energy, 0.45);
+  add("energy-0.7m", play_energy, 0.7);
+  add("energy-0.95m", play_energy, 0.95);
   const int hands = options.cases.value_or(usual_free_hands);
   for (int from = 0; from < hands; from += block)
     add("free-hands", play_free_hands, from, std::min(block, hands - from));

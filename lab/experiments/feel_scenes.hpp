@@ -67,6 +67,11 @@ FeelFigures play_rub(const std::vector<Contestant>& contestants, const FeelOptio
 FeelFigures play_stick(const std::vector<Contestant>& contestants, const FeelOptions& options,
                        double stroke);
 
+/// Hands that press on a resting plane before a D4xx and come off again: the energy that each
+/// contact gives them, beside what it is on an exact surface. @param distance  [m] from the camera
+FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOptions& options,
+                        double distance);
+
 /// Hands that press, slide and are lifted, cases of the family `lift-off` of the bench `pop`: those
 /// numbered from `from` on. Those of one block of `hands_a_camera` see the same camera and body.
 FeelFigures play_free_hands(const std::vector<Contestant>& contestants, const FeelOptions& options,

@@ -77,6 +77,9 @@ struct Tick {
   ContactState state = ContactState::free_motion;  ///< after the tick's steps
   int steps = 0;                                   ///< proxy steps taken
   double surface_velocity = 0.0;                   ///< [m/s] v of (13), towards the proxy
+  /// [m/s] world: of the surface at the proxy since the tick before, as tracked; corrections of the
+  /// estimate by a frame are no motion
+  Vec3 surface_motion = Vec3::Zero();
   std::int64_t frame = -1;  ///< number of the frame in use, from 0; -1 before the first
   std::uint32_t flags = 0;  ///< TickFlag bits
 };

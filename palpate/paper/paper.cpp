@@ -87,6 +87,8 @@ Tick Paper::tick(const Vec3& hip, double t) noexcept {
                  tick);
   tick.force = render_force(hip, t, tick.flags);
   tick.surface_velocity = velocity_;
+  if ((tick.flags & frame_stale) == 0 || variant_ == Variant::as_printed)
+    tick.surface_motion = velocity_ * proxy_.normal.value_or(Vec3::Zero());
   return tick;
 }
 

@@ -22,6 +22,9 @@ constexpr std::array<std::string_view, 6> sent_columns{"force",     "gain",   "f
 constexpr std::array<std::string_view, 8> asked_columns{
     "hip", "proxy", "normal", "rendered_force", "state", "steps", "surface_velocity", "flags"};
 
+// Those of the energy: of the method, and of the cycle.
+constexpr std::array<std::string_view, 1> asked_energy{"surface_motion"};
+
 // Does `columns` name the column, or the vector that it is an axis of?
 bool names(std::span<const std::string_view> columns, std::string_view column) {
   if (column.ends_with("_x") || column.ends_with("_y") || column.ends_with("_z"))
@@ -29,22 +32,32 @@ bool names(std::span<const std::string_view> columns, std::string_view column) {
   return std::find(columns.begin(), columns.end(), column) != columns.end();
 }
 
-// Compares the columns that are named.
-void compare(const ServoTick& recorded, const ServoTick& again,
-             std::span<const std::string_view> columns, const Vec3& force_difference,
-             ReplayDifferences& differences) {
-  const std::vector<double> a = row_of(recorded);
-  const std::vector<double> b = row_of(again);
+// Which of two groups of numbers a column belongs to.
+enum class Group { asked, sent };
+
+bool is_of(Group group, const std::string& column, bool energy) {
+  if (energy) return names(asked_energy, column) == (group == Group::asked);
+  return group == Group::asked ? names(asked_columns, column) : names(sent_columns, column);
+}
+
+// Compares the columns of a group, those of the energy if they were recorded.
+void compare(const ServoTick& recorded, const ServoTick& again, Group group, bool has_energy,
+             const Vec3& force_difference, ReplayDifferences& differences) {
   bool different = false;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const std::string& column = tick_columns()[i];
-    if (std::bit_cast<std::uint64_t>(a[i]) == std::bit_cast<std::uint64_t>(b[i]) ||
-        !names(columns, column))
-      continue;
-    different = true;
-    if (!differences.first)
-      differences.first = ReplayDifference{recorded.number, column, a[i], b[i]};
-  }
+  const auto compare_rows = [&](const std::vector<double>& a, const std::vector<double>& b,
+                                const std::vector<std::string>& columns, bool energy) {
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      if (std::bit_cast<std::uint64_t>(a[i]) == std::bit_cast<std::uint64_t>(b[i]) ||
+          !is_of(group, columns[i], energy))
+        continue;
+      different = true;
+      if (!differences.first)
+        differences.first = ReplayDifference{recorded.number, columns[i], a[i], b[i]};
+    }
+  };
+  compare_rows(row_of(recorded), row_of(again), tick_columns(), false);
+  if (has_energy)
+    compare_rows(energy_row_of(recorded), energy_row_of(again), energy_columns(), true);
   if (!different) return;
   ++differences.ticks;
   differences.largest_force = std::max(differences.largest_force, force_difference.norm());
@@ -271,8 +284,10 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
   }
   std::optional<ServoTick> last;
   std::unique_ptr<Rerun> rerun;
+  bool has_energy = false;
   for (std::size_t i = 0; i < session.ticks(); ++i) {
     try {
+      if (i == 0) has_energy = session.has_energy();
       const ServoTick recorded = session.tick(i);
       if (last && recorded.number != last->number + 1) {
         report.broken_off = "ticks " + std::to_string(last->number + 1) + " to " +
@@ -281,9 +296,11 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
       }
       if (!rerun) rerun = open_rerun(session, recorded, methods, report);
       const ServoTick again = rerun->tick(recorded);
-      compare(recorded, again, asked_columns, again.tick.force - recorded.tick.force, report.asked);
+      compare(recorded, again, Group::asked, has_energy, again.tick.force - recorded.tick.force,
+              report.asked);
       if (report.sent_unchecked.empty())
-        compare(recorded, again, sent_columns, again.force - recorded.force, report.sent);
+        compare(recorded, again, Group::sent, has_energy, again.force - recorded.force,
+                report.sent);
       last = recorded;
     } catch (const Error& error) {
       report.broken_off = last ? "after tick " + std::to_string(last->number) + ": " : "";

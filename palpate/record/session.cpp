@@ -43,6 +43,21 @@ void walk(Way& way, T& record) {
   way("hand", record.hand);
 }
 
+// The same of what came later, behind these in a row.
+template <class Way, class T>
+void walk_energy(Way& way, T& record) {
+  way("surface_motion", record.tick.surface_motion);
+  const auto walk_port = [&way](const std::string& name, auto& port) {
+    way(name + "_excess", port.excess);
+    way(name + "_most", port.most);
+    way(name + "_made", port.made);
+    way(name + "_generating", port.generating);
+  };
+  walk_port("relative", record.energy.relative);
+  walk_port("absolute", record.energy.absolute);
+  way("contacts", record.energy.contacts);
+}
+
 class Names {
  public:
   template <class T>
@@ -145,22 +160,47 @@ const std::vector<std::string>& tick_columns() {
   return columns;
 }
 
+const std::vector<std::string>& energy_columns() {
+  static const std::vector<std::string> columns = [] {
+    const ServoTick tick{};
+    Names names;
+    walk_energy(names, tick);
+    return names.names;
+  }();
+  return columns;
+}
+
 std::vector<double> row_of(const ServoTick& tick) {
   Put put;
-  put.row.reserve(tick_columns().size());
+  put.row.reserve(tick_columns().size() + energy_columns().size());
   walk(put, tick);
   return std::move(put.row);
 }
 
+std::vector<double> energy_row_of(const ServoTick& tick) {
+  Put put;
+  walk_energy(put, tick);
+  return std::move(put.row);
+}
+
+std::vector<double> whole_row_of(const ServoTick& tick) {
+  Put put;
+  put.row.reserve(tick_columns().size() + energy_columns().size());
+  walk(put, tick);
+  walk_energy(put, tick);
+  return std::move(put.row);
+}
+
 ServoTick tick_of(std::span<const double> row, const std::string& name) {
-  if (row.size() != tick_columns().size())
-    throw Error(name,
-                "has " + std::to_string(row.size()) + " numbers instead of " +
-                    std::to_string(tick_columns().size()),
-                "it may be damaged, or of another version of palpate");
+  const std::size_t whole = tick_columns().size() + energy_columns().size();
+  if (row.size() != tick_columns().size() && row.size() != whole)
+    throw Error(
+        name, "has " + std::to_string(row.size()) + " numbers instead of " + std::to_string(whole),
+        "it may be damaged, or of another version of palpate");
   ServoTick tick{};
   Get get(row, name);
   walk(get, tick);
+  if (row.size() == whole) walk_energy(get, tick);
   return tick;
 }
 
@@ -189,12 +229,14 @@ AdoptedFrame adopted_of(std::span<const double> row, const std::string& name) {
 }
 
 std::string to_json(const SessionInfo& info) {
+  std::vector<std::string> columns = tick_columns();
+  columns.insert(columns.end(), energy_columns().begin(), energy_columns().end());
   json object = {{"palpate", info.version},
                  {"kind", info.kind == SessionInfo::Kind::live ? "live" : "headless"},
                  {"cameras", info.cameras},
                  {"device", info.device},
                  {"epoch_ns", info.epoch},
-                 {"tick_columns", tick_columns()}};
+                 {"tick_columns", columns}};
   if (info.seat) object["seat"] = numbers(*info.seat);
   if (info.limits)
     object["device_limits"] = {{"max_force", info.limits->max_force},

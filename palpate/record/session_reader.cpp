@@ -76,6 +76,14 @@ ServoTick SessionReader::tick(std::size_t index) {
   return tick_of(ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data, name);
 }
 
+bool SessionReader::has_energy() {
+  if (ticks_.empty()) return false;
+  const BagReader::Place& place = ticks_.front();
+  const std::string name = bag_.name(session_topic::tick, place);
+  return ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data.size() >
+         tick_columns().size();
+}
+
 const ServoSettings& SessionReader::settings(std::uint64_t number) const {
   const auto found = settings_.find(number);
   if (found == settings_.end())

@@ -28,6 +28,8 @@ class SessionReader {
   [[nodiscard]] std::size_t ticks() const { return ticks_.size(); }
   /// @param index  from 0, in the order of the session  @throws Error if it is damaged.
   [[nodiscard]] ServoTick tick(std::size_t index);
+  /// Do its ticks have energy_columns()? As of its first one; those of old recordings do not.
+  [[nodiscard]] bool has_energy();
   /// @throws Error if they are not in the recording.
   [[nodiscard]] const ServoSettings& settings(std::uint64_t number) const;
 

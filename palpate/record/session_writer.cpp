@@ -158,7 +158,7 @@ void SessionWriter::state(const CycleState& state, double t) {
 void SessionWriter::tick(const ServoTick& tick) {
   const std::int64_t at = nanoseconds(tick.tick.t);
   const ros::Header header{ros::Time::at(at), std::string(world_frame)};
-  write(session_topic::tick, at, ros::Float64MultiArray{"tick", row_of(tick)});
+  write(session_topic::tick, at, ros::Float64MultiArray{"tick", whole_row_of(tick)});
   write(session_topic::hip, at, ros::PoseStamped{header, array_of(tick.tick.hip)});
   write(session_topic::proxy, at, ros::PoseStamped{header, array_of(tick.tick.proxy)});
   write(session_topic::force, at, ros::WrenchStamped{header, array_of(tick.force), {}});

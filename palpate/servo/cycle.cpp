@@ -135,6 +135,7 @@ void Cycle::walk(Way& way, Self& self) {
   SafetyChain::walk(way, self.safety_);
   Workspace::walk(way, self.workspace_);
   Freshness::walk(way, self.freshness_);
+  PassivityObserver::walk(way, self.passivity_);
 }
 
 std::vector<std::string> cycle_state_names() {
@@ -145,6 +146,7 @@ std::vector<std::string> cycle_state_names() {
     SafetyChain safety_{};
     Workspace workspace_{};
     Freshness freshness_{};
+    PassivityObserver passivity_{};
   } memory;
   NameState name;
   Cycle::walk(name, memory);
@@ -228,11 +230,21 @@ void Cycle::run(const Wake& wake) noexcept {
                    .frame_intervals = age.intervals,
                    .surface_velocity = tick.surface_velocity});
   device_.write(workspace_.force_in_device(safe.force), t);
+  const Placement& placement = workspace_.placement();
+  const ServoEnergy& energy =
+      passivity_.run({.t = t,
+                      .handle = placement.world_from_device.linear() * hand.position,
+                      .hip = hip,
+                      .scale = placement.workspace_scale,
+                      .surface = tick.surface_motion,
+                      .jumped = jumped,
+                      .sent = safe.force});
 
   const ServoTick record{.tick = tick,
                          .force = safe.force,
                          .position = hand.position,
                          .gain = safe.gain,
+                         .energy = energy,
                          .frame_stamp = last_stamp_,
                          .frame_age = age.age,
                          .number = number_++,

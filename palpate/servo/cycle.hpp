@@ -16,6 +16,7 @@
 #include "palpate/servo/freshness.hpp"
 #include "palpate/servo/histogram.hpp"
 #include "palpate/servo/mailbox.hpp"
+#include "palpate/servo/passivity_observer.hpp"
 #include "palpate/servo/periodic_thread.hpp"
 #include "palpate/servo/safety.hpp"
 #include "palpate/servo/tick_ring.hpp"
@@ -70,6 +71,7 @@ struct ServoTick {
   Vec3 force = Vec3::Zero();          ///< [N] world: the force sent to the device
   Vec3 position = Vec3::Zero();       ///< [m] of the hand, device frame
   double gain = 0.0;                  ///< [-] of the safety chain
+  ServoEnergy energy;                 ///< that the forces sent before have given to the hand
   double frame_stamp = 0.0;           ///< [s] of the frame in use; 0 before the first
   double frame_age = 0.0;             ///< [s] of the oldest camera's; infinite before the first
   std::uint64_t number = 0;           ///< of the cycle, from 0
@@ -226,6 +228,7 @@ class Cycle {
   std::uint64_t scene_ = 0;         // in use, as ServoSettings::scene
   bool placement_changed_ = false;  // or the scene, before this tick
   Freshness freshness_;
+  PassivityObserver passivity_;
   std::atomic<std::uint64_t> fault_resets_{0};  // asked for
   std::uint64_t fault_resets_done_ = 0;
 };

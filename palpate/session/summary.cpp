@@ -21,6 +21,9 @@ std::optional<double> least_behind(std::span<const std::shared_ptr<const Cloud>>
 
 void Summary::count(const ServoTick& record, const std::optional<double>& behind, double r_c) {
   count_tick(record.tick, record.force, behind, r_c);
+  energy = record.energy;
+  worst_relative = std::max(worst_relative, energy.relative.most);
+  worst_absolute = std::max(worst_absolute, energy.absolute.most);
   for (std::size_t i = 0; i < safety_flag_count; ++i) safety_ticks[i] += record.safety >> i & 1U;
 }
 

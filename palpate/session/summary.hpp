@@ -33,6 +33,9 @@ class Summary {
   std::size_t late_ticks = 0;    ///< of a real-time loop; set by whoever knows its timing
   double largest_asked = 0.0;    ///< [N] what the method asked for
   double largest_sent = 0.0;     ///< [N] what the device got, behind the safety chain
+  ServoEnergy energy;            ///< as of the last tick
+  double worst_relative = 0.0;   ///< [J] that a contact made, relative to the surface
+  double worst_absolute = 0.0;   ///< [J] that a contact made, with the surface's own motion
   std::size_t force_ticks = 0;   ///< in which any force was sent
   Vec3 sum_sent = Vec3::Zero();  ///< [N, world] of the forces sent, tick by tick
   std::size_t pop_throughs = 0;  ///< suspected, see below

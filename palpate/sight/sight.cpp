@@ -345,6 +345,7 @@ Tick Sight::tick(const Vec3& hip, double t) noexcept {
   if (tracker_.holding()) tick.flags |= surface_hidden;
   tick.force = blend_force(render_force(hip, t, tick.flags), hip, t);
   tick.surface_velocity = tracker_.tracking() ? tracker_.surface().normal_velocity() : 0.0;
+  if (tracker_.tracking()) tick.surface_motion = surface_speed(t) * tracker_.surface().frame().up;
   return tick;
 }
 

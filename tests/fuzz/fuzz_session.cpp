@@ -23,8 +23,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     } else {
       std::vector<double> row(text.size() / sizeof(double));
       if (!row.empty()) std::memcpy(row.data(), text.data(), row.size() * sizeof(double));
-      const std::vector<double> once = row_of(tick_of(row, "fuzz"));
-      test::expect(once.size() == row.size());
+      const ServoTick tick = tick_of(row, "fuzz");
+      test::expect(row_of(tick).size() == row.size() || whole_row_of(tick).size() == row.size());
     }
   });
   return 0;

@@ -70,6 +70,10 @@ TEST(Session, KeepsEachBitOfATick) {
   tick.safety = 0x80000001U;
   tick.wake_up_ns = 4294967295U;
   tick.hand = 7;
+  tick.tick.surface_motion = {1e-9, -0.0, 1.0 / 13.0};
+  tick.energy = {.relative = {-1.0 / 3.0, 5e-324, 1.0 / 17.0, 1ULL << 51U},
+                 .absolute = {2.0, 3.0, 1.0 / 19.0, 4},
+                 .contacts = 1ULL << 50U};
   {
     SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
     writer.tick(tick);
@@ -82,6 +86,12 @@ TEST(Session, KeepsEachBitOfATick) {
   ASSERT_EQ(read.size(), tick_columns().size());
   for (std::size_t i = 0; i < read.size(); ++i)
     EXPECT_EQ(bits(read[i]), bits(wrote[i])) << tick_columns()[i];
+  EXPECT_TRUE(reader.has_energy());
+  const std::vector<double> wrote_energy = energy_row_of(tick);
+  const std::vector<double> read_energy = energy_row_of(reader.tick(0));
+  ASSERT_EQ(read_energy.size(), energy_columns().size());
+  for (std::size_t i = 0; i < read_energy.size(); ++i)
+    EXPECT_EQ(bits(read_energy[i]), bits(wrote_energy[i])) << energy_columns()[i];
   EXPECT_EQ(reader.tick(0).number, tick.number);
   EXPECT_EQ(reader.tick(0).tick.state, ContactState::entrenchment);
 }
@@ -192,6 +202,8 @@ TEST(Session, WithDamagedSettingsIsRefused) {
     EXPECT_TRUE(fails_saying([&] { return session_from_json(damaged, "it"); }, "it")) << number;
   }
   std::vector<double> row = row_of(ServoTick{});
+  row[0] = 0.25;
+  EXPECT_EQ(tick_of(row, "of an old recording").tick.t, 0.25);
   row[13] = 3.0;
   EXPECT_TRUE(fails_saying([&] { return tick_of(row, "it"); }, "it", "state"));
   row[13] = 1e300;

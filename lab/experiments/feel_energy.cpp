@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+// The scene of `feel` that counts energy: hands that press and come off, again and again.
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <fmt/format.h>
+
+#include "lab/closed_loop.hpp"
+#include "lab/experiments/feel_scenes.hpp"
+#include "palpate/servo/passivity_observer.hpp"
+#include "palpate/sources/synthetic_camera.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr double first = 2.0;           // [s] the chain's ramp and the first frames are over
+constexpr double clear = 0.015;         // [m] above the surface, before and after a contact
+constexpr int hands_a_camera_sees = 6;  // a way of holding
+constexpr int contacts_a_hand = 8;
+
+// Who holds what.
+struct Holding {
+  std::string_view loop;
+  std::string_view device;
+  std::string_view grip;
+  bool chain;
+};
+constexpr std::array holdings = {
+    Holding{"light", "touch", "light", false}, Holding{"firm", "touch", "firm", false},
+    Holding{"omega", "omega", "light", false}, Holding{"chain", "touch", "light", true}};
+
+// A hand's way, and when each of its contacts is over.
+struct Presses {
+  HipPath path;
+  std::vector<double> ends;  // [s]
+};
+
+Presses presses(std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  const auto between = [&random](double a, double b) {
+    return a + (b - a) * static_cast<double>(random() >> 11U) * 0x1p-53;
+  };
+  std::vector<double> ends;
+  const Vec3 place(between(-0.02, 0.02), between(-0.02, 0.02), clear);
+  std::vector<HipPath::Sample> samples = {{0.0, place}, {first, place}};
+  for (int i = 0; i < contacts_a_hand; ++i) {
+    // A light grip of 100 N/m leads 4 to 40 mm deep: 0.3 to 3 N.
+    const double depth = 0.04 * std::pow(0.1, between(0.0, 1.0));
+    const double speed = 0.3 * std::pow(0.1, between(0.0, 1.0));
+    const double way = (depth + clear) / speed;
+    const Vec3 down(place.x(), place.y(), -depth);
+    double t = samples.back().t;
+    samples.push_back({t += way, down});
+    samples.push_back({t += between(0.05, 0.4), down});
+    samples.push_back({t += way, place});
+    samples.push_back({t += 0.15, place});
+    ends.push_back(t);
+  }
+  return {HipPath(std::move(samples)), std::move(ends)};
+}
+
+// What the forces of one loop have given to its hand, contact by contact.
+class Meter {
+ public:
+  explicit Meter(const std::vector<double>& ends) : ends_(&ends) {}
+
+  void add(const Felt& felt) {
+    if (last_) sum_ += sent_.dot(felt.hip - *last_);
+    last_ = felt.hip;
+    sent_ = felt.force;
+    if (made.size() < ends_->size() && felt.t >= (*ends_)[made.size()]) {
+      made.push_back(sum_);
+      sum_ = 0.0;
+    }
+  }
+
+  std::vector<double> made;  // [J]
+
+ private:
+  const std::vector<double>* ends_;
+  std::optional<Vec3> last_;
+  Vec3 sent_ = Vec3::Zero();
+  double sum_ = 0.0;
+};
+
+}  // namespace
+
+FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOptions& options,
+                        double distance) {
+  struct Counted {
+    std::vector<double> above;  // [mJ]
+    double sum = 0.0;           // [mJ]
+  };
+  std::vector<std::vector<Counted>> counted(contestants.size(),
+                                            std::vector<Counted>(holdings.size()));
+  for (int k = 0; k < options.repeats; ++k) {
+    const std::uint64_t seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
+    const auto camera = open_synthetic_camera(
+        Uri("synthetic:plane?" + camera_options(distance, 0.3, "d4xx", seed)));
+    const Truth truth = truth_of(std::make_shared<const Scene>(camera->scene()));
+    std::vector<Presses> hands;
+    for (int i = 0; i < hands_a_camera_sees; ++i)
+      hands.push_back(presses(1000 * seed + static_cast<std::uint64_t>(i)));
+    std::vector<std::unique_ptr<TouchLoop>> loops;
+    std::vector<Meter> meters;
+    double duration = 0.0;
+    for (const Holding& holding : holdings) {
+      for (const Presses& hand : hands) {
+        duration = std::max(duration, hand.ends.back());
+        const auto held = [&] {
+          return in_hand(hand.path, grip_preset(holding.grip), device_preset(holding.device), seed);
+        };
+        // The ruler first: an exact surface in the same hand, by the same way.
+        const auto add = [&](std::unique_ptr<Method> method) {
+          loops.push_back(holding.chain ? safe_loop(std::move(method), held(), options.parameters)
+                                        : straight_loop(std::move(method), held()));
+          meters.emplace_back(hand.ends);
+        };
+        add(make_method("ideal", {options.parameters, truth}));
+        for (const Contestant& contestant : contestants)
+          add(contestant.make({options.parameters, truth}));
+      }
+    }
+    play_to(
+        loops,
+        {.frame_rate = camera->setup().frame_rate,
+         .duration = duration + 0.01,
+         .cloud = [&](std::uint64_t frame, double t) { return camera->capture(t, frame).cloud; },
+         .hip = nullptr},
+        [&](std::size_t loop, const Felt& felt) { meters[loop].add(felt); });
+    const std::size_t group = 1 + contestants.size();
+    for (std::size_t h = 0; h < holdings.size(); ++h) {
+      for (std::size_t i = 0; i < hands.size(); ++i) {
+        const std::size_t ruler = (h * hands.size() + i) * group;
+        for (std::size_t m = 0; m < contestants.size(); ++m) {
+          Counted& counts = counted[m][h];
+          for (std::size_t c = 0; c < meters[ruler].made.size(); ++c) {
+            const double made = 1e3 * meters[ruler + 1 + m].made[c];
+            counts.sum += made;
+            counts.above.push_back(made - 1e3 * meters[ruler].made[c]);
+          }
+        }
+      }
+    }
+  }
+  FeelFigures figures;
+  for (std::size_t m = 0; m < contestants.size(); ++m) {
+    for (std::size_t h = 0; h < holdings.size(); ++h) {
+      Counted& counts = counted[m][h];
+      std::sort(counts.above.begin(), counts.above.end());
+      const auto n = counts.above.size();
+      const auto add = [&](std::string_view measure, double value) {
+        figures.push_back({contestants[m].name, holdings[h].loop, std::string(measure), value});
+      };
+      add("above", counts.above.back());
+      add("above-99%", counts.above[n - 1 - n / 100]);
+      add("above-95%", counts.above[n - 1 - n / 20]);
+      add("above-median", counts.above[n / 2]);
+      const auto many = std::count_if(counts.above.begin(), counts.above.end(),
+                                      [](double mj) { return mj > 0.1; });
+      add("above-0.1mJ", 100.0 * static_cast<double>(many) / static_cast<double>(n));
+      add("made", counts.sum / static_cast<double>(n));
+      add("contacts", static_cast<double>(n));
+    }
+  }
+  return figures;
+}
+
+}  // namespace palpate::lab

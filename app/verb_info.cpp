@@ -155,7 +155,6 @@ int info(const InfoOptions& options) {
   if (about.frames) json["frames"] = *about.frames;
   if (about.frame_rate) json["frame_rate_hz"] = *about.frame_rate;
   if (about.start_time != 0.0) json["start_time_s"] = about.start_time;
-  if (!about.notes.empty()) json["notes"] = about.notes;
   // Before a damaged frame ends it.
   if (const Uri uri(options.uri); uri.scheme() == "recording") {
     json["checksums"] = app::text_of(BagReader(uri.path()).check());
@@ -166,6 +165,7 @@ int info(const InfoOptions& options) {
     throw Error(options.uri, fmt::format("it has delivered no frame in {} s", first_frame_timeout),
                 "check the camera, its cable and its permissions");
   if (!frame) throw Error(options.uri, "it has no frames", "give a source with at least one");
+  if (!about.notes.empty()) json["notes"] = about.notes;  // a live camera's come with its frame
   Json first = {{"stamp_s", frame->stamp}};
   if (!about.details.empty()) first["details"] = about.details;
   if (const auto* image = dynamic_cast<const DepthImage*>(frame->cloud.get())) {

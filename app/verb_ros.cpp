@@ -47,6 +47,8 @@ int run_node(const RosOptions& options) {
                node.domain());
     if (!running.ended) session.run(options.run.duration);  // the force is off when it returns
     ended_recording = node.recording_ended();
+    if (const std::string trouble = node.trouble(); !trouble.empty())
+      fmt::print(stderr, "palpate: {}\n", trouble);
   }
   running.session = nullptr;
   return finish(session, options.run.json, ended_recording);

@@ -7,8 +7,10 @@
 #include <cctype>
 #include <chrono>
 #include <cmath>
+#include <exception>
+#include <functional>
+#include <mutex>
 #include <optional>
-#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -146,34 +148,52 @@ class RosNode::Impl {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
   [[nodiscard]] std::string recording_ended() const { return recordings_.ended(); }
+  [[nodiscard]] std::string trouble() const {
+    const std::lock_guard lock(trouble_mutex_);
+    return trouble_;
+  }
 
  private:
+  // When each of its works is due next [s].
+  struct Due {
+    double ticks, markers, report, nodes;
+  };
+
   void run() {
-    double next = monotonic_now();
-    double next_markers = next, next_report = next + report_interval, next_nodes = next;
-    counted_at_ = next;
+    const double begin = monotonic_now();
+    Due due{begin, begin, begin + report_interval, begin};
+    counted_at_ = begin;
     while (!ends_) {
-      participant_.wait(std::clamp(next - monotonic_now(), 0.0, longest_wait));
-      const double now = monotonic_now();
-      serve(now);
-      if (now < next) continue;
-      next = std::max(next + interval_, now);  // what was missed is not made up for
-      read_ticks();
-      if (fresh_) publish();
-      if (fresh_ && now >= next_markers) {
-        next_markers = now + marker_interval;
-        const double radius = session_.settings().parameters.proxy.r_c();
-        markers_.write(markers_of(report_.newest, radius, header()));
+      try {
+        participant_.wait(std::clamp(due.ticks - monotonic_now(), 0.0, longest_wait));
+        work(due);
+      } catch (const std::exception& error) {  // the session goes on without what failed
+        const std::lock_guard lock(trouble_mutex_);
+        trouble_ = error.what();
       }
-      fresh_ = false;
-      if (now >= next_nodes) {
-        next_nodes = now + nodes_interval;
-        announce();
-      }
-      if (now >= next_report) {
-        next_report = now + report_interval;
-        report(now);
-      }
+    }
+  }
+
+  void work(Due& due) {
+    const double now = monotonic_now();
+    serve(now);
+    if (now < due.ticks) return;
+    due.ticks = std::max(due.ticks + interval_, now);  // what was missed is not made up for
+    read_ticks();
+    if (fresh_) publish();
+    if (fresh_ && now >= due.markers) {
+      due.markers = now + marker_interval;
+      const double radius = session_.settings().parameters.proxy.r_c();
+      markers_.write(markers_of(report_.newest, radius, header()));
+    }
+    fresh_ = false;
+    if (now >= due.nodes) {
+      due.nodes = now + nodes_interval;
+      announce();
+    }
+    if (now >= due.report) {
+      due.report = now + report_interval;
+      report(now);
     }
   }
 
@@ -224,12 +244,12 @@ class RosNode::Impl {
   void announce() {
     const dds::Generation generation = participant_.generation();
     if (generation == announced_ || generation == dds::Generation::unknown) return;
-    announced_ = generation;
     nodes_.reset();
     if (generation == dds::Generation::from_iron)
       announce_as<16>();
     else
       announce_as<24>();
+    announced_ = generation;
   }
 
   template <std::size_t size>
@@ -378,6 +398,8 @@ class RosNode::Impl {
   bool fresh_ = false;                 // a tick came since the last message
   double counted_at_ = 0.0;            // [s]
   std::uint64_t counted_ticks_ = 0, counted_late_ = 0;
+  mutable std::mutex trouble_mutex_;
+  std::string trouble_;  // guarded by it
   std::atomic<bool> ends_{false};
   std::thread thread_;
 };
@@ -391,6 +413,9 @@ const std::string& RosNode::name() const {
 }
 std::uint32_t RosNode::domain() const {
   return impl_->domain();
+}
+std::string RosNode::trouble() const {
+  return impl_->trouble();
 }
 std::string RosNode::recording_ended() const {
   return impl_->recording_ended();

@@ -36,6 +36,8 @@ class RosNode {
   /// With its namespace: "/palpate".
   [[nodiscard]] const std::string& name() const;
   [[nodiscard]] std::uint32_t domain() const;
+  /// What could not be done, the last of it; empty if all went well.
+  [[nodiscard]] std::string trouble() const;
   /// Why the last recording was ended by its limits; empty if it was not.
   [[nodiscard]] std::string recording_ended() const;
 

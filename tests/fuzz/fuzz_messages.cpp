@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "palpate/bag/messages.hpp"
+#include "palpate/bag/node_messages.hpp"
 
 #include "tests/fuzz/expect.hpp"
 
@@ -25,7 +26,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   namespace ros = palpate::ros;
   if (size == 0) return 0;
   const std::span<const std::byte> bytes = std::as_bytes(std::span(data, size)).subspan(1);
-  switch (data[0] % 10) {
+  switch (data[0] % 14) {
     case 0:
       check<ros::Image>(bytes);
       break;
@@ -52,6 +53,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       break;
     case 8:
       check<ros::TimeReference>(bytes);
+      break;
+    case 10:
+      check<ros::SetParameters::Request>(bytes);
+      break;
+    case 11:
+      check<ros::GetParameters::Request>(bytes);
+      break;
+    case 12:
+      check<ros::ListParameters::Request>(bytes);
+      break;
+    case 13:
+      check<ros::Trigger::Request>(bytes);
       break;
     default:
       check<ros::String>(bytes);

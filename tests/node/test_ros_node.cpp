@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // A session as a node, seen by another participant: what it publishes, and its services as
 // rmw_cyclonedds_cpp asks them.
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -175,6 +177,7 @@ TEST_F(RosNodeTest, RecordsAndHoldsTheForceWhenAsked) {
   EXPECT_TRUE(ask<ros::Trigger>("release").success);
   EXPECT_FALSE(session_->state().held);
   EXPECT_TRUE(ask<ros::Trigger>("reset_faults").success);
+  EXPECT_EQ(node_->trouble(), "");
 }
 
 // By what a node of each generation says of itself.

@@ -213,6 +213,41 @@ TEST(Session, ChangesParametersFromTheNextTickOn) {
   EXPECT_NEAR(forces[3999], 1.5, 0.05);
 }
 
+TEST(Session, HoldsTheForceBackUntilTheHandEngagesAnew) {
+  const double hover = wall_depth - 0.05;
+  const double pressed = wall_depth + 0.005;
+  const HipPath twice({{0.0, {0.0, 0.0, hover}},
+                       {1.0, {0.0, 0.0, hover}},
+                       {1.1, {0.0, 0.0, pressed}},
+                       {4.0, {0.0, 0.0, pressed}},
+                       {4.1, {0.0, 0.0, hover}},
+                       {4.5, {0.0, 0.0, hover}},
+                       {4.6, {0.0, 0.0, pressed}}});
+  SessionOptions options = on_the_wall();
+  options.device = std::make_unique<ScriptedDevice>(twice, false);
+  Session session(std::move(options));
+  std::vector<double> asked;
+  std::vector<double> sent;
+  session.run(8.0, [&](const ServoTick& tick) {
+    asked.push_back(tick.tick.force.norm());
+    sent.push_back(tick.force.norm());
+    if (sent.size() == 3000) session.hold(true);
+    if (sent.size() == 3200) session.set(session.settings());  // does not end it
+    if (sent.size() == 3500) session.hold(false);
+  });
+  EXPECT_GT(sent[2999], 0.5);
+  for (std::size_t i = 3020; i < 3500; ++i) {
+    ASSERT_EQ(sent[i], 0.0) << "tick " << i;
+    ASSERT_GT(asked[i], 2.5) << "tick " << i;  // the method goes on
+  }
+  // Released inside the surface: nothing until the hand was away from it.
+  for (std::size_t i = 3500; i < 4000; ++i) ASSERT_EQ(sent[i], 0.0) << "tick " << i;
+  EXPECT_GT(sent[7999], 0.5);
+  // A limit that a session ends with is the user's, not the hold's.
+  EXPECT_GT(session.settings().safety.max_force, 0.0);
+  EXPECT_FALSE(session.state().held);
+}
+
 // A method in one class: a wall of its own, wherever the camera sees one.
 class OwnWall final : public Method {
  public:

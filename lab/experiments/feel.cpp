@@ -68,9 +68,14 @@ std::vector<Measure> all_measures() {
   add("stick", "drift", "mm", 0.1, {"light"}, {});
   add("stick-bob", "drift", "mm", 0.1, {"light"}, {});
   for (const std::string_view scene : {"energy-0.45m", "energy-0.7m", "energy-0.95m"}) {
-    add(scene, "above", "mJ", 0.1, {"light", "firm", "omega"}, {"chain"});
-    add(scene, "above-99%", "mJ", none, {}, {"light", "firm", "omega", "chain"});
-    add(scene, "made", "mJ", none, {}, {"light", "firm", "omega", "chain"});
+    const std::vector<std::string_view> loops = {"light", "firm", "omega",
+                                                 "chain", "tank", "tank-0"};
+    add(scene, "above", "mJ", 0.1, {"light", "firm", "omega"}, {"chain", "tank", "tank-0"});
+    add(scene, "above-99%", "mJ", none, {}, loops);
+    add(scene, "above-median", "mJ", none, {}, loops);
+    add(scene, "over-0.1mJ", "%", none, {}, loops);
+    add(scene, "made", "mJ", none, {}, loops);
+    add(scene, "exact", "mJ", none, {}, loops);
     add(scene, "contacts", "", none, {}, {"light"});
   }
   add("free-hands", "runs", "", none, {}, {"path"});

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The scene of `feel` that counts energy: hands that press and come off, again and again.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include <fmt/format.h>
@@ -24,11 +26,13 @@ struct Holding {
   std::string_view loop;
   std::string_view device;
   std::string_view grip;
-  bool chain;
+  std::optional<double> frame_work;  // [J] through the chain; none: without it
 };
+constexpr double no_limit = 1.0;  // [J]
 constexpr std::array holdings = {
-    Holding{"light", "touch", "light", false}, Holding{"firm", "touch", "firm", false},
-    Holding{"omega", "omega", "light", false}, Holding{"chain", "touch", "light", true}};
+    Holding{"light", "touch", "light", {}},  Holding{"firm", "touch", "firm", {}},
+    Holding{"omega", "omega", "light", {}},  Holding{"chain", "touch", "light", no_limit},
+    Holding{"tank", "touch", "light", 1e-4}, Holding{"tank-0", "touch", "light", 0.0}};
 
 // A hand's way, and when each of its contacts is over.
 struct Presses {
@@ -91,6 +95,7 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
   struct Counted {
     std::vector<double> above;  // [mJ]
     double sum = 0.0;           // [mJ]
+    double ruler = 0.0;         // [mJ] the same of the exact surface
   };
   std::vector<std::vector<Counted>> counted(contestants.size(),
                                             std::vector<Counted>(holdings.size()));
@@ -113,8 +118,11 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
         };
         // The ruler first: an exact surface in the same hand, by the same way.
         const auto add = [&](std::unique_ptr<Method> method) {
-          loops.push_back(holding.chain ? safe_loop(std::move(method), held(), options.parameters)
-                                        : straight_loop(std::move(method), held()));
+          SafetyParameters safety;
+          safety.frame_work = holding.frame_work.value_or(no_limit);
+          loops.push_back(holding.frame_work
+                              ? safe_loop(std::move(method), held(), options.parameters, safety)
+                              : straight_loop(std::move(method), held()));
           meters.emplace_back(hand.ends);
         };
         add(make_method("ideal", {options.parameters, truth}));
@@ -137,8 +145,10 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
           Counted& counts = counted[m][h];
           for (std::size_t c = 0; c < meters[ruler].made.size(); ++c) {
             const double made = 1e3 * meters[ruler + 1 + m].made[c];
+            const double exact = 1e3 * meters[ruler].made[c];
             counts.sum += made;
-            counts.above.push_back(made - 1e3 * meters[ruler].made[c]);
+            counts.ruler += exact;
+            counts.above.push_back(made - exact);
           }
         }
       }
@@ -153,14 +163,15 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
       const auto add = [&](std::string_view measure, double value) {
         figures.push_back({contestants[m].name, holdings[h].loop, std::string(measure), value});
       };
+      constexpr double much = 1e3 * PortEnergy::least_made;  // [mJ]
+      const auto many = std::count_if(counts.above.begin(), counts.above.end(),
+                                      [](double above) { return above > much; });
       add("above", counts.above.back());
       add("above-99%", counts.above[n - 1 - n / 100]);
-      add("above-95%", counts.above[n - 1 - n / 20]);
       add("above-median", counts.above[n / 2]);
-      const auto many = std::count_if(counts.above.begin(), counts.above.end(),
-                                      [](double mj) { return mj > 0.1; });
-      add("above-0.1mJ", 100.0 * static_cast<double>(many) / static_cast<double>(n));
+      add("over-0.1mJ", 100.0 * static_cast<double>(many) / static_cast<double>(n));
       add("made", counts.sum / static_cast<double>(n));
+      add("exact", counts.ruler / static_cast<double>(n));
       add("contacts", static_cast<double>(n));
     }
   }

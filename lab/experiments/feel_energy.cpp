@@ -16,9 +16,8 @@
 namespace palpate::lab {
 namespace {
 
-constexpr double first = 2.0;           // [s] the chain's ramp and the first frames are over
-constexpr double clear = 0.015;         // [m] above the surface, before and after a contact
-constexpr int hands_a_camera_sees = 6;  // a way of holding
+constexpr double first = 2.0;    // [s] the chain's ramp and the first frames are over
+constexpr double clear = 0.015;  // [m] above the surface, before and after a contact
 constexpr int contacts_a_hand = 8;
 
 // Who holds what.
@@ -105,7 +104,7 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
         Uri("synthetic:plane?" + camera_options(distance, 0.3, "d4xx", seed)));
     const Truth truth = truth_of(std::make_shared<const Scene>(camera->scene()));
     std::vector<Presses> hands;
-    for (int i = 0; i < hands_a_camera_sees; ++i)
+    for (int i = 0; i < std::max(options.phases / 4, 1); ++i)
       hands.push_back(presses(1000 * seed + static_cast<std::uint64_t>(i)));
     std::vector<std::unique_ptr<TouchLoop>> loops;
     std::vector<Meter> meters;

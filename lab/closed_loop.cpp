@@ -141,9 +141,10 @@ std::unique_ptr<TouchLoop> straight_loop(std::unique_ptr<Method> method, HeldDev
 }
 
 std::unique_ptr<TouchLoop> safe_loop(std::unique_ptr<Method> method, HeldDevice held,
-                                     const Parameters& parameters) {
+                                     const Parameters& parameters, SafetyParameters safety) {
   ServoSettings settings;
   settings.parameters = parameters;
+  settings.safety = safety;
   settings.safety.initial_heat = 0.0;
   return std::make_unique<SafeLoop>(std::move(method), std::move(held), settings);
 }

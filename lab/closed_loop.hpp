@@ -59,7 +59,7 @@ std::unique_ptr<TouchLoop> straight_loop(std::unique_ptr<Method> method, HeldDev
 /// The cycle of a live session with its safety chain between method and device. The motors are
 /// cold at the start.
 std::unique_ptr<TouchLoop> safe_loop(std::unique_ptr<Method> method, HeldDevice held,
-                                     const Parameters& parameters);
+                                     const Parameters& parameters, SafetyParameters safety = {});
 
 /// Plays one camera to several loops, which have the same frames at the same ticks. The scenario's
 /// `hip` is not used.

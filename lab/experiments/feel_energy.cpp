@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The scene of `feel` that counts energy: hands that press and come off, again and again.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include <fmt/format.h>
@@ -14,9 +16,8 @@
 namespace palpate::lab {
 namespace {
 
-constexpr double first = 2.0;           // [s] the chain's ramp and the first frames are over
-constexpr double clear = 0.015;         // [m] above the surface, before and after a contact
-constexpr int hands_a_camera_sees = 6;  // a way of holding
+constexpr double first = 2.0;    // [s] the chain's ramp and the first frames are over
+constexpr double clear = 0.015;  // [m] above the surface, before and after a contact
 constexpr int contacts_a_hand = 8;
 
 // Who holds what.
@@ -24,11 +25,13 @@ struct Holding {
   std::string_view loop;
   std::string_view device;
   std::string_view grip;
-  bool chain;
+  std::optional<double> frame_work;  // [J] through the chain; none: without it
 };
+constexpr double no_limit = 1.0;  // [J]
 constexpr std::array holdings = {
-    Holding{"light", "touch", "light", false}, Holding{"firm", "touch", "firm", false},
-    Holding{"omega", "omega", "light", false}, Holding{"chain", "touch", "light", true}};
+    Holding{"light", "touch", "light", {}},  Holding{"firm", "touch", "firm", {}},
+    Holding{"omega", "omega", "light", {}},  Holding{"chain", "touch", "light", no_limit},
+    Holding{"tank", "touch", "light", 1e-4}, Holding{"tank-0", "touch", "light", 0.0}};
 
 // A hand's way, and when each of its contacts is over.
 struct Presses {
@@ -91,6 +94,7 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
   struct Counted {
     std::vector<double> above;  // [mJ]
     double sum = 0.0;           // [mJ]
+    double ruler = 0.0;         // [mJ] the same of the exact surface
   };
   std::vector<std::vector<Counted>> counted(contestants.size(),
                                             std::vector<Counted>(holdings.size()));
@@ -100,7 +104,7 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
         Uri("synthetic:plane?" + camera_options(distance, 0.3, "d4xx", seed)));
     const Truth truth = truth_of(std::make_shared<const Scene>(camera->scene()));
     std::vector<Presses> hands;
-    for (int i = 0; i < hands_a_camera_sees; ++i)
+    for (int i = 0; i < std::max(options.phases / 4, 1); ++i)
       hands.push_back(presses(1000 * seed + static_cast<std::uint64_t>(i)));
     std::vector<std::unique_ptr<TouchLoop>> loops;
     std::vector<Meter> meters;
@@ -113,8 +117,11 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
         };
         // The ruler first: an exact surface in the same hand, by the same way.
         const auto add = [&](std::unique_ptr<Method> method) {
-          loops.push_back(holding.chain ? safe_loop(std::move(method), held(), options.parameters)
-                                        : straight_loop(std::move(method), held()));
+          SafetyParameters safety;
+          safety.frame_work = holding.frame_work.value_or(no_limit);
+          loops.push_back(holding.frame_work
+                              ? safe_loop(std::move(method), held(), options.parameters, safety)
+                              : straight_loop(std::move(method), held()));
           meters.emplace_back(hand.ends);
         };
         add(make_method("ideal", {options.parameters, truth}));
@@ -137,8 +144,10 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
           Counted& counts = counted[m][h];
           for (std::size_t c = 0; c < meters[ruler].made.size(); ++c) {
             const double made = 1e3 * meters[ruler + 1 + m].made[c];
+            const double exact = 1e3 * meters[ruler].made[c];
             counts.sum += made;
-            counts.above.push_back(made - 1e3 * meters[ruler].made[c]);
+            counts.ruler += exact;
+            counts.above.push_back(made - exact);
           }
         }
       }
@@ -153,14 +162,15 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
       const auto add = [&](std::string_view measure, double value) {
         figures.push_back({contestants[m].name, holdings[h].loop, std::string(measure), value});
       };
+      constexpr double much = 1e3 * PortEnergy::least_made;  // [mJ]
+      const auto many = std::count_if(counts.above.begin(), counts.above.end(),
+                                      [](double above) { return above > much; });
       add("above", counts.above.back());
       add("above-99%", counts.above[n - 1 - n / 100]);
-      add("above-95%", counts.above[n - 1 - n / 20]);
       add("above-median", counts.above[n / 2]);
-      const auto many = std::count_if(counts.above.begin(), counts.above.end(),
-                                      [](double mj) { return mj > 0.1; });
-      add("above-0.1mJ", 100.0 * static_cast<double>(many) / static_cast<double>(n));
+      add("over-0.1mJ", 100.0 * static_cast<double>(many) / static_cast<double>(n));
       add("made", counts.sum / static_cast<double>(n));
+      add("exact", counts.ruler / static_cast<double>(n));
       add("contacts", static_cast<double>(n));
     }
   }

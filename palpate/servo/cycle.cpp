@@ -196,7 +196,9 @@ void Cycle::run(const Wake& wake) noexcept {
   const std::uint64_t resets = fault_resets_.load(std::memory_order_relaxed);
   const bool reset = std::exchange(fault_resets_done_, resets) != resets;
   if (reset) safety_.reset();
+  bool new_frame = false;
   if (const CapturedFrame* frame = frames_.take()) {
+    new_frame = true;
     adopt_frame(*frame, t);
   } else if (const auto& in_use = frames_.taken_last(); switched && in_use.cloud) {
     method_->frame(*in_use.cloud, in_use.stamp);
@@ -228,7 +230,10 @@ void Cycle::run(const Wake& wake) noexcept {
                    .hand = hand.present && !hand.clutched && !is_faulty(hand) && !jumped,
                    .frame_age = age.age,
                    .frame_intervals = age.intervals,
-                   .surface_velocity = tick.surface_velocity});
+                   .surface_velocity = tick.surface_velocity,
+                   .surface_motion = tick.surface_motion,
+                   .stiffness = parameters_.coupling.stiffness,
+                   .new_frame = new_frame});
   device_.write(workspace_.force_in_device(safe.force), t);
   const Placement& placement = workspace_.placement();
   const ServoEnergy& energy =

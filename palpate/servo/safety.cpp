@@ -35,10 +35,10 @@ constexpr double least_lever = 1e-3;
 constexpr double least_directed_force = 0.05;
 
 constexpr std::array<std::string_view, safety_flag_count> flag_names{
-    "input_refused",   "pull_removed",  "force_cut", "continuous_cut",    "slew_cut",
-    "oscillation_cut", "disengaged",    "ramping",   "frame_late",        "frame_fading",
-    "frame_lost",      "hand_too_fast", "stalled",   "direction_refused", "fault_latched",
-    "energy_cut",      "output_refused"};
+    "input_refused",   "pull_removed",   "force_cut",     "continuous_cut",    "slew_cut",
+    "oscillation_cut", "disengaged",     "ramping",       "frame_late",        "frame_fading",
+    "frame_lost",      "hand_too_fast",  "stalled",       "direction_refused", "fault_latched",
+    "energy_cut",      "output_refused", "correction_cut"};
 
 constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the device or the method gave a number that is not finite, or time ran backwards",
@@ -58,7 +58,9 @@ constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the method's surface normal contradicts the direction from the HIP to the proxy",
     "no force: repeated faults; an operator has to reset the safety chain",
     "the surface is softened because it kept up an oscillation",
-    "no force: the safety chain's own result broke its bounds; please report it"};
+    "no force: the safety chain's own result broke its bounds; please report it",
+    "the surface comes more slowly: a correction would have done more work on the hand than it "
+    "may"};
 
 using P = SafetyParameters;
 template <double P::*member>
@@ -100,6 +102,9 @@ constexpr std::array table{
                          "cycles in a row that generate energy, which are an oscillation"),
     row<&P::cut_memory>("cut_memory", "s", 30.0, 1.0, 600.0,
                         "time constant with which a cut for generated energy is forgotten"),
+    row<&P::frame_work>("frame_work", "J", 1.0, 0.0, 1.0,
+                        "work that a frame's corrections may do on the hand, beside what the "
+                        "contact has dissipated; 1: no limit"),
     row<&P::engage_force>("engage_force", "N", 0.2, 0.0, 3.0,
                           "the hand engages while less than this is asked for"),
     row<&P::engage_ticks>("engage_ticks", "ticks", 10.0, 1.0, 1e5,
@@ -347,6 +352,27 @@ double SafetyChain::ceiling(const SafetyInput& input, double demand,
   return ceiling;
 }
 
+// The share of the force that corrections of the surface may put into the hand's contact.
+double SafetyChain::within_the_tank(const SafetyInput& input, const Vec3& force, double since_last,
+                                    std::uint32_t& flags) noexcept {
+  constexpr double no_limit = 1.0;  // [J]
+  if (!has(correction_cut) || !(parameters_.frame_work < no_limit)) {
+    tank_.restart();
+    return 1.0;
+  }
+  if (since_last > parameters_.stall_time) tank_.restart();
+  const double share = tank_.run({.dt = since_last,
+                                  .hip = input.hip,
+                                  .surface = input.surface_motion,
+                                  .force = force,
+                                  .last = last_force_,
+                                  .stiffness = input.stiffness,
+                                  .new_frame = input.new_frame,
+                                  .frame_work = parameters_.frame_work});
+  if (share < 1.0) flags |= correction_cut;
+  return share;
+}
+
 // Shrinks along the last force at fall_rate and changes otherwise at rise_rate.
 Vec3 SafetyChain::slewed(const Vec3& force, double rise, double fall) const noexcept {
   const double last = last_force_.norm();
@@ -381,7 +407,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   const bool in_order = std::isfinite(input.t) && (!last_t_ || input.t >= *last_t_);
   const bool sound = in_order && is_sound(input.force) && is_sound(input.normal) &&
                      is_sound(input.hip) && is_sound(input.proxy) && is_sound(input.position) &&
-                     std::abs(input.surface_velocity) <= largest;
+                     std::abs(input.surface_velocity) <= largest && is_sound(input.surface_motion);
   const double since_last = in_order && last_t_ ? input.t - *last_t_ : 0.0;
   const double dt = std::min(since_last, longest_credit);
   fault_clock_ += since_last;
@@ -409,11 +435,13 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     gain_ = has(ramping) ? std::min(most, gain_ + dt / parameters_.ramp_time) : most;
     if (gain_ < most) flags |= ramping;
     force *= gain_;
+    force *= within_the_tank(input, force, since_last, flags);
   } else {
     gain_ = 0.0;
     engaged_ = false;
     quiet_ticks_ = 0.0;
     energy_.restart();
+    tank_.restart();
     if (latched_by_ != 0) flags |= fault_latched;
   }
 

@@ -24,7 +24,7 @@ enum Format : std::uint8_t { depth = 0, depth_with_rays = 1, points = 2 };
 
 constexpr std::size_t frame_header_size = 96;
 constexpr std::size_t ticks_header_size = 88;
-constexpr std::size_t sample_size = 20;
+constexpr std::size_t sample_size = 28;
 constexpr std::size_t hand_size = 32;
 constexpr std::size_t shown_size = 8;
 
@@ -143,6 +143,7 @@ ViewerMessage ticks_message(const TickBatch& batch) {
   for (const TickSample& sample : samples.last(count)) {
     writer.put_float(batch.t - sample.t).put(sample.force).put(sample.penetration);
     writer.put(sample.steps).put(sample.tick_time);
+    writer.put(sample.relative).put(sample.absolute);
   }
   return message;
 }

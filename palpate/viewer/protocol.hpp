@@ -67,6 +67,8 @@ struct TickSample {
   float penetration = 0.0F;  ///< [m] largest depth of the HIP below the surface; 0: above it
   float steps = 0.0F;        ///< most
   float tick_time = 0.0F;    ///< [s] longest, of the thread's own time
+  float relative = 0.0F;     ///< [J] given to the hand in this contact, relative to the surface
+  float absolute = 0.0F;     ///< [J] the same with the surface's own motion
 };
 
 /// The newest tick, and what happened since the message before.

@@ -23,6 +23,10 @@ using nlohmann::json;
 
 constexpr double samples_per_second = 200.0;  // of the page's plots
 
+json energy_of(const PortEnergy& port) {
+  return {{"made", port.made}, {"generating", port.generating}};
+}
+
 json row_json(std::string_view name, std::string_view symbol, std::string_view unit,
               double default_value, double min, double max, std::string_view meaning,
               std::string_view source) {
@@ -196,6 +200,10 @@ std::string SessionHost::state() {
               {"latched_by", latched_by},
               {"flag_ticks", state.summary.flag_ticks},
               {"pop_throughs", state.summary.pop_throughs},
+              {"energy",
+               {{"contacts", state.summary.energy.contacts},
+                {"relative", energy_of(state.summary.energy.relative)},
+                {"absolute", energy_of(state.summary.energy.absolute)}}},
               {"recording", recording}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }

@@ -41,6 +41,8 @@ void TickBatcher::add(const ServoTick& record, double contact_radius) {
   sample_.steps = std::max(sample_.steps, static_cast<float>(tick.steps));
   sample_.tick_time =
       std::max(sample_.tick_time, 1e-9F * static_cast<float>(record.previous_compute_ns));
+  sample_.relative = static_cast<float>(record.energy.relative.excess);
+  sample_.absolute = static_cast<float>(record.energy.absolute.excess);
   if (++pending_ < ticks_per_sample_) return;
   batch_.samples.push_back(std::exchange(sample_, {}));
   pending_ = 0;

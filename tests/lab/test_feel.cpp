@@ -246,6 +246,35 @@ TEST(Feel, MeasuresFrictionThatIsWrongAndHandsThatCreep) {
   EXPECT_NEAR(figure_of(sticks, "light", "drift"), 0.5 * 600.0 / 700.0, 0.02);
 }
 
+TEST(Feel, CountsTheEnergyThatAMethodGivesBeyondAnExactSurface) {
+  // Pushes 0.6 N harder out than in.
+  struct Way {
+    double height = 0.0;
+    bool out = false;
+  };
+  const Contestant pushing{"pushing", [](const MethodSetup& setup) {
+                             auto last = std::make_shared<Way>();
+                             return std::make_unique<Plane>(setup, [last](Tick& tick) {
+                               const double z = tick.hip.z();
+                               if (std::abs(z - last->height) > 1e-4) *last = {z, z > last->height};
+                               if (last->out && !tick.force.isZero()) tick.force.z() += 0.6;
+                             });
+                           }};
+  const FeelFigures figures = play_energy({plane_with(), pushing}, once(), 0.7);
+  const auto figure = [&](std::string_view method, std::string_view loop,
+                          std::string_view measure) {
+    return figure_of(figures, loop, measure, method);
+  };
+  EXPECT_EQ(figure("plane", "light", "contacts"), 8.0);
+  for (const char* loop : {"light", "firm", "omega", "chain", "tank", "tank-0"}) {
+    EXPECT_LT(std::abs(figure("plane", loop, "above")), 0.02) << loop;
+    EXPECT_GT(figure("pushing", loop, "above"), figure("plane", loop, "above")) << loop;
+  }
+  EXPECT_GT(figure("pushing", "light", "above-median"), 0.5) << "0.6 N over some millimetres";
+  EXPECT_EQ(figure("pushing", "light", "over-0.1mJ"), 100.0);
+  EXPECT_LT(figure("pushing", "tank-0", "above"), 0.1) << "what is not pressed in is not given";
+}
+
 TEST(Feel, JudgesTheScenesThatAreAskedFor) {
   const test::TemporaryFolder folder;
   ExperimentOptions options;

@@ -98,10 +98,11 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   batch.gain = 0.25;
   batch.asked_force = 10.0;
   for (std::size_t i = 0; i < TickBatch::max_samples + 10; ++i)
-    batch.samples.push_back({100.0 - 0.001 * static_cast<double>(i), 1.0F, 0.5F, 2.0F, 3e-6F});
+    batch.samples.push_back(
+        {100.0 - 0.001 * static_cast<double>(i), 1.0F, 0.5F, 2.0F, 3e-6F, 4e-4F, -5e-4F});
   const ViewerMessage message = ticks_message(batch);
   EXPECT_EQ(at<std::uint16_t>(message.head, 2), TickBatch::max_samples);
-  ASSERT_EQ(message.head.size(), 88 + 20 * TickBatch::max_samples);
+  ASSERT_EQ(message.head.size(), 88 + 28 * TickBatch::max_samples);
   EXPECT_EQ(at<std::uint32_t>(message.head, 4), 5u);
   EXPECT_EQ(at<double>(message.head, 8), 100.0);
   EXPECT_EQ(at<std::uint32_t>(message.head, 16), 1u << 12);
@@ -111,6 +112,8 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   EXPECT_EQ(at<float>(message.head, 84), 10.0F);
   EXPECT_NEAR(at<float>(message.head, 88), 0.010, 1e-6) << "the first ten are the oldest";
   EXPECT_EQ(at<float>(message.head, 88 + 16), 3e-6F);
+  EXPECT_EQ(at<float>(message.head, 88 + 20), 4e-4F);
+  EXPECT_EQ(at<float>(message.head, 88 + 24), -5e-4F);
 }
 
 TEST(Protocol, UnderstandsAHandThatIsHeldOrLetGo) {

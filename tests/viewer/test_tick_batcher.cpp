@@ -55,6 +55,8 @@ TEST(TickBatcher, KeepsTheExtremesOfEachSample) {
     ServoTick record = tick_at(0.001 * i);
     record.force = Vec3(0.0, 0.0, i == 1 ? 3.0 : 1.0);
     record.tick.steps = i == 2 ? 9 : 1;
+    record.energy.relative.excess = 1e-4 * i;
+    record.energy.absolute.excess = -1e-3 * i;
     record.previous_compute_ns = i == 0 ? 4000 : 1000;
     record.tick.state = i == 4 ? ContactState::contact : ContactState::free_motion;
     record.tick.proxy = Vec3(0.0, 0.0, r_c);
@@ -69,6 +71,8 @@ TEST(TickBatcher, KeepsTheExtremesOfEachSample) {
   EXPECT_EQ(batch->samples[0].force, 3.0F);
   EXPECT_EQ(batch->samples[0].steps, 9.0F);
   EXPECT_FLOAT_EQ(batch->samples[0].tick_time, 4e-6F);
+  EXPECT_FLOAT_EQ(batch->samples[0].relative, 2e-4F) << "of its last tick";
+  EXPECT_FLOAT_EQ(batch->samples[1].absolute, -5e-3F);
   EXPECT_EQ(batch->samples[0].penetration, 0.0F) << "free: the hand is not in anything";
   EXPECT_FLOAT_EQ(batch->samples[1].penetration, 0.004F);
   batcher.add(tick_at(0.007), r_c);

@@ -412,6 +412,12 @@ export class Panel {
       ["Frames used", servo.frames_adopted.toLocaleString("en")],
       ["Frames overtaken", servo.frames_dropped.toLocaleString("en")],
       ["Pop-throughs", `${state.pop_throughs} suspected`],
+      [
+        "Energy made",
+        `${(1e3 * state.energy.relative.made).toFixed(1)} mJ in ` +
+          `${state.energy.contacts.toLocaleString("en")} contacts, ` +
+          `above 0.1 mJ in ${state.energy.relative.generating.toLocaleString("en")}`,
+      ],
       ["Recording", state.recording.path ?? (state.recording.message || "off")],
       ["This page", roleNames[state.role].name],
       ["Version", this.hello?.version ?? ""],

@@ -15,6 +15,8 @@ interface Quantity {
   digits: number;
   /** what the axis shows at least */
   least: number;
+  /** it may be below 0 */
+  signed?: true;
 }
 
 const QUANTITIES: readonly Quantity[] = [
@@ -26,6 +28,24 @@ const QUANTITIES: readonly Quantity[] = [
     of: (s) => 1e3 * s.penetration,
     digits: 1,
     least: 2,
+  },
+  {
+    title: "Energy given in this contact",
+    unit: "mJ",
+    colour: "--force",
+    of: (s) => 1e3 * s.relative,
+    digits: 2,
+    least: 0.5,
+    signed: true,
+  },
+  {
+    title: "… with the surface's own motion",
+    unit: "mJ",
+    colour: "--hip",
+    of: (s) => 1e3 * s.absolute,
+    digits: 2,
+    least: 0.5,
+    signed: true,
   },
   { title: "Steps a tick", unit: "", colour: "--calm", of: (s) => s.steps, digits: 0, least: 4 },
   {
@@ -130,7 +150,10 @@ export class Plots {
           scales: {
             x: { time: false, range: [-SPAN, 0] },
             y: {
-              range: (_, __, max) => [0, 1.08 * Math.max(max ?? 0, quantity.least)],
+              range: (_, min, max) => [
+                quantity.signed ? 1.08 * Math.min(min ?? 0, -quantity.least) : 0,
+                1.08 * Math.max(max ?? 0, quantity.least),
+              ],
             },
           },
           axes: [

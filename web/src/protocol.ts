@@ -8,7 +8,7 @@ const Format = { depth: 0, depthWithRays: 1, points: 2 } as const;
 
 const FRAME_HEADER = 96;
 const TICKS_HEADER = 88;
-const SAMPLE_FLOATS = 5;
+const SAMPLE_FLOATS = 7;
 const RAYS_HEADER = 12;
 const PATH_HEADER = 8;
 const HAND_BYTES = 32;
@@ -72,6 +72,10 @@ export interface Sample {
   steps: number;
   /** [s] of the servo thread's own time for a tick */
   tickTime: number;
+  /** [J] given to the hand in this contact, relative to the surface; below 0: taken from it */
+  relative: number;
+  /** [J] the same with the surface's own motion */
+  absolute: number;
 }
 
 /** Where a distorted lens's pixels look: (x, y) of the ray (x, y, 1), NaN for none. */
@@ -139,13 +143,18 @@ function decodeTicks(buffer: ArrayBuffer, view: DataView): Ticks {
   const values = new Float32Array(buffer, TICKS_HEADER);
   const samples: Sample[] = [];
   for (let i = 0; i < values.length; i += SAMPLE_FLOATS) {
-    const [before, force, penetration, steps, tickTime] = values.subarray(i, i + SAMPLE_FLOATS);
+    const [before, force, penetration, steps, tickTime, relative, absolute] = values.subarray(
+      i,
+      i + SAMPLE_FLOATS,
+    );
     samples.push({
       t: t - before!,
       force: force!,
       penetration: penetration!,
       steps: steps!,
       tickTime: tickTime!,
+      relative: relative!,
+      absolute: absolute!,
     });
   }
   return {
@@ -283,6 +292,14 @@ export interface CameraState {
   time: number;
 }
 
+/** What went through the device, relative to the surface or with the surface's own motion. */
+export interface PortEnergy {
+  /** [J] */
+  made: number;
+  /** contacts that made more than 0.1 mJ */
+  generating: number;
+}
+
 /** How recordings are played. */
 export interface Playback {
   paused: boolean;
@@ -324,6 +341,8 @@ export interface State {
   /** how many ticks had each flag */
   flag_ticks: number[];
   pop_throughs: number;
+  /** that the forces sent have given to the hand, in all contacts */
+  energy: { contacts: number; relative: PortEnergy; absolute: PortEnergy };
   recording: {
     possible: boolean;
     path: string | null;

@@ -79,6 +79,10 @@ const RULES: readonly [flag: string, say: (facts: Facts) => string][] = [
     "pull_removed",
     ({ tick }) => (differs(tick) ? "The part that pulled into the surface is removed." : ""),
   ],
+  [
+    "correction_cut",
+    ({ tick }) => (differs(tick) ? "Coming slowly: the surface was corrected under the hand." : ""),
+  ],
   ["slew_cut", ({ tick }) => (differs(tick) ? "Changing as fast as it may." : "")],
 ];
 

@@ -34,7 +34,7 @@ function frameMessage(
 }
 
 function ticksMessage(samples: number[][]): ArrayBuffer {
-  const buffer = new ArrayBuffer(88 + 20 * samples.length);
+  const buffer = new ArrayBuffer(88 + 28 * samples.length);
   const view = new DataView(buffer);
   view.setUint8(0, 2);
   view.setUint8(1, 1);
@@ -108,8 +108,8 @@ describe("ticks", () => {
   test("carry the newest tick and samples with their times", () => {
     const ticks = decode(
       ticksMessage([
-        [0.01, 1, 2, 3, 4],
-        [0, 5, 6, 7, 8],
+        [0.01, 1, 2, 3, 4, 5, 6],
+        [0, 5, 6, 7, 8, 9, 10],
       ]),
     ) as Ticks;
     expect(ticks).toMatchObject({ state: 1, flags: 0x80000001, safety: 64, steps: 7, t: 100 });
@@ -118,11 +118,14 @@ describe("ticks", () => {
     expect(ticks.frame).toBe(-1);
     expect(ticks).toMatchObject({ gain: 0.5, askedForce: 12 });
     expect(ticks.samples[0]!.t).toBeCloseTo(99.99);
-    expect(ticks.samples[1]).toEqual({ t: 100, force: 5, penetration: 6, steps: 7, tickTime: 8 });
+    expect(ticks.samples[1]).toEqual({
+      ...{ t: 100, force: 5, penetration: 6, steps: 7, tickTime: 8 },
+      ...{ relative: 9, absolute: 10 },
+    });
   });
 
   test("are refused when they are cut short", () => {
-    expect(() => decode(ticksMessage([[1, 2, 3, 4, 5]]).slice(0, 100))).toThrow("cut short");
+    expect(() => decode(ticksMessage([[1, 2, 3, 4, 5, 6, 7]]).slice(0, 100))).toThrow("cut short");
   });
 });
 

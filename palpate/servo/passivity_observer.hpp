@@ -67,12 +67,14 @@ class PassivityObserver {
     way("passivity.handle", self.handle_);
     way("passivity.hip", self.hip_);
     way("passivity.sent", self.sent_);
-    for (auto* port : {&self.energy_.relative, &self.energy_.absolute}) {
-      way("passivity.excess", port->excess);
-      way("passivity.most", port->most);
-      way("passivity.made", port->made);
-      way("passivity.generating", port->generating);
-    }
+    way("passivity.relative.excess", self.energy_.relative.excess);
+    way("passivity.relative.most", self.energy_.relative.most);
+    way("passivity.relative.made", self.energy_.relative.made);
+    way("passivity.relative.generating", self.energy_.relative.generating);
+    way("passivity.absolute.excess", self.energy_.absolute.excess);
+    way("passivity.absolute.most", self.energy_.absolute.most);
+    way("passivity.absolute.made", self.energy_.absolute.made);
+    way("passivity.absolute.generating", self.energy_.absolute.generating);
     way("passivity.contacts", self.energy_.contacts);
   }
 

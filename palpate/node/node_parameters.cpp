@@ -47,7 +47,7 @@ bool is_within(const std::string& name, const std::string& prefix, std::uint64_t
   const std::string begin = prefix.empty() ? "" : prefix + ".";
   if (!name.starts_with(begin)) return false;
   const auto dots =
-      std::count(name.begin() + static_cast<std::ptrdiff_t>(prefix.size()), name.end(), '.');
+      std::count(name.begin() + static_cast<std::ptrdiff_t>(begin.size()), name.end(), '.');
   return depth == 0 || static_cast<std::uint64_t>(dots) < depth;
 }
 

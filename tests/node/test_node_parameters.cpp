@@ -84,6 +84,7 @@ TEST_F(NodeParametersTest, ListsByPrefixAndDepth) {
   const auto safety = parameters_.list({"safety"}, 0);
   EXPECT_TRUE(has(safety.names, "safety.max_speed"));
   EXPECT_FALSE(has(safety.names, "method"));
+  EXPECT_EQ(parameters_.list({"safety"}, 1).names, safety.names);  // its direct children
   EXPECT_EQ(parameters_.list({"method"}, 1).names, std::vector<std::string>{"method"});
   EXPECT_TRUE(parameters_.list({"meth"}, 0).names.empty());
 }

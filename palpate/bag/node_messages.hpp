@@ -83,12 +83,12 @@ struct DiagnosticArray {
   template <class Way, class Self>
   static void walk(Way& way, Self& m) {
     walk_stamped(way, m.header);
-    way.sequence(m.status, 17, [&way](auto& status) {
-      way.number(status.level);
-      way.text(status.name);
-      way.text(status.message);
-      way.text(status.hardware_id);
-      way.sequence(status.values, 8, [&way](auto& value) {
+    way.sequence(m.status, 17, [&way](auto& each) {
+      way.number(each.level);
+      way.text(each.name);
+      way.text(each.message);
+      way.text(each.hardware_id);
+      way.sequence(each.values, 8, [&way](auto& value) {
         way.text(value.key);
         way.text(value.value);
       });

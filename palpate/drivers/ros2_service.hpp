@@ -66,7 +66,7 @@ class Service {
   [[nodiscard]] Guid writer() const { return replies_.guid(); }
 
  private:
-  static constexpr double patience = 2.0;  // [s]
+  static constexpr double patience = 10.0;  // [s] as a busy machine may need
   static constexpr std::size_t most_waiting = 64;
 
   struct Waiting {

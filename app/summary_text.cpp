@@ -53,9 +53,9 @@ std::string text_of(const Summary& summary, std::span<const CameraStatus> camera
     text += fmt::format(", points thinned in {} ticks", thinned);
   if (const ServoEnergy& energy = summary.energy; energy.contacts > 0)
     text += fmt::format(
-        "; energy made beside the surface's motion: {:.2f} mJ in {} contacts, {:.2f} mJ in the "
-        "worst, more than {:.1f} mJ in {}",
-        1e3 * energy.relative.made, energy.contacts, 1e3 * summary.worst_relative,
+        "; contacts {}, energy made beside the surface's motion {:.2f} mJ, {:.2f} mJ in the worst, "
+        "more than {:.1f} mJ in {}",
+        energy.contacts, 1e3 * energy.relative.made, 1e3 * summary.worst_relative,
         1e3 * PortEnergy::least_made, energy.relative.generating);
   text += "\n";
   for (const CameraStatus& camera : cameras) text += camera_line(camera);

@@ -153,8 +153,10 @@ def ripple(forces):
     return math.sqrt(total / len(forces))
 
 
-def measure(options, program):
-    """One session over the link. @return (the row's values, what the session said)."""
+def measure(options, program, again=5):
+    """One session over the link, for a table once more where this machine was too busy for it.
+
+    Returns the values of its line by their names."""
     link = None if options.loopback else Link(options)
     environment = dict(os.environ)
     if options.loopback:
@@ -206,10 +208,12 @@ def measure(options, program):
     without = sum(force < 0.2 * usual for force in forces)
     back = None
     if options.down:
-        again = start + down_at + seconds
-        later = [tick[0] for tick in ticks if tick[0] > again and tick[2] > 0.8 * usual]
-        back = later[0] - again if later else math.inf
+        up = start + down_at + seconds
+        later = [tick[0] for tick in ticks if tick[0] > up and tick[2] > 0.8 * usual]
+        back = later[0] - up if later else math.inf
     if sum(int(tick[5]) >> STALLED & 1 for tick in pressed):
+        if options.table and again > 0:
+            return measure(options, program, again - 1)
         print("poor_link: a busy machine: the session's own ticks came late", file=sys.stderr)
     return {"frames/s": f"{frames:.1f}", "age p50": f"{ages[len(ages) // 2]:.0f} ms",
             "p99": f"{ages[len(ages) * 99 // 100]:.0f} ms",

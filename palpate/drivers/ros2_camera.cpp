@@ -199,14 +199,17 @@ class SliceReader {
     const double delay = image.last_slice - image.stamp;  // and what the clocks differ by
     least_delay_ = std::min(delay, least_delay_ + least_growth * (image.last_slice - last_slice_));
     last_slice_ = image.last_slice;
-    lateness_ = std::max(lateness_, delay - least_delay_);
+    lateness_[0] = std::min(lateness_[0], delay - least_delay_);
   }
 
   void report(double now) {
     if (now < next_report_ || expected_ == 0.0) return;
     next_report_ = now + report_pause;
-    reports_.write(ros::Float64MultiArray{"received,lateness", {received_ / expected_, lateness_}});
-    expected_ = received_ = lateness_ = 0.0;
+    const double lateness = *std::min_element(lateness_.begin(), lateness_.end());
+    reports_.write(ros::Float64MultiArray{"received,lateness", {received_ / expected_, lateness}});
+    expected_ = received_ = 0.0;
+    std::rotate(lateness_.begin(), lateness_.end() - 1, lateness_.end());
+    lateness_[0] = std::numeric_limits<double>::infinity();
   }
 
   dds::Reader slices_;
@@ -214,9 +217,11 @@ class SliceReader {
   SliceAssembler assembler_;
   ros::Header header_;  // of the last slice
   std::string format_;
-  std::optional<std::uint32_t> number_;                           // of the last image
-  double expected_ = 0.0, received_ = 0.0;                        // rows since the last report
-  double lateness_ = 0.0;                                         // [s] largest since then
+  std::optional<std::uint32_t> number_;     // of the last image
+  double expected_ = 0.0, received_ = 0.0;  // rows since the last report
+  // [s] least since the last report, and before the two before: a queue that does not empty makes
+  // all of them late, a link that holds some of them up does not
+  std::array<double, 3> lateness_{};
   double least_delay_ = std::numeric_limits<double>::infinity();  // [s]
   double last_slice_ = 0.0, next_report_ = 0.0;                   // [s, monotonic]
 };

@@ -12,7 +12,10 @@ constexpr double most_lateness = 0.06;   // [s] beyond which a queue fills: more
 constexpr double cut = 0.7;              // [-] what is left of the rate
 constexpr double growth = 2.0;           // [Hz/s]
 constexpr double settling = 0.5;         // [s] until a cut shows: a queue's 0.25 s and a way back
-constexpr double rate_weight = 0.1;      // of a new interval in the usual rate
+// of a new report in the usual share: images that a link held up come at once, and some are lost
+// then where nothing is too many in the long run
+constexpr double report_weight = 0.15;
+constexpr double rate_weight = 0.1;  // of a new interval in the usual rate
 
 }  // namespace
 
@@ -20,12 +23,14 @@ void SendRate::report(double now, double received, double lateness) {
   const double passed = std::clamp(now - last_report_, 0.0, 0.2);
   last_report_ = now;
   if (!std::isfinite(received) || !std::isfinite(lateness)) return;
-  if (received >= least_received && lateness <= most_lateness) {
+  received_ += report_weight * (std::clamp(received, 0.0, 1.0) - received_);
+  if (received_ >= least_received && lateness <= most_lateness) {
     limit_ = std::min(limit_ + growth * passed, fastest);
   } else if (now - last_cut_ > settling) {
     const double usual = sent_ > 0.0 ? std::min(limit_, sent_) : limit_;
     limit_ = std::max(cut * usual, slowest);
     last_cut_ = now;
+    received_ = 1.0;
   }
 }
 

@@ -5,14 +5,15 @@ namespace palpate {
 
 /// How many images a second a link carries, from what the readers at its other end report: fewer
 /// when images come incomplete or ever later, as they do where a link's queue fills up, and a
-/// little more each second when they do not. What is lost by chance, up to 15 %, does not count.
+/// little more each second when they do not. What is lost by chance, up to 15 % of half a second,
+/// does not count.
 ///
 /// Values in, values out: no clock, no thread.
 class SendRate {
  public:
   /// @param now       [s]
   /// @param received  share of the slices that came, 0 to 1
-  /// @param lateness  [s] of the images, more than the least that was seen
+  /// @param lateness  [s] of all images lately, more than the least that was seen
   void report(double now, double received, double lateness);
 
   /// May the image that is captured now be sent? Counts it if it may.
@@ -26,6 +27,7 @@ class SendRate {
 
   double limit_ = fastest;
   double sent_ = 0.0;         // [Hz] lately
+  double received_ = 1.0;     // share, lately
   double next_ = 0.0;         // [s] from which on an image may be sent
   double last_sent_ = 0.0;    // [s]
   double last_report_ = 0.0;  // [s]

@@ -47,6 +47,23 @@ TEST(StampPlacer, TakesAKnownClockAsItIs) {
   EXPECT_NEAR(monotonic.latency(), 0.07, 0.01) << "the whole latency is known";
 }
 
+// A link that loses images and holds others up by more than a period changes nothing about when
+// they were captured.
+TEST(StampPlacer, TakesAKnownClockAsItIsHoweverImagesCome) {
+  StampPlacer placer(StampClock::monotonic);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> delay(0.07, 0.13);
+  double arrival = 0.0;
+  for (int k = 0; k < 3000; ++k) {
+    const double captured = 50.0 + k * period;
+    arrival = std::max(arrival + 1e-4, captured + delay(random));
+    if (random() % 3 == 0) continue;
+    const PlacedStamp placed = placer.place(captured, arrival);
+    EXPECT_EQ(placed.problem, StampProblem::none) << k;
+    EXPECT_DOUBLE_EQ(placed.time, captured) << k;
+  }
+}
+
 TEST(StampPlacer, UsesTheArrivalWhereAKnownClockCannotBeTrue) {
   for (const double off : {3600.0, -3600.0, 0.5, -15.0}) {
     StampPlacer placer(StampClock::monotonic);

@@ -98,8 +98,8 @@ StampProblem StampPlacer::judge(double stamp, double arrival) const {
   const bool settles = !is_known_ && arrival < settled_ && age > -deepest_settling;
   if (age < -options_.jump && !settles) return StampProblem::from_the_future;
   if (age > options_.max_age) return StampProblem::too_old;
-  // A clock set back by less than a period: the stamps' interval is off, the arrivals' is not. Where
-  // the clock is known it is a link that lost images and held others up.
+  // A clock set back by less than a period: the stamps' interval is off, the arrivals' is not.
+  // Where the clock is known it is a link that lost images and held others up.
   if (is_known_) return StampProblem::none;
   const double interval = stamp - last_stamp_;
   const double lost = arrival - last_arrival_ - interval;

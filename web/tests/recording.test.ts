@@ -5,9 +5,9 @@ import { execFileSync } from "node:child_process";
 import { existsSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { ros2humble } from "@foxglove/rosmsg-msgs-common";
 import { MessageReader } from "@foxglove/rosmsg2-serialization";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
+import { definitions } from "./definitions";
 
 const PYTHON = "/usr/bin/python3"; // whose sqlite3 is another reader than the program's
 const program = process.env.PALPATE;
@@ -27,20 +27,6 @@ for row in bag.execute("select name, type, timestamp, data from messages"
                        " join topics on topics.id = topic_id order by messages.id"):
     print(json.dumps([row[0], row[1], str(row[2]), base64.b64encode(row[3]).decode()]))
 `;
-
-// The definition of a type and of all that it is made of.
-function definitions(type: string): any[] {
-  const found = new Map<string, any>();
-  const add = (name: string) => {
-    const definition = (ros2humble as Record<string, any>)[name];
-    if (!definition || found.has(name)) return;
-    found.set(name, { ...definition, name: found.size === 0 ? undefined : name });
-    for (const field of definition.definitions) if (field.isComplex) add(field.type);
-  };
-  add(type.replace("/msg/", "/"));
-  if (found.size === 0) throw new Error(`ROS 2 has no ${type}`);
-  return [...found.values()];
-}
 
 function read(file: string): Message[] {
   const rows = execFileSync(PYTHON, ["-B", "-c", DUMP, file], { maxBuffer: 1 << 28 });
@@ -116,7 +102,7 @@ describe.skipIf(!program || !existsSync(PYTHON))("a recording", () => {
     expect([info.width, info.height]).toEqual([160, 120]);
     expect(info.distortion_model).toBe("plumb_bob");
     const image = of("/camera_0/depth/image_raw/compressedDepth")[0]!.value;
-    expect(image.format).toBe("16UC1; compressedDepth png");
+    expect(image.format).toBe("16UC1; compressedDepth png; units_per_metre=10000");
     expect(image.header).toEqual({ ...info.header, frame_id: "camera_0_optical_frame" });
     const png = Buffer.from(image.data).subarray(12);
     expect(png.subarray(1, 4).toString()).toBe("PNG");

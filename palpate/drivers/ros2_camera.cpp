@@ -206,7 +206,10 @@ class SliceReader {
     if (now < next_report_ || expected_ == 0.0) return;
     next_report_ = now + report_pause;
     const double lateness = *std::min_element(lateness_.begin(), lateness_.end());
-    reports_.write(ros::Float64MultiArray{"received,lateness", {received_ / expected_, lateness}});
+    const auto heard = static_cast<double>(assembler_.rows_heard() - rows_reported_);
+    rows_reported_ = assembler_.rows_heard();
+    reports_.write(ros::Float64MultiArray{"received,lateness,heard",
+                                          {received_ / expected_, lateness, heard / expected_}});
     expected_ = received_ = 0.0;
     std::rotate(lateness_.begin(), lateness_.end() - 1, lateness_.end());
     lateness_[0] = std::numeric_limits<double>::infinity();
@@ -223,7 +226,8 @@ class SliceReader {
   // all of them late, a link that holds some of them up does not
   std::array<double, 3> lateness_{};
   double least_delay_ = std::numeric_limits<double>::infinity();  // [s]
-  double last_slice_ = 0.0, next_report_ = 0.0;                   // [s, monotonic]
+  std::uint64_t rows_reported_ = 0;
+  double last_slice_ = 0.0, next_report_ = 0.0;  // [s, monotonic]
 };
 
 class Camera final : public LiveCamera {

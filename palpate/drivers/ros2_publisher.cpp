@@ -8,6 +8,8 @@
 #include <cmath>
 #include <mutex>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
@@ -91,9 +93,9 @@ struct Ros2CameraPublisher::Topics {
       participant.wait(longest_wait);
       try {
         while (const auto report = reports.take<ros::Float64MultiArray>()) {
-          if (report->data.size() != 2) continue;
+          if (report->data.size() != 3) continue;
           const std::lock_guard lock(rate_mutex);
-          rate.report(monotonic_now(), report->data[0], report->data[1]);
+          rate.report(monotonic_now(), report->data[0], report->data[1], report->data[2]);
         }
         while (const auto question = questions.take<ros::TimeReference>())
           answers.write(ros::TimeReference{.header = {wall_clock(), ""},
@@ -104,9 +106,10 @@ struct Ros2CameraPublisher::Topics {
     }
   }
 
-  bool may_send_slices() {
+  // How often the slices of an image that is captured now are to be sent.
+  int copies() {
     const std::lock_guard lock(rate_mutex);
-    return rate.allows(monotonic_now());
+    return rate.allows(monotonic_now()) ? rate.copies() : 0;
   }
 
   std::string name;
@@ -144,12 +147,17 @@ void Ros2CameraPublisher::publish(const DepthImage& image, double stamp) {
                                                : encode_depth_png(k.width, k.height, image.depth()),
                                            image.units_per_metre(), topics_->packing));
   }
-  if (topics_->slices.readers() > 0 && topics_->may_send_slices()) {
-    encode_depth_slices(
-        topics_->number++, k.width, k.height, image.depth(), [&](std::span<const std::byte> slice) {
-          topics_->slices.write(depth_slice(header, slice, image.units_per_metre()));
-        });
-  }
+  const int copies = topics_->slices.readers() > 0 ? topics_->copies() : 0;
+  if (copies == 0) return;
+  // Copies come when all have been sent once: a link often loses some in a row
+  std::vector<ros::CompressedImage> again;
+  encode_depth_slices(topics_->number++, k.width, k.height, image.depth(),
+                      [&](std::span<const std::byte> slice) {
+                        auto message = depth_slice(header, slice, image.units_per_metre());
+                        topics_->slices.write(message);
+                        if (copies > 1) again.push_back(std::move(message));
+                      });
+  for (const ros::CompressedImage& message : again) topics_->slices.write(message);
 }
 
 const std::string& Ros2CameraPublisher::topic() const {

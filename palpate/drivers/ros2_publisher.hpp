@@ -15,8 +15,8 @@ namespace palpate {
 /// clock and the question's own time and source.
 std::string clock_question_topic(const std::string& camera);
 std::string clock_answer_topic(const std::string& camera);
-/// Where those that read slices say how they come: Float64MultiArray, share that came (0 to 1) and
-/// lateness [s] (SendRate).
+/// Where those that read slices say how they come: Float64MultiArray with what SendRate::report
+/// takes.
 std::string report_topic(const std::string& camera);
 
 /// Publishes depth images as a camera of ROS 2: /NAME/depth/image_raw/compressedDepth (to the bit),

@@ -15,17 +15,29 @@ constexpr double settling = 0.5;         // [s] until a cut shows: a queue's 0.2
 // of a new report in the usual share: images that a link held up come at once, and some are lost
 // then where nothing is too many in the long run
 constexpr double report_weight = 0.15;
-constexpr double rate_weight = 0.1;  // of a new interval in the usual rate
+constexpr double copies_from = 0.01, copies_to = 0.004;  // lost by chance
+constexpr double room = 2.5;                             // of the rate, for copies
+constexpr double no_room_for = 30.0;  // [s] after copies were too much for a link
+constexpr double rate_weight = 0.1;   // of a new interval in the usual rate
 
 }  // namespace
 
-void SendRate::report(double now, double received, double lateness) {
+void SendRate::report(double now, double received, double lateness, double heard) {
   const double passed = std::clamp(now - last_report_, 0.0, 0.2);
   last_report_ = now;
-  if (!std::isfinite(received) || !std::isfinite(lateness)) return;
+  if (!std::isfinite(received + lateness + heard)) return;
   received_ += report_weight * (std::clamp(received, 0.0, 1.0) - received_);
+  lost_ += report_weight * (std::clamp(1.0 - heard / copies_, 0.0, 1.0) - lost_);
   if (received_ >= least_received && lateness <= most_lateness) {
     limit_ = std::min(limit_ + growth * passed, fastest);
+    if (copies_ == 2 ? lost_ < copies_to
+                     : lost_ > copies_from && now > single_until_ && limit_ > room * sent_)
+      copies_ = 3 - copies_;
+  } else if (copies_ == 2) {
+    copies_ = 1;
+    single_until_ = now + no_room_for;
+    last_cut_ = now;
+    received_ = 1.0;
   } else if (now - last_cut_ > settling) {
     const double usual = sent_ > 0.0 ? std::min(limit_, sent_) : limit_;
     limit_ = std::max(cut * usual, slowest);

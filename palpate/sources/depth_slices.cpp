@@ -22,6 +22,7 @@ constexpr std::size_t most_slice_pixels = std::size_t{1} << 24U;  // as in RVL: 
 struct SliceHeader {
   std::uint32_t number = 0;
   std::uint16_t first_row = 0, rows = 0;
+  std::uint32_t own_rows = 0;
 };
 
 std::uint32_t number_at(std::span<const std::byte> bytes, std::size_t at, std::size_t size) {
@@ -37,11 +38,12 @@ void put(std::span<std::byte> bytes, std::size_t at, std::size_t size, std::uint
 }
 
 SliceHeader header_of(std::span<const std::byte> bytes, const std::string& name) {
-  if (bytes.size() < slice_header) throw Error(name, "ends too early", "it may be damaged");
+  if (bytes.size() < slice_header + 8) throw Error(name, "ends too early", "it may be damaged");
   const SliceHeader slice{number_at(bytes, 0, 4),
                           static_cast<std::uint16_t>(number_at(bytes, 4, 2)),
-                          static_cast<std::uint16_t>(number_at(bytes, 6, 2))};
-  if (slice.first_row >= slice.rows)
+                          static_cast<std::uint16_t>(number_at(bytes, 6, 2)),
+                          number_at(bytes, slice_header + 4, 4)};  // of RVL: width, rows
+  if (slice.first_row >= slice.rows || slice.own_rows > slice.rows)
     throw Error(name, "is a slice beyond its image", "it may be damaged");
   return slice;
 }
@@ -90,8 +92,12 @@ std::optional<SliceAssembler::Image> SliceAssembler::add(std::span<const std::by
                                                          double stamp, double now,
                                                          const std::string& name) {
   const SliceHeader head = header_of(slice, name);
+  rows_heard_ += head.own_rows;
   if (newest_ && !is_newer(head.number, *newest_) && !(image_ && image_->number == head.number))
     return std::nullopt;  // too late
+  if (image_ && image_->number == head.number && head.rows == image_->height &&
+      have_[head.first_row])
+    return std::nullopt;  // once more
   const DepthPng rows = parse_depth_rvl(slice.subspan(slice_header), name);
   if (rows.height > head.rows - head.first_row)
     throw Error(name, "is a slice beyond its image", "it may be damaged");

@@ -49,10 +49,13 @@ class SliceAssembler {
   std::optional<Image> take(double now, double patience);
   /// [s] when its last slice came; none if there is no image.
   [[nodiscard]] std::optional<double> waits_since() const;
+  /// How many rows came so far, those that came twice or too late among them.
+  [[nodiscard]] std::uint64_t rows_heard() const { return rows_heard_; }
 
  private:
   std::optional<Image> image_;
-  std::vector<bool> have_;               // of its rows
+  std::vector<bool> have_;  // of its rows
+  std::uint64_t rows_heard_ = 0;
   std::optional<std::uint32_t> newest_;  // number of an image that was given, or is put together
 };
 

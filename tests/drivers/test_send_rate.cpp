@@ -41,7 +41,7 @@ struct Link {
         lateness = std::max(lateness, queue - least);
       }
       if (frame % 3 == 0 && counted > 0.0) {
-        sender.report(now, came / counted, lateness);
+        sender.report(now, came / counted, lateness, came / counted * sender.copies());
         came = counted = lateness = 0.0;
       }
     }
@@ -79,10 +79,44 @@ TEST(SendRate, ComesBackWhenTheLinkDoes) {
   EXPECT_NEAR(link.sent, 30.0, 0.3);
 }
 
+TEST(SendRate, SendsTwiceWhereSomeIsLostByChanceAndThereIsRoom) {
+  Link lossy{.lost = 0.05};
+  lossy.run(10.0);
+  EXPECT_EQ(lossy.sender.copies(), 2);
+  lossy.lost = 0.0;
+  lossy.run(10.0);
+  EXPECT_EQ(lossy.sender.copies(), 1);
+  Link narrow{.rate = 16.0, .lost = 0.05};
+  narrow.run(60.0);
+  EXPECT_EQ(narrow.sender.copies(), 1);
+  EXPECT_GE(narrow.sent, 0.5 * narrow.rate);
+}
+
+// Where copies are too much for a link they end at once, and no image is missing for it.
+TEST(SendRate, EndsCopiesFirst) {
+  SendRate sender;
+  double now = 100.0;
+  const auto report = [&](int times, double lateness, double heard) {
+    for (int i = 0; i < times; ++i, now += 0.1) {
+      for (int frame = 0; frame < 3; ++frame) sender.allows(now + frame / 30.0);
+      sender.report(now, 0.97, lateness, heard);
+    }
+  };
+  report(30, 0.0, 0.95);
+  EXPECT_EQ(sender.copies(), 2);
+  report(1, 0.2, 1.5);
+  EXPECT_EQ(sender.copies(), 1);
+  EXPECT_GT(sender.limit(), 100.0);
+  report(100, 0.0, 0.95);
+  EXPECT_EQ(sender.copies(), 1) << "not again soon";
+  report(300, 0.0, 0.95);
+  EXPECT_EQ(sender.copies(), 2);
+}
+
 TEST(SendRate, NeverStops) {
   SendRate sender;
-  for (int i = 0; i < 1000; ++i) sender.report(100.0 + 0.1 * i, 0.0, 10.0);
-  sender.report(200.0, std::numeric_limits<double>::quiet_NaN(), 0.0);
+  for (int i = 0; i < 1000; ++i) sender.report(100.0 + 0.1 * i, 0.0, 10.0, 0.0);
+  sender.report(200.0, std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0);
   EXPECT_EQ(sender.limit(), 2.0);
   int sent = 0;
   for (int frame = 0; frame < 300; ++frame) sent += sender.allows(201.0 + frame / 30.0) ? 1 : 0;

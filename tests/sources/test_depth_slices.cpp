@@ -45,6 +45,7 @@ TEST(DepthSlices, FitIntoPacketsAndMakeTheImageInAnyOrder) {
   }
   const auto image = assembler.take(1.0, patience);
   ASSERT_TRUE(image);
+  EXPECT_EQ(assembler.rows_heard(), 2U * height);
   EXPECT_EQ(image->depth, depth);
   EXPECT_EQ(image->number, 7U);
   EXPECT_EQ(image->width, width);

@@ -39,7 +39,7 @@ const QUANTITIES: readonly Quantity[] = [
     signed: true,
   },
   {
-    title: "… with the surface's own motion",
+    title: "… with the surface's motion",
     unit: "mJ",
     colour: "--hip",
     of: (s) => 1e3 * s.absolute,

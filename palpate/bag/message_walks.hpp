@@ -7,19 +7,12 @@
 #include <type_traits>
 #include <vector>
 
+#include "palpate/bag/header_walk.hpp"
 #include "palpate/bag/messages.hpp"
 
 // The fields of each message in their order, once for all: `way` writes them, reads them, or lays
 // them out in memory.
 namespace palpate::ros {
-
-template <class Way, class H>
-void walk_header(Way& way, H& header) {
-  way.begin_header();
-  way.number(header.stamp.sec);
-  way.number(header.stamp.nanosec);
-  way.text(header.frame_id);
-}
 
 template <class Way, class M>
 void walk_image(Way& way, M& m) {

@@ -11,6 +11,7 @@
 
 #include "palpate/bag/c_sample.hpp"
 #include "palpate/bag/cdr_ways.hpp"
+#include "palpate/bag/header_walk.hpp"
 #include "palpate/bag/messages.hpp"
 
 // What a node of ROS 2 says besides what recordings hold: reports, parameters, services, and which
@@ -28,14 +29,6 @@ Message decode(std::span<const std::byte> bytes, const std::string& name) {
 
 // ---------------------------------------------------------------------------- reports
 
-template <class Way, class H>
-void walk_stamped(Way& way, H& header) {
-  way.begin_header();
-  way.number(header.stamp.sec);
-  way.number(header.stamp.nanosec);
-  way.text(header.frame_id);
-}
-
 struct Vector3Stamped {
   static constexpr std::string_view type = "geometry_msgs/msg/Vector3Stamped";
   Header header;
@@ -43,7 +36,7 @@ struct Vector3Stamped {
 
   template <class Way, class Self>
   static void walk(Way& way, Self& m) {
-    walk_stamped(way, m.header);
+    walk_header(way, m.header);
     way.array(m.vector);
   }
 };
@@ -82,7 +75,7 @@ struct DiagnosticArray {
 
   template <class Way, class Self>
   static void walk(Way& way, Self& m) {
-    walk_stamped(way, m.header);
+    walk_header(way, m.header);
     way.sequence(m.status, 17, [&way](auto& each) {
       way.number(each.level);
       way.text(each.name);
@@ -123,7 +116,7 @@ struct MarkerArray {
  private:
   template <class Way, class Self>
   static void walk_marker(Way& way, Self& m) {
-    walk_stamped(way, m.header);
+    walk_header(way, m.header);
     way.text(m.ns);
     way.number(m.id);
     way.number(m.kind);
@@ -141,7 +134,7 @@ struct MarkerArray {
     std::string text;
     way.text(text);  // texture_resource
     Header texture;
-    walk_stamped(way, texture);
+    walk_header(way, texture);
     way.text(text);  // its format
     std::vector<std::byte> data;
     way.bytes(data);

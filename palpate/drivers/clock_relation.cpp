@@ -17,19 +17,10 @@ constexpr int enough_contradictions = 3;
 void ClockRelation::add(double asked, double answer, double heard) {
   if (!(std::isfinite(asked) && std::isfinite(answer) && heard >= asked)) return;
   const Known next{answer - 0.5 * (asked + heard), 0.5 * (heard - asked), heard};
-  if (!known_) {
-    known_ = next;
-    given_ = next.difference;
-    given_at_ = heard;
-    return;
-  }
+  if (!known_) return begin(next);
   const double uncertain = doubt(heard);
   if (std::abs(next.difference - known_->difference) > next.uncertainty + uncertain) {
-    if (++contradictions_ < enough_contradictions) return;
-    known_ = next;
-    given_ = next.difference;
-    given_at_ = heard;
-    contradictions_ = 0;
+    if (++contradictions_ >= enough_contradictions) begin(next);
     return;
   }
   contradictions_ = 0;
@@ -37,6 +28,13 @@ void ClockRelation::add(double asked, double answer, double heard) {
   const double most = slew * std::max(heard - given_at_, 0.0);
   given_ = *given_ + std::clamp(known_->difference - *given_, -most, most);
   given_at_ = heard;
+}
+
+void ClockRelation::begin(const Known& first) {
+  known_ = first;
+  given_ = first.difference;
+  given_at_ = first.time;
+  contradictions_ = 0;
 }
 
 double ClockRelation::doubt(double now) const {

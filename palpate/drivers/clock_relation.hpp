@@ -33,6 +33,7 @@ class ClockRelation {
     double difference, uncertainty, time;
   };
 
+  void begin(const Known& first);
   // [s] by which what is known may be wrong
   [[nodiscard]] double doubt(double now) const;
 

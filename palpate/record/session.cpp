@@ -138,6 +138,14 @@ T whole_of(const json& number, const std::string& name) {
   return number.get<T>();
 }
 
+// The names of what `walk_over` walks over.
+template <class Walk>
+std::vector<std::string> columns_of(const Walk& walk_over) {
+  Names names;
+  walk_over(names, ServoTick{});
+  return names.names;
+}
+
 // Calls `read` with the JSON in `text`; whatever does not fit is an Error about `name`.
 template <class Read>
 auto parsed(const std::string& text, const std::string& name, const Read& read) {
@@ -151,34 +159,27 @@ auto parsed(const std::string& text, const std::string& name, const Read& read) 
 }  // namespace
 
 const std::vector<std::string>& tick_columns() {
-  static const std::vector<std::string> columns = [] {
-    const ServoTick tick{};
-    Names names;
-    walk(names, tick);
-    return names.names;
-  }();
+  static const std::vector<std::string> columns =
+      columns_of([](auto& way, const ServoTick& tick) { walk(way, tick); });
   return columns;
 }
 
 const std::vector<std::string>& energy_columns() {
-  static const std::vector<std::string> columns = [] {
-    const ServoTick tick{};
-    Names names;
-    walk_energy(names, tick);
-    return names.names;
-  }();
+  static const std::vector<std::string> columns =
+      columns_of([](auto& way, const ServoTick& tick) { walk_energy(way, tick); });
   return columns;
 }
 
 std::vector<double> row_of(const ServoTick& tick) {
   Put put;
-  put.row.reserve(tick_columns().size() + energy_columns().size());
+  put.row.reserve(tick_columns().size());
   walk(put, tick);
   return std::move(put.row);
 }
 
 std::vector<double> energy_row_of(const ServoTick& tick) {
   Put put;
+  put.row.reserve(energy_columns().size());
   walk_energy(put, tick);
   return std::move(put.row);
 }

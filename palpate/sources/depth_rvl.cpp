@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "palpate/core/error.hpp"
+#include "palpate/sources/little_endian.hpp"
 
 namespace palpate {
 namespace {
@@ -38,8 +39,7 @@ class NibbleWriter {
 
  private:
   void put() {
-    for (std::uint32_t shift = 0; shift < 32; shift += 8)
-      to_.push_back(static_cast<std::byte>(word_ >> shift & 0xffU));
+    put_little_endian(to_, word_, 4);
     word_ = 0;
     count_ = 0;
   }
@@ -48,13 +48,6 @@ class NibbleWriter {
   std::uint32_t word_ = 0;
   int count_ = 0;
 };
-
-std::uint32_t word_at(std::span<const std::byte> bytes, std::size_t at) {
-  std::uint32_t word = 0;
-  for (std::size_t i = 0; i < 4; ++i)
-    word |= std::to_integer<std::uint32_t>(bytes[at + i]) << (8 * i);
-  return word;
-}
 
 class NibbleReader {
  public:
@@ -75,7 +68,7 @@ class NibbleReader {
   std::uint32_t next() {
     if (left_ == 0) {
       if (from_.size() - at_ < 4) throw Error(name_, "ends too early", "it may be damaged");
-      word_ = word_at(from_, at_);
+      word_ = little_endian(from_, at_, 4);
       at_ += 4;
       left_ = nibbles_per_word;
     }
@@ -106,10 +99,7 @@ std::vector<std::byte> encode_depth_rvl(int width, int height,
                 "give width*height values, sides up to 16384");
   std::vector<std::byte> bytes;
   bytes.reserve(header + depth.size());
-  for (const std::uint32_t side : {columns, rows}) {
-    for (std::uint32_t shift = 0; shift < 32; shift += 8)
-      bytes.push_back(static_cast<std::byte>(side >> shift & 0xffU));
-  }
+  for (const std::uint32_t side : {columns, rows}) put_little_endian(bytes, side, 4);
   NibbleWriter writer(bytes);
   std::int32_t previous = 0;
   for (auto pixel = depth.begin(); pixel != depth.end();) {
@@ -131,8 +121,8 @@ std::vector<std::byte> encode_depth_rvl(int width, int height,
 
 DepthPng parse_depth_rvl(std::span<const std::byte> bytes, const std::string& name) {
   if (bytes.size() < header) throw Error(name, "ends too early", "it may be damaged");
-  const std::uint32_t width = word_at(bytes, 0);
-  const std::uint32_t height = word_at(bytes, 4);
+  const std::uint32_t width = little_endian(bytes, 0, 4);
+  const std::uint32_t height = little_endian(bytes, 4, 4);
   const std::size_t count = std::size_t{width} * height;
   if (count == 0 || width > largest_rvl_side || height > largest_rvl_side || count > most_pixels)
     throw Error(

@@ -2,11 +2,11 @@
 #include "palpate/sources/depth_slices.hpp"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "palpate/core/error.hpp"
 #include "palpate/sources/depth_rvl.hpp"
+#include "palpate/sources/little_endian.hpp"
 
 namespace palpate {
 namespace {
@@ -25,24 +25,12 @@ struct SliceHeader {
   std::uint32_t own_rows = 0;
 };
 
-std::uint32_t number_at(std::span<const std::byte> bytes, std::size_t at, std::size_t size) {
-  std::uint32_t value = 0;
-  for (std::size_t i = 0; i < size; ++i)
-    value |= std::to_integer<std::uint32_t>(bytes[at + i]) << (8 * i);
-  return value;
-}
-
-void put(std::span<std::byte> bytes, std::size_t at, std::size_t size, std::uint32_t value) {
-  for (std::size_t i = 0; i < size; ++i)
-    bytes[at + i] = static_cast<std::byte>(value >> (8 * i) & 0xffU);
-}
-
 SliceHeader header_of(std::span<const std::byte> bytes, const std::string& name) {
   if (bytes.size() < slice_header + 8) throw Error(name, "ends too early", "it may be damaged");
-  const SliceHeader slice{number_at(bytes, 0, 4),
-                          static_cast<std::uint16_t>(number_at(bytes, 4, 2)),
-                          static_cast<std::uint16_t>(number_at(bytes, 6, 2)),
-                          number_at(bytes, slice_header + 4, 4)};  // of RVL: width, rows
+  const SliceHeader slice{little_endian(bytes, 0, 4),
+                          static_cast<std::uint16_t>(little_endian(bytes, 4, 2)),
+                          static_cast<std::uint16_t>(little_endian(bytes, 6, 2)),
+                          little_endian(bytes, slice_header + 4, 4)};  // of RVL: width, rows
   if (slice.first_row >= slice.rows || slice.own_rows > slice.rows)
     throw Error(name, "is a slice beyond its image", "it may be damaged");
   return slice;
@@ -78,12 +66,13 @@ void encode_depth_slices(std::uint32_t number, int width, int height,
     wanted = std::clamp(static_cast<int>(margin * static_cast<double>(most_bytes) * rows /
                                          static_cast<double>(packed.size())),
                         1, most_rows);
-    std::array<std::byte, slice_header> head{};
-    put(head, 0, 4, number);
-    put(head, 4, 2, static_cast<std::uint32_t>(row));
-    put(head, 6, 2, static_cast<std::uint32_t>(height));
-    packed.insert(packed.begin(), head.begin(), head.end());
-    send(packed);
+    std::vector<std::byte> slice;
+    slice.reserve(slice_header + packed.size());
+    put_little_endian(slice, number, 4);
+    put_little_endian(slice, static_cast<std::uint32_t>(row), 2);
+    put_little_endian(slice, static_cast<std::uint32_t>(height), 2);
+    slice.insert(slice.end(), packed.begin(), packed.end());
+    send(slice);
     row += rows;
   }
 }

@@ -74,16 +74,22 @@ Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const char* subject) {
   return pose;
 }
 
-void set_all(Parameters& parameters, const py::kwargs& values) {
+std::vector<std::pair<std::string, double>> numbers_of(const py::dict& values) {
+  std::vector<std::pair<std::string, double>> numbers;
   for (const auto& [name, value] : values) {
     const auto text = py::cast<std::string>(name);
     if (!py::isinstance<py::float_>(value) && !py::isinstance<py::int_>(value) &&
         !py::hasattr(value, "__float__"))
       throw py::type_error(text + ": a parameter is a number, not " +
                            py::cast<std::string>(py::str(py::type::of(value).attr("__name__"))));
-    set_parameter(parameters, text,
-                  py::cast<double>(py::float_(py::reinterpret_borrow<py::object>(value))));
+    numbers.emplace_back(text,
+                         py::cast<double>(py::float_(py::reinterpret_borrow<py::object>(value))));
   }
+  return numbers;
+}
+
+void set_all(Parameters& parameters, const py::kwargs& values) {
+  for (const auto& [name, value] : numbers_of(values)) set_parameter(parameters, name, value);
   validate(parameters);
 }
 

@@ -56,6 +56,9 @@ py::array array_of(const std::vector<CycleRecord>& ticks);
 /// A 4x4 matrix as a rigid pose. @throws Error naming `subject` if it is none.
 Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const char* subject);
 
+/// Numbers by their names. @throws TypeError for what is no number
+std::vector<std::pair<std::string, double>> numbers_of(const py::dict& values);
+
 /// Sets the parameters named by keywords. @throws Error for an unknown name or a value out of its
 /// range; TypeError for what is no number.
 void set_all(Parameters& parameters, const py::kwargs& values);

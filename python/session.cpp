@@ -21,8 +21,7 @@ constexpr std::chrono::milliseconds session_pause{50};
 constexpr std::size_t session_batch = 4096;
 
 void set_limits(SafetyParameters& limits, const py::dict& values) {
-  for (const auto& [name, value] : values)
-    set_parameter(limits, py::cast<std::string>(name), py::cast<double>(value));
+  for (const auto& [name, value] : numbers_of(values)) set_parameter(limits, name, value);
   validate(limits);
 }
 
@@ -104,17 +103,19 @@ class PythonSession {
   [[nodiscard]] std::uint64_t lost() const { return reader_->lost(); }
 
   void set(const std::optional<std::string>& method, const py::kwargs& values) {
-    ServoSettings settings = session_->settings();
-    if (method) settings.method = *method;
-    set_all(settings.parameters, values);
+    const auto numbers = numbers_of(values);
     const py::gil_scoped_release released;
-    session_->set(settings);
+    session_->change([&](ServoSettings& settings) {
+      if (method) settings.method = *method;
+      for (const auto& [name, value] : numbers) set_parameter(settings.parameters, name, value);
+    });
   }
   void limit(const py::kwargs& values) {
-    ServoSettings settings = session_->settings();
-    set_limits(settings.safety, values);
+    const auto numbers = numbers_of(values);
     const py::gil_scoped_release released;
-    session_->set(settings);
+    session_->change([&](ServoSettings& settings) {
+      for (const auto& [name, value] : numbers) set_parameter(settings.safety, name, value);
+    });
   }
 
   py::dict state() {

@@ -289,9 +289,9 @@ class RosNode::Impl {
   // All of them or none.
   ros::SetParametersResult set(const std::vector<ros::Parameter>& parameters) {
     try {
-      ServoSettings settings = session_.settings();
-      for (const ros::Parameter& parameter : parameters) parameters_.set(settings, parameter);
-      session_.set(settings);
+      session_.change([&](ServoSettings& settings) {
+        for (const ros::Parameter& parameter : parameters) parameters_.set(settings, parameter);
+      });
     } catch (const std::exception& error) {
       return {false, error.what()};
     }

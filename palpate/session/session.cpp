@@ -235,9 +235,11 @@ class Session::Impl {
     return settings_;
   }
 
-  void set(ServoSettings settings) {
-    if (needs_watchdog()) refuse_without_watchdog(device_->info(), settings.safety);
+  void change(const std::function<void(ServoSettings&)>& edit) {
     const std::lock_guard lock(control_);
+    ServoSettings settings = settings_;
+    edit(settings);
+    if (needs_watchdog()) refuse_without_watchdog(device_->info(), settings.safety);
     settings = for_cameras(std::move(settings));
     settings.scene = settings_.scene;  // not for others to count
     const ServoSettings applied = as_held(settings);
@@ -604,7 +606,11 @@ ServoSettings Session::settings() const {
 }
 
 void Session::set(const ServoSettings& settings) {
-  impl_->set(settings);
+  impl_->change([&](ServoSettings& now) { now = settings; });
+}
+
+void Session::change(const std::function<void(ServoSettings&)>& edit) {
+  impl_->change(edit);
 }
 
 void Session::set_playback(const Playback& playback) {

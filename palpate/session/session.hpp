@@ -138,6 +138,11 @@ class Session {
   /// @throws Error, leaving everything as it was, if something does not validate, there is no such
   ///         method, it cannot touch what the cameras see, or the force limit needs a watchdog.
   void set(const ServoSettings& settings);
+  /// As `set`, for what others may change meanwhile: `edit` gets the settings as they are, and
+  /// nobody else's change comes between that and what it makes of them. It must not use the
+  /// session.
+  /// @throws Error as `set`, and what `edit` throws; everything is then as it was
+  void change(const std::function<void(ServoSettings&)>& edit);
   /// How its recordings are played. The force goes to zero and ramps up again wherever time jumps.
   /// Real time. @throws Error as CameraFeed::set_playback and seek.
   void set_playback(const Playback& playback);

@@ -226,25 +226,26 @@ void SessionHost::hand(const HandMessage& hand) {
 }
 
 void SessionHost::command(const Command& command, Role role) {
-  ServoSettings settings = session_->settings();
   if (const auto* set = std::get_if<SetParameter>(&command)) {
-    set_parameter(settings.parameters, set->name, set->value);
+    session_->change([&](ServoSettings& settings) {
+      set_parameter(settings.parameters, set->name, set->value);
+    });
   } else if (const auto* limit = std::get_if<SetSafetyParameter>(&command)) {
     bounds_->check(limit->name, limit->value, role);
-    set_parameter(settings.safety, limit->name, limit->value);
-    session_->set(settings);
+    session_->change([&](ServoSettings& settings) {
+      set_parameter(settings.safety, limit->name, limit->value);
+    });
     if (role == Role::operating) bounds_->set_by_operator(limit->name, limit->value);
-    return;
   } else if (const auto* place = std::get_if<SetPlacement>(&command)) {
-    set_placement(settings.placement, place->name, place->value);
+    session_->change([&](ServoSettings& settings) {
+      set_placement(settings.placement, place->name, place->value);
+    });
   } else if (const auto* method = std::get_if<SetMethod>(&command)) {
-    settings.method = method->name;
+    session_->change([&](ServoSettings& settings) { settings.method = method->name; });
   } else if (const auto* record = std::get_if<SetRecording>(&command)) {
     record->on ? recordings_->start() : recordings_->stop();
-    return;
   } else if (const auto* play = std::get_if<SetPlayback>(&command)) {
     session_->set_playback({.paused = play->paused, .loop = play->loop, .speed = play->speed});
-    return;
   } else if (const auto* scene = std::get_if<OpenScene>(&command)) {
     const bool is_offered =
         std::any_of(rules_.scenes.begin(), rules_.scenes.end(),
@@ -253,18 +254,13 @@ void SessionHost::command(const Command& command, Role role) {
       throw Error("scene", "'" + scene->uri + "' is not among those of this session",
                   "choose one of the list, or start the program with --camera");
     rules_.open_scene(scene->uri);
-    return;
   } else if (const auto* seek = std::get_if<Seek>(&command)) {
     session_->seek(seek->share);
-    return;
   } else if (std::holds_alternative<ResetFaults>(command)) {
     session_->reset_faults();
-    return;
-  } else {
-    if (mouse_ != nullptr) mouse_->aim({.position = target_ = start_, .present = false});
-    return;
+  } else if (mouse_ != nullptr) {
+    mouse_->aim({.position = target_ = start_, .present = false});
   }
-  session_->set(settings);
 }
 
 std::filesystem::path SessionHost::begin_file(const std::string& name, std::uint64_t size) {

@@ -427,17 +427,15 @@ TEST(LiveSession, IsChangedAndWatchedFromSeveralThreads) {
   for (const double stiffness : {300.0, 500.0}) {
     threads.emplace_back([&session, stiffness] {
       for (int i = 0; i < 30; ++i) {
-        ServoSettings settings = session.settings();
-        settings.parameters.coupling.stiffness = stiffness;
-        session.set(settings);
+        session.change(
+            [&](ServoSettings& settings) { settings.parameters.coupling.stiffness = stiffness; });
       }
     });
   }
   threads.emplace_back([&session] {
     for (int i = 0; i < 20; ++i) {
-      ServoSettings settings = session.settings();
-      settings.method = i % 2 == 0 ? "paper" : "sight";
-      session.set(settings);
+      session.change(
+          [&](ServoSettings& settings) { settings.method = i % 2 == 0 ? "paper" : "sight"; });
       session.reset_faults();
     }
   });
@@ -455,7 +453,9 @@ TEST(LiveSession, IsChangedAndWatchedFromSeveralThreads) {
   watcher.join();
   session.stop();
   const double stiffness = session.settings().parameters.coupling.stiffness;
+  // Who changes the method meanwhile must not take back the stiffness that others set.
   EXPECT_TRUE(stiffness == 300.0 || stiffness == 500.0) << stiffness;
+  EXPECT_EQ(session.settings().method, "sight");
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "app/program.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/uri.hpp"
 #include "palpate/methods/methods.hpp"
 
 namespace palpate::app {
@@ -24,6 +25,15 @@ double parse_number(const std::string& subject, const std::string& text) {
   if (error != std::errc{} || rest != end)
     throw Error(subject, "'" + text + "' is not a number", "give a number such as 0.005");
   return value;
+}
+
+std::string with_material(const std::string& uri, const std::optional<std::string>& material) {
+  if (!material || Uri(uri).has("material")) return uri;
+  if (material->find_first_of("&?") != std::string::npos)
+    throw Error("--material " + *material, "a name with & or ? cannot stand in a camera's URI",
+                "rename the file");
+  const bool begun = uri.find('?') != std::string::npos;
+  return uri + (begun ? (uri.back() == '?' ? "" : "&") : "?") + "material=" + *material;
 }
 
 void MethodOptions::add_to(CLI::App& command) {

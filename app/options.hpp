@@ -44,6 +44,10 @@ class MethodOptions {
 /// @throws UnknownMethod if no method has that name.
 void check_method(const MethodRegistry& methods, const std::string& name);
 
+/// A camera's URI with the option `material`, unless it has one or there is no material.
+/// @throws Error if the URI cannot be read, or the name cannot stand in one
+std::string with_material(const std::string& uri, const std::optional<std::string>& material);
+
 /// The number that `text` is, whole. @throws Error naming `subject`.
 double parse_number(const std::string& subject, const std::string& text);
 

@@ -48,6 +48,11 @@ void SessionArguments::add_to(CLI::App& command) {
                   "where frames come from (synthetic:desk?noise=1mm); may be given several times; "
                   "?pose=x,y,z,qx,qy,qz,qw says where the camera stands")
       ->allow_extra_args(false);
+  command.add_option(
+      "--material", material_,
+      "what the cameras' surfaces are made of: wood or another name of `palpate "
+      "parameters` for all of them, or a TOML file that tells materials by colour or "
+      "label");
   command.add_option("--device", device_,
                      "the hand: mouse: in the page (the default), hand: a simulated person (the "
                      "default of --headless), script:FILE.csv a path");
@@ -104,6 +109,7 @@ void SessionArguments::add_to(CLI::App& command) {
 SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
   SessionConfig config = method_.session(methods);
   if (!cameras_.empty()) config.cameras = chosen(cameras_, config.cameras);
+  for (CameraConfig& camera : config.cameras) camera.uri = with_material(camera.uri, material_);
   if (device_) config.device = *device_;
   if (bubble_) config.placement.bubble_radius = *bubble_;
   apply_placement(device_pose_, scale_, clutch_button_, config.placement);

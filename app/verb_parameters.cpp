@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "app/verbs.hpp"
+#include "palpate/cloud/material_map.hpp"
 #include "palpate/core/parameters.hpp"
 #include "palpate/servo/safety.hpp"
 
@@ -24,6 +25,17 @@ int print_parameters() {
     fmt::print("{:<18} {:<4} {:<11} {:>12.6g} {:>9g} {:>9g}  {}\n", row.name, "", row.unit,
                row.default_value, row.min, row.max, row.meaning);
   }
+  fmt::print("\nmaterials (--material), with what differs from a surface that has no feel:\n");
+  for (const NamedMaterial& named : standard_materials().materials) {
+    std::string numbers;
+    for (const MaterialInfo& row : material_table()) {
+      if (row.get(named.material) == row.default_value) continue;
+      numbers +=
+          fmt::format("{}{} {:g}{}", numbers.empty() ? "" : ", ", row.name, row.get(named.material),
+                      row.unit == "-" ? "" : " " + std::string(row.unit));
+    }
+    fmt::print("{:<18} {}\n", named.name, numbers);
+  }
   return 0;
 }
 
@@ -31,7 +43,7 @@ int print_parameters() {
 
 Verb add_parameters(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "parameters", "list what --set and --limit can set: default, range and meaning");
+      "parameters", "list what --set, --limit and --material can set: default, range and meaning");
   return {command, print_parameters};
 }
 

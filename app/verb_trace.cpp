@@ -26,6 +26,7 @@ namespace {
 
 struct TraceOptions {
   std::vector<std::string> cameras;
+  std::optional<std::string> material;
   std::string path;
   std::string press, slide_to;
   PressOptions pressing;
@@ -48,7 +49,8 @@ HipPath path_of(const TraceOptions& options, const FrameSequence& playback) {
                     playback.upcoming_stamp(0));
 }
 
-int trace(const TraceOptions& options) {
+int trace(TraceOptions options) {
+  for (std::string& camera : options.cameras) camera = with_material(camera, options.material);
   if (!(options.rate >= 1.0 && options.rate <= 100000.0))
     throw Error("--rate", std::to_string(options.rate) + " Hz is not a tick rate",
                 "give 1 to 100000");
@@ -118,6 +120,8 @@ Verb add_trace(CLI::App& program) {
                    "where frames come from, e.g. tum:DIR; may be given several times")
       ->required()
       ->allow_extra_args(false);
+  command->add_option("--material", options->material,
+                      "what its surfaces are made of, such as wood, or a TOML file");
   command->add_option("--path", options->path, "CSV of the HIP's path: t,x,y,z in s and m, world");
   command->add_option("--press", options->press,
                       "instead of a path: press what this pixel of the first frame sees, U,V, "

@@ -10,6 +10,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/servo/safety.hpp"
+#include "palpate/sources/material_file.hpp"
 
 #include "python/arrays.hpp"
 #include "python/python_method.hpp"
@@ -37,10 +38,76 @@ Camera make_camera(int width, int height, double fx, double fy, double cx, doubl
   return {std::make_shared<const ViewingRays>(k)};
 }
 
+/// What surfaces are made of.
+struct MaterialsOf {
+  std::shared_ptr<const MaterialTable> table;
+};
+
+MaterialsOf make_materials(const py::object& what) {
+  if (py::isinstance<py::str>(what) || py::hasattr(what, "__fspath__"))
+    return {materials_of(py::cast<std::string>(py::str(what))).table};
+  MaterialTable table;
+  for (const py::handle& entry : what) {
+    const auto values = py::cast<py::dict>(py::reinterpret_borrow<py::object>(entry));
+    NamedMaterial material;
+    if (values.contains("like"))
+      material.material = standard_material(py::cast<std::string>(values["like"])).material;
+    py::dict numbers;
+    for (const auto& [key, value] : values) {
+      const auto name = py::cast<std::string>(key);
+      if (name == "name") material.name = py::cast<std::string>(value);
+      if (name != "name" && name != "like") numbers[key] = value;
+    }
+    for (const auto& [name, value] : numbers_of(numbers))
+      set_parameter(material.material, name, value);
+    table.materials.push_back(std::move(material));
+  }
+  validate(table);
+  return {std::make_shared<const MaterialTable>(std::move(table))};
+}
+
+std::vector<std::uint8_t> bytes_of(const py::object& array, const char* what,
+                                   const Intrinsics& k) {
+  if (!py::isinstance<py::array_t<std::uint8_t>>(array))
+    throw py::type_error(std::string(what) + ": it has to be an array of uint8");
+  const auto pixels =
+      py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>::ensure(array);
+  if (pixels.ndim() != 2 || pixels.shape(0) != k.height || pixels.shape(1) != k.width)
+    throw Error(what, "its shape is " + py::cast<std::string>(py::str(array.attr("shape"))),
+                "give one of (" + std::to_string(k.height) + ", " + std::to_string(k.width) +
+                    "), rows and columns of the camera");
+  return {pixels.data(), pixels.data() + pixels.size()};
+}
+
+/// Labels without a brightness, or the other way round, or both.
+std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
+                                            const std::optional<MaterialsOf>& materials,
+                                            const py::object& labels,
+                                            const py::object& brightness) {
+  if (!materials && labels.is_none() && brightness.is_none()) return nullptr;
+  if (!materials && !labels.is_none())
+    throw Error("labels", "there are no materials that they name",
+                "give materials=palpate.Materials(...)");
+  if (materials && labels.is_none() && materials->table->materials.size() > 1)
+    throw Error("materials", "nothing says which pixel is which of them",
+                "give labels, uint8 (height, width): 0 for none, i for the i-th of them");
+  const std::size_t size =
+      static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
+  const auto everywhere = static_cast<std::uint8_t>(materials ? 1 : 0);
+  return std::make_shared<LabelImage>(
+      materials ? materials->table : std::make_shared<const MaterialTable>(),
+      labels.is_none() ? std::vector<std::uint8_t>(size, everywhere)
+                       : bytes_of(labels, "labels", k),
+      brightness.is_none() ? std::vector<std::uint8_t>()
+                           : bytes_of(brightness, "brightness", k));
+}
+
 /// Takes the array's own memory, which stays alive as long as the image does.
 std::shared_ptr<DepthImage> make_image(const py::array& depth, const Camera& camera,
                                        double units_per_metre,
-                                       const std::optional<Eigen::Matrix4d>& world_from_camera) {
+                                       const std::optional<Eigen::Matrix4d>& world_from_camera,
+                                       const std::optional<MaterialsOf>& materials,
+                                       const py::object& labels, const py::object& brightness) {
   const Intrinsics& k = camera.intrinsics();
   if (!py::isinstance<py::array_t<std::uint16_t>>(depth))
     throw py::type_error("depth: it has to be an array of uint16, not of " +
@@ -54,11 +121,13 @@ std::shared_ptr<DepthImage> make_image(const py::array& depth, const Camera& cam
     throw Error("depth", "its rows do not follow one another in memory",
                 "give numpy.ascontiguousarray(depth)");
   const auto* data = static_cast<const std::uint16_t*>(depth.data());
-  return std::make_shared<DepthImage>(
+  auto image = std::make_shared<DepthImage>(
       camera.rays, DepthReadings({data, static_cast<std::size_t>(depth.size())}, kept(depth)),
       units_per_metre,
       world_from_camera ? pose_of(*world_from_camera, "world_from_camera")
                         : Eigen::Isometry3d::Identity());
+  image->set_materials(make_map(k, materials, labels, brightness));
+  return image;
 }
 
 std::shared_ptr<PointCloud> make_points(const PointsIn& points,
@@ -171,6 +240,19 @@ void define_tables(py::module_& m) {
       "All numbers of a session's safety chain: name -> unit, default, min, max, meaning, "
       "source.");
   m.def(
+      "materials",
+      [] {
+        py::dict all;
+        for (const NamedMaterial& named : standard_materials().materials) {
+          py::dict numbers;
+          for (const MaterialInfo& row : material_table())
+            numbers[py::str(std::string(row.name))] = row.get(named.material);
+          all[py::str(named.name)] = numbers;
+        }
+        return all;
+      },
+      "The standard materials: name -> its numbers, as Materials takes them.");
+  m.def(
       "methods",
       [] {
         py::dict all;
@@ -244,13 +326,34 @@ void define_clouds(py::module_& m) {
       .def_property_readonly("viewpoint", &CloudView::viewpoint,
                              "[m] world: from where they were seen, if that is known");
 
+  py::class_<MaterialsOf>(m, "Materials", "What surfaces are made of, and feel like.")
+      .def(py::init(&make_materials), py::arg("what"),
+           "A standard material's name (palpate.materials()), a TOML file, or a list of dicts, each "
+           "with a `name`, numbers by their names, and perhaps `like`, a standard material to begin "
+           "from.")
+      .def_property_readonly(
+          "names",
+          [](const MaterialsOf& materials) {
+            std::vector<std::string> names;
+            for (const NamedMaterial& m : materials.table->materials) names.push_back(m.name);
+            return names;
+          },
+          "in the order of their labels, from 1")
+      .def("__len__",
+           [](const MaterialsOf& materials) { return materials.table->materials.size(); });
+
   py::class_<DepthImage, Cloud, std::shared_ptr<DepthImage>>(
       m, "DepthImage", "One capture of a depth camera: 16-bit depth, touched in place.")
       .def(py::init(&make_image), py::arg("depth"), py::arg("camera"),
            py::arg("units_per_metre") = 1000.0, py::arg("world_from_camera") = py::none(),
+           py::arg("materials") = py::none(), py::arg("labels") = py::none(),
+           py::arg("brightness") = py::none(),
            "Depth along the optical axis, uint16 (height, width); 0 and 65535 are holes. The "
            "array is not copied: it is kept alive, and must not change meanwhile. The pose is a "
-           "4x4 matrix, the camera's optical frame (x right, y down, z forward) in the world.")
+           "4x4 matrix, the camera's optical frame (x right, y down, z forward) in the world.\n\n"
+           "`labels`, uint8 (height, width), says which of `materials` each pixel is: 0 none, 1 the "
+           "first. `brightness`, of the same shape, is what `relief` makes heights of. Both are "
+           "copied.")
       .def_property_readonly(
           "depth",
           [](const py::object& self) {
@@ -321,6 +424,10 @@ void define_renderer(py::module_& m) {
       .def_readonly("state", &Tick::state)
       .def_readonly("steps", &Tick::steps, "proxy steps taken")
       .def_readonly("surface_velocity", &Tick::surface_velocity, "[m/s] towards the proxy")
+      .def_readonly("transient", &Tick::transient,
+                    "[N] world, the part of `force` that is an impact's ringing")
+      .def_readonly("hardness", &Tick::hardness,
+                    "[-] share of `stiffness` that is felt, where a material is softer")
       .def_readonly("frame", &Tick::frame, "number of the frame in use, from 0; -1: none")
       .def_readonly("flags", &Tick::flags, "bits that palpate.flags() names")
       .def("__repr__", [](const Tick& tick) {
@@ -341,12 +448,19 @@ void define_renderer(py::module_& m) {
       .def(
           "frame",
           [](Renderer& self, const py::array& depth, const Camera& camera, double stamp,
-             const std::optional<Eigen::Matrix4d>& world_from_camera, double units_per_metre) {
-            self.frame(make_image(depth, camera, units_per_metre, world_from_camera), stamp);
+             const std::optional<Eigen::Matrix4d>& world_from_camera, double units_per_metre,
+             const std::optional<MaterialsOf>& materials, const py::object& labels,
+             const py::object& brightness) {
+            self.frame(make_image(depth, camera, units_per_metre, world_from_camera, materials,
+                                  labels, brightness),
+                       stamp);
           },
           py::arg("depth"), py::kw_only(), py::arg("camera"), py::arg("stamp"),
           py::arg("world_from_camera") = py::none(), py::arg("units_per_metre") = 1000.0,
-          "The same from a depth image, uint16 (height, width), without a copy.")
+          py::arg("materials") = py::none(), py::arg("labels") = py::none(),
+          py::arg("brightness") = py::none(),
+          "The same from a depth image, uint16 (height, width), without a copy; the rest as\n"
+          "DepthImage has it.")
       .def(
           "frame",
           [](Renderer& self, const PointsIn& points, double stamp,

@@ -595,6 +595,69 @@ double DepthImage::spacing(const Vec3& place) const noexcept {
   return inside ? p.z() / std::min(camera.fx, camera.fy) : 0.0;
 }
 
+void DepthImage::sample(const Vec3& place, const Vec3& normal, double radius,
+                        SurfaceSample& sample) const noexcept {
+  constexpr std::size_t most_pixels = 400;
+  // [pixels] so that a sample holds several however coarse they are
+  constexpr double fewest_pixels = 1.5;
+  // [m] of the layer that counts as this surface: noise is less, and what is behind it farther.
+  constexpr double thickness = 10e-3;
+  // [-] share of the weights' spread that their centre may be off, or the slope is a guess.
+  constexpr double least_spread = 0.02;
+  if ((!has_materials() && !has_brightness()) || !place.allFinite()) return;
+  const Eigen::Matrix3d rotation = world_from_camera_.linear();
+  const Vec3 centre = rotation.transpose() * (place - world_from_camera_.translation());
+  const Vec3 up = rotation.transpose() * normal;
+  const Intrinsics& k = intrinsics();
+  if (!(centre.z() > radius)) return;
+  const double reach = std::max(radius, fewest_pixels * centre.z() / std::min(k.fx, k.fy));
+  const ViewingRays::Window window = rays_->window(centre, reach);
+  if (window.empty()) return;
+  const int stride = stride_of(window, most_pixels);
+  const Vec3 along = up.unitOrthogonal();
+  const Vec3 across = up.cross(along);
+  const bool by_map = materials_ && materials_->has_brightness();
+  const bool by_point = materials_ && !materials_->is_by_pixel();
+  const bool slopes = has_brightness() && !sample.has_slope;
+
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();  // weighted, of (1, x, y) in `reach`
+  Vec3 products = Vec3::Zero();                       // of the same with the brightness
+  for (int v = window.v_begin; v < window.v_end; v += stride) {
+    for (int u = window.u_begin; u < window.u_end; u += stride) {
+      const std::size_t i = static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width) +
+                            static_cast<std::size_t>(u);
+      const std::uint16_t raw = depth_[i];
+      if (!is_measured(raw)) continue;
+      const double z = raw * metres_per_unit_;
+      const Eigen::Vector2d ray = rays_->ray(u, v);
+      const Vec3 p = Vec3(z * ray.x(), z * ray.y(), z) - centre;
+      const double x = p.dot(along) / reach;
+      const double y = p.dot(across) / reach;
+      const double left = 1.0 - x * x - y * y;
+      // Written so that a NaN (a pixel without a ray) is outside.
+      if (!(left > 0.0 && std::abs(p.dot(up)) <= thickness)) continue;
+      const double weight = left * left;
+      const Vec3 point = by_point ? Vec3(world_from_camera_ * Vec3(p + centre)) : Vec3::Zero();
+      if (materials_) sample.add(materials_->material(i, point), weight);
+      if (!slopes) continue;
+      const double bright = (by_map ? materials_->brightness(i, point) : brightness_[i]) / 255.0;
+      const Vec3 row(1.0, x, y);
+      squares += weight * row * row.transpose();
+      products += weight * bright * row;
+    }
+  }
+  if (!slopes || !(squares(0, 0) > 0.0)) return;
+  const double variance =
+      std::min(squares(1, 1), squares(2, 2)) / squares(0, 0);  // of x and y about the place
+  const double determinant = squares.determinant();
+  if (!(variance > least_spread) ||
+      !(determinant > least_spread * squares(0, 0) * squares(1, 1) * squares(2, 2)))
+    return;
+  const Vec3 plane = squares.inverse() * products;
+  sample.slope = rotation * Vec3((plane.y() * along + plane.z() * across) / reach);
+  sample.has_slope = true;
+}
+
 std::optional<Vec3> DepthImage::deproject(int u, int v) const noexcept {
   const Intrinsics& k = rays_->intrinsics();
   if (u < 0 || v < 0 || u >= k.width || v >= k.height) return std::nullopt;

@@ -12,6 +12,7 @@
 
 #include <Eigen/Geometry>
 
+#include "palpate/cloud/material_map.hpp"
 #include "palpate/core/cloud.hpp"
 
 namespace palpate {
@@ -126,6 +127,20 @@ class DepthImage final : public Cloud {
                     Patch& patch) const noexcept override;
   /// Depth of `place` by the focal length; 0 outside the image (a lens's distortion not counted).
   [[nodiscard]] double spacing(const Vec3& place) const noexcept override;
+  [[nodiscard]] bool has_materials() const noexcept override { return materials_ != nullptr; }
+  [[nodiscard]] bool has_brightness() const noexcept override {
+    return !brightness_.empty() || (materials_ && materials_->has_brightness());
+  }
+  void sample(const Vec3& place, const Vec3& normal, double radius,
+              SurfaceSample& sample) const noexcept override;
+
+  /// What its pixels feel like; null: nothing is known. Set before the image is shared.
+  [[nodiscard]] const std::shared_ptr<const MaterialMap>& materials() const noexcept {
+    return materials_;
+  }
+  void set_materials(std::shared_ptr<const MaterialMap> materials) noexcept {
+    materials_ = std::move(materials);
+  }
 
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return rays_->intrinsics(); }
   [[nodiscard]] const ViewingRays& rays() const noexcept { return *rays_; }
@@ -134,7 +149,7 @@ class DepthImage final : public Cloud {
     return rays_;
   }
   [[nodiscard]] const DepthReadings& depth() const noexcept { return depth_; }
-  /// As given: the kernel does not look at it.
+  /// As given. Where a MaterialMap has a brightness, that is felt instead.
   [[nodiscard]] const std::vector<std::uint8_t>& brightness() const noexcept { return brightness_; }
   [[nodiscard]] double units_per_metre() const noexcept { return units_per_metre_; }
   [[nodiscard]] const Eigen::Isometry3d& world_from_camera() const noexcept {
@@ -160,6 +175,7 @@ class DepthImage final : public Cloud {
   double metres_per_unit_;
   Eigen::Isometry3d world_from_camera_;
   std::vector<std::uint8_t> brightness_;
+  std::shared_ptr<const MaterialMap> materials_;
 };
 
 /// Is this depth reading a measurement? 0 is "none", 65535 "saturated".

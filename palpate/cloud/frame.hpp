@@ -39,6 +39,9 @@ struct Frame {
   std::shared_ptr<const Cloud> cloud{};
   /// Null where the source has no colour, or was not asked for it.
   std::shared_ptr<const ColourImage> colour{};
+  /// What each pixel of a DepthImage is made of, row by row: labels of a MaterialTable, 0 for none
+  /// of them. Null where the source has none.
+  std::shared_ptr<const std::vector<std::uint8_t>> labels{};
   /// [s, CLOCK_MONOTONIC] when it reached this machine, where the source knows better than whoever
   /// called it: a driver's own time of arrival.
   std::optional<double> arrival{};

@@ -316,6 +316,21 @@ void CloudSet::gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t ma
     cloud->gather_sheet(ball, sheet, max_points / clouds_.size(), patch);
 }
 
+bool CloudSet::has_materials() const noexcept {
+  return std::any_of(clouds_.begin(), clouds_.end(),
+                     [](const auto& cloud) { return cloud->has_materials(); });
+}
+
+bool CloudSet::has_brightness() const noexcept {
+  return std::any_of(clouds_.begin(), clouds_.end(),
+                     [](const auto& cloud) { return cloud->has_brightness(); });
+}
+
+void CloudSet::sample(const Vec3& place, const Vec3& normal, double radius,
+                      SurfaceSample& sample) const noexcept {
+  for (const auto& cloud : clouds_) cloud->sample(place, normal, radius, sample);
+}
+
 double CloudSet::spacing(const Vec3& place) const noexcept {
   double least = 0.0;
   for (const auto& cloud : clouds_) {

@@ -104,6 +104,11 @@ class CloudSet final : public Cloud {
                     Patch& patch) const noexcept override;
   /// That of the cloud that knows the smallest.
   [[nodiscard]] double spacing(const Vec3& place) const noexcept override;
+  [[nodiscard]] bool has_materials() const noexcept override;
+  [[nodiscard]] bool has_brightness() const noexcept override;
+  /// All clouds that know something there. The brightness is that of the first.
+  void sample(const Vec3& place, const Vec3& normal, double radius,
+              SurfaceSample& sample) const noexcept override;
 
   [[nodiscard]] const std::vector<std::shared_ptr<const Cloud>>& clouds() const noexcept {
     return clouds_;

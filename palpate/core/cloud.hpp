@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "palpate/core/material.hpp"
 #include "palpate/core/patch.hpp"
 
 namespace palpate {
@@ -71,6 +72,21 @@ class Cloud {
   ///
   /// [servo] As `gather`.
   [[nodiscard]] virtual double spacing(const Vec3& /*place*/) const noexcept { return 0.0; }
+
+  /// Does it know what its surfaces are made of?
+  [[nodiscard]] virtual bool has_materials() const noexcept { return false; }
+  /// Does it know how bright they are?
+  [[nodiscard]] virtual bool has_brightness() const noexcept { return false; }
+
+  /// Adds what is known of the surface about a place to `sample`, weighted by
+  /// (1 - d^2 / radius^2)^2, d the distance along the surface: all of it that is within `radius`,
+  /// or within a pixel and a half where pixels are coarser.
+  /// @param place   [m] world, on the surface
+  /// @param normal  [-] unit, of the surface
+  ///
+  /// [servo] As `gather`.
+  virtual void sample(const Vec3& /*place*/, const Vec3& /*normal*/, double /*radius*/,
+                      SurfaceSample& /*sample*/) const noexcept {}
 };
 
 /// A beam as one viewpoint sees it.

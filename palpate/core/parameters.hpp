@@ -72,6 +72,28 @@ struct FrictionParameters {
   double bristle_damping = 1.0;      ///< [N s/m] of the same
 };
 
+/// How a surface gives way, beside the coupling's spring. docs/materials.md.
+struct ContactParameters {
+  /// [s/m] Hunt and Crossley's damping: the share by which the force grows for each m/s at which
+  /// the hand presses in, and shrinks at which it comes out.
+  double cushion = 0.0;
+};
+
+/// What an impact feels like: tap * speed * exp(-tap_decay t) cos(2 pi tap_frequency t).
+/// docs/materials.md.
+struct TapParameters {
+  double tap = 0.0;              ///< [N s/m] force for each m/s of the impact; 0: none
+  double tap_frequency = 100.0;  ///< [Hz]
+  double tap_decay = 80.0;       ///< [1/s]
+};
+
+/// What stroking a surface feels like. docs/materials.md.
+struct TextureParameters {
+  double grain = 0.0;          ///< [-] vibration, rms, as a share of the normal force; 0: none
+  double grain_length = 1e-3;  ///< [m] of the grains: speed over frequency
+  double relief = 0.0;         ///< [m] height of white above black; 0: brightness is not felt
+};
+
 /// Everything that can be set on a method. Defaults are the paper's Table 2 where it has them.
 struct Parameters {
   ProxyParameters proxy;
@@ -79,6 +101,9 @@ struct Parameters {
   MotionParameters motion;
   SightParameters sight;
   FrictionParameters friction;
+  ContactParameters contact;
+  TapParameters tap;
+  TextureParameters texture;
 };
 
 using ParameterInfo = ParameterRow<Parameters>;

@@ -80,6 +80,11 @@ struct Tick {
   /// [m/s] world: of the surface at the proxy since the tick before, as tracked; corrections of the
   /// estimate by a frame are no motion
   Vec3 surface_motion = Vec3::Zero();
+  /// [N] world: the part of `force` that is an impact's ringing, which the safety chain limits by
+  /// itself
+  Vec3 transient = Vec3::Zero();
+  /// [-] of the coupling's stiffness that is felt, where a material is softer
+  double hardness = 1.0;
   std::int64_t frame = -1;  ///< number of the frame in use, from 0; -1 before the first
   std::uint32_t flags = 0;  ///< TickFlag bits
 };

@@ -4,18 +4,25 @@
 #include <memory>
 
 #include "palpate/core/hand_velocity.hpp"
+#include "palpate/core/material.hpp"
 #include "palpate/core/method.hpp"
 #include "palpate/feel/friction.hpp"
+#include "palpate/feel/grain.hpp"
+#include "palpate/feel/hardness.hpp"
+#include "palpate/feel/tap.hpp"
 
 namespace palpate {
 
 /// What a surface feels like, around any method: the method renders how far away it is, and this
-/// adds the tangential force of friction. docs/friction.md.
+/// makes it as soft, rough and ringing as the material there. docs/materials.md, docs/friction.md.
 ///
-/// Proxy, normal and state stay the method's. Without friction its ticks are passed on as they are,
-/// bit for bit.
+/// Proxy, normal and state stay the method's. Where nothing is to be felt but where a surface is,
+/// its ticks are passed on as they are, bit for bit.
 class Feel final : public Method {
  public:
+  /// [m] over which what is felt is averaged along the surface: no border is a step.
+  static constexpr double averaged = 3e-3;
+
   /// @param method  what renders the normal force; not null
   Feel(std::unique_ptr<Method> method, const Parameters& parameters);
 
@@ -27,13 +34,40 @@ class Feel final : public Method {
   void check(const Cloud& cloud) const override { method_->check(cloud); }
 
  private:
+  // How the hand has moved since the tick before.
+  struct Movement {
+    Vec3 by = Vec3::Zero();        // [m] relative to the surface
+    Vec3 velocity = Vec3::Zero();  // [m/s] the same
+    double dt = 0.0;               // [s]
+  };
+
   void take(const Parameters& parameters) noexcept;
+  void look_whether_to_feel() noexcept;
+  void forget_contact() noexcept;
+  Movement move(const Tick& tick) noexcept;
+  void look_at_surface(const Tick& tick) noexcept;
+  Vec3 texture(const Vec3& push, const Movement& movement) noexcept;
 
   std::unique_ptr<Method> method_;
-  bool rough_ = false;  // is there anything to add?
+  const Cloud* cloud_ = nullptr;  // the frame in use; lives as long as the method has it
+  bool feels_ = false;            // is there anything to add?
   double max_force_ = 0.0;
+  double stiffness_ = 0.0;
+  double contact_radius_ = 0.0;
+  FrictionParameters bristles_;
+  Material scene_;  // where no other is
+
+  Material here_;                  // under the foot
+  Vec3 slope_ = Vec3::Zero();      // [1/m] of the brightness there
+  Vec3 looked_at_ = Vec3::Zero();  // [m] the foot when both were looked up
+  bool looked_ = false;
+  Hardness hardness_;
   Friction friction_;
+  Grain grain_;
+  Tap tap_;
+  Vec3 drag_ = Vec3::Zero();  // [N] of friction in the tick before
   HandVelocity hand_;
+  Vec3 approach_ = Vec3::Zero();  // [m/s] of the hand relative to the surface, smoothed for longer
   Vec3 last_hip_ = Vec3::Zero();
 };
 

@@ -249,7 +249,7 @@ void Recorder::pack() {
         }
       }
       PackedClouds packed;
-      for (const auto& cloud : frame->fresh) packed[cloud.get()] = packed_png(*cloud, packing);
+      for (const auto& cloud : frame->fresh) packed[cloud.get()] = packed_image(*cloud, packing);
       const std::lock_guard lock(mutex_);
       frame->packed = std::move(packed);
       frame->ready = true;

@@ -9,6 +9,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/bag_camera.hpp"
+#include "palpate/sources/material_file.hpp"
 #include "palpate/sources/ros_frames.hpp"
 #include "palpate/sources/transforms.hpp"
 
@@ -21,11 +22,31 @@ std::array<double, 3> array_of(const Vec3& v) {
 
 }  // namespace
 
-std::vector<std::byte> packed_png(const Cloud& image, PngPacking packing) {
+PackedImage packed_image(const Cloud& image, PngPacking packing) {
   const auto* depth = dynamic_cast<const DepthImage*>(&image);
   if (depth == nullptr) throw Error("cloud", "is not a depth image", "pack depth images alone");
   const Intrinsics& k = depth->intrinsics();
-  return encode_depth_png(k.width, k.height, depth->depth(), packing);
+  PackedImage packed{.depth = encode_depth_png(k.width, k.height, depth->depth(), packing),
+                     .materials = {}};
+  const MaterialMap* map = depth->materials().get();
+  if (map == nullptr && !depth->has_brightness()) return packed;
+  std::vector<std::uint16_t> pixels(depth->depth().size());
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) {
+      const std::size_t i = static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width) +
+                            static_cast<std::size_t>(u);
+      const Vec3 point = map == nullptr || map->is_by_pixel()
+                             ? Vec3(Vec3::Zero())
+                             : depth->deproject(u, v).value_or(Vec3::Zero());
+      const unsigned label = map == nullptr ? 0U : map->label(i, point);
+      const unsigned bright = !depth->has_brightness()                  ? 0U
+                              : map != nullptr && map->has_brightness() ? map->brightness(i, point)
+                                                                        : depth->brightness()[i];
+      pixels[i] = static_cast<std::uint16_t>(label | bright << 8U);
+    }
+  }
+  packed.materials = encode_depth_png(k.width, k.height, pixels, packing);
+  return packed;
 }
 
 SessionWriter::SessionWriter(const std::filesystem::path& folder, const SessionInfo& info, double t,
@@ -69,8 +90,8 @@ void SessionWriter::frame(std::uint64_t number, double stamp,
     Camera& camera = cameras_[i];
     if (camera.newest != cameras[i]) {
       if (const auto* image = dynamic_cast<const DepthImage*>(cameras[i].get())) {
-        const auto png = packed.find(image);
-        depth(i, stamp, *image, png == packed.end() ? packed_png(*image) : png->second);
+        const auto made = packed.find(image);
+        depth(i, stamp, *image, made == packed.end() ? packed_image(*image) : made->second);
       } else if (const auto* cloud = dynamic_cast<const PointCloud*>(cameras[i].get())) {
         points(i, stamp, *cloud);
       } else {
@@ -94,19 +115,48 @@ void SessionWriter::left_out(std::uint64_t number, double stamp) {
                                .data = {static_cast<double>(number), stamp}});
 }
 
+// What has not changed since the camera's frame before is not written again.
+void SessionWriter::materials(std::size_t camera, double stamp, const DepthImage& image,
+                              const PackedImage& packed) {
+  const CameraTopics topics(camera);
+  const std::int64_t at = nanoseconds(stamp);
+  Camera& written = cameras_[camera];
+  const auto table = image.materials() ? image.materials()->table() : nullptr;
+  if (table && table != written.table) {
+    write(topics.material_table, at, ros::String{materials_json(*table)}, true);
+    written.table = table;
+    ++written.tables;
+  }
+  if (packed.materials == written.materials) return;
+  write(topics.materials, at,
+        ros::CompressedImage{
+            .header = {ros::Time::at(at), topics.optical_frame},
+            .format = std::string(image.has_brightness() ? material_format_with_brightness
+                                                         : material_format),
+            .data = packed.materials});
+  written.materials = packed.materials;
+  ++written.material_images;
+}
+
 void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& image,
-                          std::span<const std::byte> png) {
+                          const PackedImage& packed_image) {
   const CameraTopics topics(camera);
   const Intrinsics& k = image.intrinsics();
   const std::int64_t at = nanoseconds(stamp);
   const ros::Header header{ros::Time::at(at), topics.optical_frame};
 
   const ros::CompressedImage packed =
-      compressed_depth(header, png, image.units_per_metre(), DepthPacking::png);
+      compressed_depth(header, packed_image.depth, image.units_per_metre(), DepthPacking::png);
 
   ros::Float64MultiArray exact{.label = "stamp,units_per_metre,world_from_camera",
                                .data = {stamp, image.units_per_metre()}};
   for (int i = 0; i < 12; ++i) exact.data.push_back(image.world_from_camera()(i / 4, i % 4));
+  if (!packed_image.materials.empty()) {
+    materials(camera, stamp, image, packed_image);
+    exact.label += ",material_image,material_table";
+    exact.data.push_back(static_cast<double>(cameras_[camera].material_images));
+    exact.data.push_back(image.materials() ? static_cast<double>(cameras_[camera].tables) : 0.0);
+  }
 
   const ros::Header world{header.stamp, std::string(world_frame)};
   write(topics.depth, at, packed);

@@ -20,12 +20,20 @@
 
 namespace palpate {
 
-/// The PNG of a depth image, for SessionWriter::frame. Any thread.
+/// A depth image as PNGs.
+struct PackedImage {
+  std::vector<std::byte> depth;
+  /// Of 16 bits: the label of each pixel's material, and its brightness in the upper eight, if that
+  /// is felt. Empty where neither is known.
+  std::vector<std::byte> materials;
+};
+
+/// The PNGs of a depth image, for SessionWriter::frame. Any thread.
 /// @throws Error for a cloud that is not a DepthImage.
-std::vector<std::byte> packed_png(const Cloud& image, PngPacking packing = PngPacking::fast);
+PackedImage packed_image(const Cloud& image, PngPacking packing = PngPacking::fast);
 
 /// PNGs made beforehand, by the image that each was made of.
-using PackedClouds = std::map<const Cloud*, std::vector<std::byte>>;
+using PackedClouds = std::map<const Cloud*, PackedImage>;
 
 /// Writes a session as a ROS 2 bag (docs/recording.md): standard messages for whoever looks at it,
 /// and beside them every number that a replay needs, to the bit. Used on one thread.
@@ -81,14 +89,19 @@ class SessionWriter {
   struct Camera {
     std::shared_ptr<const Cloud> newest;  // kept, so that no other cloud can have its address
     std::uint64_t frames = 0;
+    // What was written last of its materials, and how often.
+    std::vector<std::byte> materials;
+    std::shared_ptr<const MaterialTable> table;
+    std::uint64_t material_images = 0, tables = 0;
   };
 
   template <class Message>
   void write(std::string_view topic, std::int64_t nanoseconds, const Message& message,
              bool latched = false);
   [[nodiscard]] std::int64_t nanoseconds(double t) const;
-  void depth(std::size_t camera, double stamp, const DepthImage& image,
-             std::span<const std::byte> png);
+  void depth(std::size_t camera, double stamp, const DepthImage& image, const PackedImage& packed);
+  void materials(std::size_t camera, double stamp, const DepthImage& image,
+                 const PackedImage& packed);
   void points(std::size_t camera, double stamp, const PointCloud& cloud);
 
   std::int64_t epoch_;  // [ns]

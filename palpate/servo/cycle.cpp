@@ -232,8 +232,9 @@ void Cycle::run(const Wake& wake) noexcept {
                    .frame_intervals = age.intervals,
                    .surface_velocity = tick.surface_velocity,
                    .surface_motion = tick.surface_motion,
-                   .stiffness = parameters_.coupling.stiffness,
-                   .new_frame = new_frame});
+                   .stiffness = tick.hardness * parameters_.coupling.stiffness,
+                   .new_frame = new_frame,
+                   .transient = tick.transient});
   device_.write(workspace_.force_in_device(safe.force), t);
   const Placement& placement = workspace_.placement();
   const ServoEnergy& energy =

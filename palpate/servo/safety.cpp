@@ -153,6 +153,14 @@ void remove_pull(const Vec3& outwards, Vec3& force) {
   if (!outwards.isZero() && push < 0.0) force -= push / outwards.squaredNorm() * outwards;
 }
 
+// Both the normal that the method gives and the direction that its proxy shows have to agree.
+void only_push(const SafetyInput& input, Vec3& force) {
+  const Vec3 lever = input.proxy - input.hip;
+  if (input.normal.isZero() && lever.isZero()) force.setZero();  // no telling which way it acts
+  remove_pull(input.normal, force);
+  if (lever.norm() > least_lever || input.normal.isZero()) remove_pull(lever, force);
+}
+
 }  // namespace
 
 std::span<const std::string_view> safety_flag_names() {
@@ -235,32 +243,35 @@ void SafetyChain::note_faults(std::uint32_t flags) noexcept {
 // After a gap the last force counts as held all through, but cooling only as of a tick that is just
 // not stalled: whether the motors were off is not known.
 void SafetyChain::warm_up(double since_last) noexcept {
-  const double change = last_force_.squaredNorm() - heat_;
+  const double change = last_sent_.squaredNorm() - heat_;
   const double elapsed = change > 0.0 ? since_last : std::min(since_last, parameters_.stall_time);
   heat_ += share_of(elapsed, parameters_.continuous_time) * change;
+}
+
+double SafetyChain::peak() const noexcept {
+  return std::min(parameters_.max_force, device_.max_force);
+}
+
+// The share of the budget that is used up takes the peak down to what can be given for ever.
+double SafetyChain::peak_as_warm() const noexcept {
+  const double cold = peak();
+  if (!(device_.continuous_force < cold)) return cold;
+  const double budget = device_.continuous_force * device_.continuous_force;
+  const double left = std::clamp((1.0 - heat_ / budget) / (1.0 - cool), 0.0, 1.0);
+  return std::sqrt(budget + left * (cold * cold - budget));
 }
 
 // Pushes only, magnitude, continuous force; and frames that are late.
 Vec3 SafetyChain::limited(const SafetyInput& input, Vec3 force,
                           std::uint32_t& flags) const noexcept {
   if (has(pull_removed)) {
-    // Both the normal that the method gives and the direction that its proxy shows have to agree.
-    const Vec3 lever = input.proxy - input.hip;
     const Vec3 before = force;
-    if (input.normal.isZero() && lever.isZero()) force.setZero();  // no telling which way it acts
-    remove_pull(input.normal, force);
-    if (lever.norm() > least_lever || input.normal.isZero()) remove_pull(lever, force);
+    only_push(input, force);
     if (force != before) flags |= pull_removed;
   }
-  const double peak = std::min(parameters_.max_force, device_.max_force);
-  if (has(force_cut) && cut_to(peak, force)) flags |= force_cut;
-
-  // The share of the budget that is used up takes the peak down to what can be given for ever.
-  const double budget = device_.continuous_force * device_.continuous_force;
-  if (has(continuous_cut) && device_.continuous_force < peak) {
-    const double left = std::clamp((1.0 - heat_ / budget) / (1.0 - cool), 0.0, 1.0);
-    if (cut_to(std::sqrt(budget + left * (peak * peak - budget)), force)) flags |= continuous_cut;
-  }
+  if (has(force_cut) && cut_to(peak(), force)) flags |= force_cut;
+  if (has(continuous_cut) && device_.continuous_force < peak() && cut_to(peak_as_warm(), force))
+    flags |= continuous_cut;
 
   if (has(frame_late) && !(input.frame_intervals <= parameters_.late_intervals)) {
     flags |= frame_late;
@@ -390,8 +401,7 @@ Vec3 SafetyChain::slewed(const Vec3& force, double rise, double fall) const noex
 // NaN included, is no force.
 Vec3 SafetyChain::bounded(Vec3 force, double rise, std::uint32_t& flags) noexcept {
   const double last = last_force_.norm();
-  const double peak = std::min(parameters_.max_force, device_.max_force);
-  const double most = (flags & frame_late) != 0 ? last : std::max(last, peak);
+  const double most = (flags & frame_late) != 0 ? last : std::max(last, peak());
   if (has(force_cut) || (flags & frame_late) != 0) cut_to(most, force);
   if (links_ != all_links) return force;
   const double length = force.norm();
@@ -402,12 +412,35 @@ Vec3 SafetyChain::bounded(Vec3 force, double rise, std::uint32_t& flags) noexcep
   return Vec3::Zero();
 }
 
+// The ringing of an impact, for which the hand has to be as engaged as for any force. It takes from
+// the force that is sent at most what that has, so that nothing pulls.
+Vec3 SafetyChain::with_transient(const SafetyInput& input, const Vec3& force,
+                                 std::uint32_t& flags) noexcept {
+  constexpr std::uint32_t amiss = input_refused | direction_refused | disengaged | frame_late |
+                                  frame_lost | hand_too_fast | stalled | fault_latched |
+                                  output_refused;
+  if ((flags & amiss) != 0) {
+    transients_.end();
+    return force;
+  }
+  const Vec3 wanted = gain_ * input.transient;
+  const Vec3 allowed = transients_.run(input.t, input.hip, wanted);
+  if (allowed != wanted) flags |= slew_cut;
+  if (allowed.isZero()) return force;
+  Vec3 sent = force + allowed;
+  if (has(pull_removed)) only_push(input, sent);
+  const double most = has(continuous_cut) ? peak_as_warm() : peak();
+  if (has(force_cut) && cut_to(std::max(force.norm(), most), sent)) flags |= force_cut;
+  return sent.allFinite() ? sent : force;
+}
+
 SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   std::uint32_t flags = 0;
   const bool in_order = std::isfinite(input.t) && (!last_t_ || input.t >= *last_t_);
   const bool sound = in_order && is_sound(input.force) && is_sound(input.normal) &&
                      is_sound(input.hip) && is_sound(input.proxy) && is_sound(input.position) &&
-                     std::abs(input.surface_velocity) <= largest && is_sound(input.surface_motion);
+                     std::abs(input.surface_velocity) <= largest &&
+                     is_sound(input.surface_motion) && is_sound(input.transient);
   const double since_last = in_order && last_t_ ? input.t - *last_t_ : 0.0;
   const double dt = std::min(since_last, longest_credit);
   fault_clock_ += since_last;
@@ -424,9 +457,10 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   note_faults(flags);
 
   Vec3 force = Vec3::Zero();
+  const Vec3 lasting = input.force - input.transient;
   if (flags == 0) {
     // Before the limits: a softer surface still holds a hand with all the force that is allowed.
-    force = limited(input, softened(input, since_last, dt, flags) * input.force, flags);
+    force = limited(input, softened(input, since_last, dt, flags) * lasting, flags);
     double most = ceiling(input, force.norm(), flags);
     if (stalls_at(input.t)) {
       flags |= stalled;
@@ -454,14 +488,17 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     if (force != wanted) flags |= slew_cut;
   }
   force = bounded(force, rise, flags);
+  // Nor may what rang in the last tick be made up for while a frame is late.
+  if ((flags & frame_late) != 0) cut_to(last_sent_.norm(), force);
 
   if (std::isfinite(input.t)) last_t_ = input.t;
   last_force_ = force;
+  last_sent_ = with_transient(input, force, flags);
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
     if (((flags & ~last_flags_) >> i & 1u) != 0) ++interventions_[i];
   }
   last_flags_ = flags;
-  return {force, flags, gain_};
+  return {last_sent_, flags, gain_};
 }
 
 }  // namespace palpate

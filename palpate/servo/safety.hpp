@@ -12,6 +12,7 @@
 #include "palpate/servo/correction_tank.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/energy_monitor.hpp"
+#include "palpate/servo/transient_budget.hpp"
 
 namespace palpate {
 
@@ -123,6 +124,8 @@ struct SafetyInput {
   Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world: the same as a vector, extrapolated
   double stiffness = 0.0;              ///< [N/m] of the surface; 0: not known
   bool new_frame = false;              ///< the first tick with a frame
+  /// [N] world: the part of `force` that is an impact's ringing: it may rise at once
+  Vec3 transient = Vec3::Zero();
 };
 
 /// What the device gets.
@@ -138,7 +141,9 @@ struct SafetyOutput {
 /// then those that give a gain: it falls at once and rises over ramp_time. The slew limit is
 /// applied to the product, so that no link can make a step, and |force| never exceeds the larger of
 /// the last force and the limit. While a frame is late the force that is sent never grows. Faults
-/// disengage the hand, and several of them latch.
+/// disengage the hand, and several of them latch. The ringing of an impact is added behind the slew
+/// limit, within a TransientBudget and the limit of the force, and only as long as nothing is
+/// amiss.
 class SafetyChain {
  public:
   /// All links; the argument below leaves some out, which only tests of the chain may do.
@@ -197,6 +202,8 @@ class SafetyChain {
     EnergyMonitor::walk(way, self.energy_);
     way("energy_ceiling", self.energy_ceiling_);
     CorrectionTank::walk(way, self.tank_);
+    TransientBudget::walk(way, self.transients_);
+    way("last_sent", self.last_sent_);
     way("engaged", self.engaged_);
     way("quiet_ticks", self.quiet_ticks_);
     way("gain", self.gain_);
@@ -217,6 +224,8 @@ class SafetyChain {
   [[nodiscard]] bool is_contradictory(const SafetyInput& input) const noexcept;
   void note_faults(std::uint32_t flags) noexcept;
   void warm_up(double since_last) noexcept;
+  [[nodiscard]] double peak() const noexcept;          // [N]
+  [[nodiscard]] double peak_as_warm() const noexcept;  // [N]
   Vec3 limited(const SafetyInput& input, Vec3 force, std::uint32_t& flags) const noexcept;
   double softened(const SafetyInput& input, double since_last, double dt,
                   std::uint32_t& flags) noexcept;
@@ -227,6 +236,8 @@ class SafetyChain {
                                        double since_last, std::uint32_t& flags) noexcept;
   [[nodiscard]] Vec3 slewed(const Vec3& force, double rise, double fall) const noexcept;
   [[nodiscard]] Vec3 bounded(Vec3 force, double rise, std::uint32_t& flags) noexcept;
+  [[nodiscard]] Vec3 with_transient(const SafetyInput& input, const Vec3& force,
+                                    std::uint32_t& flags) noexcept;
 
   DeviceLimits device_;
   SafetyParameters parameters_;
@@ -234,7 +245,8 @@ class SafetyChain {
 
   // walk() lists all of these, but for the interventions, which change nothing.
   std::optional<double> last_t_;
-  Vec3 last_force_ = Vec3::Zero();  // as sent
+  Vec3 last_force_ = Vec3::Zero();  // as sent, but for what rang
+  Vec3 last_sent_ = Vec3::Zero();   // all of it
   std::uint32_t last_flags_ = 0;
   std::array<std::uint64_t, safety_flag_count> interventions_{};
 
@@ -255,6 +267,7 @@ class SafetyChain {
   EnergyMonitor energy_;
   double energy_ceiling_ = 1.0;  // [-] what the energy link allows
   CorrectionTank tank_;
+  TransientBudget transients_;
   bool engaged_ = false;
   double quiet_ticks_ = 0.0;
   double gain_ = 0.0;

@@ -12,6 +12,8 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/sources/depth_png.hpp"
+#include "palpate/sources/material_file.hpp"
 #include "palpate/sources/realsense_lens.hpp"
 #include "palpate/sources/ros_frames.hpp"
 
@@ -46,6 +48,8 @@ CameraTopics::CameraTopics(std::size_t number) {
   camera_info = "/" + camera + "/depth/camera_info";
   points = "/" + camera + "/depth/points";
   exact = "/" + camera + "/depth/exact";
+  materials = "/" + camera + "/material/image/compressed";
+  material_table = "/" + camera + "/material/table";
   optical_frame = camera + "_optical_frame";
 }
 
@@ -201,7 +205,8 @@ std::vector<double> BagCamera::exact(std::size_t number, std::size_t size) {
   const BagReader::Place& place = exact_places_[number];
   const std::string name = bag_.name(exact_topic_, place);
   auto numbers = ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data;
-  if (numbers.size() != size)
+  const bool has_materials = numbers.size() == size + 2 && type_ != ros::PointCloud2::type;
+  if (numbers.size() != size && !has_materials)
     throw Error(
         name,
         "has " + std::to_string(numbers.size()) + " numbers instead of " + std::to_string(size),
@@ -257,8 +262,53 @@ std::optional<Frame> BagCamera::read_depth(std::size_t number, ros::Image image)
     for (int column = 0; column < 4; ++column)
       world_from_camera(row, column) = numbers[static_cast<std::size_t>(2 + 4 * row + column)];
   }
-  return Frame{numbers[0],
-               std::make_shared<DepthImage>(seen, std::move(depth), numbers[1], world_from_camera)};
+  auto cloud = std::make_shared<DepthImage>(seen, std::move(depth), numbers[1], world_from_camera);
+  if (numbers.size() > 14) cloud->set_materials(materials(number, numbers[14], numbers[15]));
+  return Frame{numbers[0], std::move(cloud)};
+}
+
+// What was recorded of a frame's materials. The messages are counted from 1.
+std::shared_ptr<const MaterialMap> BagCamera::materials(std::size_t number, double image,
+                                                        double table) {
+  if (image == material_image_ && table == material_table_) return materials_;
+  const std::string camera = topic_.substr(0, topic_.find('/', 1));
+  const auto message = [&](const std::string& topic, double count) {
+    std::vector<BagReader::Place>& places = material_places_[topic];
+    if (places.empty() && bag_.find(topic) != nullptr) places = bag_.places(topic);
+    if (!(count >= 1.0 && count <= static_cast<double>(places.size())))
+      throw Error(name(number), "has no message on " + topic, "the bag may be damaged");
+    return places[static_cast<std::size_t>(count) - 1];
+  };
+  auto names = std::make_shared<MaterialTable>();
+  if (table != 0.0) {
+    const std::string topic = camera + "/material/table";
+    const BagReader::Place place = message(topic, table);
+    *names = materials_from_json(text(place, topic), bag_.name(topic, place));
+  }
+  const std::string topic = camera + "/material/image/compressed";
+  const BagReader::Place place = message(topic, image);
+  const std::string where = bag_.name(topic, place);
+  const auto packed = ros::decode<ros::CompressedImage>(bag_.read(place), where);
+  const DepthPng png = parse_depth_png(packed.data, where);
+  const bool bright = packed.format == material_format_with_brightness;
+  std::vector<std::uint8_t> labels;
+  std::vector<std::uint8_t> brightness;
+  for (const std::uint16_t pixel : png.depth) {
+    labels.push_back(static_cast<std::uint8_t>(pixel & 0xffU));
+    if (bright) brightness.push_back(static_cast<std::uint8_t>(pixel >> 8U));
+  }
+  const Intrinsics& k = rays_->intrinsics();
+  if (png.width != k.width || png.height != k.height)
+    throw Error(where,
+                "is an image of " + std::to_string(png.width) + "x" + std::to_string(png.height) +
+                    " pixels, but its camera has " + std::to_string(k.width) + "x" +
+                    std::to_string(k.height),
+                "it may be damaged");
+  materials_ =
+      std::make_shared<LabelImage>(std::move(names), std::move(labels), std::move(brightness));
+  material_image_ = image;
+  material_table_ = table;
+  return materials_;
 }
 
 std::optional<Frame> BagCamera::read_points(std::size_t number, const ros::PointCloud2& message) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,11 +25,21 @@ struct CameraTopics {
   std::string camera_info;  ///< CameraInfo, one for each depth image
   std::string points;       ///< PointCloud2 of float64, where the camera gives points
   /// Float64MultiArray, one for each image or cloud: values that standard messages lack or round.
-  /// Depth: stamp [s], units per metre, world_from_camera (3 x 4, row by row).
+  /// Depth: stamp [s], units per metre, world_from_camera (3 x 4, row by row); where something is
+  /// known of the materials, which message of `materials` and which of `material_table` they are,
+  /// from 1, 0 for none.
   /// Points: stamp [s], voxel [m], 1 if a viewpoint follows, the viewpoint [m].
   std::string exact;
-  std::string optical_frame;  ///< in TF
+  /// CompressedImage, "mono16; png": of each pixel the label of its material, and in the upper
+  /// eight bits the brightness, if `format` ends with that. Written when it changes.
+  std::string materials;
+  std::string material_table;  ///< String: materials_json(), written when it changes
+  std::string optical_frame;   ///< in TF
 };
+
+/// CompressedImage::format of CameraTopics::materials.
+constexpr std::string_view material_format = "mono16; png; labels";
+constexpr std::string_view material_format_with_brightness = "mono16; png; labels; brightness";
 
 /// The frames of one topic of a bag, recorded by palpate (restored to the bit) or by others.
 ///
@@ -81,6 +92,7 @@ class BagCamera {
   std::optional<Frame> read_points(std::size_t number, const ros::PointCloud2& message);
   [[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(double stamp) const;
   [[nodiscard]] std::vector<double> exact(std::size_t number, std::size_t size);
+  std::shared_ptr<const MaterialMap> materials(std::size_t number, double image, double table);
   const std::shared_ptr<const ViewingRays>& rays(std::size_t number, const ros::Image& image);
   [[nodiscard]] std::string text(const BagReader::Place& place, const std::string& topic) const;
   [[nodiscard]] double realsense_units(std::size_t number) const;
@@ -94,6 +106,9 @@ class BagCamera {
   bool is_realsense_ = false;
   std::optional<BagTransforms> transforms_;
   std::shared_ptr<const ViewingRays> rays_;  // of the frame read last
+  std::map<std::string, std::vector<BagReader::Place>> material_places_;
+  std::shared_ptr<const MaterialMap> materials_;        // of the frame read last
+  double material_image_ = 0.0, material_table_ = 0.0;  // its messages
   std::string details_;
 };
 

@@ -31,6 +31,7 @@ struct RecordedImage {
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
   // Images in visible light; empty where none was asked for, or none is near in time.
   fs::path brightness{}, colour{};
+  fs::path labels{};  // of materials; empty where none was asked for
 };
 
 class DepthRecording final : public Source {
@@ -61,6 +62,12 @@ class DepthRecording final : public Source {
     Frame frame{image.stamp,
                 std::make_shared<DepthImage>(rays_, std::move(png.depth), camera_.units_per_metre,
                                              image.world_from_camera, std::move(grey.brightness))};
+    if (!image.labels.empty()) {
+      GreyPng labels = read_grey_png(image.labels);
+      check_size(image.labels, labels.width, labels.height);
+      frame.labels =
+          std::make_shared<const std::vector<std::uint8_t>>(std::move(labels.brightness));
+    }
     if (!image.colour.empty()) {
       ColourPng colour = read_colour_png(image.colour);
       check_size(image.colour, colour.width, colour.height);
@@ -212,7 +219,7 @@ bool is_json(const fs::path& path) {
 }  // namespace
 
 std::unique_ptr<Source> open_tum(const Uri& uri) {
-  allow_only(uri, {"poses", "stamps", "brightness", "colour"});
+  allow_only(uri, {"poses", "stamps", "brightness", "colour", "labels"});
   const fs::path folder = uri.path();
   std::error_code error;
   if (uri.path().empty())
@@ -252,8 +259,9 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
     }
     place(uri, parse_trajectory(read_text(file), file.string()), poses, images, info);
   }
-  for (const auto& [what, member] : {std::pair("brightness", &RecordedImage::brightness),
-                                     std::pair("colour", &RecordedImage::colour)}) {
+  for (const auto& [what, member] :
+       {std::pair("brightness", &RecordedImage::brightness),
+        std::pair("colour", &RecordedImage::colour), std::pair("labels", &RecordedImage::labels)}) {
     if (!uri.has(what)) continue;
     const fs::path file = folder / uri.text_option(what, "");
     if (!fs::is_regular_file(file, error)) {
@@ -269,7 +277,7 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
 }
 
 std::unique_ptr<Source> open_depth(const Uri& uri) {
-  allow_only(uri, {"fps", "poses"});
+  allow_only(uri, {"fps", "poses", "labels", "colour"});
   const fs::path path = uri.path();
   std::error_code error;
   const bool is_folder = fs::is_directory(path, error);
@@ -309,6 +317,20 @@ std::unique_ptr<Source> open_depth(const Uri& uri) {
   std::vector<RecordedImage> images;
   for (std::size_t k = 0; k < files.size(); ++k) {
     images.push_back({.file = files[k], .stamp = static_cast<double>(k) / fps});
+  }
+  for (const auto& [what, member] :
+       {std::pair("colour", &RecordedImage::colour), std::pair("labels", &RecordedImage::labels)}) {
+    if (!uri.has(what)) continue;
+    // A folder of images with the names of the depth images, or one image for all of them.
+    const fs::path named = (is_folder ? path : folder) / uri.text_option(what, "");
+    const bool one = fs::is_regular_file(named, error);
+    for (RecordedImage& image : images) {
+      const fs::path file = one ? named : named / image.file.filename();
+      if (!fs::is_regular_file(file, error))
+        throw Error(uri.text(), "there is no " + std::string(what) + " image " + file.string(),
+                    "name a folder of PNGs that are called as the depth images are, or one PNG");
+      image.*member = file;
+    }
   }
   const std::string poses = uri.text_option("poses", "none");
   const fs::path poses_file = (is_folder ? path : folder) / poses;

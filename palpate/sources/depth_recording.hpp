@@ -28,7 +28,8 @@ namespace palpate {
 /// camera's own frame. Frames at whose stamp the trajectory has no pose are left out, and
 /// SourceInfo::notes says how many. `colour=rgb.txt` reads that list of images in visible light,
 /// registered to the depth and of its size, and gives each frame the one nearest to it within 20
-/// ms, if any, as Frame::colour; `brightness=rgb.txt` the same in grey, as DepthImage::brightness.
+/// ms, if any, as Frame::colour; `brightness=rgb.txt` the same in grey, as DepthImage::brightness;
+/// `labels=FILE` the same of 8-bit images whose values are labels of materials, as Frame::labels.
 /// @throws Error if the lists, poses or intrinsics cannot be used, or no frame is left.
 std::unique_ptr<Source> open_tum(const Uri& uri);
 
@@ -37,10 +38,13 @@ std::unique_ptr<Source> open_tum(const Uri& uri);
 ///
 /// intrinsics.json is looked for beside the images and one folder above. Without it, fx, fy, cx, cy
 /// and units must be given; the size is that of the first image.
-/// Stamps are k/fps of the k-th frame given: `fps=30`, or fps_nominal of intrinsics.json, or 30.
-/// Points are in the camera's own frame unless `poses=FILE`, named relative to DIR, says where the
-/// camera was: a .json of one matrix for each image of the folder (parse_pose_matrices), or a
-/// trajectory in the TUM benchmark's format whose stamps count from the first image of the folder.
+/// `labels=PLACE`, named relative to DIR, is a folder of 8-bit images with the names of the depth
+/// images, or one image for all, whose values are labels of materials: Frame::labels.
+/// `colour=PLACE` is the same of images in visible light: Frame::colour. Stamps are k/fps of the
+/// k-th frame given: `fps=30`, or fps_nominal of intrinsics.json, or 30. Points are in the camera's
+/// own frame unless `poses=FILE`, named relative to DIR, says where the camera was: a .json of one
+/// matrix for each image of the folder (parse_pose_matrices), or a trajectory in the TUM
+/// benchmark's format whose stamps count from the first image of the folder.
 /// @throws Error if the folder, poses or intrinsics cannot be used, or no frame is left.
 std::unique_ptr<Source> open_depth(const Uri& uri);
 

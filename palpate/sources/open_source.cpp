@@ -8,6 +8,7 @@
 #include "palpate/core/pose.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/sources/depth_recording.hpp"
+#include "palpate/sources/material_file.hpp"
 #include "palpate/sources/point_file_source.hpp"
 #include "palpate/sources/posed_source.hpp"
 #include "palpate/sources/recording.hpp"
@@ -85,8 +86,12 @@ std::unique_ptr<Source> open_source(std::string_view text, const Registry<Source
   std::optional<Eigen::Isometry3d> pose;
   if (uri.has("pose"))
     pose = parse_pose(uri.text_option("pose", ""), uri.text() + ": option 'pose'");
-  auto source = schemes.find(uri.scheme(), uri.text()).open(uri.without("pose"));
-  return pose ? with_pose(std::move(source), *pose, uri.text()) : std::move(source);
+  std::optional<Materials> materials;
+  if (uri.has("material")) materials = materials_of(uri.text_option("material", ""));
+  auto source =
+      schemes.find(uri.scheme(), uri.text()).open(uri.without("pose").without("material"));
+  if (pose) source = with_pose(std::move(source), *pose, uri.text());
+  return materials ? with_materials(std::move(source), std::move(*materials)) : std::move(source);
 }
 
 }  // namespace palpate

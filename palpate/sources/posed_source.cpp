@@ -53,8 +53,11 @@ class PosedSource final : public Source {
   }
   [[nodiscard]] std::shared_ptr<const Cloud> posed(const Cloud& cloud) const {
     if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
-      return std::make_shared<DepthImage>(image->shared_rays(), image->depth(),
-                                          image->units_per_metre(), pose_, image->brightness());
+      auto moved =
+          std::make_shared<DepthImage>(image->shared_rays(), image->depth(),
+                                       image->units_per_metre(), pose_, image->brightness());
+      moved->set_materials(image->materials());
+      return moved;
     }
     const auto* points = dynamic_cast<const PointCloud*>(&cloud);
     if (points == nullptr)

@@ -106,7 +106,8 @@ SensorKind sensor_option(const Uri& uri, SensorKind known);
 std::string uri_of_file(const std::filesystem::path& file);
 
 /// Opens a source by its URI. Whatever the scheme, `pose=x,y,z,qx,qy,qz,qw` says where the camera
-/// stands, as parse_pose reads it: see with_pose().
+/// stands, as parse_pose reads it: see with_pose(); and `material=NAME` or `material=FILE.toml`
+/// what its surfaces are made of: see with_materials().
 /// @throws Error for an unknown scheme or option (naming the nearest known one), or input that
 ///         cannot be used.
 std::unique_ptr<Source> open_source(std::string_view uri,

@@ -12,14 +12,15 @@ methods, your own among them. All numbers are SI, all places in the world's fram
 """
 
 from . import bench
-from ._core import (Camera, Cloud, CloudView, DepthImage, Error, Frame, PointCloud, Renderer,
-                    Session, Source, State, Tick, __version__, flags, limits, methods, parameters,
-                    read_session, safety_flags, trace)
+from ._core import (Camera, Cloud, CloudView, DepthImage, Error, Frame, Materials, PointCloud,
+                    Renderer, Session, Source, State, Tick, __version__, flags, limits, materials,
+                    methods, parameters, read_session, safety_flags, trace)
 from .method import Method
 from .show import dataframe, plot
 
 __all__ = [
-    "Camera", "Cloud", "CloudView", "DepthImage", "Error", "Frame", "Method", "PointCloud",
-    "Renderer", "Session", "Source", "State", "Tick", "__version__", "bench", "dataframe", "flags",
-    "limits", "methods", "parameters", "plot", "read_session", "safety_flags", "trace",
+    "Camera", "Cloud", "CloudView", "DepthImage", "Error", "Frame", "Materials", "Method",
+    "PointCloud", "Renderer", "Session", "Source", "State", "Tick", "__version__", "bench",
+    "dataframe", "flags", "limits", "materials", "methods", "parameters", "plot", "read_session",
+    "safety_flags", "trace",
 ]

@@ -33,6 +33,38 @@ class Renderer(unittest.TestCase):
         numpy.testing.assert_allclose(tick.normal, (0, 0, -1), atol=1e-3)
         self.assertEqual(palpate.flags(tick.flags), {})
 
+    def test_feels_what_a_pixel_is_made_of(self):
+        materials = palpate.Materials([{"name": "cushion", "like": "foam", "stiffness": 150},
+                                       {"name": "board", "friction": 0.5}])
+        self.assertEqual(materials.names, ["cushion", "board"])
+        labels = numpy.ones(wall().shape, numpy.uint8)
+        labels[:, labels.shape[1] // 2:] = 2
+        for x, stiffness, friction in ((-0.05, 150, 0.6), (0.05, 600, 0.5)):
+            touch = palpate.Renderer()
+            touch.frame(wall(), camera=CAMERA, stamp=0.0, materials=materials, labels=labels)
+            touch.seat((x, 0, 0.9))
+            ticks = touch.ticks([(x, 0, 0.99 + 1e-4 * i) for i in range(100)] +
+                                [(x + 1e-4 * i, 0, 1.0) for i in range(100)], numpy.arange(200) * 1e-3)
+            force = -ticks["force"][:, 2]
+            depth = ticks["hip"][-1, 2] - 1.0
+            last = touch.tick((x + 0.01, 0, 1.006), 0.3)
+            self.assertAlmostEqual(-last.force[2], stiffness * 0.006, delta=0.1 * stiffness * 0.006)
+            self.assertAlmostEqual(last.hardness, stiffness / 600, places=2)
+            self.assertTrue((force >= 0).all() and depth >= 0)
+            slide = touch.ticks([(x + 0.01 + 1e-4 * i, 0, 1.006) for i in range(100)],
+                                0.301 + numpy.arange(100) * 1e-3)["force"][-1]
+            self.assertGreater(-slide[0] / -slide[2], 0.75 * friction)
+        self.assertIn("wood", palpate.materials())
+        for wrong, message in (({"labels": labels}, "materials"),
+                               ({"materials": materials}, "labels"),
+                               ({"materials": materials, "labels": labels[1:]}, "shape")):
+            with self.assertRaisesRegex(palpate.Error, message):
+                palpate.DepthImage(wall(), CAMERA, **wrong)
+        with self.assertRaisesRegex(palpate.Error, "'wood'"):
+            palpate.Materials("wod")
+        with self.assertRaisesRegex(palpate.Error, "friction"):
+            palpate.Materials([{"name": "a", "frction": 0.5}])
+
     def test_a_batch_is_its_single_ticks(self):
         hips = numpy.linspace((0, 0, 0.98), (0.005, 0, 1.005), 200)
         times = numpy.arange(200) * 1e-3

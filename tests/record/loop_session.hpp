@@ -33,6 +33,11 @@ class LoopSession {
     cycle_ = std::make_unique<Cycle>(make_method(method), device_, settings_);
   }
 
+  /// What the camera sees at its frame of a number.
+  std::function<std::shared_ptr<const Cloud>(int)> floor = [](int frame) {
+    return wavy_floor(frame);
+  };
+
   void record(const std::filesystem::path& folder, const RecorderOptions& options = {}) {
     const bool is_on = tick_ > 0;
     recorder_ = std::make_unique<Recorder>(
@@ -47,7 +52,7 @@ class LoopSession {
     for (int i = 0; i < ticks; ++i, ++tick_) {
       if (recorder_ && tick_ % 50 == 0) recorder_->flush();
       if (tick_ % 33 == 0) {
-        cloud_ = wavy_floor(tick_ / 33 % 10);
+        cloud_ = floor(tick_ / 33 % 10);
         stamp_ = now() - 1e-4 / 3.0;
         // Another camera is listed now and then, whose pictures come late.
         const std::array<CameraFrame, 2> cameras = {

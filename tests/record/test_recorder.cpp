@@ -16,6 +16,7 @@
 #include "palpate/methods/methods.hpp"
 #include "palpate/record/recorder.hpp"
 #include "palpate/record/replay.hpp"
+#include "palpate/sources/source.hpp"
 
 #include "tests/record/loop_session.hpp"
 #include "tests/record/sessions.hpp"
@@ -57,6 +58,56 @@ TEST_P(RecorderOf, ASessionFromItsStartIsReplayedBitForBit) {
   EXPECT_GT(largest, 1.0);
   EXPECT_GT(sent, 1.0);
   EXPECT_TRUE(reseated);
+}
+
+// A floor of three materials whose borders move, with a print that is felt, that comes and goes.
+std::shared_ptr<const Cloud> floor_of_materials(int frame) {
+  static const auto table = std::make_shared<const MaterialTable>([] {
+    MaterialTable made{.materials = {standard_material("foam"), standard_material("sandpaper"),
+                                     standard_material("metal")}};
+    made.materials[1].material.texture.relief = 2e-3;
+    return made;
+  }());
+  auto image = std::make_shared<DepthImage>(*wavy_floor(frame));
+  if (frame == 7) return image;  // one without materials
+  std::vector<std::uint8_t> labels;
+  std::vector<std::uint8_t> brightness;
+  for (std::size_t i = 0; i < image->depth().size(); ++i) {
+    labels.push_back(static_cast<std::uint8_t>((i + static_cast<std::size_t>(frame / 2)) / 5 % 4));
+    brightness.push_back(static_cast<std::uint8_t>(7 * i));
+  }
+  if (frame % 4 == 0) brightness.clear();
+  image->set_materials(
+      std::make_shared<LabelImage>(table, std::move(labels), std::move(brightness)));
+  return image;
+}
+
+TEST_P(RecorderOf, ASessionOnMaterialsIsReplayedBitForBit) {
+  for (const int before : {0, 210}) {
+    const TemporaryFolder folder;
+    LoopSession session(GetParam());
+    session.floor = floor_of_materials;
+    session.run(before);
+    session.record(folder.path() / "bag");
+    session.run(400);
+    session.recorder().stop();
+    EXPECT_EQ(session.recorder().status().trouble, "");
+    SessionReader reader(folder.path() / "bag");
+    const ReplayReport report = replay(reader);
+    EXPECT_TRUE(report.identical()) << test::text_of(report);
+    ASSERT_GE(report.ticks, 350U);
+    // As it was, and not as without materials.
+    const auto camera = open_source("recording:" + (folder.path() / "bag").string());
+    int with = 0;
+    while (const auto frame = camera->next()) {
+      const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
+      if (!image.materials()) continue;
+      ++with;
+      ASSERT_EQ(image.materials()->table()->materials.size(), 3U);
+      EXPECT_EQ(image.materials()->table()->materials[1].name, "sandpaper");
+    }
+    EXPECT_GE(with, 8);
+  }
 }
 
 TEST_P(RecorderOf, ASessionInItsMidstIsReplayedBitForBit) {

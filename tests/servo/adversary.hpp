@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <random>
@@ -75,6 +76,7 @@ class Adversary {
     latched_ = cycle_.statistics().latched_by != 0;
     if (latched_ != ((record.safety & fault_latched) != 0)) return "a latched fault without a flag";
     last_safety_ = record.safety;
+    rings_ = !record.tick.transient.isZero();
     const Vec3 away = record.tick.hip - device_.hand.position;
     if (away.allFinite() && away.norm() < 1e3) clutched_away_ = away;
     const double since_last = given - last_given_;
@@ -121,13 +123,25 @@ class Adversary {
           tick.normal = -tick.normal;
           tick.force = -tick.force;
           break;
+        case 6:
+          tick.transient = Vec3::Constant(nan);
+          break;
+        case 7:
+          rings_ = 400;
+          break;
         default:
           break;
+      }
+      if (rings_ > 0) {  // longer and stronger than any impact, and up to one after the other
+        --rings_;
+        tick.transient = Vec3(0, 0, rings_ % 3 == 0 ? -4.0 : 4.0);
+        tick.force += tick.transient;
       }
       return tick;
     }
 
    private:
+    int rings_ = 0;
     std::unique_ptr<Method> method_;
     std::mt19937_64 random_;
   };
@@ -224,6 +238,9 @@ class Adversary {
     settings.parameters.coupling.damping = one_in(2) ? 0.0 : between(0.0, 50.0);
     settings.parameters.coupling.max_force = between(0.0, 1000.0);
     settings.parameters.proxy.step_budget = one_in(4) ? 2 : 64;
+    settings.parameters.tap.tap = one_in(2) ? 0.0 : between(0.0, 50.0);
+    settings.parameters.texture.grain = one_in(2) ? 0.0 : between(0.0, 0.3);
+    settings.parameters.friction.friction = one_in(2) ? 0.0 : between(0.0, 2.0);
     settings.safety.ramp_time = between(0.01, 0.3);
     return settings;
   }
@@ -248,8 +265,19 @@ class Adversary {
     std::string broken;
     if (!force.allFinite()) broken = "a force that is not finite";
     if (length > 3.3 + 1e-9) broken = "a force above the limit";
-    if (length - last_.norm() > rise) broken = "a force that rises too fast";
-    if ((force - last_).norm() > rise + fall) broken = "a force that changes too fast";
+    const double change = (force - last_).norm();
+    if (length - last_.norm() > rise || change > rise + fall) {
+      // An impact rings: by up to 1 N to both sides, for up to 60 ms of any 100 ms.
+      if (!ringing_.empty() && !(t >= ringing_.back().t)) ringing_.clear();
+      ringing_.push_back({t, std::clamp(elapsed, 0.0, 5e-3)});
+      while (!(t - ringing_.front().t < 0.1)) ringing_.pop_front();
+      double rang_for = 0.0;
+      for (const Ringing& tick : ringing_) rang_for += tick.lasted;
+      if (rang_for > 0.066) broken = "a force that rises too fast";
+      if (!rings_ && !rang_) broken = "a force that rises too fast without an impact";
+      if (change > 2.0 + rise + fall) broken = "a force that changes too fast";
+    }
+    rang_ = rings_;
     if (heat_ > 0.88 * 0.88 * 1.001) broken = "more force than the motors bear for long";
     if ((last_safety_ & frame_late) != 0 && length > last_.norm())
       broken = "a force that grows while a frame is late";
@@ -284,6 +312,11 @@ class Adversary {
   std::size_t cloud_ = 0;
   double last_given_ = 100.0;  // [s] the time that a cycle was told last, if it was one
   bool latched_ = false;
+  bool rings_ = false, rang_ = false;  // in this tick, and in the one before
+  struct Ringing {
+    double t, lasted;  // [s]
+  };
+  std::deque<Ringing> ringing_;  // ticks of the last 100 ms in which only an impact was in time
   std::uint32_t last_safety_ = 0;
   bool any_frame_ = false;
   double last_stamp_ = 0.0, fresh_at_ = 0.0, fresh_stamp_ = 0.0;

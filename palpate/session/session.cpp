@@ -282,6 +282,7 @@ class Session::Impl {
     end_recording();
   }
 
+  Paint& paint() { return paint_; }
   Cycle& cycle() { return *cycle_; }
   [[nodiscard]] const Cycle& cycle() const { return *cycle_; }
   [[nodiscard]] const Device& device() const { return *device_; }
@@ -400,8 +401,9 @@ class Session::Impl {
 
   // To the method and the recorder.
   void give(std::size_t camera, const FedFrame& fed) {
+    std::shared_ptr<const Cloud> cloud = paint_.on(fed.frame.cloud, camera);
     const std::lock_guard lock(frames_mutex_);
-    newest_[camera] = fed.frame.cloud;
+    newest_[camera] = std::move(cloud);
     stamps_[camera].stamp = fed.frame.stamp;
     std::vector<std::shared_ptr<const Cloud>> clouds;
     for (const auto& cloud : newest_) {
@@ -534,6 +536,7 @@ class Session::Impl {
   }
 
   SessionOptions options_;
+  Paint paint_;
   std::vector<SensorKind> sensors_;                    // of the cameras
   std::vector<std::unique_ptr<CameraFeed>> feeds_;     // in real time
   std::vector<std::unique_ptr<PlayedSource>> played_;  // free-running
@@ -635,6 +638,10 @@ void Session::start_recording(const std::string& folder) {
 
 void Session::stop_recording() {
   impl_->stop_recording();
+}
+
+Paint& Session::paint() {
+  return impl_->paint();
 }
 
 const Device& Session::device() const {

@@ -14,6 +14,7 @@
 #include "palpate/record/recorder.hpp"
 #include "palpate/servo/servo_loop.hpp"
 #include "palpate/session/camera_feed.hpp"
+#include "palpate/session/paint.hpp"
 #include "palpate/session/summary.hpp"
 #include "palpate/sources/source.hpp"
 
@@ -159,6 +160,9 @@ class Session {
   void start_recording(const std::string& folder);
   /// Returns at once; state().recording says when all is written.
   void stop_recording();
+
+  /// What is painted on the cameras' frames; see Paint.
+  [[nodiscard]] Paint& paint();
 
   [[nodiscard]] const Device& device() const;
   /// The device, if a page moves it; else null.

@@ -208,6 +208,17 @@ std::optional<Command> parse_command(std::string_view message) {
     if (!paused->is_boolean() || !loop->is_boolean() || !speed->is_number()) return std::nullopt;
     return SetPlayback{paused->get<bool>(), loop->get<bool>(), speed->get<double>()};
   }
+  if (verb == "brush") {
+    if (what.is_null()) return DropBrush{};
+    if (!what.is_object() || what.size() != 2) return std::nullopt;
+    const auto material = what.find("material");
+    const auto radius = what.find("radius");
+    if (material == what.end() || radius == what.end() || !material->is_string() ||
+        !radius->is_number())
+      return std::nullopt;
+    return SetBrush{material->get<std::string>(), radius->get<double>()};
+  }
+  if (verb == "clear_paint" && what == true) return ClearPaint{};
   if (verb == "reset" && what == true) return ResetHand{};
   if (verb == "reset_faults" && what == true) return ResetFaults{};
   return std::nullopt;

@@ -135,11 +135,20 @@ struct Seek {
 struct OpenScene {
   std::string uri;
 };
+/// From now on what is touched is painted with a material; "" erases.
+struct SetBrush {
+  std::string material;
+  double radius;  ///< [m]
+};
+/// What is touched is no longer painted.
+struct DropBrush {};
+struct ClearPaint {};
 struct ResetHand {};
 /// Ends a latched fault of the safety chain; see Session::reset_faults.
 struct ResetFaults {};
 using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod,
-                             SetRecording, SetPlayback, Seek, OpenScene, ResetHand, ResetFaults>;
+                             SetRecording, SetPlayback, Seek, OpenScene, SetBrush, DropBrush,
+                             ClearPaint, ResetHand, ResetFaults>;
 
 /// The longest message a page may send [bytes].
 constexpr std::size_t max_page_message = 1024;

@@ -62,6 +62,9 @@ void check_allowed(const Command& command, Role role) {
     throw Error("hand", "only the page that has it resets it", "take the hand");
   if (std::holds_alternative<SetSafetyParameter>(command))
     throw Error("safety limit", "a page that looks on does not change it", remedy);
+  if (std::holds_alternative<SetBrush>(command) || std::holds_alternative<DropBrush>(command) ||
+      std::holds_alternative<ClearPaint>(command))
+    throw Error("brush", "a page that looks on does not paint", remedy);
   throw Error("parameter", "a page that looks on does not change it", remedy);
 }
 

@@ -132,6 +132,13 @@ std::string SessionHost::hello() {
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
+// The names of what the first camera's surfaces can be painted with.
+std::vector<std::string> SessionHost::paintable() const {
+  const auto clouds = session_->newest_clouds();
+  return clouds.empty() || !clouds.front() ? std::vector<std::string>{}
+                                           : Paint::names(*clouds.front());
+}
+
 std::string SessionHost::state() {
   SessionState state = session_->state();
   json parameters;
@@ -179,39 +186,79 @@ std::string SessionHost::state() {
                     {"message", state.recording.message},
                     {"ended", recording_ended()}};
   if (state.recording.on) recording["path"] = state.recording.folder;
+  json dabs = json::array();
+  for (const Dab& dab : session_->paint().dabs())
+    dabs.push_back({{"place", {dab.place.x(), dab.place.y(), dab.place.z()}},
+                    {"normal", {dab.normal.x(), dab.normal.y(), dab.normal.z()}},
+                    {"radius", dab.radius},
+                    {"material", dab.material}});
+  json brush;
+  if (brush_) brush = {{"material", brush_->material}, {"radius", brush_->radius}};
   const DeviceInfo& device = session_->device().info();
   const std::vector<std::string> warnings =
       stiffness_warnings(device, state.settings.parameters.coupling.stiffness,
                          state.settings.placement.workspace_scale, state.rate);
-  return json{{"method", state.settings.method},
-              {"parameters", parameters},
-              {"safety", safety},
-              {"placement", placement},
-              {"cameras", cameras},
-              {"playback", playback},
-              {"device",
-               {{"uri", device.uri},
-                {"kind", device.kind},
-                {"takes_hand", mouse_ != nullptr},
-                {"fault", state.device.text},
-                {"warnings", warnings}}},
-              {"servo", servo},
-              {"interventions", state.interventions},
-              {"latched_by", latched_by},
-              {"flag_ticks", state.summary.flag_ticks},
-              {"pop_throughs", state.summary.pop_throughs},
-              {"energy",
-               {{"contacts", state.summary.energy.contacts},
-                {"relative", energy_of(state.summary.energy.relative)},
-                {"absolute", energy_of(state.summary.energy.absolute)}}},
-              {"recording", recording}}
+  return json{
+      {"method", state.settings.method},
+      {"parameters", parameters},
+      {"safety", safety},
+      {"placement", placement},
+      {"cameras", cameras},
+      {"playback", playback},
+      {"device",
+       {{"uri", device.uri},
+        {"kind", device.kind},
+        {"takes_hand", mouse_ != nullptr},
+        {"fault", state.device.text},
+        {"warnings", warnings}}},
+      {"servo", servo},
+      {"interventions", state.interventions},
+      {"latched_by", latched_by},
+      {"flag_ticks", state.summary.flag_ticks},
+      {"pop_throughs", state.summary.pop_throughs},
+      {"energy",
+       {{"contacts", state.summary.energy.contacts},
+        {"relative", energy_of(state.summary.energy.relative)},
+        {"absolute", energy_of(state.summary.energy.absolute)}}},
+      {"paint",
+       {{"brush", brush}, {"dabs", dabs}, {"materials", paintable()}, {"trouble", brush_trouble_}}},
+      {"recording", recording}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
 std::optional<TickBatch> SessionHost::ticks() {
   const double contact_radius = session_->settings().parameters.proxy.r_c();
-  for (ServoTick record{}; reader_->try_pop(record);) batcher_->add(record, contact_radius);
+  std::optional<ServoTick> newest;
+  for (ServoTick record{}; reader_->try_pop(record);) {
+    batcher_->add(record, contact_radius);
+    newest = record;
+  }
+  if (newest) paint(*newest, contact_radius);
   return batcher_->take();
+}
+
+// Along a stroke, a dab in each third of the brush's radius.
+void SessionHost::paint(const ServoTick& newest, double contact_radius) {
+  const Tick& tick = newest.tick;
+  if (!brush_ || tick.force.isZero()) {
+    dabbed_.reset();
+    return;
+  }
+  const Vec3 foot = tick.proxy - contact_radius * tick.normal;
+  if (dabbed_ && (foot - *dabbed_).norm() < brush_->radius / 3.0) return;
+  dabbed_ = foot;
+  try {
+    if (brush_->material.empty())
+      session_->paint().erase(foot, brush_->radius);
+    else
+      session_->paint().add({.place = foot,
+                             .radius = brush_->radius,
+                             .normal = tick.normal,
+                             .material = brush_->material});
+    brush_trouble_.clear();
+  } catch (const Error& error) {  // full
+    brush_trouble_ = error.what();
+  }
 }
 
 void SessionHost::hand(const HandMessage& hand) {
@@ -256,6 +303,20 @@ void SessionHost::command(const Command& command, Role role) {
     rules_.open_scene(scene->uri);
   } else if (const auto* seek = std::get_if<Seek>(&command)) {
     session_->seek(seek->share);
+  } else if (const auto* brush = std::get_if<SetBrush>(&command)) {
+    if (!(brush->radius >= Paint::smallest && brush->radius <= Paint::largest))
+      throw Error("brush", "its radius is out of range", "give 0.001 to 0.1 m");
+    const std::vector<std::string> names = paintable();
+    if (!brush->material.empty() &&
+        std::find(names.begin(), names.end(), brush->material) == names.end())
+      static_cast<void>(standard_material(brush->material));  // throws, naming the nearest
+    brush_ = *brush;
+    dabbed_.reset();
+  } else if (std::holds_alternative<DropBrush>(command)) {
+    brush_.reset();
+  } else if (std::holds_alternative<ClearPaint>(command)) {
+    session_->paint().clear();
+    dabbed_.reset();
   } else if (std::holds_alternative<ResetFaults>(command)) {
     session_->reset_faults();
   } else if (mouse_ != nullptr) {

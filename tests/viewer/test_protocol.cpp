@@ -182,18 +182,40 @@ TEST(Protocol, UnderstandsEachCommand) {
   const auto seek = parse_command(R"({"seek": 0.25})");
   ASSERT_TRUE(seek && std::holds_alternative<Seek>(*seek));
   EXPECT_EQ(std::get<Seek>(*seek).share, 0.25);
+  const auto brush = parse_command(R"({"brush": {"material": "ice", "radius": 0.02}})");
+  ASSERT_TRUE(brush && std::holds_alternative<SetBrush>(*brush));
+  EXPECT_EQ(std::get<SetBrush>(*brush).material, "ice");
+  EXPECT_EQ(std::get<SetBrush>(*brush).radius, 0.02);
+  EXPECT_TRUE(std::holds_alternative<DropBrush>(parse_command(R"({"brush": null})").value()));
+  EXPECT_TRUE(
+      std::holds_alternative<ClearPaint>(parse_command(R"({"clear_paint": true})").value()));
   const auto faults = parse_command(R"({"reset_faults": true})");
   ASSERT_TRUE(faults && std::holds_alternative<ResetFaults>(*faults));
 }
 
 TEST(Protocol, RefusesCommandsThatAreNotItsOwn) {
-  for (const char* text :
-       {"", "{}", "null", "[1]", "{", R"({"set": 1})", R"({"set": {"name": "x"}})",
-        R"({"set": {"name": 1, "value": 1}})", R"({"set": {"name": "x", "value": "1"}})",
-        R"({"set": {"name": "x", "value": 1, "more": 1}})", R"({"method": 1})",
-        R"({"record": "yes"})", R"({"reset": false})", R"({"reset_faults": 1})",
-        R"({"quit": true})", R"({"method": "paper", "reset": true})", "\xff\xfe",
-        R"({"method": "\ud800"})"}) {
+  for (const char* text : {"",
+                           "{}",
+                           "null",
+                           "[1]",
+                           "{",
+                           R"({"set": 1})",
+                           R"({"set": {"name": "x"}})",
+                           R"({"set": {"name": 1, "value": 1}})",
+                           R"({"set": {"name": "x", "value": "1"}})",
+                           R"({"set": {"name": "x", "value": 1, "more": 1}})",
+                           R"({"method": 1})",
+                           R"({"record": "yes"})",
+                           R"({"reset": false})",
+                           R"({"reset_faults": 1})",
+                           R"({"brush": "ice"})",
+                           R"({"brush": {"material": "ice"}})",
+                           R"({"brush": {"material": 1, "radius": 0.01}})",
+                           R"({"clear_paint": false})",
+                           R"({"quit": true})",
+                           R"({"method": "paper", "reset": true})",
+                           "\xff\xfe",
+                           R"({"method": "\ud800"})"}) {
     EXPECT_FALSE(parse_command(text)) << text;
   }
   std::string deep(max_page_message, '[');

@@ -25,7 +25,8 @@ TEST(Roles, AllowALookingPageNothing) {
         Command(SetPlacement{"scale", 2.0}), Command(SetMethod{"paper"}),
         Command(SetRecording{true}), Command(SetRecording{false}), Command(ResetHand{}),
         Command(ResetFaults{}), Command(SetPlayback{true, true, 1.0}), Command(Seek{0.5}),
-        Command(OpenScene{"synthetic:desk"})}) {
+        Command(OpenScene{"synthetic:desk"}), Command(SetBrush{"ice", 0.01}), Command(DropBrush{}),
+        Command(ClearPaint{})}) {
     EXPECT_THROW(check_allowed(command, Role::looking), Error) << command.index();
     EXPECT_NO_THROW(check_allowed(command, Role::operating)) << command.index();
   }
@@ -43,6 +44,7 @@ TEST(Roles, LeaveMethodPlacementAndRecordingToTheOperator) {
   EXPECT_NO_THROW(check_allowed(SetParameter{"stiffness", 1.0}, Role::holding));
   EXPECT_NO_THROW(check_allowed(SetSafetyParameter{"max_speed", 0.1}, Role::holding));
   EXPECT_NO_THROW(check_allowed(ResetHand{}, Role::holding));
+  EXPECT_NO_THROW(check_allowed(SetBrush{"ice", 0.01}, Role::holding));
 }
 
 TEST(LimitBounds, LetWhoHoldsTheHandMakeEveryLimitStricterAndNoneLooser) {

@@ -459,6 +459,37 @@ describe.each([
   });
 });
 
+test("a brush paints what is touched, which then feels like that", async () => {
+  const page = await open(PLANE);
+  const paint = () =>
+    page.evaluate(() => (window as any).palpate.newest().state.paint as { dabs: unknown[] });
+  await page.locator("[data-tab=method]").first().click();
+  await page.locator("#brush-material").selectOption("foam");
+  await page.locator("#brush-radius").fill("30");
+  await page.locator("#brush-radius").press("Enter");
+  await expect.poll(() => page.locator("#brush-about").textContent()).toContain("painted");
+  const at = await placeWhere(page, "surface");
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await expect.poll(async () => (await paint()).dabs.length).toBeGreaterThan(0);
+  await page.mouse.move(at.x + 25, at.y + 5, { steps: 5 });
+  await expect.poll(async () => (await paint()).dabs.length).toBeGreaterThan(1);
+  await page.mouse.up();
+  await until(page, (seen) => seen.state === 0);
+
+  // Foam has 120 N/m; the plane has 600.
+  await page.locator("#brush-material").selectOption("none");
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await until(page, ({ state, force, hip, proxy }) => {
+    const depth = distance(hip, proxy) - r_c;
+    return state !== 0 && depth > 0.002 && force / depth > 90 && force / depth < 160;
+  });
+  await page.mouse.up();
+  await page.locator("#brush-clear").click();
+  await expect.poll(async () => (await paint()).dabs.length).toBe(0);
+});
+
 test("without the operator's link a page is greyed out and may hold the hand", async () => {
   const page = await open(DESK);
   expect(await page.locator("#role").textContent()).toBe("operator");

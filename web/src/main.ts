@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import "./style.css";
+import { Brush, dabColour } from "./brush";
 import { Connection, unknownToken, type Presence } from "./connection";
 import { Files } from "./files";
 import { HandInput, isForForm } from "./hand";
@@ -78,6 +79,11 @@ const panel = new Panel({
   openScene: (uri) => connection.ask({ open: uri }),
 });
 
+const brush = new Brush({
+  brush: (chosen) => connection.ask({ brush: chosen }),
+  clear: () => connection.ask({ clear_paint: true }),
+});
+
 const timeline = new Timeline((command) => connection.ask(command));
 
 const connection = new Connection({
@@ -113,6 +119,16 @@ const connection = new Connection({
     role.textContent = roleNames[newest.role].name;
     role.title = roleNames[newest.role].may;
     panel.update(newest);
+    brush.update(newest);
+    const { dabs, materials } = newest.paint;
+    view.showPaint(
+      dabs.map(({ place, normal, radius, material }) => ({
+        at: place,
+        normal,
+        radius,
+        colour: dabColour(material, materials),
+      })),
+    );
     timeline.show(newest, performance.now());
     const { r_c, r_1, r_3 } = newest.parameters;
     view.setRadii({ r_c: r_c ?? 0.005, r_1: r_1 ?? 0.005, r_3: r_3 ?? 0.01 });

@@ -123,7 +123,7 @@ export function stiffnessFirst<Row extends { name: string }>(rows: readonly Row[
   return [...rows.filter(isFirst), ...rows.filter((row) => !isFirst(row))];
 }
 
-function element<Tag extends keyof HTMLElementTagNameMap>(
+export function element<Tag extends keyof HTMLElementTagNameMap>(
   tag: Tag,
   properties: Partial<HTMLElementTagNameMap[Tag]> = {},
   ...children: (Node | string)[]

@@ -343,6 +343,16 @@ export interface State {
   pop_throughs: number;
   /** that the forces sent have given to the hand, in all contacts */
   energy: { contacts: number; relative: PortEnergy; absolute: PortEnergy };
+  /** what is painted on the cameras' frames */
+  paint: {
+    /** what is touched is painted with; "" wipes; null: nothing is painted */
+    brush: { material: string; radius: number } | null;
+    dabs: { place: Vec3; normal: Vec3; radius: number; material: string }[];
+    /** that can be painted with */
+    materials: string[];
+    /** why the brush does not paint; empty: it does */
+    trouble: string;
+  };
   recording: {
     possible: boolean;
     path: string | null;
@@ -363,4 +373,6 @@ export type Command =
   | { seek: number }
   | { open: string }
   | { reset: true }
+  | { brush: { material: string; radius: number } | null }
+  | { clear_paint: true }
   | { reset_faults: true };

@@ -33,6 +33,8 @@ const PIN = 3.2; // contact radii
 const TRAIL = 360; // ticks messages
 /** Places of the line behind the recorded hand. */
 export const GHOST_TRAIL = 60;
+const MOST_DABS = 500; // of paint
+const PAINT_LAYER = 5e-3; // [m] before the surface
 const SPOT_SIZE = 9; // [px] of the ring under the pointer
 
 export interface Radii {
@@ -99,6 +101,8 @@ export class SceneView {
   private readonly spot: THREE.Mesh<THREE.RingGeometry, THREE.MeshBasicMaterial>;
   private readonly grid: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly frusta: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly paint: THREE.InstancedMesh<THREE.CircleGeometry, THREE.MeshBasicMaterial>;
+  private readonly dab = new THREE.Object3D(); // where one of them is
   private readonly axes = new THREE.AxesHelper(AXES_LENGTH);
   // The hand that was recorded.
   private readonly ghost: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
@@ -172,6 +176,13 @@ export class SceneView {
       new THREE.RingGeometry(0.8, 1, 40),
       new THREE.MeshBasicMaterial({ ...flat, opacity: 0.9 }),
     );
+    this.paint = new THREE.InstancedMesh(
+      new THREE.CircleGeometry(1, 24),
+      new THREE.MeshBasicMaterial({ transparent: true, depthWrite: false, opacity: 0.45 }),
+      MOST_DABS,
+    );
+    this.paint.count = 0;
+    this.paint.frustumCulled = false;
     const thin = (opacity: number) => new THREE.LineBasicMaterial({ transparent: true, opacity });
     this.grid = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.16));
     this.frusta = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.5));
@@ -199,7 +210,7 @@ export class SceneView {
     const marks = [
       ...[this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin],
       ...[this.shadow, this.spot, this.grid, this.frusta, this.axes],
-      ...[this.ghost, this.ghostTrail],
+      ...[this.ghost, this.ghostTrail, this.paint],
     ];
     for (const mark of marks) mark.visible = false;
     this.arrow.visible = false;
@@ -238,6 +249,22 @@ export class SceneView {
     this.arrowMaterial.color = colour(palette.force);
     this.arrowMaterial.emissive = colour(palette.force).multiplyScalar(0.35);
     for (const cloud of this.clouds.values()) cloud.setColours(this.cloudColours());
+    this.touch();
+  }
+
+  /** Paint on surfaces. */
+  showPaint(dabs: readonly (Spot & { radius: number; colour: string })[]): void {
+    const shown = dabs.slice(0, MOST_DABS);
+    shown.forEach(({ at, normal, radius, colour }, i) => {
+      this.lay(this.dab, { at: add(at, scale(normal, PAINT_LAYER)), normal }, radius);
+      this.dab.updateMatrix();
+      this.paint.setMatrixAt(i, this.dab.matrix);
+      this.paint.setColorAt(i, new THREE.Color(colour));
+    });
+    this.paint.count = shown.length;
+    this.paint.visible = shown.length > 0;
+    this.paint.instanceMatrix.needsUpdate = true;
+    if (this.paint.instanceColor) this.paint.instanceColor.needsUpdate = true;
     this.touch();
   }
 

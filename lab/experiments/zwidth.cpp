@@ -128,10 +128,11 @@ ZScene::ZScene(std::string_view name, std::string_view sensor, std::uint64_t see
 }
 
 Vec3 ZScene::touched_at(double r_c) const {
-  // A sphere that comes down from above; all scenes are highest or symmetric about the z axis.
+  // A sphere that comes down from above; the surfaces are symmetric about the z axis. Then the hand
+  // goes on by its radius before the coupling pushes.
   Vec3 at(0.0, 0.0, 0.1);
   for (int i = 0; i < 200; ++i) at.z() -= truth_(at, 0.0).distance - r_c;
-  return at;
+  return at - r_c * Vec3::UnitZ();
 }
 
 bool ZTrial::decays() const {
@@ -320,7 +321,7 @@ set key outside right top noenhanced
 set bmargin 11
 set grid y
 of(m, w, c) = sprintf("< awk -F, 'NR > 1 {k = $1 \" \" $2 \" k_d=\" $7; if (!(k in at)) {at[k] = ++n; name[n] = k}} NR > 1 && (\"%s\" == \"\" || ($5 == \"%s\" && $6 == \"%s\")) {v = $%d; if (!(k in r) || v < r[k]) r[k] = v} END {for (i = 1; i <= n; i++) print i \",\" name[i] \",\" (name[i] in r ? r[name[i]] : \"NaN\")}' %s", m, m, w, c, csv)
-plot of("", "", 9) using 1:3:xtic(2) with points pt 0 ps 3 lc rgb "#999999" title "2(b+k_d)/(T+2t_d)", \
+plot of("", "", 9) using 1:3:xtic(2) with points pt 1 ps 1.2 lw 2 lc rgb "#999999" title "2(b+k_d)/(T+2t_d)", \
      of("", "", 10) using 1:3 with points pt 2 ps 1.4 lw 2 lc rgb "#444444" title "linear loop, no friction", \
      1500 lw 1 dt 2 lc rgb "#bbbbbb" title "1,500 N/m", \
      for [k=1:words(methods)] of(word(methods, k), "straight", 8) using ($1-0.12+0.08*k):3 with points pt 7 lc k title word(methods, k).", worst scene", \

@@ -41,7 +41,7 @@ class ZScene {
   [[nodiscard]] std::shared_ptr<const Cloud> frame(std::uint64_t number) const {
     return frames_[number % frames_.size()];
   }
-  /// [m] where a hand that presses straight down feels the surface first
+  /// [m] where a HIP that goes straight down feels the surface first
   [[nodiscard]] Vec3 touched_at(double r_c) const;
 
  private:

@@ -101,7 +101,8 @@ class SafeLoop final : public TouchLoop {
             done.tick.force,
             done.tick.surface_velocity,
             done.tick.surface_motion,
-            held_.speed()};
+            held_.speed(),
+            done.safety};
   }
 
  private:

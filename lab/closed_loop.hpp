@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -42,6 +43,7 @@ struct Felt {
   double surface_velocity = 0.0;       ///< [m/s] as the method has it
   Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world, as the method has it
   double speed = 0.0;                  ///< [m/s] of the handle
+  std::uint32_t safety = 0;            ///< SafetyFlag bits; 0 without a chain
 };
 
 /// The loop of a method and a held device, at the rate of the scenario's ticks.

@@ -66,8 +66,7 @@ MaterialsOf make_materials(const py::object& what) {
   return {std::make_shared<const MaterialTable>(std::move(table))};
 }
 
-std::vector<std::uint8_t> bytes_of(const py::object& array, const char* what,
-                                   const Intrinsics& k) {
+std::vector<std::uint8_t> bytes_of(const py::object& array, const char* what, const Intrinsics& k) {
   if (!py::isinstance<py::array_t<std::uint8_t>>(array))
     throw py::type_error(std::string(what) + ": it has to be an array of uint8");
   const auto pixels =
@@ -91,15 +90,13 @@ std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
   if (materials && labels.is_none() && materials->table->materials.size() > 1)
     throw Error("materials", "nothing says which pixel is which of them",
                 "give labels, uint8 (height, width): 0 for none, i for the i-th of them");
-  const std::size_t size =
-      static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
+  const std::size_t size = static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
   const auto everywhere = static_cast<std::uint8_t>(materials ? 1 : 0);
   return std::make_shared<LabelImage>(
       materials ? materials->table : std::make_shared<const MaterialTable>(),
       labels.is_none() ? std::vector<std::uint8_t>(size, everywhere)
                        : bytes_of(labels, "labels", k),
-      brightness.is_none() ? std::vector<std::uint8_t>()
-                           : bytes_of(brightness, "brightness", k));
+      brightness.is_none() ? std::vector<std::uint8_t>() : bytes_of(brightness, "brightness", k));
 }
 
 /// Takes the array's own memory, which stays alive as long as the image does.
@@ -327,10 +324,11 @@ void define_clouds(py::module_& m) {
                              "[m] world: from where they were seen, if that is known");
 
   py::class_<MaterialsOf>(m, "Materials", "What surfaces are made of, and feel like.")
-      .def(py::init(&make_materials), py::arg("what"),
-           "A standard material's name (palpate.materials()), a TOML file, or a list of dicts, each "
-           "with a `name`, numbers by their names, and perhaps `like`, a standard material to begin "
-           "from.")
+      .def(
+          py::init(&make_materials), py::arg("what"),
+          "A standard material's name (palpate.materials()), a TOML file, or a list of dicts, each "
+          "with a `name`, numbers by their names, and perhaps `like`, a standard material to begin "
+          "from.")
       .def_property_readonly(
           "names",
           [](const MaterialsOf& materials) {
@@ -344,16 +342,17 @@ void define_clouds(py::module_& m) {
 
   py::class_<DepthImage, Cloud, std::shared_ptr<DepthImage>>(
       m, "DepthImage", "One capture of a depth camera: 16-bit depth, touched in place.")
-      .def(py::init(&make_image), py::arg("depth"), py::arg("camera"),
-           py::arg("units_per_metre") = 1000.0, py::arg("world_from_camera") = py::none(),
-           py::arg("materials") = py::none(), py::arg("labels") = py::none(),
-           py::arg("brightness") = py::none(),
-           "Depth along the optical axis, uint16 (height, width); 0 and 65535 are holes. The "
-           "array is not copied: it is kept alive, and must not change meanwhile. The pose is a "
-           "4x4 matrix, the camera's optical frame (x right, y down, z forward) in the world.\n\n"
-           "`labels`, uint8 (height, width), says which of `materials` each pixel is: 0 none, 1 the "
-           "first. `brightness`, of the same shape, is what `relief` makes heights of. Both are "
-           "copied.")
+      .def(
+          py::init(&make_image), py::arg("depth"), py::arg("camera"),
+          py::arg("units_per_metre") = 1000.0, py::arg("world_from_camera") = py::none(),
+          py::arg("materials") = py::none(), py::arg("labels") = py::none(),
+          py::arg("brightness") = py::none(),
+          "Depth along the optical axis, uint16 (height, width); 0 and 65535 are holes. The "
+          "array is not copied: it is kept alive, and must not change meanwhile. The pose is a "
+          "4x4 matrix, the camera's optical frame (x right, y down, z forward) in the world.\n\n"
+          "`labels`, uint8 (height, width), says which of `materials` each pixel is: 0 none, 1 the "
+          "first. `brightness`, of the same shape, is what `relief` makes heights of. Both are "
+          "copied.")
       .def_property_readonly(
           "depth",
           [](const py::object& self) {

@@ -7,6 +7,7 @@
 
 #include "lab/method.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/hand_velocity.hpp"
 #include "palpate/paper/coupling.hpp"
 
 namespace palpate::lab {
@@ -44,9 +45,17 @@ class Ideal final : public LabMethod {
       if ((*proxy_ - before).norm() < 1e-9) break;
     }
     const bool touching = under.distance <= r_c + 1e-7 && (hip - *proxy_).norm() > 1e-9;
-    const Vec3 force =
-        touching ? coupling_force(parameters().coupling, hip - *proxy_, 0.0, r_c, false).force
-                 : Vec3(Vec3::Zero());
+    hand_velocity_.update(hip, t);
+    Vec3 force = Vec3::Zero();
+    if (touching) {
+      // The damper acts on the hand's velocity relative to the surface, as that of `sight`.
+      const double rises =
+          (truth_(*proxy_, t - surface_dt).distance - truth_(*proxy_, t).distance) / surface_dt;
+      const Vec3 u = hip - *proxy_;
+      const double rate =
+          (hand_velocity_.value() - rises * under.normal).dot(u) / std::max(u.norm(), 1e-12);
+      force = coupling_force(parameters().coupling, u, rate, r_c, false).force;
+    }
     return {.t = t,
             .hip = hip,
             .proxy = *proxy_,
@@ -60,7 +69,9 @@ class Ideal final : public LabMethod {
   }
 
  private:
+  static constexpr double surface_dt = 1e-3;  // [s]
   Truth truth_;
+  HandVelocity hand_velocity_;
   std::optional<Vec3> proxy_;
   std::int64_t frames_ = 0;
 };

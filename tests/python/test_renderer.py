@@ -43,8 +43,9 @@ class Renderer(unittest.TestCase):
             touch = palpate.Renderer()
             touch.frame(wall(), camera=CAMERA, stamp=0.0, materials=materials, labels=labels)
             touch.seat((x, 0, 0.9))
-            ticks = touch.ticks([(x, 0, 0.99 + 1e-4 * i) for i in range(100)] +
-                                [(x + 1e-4 * i, 0, 1.0) for i in range(100)], numpy.arange(200) * 1e-3)
+            way = ([(x, 0, 0.99 + 1e-4 * i) for i in range(100)] +
+                   [(x + 1e-4 * i, 0, 1.0) for i in range(100)])
+            ticks = touch.ticks(way, numpy.arange(200) * 1e-3)
             force = -ticks["force"][:, 2]
             depth = ticks["hip"][-1, 2] - 1.0
             last = touch.tick((x + 0.01, 0, 1.006), 0.3)

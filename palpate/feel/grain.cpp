@@ -12,6 +12,8 @@ namespace {
 constexpr double highest_share = 0.4;
 // [-] frequency over `lowest`, from which the vibration has all of its strength.
 constexpr double all_of_it = 2.0;
+// [-] by which a frequency may change until its pole is computed anew: a sixth of a semitone.
+constexpr double same_turn = 0.01;
 
 }  // namespace
 
@@ -31,18 +33,22 @@ double Grain::update(double length, double speed, double dt) noexcept {
   const double wanted = speed / length;
   const double top = dt > 0.0 ? std::min(highest, highest_share / dt) : lowest;
   if (!(wanted > lowest) || !(top > lowest)) {
-    z_ = 0.0;
+    real_ = imaginary_ = 0.0;
     return 0.0;
   }
-  const double frequency = std::min(wanted, top);
-  const double angle = 2.0 * std::numbers::pi * frequency * dt;
-  const double decay = std::exp(-half_width * angle);
-  const double kick = std::sqrt((1.0 - decay * decay));
-  const double real = noise();
-  const double imaginary = noise();
-  z_ = std::polar(decay, angle) * z_ + kick * std::complex<double>(real, imaginary);
+  const double turn = 2.0 * std::numbers::pi * std::min(wanted, top) * dt;
+  if (std::abs(turn - turn_) > same_turn * turn_) {
+    turn_ = turn;
+    const double decay = std::exp(-half_width * turn);
+    pole_real_ = decay * std::cos(turn);
+    pole_imaginary_ = decay * std::sin(turn);
+    kick_ = std::sqrt(1.0 - decay * decay);
+  }
+  const double real = real_;
+  real_ = pole_real_ * real - pole_imaginary_ * imaginary_ + kick_ * noise();
+  imaginary_ = pole_imaginary_ * real + pole_real_ * imaginary_ + kick_ * noise();
   const double strength = std::clamp((wanted / lowest - 1.0) / (all_of_it - 1.0), 0.0, 1.0);
-  return strength * z_.real();
+  return strength * real_;
 }
 
 }  // namespace palpate

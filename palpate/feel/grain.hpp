@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <complex>
 #include <cstdint>
 
 namespace palpate {
@@ -36,7 +35,9 @@ class Grain {
  private:
   double noise() noexcept;  // [-] of variance 1 and at most 3.5
 
-  std::complex<double> z_ = 0.0;
+  double real_ = 0.0, imaginary_ = 0.0;  // z
+  // The pole exp((-g + 2 pi i f) dt) and the noise's size, for the turn 2 pi f dt.
+  double turn_ = 0.0, pole_real_ = 1.0, pole_imaginary_ = 0.0, kick_ = 0.0;
   std::uint64_t random_ = 0x9e3779b97f4a7c15ULL;
 };
 

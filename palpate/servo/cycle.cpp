@@ -44,6 +44,7 @@ Cycle::Cycle(std::shared_ptr<Method> method, Device& device, const ServoSettings
              std::size_t ring)
     : first_method_(std::move(method)),
       method_(first_method_.get()),
+      first_fixtures_(settings.fixtures),
       device_(device),
       safety_(device.info().limits, settings.safety),
       workspace_(settings.placement),
@@ -54,6 +55,7 @@ Cycle::Cycle(std::shared_ptr<Method> method, Device& device, const ServoSettings
   if (method_ == nullptr) throw Error("method", "there is none", "give one");
   validate(settings);
   method_->set_parameters(settings.parameters);
+  fixtures_.use(first_fixtures_.get());
 }
 
 std::uint64_t Cycle::put_frame(std::shared_ptr<const Cloud> cloud, double stamp, double now) {
@@ -114,6 +116,7 @@ bool Cycle::adopt_change(const Change& change) noexcept {
   if (std::exchange(scene_, change.settings.scene) != change.settings.scene)
     placement_changed_ = number_ > 0;
   parameters_ = change.settings.parameters;
+  fixtures_.use(change.settings.fixtures.get());
   const bool switched = change.method.get() != method_;
   method_ = change.method.get();
   try {
@@ -136,6 +139,7 @@ void Cycle::walk(Way& way, Self& self) {
   Workspace::walk(way, self.workspace_);
   Freshness::walk(way, self.freshness_);
   PassivityObserver::walk(way, self.passivity_);
+  FixtureStage::walk(way, self.fixtures_);
 }
 
 std::vector<std::string> cycle_state_names() {
@@ -147,6 +151,7 @@ std::vector<std::string> cycle_state_names() {
     Workspace workspace_{};
     Freshness freshness_{};
     PassivityObserver passivity_{};
+    FixtureStage fixtures_{};
   } memory;
   NameState name;
   Cycle::walk(name, memory);
@@ -217,24 +222,34 @@ void Cycle::run(const Wake& wake) noexcept {
   const Tick tick = method_->tick(hip, t);
   last_proxy_ = tick.proxy;
   last_normal_ = tick.normal;
-  workspace_.feel(tick.force);
+  const bool holds = hand.present && !hand.clutched && !is_faulty(hand) && !jumped;
+  const FixtureOutput fixtures = fixtures_.run({.t = t,
+                                                .hip = hip,
+                                                .surface_force = tick.force - tick.transient,
+                                                .surface_motion = tick.surface_motion,
+                                                .hand = holds && !safety_.stalls_at(t),
+                                                .cloud = frames_.taken_last().cloud.get(),
+                                                .new_frame = new_frame});
+  workspace_.feel(tick.force + fixtures.region);
 
   const Freshness::Age age = freshness_.at(t);
-  const SafetyOutput safe =
-      safety_.run({.t = t,
-                   .force = tick.force,
-                   .hip = hip,
-                   .proxy = tick.proxy,
-                   .normal = tick.normal,
-                   .position = hand.position,
-                   .hand = hand.present && !hand.clutched && !is_faulty(hand) && !jumped,
-                   .frame_age = age.age,
-                   .frame_intervals = age.intervals,
-                   .surface_velocity = tick.surface_velocity,
-                   .surface_motion = tick.surface_motion,
-                   .stiffness = tick.hardness * parameters_.coupling.stiffness,
-                   .new_frame = new_frame,
-                   .transient = tick.transient});
+  const SafetyOutput safe = safety_.run(
+      {.t = t,
+       .force = fixtures.region.isZero() ? tick.force : Vec3(fixtures.surface + tick.transient),
+       .hip = hip,
+       .proxy = tick.proxy,
+       .normal = tick.normal,
+       .position = hand.position,
+       .hand = holds,
+       .frame_age = age.age,
+       .frame_intervals = age.intervals,
+       .surface_velocity = tick.surface_velocity,
+       .surface_motion = tick.surface_motion,
+       .stiffness = tick.hardness * parameters_.coupling.stiffness,
+       .new_frame = new_frame,
+       .transient = tick.transient,
+       .region = fixtures.region,
+       .guidance = fixtures.guidance});
   device_.write(workspace_.force_in_device(safe.force), t);
   const Placement& placement = workspace_.placement();
   const ServoEnergy& energy =
@@ -247,6 +262,8 @@ void Cycle::run(const Wake& wake) noexcept {
                       .sent = safe.force});
 
   const ServoTick record{.tick = tick,
+                         .region = fixtures.region,
+                         .guidance = fixtures.guidance,
                          .force = safe.force,
                          .position = hand.position,
                          .gain = safe.gain,
@@ -259,6 +276,7 @@ void Cycle::run(const Wake& wake) noexcept {
                          .safety = safe.flags,
                          .wake_up_ns = wake.wake_up_ns,
                          .previous_compute_ns = wake.previous_compute_ns,
+                         .fixtures = fixtures.acting,
                          .hand = hand_bits(hand) | (reseated ? proxy_reseated : 0U) |
                                  (switched ? method_switched : 0U) | (reset ? faults_reset : 0U)};
   ring_.push(record);

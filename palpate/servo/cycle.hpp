@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "palpate/core/method.hpp"
+#include "palpate/fixtures/fixture_stage.hpp"
 #include "palpate/servo/cycle_state.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/freshness.hpp"
@@ -34,6 +35,8 @@ struct ServoSettings {
   /// Counts what is in the scene: where it changes, as another recording is opened or time jumps in
   /// one, the hand is disengaged and the proxy starts anew on the free side.
   std::uint64_t scene = 0;
+  /// Virtual fixtures: forbidden regions, guides, viscous regions. Null: none.
+  std::shared_ptr<const FixtureSet> fixtures = {};
 };
 
 /// @throws Error if one of them does not validate.
@@ -68,6 +71,8 @@ constexpr DeviceFault fault_of(std::uint32_t hand) {
 /// All that happened in one cycle: what viewers and recorders read.
 struct ServoTick {
   Tick tick;                          ///< the method's; `tick.force` is the force asked for
+  Vec3 region = Vec3::Zero();         ///< [N] world: asked for by forbidden regions
+  Vec3 guidance = Vec3::Zero();       ///< [N] world: asked for by guides and viscous regions
   Vec3 force = Vec3::Zero();          ///< [N] world: the force sent to the device
   Vec3 position = Vec3::Zero();       ///< [m] of the hand, device frame
   double gain = 0.0;                  ///< [-] of the safety chain
@@ -80,6 +85,7 @@ struct ServoTick {
   std::uint32_t safety = 0;           ///< SafetyFlag bits
   std::uint32_t wake_up_ns = 0;       ///< as in Wake
   std::uint32_t previous_compute_ns = 0;  ///< as in Wake
+  std::uint32_t fixtures = 0;             ///< bit i: fixture i of the settings gives a force
   std::uint32_t hand = 0;                 ///< HandFlag bits, and the device's fault: see fault_of()
 };
 
@@ -111,7 +117,8 @@ struct CycleReader {
   TickRing<CycleState>::Reader states;
 };
 
-/// One cycle of the loop: device read, newest frame, renderer, safety chain, device write.
+/// One cycle of the loop: device read, newest frame, renderer, fixtures, safety chain, device
+/// write.
 ///
 /// Knows no clock: a thread, a test or a free-running session calls `run` with the time. `run` is
 /// one thread's, the servo's; what comes from elsewhere goes through mailboxes and out by the ring,
@@ -205,7 +212,8 @@ class Cycle {
   friend std::vector<std::string> cycle_state_names();
 
   std::shared_ptr<Method> first_method_;
-  Method* method_;  // in use: that one, or the newest of changes_
+  Method* method_;                                    // in use: that one, or the newest of changes_
+  std::shared_ptr<const FixtureSet> first_fixtures_;  // kept as that method is
   Device& device_;
   SafetyChain safety_;
   Workspace workspace_;
@@ -229,6 +237,7 @@ class Cycle {
   bool placement_changed_ = false;  // or the scene, before this tick
   Freshness freshness_;
   PassivityObserver passivity_;
+  FixtureStage fixtures_;
   std::atomic<std::uint64_t> fault_resets_{0};  // asked for
   std::uint64_t fault_resets_done_ = 0;
 };

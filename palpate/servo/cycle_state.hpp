@@ -34,7 +34,7 @@ struct AdoptedFrame {
 /// what the safety chain, the workspace and the frames' freshness need to go on from. The method is
 /// left out because the state is taken where another one takes over.
 struct CycleState {
-  static constexpr std::size_t capacity = 512;
+  static constexpr std::size_t capacity = 1024;
   std::array<double, capacity> numbers{};  ///< the first `count` count; see cycle_state_names()
   std::uint64_t count = 0;
 };

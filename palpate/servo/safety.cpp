@@ -161,6 +161,22 @@ void only_push(const SafetyInput& input, Vec3& force) {
   if (lever.norm() > least_lever || input.normal.isZero()) remove_pull(lever, force);
 }
 
+bool has_fixtures(const SafetyInput& input) {
+  return !(input.region.isZero() && input.guidance.isZero());
+}
+
+// Adds to `force` the largest share of `more` with which it is no longer than `limit`; false if
+// that is all of it.
+bool add_within(double limit, const Vec3& more, Vec3& force) {
+  const double size = more.squaredNorm();
+  if (!(size > 0.0)) return false;
+  const double room = std::max(limit * limit - force.squaredNorm(), 0.0);
+  const double along = force.dot(more);
+  const double share = (-along + std::sqrt(along * along + size * room)) / size;
+  force += std::clamp(share, 0.0, 1.0) * more;
+  return cut_to(limit, force) || share < 1.0;
+}
+
 }  // namespace
 
 std::span<const std::string_view> safety_flag_names() {
@@ -261,15 +277,27 @@ double SafetyChain::peak_as_warm() const noexcept {
   return std::sqrt(budget + left * (cold * cold - budget));
 }
 
-// Pushes only, magnitude, continuous force; and frames that are late.
-Vec3 SafetyChain::limited(const SafetyInput& input, Vec3 force,
+// Pushes only, magnitude, continuous force; and frames that are late. `share` is what the links
+// that soften leave.
+Vec3 SafetyChain::limited(const SafetyInput& input, double share,
                           std::uint32_t& flags) const noexcept {
+  Vec3 force = share * (input.force - input.transient);
   if (has(pull_removed)) {
     const Vec3 before = force;
     only_push(input, force);
     if (force != before) flags |= pull_removed;
   }
-  if (has(force_cut) && cut_to(peak(), force)) flags |= force_cut;
+  if (has_fixtures(input)) {
+    const Vec3 surface = force;
+    force = share * input.region;
+    const double most = has(force_cut) ? peak() : largest;
+    bool cut = cut_to(most, force);
+    cut = add_within(most, surface, force) || cut;
+    cut = add_within(most, share * input.guidance, force) || cut;
+    if (cut) flags |= force_cut;
+  } else if (has(force_cut) && cut_to(peak(), force)) {
+    flags |= force_cut;
+  }
   if (has(continuous_cut) && device_.continuous_force < peak() && cut_to(peak_as_warm(), force))
     flags |= continuous_cut;
 
@@ -302,8 +330,11 @@ double SafetyChain::oscillation_ceiling(double t, double dt) noexcept {
 // long a time that the next one is not felt as one more burst of a vibration.
 double SafetyChain::energy_ceiling(const SafetyInput& input, double since_last) noexcept {
   if (since_last > parameters_.stall_time) energy_.restart();
+  // Across the boundary that gives the larger force.
+  const bool by_region = input.region.squaredNorm() > input.force.squaredNorm();
   const bool found =
-      energy_.run(since_last, last_force_, input.hip, input.normal, input.surface_velocity,
+      energy_.run(since_last, last_force_, input.hip, by_region ? input.region : input.normal,
+                  by_region ? 0.0 : input.surface_velocity,
                   {parameters_.cycle_distance, parameters_.cycle_count, energy_ceiling_ < 1.0});
   if (found) {
     energy_ceiling_ *= 0.5;
@@ -419,7 +450,7 @@ Vec3 SafetyChain::with_transient(const SafetyInput& input, const Vec3& force,
   constexpr std::uint32_t amiss = input_refused | direction_refused | disengaged | frame_late |
                                   frame_lost | hand_too_fast | stalled | fault_latched |
                                   output_refused;
-  if ((flags & amiss) != 0) {
+  if ((flags & amiss) != 0 || has_fixtures(input)) {
     transients_.end();
     return force;
   }
@@ -440,7 +471,8 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   const bool sound = in_order && is_sound(input.force) && is_sound(input.normal) &&
                      is_sound(input.hip) && is_sound(input.proxy) && is_sound(input.position) &&
                      std::abs(input.surface_velocity) <= largest &&
-                     is_sound(input.surface_motion) && is_sound(input.transient);
+                     is_sound(input.surface_motion) && is_sound(input.transient) &&
+                     is_sound(input.region) && is_sound(input.guidance);
   const double since_last = in_order && last_t_ ? input.t - *last_t_ : 0.0;
   const double dt = std::min(since_last, longest_credit);
   fault_clock_ += since_last;
@@ -457,10 +489,9 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   note_faults(flags);
 
   Vec3 force = Vec3::Zero();
-  const Vec3 lasting = input.force - input.transient;
   if (flags == 0) {
     // Before the limits: a softer surface still holds a hand with all the force that is allowed.
-    force = limited(input, softened(input, since_last, dt, flags) * lasting, flags);
+    force = limited(input, softened(input, since_last, dt, flags), flags);
     double most = ceiling(input, force.norm(), flags);
     if (stalls_at(input.t)) {
       flags |= stalled;

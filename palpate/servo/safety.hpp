@@ -126,6 +126,10 @@ struct SafetyInput {
   bool new_frame = false;              ///< the first tick with a frame
   /// [N] world: the part of `force` that is an impact's ringing: it may rise at once
   Vec3 transient = Vec3::Zero();
+  /// [N] world: of forbidden regions, beside `force`. What is judged by normal and proxy is the
+  /// method's force alone. At the limit of the force it comes first, and guidance last.
+  Vec3 region = Vec3::Zero();
+  Vec3 guidance = Vec3::Zero();  ///< [N] world: of guides and viscous regions
 };
 
 /// What the device gets.
@@ -143,7 +147,7 @@ struct SafetyOutput {
 /// the last force and the limit. While a frame is late the force that is sent never grows. Faults
 /// disengage the hand, and several of them latch. The ringing of an impact is added behind the slew
 /// limit, within a TransientBudget and the limit of the force, and only as long as nothing is
-/// amiss.
+/// amiss, and no fixture gives a force.
 class SafetyChain {
  public:
   /// All links; the argument below leaves some out, which only tests of the chain may do.
@@ -226,7 +230,7 @@ class SafetyChain {
   void warm_up(double since_last) noexcept;
   [[nodiscard]] double peak() const noexcept;          // [N]
   [[nodiscard]] double peak_as_warm() const noexcept;  // [N]
-  Vec3 limited(const SafetyInput& input, Vec3 force, std::uint32_t& flags) const noexcept;
+  Vec3 limited(const SafetyInput& input, double share, std::uint32_t& flags) const noexcept;
   double softened(const SafetyInput& input, double since_last, double dt,
                   std::uint32_t& flags) noexcept;
   double ceiling(const SafetyInput& input, double demand, std::uint32_t& flags) noexcept;

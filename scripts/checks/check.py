@@ -20,12 +20,13 @@ KNOWS = {
     "feel": {"core"},
     "methods": {"core", "paper", "sight", "feel"},
     "cloud": {"core"},
-    "servo": {"core"},
+    "fixtures": {"core"},
+    "servo": {"core", "fixtures"},
     "bag": {"core"},
-    "sources": {"core", "cloud", "bag"},
+    "sources": {"core", "cloud", "fixtures", "bag"},
     "devices": {"core", "servo"},
     "drivers": {"core", "cloud", "servo", "bag", "sources", "devices"},
-    "record": {"core", "methods", "cloud", "servo", "bag", "sources"},
+    "record": {"core", "methods", "cloud", "fixtures", "servo", "bag", "sources"},
     "session": {"core", "methods", "cloud", "servo", "sources", "devices", "drivers", "bag",
                 "record"},
     "node": {"core", "methods", "servo", "bag", "drivers", "session"},
@@ -41,7 +42,7 @@ KNOWS["app/lab"] = KNOWS["app"] | {"app", "lab"}
 KNOWS["app/bench"] = KNOWS["app"] | {"app", "bench"}
 
 # Methods are pure: neither threads nor clocks nor files, and no library but Eigen.
-PURE = {"core", "paper", "sight", "feel", "methods"}
+PURE = {"core", "paper", "sight", "feel", "methods", "fixtures"}
 CORE_ALLOWS = re.compile(r"Eigen/|[a-z_]+$")
 CORE_FORBIDS = {
     "atomic", "barrier", "chrono", "condition_variable", "cstdio", "ctime", "filesystem",

@@ -53,6 +53,8 @@ void SessionArguments::add_to(CLI::App& command) {
       "what the cameras' surfaces are made of: wood or another name of `palpate "
       "parameters` for all of them, or a TOML file that tells materials by colour or "
       "label");
+  command.add_option("--fixtures", fixtures_,
+                     "TOML file of virtual fixtures: forbidden regions, guides, viscous regions");
   command.add_option("--device", device_,
                      "the hand: mouse: in the page (the default), hand: a simulated person (the "
                      "default of --headless), script:FILE.csv a path");
@@ -125,6 +127,7 @@ SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
     set_parameter(checked, name, value);
     config.operator_limits[name] = value;
   }
+  if (fixtures_) config.fixtures = *fixtures_;
   if (record_) config.record = *record_;
   if (record_folder_) config.record_folder = *record_folder_;
   if (record_limit_) config.record_limit = *record_limit_;

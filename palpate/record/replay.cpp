@@ -40,8 +40,14 @@ bool is_of(Group group, const std::string& column, bool energy) {
   return group == Group::asked ? names(asked_columns, column) : names(sent_columns, column);
 }
 
-// Compares the columns of a group, those of the energy if they were recorded.
-void compare(const ServoTick& recorded, const ServoTick& again, Group group, bool has_energy,
+// Which columns a recording has beside those of every version.
+struct LaterColumns {
+  bool energy = false;
+  bool fixtures = false;
+};
+
+// Compares the columns of a group, the later ones if they were recorded.
+void compare(const ServoTick& recorded, const ServoTick& again, Group group, LaterColumns later,
              const Vec3& force_difference, ReplayDifferences& differences) {
   bool different = false;
   const auto compare_rows = [&](const std::vector<double>& a, const std::vector<double>& b,
@@ -56,8 +62,10 @@ void compare(const ServoTick& recorded, const ServoTick& again, Group group, boo
     }
   };
   compare_rows(row_of(recorded), row_of(again), tick_columns(), false);
-  if (has_energy)
+  if (later.energy)
     compare_rows(energy_row_of(recorded), energy_row_of(again), energy_columns(), true);
+  if (later.fixtures)
+    compare_rows(fixture_row_of(recorded), fixture_row_of(again), fixture_columns(), true);
   if (!different) return;
   ++differences.ticks;
   differences.largest_force = std::max(differences.largest_force, force_difference.norm());
@@ -284,10 +292,10 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
   }
   std::optional<ServoTick> last;
   std::unique_ptr<Rerun> rerun;
-  bool has_energy = false;
+  LaterColumns later;
   for (std::size_t i = 0; i < session.ticks(); ++i) {
     try {
-      if (i == 0) has_energy = session.has_energy();
+      if (i == 0) later = {session.has_energy(), session.has_fixtures()};
       const ServoTick recorded = session.tick(i);
       if (last && recorded.number != last->number + 1) {
         report.broken_off = "ticks " + std::to_string(last->number + 1) + " to " +
@@ -296,11 +304,10 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
       }
       if (!rerun) rerun = open_rerun(session, recorded, methods, report);
       const ServoTick again = rerun->tick(recorded);
-      compare(recorded, again, Group::asked, has_energy, again.tick.force - recorded.tick.force,
+      compare(recorded, again, Group::asked, later, again.tick.force - recorded.tick.force,
               report.asked);
       if (report.sent_unchecked.empty())
-        compare(recorded, again, Group::sent, has_energy, again.force - recorded.force,
-                report.sent);
+        compare(recorded, again, Group::sent, later, again.force - recorded.force, report.sent);
       last = recorded;
     } catch (const Error& error) {
       report.broken_off = last ? "after tick " + std::to_string(last->number) + ": " : "";

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/core/error.hpp"
+#include "palpate/sources/fixture_file.hpp"
 
 namespace palpate {
 namespace {
@@ -56,6 +57,14 @@ void walk_energy(Way& way, T& record) {
   walk_port("relative", record.energy.relative);
   walk_port("absolute", record.energy.absolute);
   way("contacts", record.energy.contacts);
+}
+
+// And of what came after that.
+template <class Way, class T>
+void walk_fixtures(Way& way, T& record) {
+  way("region", record.region);
+  way("guidance", record.guidance);
+  way("fixtures", record.fixtures);
 }
 
 class Names {
@@ -170,6 +179,12 @@ const std::vector<std::string>& energy_columns() {
   return columns;
 }
 
+const std::vector<std::string>& fixture_columns() {
+  static const std::vector<std::string> columns =
+      columns_of([](auto& way, const ServoTick& tick) { walk_fixtures(way, tick); });
+  return columns;
+}
+
 std::vector<double> row_of(const ServoTick& tick) {
   Put put;
   put.row.reserve(tick_columns().size());
@@ -184,24 +199,34 @@ std::vector<double> energy_row_of(const ServoTick& tick) {
   return std::move(put.row);
 }
 
+std::vector<double> fixture_row_of(const ServoTick& tick) {
+  Put put;
+  put.row.reserve(fixture_columns().size());
+  walk_fixtures(put, tick);
+  return std::move(put.row);
+}
+
 std::vector<double> whole_row_of(const ServoTick& tick) {
   Put put;
-  put.row.reserve(tick_columns().size() + energy_columns().size());
+  put.row.reserve(tick_columns().size() + energy_columns().size() + fixture_columns().size());
   walk(put, tick);
   walk_energy(put, tick);
+  walk_fixtures(put, tick);
   return std::move(put.row);
 }
 
 ServoTick tick_of(std::span<const double> row, const std::string& name) {
-  const std::size_t whole = tick_columns().size() + energy_columns().size();
-  if (row.size() != tick_columns().size() && row.size() != whole)
+  const std::size_t with_energy = tick_columns().size() + energy_columns().size();
+  const std::size_t whole = with_energy + fixture_columns().size();
+  if (row.size() != tick_columns().size() && row.size() != with_energy && row.size() != whole)
     throw Error(
         name, "has " + std::to_string(row.size()) + " numbers instead of " + std::to_string(whole),
         "it may be damaged, or of another version of palpate");
   ServoTick tick{};
   Get get(row, name);
   walk(get, tick);
-  if (row.size() == whole) walk_energy(get, tick);
+  if (row.size() >= with_energy) walk_energy(get, tick);
+  if (row.size() == whole) walk_fixtures(get, tick);
   return tick;
 }
 
@@ -232,6 +257,7 @@ AdoptedFrame adopted_of(std::span<const double> row, const std::string& name) {
 std::string to_json(const SessionInfo& info) {
   std::vector<std::string> columns = tick_columns();
   columns.insert(columns.end(), energy_columns().begin(), energy_columns().end());
+  columns.insert(columns.end(), fixture_columns().begin(), fixture_columns().end());
   json object = {{"palpate", info.version},
                  {"kind", info.kind == SessionInfo::Kind::live ? "live" : "headless"},
                  {"cameras", info.cameras},
@@ -283,6 +309,7 @@ std::string to_json(const NumberedSettings& settings) {
                  {"bubble_speed", all.placement.bubble_speed},
                  {"scene", all.scene}};
   if (all.placement.clutch_button) object["clutch_button"] = *all.placement.clutch_button;
+  if (all.fixtures) object["fixtures"] = json::parse(fixtures_json(*all.fixtures));
   return object.dump();
 }
 
@@ -314,6 +341,8 @@ NumberedSettings settings_from_json(const std::string& text, const std::string& 
     all.placement.bubble_radius = object.value("bubble_radius", all.placement.bubble_radius);
     all.placement.bubble_speed = object.value("bubble_speed", all.placement.bubble_speed);
     if (object.contains("scene")) all.scene = whole_of<std::uint64_t>(object.at("scene"), name);
+    if (object.contains("fixtures"))
+      all.fixtures = fixtures_from_json(object.at("fixtures").dump(), name);
     validate(all);
     return settings;
   });

@@ -46,15 +46,17 @@ constexpr std::string_view transforms = "/tf";              ///< the cameras' pl
 constexpr std::string_view world_frame = "world";
 
 /// The numbers of /palpate/tick, in their order: a ServoTick to the bit. Those of energy_columns()
-/// follow; recordings that are older lack them.
+/// and of fixture_columns() follow; recordings that are older lack them.
 const std::vector<std::string>& tick_columns();
 const std::vector<std::string>& energy_columns();
-std::vector<double> row_of(const ServoTick& tick);         ///< those of tick_columns()
-std::vector<double> energy_row_of(const ServoTick& tick);  ///< those of energy_columns()
-std::vector<double> whole_row_of(const ServoTick& tick);   ///< all, as they are written
-/// Without the columns of energy, it is all zero.
+const std::vector<std::string>& fixture_columns();
+std::vector<double> row_of(const ServoTick& tick);          ///< those of tick_columns()
+std::vector<double> energy_row_of(const ServoTick& tick);   ///< those of energy_columns()
+std::vector<double> fixture_row_of(const ServoTick& tick);  ///< those of fixture_columns()
+std::vector<double> whole_row_of(const ServoTick& tick);    ///< all, as they are written
+/// What has no columns is zero.
 /// @throws Error naming `name` if the numbers are not as many as tick_columns(), or those and
-///         energy_columns().
+///         energy_columns(), or those and fixture_columns().
 ServoTick tick_of(std::span<const double> row, const std::string& name);
 
 /// number, stamp, put_at, and for each camera its number and when its frame was captured.

@@ -76,12 +76,19 @@ ServoTick SessionReader::tick(std::size_t index) {
   return tick_of(ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data, name);
 }
 
-bool SessionReader::has_energy() {
-  if (ticks_.empty()) return false;
+std::size_t SessionReader::numbers_of_a_tick() {
+  if (ticks_.empty()) return 0;
   const BagReader::Place& place = ticks_.front();
   const std::string name = bag_.name(session_topic::tick, place);
-  return ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data.size() >
-         tick_columns().size();
+  return ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data.size();
+}
+
+bool SessionReader::has_energy() {
+  return numbers_of_a_tick() > tick_columns().size();
+}
+
+bool SessionReader::has_fixtures() {
+  return numbers_of_a_tick() > tick_columns().size() + energy_columns().size();
 }
 
 const ServoSettings& SessionReader::settings(std::uint64_t number) const {

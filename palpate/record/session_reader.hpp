@@ -30,6 +30,8 @@ class SessionReader {
   [[nodiscard]] ServoTick tick(std::size_t index);
   /// Do its ticks have energy_columns()? As of its first one; those of old recordings do not.
   [[nodiscard]] bool has_energy();
+  /// Do its ticks have fixture_columns()?
+  [[nodiscard]] bool has_fixtures();
   /// @throws Error if they are not in the recording.
   [[nodiscard]] const ServoSettings& settings(std::uint64_t number) const;
 
@@ -50,6 +52,7 @@ class SessionReader {
   [[nodiscard]] std::shared_ptr<const Cloud> cloud(const PutFrame& frame);
 
  private:
+  [[nodiscard]] std::size_t numbers_of_a_tick();
   struct Camera {
     std::optional<BagCamera> camera;
     std::size_t number = 0;  // of `cloud`

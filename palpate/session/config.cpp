@@ -189,10 +189,10 @@ std::string joined(const std::vector<std::string>& lines) {
 SessionConfig parse_session_config(std::string_view text, const std::string& name,
                                    const SessionConfig& base, const MethodCheck& check_method) {
   const toml::table tree = parse_toml(text, name, remedy_toml);
-  constexpr std::array<std::string_view, 13> keys{
-      "camera",          "device", "placement",       "rate",          "method",
-      "parameters",      "safety", "record",          "record_folder", "record_limit",
-      "operator_limits", "server", "without_watchdog"};
+  constexpr std::array<std::string_view, 14> keys{
+      "camera", "device",          "placement", "rate",          "method",       "parameters",
+      "safety", "fixtures",        "record",    "record_folder", "record_limit", "operator_limits",
+      "server", "without_watchdog"};
   const TomlTable root(tree, name, "", keys);
   SessionConfig config = base;
   if (const toml::node* cameras = root.find("camera"))
@@ -201,6 +201,7 @@ SessionConfig parse_session_config(std::string_view text, const std::string& nam
   root.read("without_watchdog", config.without_watchdog);
   root.read("rate", config.rate, lowest_rate, highest_rate, "Hz");
   root.read("method", config.method);
+  root.read("fixtures", config.fixtures);
   root.read("record", config.record);
   root.read("record_folder", config.record_folder);
   root.read("record_limit", config.record_limit, lowest_record_limit, highest_record_limit, "GB");
@@ -246,6 +247,8 @@ std::string to_toml(const SessionConfig& config) {
   text += key_line("device", toml_text(config.device), "URI of the hand; \"\": the usual one");
   text += key_line("without_watchdog", config.without_watchdog ? "true" : "false",
                    "allow motors more than engage_force that no watchdog switches off");
+  text +=
+      key_line("fixtures", toml_text(config.fixtures), "TOML file of virtual fixtures; \"\": none");
   text += key_line("record", toml_text(config.record), "folder to record into; \"\": none");
   text += key_line("record_folder", toml_text(config.record_folder),
                    "where a page's recordings go; \"\": the current folder");

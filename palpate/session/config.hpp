@@ -46,6 +46,7 @@ struct SessionConfig {
   std::string method = "sight";
   Parameters parameters;
   SafetyParameters safety;
+  std::string fixtures = {};       ///< TOML file of virtual fixtures; empty: none
   std::string record = {};         ///< folder to record into; empty: none
   std::string record_folder = {};  ///< where recordings go that a page starts; empty: the current
   double record_limit = 20.0;      ///< [GB] of all recordings of a session that pages start

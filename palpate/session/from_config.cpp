@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/session/from_config.hpp"
 
+#include "palpate/sources/fixture_file.hpp"
+
 namespace palpate {
 
 SessionOptions session_options(const SessionConfig& config) {
@@ -13,6 +15,8 @@ SessionOptions session_options(const SessionConfig& config) {
   options.settings.parameters = config.parameters;
   options.settings.safety = config.safety;
   options.settings.placement = config.placement;
+  if (!config.fixtures.empty())
+    options.settings.fixtures = std::make_shared<const FixtureSet>(read_fixtures(config.fixtures));
   options.servo.rate = config.rate;
   options.without_watchdog = config.without_watchdog;
   options.record = config.record;

@@ -23,13 +23,15 @@ namespace palpate::test {
 /// change on the way, a clutch, faults and their reset, a second camera now and then.
 class LoopSession {
  public:
-  explicit LoopSession(const std::string& method) {
+  explicit LoopSession(const std::string& method,
+                       std::shared_ptr<const FixtureSet> fixtures = nullptr) {
     settings_.method = method;
     // Forces that are sent at once.
     settings_.safety.engage_force = 3.0;
     settings_.safety.engage_ticks = 2.0;
     settings_.safety.ramp_time = 0.02;
     settings_.safety.initial_heat = 0.5;
+    settings_.fixtures = std::move(fixtures);
     cycle_ = std::make_unique<Cycle>(make_method(method), device_, settings_);
   }
 

@@ -36,6 +36,7 @@ SessionConfig everything() {
   set_parameter(config.parameters, "stiffness", 1234.5678901234567);
   set_parameter(config.safety, "max_device_force", 1.0 / 3.0);
   config.record = "out/\ttab";
+  config.fixtures = "fixtures.toml";
   config.record_folder = "where it \"goes\"";
   config.record_limit = 0.25;
   config.operator_limits = {{"max_device_force", 4.0}, {"ramp_time", 0.5}};
@@ -72,6 +73,7 @@ void expect_same(const SessionConfig& a, const SessionConfig& b) {
   EXPECT_EQ(a.server.port, b.server.port);
   EXPECT_EQ(a.server.token, b.server.token);
   EXPECT_EQ(a.server.operator_token, b.server.operator_token);
+  EXPECT_EQ(a.fixtures, b.fixtures);
   EXPECT_EQ(a.record_folder, b.record_folder);
   EXPECT_EQ(a.record_limit, b.record_limit);
   EXPECT_EQ(a.operator_limits, b.operator_limits);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/sources/fixture_file.hpp"
 
 #include "python/arrays.hpp"
 
@@ -25,12 +26,21 @@ void set_limits(SafetyParameters& limits, const py::dict& values) {
   validate(limits);
 }
 
+// Of a TOML file, or of the text of one.
+std::shared_ptr<const FixtureSet> fixtures_of(const std::optional<std::string>& what) {
+  if (!what || what->empty()) return nullptr;
+  return std::make_shared<const FixtureSet>(what->find("[[fixture]]") != std::string::npos
+                                                ? parse_fixtures(*what, "fixtures", {})
+                                                : read_fixtures(*what));
+}
+
 class PythonSession {
  public:
   PythonSession(const py::object& camera, const std::string& device, const std::string& method,
                 bool free_running, double rate, const std::string& record, double stroke_time,
                 const std::optional<Eigen::Matrix4d>& world_from_device, double scale,
-                const py::dict& limits, bool without_watchdog, const py::kwargs& parameters)
+                const py::dict& limits, bool without_watchdog,
+                const std::optional<std::string>& fixtures, const py::kwargs& parameters)
       : free_running_(free_running) {
     SessionOptions options;
     if (py::isinstance<py::str>(camera)) {
@@ -47,6 +57,7 @@ class PythonSession {
     if (world_from_device)
       options.settings.placement.world_from_device =
           pose_of(*world_from_device, "world_from_device");
+    options.settings.fixtures = fixtures_of(fixtures);
     options.servo.rate = rate;
     options.pace = free_running ? Pace::free_running : Pace::real_time;
     options.without_watchdog = without_watchdog;
@@ -109,6 +120,11 @@ class PythonSession {
       if (method) settings.method = *method;
       for (const auto& [name, value] : numbers) set_parameter(settings.parameters, name, value);
     });
+  }
+  void fixtures(const std::optional<std::string>& what) {
+    const py::gil_scoped_release released;
+    const auto set = fixtures_of(what);
+    session_->change([&](ServoSettings& settings) { settings.fixtures = set; });
   }
   void limit(const py::kwargs& values) {
     const auto numbers = numbers_of(values);
@@ -196,15 +212,17 @@ void define_session(py::module_& m) {
       "`with` starts it, and takes the force off the device before anything else at the end.")
       .def(py::init<const py::object&, const std::string&, const std::string&, bool, double,
                     const std::string&, double, const std::optional<Eigen::Matrix4d>&, double,
-                    const py::dict&, bool, const py::kwargs&>(),
+                    const py::dict&, bool, const std::optional<std::string>&, const py::kwargs&>(),
            py::arg("camera"), py::arg("device") = "hand:", py::kw_only(),
            py::arg("method") = "sight", py::arg("free_running") = false, py::arg("rate") = 1000.0,
            py::arg("record") = "", py::arg("stroke_time") = 20.0,
            py::arg("world_from_device") = py::none(), py::arg("scale") = 1.0,
            py::arg("limits") = py::dict(), py::arg("without_watchdog") = false,
+           py::arg("fixtures") = py::none(),
            "camera: a URI or a list of them. device: a URI. free_running: as fast as the machine\n"
            "can, with the same forces each time. limits: of the safety chain\n"
-           "(palpate.limits()). Further keywords are parameters (palpate.parameters()).")
+           "(palpate.limits()). fixtures: a TOML file of virtual fixtures, or its text. Further\n"
+           "keywords are parameters (palpate.parameters()).")
       .def("__enter__",
            [](const py::object& self) {
              py::cast<PythonSession&>(self).start();
@@ -225,6 +243,8 @@ void define_session(py::module_& m) {
       .def("clouds", &PythonSession::clouds, "What each camera saw last; None before that.")
       .def("set", &PythonSession::set, py::arg("method") = py::none(),
            "Changes method and parameters in the next tick; the contact stays.")
+      .def("fixtures", &PythonSession::fixtures, py::arg("fixtures"),
+           "Other virtual fixtures from the next tick on: a TOML file, its text, or None for none.")
       .def("limit", &PythonSession::limit, "Changes limits of the safety chain.")
       .def("reset_faults", &PythonSession::reset_faults, "Ends a latched fault.")
       .def("start_recording", &PythonSession::start_recording, py::arg("folder"))

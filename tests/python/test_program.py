@@ -110,6 +110,27 @@ class Session(unittest.TestCase):
             self.assertEqual(palpate.read_session(bag).tobytes(), ticks.tobytes())
             self.assertEqual(len(list(palpate.Source(f"recording:{bag}"))), 30)
 
+    def test_feels_fixtures_in_free_air(self):
+        wall = ("[[fixture]]\nname = \"all\"\nshape = \"sphere\"\n"
+                "pose = [0, 0, 0.4, 0, 0, 0, 1]\nradius = 0.05")
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "path.csv"
+            path.write_text("t,x,y,z\n0,0,0,0.3\n2,0,0,0.3\n2.5,0,0,0.353\n3,0,0,0.353\n")
+
+            def force(fixtures):
+                with palpate.Session(CAMERA, device=f"script:{path}", free_running=True,
+                                     fixtures=fixtures) as session:
+                    session.run(3.0)
+                    return session.ticks()["force"][-1]
+
+            self.assertEqual(numpy.linalg.norm(force(None)), 0.0)
+            self.assertLess(force(wall)[2], -0.5)
+        with palpate.Session(CAMERA) as session:
+            session.fixtures(wall)
+            session.fixtures(None)
+            with self.assertRaisesRegex(palpate.Error, "did you mean 'radius'"):
+                session.fixtures(wall.replace("radius", "radus"))
+
     def test_runs_in_real_time_and_can_be_changed(self):
         with palpate.Session(CAMERA) as session:
             session.set(stiffness=200, method="paper")

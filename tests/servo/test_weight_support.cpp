@@ -38,7 +38,7 @@ class Held {
   Vec3 run(int ticks, double z) {
     for (int i = 0; i < ticks; ++i, ++tick) {
       const double t = 1e-3 * tick;
-      if (tick % 33 == 0) cycle->put_frame(plane, t, t);
+      if (tick % 33 == 0) cycle->put_frame(plane_, t, t);
       device.hand.position.z() = z;
       cycle->run({.t = t});
       static_cast<void>(reader->try_pop(record));
@@ -62,7 +62,7 @@ class Held {
   double largest_step = 0.0, largest = 0.0;
 
  private:
-  std::shared_ptr<PointCloud> plane =
+  std::shared_ptr<PointCloud> plane_ =
       std::make_shared<PointCloud>(test::flat_grid(), Vec3(0, 0, 1));
 };
 

@@ -65,6 +65,9 @@ void SessionArguments::add_to(CLI::App& command) {
   command.add_option("--bubble", bubble_,
                      "metres from the middle of the device's workspace beyond which the hand sends "
                      "the HIP on (rate control), to reach what the device does not; 0: none (0)");
+  command.add_option("--handle-weight", handle_weight_,
+                     "kilograms of the handle that the motors hold up, where the device does not: "
+                     "`palpate doctor --device` measures it; 0: none (0)");
   command.add_option("--clutch-button", clutch_button_,
                      "while this button of the device is pressed the HIP stays: 0 to 31");
   command
@@ -114,6 +117,7 @@ SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
   for (CameraConfig& camera : config.cameras) camera.uri = with_material(camera.uri, material_);
   if (device_) config.device = *device_;
   if (bubble_) config.placement.bubble_radius = *bubble_;
+  if (handle_weight_) config.placement.handle_weight = *handle_weight_;
   apply_placement(device_pose_, scale_, clutch_button_, config.placement);
   for (const std::string& limit : limits_) {
     const auto [name, value] = parse_assignment("--limit", limit);

@@ -26,7 +26,7 @@ class SessionArguments {
   std::vector<std::string> cameras_, limits_, operator_limits_;
   std::optional<std::string> material_, fixtures_, device_, device_pose_, record_, record_folder_;
   std::optional<std::string> listen_, token_, operator_token_;
-  std::optional<double> rate_, scale_, bubble_, record_limit_;
+  std::optional<double> rate_, scale_, bubble_, handle_weight_, record_limit_;
   std::optional<int> clutch_button_;
   std::optional<std::uint16_t> port_;
   bool no_browser_ = false, without_watchdog_ = false;

@@ -16,6 +16,7 @@
 #include <sqlite3.h>
 #include <unistd.h>
 
+#include "app/device_report.hpp"
 #include "app/machine.hpp"
 #include "app/verbs.hpp"
 #include "palpate/core/error.hpp"
@@ -35,6 +36,7 @@ struct DoctorOptions {
   double seconds = 3.0;
   double rate = 1000.0;
   bool json = false;
+  DeviceCheck device;
 };
 
 // Fit for haptics: what a hand does not feel. A wake-up half a tick late at 1 kHz is still in time.
@@ -247,6 +249,14 @@ std::string doctor_text(const Json& report) {
 }
 
 int run(const DoctorOptions& options) {
+  if (!options.device.uri.empty()) {
+    DeviceCheck check = options.device;
+    check.json = options.json;
+    return check_device(check);
+  }
+  if (options.device.agreed || options.device.without_watchdog)
+    throw Error("doctor", "--yes and --without-watchdog are for a device",
+                "add --device URI, or leave them out");
   if (!(options.seconds >= 0.1 && options.seconds <= 3600.0))
     throw Error("--seconds", fmt::format("{} s is too short or too long", options.seconds),
                 "give 0.1 to 3600");
@@ -282,6 +292,14 @@ Verb add_doctor(CLI::App& program) {
   command->add_option("--seconds", options->seconds, "how long to measure (3)");
   command->add_option("--rate", options->rate, "ticks a second (1000)");
   command->add_flag("--json", options->json, "print a JSON object");
+  command->add_option("--device", options->device.uri,
+                      "measure this haptic device instead, by moving its handle with less than "
+                      "0.5 N: mass, damping, friction, delay, and what stiffness they bear");
+  command->add_flag("--yes", options->device.agreed,
+                    "agree to that: the handle is free to move and nobody holds it");
+  command->add_flag("--without-watchdog", options->device.without_watchdog,
+                    "also where nothing takes the force away when the program is killed: an "
+                    "emergency stop is at hand");
   return {command, [options] { return run(*options); }};
 }
 

@@ -307,6 +307,8 @@ std::string to_json(const NumberedSettings& settings) {
                  {"workspace_scale", all.placement.workspace_scale},
                  {"bubble_radius", all.placement.bubble_radius},
                  {"bubble_speed", all.placement.bubble_speed},
+                 {"handle_weight", all.placement.handle_weight},
+                 {"down", {all.placement.down.x(), all.placement.down.y(), all.placement.down.z()}},
                  {"scene", all.scene}};
   if (all.placement.clutch_button) object["clutch_button"] = *all.placement.clutch_button;
   if (all.fixtures) object["fixtures"] = json::parse(fixtures_json(*all.fixtures));
@@ -340,6 +342,12 @@ NumberedSettings settings_from_json(const std::string& text, const std::string& 
       all.placement.clutch_button = whole_of<int>(object.at("clutch_button"), name);
     all.placement.bubble_radius = object.value("bubble_radius", all.placement.bubble_radius);
     all.placement.bubble_speed = object.value("bubble_speed", all.placement.bubble_speed);
+    all.placement.handle_weight = object.value("handle_weight", all.placement.handle_weight);
+    if (object.contains("down")) {
+      for (int axis = 0; axis < 3; ++axis)
+        all.placement.down[axis] =
+            object.at("down").at(static_cast<std::size_t>(axis)).get<double>();
+    }
     if (object.contains("scene")) all.scene = whole_of<std::uint64_t>(object.at("scene"), name);
     if (object.contains("fixtures"))
       all.fixtures = fixtures_from_json(object.at("fixtures").dump(), name);

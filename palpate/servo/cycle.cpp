@@ -32,6 +32,11 @@ std::uint32_t hand_bits(const HandState& hand) noexcept {
          (static_cast<std::uint32_t>(hand.fault) << hand_fault_shift);
 }
 
+constexpr double gravity = 9.80665;  // [m/s^2]
+// What also ends the support of a handle's weight at once.
+constexpr std::uint32_t no_support =
+    input_refused | hand_too_fast | stalled | fault_latched | output_refused;
+
 }  // namespace
 
 void validate(const ServoSettings& settings) {
@@ -140,6 +145,7 @@ void Cycle::walk(Way& way, Self& self) {
   Freshness::walk(way, self.freshness_);
   PassivityObserver::walk(way, self.passivity_);
   FixtureStage::walk(way, self.fixtures_);
+  WeightSupport::walk(way, self.support_);
 }
 
 std::vector<std::string> cycle_state_names() {
@@ -152,6 +158,7 @@ std::vector<std::string> cycle_state_names() {
     Freshness freshness_{};
     PassivityObserver passivity_{};
     FixtureStage fixtures_{};
+    WeightSupport support_{};
   } memory;
   NameState name;
   Cycle::walk(name, memory);
@@ -232,6 +239,13 @@ void Cycle::run(const Wake& wake) noexcept {
                                                 .new_frame = new_frame});
   workspace_.feel(tick.force + fixtures.region);
 
+  const bool held = hand.present && !is_faulty(hand) && hand.position.allFinite();
+  const DeviceLimits& limits = device_.info().limits;
+  const double most_force = std::min(safety_.parameters().max_force, limits.max_force);
+  double support = support_.run(t, gravity * workspace_.placement().handle_weight,
+                                std::min(most_force, limits.continuous_force),
+                                held && !jumped && safety_.latched_by() == 0);
+
   const Freshness::Age age = freshness_.at(t);
   const SafetyOutput safe = safety_.run(
       {.t = t,
@@ -247,10 +261,18 @@ void Cycle::run(const Wake& wake) noexcept {
        .surface_motion = tick.surface_motion,
        .stiffness = tick.hardness * parameters_.coupling.stiffness,
        .new_frame = new_frame,
+       .held = support,
        .transient = tick.transient,
        .region = fixtures.region,
        .guidance = fixtures.guidance});
-  device_.write(workspace_.force_in_device(safe.force), t);
+  if ((safe.flags & no_support) != 0) {
+    support_.release();
+    support = 0.0;
+  }
+  // A surface's force that has yet to shrink is not added to: together they keep the limit.
+  support = std::max(std::min(support, most_force - safe.force.norm()), 0.0);
+  const Vec3 sent = workspace_.force_in_device(safe.force) - support * workspace_.placement().down;
+  device_.write(sent, t);
   const Placement& placement = workspace_.placement();
   const ServoEnergy& energy =
       passivity_.run({.t = t,
@@ -280,19 +302,18 @@ void Cycle::run(const Wake& wake) noexcept {
                          .hand = hand_bits(hand) | (reseated ? proxy_reseated : 0U) |
                                  (switched ? method_switched : 0U) | (reset ? faults_reset : 0U)};
   ring_.push(record);
-  keep_statistics(record);
+  keep_statistics(record, sent.norm());
 }
 
-void Cycle::keep_statistics(const ServoTick& record) noexcept {
+void Cycle::keep_statistics(const ServoTick& record, double sent) noexcept {
   add(statistics_.ticks, 1);
   add(statistics_.steps, static_cast<std::uint64_t>(std::max(record.tick.steps, 0)));
   if (record.tick.state != ContactState::free_motion) add(statistics_.contact_ticks, 1);
   if (std::isfinite(record.frame_age)) statistics_.frame_age.add(nanoseconds(record.frame_age));
   statistics_.hand.store(record.hand, std::memory_order_relaxed);
-  const double force = record.force.norm();
-  statistics_.force_out.store(force > 0.0, std::memory_order_relaxed);
-  if (force > statistics_.max_force.load(std::memory_order_relaxed))
-    statistics_.max_force.store(force, std::memory_order_relaxed);
+  statistics_.force_out.store(sent > 0.0, std::memory_order_relaxed);
+  if (sent > statistics_.max_force.load(std::memory_order_relaxed))
+    statistics_.max_force.store(sent, std::memory_order_relaxed);
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
     statistics_.interventions[i].store(safety_.interventions()[i], std::memory_order_relaxed);
   }

@@ -21,6 +21,7 @@
 #include "palpate/servo/periodic_thread.hpp"
 #include "palpate/servo/safety.hpp"
 #include "palpate/servo/tick_ring.hpp"
+#include "palpate/servo/weight_support.hpp"
 #include "palpate/servo/workspace.hpp"
 
 namespace palpate {
@@ -206,7 +207,7 @@ class Cycle {
 
   bool adopt_change(const Change& change) noexcept;
   void adopt_frame(const CapturedFrame& frame, double t) noexcept;
-  void keep_statistics(const ServoTick& record) noexcept;
+  void keep_statistics(const ServoTick& record, double sent) noexcept;
   template <class Way, class Self>
   static void walk(Way& way, Self& self);
   friend std::vector<std::string> cycle_state_names();
@@ -217,6 +218,7 @@ class Cycle {
   Device& device_;
   SafetyChain safety_;
   Workspace workspace_;
+  WeightSupport support_;
   Parameters parameters_;  // in use
   Patch patch_;            // for seating the proxy anew
 

@@ -71,6 +71,10 @@ constexpr std::array placement_rows{
                   "of the HIP in the scene, when the hand is 2 cm beyond the bubble or farther", "",
                   [](const Placement& p) { return p.bubble_speed; },
                   [](Placement& p, double v) { p.bubble_speed = v; }},
+    PlacementInfo{"handle_weight", "", "kg", 0.0, 0.0, 0.1,
+                  "of the handle that the motors hold up, where the device does not; 0: none", "",
+                  [](const Placement& p) { return p.handle_weight; },
+                  [](Placement& p, double v) { p.handle_weight = v; }},
 };
 
 }  // namespace

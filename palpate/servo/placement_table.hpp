@@ -11,8 +11,8 @@ namespace palpate {
 
 using PlacementInfo = ParameterRow<Placement>;
 
-/// Scale, origin, angles and bubble of a placement, in the order in which they are shown. The
-/// angles turn about the world's x, then y, then z axis.
+/// Scale, origin, angles, bubble and handle of a placement, in the order in which they are shown.
+/// The angles turn about the world's x, then y, then z axis.
 std::span<const PlacementInfo> placement_table();
 
 /// Sets one of them by name; the others stay.

@@ -259,22 +259,23 @@ void SafetyChain::note_faults(std::uint32_t flags) noexcept {
 // After a gap the last force counts as held all through, but cooling only as of a tick that is just
 // not stalled: whether the motors were off is not known.
 void SafetyChain::warm_up(double since_last) noexcept {
-  const double change = last_sent_.squaredNorm() - heat_;
+  const double given = last_sent_.norm() + held_;
+  const double change = given * given - heat_;
   const double elapsed = change > 0.0 ? since_last : std::min(since_last, parameters_.stall_time);
   heat_ += share_of(elapsed, parameters_.continuous_time) * change;
 }
 
 double SafetyChain::peak() const noexcept {
-  return std::min(parameters_.max_force, device_.max_force);
+  return std::max(std::min(parameters_.max_force, device_.max_force) - held_, 0.0);
 }
 
 // The share of the budget that is used up takes the peak down to what can be given for ever.
 double SafetyChain::peak_as_warm() const noexcept {
-  const double cold = peak();
-  if (!(device_.continuous_force < cold)) return cold;
+  const double cold = peak() + held_;
+  if (!(device_.continuous_force < cold)) return peak();
   const double budget = device_.continuous_force * device_.continuous_force;
   const double left = std::clamp((1.0 - heat_ / budget) / (1.0 - cool), 0.0, 1.0);
-  return std::sqrt(budget + left * (cold * cold - budget));
+  return std::max(std::sqrt(budget + left * (cold * cold - budget)) - held_, 0.0);
 }
 
 // Pushes only, magnitude, continuous force; and frames that are late. `share` is what the links
@@ -298,7 +299,8 @@ Vec3 SafetyChain::limited(const SafetyInput& input, double share,
   } else if (has(force_cut) && cut_to(peak(), force)) {
     flags |= force_cut;
   }
-  if (has(continuous_cut) && device_.continuous_force < peak() && cut_to(peak_as_warm(), force))
+  if (has(continuous_cut) && device_.continuous_force < peak() + held_ &&
+      cut_to(peak_as_warm(), force))
     flags |= continuous_cut;
 
   if (has(frame_late) && !(input.frame_intervals <= parameters_.late_intervals)) {
@@ -476,6 +478,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   const double since_last = in_order && last_t_ ? input.t - *last_t_ : 0.0;
   const double dt = std::min(since_last, longest_credit);
   fault_clock_ += since_last;
+  held_ = std::isfinite(input.held) ? std::max(input.held, 0.0) : 0.0;
   warm_up(since_last);
 
   if (sound && since_last > 0.0) {

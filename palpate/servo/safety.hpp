@@ -124,6 +124,9 @@ struct SafetyInput {
   Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world: the same as a vector, extrapolated
   double stiffness = 0.0;              ///< [N/m] of the surface; 0: not known
   bool new_frame = false;              ///< the first tick with a frame
+  /// [N] that the motors give beside `force`, whatever way: it takes from their limit and warms
+  /// them. Of a handle's weight.
+  double held = 0.0;
   /// [N] world: the part of `force` that is an impact's ringing: it may rise at once
   Vec3 transient = Vec3::Zero();
   /// [N] world: of forbidden regions, beside `force`. What is judged by normal and proxy is the
@@ -228,8 +231,9 @@ class SafetyChain {
   [[nodiscard]] bool is_contradictory(const SafetyInput& input) const noexcept;
   void note_faults(std::uint32_t flags) noexcept;
   void warm_up(double since_last) noexcept;
-  [[nodiscard]] double peak() const noexcept;          // [N]
-  [[nodiscard]] double peak_as_warm() const noexcept;  // [N]
+  // [N] for the surface, beside what is held.
+  [[nodiscard]] double peak() const noexcept;
+  [[nodiscard]] double peak_as_warm() const noexcept;
   Vec3 limited(const SafetyInput& input, double share, std::uint32_t& flags) const noexcept;
   double softened(const SafetyInput& input, double since_last, double dt,
                   std::uint32_t& flags) noexcept;
@@ -247,10 +251,12 @@ class SafetyChain {
   SafetyParameters parameters_;
   std::uint32_t links_;
 
-  // walk() lists all of these, but for the interventions, which change nothing.
+  // walk() lists all of these, but for the interventions, which change nothing, and `held_`, which
+  // each tick sets.
   std::optional<double> last_t_;
   Vec3 last_force_ = Vec3::Zero();  // as sent, but for what rang
   Vec3 last_sent_ = Vec3::Zero();   // all of it
+  double held_ = 0.0;               // [N] SafetyInput::held of this tick
   std::uint32_t last_flags_ = 0;
   std::array<std::uint64_t, safety_flag_count> interventions_{};
 

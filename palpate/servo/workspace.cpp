@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/servo/workspace.hpp"
 
+#include <cmath>
 #include <string>
 
 #include "palpate/core/error.hpp"
@@ -24,6 +25,13 @@ void validate(const Placement& placement) {
   if (!(placement.bubble_speed >= 1e-3 && placement.bubble_speed <= 1.0))
     throw Error("bubble_speed", std::to_string(placement.bubble_speed) + " is out of range",
                 "give metres a second in the scene, from 0.001 to 1");
+  if (!(placement.handle_weight >= 0.0 && placement.handle_weight <= 0.1))
+    throw Error("handle_weight", std::to_string(placement.handle_weight) + " is out of range",
+                "give kilograms from 0 (the device holds its handle) to 0.1");
+  constexpr double rounding = 1e-3;
+  if (!(std::abs(placement.down.norm() - 1.0) <= rounding))
+    throw Error("down", "its length is " + std::to_string(placement.down.norm()),
+                "give a direction of length 1 in the device's axes, such as 0, 0, -1");
 }
 
 }  // namespace palpate

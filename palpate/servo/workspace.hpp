@@ -26,11 +26,16 @@ struct Placement {
   double bubble_radius = 0.0;
   /// [m/s, scene] How fast the HIP goes on at most, from `bubble_rim` beyond the radius on.
   double bubble_speed = 0.1;
+  /// [kg] of the handle that the device itself does not hold up, 0 to 0.1; 0: none. The motors do,
+  /// beside the force of the surface and within the same limits (WeightSupport).
+  double handle_weight = 0.0;
+  Vec3 down = -Vec3::UnitZ();  ///< [-] device: which way that weight pulls, of length 1
 
   bool operator==(const Placement& other) const {
     return world_from_device.matrix() == other.world_from_device.matrix() &&
            workspace_scale == other.workspace_scale && clutch_button == other.clutch_button &&
-           bubble_radius == other.bubble_radius && bubble_speed == other.bubble_speed;
+           bubble_radius == other.bubble_radius && bubble_speed == other.bubble_speed &&
+           handle_weight == other.handle_weight && down == other.down;
   }
 };
 
@@ -39,7 +44,8 @@ struct Placement {
 constexpr double bubble_rim = 0.02;
 
 /// @throws Error if the pose is not rigid and finite, the scale is not in 0.001 to 1000, the button
-///         not in 0 to 31, the bubble's radius not in 0 to 1 m or its speed not in 0.001 to 1 m/s.
+///         not in 0 to 31, the bubble's radius not in 0 to 1 m, its speed not in 0.001 to 1 m/s,
+///         the weight not in 0 to 0.1 kg or `down` not of length 1.
 void validate(const Placement& placement);
 
 /// Brings hands into the world and forces back, and remembers what clutch and bubble have shifted.

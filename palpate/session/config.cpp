@@ -54,8 +54,9 @@ std::vector<CameraConfig> read_cameras(const TomlTable& root, const toml::node& 
 void read_placement(const TomlTable& root, Placement& placement) {
   const toml::table* sub = root.sub("placement");
   if (sub == nullptr) return;
-  constexpr std::array<std::string_view, 5> keys{"world_from_device", "scale", "clutch_button",
-                                                 "bubble_radius", "bubble_speed"};
+  constexpr std::array<std::string_view, 9> keys{
+      "world_from_device", "scale",  "clutch_button", "bubble_radius", "bubble_speed",
+      "handle_weight",     "down_x", "down_y",        "down_z"};
   const TomlTable table(*sub, root.file(), "[placement]", keys);
   if (const auto pose = table.pose("world_from_device")) placement.world_from_device = *pose;
   table.read("scale", placement.workspace_scale, 1e-3, 1e3, "scene m per device m");
@@ -64,6 +65,10 @@ void read_placement(const TomlTable& root, Placement& placement) {
   if (button >= 0.0) placement.clutch_button = static_cast<int>(button);
   table.read("bubble_radius", placement.bubble_radius, 0.0, 1.0, "m, device");
   table.read("bubble_speed", placement.bubble_speed, 1e-3, 1.0, "m/s, scene");
+  table.read("handle_weight", placement.handle_weight, 0.0, 0.1, "kg");
+  table.read("down_x", placement.down.x(), -1.0, 1.0, "");
+  table.read("down_y", placement.down.y(), -1.0, 1.0, "");
+  table.read("down_z", placement.down.z(), -1.0, 1.0, "");
 }
 
 void read_operator_limits(const TomlTable& root, std::map<std::string, double>& limits) {
@@ -278,6 +283,11 @@ std::string to_toml(const SessionConfig& config) {
                    "m of the device, 0 to 1: rate control beyond it; 0: none");
   text += key_line("bubble_speed", toml_number(config.placement.bubble_speed),
                    "m/s in the scene, 0.001 to 1: 2 cm beyond the bubble");
+  text += key_line("handle_weight", toml_number(config.placement.handle_weight),
+                   "kg, 0 to 0.1: of the handle that the motors hold up; 0: none");
+  for (int axis = 0; axis < 3; ++axis)
+    text += key_line(std::string("down_") + "xyz"[axis], toml_number(config.placement.down[axis]),
+                     "of the device's axes: which way the handle's weight pulls");
   text += "\n[parameters]\n";
   for (const ParameterInfo& row : parameter_table()) {
     // r_c is derived from the radii below it: setting it scales them.

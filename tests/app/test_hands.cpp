@@ -449,6 +449,30 @@ TEST_F(GamepadHands, AreRefusedInOneLineThatSaysWhatToDo) {
   expect_refusal(arguments + "gamepad:x", {"'x'", "gamepad:1"});
 }
 
+// The fake arm goes where it wants, so nothing can be learned of it; but safely.
+TEST_F(ForceDimensionHands, AreMeasuredBelowHalfANewtonAndLetGo) {
+  bench.path = test::Path::inside;
+  const Outcome outcome = run("doctor --json --yes --device force-dimension:");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const nlohmann::json report = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(report["sure"], false);
+  EXPECT_FALSE(report["doubts"].empty());
+  EXPECT_TRUE(report["proposal"].is_null());
+  EXPECT_GT(bench.largest, 0.3) << "it was pushed";
+  EXPECT_LT(bench.largest, 0.5);
+  EXPECT_EQ(motor_force(), 0.0);
+  EXPECT_FALSE(bench.force_on);
+  EXPECT_EQ(bench.closes, bench.opens);
+}
+
+TEST_F(ForceDimensionHands, AreNotMovedWithoutConsent) {
+  expect_refusal("doctor --device force-dimension:", {"nobody has agreed", "--yes"});
+  EXPECT_EQ(bench.largest, 0.0);
+  expect_refusal("doctor --yes", {"--device URI"});
+  expect_refusal("doctor --yes --device spacenav:0", {"spacenav:0"});
+  expect_refusal("doctor --yes --device mouse:", {"mouse:", "no motors"});
+}
+
 // ---- The doctor
 
 class DoctorAndHands : public HaplyHands {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -80,6 +81,32 @@ TEST(Placement, ThatChangesInContactTakesTheForceOffUntilTheHandEngagesAgain) {
   EXPECT_EQ(run(3000, 500, -0.003), 0.0) << "disengaged while the hand presses";
   run(3500, 500, 0.03);
   EXPECT_NE(record.safety & ramping, 0U) << "free again, it engages";
+}
+
+// 0.15 m of device: a hand that never goes farther than 0.075 m from its middle.
+TEST(Bubble, ReachesAMetreOfSceneFromADevicesFifteenCentimetres) {
+  constexpr double dt = 1e-3;
+  constexpr double reach = 0.075;
+  const Placement placement{.bubble_radius = 0.05, .bubble_speed = 0.1};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double side : {-1.0, 1.0}) {
+      Workspace workspace(placement);
+      HandState hand;
+      double t = 0.0;
+      double x = 0.0;
+      double hip = 0.0;
+      // Out within a second, there until half a metre is reached, and back to the middle.
+      for (int tick = 0; tick < 10'000 && x >= 0.0; ++tick) {
+        x += std::abs(hip) < 0.5 && tick < 8000 ? std::min(7.5e-5, reach - x) : -7.5e-5;
+        hand.position = side * x * Vec3::Unit(axis);
+        const double next = workspace.hip_in_world(hand, t += dt)[axis];
+        // The hand's own 0.075 m/s and the bubble's, and never more.
+        EXPECT_LE(std::abs(next - hip), (0.075 + placement.bubble_speed) * dt + 1e-12);
+        hip = next;
+      }
+      EXPECT_GE(side * hip, 0.4) << "axis " << axis << ": it stays where it was led";
+    }
+  }
 }
 
 // A hand goes out along x through the rim and rests there, a quarter of the way into it.

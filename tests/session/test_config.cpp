@@ -28,7 +28,7 @@ SessionConfig everything() {
   config.cameras = {{.uri = "tum:/data/a b?x=\"1\"\\2", .world_from_camera = pose_of(1.0)},
                     {.uri = "synthetic:desk", .name = "left"}};
   config.device = "hand:?device=touch";
-  config.placement = {pose_of(-2.0), 2.5, 1, 0.0625, 0.3};
+  config.placement = {pose_of(-2.0), 2.5, 1, 0.0625, 0.3, 0.045, Vec3(0.6, 0.0, -0.8)};
   config.without_watchdog = true;
   config.rate = 2000.0;
   config.method = "paper";
@@ -61,6 +61,8 @@ void expect_same(const SessionConfig& a, const SessionConfig& b) {
   EXPECT_EQ(a.placement.clutch_button, b.placement.clutch_button);
   EXPECT_EQ(a.placement.bubble_radius, b.placement.bubble_radius);
   EXPECT_EQ(a.placement.bubble_speed, b.placement.bubble_speed);
+  EXPECT_EQ(a.placement.handle_weight, b.placement.handle_weight);
+  EXPECT_EQ(a.placement.down, b.placement.down);
   EXPECT_EQ(a.without_watchdog, b.without_watchdog);
   EXPECT_EQ(a.rate, b.rate);
   EXPECT_EQ(a.method, b.method);

@@ -241,8 +241,26 @@ class Adversary {
     settings.parameters.tap.tap = one_in(2) ? 0.0 : between(0.0, 50.0);
     settings.parameters.texture.grain = one_in(2) ? 0.0 : between(0.0, 0.3);
     settings.parameters.friction.friction = one_in(2) ? 0.0 : between(0.0, 2.0);
+    if (one_in(2)) settings.fixtures = fixtures();
     settings.safety.ramp_time = between(0.01, 0.3);
     return settings;
+  }
+
+  // A region, a guide that needs no consent and a viscous region, where the hand is about.
+  std::shared_ptr<const FixtureSet> fixtures() {
+    Fixture region{.name = "region", .shape = FixtureShape::sphere, .radius = between(0.01, 0.03)};
+    region.world_from_fixture.translation() = place(0.02);
+    region.numbers.stiffness = between(100.0, 3000.0);
+    Fixture guide{.name = "guide",
+                  .kind = FixtureKind::guide,
+                  .shape = FixtureShape::point,
+                  .consent = true};
+    guide.world_from_fixture.translation() = place(0.02);
+    Fixture honey{.name = "honey",
+                  .kind = FixtureKind::viscous,
+                  .shape = FixtureShape::box,
+                  .size = Vec3::Constant(0.05)};
+    return std::make_shared<FixtureSet>(std::vector<Fixture>{region, guide, honey});
   }
 
   void switch_method() {

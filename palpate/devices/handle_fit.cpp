@@ -85,6 +85,9 @@ bool pauses(std::span<const HandleSample> samples, int axis, const Swing& swing)
     const double to = (samples[i].position[axis] - first.position[axis]) / way;
     const double moved = samples[i].position[axis] - samples[behind].position[axis];
     if (from > 0.1 && to < 0.9 && moved * swing.sign < least * swing.sign) return true;
+    // At its ends it is slow, but does not rest.
+    constexpr double rests = 0.003;  // [-] of the way
+    if (samples[i].t - first.t > window && moved / way < rests) return true;
   }
   return false;
 }

@@ -27,7 +27,8 @@ TEST(PlacementTable, GivesBackWhatWasSetAndLeavesTheRestAlone) {
   validate(placement);
   set_placement(placement, "bubble_radius", 0.06);
   set_placement(placement, "bubble_speed", 0.3);
-  const double expected[] = {3.0, 0.0, -0.25, 0.0, 0.3, -0.4, 1.2, 0.06, 0.3};
+  set_placement(placement, "handle_weight", 0.045);
+  const double expected[] = {3.0, 0.0, -0.25, 0.0, 0.3, -0.4, 1.2, 0.06, 0.3, 0.045};
   std::size_t i = 0;
   for (const PlacementInfo& row : placement_table())
     EXPECT_NEAR(row.get(placement), expected[i++], 1e-12) << row.name;

@@ -401,9 +401,9 @@ class Session::Impl {
 
   // To the method and the recorder.
   void give(std::size_t camera, const FedFrame& fed) {
-    std::shared_ptr<const Cloud> cloud = paint_.on(fed.frame.cloud, camera);
+    std::shared_ptr<const Cloud> painted = paint_.on(fed.frame.cloud, camera);
     const std::lock_guard lock(frames_mutex_);
-    newest_[camera] = std::move(cloud);
+    newest_[camera] = std::move(painted);
     stamps_[camera].stamp = fed.frame.stamp;
     std::vector<std::shared_ptr<const Cloud>> clouds;
     for (const auto& cloud : newest_) {

@@ -219,6 +219,15 @@ std::optional<Command> parse_command(std::string_view message) {
     return SetBrush{material->get<std::string>(), radius->get<double>()};
   }
   if (verb == "clear_paint" && what == true) return ClearPaint{};
+  if (verb == "forbid") {
+    if (!what.is_object() || what.size() != 2) return std::nullopt;
+    const auto size = what.find("size");
+    const auto margin = what.find("margin");
+    if (size == what.end() || margin == what.end() || !size->is_number() || !margin->is_number())
+      return std::nullopt;
+    return Forbid{size->get<double>(), margin->get<double>()};
+  }
+  if (verb == "remove_fixture" && what.is_string()) return RemoveFixture{what.get<std::string>()};
   if (verb == "reset" && what == true) return ResetHand{};
   if (verb == "reset_faults" && what == true) return ResetFaults{};
   return std::nullopt;

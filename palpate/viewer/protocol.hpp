@@ -143,12 +143,20 @@ struct SetBrush {
 /// What is touched is no longer painted.
 struct DropBrush {};
 struct ClearPaint {};
+/// What is seen about the place that was touched last becomes a forbidden region.
+struct Forbid {
+  double size;    ///< [m] edge of the box about that place
+  double margin;  ///< [m]
+};
+struct RemoveFixture {
+  std::string name;
+};
 struct ResetHand {};
 /// Ends a latched fault of the safety chain; see Session::reset_faults.
 struct ResetFaults {};
 using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod,
                              SetRecording, SetPlayback, Seek, OpenScene, SetBrush, DropBrush,
-                             ClearPaint, ResetHand, ResetFaults>;
+                             ClearPaint, Forbid, RemoveFixture, ResetHand, ResetFaults>;
 
 /// The longest message a page may send [bytes].
 constexpr std::size_t max_page_message = 1024;

@@ -70,6 +70,37 @@ std::string_view stricter_text(std::string_view limit) {
   return "";
 }
 
+// What the page draws of a fixture.
+nlohmann::json fixture_to_draw(const Fixture& fixture) {
+  const auto numbers = [](const Vec3& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
+  nlohmann::json pose = nlohmann::json::array();
+  for (int i = 0; i < 12; ++i) pose.push_back(fixture.world_from_fixture(i / 4, i % 4));
+  Vec3 size = fixture.size;
+  nlohmann::json points = nlohmann::json::array();
+  if (fixture.shape == FixtureShape::mesh) {  // its box
+    Vec3 low = fixture.points.front();
+    Vec3 high = low;
+    for (const Vec3& point : fixture.points) {
+      low = low.cwiseMin(point);
+      high = high.cwiseMax(point);
+    }
+    size = high - low;
+    const Vec3 middle = fixture.world_from_fixture * Vec3(0.5 * (low + high));
+    for (int axis = 0; axis < 3; ++axis)
+      pose[static_cast<std::size_t>(4 * axis + 3)] = middle[axis];
+  } else {
+    for (const Vec3& point : fixture.points) points.push_back(numbers(point));
+  }
+  return {{"name", fixture.name},
+          {"kind", fixture_kind_names()[static_cast<std::size_t>(fixture.kind)]},
+          {"shape", fixture_shape_names()[static_cast<std::size_t>(fixture.shape)]},
+          {"pose", pose},
+          {"size", numbers(size)},
+          {"radius", fixture.radius},
+          {"length", fixture.length},
+          {"points", points}};
+}
+
 }  // namespace
 
 void SessionHost::attach(Session& session) {
@@ -132,6 +163,39 @@ std::string SessionHost::hello() {
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
+void SessionHost::forbid(const Forbid& wanted) {
+  if (!touched_)
+    throw Error("fixture", "nothing has been touched yet", "touch what the hand is to keep off");
+  session_->change([&](ServoSettings& settings) {
+    std::vector<Fixture> all =
+        settings.fixtures ? settings.fixtures->fixtures() : std::vector<Fixture>{};
+    Fixture region{.name = {},
+                   .kind = FixtureKind::forbidden,
+                   .shape = FixtureShape::seen,
+                   .size = Vec3::Constant(wanted.size)};
+    region.world_from_fixture.translation() = *touched_;
+    region.numbers.margin = wanted.margin;
+    const auto is_taken = [&] {
+      return std::any_of(all.begin(), all.end(),
+                         [&](const Fixture& other) { return other.name == region.name; });
+    };
+    for (int number = 1; region.name.empty() || is_taken(); ++number)
+      region.name = "keep off " + std::to_string(number);
+    all.push_back(region);
+    settings.fixtures = std::make_shared<const FixtureSet>(all);
+  });
+}
+
+void SessionHost::remove_fixture(const std::string& name) {
+  session_->change([&](ServoSettings& settings) {
+    std::vector<Fixture> all =
+        settings.fixtures ? settings.fixtures->fixtures() : std::vector<Fixture>{};
+    if (std::erase_if(all, [&](const Fixture& fixture) { return fixture.name == name; }) == 0)
+      throw Error("fixture '" + name + "'", "there is none of that name", "see the page's list");
+    settings.fixtures = all.empty() ? nullptr : std::make_shared<const FixtureSet>(all);
+  });
+}
+
 // The names of what the first camera's surfaces can be painted with.
 std::vector<std::string> SessionHost::paintable() const {
   const auto clouds = session_->newest_clouds();
@@ -192,6 +256,11 @@ std::string SessionHost::state() {
                     {"normal", {dab.normal.x(), dab.normal.y(), dab.normal.z()}},
                     {"radius", dab.radius},
                     {"material", dab.material}});
+  json fixtures = json::array();
+  if (state.settings.fixtures) {
+    for (const FixtureSet::Item& item : state.settings.fixtures->items())
+      fixtures.push_back(fixture_to_draw(item.fixture));
+  }
   json brush;
   if (brush_) brush = {{"material", brush_->material}, {"radius", brush_->radius}};
   const DeviceInfo& device = session_->device().info();
@@ -220,6 +289,7 @@ std::string SessionHost::state() {
        {{"contacts", state.summary.energy.contacts},
         {"relative", energy_of(state.summary.energy.relative)},
         {"absolute", energy_of(state.summary.energy.absolute)}}},
+      {"fixtures", fixtures},
       {"paint",
        {{"brush", brush}, {"dabs", dabs}, {"materials", paintable()}, {"trouble", brush_trouble_}}},
       {"recording", recording}}
@@ -240,6 +310,7 @@ std::optional<TickBatch> SessionHost::ticks() {
 // Along a stroke, a dab in each third of the brush's radius.
 void SessionHost::paint(const ServoTick& newest, double contact_radius) {
   const Tick& tick = newest.tick;
+  if (!tick.force.isZero()) touched_ = tick.proxy - contact_radius * tick.normal;
   if (!brush_ || tick.force.isZero()) {
     dabbed_.reset();
     return;
@@ -317,6 +388,10 @@ void SessionHost::command(const Command& command, Role role) {
   } else if (std::holds_alternative<ClearPaint>(command)) {
     session_->paint().clear();
     dabbed_.reset();
+  } else if (const auto* wanted = std::get_if<Forbid>(&command)) {
+    forbid(*wanted);
+  } else if (const auto* fixture = std::get_if<RemoveFixture>(&command)) {
+    remove_fixture(fixture->name);
   } else if (std::holds_alternative<ResetFaults>(command)) {
     session_->reset_faults();
   } else if (mouse_ != nullptr) {

@@ -89,8 +89,12 @@ class SessionHost final : public ViewerHost {
   std::atomic<ViewerServer*> server_{nullptr};
   std::array<std::uint32_t, Patch::max_views> numbers_{};  // of each camera's own frames
   MouseDevice* mouse_ = nullptr;
-  Vec3 start_ = Vec3::Zero();      // [m, device] where the mouse's hand began
-  Vec3 target_ = Vec3::Zero();     // [m, device] where it was sent last
+  Vec3 start_ = Vec3::Zero();   // [m, device] where the mouse's hand began
+  Vec3 target_ = Vec3::Zero();  // [m, device] where it was sent last
+  void forbid(const Forbid& wanted);
+  void remove_fixture(const std::string& name);
+
+  std::optional<Vec3> touched_;    // [m] where the hand touched last
   std::optional<SetBrush> brush_;  // what is touched is painted with; none: it is not
   std::optional<Vec3> dabbed_;     // [m] where the last dab was
   std::string brush_trouble_;      // why it does not paint

@@ -251,10 +251,8 @@ class Adversary {
     Fixture region{.name = "region", .shape = FixtureShape::sphere, .radius = between(0.01, 0.03)};
     region.world_from_fixture.translation() = place(0.02);
     region.numbers.stiffness = between(100.0, 3000.0);
-    Fixture guide{.name = "guide",
-                  .kind = FixtureKind::guide,
-                  .shape = FixtureShape::point,
-                  .consent = true};
+    Fixture guide{
+        .name = "guide", .kind = FixtureKind::guide, .shape = FixtureShape::point, .consent = true};
     guide.world_from_fixture.translation() = place(0.02);
     Fixture honey{.name = "honey",
                   .kind = FixtureKind::viscous,

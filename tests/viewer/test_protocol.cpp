@@ -189,6 +189,13 @@ TEST(Protocol, UnderstandsEachCommand) {
   EXPECT_TRUE(std::holds_alternative<DropBrush>(parse_command(R"({"brush": null})").value()));
   EXPECT_TRUE(
       std::holds_alternative<ClearPaint>(parse_command(R"({"clear_paint": true})").value()));
+  const auto forbid = parse_command(R"({"forbid": {"size": 0.1, "margin": 0.01}})");
+  ASSERT_TRUE(forbid && std::holds_alternative<Forbid>(*forbid));
+  EXPECT_EQ(std::get<Forbid>(*forbid).size, 0.1);
+  EXPECT_EQ(std::get<Forbid>(*forbid).margin, 0.01);
+  const auto removed = parse_command(R"({"remove_fixture": "wall"})");
+  ASSERT_TRUE(removed && std::holds_alternative<RemoveFixture>(*removed));
+  EXPECT_EQ(std::get<RemoveFixture>(*removed).name, "wall");
   const auto faults = parse_command(R"({"reset_faults": true})");
   ASSERT_TRUE(faults && std::holds_alternative<ResetFaults>(*faults));
 }
@@ -212,6 +219,9 @@ TEST(Protocol, RefusesCommandsThatAreNotItsOwn) {
                            R"({"brush": {"material": "ice"}})",
                            R"({"brush": {"material": 1, "radius": 0.01}})",
                            R"({"clear_paint": false})",
+                           R"({"forbid": {"size": 0.1}})",
+                           R"({"forbid": true})",
+                           R"({"remove_fixture": 1})",
                            R"({"quit": true})",
                            R"({"method": "paper", "reset": true})",
                            "\xff\xfe",

@@ -490,6 +490,37 @@ test("a brush paints what is touched, which then feels like that", async () => {
   await expect.poll(async () => (await paint()).dabs.length).toBe(0);
 });
 
+test("the operator keeps the hand off what it has touched", async () => {
+  const page = await open(PLANE);
+  const names = () =>
+    page.evaluate(() =>
+      (window as any).palpate.newest().state.fixtures.map(({ name }: { name: string }) => name),
+    );
+  await page.locator("[data-tab=method]").first().click();
+  const at = await placeWhere(page, "surface");
+  const touch = async () => {
+    await page.mouse.move(at.x, at.y);
+    await page.mouse.down();
+  };
+  await touch();
+  await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
+  await page.mouse.up();
+  await until(page, (seen) => seen.state === 0 && seen.hip[2]! > 0.02);
+  await page.locator("#forbid-margin").fill("15");
+  await page.locator("#forbid").click();
+  await expect.poll(names).toEqual(["keep off 1"]);
+  expect(await page.locator("#fixture-list").textContent()).toContain("forbidden, seen");
+  // It pushes before the surface does.
+  await touch();
+  await until(page, (seen) => seen.force > 0.2 && seen.hip[2]! > 0.003);
+  await page.mouse.up();
+  await page.locator("#fixture-list button").click();
+  await expect.poll(names).toEqual([]);
+  await touch();
+  await until(page, (seen) => seen.state !== 0 && seen.force > 0.3 && seen.hip[2]! < 0);
+  await page.mouse.up();
+});
+
 test("without the operator's link a page is greyed out and may hold the hand", async () => {
   const page = await open(DESK);
   expect(await page.locator("#role").textContent()).toBe("operator");

@@ -3,6 +3,7 @@ import "./style.css";
 import { Brush, dabColour } from "./brush";
 import { Connection, unknownToken, type Presence } from "./connection";
 import { Files } from "./files";
+import { fixtureLines, Fixtures } from "./fixtures";
 import { HandInput, isForForm } from "./hand";
 import { length } from "./camera_math";
 import { latchedText, mayOperate, Panel, roleNames } from "./panel";
@@ -84,6 +85,11 @@ const brush = new Brush({
   clear: () => connection.ask({ clear_paint: true }),
 });
 
+const fixtures = new Fixtures({
+  forbid: (wanted) => connection.ask({ forbid: wanted }),
+  remove: (name) => connection.ask({ remove_fixture: name }),
+});
+
 const timeline = new Timeline((command) => connection.ask(command));
 
 const connection = new Connection({
@@ -120,6 +126,8 @@ const connection = new Connection({
     role.title = roleNames[newest.role].may;
     panel.update(newest);
     brush.update(newest);
+    fixtures.update(newest);
+    view.showFixtures(newest.fixtures.flatMap(fixtureLines));
     const { dabs, materials } = newest.paint;
     view.showPaint(
       dabs.map(({ place, normal, radius, material }) => ({

@@ -308,6 +308,30 @@ export interface Playback {
 }
 
 /** Sent a few times a second. */
+/** A virtual fixture, as far as it is drawn. */
+export interface FixtureState {
+  name: string;
+  kind: "forbidden" | "guide" | "viscous";
+  shape:
+    | "box"
+    | "sphere"
+    | "cylinder"
+    | "capsule"
+    | "half_space"
+    | "mesh"
+    | "seen"
+    | "path"
+    | "plane"
+    | "point";
+  /** world_from_fixture, 3 x 4, row by row */
+  pose: number[];
+  /** [m], of a mesh that of its box */
+  size: Vec3;
+  radius: number;
+  length: number;
+  points: Vec3[];
+}
+
 export interface State {
   role: Role;
   method: string;
@@ -343,6 +367,7 @@ export interface State {
   pop_throughs: number;
   /** that the forces sent have given to the hand, in all contacts */
   energy: { contacts: number; relative: PortEnergy; absolute: PortEnergy };
+  fixtures: FixtureState[];
   /** what is painted on the cameras' frames */
   paint: {
     /** what is touched is painted with; "" wipes; null: nothing is painted */
@@ -375,4 +400,6 @@ export type Command =
   | { reset: true }
   | { brush: { material: string; radius: number } | null }
   | { clear_paint: true }
+  | { forbid: { size: number; margin: number } }
+  | { remove_fixture: string }
   | { reset_faults: true };

@@ -100,8 +100,10 @@ export class SceneView {
   private readonly shadow: THREE.Mesh<THREE.CircleGeometry, THREE.MeshBasicMaterial>;
   private readonly spot: THREE.Mesh<THREE.RingGeometry, THREE.MeshBasicMaterial>;
   private readonly grid: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly fixtures: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly frusta: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly paint: THREE.InstancedMesh<THREE.CircleGeometry, THREE.MeshBasicMaterial>;
+  private fixtureEnds: number[] = []; // of their lines, as they are drawn
   private readonly dab = new THREE.Object3D(); // where one of them is
   private readonly axes = new THREE.AxesHelper(AXES_LENGTH);
   // The hand that was recorded.
@@ -185,6 +187,7 @@ export class SceneView {
     this.paint.frustumCulled = false;
     const thin = (opacity: number) => new THREE.LineBasicMaterial({ transparent: true, opacity });
     this.grid = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.16));
+    this.fixtures = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.8));
     this.frusta = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.5));
     this.pin = new THREE.Mesh(
       new THREE.CylinderGeometry(0.09, 0.09, 1, 12).translate(0, 0.5, 0),
@@ -199,7 +202,10 @@ export class SceneView {
       this.arrowMaterial,
     );
     this.arrow.add(this.shaft, this.head);
-    const lines = [this.link, this.plumb, this.trail, this.ghostTrail, this.grid, this.frusta];
+    const lines = [
+      ...[this.link, this.plumb, this.trail, this.ghostTrail],
+      ...[this.grid, this.frusta, this.fixtures],
+    ];
     for (const object of lines) object.frustumCulled = false;
     this.shadow.renderOrder = this.ghostTrail.renderOrder = this.ghost.renderOrder = 1;
     this.spot.renderOrder = 1;
@@ -210,7 +216,7 @@ export class SceneView {
     const marks = [
       ...[this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin],
       ...[this.shadow, this.spot, this.grid, this.frusta, this.axes],
-      ...[this.ghost, this.ghostTrail, this.paint],
+      ...[this.ghost, this.ghostTrail, this.paint, this.fixtures],
     ];
     for (const mark of marks) mark.visible = false;
     this.arrow.visible = false;
@@ -246,6 +252,7 @@ export class SceneView {
     this.spot.material.color = colour(palette.calm);
     this.grid.material.color = colour(palette.text);
     this.frusta.material.color = colour(palette.calm);
+    this.fixtures.material.color = colour(palette.force);
     this.arrowMaterial.color = colour(palette.force);
     this.arrowMaterial.emissive = colour(palette.force).multiplyScalar(0.35);
     for (const cloud of this.clouds.values()) cloud.setColours(this.cloudColours());
@@ -265,6 +272,20 @@ export class SceneView {
     this.paint.visible = shown.length > 0;
     this.paint.instanceMatrix.needsUpdate = true;
     if (this.paint.instanceColor) this.paint.instanceColor.needsUpdate = true;
+    this.touch();
+  }
+
+  /** Virtual fixtures as lines: their ends, x y z after one another [m, world]. */
+  showFixtures(ends: readonly number[]): void {
+    if (ends.length === this.fixtureEnds.length && ends.every((x, i) => x === this.fixtureEnds[i]))
+      return;
+    this.fixtureEnds = [...ends];
+    this.fixtures.geometry.dispose();
+    this.fixtures.geometry = new THREE.BufferGeometry().setAttribute(
+      "position",
+      new THREE.Float32BufferAttribute(ends as number[], 3),
+    );
+    this.fixtures.visible = ends.length > 0;
     this.touch();
   }
 

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// Virtual fixtures: where they are, as lines, and what the page adds and removes.
+
+import { posed } from "./camera_math";
+import { element } from "./panel";
+import type { FixtureState, Role, State, Vec3 } from "./protocol";
+
+const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
+
+const ROUND = 32; // sides of a circle
+const PLATE = 0.15; // [m] half of what is drawn of a plane
+const CROSS = 0.015; // [m] half of what is drawn of a point
+
+type Line = readonly [Vec3, Vec3];
+
+function boxLines([x, y, z]: Vec3): Line[] {
+  const corner = (i: number): Vec3 => [
+    (i & 1 ? 0.5 : -0.5) * x,
+    (i & 2 ? 0.5 : -0.5) * y,
+    (i & 4 ? 0.5 : -0.5) * z,
+  ];
+  const lines: Line[] = [];
+  for (let i = 0; i < 8; ++i)
+    for (const bit of [1, 2, 4]) if ((i & bit) === 0) lines.push([corner(i), corner(i | bit)]);
+  return lines;
+}
+
+// A circle of a radius across an axis, `along` it from the middle.
+function circle(radius: number, axis: 0 | 1 | 2, along = 0, from = 0, to = 2): Line[] {
+  const at = (i: number): Vec3 => {
+    const angle = Math.PI * (from + ((to - from) * i) / ROUND);
+    const place: [number, number, number] = [0, 0, 0];
+    place[axis] = along;
+    place[(axis + 1) % 3] = radius * Math.cos(angle);
+    place[(axis + 2) % 3] = radius * Math.sin(angle);
+    return place;
+  };
+  return Array.from({ length: ROUND }, (_, i) => [at(i), at(i + 1)] as const);
+}
+
+function sides(radius: number, length: number): Line[] {
+  return [0, 1, 2, 3].map((quarter) => {
+    const x = radius * Math.cos((quarter * Math.PI) / 2);
+    const y = radius * Math.sin((quarter * Math.PI) / 2);
+    return [[x, y, -length / 2] as Vec3, [x, y, length / 2] as Vec3] as const;
+  });
+}
+
+function ownLines({ shape, size, radius, length, points }: FixtureState): Line[] {
+  switch (shape) {
+    case "box":
+    case "seen":
+    case "mesh":
+      return boxLines(size);
+    case "sphere":
+      return [...circle(radius, 0), ...circle(radius, 1), ...circle(radius, 2)];
+    case "cylinder":
+    case "capsule": {
+      const ends = [-length / 2, length / 2].flatMap((z) => circle(radius, 2, z));
+      if (shape === "cylinder") return [...ends, ...sides(radius, length)];
+      // Half circles over its ends, in two planes.
+      const domes = ([0, 1] as const).flatMap((axis) =>
+        circle(radius, axis).map(
+          ([a, b]) =>
+            [a, b].map(
+              ([x, y, z]) => [x, y, z + Math.sign(z || 1) * (length / 2)] as Vec3,
+            ) as unknown as Line,
+        ),
+      );
+      return [...ends, ...sides(radius, length), ...domes];
+    }
+    case "half_space":
+    case "plane":
+      return boxLines([2 * PLATE, 2 * PLATE, 0]);
+    case "path":
+      return points.slice(1).map((point, i) => [points[i]!, point] as const);
+    case "point":
+      return [0, 1, 2].map((axis) => {
+        const end: [number, number, number] = [0, 0, 0];
+        end[axis] = CROSS;
+        return [end.map((x) => -x) as unknown as Vec3, end] as const;
+      });
+  }
+}
+
+/** A fixture as lines in the world: their ends, x y z after one another. */
+export function fixtureLines(fixture: FixtureState): number[] {
+  return ownLines(fixture).flatMap(([from, to]) => [
+    ...posed(fixture.pose, from),
+    ...posed(fixture.pose, to),
+  ]);
+}
+
+/** What the button that adds a region asks for, of sizes in mm. */
+export function forbidOf(size: number, margin: number): { size: number; margin: number } {
+  const within = (x: number, low: number, high: number, usual: number) =>
+    Math.min(Math.max(Number.isFinite(x) ? x : usual, low), high) / 1e3;
+  return { size: within(size, 10, 1000, 100), margin: within(margin, 2, 100, 10) };
+}
+
+export class Fixtures {
+  private shown = "";
+  private role: Role | null = null;
+
+  constructor(
+    private readonly actions: {
+      forbid(wanted: ReturnType<typeof forbidOf>): void;
+      remove(name: string): void;
+    },
+  ) {
+    get("forbid").addEventListener("click", () =>
+      this.actions.forbid(
+        forbidOf(
+          get<HTMLInputElement>("forbid-size").valueAsNumber,
+          get<HTMLInputElement>("forbid-margin").valueAsNumber,
+        ),
+      ),
+    );
+  }
+
+  update({ fixtures, role }: State): void {
+    const shown = fixtures.map(({ name, kind, shape }) => [name, kind, shape].join("\n")).join();
+    if (shown === this.shown && role === this.role) return;
+    this.shown = shown;
+    this.role = role;
+    const may = role === "operating";
+    for (const id of ["forbid", "forbid-size", "forbid-margin"])
+      get<HTMLButtonElement | HTMLInputElement>(id).disabled = !may;
+    get("fixture-list").replaceChildren(
+      ...fixtures.map(({ name, kind, shape }) => {
+        const remove = element("button", { className: "tool", title: `Remove ${name}` }, "×");
+        remove.disabled = !may;
+        remove.addEventListener("click", () => this.actions.remove(name));
+        const what = `${kind}, ${shape.replaceAll("_", " ")}`;
+        return element("li", {}, `${name} (${what}) `, remove);
+      }),
+    );
+  }
+}

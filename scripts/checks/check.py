@@ -22,6 +22,7 @@ KNOWS = {
     "cloud": {"core"},
     "fixtures": {"core"},
     "servo": {"core", "fixtures"},
+    "teleop": {"core", "servo"},
     "bag": {"core"},
     "sources": {"core", "cloud", "fixtures", "bag"},
     "devices": {"core", "servo"},

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "palpate/core/patch.hpp"
+
+namespace palpate {
+
+/// What is known of a robot that a hand leads.
+struct RobotInfo {
+  std::string uri;   ///< as it was opened
+  std::string kind;  ///< e.g. "simulated arm"
+  /// [m] world: the box in which the tool may be; empty: not known
+  std::optional<Eigen::AlignedBox3d> reach = {};
+  double max_speed = 0.5;      ///< [m/s] of the tool that it can follow
+  double max_force = 5.0;      ///< [N] with which the tool may press
+  double tool_radius = 0.005;  ///< [m] of the ball at the tool's tip that touches
+  std::vector<std::string> joint_names = {};
+};
+
+/// What a robot says of itself.
+struct RobotState {
+  double t = 0.0;                   ///< [s] on the servo loop's clock, when it was so
+  Vec3 position = Vec3::Zero();     ///< [m] world: the centre of the ball at the tool's tip
+  Vec3 velocity = Vec3::Zero();     ///< [m/s] world
+  Vec3 force = Vec3::Zero();        ///< [N] world: of what it touches, on the tool
+  std::vector<double> joints = {};  ///< [rad], as RobotInfo::joint_names
+  std::vector<Vec3> links = {};     ///< [m] world: the arm as a line from base to tip; may be empty
+  std::string fault = {};           ///< why it does not move, with the remedy; empty: it does
+};
+
+/// A robot whose tool's tip is led: an arm, simulated or real, that follows positions.
+///
+/// Functions may be called by one thread at a time.
+class Robot {
+ public:
+  Robot() = default;
+  virtual ~Robot() = default;  ///< leaves it at rest
+  Robot(const Robot&) = delete;
+  Robot& operator=(const Robot&) = delete;
+
+  [[nodiscard]] virtual const RobotInfo& info() const = 0;
+  /// Where the tool's tip is to be, now. Comes several hundred times a second. A robot stops by
+  /// itself where no command came for 100 ms.
+  /// @param position  [m] world, finite
+  /// @param velocity  [m/s] world, of that place: for feed-forward
+  virtual void command(const Vec3& position, const Vec3& velocity, double t) noexcept = 0;
+  /// The newest state. Empty before the robot has told one.
+  [[nodiscard]] virtual std::optional<RobotState> state() = 0;
+};
+
+}  // namespace palpate

@@ -283,9 +283,12 @@ void Cycle::run(const Wake& wake) noexcept {
                       .jumped = jumped,
                       .sent = safe.force});
 
+  Vec3 kept_out = fixtures.displacement;
+  join(tick.proxy - hip, kept_out);
   const ServoTick record{.tick = tick,
                          .region = fixtures.region,
                          .guidance = fixtures.guidance,
+                         .place = hip + kept_out,
                          .force = safe.force,
                          .position = hand.position,
                          .gain = safe.gain,

@@ -71,9 +71,11 @@ constexpr DeviceFault fault_of(std::uint32_t hand) {
 
 /// All that happened in one cycle: what viewers and recorders read.
 struct ServoTick {
-  Tick tick;                          ///< the method's; `tick.force` is the force asked for
-  Vec3 region = Vec3::Zero();         ///< [N] world: asked for by forbidden regions
-  Vec3 guidance = Vec3::Zero();       ///< [N] world: asked for by guides and viscous regions
+  Tick tick;                     ///< the method's; `tick.force` is the force asked for
+  Vec3 region = Vec3::Zero();    ///< [N] world: asked for by forbidden regions
+  Vec3 guidance = Vec3::Zero();  ///< [N] world: asked for by guides and viscous regions
+  /// [m] world: the proxy, or where forbidden regions keep it beside that. A robot may go there.
+  Vec3 place = Vec3::Zero();
   Vec3 force = Vec3::Zero();          ///< [N] world: the force sent to the device
   Vec3 position = Vec3::Zero();       ///< [m] of the hand, device frame
   double gain = 0.0;                  ///< [-] of the safety chain

@@ -33,7 +33,8 @@ KNOWS = {
     "node": {"core", "methods", "servo", "bag", "drivers", "session"},
     "viewer": {"core", "methods", "cloud", "servo", "sources", "devices", "record", "session"},
     "search": {"core"},
-    "lab": {"core", "paper", "methods", "cloud", "servo", "sources", "devices", "search"},
+    "lab": {"core", "paper", "methods", "cloud", "servo", "teleop", "sources", "devices",
+            "search"},
     "bench": {"core", "paper", "methods", "cloud", "search"},
 }
 KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench"}

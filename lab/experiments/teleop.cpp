@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/experiments/teleop.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "lab/experiments/feel_scenes.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
+#include "palpate/sources/synthetic_camera.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr double distance = 0.7;  // [m] of the camera
+constexpr double across = 0.2;    // [m] that it sees
+constexpr double engaged = 2.5;   // [s] the chain's ramp is over, and frames have come at any delay
+constexpr double above = 0.03;    // [m]
+constexpr double pressed = 0.02;  // [m] beneath the surface: 2 N at a light grip's 100 N/m
+constexpr double way_time = 0.5;  // [s] down and up again: 0.1 m/s
+constexpr double hold = 2.0;      // [s]
+constexpr double rest = 0.5;      // [s]
+constexpr int presses = 3;
+constexpr double top_speed = 0.06;   // [m/s] of surfaces
+constexpr double bob_rate = 0.5;     // [Hz]
+constexpr double settle_time = 1.0;  // [s] of a press, after which it is judged
+
+constexpr std::array<std::string_view, 3> scenes = {"rest", "bob", "come"};
+constexpr std::array<std::string_view, 2> sensors = {"ideal", "d4xx"};
+constexpr std::array<double, 6> round_trips = {0.0, 0.02, 0.05, 0.1, 0.2, 0.5};  // [s]
+constexpr double jitter = 0.03;                                                  // [s]
+constexpr double loss = 0.05;                                                    // [-]
+
+Motion motion_of(std::string_view name) {
+  Motion motion;
+  if (name == "bob") {
+    motion.start = engaged;
+    motion.frequency = bob_rate;
+    motion.stroke = top_speed / (std::numbers::pi * bob_rate);
+  } else if (name == "come") {
+    motion.start = engaged + 0.5;
+    motion.speed = top_speed;
+  } else if (name != "rest") {
+    throw Error("--families " + std::string(name), "teleop has no such scene",
+                "did you mean '" + std::string(nearest_name(name, scenes)) + "'?");
+  }
+  return motion;
+}
+
+HipPath hand_of(std::string_view name, TeleopScene& scene) {
+  const auto at = [](double height) { return Vec3(0.0, 0.0, height); };
+  std::vector<HipPath::Sample> path = {{0.0, at(above)}, {engaged, at(above)}};
+  if (name == "rest") {
+    for (int i = 0; i < presses; ++i) {
+      const double t = path.back().t;
+      path.push_back({t + way_time, at(-pressed)});
+      path.push_back({t + way_time + hold, at(-pressed)});
+      path.push_back({t + 2.0 * way_time + hold, at(above)});
+      path.push_back({t + 2.0 * way_time + hold + rest, at(above)});
+      scene.marks.push_back(path.back().t);
+    }
+  } else {
+    // Off the surface, which comes, and leads up to 2 N deep.
+    const double height = name == "bob" ? 0.025 : 0.02;
+    path.push_back({engaged + 0.4, at(height)});
+    path.push_back({engaged + (name == "bob" ? 8.4 : 1.1), at(height)});
+  }
+  scene.duration = path.back().t;
+  return HipPath(std::move(path));
+}
+
+LinkQuality link_of(double round_trip, bool poor) {
+  LinkQuality link{.delay = 0.5 * round_trip};
+  if (poor) {
+    link.jitter = std::min(jitter, link.delay);
+    link.loss = loss;
+  }
+  return link;
+}
+
+}  // namespace
+
+TeleopScene teleop_scene(std::string_view name, std::string_view sensor, std::uint64_t seed) {
+  const auto scene = std::make_shared<const Scene>(
+      std::vector<Part>{{HalfSpace{}, Eigen::Isometry3d::Identity(), motion_of(name)}});
+  const auto plain = open_synthetic_camera(
+      Uri("synthetic:plane?" + camera_options(distance, across, sensor, seed)));
+  const auto camera =
+      std::make_shared<SyntheticCamera>(*scene, plain->setup(), plain->sensor().model());
+  TeleopScene played{
+      .cloud = [camera](std::uint64_t frame, double t) -> std::shared_ptr<const Cloud> {
+        return camera->capture(t, frame).cloud;
+      },
+      .truth = truth_of(scene),
+      .hand = HipPath({{0.0, Vec3::Zero()}}),
+      .duration = 0.0};
+  played.hand = hand_of(name, played);
+  return played;
+}
+
+TeleopFigures play_teleop_case(const TeleopScene& scene, const TeleopCase& one) {
+  TeleopFigures figures;
+  std::vector<double> forces;
+  std::vector<double> heights;
+  std::size_t mark = 0;
+  double work = 0.0;
+  play_teleop(scene, one, [&](const TeleopTick& tick) {
+    figures.depth = std::max(figures.depth, tick.depth);
+    figures.contact = std::max(figures.contact, tick.contact);
+    if (tick.t < engaged) {
+      work = tick.work;
+      return;
+    }
+    figures.shake = std::max(figures.shake, tick.shake);
+    figures.most_force = std::max(figures.most_force, tick.force.norm());
+    if (mark >= scene.marks.size()) return;
+    const double end = scene.marks[mark];
+    const double released = end - rest - way_time;
+    if (tick.t > released - hold + settle_time && tick.t <= released) {
+      forces.push_back(tick.force.norm());
+      heights.push_back(tick.tool.z());
+    }
+    if (tick.t < end) return;
+    figures.energy = std::max(figures.energy, tick.work - work);
+    work = tick.work;
+    ++mark;
+  });
+  if (forces.empty()) return figures;
+  double mean = 0.0;
+  for (const double height : heights) mean += height / static_cast<double>(heights.size());
+  double squares = 0.0;
+  for (const double height : heights) squares += (height - mean) * (height - mean);
+  figures.swing = std::sqrt(squares / static_cast<double>(heights.size()));
+  figures.force = median(std::move(forces));
+  return figures;
+}
+
+namespace {
+
+std::string rows_of(std::string_view name, std::string_view sensor, std::string_view way,
+                    const ExperimentOptions& options) {
+  std::string rows;
+  for (const double round_trip : round_trips) {
+    for (const bool poor : {false, true}) {
+      if (poor && round_trip == 0.0) continue;
+      const TeleopCase one{.way = way,
+                           .up = link_of(round_trip, poor),
+                           .down = link_of(round_trip, poor),
+                           .parameters = options.parameters,
+                           .seed = options.seed};
+      const TeleopFigures figures = play_teleop_case(teleop_scene(name, sensor, options.seed), one);
+      rows += Row()
+                  .add(way)
+                  .add(name)
+                  .add(sensor)
+                  .add(1e3 * round_trip)
+                  .add(poor ? "poor" : "even")
+                  .add(figures.force)
+                  .add(figures.most_force)
+                  .add(1e3 * figures.shake)
+                  .add(1e3 * figures.energy)
+                  .add(1e3 * figures.depth)
+                  .add(figures.contact)
+                  .add(1e3 * figures.swing)
+                  .done();
+    }
+  }
+  return rows;
+}
+
+std::vector<Cell> teleop_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  for (const std::string& name : options.families) motion_of(name);  // throws for an unknown one
+  std::vector<Cell> cells;
+  std::vector<std::string> ways = options.methods;
+  if (ways.empty())
+    ways.assign(experiment.default_methods.begin(), experiment.default_methods.end());
+  for (const std::string& way : ways) {
+    const auto& known = teleop_ways();
+    const auto known_way = std::find(known.begin(), known.end(), way);
+    if (known_way == known.end())
+      throw Error("--methods " + way, "teleop has no such way to couple",
+                  "did you mean '" + std::string(nearest_name(way, known)) + "'?");
+    for (const std::string_view scene : scenes) {
+      if (!options.families.empty() && std::find(options.families.begin(), options.families.end(),
+                                                 scene) == options.families.end())
+        continue;
+      for (const std::string_view sensor : sensors) {
+        // Those without a camera have no sensor.
+        if (*known_way != "palpate" && sensor != sensors.front()) continue;
+        cells.emplace_back([=, way = *known_way] { return rows_of(scene, sensor, way, options); });
+      }
+    }
+  }
+  return cells;
+}
+
+// A row a way, scene and sensor: the worst over links with and without jitter and loss, by delay.
+Scores teleop_scores(const Table& table) {
+  Scores scores;
+  scores.columns = {
+      "way",       "scene",      "sensor",      "force [N], 0 to 500 ms", "worst, %", "shake [mm]",
+      "made [mJ]", "depth [mm]", "contact [N]", "tool's swing [mm]"};
+  std::vector<std::string> done;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto key = [&](std::size_t of) {
+      return table.text(of, "way") + ',' + table.text(of, "scene") + ',' + table.text(of, "sensor");
+    };
+    const std::string mine = key(row);
+    if (std::find(done.begin(), done.end(), mine) != done.end()) continue;
+    done.push_back(mine);
+    const auto all = [&](std::string_view column) {
+      return table.numbers(column, [&](std::size_t other) { return key(other) == mine; });
+    };
+    const auto most = [&](std::string_view column) {
+      const std::vector<double> values = all(column);
+      return *std::max_element(values.begin(), values.end());
+    };
+    const std::vector<double> forces = all("force");
+    const auto [low, high] = std::minmax_element(forces.begin(), forces.end());
+    double off = 0.0;
+    for (const double force : forces) off = std::max(off, std::abs(force / forces.front() - 1.0));
+    const bool presses_here = forces.front() > 0.0;
+    scores.rows.push_back(
+        {table.text(row, "way"), table.text(row, "scene"), table.text(row, "sensor"),
+         presses_here ? fmt::format("{:.2f} to {:.2f}", *low, *high) : "-",
+         presses_here ? fmt::format("{:.1f}", 100.0 * off) : "-",
+         fmt::format("{:.3f}", most("shake")),
+         presses_here ? fmt::format("{:.2f}", most("energy")) : "-",
+         fmt::format("{:.2f}", most("depth")), fmt::format("{:.1f}", most("contact")),
+         presses_here ? fmt::format("{:.2f}", most("swing")) : "-"});
+  }
+  scores.note =
+      "The worst of round trips from 0 to 500 ms, with and without jitter of 30 ms and 5 % loss. "
+      "Worst, %: of the force against that without delay. Aims: 5 %, 0.05 mm, 0.1 mJ; depth 0.5 mm "
+      "(rest), 1 mm (bob, come); 5 N. What is measured: docs/teleop.md.";
+  return scores;
+}
+
+constexpr std::string_view teleop_plot = R"gp(
+set xlabel "round trip [ms]"
+set key outside right top noenhanced
+set grid y
+set multiplot layout 2,1
+of(w, s, c) = sprintf("< awk -F, '$1 == \"%s\" && $2 == \"rest\" && $3 == \"%s\" && $5 == \"even\" {print $4 \",\" $%d}' %s", w, s, c, csv)
+set ylabel "force on the hand [N]"
+plot of("palpate", "d4xx", 6) using 1:2 with linespoints lw 2 title "palpate, D4xx", \
+     for [w in "position-force wave tdpa"] of(w, "ideal", 6) using 1:2 with linespoints title w
+set ylabel "swing of the robot's tool [mm]"
+set logscale y
+plot of("palpate", "d4xx", 12) using 1:2 with linespoints lw 2 title "palpate, D4xx", \
+     for [w in "position-force wave tdpa"] of(w, "ideal", 12) using 1:2 with linespoints title w
+unset multiplot
+)gp";
+
+}  // namespace
+
+Experiment teleop_experiment() {
+  return {"teleop",
+          "a hand leads a robot over a link: ours beside force links, by delay, jitter and loss",
+          "way,scene,sensor,round_trip,link,force,most_force,shake,energy,depth,contact,swing",
+          {"palpate", "position-force", "wave", "tdpa"},
+          false,
+          teleop_cells,
+          teleop_plot,
+          no_claims,
+          teleop_scores};
+}
+
+}  // namespace palpate::lab

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "palpate/core/cloud.hpp"
+#include "palpate/core/patch.hpp"
+
+namespace palpate {
+
+/// Something that comes towards a tool.
+struct Approach {
+  double speed = 0.0;         ///< [m/s] towards the tool, of what comes; 0: nothing does
+  double gap = 0.0;           ///< [m] from `place` to what is nearest, when it was seen
+  Vec3 place = Vec3::Zero();  ///< [m] world: where the tool was
+  Vec3 away = Vec3::UnitZ();  ///< [-] unit, world: from what comes to the tool
+  double stamp = 0.0;         ///< [s] of the frame
+};
+
+/// Sees what comes towards a tool before it is touched, from one camera's frames alone.
+///
+/// A hand waits with its judgement until noise is told from motion (method `sight` needs up to 0.2
+/// s before a noisy camera); a robot that goes out of the way too early does no harm. The distances
+/// from where the tool is now to the nearest points of the last frames give a straight line over
+/// time. Its slope counts as a speed where it is steeper than `least_speed` and `least_ratio` times
+/// as large as its own uncertainty; half of that is enough for what came before. What moves
+/// sideways without coming nearer is none.
+class ApproachWatch {
+ public:
+  static constexpr double reach = 0.06;         ///< [m] about the tool
+  static constexpr double least_speed = 0.015;  ///< [m/s] slower things are left to the proxy
+  static constexpr double least_ratio = 3.0;    ///< [-] of a slope to its standard error
+
+  ApproachWatch();
+
+  /// A frame has come. Four gatherings of a ball. @param tool  [m] world
+  /// @param stamp  [s] later than those before; others begin anew
+  const Approach& frame(std::shared_ptr<const Cloud> cloud, double stamp, const Vec3& tool);
+  [[nodiscard]] const Approach& newest() const { return approach_; }
+
+ private:
+  static constexpr std::size_t frames =
+      6;  // 0.2 s at 30 Hz: a stereo camera at 0.7 m needs as many
+  static constexpr std::size_t nearest = 24;  // points: more than a speckle of noise has
+
+  static constexpr double noise_memory = 30.0;  // [frames]
+  static constexpr double surprise = 4.0;       // [-] of a variance beyond the usual one
+  static constexpr double across = 0.02;        // [m] about the line to the nearest points
+  static constexpr double one_surface = 0.015;  // [m] along it: what is farther is another one
+
+  struct Seen {
+    std::shared_ptr<const Cloud> cloud;
+    double stamp = 0.0;  // [s]
+  };
+
+  bool find_nearest(const Cloud& cloud, const Vec3& tool, Vec3& towards);
+  double distance_along(const Cloud& cloud, const Vec3& tool, const Vec3& direction,
+                        double expected);
+
+  std::vector<Seen> seen_;  // the newest last
+  std::unique_ptr<Patch> patch_;
+  std::vector<std::size_t> order_;
+  std::vector<float> squares_;
+  double variance_ = -1.0;  // [m^2] of a distance, as usual; negative: not known yet
+  bool comes_ = false;
+  Approach approach_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/teleop/led_hand.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "palpate/core/error.hpp"
+
+namespace palpate {
+
+void validate(const LeadLimits& limits) {
+  const auto check = [](const char* name, double value, double least, double most,
+                        const char* unit) {
+    if (!(value >= least && value <= most))
+      throw Error(std::string("teleop, ") + name,
+                  number_text(value) + " " + unit + " is out of range",
+                  "give " + number_text(least) + " to " + number_text(most) + " " + unit);
+  };
+  check("max_speed", limits.max_speed, 1e-3, 5.0, "m/s");
+  check("silence", limits.silence, 0.005, 0.5, "s");
+  check("resume_time", limits.resume_time, 0.0, 10.0, "s");
+  if (limits.reach && (limits.reach->isEmpty() || !limits.reach->min().allFinite() ||
+                       !limits.reach->max().allFinite()))
+    throw Error("teleop, reach", "is no box",
+                "give the least corner before the greatest one, in metres");
+}
+
+LedHand::LedHand(const Vec3& begin, const LeadLimits& limits, std::string uri)
+    : limits_(limits), tool_(begin), place_(begin) {
+  validate(limits);
+  if (!is_place(begin)) throw Error("teleop", "the tool begins nowhere", "give a place in metres");
+  info_.uri = std::move(uri);
+  info_.kind = "led from afar";
+  info_.limits = no_motors;
+}
+
+void LedHand::lead(const Lead& lead, double now) {
+  leads_.put({lead, now});
+}
+
+void LedHand::tool_is_at(const Vec3& place) {
+  if (is_place(place)) tools_.put(place);
+}
+
+HandState LedHand::read(double t) noexcept {
+  constexpr double longest_step = 0.005;  // [s] after a stall
+  const double since = began_ ? t - last_t_ : 0.0;
+  const double dt = since > 0.0 ? std::min(since, longest_step) : 0.0;
+  began_ = true;
+  last_t_ = t;
+  leads_.take();
+  if (const Vec3* tool = tools_.take()) tool_ = *tool;
+  const Heard& heard = leads_.taken_last();
+
+  const bool was_led = std::exchange(
+      led_, heard.lead.leads && is_place(heard.lead.place) && t - heard.time <= limits_.silence);
+  press_ = led_ && heard.lead.press.allFinite() ? heard.lead.press : Vec3(Vec3::Zero());
+  if (!led_) {
+    if (was_led) place_ = tool_;
+    led_for_ = 0.0;
+    return {.position = place_};
+  }
+  led_for_ += dt;
+  const double share =
+      limits_.resume_time > 0.0 ? std::min(led_for_ / limits_.resume_time, 1.0) : 1.0;
+  Vec3 wanted = heard.lead.place;
+  if (limits_.reach) wanted = wanted.cwiseMax(limits_.reach->min()).cwiseMin(limits_.reach->max());
+  const Vec3 way = wanted - place_;
+  const double distance = way.norm();
+  const double step = share * limits_.max_speed * dt;
+  place_ = distance <= step ? wanted : Vec3(place_ + step / distance * way);
+  return {.position = place_};
+}
+
+}  // namespace palpate

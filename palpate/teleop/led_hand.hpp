@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <Eigen/Geometry>
+
+#include "palpate/servo/device.hpp"
+#include "palpate/servo/mailbox.hpp"
+#include "palpate/teleop/lead.hpp"
+
+namespace palpate {
+
+/// How a robot follows leads.
+struct LeadLimits {
+  double max_speed = 0.5;  ///< [m/s] in which a lead is followed
+  /// [m] world: leads beyond it are followed to its boundary; empty: no limit
+  std::optional<Eigen::AlignedBox3d> reach = {};
+  /// [s] without a lead, after which the tool is stopped where it is. Longer than the link's
+  /// jitter; with the robot's own time to stop less than 100 ms.
+  double silence = 0.05;
+  double resume_time = 0.5;  ///< [s] in which the speed comes back after a stop
+};
+
+/// @throws Error if a limit is not positive and finite, or the reach is empty.
+void validate(const LeadLimits& limits);
+
+/// The hand at the robot's end of a link: what was led goes into a session there as any hand does,
+/// so that a camera beside the robot keeps its proxy, and with it the robot, out of what is seen.
+///
+/// Follows the newest lead at a limited speed. Where none comes, or nobody leads any more, it rests
+/// where the tool is, and stays a hand: a surface that moves still pushes the proxy, and the robot
+/// with it. Afterwards it takes up the lead from there, slowly at first.
+class LedHand final : public Device {
+ public:
+  /// @param begin  [m] world: where the tool is
+  /// @throws Error as validate().
+  explicit LedHand(const Vec3& begin, const LeadLimits& limits = {}, std::string uri = "teleop:");
+
+  /// A lead has come. One thread.
+  /// @param now  [s] on the loop's clock
+  void lead(const Lead& lead, double now);
+  /// Where the robot's tool is [m, world], as it says. One thread.
+  void tool_is_at(const Vec3& place);
+
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  HandState read(double t) noexcept override;
+  void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
+
+  /// Is the tool being led? The servo's thread, as `press`.
+  [[nodiscard]] bool is_led() const noexcept { return led_; }
+  /// [N] world: of the newest lead; zero where nobody leads.
+  [[nodiscard]] const Vec3& press() const noexcept { return press_; }
+
+ private:
+  struct Heard {
+    Lead lead;
+    double time = -1e9;  // [s] on the loop's clock
+  };
+
+  DeviceInfo info_;
+  LeadLimits limits_;
+  Mailbox<Heard> leads_;
+  Mailbox<Vec3> tools_;
+  // The servo's thread
+  Vec3 tool_;
+  Vec3 place_;
+  Vec3 press_ = Vec3::Zero();
+  double last_t_ = 0.0;   // [s]
+  double led_for_ = 0.0;  // [s] since it was taken up
+  bool began_ = false;
+  bool led_ = false;
+};
+
+}  // namespace palpate

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+
+#include "palpate/servo/safety.hpp"
+
+namespace palpate {
+
+/// The safety chain's limits for frames that come over a link. What is old by the link alone is no
+/// reason to fade: a frame fades once it is `fade_age` older than frames usually are on arrival,
+/// and is lost 0.3 s later.
+/// @param latency  [s] capture to arrival, as it usually is; at most 1 s counts
+inline SafetyParameters for_link(SafetyParameters safety, double latency) noexcept {
+  constexpr double longest = 1.0;    // [s] nobody leads a robot by older pictures
+  constexpr double fade_time = 0.3;  // [s]
+  if (latency > 0.0) safety.fade_age += std::min(latency, longest);
+  safety.lost_age = safety.fade_age + fade_time;
+  return safety;
+}
+
+}  // namespace palpate

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "palpate/servo/cycle.hpp"
+#include "palpate/teleop/approach_watch.hpp"
+#include "palpate/teleop/robot.hpp"
+
+namespace palpate {
+
+/// How the robot's set-point is made of the proxy at its end.
+struct SetPointOptions {
+  double tool_radius = 5e-3;  ///< [m] as RobotInfo::tool_radius
+  /// [m] by which the tool stays away from what is seen: the proxy's radius at the robot's end is
+  /// larger by it
+  double margin = 1e-3;
+  double lag = 0.08;  ///< [s] as RobotInfo::lag: a surface that comes is led before by so much
+  /// [N/m] as RobotInfo::stiffness; empty: it does not press
+  std::optional<double> stiffness = {};
+  double max_force = 5.0;    ///< [N] with which the tool may press, wanted or not
+  double press_share = 0.0;  ///< [-] of the operator's force with which the tool presses, 0 to 1
+  double max_speed = 0.5;    ///< [m/s] of the set-point itself
+};
+
+/// @throws Error if one of them is out of range.
+void validate(const SetPointOptions& options);
+
+/// Where the robot's tool is sent: the proxy at the robot's end, which its own camera keeps out of
+/// what is seen, and
+/// - from what comes, touched or not, by its speed times the robot's lag, so that the tool is out
+/// of
+///   the way when it arrives (ApproachWatch, and the method's own velocity);
+/// - where the operator presses and the robot is to press too, into the surface by the force over
+///   the robot's stiffness;
+/// - where it is pushed with more than `max_force`, seen or not, away from what pushes.
+/// Values in, values out: no clock, no thread. [servo]
+class SetPoint {
+ public:
+  explicit SetPoint(const SetPointOptions& options = {});
+
+  struct Order {
+    Vec3 position = Vec3::Zero();  ///< [m] world
+    Vec3 velocity = Vec3::Zero();  ///< [m/s] world
+  };
+
+  /// @param tick   at the robot's end
+  /// @param press  [N] world: with which the operator presses
+  /// @param led    false: nobody leads, and the set-point may go back to where the tool is at once
+  /// @param comes  what comes towards the tool
+  /// @param force  [N] world: of what the tool touches, on the tool; zero where it is not known
+  Order next(const ServoTick& tick, const Vec3& press, bool led, const Approach& comes,
+             const Vec3& force) noexcept;
+
+ private:
+  [[nodiscard]] Vec3 way_out(const Vec3& place, const Approach& comes, double t) const noexcept;
+
+  SetPointOptions options_;
+  bool began_ = false;
+  bool led_ = false;
+  double last_t_ = 0.0;          // [s]
+  Vec3 normal_ = Vec3::UnitZ();  // of the last contact
+  double approach_ = 0.0;        // [m/s] of the surface, towards the tool
+  double depth_ = 0.0;           // [m] by which it presses
+  Vec3 retreat_ = Vec3::Zero();  // [m] from what pushes too hard
+  Vec3 sent_ = Vec3::Zero();     // [m] world
+};
+
+}  // namespace palpate

@@ -14,6 +14,7 @@
 #include "lab/experiments/scan.hpp"
 #include "lab/experiments/surfaces.hpp"
 #include "lab/experiments/teleop.hpp"
+#include "lab/experiments/teleop_faults.hpp"
 #include "lab/experiments/tradeoff.hpp"
 #include "lab/experiments/zwidth.hpp"
 #include "lab/find_named.hpp"
@@ -25,13 +26,14 @@ namespace palpate::lab {
 
 const std::vector<Experiment>& known_experiments() {
   static const std::vector<Experiment> experiments = {
-      flat_experiment(),          jump_experiment(),     single_lift_experiment(),
-      lift_experiment(),          bound_experiment(),    speed_experiment(),
-      first_contact_experiment(), hold_experiment(),     force_experiment(),
-      damping_experiment(),       corners_experiment(),  scan_experiment(),
-      fidelity_experiment(),      feel_experiment(),     zwidth_experiment(),
-      teleop_experiment(),        pop_experiment(),      field_experiment(),
-      real_experiment(),          tradeoff_experiment(), methods_experiment()};
+      flat_experiment(),          jump_experiment(),          single_lift_experiment(),
+      lift_experiment(),          bound_experiment(),         speed_experiment(),
+      first_contact_experiment(), hold_experiment(),          force_experiment(),
+      damping_experiment(),       corners_experiment(),       scan_experiment(),
+      fidelity_experiment(),      feel_experiment(),          zwidth_experiment(),
+      teleop_experiment(),        teleop_faults_experiment(), pop_experiment(),
+      field_experiment(),         real_experiment(),          tradeoff_experiment(),
+      methods_experiment()};
   return experiments;
 }
 

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double period = 1e-3;         // [s] of a tick
 constexpr double loop_rate = 4.0;       // [Hz] of the robot's own loop
-constexpr double robot_speed = 0.5;     // [m/s]
+constexpr double robot_speed = 0.25;    // [m/s] the reduced speed of ISO 10218
 constexpr double velocity_time = 5e-3;  // [s] of the filter behind an encoder's differences
 
 Vec3 no_longer_than(const Vec3& v, double longest) {
@@ -44,16 +44,20 @@ class Coupling {
 class Palpate final : public Coupling {
  public:
   Palpate(const TeleopCase& one, SimulatedHand& hand, const Vec3& begin, double latency)
-      : leads_(one.up, 2 * one.seed),
+      : one_(one),
+        hand_(hand),
+        sent_(begin),
+        stopped_(begin),
+        leads_(one.up, 2 * one.seed),
         frames_(one.down, 2 * one.seed + 1),
         led_(begin, LeadLimits{.max_speed = robot_speed}),
         operator_(make_method("sight", {one.parameters, nullptr}), hand,
-                  operator_settings(one.parameters, latency), ring),
-        guard_(make_method("sight", {guard_parameters(one), nullptr}), led_,
-               guard_settings(guard_parameters(one)), ring),
+                  operator_settings(one, latency), ring),
+        guard_(make_method("sight", {guard_parameters(one), nullptr}), led_, guard_settings(one),
+               ring),
         operator_ticks_(operator_.reader()),
         guard_ticks_(guard_.reader()),
-        set_point_(for_tool(one.robot)) {}
+        set_point_(for_tool(one)) {}
 
   void frame(const std::shared_ptr<const Cloud>& cloud, double stamp, double t) override {
     guard_.put_frame(cloud, stamp, t);
@@ -62,37 +66,64 @@ class Palpate final : public Coupling {
   }
 
   void tick(double t, SimulatedTool& tool, TeleopTick& out) override {
+    if (t < one_.operator_dies)
+      operator_end(t, out);
+    else
+      let_go(t);
+    if (t < one_.robot_dies)
+      sent_ = robot_end(t, tool, out);
+    else if (t < one_.robot_dies + own_stop)
+      stopped_ = tool.place();
+    else
+      sent_ = stopped_;
+    out.goal = sent_;
+    tool.lead_to(sent_, t + period, period);
+  }
+
+ private:
+  struct Seen {
+    std::shared_ptr<const Cloud> cloud;
+    double stamp = 0.0;  // [s]
+  };
+  static constexpr std::size_t ring = 4;      // read after each tick
+  static constexpr double own_stop = 0.1;     // [s] without an order: a robot stops
+  static constexpr double blind_after = 0.2;  // [s] without a frame
+
+  // As a watchdog does.
+  void let_go(double t) {
+    static_cast<void>(hand_.read(t));
+    hand_.write(Vec3::Zero(), t);
+  }
+
+  void operator_end(double t, TeleopTick& out) {
     if (const auto seen = frames_.arrived(t)) operator_.put_frame(seen->cloud, seen->stamp, t);
     operator_.run({.t = t});
     ServoTick felt;
     static_cast<void>(operator_ticks_.try_pop(felt));
     out.force = felt.force;
     leads_.send(lead_of(felt), t);
+  }
 
+  Vec3 robot_end(double t, SimulatedTool& tool, TeleopTick& out) {
     if (const std::optional<Lead> lead = leads_.arrived(t)) led_.lead(*lead, t);
     led_.tool_is_at(tool.place());
+    led_.sees(t - newest_.stamp <= blind_after);
     guard_.run({.t = t});
     ServoTick guarded;
     static_cast<void>(guard_ticks_.try_pop(guarded));
+    led_.touches(guarded.tick.state != ContactState::free_motion);
     out.led = led_.is_led();
     if (newest_.cloud)
       watch_.frame(std::exchange(newest_.cloud, nullptr), newest_.stamp, tool.place());
     const SetPoint::Order order =
         set_point_.next(guarded, led_.press(), led_.is_led(), watch_.newest(), tool.contact());
-    out.goal = order.position;
-    tool.lead_to(order.position, t + period, period);
+    return order.position;
   }
 
- private:
-  struct Seen {
-    std::shared_ptr<const Cloud> cloud;
-    double stamp;  // [s]
-  };
-  static constexpr std::size_t ring = 4;  // read after each tick
-
-  static ServoSettings operator_settings(const Parameters& parameters, double latency) {
+  static ServoSettings operator_settings(const TeleopCase& one, double latency) {
     ServoSettings settings;
-    settings.parameters = parameters;
+    settings.parameters = one.parameters;
+    settings.fixtures = one.fixtures;
     settings.safety = for_link(settings.safety, latency);
     settings.safety.initial_heat = 0.0;
     return settings;
@@ -102,19 +133,25 @@ class Palpate final : public Coupling {
     set_parameter(parameters, "r_c", SimulatedTool::radius + one.robot.margin);
     return parameters;
   }
-  static SetPointOptions for_tool(SetPointOptions options) {
+  static SetPointOptions for_tool(const TeleopCase& one) {
+    SetPointOptions options = one.robot;
+    if (one.fixtures) options.fixtures = robot_fixtures(*one.fixtures);
     options.tool_radius = SimulatedTool::radius;
     options.lag = SimulatedTool::lag();
     options.stiffness = SimulatedTool::stiffness();
     options.max_speed = robot_speed;
     return options;
   }
-  static ServoSettings guard_settings(const Parameters& parameters) {
+  static ServoSettings guard_settings(const TeleopCase& one) {
     ServoSettings settings;
-    settings.parameters = parameters;
+    settings.parameters = guard_parameters(one);
+    if (one.fixtures) settings.fixtures = robot_fixtures(*one.fixtures);
     return settings;
   }
 
+  TeleopCase one_;
+  SimulatedHand& hand_;
+  Vec3 sent_, stopped_;
   Channel<Lead> leads_;
   Channel<Seen> frames_;
   LedHand led_;

@@ -6,9 +6,49 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 
 namespace palpate {
+namespace {
+
+struct Distance {
+  double t;         // [s] 0 is now
+  double distance;  // [m]
+};
+
+struct Line {
+  double slope;     // [m/s]
+  double now;       // [m] at t = 0
+  double variance;  // [m^2] of what it leaves over
+  double spread;    // [s^2] sum of the squares of times about their mean
+};
+
+// By least squares.
+Line line_through(std::span<const Distance> points) {
+  const auto n = static_cast<double>(points.size());
+  double mean_t = 0.0;
+  double mean_d = 0.0;
+  for (const auto& [t, distance] : points) {
+    mean_t += t / n;
+    mean_d += distance / n;
+  }
+  Line line{};
+  double covariance = 0.0;
+  for (const auto& [t, distance] : points) {
+    line.spread += (t - mean_t) * (t - mean_t);
+    covariance += (t - mean_t) * (distance - mean_d);
+  }
+  line.slope = covariance / line.spread;
+  line.now = mean_d - line.slope * mean_t;
+  for (const auto& [t, distance] : points) {
+    const double left = distance - line.now - line.slope * t;
+    line.variance += left * left / (n - 2.0);
+  }
+  return line;
+}
+
+}  // namespace
 
 ApproachWatch::ApproachWatch() : patch_(std::make_unique<Patch>()) {}
 
@@ -59,47 +99,42 @@ const Approach& ApproachWatch::frame(std::shared_ptr<const Cloud> cloud, double 
   if (!seen_.empty() && !(stamp > seen_.back().stamp)) seen_.clear();
   if (seen_.size() == frames) seen_.erase(seen_.begin());
   seen_.push_back({std::move(cloud), stamp});
-  if (seen_.size() < frames) return approach_;
-
   Vec3 towards = Vec3::Zero();
   if (!find_nearest(*seen_.back().cloud, tool, towards)) return approach_;
   const double size = towards.norm();
   towards /= size;
-  std::array<double, frames> distances{};
+  std::array<Distance, frames> distances{};
+  std::size_t count = 0;
   double expected = size;
-  for (std::size_t i = frames; i-- > 0;) {
-    distances[i] = expected = distance_along(*seen_[i].cloud, tool, towards, expected);
-    if (std::isnan(expected)) return approach_;
+  while (count < seen_.size()) {
+    const Seen& seen = seen_[seen_.size() - 1 - count];
+    expected = distance_along(*seen.cloud, tool, towards, expected);
+    if (std::isnan(expected)) break;
+    distances[count++] = {seen.stamp - stamp, expected};
   }
-  double mean_t = 0.0;
-  double mean_d = 0.0;
-  for (std::size_t i = 0; i < frames; ++i) {
-    mean_t += (seen_[i].stamp - stamp) / frames;
-    mean_d += distances[i] / frames;
+  if (count < windows.front()) return approach_;
+
+  Line best{};
+  double most = -1.0;  // how sure it is that something comes
+  for (const std::size_t window : windows) {
+    if (window > count) break;
+    const Line line = line_through({distances.data(), window});
+    // A few frames say little of their own noise; the last second says more.
+    if (window == windows.front())
+      variance_ =
+          variance_ < 0.0 ? line.variance : variance_ + (line.variance - variance_) / noise_memory;
+    const double error = std::sqrt(std::max(variance_, line.variance / surprise) / line.spread);
+    const double sure = error > 0.0 ? -line.slope / error : -line.slope / 1e-9;
+    if (sure > most) {
+      most = sure;
+      best = line;
+    }
   }
-  double tt = 0.0;
-  double td = 0.0;
-  for (std::size_t i = 0; i < frames; ++i) {
-    const double t = seen_[i].stamp - stamp - mean_t;
-    tt += t * t;
-    td += t * (distances[i] - mean_d);
-  }
-  const double slope = td / tt;
-  double squares = 0.0;
-  for (std::size_t i = 0; i < frames; ++i) {
-    const double left = distances[i] - mean_d - slope * (seen_[i].stamp - stamp - mean_t);
-    squares += left * left;
-  }
-  // A few frames say little of their own noise; the last second says more.
-  const double variance = squares / (frames - 2);
-  variance_ = variance_ < 0.0 ? variance : variance_ + (variance - variance_) / noise_memory;
-  const double error = std::sqrt(std::max(variance_, variance / surprise) / tt);
-  if (!(-slope > (came ? 0.5 : 1.0) * least_speed &&
-        -slope > (came ? 0.5 : 1.0) * least_ratio * error))
-    return approach_;
+  const double enough = came ? 0.5 : 1.0;
+  if (!(-best.slope > enough * least_speed && most > enough * least_ratio)) return approach_;
   comes_ = true;
-  approach_.speed = -slope;
-  approach_.gap = std::max(mean_d - slope * mean_t, 0.0);
+  approach_.speed = -best.slope;
+  approach_.gap = std::max(best.now, 0.0);
   approach_.away = -towards;
   return approach_;
 }

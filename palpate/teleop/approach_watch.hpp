@@ -42,8 +42,10 @@ class ApproachWatch {
   [[nodiscard]] const Approach& newest() const { return approach_; }
 
  private:
-  static constexpr std::size_t frames =
-      6;  // 0.2 s at 30 Hz: a stereo camera at 0.7 m needs as many
+  // The slope is taken over several numbers of frames, as little noise or much speed need few; the
+  // surest one counts.
+  static constexpr std::array<std::size_t, 3> windows = {4, 6, 9};
+  static constexpr std::size_t frames = windows.back();
   static constexpr std::size_t nearest = 24;  // points: more than a speckle of noise has
 
   static constexpr double noise_memory = 30.0;  // [frames]

@@ -18,6 +18,7 @@ void validate(const LeadLimits& limits) {
                   "give " + number_text(least) + " to " + number_text(most) + " " + unit);
   };
   check("max_speed", limits.max_speed, 1e-3, 5.0, "m/s");
+  check("contact_speed", limits.contact_speed, 1e-3, 5.0, "m/s");
   check("silence", limits.silence, 0.005, 0.5, "s");
   check("resume_time", limits.resume_time, 0.0, 10.0, "s");
   if (limits.reach && (limits.reach->isEmpty() || !limits.reach->min().allFinite() ||
@@ -53,8 +54,9 @@ HandState LedHand::read(double t) noexcept {
   if (const Vec3* tool = tools_.take()) tool_ = *tool;
   const Heard& heard = leads_.taken_last();
 
-  const bool was_led = std::exchange(
-      led_, heard.lead.leads && is_place(heard.lead.place) && t - heard.time <= limits_.silence);
+  const bool was_led =
+      std::exchange(led_, sees_.load(std::memory_order_relaxed) && heard.lead.leads &&
+                              is_place(heard.lead.place) && t - heard.time <= limits_.silence);
   press_ = led_ && heard.lead.press.allFinite() ? heard.lead.press : Vec3(Vec3::Zero());
   if (!led_) {
     if (was_led) place_ = tool_;
@@ -68,7 +70,10 @@ HandState LedHand::read(double t) noexcept {
   if (limits_.reach) wanted = wanted.cwiseMax(limits_.reach->min()).cwiseMin(limits_.reach->max());
   const Vec3 way = wanted - place_;
   const double distance = way.norm();
-  const double step = share * limits_.max_speed * dt;
+  const double speed = touches_.load(std::memory_order_relaxed)
+                           ? std::min(limits_.contact_speed, limits_.max_speed)
+                           : limits_.max_speed;
+  const double step = share * speed * dt;
   place_ = distance <= step ? wanted : Vec3(place_ + step / distance * way);
   return {.position = place_};
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <optional>
 #include <string>
 
@@ -14,7 +15,10 @@ namespace palpate {
 
 /// How a robot follows leads.
 struct LeadLimits {
-  double max_speed = 0.5;  ///< [m/s] in which a lead is followed
+  double max_speed = 0.25;  ///< [m/s] in which a lead is followed: the reduced speed of ISO 10218
+  /// [m/s] the same while something is touched. A robot that is late cuts corners: 0.1 m/s and a
+  /// lag of 80 ms about a ball of 20 mm by 0.1 mm.
+  double contact_speed = 0.05;
   /// [m] world: leads beyond it are followed to its boundary; empty: no limit
   std::optional<Eigen::AlignedBox3d> reach = {};
   /// [s] without a lead, after which the tool is stopped where it is. Longer than the link's
@@ -29,9 +33,9 @@ void validate(const LeadLimits& limits);
 /// The hand at the robot's end of a link: what was led goes into a session there as any hand does,
 /// so that a camera beside the robot keeps its proxy, and with it the robot, out of what is seen.
 ///
-/// Follows the newest lead at a limited speed. Where none comes, or nobody leads any more, it rests
-/// where the tool is, and stays a hand: a surface that moves still pushes the proxy, and the robot
-/// with it. Afterwards it takes up the lead from there, slowly at first.
+/// Follows the newest lead at a limited speed. Where none comes, nobody leads any more, or nothing
+/// is seen, it rests where the tool is, and stays a hand: a surface that moves still pushes the
+/// proxy, and the robot with it. Afterwards it takes up the lead from there, slowly at first.
 class LedHand final : public Device {
  public:
   /// @param begin  [m] world: where the tool is
@@ -41,6 +45,10 @@ class LedHand final : public Device {
   /// A lead has come. One thread.
   /// @param now  [s] on the loop's clock
   void lead(const Lead& lead, double now);
+  /// Does the robot's end see what is there? Who does not is not led. Any thread.
+  void sees(bool yes) noexcept { sees_.store(yes, std::memory_order_relaxed); }
+  /// Does the proxy at the robot's end touch something? Any thread.
+  void touches(bool yes) noexcept { touches_.store(yes, std::memory_order_relaxed); }
   /// Where the robot's tool is [m, world], as it says. One thread.
   void tool_is_at(const Vec3& place);
 
@@ -63,6 +71,7 @@ class LedHand final : public Device {
   LeadLimits limits_;
   Mailbox<Heard> leads_;
   Mailbox<Vec3> tools_;
+  std::atomic<bool> sees_{true}, touches_{false};
   // The servo's thread
   Vec3 tool_;
   Vec3 place_;

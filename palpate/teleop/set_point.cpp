@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "palpate/core/error.hpp"
 
@@ -17,7 +18,10 @@ constexpr double retreat_speed = 0.02;    // [m/s] for each N above what is allo
 constexpr double farthest_retreat = 0.1;  // [m]
 constexpr double return_time = 1.0;       // [s] in which a retreat is taken back
 constexpr double longest_forecast = 0.3;  // [s]
-constexpr double fastest_surface = 0.5;   // [m/s] that is led before
+// [-] of the robot's lag by which a surface that comes is led before: 1 for a surface that goes on
+// as it does; half as much again as its speed is known late, and only about.
+constexpr double ahead = 1.5;
+constexpr double fastest_surface = 0.5;  // [m/s] that is led before
 
 // The share of the way to its goal that a first-order lag goes in dt.
 double share_of(double dt, double time) {
@@ -48,8 +52,20 @@ void validate(const SetPointOptions& options) {
   check("max_speed", options.max_speed, 1e-3, 5.0, "m/s");
 }
 
+std::shared_ptr<const FixtureSet> robot_fixtures(const FixtureSet& fixtures) {
+  constexpr double never = 1.0;  // [m] the most that a fixture takes
+  std::vector<Fixture> regions;
+  for (Fixture& fixture : fixtures.fixtures()) {
+    if (fixture.kind != FixtureKind::forbidden || fixture.shape == FixtureShape::seen) continue;
+    fixture.numbers.give_way = never;
+    regions.push_back(std::move(fixture));
+  }
+  return std::make_shared<const FixtureSet>(regions);
+}
+
 SetPoint::SetPoint(const SetPointOptions& options) : options_(options) {
   validate(options);
+  fixtures_.use(options_.fixtures.get());
 }
 
 // [m] from `place`, so that the tool is clear of what comes by the time that it can be out of the
@@ -59,7 +75,8 @@ Vec3 SetPoint::way_out(const Vec3& place, const Approach& comes, double t) const
   if (!(comes.speed > 0.0 && age >= 0.0 && age < longest_forecast)) return Vec3::Zero();
   const double speed = std::min(comes.speed, fastest_surface);
   const double gap = comes.gap + (place - comes.place).dot(comes.away);
-  const double needed = options_.tool_radius + options_.margin + speed * (age + options_.lag);
+  const double needed =
+      options_.tool_radius + options_.margin + speed * (age + ahead * options_.lag);
   return std::clamp(needed - gap, 0.0, farthest_retreat) * comes.away;
 }
 
@@ -93,8 +110,17 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
   else
     retreat_ -= share_of(dt, return_time) * retreat_;
 
-  const Vec3 held = record.place + (options_.lag * approach_ - depth_) * normal_;
-  const Vec3 goal = held + way_out(held, comes, tick.t) + retreat_;
+  const Vec3 held = record.place + (ahead * options_.lag * approach_ - depth_) * normal_;
+  Vec3 goal = held + way_out(held, comes, tick.t) + retreat_;
+  goal += fixtures_
+              .run({.t = tick.t,
+                    .hip = goal,
+                    .surface_force = Vec3::Zero(),
+                    .surface_motion = Vec3::Zero(),
+                    .hand = true,
+                    .cloud = nullptr,
+                    .new_frame = false})
+              .displacement;
   // A stop takes the set-point back to the tool at once; so does the beginning.
   const bool stops = std::exchange(led_, led) && !led;
   const bool at_once = !began_ || stops;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <optional>
 
+#include "palpate/fixtures/fixture_stage.hpp"
 #include "palpate/servo/cycle.hpp"
 #include "palpate/teleop/approach_watch.hpp"
 #include "palpate/teleop/robot.hpp"
@@ -14,14 +16,20 @@ struct SetPointOptions {
   double tool_radius = 5e-3;  ///< [m] as RobotInfo::tool_radius
   /// [m] by which the tool stays away from what is seen: the proxy's radius at the robot's end is
   /// larger by it
-  double margin = 1e-3;
+  double margin = 2e-3;
   double lag = 0.08;  ///< [s] as RobotInfo::lag: a surface that comes is led before by so much
   /// [N/m] as RobotInfo::stiffness; empty: it does not press
   std::optional<double> stiffness = {};
   double max_force = 5.0;    ///< [N] with which the tool may press, wanted or not
   double press_share = 0.0;  ///< [-] of the operator's force with which the tool presses, 0 to 1
   double max_speed = 0.5;    ///< [m/s] of the set-point itself
+  /// Into these the robot is not sent, whatever comes; see robot_fixtures(). Null: none
+  std::shared_ptr<const FixtureSet> fixtures = {};
 };
+
+/// The forbidden regions of a set as a robot has to keep them: they never give way. Guides, viscous
+/// regions and what is seen are left out; the proxy keeps out of what is seen.
+std::shared_ptr<const FixtureSet> robot_fixtures(const FixtureSet& fixtures);
 
 /// @throws Error if one of them is out of range.
 void validate(const SetPointOptions& options);
@@ -34,6 +42,7 @@ void validate(const SetPointOptions& options);
 /// - where the operator presses and the robot is to press too, into the surface by the force over
 ///   the robot's stiffness;
 /// - where it is pushed with more than `max_force`, seen or not, away from what pushes.
+/// Forbidden regions come before all that.
 /// Values in, values out: no clock, no thread. [servo]
 class SetPoint {
  public:
@@ -56,6 +65,7 @@ class SetPoint {
   [[nodiscard]] Vec3 way_out(const Vec3& place, const Approach& comes, double t) const noexcept;
 
   SetPointOptions options_;
+  FixtureStage fixtures_;
   bool began_ = false;
   bool led_ = false;
   double last_t_ = 0.0;          // [s]

@@ -22,7 +22,7 @@ KNOWS = {
     "cloud": {"core"},
     "fixtures": {"core"},
     "servo": {"core", "fixtures"},
-    "teleop": {"core", "servo"},
+    "teleop": {"core", "fixtures", "servo"},
     "bag": {"core"},
     "sources": {"core", "cloud", "fixtures", "bag"},
     "devices": {"core", "servo"},
@@ -33,7 +33,7 @@ KNOWS = {
     "node": {"core", "methods", "servo", "bag", "drivers", "session"},
     "viewer": {"core", "methods", "cloud", "servo", "sources", "devices", "record", "session"},
     "search": {"core"},
-    "lab": {"core", "paper", "methods", "cloud", "servo", "teleop", "sources", "devices",
+    "lab": {"core", "paper", "methods", "cloud", "fixtures", "servo", "teleop", "sources", "devices",
             "search"},
     "bench": {"core", "paper", "methods", "cloud", "search"},
 }

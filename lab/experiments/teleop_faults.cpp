@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/experiments/teleop_faults.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "lab/experiments/feel_scenes.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/core/nearest_name.hpp"
+#include "palpate/sources/synthetic_camera.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr std::array<std::string_view, 5> faults = {"none", "link", "camera", "operator", "robot"};
+constexpr int usual_cases = 20;  // of each fault
+constexpr int cases_a_cell = 20;
+constexpr double begins = 2.0;    // [s] frames have come at any delay
+constexpr double duration = 7.0;  // [s]
+constexpr double across = 0.24;   // [m] that the camera sees
+constexpr double aside = 0.06;    // [m] to which the hand goes
+constexpr double fastest = 0.3;   // [m/s] of the hand
+constexpr double moving = 0.02;   // [m/s] of a tool that has to stop
+constexpr double at_rest = 0.01;  // [m/s] of a tool that has stopped, or nearly
+constexpr double after = 0.5;     // [s] after what failed is back
+
+class Chance {
+ public:
+  explicit Chance(std::uint64_t seed) : random_(seed) {}
+  double between(double low, double high) {
+    return low + (high - low) * static_cast<double>(random_() >> 11U) * 0x1p-53;
+  }
+  bool one_in(int n) { return between(0.0, 1.0) * n < 1.0; }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+// A plane or a ball on it, tilted by chance; one in two moves by up to 60 mm/s.
+std::vector<Part> parts_of(Chance& chance) {
+  const double slope = chance.between(0.0, 0.3);  // [rad]
+  const Eigen::Isometry3d pose(
+      Eigen::AngleAxisd(chance.between(0.0, 2.0 * std::numbers::pi), Vec3::UnitZ()) *
+      Eigen::AngleAxisd(slope, Vec3::UnitY()));
+  Motion motion;
+  if (chance.one_in(2)) {
+    motion.start = begins;
+    motion.frequency = chance.between(0.2, 0.6);
+    motion.stroke = chance.between(0.2, 1.0) * 0.06 / (std::numbers::pi * motion.frequency);
+  }
+  std::vector<Part> parts{{HalfSpace{}, pose, motion}};
+  if (chance.one_in(2)) {
+    const double radius = chance.between(0.02, 0.05);
+    const Vec3 place(chance.between(-0.03, 0.03), chance.between(-0.03, 0.03), -0.3 * radius);
+    parts.push_back({Sphere{radius}, Eigen::Isometry3d(Eigen::Translation3d(place)), motion});
+  }
+  return parts;
+}
+
+HipPath wander(Chance& chance) {
+  Vec3 place(0.0, 0.0, 0.07);
+  std::vector<HipPath::Sample> path = {{0.0, place}, {begins, place}};
+  while (path.back().t < duration) {
+    const Vec3 to(chance.between(-aside, aside), chance.between(-aside, aside),
+                  chance.between(-0.02, 0.06));
+    const double speed = chance.between(0.03, fastest);
+    path.push_back({path.back().t + std::max((to - place).norm() / speed, 1e-3), to});
+    path.push_back({path.back().t + chance.between(0.05, 0.6), to});
+    place = to;
+  }
+  return HipPath(std::move(path));
+}
+
+}  // namespace
+
+TeleopEpisode teleop_episode(std::string_view fault, std::uint64_t seed) {
+  if (std::find(faults.begin(), faults.end(), fault) == faults.end())
+    throw Error("--families " + std::string(fault), "teleop-faults has no such fault",
+                "did you mean '" + std::string(nearest_name(fault, faults)) + "'?");
+  Chance chance(seed * 1000003U + 17U);
+  std::vector<Part> parts = parts_of(chance);
+  const bool moves = !parts.front().motion.rests();
+  const auto scene = std::make_shared<const Scene>(std::move(parts));
+  const double distance = chance.between(0.45, 0.8);
+  const std::string_view sensor = chance.one_in(3) ? "ideal" : "d4xx";
+  const auto plain = open_synthetic_camera(
+      Uri("synthetic:plane?" + camera_options(distance, across, sensor, seed)));
+  const auto camera =
+      std::make_shared<SyntheticCamera>(*scene, plain->setup(), plain->sensor().model());
+  TeleopEpisode episode{
+      .scene = {.cloud = [camera](std::uint64_t frame, double t) -> std::shared_ptr<const Cloud> {
+                  return camera->capture(t, frame).cloud;
+                },
+                .truth = truth_of(scene),
+                .hand = wander(chance),
+                .duration = duration},
+      .one = {.way = "palpate", .seed = seed},
+      .region = {},
+      .moves = moves,
+      .sensor = sensor};
+
+  LinkQuality link{.delay = chance.between(0.0, 0.25), .loss = chance.between(0.0, 0.2)};
+  link.jitter = std::min(chance.between(0.0, 0.03), link.delay);
+  const double at = chance.between(begins + 0.5, duration - 2.0);
+  const double until = at + chance.between(0.2, 1.5);
+  if (fault == "link") {
+    link.down_from = at;
+    link.down_until = until;
+    episode.failed = at + link.delay + link.jitter;  // the last that was sent arrives
+    episode.back = until + link.delay + link.jitter;
+  } else if (fault == "camera") {
+    episode.scene.dark_from = at;
+    episode.scene.dark_until = until;
+    episode.dark = true;
+  } else if (fault == "operator") {
+    episode.one.operator_dies = at;
+    episode.failed = at + link.delay + link.jitter;
+  } else if (fault == "robot") {
+    episode.one.robot_dies = at;
+  }
+  episode.one.up = episode.one.down = link;
+
+  // Beyond a wall that stands upright, on one side.
+  const double turn = chance.between(0.0, 2.0 * std::numbers::pi);
+  episode.region.name = "wall";
+  episode.region.shape = FixtureShape::half_space;
+  const Vec3 outward(std::cos(turn), std::sin(turn), 0.0);
+  episode.region.world_from_fixture.linear() =
+      Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), outward).toRotationMatrix();
+  episode.region.world_from_fixture.translation() = -chance.between(0.0, 0.03) * outward;
+  episode.one.fixtures = std::make_shared<const FixtureSet>(std::vector{episode.region});
+  return episode;
+}
+
+EpisodeFigures play_episode(const TeleopEpisode& episode) {
+  EpisodeFigures figures;
+  const Eigen::Isometry3d region_from_world = episode.region.world_from_fixture.inverse();
+  double speed_at_failure = 0.0;
+  double slow_since = -1.0;
+  Vec3 last_force = Vec3::Zero();
+  play_teleop(episode.scene, episode.one, [&](const TeleopTick& tick) {
+    // The tool starts where it is not wanted, now and then.
+    if (tick.t >= begins)
+      figures.breach = std::max(figures.breach, -(region_from_world * tick.tool).z());
+    const bool unseen = episode.dark && tick.t >= episode.scene.dark_from &&
+                        tick.t < episode.scene.dark_until + 0.3;
+    (unseen ? figures.unseen : figures.contact) =
+        std::max(unseen ? figures.unseen : figures.contact, tick.contact);
+    figures.force = std::max(figures.force, tick.force.norm());
+    if (episode.back && tick.t >= *episode.back && tick.t < *episode.back + after)
+      figures.rise = std::max(figures.rise, (tick.force - last_force).norm());
+    last_force = tick.force;
+    if (!episode.failed || tick.t < *episode.failed || figures.stop) return;
+    const double speed = tick.tool_velocity.norm();
+    if (speed_at_failure == 0.0) speed_at_failure = speed;
+    if (slow_since < 0.0 && speed <= std::max(0.1 * speed_at_failure, at_rest)) {
+      slow_since = tick.t;
+      if (speed_at_failure >= moving) figures.stop = tick.t - *episode.failed;
+    }
+  });
+  return figures;
+}
+
+namespace {
+
+std::vector<Cell> episode_cells(const Experiment& /*experiment*/,
+                                const ExperimentOptions& options) {
+  for (const std::string& fault : options.families) teleop_episode(fault, 1);  // throws
+  std::vector<Cell> cells;
+  const int cases = options.cases.value_or(usual_cases);
+  for (const std::string_view fault : faults) {
+    if (!options.families.empty() && std::find(options.families.begin(), options.families.end(),
+                                               fault) == options.families.end())
+      continue;
+    for (int first = 0; first < cases; first += cases_a_cell) {
+      cells.emplace_back([=, seed = options.seed, last = std::min(first + cases_a_cell, cases)] {
+        std::string rows;
+        for (int i = first; i < last; ++i) {
+          const std::uint64_t number = seed * 1000000 + static_cast<std::uint64_t>(i);
+          const TeleopEpisode episode = teleop_episode(fault, number);
+          const EpisodeFigures figures = play_episode(episode);
+          rows += Row()
+                      .add(fault)
+                      .add(episode.moves ? "moves" : "rests")
+                      .add(episode.sensor)
+                      .add(number)
+                      .add(1e3 * figures.breach)
+                      .add(figures.contact)
+                      .add(figures.unseen)
+                      .add(figures.rise)
+                      .add(figures.force)
+                      .add(1e3 * figures.stop.value_or(0.0))
+                      .done();
+        }
+        return rows;
+      });
+    }
+  }
+  return cells;
+}
+
+Scores episode_scores(const Table& table) {
+  Scores scores;
+  scores.columns = {
+      "fault",         "scene",     "episodes",     "breach > 0.5 mm", "worst [mm]",
+      "contact > 5 N", "worst [N]", "unseen > 5 N", "rise [N/ms]",     "stops within [ms]"};
+  for (const std::string_view fault : faults) {
+    for (const std::string_view scene : {"rests", "moves"}) {
+      const auto of = [&](std::string_view column) {
+        return table.numbers(column, [&](std::size_t row) {
+          return table.text(row, "fault") == fault && table.text(row, "scene") == scene;
+        });
+      };
+      const auto most = [&](std::string_view column) {
+        const std::vector<double> values = of(column);
+        return *std::max_element(values.begin(), values.end());
+      };
+      const auto above = [&](std::string_view column, double limit) {
+        const std::vector<double> values = of(column);
+        return fmt::format("{}", std::count_if(values.begin(), values.end(),
+                                               [limit](double value) { return value > limit; }));
+      };
+      const std::size_t cases = of("breach").size();
+      if (cases == 0) continue;
+      scores.rows.push_back({std::string(fault), std::string(scene), fmt::format("{}", cases),
+                             above("breach", 0.5), fmt::format("{:.2f}", most("breach")),
+                             above("contact", 5.0), fmt::format("{:.1f}", most("contact")),
+                             above("unseen", 5.0), fmt::format("{:.3f}", most("rise")),
+                             fmt::format("{:.0f}", most("stop"))});
+    }
+  }
+  scores.note =
+      "Stops within: until the tool is slower than 10 mm/s. Unseen: a surface that moves before "
+      "a "
+      "camera that is dark. What is measured: docs/teleop.md.";
+  return scores;
+}
+
+constexpr std::string_view episode_plot = R"gp(
+set xlabel "contact of the tool [N]"
+set ylabel "share of episodes"
+set key outside right top noenhanced
+plot for [f in "none link camera operator robot"] sprintf("< awk -F, '$1 == \"%s\" {print $6}' %s | sort -g | awk '{v[NR] = $1} END {for (i = 1; i <= NR; i++) print v[i] \",\" i / NR}'", f, csv) using 1:2 with steps lw 2 title f
+)gp";
+
+}  // namespace
+
+Experiment teleop_faults_experiment() {
+  return {"teleop-faults",
+          "a robot that is led while link, camera or a process fails: fixtures, force, stops",
+          "fault,scene,sensor,number,breach,contact,unseen,rise,force,stop",
+          {},
+          false,
+          episode_cells,
+          episode_plot,
+          no_claims,
+          episode_scores};
+}
+
+}  // namespace palpate::lab

@@ -35,6 +35,9 @@ class MethodOptions {
   /// The same with all else that the configuration file says.
   [[nodiscard]] SessionConfig session(const MethodRegistry& methods) const;
 
+  /// Is there a configuration file?
+  [[nodiscard]] bool has_file() const { return config_.has_value(); }
+
  private:
   std::optional<std::string> method_;
   std::vector<std::string> assignments_;

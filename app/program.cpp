@@ -76,7 +76,7 @@ int run_verb(int argc, char** argv, std::span<const AddVerb> own_verbs) {
 
   std::vector<AddVerb> adders = {add_run,          add_trace,      add_replay,    add_info,
                                  add_methods,      add_parameters, add_calibrate, add_doctor,
-                                 add_serve_camera, add_ros};
+                                 add_serve_camera, add_ros,        add_teleop};
   adders.insert(adders.begin() + 3, own_verbs.begin(), own_verbs.end());
   std::vector<Verb> verbs;
   std::vector<std::string> words;

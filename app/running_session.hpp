@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,10 +12,19 @@
 #include "palpate/servo/device.hpp"
 #include "palpate/session/config.hpp"
 #include "palpate/session/session.hpp"
+#include "palpate/viewer/session_host.hpp"
 
 namespace palpate::app {
 
 // What the verbs that run a session share.
+
+/// What a verb has beside its session. Each may be empty.
+struct Beside {
+  std::function<void(SessionOptions&)> prepare;  ///< before the session is made
+  /// When it has been made; what is returned lives until the force is off.
+  std::function<std::shared_ptr<void>(Session&)> attach;
+  std::function<std::optional<RobotPicture>()> robot;  ///< what its pages draw; one thread
+};
 
 struct RunOptions {
   SessionArguments session;
@@ -24,6 +34,7 @@ struct RunOptions {
   bool in_real_time = false;
   bool json = false;
   bool print_config = false;
+  Beside beside = {};
 };
 
 constexpr double headless_duration = 10.0;  ///< [s]
@@ -56,6 +67,10 @@ struct Running {
     if (Session* now = session) now->request_stop();
   }
 };
+
+/// A session with its page, or without one; prints what there is to say.
+/// @return the program's exit code
+int run_session(const RunOptions& options, const SessionConfig& config);
 
 /// Prints how the recording ended and the summary. @return the program's exit code
 /// @param ended  why an observer's recording was ended by its limits; empty if it was not

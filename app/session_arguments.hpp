@@ -20,6 +20,8 @@ class SessionArguments {
   void add_to(CLI::App& command);
 
   /// @throws Error for an unknown name or a value out of range, naming the option or FILE:LINE.
+  /// Are cameras named, and not left to the usual one? Those of --config count as named.
+  [[nodiscard]] bool names_cameras() const;
   [[nodiscard]] SessionConfig config(const MethodRegistry& methods) const;
 
  private:

@@ -101,6 +101,7 @@ int run_headless(const RunOptions& options, const SessionConfig& config,
                  std::unique_ptr<Device> guarded, Running& running) {
   SessionOptions wanted = options_of(options, config, session_methods());
   wanted.device = std::move(guarded);
+  if (options.beside.prepare) options.beside.prepare(wanted);
   const std::string warning = late_ticks(wanted);
   const bool is_free = wanted.pace == Pace::free_running;
   Session session(std::move(wanted));
@@ -108,6 +109,8 @@ int run_headless(const RunOptions& options, const SessionConfig& config,
   running.session = &session;
   introduce(session, config);
   if (running.ended) return finish(session, options.json);
+  std::shared_ptr<void> beside;
+  if (options.beside.attach) beside = options.beside.attach(session);
   const bool watched = isatty(STDERR_FILENO) == 1;
   const auto ticks_a_line = static_cast<std::uint64_t>(std::max(config.rate / 10.0, 1.0));
   session.run(options.duration.value_or(headless_duration), [&](const ServoTick& record) {
@@ -168,6 +171,7 @@ Ending run_page(const RunOptions& options, SessionConfig& config, std::unique_pt
   wanted.on_frame = [&host](std::size_t camera, const FedFrame& frame) {
     host.show(camera, frame);
   };
+  if (options.beside.prepare) options.beside.prepare(wanted);
   const std::string warning = is_first ? late_ticks(wanted) : "";
   Session session(std::move(wanted));
   std::fputs(warning.c_str(), stderr);
@@ -178,6 +182,8 @@ Ending run_page(const RunOptions& options, SessionConfig& config, std::unique_pt
   running.session = &session;
   introduce(session, config);
   if (running.ended) return {.status = finish(session, options.json)};
+  std::shared_ptr<void> beside;
+  if (options.beside.attach) beside = options.beside.attach(session);
   std::string ended_recording;
   session.start();
   if (is_first) {
@@ -212,8 +218,10 @@ int run_pages(const RunOptions& options, SessionConfig config, std::unique_ptr<D
   const std::vector<CameraConfig> given = config.cameras;
   std::vector<CameraConfig> before = given;
   // A device with motors is opened once: its hand is somewhere, and its guard is another process.
-  const bool may_choose = config.device.empty() || Uri(config.device).scheme() == "mouse";
+  const bool may_choose =
+      !options.beside.attach && (config.device.empty() || Uri(config.device).scheme() == "mouse");
   PageRules rules = page_rules(config);
+  rules.robot = options.beside.robot;
   if (may_choose) rules.files = std::make_shared<DroppedFiles>();
   OpenedScenes opened(std::filesystem::temp_directory_path() / DroppedFiles::folder_prefix);
   for (bool is_first = true;; is_first = false) {
@@ -246,6 +254,12 @@ int run(const RunOptions& options) {
     std::fputs(to_toml(config).c_str(), stdout);
     return 0;
   }
+  return run_session(options, config);
+}
+
+}  // namespace
+
+int run_session(const RunOptions& options, const SessionConfig& config) {
   std::unique_ptr<Device> guarded = guarded_device(config);
   // Before any other thread begins, so that these signals come to this one alone.
   Running running;
@@ -253,8 +267,6 @@ int run(const RunOptions& options) {
   return options.headless ? run_headless(options, config, std::move(guarded), running)
                           : run_pages(options, config, std::move(guarded), running);
 }
-
-}  // namespace
 
 Verb add_run(CLI::App& program) {
   CLI::App* command = program.add_subcommand("run", "touch a scene");

@@ -30,5 +30,6 @@ Verb add_parameters(CLI::App& program);
 Verb add_calibrate(CLI::App& program);
 Verb add_serve_camera(CLI::App& program);
 Verb add_ros(CLI::App& program);
+Verb add_teleop(CLI::App& program);
 
 }  // namespace palpate::app

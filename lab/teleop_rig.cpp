@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "palpate/core/error.hpp"
@@ -19,7 +18,6 @@ namespace palpate::lab {
 namespace {
 
 constexpr double period = 1e-3;         // [s] of a tick
-constexpr double loop_rate = 4.0;       // [Hz] of the robot's own loop
 constexpr double robot_speed = 0.25;    // [m/s] the reduced speed of ISO 10218
 constexpr double velocity_time = 5e-3;  // [s] of the filter behind an encoder's differences
 
@@ -105,7 +103,7 @@ class Palpate final : public Coupling {
   }
 
   Vec3 robot_end(double t, SimulatedTool& tool, TeleopTick& out) {
-    if (const std::optional<Lead> lead = leads_.arrived(t)) led_.lead(*lead, t);
+    if (const std::optional<Lead> lead = leads_.arrived(t)) led_.lead(lead_ = *lead, t);
     led_.tool_is_at(tool.place());
     led_.sees(t - newest_.stamp <= blind_after);
     guard_.run({.t = t});
@@ -116,7 +114,7 @@ class Palpate final : public Coupling {
     if (newest_.cloud)
       watch_.frame(std::exchange(newest_.cloud, nullptr), newest_.stamp, tool.place());
     const SetPoint::Order order =
-        set_point_.next(guarded, led_.press(), led_.is_led(), watch_.newest(), tool.contact());
+        set_point_.next(guarded, lead_.press, led_.is_led(), watch_.newest(), tool.contact());
     return order.position;
   }
 
@@ -155,6 +153,7 @@ class Palpate final : public Coupling {
   Channel<Lead> leads_;
   Channel<Seen> frames_;
   LedHand led_;
+  Lead lead_;
   Cycle operator_, guard_;
   TickRing<ServoTick>::Reader operator_ticks_, guard_ticks_;
   ApproachWatch watch_;
@@ -337,36 +336,6 @@ const std::vector<std::string_view>& teleop_ways() {
   return ways;
 }
 
-double SimulatedTool::stiffness() {
-  const double w = 2.0 * std::numbers::pi * loop_rate;
-  return mass * w * w;
-}
-
-double SimulatedTool::damping() {
-  return 2.0 * std::sqrt(stiffness() * mass);
-}
-
-template <class Force>
-void SimulatedTool::advance(const Force& force, double t, double dt) {
-  constexpr int substeps = 10;
-  const double step = dt / substeps;
-  for (int i = 1; i <= substeps; ++i) {
-    const TruePoint at = truth_(x_, t - dt + i * step);
-    depth_ = std::max(radius - at.distance, 0.0);
-    contact_ = surface_stiffness * depth_ * at.normal;
-    v_ += step / mass * (force() + contact_);
-    x_ += step * v_;
-  }
-}
-
-void SimulatedTool::lead_to(const Vec3& place, double t, double dt) {
-  advance([&] { return Vec3(stiffness() * (place - x_) - damping() * v_); }, t, dt);
-}
-
-void SimulatedTool::push(const Vec3& force, double t, double dt) {
-  advance([&] { return force; }, t, dt);
-}
-
 void play_teleop(const TeleopScene& scene, const TeleopCase& one,
                  const std::function<void(const TeleopTick&)>& on_tick) {
   const DevicePreset& device = device_preset(one.device);
@@ -378,7 +347,10 @@ void play_teleop(const TeleopScene& scene, const TeleopCase& one,
                                            .body = device.body});
   hand.set_device(device);
   const Vec3 begin = scene.hand.at(scene.hand.first_time());
-  SimulatedTool tool(begin, scene.truth);
+  SimulatedTool tool(begin, [&scene](const Vec3& place, double t) -> SimulatedTool::Surface {
+    const TruePoint at = scene.truth(place, t);
+    return {at.distance, at.normal};
+  });
   const double latency = scene.camera_latency + one.down.delay;
   const auto coupling = make_coupling(one, hand, device.limits.max_force, begin, latency);
   std::uint64_t next_frame = 0;

@@ -18,6 +18,7 @@
 #include "palpate/devices/device_body.hpp"
 #include "palpate/devices/hip_path.hpp"
 #include "palpate/teleop/set_point.hpp"
+#include "palpate/teleop/simulated_tool.hpp"
 
 namespace palpate::lab {
 
@@ -74,38 +75,6 @@ class Channel {
   std::mt19937_64 random_;
   std::deque<Parcel> on_the_way_;
   std::uint64_t sent_ = 0, taken_ = 0;
-};
-
-/// A robot's tool: a mass that is led by spring and damper, before a stiff surface.
-class SimulatedTool {
- public:
-  static constexpr double mass = 3.0;                      ///< [kg]
-  static constexpr double radius = 5e-3;                   ///< [m]
-  static constexpr double surface_stiffness = 1e4;         ///< [N/m] of what it touches
-  static double stiffness();                               ///< [N/m] of its own loop of 4 Hz
-  static double damping();                                 ///< [N s/m] critical
-  static double lag() { return damping() / stiffness(); }  ///< [s] behind what moves steadily
-
-  /// @param truth  where surfaces are
-  SimulatedTool(const Vec3& begin, Truth truth) : truth_(std::move(truth)), x_(begin) {}
-
-  /// Led to a place for dt, its end at t [s].
-  void lead_to(const Vec3& place, double t, double dt);
-  /// Moved by a force [N].
-  void push(const Vec3& force, double t, double dt);
-
-  [[nodiscard]] const Vec3& place() const { return x_; }
-  [[nodiscard]] const Vec3& velocity() const { return v_; }
-  [[nodiscard]] const Vec3& contact() const { return contact_; }  ///< [N] of the surface on it
-  [[nodiscard]] double depth() const { return depth_; }           ///< [m] in the surface
-
- private:
-  template <class Force>
-  void advance(const Force& force, double t, double dt);
-
-  Truth truth_;
-  Vec3 x_, v_ = Vec3::Zero(), contact_ = Vec3::Zero();
-  double depth_ = 0.0;
 };
 
 /// A scene before a robot's camera, with who leads the robot.

@@ -54,11 +54,10 @@ HandState LedHand::read(double t) noexcept {
   if (const Vec3* tool = tools_.take()) tool_ = *tool;
   const Heard& heard = leads_.taken_last();
 
-  const bool was_led =
-      std::exchange(led_, sees_.load(std::memory_order_relaxed) && heard.lead.leads &&
-                              is_place(heard.lead.place) && t - heard.time <= limits_.silence);
-  press_ = led_ && heard.lead.press.allFinite() ? heard.lead.press : Vec3(Vec3::Zero());
-  if (!led_) {
+  const bool led = sees_.load(std::memory_order_relaxed) && heard.lead.leads &&
+                   is_place(heard.lead.place) && t - heard.time <= limits_.silence;
+  const bool was_led = led_.exchange(led, std::memory_order_relaxed);
+  if (!led) {
     if (was_led) place_ = tool_;
     led_for_ = 0.0;
     return {.position = place_};

@@ -56,10 +56,8 @@ class LedHand final : public Device {
   HandState read(double t) noexcept override;
   void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
 
-  /// Is the tool being led? The servo's thread, as `press`.
-  [[nodiscard]] bool is_led() const noexcept { return led_; }
-  /// [N] world: of the newest lead; zero where nobody leads.
-  [[nodiscard]] const Vec3& press() const noexcept { return press_; }
+  /// Is the tool being led? Any thread.
+  [[nodiscard]] bool is_led() const noexcept { return led_.load(std::memory_order_relaxed); }
 
  private:
   struct Heard {
@@ -71,15 +69,13 @@ class LedHand final : public Device {
   LeadLimits limits_;
   Mailbox<Heard> leads_;
   Mailbox<Vec3> tools_;
-  std::atomic<bool> sees_{true}, touches_{false};
+  std::atomic<bool> sees_{true}, touches_{false}, led_{false};
   // The servo's thread
   Vec3 tool_;
   Vec3 place_;
-  Vec3 press_ = Vec3::Zero();
   double last_t_ = 0.0;   // [s]
   double led_for_ = 0.0;  // [s] since it was taken up
   bool began_ = false;
-  bool led_ = false;
 };
 
 }  // namespace palpate

@@ -17,7 +17,12 @@ struct RobotInfo {
   std::string kind;  ///< e.g. "simulated arm"
   /// [m] world: the box in which the tool may be; empty: not known
   std::optional<Eigen::AlignedBox3d> reach = {};
-  double max_speed = 0.5;      ///< [m/s] of the tool that it can follow
+  double max_speed = 0.5;  ///< [m/s] of the tool that it can follow
+  /// [s] by which the tool is behind where it is led when that moves steadily: 2 / w of a loop with
+  /// the poles -w, -w
+  double lag = 0.08;
+  /// [N/m] with which the tool gives way when it is pushed out of its place; empty: not known
+  std::optional<double> stiffness = {};
   double max_force = 5.0;      ///< [N] with which the tool may press
   double tool_radius = 0.005;  ///< [m] of the ball at the tool's tip that touches
   std::vector<std::string> joint_names = {};

@@ -542,6 +542,10 @@ class ViewerServer::Impl final : public Hub {
       const auto message = std::make_shared<const ViewerMessage>(ticks_message(*batch));
       for (const auto& page : pages_) page->send(message);
     }
+    if (const std::string robot = host_.robot(); !robot.empty()) {
+      const SharedMessage message = shared_text("{\"robot\":" + robot + "}");
+      for (const auto& page : pages_) page->send(message);
+    }
     if (++beats_ % ticks_per_state == 0) send_state(pages_);
   }
 

@@ -23,6 +23,8 @@ class ViewerHost {
   virtual std::string hello() = 0;
   /// The state message that pages get a few times a second, likewise.
   virtual std::string state() = 0;
+  /// The robot that the hand leads, likewise, 30 times a second; empty: there is none.
+  virtual std::string robot() { return {}; }
   /// Ticks since the last call; none if there was no tick.
   virtual std::optional<TickBatch> ticks() = 0;
   /// Does a page move the session's device? If not, no page ever holds the hand.

@@ -296,6 +296,26 @@ std::string SessionHost::state() {
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
+std::string SessionHost::robot() {
+  const std::optional<RobotPicture> robot = rules_.robot ? rules_.robot() : std::nullopt;
+  if (!robot) return {};
+  const auto place = [](const Vec3& at) { return json{at.x(), at.y(), at.z()}; };
+  json links = json::array();
+  for (const Vec3& link : robot->links) links.push_back(place(link));
+  json tool;
+  if (robot->tool) tool = place(*robot->tool);
+  return json{{"name", robot->name},
+              {"tool", tool},
+              {"links", links},
+              {"force", place(robot->force)},
+              {"radius", robot->radius},
+              {"age", robot->age},
+              {"latency", robot->latency},
+              {"led", robot->led},
+              {"trouble", robot->trouble}}
+      .dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
 std::optional<TickBatch> SessionHost::ticks() {
   const double contact_radius = session_->settings().parameters.proxy.r_c();
   std::optional<ServoTick> newest;

@@ -27,6 +27,19 @@ struct SceneChoice {
   std::string group = {};  ///< of its like, as a heading; empty: none
 };
 
+/// A robot that is led, for pages to draw.
+struct RobotPicture {
+  std::string name;
+  std::optional<Vec3> tool = {};  ///< [m] world; none: it has not been heard yet
+  std::vector<Vec3> links = {};   ///< [m] world: the arm as a line from base to tip
+  Vec3 force = Vec3::Zero();      ///< [N] world: of what it touches, on the tool
+  double radius = 0.005;          ///< [m] of the tool
+  double age = 0.0;               ///< [s] since it said so
+  double latency = 0.0;           ///< [s] of what is felt; 0: not known
+  bool led = false;               ///< a hand leads it
+  std::string trouble = {};       ///< why it does not move; empty: nothing is wrong
+};
+
 /// What a session's options say about its pages.
 struct PageRules {
   /// By name, the loosest values to which the operator's page may set safety limits.
@@ -38,6 +51,8 @@ struct PageRules {
   std::function<void(const std::string& uri)> open_scene = {};
   /// Where files go that the operator's page sends to be touched; null: it sends none.
   std::shared_ptr<DroppedFiles> files = {};
+  /// The robot that the hand leads; empty: there is none. The server's thread.
+  std::function<std::optional<RobotPicture>()> robot = {};
   std::string notice = {};  ///< what pages are told when they join; empty: nothing
 };
 
@@ -64,6 +79,7 @@ class SessionHost final : public ViewerHost {
 
   std::string hello() override;
   std::string state() override;
+  std::string robot() override;
   std::optional<TickBatch> ticks() override;
   bool takes_hand() override { return mouse_ != nullptr; }
   void hand(const HandMessage& hand) override;

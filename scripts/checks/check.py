@@ -31,6 +31,8 @@ KNOWS = {
     "session": {"core", "methods", "cloud", "servo", "sources", "devices", "drivers", "bag",
                 "record"},
     "node": {"core", "methods", "servo", "bag", "drivers", "session"},
+    "telelink": {"core", "bag", "cloud", "drivers", "fixtures", "servo", "session", "sources",
+                 "teleop"},
     "viewer": {"core", "methods", "cloud", "servo", "sources", "devices", "record", "session"},
     "search": {"core"},
     "lab": {"core", "paper", "methods", "cloud", "fixtures", "servo", "teleop", "sources", "devices",

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "palpate/session/camera_feed.hpp"
+#include "palpate/sources/source.hpp"
+#include "palpate/teleop/robot.hpp"
+
+namespace palpate::app {
+
+/// A robot, and its camera where it has one of its own.
+struct Cell {
+  std::function<std::unique_ptr<Robot>()> robot;    ///< once
+  std::function<std::unique_ptr<Source>()> camera;  ///< once; empty: none
+  /// Sees the camera's frames; empty: it need not.
+  std::function<void(const FedFrame&)> on_frame;
+};
+
+/// What this program can lead; each program has its own.
+/// @param uri  of a robot
+/// @throws Error for an unknown kind, or if it cannot be opened.
+Cell open_cell(const std::string& uri);
+
+/// The help of --robot.
+std::string robots_help();
+
+constexpr const char* usual_cell = "synthetic:desk?sensor=d4xx";  ///< a scene with a tool in it
+
+}  // namespace palpate::app

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "app/program_robots.hpp"
+#include "app/running_session.hpp"
+#include "app/verbs.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/sources/fixture_file.hpp"
+#include "palpate/telelink/operator_end.hpp"
+#include "palpate/telelink/robot_end.hpp"
+#include "palpate/telelink/robots.hpp"
+
+namespace palpate::app {
+namespace {
+
+// Of the page at the robot's end, beside the operator's on one machine.
+constexpr std::uint16_t robot_port = 8643;
+
+struct OperatorOptions {
+  RunOptions run;
+  std::string name = "robot";
+  bool whole_images = false, no_index = false;
+};
+
+struct RobotOptions {
+  RunOptions run;
+  RobotEndOptions end;
+  std::string robot = usual_cell;
+};
+
+// A line when what is wrong changes.
+void say_trouble(std::string& said, const std::string& trouble) {
+  if (trouble == said) return;
+  said = trouble;
+  fmt::print(stderr, "palpate: robot: {}\n", trouble.empty() ? "ready" : trouble);
+}
+
+int operate(const OperatorOptions& options) {
+  RunOptions run = options.run;
+  SessionConfig config = run.session.config(session_methods());
+  if (!run.session.names_cameras())
+    config.cameras = {{.uri = "ros2:/" + options.name + "/depth/image_raw/" +
+                              (options.whole_images ? "compressedDepth?reliable" : "slices")}};
+  if (run.print_config) {
+    std::fputs(to_toml(config).c_str(), stdout);
+    return 0;
+  }
+  const bool is_mouse = !run.headless && (config.device.empty() || config.device == "mouse:");
+  std::shared_ptr<OperatorEnd> end;
+  run.beside.attach = [&](Session& session) -> std::shared_ptr<void> {
+    end = std::make_shared<OperatorEnd>(
+        session, OperatorEndOptions{.name = options.name, .index = !options.no_index && !is_mouse});
+    fmt::print(stderr, "palpate: leads /{} in domain {}; Ctrl-C ends it\n", options.name,
+               end->domain());
+    return std::shared_ptr<void>(nullptr, [&end](std::nullptr_t) { end.reset(); });
+  };
+  std::string said;
+  run.beside.robot = [&]() -> std::optional<RobotPicture> {
+    RobotPicture picture{.name = options.name};
+    if (!end) return picture;
+    const RobotView view = end->robot();
+    picture.age = view.age;
+    picture.latency = view.latency;
+    picture.led = view.led;
+    if (view.state) {
+      picture.tool = view.state->position;
+      picture.links = view.state->links;
+      picture.force = view.state->force;
+      picture.trouble = view.heard ? view.state->fault : "the robot is not heard any more";
+    } else {
+      picture.trouble = "nothing is heard of the robot yet";
+    }
+    say_trouble(said, picture.trouble);
+    return picture;
+  };
+  return run_session(run, config);
+}
+
+int guard(const RobotOptions& options) {
+  RunOptions run = options.run;
+  SessionConfig config = run.session.config(session_methods());
+  if (run.print_config) {
+    std::fputs(to_toml(config).c_str(), stdout);
+    return 0;
+  }
+  if (!config.device.empty())
+    throw Error("--device", "the hand is at the operator's end",
+                "leave it out, and start palpate teleop operator --device there");
+  if (!config.server.port) config.server.port = robot_port;
+  const Cell cell = open_cell(options.robot);
+  const bool own_camera = cell.camera && !run.session.names_cameras();
+  if (!own_camera && !run.session.names_cameras())
+    throw Error("--camera", options.robot + " has none of its own",
+                "give the robot's, such as --camera realsense:");
+  RobotEndOptions wishes = options.end;
+  if (!config.fixtures.empty())
+    wishes.fixtures = std::make_shared<const FixtureSet>(read_fixtures(config.fixtures));
+  RobotEnd end(cell.robot(), wishes);
+  run.in_real_time = true;
+  run.beside.prepare = [&](SessionOptions& session) {
+    end.prepare(session.settings);
+    session.device = end.device();
+    if (own_camera) {
+      session.cameras.clear();
+      session.cameras.push_back({.uri = options.robot, .source = cell.camera()});
+    }
+    session.on_frame = [&, shown = std::move(session.on_frame)](std::size_t camera,
+                                                                const FedFrame& frame) {
+      if (own_camera) cell.on_frame(frame);
+      end.on_frame(camera, frame);
+      if (shown) shown(camera, frame);
+    };
+  };
+  run.beside.attach = [&](Session& session) -> std::shared_ptr<void> {
+    end.attach(session);
+    fmt::print(stderr, "palpate: {} ({}) is led by /{} in domain {}; Ctrl-C ends it\n",
+               end.info().uri, end.info().kind, options.end.name, end.domain());
+    return std::shared_ptr<void>(nullptr, [&end](std::nullptr_t) { end.detach(); });
+  };
+  std::string said;
+  run.beside.robot = [&]() -> std::optional<RobotPicture> {
+    const RobotState state = end.state();
+    say_trouble(said, state.fault);
+    return RobotPicture{.name = options.end.name,
+                        .tool = state.position,
+                        .links = state.links,
+                        .force = state.force,
+                        .radius = end.info().tool_radius,
+                        .led = end.is_led(),
+                        .trouble = state.fault};
+  };
+  return run_session(run, config);
+}
+
+void add_running(CLI::App& command, RunOptions& run) {
+  run.session.add_to(command);
+  command.add_option("--duration", run.duration,
+                     "seconds of the session (until Ctrl-C; headless 10)");
+  command.add_flag("--headless", run.headless, "no page");
+  command.add_flag("--json", run.json, "print the summary as a JSON object");
+  command.add_flag("--print-config", run.print_config,
+                   "print the session that these options describe as a TOML file, and end");
+}
+
+}  // namespace
+
+Verb add_teleop(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("teleop", "lead a robot by hand, and feel what its camera sees");
+  command->require_subcommand(0, 1);
+  const auto operating = std::make_shared<OperatorOptions>();
+  CLI::App* hand = command->add_subcommand("operator", "the hand's end of a link");
+  add_running(*hand, operating->run);
+  hand->add_option("--name", operating->name, "of the robot's topics (robot): /NAME/teleop/...");
+  hand->add_flag("--whole-images", operating->whole_images,
+                 "read depth images that are sent again where lost, not slices");
+  hand->add_flag("--no-index", operating->no_index,
+                 "the robot comes to where the hand is; else the scene comes to the hand");
+  operating->run.in_real_time = true;
+
+  const auto robot = std::make_shared<RobotOptions>();
+  CLI::App* arm = command->add_subcommand("robot", "the robot's end: its camera and its arm");
+  add_running(*arm, robot->run);
+  arm->add_option("--robot", robot->robot, robots_help());
+  arm->add_option("--name", robot->end.name, "of its topics (robot): /NAME/teleop/...");
+  arm->add_option("--margin", robot->end.margin,
+                  "[m] by which the tool stays away from what is seen (0.002)");
+  arm->add_option("--press", robot->end.press_share,
+                  "share of the operator's force with which the tool presses, 0 (usual) to 1");
+  return {command, [command, hand, arm, operating, robot] {
+            if (hand->parsed()) return operate(*operating);
+            if (arm->parsed()) return guard(*robot);
+            std::fputs(command->help().c_str(), stdout);
+            return 2;
+          }};
+}
+
+}  // namespace palpate::app

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/telelink/robot_end.hpp"
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "palpate/bag/robot_messages.hpp"
+#include "palpate/cloud/depth_image.hpp"
+#include "palpate/core/error.hpp"
+#include "palpate/drivers/dds.hpp"
+#include "palpate/drivers/ros2_publisher.hpp"
+#include "palpate/servo/realtime.hpp"
+#include "palpate/sources/fixture_file.hpp"
+#include "palpate/telelink/topics.hpp"
+#include "palpate/teleop/approach_watch.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double first_state = 5.0;       // [s] that a robot may take to say where it is
+constexpr double order_interval = 2e-3;   // [s]
+constexpr double report_interval = 0.01;  // [s]
+constexpr double blind_after = 0.2;       // [s] without a frame nothing is led
+
+// A device for a session, of a hand that the robot's end keeps.
+class Borrowed final : public Device {
+ public:
+  explicit Borrowed(std::shared_ptr<LedHand> hand) : hand_(std::move(hand)) {}
+  [[nodiscard]] const DeviceInfo& info() const override { return hand_->info(); }
+  HandState read(double t) noexcept override { return hand_->read(t); }
+  void write(const Vec3& force, double t) noexcept override { hand_->write(force, t); }
+
+ private:
+  std::shared_ptr<LedHand> hand_;
+};
+
+// The walls of what the robot reaches.
+void add_walls(const Eigen::AlignedBox3d& reach, std::vector<Fixture>& fixtures) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double sign : {-1.0, 1.0}) {
+      Fixture wall;
+      wall.name = std::string("reach ") + (sign < 0.0 ? "-" : "+") + "xyz"[axis];
+      wall.shape = FixtureShape::half_space;
+      Vec3 inward = Vec3::Zero();
+      inward[axis] = -sign;
+      wall.world_from_fixture.linear() =
+          Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), inward).toRotationMatrix();
+      Vec3 place = reach.center();
+      place[axis] = sign < 0.0 ? reach.min()[axis] : reach.max()[axis];
+      wall.world_from_fixture.translation() = place;
+      fixtures.push_back(std::move(wall));
+    }
+  }
+}
+
+std::shared_ptr<const FixtureSet> regions_of(const RobotInfo& info,
+                                             const std::shared_ptr<const FixtureSet>& own) {
+  std::vector<Fixture> all;
+  if (own) all = own->fixtures();
+  if (info.reach) add_walls(*info.reach, all);
+  return std::make_shared<const FixtureSet>(all);
+}
+
+RobotState first_of(Robot& robot) {
+  const double end = monotonic_now() + first_state;
+  for (;;) {
+    if (std::optional<RobotState> state = robot.state()) return *std::move(state);
+    if (monotonic_now() > end)
+      throw Error(robot.info().uri, "the robot does not say where it is",
+                  "switch it on, and check its topics");
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+}
+
+LeadLimits limits_of(const RobotInfo& info) {
+  LeadLimits limits;
+  limits.max_speed = std::min(limits.max_speed, info.max_speed);
+  limits.reach = info.reach;
+  return limits;
+}
+
+SetPointOptions set_point_of(const RobotInfo& info, const RobotEndOptions& options,
+                             const std::shared_ptr<const FixtureSet>& regions) {
+  return {.tool_radius = info.tool_radius,
+          .margin = options.margin,
+          .lag = info.lag,
+          .stiffness = info.stiffness,
+          .max_force = info.max_force,
+          .press_share = options.press_share,
+          .max_speed = info.max_speed,
+          .fixtures = robot_fixtures(*regions)};
+}
+
+}  // namespace
+
+class RobotEnd::Impl {
+ public:
+  Impl(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
+      : robot_(std::move(robot)),
+        state_(first_of(*robot_)),
+        regions_(regions_of(robot_->info(), options.fixtures)),
+        options_(options),
+        set_point_(set_point_of(robot_->info(), options, regions_)),
+        hand_(std::make_shared<LedHand>(state_.position, limits_of(robot_->info()))),
+        topics_(options.name),
+        publisher_(options.name, options.packing),
+        participant_("teleop"),
+        places_(participant_, topics_.place, ros::PoseStamped{}, newest_alone),
+        presses_(participant_, topics_.press, ros::WrenchStamped{}, newest_alone),
+        tools_(participant_, topics_.tool, ros::PoseStamped{}, newest_alone),
+        twists_(participant_, topics_.twist, ros::TwistStamped{}, newest_alone),
+        contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
+        links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
+        joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
+        faults_(participant_, topics_.fault, ros::Text{}, kept_for_late),
+        region_texts_(participant_, topics_.regions, ros::Text{}, kept_for_late) {
+    region_texts_.write(ros::Text{fixtures_json(*regions_)});
+    faults_.write(ros::Text{""});
+  }
+  ~Impl() { detach(); }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  std::unique_ptr<Device> device() { return std::make_unique<Borrowed>(hand_); }
+
+  void prepare(ServoSettings& settings) const {
+    set_parameter(settings.parameters, "r_c", robot_->info().tool_radius + options_.margin);
+    settings.fixtures = robot_fixtures(*regions_);
+  }
+
+  void on_frame(std::size_t camera, const FedFrame& fed) {
+    const auto* image = dynamic_cast<const DepthImage*>(fed.frame.cloud.get());
+    // What others touch is the first camera's.
+    if (camera == 0 && image != nullptr) publisher_.publish(*image, since_1970(fed.frame.stamp));
+    const std::lock_guard lock(mutex_);
+    if (watches_.size() <= camera) watches_.resize(camera + 1);
+    watches_[camera].frame(fed.frame.cloud, fed.frame.stamp, state_.position);
+  }
+
+  void attach(Session& session) {
+    ends_ = false;
+    ticks_.emplace(session.ticks());
+    thread_ = std::thread([this] { lead(); });
+  }
+  void detach() {
+    ends_ = true;
+    if (thread_.joinable()) thread_.join();
+    ticks_.reset();
+  }
+
+  [[nodiscard]] const RobotInfo& info() const { return robot_->info(); }
+  [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
+  [[nodiscard]] RobotState state() const {
+    const std::lock_guard lock(mutex_);
+    return state_;
+  }
+  [[nodiscard]] bool is_led() const { return hand_->is_led(); }
+
+ private:
+  void lead() {
+    double order_due = monotonic_now();
+    double report_due = order_due;
+    while (!ends_) {
+      participant_.wait(std::clamp(order_due - monotonic_now(), 0.0, order_interval));
+      const double now = monotonic_now();
+      hear(now);
+      if (now < order_due) continue;
+      order_due = std::max(order_due + order_interval, now);
+      try {
+        order(now);
+        if (now >= report_due) {
+          report_due = std::max(report_due + report_interval, now);
+          report(now);
+        }
+      } catch (const std::exception& error) {  // no orders: the robot stops by itself
+        say(error.what());
+      }
+    }
+  }
+
+  void hear(double now) {
+    while (const auto press = take<ros::WrenchStamped>(presses_))
+      lead_.press = Vec3(press->force[0], press->force[1], press->force[2]);
+    bool any = false;
+    while (const auto place = take<ros::PoseStamped>(places_)) {
+      const std::int64_t stamp = place->header.stamp.nanoseconds();
+      // What was overtaken on the way is late; a stamp long before begins anew.
+      constexpr std::int64_t anew = 1'000'000'000;  // [ns]
+      if (stamp <= heard_ && stamp > heard_ - anew) continue;
+      heard_ = stamp;
+      lead_.place = Vec3(place->position[0], place->position[1], place->position[2]);
+      any = true;
+    }
+    if (!any) return;
+    lead_.leads = lead_.place.allFinite() && lead_.press.allFinite();
+    hand_->lead(lead_, now);
+  }
+
+  void order(double now) {
+    if (std::optional<RobotState> state = robot_->state()) {
+      hand_->tool_is_at(state->position);
+      const std::lock_guard lock(mutex_);
+      state_ = *std::move(state);
+    }
+    bool any = false;
+    ServoTick tick;
+    while (ticks_->try_pop(tick)) any = true;
+    if (!any) return;  // nothing guards the robot now
+    hand_->sees(tick.frame_age <= blind_after);
+    hand_->touches(tick.tick.state != ContactState::free_motion);
+    Approach comes;
+    RobotState at;
+    {
+      const std::lock_guard lock(mutex_);
+      at = state_;
+      for (const ApproachWatch& watch : watches_) {
+        if (watch.newest().speed > comes.speed) comes = watch.newest();
+      }
+    }
+    const SetPoint::Order order =
+        set_point_.next(tick, lead_.press, hand_->is_led(), comes, at.force);
+    if (at.fault.empty()) robot_->command(order.position, order.velocity, now);
+    say(at.fault);
+  }
+
+  void report(double now) {
+    const RobotState at = state();
+    const ros::Header header{ros_stamp(now), "world"};
+    tools_.write(ros::PoseStamped{header, components(at.position)});
+    twists_.write(ros::TwistStamped{header, components(at.velocity)});
+    contacts_.write(ros::WrenchStamped{header, components(at.force), {}});
+    ros::Float64MultiArray links;
+    for (const Vec3& place : at.links)
+      links.data.insert(links.data.end(), {place.x(), place.y(), place.z()});
+    links_.write(links);
+    if (!at.joints.empty())
+      joints_.write(ros::JointState{header, robot_->info().joint_names, at.joints, {}, {}});
+  }
+
+  void say(const std::string& fault) {
+    if (fault == said_) return;
+    said_ = fault;
+    faults_.write(ros::Text{fault});
+  }
+
+  // A message that is damaged counts as none.
+  template <class Message>
+  static std::optional<Message> take(dds::Reader& reader) {
+    for (;;) {
+      try {
+        return reader.take<Message>();
+      } catch (const Error&) {
+        continue;
+      }
+    }
+  }
+
+  std::unique_ptr<Robot> robot_;
+  mutable std::mutex mutex_;  // of state_ and watches_
+  RobotState state_;
+  std::vector<ApproachWatch> watches_;  // one a camera
+  const std::shared_ptr<const FixtureSet> regions_;
+  const RobotEndOptions options_;
+  SetPoint set_point_;
+  std::shared_ptr<LedHand> hand_;
+  const TeleopTopics topics_;
+  Ros2CameraPublisher publisher_;
+  dds::Participant participant_;
+  dds::Reader places_, presses_;
+  dds::Writer tools_, twists_, contacts_, links_, joints_, faults_, region_texts_;
+  // Of the leading thread
+  Lead lead_;
+  std::int64_t heard_ = 0;  // [ns] stamp of the newest place
+  std::string said_;
+  std::optional<TickRing<ServoTick>::Reader> ticks_;
+  std::atomic<bool> ends_{false};
+  std::thread thread_;
+};
+
+RobotEnd::RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
+    : impl_(std::make_unique<Impl>(std::move(robot), options)) {}
+RobotEnd::~RobotEnd() = default;
+std::unique_ptr<Device> RobotEnd::device() {
+  return impl_->device();
+}
+void RobotEnd::prepare(ServoSettings& settings) const {
+  impl_->prepare(settings);
+}
+void RobotEnd::on_frame(std::size_t camera, const FedFrame& frame) {
+  impl_->on_frame(camera, frame);
+}
+void RobotEnd::attach(Session& session) {
+  impl_->attach(session);
+}
+void RobotEnd::detach() {
+  impl_->detach();
+}
+const RobotInfo& RobotEnd::info() const {
+  return impl_->info();
+}
+std::uint32_t RobotEnd::domain() const {
+  return impl_->domain();
+}
+RobotState RobotEnd::state() const {
+  return impl_->state();
+}
+bool RobotEnd::is_led() const {
+  return impl_->is_led();
+}
+
+}  // namespace palpate

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "palpate/session/session.hpp"
+#include "palpate/sources/ros_frames.hpp"
+#include "palpate/teleop/led_hand.hpp"
+#include "palpate/teleop/robot.hpp"
+#include "palpate/teleop/set_point.hpp"
+
+namespace palpate {
+
+/// What the robot's end of a link is told.
+struct RobotEndOptions {
+  std::string name = "robot";  ///< of its topics: /NAME/...
+  DepthPacking packing = DepthPacking::rvl;
+  double margin = SetPointOptions{}.margin;  ///< [m] as SetPointOptions
+  double press_share = 0.0;                  ///< [-] as SetPointOptions
+  /// Forbidden regions that the robot has, told to operators as well; null: none but its reach.
+  std::shared_ptr<const FixtureSet> fixtures = {};
+};
+
+/// The robot's end of a link: serves the camera, hears leads, leads the robot.
+///
+/// A session here has the led hand as its device and the robot's cameras; its proxy, which they
+/// keep out of what they see, is where the tool goes (SetPoint). Topics, all of ROS's own types: in
+/// /NAME/teleop/place (PoseStamped), /NAME/teleop/press (WrenchStamped); out /NAME/teleop/tool
+/// (PoseStamped), twist (TwistStamped), contact (WrenchStamped), links
+///     (Float64MultiArray: x, y, z of each joint), fault (String), regions (String: fixtures as
+///     JSON), /NAME/joint_states (JointState), and the camera's (Ros2CameraPublisher).
+class RobotEnd {
+ public:
+  /// Waits up to 5 s for the robot's first state.
+  /// @throws Error if the robot says nothing, an option is out of range, or DDS is missing.
+  RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options);
+  ~RobotEnd();  ///< the robot rests
+
+  /// The device of the session here. Once.
+  [[nodiscard]] std::unique_ptr<Device> device();
+  /// What the settings of the session here have to be besides: radius of the proxy, fixtures.
+  void prepare(ServoSettings& settings) const;
+  /// For SessionOptions::on_frame.
+  void on_frame(std::size_t camera, const FedFrame& frame);
+  /// Begins to lead the robot. The session must outlive this, or `detach` come first.
+  void attach(Session& session);
+  void detach();
+
+  [[nodiscard]] const RobotInfo& info() const;
+  [[nodiscard]] std::uint32_t domain() const;
+  /// What the robot last said; where nothing leads it that is in `fault`.
+  [[nodiscard]] RobotState state() const;
+  [[nodiscard]] bool is_led() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate

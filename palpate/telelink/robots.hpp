@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "palpate/core/registry.hpp"
+#include "palpate/core/uri.hpp"
+#include "palpate/sources/scene.hpp"
+#include "palpate/teleop/robot.hpp"
+
+namespace palpate {
+
+/// A kind of robot that can be led, by the scheme of its URI.
+struct RobotScheme {
+  std::string name;     ///< the scheme
+  std::string summary;  ///< one line
+  std::function<std::unique_ptr<Robot>(const Uri&)> open;
+};
+
+/// The library's:
+/// - `ros2:?command=/TOPIC&pose=/TOPIC`: an arm of ROS 2 that takes poses (docs/teleop.md has the
+///   options);
+/// - `point:`: a ball that follows as an arm with a loop of 4 Hz does and touches nothing, to try a
+///   link without a robot.
+Registry<RobotScheme> standard_robots();
+
+/// A robot in a synthetic scene (SimulatedTool): what its camera sees is what it touches. The scene
+/// moves as the camera shows it, and does not yield.
+class SceneRobot : public Robot {
+ public:
+  /// Where the scene stands in time, as the newest frame has it. Any thread.
+  /// @param loop  [s] on the servo loop's clock @param scene  [s] the same instant, of the scene
+  virtual void relate(double loop, double scene) = 0;
+};
+/// @param begin  [m] world: where the tool is at first
+std::unique_ptr<SceneRobot> open_scene_robot(std::shared_ptr<const Scene> scene, const Vec3& begin,
+                                             const std::string& uri);
+
+/// @throws Error for an unknown scheme, or what the scheme throws.
+std::unique_ptr<Robot> open_robot(const std::string& uri,
+                                  const Registry<RobotScheme>& robots = standard_robots());
+
+}  // namespace palpate

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <string>
+
+#include "palpate/bag/messages.hpp"
+#include "palpate/core/patch.hpp"
+#include "palpate/drivers/dds.hpp"
+#include "palpate/servo/realtime.hpp"
+
+namespace palpate {
+
+/// The topics of a link, by the robot's name.
+struct TeleopTopics {
+  explicit TeleopTopics(const std::string& name)
+      : place("/" + name + "/teleop/place"),
+        press("/" + name + "/teleop/press"),
+        tool("/" + name + "/teleop/tool"),
+        twist("/" + name + "/teleop/twist"),
+        contact("/" + name + "/teleop/contact"),
+        links("/" + name + "/teleop/links"),
+        fault("/" + name + "/teleop/fault"),
+        regions("/" + name + "/teleop/regions"),
+        joints("/" + name + "/joint_states") {}
+
+  std::string place, press;                                         // from the operator
+  std::string tool, twist, contact, links, fault, regions, joints;  // from the robot
+};
+
+/// Of what is told again and again, and of what is told once.
+inline constexpr dds::Quality newest_alone{};
+inline constexpr dds::Quality kept_for_late{.reliable = true, .keeps_for_late = true};
+
+/// A time of the servo loop's clock [s] on the wall's, since 1970.
+inline double since_1970(double monotonic) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(now).count() + monotonic - monotonic_now();
+}
+
+/// The same as a stamp of ROS.
+inline ros::Time ros_stamp(double monotonic) {
+  return ros::Time::at(static_cast<std::int64_t>(std::llround(1e9 * since_1970(monotonic))));
+}
+
+inline std::array<double, 3> components(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+}  // namespace palpate

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "app/program_robots.hpp"
 #include "app/running_session.hpp"
@@ -52,11 +57,13 @@ int operate(const OperatorOptions& options) {
     std::fputs(to_toml(config).c_str(), stdout);
     return 0;
   }
-  const bool is_mouse = !run.headless && (config.device.empty() || config.device == "mouse:");
   std::shared_ptr<OperatorEnd> end;
   run.beside.attach = [&](Session& session) -> std::shared_ptr<void> {
+    // A mouse and a simulated hand are where they want to be.
+    const DeviceInfo& device = session.device().info();
+    const bool is_device = device.limits.motors && !device.simulated;
     end = std::make_shared<OperatorEnd>(
-        session, OperatorEndOptions{.name = options.name, .index = !options.no_index && !is_mouse});
+        session, OperatorEndOptions{.name = options.name, .index = !options.no_index && is_device});
     fmt::print(stderr, "palpate: leads /{} in domain {}; Ctrl-C ends it\n", options.name,
                end->domain());
     return std::shared_ptr<void>(nullptr, [&end](std::nullptr_t) { end.reset(); });
@@ -139,6 +146,48 @@ int guard(const RobotOptions& options) {
   return run_session(run, config);
 }
 
+// The robot's end as a process of its own, which ends with this one, whatever becomes of it.
+class OtherEnd {
+ public:
+  explicit OtherEnd(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "palpate");
+    std::vector<char*> words;
+    for (std::string& word : arguments) words.push_back(word.data());
+    words.push_back(nullptr);
+    const pid_t parent = getpid();
+    child_ = fork();
+    if (child_ < 0) throw Error("teleop", "no second process can be started", "end some others");
+    if (child_ > 0) return;
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() == parent) execv("/proc/self/exe", words.data());
+    _exit(1);
+  }
+  ~OtherEnd() {
+    kill(child_, SIGTERM);
+    waitpid(child_, nullptr, 0);
+  }
+  OtherEnd(const OtherEnd&) = delete;
+  OtherEnd& operator=(const OtherEnd&) = delete;
+
+ private:
+  pid_t child_ = -1;
+};
+
+// Both ends on this machine, to see how it is.
+int lead_here(const OperatorOptions& operating, const RobotOptions& robot) {
+  std::vector<std::string> words = {"teleop", "robot",        "--robot",     robot.robot,
+                                    "--name", operating.name, "--no-browser"};
+  if (operating.run.headless) words.emplace_back("--headless");
+  const double seconds =
+      operating.run.duration.value_or(operating.run.headless ? headless_duration : 0.0);
+  if (seconds > 0.0) {
+    words.emplace_back("--duration");
+    words.push_back(fmt::format("{}", seconds + 30.0));  // it ends with this one
+  }
+  const OtherEnd other(std::move(words));
+  return operate(operating);
+}
+
 void add_running(CLI::App& command, RunOptions& run) {
   run.session.add_to(command);
   command.add_option("--duration", run.duration,
@@ -174,11 +223,18 @@ Verb add_teleop(CLI::App& program) {
                   "[m] by which the tool stays away from what is seen (0.002)");
   arm->add_option("--press", robot->end.press_share,
                   "share of the operator's force with which the tool presses, 0 (usual) to 1");
-  return {command, [command, hand, arm, operating, robot] {
+  const auto both = std::make_shared<OperatorOptions>();
+  both->run.in_real_time = true;
+  command->add_option("--robot", robot->robot, "both ends on this machine: as of teleop robot");
+  command->add_option("--name", both->name, "of the robot's topics (robot)");
+  command->add_option("--duration", both->run.duration,
+                      "seconds of the session (until Ctrl-C; headless 10)");
+  command->add_flag("--headless", both->run.headless, "no pages");
+  command->add_flag("--json", both->run.json, "print the operator's summary as a JSON object");
+  return {command, [hand, arm, operating, robot, both] {
             if (hand->parsed()) return operate(*operating);
             if (arm->parsed()) return guard(*robot);
-            std::fputs(command->help().c_str(), stdout);
-            return 2;
+            return lead_here(*both, *robot);
           }};
 }
 

@@ -1,5 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-import { decode, type Command, type Hello, type Message, type State } from "./protocol";
+import {
+  decode,
+  type Command,
+  type Hello,
+  type Message,
+  type RobotState,
+  type State,
+} from "./protocol";
 
 const SILENCE = 2500; // [ms] the program speaks thirty times a second
 const FIRST_PAUSE = 250; // [ms] before trying again
@@ -41,6 +48,7 @@ export interface Handlers {
   hello(hello: Hello): void;
   state(state: State): void;
   presence(presence: Presence): void;
+  robot(robot: RobotState): void;
   refused(reason: string): void;
   message(message: Message): void;
 }
@@ -103,6 +111,7 @@ export class Connection {
     if (verb === "hello") this.greet(what as Hello);
     if (verb === "state") this.handlers.state(what as State);
     if (verb === "presence") this.handlers.presence(what as Presence);
+    if (verb === "robot") this.handlers.robot(what as RobotState);
     if (verb === "error") this.handlers.refused(what as string);
   }
 

@@ -16,6 +16,7 @@ import {
   type State,
   type Ticks,
 } from "./protocol";
+import { robotLines, robotText } from "./robot";
 import { GHOST_TRAIL, SceneView, type Palette } from "./scene";
 import { Senses } from "./senses";
 import { handAt, Timeline, trailAt } from "./timeline";
@@ -170,6 +171,12 @@ const connection = new Connection({
       free: "hand free",
     };
     chip.textContent = texts[owner] + (viewers > 1 ? ` · ${viewers} viewers` : "");
+  },
+  robot(robot) {
+    view.showRobot(robot.tool, robot.radius, robotLines(robot));
+    const said = robotText(robot);
+    if (get("robot").textContent !== said) get("robot").textContent = said;
+    get("robot").hidden = false;
   },
   refused(reason) {
     toast(reason);

@@ -307,7 +307,26 @@ export interface Playback {
   speed: number;
 }
 
-/** Sent a few times a second. */
+/** A robot that the hand leads; 30 times a second. */
+export interface RobotState {
+  name: string;
+  /** [m] world: the middle of the ball at its tip; null: it has not been heard yet */
+  tool: Vec3 | null;
+  /** [m] world: the arm from base to tip; may be empty */
+  links: Vec3[];
+  /** [N] of what it touches, on the tool */
+  force: Vec3;
+  /** [m] */
+  radius: number;
+  /** [s] since it said so */
+  age: number;
+  /** [s] of what is felt, capture to arrival; 0: not known */
+  latency: number;
+  led: boolean;
+  /** why it does not move; empty: nothing is wrong */
+  trouble: string;
+}
+
 /** A virtual fixture, as far as it is drawn. */
 export interface FixtureState {
   name: string;
@@ -332,6 +351,7 @@ export interface FixtureState {
   points: Vec3[];
 }
 
+/** Sent a few times a second. */
 export interface State {
   role: Role;
   method: string;

@@ -103,6 +103,9 @@ export class SceneView {
   private readonly fixtures: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly frusta: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly paint: THREE.InstancedMesh<THREE.CircleGeometry, THREE.MeshBasicMaterial>;
+  // The robot that the hand leads.
+  private readonly tool: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
+  private readonly arm: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private fixtureEnds: number[] = []; // of their lines, as they are drawn
   private readonly dab = new THREE.Object3D(); // where one of them is
   private readonly axes = new THREE.AxesHelper(AXES_LENGTH);
@@ -151,6 +154,7 @@ export class SceneView {
     this.ring = new THREE.Sprite(
       new THREE.SpriteMaterial({ map: ringTexture(), depthTest: false, sizeAttenuation: false }),
     );
+    this.tool = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ roughness: 0.4 }));
     const line = (points: number): THREE.BufferGeometry =>
       new THREE.BufferGeometry().setAttribute(
         "position",
@@ -189,6 +193,7 @@ export class SceneView {
     this.grid = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.16));
     this.fixtures = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.8));
     this.frusta = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.5));
+    this.arm = new THREE.LineSegments(new THREE.BufferGeometry(), thin(1));
     this.pin = new THREE.Mesh(
       new THREE.CylinderGeometry(0.09, 0.09, 1, 12).translate(0, 0.5, 0),
       new THREE.MeshStandardMaterial({ roughness: 0.6 }),
@@ -204,7 +209,7 @@ export class SceneView {
     this.arrow.add(this.shaft, this.head);
     const lines = [
       ...[this.link, this.plumb, this.trail, this.ghostTrail],
-      ...[this.grid, this.frusta, this.fixtures],
+      ...[this.grid, this.frusta, this.fixtures, this.arm],
     ];
     for (const object of lines) object.frustumCulled = false;
     this.shadow.renderOrder = this.ghostTrail.renderOrder = this.ghost.renderOrder = 1;
@@ -216,7 +221,7 @@ export class SceneView {
     const marks = [
       ...[this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin],
       ...[this.shadow, this.spot, this.grid, this.frusta, this.axes],
-      ...[this.ghost, this.ghostTrail, this.paint, this.fixtures],
+      ...[this.ghost, this.ghostTrail, this.paint, this.fixtures, this.tool, this.arm],
     ];
     for (const mark of marks) mark.visible = false;
     this.arrow.visible = false;
@@ -253,6 +258,7 @@ export class SceneView {
     this.grid.material.color = colour(palette.text);
     this.frusta.material.color = colour(palette.calm);
     this.fixtures.material.color = colour(palette.force);
+    this.tool.material.color = this.arm.material.color = colour(palette.calm);
     this.arrowMaterial.color = colour(palette.force);
     this.arrowMaterial.emissive = colour(palette.force).multiplyScalar(0.35);
     for (const cloud of this.clouds.values()) cloud.setColours(this.cloudColours());
@@ -287,6 +293,25 @@ export class SceneView {
     );
     this.fixtures.visible = ends.length > 0;
     this.touch();
+  }
+
+  /** A robot that is led: its tool [m], null where it is not known, and its lines. */
+  showRobot(tool: Vec3 | null, radius: number, ends: readonly number[]): void {
+    this.tool.visible = tool !== null;
+    if (tool) this.tool.position.set(...tool);
+    this.tool.scale.setScalar(radius);
+    this.arm.geometry.dispose();
+    this.arm.geometry = new THREE.BufferGeometry().setAttribute(
+      "position",
+      new THREE.Float32BufferAttribute(ends as number[], 3),
+    );
+    this.arm.visible = ends.length > 0;
+    this.touch();
+  }
+
+  /** For tests: where the robot's tool is drawn [m]. */
+  get toolAt(): Vec3 | null {
+    return this.tool.visible ? this.tool.position.toArray() : null;
   }
 
   setRadii(radii: Radii): void {

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// A robot that the hand leads: what is said of it, and where its lines go.
+
+import { add, length, scale } from "./camera_math";
+import type { RobotState, Vec3 } from "./protocol";
+
+const ARROW = 0.02; // [m] of a line for each N that the tool presses with
+const SILENCE = 0.5; // [s] after which what was heard last is old
+
+/** One line: what it does, how old what is felt is, how hard it presses. */
+export function robotText({ name, tool, trouble, led, age, latency, force }: RobotState): string {
+  if (trouble) return `${name}: ${trouble}`;
+  if (!tool) return `${name} has not been heard yet`;
+  if (age > SILENCE) return `${name} was heard ${age.toFixed(1)} s ago`;
+  const parts = [led ? `${name} is led` : `${name} rests: nobody leads it`];
+  if (latency > 0) parts.push(`what is felt is ${(1e3 * latency).toFixed(0)} ms old`);
+  const newtons = length(force);
+  if (newtons > 0.05) parts.push(`its tool is pushed with ${newtons.toFixed(1)} N`);
+  return parts.join(" · ");
+}
+
+/** The arm, and the force on its tool, as lines: their ends, x y z after one another. */
+export function robotLines({ tool, links, force }: RobotState): number[] {
+  const lines: (readonly [Vec3, Vec3])[] = links.slice(1).map((at, i) => [links[i]!, at]);
+  if (tool && length(force) > 0) lines.push([tool, add(tool, scale(force, ARROW))]);
+  return lines.flatMap(([from, to]) => [...from, ...to]);
+}

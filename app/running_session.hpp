@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -35,6 +36,9 @@ struct RunOptions {
   bool json = false;
   bool print_config = false;
   Beside beside = {};
+  std::string whose_page =
+      {};  ///< a word before the page's address, which is all that is said of it
+  std::uint16_t usual_port = 8642;  ///< of the page, where none is asked for and it is free
 };
 
 constexpr double headless_duration = 10.0;  ///< [s]

@@ -28,8 +28,6 @@
 namespace palpate::app {
 namespace {
 
-constexpr std::uint16_t usual_port = 8642;
-
 // One line that is written over and over while a person watches.
 void show_status(const ServoTick& record) {
   const Tick& tick = record.tick;
@@ -56,7 +54,8 @@ void show_in_browser(const std::string& url) {
       posix_spawnp(&pid, program.c_str(), nullptr, nullptr, arguments.data(), environ));
 }
 
-std::unique_ptr<ViewerServer> open_server(const ServerConfig& config, ViewerHost& host) {
+std::unique_ptr<ViewerServer> open_server(const ServerConfig& config, std::uint16_t usual_port,
+                                          ViewerHost& host) {
   ViewerOptions viewer{.listen = config.listen,
                        .port = config.port.value_or(usual_port),
                        .token = config.token,
@@ -196,9 +195,13 @@ Ending run_page(const RunOptions& options, SessionConfig& config, std::unique_pt
       SessionHost& host;
       ~Detach() { host.detach(); }
     } const after_the_server{host};
-    const std::unique_ptr<ViewerServer> server = open_server(config.server, host);
+    const std::unique_ptr<ViewerServer> server =
+        open_server(config.server, options.usual_port, host);
     host.show_on(server.get());
-    if (is_first) print_links(config.server, *server);
+    if (is_first && !options.whose_page.empty())
+      fmt::print(stderr, "palpate: {} {}\n", options.whose_page, server->operator_url());
+    else if (is_first)
+      print_links(config.server, *server);
     config.server.port = server->port();
     session.run(options.duration);
     host.show_on(nullptr);

@@ -27,15 +27,18 @@ namespace {
 
 // Of the page at the robot's end, beside the operator's on one machine.
 constexpr std::uint16_t robot_port = 8643;
+constexpr const char* patience = "wait=25s";  // for an end that starts together with this one
 
 struct OperatorOptions {
   RunOptions run;
   std::string name = "robot";
   bool whole_images = false, no_index = false;
+  bool robot_starts = false;  // too, now
 };
 
 struct RobotOptions {
   RunOptions run;
+  bool is_beside = false;  // the operator's end, which has the page that people are to open
   RobotEndOptions end;
   std::string robot = usual_cell;
 };
@@ -50,9 +53,12 @@ void say_trouble(std::string& said, const std::string& trouble) {
 int operate(const OperatorOptions& options) {
   RunOptions run = options.run;
   SessionConfig config = run.session.config(session_methods());
-  if (!run.session.names_cameras())
-    config.cameras = {{.uri = "ros2:/" + options.name + "/depth/image_raw/" +
-                              (options.whole_images ? "compressedDepth?reliable" : "slices")}};
+  if (!run.session.names_cameras()) {
+    std::string uri = "ros2:/" + options.name + "/depth/image_raw/";
+    uri += options.whole_images ? "compressedDepth?reliable" : "slices";
+    if (options.robot_starts) uri += std::string(options.whole_images ? "&" : "?") + patience;
+    config.cameras = {{.uri = uri}};
+  }
   if (run.print_config) {
     std::fputs(to_toml(config).c_str(), stdout);
     return 0;
@@ -100,7 +106,8 @@ int guard(const RobotOptions& options) {
   if (!config.device.empty())
     throw Error("--device", "the hand is at the operator's end",
                 "leave it out, and start palpate teleop operator --device there");
-  if (!config.server.port) config.server.port = robot_port;
+  run.usual_port = robot_port;
+  if (options.is_beside) run.whose_page = "the robot's end has a page, too:";
   const Cell cell = open_cell(options.robot);
   const bool own_camera = cell.camera && !run.session.names_cameras();
   if (!own_camera && !run.session.names_cameras())
@@ -175,8 +182,8 @@ class OtherEnd {
 
 // Both ends on this machine, to see how it is.
 int lead_here(const OperatorOptions& operating, const RobotOptions& robot) {
-  std::vector<std::string> words = {"teleop", "robot",        "--robot",     robot.robot,
-                                    "--name", operating.name, "--no-browser"};
+  std::vector<std::string> words = {"teleop", "robot",        "--robot",      robot.robot,
+                                    "--name", operating.name, "--no-browser", "--beside"};
   if (operating.run.headless) words.emplace_back("--headless");
   const double seconds =
       operating.run.duration.value_or(operating.run.headless ? headless_duration : 0.0);
@@ -219,18 +226,16 @@ Verb add_teleop(CLI::App& program) {
   add_running(*arm, robot->run);
   arm->add_option("--robot", robot->robot, robots_help());
   arm->add_option("--name", robot->end.name, "of its topics (robot): /NAME/teleop/...");
+  arm->add_flag("--beside", robot->is_beside)->group("");  // not for people
   arm->add_option("--margin", robot->end.margin,
                   "[m] by which the tool stays away from what is seen (0.002)");
   arm->add_option("--press", robot->end.press_share,
                   "share of the operator's force with which the tool presses, 0 (usual) to 1");
   const auto both = std::make_shared<OperatorOptions>();
-  both->run.in_real_time = true;
+  both->run.in_real_time = both->robot_starts = true;
+  add_running(*command, both->run);
   command->add_option("--robot", robot->robot, "both ends on this machine: as of teleop robot");
   command->add_option("--name", both->name, "of the robot's topics (robot)");
-  command->add_option("--duration", both->run.duration,
-                      "seconds of the session (until Ctrl-C; headless 10)");
-  command->add_flag("--headless", both->run.headless, "no pages");
-  command->add_flag("--json", both->run.json, "print the operator's summary as a JSON object");
   return {command, [hand, arm, operating, robot, both] {
             if (hand->parsed()) return operate(*operating);
             if (arm->parsed()) return guard(*robot);

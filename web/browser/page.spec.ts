@@ -19,7 +19,7 @@ import {
 } from "./session";
 
 const DESK = ["--camera", "synthetic:desk?size=320x240"];
-const PLANE = ["--camera", "synthetic:plane?size=320x240"];
+const PLANE = ["--camera", "synthetic:plane?size=320x240&noise=1mm"];
 const patience = 120_000; // [ms] for a machine that draws a frame a second
 const r_c = 0.005; // [m] the proxy's radius
 
@@ -519,6 +519,30 @@ test("the operator keeps the hand off what it has touched", async () => {
   await touch();
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.3 && seen.hip[2]! < 0);
   await page.mouse.up();
+});
+
+test("the hand leads a tool at the other end of a link, and sees where it is", async () => {
+  // Both ends, on a network of their own; a camera without noise would be taken for frozen.
+  process.env.ROS_DOMAIN_ID = String(20 + (process.pid % 80));
+  process.env.ROS_LOCALHOST_ONLY = "1";
+  const robot = ["--robot", "synthetic:plane?size=320x240&noise=1mm"];
+  program = await Program.start(robot, 0, undefined, "teleop");
+  const page = await open([]);
+  const tool = () => page.evaluate(() => (window as any).palpate.view.toolAt as number[] | null);
+  await expect.poll(tool).not.toBeNull();
+  const at = await placeWhere(page, "surface");
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
+  await expect.poll(() => page.locator("#robot").textContent()).toContain("robot is led");
+  // The tool comes to the proxy, and stays on the surface as that does.
+  await expect
+    .poll(async () => distance((await tool())!, (await glimpse(page)).proxy))
+    .toBeLessThan(0.006);
+  if (process.env.PALPATE_PICTURES)
+    await page.screenshot({ path: join(process.env.PALPATE_PICTURES, "teleop.png") });
+  await page.mouse.up();
+  await expect.poll(() => page.locator("#robot").textContent()).toContain("nobody leads");
 });
 
 test("without the operator's link a page is greyed out and may hold the hand", async () => {

@@ -15,11 +15,16 @@ export class Program {
   ) {}
 
   /** @param cwd  where its recordings go */
-  static async start(options: string[], port = 0, cwd?: string): Promise<Program> {
+  static async start(
+    options: string[],
+    port = 0,
+    cwd?: string,
+    verb = "run",
+  ): Promise<Program> {
     const program = process.env.PALPATE;
     if (!program) throw new Error("PALPATE must name the program");
     const token = ["--operator-token", "of-the-browser-tests"];
-    const words = ["run", "--no-browser", "--port", String(port), ...token, ...options];
+    const words = [verb, "--no-browser", "--port", String(port), ...token, ...options];
     const state = mkdtempSync(join(tmpdir(), "palpate-state-"));
     const child = spawn(program, words, { cwd, env: { ...process.env, XDG_STATE_HOME: state } });
     child.on("exit", () => rmSync(state, { recursive: true }));

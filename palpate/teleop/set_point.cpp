@@ -111,7 +111,8 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
     retreat_ -= share_of(dt, return_time) * retreat_;
 
   const Vec3 held = record.place + (ahead * options_.lag * approach_ - depth_) * normal_;
-  Vec3 goal = held + way_out(held, comes, tick.t) + retreat_;
+  // The first place of all lies outside of all regions; what would be out of the way may not.
+  Vec3 goal = began_ ? Vec3(held + way_out(held, comes, tick.t) + retreat_) : held;
   goal += fixtures_
               .run({.t = tick.t,
                     .hip = goal,

@@ -35,8 +35,8 @@ KNOWS = {
                  "teleop"},
     "viewer": {"core", "methods", "cloud", "servo", "sources", "devices", "record", "session"},
     "search": {"core"},
-    "lab": {"core", "paper", "methods", "cloud", "fixtures", "servo", "teleop", "sources", "devices",
-            "search"},
+    "lab": {"core", "paper", "methods", "cloud", "fixtures", "servo", "teleop", "sources",
+            "devices", "search"},
     "bench": {"core", "paper", "methods", "cloud", "search"},
 }
 KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench"}

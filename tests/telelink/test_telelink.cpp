@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+// Both ends of a link in one process, on a network of their own.
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "palpate/devices/scripted_device.hpp"
+#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/telelink/operator_end.hpp"
+#include "palpate/telelink/robot_end.hpp"
+#include "palpate/telelink/robots.hpp"
+
+#include "tests/drivers/dds_test.hpp"
+#include "tests/support/errors.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double long_enough = 60.0;  // [s] on a busy machine
+constexpr const char* scene = "synthetic:plane?size=160x120&noise=0.5mm";
+
+bool happens(const std::function<bool()>& what) {
+  const double end = monotonic_now() + long_enough;
+  while (monotonic_now() < end) {
+    if (what()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+// A robot whose reach and fault a test decides.
+class TestRobot final : public Robot {
+ public:
+  TestRobot() {
+    info_.uri = "test:";
+    info_.kind = "of a test";
+    info_.reach.emplace(Vec3(-0.2, -0.2, -0.05), Vec3(0.2, 0.2, 0.2));
+  }
+  [[nodiscard]] const RobotInfo& info() const override { return info_; }
+  void command(const Vec3& position, const Vec3& /*velocity*/, double t) noexcept override {
+    const std::lock_guard lock(*mutex_);
+    shared_->position = position;
+    shared_->t = t;
+  }
+  [[nodiscard]] std::optional<RobotState> state() override {
+    const std::lock_guard lock(*mutex_);
+    RobotState state = *shared_;
+    state.t = monotonic_now();
+    return state;
+  }
+  // What a test sees and sets beside the link.
+  std::shared_ptr<RobotState> shared_ = std::make_shared<RobotState>();
+  std::shared_ptr<std::mutex> mutex_ = std::make_shared<std::mutex>();
+
+ private:
+  RobotInfo info_;
+};
+
+class Telelink : public ::testing::Test {
+ protected:
+  Telelink() {
+    auto robot = std::make_unique<TestRobot>();
+    state_ = robot->shared_;
+    mutex_ = robot->mutex_;
+    state_->position = Vec3(0.0, 0.0, 0.1);
+    robot_end_ = std::make_unique<RobotEnd>(std::move(robot), RobotEndOptions{.name = "arm"});
+    SessionOptions options;
+    options.cameras.push_back({.uri = scene});
+    options.device = robot_end_->device();
+    robot_end_->prepare(options.settings);
+    options.on_frame = [this](std::size_t camera, const FedFrame& frame) {
+      robot_end_->on_frame(camera, frame);
+    };
+    robot_ = std::make_unique<Session>(std::move(options));
+    robot_->start();
+    robot_end_->attach(*robot_);
+  }
+  ~Telelink() override {
+    operator_end_.reset();
+    operator_.reset();
+    robot_end_->detach();
+    robot_.reset();
+  }
+
+  // An operator whose hand rests at a place.
+  void operate(const Vec3& hand) {
+    SessionOptions options;
+    options.cameras.push_back({.uri = "ros2:/arm/depth/image_raw/slices?wait=25s"});
+    options.device = std::make_unique<ScriptedDevice>(HipPath({{0.0, hand}}), false);
+    operator_ = std::make_unique<Session>(std::move(options));
+    operator_end_ = std::make_unique<OperatorEnd>(
+        *operator_, OperatorEndOptions{.name = "arm", .index = false});
+    operator_->start();
+  }
+  Vec3 tool() {
+    const std::lock_guard lock(*mutex_);
+    return state_->position;
+  }
+
+  test::OwnNetwork network_;
+  std::shared_ptr<RobotState> state_;
+  std::shared_ptr<std::mutex> mutex_;
+  std::unique_ptr<RobotEnd> robot_end_;
+  std::unique_ptr<Session> robot_, operator_;
+  std::unique_ptr<OperatorEnd> operator_end_;
+};
+
+TEST_F(Telelink, LeadsTheRobotToTheHandAndNotThroughWhatIsSeen) {
+  // 10 mm below the plane: the tool stays on it.
+  operate({0.05, 0.0, -0.01});
+  const double radius = RobotInfo{}.tool_radius;
+  EXPECT_TRUE(happens([&] { return std::abs(tool().x() - 0.05) < 2e-3 && tool().z() < 0.012; }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_GT(tool().z(), radius - 1e-3);
+  EXPECT_TRUE(robot_end_->is_led());
+  EXPECT_TRUE(happens([&] {
+    const RobotView view = operator_end_->robot();
+    return view.heard && view.led && view.state && (view.state->position - tool()).norm() < 2e-3;
+  }));
+}
+
+TEST_F(Telelink, StopsTheRobotWithItsOperator) {
+  operate({0.15, 0.0, 0.1});
+  ASSERT_TRUE(happens([&] { return tool().x() > 0.02; }));
+  operator_->stop();
+  EXPECT_TRUE(happens([&] { return !robot_end_->is_led(); }));
+  const Vec3 stopped = tool();
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_LT((tool() - stopped).norm(), 2e-3);
+  EXPECT_LT(tool().x(), 0.14);
+}
+
+TEST_F(Telelink, TellsTheOperatorWhatTheRobotMayNotDo) {
+  operate({0.0, 0.0, 0.1});
+  const auto regions = [&] {
+    std::size_t count = 0;
+    if (const auto fixtures = operator_->settings().fixtures) {
+      for (const Fixture& one : fixtures->fixtures()) count += one.name.starts_with("robot: reach");
+    }
+    return count;
+  };
+  EXPECT_TRUE(happens([&] { return regions() == 6; }));
+  {
+    const std::lock_guard lock(*mutex_);
+    state_->fault = "its emergency stop is open";
+  }
+  EXPECT_TRUE(happens([&] {
+    const RobotView view = operator_end_->robot();
+    return view.state && view.state->fault == "its emergency stop is open";
+  }));
+}
+
+TEST(Robots, SayWhatTheyNeed) {
+  EXPECT_TRUE(
+      test::fails_saying([] { open_robot("pint:"); }, "pint", "unknown kind of robot", "point:"));
+  EXPECT_TRUE(test::fails_saying([] { open_robot("point:?lag=9"); }, "lag", "9", ""));
+  const test::OwnNetwork network;
+  EXPECT_TRUE(test::fails_saying([] { open_robot("ros2:?pose=/arm/pose"); },
+                                 "ros2:", "names no topic", "command="));
+  EXPECT_TRUE(
+      test::fails_saying([] { open_robot("ros2:?pose=/arm/pose&command=/arm/go&wait=0.2"); },
+                         "ros2:", "no pose comes", "pose="));
+}
+
+TEST(Robots, APointFollowsAndStopsByItself) {
+  const auto robot = open_robot("point:?x=0.1");
+  ASSERT_TRUE(robot->state());
+  EXPECT_NEAR(robot->state()->position.x(), 0.1, 1e-9);
+  const Vec3 to(0.2, 0.0, 0.1);
+  for (int i = 0; i < 50; ++i) {
+    robot->command(to, Vec3::Zero(), monotonic_now());
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    static_cast<void>(robot->state());
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(150));
+  const double x = robot->state()->position.x();
+  EXPECT_GT(x, 0.1);
+  EXPECT_LE(x, 0.2 + 1e-9);
+  // A tool in a scene does not go through what it touches.
+  const auto camera = open_synthetic_camera(Uri("synthetic:plane?size=64x48"));
+  const auto tool = open_scene_robot(std::make_shared<const Scene>(camera->scene()),
+                                     {0.0, 0.0, 0.02}, "synthetic:plane");
+  for (int i = 0; i < 200; ++i) {
+    tool->command({0.0, 0.0, 0.0}, Vec3::Zero(), monotonic_now());
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  EXPECT_GT(tool->state()->position.z(), 3e-3);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// What crosses the link, and how it is followed.
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/methods/methods.hpp"
+#include "palpate/teleop/lead.hpp"
+#include "palpate/teleop/led_hand.hpp"
+#include "palpate/teleop/link_limits.hpp"
+
+#include "tests/support/errors.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double tick = 1e-3;  // [s]
+
+ServoTick held_at(const Vec3& place) {
+  ServoTick record;
+  record.place = place;
+  record.hand = hand_present;
+  return record;
+}
+
+TEST(Lead, IsTheProxyWhileAHandIsThereAndSees) {
+  ServoTick record = held_at({0.1, 0.2, 0.3});
+  record.force = Vec3(0.0, 0.0, 2.0);
+  const Lead lead = lead_of(record);
+  EXPECT_TRUE(lead.leads);
+  EXPECT_EQ(lead.place, record.place);
+  EXPECT_EQ(lead.press, Vec3(0.0, 0.0, -2.0));
+
+  const auto leads_with = [&](std::uint32_t hand, std::uint32_t safety) {
+    ServoTick other = record;
+    other.hand = hand;
+    other.safety = safety;
+    return lead_of(other).leads;
+  };
+  EXPECT_TRUE(leads_with(hand_present, disengaged | ramping | frame_fading | force_cut));
+  EXPECT_FALSE(leads_with(0, 0));
+  EXPECT_FALSE(leads_with(hand_present | hand_clutched, 0));
+  EXPECT_FALSE(leads_with(hand_present | hand_fault, 0));
+  for (const std::uint32_t blind : {frame_lost, fault_latched, output_refused})
+    EXPECT_FALSE(leads_with(hand_present, blind));
+  record.place.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(lead_of(record).leads);
+}
+
+// A hand that is pressed into a forbidden region leads to the region's border.
+TEST(Lead, StaysOutOfForbiddenRegions) {
+  Fixture wall;
+  wall.name = "wall";
+  wall.shape = FixtureShape::half_space;  // below z = 0
+  LedHand hand({0.0, 0.0, 0.02}, {.max_speed = 1.0, .resume_time = 0.0});
+  ServoSettings settings;
+  settings.fixtures = std::make_shared<const FixtureSet>(std::vector{wall});
+  Cycle cycle(make_method("sight"), hand, settings);
+  auto ticks = cycle.reader();
+  ServoTick record;
+  for (int i = 0; i < 200; ++i) {
+    const double t = 1.0 + i * tick;
+    hand.lead({.place = {0.0, 0.0, -0.01}, .leads = true}, t);
+    cycle.run({.t = t});
+    ASSERT_TRUE(ticks.try_pop(record));
+    ASSERT_GE(record.place.z(), -1e-6);
+  }
+  EXPECT_NEAR(record.tick.hip.z(), -0.01, 1e-9);
+  EXPECT_NEAR(record.place.z(), 0.0, 1e-6);
+}
+
+class LedHandTest : public ::testing::Test {
+ protected:
+  // Reads for so long, led or not; the tool follows at once. @return the largest speed [m/s]
+  double go(LedHand& hand, double seconds, const std::optional<Vec3>& to) {
+    double fastest = 0.0;
+    for (const double end = t_ + seconds; t_ < end; t_ += tick) {
+      if (to) hand.lead({.place = *to, .leads = true}, t_);
+      const Vec3 before = at_;
+      at_ = hand.read(t_).position;
+      hand.tool_is_at(tool_.value_or(at_));
+      fastest = std::max(fastest, (at_ - before).norm() / tick);
+    }
+    return fastest;
+  }
+
+  double t_ = 100.0;
+  Vec3 at_ = Vec3::Zero();
+  std::optional<Vec3> tool_;  // where it is said to be; none: at the hand
+};
+
+TEST_F(LedHandTest, FollowsAtALimitedSpeedAndSlowlyAtFirst) {
+  LedHand hand(Vec3::Zero(), {.max_speed = 0.2, .contact_speed = 0.05, .resume_time = 0.5});
+  const Vec3 far(1.0, 0.0, 0.0);
+  EXPECT_LT(go(hand, 0.05, far), 0.03);
+  EXPECT_NEAR(go(hand, 1.0, far), 0.2, 1e-6);
+  hand.touches(true);
+  EXPECT_NEAR(go(hand, 0.2, far), 0.05, 1e-6);
+  hand.touches(false);
+  go(hand, 6.0, far);
+  EXPECT_EQ(at_, far);
+  EXPECT_TRUE(hand.is_led());
+}
+
+TEST_F(LedHandTest, RestsWhereTheToolIsWithoutALead) {
+  LedHand hand(Vec3::Zero(), {.max_speed = 0.2, .silence = 0.05, .resume_time = 0.1});
+  go(hand, 1.0, Vec3(1.0, 0.0, 0.0));
+  tool_ = at_ - Vec3(0.015, 0.0, 0.0);  // it is late
+  go(hand, 0.04, std::nullopt);
+  EXPECT_TRUE(hand.is_led());
+  go(hand, 0.02, std::nullopt);
+  EXPECT_FALSE(hand.is_led());
+  EXPECT_EQ(at_, *tool_);
+  // What pushes the tool afterwards does not lead it.
+  const Vec3 rests = at_;
+  tool_ = Vec3(0.0, 0.0, 0.5);
+  go(hand, 1.0, std::nullopt);
+  EXPECT_EQ(at_, rests);
+}
+
+TEST_F(LedHandTest, IsNotLedWhileNothingIsSeenOrByWhatIsNoPlace) {
+  LedHand hand(Vec3::Zero(), {});
+  const Vec3 to(0.1, 0.0, 0.0);
+  go(hand, 0.2, to);
+  hand.sees(false);
+  go(hand, 0.01, to);
+  EXPECT_FALSE(hand.is_led());
+  hand.sees(true);
+  go(hand, 0.2, to);
+  EXPECT_TRUE(hand.is_led());
+  const Vec3 before = at_;
+  go(hand, 0.2, Vec3(std::numeric_limits<double>::infinity(), 0.0, 0.0));
+  EXPECT_FALSE(hand.is_led());
+  EXPECT_EQ(at_, before);
+  hand.tool_is_at(Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+  EXPECT_TRUE(hand.read(t_).position.allFinite());
+}
+
+TEST_F(LedHandTest, StaysWithinItsReach) {
+  LeadLimits limits;
+  limits.reach.emplace(Vec3(-0.1, -0.1, 0.0), Vec3(0.1, 0.1, 0.2));
+  LedHand hand(Vec3(0.0, 0.0, 0.1), limits);
+  go(hand, 5.0, Vec3(1.0, -1.0, 0.1));
+  EXPECT_LT((at_ - Vec3(0.1, -0.1, 0.1)).norm(), 1e-9);
+}
+
+TEST_F(LedHandTest, RefusesWhatCannotBe) {
+  EXPECT_TRUE(test::fails_saying([] { LedHand(Vec3::Zero(), {.max_speed = 0.0}); }, "max_speed",
+                                 "m/s", ""));
+  EXPECT_TRUE(
+      test::fails_saying([] { LedHand(Vec3::Zero(), {.silence = 5.0}); }, "silence", "5", "s"));
+  LeadLimits turned;
+  turned.reach.emplace(Vec3::Ones(), Vec3::Zero());
+  EXPECT_TRUE(
+      test::fails_saying([&] { LedHand(Vec3::Zero(), turned); }, "reach", "no box", "corner"));
+}
+
+TEST(LinkLimits, FadeWhenFramesAreOlderThanTheLinkMakesThem) {
+  const SafetyParameters usual;
+  const SafetyParameters near = for_link(usual, 0.0);
+  EXPECT_EQ(near.fade_age, usual.fade_age);
+  EXPECT_NEAR(near.lost_age, usual.fade_age + 0.3, 1e-12);
+  const SafetyParameters far = for_link(usual, 0.25);
+  EXPECT_NEAR(far.fade_age, usual.fade_age + 0.25, 1e-12);
+  EXPECT_NEAR(far.lost_age - far.fade_age, 0.3, 1e-12);
+  EXPECT_LE(for_link(usual, 60.0).fade_age, usual.fade_age + 1.0);
+  validate(far);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a robot is sent: out of the way of what comes, no harder than it may press, never into a
+// forbidden region.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/teleop/approach_watch.hpp"
+#include "palpate/teleop/set_point.hpp"
+#include "palpate/teleop/simulated_tool.hpp"
+
+#include "tests/support/errors.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double tick = 1e-3;  // [s]
+const Vec3 up = Vec3::UnitZ();
+
+// On a surface below, or in free space.
+ServoTick at(const Vec3& place, bool touches, double t) {
+  ServoTick record;
+  record.place = record.tick.proxy = record.tick.hip = place;
+  record.tick.t = t;
+  record.tick.state = touches ? ContactState::contact : ContactState::free_motion;
+  if (touches) record.tick.normal = up;
+  return record;
+}
+
+class SetPointTest : public ::testing::Test {
+ protected:
+  SetPoint::Order run(SetPoint& point, ServoTick record, double seconds, const Approach& comes = {},
+                      const Vec3& force = Vec3::Zero(), const Vec3& press = Vec3::Zero()) {
+    SetPoint::Order order;
+    for (const double end = t_ + seconds; t_ < end; t_ += tick) {
+      record.tick.t = t_;
+      order = point.next(record, press, true, comes, force);
+      EXPECT_TRUE(order.position.allFinite());
+    }
+    return order;
+  }
+  double t_ = 10.0;
+};
+
+TEST_F(SetPointTest, IsTheProxyWhereNothingElseIs) {
+  SetPoint point;
+  const Vec3 place(0.01, -0.02, 0.03);
+  const SetPoint::Order order = run(point, at(place, false, t_), 0.1);
+  EXPECT_EQ(order.position, place);
+  EXPECT_EQ(order.velocity, Vec3::Zero());
+}
+
+TEST_F(SetPointTest, GoesAheadOfASurfaceThatComesAndNotAfterOneThatGoes) {
+  SetPoint point({.lag = 0.08});
+  ServoTick record = at(Vec3::Zero(), true, t_);
+  record.tick.surface_velocity = 0.05;
+  EXPECT_GE(run(point, record, 0.2).position.z(), 0.05 * 0.08);
+  record.tick.surface_velocity = -0.05;
+  EXPECT_NEAR(run(point, record, 0.5).position.z(), 0.0, 1e-6);
+}
+
+TEST_F(SetPointTest, IsOutOfTheWayBeforeWhatComesTouches) {
+  SetPoint point({.tool_radius = 5e-3, .margin = 1e-3, .lag = 0.08});
+  const ServoTick record = at(Vec3::Zero(), false, t_);
+  // 20 mm away, at 60 mm/s: 15 mm of room less 1 mm are gone in 0.23 s.
+  const Approach comes{.speed = 0.06, .gap = 0.02, .place = Vec3::Zero(), .away = up, .stamp = t_};
+  EXPECT_EQ(run(point, record, 0.02, comes).position, Vec3::Zero());
+  const SetPoint::Order order = run(point, record, 0.18, comes);
+  const double surface = -0.02 + 0.06 * (t_ - comes.stamp);
+  EXPECT_GT(order.position.z() - surface, 5e-3 + 1e-3 + 0.06 * 0.08);
+  EXPECT_GT(order.velocity.z(), 0.0);
+  // An old sight is no sight.
+  run(point, record, 1.0, comes);
+  EXPECT_NEAR(run(point, record, 0.01, comes).position.z(), 0.0, 1e-9);
+}
+
+TEST_F(SetPointTest, PressesByAShareOfTheForceIfTheRobotsStiffnessIsKnown) {
+  const ServoTick record = at(Vec3::Zero(), true, t_);
+  const Vec3 press(0.0, 0.0, -2.0);
+  SetPointOptions options{.margin = 1e-3, .stiffness = 1000.0, .press_share = 0.5};
+  SetPoint point(options);
+  // Through the margin, and 1 N deep.
+  EXPECT_NEAR(run(point, record, 2.0, {}, {}, press).position.z(), -1e-3 - 1e-3, 1e-5);
+  // No harder than it may.
+  EXPECT_NEAR(run(point, record, 2.0, {}, {}, 100.0 * press).position.z(), -1e-3 - 5e-3, 1e-5);
+  options.stiffness.reset();
+  SetPoint unknown(options);
+  EXPECT_EQ(run(unknown, record, 2.0, {}, {}, press).position, Vec3::Zero());
+}
+
+TEST_F(SetPointTest, GivesWayToWhatPushesTooHard) {
+  SetPoint point({.max_force = 5.0});
+  const ServoTick record = at(Vec3::Zero(), false, t_);
+  EXPECT_EQ(run(point, record, 0.5, {}, Vec3(4.0, 0.0, 0.0)).position, Vec3::Zero());
+  const SetPoint::Order away = run(point, record, 0.5, {}, Vec3(8.0, 0.0, 0.0));
+  EXPECT_GT(away.position.x(), 0.01);
+  EXPECT_LT(run(point, record, 5.0).position.x(), 1e-3);
+}
+
+TEST_F(SetPointTest, NeverGoesIntoAForbiddenRegion) {
+  Fixture wall;
+  wall.name = "wall";
+  wall.shape = FixtureShape::half_space;
+  wall.world_from_fixture = Eigen::AngleAxisd(std::numbers::pi, Vec3::UnitX());  // above z = 0
+  SetPoint point({.fixtures = robot_fixtures(FixtureSet({wall}))});
+  const ServoTick record = at(Vec3(0.0, 0.0, -0.001), false, t_);
+  Vec3 highest = Vec3::Constant(-1.0);
+  for (int i = 0; i < 100; ++i) {
+    const Approach comes{
+        .speed = 0.2, .gap = 0.01, .place = record.place, .away = up, .stamp = t_ - 0.1};
+    highest = highest.cwiseMax(run(point, record, 0.005, comes, Vec3(0.0, 0.0, 50.0)).position);
+  }
+  EXPECT_LE(highest.z(), 1e-6);
+}
+
+TEST_F(SetPointTest, TheRegionsOfARobotDoNotGiveWay) {
+  Fixture box;
+  box.name = "box";
+  box.size = Vec3::Constant(0.1);
+  Fixture guide = box;
+  guide.name = "guide";
+  guide.kind = FixtureKind::guide;
+  guide.shape = FixtureShape::point;
+  const auto regions = robot_fixtures(FixtureSet({box, guide}));
+  ASSERT_EQ(regions->items().size(), 1U);
+  EXPECT_EQ(regions->items()[0].fixture.numbers.give_way, 1.0);
+}
+
+TEST_F(SetPointTest, RefusesWhatCannotBe) {
+  EXPECT_TRUE(test::fails_saying([] { SetPoint({.margin = -1.0}); }, "margin", "-1", "m"));
+  EXPECT_TRUE(test::fails_saying([] { SetPoint({.press_share = 2.0}); }, "press_share", "2", ""));
+}
+
+// A plane that comes at 60 mm/s from 3 s on, or rests, before a noisy stereo camera.
+std::vector<Approach> watched(const char* motion, double seconds, const Vec3& tool) {
+  const auto camera = open_synthetic_camera(
+      Uri("synthetic:plane?size=160x160&fov=15.5deg&distance=0.7m&sensor=d4xx&seed=3" +
+          std::string(motion)));
+  ApproachWatch watch;
+  std::vector<Approach> all;
+  for (int i = 0; i < static_cast<int>(30.0 * seconds); ++i) {
+    const double t = i / 30.0;
+    all.push_back(watch.frame(camera->capture(t, static_cast<std::uint64_t>(i)).cloud, t, tool));
+  }
+  return all;
+}
+
+TEST(ApproachWatchTest, SeesWhatComesWithinSevenFrames) {
+  const std::vector<Approach> seen = watched("&speed=0.06&start=2", 2.5, {0.0, 0.0, 0.03});
+  int late = 0;
+  for (std::size_t i = 60 + 7; i < seen.size(); ++i) {
+    late += seen[i].speed == 0.0;
+    if (seen[i].speed == 0.0) continue;
+    EXPECT_GT(seen[i].speed, 0.03);
+    EXPECT_LT(seen[i].speed, 0.12);
+    EXPECT_GT(seen[i].away.z(), 0.9);
+    const double true_gap = 0.03 - 0.06 * (static_cast<double>(i) / 30.0 - 2.0);
+    EXPECT_NEAR(seen[i].gap, std::max(true_gap, 0.0), 4e-3);
+  }
+  EXPECT_LE(late, 1);
+}
+
+TEST(ApproachWatchTest, IsSeldomWrongAboutWhatRests) {
+  const std::vector<Approach> seen = watched("", 20.0, {0.0, 0.0, 0.03});
+  const auto wrong =
+      std::count_if(seen.begin(), seen.end(), [](const Approach& one) { return one.speed > 0.0; });
+  EXPECT_LE(wrong, 30);  // of 600
+}
+
+TEST(ApproachWatchTest, BeginsAnewWhereTimeDoesAndSaysNothingOfNothing) {
+  const auto camera = open_synthetic_camera(Uri("synthetic:plane?size=64x48&noise=1mm"));
+  ApproachWatch watch;
+  for (const double t : {1.0, 1.1, 1.2, 1.3, 0.5, 0.6})
+    EXPECT_EQ(watch.frame(camera->capture(t, 1).cloud, t, {0.0, 0.0, 0.03}).speed, 0.0);
+  EXPECT_EQ(watch.frame(camera->capture(0.7, 2).cloud, 0.7, {0.0, 0.0, 5.0}).speed, 0.0);
+}
+
+TEST(SimulatedToolTest, IsLateByItsLagAndDoesNotOvershoot) {
+  const auto nothing = [](const Vec3&, double) { return SimulatedTool::Surface{1.0, up}; };
+  SimulatedTool tool(Vec3::Zero(), nothing);
+  constexpr double speed = 0.1;
+  double t = 0.0;
+  for (; t < 1.0; t += tick) tool.lead_to(speed * t * up, t + tick, tick);
+  EXPECT_NEAR(speed * t - tool.place().z(), speed * SimulatedTool::lag(), 2e-4);
+  const double end = speed * t;
+  for (; t < 2.0; t += tick) {
+    tool.lead_to(end * up, t + tick, tick);
+    ASSERT_LE(tool.place().z(), end + 1e-9);
+  }
+  EXPECT_NEAR(tool.place().z(), end, 1e-5);
+}
+
+}  // namespace
+}  // namespace palpate

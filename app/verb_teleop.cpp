@@ -72,7 +72,7 @@ int operate(const OperatorOptions& options) {
         session, OperatorEndOptions{.name = options.name, .index = !options.no_index && is_device});
     fmt::print(stderr, "palpate: leads /{} in domain {}; Ctrl-C ends it\n", options.name,
                end->domain());
-    return std::shared_ptr<void>(nullptr, [&end](std::nullptr_t) { end.reset(); });
+    return {nullptr, [&end](std::nullptr_t) { end.reset(); }};
   };
   std::string said;
   run.beside.robot = [&]() -> std::optional<RobotPicture> {
@@ -136,7 +136,7 @@ int guard(const RobotOptions& options) {
     end.attach(session);
     fmt::print(stderr, "palpate: {} ({}) is led by /{} in domain {}; Ctrl-C ends it\n",
                end.info().uri, end.info().kind, options.end.name, end.domain());
-    return std::shared_ptr<void>(nullptr, [&end](std::nullptr_t) { end.detach(); });
+    return {nullptr, [&end](std::nullptr_t) { end.detach(); }};
   };
   std::string said;
   run.beside.robot = [&]() -> std::optional<RobotPicture> {

@@ -170,7 +170,7 @@ class ForceLink : public Coupling {
 
  protected:
   Vec3 read(double t) {
-    const Vec3 place = hand_.read(t).position;
+    Vec3 place = hand_.read(t).position;
     if (last_)
       velocity_ +=
           (1.0 - std::exp(-period / velocity_time)) * ((place - *last_) / period - velocity_);

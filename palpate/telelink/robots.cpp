@@ -13,6 +13,7 @@
 
 #include "palpate/bag/robot_messages.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/tick.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/teleop/simulated_tool.hpp"

@@ -54,6 +54,29 @@ class Ros2Program : public test::Program {
   test::OwnNetwork network_;
 };
 
+// The hand of the operator's end strokes what the robot's camera sees, and the tool follows it.
+TEST_F(Ros2Program, LeadsARobotInAnotherProcess) {
+  const Outcome both =
+      run("teleop --headless --duration 3 --json --robot 'synthetic:plane?size=160x120&noise=1mm'");
+  ASSERT_EQ(both.code, 0) << both.err;
+  EXPECT_NE(both.err.find("is led by /robot"), std::string::npos) << both.err;
+  const auto summary = nlohmann::json::parse(both.out);
+  EXPECT_GT(summary["ticks"], 1000);
+}
+
+TEST_F(Ros2Program, SaysWhatAnEndOfALinkLacks) {
+  const auto refuses = [&](const std::string& words, const std::string& what) {
+    const Outcome refused = run("teleop robot --headless --duration 1 " + words);
+    EXPECT_EQ(refused.code, 2) << words;
+    EXPECT_NE(refused.err.find(what), std::string::npos) << refused.err;
+  };
+  refuses("--robot point:", "none of its own; give the robot's");
+  refuses("--robot pint: --camera synthetic:plane", "unknown kind of robot");
+  refuses("--device mouse:", "the hand is at the operator's end");
+  refuses("--margin -1", "margin");
+  refuses("--name 'a b'", "none for a topic");
+}
+
 TEST_F(Ros2Program, ServesACameraToAnother) {
   Started server({"serve-camera", "--camera", "synthetic:plane?size=64x48", "--name", "robot/eye"});
   const Outcome read =

@@ -62,6 +62,17 @@ class TestRobot final : public Robot {
 };
 
 class Telelink : public ::testing::Test {
+ public:
+  ~Telelink() override {
+    operator_end_.reset();
+    operator_.reset();
+    robot_end_->detach();
+    robot_.reset();
+  }
+
+  Telelink(const Telelink&) = delete;
+  Telelink& operator=(const Telelink&) = delete;
+
  protected:
   Telelink() {
     auto robot = std::make_unique<TestRobot>();
@@ -80,13 +91,6 @@ class Telelink : public ::testing::Test {
     robot_->start();
     robot_end_->attach(*robot_);
   }
-  ~Telelink() override {
-    operator_end_.reset();
-    operator_.reset();
-    robot_end_->detach();
-    robot_.reset();
-  }
-
   // An operator whose hand rests at a place.
   void operate(const Vec3& hand) {
     SessionOptions options;

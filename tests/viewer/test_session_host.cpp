@@ -4,8 +4,10 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -52,6 +54,24 @@ struct Hosted {
   SessionHost host;
   Session session;
 };
+
+TEST(SessionHost, ShowsTheRobotThatTheHandLeads) {
+  EXPECT_EQ(Hosted().host.robot(), "");
+  RobotPicture picture{.name = "arm", .latency = 0.12};
+  PageRules rules;
+  rules.robot = [&] { return std::optional(picture); };
+  Hosted hosted(std::move(rules));
+  json shown = json::parse(hosted.host.robot());
+  EXPECT_TRUE(shown["tool"].is_null());
+  EXPECT_EQ(shown["latency"], 0.12);
+  picture.tool = Vec3(0.1, 0.2, 0.3);
+  picture.links = {Vec3::Zero(), *picture.tool};
+  picture.trouble = "its brakes are on";
+  shown = json::parse(hosted.host.robot());
+  EXPECT_EQ(shown["tool"], (json{0.1, 0.2, 0.3}));
+  EXPECT_EQ(shown["links"].size(), 2U);
+  EXPECT_EQ(shown["trouble"], "its brakes are on");
+}
 
 TEST(SessionHost, HoldsLimitsToWhatTheSessionWasStartedWith) {
   Hosted hosted;

@@ -109,7 +109,10 @@ class Palpate final : public Coupling {
     guard_.run({.t = t});
     ServoTick guarded;
     static_cast<void>(guard_ticks_.try_pop(guarded));
-    led_.touches(guarded.tick.state != ContactState::free_motion);
+    const double ahead = (guarded.place - tool.place()).norm();
+    led_.clearance(guarded.tick.state == ContactState::free_motion
+                       ? watch_.clearance() - SimulatedTool::radius - ahead
+                       : 0.0);
     out.led = led_.is_led();
     if (newest_.cloud)
       watch_.frame(std::exchange(newest_.cloud, nullptr), newest_.stamp, tool.place());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/telelink/robot_end.hpp"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -215,16 +216,21 @@ class RobotEnd::Impl {
     while (ticks_->try_pop(tick)) any = true;
     if (!any) return;  // nothing guards the robot now
     hand_->sees(tick.frame_age <= blind_after);
-    hand_->touches(tick.tick.state != ContactState::free_motion);
     Approach comes;
     RobotState at;
+    double clearance = ApproachWatch::reach;
     {
       const std::lock_guard lock(mutex_);
       at = state_;
       for (const ApproachWatch& watch : watches_) {
         if (watch.newest().speed > comes.speed) comes = watch.newest();
+        clearance = std::min(clearance, watch.clearance());
       }
     }
+    const double ahead = (tick.place - at.position).norm();
+    hand_->clearance(tick.tick.state == ContactState::free_motion
+                         ? clearance - robot_->info().tool_radius - ahead
+                         : 0.0);
     const SetPoint::Order order =
         set_point_.next(tick, lead_.press, hand_->is_led(), comes, at.force);
     if (at.fault.empty()) robot_->command(order.position, order.velocity, now);

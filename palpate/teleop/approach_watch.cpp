@@ -99,9 +99,11 @@ const Approach& ApproachWatch::frame(std::shared_ptr<const Cloud> cloud, double 
   if (!seen_.empty() && !(stamp > seen_.back().stamp)) seen_.clear();
   if (seen_.size() == frames) seen_.erase(seen_.begin());
   seen_.push_back({std::move(cloud), stamp});
+  clearance_ = reach;
   Vec3 towards = Vec3::Zero();
   if (!find_nearest(*seen_.back().cloud, tool, towards)) return approach_;
   const double size = towards.norm();
+  clearance_ = size;
   towards /= size;
   std::array<Distance, frames> distances{};
   std::size_t count = 0;

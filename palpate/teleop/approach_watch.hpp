@@ -40,6 +40,8 @@ class ApproachWatch {
   /// @param stamp  [s] later than those before; others begin anew
   const Approach& frame(std::shared_ptr<const Cloud> cloud, double stamp, const Vec3& tool);
   [[nodiscard]] const Approach& newest() const { return approach_; }
+  /// [m] from the tool to what is nearest, in the newest frame; at most `reach`.
+  [[nodiscard]] double clearance() const { return clearance_; }
 
  private:
   // The slope is taken over several numbers of frames, as little noise or much speed need few; the
@@ -69,6 +71,7 @@ class ApproachWatch {
   double variance_ = -1.0;  // [m^2] of a distance, as usual; negative: not known yet
   bool comes_ = false;
   Approach approach_;
+  double clearance_ = reach;  // [m]
 };
 
 }  // namespace palpate

@@ -19,6 +19,7 @@ void validate(const LeadLimits& limits) {
   };
   check("max_speed", limits.max_speed, 1e-3, 5.0, "m/s");
   check("contact_speed", limits.contact_speed, 1e-3, 5.0, "m/s");
+  check("near_time", limits.near_time, 0.01, 10.0, "s");
   check("silence", limits.silence, 0.005, 0.5, "s");
   check("resume_time", limits.resume_time, 0.0, 10.0, "s");
   if (limits.reach && (limits.reach->isEmpty() || !limits.reach->min().allFinite() ||
@@ -69,9 +70,8 @@ HandState LedHand::read(double t) noexcept {
   if (limits_.reach) wanted = wanted.cwiseMax(limits_.reach->min()).cwiseMin(limits_.reach->max());
   const Vec3 way = wanted - place_;
   const double distance = way.norm();
-  const double speed = touches_.load(std::memory_order_relaxed)
-                           ? std::min(limits_.contact_speed, limits_.max_speed)
-                           : limits_.max_speed;
+  const double gap = std::max(0.0, gap_.load(std::memory_order_relaxed));  // 0 if it is no number
+  const double speed = std::min(limits_.contact_speed + gap / limits_.near_time, limits_.max_speed);
   const double step = share * speed * dt;
   place_ = distance <= step ? wanted : Vec3(place_ + step / distance * way);
   return {.position = place_};

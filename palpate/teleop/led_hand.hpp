@@ -16,9 +16,11 @@ namespace palpate {
 /// How a robot follows leads.
 struct LeadLimits {
   double max_speed = 0.25;  ///< [m/s] in which a lead is followed: the reduced speed of ISO 10218
-  /// [m/s] the same while something is touched. A robot that is late cuts corners: 0.1 m/s and a
-  /// lag of 80 ms about a ball of 20 mm by 0.1 mm.
+  /// [m/s] the same while something is touched, and so much more for each metre that nothing is
+  /// near. A robot that is late cuts corners: with a lag of 80 ms, at 0.05 m/s about a ball of 20
+  /// mm by 0.2 mm; 20 mm away, at 0.15 m/s, by 2 mm.
   double contact_speed = 0.05;
+  double near_time = 0.2;  ///< [s] the clearance over this is the speed that it allows beyond that
   /// [m] world: leads beyond it are followed to its boundary; empty: no limit
   std::optional<Eigen::AlignedBox3d> reach = {};
   /// [s] without a lead, after which the tool is stopped where it is. Longer than the link's
@@ -47,8 +49,8 @@ class LedHand final : public Device {
   void lead(const Lead& lead, double now);
   /// Does the robot's end see what is there? Who does not is not led. Any thread.
   void sees(bool yes) noexcept { sees_.store(yes, std::memory_order_relaxed); }
-  /// Does the proxy at the robot's end touch something? Any thread.
-  void touches(bool yes) noexcept { touches_.store(yes, std::memory_order_relaxed); }
+  /// How far the tool is from what the robot's end sees [m]; 0 where its proxy touches. Any thread.
+  void clearance(double gap) noexcept { gap_.store(gap, std::memory_order_relaxed); }
   /// Where the robot's tool is [m, world], as it says. One thread.
   void tool_is_at(const Vec3& place);
 
@@ -69,7 +71,8 @@ class LedHand final : public Device {
   LeadLimits limits_;
   Mailbox<Heard> leads_;
   Mailbox<Vec3> tools_;
-  std::atomic<bool> sees_{true}, touches_{false}, led_{false};
+  std::atomic<bool> sees_{true}, led_{false};
+  std::atomic<double> gap_{1.0};  // [m]
   // The servo's thread
   Vec3 tool_;
   Vec3 place_;

@@ -97,9 +97,13 @@ TEST_F(LedHandTest, FollowsAtALimitedSpeedAndSlowlyAtFirst) {
   const Vec3 far(1.0, 0.0, 0.0);
   EXPECT_LT(go(hand, 0.05, far), 0.03);
   EXPECT_NEAR(go(hand, 1.0, far), 0.2, 1e-6);
-  hand.touches(true);
+  hand.clearance(0.0);
   EXPECT_NEAR(go(hand, 0.2, far), 0.05, 1e-6);
-  hand.touches(false);
+  hand.clearance(0.01);
+  EXPECT_NEAR(go(hand, 0.2, far), 0.1, 1e-6);
+  hand.clearance(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_LE(go(hand, 0.2, far), 0.05 + 1e-6);
+  hand.clearance(1.0);
   go(hand, 6.0, far);
   EXPECT_EQ(at_, far);
   EXPECT_TRUE(hand.is_led());

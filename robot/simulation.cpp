@@ -13,6 +13,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/pose.hpp"
+#include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/periodic_thread.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -230,6 +231,8 @@ class Simulation::Implementation {
     info_.kind = "simulated arm";
     info_.reach = reach_;
     info_.max_speed = setup_.max_speed;
+    info_.lag = 0.0;  // with the velocity fed forward
+    info_.stiffness = stiffness;
     info_.max_force = setup_.max_force;
     info_.tool_radius = m.geom_size[3 * static_cast<std::ptrdiff_t>(tip_geom_)];
     for (int i = 0; i < m.ngeom; ++i) {
@@ -266,6 +269,7 @@ class Simulation::Implementation {
     try {
       mj_step1(model_.get(), data_.get());
       keep();
+      take_command();
       lead();
       drive_plate();
       mj_step2(model_.get(), data_.get());
@@ -463,13 +467,13 @@ class Simulation::Implementation {
     keep();
   }
 
-  // To be called with the mutex held.
-  void command(const Vec3& position, const Vec3& velocity) noexcept {
-    if (!position.allFinite() || !velocity.allFinite()) return;
-    goal_ = position.cwiseMax(reach_.min()).cwiseMin(reach_.max());
-    goal_velocity_ = limited(velocity, setup_.max_speed);
+  void take_command() {
+    const Command* const command = commands_.take();
+    if (command == nullptr) return;
+    goal_ = command->position.cwiseMax(reach_.min()).cwiseMin(reach_.max());
+    goal_velocity_ = limited(command->velocity, setup_.max_speed);
     for (int i = 0; i < 3; ++i) {
-      if (goal_[i] != position[i]) goal_velocity_[i] = 0.0;
+      if (goal_[i] != command->position[i]) goal_velocity_[i] = 0.0;
     }
     commanded_ = true;
     commanded_at_ = data_->time;
@@ -499,6 +503,11 @@ class Simulation::Implementation {
   std::vector<int> chain_;  // bodies of the arm
   int tip_site_ = 0, tip_geom_ = 0, plate_joint_ = 0, plate_dof_ = 0;
   double plate_mass_ = 0.0, plate_since_ = 0.0;
+
+  struct Command {
+    Vec3 position = Vec3::Zero(), velocity = Vec3::Zero();
+  };
+  Mailbox<Command> commands_;  // so that whoever leads the arm never waits for a step
 
   mutable std::mutex mutex_;  // over all that follows, and data_
   double origin_ = 0.0;       // [s] time 0 of the simulation on the clock that the state tells
@@ -567,8 +576,8 @@ const RobotInfo& Simulation::info() const {
 }
 
 void Simulation::command(const Vec3& position, const Vec3& velocity) noexcept {
-  const std::lock_guard lock(implementation_->mutex_);
-  implementation_->command(position, velocity);
+  if (position.allFinite() && velocity.allFinite())
+    implementation_->commands_.put({position, velocity});
 }
 
 RobotState Simulation::state() const {

@@ -92,7 +92,8 @@ class Simulation {
   [[nodiscard]] double step_length() const;  ///< [s]
 
   [[nodiscard]] const RobotInfo& info() const;
-  /// Where the tip is to be from the next step on; without effect unless finite.
+  /// Where the tip is to be from the next step on; without effect unless finite. One thread at a
+  /// time; wait-free.
   void command(const Vec3& position, const Vec3& velocity) noexcept;
   [[nodiscard]] RobotState state() const;
 

@@ -210,9 +210,12 @@ class Simulation::Implementation {
       }
       info_.joint_names.emplace_back(mj_id2name(&m, mjOBJ_JOINT, i));
       const int body = m.jnt_bodyid[i];
-      if (chain_.empty() || chain_.back() != body) chain_.push_back(body);
+      // Joints that share a place make no link.
+      const mjtNum* const offset = m.body_pos + 3 * static_cast<std::ptrdiff_t>(body);
+      if (chain_.empty() || vector(offset).norm() > 0.0) chain_.push_back(body);
     }
     tip_site_ = find(m, mjOBJ_SITE, "tip");
+    base_site_ = find(m, mjOBJ_SITE, "base");
     tip_geom_ = find(m, mjOBJ_GEOM, "tip");
     plate_joint_ = find(m, mjOBJ_JOINT, "plate");
     if (m.jnt_type[plate_joint_] != mjJNT_SLIDE) {
@@ -257,7 +260,7 @@ class Simulation::Implementation {
     goal_ = reference_;
     last_tip_ = reference_;
     state_.joints.resize(arm_joints);
-    state_.links.resize(chain_.size() + 1);
+    state_.links.resize(chain_.size() + 2);
     tell(0.0);
     keep();
   }
@@ -289,7 +292,7 @@ class Simulation::Implementation {
     for (const int warning : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC, mjWARN_BADCTRL,
                               mjWARN_CONTACTFULL, mjWARN_CNSTRFULL}) {
       const mjWarningStat& stat = data_->warning[warning];
-      if (stat.number > 0) return mju_warningText(warning, static_cast<size_t>(stat.lastinfo));
+      if (stat.number > 0) return mju_warningText(warning, stat.lastinfo);
     }
     return {};
   }
@@ -417,8 +420,9 @@ class Simulation::Implementation {
     state_.velocity = tip_velocity_;
     state_.force = filtered_force_;
     std::copy_n(d.qpos, arm_joints, state_.joints.begin());
+    state_.links.front() = vector(d.site_xpos + 3 * static_cast<std::ptrdiff_t>(base_site_));
     for (std::size_t i = 0; i < chain_.size(); ++i)
-      state_.links[i] = vector(d.xpos + 3 * static_cast<std::ptrdiff_t>(chain_[i]));
+      state_.links[i + 1] = vector(d.xpos + 3 * static_cast<std::ptrdiff_t>(chain_[i]));
     state_.links.back() = state_.position;
   }
 
@@ -500,8 +504,8 @@ class Simulation::Implementation {
   RobotInfo info_;
   Eigen::AlignedBox3d reach_;
   std::vector<VisibleGeom> geoms_;
-  std::vector<int> chain_;  // bodies of the arm
-  int tip_site_ = 0, tip_geom_ = 0, plate_joint_ = 0, plate_dof_ = 0;
+  std::vector<int> chain_;  // bodies of the arm at its bends
+  int tip_site_ = 0, base_site_ = 0, tip_geom_ = 0, plate_joint_ = 0, plate_dof_ = 0;
   double plate_mass_ = 0.0, plate_since_ = 0.0;
 
   struct Command {

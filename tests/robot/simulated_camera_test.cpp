@@ -21,7 +21,7 @@ TEST(SimulatedCamera, MeasuresWhatMuJoCosRaysMeet) {
   const SimulatedCell cell = stepped("&arm=seen&quantisation=0.05mm");
   const auto camera = cell.camera();
   cell.simulation()->command({0.05, 0.08, 0.05}, Vec3::Zero());
-  for (int i = 0; i < 15; ++i) ASSERT_TRUE(camera->next());
+  ASSERT_EQ(camera->skip(15), 15u);
   const Frame frame = *camera->next();
   EXPECT_NEAR(frame.stamp, 0.5, 1e-9);
   const DepthImage& image = image_of(frame);
@@ -29,7 +29,7 @@ TEST(SimulatedCamera, MeasuresWhatMuJoCosRaysMeet) {
   std::mt19937 random(3);
   int compared = 0;
   int of_arm = 0;
-  for (int i = 0; i < 4000; ++i) {
+  for (int i = 0; i < 2000; ++i) {
     const int u = std::uniform_int_distribution<int>(0, 319)(random);
     const int v = std::uniform_int_distribution<int>(0, 239)(random);
     const Vec3 ray = image.rays().ray(u, v).homogeneous();
@@ -43,8 +43,8 @@ TEST(SimulatedCamera, MeasuresWhatMuJoCosRaysMeet) {
     const auto scene = cell.simulation()->ray(eye, direction, false);
     of_arm += !scene || *scene > *truth + 1e-3;
   }
-  EXPECT_GT(compared, 3000);
-  EXPECT_GT(of_arm, 50);
+  EXPECT_GT(compared, 1500);
+  EXPECT_GT(of_arm, 25);
 }
 
 TEST(SimulatedCamera, LeavesOutTheArmAndNothingElse) {
@@ -56,8 +56,8 @@ TEST(SimulatedCamera, LeavesOutTheArmAndNothingElse) {
   const DepthImage& image = image_of(without);
   const Vec3 eye = image.world_from_camera().translation();
   int left_out = 0, around = 0;
-  for (int v = 0; v < 240; v += 2) {
-    for (int u = 0; u < 320; u += 2) {
+  for (int v = 0; v < 240; v += 3) {
+    for (int u = 0; u < 320; u += 3) {
       const Vec3 direction =
           (image.world_from_camera().linear() * image.rays().ray(u, v).homogeneous()).normalized();
       const auto first = cell.simulation()->ray(eye, direction, true);

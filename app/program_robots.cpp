@@ -1,54 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/program_robots.hpp"
 
-#include <utility>
-
-#include "palpate/core/error.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
-#include "palpate/telelink/robots.hpp"
+#include "app/standard_cells.hpp"
 
 namespace palpate::app {
-namespace {
-
-// A tool in a synthetic scene, and the camera that sees it.
-Cell open_scene(const std::string& uri) {
-  auto camera = open_synthetic_camera(Uri(uri));
-  const Vec3 begin(0.0, 0.0, 0.12);  // [m] above what scenes have in the middle
-  std::shared_ptr<SceneRobot> robot =
-      open_scene_robot(std::make_shared<const Scene>(camera->scene()), begin, uri);
-  // Whoever leads it has the robot; whoever shows it frames knows it as long as they come.
-  struct Shared final : Robot {
-    explicit Shared(std::shared_ptr<SceneRobot> one) : robot(std::move(one)) {}
-    [[nodiscard]] const RobotInfo& info() const override { return robot->info(); }
-    void command(const Vec3& position, const Vec3& velocity, double t) noexcept override {
-      robot->command(position, velocity, t);
-    }
-    [[nodiscard]] std::optional<RobotState> state() override { return robot->state(); }
-    std::shared_ptr<SceneRobot> robot;
-  };
-  const std::shared_ptr<std::unique_ptr<Source>> source =
-      std::make_shared<std::unique_ptr<Source>>(std::move(camera));
-  return {
-      .robot = [robot] { return std::make_unique<Shared>(robot); },
-      .camera = [source] { return std::move(*source); },
-      .on_frame =
-          [robot](const FedFrame& frame) { robot->relate(frame.frame.stamp, frame.source_stamp); }};
-}
-
-}  // namespace
 
 Cell open_cell(const std::string& uri) {
-  if (Uri(uri).scheme() == "synthetic") return open_scene(uri);
-  return {.robot = [uri] { return open_robot(uri); }, .camera = nullptr, .on_frame = nullptr};
+  return open_standard_cell(uri);
 }
 
 std::string robots_help() {
-  std::string text = "what is led, and the camera with it where it has one (" +
-                     std::string(usual_cell) + "): synthetic:SCENE: a simulated tool in a scene";
-  const Registry<RobotScheme> robots = standard_robots();
-  for (const RobotScheme& scheme : robots.entries())
-    text += "; " + scheme.name + ": " + scheme.summary;
-  return text;
+  return "what is led, and the camera with it where it has one (" + std::string(usual_cell) +
+         "): " + standard_robots_help();
 }
 
 }  // namespace palpate::app

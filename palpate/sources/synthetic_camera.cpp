@@ -61,44 +61,6 @@ std::uint64_t whole_option(const Uri& uri, std::string_view key, std::uint64_t f
   return static_cast<std::uint64_t>(value);
 }
 
-CameraSetup setup_of(const Uri& uri) {
-  CameraSetup setup;
-  const Pair size = pair_option(uri, "size", {640, 480}, 1, 16384, false);
-  if (size.first != std::floor(size.first) || size.second != std::floor(size.second)) {
-    throw Error(uri.text() + ": option 'size'", "there are no parts of a pixel",
-                "write such as size=640x480");
-  }
-  setup.intrinsics = pinhole(static_cast<int>(size.first), static_cast<int>(size.second),
-                             uri.number_option("fov", 57.0 * deg, deg, 170.0 * deg, "rad"));
-  setup.world_from_camera = looking_at_origin(
-      uri.number_option("distance", 0.7, 0.01, 100.0, "m"),
-      uri.number_option("tilt", 34.0 * deg, -std::numbers::pi, std::numbers::pi, "rad"),
-      uri.number_option("azimuth", 0.0, -2.0 * std::numbers::pi, 2.0 * std::numbers::pi, "rad"));
-  setup.frame_rate = uri.number_option("fps", 30.0, 1e-3, 10000.0, "Hz");
-  setup.brightness = uri.number_option("brightness", 0.0, 1e-4, 100.0, "m");
-  setup.colour = uri.number_option("colour", 0.0, 1e-4, 100.0, "m");
-  if (uri.has("frames")) setup.frames = whole_option(uri, "frames", 0, 1.0);
-  return setup;
-}
-
-SensorModel sensor_of(const Uri& uri) {
-  SensorModel model = SensorModel::named(uri.text_option("sensor", "ideal"));
-  model.noise = uri.number_option("noise", model.noise, 0.0, 1.0, "m");
-  if (uri.has("noise_grows"))
-    model.noise_growth = uri.number_option("noise_grows", 0.0, 0.0, 1.0, "px") != 0.0 ? 2 : 0;
-  const Pair correlation =
-      pair_option(uri, "correlation", {model.correlation_x, model.correlation_y}, 0.0, 100.0, true);
-  model.correlation_x = correlation.first;
-  model.correlation_y = correlation.second;
-  model.quantisation = uri.number_option("quantisation", model.quantisation, 1e-6, 0.1, "m");
-  model.disparity_step = uri.number_option("disparity_step", model.disparity_step, 0.0, 0.1, "m");
-  model.dropouts = uri.number_option("dropouts", model.dropouts, 0.0, 1.0, "1");
-  model.grazing = uri.number_option("grazing", model.grazing, 0.0, 0.5 * std::numbers::pi, "rad");
-  model.flying = uri.number_option("flying", model.flying, 0.0, 1.0, "1");
-  model.seed = whole_option(uri, "seed", model.seed, 0.0);
-  return model;
-}
-
 }  // namespace
 
 Intrinsics pinhole(int width, int height, double field_of_view) {
@@ -233,6 +195,52 @@ void SyntheticCamera::draw(const Part& part, double t, std::vector<float>& depth
   }
 }
 
+CameraSetup camera_setup(const Uri& uri) {
+  CameraSetup setup;
+  const Pair size = pair_option(uri, "size", {640, 480}, 1, 16384, false);
+  if (size.first != std::floor(size.first) || size.second != std::floor(size.second)) {
+    throw Error(uri.text() + ": option 'size'", "there are no parts of a pixel",
+                "write such as size=640x480");
+  }
+  setup.intrinsics = pinhole(static_cast<int>(size.first), static_cast<int>(size.second),
+                             uri.number_option("fov", 57.0 * deg, deg, 170.0 * deg, "rad"));
+  setup.world_from_camera = looking_at_origin(
+      uri.number_option("distance", 0.7, 0.01, 100.0, "m"),
+      uri.number_option("tilt", 34.0 * deg, -std::numbers::pi, std::numbers::pi, "rad"),
+      uri.number_option("azimuth", 0.0, -2.0 * std::numbers::pi, 2.0 * std::numbers::pi, "rad"));
+  setup.frame_rate = uri.number_option("fps", 30.0, 1e-3, 10000.0, "Hz");
+  setup.brightness = uri.number_option("brightness", 0.0, 1e-4, 100.0, "m");
+  setup.colour = uri.number_option("colour", 0.0, 1e-4, 100.0, "m");
+  if (uri.has("frames")) setup.frames = whole_option(uri, "frames", 0, 1.0);
+  return setup;
+}
+
+SensorModel camera_sensor(const Uri& uri) {
+  SensorModel model = SensorModel::named(uri.text_option("sensor", "ideal"));
+  model.noise = uri.number_option("noise", model.noise, 0.0, 1.0, "m");
+  if (uri.has("noise_grows"))
+    model.noise_growth = uri.number_option("noise_grows", 0.0, 0.0, 1.0, "px") != 0.0 ? 2 : 0;
+  const Pair correlation =
+      pair_option(uri, "correlation", {model.correlation_x, model.correlation_y}, 0.0, 100.0, true);
+  model.correlation_x = correlation.first;
+  model.correlation_y = correlation.second;
+  model.quantisation = uri.number_option("quantisation", model.quantisation, 1e-6, 0.1, "m");
+  model.disparity_step = uri.number_option("disparity_step", model.disparity_step, 0.0, 0.1, "m");
+  model.dropouts = uri.number_option("dropouts", model.dropouts, 0.0, 1.0, "1");
+  model.grazing = uri.number_option("grazing", model.grazing, 0.0, 0.5 * std::numbers::pi, "rad");
+  model.flying = uri.number_option("flying", model.flying, 0.0, 1.0, "1");
+  model.seed = whole_option(uri, "seed", model.seed, 0.0);
+  return model;
+}
+
+SensorKind camera_kind(const Uri& uri) {
+  const std::string sensor = uri.text_option("sensor", "ideal");
+  if (sensor == "d4xx") return SensorKind::stereo;
+  if (sensor == "kinect") return SensorKind::structured_light;
+  if (sensor == "tof") return SensorKind::time_of_flight;
+  return SensorKind::unknown;
+}
+
 std::unique_ptr<SyntheticCamera> open_synthetic_camera(const Uri& text) {
   const Uri uri = text.path().empty() ? Uri("synthetic:desk" + text.text().substr(10)) : text;
   std::vector<std::string_view> options = scene_options(uri.path());
@@ -246,11 +254,8 @@ std::unique_ptr<SyntheticCamera> open_synthetic_camera(const Uri& text) {
   SourceInfo info;
   info.uri = text.text();
   info.kind = "synthetic depth camera, scene " + uri.path();
-  const std::string sensor = uri.text_option("sensor", "ideal");
-  if (sensor == "d4xx") info.sensor = SensorKind::stereo;
-  if (sensor == "kinect") info.sensor = SensorKind::structured_light;
-  if (sensor == "tof") info.sensor = SensorKind::time_of_flight;
-  return std::make_unique<SyntheticCamera>(make_scene(uri), setup_of(uri), sensor_of(uri),
+  info.sensor = camera_kind(uri);
+  return std::make_unique<SyntheticCamera>(make_scene(uri), camera_setup(uri), camera_sensor(uri),
                                            std::move(info));
 }
 

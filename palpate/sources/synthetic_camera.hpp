@@ -76,6 +76,13 @@ class SyntheticCamera final : public Source {
   std::uint64_t next_frame_ = 0;
 };
 
+/// What a URI's options say of a camera as open_synthetic_camera takes them, for cameras that see
+/// other scenes. Options that are not of the camera are ignored.
+/// @throws Error for a value out of range.
+CameraSetup camera_setup(const Uri& uri);
+SensorModel camera_sensor(const Uri& uri);
+SensorKind camera_kind(const Uri& uri);
+
 /// `synthetic:SCENE?KEY=VALUE&...`: a scene with its options (make_scene) and
 ///   size=640x480 fps=30Hz frames=N fov=57deg distance=0.7m tilt=34deg azimuth=0deg seed=1
 ///   brightness=20mm: an image in grey; surfaces are painted with waves along the world's x

@@ -37,12 +37,14 @@ KNOWS = {
     "search": {"core"},
     "lab": {"core", "paper", "methods", "cloud", "fixtures", "servo", "teleop", "sources",
             "devices", "search"},
+    "robot": {"core", "cloud", "sources", "servo", "teleop"},
     "bench": {"core", "paper", "methods", "cloud", "search"},
 }
-KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench"}
+KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench", "robot"}
 KNOWS["python"] = KNOWS["app"] - {"node", "viewer"} | {"lab"}
 # The programs that are built when they are first asked for.
 KNOWS["app/lab"] = KNOWS["app"] | {"app", "lab"}
+KNOWS["app/robot"] = KNOWS["app"] | {"app", "robot"}
 KNOWS["app/bench"] = KNOWS["app"] | {"app", "bench"}
 
 # Methods are pure: neither threads nor clocks nor files, and no library but Eigen.
@@ -88,9 +90,9 @@ def lines(root, path):
 def room_of(path):
     """The room that a path from the root belongs to, or None."""
     parts = path.split("/")
-    if "/".join(parts[:2]) in ("app/lab", "app/bench"):
+    if "/".join(parts[:2]) in ("app/lab", "app/bench", "app/robot"):
         return "/".join(parts[:2])
-    if len(parts) > 1 and parts[0] in ("search", "lab", "bench", "app", "python"):
+    if len(parts) > 1 and parts[0] in ("search", "lab", "bench", "robot", "app", "python"):
         return parts[0]
     return parts[1] if len(parts) > 2 and parts[0] == "palpate" else None
 
@@ -98,7 +100,8 @@ def room_of(path):
 def check_rooms(root):
     """Includes and CMake links that point up or sideways."""
     faults = []
-    of_a_room = re.compile(r"^(palpate|search|lab|bench|app|python)/.*(\.[ch]pp|CMakeLists\.txt)$")
+    of_a_room = re.compile(r"^(palpate|search|lab|bench|robot|app|python)/.*"
+                           r"(\.[ch]pp|CMakeLists\.txt)$")
     for path in files(root, of_a_room):
         room = room_of(path)
         if room is None:

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/program_robots.hpp"
+
+#include "app/standard_cells.hpp"
+
+#include "robot/simulated_cell.hpp"
+
+namespace palpate::app {
+
+Cell open_cell(const std::string& uri) {
+  if (Uri(uri).scheme() != "mujoco") return open_standard_cell(uri);
+  const robot::SimulatedCell cell{Uri(uri)};
+  return {.robot = [cell] { return cell.robot(); },
+          .camera = [cell] { return cell.camera(); },
+          .on_frame = [](const FedFrame& /*frame*/) {}};  // both are on the loop's clock
+}
+
+std::string robots_help() {
+  return "what is led, and the camera with it where it has one (" + std::string(usual_cell) +
+         "): mujoco:desk?KEY=VALUE&...: a simulated arm at a table; " + standard_robots_help();
+}
+
+}  // namespace palpate::app

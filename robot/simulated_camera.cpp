@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "robot/simulated_camera.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <variant>
+
+#include "palpate/core/error.hpp"
+#include "palpate/servo/realtime.hpp"
+
+namespace palpate::robot {
+namespace {
+
+constexpr float nothing = std::numeric_limits<float>::infinity();
+
+// The same shape with its surface moved out by `margin` (a block's corners stay sharp).
+Shape thickened(const Shape& shape, double margin) {
+  if (const auto* ball = std::get_if<Sphere>(&shape)) return Sphere{ball->radius + margin};
+  if (const auto* rod = std::get_if<Capsule>(&shape))
+    return Capsule{rod->radius + margin, rod->half_length};
+  if (const auto* rod = std::get_if<Cylinder>(&shape))
+    return Cylinder{rod->radius + margin, rod->half_length + margin};
+  if (const auto* prism = std::get_if<Prism>(&shape)) {
+    // Of an arm, always a block.
+    const Eigen::Vector2d half = prism->outline.front().cwiseAbs();
+    return block({half.x() + margin, prism->half_length + margin, half.y() + margin});
+  }
+  return shape;
+}
+
+}  // namespace
+
+SimulatedCamera::SimulatedCamera(std::shared_ptr<Simulation> simulation,
+                                 const SimulatedCameraSetup& setup, SourceInfo info)
+    : simulation_(std::move(simulation)),
+      setup_(setup),
+      sensor_(setup.sensor, setup.camera.intrinsics),
+      info_(std::move(info)),
+      rays_(std::make_shared<const ViewingRays>(setup.camera.intrinsics)),
+      directions_(setup.camera.intrinsics.width),
+      along_(setup.camera.intrinsics.width) {
+  if (!(setup.camera.frame_rate >= 0.1 && setup.camera.frame_rate <= 1000.0)) {
+    throw Error("simulated camera: frame rate", "it is not between 0.1 and 1000 Hz",
+                "give such as 30 Hz");
+  }
+  if (!(setup.latency >= 0.0 && setup.latency <= 0.4)) {
+    throw Error("simulated camera: latency", "it is not between 0 and 0.4 s", "give such as 30 ms");
+  }
+  if (!(setup.margin >= 0.0 && setup.margin <= 0.1)) {
+    throw Error("simulated camera: margin", "it is not between 0 and 0.1 m", "give such as 3 mm");
+  }
+  for (const VisibleGeom& geom : simulation_->geoms())
+    thick_.push_back(thickened(geom.shape, geom.of_arm ? setup.margin : 0.0));
+  info_.frame_rate = setup.camera.frame_rate;
+  info_.live = simulation_->runs();
+  info_.clock = info_.live ? StampClock::monotonic : StampClock::recording;
+  if (info_.kind.empty()) info_.kind = "simulated depth camera of a robot's cell";
+}
+
+void SimulatedCamera::cancel() noexcept {
+  {
+    const std::lock_guard lock(mutex_);
+    cancelled_ = true;
+  }
+  cancelled_changed_.notify_all();
+}
+
+std::size_t SimulatedCamera::skip(std::size_t count) {
+  if (info_.live) return 0;
+  next_frame_ += count;
+  return count;
+}
+
+std::optional<Frame> SimulatedCamera::next(double timeout) {
+  if (info_.live) return live(timeout);
+  const std::uint64_t frame = next_frame_++;
+  const double due = static_cast<double>(frame) / setup_.camera.frame_rate;
+  // What is told of a time is told by the step that begins then.
+  simulation_->advance(due + simulation_->step_length());
+  return capture(simulation_->poses(due), frame);
+}
+
+std::optional<Frame> SimulatedCamera::live(double timeout) {
+  using namespace std::chrono;  // steady_clock is CLOCK_MONOTONIC
+  const double now = monotonic_now();
+  const double period = 1.0 / setup_.camera.frame_rate;
+  if (!first_) first_ = now;
+  // The newest frame that can be given by now, unless it was given; else the one to come.
+  const double newest = std::floor((now - setup_.latency - *first_) / period);
+  if (newest > static_cast<double>(next_frame_)) next_frame_ = static_cast<std::uint64_t>(newest);
+  const double captured = *first_ + static_cast<double>(next_frame_) * period;
+  const double wait = captured + setup_.latency - now;
+  {
+    std::unique_lock lock(mutex_);
+    if (wait > 0.0 || cancelled_) {
+      const double longest = std::clamp(std::min(wait, timeout), 0.0, 3600.0);
+      cancelled_changed_.wait_for(lock, duration<double>(longest), [this] { return cancelled_; });
+      if (cancelled_ || wait > timeout) return std::nullopt;
+    }
+  }
+  return capture(simulation_->poses(captured), next_frame_++);
+}
+
+Frame SimulatedCamera::capture(const BodyPoses& poses, std::uint64_t frame) {
+  const std::vector<VisibleGeom>& geoms = simulation_->geoms();
+  const Intrinsics& image = setup_.camera.intrinsics;
+  if (resting_.empty()) {
+    resting_.assign(static_cast<std::size_t>(image.width) * image.height, nothing);
+    for (const VisibleGeom& geom : geoms) {
+      if (geom.rests && !geom.of_arm) draw(geom, geom.shape, poses, resting_);
+    }
+  }
+  depth_ = resting_;
+  for (const VisibleGeom& geom : geoms) {
+    const bool drawn = geom.of_arm ? setup_.arm == ArmView::seen : !geom.rests;
+    if (drawn) draw(geom, geom.shape, poses, depth_);
+  }
+  std::vector<std::uint16_t> readings = sensor_.measure(depth_, frame);
+  if (setup_.arm == ArmView::hidden) {
+    // Starting from the scene's depth, so that what is before the arm stays.
+    arm_ = depth_;
+    for (std::size_t i = 0; i < geoms.size(); ++i) {
+      if (geoms[i].of_arm) draw(geoms[i], thick_[i], poses, arm_);
+    }
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+      if (arm_[i] < depth_[i]) readings[i] = 0;
+    }
+  }
+  return {poses.t, std::make_shared<const DepthImage>(rays_, std::move(readings),
+                                                      1.0 / sensor_.model().quantisation,
+                                                      setup_.camera.world_from_camera)};
+}
+
+// The pixels that can show a shape: those of balls whose convex hull holds it, which is seen within
+// the bounds of theirs. Where one of the balls is out of the image, the hull may still cross it:
+// then those of the ball around the whole shape.
+ViewingRays::Window SimulatedCamera::window(const Shape& shape,
+                                            const Eigen::Isometry3d& camera_from_shape) const {
+  const Intrinsics& image = setup_.camera.intrinsics;
+  const double bound = bounding_radius(shape);
+  if (!std::isfinite(bound)) return {0, image.width, 0, image.height};
+  const ViewingRays::Window around = rays_->window(camera_from_shape.translation(), bound);
+  ViewingRays::Window hull{image.width, 0, image.height, 0};
+  bool complete = true;
+  const auto add = [&](const Vec3& centre, double radius) {
+    const ViewingRays::Window one = rays_->window(camera_from_shape * centre, radius);
+    complete = complete && !one.empty();
+    hull = {std::min(hull.u_begin, one.u_begin), std::max(hull.u_end, one.u_end),
+            std::min(hull.v_begin, one.v_begin), std::max(hull.v_end, one.v_end)};
+  };
+  if (const auto* capsule = std::get_if<Capsule>(&shape)) {
+    for (const double side : {-1.0, 1.0})
+      add({0.0, side * capsule->half_length, 0.0}, capsule->radius);
+  } else if (const auto* cylinder = std::get_if<Cylinder>(&shape)) {
+    for (const double side : {-1.0, 1.0})
+      add({0.0, side * cylinder->half_length, 0.0}, cylinder->radius);
+  } else if (const auto* prism = std::get_if<Prism>(&shape)) {
+    // Balls of some size, so that each has a pixel.
+    for (const Eigen::Vector2d& corner : prism->outline) {
+      for (const double side : {-1.0, 1.0})
+        add({corner.x(), side * prism->half_length, corner.y()}, bound / 16.0);
+    }
+  } else {
+    complete = false;
+  }
+  return complete ? hull : around;
+}
+
+// Rays are (x, y, 1) in the camera's frame, so that the length along a ray is the depth.
+void SimulatedCamera::draw(const VisibleGeom& geom, const Shape& shape, const BodyPoses& poses,
+                           std::vector<float>& depth) {
+  const Eigen::Isometry3d shape_from_camera =
+      (poses.world_from_body[geom.body] * geom.body_from_shape).inverse() *
+      setup_.camera.world_from_camera;
+  const ViewingRays::Window seen = window(shape, shape_from_camera.inverse());
+  if (seen.empty()) return;
+  const Vec3 origin = shape_from_camera.translation();
+  const Eigen::Matrix3d turn = shape_from_camera.linear();
+  const std::size_t count = seen.u_end - seen.u_begin;
+  for (int v = seen.v_begin; v < seen.v_end; ++v) {
+    float* const row = depth.data() +
+                       static_cast<std::ptrdiff_t>(v) * setup_.camera.intrinsics.width +
+                       seen.u_begin;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector2d ray = rays_->ray(seen.u_begin + static_cast<int>(i), v);
+      directions_[i] = turn.col(0) * ray.x() + turn.col(1) * ray.y() + turn.col(2);
+      along_[i] = row[i];
+    }
+    cast(shape, origin, std::span(directions_).first(count), std::span(along_).first(count));
+    for (std::size_t i = 0; i < count; ++i) row[i] = static_cast<float>(along_[i]);
+  }
+}
+
+}  // namespace palpate::robot

@@ -9,8 +9,12 @@ Cell open_cell(const std::string& uri) {
   return open_standard_cell(uri);
 }
 
+std::string usual_cell() {
+  return "synthetic:desk?sensor=d4xx";
+}
+
 std::string robots_help() {
-  return "what is led, and the camera with it where it has one (" + std::string(usual_cell) +
+  return "what is led, and the camera with it where it has one (" + usual_cell() +
          "): " + standard_robots_help();
 }
 

@@ -27,6 +27,7 @@ Cell open_cell(const std::string& uri);
 /// The help of --robot.
 std::string robots_help();
 
-constexpr const char* usual_cell = "synthetic:desk?sensor=d4xx";  ///< a scene with a tool in it
+/// What is led where nothing is named: a scene with a robot in it, and its camera.
+std::string usual_cell();
 
 }  // namespace palpate::app

@@ -40,7 +40,7 @@ struct RobotOptions {
   RunOptions run;
   bool is_beside = false;  // the operator's end, which has the page that people are to open
   RobotEndOptions end;
-  std::string robot = usual_cell;
+  std::string robot = usual_cell();
 };
 
 // A line when what is wrong changes.
@@ -127,7 +127,7 @@ int guard(const RobotOptions& options) {
     }
     session.on_frame = [&, shown = std::move(session.on_frame)](std::size_t camera,
                                                                 const FedFrame& frame) {
-      if (own_camera) cell.on_frame(frame);
+      if (own_camera && cell.on_frame) cell.on_frame(frame);
       end.on_frame(camera, frame);
       if (shown) shown(camera, frame);
     };

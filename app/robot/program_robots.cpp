@@ -15,8 +15,12 @@ Cell open_cell(const std::string& uri) {
           .on_frame = [](const FedFrame& /*frame*/) {}};  // both are on the loop's clock
 }
 
+std::string usual_cell() {
+  return "mujoco:desk?sensor=d4xx&size=320x240";
+}
+
 std::string robots_help() {
-  return "what is led, and the camera with it where it has one (" + std::string(usual_cell) +
+  return "what is led, and the camera with it where it has one (" + usual_cell() +
          "): mujoco:desk?KEY=VALUE&...: a simulated arm at a table; " + standard_robots_help();
 }
 

@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "robot/simulation.hpp"
-
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <functional>
 #include <numbers>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
 
 #include "palpate/core/error.hpp"
 
 #include "robot/models.hpp"
+#include "robot/simulation.hpp"
 
 namespace palpate::robot {
 namespace {

@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "robot/simulated_camera.hpp"
+#include <cmath>
+#include <memory>
+#include <random>
+#include <string>
+
+#include <gtest/gtest.h>
 
 #include "palpate/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 
+#include "robot/simulated_camera.hpp"
 #include "robot/simulated_cell.hpp"
 
 namespace palpate::robot {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <filesystem>
 #include <functional>
 #include <numbers>
 #include <string>
@@ -213,9 +213,9 @@ TEST(Simulation, GivesEqualStatesBitForBit) {
   const auto [second, second_box] = end();
   EXPECT_EQ(first.t, second.t);
   EXPECT_EQ(first.joints, second.joints);
-  EXPECT_EQ(std::memcmp(first.position.data(), second.position.data(), sizeof(Vec3)), 0);
-  EXPECT_EQ(std::memcmp(first.force.data(), second.force.data(), sizeof(Vec3)), 0);
-  EXPECT_EQ(std::memcmp(first_box.data(), second_box.data(), sizeof(double) * 16), 0);
+  EXPECT_EQ(first.position, second.position);
+  EXPECT_EQ(first.force, second.force);
+  EXPECT_EQ(first_box.matrix(), second_box.matrix());
   EXPECT_GT((first_box.translation() - Vec3(0.10, 0.10, 0.04)).norm(), 0.01);
 }
 

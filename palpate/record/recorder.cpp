@@ -25,7 +25,8 @@ Recorder::Recorder(const std::filesystem::path& folder, const SessionInfo& info,
                    const CycleReader& cycle, std::function<void()> renew,
                    const RecorderOptions& options)
     : options_(options), cycle_(cycle), renew_(std::move(renew)), begun_(!renew_), info_(info) {
-  writer_.emplace(folder, info, monotonic_now(), std::nullopt, options.commit_interval);
+  info_.frames_in_parent = !options_.with_frames;
+  writer_.emplace(folder, info_, monotonic_now(), std::nullopt, options.commit_interval);
   status_.folder = writer_->folder();
   threads_.emplace_back([this] { collect(); });
   threads_.emplace_back([this] { write(); });
@@ -89,9 +90,10 @@ void Recorder::frame(std::uint64_t number, double stamp,
                      std::vector<std::shared_ptr<const Cloud>> cameras) {
   const std::lock_guard lock(mutex_);
   if (stopping_) return;
+  if (!options_.with_frames) cameras.clear();
   auto frame = std::make_shared<PutFrame>(
       PutFrame{.number = number, .stamp = stamp, .cameras = std::move(cameras), .fresh = {}});
-  if (entries_.size() >= options_.most_frames) {
+  if (options_.with_frames && entries_.size() >= options_.most_frames) {
     ++status_.lost_frames;
     frame->cameras.clear();
     frame->left_out = true;
@@ -321,7 +323,7 @@ void Recorder::write_entries() {
       const PutFrame& frame = **put;
       if (frame.left_out) {
         writer_->left_out(frame.number, frame.stamp);
-      } else {
+      } else if (options_.with_frames) {
         writer_->frame(frame.number, frame.stamp, frame.cameras, frame.packed);
       }
       frame_written_ = frame.number;

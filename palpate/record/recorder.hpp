@@ -28,6 +28,8 @@ struct RecorderOptions {
   std::size_t compress_below = 8;
   std::size_t most_frames = 150;    ///< waiting; the next is left out, and counted. 90 MB at VGA
   std::size_t most_ticks = 60'000;  ///< waiting; the next are lost, and counted. 20 MB
+  /// False: another recording of the session has the frames; see SessionInfo::frames_in_parent.
+  bool with_frames = true;
 };
 
 /// Records a live session on threads of its own: ticks from the servo's ring, frames and settings

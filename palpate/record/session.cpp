@@ -254,6 +254,10 @@ AdoptedFrame adopted_of(std::span<const double> row, const std::string& name) {
   return frame;
 }
 
+std::filesystem::path hand_folder(const std::filesystem::path& first, const std::string& hand) {
+  return first / hand;
+}
+
 std::string to_json(const SessionInfo& info) {
   std::vector<std::string> columns = tick_columns();
   columns.insert(columns.end(), energy_columns().begin(), energy_columns().end());
@@ -268,6 +272,9 @@ std::string to_json(const SessionInfo& info) {
   if (info.limits)
     object["device_limits"] = {{"max_force", info.limits->max_force},
                                {"continuous_force", info.limits->continuous_force}};
+  if (!info.hand.empty()) object["hand"] = info.hand;
+  if (!info.more_hands.empty()) object["more_hands"] = info.more_hands;
+  if (info.frames_in_parent) object["frames_in_parent"] = true;
   return object.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -286,6 +293,13 @@ SessionInfo session_from_json(const std::string& text, const std::string& name) 
       info.limits = DeviceLimits{.max_force = limits.at("max_force").get<double>(),
                                  .continuous_force = limits.at("continuous_force").get<double>()};
     }
+    info.hand = object.value("hand", std::string());
+    info.more_hands = object.value("more_hands", std::vector<std::string>());
+    for (const std::string& hand : info.more_hands) {
+      if (hand.empty() || hand.find_first_of("./\\") != std::string::npos)
+        throw Error(name, "has a hand '" + hand + "'", "it may be damaged");
+    }
+    info.frames_in_parent = object.value("frames_in_parent", false);
     return info;
   });
 }

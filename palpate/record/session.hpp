@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -27,7 +28,15 @@ struct SessionInfo {
   std::optional<Vec3> seat{};          ///< [m] where the proxy was put before the first tick
   /// Of the device; none in recordings of which a replay cannot run the safety chain.
   std::optional<DeviceLimits> limits{};
+  /// The hand's name, in a session of several; the recording of the first one names the others,
+  /// which lie in its hand_folder().
+  std::string hand{};
+  std::vector<std::string> more_hands{};
+  bool frames_in_parent = false;  ///< of a hand after the first: its frames are in the first one's
 };
+
+/// Where the recording of a hand after the first lies within that of the first.
+std::filesystem::path hand_folder(const std::filesystem::path& first, const std::string& hand);
 
 /// The topics of a session besides its cameras' (CameraTopics).
 namespace session_topic {

@@ -30,6 +30,28 @@ void SessionReader::read_all(std::string_view topic, const Take& take) {
   }
 }
 
+// The recording of the first hand, in whose folder that of another one lies.
+std::unique_ptr<SessionReader> SessionReader::parent_of(const std::filesystem::path& path) {
+  const auto folder = [](std::filesystem::path of) {
+    if (!of.has_filename()) of = of.parent_path();  // a slash at its end
+    return of.parent_path();
+  };
+  std::error_code unused;
+  const std::filesystem::path here = std::filesystem::absolute(path).lexically_normal();
+  const std::filesystem::path first =
+      folder(std::filesystem::is_regular_file(here, unused) ? folder(here) : here);
+  try {
+    auto parent = std::make_unique<SessionReader>(first);
+    if (!parent->info_.frames_in_parent) return parent;
+  } catch (const Error& error) {
+    throw Error(path.string(),
+                std::string("needs the recording of its session's first hand: ") + error.what(),
+                "leave it in the folder in which it was made");
+  }
+  throw Error(path.string(), "lies in a recording that has no frames either",
+              "leave it in the folder in which it was made");
+}
+
 SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
   const BagReader::Topic* session = bag_.find(session_topic::session);
   if (session == nullptr || bag_.places(session_topic::session).empty())
@@ -38,6 +60,7 @@ SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
   read_all<ros::String>(session_topic::session, [&](const auto& message, const auto& name) {
     info_ = session_from_json(message.data, name);
   });
+  if (info_.frames_in_parent) parent_ = parent_of(path);
   read_all<ros::String>(session_topic::settings, [&](const auto& message, const auto& name) {
     const NumberedSettings settings = settings_from_json(message.data, name);
     settings_[settings.number] = settings.settings;
@@ -116,6 +139,7 @@ std::shared_ptr<const Cloud> SessionReader::cloud(std::size_t camera, std::size_
 }
 
 std::shared_ptr<const Cloud> SessionReader::cloud(const PutFrame& frame) {
+  if (parent_) return parent_->cloud(frame);
   if (frame.parts.empty())
     throw Error("recording", "a frame was left out of it when it was made",
                 "the machine or its disk was too slow to record all of them");

@@ -19,6 +19,7 @@ namespace palpate {
 /// Reads what SessionWriter wrote, also of a session that was killed. Used on one thread.
 class SessionReader {
  public:
+  /// Of a hand after the first this reads the frames from the recording that holds it.
   /// @throws Error if it is no bag, not of palpate's, or damaged.
   explicit SessionReader(const std::filesystem::path& path);
 
@@ -42,7 +43,9 @@ class SessionReader {
     std::vector<std::pair<std::size_t, std::size_t>> parts;
   };
   /// By their number.
-  [[nodiscard]] const std::map<std::uint64_t, PutFrame>& frames() const { return frames_; }
+  [[nodiscard]] const std::map<std::uint64_t, PutFrame>& frames() const {
+    return parent_ ? parent_->frames() : frames_;
+  }
   /// How frames were taken into use, by their number; none in old recordings.
   [[nodiscard]] const std::map<std::uint64_t, AdoptedFrame>& adopted() const { return adopted_; }
   /// What the cycle remembered before the first tick; none of a session from its start, of an old
@@ -59,12 +62,14 @@ class SessionReader {
     std::shared_ptr<const Cloud> cloud;
   };
 
+  static std::unique_ptr<SessionReader> parent_of(const std::filesystem::path& path);
   std::shared_ptr<const Cloud> cloud(std::size_t camera, std::size_t number);
   template <class Message, class Take>
   void read_all(std::string_view topic, const Take& take);
 
   BagReader bag_;
   SessionInfo info_;
+  std::unique_ptr<SessionReader> parent_;  // of the first hand, if it has the frames
   std::vector<BagReader::Place> ticks_;
   std::map<std::uint64_t, ServoSettings> settings_;
   std::map<std::uint64_t, PutFrame> frames_;

@@ -100,10 +100,12 @@ struct CycleStatistics {
   std::atomic<std::uint64_t> frames_adopted{0};
   std::atomic<std::uint64_t> frames_dropped{0};  ///< overtaken by a newer one before any tick
   std::atomic<std::uint64_t> settings_refused{0};
-  std::atomic<double> max_force{0.0};  ///< [N] sent
-  std::atomic<std::uint32_t> hand{0};  ///< HandFlag bits of the last tick
-  Histogram frame_age;                 ///< [ns] at each tick that had a frame
-  Histogram hand_over;                 ///< [ns] from put_frame to the tick that uses the frame
+  std::atomic<double> max_force{0.0};    ///< [N] sent
+  std::atomic<std::uint32_t> hand{0};    ///< HandFlag bits of the last tick
+  std::atomic<std::uint32_t> safety{0};  ///< SafetyFlag bits of the last tick
+  std::atomic<double> last_t{0.0};       ///< [s] of the last tick, once `ticks` are not 0
+  Histogram frame_age;                   ///< [ns] at each tick that had a frame
+  Histogram hand_over;                   ///< [ns] from put_frame to the tick that uses the frame
   std::array<std::atomic<std::uint64_t>, safety_flag_count> interventions{};
   std::atomic<bool> force_out{false};        ///< the last tick sent a force other than zero
   std::atomic<std::uint32_t> latched_by{0};  ///< SafetyFlag bits, as SafetyChain::latched_by
@@ -182,6 +184,10 @@ class Cycle {
     return {ring_.reader(), adopted_.reader(), states_.reader()};
   }
   [[nodiscard]] const CycleStatistics& statistics() const { return statistics_; }
+  /// The same for who may live longer than this.
+  [[nodiscard]] std::shared_ptr<const CycleStatistics> shared_statistics() const {
+    return kept_statistics_;
+  }
   [[nodiscard]] const Device& device() const { return device_; }
 
   /// Makes a new cycle remember what another one did. Before its first `run`, then with set_method
@@ -231,7 +237,8 @@ class Cycle {
   TickRing<ServoTick> ring_;
   TickRing<AdoptedFrame> adopted_{1024};
   TickRing<CycleState> states_{8};
-  CycleStatistics statistics_;
+  std::shared_ptr<CycleStatistics> kept_statistics_ = std::make_shared<CycleStatistics>();
+  CycleStatistics& statistics_ = *kept_statistics_;
 
   std::uint64_t number_ = 0;
   Vec3 last_proxy_ = Vec3::Zero();

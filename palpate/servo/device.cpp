@@ -20,11 +20,12 @@ constexpr std::array rows{
     Row{"busy", "another program holds the device; close that program"},
     Row{"refused_command", "the device did not accept the force; switch it off and on again"},
     Row{"other", "the device reports a fault; see its manual, or switch it off and on again"},
+    Row{"another_hand", "another hand of this session has a fault or does not answer; see there"},
 };
 
 const Row& row_of(DeviceFault fault) {
   const auto i = static_cast<std::size_t>(fault);
-  return i < rows.size() ? rows[i] : rows.back();
+  return rows[i < rows.size() ? i : static_cast<std::size_t>(DeviceFault::other)];
 }
 
 }  // namespace

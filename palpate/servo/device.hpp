@@ -66,6 +66,7 @@ enum class DeviceFault : std::uint8_t {
   busy,             ///< another program holds it
   refused_command,  ///< it did not accept a force
   other,            ///< see Device::fault_text
+  another_hand,     ///< another hand of the session is in trouble; see LinkedDevice
 };
 
 /// As in the code, e.g. "not_calibrated".

@@ -52,12 +52,12 @@ PeriodicThread::~PeriodicThread() {
 }
 
 void PeriodicThread::stop() {
-  stopping_.store(true, std::memory_order_relaxed);
+  request_stop();
   if (thread_.joinable()) thread_.join();
 }
 
 bool PeriodicThread::try_stop(double timeout) {
-  stopping_.store(true, std::memory_order_relaxed);
+  request_stop();
   return ended_.wait_for(std::chrono::duration<double>(timeout)) == std::future_status::ready;
 }
 

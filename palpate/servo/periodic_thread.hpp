@@ -47,6 +47,8 @@ class PeriodicThread {
 
   /// The same, and keeps the timing. Not from within a cycle.
   void stop();
+  /// Asks the thread to stop after the cycle in progress, and returns at once.
+  void request_stop() noexcept { stopping_.store(true, std::memory_order_relaxed); }
   /// Asks the thread to stop and waits, at most `timeout` [s], until `last` has been called.
   /// @return false if it has not: the cycle in progress hangs
   bool try_stop(double timeout);

@@ -30,12 +30,16 @@ void touch_stack() {
   for (std::size_t i = 0; i < stack.size(); i += 1024) stack[i] = 0;
 }
 
-int last_core() {
+// The last but `skipped` of those that the thread may use, in turn where these are fewer.
+int core_from_the_end(unsigned skipped) {
   cpu_set_t allowed;
   CPU_ZERO(&allowed);
   if (pthread_getaffinity_np(pthread_self(), sizeof(allowed), &allowed) != 0) return -1;
+  const int cores = CPU_COUNT(&allowed);
+  if (cores < 1) return -1;
+  int left = static_cast<int>(skipped % static_cast<unsigned>(cores));
   for (int core = CPU_SETSIZE - 1; core >= 0; --core) {
-    if (CPU_ISSET(core, &allowed)) return core;
+    if (CPU_ISSET(core, &allowed) && left-- == 0) return core;
   }
   return -1;
 }
@@ -76,7 +80,7 @@ RealtimeThread::RealtimeThread(const RealtimeRequest& request) {
   }
 
   if (request.pin) {
-    const int core = last_core();
+    const int core = core_from_the_end(request.core);
     if (pin_to(core)) {
       report_.core = core;
     } else {

@@ -175,13 +175,19 @@ void ServoLoop::request_end_of_watch() {
   watch_wakes_.notify_all();
 }
 
+void ServoLoop::request_stop() noexcept {
+  if (!started_) return;
+  stopping_.store(true, std::memory_order_release);
+  if (thread_) thread_->request_stop();
+}
+
 bool ServoLoop::stop() {
   if (!started_) return true;
   if (stopped_.exchange(true)) {
     if (!ended_) device_.disable();
     return ended_;
   }
-  stopping_.store(true, std::memory_order_release);
+  request_stop();
   const bool sent =
       thread_ ? thread_->try_stop(last_write_time) : wait_for(last_write_time, [this] {
         return zero_sent_.load(std::memory_order_acquire);

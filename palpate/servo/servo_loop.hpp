@@ -65,6 +65,9 @@ class ServoLoop {
   /// @return false if a cycle (or Device::enable) hangs: its thread goes on until that returns and
   ///         then ends; the device stays disabled. Destroying this waits for it
   bool stop();
+  /// Asks the thread that ticks to end with a zero force, and returns at once: where several loops
+  /// are to end, no hand then waits for another one's. `stop` has to follow. Any thread.
+  void request_stop() noexcept;
   /// Has `stop` returned true? Any thread.
   [[nodiscard]] bool has_ended() const noexcept { return ended_.load(std::memory_order_acquire); }
 

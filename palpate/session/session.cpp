@@ -8,6 +8,7 @@
 #include <future>
 #include <limits>
 #include <mutex>
+#include <span>
 #include <thread>
 #include <utility>
 
@@ -19,6 +20,7 @@
 #include "palpate/devices/mouse_device.hpp"
 #include "palpate/session/hand_paths.hpp"
 #include "palpate/session/played_source.hpp"
+#include "palpate/session/session_hand.hpp"
 #include "palpate/sources/posed_source.hpp"
 
 namespace palpate {
@@ -51,11 +53,12 @@ std::function<std::unique_ptr<Source>()> opener(const SessionCamera& camera,
 }
 
 // A mouse starts where it can hover; a hand without a path strokes what the camera sees.
-std::unique_ptr<Device> open_hand(const SessionOptions& options, const Cloud& seen) {
-  const Uri uri(options.device_uri);
+std::unique_ptr<Device> open_hand(const SessionOptions& options, const std::string& device_uri,
+                                  const Cloud& seen) {
+  const Uri uri(device_uri);
   if (uri.scheme() == "mouse" && !uri.has("x") && !uri.has("y") && !uri.has("z")) {
     const Vec3 place = hover_place(seen);
-    std::string text = options.device_uri;
+    std::string text = device_uri;
     char mark = text.find('?') == std::string::npos ? '?' : '&';
     for (int axis = 0; axis < 3; ++axis) {
       text += std::string(1, std::exchange(mark, '&')) + "xyz"[axis] + "=" +
@@ -69,7 +72,22 @@ std::unique_ptr<Device> open_hand(const SessionOptions& options, const Cloud& se
       image != nullptr && follows_path && uri.path().empty()) {
     path = stroke_path(*image, options.stroke_time, press);
   }
-  return open_device(options.device_uri, path, options.devices);
+  return open_device(device_uri, path, options.devices);
+}
+
+void check_name(const std::string& name, std::span<const std::unique_ptr<SessionHand>> before) {
+  const auto fits = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+  };
+  constexpr std::size_t longest = 40;
+  const bool begins = !name.empty() && name.front() >= 'a' && name.front() <= 'z';
+  if (!begins || name.size() > longest || !std::all_of(name.begin(), name.end(), fits))
+    throw Error("hand '" + name + "'", "that is no name for a hand",
+                "use small letters, digits and _, beginning with a letter, at most 40 in all");
+  for (const auto& hand : before) {
+    if (hand->name() == name)
+      throw Error("hand '" + name + "'", "two hands have this name", "name each of them");
+  }
 }
 
 // A device with motors that nothing watches keeps its last force when this process is killed: no
@@ -108,26 +126,26 @@ class Session::Impl {
     for (std::size_t i = 0; i < stamps_.size(); ++i) stamps_[i].camera = i;
     std::vector<std::shared_ptr<const Cloud>> first;
     for (SessionCamera& camera : options_.cameras) first.push_back(open_camera(camera));
-    device_ = options_.device ? std::move(options_.device) : open_hand(options_, *first.front());
-    if (needs_watchdog()) refuse_without_watchdog(device_->info(), options_.settings.safety);
+    open_hands(*first.front());
+    for (const auto& hand : hands_) {
+      if (needs_watchdog())
+        refuse_without_watchdog(hand->device().info(), options_.settings.safety);
+    }
     settings_ = for_cameras(options_.settings);
     proxy_radius_ = settings_.parameters.proxy.r_c();
-    auto method = open_method(settings_, first);
-    if (is_live()) {
-      loop_ = std::make_unique<ServoLoop>(std::move(method), *device_, settings_, options_.servo);
-      cycle_ = &loop_->cycle();
-    } else {
-      free_cycle_ = std::make_unique<Cycle>(std::move(method), *device_, settings_);
-      cycle_ = free_cycle_.get();
+    for (std::size_t i = 0; i < hands_.size(); ++i) {
+      ServoOptions servo = options_.servo;
+      servo.realtime.core += static_cast<unsigned>(i);
+      hands_[i]->begin(open_method(settings_, first), settings_of(*hands_[i], settings_),
+                       is_live() ? std::optional(servo) : std::nullopt);
     }
-    ticks_.emplace(cycle_->reader());
+    if (hands_.size() > 1) {
+      for (const auto& hand : hands_) hand->link(hands_);
+    }
     if (!options_.record.empty()) open_recorder(options_.record, false);
   }
 
-  ~Impl() {
-    stop();
-    if (loop_ && !loop_->has_ended()) leave_behind();
-  }
+  ~Impl() { stop(); }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
@@ -137,7 +155,12 @@ class Session::Impl {
     if (!is_live())
       throw Error("session", "a free-running session has no time of its own to start in",
                   "call run, or choose real time");
-    loop_->start();
+    try {
+      for (const auto& hand : hands_) hand->loop()->start();
+    } catch (...) {
+      stop_loops();  // of those that have begun
+      throw;
+    }
     started_ = true;
     for (std::size_t i = 0; i < feeds_.size(); ++i)
       feeds_[i]->start([this, i](const FedFrame& frame) { take(i, frame); });
@@ -146,13 +169,13 @@ class Session::Impl {
 
   void stop() noexcept {
     if (stopped_.exchange(true)) {
-      if (loop_) loop_->stop();
+      for (const auto& hand : hands_) {
+        if (hand->loop() != nullptr && !hand->loop()->has_ended()) hand->device().disable();
+      }
       return;
     }
     // Zero force leaves first: nothing above this line may wait for anything.
-    if (loop_) loop_->stop();
-    if (free_cycle_ && started_) device_->write(Vec3::Zero(), free_t_);
-    device_->disable();
+    stop_loops();
     for (const auto& feed : feeds_) feed->request_stop();
     {
       const std::lock_guard lock(house_mutex_);
@@ -167,11 +190,25 @@ class Session::Impl {
     }
     drain();
     const std::lock_guard lock(control_);
-    for (auto& recorder : closing_) {
-      if (!recorder->try_stop(options_.record_patience)) leave_behind(std::move(recorder));
+    for (auto& recording : closing_) {
+      for (auto& recorder : recording) {
+        if (!recorder->try_stop(options_.record_patience)) leave_behind(std::move(recorder));
+      }
+      std::erase(recording, nullptr);
     }
-    std::erase(closing_, nullptr);
     report_closed();
+  }
+
+  // Every hand is let go before any is waited for.
+  void stop_loops() noexcept {
+    for (const auto& hand : hands_) {
+      if (hand->loop() != nullptr) hand->loop()->request_stop();
+      if (!is_live() && started_) hand->device().write(Vec3::Zero(), free_t_);
+    }
+    for (const auto& hand : hands_) {
+      if (hand->loop() != nullptr) hand->loop()->stop();
+      hand->device().disable();
+    }
   }
 
   void run(std::optional<double> duration, const std::function<void(const ServoTick&)>& on_tick,
@@ -202,18 +239,14 @@ class Session::Impl {
     SessionState state;
     for (const auto& feed : feeds_) state.cameras.push_back(feed->status());
     for (const auto& played : played_) state.cameras.push_back(played->status());
-    if (loop_) state.device = loop_->device_status();
-    const CycleStatistics& statistics = cycle_->statistics();
-    for (std::size_t i = 0; i < safety_flag_count; ++i)
-      state.interventions[i] = statistics.interventions[i].load();
-    state.latched_by = statistics.latched_by.load();
-    state.rate = loop_ ? loop_->rate() : options_.servo.rate;
+    const SessionHandState first = report(*hands_.front());
+    state.device = first.device;
+    state.interventions = first.interventions;
+    state.latched_by = first.latched_by;
+    state.summary = first.summary;
+    const ServoLoop* loop = hands_.front()->loop();
+    state.rate = loop != nullptr ? loop->rate() : options_.servo.rate;
     state.running = started_ && !stopped_;
-    {
-      const std::lock_guard lock(summary_mutex_);
-      state.summary = summary_;
-    }
-    if (loop_) state.summary.late_ticks = loop_->timing().late_ticks.load();
     {
       const std::lock_guard lock(frames_mutex_);
       state.summary.frames = frames_;
@@ -221,12 +254,19 @@ class Session::Impl {
     const std::lock_guard lock(control_);
     state.settings = settings_;
     state.held = held_;
-    if (recorder_ && !recorder_->status().trouble.empty()) end_recording();
+    for (std::size_t i = 1; i < hands_.size(); ++i) {
+      state.more_hands.push_back(report(*hands_[i]));
+      state.more_hands.back().placement = hands_[i]->placement;
+    }
+    if (is_recording() && std::any_of(hands_.begin(), hands_.end(), [](const auto& hand) {
+          return !hand->recorder->status().trouble.empty();
+        }))
+      end_recording();
     report_closed();
     state.recording = recording_;
-    state.recording.on = recorder_ != nullptr;
+    state.recording.on = is_recording();
     state.recording.closing = !closing_.empty();
-    if (recorder_) state.recording.folder = recorder_->status().folder.string();
+    if (is_recording()) state.recording.folder = hands_.front()->recorder->status().folder.string();
     return state;
   }
 
@@ -239,27 +279,32 @@ class Session::Impl {
     const std::lock_guard lock(control_);
     ServoSettings settings = settings_;
     edit(settings);
-    if (needs_watchdog()) refuse_without_watchdog(device_->info(), settings.safety);
+    for (const auto& hand : hands_) {
+      if (needs_watchdog()) refuse_without_watchdog(hand->device().info(), settings.safety);
+    }
     settings = for_cameras(std::move(settings));
     settings.scene = settings_.scene;  // not for others to count
-    const ServoSettings applied = as_held(settings);
-    const std::uint64_t number = settings.method == settings_.method
-                                     ? cycle_->set_settings(applied)
-                                     : cycle_->set_method(open_method(settings, newest()), applied);
-    settings_ = settings;
-    settings_number_ = number;
-    proxy_radius_ = settings.parameters.proxy.r_c();
-    if (recorder_) recorder_->settings({number, applied}, now());
+    validate(settings);
+    apply(settings, settings.method != settings_.method);
+  }
+
+  void place(std::size_t number, const Placement& placement) {
+    validate(placement);
+    const std::lock_guard lock(control_);
+    SessionHand& hand = *hands_.at(number);
+    hand.placement = placement;
+    if (number == 0) settings_.placement = placement;
+    const ServoSettings applied = as_held(settings_of(hand, settings_));
+    note(hand, {hand.cycle().set_settings(applied), applied});
   }
 
   void hold(bool on) {
     const std::lock_guard lock(control_);
     if (held_ == on) return;
     held_ = on;
-    if (!on) ++settings_.scene;  // the hand has to engage anew
-    const ServoSettings applied = as_held(settings_);
-    settings_number_ = cycle_->set_settings(applied);
-    if (recorder_) recorder_->settings({settings_number_, applied}, now());
+    ServoSettings settings = settings_;
+    if (!on) ++settings.scene;  // the hands have to engage anew
+    apply(settings, false);
   }
 
   void set_playback(const Playback& playback) {
@@ -272,9 +317,9 @@ class Session::Impl {
 
   void start_recording(const std::string& folder) {
     const std::lock_guard lock(control_);
-    if (recorder_)
+    if (is_recording())
       throw Error(folder, "a recording is on already", "stop it before another is begun");
-    open_recorder(folder, cycle_->statistics().ticks > 0);
+    open_recorder(folder, hands_.front()->cycle().statistics().ticks > 0);
   }
 
   void stop_recording() {
@@ -283,12 +328,18 @@ class Session::Impl {
   }
 
   Paint& paint() { return paint_; }
-  Cycle& cycle() { return *cycle_; }
-  [[nodiscard]] const Cycle& cycle() const { return *cycle_; }
-  [[nodiscard]] const Device& device() const { return *device_; }
-  [[nodiscard]] MouseDevice* mouse() const { return dynamic_cast<MouseDevice*>(device_.get()); }
+  [[nodiscard]] std::size_t hands() const { return hands_.size(); }
+  [[nodiscard]] SessionHand& hand(std::size_t number) const { return *hands_.at(number); }
+  void reset_faults() noexcept {
+    for (const auto& hand : hands_) hand->cycle().reset_faults();
+  }
+  [[nodiscard]] MouseDevice* mouse() const {
+    for (const auto& hand : hands_) {
+      if (hand->mouse() != nullptr) return hand->mouse();
+    }
+    return nullptr;
+  }
   [[nodiscard]] const MethodRegistry& methods() const { return options_.methods; }
-  [[nodiscard]] const ServoLoop* loop() const { return loop_.get(); }
 
  private:
   [[nodiscard]] bool is_live() const { return options_.pace == Pace::real_time; }
@@ -296,17 +347,6 @@ class Session::Impl {
   void refuse_if_stopped() const {
     if (stopped_)
       throw Error("session", "it has been stopped and cannot go on", "make another session");
-  }
-  // The thread of a cycle that hangs uses loop and device until it returns.
-  void leave_behind() {
-    struct Left {
-      std::unique_ptr<Device> device;
-      std::unique_ptr<ServoLoop> loop;  // destroyed first
-    };
-    auto left = std::make_unique<Left>();
-    left->device = std::move(device_);
-    left->loop = std::move(loop_);
-    std::thread([left = std::move(left)]() mutable { left.reset(); }).detach();
   }
   // With control_ held: a recorder whose disk hangs. Its threads use nothing of the session.
   void leave_behind(std::unique_ptr<Recorder> recorder) {
@@ -327,6 +367,44 @@ class Session::Impl {
   }
   // [s] on the session's clock
   [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }
+
+  void open_hands(const Cloud& seen) {
+    if (options_.more_hands.size() + 1 > most_hands)
+      throw Error("hands", std::to_string(options_.more_hands.size() + 1) + " are too many",
+                  "give at most " + std::to_string(most_hands));
+    const bool alone = options_.more_hands.empty();
+    const auto opened = [&](std::unique_ptr<Device> device, const std::string& uri) {
+      return device ? std::move(device) : open_hand(options_, uri, seen);
+    };
+    hands_.push_back(std::make_unique<SessionHand>(
+        alone ? "" : "hand_1", opened(std::move(options_.device), options_.device_uri),
+        options_.settings.placement));
+    for (SessionHandOptions& more : options_.more_hands) {
+      if (more.name.empty()) more.name = "hand_" + std::to_string(hands_.size() + 1);
+      check_name(more.name, hands_);
+      validate(more.placement);
+      hands_.push_back(
+          std::make_unique<SessionHand>(more.name, opened(std::move(more.device), more.device_uri),
+                                        more.placement, std::move(more.on_tick)));
+    }
+    const auto mice = std::count_if(hands_.begin(), hands_.end(),
+                                    [](const auto& hand) { return hand->mouse() != nullptr; });
+    if (mice > 1)
+      throw Error("mouse:", "two hands cannot be moved by one mouse", "give it to one of them");
+    if (alone) return;
+    for (const auto& hand : hands_) hand->prepare_link();
+  }
+
+  [[nodiscard]] static SessionHandState report(const SessionHand& hand) {
+    SessionHandState state{.name = hand.name(), .placement = {}, .device = {}, .summary = {}};
+    if (hand.loop() != nullptr) state.device = hand.loop()->device_status();
+    const CycleStatistics& statistics = hand.cycle().statistics();
+    for (std::size_t i = 0; i < safety_flag_count; ++i)
+      state.interventions[i] = statistics.interventions[i].load();
+    state.latched_by = statistics.latched_by.load();
+    state.summary = hand.summary();
+    return state;
+  }
 
   std::shared_ptr<const Cloud> open_camera(SessionCamera& camera) {
     std::unique_ptr<Source> source = std::move(camera.source);
@@ -371,24 +449,50 @@ class Session::Impl {
     return method;
   }
 
+  // A hand's settings, where the session's are these.
+  [[nodiscard]] static ServoSettings settings_of(const SessionHand& hand, ServoSettings settings) {
+    settings.placement = hand.placement;
+    return settings;
+  }
+
   // What the cycle gets, for these settings of the user's: no force while it is held back.
   [[nodiscard]] ServoSettings as_held(ServoSettings settings) const {
     if (held_) settings.safety.max_force = 0.0;
     return settings;
   }
 
-  // What is seen jumps. Before the frame after the jump the hand is disengaged; after it a method
-  // takes over that remembers nothing of before, on the free side of what is seen now.
-  void disengage(bool method_begins_anew) {
-    const std::lock_guard lock(control_);
-    ++settings_.scene;
-    const ServoSettings applied = as_held(settings_);
-    if (method_begins_anew) {
-      settings_number_ = cycle_->set_method(open_method(settings_, newest()), applied);
-    } else {
-      settings_number_ = cycle_->set_settings(applied);
+  // With control_ held: what a hand has been given.
+  void note(SessionHand& hand, const NumberedSettings& given) {
+    hand.settings_number = given.number;
+    if (hand.recorder) hand.recorder->settings(given, now());
+  }
+
+  // With control_ held: settings that validate, to all hands; throws before any of them has them.
+  void apply(const ServoSettings& settings, bool with_new_methods) {
+    std::vector<std::shared_ptr<Method>> methods(hands_.size());
+    if (with_new_methods) {
+      const auto seen = newest();
+      for (auto& method : methods) method = open_method(settings, seen);
     }
-    if (recorder_) recorder_->settings({settings_number_, applied}, now());
+    hands_.front()->placement = settings.placement;
+    settings_ = settings;
+    proxy_radius_ = settings.parameters.proxy.r_c();
+    for (std::size_t i = 0; i < hands_.size(); ++i) {
+      SessionHand& hand = *hands_[i];
+      const ServoSettings applied = as_held(settings_of(hand, settings));
+      note(hand, {methods[i] ? hand.cycle().set_method(methods[i], applied)
+                             : hand.cycle().set_settings(applied),
+                  applied});
+    }
+  }
+
+  // What is seen jumps. Before the frame after the jump the hands are disengaged; after it methods
+  // take over that remember nothing of before, on the free side of what is seen now.
+  void disengage(bool methods_begin_anew) {
+    const std::lock_guard lock(control_);
+    ServoSettings settings = settings_;
+    ++settings.scene;
+    apply(settings, methods_begin_anew);
   }
 
   // A camera's thread, or the free-running one: a frame to all who want it.
@@ -410,27 +514,30 @@ class Session::Impl {
       if (cloud) clouds.push_back(cloud);
     }
     stamp_ = std::max(fed.frame.stamp, stamp_ + 1e-6);  // of two cameras in the wrong order
-    frame_number_ = cycle_->put_frame(
-        clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds)), stamp_,
-        stamps_, now());
-    if (recorder_) recorder_->frame(frame_number_, stamp_, newest_);
+    const std::shared_ptr<const Cloud> cloud =
+        clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds));
+    // Each hand counts the same frames, so a frame has the same number for all.
+    for (const auto& hand : hands_) {
+      frame_number_ = hand->cycle().put_frame(cloud, stamp_, stamps_, now());
+      if (hand->recorder) hand->recorder->frame(frame_number_, stamp_, newest_);
+    }
     ++frames_;
   }
 
   void run_free(std::optional<double> duration,
                 const std::function<void(const ServoTick&)>& on_tick,
                 const std::atomic<bool>& stop_requested) {
-    device_->enable();
+    for (const auto& hand : hands_) hand->device().enable();
     started_ = true;
     const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.servo.rate);
-    TickRing<ServoTick>::Reader reader = cycle_->reader();
+    TickRing<ServoTick>::Reader reader = hands_.front()->cycle().reader();
     for (std::int64_t i = 0; i < ticks && !stop_requested.load(std::memory_order_relaxed); ++i) {
       const double t = static_cast<double>(i) / options_.servo.rate;
       free_t_ = t;
       for (std::size_t camera = 0; camera < played_.size(); ++camera) {
         while (const auto frame = played_[camera]->next_until(t)) take(camera, *frame);
       }
-      cycle_->run({.t = t});
+      for (const auto& hand : hands_) hand->run_at(t);
       if (ServoTick record{}; on_tick && reader.try_pop(record)) on_tick(record);
       drain();
       if (i % ticks_between_flushes == 0) wait_for_recorder();
@@ -440,7 +547,9 @@ class Session::Impl {
   // The clock waits for the disk here, as it runs faster than time.
   void wait_for_recorder() {
     const std::lock_guard lock(control_);
-    if (recorder_) recorder_->flush();
+    for (const auto& hand : hands_) {
+      if (hand->recorder) hand->recorder->flush();
+    }
   }
 
   void keep_house() {
@@ -452,87 +561,126 @@ class Session::Impl {
     }
   }
 
-  // Counts the ticks that came since the last time; of the newest one, whether its proxy is behind
-  // what the cameras see.
   void drain() {
-    const std::lock_guard lock(summary_mutex_);
     const double r_c = proxy_radius_.load(std::memory_order_relaxed);
-    ServoTick record{};
-    bool any = false;
-    for (ServoTick next{}; ticks_->try_pop(next); record = next) {
-      if (any) summary_.count(record, std::nullopt, r_c);
-      any = true;
-    }
-    if (any) summary_.count(record, least_behind(newest(), record.tick.proxy, r_c), r_c);
+    const auto seen = newest();
+    for (const auto& hand : hands_) hand->count(seen, r_c);
   }
 
-  // With control_ held, or before anything runs.
+  [[nodiscard]] bool is_recording() const { return hands_.front()->recorder != nullptr; }
+
+  // With control_ held, or before anything runs. The first hand's recording holds the frames; those
+  // of the others lie in folders within it.
   void open_recorder(const std::string& folder, bool is_on) {
+    struct Opened {
+      std::unique_ptr<Recorder> recorder;
+      std::shared_ptr<std::promise<Recorder*>> promise =
+          std::make_shared<std::promise<Recorder*>>();
+    };
+    std::vector<Opened> opened(hands_.size());
+    for (std::size_t i = 0; i < hands_.size(); ++i) {
+      SessionHand& hand = *hands_[i];
+      std::function<void()> begin_anew;
+      if (is_on) {
+        // On the recorder's thread, once: the recording begins with a method that remembers
+        // nothing.
+        begin_anew = [this, &hand, promise = opened[i].promise, settings = settings_] {
+          Recorder* recorder = promise->get_future().get();
+          if (recorder != nullptr)
+            recorder->settings(hand.cycle().set_method(open_method(settings, newest())), now());
+        };
+      }
+      try {
+        opened[i].recorder = std::make_unique<Recorder>(
+            i == 0 ? folder : hand_folder(folder, hand.name()).string(), info_of(hand),
+            hand.cycle().full_reader(), std::move(begin_anew),
+            RecorderOptions{.with_frames = i == 0});
+      } catch (...) {
+        for (Opened& each : opened) each.promise->set_value(nullptr);
+        throw;
+      }
+      const ServoSettings applied = as_held(settings_of(hand, settings_));
+      opened[i].recorder->settings({hand.settings_number, applied}, now());
+    }
+    {
+      const std::lock_guard lock(frames_mutex_);
+      for (std::size_t i = 0; i < hands_.size(); ++i) {
+        // The first tick of the recording uses this frame, or one that is yet to come.
+        if (frame_number_ > 0) opened[i].recorder->frame(frame_number_, stamp_, newest_);
+        hands_[i]->recorder = std::move(opened[i].recorder);
+      }
+    }
+    for (std::size_t i = 0; i < hands_.size(); ++i)
+      opened[i].promise->set_value(hands_[i]->recorder.get());
+    recording_.folder = folder;
+  }
+
+  [[nodiscard]] SessionInfo info_of(const SessionHand& hand) const {
     using std::chrono::nanoseconds;
     using std::chrono::system_clock;
     SessionInfo info{.kind = SessionInfo::Kind::live, .version = options_.version};
     for (const SessionCamera& camera : options_.cameras) info.cameras.push_back(camera.uri);
-    info.device = device_->info().uri;
-    info.limits = device_->info().limits;
+    info.device = hand.device().info().uri;
+    info.limits = hand.device().info().limits;
     info.epoch =
         std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count() -
         std::llround(1e9 * now());
-    std::function<void()> begin_anew;
-    auto opened = std::make_shared<std::promise<Recorder*>>();
-    if (is_on) {
-      // On the recorder's thread, once: the recording begins with a method that remembers nothing.
-      begin_anew = [this, opened, settings = settings_] {
-        Recorder* recorder = opened->get_future().get();
-        recorder->settings(cycle_->set_method(open_method(settings, newest())), now());
-      };
+    info.hand = hand.name();
+    if (&hand == hands_.front().get()) {
+      for (std::size_t i = 1; i < hands_.size(); ++i) info.more_hands.push_back(hands_[i]->name());
     }
-    auto recorder =
-        std::make_unique<Recorder>(folder, info, cycle_->full_reader(), std::move(begin_anew));
-    recorder->settings({settings_number_, as_held(settings_)}, now());
-    {
-      const std::lock_guard lock(frames_mutex_);
-      // The first tick of the recording uses this frame, or one that is yet to come.
-      if (frame_number_ > 0) recorder->frame(frame_number_, stamp_, newest_);
-      recorder_ = std::move(recorder);
-    }
-    opened->set_value(recorder_.get());
-    recording_.folder = folder;
+    return info;
   }
 
   // With control_ held. Closing takes as long as the disk does, and nobody waits for that.
   void end_recording() {
-    if (!recorder_) return;
-    std::unique_ptr<Recorder> recorder;
+    if (!is_recording()) return;
+    Recording recording;
     {
       const std::lock_guard lock(frames_mutex_);
-      recorder = std::move(recorder_);
+      for (const auto& hand : hands_) recording.push_back(std::move(hand->recorder));
     }
-    recorder->request_stop();
-    recording_.message = recorder->status().folder.string() + ": closing";
-    closing_.push_back(std::move(recorder));
+    for (const auto& recorder : recording) recorder->request_stop();
+    recording_.message = recording.front()->status().folder.string() + ": closing";
+    closing_.push_back(std::move(recording));
   }
 
   // With control_ held: how the recordings ended that are closed by now.
   void report_closed() {
-    std::erase_if(closing_, [this](const std::unique_ptr<Recorder>& recorder) {
-      const Recorder::Status status = recorder->status();
-      if (!status.done) return false;
-      const std::string folder = status.folder.string();
-      const auto counts = [](std::uint64_t ticks, std::uint64_t frames) {
-        return std::to_string(ticks) + " ticks, " + std::to_string(frames) + " frames";
-      };
-      if (!status.trouble.empty()) {
-        recording_.failed = true;
-        recording_.message = "the recording has stopped: " + status.trouble;
-      } else if (status.lost_ticks + status.lost_frames > 0) {
-        recording_.failed = true;
-        recording_.message = folder + ": the machine was too slow for " +
-                             counts(status.lost_ticks, status.lost_frames);
-      } else {
-        recording_.message = folder + ": " + counts(status.ticks, status.frames);
-      }
+    std::erase_if(closing_, [this](const Recording& recording) {
+      std::vector<Recorder::Status> parts;
+      for (const auto& recorder : recording) parts.push_back(recorder->status());
+      if (!std::all_of(parts.begin(), parts.end(), [](const auto& part) { return part.done; }))
+        return false;
+      if (!parts.empty()) report_closed(parts);
       return true;
     });
+  }
+
+  // What went wrong with any part of a recording comes before what went well.
+  void report_closed(const std::vector<Recorder::Status>& parts) {
+    const auto counts = [](std::uint64_t ticks, std::uint64_t frames) {
+      return std::to_string(ticks) + " ticks, " + std::to_string(frames) + " frames";
+    };
+    for (const Recorder::Status& part : parts) {
+      if (part.trouble.empty()) continue;
+      recording_.failed = true;
+      recording_.message = "the recording has stopped: " + part.trouble;
+      return;
+    }
+    std::string text;
+    for (const Recorder::Status& part : parts) {
+      if (part.lost_ticks + part.lost_frames > 0) {
+        recording_.failed = true;
+        recording_.message = part.folder.string() + ": the machine was too slow for " +
+                             counts(part.lost_ticks, part.lost_frames);
+        return;
+      }
+      text += text.empty() ? part.folder.string() + ": " + counts(part.ticks, part.frames)
+                           : "; " + part.folder.filename().string() + ": " +
+                                 std::to_string(part.ticks) + " ticks";
+    }
+    recording_.message = text;
   }
 
   SessionOptions options_;
@@ -540,11 +688,10 @@ class Session::Impl {
   std::vector<SensorKind> sensors_;                    // of the cameras
   std::vector<std::unique_ptr<CameraFeed>> feeds_;     // in real time
   std::vector<std::unique_ptr<PlayedSource>> played_;  // free-running
-  std::unique_ptr<Device> device_;
-  std::unique_ptr<ServoLoop> loop_;    // in real time
-  std::unique_ptr<Cycle> free_cycle_;  // free-running
-  Cycle* cycle_ = nullptr;             // of one of these
-  std::atomic<double> free_t_{0.0};    // [s]
+  // As many from the first thread on. Recorders are set and reset with control_ and frames_mutex_
+  // held, and used with either.
+  std::vector<std::unique_ptr<SessionHand>> hands_;
+  std::atomic<double> free_t_{0.0};  // [s]
   std::atomic<bool> started_{false};
   std::atomic<bool> stopped_{false};
 
@@ -554,20 +701,15 @@ class Session::Impl {
   double stamp_ = -std::numeric_limits<double>::infinity();  // guarded by frames_mutex_
   std::uint64_t frame_number_ = 0;                           // guarded by frames_mutex_
   std::size_t frames_ = 0;                                   // guarded by frames_mutex_
-  // Set and reset with both mutexes held; used with either.
-  std::unique_ptr<Recorder> recorder_;
 
-  mutable std::mutex control_;         // settings and recordings; taken before frames_mutex_
-  ServoSettings settings_;             // guarded by control_
-  std::uint64_t settings_number_ = 0;  // guarded by control_
-  bool held_ = false;                  // guarded by control_
-  RecordingState recording_;           // guarded by control_
-  std::vector<std::unique_ptr<Recorder>> closing_;  // guarded by control_
+  mutable std::mutex control_;  // settings and recordings; taken before frames_mutex_
+  ServoSettings settings_;      // guarded by control_; the placement is the first hand's
+  bool held_ = false;           // guarded by control_
+  RecordingState recording_;    // guarded by control_
+  // Of each hand, the first hand's first.
+  using Recording = std::vector<std::unique_ptr<Recorder>>;
+  std::vector<Recording> closing_;  // guarded by control_
   std::atomic<double> proxy_radius_{ProxyParameters{}.r_c()};
-
-  std::mutex summary_mutex_;                          // taken before frames_mutex_
-  std::optional<TickRing<ServoTick>::Reader> ticks_;  // guarded by summary_mutex_
-  Summary summary_;                                   // guarded by summary_mutex_
 
   std::thread housekeeper_;
   std::mutex house_mutex_;
@@ -592,8 +734,16 @@ void Session::run(std::optional<double> duration,
   impl_->run(duration, on_tick, stop_requested_);
 }
 
-TickRing<ServoTick>::Reader Session::ticks() const {
-  return impl_->cycle().reader();
+std::size_t Session::hands() const {
+  return impl_->hands();
+}
+
+const std::string& Session::hand_name(std::size_t hand) const {
+  return impl_->hand(hand).name();
+}
+
+TickRing<ServoTick>::Reader Session::ticks(std::size_t hand) const {
+  return impl_->hand(hand).cycle().reader();
 }
 
 std::vector<std::shared_ptr<const Cloud>> Session::newest_clouds() const {
@@ -616,6 +766,10 @@ void Session::change(const std::function<void(ServoSettings&)>& edit) {
   impl_->change(edit);
 }
 
+void Session::place(std::size_t hand, const Placement& placement) {
+  impl_->place(hand, placement);
+}
+
 void Session::set_playback(const Playback& playback) {
   impl_->set_playback(playback);
 }
@@ -629,7 +783,7 @@ void Session::hold(bool on) {
 }
 
 void Session::reset_faults() noexcept {
-  impl_->cycle().reset_faults();
+  impl_->reset_faults();
 }
 
 void Session::start_recording(const std::string& folder) {
@@ -644,8 +798,8 @@ Paint& Session::paint() {
   return impl_->paint();
 }
 
-const Device& Session::device() const {
-  return impl_->device();
+const Device& Session::device(std::size_t hand) const {
+  return impl_->hand(hand).device();
 }
 
 MouseDevice* Session::mouse() const {
@@ -656,16 +810,18 @@ const MethodRegistry& Session::methods() const {
   return impl_->methods();
 }
 
-const CycleStatistics& Session::statistics() const {
-  return impl_->cycle().statistics();
+const CycleStatistics& Session::statistics(std::size_t hand) const {
+  return impl_->hand(hand).cycle().statistics();
 }
 
-const Timing* Session::timing() const {
-  return impl_->loop() == nullptr ? nullptr : &impl_->loop()->timing();
+const Timing* Session::timing(std::size_t hand) const {
+  const ServoLoop* loop = impl_->hand(hand).loop();
+  return loop == nullptr ? nullptr : &loop->timing();
 }
 
-const RealtimeReport* Session::realtime() const {
-  return impl_->loop() == nullptr ? nullptr : &impl_->loop()->realtime();
+const RealtimeReport* Session::realtime(std::size_t hand) const {
+  const ServoLoop* loop = impl_->hand(hand).loop();
+  return loop == nullptr ? nullptr : &loop->realtime();
 }
 
 }  // namespace palpate

@@ -31,6 +31,18 @@ struct SessionCamera {
   std::optional<Eigen::Isometry3d> world_from_camera = {};
 };
 
+/// Another hand of a session, beside the first: a second device, or the other finger of a gripper.
+struct SessionHandOptions {
+  /// For messages, topics and the page: small letters, digits and _, beginning with a letter.
+  /// Empty: hand_2, hand_3, ...
+  std::string name = {};
+  std::string device_uri = "hand:";     ///< opened by SessionOptions::devices
+  std::unique_ptr<Device> device = {};  ///< used in place of the URI
+  Placement placement = {};             ///< of this device
+  /// Free-running: sees each tick of this hand. The caller's thread of `run`.
+  std::function<void(const ServoTick&)> on_tick = {};
+};
+
 /// Whose time a session runs in.
 enum class Pace {
   real_time,     ///< this machine's clock: a person, a device, a live camera
@@ -44,8 +56,13 @@ struct SessionOptions {
   /// `hand:` and `script:` without a file stroke it.
   std::string device_uri = "hand:";
   std::unique_ptr<Device> device = {};  ///< used in place of the URI
-  /// Method, its parameters, safety limits, placement. Parameters that are left to the cameras'
-  /// kind (for_sensors) are set by it, also in what `settings()` and `state()` give.
+  /// Further hands. They share cameras, method, parameters, limits and fixtures with the first, and
+  /// have a device, a loop, a method's memory and a safety chain each. While one of the hands is in
+  /// trouble (is_in_trouble), none of them has a force. At most Session::most_hands in all.
+  std::vector<SessionHandOptions> more_hands = {};
+  /// Method, its parameters, safety limits, placement of the first hand. Parameters that are left
+  /// to the cameras' kind (for_sensors) are set by it, also in what `settings()` and `state()`
+  /// give.
   ServoSettings settings = {};
   ServoOptions servo = {};  ///< rate, real-time rights
   Pace pace = Pace::real_time;
@@ -76,6 +93,16 @@ struct RecordingState {
   bool closing = false;  ///< one that was stopped is still being written
 };
 
+/// How a hand of a session does.
+struct SessionHandState {
+  std::string name;
+  Placement placement;
+  DeviceStatus device;  ///< of a session in real time
+  Summary summary;
+  std::array<std::uint64_t, safety_flag_count> interventions{};
+  std::uint32_t latched_by = 0;  ///< SafetyFlag bits that hold the force off until `reset_faults`
+};
+
 /// How a session does: what a page or a program shows of it.
 struct SessionState {
   ServoSettings settings;
@@ -85,7 +112,9 @@ struct SessionState {
   Summary summary;
   std::array<std::uint64_t, safety_flag_count> interventions{};
   std::uint32_t latched_by = 0;  ///< SafetyFlag bits that hold the force off until `reset_faults`
-  double rate = 0.0;             ///< [Hz]
+  /// The hands beside the first, which is what device, summary and so on above are of.
+  std::vector<SessionHandState> more_hands;
+  double rate = 0.0;  ///< [Hz]
   bool running = false;
   bool held = false;  ///< by Session::hold
 };
@@ -93,15 +122,20 @@ struct SessionState {
 /// Cameras, device, method, safety chain and recorder, wired together: a whole session as one
 /// object. Prints nothing.
 ///
+/// A session has one hand, or several, numbered from 0. Where a function asks for a hand's number
+/// it throws std::out_of_range for one that is not there.
+///
 /// One way through, whatever the clock, the hand and the watcher: camera's thread → newest frame →
 /// method → safety chain → device. Program, page and tests differ in their options alone.
 ///
 /// Functions may be called by any thread but the servo's; `run`, `start` and `stop` by one.
 class Session {
  public:
-  /// Opens cameras and device, waits for each camera's first frame, and makes the method.
+  static constexpr std::size_t most_hands = 8;
+
+  /// Opens cameras and devices, waits for each camera's first frame, and makes the method.
   /// @throws Error if one of them cannot be used: a URI, a device, a method that cannot touch what
-  ///         the cameras see, settings out of range, a force that needs a watchdog.
+  ///         the cameras see, settings out of range, a force that needs a watchdog, a hand's name.
   explicit Session(SessionOptions options);
   /// stop().
   ~Session();
@@ -111,15 +145,15 @@ class Session {
   /// Real time: starts loop and cameras, and returns. A session runs once.
   /// @throws Error if the device refuses, or the session has been stopped.
   void start();
-  /// Takes the force off the device before anything else, then ends everything. A camera, a method,
-  /// a driver or a disk that hangs is left behind: its thread ends when it returns, also after this
-  /// has been destroyed, and the device stays disabled. Any number of times; while one call is at
-  /// work another one disables the device at once.
+  /// Takes the force off all devices before anything else, then ends everything. A camera, a
+  /// method, a driver or a disk that hangs is left behind: its thread ends when it returns, also
+  /// after this has been destroyed, and the device stays disabled. Any number of times; while one
+  /// call is at work another one disables the device at once.
   void stop() noexcept;
 
   /// Runs until `duration` [s] has passed (none: for ever) or `request_stop`, then stops.
   /// Real time: starts what is not started. Free-running: runs the ticks on this thread.
-  /// @param on_tick  free-running: sees each tick
+  /// @param on_tick  free-running: sees each tick of the first hand
   /// @throws Error as `start`; free-running: what a source throws whose frame cannot be read. The
   ///         session is stopped then, too.
   void run(std::optional<double> duration,
@@ -127,8 +161,11 @@ class Session {
   /// Makes `run` return soon. Any thread, and a signal handler.
   void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
 
+  [[nodiscard]] std::size_t hands() const;
+  /// Empty for a first hand that is alone; hand_1 if it is not.
+  [[nodiscard]] const std::string& hand_name(std::size_t hand) const;
   /// Sees every tick from the next one on; must not outlive the session.
-  [[nodiscard]] TickRing<ServoTick>::Reader ticks() const;
+  [[nodiscard]] TickRing<ServoTick>::Reader ticks(std::size_t hand = 0) const;
   /// What each camera saw last; null before its first frame.
   [[nodiscard]] std::vector<std::shared_ptr<const Cloud>> newest_clouds() const;
   /// Counts what has happened so far; looks at no more than the last second of ticks.
@@ -144,6 +181,9 @@ class Session {
   /// session.
   /// @throws Error as `set`, and what `edit` throws; everything is then as it was
   void change(const std::function<void(ServoSettings&)>& edit);
+  /// Says where a hand's device lies in the scene; takes effect in the next tick, and the hand has
+  /// to engage anew. @throws Error, leaving everything as it was, if the placement is out of range.
+  void place(std::size_t hand, const Placement& placement);
   /// How its recordings are played. The force goes to zero and ramps up again wherever time jumps.
   /// Real time. @throws Error as CameraFeed::set_playback and seek.
   void set_playback(const Playback& playback);
@@ -152,7 +192,7 @@ class Session {
   /// everything else goes on. Afterwards the hand has to engage anew, so the force comes up
   /// gradually.
   void hold(bool on);
-  /// Ends a latched fault of the safety chain: an operator's decision.
+  /// Ends latched faults of all hands' safety chains: an operator's decision.
   void reset_faults() noexcept;
 
   /// Begins to record into `folder`, which must not be there yet. @throws Error if it cannot be
@@ -164,14 +204,14 @@ class Session {
   /// What is painted on the cameras' frames; see Paint.
   [[nodiscard]] Paint& paint();
 
-  [[nodiscard]] const Device& device() const;
-  /// The device, if a page moves it; else null.
+  [[nodiscard]] const Device& device(std::size_t hand = 0) const;
+  /// The device that a page moves; null if there is none.
   [[nodiscard]] MouseDevice* mouse() const;
   [[nodiscard]] const MethodRegistry& methods() const;
-  [[nodiscard]] const CycleStatistics& statistics() const;
-  /// Real time: of the loop. Free-running: empty.
-  [[nodiscard]] const Timing* timing() const;
-  [[nodiscard]] const RealtimeReport* realtime() const;
+  [[nodiscard]] const CycleStatistics& statistics(std::size_t hand = 0) const;
+  /// Real time: of the hand's loop. Free-running: null.
+  [[nodiscard]] const Timing* timing(std::size_t hand = 0) const;
+  [[nodiscard]] const RealtimeReport* realtime(std::size_t hand = 0) const;
 
  private:
   class Impl;

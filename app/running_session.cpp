@@ -26,25 +26,20 @@ bool can_run_freely(const SessionConfig& config) {
     if (drivers.try_find(Uri(camera.uri).scheme()) != nullptr) return false;
     if (open_source(camera.uri)->info().live) return false;
   }
-  const std::string scheme = Uri(config.device.empty() ? "hand:" : config.device).scheme();
-  return scheme == "hand" || scheme == "script";
+  const auto is_simulated = [](const std::string& device) {
+    const std::string scheme = Uri(device).scheme();
+    return scheme == "hand" || scheme == "script";
+  };
+  return is_simulated(config.device.empty() ? "hand:" : config.device) &&
+         std::all_of(config.more_hands.begin(), config.more_hands.end(),
+                     [&](const HandConfig& hand) { return is_simulated(hand.device); });
 }
 
-}  // namespace
-
-MethodRegistry session_methods() {
-  const MethodRegistry all = program_methods();
-  MethodRegistry methods("method", "", {});
-  for (const MethodInfo& method : all.entries()) {
-    if (method.name != "ideal") methods.add(method);
-  }
-  return methods;
-}
-
-void introduce(const Session& session, const SessionConfig& config) {
-  const DeviceInfo& device = session.device().info();
-  if (!device.limits.motors || device.simulated) return;
-  std::string text = fmt::format("{}: {}", device.uri, device.kind);
+// @param hand  its name; empty: it is the only one
+void introduce_device(const DeviceInfo& device, const std::string& hand,
+                      const ServoSettings& settings, double rate) {
+  std::string text = hand.empty() ? "" : hand + ": ";
+  text += fmt::format("{}: {}", device.uri, device.kind);
   if (!device.serial.empty()) text += ", serial number " + device.serial;
   text += fmt::format("; at most {:.2g} N, {:.2g} N for long", device.limits.max_force,
                       device.limits.continuous_force);
@@ -60,20 +55,49 @@ void introduce(const Session& session, const SessionConfig& config) {
   if (const Driver* driver = drivers.try_find(Uri(device.uri).scheme()))
     text += "; its driver was tried on " + driver->tried;
   fmt::print(stderr, "palpate: {}\n", text);
-  const ServoSettings settings = session.settings();
-  for (const std::string& line :
-       stiffness_warnings(device, settings.parameters.coupling.stiffness,
-                          settings.placement.workspace_scale, config.rate))
+  for (const std::string& line : stiffness_warnings(device, settings.parameters.coupling.stiffness,
+                                                    settings.placement.workspace_scale, rate))
     fmt::print(stderr, "palpate: {}: {}\n", device.uri, line);
 }
 
-std::unique_ptr<Device> guarded_device(const SessionConfig& config) {
-  const std::string& uri = config.device;
-  if (uri.empty() || config.without_watchdog) return nullptr;
+}  // namespace
+
+MethodRegistry session_methods() {
+  const MethodRegistry all = program_methods();
+  MethodRegistry methods("method", "", {});
+  for (const MethodInfo& method : all.entries()) {
+    if (method.name != "ideal") methods.add(method);
+  }
+  return methods;
+}
+
+void introduce(const Session& session, const SessionConfig& config) {
+  for (std::size_t hand = 0; hand < session.hands(); ++hand) {
+    const DeviceInfo& device = session.device(hand).info();
+    if (!device.limits.motors || device.simulated) continue;
+    introduce_device(device, session.hand_name(hand), session.settings(), config.rate);
+  }
+}
+
+GuardedDevices guarded_devices(const SessionConfig& config) {
   const Registry<Driver> drivers = standard_drivers();
-  const Driver* driver = drivers.try_find(Uri(uri).scheme());
-  if (driver == nullptr || !driver->needs_guard) return nullptr;
-  return open_guarded([&] { return driver->open_device(Uri(uri)); });
+  const auto guarded = [&](const std::string& uri) -> std::unique_ptr<Device> {
+    if (uri.empty() || config.without_watchdog) return nullptr;
+    const Driver* driver = drivers.try_find(Uri(uri).scheme());
+    if (driver == nullptr || !driver->needs_guard) return nullptr;
+    return open_guarded([&] { return driver->open_device(Uri(uri)); });
+  };
+  GuardedDevices devices;
+  devices.push_back(guarded(config.device));
+  for (const HandConfig& hand : config.more_hands) devices.push_back(guarded(hand.device));
+  return devices;
+}
+
+void use(GuardedDevices devices, SessionOptions& session) {
+  if (devices.empty()) return;
+  session.device = std::move(devices.front());
+  for (std::size_t i = 1; i < devices.size(); ++i)
+    session.more_hands.at(i - 1).device = std::move(devices[i]);
 }
 
 SessionOptions options_of(const RunOptions& options, const SessionConfig& config,
@@ -104,8 +128,8 @@ int finish(Session& session, bool json, const std::string& ended) {
   if (!ended.empty()) recording += (recording.empty() ? "" : "; ") + ended;
   if (!recording.empty()) fmt::print(stderr, "palpate: {}\n", recording);
   const std::string text = json ? json_of(state.summary, recording, state.cameras, session.timing(),
-                                          &session.statistics().hand_over)
-                                : text_of(state.summary, state.cameras);
+                                          &session.statistics().hand_over, state.more_hands)
+                                : text_of(state.summary, state.cameras, state.more_hands);
   std::fputs(text.c_str(), stdout);
   return state.recording.failed ? 1 : 0;
 }

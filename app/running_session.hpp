@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "app/session_arguments.hpp"
 #include "palpate/core/method.hpp"
@@ -50,10 +51,14 @@ MethodRegistry session_methods();
 SessionOptions options_of(const RunOptions& options, const SessionConfig& config,
                           MethodRegistry methods);
 
-/// A device whose motors would keep their force if this process died, in a process of its own; null
-/// for any other, and where the user wants none (--without-watchdog). Only while this process has
-/// one thread.
-std::unique_ptr<Device> guarded_device(const SessionConfig& config);
+/// Of each hand the device, if its motors would keep their force if this process died, in a process
+/// of its own; null for any other, and where the user wants none (--without-watchdog). Only while
+/// this process has one thread.
+using GuardedDevices = std::vector<std::unique_ptr<Device>>;
+GuardedDevices guarded_devices(const SessionConfig& config);
+
+/// Gives the session these devices in place of what their URIs name.
+void use(GuardedDevices devices, SessionOptions& session);
 
 /// A line about a method whose ticks are not bounded; empty for any other.
 std::string late_ticks(const SessionOptions& options);

@@ -55,12 +55,17 @@ void SessionArguments::add_to(CLI::App& command) {
       "label");
   command.add_option("--fixtures", fixtures_,
                      "TOML file of virtual fixtures: forbidden regions, guides, viscous regions");
-  command.add_option("--device", device_,
-                     "the hand: mouse: in the page (the default), hand: a simulated person (the "
-                     "default of --headless), script:FILE.csv a path");
+  command
+      .add_option("--device", devices_,
+                  "the hand: mouse: in the page (the default), hand: a simulated person (the "
+                  "default of --headless), script:FILE.csv a path; given several times, a hand "
+                  "for each")
+      ->allow_extra_args(false);
   command.add_option("--device-pose", device_pose_,
                      "where the device lies in the scene: x,y,z,qx,qy,qz,qw [m], or the TOML file "
-                     "that palpate calibrate wrote");
+                     "that palpate calibrate wrote; of several hands the first's, as are --scale, "
+                     "--bubble, --handle-weight and --clutch-button: [[hand]] of --config has "
+                     "those of the others");
   command.add_option("--scale", scale_, "scene metres per device metre (1)");
   command.add_option("--bubble", bubble_,
                      "metres from the middle of the device's workspace beyond which the hand sends "
@@ -119,7 +124,12 @@ SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
   SessionConfig config = method_.session(methods);
   if (!cameras_.empty()) config.cameras = chosen(cameras_, config.cameras);
   for (CameraConfig& camera : config.cameras) camera.uri = with_material(camera.uri, material_);
-  if (device_) config.device = *device_;
+  if (!devices_.empty()) {
+    config.device = devices_.front();
+    // Of a hand that the file knows, all but where it is plugged in stays.
+    config.more_hands.resize(devices_.size() - 1);
+    for (std::size_t i = 1; i < devices_.size(); ++i) config.more_hands[i - 1].device = devices_[i];
+  }
   if (bubble_) config.placement.bubble_radius = *bubble_;
   if (handle_weight_) config.placement.handle_weight = *handle_weight_;
   apply_placement(device_pose_, scale_, clutch_button_, config.placement);

@@ -25,8 +25,8 @@ class SessionArguments {
   [[nodiscard]] SessionConfig config(const MethodRegistry& methods) const;
 
  private:
-  std::vector<std::string> cameras_, limits_, operator_limits_;
-  std::optional<std::string> material_, fixtures_, device_, device_pose_, record_, record_folder_;
+  std::vector<std::string> cameras_, devices_, limits_, operator_limits_;
+  std::optional<std::string> material_, fixtures_, device_pose_, record_, record_folder_;
   std::optional<std::string> listen_, token_, operator_token_;
   std::optional<double> rate_, scale_, bubble_, handle_weight_, record_limit_;
   std::optional<int> clutch_button_;

@@ -36,9 +36,34 @@ nlohmann::ordered_json object_of(const PortEnergy& port, double worst) {
       {"made_j", port.made}, {"worst_contact_j", worst}, {"generating_contacts", port.generating}};
 }
 
-}  // namespace
+// What a hand's session amounted to.
+nlohmann::ordered_json object_of(const Summary& summary) {
+  nlohmann::ordered_json safety;
+  for (std::size_t i = 0; i < safety_flag_count; ++i)
+    safety[std::string(safety_flag_names()[i])] = summary.safety_ticks[i];
+  const Vec3 mean =
+      summary.sum_sent / static_cast<double>(std::max<std::size_t>(summary.force_ticks, 1));
+  return {{"ticks", summary.ticks},
+          {"frames", summary.frames},
+          {"duration_s", summary.duration()},
+          {"late_ticks", summary.late_ticks},
+          {"contact_ticks", summary.contact_ticks},
+          {"force_ticks", summary.force_ticks},
+          {"steps", summary.steps},
+          {"step_budget_hits", ticks_with(summary, step_budget_hit)},
+          {"patch_thinned_ticks", ticks_with(summary, patch_thinned)},
+          {"max_force_asked", summary.largest_asked},
+          {"max_force_sent", summary.largest_sent},
+          {"mean_force_sent", {mean.x(), mean.y(), mean.z()}},
+          {"pop_throughs", summary.pop_throughs},
+          {"energy",
+           {{"contacts", summary.energy.contacts},
+            {"relative", object_of(summary.energy.relative, summary.worst_relative)},
+            {"absolute", object_of(summary.energy.absolute, summary.worst_absolute)}}},
+          {"safety_ticks", safety}};
+}
 
-std::string text_of(const Summary& summary, std::span<const CameraStatus> cameras) {
+std::string hand_line(const Summary& summary) {
   const auto ticks = static_cast<double>(std::max<std::size_t>(summary.ticks, 1));
   std::string text = fmt::format(
       "{} ticks over {:.3f} s, {} frames, in contact {:.1f} % of the time, largest force asked "
@@ -57,38 +82,29 @@ std::string text_of(const Summary& summary, std::span<const CameraStatus> camera
         "more than {:.1f} mJ in {}",
         energy.contacts, 1e3 * energy.relative.made, 1e3 * summary.worst_relative,
         1e3 * PortEnergy::least_made, energy.relative.generating);
-  text += "\n";
+  return text;
+}
+
+}  // namespace
+
+std::string text_of(const Summary& summary, std::span<const CameraStatus> cameras,
+                    std::span<const SessionHandState> more_hands) {
+  std::string text = hand_line(summary) + "\n";
+  for (const SessionHandState& hand : more_hands)
+    text += hand.name + ": " + hand_line(hand.summary) + "\n";
   for (const CameraStatus& camera : cameras) text += camera_line(camera);
   return text;
 }
 
 std::string json_of(const Summary& summary, const std::string& recording,
                     std::span<const CameraStatus> cameras, const Timing* timing,
-                    const Histogram* hand_over) {
-  nlohmann::ordered_json safety;
-  for (std::size_t i = 0; i < safety_flag_count; ++i)
-    safety[std::string(safety_flag_names()[i])] = summary.safety_ticks[i];
-  const Vec3 mean =
-      summary.sum_sent / static_cast<double>(std::max<std::size_t>(summary.force_ticks, 1));
-  nlohmann::ordered_json object = {
-      {"ticks", summary.ticks},
-      {"frames", summary.frames},
-      {"duration_s", summary.duration()},
-      {"late_ticks", summary.late_ticks},
-      {"contact_ticks", summary.contact_ticks},
-      {"force_ticks", summary.force_ticks},
-      {"steps", summary.steps},
-      {"step_budget_hits", ticks_with(summary, step_budget_hit)},
-      {"patch_thinned_ticks", ticks_with(summary, patch_thinned)},
-      {"max_force_asked", summary.largest_asked},
-      {"max_force_sent", summary.largest_sent},
-      {"mean_force_sent", {mean.x(), mean.y(), mean.z()}},
-      {"pop_throughs", summary.pop_throughs},
-      {"energy",
-       {{"contacts", summary.energy.contacts},
-        {"relative", object_of(summary.energy.relative, summary.worst_relative)},
-        {"absolute", object_of(summary.energy.absolute, summary.worst_absolute)}}},
-      {"safety_ticks", safety}};
+                    const Histogram* hand_over, std::span<const SessionHandState> more_hands) {
+  nlohmann::ordered_json object = object_of(summary);
+  for (const SessionHandState& hand : more_hands) {
+    nlohmann::ordered_json other = {{"name", hand.name}};
+    other.update(object_of(hand.summary));
+    object["more_hands"].push_back(std::move(other));
+  }
   for (const CameraStatus& camera : cameras)
     object["cameras"].push_back({{"uri", camera.uri},
                                  {"kind", camera.kind},

@@ -6,18 +6,21 @@
 
 #include "palpate/servo/periodic_thread.hpp"
 #include "palpate/session/camera_feed.hpp"
+#include "palpate/session/session.hpp"
 #include "palpate/session/summary.hpp"
 
 namespace palpate::app {
 
-/// A summary in one line, for people, and one for each live camera.
-std::string text_of(const Summary& summary, std::span<const CameraStatus> cameras = {});
+/// A summary in one line, for people, and one for each live camera and each further hand.
+std::string text_of(const Summary& summary, std::span<const CameraStatus> cameras = {},
+                    std::span<const SessionHandState> more_hands = {});
 /// The same as a JSON object, SI units.
 /// @param recording  how it went; empty: there was none
 /// @param timing     of a loop in real time; null: there was none
 /// @param hand_over  [ns] from a frame's arrival to the tick that used it; null: not known
 std::string json_of(const Summary& summary, const std::string& recording = {},
                     std::span<const CameraStatus> cameras = {}, const Timing* timing = nullptr,
-                    const Histogram* hand_over = nullptr);
+                    const Histogram* hand_over = nullptr,
+                    std::span<const SessionHandState> more_hands = {});
 
 }  // namespace palpate::app

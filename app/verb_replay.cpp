@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -52,7 +56,7 @@ nlohmann::ordered_json replay_json(const ReplayDifferences& differences) {
   return object;
 }
 
-std::string replay_json(const ReplayReport& report) {
+nlohmann::ordered_json replay_json(const ReplayReport& report) {
   nlohmann::ordered_json object = {{"identical", report.identical()},
                                    {"ticks", report.ticks},
                                    {"frames", report.frames},
@@ -65,17 +69,41 @@ std::string replay_json(const ReplayReport& report) {
   if (!report.broken_off.empty()) object["broken_off"] = report.broken_off;
   object["checksums"] = app::text_of(report.check);
   if (!report.check.damage.empty()) object["damage"] = report.check.damage;
-  return object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return object;
+}
+
+struct HandReplay {
+  std::string name;  // of the hand; empty: it is the only one
+  ReplayReport report;
+  std::vector<std::string> more_hands;
+};
+
+HandReplay replayed(const std::filesystem::path& path) {
+  SessionReader session(path);
+  const std::string& name = session.info().hand;
+  Progress progress(name.empty() ? "replay" : "replay of " + name, session.ticks());
+  ReplayReport report = replay(
+      session, [&progress](std::size_t ticks) { progress.set(ticks); }, program_methods());
+  progress.finish();
+  return {name, std::move(report), session.info().more_hands};
 }
 
 int run(const ReplayOptions& options) {
-  SessionReader session(options.path);
-  Progress progress("replay", session.ticks());
-  const ReplayReport report = replay(
-      session, [&progress](std::size_t ticks) { progress.set(ticks); }, program_methods());
-  progress.finish();
-  std::fputs(options.json ? replay_json(report).c_str() : replay_text(report).c_str(), stdout);
-  return report.identical() ? 0 : 1;
+  std::vector<HandReplay> hands{replayed(options.path)};
+  const std::vector<std::string> more = hands.front().more_hands;
+  for (const std::string& name : more) hands.push_back(replayed(hand_folder(options.path, name)));
+  if (options.json) {
+    nlohmann::ordered_json object = replay_json(hands.front().report);
+    for (std::size_t i = 1; i < hands.size(); ++i)
+      object["more_hands"][hands[i].name] = replay_json(hands[i].report);
+    fmt::print("{}\n", object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  } else {
+    for (const HandReplay& hand : hands)
+      fmt::print("{}{}", hands.size() == 1 ? "" : hand.name + ":\n", replay_text(hand.report));
+  }
+  const bool identical = std::all_of(hands.begin(), hands.end(),
+                                     [](const auto& hand) { return hand.report.identical(); });
+  return identical ? 0 : 1;
 }
 
 }  // namespace

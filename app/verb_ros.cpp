@@ -27,11 +27,11 @@ int run_node(const RosOptions& options) {
     return 0;
   }
   // While there is one thread, and before there is DDS: a guard is another process.
-  std::unique_ptr<Device> guarded = guarded_device(config);
+  GuardedDevices guarded = guarded_devices(config);
   Running running;
   const EndingSignals signals([&] { running.end(); });
   SessionOptions wanted = options_of(options.run, config, session_methods());
-  wanted.device = std::move(guarded);
+  use(std::move(guarded), wanted);
   const std::string warning = late_ticks(wanted);
   Session session(std::move(wanted));
   std::fputs(warning.c_str(), stderr);

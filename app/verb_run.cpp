@@ -96,10 +96,10 @@ std::vector<SceneChoice> scene_choices(const std::vector<CameraConfig>& given,
   return choices;
 }
 
-int run_headless(const RunOptions& options, const SessionConfig& config,
-                 std::unique_ptr<Device> guarded, Running& running) {
+int run_headless(const RunOptions& options, const SessionConfig& config, GuardedDevices guarded,
+                 Running& running) {
   SessionOptions wanted = options_of(options, config, session_methods());
-  wanted.device = std::move(guarded);
+  use(std::move(guarded), wanted);
   if (options.beside.prepare) options.beside.prepare(wanted);
   const std::string warning = late_ticks(wanted);
   const bool is_free = wanted.pace == Pace::free_running;
@@ -155,7 +155,7 @@ struct Ending {
 };
 
 // @param config  gets port and tokens of the page, for the session that follows
-Ending run_page(const RunOptions& options, SessionConfig& config, std::unique_ptr<Device> guarded,
+Ending run_page(const RunOptions& options, SessionConfig& config, GuardedDevices guarded,
                 PageRules rules, bool is_first, Running& running) {
   std::mutex mutex;
   std::optional<std::string> chosen;  // guarded by it
@@ -166,7 +166,7 @@ Ending run_page(const RunOptions& options, SessionConfig& config, std::unique_pt
   };
   SessionHost host(PALPATE_VERSION, std::move(rules));
   SessionOptions wanted = options_of(options, config, session_methods());
-  wanted.device = std::move(guarded);
+  use(std::move(guarded), wanted);
   wanted.on_frame = [&host](std::size_t camera, const FedFrame& frame) {
     host.show(camera, frame);
   };
@@ -212,7 +212,7 @@ Ending run_page(const RunOptions& options, SessionConfig& config, std::unique_pt
 }
 
 // Session after session, as the operator's page chooses other scenes.
-int run_pages(const RunOptions& options, SessionConfig config, std::unique_ptr<Device> guarded,
+int run_pages(const RunOptions& options, SessionConfig config, GuardedDevices guarded,
               Running& running) {
   // The links stay good from one session to the next.
   ServerConfig& server = config.server;
@@ -221,8 +221,8 @@ int run_pages(const RunOptions& options, SessionConfig config, std::unique_ptr<D
   const std::vector<CameraConfig> given = config.cameras;
   std::vector<CameraConfig> before = given;
   // A device with motors is opened once: its hand is somewhere, and its guard is another process.
-  const bool may_choose =
-      !options.beside.attach && (config.device.empty() || Uri(config.device).scheme() == "mouse");
+  const bool may_choose = !options.beside.attach && config.more_hands.empty() &&
+                          (config.device.empty() || Uri(config.device).scheme() == "mouse");
   PageRules rules = page_rules(config);
   rules.robot = options.beside.robot;
   if (may_choose) rules.files = std::make_shared<DroppedFiles>();
@@ -263,7 +263,7 @@ int run(const RunOptions& options) {
 }  // namespace
 
 int run_session(const RunOptions& options, const SessionConfig& config) {
-  std::unique_ptr<Device> guarded = guarded_device(config);
+  GuardedDevices guarded = guarded_devices(config);
   // Before any other thread begins, so that these signals come to this one alone.
   Running running;
   const EndingSignals signals([&] { running.end(); });

@@ -34,13 +34,43 @@ std::shared_ptr<const FixtureSet> fixtures_of(const std::optional<std::string>& 
                                                 : read_fixtures(*what));
 }
 
+// Hands beside the first: each a device's URI, or a dict with it.
+std::vector<SessionHandOptions> hands_of(const py::iterable& hands) {
+  std::vector<SessionHandOptions> more;
+  for (const py::handle& each : hands) {
+    SessionHandOptions hand;
+    if (py::isinstance<py::str>(each)) {
+      hand.device_uri = py::cast<std::string>(each);
+    } else {
+      for (const auto& [key, value] : py::cast<py::dict>(each)) {
+        const auto name = py::cast<std::string>(key);
+        if (name == "device")
+          hand.device_uri = py::cast<std::string>(value);
+        else if (name == "name")
+          hand.name = py::cast<std::string>(value);
+        else if (name == "scale")
+          hand.placement.workspace_scale = py::cast<double>(value);
+        else if (name == "world_from_device")
+          hand.placement.world_from_device =
+              pose_of(py::cast<Eigen::Matrix4d>(value), "world_from_device");
+        else
+          throw Error("hands", "a hand has no '" + name + "'",
+                      "give device, name, world_from_device and scale");
+      }
+    }
+    more.push_back(std::move(hand));
+  }
+  return more;
+}
+
 class PythonSession {
  public:
   PythonSession(const py::object& camera, const std::string& device, const std::string& method,
                 bool free_running, double rate, const std::string& record, double stroke_time,
                 const std::optional<Eigen::Matrix4d>& world_from_device, double scale,
                 const py::dict& limits, bool without_watchdog,
-                const std::optional<std::string>& fixtures, const py::kwargs& parameters)
+                const std::optional<std::string>& fixtures, const py::iterable& hands,
+                const py::kwargs& parameters)
       : free_running_(free_running) {
     SessionOptions options;
     if (py::isinstance<py::str>(camera)) {
@@ -64,9 +94,17 @@ class PythonSession {
     options.stroke_time = stroke_time;
     options.record = record;
     options.version = PALPATE_VERSION;
+    options.more_hands = hands_of(hands);
+    ran_.resize(1 + options.more_hands.size());
+    if (free_running_) {
+      for (std::size_t i = 1; i < ran_.size(); ++i)
+        options.more_hands[i - 1].on_tick = [this, i](const ServoTick& tick) {
+          ran_[i].push_back(record_of(tick));
+        };
+    }
     const py::gil_scoped_release released;
     session_.emplace(std::move(options));
-    reader_.emplace(session_->ticks());
+    for (std::size_t i = 0; i < ran_.size(); ++i) readers_.push_back(session_->ticks(i));
   }
 
   ~PythonSession() { stop(); }
@@ -89,7 +127,7 @@ class PythonSession {
     if (free_running_) {
       std::size_t count = 0;
       session_->run(duration, [&](const ServoTick& tick) {
-        ran_.push_back(record_of(tick));
+        ran_.front().push_back(record_of(tick));
         if (++count % session_batch == 0) check_signals();
       });
       return;
@@ -104,14 +142,21 @@ class PythonSession {
     session_->stop();
   }
 
-  py::array ticks() {
-    if (free_running_) return array_of(std::exchange(ran_, {}));
+  py::array ticks(std::size_t hand) {
+    if (hand >= ran_.size())
+      throw Error("hand " + std::to_string(hand), "the session has none of this number",
+                  "give 0 to " + std::to_string(ran_.size() - 1));
+    if (free_running_) return array_of(std::exchange(ran_[hand], {}));
     std::vector<CycleRecord> records;
     ServoTick tick;
-    while (reader_->try_pop(tick)) records.push_back(record_of(tick));
+    while (readers_[hand].try_pop(tick)) records.push_back(record_of(tick));
     return array_of(records);
   }
-  [[nodiscard]] std::uint64_t lost() const { return reader_->lost(); }
+  [[nodiscard]] std::uint64_t lost() const {
+    std::uint64_t lost = 0;
+    for (const auto& reader : readers_) lost += reader.lost();
+    return lost;
+  }
 
   void set(const std::optional<std::string>& method, const py::kwargs& values) {
     const auto numbers = numbers_of(values);
@@ -178,6 +223,18 @@ class PythonSession {
     }
     state["interventions"] = interventions;
     state["latched_by"] = now.latched_by;
+    py::list hands;
+    for (const SessionHandState& hand : now.more_hands) {
+      py::dict each;
+      each["name"] = hand.name;
+      each["ticks"] = hand.summary.ticks;
+      each["contact_ticks"] = hand.summary.contact_ticks;
+      each["largest_force"] = hand.summary.largest_sent;
+      each["latched_by"] = hand.latched_by;
+      each["trouble"] = hand.device.text;
+      hands.append(each);
+    }
+    state["more_hands"] = hands;
     return state;
   }
 
@@ -197,8 +254,9 @@ class PythonSession {
  private:
   bool free_running_;
   std::optional<Session> session_;
-  std::optional<TickRing<ServoTick>::Reader> reader_;
-  std::vector<CycleRecord> ran_;
+  // Of each hand:
+  std::vector<TickRing<ServoTick>::Reader> readers_;
+  std::vector<std::vector<CycleRecord>> ran_;
 };
 
 }  // namespace
@@ -212,16 +270,19 @@ void define_session(py::module_& m) {
       "`with` starts it, and takes the force off the device before anything else at the end.")
       .def(py::init<const py::object&, const std::string&, const std::string&, bool, double,
                     const std::string&, double, const std::optional<Eigen::Matrix4d>&, double,
-                    const py::dict&, bool, const std::optional<std::string>&, const py::kwargs&>(),
+                    const py::dict&, bool, const std::optional<std::string>&, const py::iterable&,
+                    const py::kwargs&>(),
            py::arg("camera"), py::arg("device") = "hand:", py::kw_only(),
            py::arg("method") = "sight", py::arg("free_running") = false, py::arg("rate") = 1000.0,
            py::arg("record") = "", py::arg("stroke_time") = 20.0,
            py::arg("world_from_device") = py::none(), py::arg("scale") = 1.0,
            py::arg("limits") = py::dict(), py::arg("without_watchdog") = false,
-           py::arg("fixtures") = py::none(),
+           py::arg("fixtures") = py::none(), py::arg("hands") = py::tuple(),
            "camera: a URI or a list of them. device: a URI. free_running: as fast as the machine\n"
            "can, with the same forces each time. limits: of the safety chain\n"
-           "(palpate.limits()). fixtures: a TOML file of virtual fixtures, or its text. Further\n"
+           "(palpate.limits()). fixtures: a TOML file of virtual fixtures, or its text.\n"
+           "hands: further hands, each a device's URI or a dict with device, name, scale and\n"
+           "world_from_device; while one of the hands is in trouble, none has a force. Further\n"
            "keywords are parameters (palpate.parameters()).")
       .def("__enter__",
            [](const py::object& self) {
@@ -234,11 +295,13 @@ void define_session(py::module_& m) {
            "Takes the force off the device, then ends everything. Any number of times.")
       .def("run", &PythonSession::run, py::arg("duration") = py::none(),
            "Runs for `duration` [s], or until Ctrl-C, and stops.")
-      .def("ticks", &PythonSession::ticks,
-           "The cycles since the last call, as a structured array. Call it at least every few\n"
+      .def("ticks", &PythonSession::ticks, py::arg("hand") = 0,
+           "The cycles of a hand since the last call, as a structured array. Call it at least "
+           "every few\n"
            "seconds: the last 8192 are kept; of a free-running session, all of them.")
-      .def_property_readonly("lost", &PythonSession::lost,
-                             "How many cycles were overwritten before `ticks` was called.")
+      .def_property_readonly(
+          "lost", &PythonSession::lost,
+          "How many cycles were overwritten before `ticks` was called, of all hands.")
       .def("state", &PythonSession::state, "How the session does: a dict.")
       .def("clouds", &PythonSession::clouds, "What each camera saw last; None before that.")
       .def("set", &PythonSession::set, py::arg("method") = py::none(),

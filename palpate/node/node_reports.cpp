@@ -125,35 +125,45 @@ DiagnosticStatus camera_status(const CameraStatus& camera, double now) {
   return made;
 }
 
-DiagnosticStatus contact_status(const SessionReport& report) {
-  const ServoTick& newest = report.ticks.newest;
-  DiagnosticStatus made = status("contact", DiagnosticStatus::ok, to_string(newest.tick.state));
-  if (report.state.held) made.message += "; the force is held back (~/release ends that)";
-  if (report.state.latched_by != 0) {
+// What is said of a hand's contact.
+struct Contact {
+  std::string name;  // of the hand, with a blank behind it; empty: the first one
+  const TickReport& ticks;
+  std::uint32_t latched_by;
+  std::size_t pop_throughs;
+};
+
+DiagnosticStatus contact_status(const Contact& contact, bool held) {
+  const ServoTick& newest = contact.ticks.newest;
+  DiagnosticStatus made =
+      status(contact.name + "contact", DiagnosticStatus::ok, to_string(newest.tick.state));
+  if (held) made.message += "; the force is held back (~/release ends that)";
+  if (contact.latched_by != 0) {
     made.level = DiagnosticStatus::error;
-    made.message = "no force: latched by " +
-                   names_of(report.state.latched_by, safety_flag_names()) +
+    made.message = "no force: latched by " + names_of(contact.latched_by, safety_flag_names()) +
                    " (~/reset_faults ends that)";
   }
   made.values = {{"force asked for [N]", number(newest.tick.force.norm())},
                  {"force sent [N]", number(newest.force.norm())},
                  {"gain", number(newest.gain)},
                  {"age of the frame [s]", number(newest.frame_age)},
-                 {"flags", tick_flags(report.ticks.flags)},
-                 {"safety flags", names_of(report.ticks.safety, safety_flag_names())},
-                 {"pop-throughs suspected", std::to_string(report.state.summary.pop_throughs)}};
+                 {"flags", tick_flags(contact.ticks.flags)},
+                 {"safety flags", names_of(contact.ticks.safety, safety_flag_names())},
+                 {"pop-throughs suspected", std::to_string(contact.pop_throughs)}};
   return made;
 }
 
-DiagnosticStatus device_status(const SessionReport& report, const DeviceInfo& device) {
-  const std::uint32_t hand = report.ticks.newest.hand;
-  DiagnosticStatus made = status("device " + device.uri, DiagnosticStatus::ok, "no hand");
+// @param name     as Contact's
+// @param trouble  of the device, in more words than its fault has; may be empty
+DiagnosticStatus device_status(const std::string& name, const TickReport& ticks,
+                               const std::string& trouble, const DeviceInfo& device) {
+  const std::uint32_t hand = ticks.newest.hand;
+  DiagnosticStatus made = status(name + "device " + device.uri, DiagnosticStatus::ok, "no hand");
   if ((hand & hand_present) != 0) made.message = "held";
   if ((hand & hand_clutched) != 0) made.message = "clutched";
   if ((hand & hand_fault) != 0) {
     made.level = DiagnosticStatus::error;
-    made.message = report.state.device.text.empty() ? std::string(describe(fault_of(hand)))
-                                                    : report.state.device.text;
+    made.message = trouble.empty() ? std::string(describe(fault_of(hand))) : trouble;
   }
   made.hardware_id = device.serial.empty() ? device.uri : device.serial;
   made.values = {{"kind", device.kind},
@@ -203,8 +213,18 @@ ros::DiagnosticArray diagnostics_of(const SessionReport& report, const DeviceInf
   array.status.push_back(loop_status(report));
   for (const CameraStatus& camera : report.state.cameras)
     array.status.push_back(camera_status(camera, report.now));
-  array.status.push_back(contact_status(report));
-  array.status.push_back(device_status(report, device));
+  const SessionState& state = report.state;
+  array.status.push_back(
+      contact_status({"", report.ticks, state.latched_by, state.summary.pop_throughs}, state.held));
+  array.status.push_back(device_status("", report.ticks, state.device.text, device));
+  for (std::size_t i = 0; i < report.more_hands.size() && i < state.more_hands.size(); ++i) {
+    const SessionHandState& hand = state.more_hands[i];
+    const auto& [ticks, info] = report.more_hands[i];
+    const std::string name = hand.name + " ";
+    array.status.push_back(
+        contact_status({name, ticks, hand.latched_by, hand.summary.pop_throughs}, state.held));
+    array.status.push_back(device_status(name, ticks, hand.device.text, info));
+  }
   array.status.push_back(recording_status(report.state.recording));
   return array;
 }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "palpate/bag/node_messages.hpp"
 #include "palpate/servo/cycle.hpp"
@@ -38,9 +39,14 @@ struct SessionReport {
   double tick_rate = 0.0;        ///< [Hz] measured
   std::uint64_t late_ticks = 0;  ///< in that time
   double now = 0.0;              ///< [s] on the servo loop's clock
+  struct Hand {
+    TickReport ticks;
+    DeviceInfo device;
+  };
+  std::vector<Hand> more_hands = {};  ///< as SessionState::more_hands
 };
 
-/// Loop, cameras, contact, device and recording, each with its level.
+/// Loop, cameras, each hand's contact and device, and recording, each with its level.
 ros::DiagnosticArray diagnostics_of(const SessionReport& report, const DeviceInfo& device,
                                     const ros::Header& header);
 

@@ -82,6 +82,51 @@ std::array<std::uint8_t, size> identity(const dds::Guid& guid) {
   return bytes;
 }
 
+// The topics of a hand, and what has been read of it.
+struct HandTopics {
+  HandTopics(dds::Participant& participant, const std::string& name,
+             TickRing<ServoTick>::Reader reader)
+      : ticks(std::move(reader)),
+        proxy(participant, name + "/proxy", ros::PoseStamped{}, reliable),
+        hip(participant, name + "/hip", ros::PoseStamped{}, reliable),
+        force(participant, name + "/force", ros::WrenchStamped{}, reliable),
+        normal(participant, name + "/normal", ros::Vector3Stamped{}, reliable),
+        contact(participant, name + "/contact", ros::UInt8{}, reliable),
+        flags(participant, name + "/flags", ros::UInt32{}, reliable),
+        safety(participant, name + "/safety_flags", ros::UInt32{}, reliable) {}
+
+  void read() {
+    TickReport since;
+    fresh = false;
+    for (ServoTick record{}; ticks.try_pop(record); fresh = true) {
+      since.add(record);
+      second.add(record);
+    }
+    if (fresh) report = since;
+  }
+
+  void publish(const ros::Header& now) {
+    const Tick& tick = report.newest.tick;
+    proxy.write(ros::PoseStamped{now, components(tick.proxy)});
+    hip.write(ros::PoseStamped{now, components(tick.hip)});
+    force.write(ros::WrenchStamped{now, components(report.newest.force)});
+    normal.write(ros::Vector3Stamped{now, components(tick.normal)});
+    contact.write(ros::UInt8{static_cast<std::uint8_t>(tick.state)});
+    flags.write(ros::UInt32{report.flags});
+    safety.write(ros::UInt32{report.safety});
+  }
+
+  [[nodiscard]] std::array<const dds::Writer*, 7> writers() const {
+    return {&proxy, &hip, &force, &normal, &contact, &flags, &safety};
+  }
+
+  TickRing<ServoTick>::Reader ticks;
+  dds::Writer proxy, hip, force, normal, contact, flags, safety;
+  TickReport report;   // since the last message
+  TickReport second;   // since the last report
+  bool fresh = false;  // a tick came since the last message
+};
+
 }  // namespace
 
 class RosNode::Impl {
@@ -93,15 +138,8 @@ class RosNode::Impl {
         frame_(options.frame),
         interval_(1.0 / checked_rate(options.rate)),
         parameters_(session.methods()),
-        ticks_(session.ticks()),
         participant_("ros", "enclave=/;"),
-        proxy_(participant_, name_ + "/proxy", ros::PoseStamped{}, reliable),
-        hip_(participant_, name_ + "/hip", ros::PoseStamped{}, reliable),
-        force_(participant_, name_ + "/force", ros::WrenchStamped{}, reliable),
-        normal_(participant_, name_ + "/normal", ros::Vector3Stamped{}, reliable),
-        contact_(participant_, name_ + "/contact", ros::UInt8{}, reliable),
-        flags_(participant_, name_ + "/flags", ros::UInt32{}, reliable),
-        safety_(participant_, name_ + "/safety_flags", ros::UInt32{}, reliable),
+        hands_(topics_of(participant_, name_, session)),
         markers_(participant_, name_ + "/markers", ros::MarkerArray{}, newest_alone),
         diagnostics_(participant_, "/diagnostics", ros::DiagnosticArray{}, reliable),
         events_(participant_, "/parameter_events", ros::ParameterEvent{}, events),
@@ -154,6 +192,17 @@ class RosNode::Impl {
   }
 
  private:
+  // The first hand's are the node's own; another one's have its name between.
+  static std::vector<std::unique_ptr<HandTopics>> topics_of(dds::Participant& participant,
+                                                            const std::string& node,
+                                                            const Session& session) {
+    std::vector<std::unique_ptr<HandTopics>> hands;
+    for (std::size_t i = 0; i < session.hands(); ++i)
+      hands.push_back(std::make_unique<HandTopics>(
+          participant, i == 0 ? node : node + "/" + session.hand_name(i), session.ticks(i)));
+    return hands;
+  }
+
   // When each of its works is due next [s].
   struct Due {
     double ticks, markers, report, nodes;
@@ -179,14 +228,16 @@ class RosNode::Impl {
     serve(now);
     if (now < due.ticks) return;
     due.ticks = std::max(due.ticks + interval_, now);  // what was missed is not made up for
-    read_ticks();
-    if (fresh_) publish();
-    if (fresh_ && now >= due.markers) {
-      due.markers = now + marker_interval;
-      const double radius = session_.settings().parameters.proxy.r_c();
-      markers_.write(markers_of(report_.newest, radius, header()));
+    bool fresh = false;
+    for (const auto& hand : hands_) {
+      hand->read();
+      if (hand->fresh) hand->publish({stamp_of(hand->report.newest.tick.t), frame_});
+      fresh = fresh || hand->fresh;
     }
-    fresh_ = false;
+    if (fresh && now >= due.markers) {
+      due.markers = now + marker_interval;
+      write_markers();
+    }
     if (now >= due.nodes) {
       due.nodes = now + nodes_interval;
       announce();
@@ -197,34 +248,25 @@ class RosNode::Impl {
     }
   }
 
-  void read_ticks() {
-    TickReport since;
-    for (ServoTick record{}; ticks_.try_pop(record);) {
-      since.add(record);
-      second_.add(record);
-      fresh_ = true;
+  // Of all hands in one message, by the hand's number.
+  void write_markers() {
+    const double radius = session_.settings().parameters.proxy.r_c();
+    ros::MarkerArray all;
+    for (std::size_t i = 0; i < hands_.size(); ++i) {
+      const ServoTick& newest = hands_[i]->report.newest;
+      ros::MarkerArray markers = markers_of(newest, radius, {stamp_of(newest.tick.t), frame_});
+      for (auto& marker : markers.markers) {
+        marker.id = static_cast<std::int32_t>(i);
+        all.markers.push_back(std::move(marker));
+      }
     }
-    if (fresh_) report_ = since;
-  }
-
-  [[nodiscard]] ros::Header header() const { return {stamp_of(report_.newest.tick.t), frame_}; }
-
-  void publish() {
-    const Tick& tick = report_.newest.tick;
-    const ros::Header now = header();
-    proxy_.write(ros::PoseStamped{now, components(tick.proxy)});
-    hip_.write(ros::PoseStamped{now, components(tick.hip)});
-    force_.write(ros::WrenchStamped{now, components(report_.newest.force)});
-    normal_.write(ros::Vector3Stamped{now, components(tick.normal)});
-    contact_.write(ros::UInt8{static_cast<std::uint8_t>(tick.state)});
-    flags_.write(ros::UInt32{report_.flags});
-    safety_.write(ros::UInt32{report_.safety});
+    markers_.write(all);
   }
 
   void report(double now) {
     SessionReport report;
     report.state = session_.state();
-    report.ticks = second_;
+    report.ticks = hands_.front()->second;
     report.now = now;
     const std::uint64_t ticks = session_.statistics().ticks.load();
     report.tick_rate =
@@ -233,7 +275,9 @@ class RosNode::Impl {
     counted_at_ = now;
     counted_ticks_ = ticks;
     counted_late_ = report.state.summary.late_ticks;
-    second_.flags = second_.safety = 0;
+    for (std::size_t i = 1; i < hands_.size(); ++i)
+      report.more_hands.push_back({hands_[i]->second, session_.device(i).info()});
+    for (const auto& hand : hands_) hand->second.flags = hand->second.safety = 0;
     diagnostics_.write(diagnostics_of(report, session_.device().info(), {stamp_of(now), frame_}));
     tell_changes();
   }
@@ -259,8 +303,11 @@ class RosNode::Impl {
     auto& node = info.nodes.emplace_back();
     node.node_namespace = node_.space;
     node.node_name = node_.name;
-    for (const dds::Writer* writer : {&proxy_, &hip_, &force_, &normal_, &contact_, &flags_,
-                                      &safety_, &markers_, &diagnostics_, &events_})
+    for (const auto& hand : hands_) {
+      for (const dds::Writer* writer : hand->writers())
+        node.writers.push_back(identity<size>(writer->guid()));
+    }
+    for (const dds::Writer* writer : {&markers_, &diagnostics_, &events_})
       node.writers.push_back(identity<size>(writer->guid()));
     const auto add = [&](const auto&... services) {
       (node.readers.push_back(identity<size>(services.reader())), ...);
@@ -376,11 +423,10 @@ class RosNode::Impl {
   const std::string name_, frame_;
   const double interval_;  // [s]
   const NodeParameters parameters_;
-  TickRing<ServoTick>::Reader ticks_;
 
   dds::Participant participant_;
-  dds::Writer proxy_, hip_, force_, normal_, contact_, flags_, safety_, markers_;
-  dds::Writer diagnostics_, events_;
+  std::vector<std::unique_ptr<HandTopics>> hands_;
+  dds::Writer markers_, diagnostics_, events_;
   dds::Service<ros::SetParameters> set_;
   dds::Service<ros::SetParametersAtomically> set_all_;
   dds::Service<ros::GetParameters> get_;
@@ -393,9 +439,6 @@ class RosNode::Impl {
 
   ObserverRecordings recordings_;
   std::vector<ros::Parameter> known_;  // as others were told
-  TickReport report_;                  // since the last message
-  TickReport second_;                  // since the last report
-  bool fresh_ = false;                 // a tick came since the last message
   double counted_at_ = 0.0;            // [s]
   std::uint64_t counted_ticks_ = 0, counted_late_ = 0;
   mutable std::mutex trouble_mutex_;

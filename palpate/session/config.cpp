@@ -51,13 +51,11 @@ std::vector<CameraConfig> read_cameras(const TomlTable& root, const toml::node& 
   return cameras;
 }
 
-void read_placement(const TomlTable& root, Placement& placement) {
-  const toml::table* sub = root.sub("placement");
-  if (sub == nullptr) return;
-  constexpr std::array<std::string_view, 9> keys{
-      "world_from_device", "scale",  "clutch_button", "bubble_radius", "bubble_speed",
-      "handle_weight",     "down_x", "down_y",        "down_z"};
-  const TomlTable table(*sub, root.file(), "[placement]", keys);
+constexpr std::array<std::string_view, 9> placement_keys{
+    "world_from_device", "scale",  "clutch_button", "bubble_radius", "bubble_speed",
+    "handle_weight",     "down_x", "down_y",        "down_z"};
+
+void read_placement(const TomlTable& table, Placement& placement) {
   if (const auto pose = table.pose("world_from_device")) placement.world_from_device = *pose;
   table.read("scale", placement.workspace_scale, 1e-3, 1e3, "scene m per device m");
   double button = -1.0;
@@ -69,6 +67,32 @@ void read_placement(const TomlTable& root, Placement& placement) {
   table.read("down_x", placement.down.x(), -1.0, 1.0, "");
   table.read("down_y", placement.down.y(), -1.0, 1.0, "");
   table.read("down_z", placement.down.z(), -1.0, 1.0, "");
+}
+
+HandConfig read_hand(const TomlTable& root, const toml::node& node) {
+  if (!node.is_table()) root.fail(node, "a hand is not a table", "write [[hand]] and a device");
+  constexpr std::array<std::string_view, 2> own_keys{"device", "name"};
+  std::array<std::string_view, own_keys.size() + placement_keys.size()> keys;
+  std::copy(placement_keys.begin(), placement_keys.end(),
+            std::copy(own_keys.begin(), own_keys.end(), keys.begin()));
+  const TomlTable table(*node.as_table(), root.file(), "[[hand]]", keys);
+  HandConfig hand{.device = ""};
+  table.read("device", hand.device);
+  if (hand.device.empty())
+    root.fail(node, "a hand has no 'device'", "write device = \"SCHEME:PATH\"");
+  table.read("name", hand.name);
+  read_placement(table, hand.placement);
+  return hand;
+}
+
+std::vector<HandConfig> read_hands(const TomlTable& root, const toml::node& node) {
+  std::vector<HandConfig> hands;
+  if (const toml::array* array = node.as_array()) {
+    for (const toml::node& element : *array) hands.push_back(read_hand(root, element));
+  } else {
+    hands.push_back(read_hand(root, node));
+  }
+  return hands;
 }
 
 void read_operator_limits(const TomlTable& root, std::map<std::string, double>& limits) {
@@ -135,6 +159,29 @@ std::string key_line(const std::string& key, const std::string& value, const std
   return key + " = " + value + "  # " + comment + "\n";
 }
 
+// The keys of a placement, a line each.
+std::string placement_lines(const Placement& placement) {
+  std::string text;
+  text += key_line("world_from_device", toml_pose(placement.world_from_device),
+                   "x, y, z in m; quaternion x, y, z, w");
+  text += key_line("scale", toml_number(placement.workspace_scale),
+                   "0.001 to 1000: scene metres per device metre");
+  text += placement.clutch_button
+              ? key_line("clutch_button", std::to_string(*placement.clutch_button),
+                         "0 to 31: the HIP stays while it is pressed")
+              : key_line("# clutch_button", "0", "0 to 31: the HIP stays while it is pressed");
+  text += key_line("bubble_radius", toml_number(placement.bubble_radius),
+                   "m of the device, 0 to 1: rate control beyond it; 0: none");
+  text += key_line("bubble_speed", toml_number(placement.bubble_speed),
+                   "m/s in the scene, 0.001 to 1: 2 cm beyond the bubble");
+  text += key_line("handle_weight", toml_number(placement.handle_weight),
+                   "kg, 0 to 0.1: of the handle that the motors hold up; 0: none");
+  for (int axis = 0; axis < 3; ++axis)
+    text += key_line(std::string("down_") + "xyz"[axis], toml_number(placement.down[axis]),
+                     "of the device's axes: which way the handle's weight pulls");
+  return text;
+}
+
 std::vector<std::string> lines_of(std::string_view text) {
   std::vector<std::string> lines;
   while (!text.empty()) {
@@ -194,10 +241,10 @@ std::string joined(const std::vector<std::string>& lines) {
 SessionConfig parse_session_config(std::string_view text, const std::string& name,
                                    const SessionConfig& base, const MethodCheck& check_method) {
   const toml::table tree = parse_toml(text, name, remedy_toml);
-  constexpr std::array<std::string_view, 14> keys{
-      "camera", "device",          "placement", "rate",          "method",       "parameters",
-      "safety", "fixtures",        "record",    "record_folder", "record_limit", "operator_limits",
-      "server", "without_watchdog"};
+  constexpr std::array<std::string_view, 15> keys{
+      "camera", "device",           "placement", "rate",          "method",       "parameters",
+      "safety", "fixtures",         "record",    "record_folder", "record_limit", "operator_limits",
+      "server", "without_watchdog", "hand"};
   const TomlTable root(tree, name, "", keys);
   SessionConfig config = base;
   if (const toml::node* cameras = root.find("camera"))
@@ -220,7 +267,10 @@ SessionConfig parse_session_config(std::string_view text, const std::string& nam
   };
   if (const toml::node* method = root.find("method"); method != nullptr && check_method)
     with_line(method, [&] { check_method(config.method); });
-  read_placement(root, config.placement);
+  if (const toml::table* placement = root.sub("placement"))
+    read_placement(TomlTable(*placement, root.file(), "[placement]", placement_keys),
+                   config.placement);
+  if (const toml::node* hands = root.find("hand")) config.more_hands = read_hands(root, *hands);
   read_rows(root, "parameters", parameter_table(), config.parameters);
   read_rows(root, "safety", safety_parameter_table(), config.safety);
   read_operator_limits(root, config.operator_limits);
@@ -270,24 +320,13 @@ std::string to_toml(const SessionConfig& config) {
       text += key_line("# world_from_camera", "[0, 0, 0, 0, 0, 0, 1]", comment);
     }
   }
-  text += "\n[placement]\n";
-  text += key_line("world_from_device", toml_pose(config.placement.world_from_device),
-                   "x, y, z in m; quaternion x, y, z, w");
-  text += key_line("scale", toml_number(config.placement.workspace_scale),
-                   "0.001 to 1000: scene metres per device metre");
-  text += config.placement.clutch_button
-              ? key_line("clutch_button", std::to_string(*config.placement.clutch_button),
-                         "0 to 31: the HIP stays while it is pressed")
-              : key_line("# clutch_button", "0", "0 to 31: the HIP stays while it is pressed");
-  text += key_line("bubble_radius", toml_number(config.placement.bubble_radius),
-                   "m of the device, 0 to 1: rate control beyond it; 0: none");
-  text += key_line("bubble_speed", toml_number(config.placement.bubble_speed),
-                   "m/s in the scene, 0.001 to 1: 2 cm beyond the bubble");
-  text += key_line("handle_weight", toml_number(config.placement.handle_weight),
-                   "kg, 0 to 0.1: of the handle that the motors hold up; 0: none");
-  for (int axis = 0; axis < 3; ++axis)
-    text += key_line(std::string("down_") + "xyz"[axis], toml_number(config.placement.down[axis]),
-                     "of the device's axes: which way the handle's weight pulls");
+  text += "\n[placement]\n" + placement_lines(config.placement);
+  for (const HandConfig& hand : config.more_hands) {
+    text += "\n[[hand]]\n";
+    text += key_line("device", toml_text(hand.device), "URI of another hand");
+    if (!hand.name.empty()) text += "name = " + toml_text(hand.name) + "\n";
+    text += placement_lines(hand.placement);
+  }
   text += "\n[parameters]\n";
   for (const ParameterInfo& row : parameter_table()) {
     // r_c is derived from the radii below it: setting it scales them.
@@ -347,6 +386,7 @@ void validate(const SessionConfig& config) {
       check_rigid(*camera.world_from_camera, "world_from_camera of " + camera.uri);
   }
   validate(config.placement);
+  for (const HandConfig& hand : config.more_hands) validate(hand.placement);
   validate(config.parameters);
   validate(config.safety);
   if (!(config.rate >= lowest_rate && config.rate <= highest_rate)) {

@@ -26,6 +26,13 @@ struct CameraConfig {
   std::string name = {};  ///< for messages and the page; empty: the URI
 };
 
+/// A hand of a session beside the first.
+struct HandConfig {
+  std::string device = "hand:";  ///< URI
+  std::string name = {};         ///< empty: hand_2, hand_3, ...
+  Placement placement = {};
+};
+
 /// The page's server.
 struct ServerConfig {
   std::string listen = "127.0.0.1";        ///< address; this default lets in this machine alone
@@ -40,6 +47,7 @@ struct SessionConfig {
   std::vector<CameraConfig> cameras{{.uri = "synthetic:desk?noise=1mm"}};
   std::string device = {};  ///< URI; empty: the program's choice
   Placement placement;
+  std::vector<HandConfig> more_hands = {};
   /// SessionOptions::without_watchdog: more than the engage force on motors that nothing watches.
   bool without_watchdog = false;
   double rate = 1000.0;  ///< [Hz] of the servo loop, 100 to 100 000

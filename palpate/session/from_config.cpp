@@ -11,6 +11,9 @@ SessionOptions session_options(const SessionConfig& config) {
   for (const CameraConfig& camera : config.cameras)
     options.cameras.push_back({.uri = camera.uri, .world_from_camera = camera.world_from_camera});
   if (!config.device.empty()) options.device_uri = config.device;
+  for (const HandConfig& hand : config.more_hands)
+    options.more_hands.push_back(
+        {.name = hand.name, .device_uri = hand.device, .placement = hand.placement});
   options.settings.method = config.method;
   options.settings.parameters = config.parameters;
   options.settings.safety = config.safety;

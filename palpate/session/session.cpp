@@ -257,6 +257,7 @@ class Session::Impl {
     for (std::size_t i = 1; i < hands_.size(); ++i) {
       state.more_hands.push_back(report(*hands_[i]));
       state.more_hands.back().placement = hands_[i]->placement;
+      state.more_hands.back().summary.frames = state.summary.frames;
     }
     if (is_recording() && std::any_of(hands_.begin(), hands_.end(), [](const auto& hand) {
           return !hand->recorder->status().trouble.empty();

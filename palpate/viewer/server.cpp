@@ -542,10 +542,13 @@ class ViewerServer::Impl final : public Hub {
       const auto message = std::make_shared<const ViewerMessage>(ticks_message(*batch));
       for (const auto& page : pages_) page->send(message);
     }
-    if (const std::string robot = host_.robot(); !robot.empty()) {
-      const SharedMessage message = shared_text("{\"robot\":" + robot + "}");
+    const auto tell = [this](const std::string& verb, const std::string& what) {
+      if (what.empty()) return;
+      const SharedMessage message = shared_text("{\"" + verb + "\":" + what + "}");
       for (const auto& page : pages_) page->send(message);
-    }
+    };
+    tell("robot", host_.robot());
+    tell("more_hands", host_.more_hands());
     if (++beats_ % ticks_per_state == 0) send_state(pages_);
   }
 

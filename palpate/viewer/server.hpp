@@ -25,6 +25,8 @@ class ViewerHost {
   virtual std::string state() = 0;
   /// The robot that the hand leads, likewise, 30 times a second; empty: there is none.
   virtual std::string robot() { return {}; }
+  /// The hands beside the first, likewise, 30 times a second; empty: there are none.
+  virtual std::string more_hands() { return {}; }
   /// Ticks since the last call; none if there was no tick.
   virtual std::optional<TickBatch> ticks() = 0;
   /// Does a page move the session's device? If not, no page ever holds the hand.

@@ -110,6 +110,8 @@ void SessionHost::attach(Session& session) {
   mouse_ = session.mouse();
   if (mouse_ != nullptr) target_ = start_ = mouse_->start_position();
   reader_.emplace(session.ticks());
+  for (std::size_t hand = 1; hand < session.hands(); ++hand)
+    others_.push_back({.reader = session.ticks(hand)});
   const double rate = session.state().rate;
   batcher_.emplace(static_cast<unsigned>(std::max(1.0, rate / samples_per_second)));
 }
@@ -314,6 +316,26 @@ std::string SessionHost::robot() {
               {"led", robot->led},
               {"trouble", robot->trouble}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string SessionHost::more_hands() {
+  if (others_.empty()) return {};
+  json hands = json::array();
+  for (std::size_t i = 0; i < others_.size(); ++i) {
+    Other& other = others_[i];
+    while (other.reader.try_pop(other.newest)) {
+    }
+    const Tick& tick = other.newest.tick;
+    const auto numbers = [](const Vec3& v) { return json{v.x(), v.y(), v.z()}; };
+    hands.push_back({{"name", session_->hand_name(i + 1)},
+                     {"hip", numbers(tick.hip)},
+                     {"proxy", numbers(tick.proxy)},
+                     {"force", numbers(other.newest.force)},
+                     {"touches", tick.state != ContactState::free_motion},
+                     {"present", (other.newest.hand & hand_present) != 0},
+                     {"trouble", palpate::describe(fault_of(other.newest.hand))}});
+  }
+  return hands.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
 std::optional<TickBatch> SessionHost::ticks() {

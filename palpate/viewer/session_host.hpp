@@ -80,6 +80,7 @@ class SessionHost final : public ViewerHost {
   std::string hello() override;
   std::string state() override;
   std::string robot() override;
+  std::string more_hands() override;
   std::optional<TickBatch> ticks() override;
   bool takes_hand() override { return mouse_ != nullptr; }
   void hand(const HandMessage& hand) override;
@@ -116,6 +117,12 @@ class SessionHost final : public ViewerHost {
   std::string brush_trouble_;      // why it does not paint
   std::optional<TickRing<ServoTick>::Reader> reader_;
   std::optional<TickBatcher> batcher_;
+  // A hand beside the first.
+  struct Other {
+    TickRing<ServoTick>::Reader reader;
+    ServoTick newest = {};
+  };
+  std::vector<Other> others_;
 };
 
 }  // namespace palpate

@@ -38,6 +38,11 @@ class RosNodeTest : public ::testing::Test {
   RosNodeTest() {
     SessionOptions options;
     options.cameras.push_back({.uri = "synthetic:plane?size=64x48"});
+    begin(std::move(options));
+  }
+
+  void begin(SessionOptions options) {
+    session_.reset();
     session_ = std::make_unique<Session>(std::move(options));
   }
 
@@ -112,6 +117,27 @@ TEST_F(RosNodeTest, PublishesTicksAndReports) {
   ASSERT_EQ(report->status.size(), 5U);
   EXPECT_EQ(report->status[0].name, "palpate: servo loop");
   EXPECT_NE(report->status[1].name.find("synthetic:plane"), std::string::npos);
+}
+
+TEST_F(RosNodeTest, PublishesEachHandOfTheSession) {
+  SessionOptions options;
+  options.cameras.push_back({.uri = "synthetic:plane?size=64x48"});
+  options.more_hands.push_back({.name = "left"});
+  begin(std::move(options));
+  open();
+  const auto any = [](const auto&) { return true; };
+  EXPECT_TRUE(hears<ros::PoseStamped>("/palpate/hip", any));
+  EXPECT_TRUE(hears<ros::PoseStamped>("/palpate/left/hip", any));
+  EXPECT_TRUE(hears<ros::WrenchStamped>("/palpate/left/force", any));
+  EXPECT_TRUE(hears<ros::UInt8>("/palpate/left/contact", any));
+  EXPECT_TRUE(hears<ros::MarkerArray>("/palpate/markers", [](const auto& m) {
+    return m.markers.size() == 10 && m.markers[0].id == 0 && m.markers[5].id == 1;
+  }));
+  const auto report = hears<ros::DiagnosticArray>("/diagnostics", any);
+  ASSERT_TRUE(report);
+  ASSERT_EQ(report->status.size(), 7U);
+  EXPECT_EQ(report->status[4].name, "palpate: left contact");
+  EXPECT_TRUE(report->status[5].name.starts_with("palpate: left device")) << report->status[5].name;
 }
 
 TEST_F(RosNodeTest, SetsAndDescribesParameters) {

@@ -131,6 +131,25 @@ class Session(unittest.TestCase):
             with self.assertRaisesRegex(palpate.Error, "did you mean 'radius'"):
                 session.fixtures(wall.replace("radius", "radus"))
 
+    def test_has_several_hands(self):
+        with tempfile.TemporaryDirectory() as folder:
+            bag = os.path.join(folder, "session")
+            hands = ["hand:", {"device": "hand:", "name": "left", "scale": 0.5}]
+            with palpate.Session(CAMERA, free_running=True, stroke_time=1.0, hands=hands,
+                                 record=bag) as session:
+                session.run(1.0)
+                ticks = [session.ticks(hand) for hand in range(3)]
+                state = session.state()
+            self.assertEqual([len(each) for each in ticks], [1000] * 3)
+            self.assertEqual(ticks[0].tobytes(), ticks[1].tobytes())
+            self.assertNotEqual(ticks[0].tobytes(), ticks[2].tobytes())
+            self.assertEqual([each["name"] for each in state["more_hands"]], ["hand_2", "left"])
+            self.assertEqual(palpate.read_session(f"{bag}/left").tobytes(), ticks[2].tobytes())
+            with self.assertRaisesRegex(palpate.Error, "none of this number"):
+                session.ticks(3)
+        with self.assertRaisesRegex(palpate.Error, "a hand has no 'divice'"):
+            palpate.Session(CAMERA, hands=[{"divice": "hand:"}])
+
     def test_runs_in_real_time_and_can_be_changed(self):
         with palpate.Session(CAMERA) as session:
             session.set(stiffness=200, method="paper")

@@ -29,6 +29,8 @@ SessionConfig everything() {
                     {.uri = "synthetic:desk", .name = "left"}};
   config.device = "hand:?device=touch";
   config.placement = {pose_of(-2.0), 2.5, 1, 0.0625, 0.3, 0.045, Vec3(0.6, 0.0, -0.8)};
+  config.more_hands = {{.device = "script:a.csv", .name = "left", .placement = {pose_of(0.5), 0.5}},
+                       {.device = "hand:"}};
   config.without_watchdog = true;
   config.rate = 2000.0;
   config.method = "paper";
@@ -44,6 +46,16 @@ SessionConfig everything() {
   return config;
 }
 
+void expect_same(const Placement& a, const Placement& b) {
+  EXPECT_TRUE(a.world_from_device.isApprox(b.world_from_device, 1e-14));
+  EXPECT_EQ(a.workspace_scale, b.workspace_scale);
+  EXPECT_EQ(a.clutch_button, b.clutch_button);
+  EXPECT_EQ(a.bubble_radius, b.bubble_radius);
+  EXPECT_EQ(a.bubble_speed, b.bubble_speed);
+  EXPECT_EQ(a.handle_weight, b.handle_weight);
+  EXPECT_EQ(a.down, b.down);
+}
+
 void expect_same(const SessionConfig& a, const SessionConfig& b) {
   ASSERT_EQ(a.cameras.size(), b.cameras.size());
   for (std::size_t i = 0; i < a.cameras.size(); ++i) {
@@ -56,13 +68,13 @@ void expect_same(const SessionConfig& a, const SessionConfig& b) {
     }
   }
   EXPECT_EQ(a.device, b.device);
-  EXPECT_TRUE(a.placement.world_from_device.isApprox(b.placement.world_from_device, 1e-14));
-  EXPECT_EQ(a.placement.workspace_scale, b.placement.workspace_scale);
-  EXPECT_EQ(a.placement.clutch_button, b.placement.clutch_button);
-  EXPECT_EQ(a.placement.bubble_radius, b.placement.bubble_radius);
-  EXPECT_EQ(a.placement.bubble_speed, b.placement.bubble_speed);
-  EXPECT_EQ(a.placement.handle_weight, b.placement.handle_weight);
-  EXPECT_EQ(a.placement.down, b.placement.down);
+  expect_same(a.placement, b.placement);
+  ASSERT_EQ(a.more_hands.size(), b.more_hands.size());
+  for (std::size_t i = 0; i < a.more_hands.size(); ++i) {
+    EXPECT_EQ(a.more_hands[i].device, b.more_hands[i].device);
+    EXPECT_EQ(a.more_hands[i].name, b.more_hands[i].name);
+    expect_same(a.more_hands[i].placement, b.more_hands[i].placement);
+  }
   EXPECT_EQ(a.without_watchdog, b.without_watchdog);
   EXPECT_EQ(a.rate, b.rate);
   EXPECT_EQ(a.method, b.method);
@@ -165,6 +177,10 @@ TEST(SessionConfig, NamesFileAndLineOfWhatIsWrong) {
       fails_saying(parsing("[placement]\nclutch_button = 1.5"), "session.toml:2:", "whole number"));
   EXPECT_TRUE(fails_saying(parsing("[placement]\nclutch_buton = 1"),
                            "session.toml:2:", "did you mean 'clutch_button'?"));
+  EXPECT_TRUE(fails_saying(parsing("[[hand]]\nname = \"x\""), "session.toml:1:", "no 'device'"));
+  EXPECT_TRUE(fails_saying(parsing("hand = [3]"), "session.toml:1:", "write [[hand]]"));
+  EXPECT_TRUE(fails_saying(parsing("[[hand]]\ndevice = \"hand:\"\nscal = 2"),
+                           "session.toml:3:", "did you mean 'scale'?"));
   EXPECT_TRUE(fails_saying(parsing("[server]\nport = 99999"), "session.toml:2:", "65535"));
   EXPECT_TRUE(fails_saying(parsing("[server]\nbrowser = 1"), "session.toml:2:", "true or false"));
   EXPECT_TRUE(fails_saying(parsing("[[camera]]\nname = \"x\""), "session.toml:1:", "no 'uri'"));

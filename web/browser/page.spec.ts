@@ -521,6 +521,24 @@ test("the operator keeps the hand off what it has touched", async () => {
   await page.mouse.up();
 });
 
+test("a second hand of the session is drawn and said", async () => {
+  const desk = [...DESK, "--device", "mouse:", "--device", "hand:"];
+  const page = await open(desk);
+  const text = () => page.locator("#more-hands").textContent();
+  await expect.poll(text, { timeout: 30_000 }).toMatch(/^hand_2 touches with [0-9.]+ N$/);
+  const drawn = await page.evaluate(() => (window as any).palpate.view.otherProxies as number[][]);
+  expect(drawn.length).toBe(1);
+  expect(Math.hypot(...drawn[0]!)).toBeGreaterThan(0);
+  // The mouse's hand is the first one's, as ever.
+  const at = await placeWhere(page, "surface");
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
+  if (process.env.PALPATE_PICTURES)
+    await page.screenshot({ path: join(process.env.PALPATE_PICTURES, "two_hands.png") });
+  await page.mouse.up();
+});
+
 test("the hand leads a tool at the other end of a link, and sees where it is", async () => {
   // Both ends, on a network of their own; a camera without noise would be taken for frozen.
   process.env.ROS_DOMAIN_ID = String(20 + (process.pid % 80));

@@ -4,6 +4,7 @@ import {
   type Command,
   type Hello,
   type Message,
+  type OtherHand,
   type RobotState,
   type State,
 } from "./protocol";
@@ -49,6 +50,7 @@ export interface Handlers {
   state(state: State): void;
   presence(presence: Presence): void;
   robot(robot: RobotState): void;
+  moreHands(hands: OtherHand[]): void;
   refused(reason: string): void;
   message(message: Message): void;
 }
@@ -112,6 +114,7 @@ export class Connection {
     if (verb === "state") this.handlers.state(what as State);
     if (verb === "presence") this.handlers.presence(what as Presence);
     if (verb === "robot") this.handlers.robot(what as RobotState);
+    if (verb === "more_hands") this.handlers.moreHands(what as OtherHand[]);
     if (verb === "error") this.handlers.refused(what as string);
   }
 

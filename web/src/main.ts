@@ -6,6 +6,7 @@ import { Files } from "./files";
 import { fixtureLines, Fixtures } from "./fixtures";
 import { HandInput, isForForm } from "./hand";
 import { length } from "./camera_math";
+import { handsLines, handsText } from "./more_hands";
 import { latchedText, mayOperate, Panel, roleNames } from "./panel";
 import { Plots } from "./plots";
 import {
@@ -171,6 +172,12 @@ const connection = new Connection({
       free: "hand free",
     };
     chip.textContent = texts[owner] + (viewers > 1 ? ` · ${viewers} viewers` : "");
+  },
+  moreHands(hands) {
+    view.showHands(hands, handsLines(hands));
+    const said = handsText(hands);
+    if (get("more-hands").textContent !== said) get("more-hands").textContent = said;
+    get("more-hands").hidden = false;
   },
   robot(robot) {
     view.showRobot(robot.tool, robot.radius, robotLines(robot));

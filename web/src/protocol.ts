@@ -327,6 +327,22 @@ export interface RobotState {
   trouble: string;
 }
 
+/** A hand beside the first; 30 times a second. */
+export interface OtherHand {
+  name: string;
+  /** [m] world */
+  hip: Vec3;
+  /** [m] world */
+  proxy: Vec3;
+  /** [N] world: as sent */
+  force: Vec3;
+  touches: boolean;
+  /** somebody holds its device */
+  present: boolean;
+  /** why its device gives no force; empty: it does */
+  trouble: string;
+}
+
 /** A virtual fixture, as far as it is drawn. */
 export interface FixtureState {
   name: string;

@@ -23,7 +23,7 @@ import {
 } from "./camera_math";
 import { firstView, offCentre, type Room } from "./first_view";
 import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";
-import type { Frame, Rays, Ticks, Vec3 } from "./protocol";
+import type { Frame, OtherHand, Rays, Ticks, Vec3 } from "./protocol";
 import type { Spot } from "./surface";
 import { Thinning } from "./thinning";
 
@@ -106,6 +106,9 @@ export class SceneView {
   // The robot that the hand leads.
   private readonly tool: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
   private readonly arm: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  // The hands beside the first: proxies and HIPs in turn.
+  private readonly otherBalls: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>[] = [];
+  private readonly otherLines: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private fixtureEnds: number[] = []; // of their lines, as they are drawn
   private readonly dab = new THREE.Object3D(); // where one of them is
   private readonly axes = new THREE.AxesHelper(AXES_LENGTH);
@@ -194,6 +197,7 @@ export class SceneView {
     this.fixtures = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.8));
     this.frusta = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.5));
     this.arm = new THREE.LineSegments(new THREE.BufferGeometry(), thin(1));
+    this.otherLines = new THREE.LineSegments(new THREE.BufferGeometry(), thin(1));
     this.pin = new THREE.Mesh(
       new THREE.CylinderGeometry(0.09, 0.09, 1, 12).translate(0, 0.5, 0),
       new THREE.MeshStandardMaterial({ roughness: 0.6 }),
@@ -209,7 +213,7 @@ export class SceneView {
     this.arrow.add(this.shaft, this.head);
     const lines = [
       ...[this.link, this.plumb, this.trail, this.ghostTrail],
-      ...[this.grid, this.frusta, this.fixtures, this.arm],
+      ...[this.grid, this.frusta, this.fixtures, this.arm, this.otherLines],
     ];
     for (const object of lines) object.frustumCulled = false;
     this.shadow.renderOrder = this.ghostTrail.renderOrder = this.ghost.renderOrder = 1;
@@ -222,6 +226,7 @@ export class SceneView {
       ...[this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin],
       ...[this.shadow, this.spot, this.grid, this.frusta, this.axes],
       ...[this.ghost, this.ghostTrail, this.paint, this.fixtures, this.tool, this.arm],
+      this.otherLines,
     ];
     for (const mark of marks) mark.visible = false;
     this.arrow.visible = false;
@@ -307,6 +312,40 @@ export class SceneView {
     );
     this.arm.visible = ends.length > 0;
     this.touch();
+  }
+
+  /** The hands beside the first, and their lines. */
+  showHands(hands: readonly OtherHand[], ends: readonly number[]): void {
+    while (this.otherBalls.length < 2 * hands.length) {
+      const ball = new THREE.Mesh(
+        this.proxy.geometry,
+        new THREE.MeshStandardMaterial({ roughness: 0.35 }),
+      );
+      this.otherBalls.push(ball);
+      this.scene.add(ball);
+    }
+    hands.forEach(({ hip, proxy, touches }, i) => {
+      const [at, pulled] = [this.otherBalls[2 * i]!, this.otherBalls[2 * i + 1]!];
+      at.position.set(...proxy);
+      at.scale.setScalar(this.radii.r_c);
+      at.material.color.copy(touches ? this.proxy.material.color : this.tool.material.color);
+      pulled.position.set(...hip);
+      pulled.scale.setScalar(0.3 * this.radii.r_c);
+      pulled.material.color.copy(this.hip.material.color);
+    });
+    this.otherLines.material.color.copy(this.hip.material.color);
+    this.otherLines.geometry.dispose();
+    this.otherLines.geometry = new THREE.BufferGeometry().setAttribute(
+      "position",
+      new THREE.Float32BufferAttribute(ends as number[], 3),
+    );
+    this.otherLines.visible = ends.length > 0;
+    this.touch();
+  }
+
+  /** For tests: where the other hands' proxies are drawn [m]. */
+  get otherProxies(): Vec3[] {
+    return this.otherBalls.filter((_, i) => i % 2 === 0).map((ball) => ball.position.toArray());
   }
 
   /** For tests: where the robot's tool is drawn [m]. */

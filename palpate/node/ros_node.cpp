@@ -85,8 +85,8 @@ std::array<std::uint8_t, size> identity(const dds::Guid& guid) {
 // The topics of a hand, and what has been read of it.
 struct HandTopics {
   HandTopics(dds::Participant& participant, const std::string& name,
-             TickRing<ServoTick>::Reader reader)
-      : ticks(std::move(reader)),
+             const TickRing<ServoTick>::Reader& reader)
+      : ticks(reader),
         proxy(participant, name + "/proxy", ros::PoseStamped{}, reliable),
         hip(participant, name + "/hip", ros::PoseStamped{}, reliable),
         force(participant, name + "/force", ros::WrenchStamped{}, reliable),

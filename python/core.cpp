@@ -13,9 +13,46 @@
 #include "palpate/sources/material_file.hpp"
 
 #include "python/arrays.hpp"
+#include "python/materials.hpp"
 #include "python/python_method.hpp"
 
 namespace palpate::python {
+namespace {
+
+std::vector<std::uint8_t> bytes_of(const py::object& array, const char* what, const Intrinsics& k) {
+  if (!py::isinstance<py::array_t<std::uint8_t>>(array))
+    throw py::type_error(std::string(what) + ": it has to be an array of uint8");
+  const auto pixels =
+      py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>::ensure(array);
+  if (pixels.ndim() != 2 || pixels.shape(0) != k.height || pixels.shape(1) != k.width)
+    throw Error(what, "its shape is " + py::cast<std::string>(py::str(array.attr("shape"))),
+                "give one of (" + std::to_string(k.height) + ", " + std::to_string(k.width) +
+                    "), rows and columns of the camera");
+  return {pixels.data(), pixels.data() + pixels.size()};
+}
+
+}  // namespace
+
+std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
+                                            const std::optional<MaterialsOf>& materials,
+                                            const py::object& labels,
+                                            const py::object& brightness) {
+  if (!materials && labels.is_none() && brightness.is_none()) return nullptr;
+  if (!materials && !labels.is_none())
+    throw Error("labels", "there are no materials that they name",
+                "give materials=palpate.Materials(...)");
+  if (materials && labels.is_none() && materials->table->materials.size() > 1)
+    throw Error("materials", "nothing says which pixel is which of them",
+                "give labels, uint8 (height, width): 0 for none, i for the i-th of them");
+  const std::size_t size = static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
+  const auto everywhere = static_cast<std::uint8_t>(materials ? 1 : 0);
+  return std::make_shared<LabelImage>(
+      materials ? materials->table : std::make_shared<const MaterialTable>(),
+      labels.is_none() ? std::vector<std::uint8_t>(size, everywhere)
+                       : bytes_of(labels, "labels", k),
+      brightness.is_none() ? std::vector<std::uint8_t>() : bytes_of(brightness, "brightness", k));
+}
+
 namespace {
 
 using SharedCloud = std::shared_ptr<const Cloud>;
@@ -38,11 +75,6 @@ Camera make_camera(int width, int height, double fx, double fy, double cx, doubl
   return {std::make_shared<const ViewingRays>(k)};
 }
 
-/// What surfaces are made of.
-struct MaterialsOf {
-  std::shared_ptr<const MaterialTable> table;
-};
-
 MaterialsOf make_materials(const py::object& what) {
   if (py::isinstance<py::str>(what) || py::hasattr(what, "__fspath__"))
     return {materials_of(py::cast<std::string>(py::str(what))).table};
@@ -64,39 +96,6 @@ MaterialsOf make_materials(const py::object& what) {
   }
   validate(table);
   return {std::make_shared<const MaterialTable>(std::move(table))};
-}
-
-std::vector<std::uint8_t> bytes_of(const py::object& array, const char* what, const Intrinsics& k) {
-  if (!py::isinstance<py::array_t<std::uint8_t>>(array))
-    throw py::type_error(std::string(what) + ": it has to be an array of uint8");
-  const auto pixels =
-      py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>::ensure(array);
-  if (pixels.ndim() != 2 || pixels.shape(0) != k.height || pixels.shape(1) != k.width)
-    throw Error(what, "its shape is " + py::cast<std::string>(py::str(array.attr("shape"))),
-                "give one of (" + std::to_string(k.height) + ", " + std::to_string(k.width) +
-                    "), rows and columns of the camera");
-  return {pixels.data(), pixels.data() + pixels.size()};
-}
-
-/// Labels without a brightness, or the other way round, or both.
-std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
-                                            const std::optional<MaterialsOf>& materials,
-                                            const py::object& labels,
-                                            const py::object& brightness) {
-  if (!materials && labels.is_none() && brightness.is_none()) return nullptr;
-  if (!materials && !labels.is_none())
-    throw Error("labels", "there are no materials that they name",
-                "give materials=palpate.Materials(...)");
-  if (materials && labels.is_none() && materials->table->materials.size() > 1)
-    throw Error("materials", "nothing says which pixel is which of them",
-                "give labels, uint8 (height, width): 0 for none, i for the i-th of them");
-  const std::size_t size = static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height);
-  const auto everywhere = static_cast<std::uint8_t>(materials ? 1 : 0);
-  return std::make_shared<LabelImage>(
-      materials ? materials->table : std::make_shared<const MaterialTable>(),
-      labels.is_none() ? std::vector<std::uint8_t>(size, everywhere)
-                       : bytes_of(labels, "labels", k),
-      brightness.is_none() ? std::vector<std::uint8_t>() : bytes_of(brightness, "brightness", k));
 }
 
 /// Takes the array's own memory, which stays alive as long as the image does.

@@ -12,6 +12,7 @@
 #include "palpate/sources/fixture_file.hpp"
 
 #include "python/arrays.hpp"
+#include "python/materials.hpp"
 
 namespace palpate::python {
 namespace {
@@ -63,6 +64,27 @@ std::vector<SessionHandOptions> hands_of(const py::iterable& hands) {
   return more;
 }
 
+// Asks a Python function, on a camera's thread, which of the materials each pixel is.
+// @param labels  called with the camera's number and its depth; gives labels or None
+auto labelled(const MaterialsOf& materials, const py::function& labels) {
+  // Let go of on whatever thread; so the last reference takes the lock of the interpreter.
+  const std::shared_ptr<py::function> function(new py::function(labels), [](py::function* held) {
+    const py::gil_scoped_acquire lock;
+    delete held;
+  });
+  return [materials, function](std::size_t camera, const DepthImage& image) {
+    const py::gil_scoped_acquire lock;
+    try {
+      const Intrinsics& k = image.intrinsics();
+      const py::array_t<std::uint16_t> depth({k.height, k.width}, image.depth().data());
+      const py::object found = (*function)(camera, depth);
+      return found.is_none() ? nullptr : make_map(k, materials, found, py::none());
+    } catch (py::error_already_set& error) {  // of the interpreter, which is locked here alone
+      throw Error("labels", error.what(), "return uint8 (height, width), or None");
+    }
+  };
+}
+
 class PythonSession {
  public:
   PythonSession(const py::object& camera, const std::string& device, const std::string& method,
@@ -70,7 +92,8 @@ class PythonSession {
                 const std::optional<Eigen::Matrix4d>& world_from_device, double scale,
                 const py::dict& limits, bool without_watchdog,
                 const std::optional<std::string>& fixtures, const py::iterable& hands,
-                const py::kwargs& parameters)
+                const std::optional<MaterialsOf>& materials,
+                const std::optional<py::function>& labels, const py::kwargs& parameters)
       : free_running_(free_running) {
     SessionOptions options;
     if (py::isinstance<py::str>(camera)) {
@@ -95,6 +118,10 @@ class PythonSession {
     options.record = record;
     options.version = PALPATE_VERSION;
     options.more_hands = hands_of(hands);
+    if (materials.has_value() != labels.has_value())
+      throw Error("materials, labels", "one is of no use without the other",
+                  "give materials=palpate.Materials(...) and labels=FUNCTION");
+    if (labels) options.materials = labelled(*materials, *labels);
     ran_.resize(1 + options.more_hands.size());
     if (free_running_) {
       for (std::size_t i = 1; i < ran_.size(); ++i)
@@ -271,6 +298,7 @@ void define_session(py::module_& m) {
       .def(py::init<const py::object&, const std::string&, const std::string&, bool, double,
                     const std::string&, double, const std::optional<Eigen::Matrix4d>&, double,
                     const py::dict&, bool, const std::optional<std::string>&, const py::iterable&,
+                    const std::optional<MaterialsOf>&, const std::optional<py::function>&,
                     const py::kwargs&>(),
            py::arg("camera"), py::arg("device") = "hand:", py::kw_only(),
            py::arg("method") = "sight", py::arg("free_running") = false, py::arg("rate") = 1000.0,
@@ -278,11 +306,14 @@ void define_session(py::module_& m) {
            py::arg("world_from_device") = py::none(), py::arg("scale") = 1.0,
            py::arg("limits") = py::dict(), py::arg("without_watchdog") = false,
            py::arg("fixtures") = py::none(), py::arg("hands") = py::tuple(),
+           py::arg("materials") = py::none(), py::arg("labels") = py::none(),
            "camera: a URI or a list of them. device: a URI. free_running: as fast as the machine\n"
            "can, with the same forces each time. limits: of the safety chain\n"
            "(palpate.limits()). fixtures: a TOML file of virtual fixtures, or its text.\n"
            "hands: further hands, each a device's URI or a dict with device, name, scale and\n"
-           "world_from_device; while one of the hands is in trouble, none has a force. Further\n"
+           "world_from_device; while one of the hands is in trouble, none has a force. labels: a\n"
+           "function that is called with a camera's number and depth for each of its frames, and\n"
+           "returns uint8 (height, width), 0 for none and i for the i-th of `materials`. Further\n"
            "keywords are parameters (palpate.parameters()).")
       .def("__enter__",
            [](const py::object& self) {

@@ -503,6 +503,34 @@ void DepthImage::gather_sides(const Ball& ball, const Sides& sides, std::size_t 
   }
 }
 
+void DepthImage::gather_of(std::string_view material, const Ball& ball, std::size_t max_points,
+                           Patch& patch) const noexcept {
+  patch.start_view(Vec3(world_from_camera_.translation()));
+  const std::uint8_t label = materials_ == nullptr ? 0 : materials_->table()->label(material);
+  if (label == 0) return;
+  const Eigen::Matrix3d rotation = world_from_camera_.linear();
+  const Vec3 centre = rotation.transpose() * (ball.centre - world_from_camera_.translation());
+  const ViewingRays::Window window = rays_->window(centre, ball.radius);
+  if (window.empty()) return;
+  const int stride = stride_of(window, max_points);
+  if (stride > 1) patch.mark_thinned(1.0 / (stride * stride));
+  const auto on_grid = [stride](int first) { return (first + stride - 1) / stride * stride; };
+  const auto width = static_cast<std::size_t>(intrinsics().width);
+  for (int v = on_grid(window.v_begin); v < window.v_end; v += stride) {
+    for (int u = on_grid(window.u_begin); u < window.u_end; u += stride) {
+      const std::size_t pixel = static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u);
+      const double z = depth_[pixel] * metres_per_unit_;
+      const Eigen::Vector2d ray = rays_->ray(u, v);
+      if (!is_measured(depth_[pixel]) || !ray.allFinite()) continue;
+      const Vec3 p = Vec3(z * ray.x(), z * ray.y(), z) - centre;
+      if (p.squaredNorm() > ball.radius * ball.radius) continue;
+      const Vec3 q = rotation * p;
+      if (materials_->label(pixel, Vec3(ball.centre + q)) != label) continue;
+      patch.push(static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()));
+    }
+  }
+}
+
 // Each pixel is a tile, which reaches half way to its neighbours: bilinear between those that are
 // of the same surface, and going on as it is where they are not.
 void DepthImage::gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t max_points,

@@ -125,6 +125,8 @@ class DepthImage final : public Cloud {
                     Patch& patch) const noexcept override;
   void gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t max_points,
                     Patch& patch) const noexcept override;
+  void gather_of(std::string_view material, const Ball& ball, std::size_t max_points,
+                 Patch& patch) const noexcept override;
   /// Depth of `place` by the focal length; 0 outside the image (a lens's distortion not counted).
   [[nodiscard]] double spacing(const Vec3& place) const noexcept override;
   [[nodiscard]] bool has_materials() const noexcept override { return materials_ != nullptr; }

@@ -34,6 +34,13 @@ struct MaterialTable {
   static constexpr std::size_t most = 255;
   std::vector<NamedMaterial> materials;
 
+  /// The label of the first one of that name; 0 if there is none. [servo]
+  [[nodiscard]] std::uint8_t label(std::string_view name) const noexcept {
+    for (std::size_t i = 0; i < materials.size() && i < 255; ++i) {
+      if (materials[i].name == name) return static_cast<std::uint8_t>(i + 1);
+    }
+    return 0;
+  }
   /// Null for label 0, and for labels that nothing has.
   [[nodiscard]] const Material* find(std::uint8_t label) const noexcept {
     return label == 0 || label > materials.size() ? nullptr : &materials[label - 1].material;

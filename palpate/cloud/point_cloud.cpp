@@ -316,6 +316,12 @@ void CloudSet::gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t ma
     cloud->gather_sheet(ball, sheet, max_points / clouds_.size(), patch);
 }
 
+void CloudSet::gather_of(std::string_view material, const Ball& ball, std::size_t max_points,
+                         Patch& patch) const noexcept {
+  for (const auto& cloud : clouds_)
+    cloud->gather_of(material, ball, max_points / clouds_.size(), patch);
+}
+
 bool CloudSet::has_materials() const noexcept {
   return std::any_of(clouds_.begin(), clouds_.end(),
                      [](const auto& cloud) { return cloud->has_materials(); });

@@ -102,6 +102,8 @@ class CloudSet final : public Cloud {
                     Patch& patch) const noexcept override;
   void gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t max_points,
                     Patch& patch) const noexcept override;
+  void gather_of(std::string_view material, const Ball& ball, std::size_t max_points,
+                 Patch& patch) const noexcept override;
   /// That of the cloud that knows the smallest.
   [[nodiscard]] double spacing(const Vec3& place) const noexcept override;
   [[nodiscard]] bool has_materials() const noexcept override;

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <optional>
+#include <string_view>
 
 #include "palpate/core/material.hpp"
 #include "palpate/core/patch.hpp"
@@ -66,6 +67,12 @@ class Cloud {
   /// [servo] As `gather`.
   virtual void gather_sheet(const Ball& /*ball*/, const Sheet& /*sheet*/,
                             std::size_t /*max_points*/, Patch& /*patch*/) const noexcept {}
+
+  /// Adds points of the ball of which the cloud knows that they are of the material of that name.
+  ///
+  /// [servo] As `gather`.
+  virtual void gather_of(std::string_view /*material*/, const Ball& /*ball*/,
+                         std::size_t /*max_points*/, Patch& /*patch*/) const noexcept {}
 
   /// [m] between neighbouring points of a surface at `place` that faces the viewpoint: what a pixel
   /// spans there. 0 where that is not known.

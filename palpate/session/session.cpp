@@ -8,6 +8,7 @@
 #include <future>
 #include <limits>
 #include <mutex>
+#include <set>
 #include <span>
 #include <thread>
 #include <utility>
@@ -75,6 +76,26 @@ std::unique_ptr<Device> open_hand(const SessionOptions& options, const std::stri
   return open_device(device_uri, path, options.devices);
 }
 
+// A fixture of a material that nothing is made of would keep nobody off anything.
+void check_materials(const FixtureSet* fixtures,
+                     std::span<const std::shared_ptr<const Cloud>> seen) {
+  if (fixtures == nullptr) return;
+  for (const FixtureSet::Item& item : fixtures->items()) {
+    const std::string& wanted = item.fixture.material;
+    if (wanted.empty()) continue;
+    std::set<std::string> known;  // to cameras, and to brushes
+    for (const auto& cloud : seen) {
+      if (!cloud) continue;
+      for (std::string& name : Paint::names(*cloud)) known.insert(std::move(name));
+    }
+    if (known.contains(wanted)) continue;
+    std::string all;
+    for (const std::string& name : known) all += (all.empty() ? "" : ", ") + name;
+    throw Error("fixture '" + item.fixture.name + "'",
+                "no camera knows a material '" + wanted + "'", "give one of " + all);
+  }
+}
+
 void check_name(const std::string& name, std::span<const std::unique_ptr<SessionHand>> before) {
   const auto fits = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
@@ -125,13 +146,15 @@ class Session::Impl {
     stamps_.resize(options_.cameras.size());
     for (std::size_t i = 0; i < stamps_.size(); ++i) stamps_[i].camera = i;
     std::vector<std::shared_ptr<const Cloud>> first;
-    for (SessionCamera& camera : options_.cameras) first.push_back(open_camera(camera));
+    for (SessionCamera& camera : options_.cameras)
+      first.push_back(with_materials(open_camera(camera), first.size()));
     open_hands(*first.front());
     for (const auto& hand : hands_) {
       if (needs_watchdog())
         refuse_without_watchdog(hand->device().info(), options_.settings.safety);
     }
     settings_ = for_cameras(options_.settings);
+    check_materials(settings_.fixtures.get(), first);
     proxy_radius_ = settings_.parameters.proxy.r_c();
     for (std::size_t i = 0; i < hands_.size(); ++i) {
       ServoOptions servo = options_.servo;
@@ -250,6 +273,11 @@ class Session::Impl {
     {
       const std::lock_guard lock(frames_mutex_);
       state.summary.frames = frames_;
+      for (std::size_t i = 0; i < state.cameras.size(); ++i) {
+        std::string& doubt = state.cameras[i].doubt;
+        const std::string& trouble = materials_trouble_[i];
+        if (!trouble.empty()) doubt += (doubt.empty() ? "" : "; ") + trouble;
+      }
     }
     const std::lock_guard lock(control_);
     state.settings = settings_;
@@ -286,6 +314,7 @@ class Session::Impl {
     settings = for_cameras(std::move(settings));
     settings.scene = settings_.scene;  // not for others to count
     validate(settings);
+    if (settings.fixtures != settings_.fixtures) check_materials(settings.fixtures.get(), newest());
     apply(settings, settings.method != settings_.method);
   }
 
@@ -504,9 +533,35 @@ class Session::Impl {
     if (options_.on_frame) options_.on_frame(camera, fed);
   }
 
+  // What the session's options say that a frame is made of.
+  std::shared_ptr<const Cloud> with_materials(std::shared_ptr<const Cloud> cloud,
+                                              std::size_t camera) {
+    const auto* image = dynamic_cast<const DepthImage*>(cloud.get());
+    if (!options_.materials || image == nullptr) return cloud;
+    std::string trouble;
+    try {
+      std::shared_ptr<const MaterialMap> map = options_.materials(camera, *image);
+      const auto* labels = dynamic_cast<const LabelImage*>(map.get());
+      if (labels != nullptr && labels->size() != image->depth().size()) {
+        trouble = "it is given materials for " + std::to_string(labels->size()) +
+                  " pixels and has " + std::to_string(image->depth().size());
+      } else if (map) {
+        auto made = std::make_shared<DepthImage>(*image);
+        made->set_materials(std::move(map));
+        cloud = std::move(made);
+      }
+    } catch (const std::exception& error) {
+      trouble = std::string("what it is made of is not known: ") + error.what();
+    }
+    const std::lock_guard lock(frames_mutex_);
+    materials_trouble_[camera] = std::move(trouble);
+    return cloud;
+  }
+
   // To the method and the recorder.
   void give(std::size_t camera, const FedFrame& fed) {
-    std::shared_ptr<const Cloud> painted = paint_.on(fed.frame.cloud, camera);
+    std::shared_ptr<const Cloud> painted =
+        paint_.on(with_materials(fed.frame.cloud, camera), camera);
     const std::lock_guard lock(frames_mutex_);
     newest_[camera] = std::move(painted);
     stamps_[camera].stamp = fed.frame.stamp;
@@ -697,11 +752,12 @@ class Session::Impl {
   std::atomic<bool> stopped_{false};
 
   mutable std::mutex frames_mutex_;  // taken by the cameras' threads; never held for long
-  std::vector<std::shared_ptr<const Cloud>> newest_;         // guarded by frames_mutex_
-  std::vector<CameraFrame> stamps_;                          // guarded by frames_mutex_
-  double stamp_ = -std::numeric_limits<double>::infinity();  // guarded by frames_mutex_
-  std::uint64_t frame_number_ = 0;                           // guarded by frames_mutex_
-  std::size_t frames_ = 0;                                   // guarded by frames_mutex_
+  std::vector<std::shared_ptr<const Cloud>> newest_;             // guarded by frames_mutex_
+  std::vector<CameraFrame> stamps_;                              // guarded by frames_mutex_
+  std::array<std::string, Patch::max_views> materials_trouble_;  // guarded by frames_mutex_
+  double stamp_ = -std::numeric_limits<double>::infinity();      // guarded by frames_mutex_
+  std::uint64_t frame_number_ = 0;                               // guarded by frames_mutex_
+  std::size_t frames_ = 0;                                       // guarded by frames_mutex_
 
   mutable std::mutex control_;  // settings and recordings; taken before frames_mutex_
   ServoSettings settings_;      // guarded by control_; the placement is the first hand's

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/cloud/depth_image.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/record/recorder.hpp"
@@ -79,6 +80,12 @@ struct SessionOptions {
   MethodRegistry methods = standard_methods();
   Registry<SourceScheme> sources = all_sources();
   Registry<DeviceScheme> devices = all_devices();
+  /// Says what a camera's depth image is made of, before anything else sees it; null: what it came
+  /// with. A map of another size, or an exception, is said in CameraStatus::doubt, and the frame
+  /// goes on as it came. A camera's thread, or the caller's of `run` where the session is
+  /// free-running.
+  std::function<std::shared_ptr<const MaterialMap>(std::size_t camera, const DepthImage& image)>
+      materials = {};
   /// Sees each frame after the method got it. A camera's thread, or the caller's of `run` where the
   /// session is free-running. Must be quick and must not throw.
   std::function<void(std::size_t camera, const FedFrame& frame)> on_frame = {};
@@ -135,7 +142,8 @@ class Session {
 
   /// Opens cameras and devices, waits for each camera's first frame, and makes the method.
   /// @throws Error if one of them cannot be used: a URI, a device, a method that cannot touch what
-  ///         the cameras see, settings out of range, a force that needs a watchdog, a hand's name.
+  ///         the cameras see, settings out of range, a force that needs a watchdog, a hand's name,
+  ///         a fixture of a material that no camera knows.
   explicit Session(SessionOptions options);
   /// stop().
   ~Session();
@@ -174,7 +182,8 @@ class Session {
   [[nodiscard]] ServoSettings settings() const;
   /// Takes effect in the next tick. Another method is made and takes over where the proxy is.
   /// @throws Error, leaving everything as it was, if something does not validate, there is no such
-  ///         method, it cannot touch what the cameras see, or the force limit needs a watchdog.
+  ///         method, it cannot touch what the cameras see, the force limit needs a watchdog, or a
+  ///         fixture is of a material that no camera knows.
   void set(const ServoSettings& settings);
   /// As `set`, for what others may change meanwhile: `edit` gets the settings as they are, and
   /// nobody else's change comes between that and what it makes of them. It must not use the

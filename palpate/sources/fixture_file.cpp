@@ -80,9 +80,9 @@ void read_mesh(const TomlTable& table, const toml::node& node, const fs::path& f
 
 Fixture read_fixture(const TomlTable& root, const toml::node& node, const fs::path& folder) {
   if (!node.is_table()) root.fail(node, "a fixture is not a table", fixture_remedy);
-  std::vector<std::string_view> keys{"name", "kind",    "shape",   "pose",
-                                     "size", "radius",  "length",  "points",
-                                     "file", "one_way", "consent", "on_surface"};
+  std::vector<std::string_view> keys{"name",    "kind",    "shape",     "pose", "size",
+                                     "radius",  "length",  "points",    "file", "material",
+                                     "one_way", "consent", "on_surface"};
   for (const FixtureInfo& row : fixture_table()) keys.push_back(row.name);
   const TomlTable table(*node.as_table(), root.file(), "[[fixture]]", keys);
   Fixture fixture;
@@ -103,6 +103,7 @@ Fixture read_fixture(const TomlTable& root, const toml::node& node, const fs::pa
       fixture.points.push_back(read_triple(table, point, "points"));
   }
   if (const toml::node* file = table.find("file")) read_mesh(table, *file, folder, fixture);
+  table.read("material", fixture.material);
   table.read("one_way", fixture.one_way);
   table.read("consent", fixture.consent);
   table.read("on_surface", fixture.on_surface);
@@ -161,6 +162,7 @@ std::string fixtures_json(const FixtureSet& set) {
         {"one_way", f.one_way},
         {"consent", f.consent},
         {"on_surface", f.on_surface}};
+    if (!f.material.empty()) entry["material"] = f.material;
     for (int i = 0; i < 12; ++i)
       entry["world_from_fixture"].push_back(f.world_from_fixture(i / 4, i % 4));
     for (const Vec3& point : f.points) entry["points"].push_back(triple(point));
@@ -185,6 +187,7 @@ std::shared_ptr<const FixtureSet> fixtures_from_json(std::string_view text,
       if (entry.contains("size")) f.size = triple_of(entry.at("size"));
       f.radius = entry.value("radius", f.radius);
       f.length = entry.value("length", f.length);
+      f.material = entry.value("material", f.material);
       f.one_way = entry.value("one_way", f.one_way);
       f.consent = entry.value("consent", f.consent);
       f.on_surface = entry.value("on_surface", f.on_surface);

@@ -2,7 +2,18 @@
 # Types of the compiled module; a test holds them against it.
 import enum
 import os
-from typing import Any, Iterable, Iterator, List, Optional, Sequence, Tuple, Union, overload
+from typing import (
+    Any,
+    Callable,
+    Iterable,
+    Iterator,
+    List,
+    Optional,
+    Sequence,
+    Tuple,
+    Union,
+    overload,
+)
 
 import numpy
 from numpy.typing import ArrayLike, NDArray
@@ -186,6 +197,10 @@ class Session:
         without_watchdog: bool = False,
         fixtures: str | None = None,
         hands: Iterable[Union[str, dict[str, Any]]] = (),
+        materials: Optional[Materials] = None,
+        labels: Optional[
+            Callable[[int, NDArray[numpy.uint16]], Optional[NDArray[numpy.uint8]]]
+        ] = None,
         **parameters: float,
     ) -> None: ...
     def __enter__(self) -> Session: ...

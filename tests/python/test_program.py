@@ -131,6 +131,45 @@ class Session(unittest.TestCase):
             with self.assertRaisesRegex(palpate.Error, "did you mean 'radius'"):
                 session.fixtures(wall.replace("radius", "radus"))
 
+    def test_asks_what_frames_are_made_of(self):
+        asked = []
+
+        def labels(camera, depth):
+            asked.append((camera, depth.shape))
+            found = numpy.zeros(depth.shape, numpy.uint8)
+            found[:, depth.shape[1] // 2:] = 1
+            return found
+
+        keep_off = ("[[fixture]]\nname = \"off\"\nshape = \"seen\"\nmaterial = \"tissue\"\n"
+                    "pose = [0, 0, 0, 0, 0, 0, 1]\nsize = [1, 1, 1]\nmargin = 0.02")
+        materials = palpate.Materials([{"name": "tissue", "like": "rubber"}])
+        with tempfile.TemporaryDirectory() as folder:
+            forces = []
+            for x in (-0.05, 0.05):  # 10 mm above the plane, on either side
+                path = pathlib.Path(folder) / "path.csv"
+                path.write_text(f"t,x,y,z\n0,{x},0,0.1\n1,{x},0,0.1\n2,{x},0,0.01\n3,{x},0,0.01\n")
+                with palpate.Session("synthetic:plane?size=160x120&distance=0.5",
+                                     device=f"script:{path}", free_running=True, fixtures=keep_off,
+                                     materials=materials, labels=labels) as session:
+                    session.run(4.0)
+                    forces.append(session.ticks()["force"][-1])
+                    self.assertEqual(session.state()["cameras"][0]["doubt"], "")
+        self.assertEqual(numpy.linalg.norm(forces[0]), 0.0)
+        self.assertGreater(forces[1][2], 1.0)
+        self.assertEqual(asked[0], (0, (120, 160)))
+
+        def wrong(camera, depth):
+            raise ValueError("no idea")
+
+        with palpate.Session(CAMERA, free_running=True, materials=materials,
+                             labels=wrong) as session:
+            session.run(0.1)
+            self.assertIn("no idea", session.state()["cameras"][0]["doubt"])
+        with self.assertRaisesRegex(palpate.Error, "no camera knows a material 'tissue'"):
+            palpate.Session(CAMERA, fixtures=keep_off)
+        with self.assertRaisesRegex(palpate.Error, "of no use without the other"):
+            palpate.Session(CAMERA, labels=labels)
+
     def test_has_several_hands(self):
         with tempfile.TemporaryDirectory() as folder:
             bag = os.path.join(folder, "session")

@@ -131,6 +131,48 @@ TEST(Session, IsReplayedFromItsRecordingBitForBit) {
   EXPECT_TRUE(fails_saying([&] { Session session(std::move(again)); }, "bag", "already"));
 }
 
+TEST(Session, AsksWhatFramesAreMadeOfAndKeepsAHandOffOneMaterial) {
+  const test::TemporaryFolder folder;
+  const auto table = std::make_shared<const MaterialTable>(MaterialTable{
+      .materials = {{.name = "bone", .material = {}}, {.name = "nerve", .material = {}}}});
+  const auto on_the_wall_at = [&](double x, const std::string& material) {
+    // 10 mm before the wall.
+    SessionOptions options = on_the_wall();
+    options.device = std::make_unique<ScriptedDevice>(
+        HipPath({{0.0, {x, 0.0, wall_depth - 0.1}}, {1.0, {x, 0.0, wall_depth - 0.01}}}), false);
+    options.materials = [=](std::size_t /*camera*/, const DepthImage& image) {
+      std::vector<std::uint8_t> labels(image.depth().size());
+      const auto width = static_cast<std::size_t>(image.intrinsics().width);
+      for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = i % width < width / 2 ? 1 : 2;
+      return std::make_shared<LabelImage>(table, std::move(labels));
+    };
+    Fixture off{.name = "off", .shape = FixtureShape::seen, .material = material};
+    off.world_from_fixture.translation().z() = wall_depth;
+    off.size = Vec3::Constant(1.0);
+    off.numbers.margin = 0.02;
+    options.settings.fixtures = std::make_shared<const FixtureSet>(std::vector{off});
+    return options;
+  };
+  EXPECT_NEAR(play(on_the_wall_at(0.05, ""), 3.0).ticks.back().force.z(), -3.3, 0.01);
+  EXPECT_EQ(play(on_the_wall_at(-0.05, "nerve"), 3.0).state.summary.largest_sent, 0.0);
+  SessionOptions recorded = on_the_wall_at(0.05, "nerve");
+  recorded.record = (folder.path() / "bag").string();
+  EXPECT_NEAR(play(std::move(recorded), 3.0).ticks.back().force.z(), -3.3, 0.01);
+  SessionReader reader(folder.path() / "bag");
+  EXPECT_EQ(reader.settings(0).fixtures->items()[0].fixture.material, "nerve");
+  EXPECT_TRUE(replay(reader).identical());
+
+  EXPECT_TRUE(fails_saying([&] { const Session session(on_the_wall_at(0.0, "nerves")); },
+                           "fixture 'off'", "'nerves'", "bone, "));
+  SessionOptions wrong = on_the_wall_at(0.0, "");
+  wrong.materials = [=](std::size_t, const DepthImage&) {
+    return std::make_shared<LabelImage>(table, std::vector<std::uint8_t>(3));
+  };
+  EXPECT_NE(play(std::move(wrong), 0.1).state.cameras[0].doubt.find("3 pixels"), std::string::npos);
+  Fixture box{.name = "box", .size = Vec3::Constant(0.1), .material = "nerve"};
+  EXPECT_TRUE(fails_saying([&] { validate(box); }, "'box'", "leave material out"));
+}
+
 TEST(Session, TakesTheNoiseThatIsUsualForTheCamerasKindUnlessItIsSet) {
   const auto on_a = [](SensorKind sensor) {
     SessionOptions options = on_the_wall();

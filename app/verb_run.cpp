@@ -232,7 +232,7 @@ int run_pages(const RunOptions& options, SessionConfig config, GuardedDevices gu
     if (config.cameras.size() == 1) opened.add(config.cameras.front().uri);
     if (may_choose) rules.scenes = scene_choices(given, opened);
     try {
-      ending = run_page(options, config, std::move(guarded), rules, is_first, running);
+      ending = run_page(options, config, std::exchange(guarded, {}), rules, is_first, running);
     } catch (const Error& error) {
       opened.remove(config.cameras.front().uri);
       if (is_first || config.cameras.front().uri == before.front().uri) throw;

@@ -227,6 +227,12 @@ std::optional<Command> parse_command(std::string_view message) {
       return std::nullopt;
     return Forbid{size->get<double>(), margin->get<double>()};
   }
+  if (verb == "guide") {
+    if (!what.is_object() || what.size() != 1) return std::nullopt;
+    const auto slack = what.find("slack");
+    if (slack == what.end() || !slack->is_number()) return std::nullopt;
+    return Guide{slack->get<double>()};
+  }
   if (verb == "remove_fixture" && what.is_string()) return RemoveFixture{what.get<std::string>()};
   if (verb == "reset" && what == true) return ResetHand{};
   if (verb == "reset_faults" && what == true) return ResetFaults{};

@@ -148,6 +148,10 @@ struct Forbid {
   double size;    ///< [m] edge of the box about that place
   double margin;  ///< [m]
 };
+/// The stroke of the hand's last contact becomes a guide: a path, or a point if it hardly moved.
+struct Guide {
+  double slack;  ///< [m] from it within which the hand is free
+};
 struct RemoveFixture {
   std::string name;
 };
@@ -156,7 +160,7 @@ struct ResetHand {};
 struct ResetFaults {};
 using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod,
                              SetRecording, SetPlayback, Seek, OpenScene, SetBrush, DropBrush,
-                             ClearPaint, Forbid, RemoveFixture, ResetHand, ResetFaults>;
+                             ClearPaint, Forbid, Guide, RemoveFixture, ResetHand, ResetFaults>;
 
 /// The longest message a page may send [bytes].
 constexpr std::size_t max_page_message = 1024;

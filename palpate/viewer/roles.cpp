@@ -54,7 +54,8 @@ void check_allowed(const Command& command, Role role) {
     throw Error("scene", "only the operator chooses it", operator_remedy);
   if (std::holds_alternative<SetPlacement>(command))
     throw Error("placement", "only the operator changes it", operator_remedy);
-  if (std::holds_alternative<Forbid>(command) || std::holds_alternative<RemoveFixture>(command))
+  if (std::holds_alternative<Forbid>(command) || std::holds_alternative<Guide>(command) ||
+      std::holds_alternative<RemoveFixture>(command))
     throw Error("fixture", "only the operator adds and removes it", operator_remedy);
   if (std::holds_alternative<ResetFaults>(command))
     throw Error("latched fault", "only the operator resets it", operator_remedy);

@@ -168,22 +168,43 @@ std::string SessionHost::hello() {
 void SessionHost::forbid(const Forbid& wanted) {
   if (!touched_)
     throw Error("fixture", "nothing has been touched yet", "touch what the hand is to keep off");
+  Fixture region{.name = {},
+                 .kind = FixtureKind::forbidden,
+                 .shape = FixtureShape::seen,
+                 .size = Vec3::Constant(wanted.size)};
+  region.world_from_fixture.translation() = *touched_;
+  region.numbers.margin = wanted.margin;
+  add_fixture(std::move(region), "keep off");
+}
+
+void SessionHost::guide(const Guide& wanted) {
+  constexpr double shortest = 0.01;  // [m] from end to end of a path; else it is a place
+  if (stroke_.empty())
+    throw Error("fixture", "nothing has been stroked yet", "stroke where the hand is to be guided");
+  double length = 0.0;
+  for (std::size_t i = 1; i < stroke_.size(); ++i) length += (stroke_[i] - stroke_[i - 1]).norm();
+  Fixture line{.name = {}, .kind = FixtureKind::guide, .shape = FixtureShape::point};
+  if (length >= shortest) {
+    line.shape = FixtureShape::path;
+    line.points = stroke_;
+  } else {
+    line.world_from_fixture.translation() = stroke_.back();
+  }
+  set_parameter(line.numbers, "slack", wanted.slack);
+  add_fixture(std::move(line), length >= shortest ? "stroke" : "place");
+}
+
+void SessionHost::add_fixture(Fixture fixture, const std::string& name) {
   session_->change([&](ServoSettings& settings) {
     std::vector<Fixture> all =
         settings.fixtures ? settings.fixtures->fixtures() : std::vector<Fixture>{};
-    Fixture region{.name = {},
-                   .kind = FixtureKind::forbidden,
-                   .shape = FixtureShape::seen,
-                   .size = Vec3::Constant(wanted.size)};
-    region.world_from_fixture.translation() = *touched_;
-    region.numbers.margin = wanted.margin;
     const auto is_taken = [&] {
       return std::any_of(all.begin(), all.end(),
-                         [&](const Fixture& other) { return other.name == region.name; });
+                         [&](const Fixture& other) { return other.name == fixture.name; });
     };
-    for (int number = 1; region.name.empty() || is_taken(); ++number)
-      region.name = "keep off " + std::to_string(number);
-    all.push_back(region);
+    for (int number = 1; fixture.name.empty() || is_taken(); ++number)
+      fixture.name = name + " " + std::to_string(number);
+    all.push_back(std::move(fixture));
     settings.fixtures = std::make_shared<const FixtureSet>(all);
   });
 }
@@ -350,8 +371,30 @@ std::optional<TickBatch> SessionHost::ticks() {
 }
 
 // Along a stroke, a dab in each third of the brush's radius.
+// Keeps the stroke in as few places as a guide may have, however long it becomes.
+void SessionHost::follow(const Tick& tick, const Vec3& foot) {
+  constexpr double finest = 0.002;   // [m]
+  constexpr std::size_t most = 128;  // places
+  if (tick.force.isZero()) {
+    stroke_is_over_ = true;
+    return;
+  }
+  if (std::exchange(stroke_is_over_, false)) {
+    stroke_.clear();
+    stroke_spacing_ = finest;
+  }
+  if (!stroke_.empty() && (foot - stroke_.back()).norm() < stroke_spacing_) return;
+  stroke_.push_back(foot);
+  if (stroke_.size() < most) return;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < stroke_.size(); i += 2) stroke_[kept++] = stroke_[i];
+  stroke_.resize(kept);
+  stroke_spacing_ *= 2.0;
+}
+
 void SessionHost::paint(const ServoTick& newest, double contact_radius) {
   const Tick& tick = newest.tick;
+  follow(tick, tick.proxy - contact_radius * tick.normal);
   if (!tick.force.isZero()) touched_ = tick.proxy - contact_radius * tick.normal;
   if (!brush_ || tick.force.isZero()) {
     dabbed_.reset();
@@ -432,6 +475,8 @@ void SessionHost::command(const Command& command, Role role) {
     dabbed_.reset();
   } else if (const auto* wanted = std::get_if<Forbid>(&command)) {
     forbid(*wanted);
+  } else if (const auto* along = std::get_if<Guide>(&command)) {
+    guide(*along);
   } else if (const auto* fixture = std::get_if<RemoveFixture>(&command)) {
     remove_fixture(fixture->name);
   } else if (std::holds_alternative<ResetFaults>(command)) {

@@ -109,9 +109,16 @@ class SessionHost final : public ViewerHost {
   Vec3 start_ = Vec3::Zero();   // [m, device] where the mouse's hand began
   Vec3 target_ = Vec3::Zero();  // [m, device] where it was sent last
   void forbid(const Forbid& wanted);
+  void guide(const Guide& wanted);
+  // Gives the session one more, which it names.
+  void add_fixture(Fixture fixture, const std::string& name);
   void remove_fixture(const std::string& name);
+  void follow(const Tick& tick, const Vec3& foot);
 
   std::optional<Vec3> touched_;    // [m] where the hand touched last
+  std::vector<Vec3> stroke_;       // [m] along the surface, in the last contact
+  double stroke_spacing_ = 0.0;    // [m] between its places
+  bool stroke_is_over_ = true;     // the next contact begins another
   std::optional<SetBrush> brush_;  // what is touched is painted with; none: it is not
   std::optional<Vec3> dabbed_;     // [m] where the last dab was
   std::string brush_trouble_;      // why it does not paint

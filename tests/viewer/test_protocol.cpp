@@ -193,6 +193,9 @@ TEST(Protocol, UnderstandsEachCommand) {
   ASSERT_TRUE(forbid && std::holds_alternative<Forbid>(*forbid));
   EXPECT_EQ(std::get<Forbid>(*forbid).size, 0.1);
   EXPECT_EQ(std::get<Forbid>(*forbid).margin, 0.01);
+  const auto guide = parse_command(R"({"guide": {"slack": 0.003}})");
+  ASSERT_TRUE(guide && std::holds_alternative<Guide>(*guide));
+  EXPECT_EQ(std::get<Guide>(*guide).slack, 0.003);
   const auto removed = parse_command(R"({"remove_fixture": "wall"})");
   ASSERT_TRUE(removed && std::holds_alternative<RemoveFixture>(*removed));
   EXPECT_EQ(std::get<RemoveFixture>(*removed).name, "wall");
@@ -221,6 +224,8 @@ TEST(Protocol, RefusesCommandsThatAreNotItsOwn) {
                            R"({"clear_paint": false})",
                            R"({"forbid": {"size": 0.1}})",
                            R"({"forbid": true})",
+                           R"({"guide": {}})",
+                           R"({"guide": {"slack": "wide"}})",
                            R"({"remove_fixture": 1})",
                            R"({"quit": true})",
                            R"({"method": "paper", "reset": true})",

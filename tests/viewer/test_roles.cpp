@@ -26,7 +26,8 @@ TEST(Roles, AllowALookingPageNothing) {
         Command(SetRecording{true}), Command(SetRecording{false}), Command(ResetHand{}),
         Command(ResetFaults{}), Command(SetPlayback{true, true, 1.0}), Command(Seek{0.5}),
         Command(OpenScene{"synthetic:desk"}), Command(SetBrush{"ice", 0.01}), Command(DropBrush{}),
-        Command(ClearPaint{}), Command(Forbid{0.1, 0.01}), Command(RemoveFixture{"wall"})}) {
+        Command(ClearPaint{}), Command(Forbid{0.1, 0.01}), Command(Guide{0.002}),
+        Command(RemoveFixture{"wall"})}) {
     EXPECT_THROW(check_allowed(command, Role::looking), Error) << command.index();
     EXPECT_NO_THROW(check_allowed(command, Role::operating)) << command.index();
   }
@@ -42,6 +43,7 @@ TEST(Roles, LeaveMethodPlacementAndRecordingToTheOperator) {
   EXPECT_TRUE(fails_saying(asking(OpenScene{"synthetic:desk"}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(ResetFaults{}, Role::holding), "latched", "operator"));
   EXPECT_TRUE(fails_saying(asking(Forbid{0.1, 0.01}, Role::holding), "fixture", "operator"));
+  EXPECT_TRUE(fails_saying(asking(Guide{0.002}, Role::holding), "fixture", "operator"));
   EXPECT_TRUE(fails_saying(asking(RemoveFixture{"wall"}, Role::holding), "operator"));
   EXPECT_NO_THROW(check_allowed(SetParameter{"stiffness", 1.0}, Role::holding));
   EXPECT_NO_THROW(check_allowed(SetSafetyParameter{"max_speed", 0.1}, Role::holding));

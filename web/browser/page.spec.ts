@@ -521,6 +521,33 @@ test("the operator keeps the hand off what it has touched", async () => {
   await page.mouse.up();
 });
 
+test("the operator makes a guide of what the hand has stroked", async () => {
+  const page = await open(PLANE);
+  const fixtures = () =>
+    page.evaluate(() =>
+      (window as any).palpate
+        .newest()
+        .state.fixtures.map(({ name, shape, points }: any) => [name, shape, points.length]),
+    );
+  await page.locator("[data-tab=method]").first().click();
+  const at = await placeWhere(page, "surface");
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
+  for (let i = 1; i <= 20; ++i) await page.mouse.move(at.x + 3 * i, at.y);
+  await until(page, (seen) => seen.state !== 0 && seen.force > 0.1);
+  await page.mouse.up();
+  await until(page, (seen) => seen.state === 0 && seen.hip[2]! > 0.02);
+  await page.locator("#guide").click();
+  await expect.poll(async () => (await fixtures()).length).toBe(1);
+  const [[name, shape, points]] = (await fixtures()) as [[string, string, number]];
+  expect([name, shape]).toEqual(["stroke 1", "path"]);
+  expect(points).toBeGreaterThan(3);
+  expect(await page.locator("#fixture-list").textContent()).toContain("guide, path");
+  if (process.env.PALPATE_PICTURES)
+    await page.screenshot({ path: join(process.env.PALPATE_PICTURES, "guide.png") });
+});
+
 test("a second hand of the session is drawn and said", async () => {
   const desk = [...DESK, "--device", "mouse:", "--device", "hand:"];
   const page = await open(desk);

@@ -98,6 +98,11 @@ export function forbidOf(size: number, margin: number): { size: number; margin: 
   return { size: within(size, 10, 1000, 100), margin: within(margin, 2, 100, 10) };
 }
 
+/** What the button that adds a guide asks for, of a width in mm. */
+export function guideOf(slack: number): { slack: number } {
+  return { slack: Math.min(Math.max(Number.isFinite(slack) ? slack : 2, 0), 50) / 1e3 };
+}
+
 export class Fixtures {
   private shown = "";
   private role: Role | null = null;
@@ -105,6 +110,7 @@ export class Fixtures {
   constructor(
     private readonly actions: {
       forbid(wanted: ReturnType<typeof forbidOf>): void;
+      guide(wanted: ReturnType<typeof guideOf>): void;
       remove(name: string): void;
     },
   ) {
@@ -116,6 +122,9 @@ export class Fixtures {
         ),
       ),
     );
+    get("guide").addEventListener("click", () =>
+      this.actions.guide(guideOf(get<HTMLInputElement>("guide-slack").valueAsNumber)),
+    );
   }
 
   update({ fixtures, role }: State): void {
@@ -124,7 +133,7 @@ export class Fixtures {
     this.shown = shown;
     this.role = role;
     const may = role === "operating";
-    for (const id of ["forbid", "forbid-size", "forbid-margin"])
+    for (const id of ["forbid", "forbid-size", "forbid-margin", "guide", "guide-slack"])
       get<HTMLButtonElement | HTMLInputElement>(id).disabled = !may;
     get("fixture-list").replaceChildren(
       ...fixtures.map(({ name, kind, shape }) => {

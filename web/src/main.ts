@@ -89,6 +89,7 @@ const brush = new Brush({
 
 const fixtures = new Fixtures({
   forbid: (wanted) => connection.ask({ forbid: wanted }),
+  guide: (wanted) => connection.ask({ guide: wanted }),
   remove: (name) => connection.ask({ remove_fixture: name }),
 });
 

@@ -437,5 +437,6 @@ export type Command =
   | { brush: { material: string; radius: number } | null }
   | { clear_paint: true }
   | { forbid: { size: number; margin: number } }
+  | { guide: { slack: number } }
   | { remove_fixture: string }
   | { reset_faults: true };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 import { expect, test } from "vitest";
-import { fixtureLines, forbidOf } from "../src/fixtures";
+import { fixtureLines, forbidOf, guideOf } from "../src/fixtures";
 import type { FixtureState } from "../src/protocol";
 
 const shifted = [1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, -0.25];
@@ -59,4 +59,7 @@ test("a region that is asked for is of a size that can be", () => {
   expect(forbidOf(100, 10)).toEqual({ size: 0.1, margin: 0.01 });
   expect(forbidOf(Number.NaN, Number.NaN)).toEqual({ size: 0.1, margin: 0.01 });
   expect(forbidOf(1, 1000)).toEqual({ size: 0.01, margin: 0.1 });
+  expect(guideOf(3)).toEqual({ slack: 0.003 });
+  expect(guideOf(Number.NaN)).toEqual({ slack: 0.002 });
+  expect(guideOf(-1)).toEqual({ slack: 0 });
 });

@@ -175,6 +175,11 @@ void check_range(double value, double least, double most, const std::string& wha
   }
 }
 
+double checked_hole(const SimulationSetup& setup) {
+  check_range(setup.hole, 0.011, 0.06, "board's hole", "m");
+  return setup.hole;
+}
+
 }  // namespace
 
 void validate(const PlateMotion& plate) {
@@ -535,7 +540,8 @@ class Simulation::Implementation {
 
 Simulation::Simulation(std::string_view mjcf, const SimulationSetup& setup)
     : implementation_(std::make_unique<Implementation>(mjcf, setup)) {}
-Simulation::Simulation(const SimulationSetup& setup) : Simulation(desk_model(), setup) {}
+Simulation::Simulation(const SimulationSetup& setup)
+    : Simulation(desk_model(checked_hole(setup)), setup) {}
 
 Simulation::~Simulation() {
   stop();

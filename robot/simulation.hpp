@@ -30,6 +30,7 @@ struct SimulationSetup {
   PlateMotion plate;
   double max_force = 8.0;  ///< [N] with which the resting tool presses at most
   double max_speed = 0.5;  ///< [m/s] of the tool's tip
+  double hole = 0.015;     ///< [m] side of the square hole in the board
 };
 
 /// A body's geometry as a camera sees it.

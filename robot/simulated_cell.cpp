@@ -10,12 +10,12 @@
 namespace palpate::robot {
 namespace {
 
-constexpr std::array<std::string_view, 25> options = {
-    "plate",       "plate_stroke", "plate_rate",   "max_force",      "max_speed", "arm",
-    "hole",        "margin",       "latency",      "size",           "fps",       "fov",
-    "distance",    "tilt",         "azimuth",      "seed",           "sensor",    "noise",
-    "noise_grows", "correlation",  "quantisation", "disparity_step", "dropouts",  "grazing",
-    "flying"};
+constexpr std::array<std::string_view, 26> options = {
+    "plate",   "plate_stroke",    "plate_rate",  "max_force",    "max_speed",      "arm",
+    "hole",    "plate_stiffness", "margin",      "latency",      "size",           "fps",
+    "fov",     "distance",        "tilt",        "azimuth",      "seed",           "sensor",
+    "noise",   "noise_grows",     "correlation", "quantisation", "disparity_step", "dropouts",
+    "grazing", "flying"};
 
 void check(const Uri& uri) {
   uri.allow_only(options);
@@ -30,6 +30,8 @@ SimulationSetup simulation_setup(const Uri& uri) {
   setup.plate.frequency = uri.number_option("plate_rate", setup.plate.frequency, 0.0, 5.0, "Hz");
   setup.max_force = uri.number_option("max_force", setup.max_force, 0.5, 30.0);
   setup.max_speed = uri.number_option("max_speed", setup.max_speed, 0.01, 1.0);
+  if (uri.has("plate_stiffness"))
+    setup.plate_stiffness = uri.number_option("plate_stiffness", 0.0, 50.0, 5e3);
   setup.hole = uri.number_option("hole", setup.hole, 0.011, 0.06, "m");
   return setup;
 }

@@ -7,15 +7,19 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "palpate/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
+#include "palpate/session/paint.hpp"
+#include "palpate/telelink/touched_paint.hpp"
 #include "palpate/teleop/approach_watch.hpp"
 #include "palpate/teleop/lead.hpp"
 #include "palpate/teleop/led_hand.hpp"
 #include "palpate/teleop/link_limits.hpp"
 #include "palpate/teleop/set_point.hpp"
+#include "palpate/teleop/touched.hpp"
 
 #include "robot/simulated_cell.hpp"
 
@@ -65,9 +69,15 @@ class Task {
         set_point_(set_point(wanted)),
         leads_(delay),
         to_guard_(camera_latency),
-        to_operator_(camera_latency + delay) {}
+        to_operator_(camera_latency + delay),
+        learner_(cell_.simulation()->info().tool_radius),
+        found_(delay) {}
 
   Simulation& simulation() { return *cell_.simulation(); }
+  // What the operator was last told of what the tool touched, and why it was ignored.
+  [[nodiscard]] const std::optional<Touched>& touched() const { return touched_; }
+  [[nodiscard]] const std::string& ignored() const { return ignored_; }
+  [[nodiscard]] std::string_view why_not() const { return learner_.why_not(); }
 
   void run(double seconds, const std::function<void(const ServoTick& felt)>& look = {}) {
     for (const double end = t_ + seconds; t_ < end; t_ += tick) {
@@ -78,8 +88,12 @@ class Task {
         to_guard_.send({frame.cloud, frame.stamp}, t_);
         to_operator_.send({frame.cloud, frame.stamp}, t_);
       }
+      if (const auto found = found_.arrived(t_)) {
+        touched_ = found;
+        ignored_ = paint_touched(paint_, {}, *found);
+      }
       if (const auto seen = to_operator_.arrived(t_))
-        operator_.put_frame(seen->cloud, seen->stamp, t_);
+        operator_.put_frame(paint_.on(seen->cloud, 0), seen->stamp, t_);
       operator_.run({.t = t_});
       ServoTick felt;
       static_cast<void>(felt_.try_pop(felt));
@@ -125,6 +139,9 @@ class Task {
     led_.clearance(guarded.tick.state == ContactState::free_motion
                        ? watch_.clearance() - simulation().info().tool_radius
                        : 0.0);
+    if (const auto found =
+            learner_.next(t_, state.position, state.velocity, state.force, guarded.tick.normal))
+      found_.send(*found, t_);
     const SetPoint::Order order =
         set_point_.next(guarded, lead_.press, led_.is_led(), watch_.newest(), state.force);
     simulation().command(order.position, order.velocity);
@@ -140,6 +157,11 @@ class Task {
   SetPoint set_point_;
   Delayed<Lead> leads_;
   Delayed<Seen> to_guard_, to_operator_;
+  TouchLearner learner_;
+  Delayed<Touched> found_;
+  std::optional<Touched> touched_;
+  std::string ignored_;
+  Paint paint_;
   Lead lead_;
   double t_ = 0.0;  // [s]
   std::uint64_t frames_ = 0;

@@ -32,7 +32,7 @@ constexpr const char* patience = "wait=25s";  // for an end that starts together
 struct OperatorOptions {
   RunOptions run;
   std::string name = "robot";
-  bool whole_images = false, no_index = false;
+  bool whole_images = false, no_index = false, learn = false;
   bool robot_starts = false;  // too, now
 };
 
@@ -69,7 +69,9 @@ int operate(const OperatorOptions& options) {
     const DeviceInfo& device = session.device().info();
     const bool is_device = device.limits.motors && !device.simulated;
     end = std::make_shared<OperatorEnd>(
-        session, OperatorEndOptions{.name = options.name, .index = !options.no_index && is_device});
+        session,
+        OperatorEndOptions{
+            .name = options.name, .index = !options.no_index && is_device, .learn = options.learn});
     fmt::print(stderr, "palpate: leads /{} in domain {}; Ctrl-C ends it\n", options.name,
                end->domain());
     return {nullptr, [&end](std::nullptr_t) { end.reset(); }};
@@ -205,6 +207,11 @@ void add_running(CLI::App& command, RunOptions& run) {
                    "print the session that these options describe as a TOML file, and end");
 }
 
+void add_learn(CLI::App& command, OperatorOptions& options) {
+  command.add_flag("--learn", options.learn,
+                   "what the robot's tool touches is felt as soft and rough as it was found");
+}
+
 }  // namespace
 
 Verb add_teleop(CLI::App& program) {
@@ -219,6 +226,7 @@ Verb add_teleop(CLI::App& program) {
                  "read depth images that are sent again where lost, not slices");
   hand->add_flag("--no-index", operating->no_index,
                  "the robot comes to where the hand is; else the scene comes to the hand");
+  add_learn(*hand, *operating);
   operating->run.in_real_time = true;
 
   const auto robot = std::make_shared<RobotOptions>();
@@ -234,6 +242,7 @@ Verb add_teleop(CLI::App& program) {
   const auto both = std::make_shared<OperatorOptions>();
   both->run.in_real_time = both->robot_starts = true;
   add_running(*command, both->run);
+  add_learn(*command, *both);
   command->add_option("--robot", robot->robot, "both ends on this machine: as of teleop robot");
   command->add_option("--name", both->name, "of the robot's topics (robot)");
   return {command, [hand, arm, operating, robot, both] {

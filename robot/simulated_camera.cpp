@@ -53,6 +53,8 @@ SimulatedCamera::SimulatedCamera(std::shared_ptr<Simulation> simulation,
   }
   for (const VisibleGeom& geom : simulation_->geoms())
     thick_.push_back(thickened(geom.shape, geom.of_arm ? setup.margin : 0.0));
+  if (setup.arm == ArmView::remembered)
+    behind_arm_.emplace(setup.camera.intrinsics.width, setup.camera.intrinsics.height);
   info_.frame_rate = setup.camera.frame_rate;
   info_.live = simulation_->runs();
   info_.clock = info_.live ? StampClock::monotonic : StampClock::recording;
@@ -118,15 +120,19 @@ Frame SimulatedCamera::capture(const BodyPoses& poses, std::uint64_t frame) {
     if (drawn) draw(geom, geom.shape, poses, depth_);
   }
   std::vector<std::uint16_t> readings = sensor_.measure(depth_, frame);
-  if (setup_.arm == ArmView::hidden) {
+  if (setup_.arm != ArmView::seen) {
     // Starting from the scene's depth, so that what is before the arm stays.
     arm_ = depth_;
     for (std::size_t i = 0; i < geoms.size(); ++i) {
       if (geoms[i].of_arm) draw(geoms[i], thick_[i], poses, arm_);
     }
     for (std::size_t i = 0; i < readings.size(); ++i) {
-      if (arm_[i] < depth_[i]) readings[i] = 0;
+      if (arm_[i] < depth_[i])
+        readings[i] = 0;
+      else
+        arm_[i] = nothing;
     }
+    if (behind_arm_) behind_arm_->fill(readings, arm_, 1.0 / sensor_.model().quantisation, poses.t);
   }
   return {poses.t, std::make_shared<const DepthImage>(rays_, std::move(readings),
                                                       1.0 / sensor_.model().quantisation,

@@ -11,6 +11,7 @@
 #include "palpate/sources/sensor_model.hpp"
 #include "palpate/sources/source.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/teleop/behind_arm.hpp"
 
 #include "robot/simulation.hpp"
 
@@ -18,8 +19,9 @@ namespace palpate::robot {
 
 /// How the robot's own arm appears in the image.
 enum class ArmView : std::uint8_t {
-  seen,    ///< as any other body
-  hidden,  ///< its pixels are holes: what is touched is the scene, not the robot
+  seen,        ///< as any other body
+  hidden,      ///< its pixels are holes: what is touched is the scene, not the robot
+  remembered,  ///< its pixels show what was seen there before it came; see BehindArm
 };
 
 struct SimulatedCameraSetup {
@@ -66,6 +68,7 @@ class SimulatedCamera final : public Source {
   std::vector<Shape> thick_;            // of the arm's geoms, by the margin; one per geom
   std::vector<float> resting_, depth_;  // bodies at rest, drawn once; and the newest image
   std::vector<float> arm_;              // the thickened arm
+  std::optional<BehindArm> behind_arm_;
   std::vector<Vec3> directions_;
   std::vector<double> along_;
   std::uint64_t next_frame_ = 0;

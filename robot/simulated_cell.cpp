@@ -10,11 +10,12 @@
 namespace palpate::robot {
 namespace {
 
-constexpr std::array<std::string_view, 24> options = {
-    "plate",       "plate_stroke", "plate_rate",     "max_force", "max_speed", "arm",
-    "margin",      "latency",      "size",           "fps",       "fov",       "distance",
-    "tilt",        "azimuth",      "seed",           "sensor",    "noise",     "noise_grows",
-    "correlation", "quantisation", "disparity_step", "dropouts",  "grazing",   "flying"};
+constexpr std::array<std::string_view, 26> options = {
+    "plate",   "plate_stroke",    "plate_rate",  "max_force",    "max_speed",      "arm",
+    "hole",    "plate_stiffness", "margin",      "latency",      "size",           "fps",
+    "fov",     "distance",        "tilt",        "azimuth",      "seed",           "sensor",
+    "noise",   "noise_grows",     "correlation", "quantisation", "disparity_step", "dropouts",
+    "grazing", "flying"};
 
 void check(const Uri& uri) {
   uri.allow_only(options);
@@ -29,6 +30,9 @@ SimulationSetup simulation_setup(const Uri& uri) {
   setup.plate.frequency = uri.number_option("plate_rate", setup.plate.frequency, 0.0, 5.0, "Hz");
   setup.max_force = uri.number_option("max_force", setup.max_force, 0.5, 30.0);
   setup.max_speed = uri.number_option("max_speed", setup.max_speed, 0.01, 1.0);
+  if (uri.has("plate_stiffness"))
+    setup.plate_stiffness = uri.number_option("plate_stiffness", 0.0, 50.0, 5e3);
+  setup.hole = uri.number_option("hole", setup.hole, 0.011, 0.06, "m");
   return setup;
 }
 
@@ -38,11 +42,13 @@ std::unique_ptr<Source> make_camera(const Uri& uri, const std::shared_ptr<Simula
   setup.camera = camera_setup(uri);
   setup.sensor = camera_sensor(uri);
   const std::string arm = uri.text_option("arm", "hidden");
-  if (arm != "hidden" && arm != "seen") {
-    throw Error(uri.text() + ": option 'arm'", "'" + arm + "' is neither hidden nor seen",
-                "write arm=hidden or arm=seen");
+  if (arm != "hidden" && arm != "remembered" && arm != "seen") {
+    throw Error(uri.text() + ": option 'arm'", "there is no '" + arm + "'",
+                "write arm=hidden, arm=remembered or arm=seen");
   }
-  setup.arm = arm == "seen" ? ArmView::seen : ArmView::hidden;
+  setup.arm = arm == "seen"         ? ArmView::seen
+              : arm == "remembered" ? ArmView::remembered
+                                    : ArmView::hidden;
   setup.margin = uri.number_option("margin", setup.margin, 0.0, 0.1, "m");
   setup.latency = uri.number_option("latency", setup.latency, 0.0, 0.4, "s");
   SourceInfo info;

@@ -22,10 +22,12 @@ enum class Pace : std::uint8_t {
 ///
 /// `mujoco:desk?KEY=VALUE&...`:
 ///   plate=30mm plate_stroke=0mm plate_rate=0.5Hz  height of the plate's top, and its motion
+///   plate_stiffness=400  [N/m] of a soft skin that it has; without it, it is hard
+///   hole=15mm  side of the square hole in the board
 ///   max_force=8 max_speed=0.5  [N] and [m/s] of the robot
-///   arm=hidden|seen margin=3mm latency=0ms  of the camera, and as a synthetic camera has them:
-///   size fps fov distance tilt azimuth seed sensor noise noise_grows correlation quantisation
-///   disparity_step dropouts grazing flying
+///   arm=hidden|remembered|seen margin=3mm latency=0ms  of the camera, and as a synthetic camera
+///   has them: size fps fov distance tilt azimuth seed sensor noise noise_grows correlation
+///   quantisation disparity_step dropouts grazing flying
 class SimulatedCell {
  public:
   /// The simulation runs, or stands at time 0.

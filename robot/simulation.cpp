@@ -43,6 +43,11 @@ constexpr double force_filter = 2.0 * pi * 80.0;  // [rad/s] of the force that t
 constexpr double plate_stiffness = 5e4;  // [N/m]
 constexpr double plate_damping = 600.0;  // [N s/m]
 
+// Of a soft skin. In MuJoCo a contact is the softer the less of its acceleration is its own; what
+// it has adds to the mass that meets the skin.
+constexpr double skin_impedance = 0.05;  // [-]
+constexpr double skin_damping = 5.0;     // [N s/m]
+
 constexpr double largest_lag = 0.05;  // [s] that is caught up in real time
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -175,6 +180,11 @@ void check_range(double value, double least, double most, const std::string& wha
   }
 }
 
+double checked_hole(const SimulationSetup& setup) {
+  check_range(setup.hole, 0.011, 0.06, "board's hole", "m");
+  return setup.hole;
+}
+
 }  // namespace
 
 void validate(const PlateMotion& plate) {
@@ -191,6 +201,7 @@ class Simulation::Implementation {
     validate(setup.plate);
     check_range(setup.max_force, 0.5, 30.0, "robot's max_force", "N");
     check_range(setup.max_speed, 0.01, 1.0, "robot's max_speed", "m/s");
+    check_range(setup.plate_stiffness.value_or(1e3), 50.0, 5e3, "plate's stiffness", "N/m");
     data_.reset(mj_makeData(model_.get()));
     if (!data_) throw Error("robot's model", "there is no memory for it", "free some");
     find_parts();
@@ -221,6 +232,7 @@ class Simulation::Implementation {
     if (m.jnt_type[plate_joint_] != mjJNT_SLIDE) {
       throw Error("robot's model: joint 'plate'", "it does not slide", "make it a slide joint");
     }
+    if (setup_.plate_stiffness) soften_plate(*setup_.plate_stiffness);
     plate_dof_ = m.jnt_dofadr[plate_joint_];
     plate_mass_ = m.body_subtreemass[m.jnt_bodyid[plate_joint_]];
     const std::vector<double> home = numbers(m, "home", arm_joints);
@@ -241,6 +253,24 @@ class Simulation::Implementation {
     for (int i = 0; i < m.ngeom; ++i) {
       if (auto geom = visible(m, i)) geoms_.push_back(std::move(*geom));
     }
+  }
+
+  // What touches the plate sinks in by its force over `wanted` [N/m]. With an impedance d and the
+  // inverse mass 1/m of what meets, MuJoCo's contact with solref = (-k, -b) is a spring of
+  // k m / (1 - d) and a damper of b m / (1 - d).
+  void soften_plate(double wanted) {
+    mjModel& m = *model_;
+    const int plate = find(m, mjOBJ_GEOM, "plate");
+    const double inverse_mass =
+        m.body_invweight0[2 * static_cast<std::ptrdiff_t>(m.geom_bodyid[tip_geom_])] +
+        m.body_invweight0[2 * static_cast<std::ptrdiff_t>(m.geom_bodyid[plate])];
+    const double scale = inverse_mass * (1.0 - skin_impedance);
+    mjtNum* const solref = m.geom_solref + mjNREF * static_cast<std::ptrdiff_t>(plate);
+    solref[0] = -wanted * scale;
+    solref[1] = -skin_damping * scale;
+    mjtNum* const solimp = m.geom_solimp + mjNIMP * static_cast<std::ptrdiff_t>(plate);
+    solimp[0] = solimp[1] = skin_impedance;
+    m.geom_priority[plate] = m.geom_priority[tip_geom_] + 1;
   }
 
   void begin() {
@@ -535,7 +565,8 @@ class Simulation::Implementation {
 
 Simulation::Simulation(std::string_view mjcf, const SimulationSetup& setup)
     : implementation_(std::make_unique<Implementation>(mjcf, setup)) {}
-Simulation::Simulation(const SimulationSetup& setup) : Simulation(desk_model(), setup) {}
+Simulation::Simulation(const SimulationSetup& setup)
+    : Simulation(desk_model(checked_hole(setup)), setup) {}
 
 Simulation::~Simulation() {
   stop();

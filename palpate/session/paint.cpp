@@ -16,16 +16,18 @@ constexpr double least_seen = 0.3;
 // [-] of a radius within which dabs are one.
 constexpr double apart = 1.0 / 3.0;
 
+void add_missing(MaterialTable& table, const std::vector<NamedMaterial>& others) {
+  for (const NamedMaterial& other : others) {
+    const bool is_there = std::any_of(table.materials.begin(), table.materials.end(),
+                                      [&](const NamedMaterial& m) { return m.name == other.name; });
+    if (!is_there && table.materials.size() < MaterialTable::most) table.materials.push_back(other);
+  }
+}
+
 // A camera's materials and all standard ones whose names it does not have.
 MaterialTable with_standard(const MaterialTable* base) {
   MaterialTable table = base == nullptr ? MaterialTable{} : *base;
-  for (const NamedMaterial& standard : standard_materials().materials) {
-    const bool is_there =
-        std::any_of(table.materials.begin(), table.materials.end(),
-                    [&](const NamedMaterial& m) { return m.name == standard.name; });
-    if (!is_there && table.materials.size() < MaterialTable::most)
-      table.materials.push_back(standard);
-  }
+  add_missing(table, standard_materials().materials);
   return table;
 }
 
@@ -72,12 +74,29 @@ std::size_t for_each_pixel(const DepthImage& image, const Vec3& place, double ra
 
 }  // namespace
 
+void Paint::define(const NamedMaterial& material) {
+  validate(MaterialTable{{material}});
+  const std::lock_guard lock(mutex_);
+  const bool is_there = std::any_of(defined_.begin(), defined_.end(), [&](const NamedMaterial& m) {
+    return m.name == material.name;
+  });
+  if (is_there) return;
+  MaterialTable table = with_standard(base_.get());
+  add_missing(table, defined_);
+  if (table.materials.size() >= MaterialTable::most)
+    throw Error("brush", "there are " + std::to_string(MaterialTable::most) + " materials already",
+                "name fewer in the camera's file");
+  defined_.push_back(material);
+  table_.reset();  // made anew with the next frame
+}
+
 void Paint::add(const Dab& dab) {
   if (!is_place(dab.place) || !(dab.radius >= smallest && dab.radius <= largest))
     throw Error("brush", "its place or radius cannot be", "give a radius from 1 mm to 100 mm");
   const std::lock_guard lock(mutex_);
-  const MaterialTable fallback = table_ ? MaterialTable{} : with_standard(nullptr);
-  if (label_of(table_ ? *table_ : fallback, dab.material) == 0)
+  MaterialTable table = table_ ? *table_ : with_standard(base_.get());
+  add_missing(table, defined_);
+  if (label_of(table, dab.material) == 0)
     static_cast<void>(standard_material(dab.material));  // throws, naming the nearest
   const auto same = std::find_if(dabs_.begin(), dabs_.end(), [&](const Dab& other) {
     return (other.place - dab.place).norm() <= apart * dab.radius && other.radius <= dab.radius;
@@ -123,7 +142,9 @@ std::shared_ptr<const Cloud> Paint::on(const std::shared_ptr<const Cloud>& cloud
   const auto base = map == nullptr ? nullptr : map->table();
   if (!table_ || base != base_) {
     base_ = base;
-    table_ = std::make_shared<const MaterialTable>(with_standard(base.get()));
+    MaterialTable table = with_standard(base.get());
+    add_missing(table, defined_);
+    table_ = std::make_shared<const MaterialTable>(std::move(table));
   }
   if (dabs_.empty()) return cloud;
 

@@ -31,6 +31,10 @@ class Paint {
   static constexpr double largest = 0.1;    ///< [m] radius
   static constexpr double followed = 0.04;  ///< [m] that a surface moves from frame to frame
 
+  /// Makes a material that dabs can have beside the camera's and the standard ones, by its name.
+  /// One of that name that is there already stays.
+  /// @throws Error if it does not validate, or there are as many as a table can have.
+  void define(const NamedMaterial& material);
   /// A dab on another one, nearer than a third of its radius and as large, takes its place.
   /// @throws Error for a place or radius that cannot be, an unknown material, or one too many.
   void add(const Dab& dab);
@@ -50,6 +54,7 @@ class Paint {
   mutable std::mutex mutex_;
   std::vector<Dab> dabs_;                              // guarded by mutex_, as is the table
   std::shared_ptr<const MaterialTable> base_, table_;  // the camera's, and the same with all others
+  std::vector<NamedMaterial> defined_;
 };
 
 }  // namespace palpate

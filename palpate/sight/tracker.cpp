@@ -207,6 +207,11 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   covered_ = covered;
   if (!surface_.add(cloud, foot, {wide, event == Event::jumped, shadowed_})) {
     surface_.shift(-expected - jump);
+    // What is seen behind it is not hidden by anything: the surface ends here, as over a hole.
+    if (jump < 0.0) {
+      forget();
+      return Event::none;
+    }
     return hold(previous_stamp);
   }
   holding_ = false;

@@ -16,6 +16,8 @@
 #include "palpate/drivers/dds.hpp"
 #include "palpate/sources/fixture_file.hpp"
 #include "palpate/telelink/topics.hpp"
+#include "palpate/telelink/touched_message.hpp"
+#include "palpate/telelink/touched_paint.hpp"
 #include "palpate/teleop/lead.hpp"
 #include "palpate/teleop/link_limits.hpp"
 
@@ -38,6 +40,7 @@ class OperatorEnd::Impl {
       : session_(session),
         topics_(options.name),
         index_(options.index),
+        learns_(options.learn),
         ticks_(session.ticks()),
         given_(session.settings().safety),
         participant_("teleop"),
@@ -50,6 +53,7 @@ class OperatorEnd::Impl {
         joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
         faults_(participant_, topics_.fault, ros::Text{}, kept_for_late),
         regions_(participant_, topics_.regions, ros::Text{}, kept_for_late),
+        touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
         thread_([this] { run(); }) {}
   ~Impl() {
     ends_ = true;
@@ -151,6 +155,13 @@ class OperatorEnd::Impl {
     }
     while (const auto fault = take<ros::Text>(faults_)) view_.state->fault = fault->data;
     while (const auto regions = take<ros::Text>(regions_)) use_regions(regions->data);
+    while (const auto message = take<ros::Float64MultiArray>(touched_)) {
+      const Touched touched = touched_of(*message);
+      view_.touched = touched;
+      view_.ignored = learns_
+                          ? paint_touched(session_.paint(), session_.settings().parameters, touched)
+                          : "the operator does not learn";
+    }
   }
 
   // What the robot may not do, instead of what it said before; the operator's own fixtures stay.
@@ -204,6 +215,7 @@ class OperatorEnd::Impl {
   Session& session_;
   const TeleopTopics topics_;
   bool index_;  // still to be done
+  const bool learns_;
   TickRing<ServoTick>::Reader ticks_;
   ServoTick tick_;
   const SafetyParameters given_;
@@ -212,7 +224,7 @@ class OperatorEnd::Impl {
   RobotView view_;  // guarded by it
   dds::Participant participant_;
   dds::Writer places_, presses_;
-  dds::Reader tools_, twists_, contacts_, links_, joints_, faults_, regions_;
+  dds::Reader tools_, twists_, contacts_, links_, joints_, faults_, regions_, touched_;
   std::atomic<bool> ends_{false};
   std::thread thread_;
 };

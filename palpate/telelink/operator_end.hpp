@@ -7,6 +7,7 @@
 
 #include "palpate/session/session.hpp"
 #include "palpate/teleop/robot.hpp"
+#include "palpate/teleop/touched.hpp"
 
 namespace palpate {
 
@@ -15,6 +16,9 @@ struct OperatorEndOptions {
   std::string name = "robot";  ///< of the robot's topics
   /// The scene is brought to the hand when it begins, so that the hand is where the tool is.
   bool index = true;
+  /// What the robot's tool found out by touching becomes the material of the surface there; see
+  /// paint_touched.
+  bool learn = false;
 };
 
 /// The robot as its operator knows it.
@@ -24,6 +28,8 @@ struct RobotView {
   bool heard = false;               ///< lately
   bool led = false;                 ///< leads are sent now
   double latency = 0.0;             ///< [s] of what is felt, capture to arrival
+  std::optional<Touched> touched;   ///< what it last found out by touching, believed or not
+  std::string ignored;              ///< why that changed nothing; empty: it did
 };
 
 /// The operator's end of a link: sends where the proxy of a session is to the robot, and what the

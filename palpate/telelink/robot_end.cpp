@@ -21,7 +21,9 @@
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/fixture_file.hpp"
 #include "palpate/telelink/topics.hpp"
+#include "palpate/telelink/touched_message.hpp"
 #include "palpate/teleop/approach_watch.hpp"
+#include "palpate/teleop/touched.hpp"
 
 namespace palpate {
 namespace {
@@ -122,7 +124,9 @@ class RobotEnd::Impl {
         links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
         joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
         faults_(participant_, topics_.fault, ros::Text{}, kept_for_late),
-        region_texts_(participant_, topics_.regions, ros::Text{}, kept_for_late) {
+        region_texts_(participant_, topics_.regions, ros::Text{}, kept_for_late),
+        touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
+        learner_(robot_->info().tool_radius) {
     region_texts_.write(ros::Text{fixtures_json(*regions_)});
     faults_.write(ros::Text{""});
   }
@@ -234,6 +238,9 @@ class RobotEnd::Impl {
     const SetPoint::Order order =
         set_point_.next(tick, lead_.press, hand_->is_led(), comes, at.force);
     if (at.fault.empty()) robot_->command(order.position, order.velocity, now);
+    if (const auto found =
+            learner_.next(at.t, at.position, at.velocity, at.force, tick.tick.normal))
+      touched_.write(message_of(*found));
     say(at.fault);
   }
 
@@ -281,8 +288,9 @@ class RobotEnd::Impl {
   Ros2CameraPublisher publisher_;
   dds::Participant participant_;
   dds::Reader places_, presses_;
-  dds::Writer tools_, twists_, contacts_, links_, joints_, faults_, region_texts_;
+  dds::Writer tools_, twists_, contacts_, links_, joints_, faults_, region_texts_, touched_;
   // Of the leading thread
+  TouchLearner learner_;
   Lead lead_;
   std::int64_t heard_ = 0;  // [ns] stamp of the newest place
   std::string said_;

@@ -24,14 +24,16 @@ struct TeleopTopics {
         links("/" + name + "/teleop/links"),
         fault("/" + name + "/teleop/fault"),
         regions("/" + name + "/teleop/regions"),
+        touched("/" + name + "/teleop/touched"),
         joints("/" + name + "/joint_states") {}
 
-  std::string place, press;                                         // from the operator
-  std::string tool, twist, contact, links, fault, regions, joints;  // from the robot
+  std::string place, press;                                                  // from the operator
+  std::string tool, twist, contact, links, fault, regions, touched, joints;  // from the robot
 };
 
-/// Of what is told again and again, and of what is told once.
+/// Of what is told again and again, of what is told when it happens, and of what holds on.
 inline constexpr dds::Quality newest_alone{};
+inline constexpr dds::Quality each_one{.reliable = true};
 inline constexpr dds::Quality kept_for_late{.reliable = true, .keeps_for_late = true};
 
 /// A time of the servo loop's clock [s] on the wall's, since 1970.

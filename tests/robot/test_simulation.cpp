@@ -202,6 +202,24 @@ TEST(Simulation, FitsItsToolIntoTheHole) {
   EXPECT_LT(simulation.truth().tip_force.x(), -3.0);
 }
 
+TEST(Simulation, HasAHoleOfTheAskedSize) {
+  for (const double hole : {0.015, 0.04}) {
+    SimulationSetup setup;
+    setup.hole = hole;
+    const Simulation simulation(setup);
+    for (const double beside : {0.007, 0.019}) {
+      for (const Vec3& way : {Vec3(1.0, 0.0, 0.0), Vec3(0.0, -1.0, 0.0)}) {
+        const Vec3 eye = Vec3(-0.13, -0.16, 0.05) + beside * way;
+        EXPECT_NEAR(*simulation.ray(eye, -Vec3::UnitZ(), false), beside < 0.5 * hole ? 0.05 : 0.02,
+                    1e-9);
+      }
+    }
+  }
+  SimulationSetup setup;
+  setup.hole = 0.01;
+  EXPECT_THROW(Simulation{setup}, Error);
+}
+
 TEST(Simulation, GivesEqualStatesBitForBit) {
   const auto end = [] {
     Simulation simulation;

@@ -98,8 +98,13 @@ class Telelink : public ::testing::Test {
     options.device = std::make_unique<ScriptedDevice>(HipPath({{0.0, hand}}), false);
     operator_ = std::make_unique<Session>(std::move(options));
     operator_end_ = std::make_unique<OperatorEnd>(
-        *operator_, OperatorEndOptions{.name = "arm", .index = false});
+        *operator_, OperatorEndOptions{.name = "arm", .index = false, .learn = true});
     operator_->start();
+  }
+  // [N] upwards, that the tool touches with
+  void push_back(double force) {
+    const std::lock_guard lock(*mutex_);
+    state_->force = Vec3(0.0, 0.0, force);
   }
   Vec3 tool() {
     const std::lock_guard lock(*mutex_);
@@ -126,6 +131,15 @@ TEST_F(Telelink, LeadsTheRobotToTheHandAndNotThroughWhatIsSeen) {
     const RobotView view = operator_end_->robot();
     return view.heard && view.led && view.state && (view.state->position - tool()).norm() < 2e-3;
   }));
+  // What it touches there does not give way.
+  push_back(2.0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  push_back(0.0);
+  EXPECT_TRUE(happens([&] { return operator_end_->robot().touched.has_value(); }));
+  const RobotView view = operator_end_->robot();
+  EXPECT_NEAR(view.touched->place.x(), 0.05, 5e-3);
+  EXPECT_EQ(view.touched->stiffness, Touched::hardest);
+  EXPECT_EQ(view.ignored, "it is as hard as what is rendered");
 }
 
 TEST_F(Telelink, StopsTheRobotWithItsOperator) {

@@ -113,6 +113,7 @@ class Palpate final : public Coupling {
     led_.clearance(guarded.tick.state == ContactState::free_motion
                        ? watch_.clearance() - SimulatedTool::radius - ahead
                        : 0.0);
+    led_.kept_out(guarded.place - guarded.tick.proxy);
     out.led = led_.is_led();
     if (newest_.cloud)
       watch_.frame(std::exchange(newest_.cloud, nullptr), newest_.stamp, tool.place());

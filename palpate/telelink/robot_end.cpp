@@ -235,6 +235,7 @@ class RobotEnd::Impl {
     hand_->clearance(tick.tick.state == ContactState::free_motion
                          ? clearance - robot_->info().tool_radius - ahead
                          : 0.0);
+    hand_->kept_out(tick.place - tick.tick.proxy);
     const SetPoint::Order order =
         set_point_.next(tick, lead_.press, hand_->is_led(), comes, at.force);
     if (at.fault.empty()) robot_->command(order.position, order.velocity, now);

@@ -94,7 +94,7 @@ double ApproachWatch::distance_along(const Cloud& cloud, const Vec3& tool, const
 
 const Approach& ApproachWatch::frame(std::shared_ptr<const Cloud> cloud, double stamp,
                                      const Vec3& tool) {
-  approach_ = Approach{.place = tool, .stamp = stamp};
+  approach_ = Approach{.place = tool, .stamp = stamp, .noise = approach_.noise};
   const bool came = std::exchange(comes_, false);
   if (!seen_.empty() && !(stamp > seen_.back().stamp)) seen_.clear();
   if (seen_.size() == frames) seen_.erase(seen_.begin());
@@ -125,6 +125,7 @@ const Approach& ApproachWatch::frame(std::shared_ptr<const Cloud> cloud, double 
     if (window == windows.front())
       variance_ =
           variance_ < 0.0 ? line.variance : variance_ + (line.variance - variance_) / noise_memory;
+    approach_.noise = std::sqrt(variance_);
     const double error = std::sqrt(std::max(variance_, line.variance / surprise) / line.spread);
     const double sure = error > 0.0 ? -line.slope / error : -line.slope / 1e-9;
     if (sure > most) {

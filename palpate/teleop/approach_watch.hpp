@@ -18,6 +18,7 @@ struct Approach {
   Vec3 place = Vec3::Zero();  ///< [m] world: where the tool was
   Vec3 away = Vec3::UnitZ();  ///< [-] unit, world: from what comes to the tool
   double stamp = 0.0;         ///< [s] of the frame
+  double noise = 0.0;         ///< [m] standard deviation of such a gap from frame to frame
 };
 
 /// Sees what comes towards a tool before it is touched, from one camera's frames alone.

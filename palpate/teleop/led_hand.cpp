@@ -45,14 +45,22 @@ void LedHand::tool_is_at(const Vec3& place) {
   if (is_place(place)) tools_.put(place);
 }
 
+void LedHand::kept_out(const Vec3& way) {
+  if (is_place(way)) ways_.put(way);
+}
+
 HandState LedHand::read(double t) noexcept {
   constexpr double longest_step = 0.005;  // [s] after a stall
+  constexpr double keep_time = 0.01;      // [s] in which it goes where regions keep it
   const double since = began_ ? t - last_t_ : 0.0;
   const double dt = since > 0.0 ? std::min(since, longest_step) : 0.0;
   began_ = true;
   last_t_ = t;
   leads_.take();
   if (const Vec3* tool = tools_.take()) tool_ = *tool;
+  const Vec3* const way_out = ways_.take();
+  const double kept_for = std::min(t - kept_at_, longest_step);
+  if (way_out != nullptr) kept_at_ = t;
   const Heard& heard = leads_.taken_last();
 
   const bool led = sees_.load(std::memory_order_relaxed) && heard.lead.leads &&
@@ -74,6 +82,8 @@ HandState LedHand::read(double t) noexcept {
   const double speed = std::min(limits_.contact_speed + gap / limits_.near_time, limits_.max_speed);
   const double step = share * speed * dt;
   place_ = distance <= step ? wanted : Vec3(place_ + step / distance * way);
+  if (way_out != nullptr && kept_for > 0.0)
+    place_ += (1.0 - std::exp(-kept_for / keep_time)) * *way_out;
   return {.position = place_};
 }
 

@@ -19,7 +19,7 @@ struct LeadLimits {
   /// [m/s] the same while something is touched, and so much more for each metre that nothing is
   /// near. A robot that is late cuts corners: with a lag of 80 ms, at 0.05 m/s about a ball of 20
   /// mm by 0.2 mm; 20 mm away, at 0.15 m/s, by 2 mm.
-  double contact_speed = 0.05;
+  double contact_speed = 0.03;
   double near_time = 0.2;  ///< [s] the clearance over this is the speed that it allows beyond that
   /// [m] world: leads beyond it are followed to its boundary; empty: no limit
   std::optional<Eigen::AlignedBox3d> reach = {};
@@ -53,6 +53,10 @@ class LedHand final : public Device {
   void clearance(double gap) noexcept { gap_.store(gap, std::memory_order_relaxed); }
   /// Where the robot's tool is [m, world], as it says. One thread.
   void tool_is_at(const Vec3& place);
+  /// By how much forbidden regions keep the proxy from where the surface alone would have it
+  /// [m, world]; zero: they do not. The hand goes that way, so that the surface is looked for where
+  /// the tool may be: beyond a region's border it is another one. One thread, once a tick.
+  void kept_out(const Vec3& way);
 
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
   HandState read(double t) noexcept override;
@@ -70,13 +74,14 @@ class LedHand final : public Device {
   DeviceInfo info_;
   LeadLimits limits_;
   Mailbox<Heard> leads_;
-  Mailbox<Vec3> tools_;
+  Mailbox<Vec3> tools_, ways_;
   std::atomic<bool> sees_{true}, led_{false};
   std::atomic<double> gap_{1.0};  // [m]
   // The servo's thread
   Vec3 tool_;
   Vec3 place_;
   double last_t_ = 0.0;   // [s]
+  double kept_at_ = 0.0;  // [s] when it was last told what keeps it out
   double led_for_ = 0.0;  // [s] since it was taken up
   bool began_ = false;
 };

@@ -11,10 +11,14 @@
 namespace palpate {
 namespace {
 
-constexpr double approach_time = 0.005;   // [s] in which a speed of the surface counts
-constexpr double press_time = 0.1;        // [s] in which a wanted force is reached
-constexpr double touching_force = 0.1;    // [N] who is to press with more is to touch
-constexpr double retreat_speed = 0.02;    // [m/s] for each N above what is allowed
+constexpr double approach_time = 0.005;  // [s] in which a speed of the surface counts
+constexpr double press_time = 0.1;       // [s] in which a wanted force is reached
+constexpr double touching_force = 0.1;   // [N] who is to press with more is to touch
+constexpr double clear_deviations = 2.0;  // [-] of the camera's noise that it stays farther away
+constexpr double farthest_clear = 8e-3;   // [m] for noise and motion
+constexpr double lately_time = 2.0;       // [s] after which a motion is nearly forgotten
+constexpr double unwanted_force = 1.0;    // [N] above a wanted one: more than sensors' errors
+constexpr double retreat_speed = 0.02;    // [m/s] for each N above that
 constexpr double farthest_retreat = 0.1;  // [m]
 constexpr double return_time = 1.0;       // [s] in which a retreat is taken back
 constexpr double longest_forecast = 0.3;  // [s]
@@ -22,6 +26,7 @@ constexpr double longest_forecast = 0.3;  // [s]
 // as it does; half as much again as its speed is known late, and only about.
 constexpr double ahead = 1.5;
 constexpr double fastest_surface = 0.5;  // [m/s] that is led before
+constexpr double acceleration = 1.0;     // [m/s^2] of what is led, after a contact
 
 // The share of the way to its goal that a first-order lag goes in dt.
 double share_of(double dt, double time) {
@@ -31,6 +36,10 @@ double share_of(double dt, double time) {
 Vec3 no_longer_than(const Vec3& v, double longest) {
   const double size = v.norm();
   return size > longest ? Vec3(longest / size * v) : v;
+}
+
+Vec3 without_part_against(const Vec3& unit, const Vec3& v) {
+  return v - std::min(v.dot(unit), 0.0) * unit;
 }
 
 }  // namespace
@@ -50,6 +59,7 @@ void validate(const SetPointOptions& options) {
   check("max_force", options.max_force, 0.1, 1000.0, "N");
   check("press_share", options.press_share, 0.0, 1.0, "");
   check("max_speed", options.max_speed, 1e-3, 5.0, "m/s");
+  check("contact_speed", options.contact_speed, 1e-3, 5.0, "m/s");
 }
 
 std::shared_ptr<const FixtureSet> robot_fixtures(const FixtureSet& fixtures) {
@@ -76,8 +86,20 @@ Vec3 SetPoint::way_out(const Vec3& place, const Approach& comes, double t) const
   const double speed = std::min(comes.speed, fastest_surface);
   const double gap = comes.gap + (place - comes.place).dot(comes.away);
   const double needed =
-      options_.tool_radius + options_.margin + speed * (age + ahead * options_.lag);
+      options_.tool_radius + options_.margin + clear_ + speed * (age + ahead * options_.lag);
   return std::clamp(needed - gap, 0.0, farthest_retreat) * comes.away;
+}
+
+// The proxy goes away from what is touched as fast as that comes, and any other way only slowly, in
+// contact and for a while after: one that a noisy picture lets fall must not take the tool along.
+// Nor does it go fast against what pushes the tool: what is touched from behind is none of its.
+Vec3 SetPoint::followed(const Vec3& held, bool touches, const Vec3& force, double dt) noexcept {
+  const double fastest = options_.max_speed + fastest_surface;
+  speed_ = touches ? options_.contact_speed : std::min(speed_ + acceleration * dt, fastest);
+  const Vec3 way = held - held_;
+  const double along = normal_.dot(force) < -touching_force ? 0.0 : std::max(way.dot(normal_), 0.0);
+  const Vec3 outward = along * normal_;
+  return held_ + outward + no_longer_than(way - outward, speed_ * dt);
 }
 
 SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool led,
@@ -92,27 +114,50 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
   const double speed = touches ? std::clamp(tick.surface_velocity, 0.0, fastest_surface) : 0.0;
   approach_ += share_of(dt, approach_time) * (speed - approach_);
 
-  double wanted = 0.0;
-  if (touches && led && options_.stiffness) {
-    const double newtons =
-        std::clamp(-options_.press_share * press.dot(normal_), 0.0, options_.max_force);
-    // Through the margin first, and then against the surface.
-    wanted =
-        options_.margin * std::min(newtons / touching_force, 1.0) + newtons / *options_.stiffness;
-  }
-  depth_ += share_of(dt, press_time) * (wanted - depth_);
+  // What has moved lately may turn and come before the tool is out of its way.
+  const double moves = touches ? std::abs(tick.surface_velocity) : 0.0;
+  lately_ = std::max(std::min(std::max(moves, comes.speed), fastest_surface),
+                     lately_ * (1.0 - share_of(dt, lately_time)));
+  clear_ = std::min(clear_deviations * comes.noise + options_.lag * lately_, farthest_clear);
 
-  const double size = force.allFinite() ? force.norm() : 0.0;
-  const double above = size - options_.max_force;
+  double wanted = 0.0;
+  double newtons = 0.0;
+  double clear = touches ? clear_ : 0.0;
+  if (touches && led && options_.stiffness) {
+    newtons = std::clamp(-options_.press_share * press.dot(normal_), 0.0, options_.max_force);
+    // Through the margin first, and then against the surface.
+    const double through = std::min(newtons / touching_force, 1.0);
+    wanted = options_.margin * through + newtons / *options_.stiffness;
+    clear *= 1.0 - through;
+  }
+  depth_ += share_of(dt, press_time) * (wanted - clear - depth_);
+
+  const Vec3 pushed = force.allFinite() ? force : Vec3::Zero();
+  const double size = pushed.norm();
+  const double above = size - std::min(newtons + unwanted_force, options_.max_force);
   if (above > 0.0)
     retreat_ =
-        no_longer_than(retreat_ + (retreat_speed * above * dt / size) * force, farthest_retreat);
+        no_longer_than(retreat_ + (retreat_speed * above * dt / size) * pushed, farthest_retreat);
   else
     retreat_ -= share_of(dt, return_time) * retreat_;
 
+  // A stop takes the set-point back to the tool at once; so does the beginning.
+  const bool stops = std::exchange(led_, led) && !led;
+  const bool at_once = !began_ || stops;
   const Vec3 held = record.place + (ahead * options_.lag * approach_ - depth_) * normal_;
+  held_ = at_once ? held : followed(held, touches, pushed, dt);
   // The first place of all lies outside of all regions; what would be out of the way may not.
-  Vec3 goal = began_ ? Vec3(held + way_out(held, comes, tick.t) + retreat_) : held;
+  Vec3 goal = held_;
+  if (began_) {
+    // Never into what is touched, by the picture or by the robot's own force.
+    Vec3 out = way_out(held_, comes, tick.t);
+    if (touches) out = without_part_against(normal_, out);
+    if (size > touching_force) out = without_part_against(pushed / size, out);
+    // Out of the way at once, back slowly.
+    const bool farther = out.squaredNorm() > out_.squaredNorm();
+    out_ = farther ? out : Vec3(out_ + no_longer_than(out - out_, options_.contact_speed * dt));
+    goal += out_ + retreat_;
+  }
   goal += fixtures_
               .run({.t = tick.t,
                     .hip = goal,
@@ -122,14 +167,9 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
                     .cloud = nullptr,
                     .new_frame = false})
               .displacement;
-  // A stop takes the set-point back to the tool at once; so does the beginning.
-  const bool stops = std::exchange(led_, led) && !led;
-  const bool at_once = !began_ || stops;
-  const Vec3 way = goal - sent_;
   const double step = (options_.max_speed + fastest_surface) * dt;
-  const double distance = way.norm();
   Order order;
-  order.position = at_once || distance <= step ? goal : Vec3(sent_ + step / distance * way);
+  order.position = at_once ? goal : Vec3(sent_ + no_longer_than(goal - sent_, step));
   if (!at_once && dt > 0.0) order.velocity = (order.position - sent_) / dt;
   sent_ = order.position;
   began_ = true;

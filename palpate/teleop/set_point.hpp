@@ -20,9 +20,10 @@ struct SetPointOptions {
   double lag = 0.08;  ///< [s] as RobotInfo::lag: a surface that comes is led before by so much
   /// [N/m] as RobotInfo::stiffness; empty: it does not press
   std::optional<double> stiffness = {};
-  double max_force = 5.0;    ///< [N] with which the tool may press, wanted or not
-  double press_share = 0.0;  ///< [-] of the operator's force with which the tool presses, 0 to 1
-  double max_speed = 0.5;    ///< [m/s] of the set-point itself
+  double max_force = 5.0;       ///< [N] with which the tool may press, wanted or not
+  double press_share = 0.0;     ///< [-] of the operator's force with which the tool presses, 0 to 1
+  double max_speed = 0.5;       ///< [m/s] of the set-point itself
+  double contact_speed = 0.05;  ///< [m/s] the same along and into what is touched
   /// Into these the robot is not sent, whatever comes; see robot_fixtures(). Null: none
   std::shared_ptr<const FixtureSet> fixtures = {};
 };
@@ -62,6 +63,7 @@ class SetPoint {
              const Vec3& force) noexcept;
 
  private:
+  Vec3 followed(const Vec3& held, bool touches, const Vec3& force, double dt) noexcept;
   [[nodiscard]] Vec3 way_out(const Vec3& place, const Approach& comes, double t) const noexcept;
 
   SetPointOptions options_;
@@ -70,8 +72,13 @@ class SetPoint {
   bool led_ = false;
   double last_t_ = 0.0;          // [s]
   Vec3 normal_ = Vec3::UnitZ();  // of the last contact
+  Vec3 held_ = Vec3::Zero();     // [m] world: the proxy as it is followed
+  double speed_ = 0.0;           // [m/s] at which it is followed at most
+  double lately_ = 0.0;          // [m/s] of what is touched or comes, in the last seconds
+  double clear_ = 0.0;           // [m] that it stays farther away for noise and motion
   double approach_ = 0.0;        // [m/s] of the surface, towards the tool
   double depth_ = 0.0;           // [m] by which it presses
+  Vec3 out_ = Vec3::Zero();      // [m] out of the way of what comes
   Vec3 retreat_ = Vec3::Zero();  // [m] from what pushes too hard
   Vec3 sent_ = Vec3::Zero();     // [m] world
 };

@@ -142,6 +142,7 @@ class Task {
     if (const auto found =
             learner_.next(t_, state.position, state.velocity, state.force, guarded.tick.normal))
       found_.send(*found, t_);
+    led_.kept_out(guarded.place - guarded.tick.proxy);
     const SetPoint::Order order =
         set_point_.next(guarded, lead_.press, led_.is_led(), watch_.newest(), state.force);
     simulation().command(order.position, order.velocity);

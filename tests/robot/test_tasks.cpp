@@ -30,7 +30,7 @@ TEST_P(Tasks, PressesABoxThatMoves) {
   task.run(10.0, [&](const ServoTick&) {
     hardest = std::max(hardest, task.simulation().truth().tip_force.norm());
   });
-  EXPECT_GT(task.simulation().pose("box").translation().y() - before, 0.02);
+  EXPECT_GT(task.simulation().pose("box").translation().y() - before, 0.015);
   EXPECT_LT(hardest, 8.0);
 }
 

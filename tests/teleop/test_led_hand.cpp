@@ -143,6 +143,32 @@ TEST_F(LedHandTest, IsNotLedWhileNothingIsSeenOrByWhatIsNoPlace) {
   EXPECT_TRUE(hand.read(t_).position.allFinite());
 }
 
+TEST_F(LedHandTest, GoesWhereRegionsKeepTheProxy) {
+  LedHand hand(Vec3::Zero(), {.resume_time = 0.0});
+  const Vec3 in(0.0, 0.0, -0.02);
+  const auto pushed = [&](double seconds) {
+    for (int i = 0; i < seconds / tick; ++i) {
+      hand.kept_out(Vec3(0.0, 0.0, std::max(-0.001 - at_.z(), 0.0)));  // z = -1 mm is a border
+      go(hand, 0.5 * tick, in);
+    }
+  };
+  hand.clearance(0.0);
+  pushed(2.0);
+  EXPECT_GT(at_.z(), -0.0015);
+  // Nobody says so any more: it goes on.
+  go(hand, 2.0, in);
+  EXPECT_EQ(at_, in);
+  hand.kept_out(Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+  go(hand, 0.01, in);
+  EXPECT_EQ(at_, in);
+  // A single word counts once.
+  hand.kept_out(Vec3(0.0, 0.0, 1.0));
+  go(hand, 0.002, std::nullopt);
+  EXPECT_LT((at_ - in).norm(), 0.45);
+  go(hand, 20.0, in);
+  EXPECT_EQ(at_, in);
+}
+
 TEST_F(LedHandTest, StaysWithinItsReach) {
   LeadLimits limits;
   limits.reach.emplace(Vec3(-0.1, -0.1, 0.0), Vec3(0.1, 0.1, 0.2));

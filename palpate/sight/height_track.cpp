@@ -22,6 +22,11 @@ constexpr std::size_t motion_frames = 24;
 // begins between two frames looks like a strong acceleration, which would carry the surface three
 // times too far.
 constexpr double plain_bonus = 8.0;
+// Logarithm of the odds that the newest frame alone has to bring beside what is asked of several:
+// by itself it may be a bad frame, of which a person who presses on a thing at rest meets one in a
+// few minutes. A motion that begins is proved by the frame after it, or at once by one that is five
+// standard deviations away instead of four.
+constexpr double single_proof = 4.5;
 // Standard deviations of a surface's velocity [m/s] and acceleration [m/s^2] before it is known.
 constexpr double first_velocity = 3.0;
 constexpr double first_acceleration = 10.0;
@@ -93,14 +98,20 @@ struct Bank {
   }
 };
 
-// The same logarithm of the likelihood for a surface that rests: each height is foretold by the
-// mean of those before.
-double likelihood_of_rest(std::span<const HeightSample> samples, std::size_t frames,
-                          double variance, double memory) noexcept {
+// Logarithm of the likelihood of a surface that rests, with and without the newest height.
+struct Rest {
+  double with, without;
+};
+
+// Each height is foretold by the mean of those before.
+Rest likelihood_of_rest(std::span<const HeightSample> samples, std::size_t frames, double variance,
+                        double memory) noexcept {
   double sum = 0.0;
   double n = 0.0;
   double likelihood = 0.0;
+  double before = 0.0;
   for (std::size_t i = samples.size(); i-- > 0;) {
+    before = likelihood;
     const double height = samples[i].height - samples.front().height;
     const double weight = 1.0 / samples[i].doubt;
     if (n > 0.0 && i + 1 < frames) {
@@ -112,7 +123,7 @@ double likelihood_of_rest(std::span<const HeightSample> samples, std::size_t fra
     sum += weight * height;
     n += weight;
   }
-  return likelihood;
+  return {likelihood, before};
 }
 
 }  // namespace
@@ -159,12 +170,20 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
   const double base = samples.front().height;
   const double variance = std::max(sd * sd, 1e-14);
   Bank bank(samples[frames - 1].height - base, samples[frames - 1].doubt * variance, memory);
+  Bank::Lanes before{};  // the newest height
   for (std::size_t i = frames - 1; i-- > 0;) {
+    before = bank.likelihood;
     const double dt = std::max(samples[i].stamp - samples[i + 1].stamp, 0.0);
     bank.step(dt, samples[i].height - base, samples[i].doubt * variance);
   }
-  const double rest = parameters.rest_odds + likelihood_of_rest(samples, frames, variance, memory);
-  for (std::size_t i = 0; i < jerks.size(); ++i) bank.likelihood[i] -= plain_bonus;
+  const Rest resting_odds = likelihood_of_rest(samples, frames, variance, memory);
+  for (std::size_t i = 0; i < jerks.size(); ++i) {
+    bank.likelihood[i] -= plain_bonus;
+    before[i] -= plain_bonus;
+  }
+  double rest = parameters.rest_odds + resting_odds.with;
+  if (parameters.rest_odds + resting_odds.without > *std::max_element(before.begin(), before.end()))
+    rest += single_proof;
   double most = rest;
   for (const double l : bank.likelihood) most = std::max(most, l);
   const double rest_share = std::exp(rest - most);

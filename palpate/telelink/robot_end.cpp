@@ -226,10 +226,13 @@ class RobotEnd::Impl {
     {
       const std::lock_guard lock(mutex_);
       at = state_;
+      double noise = 0.0;
       for (const ApproachWatch& watch : watches_) {
         if (watch.newest().speed > comes.speed) comes = watch.newest();
+        noise = std::max(noise, watch.newest().noise);
         clearance = std::min(clearance, watch.clearance());
       }
+      comes.noise = noise;
     }
     const double ahead = (tick.place - at.position).norm();
     hand_->clearance(tick.tick.state == ContactState::free_motion

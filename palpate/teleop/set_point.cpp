@@ -11,13 +11,12 @@
 namespace palpate {
 namespace {
 
-constexpr double approach_time = 0.005;  // [s] in which a speed of the surface counts
-constexpr double press_time = 0.1;       // [s] in which a wanted force is reached
-constexpr double touching_force = 0.1;   // [N] who is to press with more is to touch
+constexpr double approach_time = 0.005;   // [s] in which a speed of the surface counts
+constexpr double press_time = 0.1;        // [s] in which a wanted force is reached
+constexpr double touching_force = 0.1;    // [N] who is to press with more is to touch
 constexpr double clear_deviations = 2.0;  // [-] of the camera's noise that it stays farther away
 constexpr double farthest_clear = 8e-3;   // [m] for noise and motion
 constexpr double lately_time = 2.0;       // [s] after which a motion is nearly forgotten
-constexpr double unwanted_force = 1.0;    // [N] above a wanted one: more than sensors' errors
 constexpr double retreat_speed = 0.02;    // [m/s] for each N above that
 constexpr double farthest_retreat = 0.1;  // [m]
 constexpr double return_time = 1.0;       // [s] in which a retreat is taken back
@@ -57,6 +56,7 @@ void validate(const SetPointOptions& options) {
   check("lag", options.lag, 0.0, 1.0, "s");
   if (options.stiffness) check("stiffness", *options.stiffness, 1.0, 1e6, "N/m");
   check("max_force", options.max_force, 0.1, 1000.0, "N");
+  check("unwanted_force", options.unwanted_force, 0.1, 1000.0, "N");
   check("press_share", options.press_share, 0.0, 1.0, "");
   check("max_speed", options.max_speed, 1e-3, 5.0, "m/s");
   check("contact_speed", options.contact_speed, 1e-3, 5.0, "m/s");
@@ -134,7 +134,7 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
 
   const Vec3 pushed = force.allFinite() ? force : Vec3::Zero();
   const double size = pushed.norm();
-  const double above = size - std::min(newtons + unwanted_force, options_.max_force);
+  const double above = size - std::min(newtons + options_.unwanted_force, options_.max_force);
   if (above > 0.0)
     retreat_ =
         no_longer_than(retreat_ + (retreat_speed * above * dt / size) * pushed, farthest_retreat);
@@ -153,9 +153,17 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
     Vec3 out = way_out(held_, comes, tick.t);
     if (touches) out = without_part_against(normal_, out);
     if (size > touching_force) out = without_part_against(pushed / size, out);
-    // Out of the way at once, back slowly.
-    const bool farther = out.squaredNorm() > out_.squaredNorm();
-    out_ = farther ? out : Vec3(out_ + no_longer_than(out - out_, options_.contact_speed * dt));
+    const double far = out_.norm();
+    if (far > 0.0) {
+      // Farther at once; back, and to another side, slowly: where it comes from is a noisy guess.
+      const Vec3 unit = out_ / far;
+      const double along = out.dot(unit);
+      const Vec3 aside = out - along * unit;
+      const double slowly = options_.contact_speed * dt;
+      out = std::max(along, far - slowly) * unit + no_longer_than(aside, slowly);
+      if (out.dot(unit) < 0.0) out.setZero();
+    }
+    out_ = out;
     goal += out_ + retreat_;
   }
   goal += fixtures_

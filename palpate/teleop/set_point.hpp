@@ -21,6 +21,7 @@ struct SetPointOptions {
   /// [N/m] as RobotInfo::stiffness; empty: it does not press
   std::optional<double> stiffness = {};
   double max_force = 5.0;       ///< [N] with which the tool may press, wanted or not
+  double unwanted_force = 1.0;  ///< [N] beyond a wanted one that it bears: the sensor's error
   double press_share = 0.0;     ///< [-] of the operator's force with which the tool presses, 0 to 1
   double max_speed = 0.5;       ///< [m/s] of the set-point itself
   double contact_speed = 0.05;  ///< [m/s] the same along and into what is touched
@@ -37,13 +38,18 @@ void validate(const SetPointOptions& options);
 
 /// Where the robot's tool is sent: the proxy at the robot's end, which its own camera keeps out of
 /// what is seen, and
+/// - farther from what is touched by twice the noise of the picture, and by the robot's lag times
+///   what moved in the last seconds, which may turn: 8 mm at most;
 /// - from what comes, touched or not, by its speed times the robot's lag, so that the tool is out
 /// of
 ///   the way when it arrives (ApproachWatch, and the method's own velocity);
 /// - where the operator presses and the robot is to press too, into the surface by the force over
 ///   the robot's stiffness;
-/// - where it is pushed with more than `max_force`, seen or not, away from what pushes.
-/// Forbidden regions come before all that.
+/// - where it is pushed with `unwanted_force` more than that, or with more than `max_force`, seen
+/// or
+///   not, away from what pushes.
+/// Forbidden regions come before all that. What comes moves it at once; a proxy that falls, as a
+/// noisy picture may let it, takes it along at `contact_speed` only.
 /// Values in, values out: no clock, no thread. [servo]
 class SetPoint {
  public:

@@ -190,6 +190,27 @@ TEST(HeightTrack, HasNoVelocityAtRestUnderNoiseAndTheRightOneInSteadyMotion) {
   EXPECT_NEAR(track_height(rising, 1e-5, interval).velocity, 0.03, 1e-7);
 }
 
+TEST(HeightTrack, TakesNoMotionFromASingleFrameThatMayBeABadOne) {
+  // In some minutes of pressing a frame is this far off. [m], of noise of 1 mm
+  const auto after_rest = [](std::vector<double> newest) {
+    std::mt19937 random(7);
+    std::normal_distribution<double> noise(0.0, 1e-3);
+    std::vector<double> heights;
+    for (int i = 0; i < 32; ++i) heights.push_back(noise(random));
+    heights.insert(heights.end(), newest.begin(), newest.end());
+    return track_height(heights_of(heights), 1e-3, interval);
+  };
+  const HeightTrack bad = after_rest({4.5e-3});
+  EXPECT_EQ(bad.velocity, 0.0);
+  EXPECT_LT(bad.height, 2.5e-3) << "three standard deviations from the newest are 1.5 mm";
+  EXPECT_LT(after_rest({4.5e-3, 0.0}).height, 1e-3);
+  // The frame after it proves a motion, and so does one that is far off.
+  EXPECT_GT(after_rest({4.5e-3, 9e-3}).velocity, 0.08);
+  EXPECT_NEAR(after_rest({4.5e-3, 9e-3}).height, 9e-3, 1e-3);
+  EXPECT_GT(after_rest({8e-3}).velocity, 0.05);
+  EXPECT_NEAR(after_rest({8e-3}).height, 8e-3, 1e-3);
+}
+
 TEST(SurfaceEstimate, TakesANarrowDiscForAtLeastAsNoisyAsAWiderOneIs) {
   // A plane that lies higher or lower by some 6 mm in each frame, and a foot that slides along:
   // only wide discs see the same place often enough to measure that.

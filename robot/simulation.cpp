@@ -9,6 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include <Eigen/Eigenvalues>
 #include <mujoco/mujoco.h>
 
 #include "palpate/core/error.hpp"
@@ -344,6 +345,7 @@ class Simulation::Implementation {
     const Matrix6 mass = full_mass_.topLeftCorner<6, 6>();
     const Matrix6 mobility =
         jacobian * mass.ldlt().solve(Matrix6(jacobian.transpose()));  // [1/kg, 1/(kg m^2)]
+    tip_mobility_ = mobility.topLeftCorner<3, 3>();
     const Matrix6 apparent_mass =
         (mobility + singular_damping * Matrix6::Identity()).ldlt().solve(Matrix6::Identity());
     const Vector6 velocity = jacobian * Eigen::Map<const Vector6>(d.qvel);
@@ -549,6 +551,7 @@ class Simulation::Implementation {
   Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor> jacobian_position_, jacobian_rotation_;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> full_mass_;
   Eigen::Matrix3d upright_ = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d tip_mobility_ = Eigen::Matrix3d::Identity();  // [1/kg]
   Vec3 goal_ = Vec3::Zero(), goal_velocity_ = Vec3::Zero();
   Vec3 reference_ = Vec3::Zero(), reference_velocity_ = Vec3::Zero();
   bool commanded_ = false, led_ = false;
@@ -631,6 +634,9 @@ Truth Simulation::truth() const {
   truth.penetration = own.penetration_;
   truth.plate_height = own.plate_height_;
   truth.plate_velocity = own.plate_velocity_;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> mobilities(own.tip_mobility_,
+                                                                  Eigen::EigenvaluesOnly);
+  truth.apparent_mass = 1.0 / std::max(mobilities.eigenvalues()[0], 1e-9);
   return truth;
 }
 

@@ -59,6 +59,8 @@ struct Truth {
   double penetration = 0.0;          ///< [m] deepest overlap of the tip's ball with anything, >= 0
   double plate_height = 0.0;         ///< [m] of its top
   double plate_velocity = 0.0;       ///< [m/s] upwards
+  /// [kg] with which the tip moves where it is heaviest; without bound where the arm is singular
+  double apparent_mass = 0.0;
 };
 
 /// A robot cell in MuJoCo: an arm that follows positions, and things that it can touch and push.

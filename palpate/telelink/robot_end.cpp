@@ -23,6 +23,7 @@
 #include "palpate/telelink/topics.hpp"
 #include "palpate/telelink/touched_message.hpp"
 #include "palpate/teleop/approach_watch.hpp"
+#include "palpate/teleop/force_zero.hpp"
 #include "palpate/teleop/touched.hpp"
 
 namespace palpate {
@@ -238,6 +239,9 @@ class RobotEnd::Impl {
     hand_->clearance(tick.tick.state == ContactState::free_motion
                          ? clearance - robot_->info().tool_radius - ahead
                          : 0.0);
+    const bool free = tick.tick.state == ContactState::free_motion &&
+                      clearance - robot_->info().tool_radius > ForceZero::clear;
+    at.force = force_zero_.next(now, at.force, free);
     hand_->kept_out(tick.place - tick.tick.proxy);
     const SetPoint::Order order =
         set_point_.next(tick, lead_.press, hand_->is_led(), comes, at.force);
@@ -295,6 +299,7 @@ class RobotEnd::Impl {
   dds::Writer tools_, twists_, contacts_, links_, joints_, faults_, region_texts_, touched_;
   // Of the leading thread
   TouchLearner learner_;
+  ForceZero force_zero_;
   Lead lead_;
   std::int64_t heard_ = 0;  // [ns] stamp of the newest place
   std::string said_;

@@ -89,16 +89,18 @@ TEST(Simulation, ReachesTheCornersOfItsReachUprightAndFreeOfItsMotorsLimits) {
   const Vec3 most = simulation.info().reach->max();
   for (const Eigen::Vector2d& corner :
        {Eigen::Vector2d(most.x(), least.y()), Eigen::Vector2d(most.x(), most.y()),
-        Eigen::Vector2d(least.x(), most.y()), Eigen::Vector2d(least.x(), least.y())}) {
+        Eigen::Vector2d(least.x(), most.y()), Eigen::Vector2d(least.x(), 0.0),
+        Eigen::Vector2d(least.x(), least.y())}) {
     for (const double z : {0.12, most.z()}) {
       const Vec3 place(corner.x(), corner.y(), z);
-      go(simulation, place, z == 0.12 ? 1.8 : 0.8);
+      go(simulation, place, z == 0.12 || corner.y() == 0.0 ? 1.8 : 0.8);
       const RobotState state = simulation.state();
       EXPECT_LT((state.position - place).norm(), 2e-3) << place.transpose();
       ASSERT_EQ(state.links.size(), 5u);  // base, shoulder, elbow, wrist, tip
       EXPECT_NEAR((state.links[2] - state.links[1]).norm(), 0.42, 1e-6);
       EXPECT_NEAR((state.links[3] - state.links[2]).norm(), 0.40, 1e-6);
       EXPECT_GT((state.links[3] - state.position).normalized().z(), 0.999);
+      EXPECT_LT(simulation.truth().apparent_mass, 10.0) << "near a singularity";
     }
   }
   EXPECT_LT(simulation.max_torque_share(), 0.8);

@@ -3,6 +3,7 @@
 // forbidden region.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <vector>
@@ -11,6 +12,7 @@
 
 #include "palpate/sources/synthetic_camera.hpp"
 #include "palpate/teleop/approach_watch.hpp"
+#include "palpate/teleop/force_zero.hpp"
 #include "palpate/teleop/set_point.hpp"
 #include "palpate/teleop/simulated_tool.hpp"
 
@@ -196,6 +198,30 @@ TEST_F(SetPointTest, RefusesWhatCannotBe) {
 }
 
 // A plane that comes at 60 mm/s from 3 s on, or rests, before a noisy stereo camera.
+TEST(ForceZeroTest, TakesOffWhatIsMeasuredInFreeSpaceAndNoContact) {
+  ForceZero zero;
+  const Vec3 weight(0.5, 0.0, -6.0);
+  double t = 3.0;
+  const auto run = [&](double seconds, const Vec3& force, bool free) {
+    Vec3 left = Vec3::Zero();
+    for (const double end = t + seconds; t < end; t += tick) left = zero.next(t, force, free);
+    return left;
+  };
+  // Before anything was free, all is told as it is.
+  EXPECT_EQ(run(0.1, weight, false), weight);
+  EXPECT_LT(run(1.0, weight, true).norm(), 1e-9);
+  // A contact counts, with what is seen and with what is not; afterwards nothing is left of it.
+  const Vec3 push(0.0, 0.0, 3.0);
+  EXPECT_LT((run(5.0, weight + push, false) - push).norm(), 1e-9);
+  EXPECT_LT((run(5.0, weight + push, true) - push).norm(), 1e-9);
+  EXPECT_LT(run(0.01, weight, true).norm(), 1e-9);
+  // Drift.
+  EXPECT_LT(run(10.0, weight + 0.2 * push, true).norm(), 0.01);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(run(0.01, Vec3::Constant(nan), true).allFinite());
+  EXPECT_LT(run(0.01, weight + 0.2 * push, true).norm(), 0.01);
+}
+
 std::vector<Approach> watched(const char* motion, double seconds, const Vec3& tool) {
   const auto camera = open_synthetic_camera(
       Uri("synthetic:plane?size=160x160&fov=15.5deg&distance=0.7m&sensor=d4xx&seed=3" +

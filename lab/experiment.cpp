@@ -8,6 +8,7 @@
 #include "lab/experiments/field.hpp"
 #include "lab/experiments/forces.hpp"
 #include "lab/experiments/lifts.hpp"
+#include "lab/experiments/materials.hpp"
 #include "lab/experiments/methods.hpp"
 #include "lab/experiments/pop.hpp"
 #include "lab/experiments/real.hpp"
@@ -26,14 +27,14 @@ namespace palpate::lab {
 
 const std::vector<Experiment>& known_experiments() {
   static const std::vector<Experiment> experiments = {
-      flat_experiment(),          jump_experiment(),          single_lift_experiment(),
-      lift_experiment(),          bound_experiment(),         speed_experiment(),
-      first_contact_experiment(), hold_experiment(),          force_experiment(),
-      damping_experiment(),       corners_experiment(),       scan_experiment(),
-      fidelity_experiment(),      feel_experiment(),          zwidth_experiment(),
-      teleop_experiment(),        teleop_faults_experiment(), pop_experiment(),
-      field_experiment(),         real_experiment(),          tradeoff_experiment(),
-      methods_experiment()};
+      flat_experiment(),          jump_experiment(),    single_lift_experiment(),
+      lift_experiment(),          bound_experiment(),   speed_experiment(),
+      first_contact_experiment(), hold_experiment(),    force_experiment(),
+      damping_experiment(),       corners_experiment(), scan_experiment(),
+      fidelity_experiment(),      feel_experiment(),    zwidth_experiment(),
+      materials_experiment(),     teleop_experiment(),  teleop_faults_experiment(),
+      pop_experiment(),           field_experiment(),   real_experiment(),
+      tradeoff_experiment(),      methods_experiment()};
   return experiments;
 }
 

@@ -83,6 +83,9 @@ struct Tick {
   /// [N] world: the part of `force` that is an impact's ringing, which the safety chain limits by
   /// itself
   Vec3 transient = Vec3::Zero();
+  /// [N] world: the part of `force` that a material's grain makes under a hand that slides, which
+  /// is no oscillation of the loop
+  Vec3 vibration = Vec3::Zero();
   /// [-] of the coupling's stiffness that is felt, where a material is softer
   double hardness = 1.0;
   std::int64_t frame = -1;  ///< number of the frame in use, from 0; -1 before the first

@@ -108,29 +108,30 @@ void Feel::look_at_surface(const Tick& tick) noexcept {
 }
 
 // The normal force on a slope of the relief, and the vibration of the grains.
-Vec3 Feel::texture(const Vec3& push, const Movement& movement) noexcept {
+Feel::Texture Feel::texture(const Vec3& push, const Movement& movement) noexcept {
   const double size = push.norm();
   const TextureParameters& texture = here_.texture;
   if (!(size > 0.0)) {
     grain_.reset();
-    return Vec3::Zero();
+    return {};
   }
   const Vec3 normal = push / size;
-  Vec3 force = Vec3::Zero();
+  Texture felt;
   if (texture.relief != 0.0) {
     Vec3 rise = texture.relief * (slope_ - slope_.dot(normal) * normal);
     if (const double steep = rise.norm(); steep > steepest) rise *= steepest / steep;
-    force -= size * rise;
+    felt.force -= size * rise;
   }
   if (texture.grain > 0.0) {
     const Vec3 slide = movement.velocity - movement.velocity.dot(normal) * normal;
     const double grain =
         texture.grain * grain_.update(texture.grain_length, slide.norm(), movement.dt);
-    force += std::clamp(grain, -roughest, roughest) * push;
+    felt.vibration = std::clamp(grain, -roughest, roughest) * push;
+    felt.force += felt.vibration;
   } else {
     grain_.reset();
   }
-  return force;
+  return felt;
 }
 
 Tick Feel::tick(const Vec3& hip, double t) noexcept {
@@ -156,7 +157,8 @@ Tick Feel::tick(const Vec3& hip, double t) noexcept {
   bristles_.viscosity = here_.viscosity;
   friction_.set(bristles_);
   drag_ = friction_.update(push, movement.by, movement.velocity, movement.dt);
-  const Vec3 beside = drag_ + felt.brake + texture(push, movement);
+  const Texture rough = texture(push, movement);
+  const Vec3 beside = drag_ + felt.brake + rough.force;
   const Vec3 ringing = tap_.update(pressed, normal, -approach_.dot(normal), here_.tap, t);
 
   // Together no more than the limit: the normal force comes first, the ringing last.
@@ -177,7 +179,7 @@ Tick Feel::tick(const Vec3& hip, double t) noexcept {
     tick.force *= max_force_ / length;
     tick.flags |= force_saturated;
   }
-  static_cast<void>(add(beside));
+  tick.vibration = add(beside) * rough.vibration;
   tick.transient = add(ringing) * ringing;
   if (const double length = tick.force.norm(); length > max_force_)
     tick.force *= (1.0 - 1e-15) * max_force_ / length;  // after rounding, too

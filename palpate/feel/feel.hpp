@@ -46,7 +46,10 @@ class Feel final : public Method {
   void forget_contact() noexcept;
   Movement move(const Tick& tick) noexcept;
   void look_at_surface(const Tick& tick) noexcept;
-  Vec3 texture(const Vec3& push, const Movement& movement) noexcept;
+  struct Texture {
+    Vec3 force = Vec3::Zero(), vibration = Vec3::Zero();  // [N] of relief and grains; of these
+  };
+  Texture texture(const Vec3& push, const Movement& movement) noexcept;
 
   std::unique_ptr<Method> method_;
   const Cloud* cloud_ = nullptr;  // the frame in use; lives as long as the method has it

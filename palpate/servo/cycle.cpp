@@ -263,6 +263,7 @@ void Cycle::run(const Wake& wake) noexcept {
        .new_frame = new_frame,
        .held = support,
        .transient = tick.transient,
+       .vibration = tick.vibration,
        .region = fixtures.region,
        .guidance = fixtures.guidance});
   if ((safe.flags & no_support) != 0) {

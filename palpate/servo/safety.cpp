@@ -309,11 +309,27 @@ Vec3 SafetyChain::limited(const SafetyInput& input, double share,
   return force;
 }
 
+namespace {
+
+// What of a grain's vibration is in the force that was sent: as much as of the rest, and never more
+// than half, so that nobody hides a swing by calling it one.
+Vec3 vibration_in(const SafetyInput& input, const Vec3& sent) noexcept {
+  const double given = (input.force - input.transient).norm();
+  if (!(given > 0.0) || !input.vibration.allFinite()) return Vec3::Zero();
+  const double length = sent.norm();
+  Vec3 vibration = std::min(length / given, 1.0) * input.vibration;
+  cut_to(0.5 * length, vibration);
+  return vibration;
+}
+
+}  // namespace
+
 // Halves what is allowed at each train of fast, large swings, and gives it back when they stop.
 double SafetyChain::oscillation_ceiling(double t, double dt) noexcept {
+  const Vec3 steady = last_force_ - last_vibration_;
   for (int axis = 0; axis < 3; ++axis) {
     Swings& swings = swings_[static_cast<std::size_t>(axis)];
-    const double x = swings.up ? last_force_[axis] : -last_force_[axis];
+    const double x = swings.up ? steady[axis] : -steady[axis];
     if (x > swings.extreme) swings.extreme = x;
     if (swings.extreme - x < parameters_.swing) continue;
     const bool fast = t - swings.turned_at < parameters_.swing_time;
@@ -474,7 +490,8 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
                      is_sound(input.hip) && is_sound(input.proxy) && is_sound(input.position) &&
                      std::abs(input.surface_velocity) <= largest &&
                      is_sound(input.surface_motion) && is_sound(input.transient) &&
-                     is_sound(input.region) && is_sound(input.guidance);
+                     is_sound(input.vibration) && is_sound(input.region) &&
+                     is_sound(input.guidance);
   const double since_last = in_order && last_t_ ? input.t - *last_t_ : 0.0;
   const double dt = std::min(since_last, longest_credit);
   fault_clock_ += since_last;
@@ -527,6 +544,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
 
   if (std::isfinite(input.t)) last_t_ = input.t;
   last_force_ = force;
+  last_vibration_ = vibration_in(input, force);
   last_sent_ = with_transient(input, force, flags);
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
     if (((flags & ~last_flags_) >> i & 1u) != 0) ++interventions_[i];

@@ -129,6 +129,9 @@ struct SafetyInput {
   double held = 0.0;
   /// [N] world: the part of `force` that is an impact's ringing: it may rise at once
   Vec3 transient = Vec3::Zero();
+  /// [N] world: the part of `force` that a grain makes as the hand slides. It is no swing of the
+  /// loop, as far as it is less than half of the force.
+  Vec3 vibration = Vec3::Zero();
   /// [N] world: of forbidden regions, beside `force`. What is judged by normal and proxy is the
   /// method's force alone. At the limit of the force it comes first, and guidance last.
   Vec3 region = Vec3::Zero();
@@ -189,6 +192,7 @@ class SafetyChain {
   static void walk(Way& way, Self& self) {
     way("last_t", self.last_t_);
     way("last_force", self.last_force_);
+    way("last_vibration", self.last_vibration_);
     way("last_flags", self.last_flags_);
     way("heat", self.heat_);
     way("fault_clock", self.fault_clock_);
@@ -254,9 +258,10 @@ class SafetyChain {
   // walk() lists all of these, but for the interventions, which change nothing, and `held_`, which
   // each tick sets.
   std::optional<double> last_t_;
-  Vec3 last_force_ = Vec3::Zero();  // as sent, but for what rang
-  Vec3 last_sent_ = Vec3::Zero();   // all of it
-  double held_ = 0.0;               // [N] SafetyInput::held of this tick
+  Vec3 last_force_ = Vec3::Zero();      // as sent, but for what rang
+  Vec3 last_vibration_ = Vec3::Zero();  // the grain's part of it
+  Vec3 last_sent_ = Vec3::Zero();       // all of it
+  double held_ = 0.0;                   // [N] SafetyInput::held of this tick
   std::uint32_t last_flags_ = 0;
   std::array<std::uint64_t, safety_flag_count> interventions_{};
 

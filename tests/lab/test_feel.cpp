@@ -297,5 +297,32 @@ TEST(Feel, JudgesTheScenesThatAreAskedFor) {
                                  "--families swings", "did you mean 'swing'"));
 }
 
+TEST(MaterialsExperiment, TellsIceFromRubberAndSandpaper) {
+  const Experiment& experiment = find_experiment("materials");
+  ExperimentOptions options;
+  options.families = {"ice", "rubber", "sandpaper"};
+  const test::TemporaryFolder folder;
+  const Table table("materials",
+                    run_experiment(experiment, options, {}, folder.path() / "materials.csv"));
+  const Scores scores = experiment.scores(table);
+  ASSERT_EQ(scores.rows.size(), 3U);
+  const auto number = [&](std::size_t row, std::size_t column) {
+    return std::stod(scores.rows[row][column]);
+  };
+  // Stiffness, strike, friction, and what shakes in a stroke and at rest.
+  EXPECT_NEAR(number(0, 1), 600.0, 6.0);
+  EXPECT_NEAR(number(1, 1), 300.0, 6.0);
+  EXPECT_NEAR(number(0, 3), 0.03, 0.01);
+  EXPECT_NEAR(number(1, 3), 0.85, 0.02);
+  EXPECT_NEAR(number(2, 3), 0.76, 0.02);
+  EXPECT_LT(number(0, 4), 0.5);
+  // The safety chain lets the grain through.
+  EXPECT_GT(number(2, 4), 200.0);
+  for (std::size_t row = 0; row < 3; ++row) EXPECT_LT(number(row, 5), 0.5) << row;
+  options.families = {"rubbr"};
+  EXPECT_TRUE(
+      test::fails_saying([&] { experiment.cells(experiment, options); }, "rubbr", "", "rubber"));
+}
+
 }  // namespace
 }  // namespace palpate::lab

@@ -476,6 +476,26 @@ TEST(SafetyChain, TakesEightFastSwingsInARowForAnOscillationAndNoFewer) {
   for (int i = 0; i < 5; ++i) EXPECT_FALSE(flags_of_changes(trains, 8)) << "with pauses between";
 }
 
+TEST(SafetyChain, TakesAGrainUnderASlidingHandForNoOscillationUpToHalfOfTheForce) {
+  const auto flags_with = [](double mean, double swing) {
+    Session session = engaged_without(0, never_hot);
+    session.run_for(0.2, mean);
+    std::uint32_t flags = 0;
+    for (int i = 0; i < 1000; ++i) {
+      const double vibration = (i / 5) % 2 == 0 ? swing : -swing;
+      session.input.vibration = vibration * Vec3::UnitZ();
+      flags |= session.run(mean + vibration).flags;
+    }
+    return flags & oscillation_cut;
+  };
+  EXPECT_FALSE(flags_with(1.8, 0.55));
+  EXPECT_TRUE(flags_with(1.55, 1.25)) << "whatever it is called";
+  // Refused, as any force that is no number.
+  Session session = engaged_without(0, never_hot);
+  session.input.vibration.y() = std::nan("");
+  EXPECT_TRUE(session.run(1.0).flags & input_refused);
+}
+
 TEST(SafetyChain, SoftensWhatOscillatesAndStillGivesAllTheForceThatIsAllowed) {
   // A gain behind the limit would let a hand of 2 N sink through the surface.
   Session session = engaged_without(0, never_hot);

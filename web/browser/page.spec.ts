@@ -510,23 +510,27 @@ test("the operator keeps the hand off what it has touched", async () => {
   await page.locator("#forbid").click();
   await expect.poll(names).toEqual(["keep off 1"]);
   expect(await page.locator("#fixture-list").textContent()).toContain("forbidden, seen");
-  // It pushes before the surface does: the hand is soon through, so it is looked at several times.
-  const pushedAbove = async () => {
-    await touch();
-    let pushed = false;
-    for (let i = 0; i < 20 && !pushed; ++i) {
-      const seen = await glimpse(page);
-      pushed = seen.force > 0.2 && seen.hip[2]! > 0.003;
-    }
-    await page.mouse.up();
-    await until(page, (seen) => seen.hip[2]! > 0.02);
-    return pushed;
-  };
-  await expect.poll(pushedAbove).toBe(true);
+  // It pushes before the surface does. The hand is soon through: what the plots keep tells.
+  const now = () => page.evaluate(() => (window as any).palpate.newest().tick.t as number);
+  const pushedAbove = (since: number) =>
+    page.evaluate(
+      (since) =>
+        (window as any).palpate
+          .history()
+          .some((sample: any) => sample.t > since && sample.force > 0.2 && sample.penetration === 0),
+      since,
+    );
+  const guarded = await now();
+  await touch();
+  await expect.poll(() => pushedAbove(guarded), { interval: 100 }).toBe(true);
+  await page.mouse.up();
+  await until(page, (seen) => seen.state === 0 && seen.force === 0 && seen.hip[2]! > 0.02);
   await page.locator("#fixture-list button").click();
   await expect.poll(names).toEqual([]);
+  const free = await now();
   await touch();
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.3 && seen.hip[2]! < 0);
+  expect(await pushedAbove(free)).toBe(false);
   await page.mouse.up();
 });
 

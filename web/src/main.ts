@@ -368,4 +368,6 @@ addEventListener("keydown", (event) => {
 requestAnimationFrame(loop);
 
 // For the tests that look at the page from outside.
-Object.assign(window, { palpate: { view, senses, newest: () => ({ tick, state }) } });
+Object.assign(window, {
+  palpate: { view, senses, newest: () => ({ tick, state }), history: () => plots.history() },
+});

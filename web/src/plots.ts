@@ -90,6 +90,11 @@ export class Plots {
     if (first > 0) this.samples.splice(0, first);
   }
 
+  /** What the plots show, the oldest first. */
+  history(): readonly Sample[] {
+    return this.samples;
+  }
+
   /** @param pause [ms] between drawings where drawing is slow */
   draw(now: number, pause: number): void {
     if (now - this.drawn < Math.max(INTERVAL, pause) || this.parent.offsetParent === null) return;

@@ -513,13 +513,11 @@ test("the operator keeps the hand off what it has touched", async () => {
   // It pushes before the surface does. The hand is soon through: what the plots keep tells.
   const now = () => page.evaluate(() => (window as any).palpate.newest().tick.t as number);
   const pushedAbove = (since: number) =>
-    page.evaluate(
-      (since) =>
-        (window as any).palpate
-          .history()
-          .some((sample: any) => sample.t > since && sample.force > 0.2 && sample.penetration === 0),
-      since,
-    );
+    page.evaluate((since) => {
+      const above = ({ t, force, penetration }: any) =>
+        t > since && force > 0.2 && penetration === 0;
+      return (window as any).palpate.history().some(above);
+    }, since);
   const guarded = await now();
   await touch();
   await expect.poll(() => pushedAbove(guarded), { interval: 100 }).toBe(true);

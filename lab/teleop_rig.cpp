@@ -105,10 +105,11 @@ class Palpate final : public Coupling {
   Vec3 robot_end(double t, SimulatedTool& tool, TeleopTick& out) {
     if (const std::optional<Lead> lead = leads_.arrived(t)) led_.lead(lead_ = *lead, t);
     led_.tool_is_at(tool.place());
-    led_.sees(t - newest_.stamp <= blind_after);
     guard_.run({.t = t});
     ServoTick guarded;
     static_cast<void>(guard_ticks_.try_pop(guarded));
+    const bool lost = watch_.is_between(guarded.place, tool.place(), SimulatedTool::radius, t);
+    led_.sees(t - newest_.stamp <= blind_after && !lost);
     const double ahead = (guarded.place - tool.place()).norm();
     led_.clearance(guarded.tick.state == ContactState::free_motion
                        ? watch_.clearance() - SimulatedTool::radius - ahead

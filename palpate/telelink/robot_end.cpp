@@ -220,28 +220,30 @@ class RobotEnd::Impl {
     ServoTick tick;
     while (ticks_->try_pop(tick)) any = true;
     if (!any) return;  // nothing guards the robot now
-    hand_->sees(tick.frame_age <= blind_after);
     Approach comes;
     RobotState at;
     double clearance = ApproachWatch::reach;
+    const bool in_the_open = tick.tick.state == ContactState::free_motion;
+    const double radius = robot_->info().tool_radius;
+    bool lost = !watches_.empty();  // so all cameras say
     {
       const std::lock_guard lock(mutex_);
       at = state_;
       double noise = 0.0;
-      for (const ApproachWatch& watch : watches_) {
+      for (ApproachWatch& watch : watches_) {
         if (watch.newest().speed > comes.speed) comes = watch.newest();
         noise = std::max(noise, watch.newest().noise);
         clearance = std::min(clearance, watch.clearance());
+        lost = lost && watch.is_between(tick.place, at.position, radius, now);
       }
       comes.noise = noise;
     }
+    hand_->sees(tick.frame_age <= blind_after && !lost);
     const double ahead = (tick.place - at.position).norm();
-    hand_->clearance(tick.tick.state == ContactState::free_motion
-                         ? clearance - robot_->info().tool_radius - ahead
-                         : 0.0);
-    const bool free = tick.tick.state == ContactState::free_motion &&
-                      clearance - robot_->info().tool_radius > ForceZero::clear;
-    at.force = force_zero_.next(now, at.force, free);
+    hand_->clearance(in_the_open ? clearance - radius - ahead : 0.0);
+    at.force =
+        force_zero_.next(now, at.force, in_the_open && clearance - radius > ForceZero::clear);
+    contact_ = at.force;
     hand_->kept_out(tick.place - tick.tick.proxy);
     const SetPoint::Order order =
         set_point_.next(tick, lead_.press, hand_->is_led(), comes, at.force);
@@ -257,7 +259,7 @@ class RobotEnd::Impl {
     const ros::Header header{ros_stamp(now), "world"};
     tools_.write(ros::PoseStamped{header, components(at.position)});
     twists_.write(ros::TwistStamped{header, components(at.velocity)});
-    contacts_.write(ros::WrenchStamped{header, components(at.force), {}});
+    contacts_.write(ros::WrenchStamped{header, components(contact_), {}});
     ros::Float64MultiArray links;
     for (const Vec3& place : at.links)
       links.data.insert(links.data.end(), {place.x(), place.y(), place.z()});
@@ -300,6 +302,7 @@ class RobotEnd::Impl {
   // Of the leading thread
   TouchLearner learner_;
   ForceZero force_zero_;
+  Vec3 contact_ = Vec3::Zero();  // [N] without what the sensor shows in free space
   Lead lead_;
   std::int64_t heard_ = 0;  // [ns] stamp of the newest place
   std::string said_;

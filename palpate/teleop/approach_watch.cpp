@@ -92,6 +92,44 @@ double ApproachWatch::distance_along(const Cloud& cloud, const Vec3& tool, const
                          : sum / static_cast<double>(count);
 }
 
+// How far a place is behind all that is seen in its direction [m]; negative before it, and where
+// nothing is seen.
+double ApproachWatch::behind(const Cloud& cloud, const Vec3& place, double radius) noexcept {
+  constexpr double far = 0.3;  // [m]
+  gather(cloud, Beam{place, radius, far, Vec3::UnitZ()}, Patch::capacity, *patch_);
+  double least = patch_->size() > 0 ? far : -far;
+  for (std::size_t view = 0; view < patch_->view_count(); ++view) {
+    const std::optional<Vec3>& viewpoint = patch_->view(view).viewpoint;
+    if (!viewpoint) return -far;  // where it is seen from is not known
+    const Vec3 sight = (place - *viewpoint).normalized();
+    for (std::size_t i = patch_->view(view).begin; i < patch_->view_end(view); ++i)
+      least = std::min(least, -sight.dot(Vec3(patch_->x()[i], patch_->y()[i], patch_->z()[i])));
+  }
+  return least;
+}
+
+bool ApproachWatch::is_between(const Vec3& proxy, const Vec3& tool, double radius,
+                               double t) noexcept {
+  constexpr double interval = 0.01;  // [s]
+  constexpr int most = 16;           // places that are looked at
+  if (seen_.empty()) return false;
+  if (t >= looked_ && t - looked_ < interval) return between_;
+  looked_ = t;
+  between_ = false;
+  const Cloud& cloud = *seen_.back().cloud;
+  const Vec3 way = proxy - tool;
+  const int count = std::clamp(static_cast<int>(std::ceil(way.norm() / radius)), 1, most);
+  // A way through a surface is just before it at one place and just behind it at the next; what
+  // only hides the way is far before it. A tool that is in something already is led out of it.
+  double last = behind(cloud, tool, radius);
+  for (int i = 1; i <= count && !between_; ++i) {
+    const double depth = behind(cloud, tool + static_cast<double>(i) / count * way, radius);
+    between_ = last > -2.0 * radius && last <= radius && depth > radius && depth < 4.0 * radius;
+    last = depth;
+  }
+  return between_;
+}
+
 const Approach& ApproachWatch::frame(std::shared_ptr<const Cloud> cloud, double stamp,
                                      const Vec3& tool) {
   approach_ = Approach{.place = tool, .stamp = stamp, .noise = approach_.noise};

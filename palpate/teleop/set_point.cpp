@@ -15,7 +15,8 @@ constexpr double approach_time = 0.005;   // [s] in which a speed of the surface
 constexpr double press_time = 0.1;        // [s] in which a wanted force is reached
 constexpr double touching_force = 0.1;    // [N] who is to press with more is to touch
 constexpr double clear_deviations = 2.0;  // [-] of the camera's noise that it stays farther away
-constexpr double farthest_clear = 8e-3;   // [m] for noise and motion
+constexpr double notice_time = 0.2;       // [s] after which a noisy picture shows a motion turned
+constexpr double farthest_clear = 0.02;   // [m] for noise and motion: 60 mm/s in lag and notice
 constexpr double lately_time = 2.0;       // [s] after which a motion is nearly forgotten
 constexpr double retreat_speed = 0.02;    // [m/s] for each N above that
 constexpr double farthest_retreat = 0.1;  // [m]
@@ -116,9 +117,13 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
 
   // What has moved lately may turn and come before the tool is out of its way.
   const double moves = touches ? std::abs(tick.surface_velocity) : 0.0;
-  lately_ = std::max(std::min(std::max(moves, comes.speed), fastest_surface),
-                     lately_ * (1.0 - share_of(dt, lately_time)));
-  clear_ = std::min(clear_deviations * comes.noise + options_.lag * lately_, farthest_clear);
+  const double kept = 1.0 - share_of(dt, lately_time);
+  lately_ = std::max(std::min(std::max(moves, comes.speed), fastest_surface), kept * lately_);
+  touched_lately_ = std::max(std::min(moves, fastest_surface), kept * touched_lately_);
+  // What is said to come may be noise; a surface that was touched and moved may turn unnoticed.
+  clear_ = std::min(
+      clear_deviations * comes.noise + options_.lag * lately_ + notice_time * touched_lately_,
+      farthest_clear);
 
   double wanted = 0.0;
   double newtons = 0.0;

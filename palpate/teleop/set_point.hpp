@@ -38,16 +38,15 @@ void validate(const SetPointOptions& options);
 
 /// Where the robot's tool is sent: the proxy at the robot's end, which its own camera keeps out of
 /// what is seen, and
-/// - farther from what is touched by twice the noise of the picture, and by the robot's lag times
-///   what moved in the last seconds, which may turn: 8 mm at most;
+/// - farther from what is touched by twice the noise of the picture, and by the way that what moved
+///   in the last seconds makes in the robot's lag, and in the 0.2 s in which nobody notices that a
+///   surface that was touched has turned: 20 mm at most;
 /// - from what comes, touched or not, by its speed times the robot's lag, so that the tool is out
-/// of
-///   the way when it arrives (ApproachWatch, and the method's own velocity);
+///   of the way when it arrives (ApproachWatch, and the method's own velocity);
 /// - where the operator presses and the robot is to press too, into the surface by the force over
 ///   the robot's stiffness;
 /// - where it is pushed with `unwanted_force` more than that, or with more than `max_force`, seen
-/// or
-///   not, away from what pushes.
+///   or not, away from what pushes.
 /// Forbidden regions come before all that. What comes moves it at once; a proxy that falls, as a
 /// noisy picture may let it, takes it along at `contact_speed` only.
 /// Values in, values out: no clock, no thread. [servo]
@@ -81,6 +80,7 @@ class SetPoint {
   Vec3 held_ = Vec3::Zero();     // [m] world: the proxy as it is followed
   double speed_ = 0.0;           // [m/s] at which it is followed at most
   double lately_ = 0.0;          // [m/s] of what is touched or comes, in the last seconds
+  double touched_lately_ = 0.0;  // [m/s] of what is touched alone
   double clear_ = 0.0;           // [m] that it stays farther away for noise and motion
   double approach_ = 0.0;        // [m/s] of the surface, towards the tool
   double depth_ = 0.0;           // [m] by which it presses

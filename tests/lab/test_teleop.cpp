@@ -115,6 +115,16 @@ TEST(TeleopFaults, AWallDoesNotPushTheToolIntoASurface) {
   EXPECT_LE(figures.breach, 0.1e-3);
 }
 
+// In this episode the robot's own proxy is lost: the hand is led through a ball, and the proxy
+// comes out behind it. The tool followed at 0.27 m/s and hit the ball with 43 N.
+TEST(TeleopFaults, AToolDoesNotFollowAProxyThroughWhatIsSeen) {
+  const TeleopEpisode episode = teleop_episode("none", 32000524);
+  ASSERT_FALSE(episode.moves);
+  const EpisodeFigures figures = play_episode(episode);
+  EXPECT_LT(figures.contact, 5.0);
+  EXPECT_LT(figures.breach, 5e-4);
+}
+
 TEST(Teleop, MakesItsTable) {
   ExperimentOptions options;
   options.families = {"rest"};

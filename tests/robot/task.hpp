@@ -136,6 +136,8 @@ class Task {
     guard_.run({.t = t_});
     ServoTick guarded;
     static_cast<void>(guarded_.try_pop(guarded));
+    led_.sees(
+        !watch_.is_between(guarded.place, state.position, simulation().info().tool_radius, t_));
     led_.clearance(guarded.tick.state == ContactState::free_motion
                        ? watch_.clearance() - simulation().info().tool_radius
                        : 0.0);

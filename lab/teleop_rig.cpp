@@ -109,17 +109,18 @@ class Palpate final : public Coupling {
     ServoTick guarded;
     static_cast<void>(guard_ticks_.try_pop(guarded));
     const bool lost = watch_.is_between(guarded.place, tool.place(), SimulatedTool::radius, t);
+    if (lost) guarded = with_proxy_at(tool.place(), guarded);
     led_.sees(t - newest_.stamp <= blind_after && !lost);
     const double ahead = (guarded.place - tool.place()).norm();
     led_.clearance(guarded.tick.state == ContactState::free_motion
                        ? watch_.clearance() - SimulatedTool::radius - ahead
                        : 0.0);
     led_.kept_out(guarded.place - guarded.tick.proxy);
-    out.led = led_.is_led();
+    out.led = led_.is_led() && !lost;
     if (newest_.cloud)
       watch_.frame(std::exchange(newest_.cloud, nullptr), newest_.stamp, tool.place());
     const SetPoint::Order order =
-        set_point_.next(guarded, lead_.press, led_.is_led(), watch_.newest(), tool.contact());
+        set_point_.next(guarded, lead_.press, out.led, watch_.newest(), tool.contact());
     return order.position;
   }
 

@@ -223,7 +223,6 @@ class RobotEnd::Impl {
     Approach comes;
     RobotState at;
     double clearance = ApproachWatch::reach;
-    const bool in_the_open = tick.tick.state == ContactState::free_motion;
     const double radius = robot_->info().tool_radius;
     bool lost = !watches_.empty();  // so all cameras say
     {
@@ -238,15 +237,17 @@ class RobotEnd::Impl {
       }
       comes.noise = noise;
     }
+    if (lost) tick = with_proxy_at(at.position, tick);
+    const bool in_the_open = tick.tick.state == ContactState::free_motion;
     hand_->sees(tick.frame_age <= blind_after && !lost);
     const double ahead = (tick.place - at.position).norm();
     hand_->clearance(in_the_open ? clearance - radius - ahead : 0.0);
-    at.force =
-        force_zero_.next(now, at.force, in_the_open && clearance - radius > ForceZero::clear);
+    const bool alone = in_the_open && !lost && clearance - radius > ForceZero::clear;
+    at.force = force_zero_.next(now, at.force, alone);
     contact_ = at.force;
     hand_->kept_out(tick.place - tick.tick.proxy);
     const SetPoint::Order order =
-        set_point_.next(tick, lead_.press, hand_->is_led(), comes, at.force);
+        set_point_.next(tick, lead_.press, hand_->is_led() && !lost, comes, at.force);
     if (at.fault.empty()) robot_->command(order.position, order.velocity, now);
     if (const auto found =
             learner_.next(at.t, at.position, at.velocity, at.force, tick.tick.normal))

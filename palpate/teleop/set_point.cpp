@@ -26,6 +26,7 @@ constexpr double longest_forecast = 0.3;  // [s]
 // as it does; half as much again as its speed is known late, and only about.
 constexpr double ahead = 1.5;
 constexpr double fastest_surface = 0.5;  // [m/s] that is led before
+constexpr double turn_time = 0.2;        // [s] in which a normal that turned round is believed
 constexpr double acceleration = 1.0;     // [m/s^2] of what is led, after a contact
 
 // The share of the way to its goal that a first-order lag goes in dt.
@@ -74,6 +75,14 @@ std::shared_ptr<const FixtureSet> robot_fixtures(const FixtureSet& fixtures) {
   return std::make_shared<const FixtureSet>(regions);
 }
 
+ServoTick with_proxy_at(const Vec3& tool, ServoTick tick) {
+  tick.place = tick.tick.proxy = tool;
+  tick.tick.state = ContactState::free_motion;
+  tick.tick.normal = Vec3::Zero();
+  tick.tick.surface_velocity = 0.0;
+  return tick;
+}
+
 SetPoint::SetPoint(const SetPointOptions& options) : options_(options) {
   validate(options);
   fixtures_.use(options_.fixtures.get());
@@ -93,12 +102,14 @@ Vec3 SetPoint::way_out(const Vec3& place, const Approach& comes, double t) const
 
 // The proxy goes away from what is touched as fast as that comes, and any other way only slowly, in
 // contact and for a while after: one that a noisy picture lets fall must not take the tool along.
-// Nor does it go fast against what pushes the tool: what is touched from behind is none of its.
+// Nor does it go fast against what pushes the tool: what is touched from behind is none of its; nor
+// along a normal that has just turned round, as it does where a proxy slips under a noisy surface.
 Vec3 SetPoint::followed(const Vec3& held, bool touches, const Vec3& force, double dt) noexcept {
   const double fastest = options_.max_speed + fastest_surface;
   speed_ = touches ? options_.contact_speed : std::min(speed_ + acceleration * dt, fastest);
   const Vec3 way = held - held_;
-  const double along = normal_.dot(force) < -touching_force ? 0.0 : std::max(way.dot(normal_), 0.0);
+  const bool believed = normal_.dot(force) >= -touching_force && normal_.dot(usual_) >= 0.0;
+  const double along = believed ? std::max(way.dot(normal_), 0.0) : 0.0;
   const Vec3 outward = along * normal_;
   return held_ + outward + no_longer_than(way - outward, speed_ * dt);
 }
@@ -111,6 +122,8 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
   last_t_ = tick.t;
   const bool touches = tick.state != ContactState::free_motion && tick.normal.squaredNorm() > 0.25;
   if (touches) normal_ = tick.normal.normalized();
+  const bool goes_on = std::exchange(touched_, touches) && touches;
+  usual_ += (goes_on ? share_of(dt, turn_time) : 1.0) * (normal_ - usual_);
 
   const double speed = touches ? std::clamp(tick.surface_velocity, 0.0, fastest_surface) : 0.0;
   approach_ += share_of(dt, approach_time) * (speed - approach_);

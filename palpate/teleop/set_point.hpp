@@ -36,6 +36,11 @@ std::shared_ptr<const FixtureSet> robot_fixtures(const FixtureSet& fixtures);
 /// @throws Error if one of them is out of range.
 void validate(const SetPointOptions& options);
 
+/// What a tick at the robot's end counts for when its proxy has been lost
+/// (ApproachWatch::is_between): nothing is touched, and the proxy is where the tool is.
+/// @param tool  [m, world]
+ServoTick with_proxy_at(const Vec3& tool, ServoTick tick);
+
 /// Where the robot's tool is sent: the proxy at the robot's end, which its own camera keeps out of
 /// what is seen, and
 /// - farther from what is touched by twice the noise of the picture, and by the way that what moved
@@ -77,6 +82,8 @@ class SetPoint {
   bool led_ = false;
   double last_t_ = 0.0;          // [s]
   Vec3 normal_ = Vec3::UnitZ();  // of the last contact
+  Vec3 usual_ = Vec3::Zero();    // the same, over `turn_time`
+  bool touched_ = false;
   Vec3 held_ = Vec3::Zero();     // [m] world: the proxy as it is followed
   double speed_ = 0.0;           // [m/s] at which it is followed at most
   double lately_ = 0.0;          // [m/s] of what is touched or comes, in the last seconds

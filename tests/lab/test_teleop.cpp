@@ -125,6 +125,14 @@ TEST(TeleopFaults, AToolDoesNotFollowAProxyThroughWhatIsSeen) {
   EXPECT_LT(figures.breach, 5e-4);
 }
 
+// A ball before a noisy camera: the proxy slips under its surface, whose normal is then that of its
+// back, and pushes the tool through it: 24 N.
+TEST(TeleopFaults, AToolIsNotPushedThroughASurfaceByItsBack) {
+  const TeleopEpisode episode = teleop_episode("none", 33000248);
+  ASSERT_FALSE(episode.moves);
+  EXPECT_LT(play_episode(episode).contact, 5.0);
+}
+
 TEST(Teleop, MakesItsTable) {
   ExperimentOptions options;
   options.families = {"rest"};

@@ -136,8 +136,10 @@ class Task {
     guard_.run({.t = t_});
     ServoTick guarded;
     static_cast<void>(guarded_.try_pop(guarded));
-    led_.sees(
-        !watch_.is_between(guarded.place, state.position, simulation().info().tool_radius, t_));
+    const bool lost =
+        watch_.is_between(guarded.place, state.position, simulation().info().tool_radius, t_);
+    if (lost) guarded = with_proxy_at(state.position, guarded);
+    led_.sees(!lost);
     led_.clearance(guarded.tick.state == ContactState::free_motion
                        ? watch_.clearance() - simulation().info().tool_radius
                        : 0.0);
@@ -146,7 +148,7 @@ class Task {
       found_.send(*found, t_);
     led_.kept_out(guarded.place - guarded.tick.proxy);
     const SetPoint::Order order =
-        set_point_.next(guarded, lead_.press, led_.is_led(), watch_.newest(), state.force);
+        set_point_.next(guarded, lead_.press, led_.is_led() && !lost, watch_.newest(), state.force);
     simulation().command(order.position, order.velocity);
   }
 

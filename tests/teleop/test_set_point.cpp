@@ -151,6 +151,27 @@ TEST_F(SetPointTest, FollowsAFallingProxySlowlyAndARisingOneAtOnce) {
   EXPECT_GT(run(point, behind, 0.02, {}, 0.5 * up).position.z(), -0.0015);
 }
 
+TEST_F(SetPointTest, BelievesANormalThatTurnsRoundSlowly) {
+  SetPoint point({.margin = 2e-3});
+  ServoTick record = at(Vec3::Zero(), true, t_);
+  EXPECT_NEAR(run(point, record, 1.0, {.noise = 5e-3}).position.z(), 0.01, 1e-5);
+  record.tick.normal = Vec3(0.0, -0.8, -0.6);  // from the back of what is touched
+  EXPECT_GT(run(point, record, 0.04, {.noise = 5e-3}).position.z(), 0.01 - 0.05 * 0.045);
+  record.tick.normal = up;
+  EXPECT_NEAR(run(point, record, 0.1, {.noise = 5e-3}).position.z(), 0.01, 1e-3);
+  // A corner that is gone round is no turn of that kind.
+  record.tick.normal = Vec3(0.8, 0.0, 0.6);
+  EXPECT_GT(run(point, record, 0.02, {.noise = 5e-3}).position.x(), 3e-3);
+}
+
+TEST_F(SetPointTest, LostProxiesAreWhereTheToolIs) {
+  SetPoint point;
+  run(point, at(Vec3::Zero(), true, t_), 0.5);
+  const ServoTick lost = with_proxy_at(Vec3(0.0, 0.0, 0.01), at(Vec3(0.0, 0.0, -0.05), true, t_));
+  EXPECT_EQ(lost.tick.state, ContactState::free_motion);
+  EXPECT_NEAR(point.next(lost, Vec3::Zero(), false, {}, Vec3::Zero()).position.z(), 0.01, 1e-9);
+}
+
 TEST_F(SetPointTest, GoesOutOfTheWayOfNothingIntoWhatIsTouched) {
   SetPoint point;
   const ServoTick record = at(Vec3::Zero(), true, t_);

@@ -127,6 +127,12 @@ int finish(Session& session, bool json, const std::string& ended) {
   std::string recording = state.recording.message;
   if (!ended.empty()) recording += (recording.empty() ? "" : "; ") + ended;
   if (!recording.empty()) fmt::print(stderr, "palpate: {}\n", recording);
+  if (const std::string& folder = state.recording.folder;
+      !folder.empty() && !state.recording.failed)
+    fmt::print(stderr,
+               "palpate: its forces again: palpate replay {0}; touch it: palpate run --camera "
+               "recording:{0}\n",
+               folder);
   const std::string text = json ? json_of(state.summary, recording, state.cameras, session.timing(),
                                           &session.statistics().hand_over, state.more_hands)
                                 : text_of(state.summary, state.cameras, state.more_hands);

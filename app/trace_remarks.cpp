@@ -16,6 +16,9 @@ namespace {
 constexpr std::size_t enough_points = 20000;  // of each camera, for a distance
 constexpr double precision = 0.01;            // [-] of the least distance
 constexpr double grace = 0.1;                 // [s] that the last frame may be in use, at least
+constexpr double felt_force = 1.0;            // [N] that anybody feels
+constexpr int least_felt = 100;               // [ticks] of it that make a press
+constexpr int enough_about = 8;               // points within two r_c of a proxy that rests
 constexpr double margin = 0.05;               // [m] around a cloud, within which a path is near it
 
 // Distances for people: millimetres up to a metre.
@@ -90,6 +93,14 @@ void TraceRemarks::count(const Tick& tick, std::span<const std::shared_ptr<const
   if (!has_frame) return;
   if (measured_frame_ < 0) look_at_start(tick, cameras);
   touched_ = touched_ || tick.state != ContactState::free_motion;
+  const double force = tick.force.norm();
+  felt_ += force > felt_force ? 1 : 0;
+  largest_ = std::max(largest_, force);
+  if (tick.state != ContactState::free_motion) {
+    stale_ += (tick.flags & frame_stale) != 0 ? 1 : 0;
+    ++contact_;
+    if (is_press_ && points_about_ < 0) count_points(tick, cameras);
+  }
   if (!touched_) measure(tick, cameras);
   measured_frame_ = tick.frame;
 }
@@ -161,6 +172,40 @@ std::string TraceRemarks::nothing_met() const {
   return text + "; are both in metres and in the world frame?";
 }
 
+// How many points carry a proxy where it touched first; only of clouds that are no images.
+void TraceRemarks::count_points(const Tick& tick,
+                                std::span<const std::shared_ptr<const Cloud>> cameras) {
+  points_about_ = 0;
+  for (const auto& cloud : cameras) {
+    if (dynamic_cast<const PointCloud*>(cloud.get()) == nullptr) {
+      points_about_ = enough_about;
+      return;
+    }
+    Patch patch;
+    gather(*cloud, Ball{tick.proxy, 2.0 * r_c_}, patch);
+    points_about_ += static_cast<int>(patch.size());
+  }
+}
+
+// The one reason why a touch gave no force, or too little.
+std::string TraceRemarks::hardly_felt(std::span<const ShownFrames> shown) const {
+  const std::string begin =
+      fmt::format("it was touched and hardly felt, with {:.2f} N at most: ", largest_);
+  // A single frame is a picture, however old.
+  std::size_t frames = 0;
+  for (const ShownFrames& each : shown) frames += each.count;
+  if (frames > 1 && 2 * stale_ > contact_)
+    return begin + "the frames had stopped, and a camera's last frame gives no force for long";
+  if (is_press_ && points_about_ < enough_about)
+    return begin +
+           fmt::format(
+               "its points are too sparse for a proxy with r_c = {}, of which {} lay within "
+               "twice that; give a smaller ?scale, or a larger proxy",
+               length_text(r_c_), points_about_);
+  return begin +
+         "an edge, or something narrower than the proxy, which slid off it; press farther inside";
+}
+
 std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
                                              std::span<const std::string> uris) const {
   std::vector<std::string> lines;
@@ -179,7 +224,7 @@ std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
         "there was no frame before t = {:.3f} s: the path began {:.3f} s before it, in nothing",
         first, first - first_t_));
   }
-  if (!start_.empty()) lines.push_back(start_);
+  if (!is_press_ && !start_.empty()) lines.push_back(start_);
   for (std::size_t i = 0; i < shown.size(); ++i) {
     const ShownFrames& frames = shown[i];
     if (!frames.ended || frames.count < 2) continue;  // one frame is a still picture
@@ -187,11 +232,14 @@ std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
     const double left = last_t_ - frames.last;
     if (left > std::max(2.0 * interval, grace))
       lines.push_back(fmt::format(
-          "{}: its frames ended at t = {:.3f} s, {:.3f} s before the path, which touched the last "
-          "one from there on; sight gives no force of a frame that is too old",
+          "{}: its frames ended at t = {:.3f} s, {:.3f} s before the hand's way, which touched the "
+          "last one from there on, as a still picture",
           uris[i], frames.last, left));
   }
-  if (!touched_) lines.push_back(nothing_met());
+  if (!touched_)
+    lines.push_back(nothing_met());
+  else if (is_press_ ? felt_ < least_felt : largest_ == 0.0)
+    lines.push_back(hardly_felt(shown));
   return lines;
 }
 

@@ -24,8 +24,9 @@ namespace palpate::app {
 /// than any before: a distance changes by no more than its place moves.
 class TraceRemarks {
  public:
-  /// @param r_c  [m] of the proxy
-  explicit TraceRemarks(double r_c) : r_c_(r_c) {}
+  /// @param r_c       [m] of the proxy
+  /// @param is_press  the hand is led by what is seen, so it began where it did on purpose
+  TraceRemarks(double r_c, bool is_press) : r_c_(r_c), is_press_(is_press) {}
 
   /// Counts a tick. @param cameras  the newest frame of each; null before its first
   void count(const Tick& tick, std::span<const std::shared_ptr<const Cloud>> cameras);
@@ -38,10 +39,17 @@ class TraceRemarks {
  private:
   void look_at_start(const Tick& tick, std::span<const std::shared_ptr<const Cloud>> cameras);
   void measure(const Tick& tick, std::span<const std::shared_ptr<const Cloud>> cameras);
+  void count_points(const Tick& tick, std::span<const std::shared_ptr<const Cloud>> cameras);
   [[nodiscard]] std::string nothing_met() const;
+  [[nodiscard]] std::string hardly_felt(std::span<const ShownFrames> shown) const;
 
   double r_c_;  // [m]
+  bool is_press_;
   bool any_tick_ = false, touched_ = false;
+  int felt_ = 0;                 // ticks with a force that anybody feels
+  int contact_ = 0, stale_ = 0;  // ticks in contact, and those of them with an old frame
+  int points_about_ = -1;        // where it touched first
+  double largest_ = 0.0;         // [N]
   bool first_without_frame_ = false;
   double first_t_ = 0.0, last_t_ = 0.0;  // [s] of ticks
   std::string start_;                    // what is odd about where the path began

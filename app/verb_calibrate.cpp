@@ -21,7 +21,7 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/session/camera_registration.hpp"
 #include "palpate/session/point_capture.hpp"
-#include "palpate/session/press_path.hpp"
+#include "palpate/session/press.hpp"
 #include "palpate/session/registration.hpp"
 #include "palpate/sources/source.hpp"
 

@@ -19,7 +19,7 @@
 #include "palpate/devices/hip_path.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/session/frame_sequence.hpp"
-#include "palpate/session/press_path.hpp"
+#include "palpate/session/press.hpp"
 
 namespace palpate::app {
 namespace {
@@ -36,17 +36,12 @@ struct TraceOptions {
   MethodOptions method;
 };
 
-// A file's path, or one that presses what the first camera sees.
-HipPath path_of(const TraceOptions& options, const FrameSequence& playback) {
-  if (options.press.empty()) return HipPath::read_csv(options.path);
-  const auto* image = dynamic_cast<const DepthImage*>(playback.upcoming(0));
-  if (image == nullptr)
-    throw Error("--press", options.cameras.front() + " has no depth image",
-                "give a path with --path FILE.csv");
+// A hand that presses what the first camera sees; none: a path is given.
+std::optional<Press> press_of(const TraceOptions& options, const FrameSequence& playback) {
+  if (options.press.empty()) return std::nullopt;
   PressOptions pressing = options.pressing;
   if (!options.slide_to.empty()) pressing.slide_to = parse_pixel(options.slide_to, "--slide-to");
-  return press_path(*image, parse_pixel(options.press, "--press"), pressing,
-                    playback.upcoming_stamp(0));
+  return Press(*playback.upcoming(0), parse_pixel(options.press, "--press"), pressing);
 }
 
 int trace(TraceOptions options) {
@@ -63,7 +58,9 @@ int trace(TraceOptions options) {
   if (options.press.empty() && !options.slide_to.empty())
     throw Error("--slide-to", "there is no --press to slide from", "add --press U,V");
   FrameSequence playback(options.cameras);
-  const HipPath path = path_of(options, playback);
+  std::optional<Press> press = press_of(options, playback);
+  const std::optional<HipPath> path =
+      press ? std::nullopt : std::optional(HipPath::read_csv(options.path));
   for (std::size_t camera = 0; camera < playback.cameras(); ++camera) {
     const SourceInfo& about = playback.source(camera).info();
     for (const std::string& note : about.notes)
@@ -78,29 +75,40 @@ int trace(TraceOptions options) {
   TraceWriter writer(options.out);
   Summary summary;
   const double r_c = parameters.proxy.r_c();
-  TraceRemarks remarks(r_c);
+  TraceRemarks remarks(r_c, press.has_value());
   const Interruption interruption;
-  const std::int64_t ticks = ticks_along(path, options.rate);
+  // Of a press that is not known before.
+  const std::int64_t ticks = path ? ticks_along(*path, options.rate) : 0;
   Progress progress("trace", static_cast<std::size_t>(ticks));
-  touch_along(playback, *method, path, options.rate, [&](const Tick& tick) {
+  const auto on_tick = [&](const Tick& tick) {
     writer.write(tick);
     remarks.count(tick, playback.newest());
     summary.count(tick, least_behind(playback.newest(), tick.proxy, r_c), r_c);
     progress.advance();
     return interruption.signal() == 0;
-  });
+  };
+  if (press)
+    touch_along(playback, *method, *press, options.rate, on_tick);
+  else
+    touch_along(playback, *method, *path, options.rate, on_tick);
   summary.frames = playback.adopted();
   writer.finish();
   progress.finish();
+  if (press && press->pixel() != parse_pixel(options.press, "--press") && options.slide_to.empty())
+    fmt::print(
+        stderr,
+        "palpate: pixel {} shows nothing that can be pressed: {},{} was pressed, the nearest "
+        "that does\n",
+        options.press, press->pixel().u, press->pixel().v);
   for (const std::string& remark : remarks.lines(playback.shown(), options.cameras))
     fmt::print(stderr, "palpate: {}\n", remark);
   const int signal = interruption.signal();
-  const bool is_whole = summary.ticks == static_cast<std::size_t>(ticks);
+  const bool is_whole = press ? press->done() : summary.ticks == static_cast<std::size_t>(ticks);
   if (!is_whole)
     fmt::print(stderr,
-               "palpate: interrupted: {} has {} of {} ticks, in whole lines; the same command "
+               "palpate: interrupted: {} has {}{} ticks, in whole lines; the same command "
                "again makes the same lines and goes on to the end\n",
-               writer.name(), summary.ticks, ticks);
+               writer.name(), summary.ticks, press ? "" : fmt::format(" of {}", ticks));
   if (options.json) {
     std::fputs(json_of(summary).c_str(), stdout);
   } else {
@@ -123,9 +131,10 @@ Verb add_trace(CLI::App& program) {
   command->add_option("--material", options->material,
                       "what its surfaces are made of, such as wood, or a TOML file");
   command->add_option("--path", options->path, "CSV of the HIP's path: t,x,y,z in s and m, world");
-  command->add_option("--press", options->press,
-                      "instead of a path: press what this pixel of the first frame sees, U,V, "
-                      "along the line of sight, and lift again");
+  command->add_option(
+      "--press", options->press,
+      "instead of a path: press what this pixel sees, U,V, in the newest frame, along "
+      "the line of sight, and lift again");
   command->add_option("--slide-to", options->slide_to,
                       "with --press: stroke the surface to this pixel before lifting, U,V");
   command->add_option("--press-depth", options->pressing.depth,

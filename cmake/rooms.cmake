@@ -146,10 +146,11 @@ function(palpate_test name)
     return()
   endif()
   add_executable(test_${name} ${sources})
-  set_target_properties(test_${name} PROPERTIES UNITY_BUILD OFF)  # their helpers share names
   target_include_directories(test_${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(test_${name} PRIVATE ${ARG_LINKS} GTest::gtest_main)
   palpate_target_options(test_${name})
+  # Each file has a namespace of its own, so that they can be compiled as one; six, for all cores.
+  set_target_properties(test_${name} PROPERTIES UNITY_BUILD_BATCH_SIZE 6)
   palpate_runs_once(test_${name})
   target_precompile_headers(test_${name} REUSE_FROM palpate_test_headers)
   gtest_discover_tests(test_${name} DISCOVERY_TIMEOUT 60 TEST_FILTER "${PALPATE_TEST_FILTER}"

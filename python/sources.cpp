@@ -10,7 +10,7 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/record/session_reader.hpp"
 #include "palpate/session/frame_sequence.hpp"
-#include "palpate/session/press_path.hpp"
+#include "palpate/session/press.hpp"
 #include "palpate/sources/source.hpp"
 
 #include "python/arrays.hpp"
@@ -108,12 +108,10 @@ HipPath path_of(const py::object& path) {
   return HipPath(std::move(samples));
 }
 
-HipPath press_of(const FrameSequence& frames, const std::string& uri, std::pair<int, int> at,
-                 const std::optional<std::pair<int, int>>& slide_to, PressOptions options) {
-  const auto* image = dynamic_cast<const DepthImage*>(frames.upcoming(0));
-  if (image == nullptr) throw Error("press", uri + " has no depth image", "give a path instead");
+Press press_of(const FrameSequence& frames, std::pair<int, int> at,
+               const std::optional<std::pair<int, int>>& slide_to, PressOptions options) {
   if (slide_to) options.slide_to = Pixel{slide_to->first, slide_to->second};
-  return press_path(*image, {at.first, at.second}, options, frames.upcoming_stamp(0));
+  return {*frames.upcoming(0), {at.first, at.second}, options};
 }
 
 py::array trace(const py::object& camera, const py::object& path, const py::object& method,
@@ -131,22 +129,29 @@ py::array trace(const py::object& camera, const py::object& path, const py::obje
     const py::gil_scoped_release released;
     frames.emplace(uris);
   }
-  const HipPath hips =
-      press ? press_of(*frames, uris.front(), *press, slide_to,
-                       {.depth = press_depth, .speed = press_speed, .hold = press_hold})
-            : path_of(path);
+  std::optional<HipPath> hips;
+  std::optional<Press> pressing;
+  if (press)
+    pressing.emplace(press_of(*frames, *press, slide_to,
+                              {.depth = press_depth, .speed = press_speed, .hold = press_hold}));
+  else
+    hips.emplace(path_of(path));
   const auto trouble = std::make_shared<Trouble>();
   const std::unique_ptr<Method> made =
       method_of(method, for_sensors(parameters, frames->sensors()), trouble);
   std::vector<TickRecord> records;
-  records.reserve(static_cast<std::size_t>(ticks_along(hips, rate)));
+  if (hips) records.reserve(static_cast<std::size_t>(ticks_along(*hips, rate)));
   {
     const py::gil_scoped_release released;
-    touch_along(*frames, *made, hips, rate, [&](const Tick& tick) {
+    const auto on_tick = [&](const Tick& tick) {
       records.push_back(record_of(tick));
       if (records.size() % ticks_between_signals == 0) check_signals();
       return !trouble->first;
-    });
+    };
+    if (pressing)
+      touch_along(*frames, *made, *pressing, rate, on_tick);
+    else
+      touch_along(*frames, *made, *hips, rate, on_tick);
   }
   trouble->rethrow();
   return array_of(records);
@@ -213,7 +218,8 @@ void define_sources(py::module_& m) {
         "Touches what cameras saw along a path, exactly as `palpate trace` does, and gives the\n"
         "ticks as a structured array.\n\n"
         "camera: a URI, or a list of them. path: a CSV file with the columns t,x,y,z, or an array\n"
-        "(n, 4), s and m, world; or `press`, a pixel (u, v) of the first frame to be pressed, and\n"
+        "(n, 4), s and m, world; or `press`, a pixel (u, v) to be pressed, led by the newest "
+        "frame, and\n"
         "`slide_to`, another one to be stroked to. method: a name or an object of a class derived\n"
         "from palpate.Method. Further keywords are parameters.");
   m.def(

@@ -14,23 +14,20 @@ Exits 1 if a session cannot be read or lost more than 1 s.
 """
 import pathlib
 import random
-import sqlite3
 import subprocess
 import sys
 import tempfile
 import time
 
+import mcap_messages
+
 MOST_LOST = 1.0  # [s] half a second, the commit itself and a machine with other work
-TICKS = "SELECT max(timestamp) FROM messages JOIN topics ON topic_id = topics.id WHERE name = ?"
 
 
 def kept_until(folder):
     """[s since 1970] the last tick in a recording; none if there is none."""
-    times = []
-    for file in folder.glob("*.db3"):
-        with sqlite3.connect(file) as bag:
-            times += [bag.execute(TICKS, ("/palpate/tick",)).fetchone()[0]]
-    times = [t for t in times if t is not None]
+    times = [message[2] for file in folder.glob("*.mcap")
+             for message in mcap_messages.messages(file) if message[0] == "/palpate/tick"]
     return 1e-9 * max(times) if times else None
 
 
@@ -40,7 +37,7 @@ def kill_one(program, folder, seconds):
         [program, "run", "--no-browser", "--port", "0", "--device", "hand:", "--record", folder],
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     end = time.time() + 60.0
-    while time.time() < end and session.poll() is None and not list(folder.glob("*.db3")):
+    while time.time() < end and session.poll() is None and not list(folder.glob("*.mcap")):
         time.sleep(0.01)
     time.sleep(seconds)
     if session.poll() is not None:

@@ -25,7 +25,6 @@ import pathlib
 import random
 import select
 import signal
-import sqlite3
 import statistics
 import struct
 import subprocess
@@ -33,6 +32,8 @@ import sys
 import tempfile
 import threading
 import time
+
+import mcap_messages
 
 TUNSETIFF, TAP_WITHOUT_HEADER = 0x400454CA, 0x0002 | 0x1000
 # Of the namespaces and the devices in them, which may have 15 letters
@@ -130,16 +131,14 @@ def remove_namespaces():
 def ticks_of(folder):
     """The numbers named here of each tick of a recording."""
     wanted = ("t", "hip_z", "force_z", "frame_age", "frame_number", "safety")
-    with sqlite3.connect(next(folder.glob("*.db3"))) as bag:
-        messages = "SELECT data FROM messages JOIN topics ON topic_id = topics.id WHERE name = ?"
-        session = bag.execute(messages, ("/palpate/session",)).fetchone()[0]
-        names = session.decode(errors="replace").split('"tick_columns":[')[1].split("]")[0]
-        names = [name.strip('"') for name in names.split(",")]
-        places = [names.index(name) for name in wanted]
-        ticks = []
-        for (data,) in bag.execute(messages + " ORDER BY messages.id", ("/palpate/tick",)):
-            numbers = struct.unpack(f"<{len(names)}d", data[-8 * len(names):])
-            ticks.append([numbers[place] for place in places])
+    names, ticks = [], []
+    for topic, _, _, data, _ in mcap_messages.messages(next(folder.glob("*.mcap"))):
+        if topic == "/palpate/session":
+            names = data.decode(errors="replace").split('"tick_columns":[')[1].split("]")[0]
+            names = [name.strip('"') for name in names.split(",")]
+        elif topic == "/palpate/tick":
+            numbers = dict(zip(names, struct.unpack(f"<{len(names)}d", data[-8 * len(names):])))
+            ticks.append([numbers[name] for name in wanted])
     return ticks
 
 
@@ -180,7 +179,7 @@ def measure(options, program, again=5):
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
             if options.down:
                 down_at, seconds = (float(value) for value in options.down.split(":"))
-                while hand.poll() is None and not list(folder.glob("session/*.db3")):
+                while hand.poll() is None and not list(folder.glob("session/*.mcap")):
                     time.sleep(0.01)
                 link.go_down(time.monotonic() + down_at, seconds)
             _, said = hand.communicate()

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
@@ -99,11 +100,11 @@ struct Row {
   std::vector<SearchCosts> search;
 };
 
-const SearchCosts& search_named(const Row& row, const std::string& name) {
+const SearchCosts& search_named(const Row& row, std::string_view name) {
   for (const SearchCosts& costs : row.search) {
     if (costs.name == name) return costs;
   }
-  throw std::logic_error("no search is called " + name);
+  throw std::logic_error("no search is called " + std::string(name));
 }
 
 bench::MethodChoice choice_of(const BenchOptions& options) {

@@ -16,8 +16,8 @@
 namespace palpate::lab {
 namespace {
 
-constexpr int usual_cases = 50;   // of each family
-constexpr int block = 50;         // cases a row
+constexpr int usual_cases = 50;  // of each family
+constexpr int cases_a_row = 50;
 constexpr double patience = 0.5;  // [s] behind for longer than this is lost
 constexpr double noticed =
     0.3;  // [N] largest change of force by an occluder that counts as unnoticed
@@ -249,10 +249,10 @@ std::vector<Cell> pop_cells(const Experiment& experiment, const ExperimentOption
   const std::vector<const PopFamily*> families = families_of(options);
   for (const std::string& name : methods_of(experiment, options)) {
     for (const PopFamily* family : families) {
-      for (int from = 0; from < cases; from += block) {
+      for (int from = 0; from < cases; from += cases_a_row) {
         cells.emplace_back([=] {
           return row_of(
-              name, *family, from, std::min(block, cases - from),
+              name, *family, from, std::min(cases_a_row, cases - from),
               [&](int i) {
                 return with_fixed(
                     draw_pop_case(*family, options.seed, static_cast<std::uint64_t>(i)),

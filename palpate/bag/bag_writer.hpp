@@ -1,31 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
+#include <limits>
+#include <map>
+#include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
-
-#include "palpate/bag/checksum.hpp"
-#include "palpate/bag/database.hpp"
 
 namespace palpate {
 
 /// Writes a bag as ROS 2's rosbag2 does: a folder with metadata.yaml (version 7) and one file of
-/// SQLite (schema 4). Beside what rosbag2 knows, each commit writes the checksums of its messages.
+/// MCAP, in chunks that are compressed with zstd and have checksums. Images and points are in
+/// chunks of their own, so that nobody has to unpack them for what lies between.
 ///
-/// What was committed stays readable whatever happens to the program: SQLite keeps it in the
-/// write-ahead log beside the file until the bag is closed. Used on one thread.
+/// What was committed stays readable whatever happens to the program: the file only grows, by whole
+/// chunks. Used on one thread.
 class BagWriter {
  public:
-  /// @param folder     of the bag; must not be there yet
-  /// @param max_bytes  of the file, for disks that are not ours alone; none: what the disk has
+  /// @param folder  of the bag; must not be there yet
   /// @throws Error if it is there, or cannot be made.
-  explicit BagWriter(const std::filesystem::path& folder,
-                     std::optional<std::uint64_t> max_bytes = std::nullopt);
+  explicit BagWriter(const std::filesystem::path& folder);
   /// Closes; what goes wrong then is not told.
   ~BagWriter();
   BagWriter(const BagWriter&) = delete;
@@ -40,34 +40,58 @@ class BagWriter {
   /// @throws Error if the disk is full or fails. What was committed before stays; nothing more can
   ///         be written.
   void write(std::size_t topic, std::int64_t nanoseconds, std::span<const std::byte> message);
-  /// Makes what was written so far last, and metadata.yaml say how much that is. Throws as `write`.
+  /// Makes what was written so far last, the images before the rest, and metadata.yaml say how much
+  /// that is. Throws as `write`.
   void commit();
-  /// Commits and folds the log into the file. Throws as `write`.
+  /// Commits and ends the file with its index. Throws as `write`.
   void close();
 
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   [[nodiscard]] std::uint64_t messages() const { return messages_; }
+  [[nodiscard]] std::uint64_t bytes() const { return size_; }  ///< of the file so far
 
  private:
+  using Bytes = std::vector<std::byte>;
   struct Topic {
     std::string name, type, profile;
+    bool is_bulk;  // images and points
     std::uint64_t messages = 0;
   };
+  struct Times {  // [ns]
+    std::int64_t first = std::numeric_limits<std::int64_t>::max(), last = 0;
+    void add(std::int64_t nanoseconds);
+  };
+  struct Chunk {
+    Bytes records;
+    Times times;
+    std::map<std::uint16_t, Bytes> places;  // of each topic's messages in it: time and offset
+  };
+  struct File {
+    explicit File(std::filesystem::path where);
+    ~File();
+    File(const File&) = delete;
+    File& operator=(const File&) = delete;
+    std::filesystem::path path;
+    int descriptor;
+  };
 
-  void write_checksums(bool closed);
+  void end_chunks();
+  void end_chunk(Chunk& chunk);
+  void append(std::span<const std::byte> bytes);
   [[nodiscard]] std::string metadata() const;
   void write_metadata() const;
 
   std::filesystem::path folder_;
-  std::string file_;
+  std::string name_;  // of the file
+  std::unique_ptr<File> file_;
   std::vector<Topic> topics_;
-  std::uint64_t messages_ = 0;
-  std::int64_t first_ = 0, last_ = 0;  // [ns]
-  ChecksumBlock checksums_;            // of what was written since the last commit
-  std::uint32_t chain_ = 0;
+  std::array<Chunk, 2> chunks_;  // of images and points, and of all else
+  Bytes definitions_, fresh_;    // of the topics; of these, what is not in the file yet
+  Bytes chunk_indexes_;
+  std::uint64_t messages_ = 0, size_ = 0;
+  std::uint32_t chunk_count_ = 0, crc_ = 0;  // of all bytes of the file
+  Times times_;
   bool open_ = true;
-  std::optional<Database> database_;
-  std::optional<Statement> insert_;
 };
 
 }  // namespace palpate

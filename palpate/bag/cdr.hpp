@@ -89,7 +89,7 @@ class CdrReader {
     align(sizeof(T));
     const std::span<const std::byte> bytes = take(sizeof(T));
     std::array<std::byte, sizeof(T)> ordered{};
-    std::copy(bytes.begin(), bytes.end(), ordered.begin());
+    std::memcpy(ordered.data(), bytes.data(), sizeof(T));
     if (swapped_) std::reverse(ordered.begin(), ordered.end());
     return std::bit_cast<T>(ordered);
   }

@@ -58,21 +58,6 @@ std::uint32_t chained(std::uint32_t before, const ChecksumBlock& block) {
   return add(crc, words.data(), words.size());
 }
 
-std::uint32_t append(Database& database, std::uint32_t before, const ChecksumBlock& block) {
-  const std::string table(checksum_table);
-  database.run("CREATE TABLE IF NOT EXISTS " + table +
-               "(id INTEGER PRIMARY KEY,first INTEGER NOT NULL,closed INTEGER NOT NULL,"
-               "crc32 BLOB NOT NULL,chain INTEGER NOT NULL)");
-  const std::uint32_t chain = chained(before, block);
-  Statement insert(database, "INSERT INTO " + table + "(first,closed,crc32,chain) VALUES(?,?,?,?)");
-  insert.bind(0, block.first);
-  insert.bind(1, std::int64_t{block.closed});
-  insert.bind(2, bytes_of(block.messages));
-  insert.bind(3, std::int64_t{chain});
-  insert.run();
-  return chain;
-}
-
 const std::uint32_t* Checksums::find(std::int64_t id) const {
   auto block = std::upper_bound(
       blocks.begin(), blocks.end(), id,

@@ -22,8 +22,8 @@ std::uint32_t checksum_of(std::string_view topic, std::string_view type, std::in
 /// @param before  of the parts before, 0 for the first
 std::uint32_t crc32_on(std::uint32_t before, std::span<const std::byte> bytes);
 
-/// The checksums of the messages that one commit made final: a row of the table `checksum_table`,
-/// beside those of rosbag2, which does not look at it.
+/// The checksums of the messages that one commit made final: a row of the table `checksum_table`
+/// beside those of rosbag2, in palpate's recordings of before they were MCAP.
 struct ChecksumBlock {
   std::int64_t first = 1;                 ///< id of the first message; the others follow it
   std::vector<std::uint32_t> messages{};  ///< of each message, in the order of their ids
@@ -34,10 +34,6 @@ constexpr std::string_view checksum_table = "palpate_checksums";
 /// Of a block and all before it: what the row keeps beside the block.
 /// @param before  the value of the block before, 0 for the first one
 std::uint32_t chained(std::uint32_t before, const ChecksumBlock& block);
-
-/// Appends a block to a database; makes the table where it is missing. @throws Error
-/// @param before  as for `chained`  @return the same for the next block
-std::uint32_t append(Database& database, std::uint32_t before, const ChecksumBlock& block);
 
 /// The blocks of a database.
 struct Checksums {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// The format is described at https://mcap.dev/spec.
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -14,33 +13,17 @@
 #include "palpate/bag/bag_file.hpp"
 #include "palpate/bag/checksum.hpp"
 #include "palpate/bag/compression.hpp"
+#include "palpate/bag/mcap_format.hpp"
 #include "palpate/bag/random_access.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate {
 namespace {
 
-constexpr std::string_view mcap_magic = "\x89MCAP0\r\n";  // at both ends of a file
-constexpr std::size_t record_head = 9;                    // [bytes] kind and length
-constexpr std::size_t footer_content = 20;                // [bytes]
-constexpr std::size_t message_head = 22;                  // [bytes] channel, sequence, two times
+constexpr std::size_t footer_content = 20;           // [bytes]
 constexpr std::uint64_t largest_record = 1U << 28U;  // [bytes] in memory, when decompressed, too
 constexpr std::size_t most_mcap_messages = std::size_t{1} << 25U;
 constexpr const char* mcap_remedy = "copy it again, or keep what is whole with mcap recover";
-
-enum class RecordKind : std::uint8_t {
-  none = 0,
-  footer = 2,
-  schema = 3,
-  channel = 4,
-  message = 5,
-  chunk = 6,
-  message_index = 7,
-  chunk_index = 8,
-  attachment = 9,
-  statistics = 11,
-  data_end = 15,
-};
 
 class McapFile final : public BagFile {
  public:

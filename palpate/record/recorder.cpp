@@ -14,11 +14,6 @@ namespace {
 
 constexpr std::chrono::milliseconds interval{20};  // between looks at the ring, which holds seconds
 
-unsigned packers_of(const RecorderOptions& options) {
-  if (options.packers > 0) return options.packers;
-  return std::clamp(std::thread::hardware_concurrency() / 2, 1U, 4U);
-}
-
 }  // namespace
 
 Recorder::Recorder(const std::filesystem::path& folder, const SessionInfo& info,
@@ -26,11 +21,11 @@ Recorder::Recorder(const std::filesystem::path& folder, const SessionInfo& info,
                    const RecorderOptions& options)
     : options_(options), cycle_(cycle), renew_(std::move(renew)), begun_(!renew_), info_(info) {
   info_.frames_in_parent = !options_.with_frames;
-  writer_.emplace(folder, info_, monotonic_now(), std::nullopt, options.commit_interval);
+  writer_.emplace(folder, info_, monotonic_now(), options.commit_interval);
   status_.folder = writer_->folder();
   threads_.emplace_back([this] { collect(); });
   threads_.emplace_back([this] { write(); });
-  for (unsigned i = 0; i < packers_of(options_); ++i) threads_.emplace_back([this] { pack(); });
+  threads_.emplace_back([this] { pack(); });
 }
 
 Recorder::~Recorder() {
@@ -44,7 +39,7 @@ void Recorder::request_stop() {
   stopping_ = true;
   status_.closing = !status_.done;
   wake_collector_.notify_all();
-  wake_packers_.notify_all();
+  wake_packer_.notify_all();
   wake_writer_.notify_all();
   progress_.notify_all();
 }
@@ -108,7 +103,7 @@ void Recorder::frame(std::uint64_t number, double stamp,
   frame->ready = frame->fresh.empty();
   if (!frame->ready) {
     to_pack_.push_back(frame);
-    wake_packers_.notify_one();
+    wake_packer_.notify_one();
   }
   entries_.emplace_back(std::move(frame));
   ++entries_handed_;
@@ -142,7 +137,7 @@ void Recorder::fail(const std::string& trouble) {
   collected_.clear();
   adopted_.clear();
   wake_collector_.notify_all();
-  wake_packers_.notify_all();
+  wake_packer_.notify_all();
   wake_writer_.notify_all();
 }
 
@@ -238,20 +233,15 @@ void Recorder::pack() {
   guarded([this] {
     for (;;) {
       std::shared_ptr<PutFrame> frame;
-      PngPacking packing = PngPacking::fast;
       {
         std::unique_lock lock(mutex_);
-        wake_packers_.wait(lock, [this] { return stopping_ || !to_pack_.empty(); });
+        wake_packer_.wait(lock, [this] { return stopping_ || !to_pack_.empty(); });
         if (to_pack_.empty()) return;
         frame = std::move(to_pack_.front());
         to_pack_.pop_front();
-        if (entries_.size() > options_.compress_below) {
-          packing = PngPacking::stored;
-          ++status_.stored_frames;
-        }
       }
       PackedClouds packed;
-      for (const auto& cloud : frame->fresh) packed[cloud.get()] = packed_image(*cloud, packing);
+      for (const auto& cloud : frame->fresh) packed[cloud.get()] = packed_image(*cloud);
       const std::lock_guard lock(mutex_);
       frame->packed = std::move(packed);
       frame->ready = true;
@@ -297,12 +287,14 @@ void Recorder::write() {
       const bool committed = flush || writer_->commit_if_due();
       const std::lock_guard lock(mutex_);
       if (committed) status_.committed_ticks = writer_->ticks();
+      status_.bytes = writer_->bytes();
       if (flush) flushes_done_ = flushes;
       progress_.notify_all();
     }
     writer_->close();
     const std::lock_guard lock(mutex_);
     status_.committed_ticks = writer_->ticks();
+    status_.bytes = writer_->bytes();
   });
   writer_.reset();  // here, as closing waits for the disk even after trouble
   const std::lock_guard lock(mutex_);

@@ -21,11 +21,7 @@ namespace palpate {
 
 /// How a Recorder shares out its work. The defaults suit a disk of 50 MB/s.
 struct RecorderOptions {
-  double commit_interval = 0.5;  ///< [s] on the machine's clock: how much a crash can cost
-  unsigned packers = 0;          ///< threads that compress images; 0: half of the cores, 1 to 4
-  /// Frames waiting up to which images are compressed. With more they are stored as they are, which
-  /// takes a tenth of the time and three times the space.
-  std::size_t compress_below = 8;
+  double commit_interval = 0.5;     ///< [s] on the machine's clock: how much a crash can cost
   std::size_t most_frames = 150;    ///< waiting; the next is left out, and counted. 90 MB at VGA
   std::size_t most_ticks = 60'000;  ///< waiting; the next are lost, and counted. 20 MB
   /// False: another recording of the session has the frames; see SessionInfo::frames_in_parent.
@@ -35,10 +31,10 @@ struct RecorderOptions {
 /// Records a live session on threads of its own: ticks from the servo's ring, frames and settings
 /// from whoever hands them to the loop. None of these waits for a compressor or the disk.
 ///
-/// One thread empties the ring, some compress images, one writes. A tick is written after the frame
-/// and the settings that it used, so that whatever is committed can be replayed to its end; a
-/// commit is made twice a second, however much is waiting. Where the machine cannot keep up, images
-/// are stored uncompressed, then frames are left out, then ticks are lost, and each is counted.
+/// One thread empties the ring, one packs images, one compresses all and writes. A tick is written
+/// after the frame and the settings that it used, so that whatever is committed can be replayed to
+/// its end; a commit is made twice a second, however much is waiting. Where the machine cannot keep
+/// up, frames are left out, then ticks are lost, and each is counted.
 class Recorder {
  public:
   struct Status {
@@ -49,7 +45,7 @@ class Recorder {
     std::uint64_t ticks = 0, frames = 0;  ///< written
     std::uint64_t committed_ticks = 0;    ///< of these, safe from a crash of the program
     std::uint64_t ticks_waiting = 0, frames_waiting = 0;
-    std::uint64_t stored_frames = 0;  ///< with images that were not compressed, for want of time
+    std::uint64_t bytes = 0;  ///< of the bag's file so far
     std::uint64_t lost_ticks = 0, lost_frames = 0;
   };
 
@@ -98,7 +94,7 @@ class Recorder {
     std::uint64_t number;
     double stamp;
     std::vector<std::shared_ptr<const Cloud>> cameras;
-    std::vector<std::shared_ptr<const Cloud>> fresh;  // of these, the images to compress
+    std::vector<std::shared_ptr<const Cloud>> fresh;  // of these, the images to pack
     bool left_out = false;
     PackedClouds packed{};
     bool ready = false;  // guarded by mutex_, as are packed and fresh until it is set
@@ -110,7 +106,7 @@ class Recorder {
   using Entry = std::variant<std::shared_ptr<PutFrame>, SetSettings>;
 
   void collect();  // the thread that empties the ring
-  void pack();     // each thread that compresses
+  void pack();     // the thread that packs images
   void write();    // the thread that writes the bag
   void collect_ticks();
   void begin(const ServoTick& first);
@@ -141,7 +137,7 @@ class Recorder {
   std::uint64_t entries_written_ = 0;
 
   mutable std::mutex mutex_;
-  std::condition_variable wake_collector_, wake_packers_, wake_writer_, progress_;
+  std::condition_variable wake_collector_, wake_packer_, wake_writer_, progress_;
   // All below are guarded by mutex_.
   std::deque<Entry> entries_;                         // to be written, in this order
   std::deque<std::shared_ptr<PutFrame>> to_pack_;     // of these, what no thread has taken yet

@@ -9,6 +9,8 @@
 #include "palpate/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/bag_camera.hpp"
+#include "palpate/sources/depth_png.hpp"
+#include "palpate/sources/depth_rvl.hpp"
 #include "palpate/sources/material_file.hpp"
 #include "palpate/sources/ros_frames.hpp"
 #include "palpate/sources/transforms.hpp"
@@ -22,12 +24,11 @@ std::array<double, 3> array_of(const Vec3& v) {
 
 }  // namespace
 
-PackedImage packed_image(const Cloud& image, PngPacking packing) {
+PackedImage packed_image(const Cloud& image) {
   const auto* depth = dynamic_cast<const DepthImage*>(&image);
   if (depth == nullptr) throw Error("cloud", "is not a depth image", "pack depth images alone");
   const Intrinsics& k = depth->intrinsics();
-  PackedImage packed{.depth = encode_depth_png(k.width, k.height, depth->depth(), packing),
-                     .materials = {}};
+  PackedImage packed{.depth = encode_depth_rvl(k.width, k.height, depth->depth()), .materials = {}};
   const MaterialMap* map = depth->materials().get();
   if (map == nullptr && !depth->has_brightness()) return packed;
   std::vector<std::uint16_t> pixels(depth->depth().size());
@@ -45,13 +46,13 @@ PackedImage packed_image(const Cloud& image, PngPacking packing) {
       pixels[i] = static_cast<std::uint16_t>(label | bright << 8U);
     }
   }
-  packed.materials = encode_depth_png(k.width, k.height, pixels, packing);
+  packed.materials = encode_depth_png(k.width, k.height, pixels);
   return packed;
 }
 
 SessionWriter::SessionWriter(const std::filesystem::path& folder, const SessionInfo& info, double t,
-                             std::optional<std::uint64_t> max_bytes, double commit_interval)
-    : epoch_(info.epoch), bag_(folder, max_bytes), commit_interval_(commit_interval) {
+                             double commit_interval)
+    : epoch_(info.epoch), bag_(folder), commit_interval_(commit_interval) {
   this->info(info, t);
   commit();
 }
@@ -146,7 +147,7 @@ void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& im
   const ros::Header header{ros::Time::at(at), topics.optical_frame};
 
   const ros::CompressedImage packed =
-      compressed_depth(header, packed_image.depth, image.units_per_metre(), DepthPacking::png);
+      compressed_depth(header, packed_image.depth, image.units_per_metre(), DepthPacking::rvl);
 
   ros::Float64MultiArray exact{.label = "stamp,units_per_metre,world_from_camera",
                                .data = {stamp, image.units_per_metre()}};

@@ -33,6 +33,9 @@ class FeedClock {
 /// This machine's clocks.
 std::shared_ptr<FeedClock> machine_clock();
 
+/// [s] at which a picture that stays valid is shown again: 30 Hz, as a camera would.
+inline constexpr double still_interval = 1.0 / 30.0;
+
 /// When a camera is given up, looked for again and shown. Times in seconds.
 struct FeedOptions {
   double silence = 2.0;        ///< [s] without a frame after which a live camera is opened again
@@ -40,7 +43,7 @@ struct FeedOptions {
   double first_pause = 0.1;    ///< [s] before it is opened again; doubles with each failure
   double longest_pause = 5.0;  ///< [s] at most
   double waiting = 0.25;       ///< [s] without a frame after which its state says so
-  double still_interval = 1.0 / 30.0;  ///< [s] at which a recording of one frame is shown again
+  double still_interval = palpate::still_interval;  ///< [s] at which a still picture is shown again
   double longest_gap = 10.0;  ///< [s] between frames of a recording beyond which it is cut short
   double longest_lag = 1.0;   ///< [s] behind its stamps, beyond which a recording is slowed down
   int frozen_frames = 10;     ///< identical depth images in a row that make a live camera frozen

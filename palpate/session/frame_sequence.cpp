@@ -1,26 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/session/frame_sequence.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/session/camera_feed.hpp"
 
 namespace palpate {
 
-FrameSequence::FrameSequence(const std::vector<std::string>& uris) {
-  if (uris.empty())
-    throw Error("--camera", "no camera is given", "give one, such as --camera synthetic:desk");
+namespace {
+
+std::vector<std::unique_ptr<Source>> opened(const std::vector<std::string>& uris) {
+  std::vector<std::unique_ptr<Source>> sources;
   if (uris.size() > Patch::max_views)
     throw Error("--camera", std::to_string(uris.size()) + " cameras are too many",
                 "give at most " + std::to_string(Patch::max_views));
-  for (const std::string& uri : uris) {
+  for (const std::string& uri : uris) sources.push_back(open_source(uri, all_sources()));
+  return sources;
+}
+
+}  // namespace
+
+FrameSequence::FrameSequence(const std::vector<std::string>& uris) : FrameSequence(opened(uris)) {}
+
+FrameSequence::FrameSequence(std::vector<std::unique_ptr<Source>> sources) {
+  if (sources.empty())
+    throw Error("--camera", "no camera is given", "give one, such as --camera synthetic:desk");
+  for (std::unique_ptr<Source>& source : sources) {
     Camera camera;
-    camera.source = open_source(uri, all_sources());
+    camera.source = std::move(source);
     camera.next = camera.source->next();
-    if (!camera.next) throw Error(uri, "it has no frames", "give a source with at least one");
+    if (!camera.next)
+      throw Error(camera.source->info().uri, "it has no frames", "give a source with at least one");
     camera.first_stamp = camera.next->stamp;
     cameras_.push_back(std::move(camera));
   }
@@ -34,7 +49,7 @@ void FrameSequence::adopt_until(double t, const std::function<void(const Cloud&,
       if (!camera.next || camera.next->stamp > t) continue;
       if (due == nullptr || camera.next->stamp < due->next->stamp) due = &camera;
     }
-    if (due == nullptr) return;
+    if (due == nullptr) break;
     due->newest = std::move(*due->next);
     due->next = due->source->next();
 
@@ -49,7 +64,15 @@ void FrameSequence::adopt_until(double t, const std::function<void(const Cloud&,
     newest_[static_cast<std::size_t>(due - cameras_.data())] = due->newest.cloud;
     ++due->adopted;
     ++adopted_;
+    shown_ = due->newest.stamp;
   }
+  // A live camera that ends has failed: what it saw last stays as old as it is.
+  const bool is_valid = std::all_of(cameras_.begin(), cameras_.end(), [](const Camera& camera) {
+    return !camera.next && !camera.source->info().live;
+  });
+  if (!is_valid || adopted_ < 2 || shown_ + still_interval > t) return;
+  shown_ += still_interval * std::floor((t - shown_) / still_interval);
+  adopt(*in_use_, shown_);
 }
 
 std::vector<ShownFrames> FrameSequence::shown() const {
@@ -72,24 +95,42 @@ void FrameSequence::check(const Method& method) const {
   for (const Camera& camera : cameras_) method.check(*camera.next->cloud);
 }
 
-std::int64_t ticks_along(const HipPath& path, double rate) {
+namespace {
+
+void check_rate(double rate) {
   if (!(rate >= 1.0 && rate <= 100000.0))
     throw Error("rate", std::to_string(rate) + " Hz is not a tick rate", "give 1 to 100000");
+}
+
+}  // namespace
+
+std::int64_t ticks_along(const HipPath& path, double rate) {
+  check_rate(rate);
   // A path of whole milliseconds has its last tick at its last time, whatever the rounding.
   const double duration = path.last_time() - path.first_time();
   return static_cast<std::int64_t>(std::floor(duration * rate + 1e-6)) + 1;
 }
 
+void touch(FrameSequence& frames, Method& method, const HipPath::Sample& first, double rate,
+           const std::function<std::optional<Vec3>(double)>& hand,
+           const std::function<bool(const Tick&)>& on_tick) {
+  check_rate(rate);
+  frames.check(method);
+  method.seat(first.hip);
+  for (std::int64_t i = 0;; ++i) {
+    const double t = first.t + static_cast<double>(i) / rate;
+    frames.adopt_until(t, [&](const Cloud& cloud, double stamp) { method.frame(cloud, stamp); });
+    const std::optional<Vec3> hip = hand(t);
+    if (!hip || !on_tick(method.tick(*hip, t))) return;
+  }
+}
+
 void touch_along(FrameSequence& frames, Method& method, const HipPath& path, double rate,
                  const std::function<bool(const Tick&)>& on_tick) {
-  const std::int64_t ticks = ticks_along(path, rate);
-  frames.check(method);
-  method.seat(path.at(path.first_time()));
-  for (std::int64_t i = 0; i < ticks; ++i) {
-    const double t = path.first_time() + static_cast<double>(i) / rate;
-    frames.adopt_until(t, [&](const Cloud& cloud, double stamp) { method.frame(cloud, stamp); });
-    if (!on_tick(method.tick(path.at(t), t))) return;
-  }
+  std::int64_t left = ticks_along(path, rate);
+  touch(
+      frames, method, path.samples().front(), rate,
+      [&](double t) { return left-- > 0 ? std::optional(path.at(t)) : std::nullopt; }, on_tick);
 }
 
 }  // namespace palpate

@@ -25,19 +25,24 @@ struct ShownFrames {
 
 /// Frames of one or several cameras in the order of their stamps, each adopted at the first tick at
 /// or after it. Several cameras are touched at once: each new frame replaces its camera's last.
+///
+/// When all have ended, what they saw last is valid: it is shown again at 30 Hz, with the stamps of
+/// then. A single frame is not, as methods take it for a picture anyway.
 class FrameSequence {
  public:
   /// @throws Error if a source cannot be opened, or there are none.
   explicit FrameSequence(const std::vector<std::string>& uris);
+  /// Of sources that are open. @throws Error as above.
+  explicit FrameSequence(std::vector<std::unique_ptr<Source>> sources);
 
-  /// Hands every frame stamped at or before `t` [s], and its stamp, to `adopt`, oldest first. A
-  /// frame lives until the next has been handed over.
+  /// Hands every frame stamped at or before `t` [s], and its stamp, to `adopt`, oldest first; after
+  /// the last, that one again. A frame lives until the next has been handed over.
   /// @throws Error if a frame cannot be read.
   void adopt_until(double t, const std::function<void(const Cloud&, double)>& adopt);
 
   /// @throws Error if the method cannot touch what a camera shows first.
   void check(const Method& method) const;
-  /// Frames handed over so far.
+  /// Frames handed over so far, each once.
   [[nodiscard]] std::size_t adopted() const { return adopted_; }
   /// The same of each camera.
   [[nodiscard]] std::vector<ShownFrames> shown() const;
@@ -68,7 +73,17 @@ class FrameSequence {
   std::vector<std::shared_ptr<const Cloud>> newest_;
   std::shared_ptr<const Cloud> in_use_;
   std::size_t adopted_ = 0;
+  double shown_ = 0.0;  // [s] stamp handed over last
 };
+
+/// Moves a hand through what the cameras saw, tick by tick, from `first` on, where the proxy
+/// starts.
+/// @param hand  where it is at a time [s], asked for once a tick after that tick's frames; none:
+///              the end
+/// Else as touch_along.
+void touch(FrameSequence& frames, Method& method, const HipPath::Sample& first, double rate,
+           const std::function<std::optional<Vec3>(double)>& hand,
+           const std::function<bool(const Tick&)>& on_tick);
 
 /// How many ticks `touch_along` makes.
 /// @throws Error if `rate` is not in 1 to 100 000 Hz.

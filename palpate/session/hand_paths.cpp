@@ -9,7 +9,7 @@
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/session/press_path.hpp"
+#include "palpate/session/press.hpp"
 
 namespace palpate {
 HipPath stroke_path(const DepthImage& image, double duration, double press) {

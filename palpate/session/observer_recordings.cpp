@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/session/observer_recordings.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -36,15 +37,6 @@ double size_of(const std::filesystem::path& folder) {
     if (!gone) size += static_cast<double>(bytes);
   }
   return size;
-}
-
-std::string size_text(double bytes) {
-  const auto [unit, name] = bytes >= 1e9   ? std::pair(1e9, "GB")
-                            : bytes >= 1e6 ? std::pair(1e6, "MB")
-                                           : std::pair(1e3, "kB");
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.4g %s", bytes / unit, name);
-  return text.data();
 }
 
 }  // namespace
@@ -116,8 +108,14 @@ void ObserverRecordings::watch() {
   }
 }
 
-std::string ObserverRecordings::reason_to_end() const {
-  if (recorded() >= rules_.limit)
+std::optional<double> ObserverRecordings::room() const {
+  const std::lock_guard lock(mutex_);
+  return room_;
+}
+
+std::string ObserverRecordings::reason_to_end() {
+  const double left = rules_.limit - recorded();
+  if (left <= 0.0)
     return "the recordings of this session have reached " + size_text(rules_.limit) +
            " (--record-limit)";
   std::error_code error;
@@ -125,6 +123,8 @@ std::string ObserverRecordings::reason_to_end() const {
       std::filesystem::space(rules_.folder.empty() ? "." : rules_.folder, error);
   if (!error && static_cast<double>(space.available) < rules_.keep_free)
     return "less than " + size_text(rules_.keep_free) + " is free on the disk";
+  const std::lock_guard lock(mutex_);
+  room_ = error ? left : std::min(left, static_cast<double>(space.available) - rules_.keep_free);
   return {};
 }
 

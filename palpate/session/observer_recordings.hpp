@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -38,11 +39,13 @@ class ObserverRecordings {
   void stop();
   /// Why the last one was ended by its limits; empty if it was not. Any thread.
   [[nodiscard]] std::string ended() const;
+  /// [bytes] until a limit ends one, as of the last look; none before the first. Any thread.
+  [[nodiscard]] std::optional<double> room() const;
 
  private:
   void watch();
-  [[nodiscard]] std::string reason_to_end() const;  // empty: none
-  [[nodiscard]] double recorded() const;            // [bytes]
+  std::string reason_to_end();            // empty: none
+  [[nodiscard]] double recorded() const;  // [bytes]
 
   Session& session_;
   const RecordingRules rules_;
@@ -50,6 +53,7 @@ class ObserverRecordings {
   std::condition_variable wakes_;
   std::vector<std::filesystem::path> folders_;  // guarded by mutex_: of all that were begun
   std::string ended_;                           // guarded by mutex_
+  std::optional<double> room_;                  // guarded by mutex_
   bool watching_ = false;                       // guarded by mutex_
   bool ends_ = false;                           // guarded by mutex_
   std::thread thread_;

@@ -83,7 +83,6 @@ void PlayedSource::read_next() {
 std::optional<FedFrame> PlayedSource::next_until(double t) {
   begin();
   if (is_still_) {
-    constexpr double still_interval = 1.0 / 30.0;  // [s]
     if (last_ + still_interval > t) return std::nullopt;
     last_ += still_interval;
     Frame frame = still_;

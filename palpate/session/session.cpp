@@ -2,9 +2,11 @@
 #include "palpate/session/session.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <cstdio>
 #include <future>
 #include <limits>
 #include <mutex>
@@ -15,6 +17,7 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
+#include "palpate/cloud/proposed_view.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/sensor.hpp"
 #include "palpate/core/uri.hpp"
@@ -34,9 +37,9 @@ constexpr double shortest_loop = 2.0;         // [s] of a recording; others stay
 constexpr double press = 0.008;               // [m] of the built-in path
 constexpr auto housekeeping_interval = std::chrono::milliseconds(10);
 constexpr auto stop_poll_interval = std::chrono::milliseconds(5);
-constexpr double longest_watchdog = 0.5;              // [s] in which a hand reacts
-constexpr double camera_join_time = 0.5;              // [s] for a camera's thread to end
-constexpr std::int64_t ticks_between_flushes = 2000;  // of a free-running session's recording
+constexpr double longest_watchdog = 0.5;             // [s] in which a hand reacts
+constexpr double camera_join_time = 0.5;             // [s] for a camera's thread to end
+constexpr std::int64_t ticks_between_flushes = 500;  // of a free-running session's recording
 
 std::string seconds_text(double seconds) {
   return std::to_string(static_cast<int>(seconds)) + " s";
@@ -69,9 +72,13 @@ std::unique_ptr<Device> open_hand(const SessionOptions& options, const std::stri
   }
   std::optional<HipPath> path;
   const bool follows_path = uri.scheme() == "hand" || uri.scheme() == "script";
-  if (const auto* image = dynamic_cast<const DepthImage*>(&seen);
-      image != nullptr && follows_path && uri.path().empty()) {
-    path = stroke_path(*image, options.stroke_time, press);
+  if (follows_path && uri.path().empty()) {
+    const auto* points = dynamic_cast<const PointCloud*>(&seen);
+    if (const auto* image = dynamic_cast<const DepthImage*>(&seen))
+      path = stroke_path(*image, options.stroke_time, press);
+    else if (points != nullptr && points->size() > 0)
+      path = stroke_path(SeenPoints(proposed_view(*points), *points).image(), options.stroke_time,
+                         press);
   }
   return open_device(device_uri, path, options.devices);
 }
@@ -295,7 +302,13 @@ class Session::Impl {
     state.recording = recording_;
     state.recording.on = is_recording();
     state.recording.closing = !closing_.empty();
-    if (is_recording()) state.recording.folder = hands_.front()->recorder->status().folder.string();
+    if (is_recording()) {
+      state.recording.folder = hands_.front()->recorder->status().folder.string();
+      state.recording.seconds = now() - recording_since_;
+      state.recording.bytes = 0.0;
+      for (const auto& hand : hands_)
+        state.recording.bytes += static_cast<double>(hand->recorder->status().bytes);
+    }
     return state;
   }
 
@@ -668,7 +681,9 @@ class Session::Impl {
     }
     for (std::size_t i = 0; i < hands_.size(); ++i)
       opened[i].promise->set_value(hands_[i]->recorder.get());
+    recording_ = RecordingState();
     recording_.folder = folder;
+    recording_since_ = now();
   }
 
   [[nodiscard]] SessionInfo info_of(const SessionHand& hand) const {
@@ -697,7 +712,9 @@ class Session::Impl {
       for (const auto& hand : hands_) recording.push_back(std::move(hand->recorder));
     }
     for (const auto& recorder : recording) recorder->request_stop();
-    recording_.message = recording.front()->status().folder.string() + ": closing";
+    recording_.folder = recording.front()->status().folder.string();
+    recording_.message = recording_.folder + ": closing";
+    recording_.seconds = now() - recording_since_;
     closing_.push_back(std::move(recording));
   }
 
@@ -718,6 +735,8 @@ class Session::Impl {
     const auto counts = [](std::uint64_t ticks, std::uint64_t frames) {
       return std::to_string(ticks) + " ticks, " + std::to_string(frames) + " frames";
     };
+    recording_.bytes = 0.0;
+    for (const Recorder::Status& part : parts) recording_.bytes += static_cast<double>(part.bytes);
     for (const Recorder::Status& part : parts) {
       if (part.trouble.empty()) continue;
       recording_.failed = true;
@@ -736,7 +755,9 @@ class Session::Impl {
                            : "; " + part.folder.filename().string() + ": " +
                                  std::to_string(part.ticks) + " ticks";
     }
-    recording_.message = text;
+    std::array<char, 32> seconds{};
+    std::snprintf(seconds.data(), seconds.size(), "; %.1f s, ", recording_.seconds);
+    recording_.message = text + seconds.data() + size_text(recording_.bytes);
   }
 
   SessionOptions options_;
@@ -763,6 +784,7 @@ class Session::Impl {
   ServoSettings settings_;      // guarded by control_; the placement is the first hand's
   bool held_ = false;           // guarded by control_
   RecordingState recording_;    // guarded by control_
+  double recording_since_ = 0;  // [s] on the session's clock; guarded by control_
   // Of each hand, the first hand's first.
   using Recording = std::vector<std::unique_ptr<Recorder>>;
   std::vector<Recording> closing_;  // guarded by control_
@@ -841,6 +863,15 @@ void Session::hold(bool on) {
 
 void Session::reset_faults() noexcept {
   impl_->reset_faults();
+}
+
+std::string size_text(double bytes) {
+  const auto [unit, name] = bytes >= 1e9   ? std::pair(1e9, "GB")
+                            : bytes >= 1e6 ? std::pair(1e6, "MB")
+                                           : std::pair(1e3, "kB");
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g %s", bytes / unit, name);
+  return text.data();
 }
 
 void Session::start_recording(const std::string& folder) {

@@ -98,7 +98,12 @@ struct RecordingState {
   std::string message;   ///< about the last: how it went
   bool failed = false;   ///< one ended before its time or lost something
   bool closing = false;  ///< one that was stopped is still being written
+  double seconds = 0.0;  ///< of the one that is on, or else of the last
+  double bytes = 0.0;    ///< of the same, on the disk so far
 };
+
+/// A size in kB, MB or GB, as people read it.
+std::string size_text(double bytes);
 
 /// How a hand of a session does.
 struct SessionHandState {

@@ -49,17 +49,12 @@ struct ColourPng {
 /// @throws Error as read_depth_png, but for its kind.
 ColourPng read_colour_png(const std::filesystem::path& path);
 
-/// How a depth image is compressed; both are lossless.
-enum class PngPacking {
-  fast,   ///< for speed rather than size: about 6 ms for 640x480, to a third of its size
-  stored  ///< not at all: about 0.6 ms for 640x480
-};
-
-/// A 16-bit grey PNG in memory. Any thread.
+/// A 16-bit grey PNG in memory, packed for speed rather than size: some 6 ms for 640x480. Any
+/// thread.
 /// @param depth  row by row, width*height raw values
 /// @throws Error if the sizes do not match.
-std::vector<std::byte> encode_depth_png(int width, int height, std::span<const std::uint16_t> depth,
-                                        PngPacking packing = PngPacking::fast);
+std::vector<std::byte> encode_depth_png(int width, int height,
+                                        std::span<const std::uint16_t> depth);
 
 /// Writes a 16-bit grey PNG, packed for speed rather than size.
 /// @param depth  row by row, width*height raw values

@@ -7,6 +7,7 @@
 #include <system_error>
 #include <utility>
 
+#include "palpate/cloud/organised.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/sources/files.hpp"
@@ -15,6 +16,8 @@ namespace palpate {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t largest_image_side = 16384;  // [px] of a camera's image
 
 // For example "640x480 points, binary, x float32, y float32, z float32, _ uint8 x 4".
 std::string details_of(const PointFile& file) {
@@ -69,6 +72,18 @@ std::optional<Frame> PointFileSource::next(double /*timeout*/) {
     colour->width = static_cast<int>(file.width);
     colour->height = static_cast<int>(file.height);
     colour->rgb = std::move(file.colours);
+  }
+  if (is_image) {
+    // Files of one camera share what was fitted to the first of them.
+    std::shared_ptr<const DepthImage> image;
+    if (camera_) image = depth_image_of(file.points, *camera_);
+    if (!image) {
+      camera_ =
+          fit_camera(file.points, static_cast<int>(std::min(file.width, largest_image_side)),
+                     static_cast<int>(std::min(file.height, largest_image_side)), file.viewpoint);
+      if (camera_) image = depth_image_of(file.points, *camera_);
+    }
+    if (image) return Frame{stamp, std::move(image), std::move(colour)};
   }
   Surface surface{.points = std::move(file.points),
                   .normals = std::move(file.normals),

@@ -4,15 +4,17 @@
 #include <filesystem>
 #include <vector>
 
+#include "palpate/cloud/organised.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/sources/point_file.hpp"
 #include "palpate/sources/source.hpp"
 
 namespace palpate {
 
-/// PCD or PLY files as frames, each a PointCloud, with the faces and normals of a PLY and the image
-/// layout of an organised PCD beside its points; where one of these is there, so are the points'
-/// colours, as Frame::colour.
+/// PCD or PLY files as frames. An organised PCD whose points a pinhole camera could have seen is a
+/// DepthImage of that camera (fit_camera); all others are a PointCloud, with the faces and normals
+/// of a PLY and the image layout of an organised PCD beside its points. Where one of these is
+/// there, so are the points' colours, as Frame::colour.
 ///
 /// The files of a folder (.pcd or .ply, upper or lower case) come in natural order of their names;
 /// frame k is stamped k / fps, even if a file before it could not be read.
@@ -39,6 +41,7 @@ class PointFileSource final : public Source {
   Options options_;
   SourceInfo info_;
   std::size_t next_ = 0;
+  std::optional<GridCamera> camera_;  // of the organised frame read last
 };
 
 /// Opens `pcd:FILE|DIR` or `ply:FILE|DIR`, with `?fps=30`, `voxel=10mm` and `scale=1mm` (the

@@ -21,9 +21,12 @@ enum Kind : std::uint8_t { frame = 1, ticks = 2, rays = 3, path = 4, hand = 16, 
 // What a hand message says of the hand.
 enum Grip : std::uint8_t { let_go = 0, held = 1, let_go_towards = 2 };
 enum Format : std::uint8_t { depth = 0, depth_with_rays = 1, points = 2 };
+// Whose pixels colours are: nobody's, those of the depth or the points, another camera's.
+enum class Colours : std::uint8_t { none = 0, registered = 1, own_camera = 2 };
 
 constexpr std::size_t frame_header_size = 96;
-constexpr std::size_t ticks_header_size = 88;
+constexpr std::size_t colour_header_size = 72;
+constexpr std::size_t ticks_header_size = 112;
 constexpr std::size_t sample_size = 28;
 constexpr std::size_t hand_size = 32;
 constexpr std::size_t shown_size = 8;
@@ -54,21 +57,43 @@ Number read(std::span<const std::byte> message, std::size_t at) {
   return value;
 }
 
+Writer& put_pose(Writer& writer, const Eigen::Isometry3d& pose) {
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) writer.put_float(pose(row, column));
+  }
+  return writer;
+}
+
 ViewerMessage frame_message(const FrameHeader& header, Format format,
                             std::span<const std::byte> payload, std::shared_ptr<const void> owner,
                             std::uint32_t triangles = 0) {
   ViewerMessage message;
-  message.head.reserve(frame_header_size);
+  message.head.reserve(frame_header_size + colour_header_size);
   Writer writer(message.head);
-  writer.put(Kind::frame).put(header.camera).put(format).put(std::uint8_t{0});
+  const ColourImage* colour = header.colour.get();
+  const Colours colours = colour == nullptr ? Colours::none
+                          : colour->camera  ? Colours::own_camera
+                                            : Colours::registered;
+  if (colour != nullptr) {
+    const auto count =
+        static_cast<std::size_t>(colour->width) * static_cast<std::size_t>(colour->height);
+    if (colour->rgb.size() != 3 * count ||
+        (!colour->camera && count != std::size_t{header.width} * header.height))
+      throw Error("colour for the viewer", "its size is not that of its image");
+  }
+  writer.put(Kind::frame).put(header.camera).put(format).put(colours);
   writer.put(header.number).put(header.stamp).put(header.width).put(header.height);
   writer.put_float(header.fx).put_float(header.fy).put_float(header.cx).put_float(header.cy);
   writer.put_float(header.metres_per_unit);
-  const Eigen::Matrix4d pose = header.world_from_camera.matrix();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) writer.put_float(pose(row, column));
+  put_pose(writer, header.world_from_camera).put(triangles);
+  if (colours == Colours::own_camera) {
+    const Intrinsics& k = colour->camera->intrinsics;
+    writer.put(static_cast<std::uint32_t>(colour->width));
+    writer.put(static_cast<std::uint32_t>(colour->height));
+    writer.put_float(k.fx).put_float(k.fy).put_float(k.cx).put_float(k.cy);
+    put_pose(writer, colour->camera->world_from_camera.inverse());
   }
-  writer.put(triangles);
+  message.colour = header.colour;
   message.payload = payload;
   message.owner = std::move(owner);
   return message;
@@ -138,7 +163,8 @@ ViewerMessage ticks_message(const TickBatch& batch) {
   writer.put(batch.flags).put(batch.t).put(batch.safety).put(batch.steps);
   writer.put_vec3(batch.hip).put_vec3(batch.proxy).put_vec3(batch.normal).put_vec3(batch.force);
   writer.put_float(batch.surface_velocity).put(batch.frame);
-  writer.put_float(batch.gain).put_float(batch.asked_force);
+  writer.put_float(batch.gain).put_float(batch.asked_force).put_vec3(batch.place);
+  writer.put_float(batch.region).put_float(batch.guidance).put(batch.fixtures);
   const std::span<const TickSample> samples(batch.samples);
   for (const TickSample& sample : samples.last(count)) {
     writer.put_float(batch.t - sample.t).put(sample.force).put(sample.penetration);

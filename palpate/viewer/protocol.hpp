@@ -13,18 +13,20 @@
 
 #include <Eigen/Geometry>
 
+#include "palpate/cloud/frame.hpp"
 #include "palpate/core/patch.hpp"
 
 namespace palpate {
 
 /// The messages between program and page, as docs/protocol.md lays them out.
 
-/// A message on its way to the pages: a head of its own and a payload that is shared, not copied.
+/// A message on its way to the pages: a head of its own, then what is shared, not copied.
 struct ViewerMessage {
   bool text = false;
   std::vector<std::byte> head;
   std::span<const std::byte> payload;
-  std::shared_ptr<const void> owner;  ///< keeps the payload alive
+  std::shared_ptr<const void> owner;          ///< keeps the payload alive
+  std::shared_ptr<const ColourImage> colour;  ///< behind the payload; null: nothing is
 };
 
 /// What a page needs to know of a frame besides its depths or points.
@@ -38,17 +40,19 @@ struct FrameHeader {
   double metres_per_unit = 1.0;
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
   bool has_rays = false;  ///< the lens is distorted: a rays message tells where pixels look
+  std::shared_ptr<const ColourImage> colour = {};  ///< null: none
 };
 
 /// A depth image as it was captured; holes are 0 and 65535.
 /// @param owner  keeps `depth` alive and unchanged
-/// @throws Error if the size is not width * height.
+/// @throws Error if the size is not width * height, or that of the colour is another.
 ViewerMessage depth_message(const FrameHeader& header, std::span<const std::uint16_t> depth,
                             std::shared_ptr<const void> owner);
 
 /// Points without an image [m, camera], x y z after one another.
 /// @param triangles  of a mesh whose corners they are, three indices each; empty: none
-/// @throws Error if there are not three numbers for each, or an index is beyond the points.
+/// @throws Error if there are not three numbers for each, an index is beyond the points, or the
+///         colours are not one for each.
 ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz,
                              std::span<const std::uint32_t> triangles = {});
 
@@ -80,9 +84,14 @@ struct TickBatch {
   std::uint32_t steps = 0;
   std::int32_t frame = -1;
   Vec3 hip = Vec3::Zero(), proxy = Vec3::Zero(), normal = Vec3::Zero(), force = Vec3::Zero();
-  double surface_velocity = 0.0;    ///< [m/s]
-  double gain = 0.0;                ///< [-] of the safety chain: 0 disengaged, 1 nothing faded
-  double asked_force = 0.0;         ///< [N] length of the force that the method asks for
+  double surface_velocity = 0.0;  ///< [m/s]
+  double gain = 0.0;              ///< [-] of the safety chain: 0 disengaged, 1 nothing faded
+  double asked_force = 0.0;       ///< [N] length of all that is asked for: surface and fixtures
+  /// [m] world: where the hand is kept by the surface and by forbidden regions; ServoTick::place
+  Vec3 place = Vec3::Zero();
+  double region = 0.0;              ///< [N] length of what forbidden regions ask for
+  double guidance = 0.0;            ///< [N] of what guides and viscous regions ask for
+  std::uint32_t fixtures = 0;       ///< bit i: the session's fixture i gives a force
   std::vector<TickSample> samples;  ///< oldest first; at most `max_samples` are sent, the newest
   static constexpr std::size_t max_samples = 1024;
 };

@@ -258,9 +258,12 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
     }
     if (!writing_) return;
     socket_.text(writing_->text);
-    const std::array<asio::const_buffer, 2> buffers = {
+    const std::span<const std::uint8_t> colour =
+        writing_->colour ? std::span(writing_->colour->rgb) : std::span<const std::uint8_t>{};
+    const std::array<asio::const_buffer, 3> buffers = {
         asio::buffer(writing_->head.data(), writing_->head.size()),
-        asio::buffer(writing_->payload.data(), writing_->payload.size())};
+        asio::buffer(writing_->payload.data(), writing_->payload.size()),
+        asio::buffer(colour.data(), colour.size())};
     socket_.async_write(buffers, [self = shared_from_this()](beast::error_code error, std::size_t) {
       self->writing_.reset();
       if (error) return self->leave();

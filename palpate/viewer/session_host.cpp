@@ -226,6 +226,15 @@ std::vector<std::string> SessionHost::paintable() const {
                                            : Paint::names(*clouds.front());
 }
 
+// The recording that was made last, to be touched; empty while there is none that is whole.
+std::string SessionHost::recorded_scene(const RecordingState& recording) const {
+  if (!rules_.open_scene || recording.on || recording.closing || recording.failed ||
+      recording.folder.empty())
+    return {};
+  const bool has_mark = recording.folder.find('?') != std::string::npos;  // of options, in a URI
+  return "recording:" + recording.folder + (has_mark ? "?" : "");
+}
+
 std::string SessionHost::state() {
   SessionState state = session_->state();
   json parameters;
@@ -245,6 +254,7 @@ std::string SessionHost::state() {
                        {"sensor", name_of(status.sensor)},
                        {"rate", status.rate},
                        {"state", status.text},
+                       {"dropped", status.dropped},
                        {"frames", status.recorded},
                        {"place", status.place},
                        {"time", status.recorded_time}});
@@ -271,8 +281,15 @@ std::string SessionHost::state() {
   json recording = {{"possible", true},
                     {"path", nullptr},
                     {"message", state.recording.message},
-                    {"ended", recording_ended()}};
+                    {"ended", recording_ended()},
+                    {"seconds", state.recording.seconds},
+                    {"bytes", state.recording.bytes},
+                    {"room", nullptr},
+                    {"open", nullptr}};
   if (state.recording.on) recording["path"] = state.recording.folder;
+  if (const auto room = recordings_ ? recordings_->room() : std::nullopt) recording["room"] = *room;
+  if (const std::string uri = recorded_scene(state.recording); !uri.empty())
+    recording["open"] = uri;
   json dabs = json::array();
   for (const Dab& dab : session_->paint().dabs())
     dabs.push_back({{"place", {dab.place.x(), dab.place.y(), dab.place.z()}},
@@ -453,7 +470,9 @@ void SessionHost::command(const Command& command, Role role) {
     const bool is_offered =
         std::any_of(rules_.scenes.begin(), rules_.scenes.end(),
                     [&](const SceneChoice& choice) { return choice.uri == scene->uri; });
-    if (!is_offered || !rules_.open_scene)
+    const bool is_recorded =
+        !scene->uri.empty() && scene->uri == recorded_scene(session_->state().recording);
+    if (!(is_offered || is_recorded) || !rules_.open_scene)
       throw Error("scene", "'" + scene->uri + "' is not among those of this session",
                   "choose one of the list, or start the program with --camera");
     rules_.open_scene(scene->uri);
@@ -520,6 +539,7 @@ void SessionHost::show(std::size_t number, const FedFrame& fed) {
     header.world_from_camera = image->world_from_camera();
     header.has_rays = k.distorted();
     if (header.has_rays && header.number == 0) describe(camera, image->rays());
+    header.colour = frame.colour;
     server->show(camera, depth_message(header, image->depth(), frame.cloud));
   } else if (const auto* points = dynamic_cast<const PointCloud*>(frame.cloud.get())) {
     std::vector<float> xyz;
@@ -527,17 +547,28 @@ void SessionHost::show(std::size_t number, const FedFrame& fed) {
     const auto put = [&](const Vec3& point) {
       for (int axis = 0; axis < 3; ++axis) xyz.push_back(static_cast<float>(point[axis]));
     };
-    if (const Surface* mesh = points->surface(); mesh != nullptr && !mesh->triangles.empty()) {
-      std::vector<std::uint32_t> place(mesh->points.size(), 0);  // among those that are finite
-      for (std::size_t i = 0; i < mesh->points.size(); ++i) {
+    if (const Surface* given = points->surface()) {
+      const std::vector<Vec3>& all = given->points;
+      const bool has_colour = frame.colour && frame.colour->rgb.size() == 3 * all.size();
+      auto colour = has_colour ? std::make_shared<ColourImage>() : nullptr;
+      std::vector<std::uint32_t> place(all.size(), 0);  // among those that are finite
+      for (std::size_t i = 0; i < all.size(); ++i) {
         place[i] = static_cast<std::uint32_t>(xyz.size() / 3);
-        if (mesh->points[i].allFinite()) put(mesh->points[i]);
+        if (!all[i].allFinite()) continue;
+        put(all[i]);
+        if (!colour) continue;
+        for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) colour->rgb.push_back(frame.colour->rgb[k]);
       }
-      for (const auto& corners : mesh->triangles) {
+      for (const auto& corners : given->triangles) {
         if (!std::all_of(corners.begin(), corners.end(),
-                         [&](std::uint32_t i) { return mesh->points[i].allFinite(); }))
+                         [&](std::uint32_t i) { return all[i].allFinite(); }))
           continue;
         for (const std::uint32_t i : corners) triangles.push_back(place[i]);
+      }
+      if (colour) {
+        colour->width = static_cast<int>(xyz.size() / 3);
+        colour->height = 1;
+        header.colour = std::move(colour);
       }
     } else {
       xyz.reserve(3 * points->size());

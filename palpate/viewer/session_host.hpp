@@ -95,6 +95,7 @@ class SessionHost final : public ViewerHost {
 
  private:
   [[nodiscard]] std::vector<std::string> paintable() const;
+  [[nodiscard]] std::string recorded_scene(const RecordingState& recording) const;
   void paint(const ServoTick& newest, double contact_radius);
   void describe(std::uint8_t camera, const ViewingRays& rays);
 

@@ -31,7 +31,13 @@ void TickBatcher::add(const ServoTick& record, double contact_radius) {
   batch_.force = record.force;
   batch_.surface_velocity = tick.surface_velocity;
   batch_.gain = record.gain;
-  batch_.asked_force = tick.force.norm();
+  Vec3 asked = record.region;
+  join(tick.force, asked);
+  batch_.asked_force = (asked + record.guidance).norm();
+  batch_.place = record.place;
+  batch_.region = record.region.norm();
+  batch_.guidance = record.guidance.norm();
+  batch_.fixtures = record.fixtures;
   any_ = true;
 
   const double penetration = penetration_of(tick, contact_radius);

@@ -16,7 +16,7 @@
 #include "tests/support/sanitized.hpp"
 
 namespace palpate {
-namespace {
+namespace test_cameras {
 
 using Json = nlohmann::json;
 
@@ -191,5 +191,5 @@ TEST_F(CameraProgram, SaysWhatToInstallOnAnEmptyMachine) {
   EXPECT_EQ(empty["v4l2:"]["problem"], "") << "it needs no library";
 }
 
-}  // namespace
+}  // namespace test_cameras
 }  // namespace palpate

@@ -19,7 +19,7 @@
 #include "tests/support/environment.hpp"
 
 namespace palpate {
-namespace {
+namespace test_hands {
 
 using test::clock_now;
 using test::Environment;
@@ -538,5 +538,5 @@ TEST_F(DoctorAndHands, SaysWhatToInstallOnAnEmptyMachine) {
   }
 }
 
-}  // namespace
+}  // namespace test_hands
 }  // namespace palpate

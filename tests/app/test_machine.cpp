@@ -10,7 +10,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::app {
-namespace {
+namespace test_machine {
 
 // A system's folders as a test wants them.
 class FakeSystem {
@@ -76,5 +76,5 @@ TEST(Machine, ThatSaysNothingIsNoError) {
   EXPECT_FALSE(machine.is_virtual);
 }
 
-}  // namespace
+}  // namespace test_machine
 }  // namespace palpate::app

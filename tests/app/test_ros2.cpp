@@ -20,7 +20,7 @@
 #include "tests/drivers/ros_client.hpp"
 
 namespace palpate {
-namespace {
+namespace test_ros2 {
 
 // The program, at work until it is told to end.
 class Started {
@@ -131,5 +131,5 @@ TEST_F(Ros2Program, SaysWhatIsNoNode) {
   expect_refusal("ros --camera synthetic:plane --duration 0", {"--duration", "0.1"});
 }
 
-}  // namespace
+}  // namespace test_ros2
 }  // namespace palpate

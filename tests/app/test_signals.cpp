@@ -12,7 +12,7 @@
 #include "app/signals.hpp"
 
 namespace palpate::app {
-namespace {
+namespace test_signals {
 
 constexpr int good = 42;  // exit status of a child that saw what it should
 
@@ -122,5 +122,5 @@ TEST(EndingSignals, LeaveTheSignalsAsTheyWere) {
     EXPECT_EQ(sigismember(&before, signal), sigismember(&after, signal)) << signal;
 }
 
-}  // namespace
+}  // namespace test_signals
 }  // namespace palpate::app

@@ -21,7 +21,7 @@
 #include "tests/app/program.hpp"
 
 namespace palpate {
-namespace {
+namespace test_trace {
 
 using Place = Eigen::Vector3d;
 
@@ -129,12 +129,24 @@ TEST_F(Trace, SaysThatFramesEndedBeforeThePath) {
   const std::string touching = ",0,0,0.02\n";
   const std::string end = ",0,0,-0.002\n";
   const std::string longer = remarks(frames, "0" + touching + "1" + end);
-  EXPECT_TRUE(says(longer, frames + ": its frames ended at t = 0.200 s, 0.800 s before the path"))
+  EXPECT_TRUE(
+      says(longer, frames + ": its frames ended at t = 0.200 s, 0.800 s before the hand's way"))
       << longer;
   EXPECT_EQ(remarks(frames, "0" + touching + "0.38" + end), "")
       << "less than two frames' intervals";
   // A single frame is a still picture, however long it is touched.
   EXPECT_EQ(remarks("pcd:" + path("frames/0.pcd"), "0" + touching + "1" + end), "");
+}
+
+TEST_F(Trace, SaysWhyAPressIsHardlyFelt) {
+  std::vector<Place> sheet;
+  for (int i = 0; i < 100; ++i) sheet.emplace_back(0.03 * (i % 10 - 5), 0.03 * (i / 10 - 5), 0.5);
+  const Outcome outcome =
+      run("trace --out " + path("trace.csv") +
+          " --set stiffness=100 --camera pcd:" + cloud("sparse.pcd", sheet) + " --press 320,240");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(says(outcome.err, "its points are too sparse")) << outcome.err;
+  EXPECT_FALSE(says(outcome.err, "frames had stopped")) << outcome.err;
 }
 
 TEST_F(Trace, SaysThatThePathBeganBeforeTheFrames) {
@@ -205,5 +217,5 @@ TEST_F(Trace, LeavesWholeLinesAndASummaryWhenItIsInterrupted) {
   EXPECT_TRUE(says(said, "\n" + ticks + " ticks over ")) << said;
 }
 
-}  // namespace
+}  // namespace test_trace
 }  // namespace palpate

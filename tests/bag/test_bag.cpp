@@ -17,10 +17,11 @@
 #include "tests/support/bag_contents.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/errors.hpp"
+#include "tests/support/sqlite_bag.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_bag {
 
 using test::bag_contents;
 using test::fails_saying;
@@ -62,14 +63,12 @@ TEST(Bag, SaysInItsMetadataWhatItHolds) {
   write_two(folder.path() / "bag");
   const std::string yaml = text_of(folder.path() / "bag/metadata.yaml");
   for (const char* line :
-       {"rosbag2_bagfile_information:\n  version: 7\n  storage_identifier: sqlite3\n",
+       {"rosbag2_bagfile_information:\n  version: 7\n  storage_identifier: mcap\n",
         "  duration:\n    nanoseconds: 2000\n",
         "  starting_time:\n    nanoseconds_since_epoch: 1000\n", "  message_count: 3\n",
         "        name: \"/a\"\n        type: std_msgs/msg/String\n",
-        "  relative_file_paths:\n    - \"bag_0.db3\"\n"})
+        "  relative_file_paths:\n    - \"bag_0.mcap\"\n"})
     EXPECT_NE(yaml.find(line), std::string::npos) << line << " is not in\n" << yaml;
-  // One file and no log beside it.
-  EXPECT_FALSE(std::filesystem::exists(folder.path() / "bag/bag_0.db3-wal"));
 }
 
 TEST(Bag, IsNotWrittenOverAnother) {
@@ -89,8 +88,8 @@ TEST(Bag, InSeveralFilesIsReadInTheirOrder) {
     if (part == 10) static_cast<void>(writer.topic("/before", ros::String::type));
     writer.write(writer.topic("/a", ros::String::type), part, ros::encode(ros::String{name}));
     writer.close();
-    std::filesystem::rename(folder.path() / name / (name + "_0.db3"),
-                            folder.path() / "split" / ("split_" + std::to_string(part) + ".db3"));
+    std::filesystem::rename(folder.path() / name / (name + "_0.mcap"),
+                            folder.path() / "split" / ("split_" + std::to_string(part) + ".mcap"));
   }
   BagReader reader(folder.path() / "split");
   const auto places = reader.places("/a");
@@ -218,7 +217,8 @@ TEST(Bag, OfRosbag2IsRead) {
 // Ten commits of some messages on two topics. @return its one file
 std::filesystem::path write_commits(const std::filesystem::path& folder) {
   std::mt19937 random(3);
-  BagWriter writer(folder);
+  const std::filesystem::path file = folder.string() + ".db3";
+  test::SqliteBagWriter writer(file);
   const std::size_t a = writer.topic("/a", ros::String::type);
   const std::size_t b = writer.topic("/b", ros::Float64MultiArray::type);
   for (int i = 0; i < 100; ++i) {
@@ -226,8 +226,8 @@ std::filesystem::path write_commits(const std::filesystem::path& folder) {
     writer.write(b, 1000 * i, ros::encode(ros::Float64MultiArray{"b", {1.0 / 3.0, 1.0 * i}}));
     if (i % 10 == 9) writer.commit();
   }
-  writer.close();
-  return folder / (folder.filename().string() + "_0.db3");
+  writer.commit(true);
+  return file;
 }
 
 TEST(BagChecksums, OfAWholeBagAreRight) {
@@ -331,5 +331,5 @@ TEST(BagChecksums, AreMissingInBagsOfOthersWhichAreReadAllTheSame) {
   EXPECT_EQ(bag_contents(file).size(), 200U);
 }
 
-}  // namespace
+}  // namespace test_bag
 }  // namespace palpate

@@ -12,7 +12,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_cdr {
 
 using test::fails_saying;
 
@@ -120,5 +120,5 @@ TEST(Messages, CutAnywhereAreAnError) {
   }
 }
 
-}  // namespace
+}  // namespace test_cdr
 }  // namespace palpate

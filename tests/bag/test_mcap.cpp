@@ -20,7 +20,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_mcap {
 
 using test::bag_contents;
 using test::fails_saying;
@@ -360,5 +360,5 @@ TEST(Lz4, OfDamagedDataIsAnErrorOrWhatItBecame) {
   EXPECT_GT(errors, 700);
 }
 
-}  // namespace
+}  // namespace test_mcap
 }  // namespace palpate

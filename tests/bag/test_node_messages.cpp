@@ -10,7 +10,7 @@
 #include "palpate/bag/node_messages.hpp"
 
 namespace palpate::ros {
-namespace {
+namespace test_node_messages {
 
 std::string hex(const std::vector<std::byte>& bytes) {
   std::string text;
@@ -82,5 +82,5 @@ TEST(NodeMessages, AreWhatAnotherEncoderMakesOfParameters) {
       "0000000000000040000000000000000000000000");
 }
 
-}  // namespace
+}  // namespace test_node_messages
 }  // namespace palpate::ros

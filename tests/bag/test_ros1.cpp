@@ -16,7 +16,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_ros1 {
 
 namespace ros1 = test::ros1;
 using test::bag_contents;
@@ -272,5 +272,5 @@ TEST(Bz2, GivesNoMoreThanItMay) {
       [&] { return decompress_bz2(std::as_bytes(std::span(packed)), 300'000, "it"); }, "it"));
 }
 
-}  // namespace
+}  // namespace test_ros1
 }  // namespace palpate

@@ -20,7 +20,7 @@
 #include "tests/support/sanitized.hpp"
 
 namespace palpate {
-namespace {
+namespace test_clouds {
 
 using Point = std::tuple<float, float, float>;
 
@@ -568,5 +568,5 @@ TEST(Clouds, AllGiveTheSameProxyToRounding) {
   EXPECT_GT(largest, 1.0);
 }
 
-}  // namespace
+}  // namespace test_clouds
 }  // namespace palpate

@@ -10,7 +10,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_pixel_probe {
 
 using test::fails_saying;
 
@@ -103,5 +103,5 @@ TEST(PixelProbe, TakesAnOrganisedCloud) {
   EXPECT_TRUE(fails_saying([&] { return probe_pixel(points, 0, 0); }, "no pixels"));
 }
 
-}  // namespace
+}  // namespace test_pixel_probe
 }  // namespace palpate

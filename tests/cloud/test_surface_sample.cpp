@@ -9,7 +9,7 @@
 #include "palpate/cloud/point_cloud.hpp"
 
 namespace palpate {
-namespace {
+namespace test_surface_sample {
 
 constexpr double pitch = 1e-3;  // [m] between pixels of the wall
 
@@ -105,5 +105,5 @@ TEST(SurfaceSample, OfSeveralCamerasIsThatOfAll) {
   EXPECT_EQ(sample.count, 2U);
 }
 
-}  // namespace
+}  // namespace test_surface_sample
 }  // namespace palpate

@@ -9,7 +9,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_pose {
 
 using test::fails_saying;
 
@@ -70,5 +70,5 @@ TEST(Pose, RefusesWhatIsNone) {
   EXPECT_EQ(parse_pose("1,2,3,0,0,0,1.001", "pose").linear(), Eigen::Matrix3d::Identity());
 }
 
-}  // namespace
+}  // namespace test_pose
 }  // namespace palpate

@@ -8,7 +8,7 @@
 #include "palpate/core/sensor.hpp"
 
 namespace palpate {
-namespace {
+namespace test_sensor {
 
 constexpr std::array kinds{SensorKind::unknown, SensorKind::stereo, SensorKind::structured_light,
                            SensorKind::time_of_flight};
@@ -67,5 +67,5 @@ TEST(SensorKind, SetsWhatIsLeftToItAndNothingElse) {
   EXPECT_EQ(both(for_sensors(set, two)), std::pair(5e-3, 2));
 }
 
-}  // namespace
+}  // namespace test_sensor
 }  // namespace palpate

@@ -14,7 +14,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_tick {
 
 TEST(Tick, IsAllZeroUnlessItIsSaidOtherwise) {
   // Left over memory must not shine through.
@@ -76,5 +76,5 @@ TEST(Registry, IsAValueThatCanBeAddedToButNotTwice) {
   EXPECT_THROW(mine.add({"", 5}), Error);
 }
 
-}  // namespace
+}  // namespace test_tick
 }  // namespace palpate

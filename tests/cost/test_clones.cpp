@@ -16,7 +16,7 @@ namespace palpate_avx512f {
 Probe probe();
 }
 
-namespace {
+namespace test_clones {
 
 // Sums of some hundred unit vectors in another order: floats differ by 1e-7 of the terms' sum.
 constexpr double rounding = 2e-5;
@@ -49,4 +49,4 @@ TEST(Cost, Avx512AgreesWithTheBaseline) {
 }
 #endif
 
-}  // namespace
+}  // namespace test_clones

@@ -4,7 +4,7 @@
 #include "bench/costs.hpp"
 
 namespace palpate::bench {
-namespace {
+namespace test_operations {
 
 // Counts do not depend on the clock; how many ticks are run does, a little.
 constexpr double budget = 0.02;
@@ -44,5 +44,5 @@ TEST(Cost, EveryMethodFindsTheSamePoints) {
   }
 }
 
-}  // namespace
+}  // namespace test_operations
 }  // namespace palpate::bench

@@ -21,7 +21,7 @@
 #include "tests/support/grids.hpp"
 
 namespace palpate {
-namespace {
+namespace test_device_body {
 
 using test::fails_saying;
 
@@ -302,5 +302,5 @@ TEST(OpenDevice, OpensHandsOnDevicesAndSaysWhatTheDeviceIs) {
   EXPECT_TRUE(fails_saying(opening("hand:?device=touch&delay=1s"), "'delay'", "out of range"));
 }
 
-}  // namespace
+}  // namespace test_device_body
 }  // namespace palpate

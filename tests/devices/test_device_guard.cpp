@@ -18,7 +18,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_device_guard {
 
 constexpr double beat_time = 0.020;  // [s]
 
@@ -215,5 +215,5 @@ TEST_F(DeviceGuard, SaysWhyADeviceDidNotOpen) {
       test::fails_saying([&] { return open_guarded(nullptr, {.beat_time = 1.0}); }, "beat_time"));
 }
 
-}  // namespace
+}  // namespace test_device_guard
 }  // namespace palpate

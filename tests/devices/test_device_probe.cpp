@@ -14,7 +14,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_device_probe {
 
 using test::fails_saying;
 
@@ -186,5 +186,5 @@ TEST(MeasureDevice, RefusesWhatItCannotMeasure) {
   EXPECT_EQ(dead.largest, 0.0);
 }
 
-}  // namespace
+}  // namespace test_device_probe
 }  // namespace palpate

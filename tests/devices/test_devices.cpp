@@ -24,7 +24,7 @@
 #include "tests/support/grids.hpp"
 
 namespace palpate {
-namespace {
+namespace test_devices {
 
 using test::fails_saying;
 
@@ -376,5 +376,5 @@ TEST(OpenDevice, SaysWhatIsWrongWithAName) {
   EXPECT_TRUE(fails_saying(opening("mouse:?response=5m"), "'response'", "unit"));
 }
 
-}  // namespace
+}  // namespace test_devices
 }  // namespace palpate

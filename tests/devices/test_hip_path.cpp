@@ -11,7 +11,7 @@
 #include "palpate/devices/hip_path.hpp"
 
 namespace palpate {
-namespace {
+namespace test_hip_path {
 
 // A file of that content that goes with the test.
 class CsvFile {
@@ -112,5 +112,5 @@ TEST(HipPath, RefusesSamplesInMemoryThatAFileCouldNotHold) {
   EXPECT_THROW(HipPath({{1.0, Vec3(0, std::numeric_limits<double>::infinity(), 0)}}), Error);
 }
 
-}  // namespace
+}  // namespace test_hip_path
 }  // namespace palpate

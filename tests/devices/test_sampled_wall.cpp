@@ -4,7 +4,7 @@
 #include "palpate/devices/sampled_wall.hpp"
 
 namespace palpate {
-namespace {
+namespace test_sampled_wall {
 
 SampledWall touch_wall(double damping) {
   return {.handle = {.mass = 0.06, .damping = 0.7, .stiffness = 0.0},
@@ -33,5 +33,5 @@ TEST(LinearStiffness, ADamperHelpsUntilItsOwnDelayUndoesIt) {
   EXPECT_EQ(linear_stiffness(touch_wall(2.0), 1000.0), 1000.0) << "no more than asked for";
 }
 
-}  // namespace
+}  // namespace test_sampled_wall
 }  // namespace palpate

@@ -7,7 +7,7 @@
 #include "palpate/drivers/clock_relation.hpp"
 
 namespace palpate {
-namespace {
+namespace test_clock_relation {
 
 constexpr double ahead = 1234.5;  // [s]
 
@@ -77,5 +77,5 @@ TEST(ClockRelation, PassesOverWhatCannotBe) {
   EXPECT_EQ(relation.uncertainty(10.0), 0.0);
 }
 
-}  // namespace
+}  // namespace test_clock_relation
 }  // namespace palpate

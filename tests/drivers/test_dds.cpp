@@ -58,7 +58,7 @@ static_assert(cyclone::of_array == DDS_OP_VAL_ARR && cyclone::of_struct == DDS_O
 static_assert(cyclone::of_flag == DDS_OP_VAL_BLN);
 
 namespace palpate::dds {
-namespace {
+namespace test_dds {
 
 constexpr double long_enough = 60.0;  // [s]
 
@@ -282,5 +282,5 @@ TEST_F(Dds, NamesThePackageWhereTheLibraryIsMissing) {
                                  "Cyclone DDS", "apt install"));
 }
 
-}  // namespace
+}  // namespace test_dds
 }  // namespace palpate::dds

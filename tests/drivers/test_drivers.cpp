@@ -10,7 +10,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_drivers {
 
 TEST(Drivers, AreKindsOfSourceAndDeviceLikeAnyOther) {
   Registry<Driver> drivers = standard_drivers();
@@ -55,5 +55,5 @@ TEST(Drivers, AreCompleteAndLookWithoutThrowing) {
   }
 }
 
-}  // namespace
+}  // namespace test_drivers
 }  // namespace palpate

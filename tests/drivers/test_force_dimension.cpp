@@ -10,7 +10,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_force_dimension {
 
 class ForceDimension : public test::FakeDeviceTest {
  protected:
@@ -108,5 +108,5 @@ TEST_F(ForceDimension, WorksWithoutDrdButDoesNotCalibrateThen) {
                                  "cannot calibrate it", "install libdrd"));
 }
 
-}  // namespace
+}  // namespace test_force_dimension
 }  // namespace palpate

@@ -12,7 +12,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_freenect_camera {
 
 using test::fails_saying;
 using test::image_of;
@@ -98,5 +98,5 @@ TEST_F(Freenect, IsReported) {
   EXPECT_EQ(live_objects(), 0);
 }
 
-}  // namespace
+}  // namespace test_freenect_camera
 }  // namespace palpate

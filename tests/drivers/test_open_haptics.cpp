@@ -11,7 +11,7 @@
 #include "tests/drivers/fake_device_test.hpp"
 
 namespace palpate {
-namespace {
+namespace test_open_haptics {
 
 class OpenHaptics : public test::FakeDeviceTest {
  protected:
@@ -81,5 +81,5 @@ TEST_F(OpenHaptics, GivesNoForceWhileItsMotorsAreHot) {
   pen->stop();
 }
 
-}  // namespace
+}  // namespace test_open_haptics
 }  // namespace palpate

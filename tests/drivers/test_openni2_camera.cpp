@@ -20,7 +20,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_openni2_camera {
 
 using test::fails_saying;
 using test::image_of;
@@ -197,5 +197,5 @@ TEST_F(StockOpenNi2, RefusesItsOwnDummyRatherThanCrashWithIt) {
   EXPECT_TRUE(fails_saying(opening("openni2:Dummy"), "field of view"));
 }
 
-}  // namespace
+}  // namespace test_openni2_camera
 }  // namespace palpate

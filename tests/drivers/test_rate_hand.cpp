@@ -10,7 +10,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_rate_hand {
 
 // What the test and the sticks' thread share.
 struct Bench {
@@ -95,5 +95,5 @@ TEST(RateOptions, AreRead) {
   EXPECT_TRUE(test::fails_saying([] { return rate_options(Uri("gamepad:?speed=9")); }, "speed"));
 }
 
-}  // namespace
+}  // namespace test_rate_hand
 }  // namespace palpate

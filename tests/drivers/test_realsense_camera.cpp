@@ -13,7 +13,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_realsense_camera {
 
 using test::fails_saying;
 using test::image_of;
@@ -207,5 +207,5 @@ TEST_F(RealSense, IsReportedWithFirmwareRateAndRemedy) {
   EXPECT_EQ(live_objects(), 0);
 }
 
-}  // namespace
+}  // namespace test_realsense_camera
 }  // namespace palpate

@@ -23,7 +23,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_ros2_camera {
 
 constexpr int width = 8, height = 6;
 constexpr double long_enough = 60.0;  // [s]
@@ -291,5 +291,5 @@ TEST_F(Ros2Camera, SaysWhatIsThereInstead) {
   EXPECT_NE(report.library, "");
 }
 
-}  // namespace
+}  // namespace test_ros2_camera
 }  // namespace palpate

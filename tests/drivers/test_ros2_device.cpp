@@ -26,7 +26,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_ros2_device {
 
 using Xyz = std::array<double, 3>;
 constexpr Xyz pose_in_topic{0.1, 0.2, 0.3};
@@ -277,5 +277,5 @@ TEST_F(Ros2Device, LeavesNoForceBehindWhenItsSessionIsKilled) {
   RecordProperty("milliseconds_to_zero", std::to_string(1e3 * (node.held().since - killed)));
 }
 
-}  // namespace
+}  // namespace test_ros2_device
 }  // namespace palpate

@@ -9,7 +9,7 @@
 #include "palpate/drivers/send_rate.hpp"
 
 namespace palpate {
-namespace {
+namespace test_send_rate {
 
 // A camera of 30 Hz before a link of a queue, whose far end reports ten times a second.
 struct Link {
@@ -123,5 +123,5 @@ TEST(SendRate, NeverStops) {
   EXPECT_NEAR(sent, 20, 1);
 }
 
-}  // namespace
+}  // namespace test_send_rate
 }  // namespace palpate

@@ -10,7 +10,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_shared_library {
 
 const std::string folder = PALPATE_FAKES;
 
@@ -82,5 +82,5 @@ TEST(SharedLibrary, NamesAFunctionThatItDoesNotHave) {
                                  "another version", "install it"));
 }
 
-}  // namespace
+}  // namespace test_shared_library
 }  // namespace palpate

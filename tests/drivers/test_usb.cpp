@@ -8,7 +8,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_usb {
 
 TEST(Usb, ShowsVendorAndProductAndHowToAllowThem) {
   const test::TemporaryFolder system;
@@ -28,5 +28,5 @@ TEST(Usb, ShowsVendorAndProductAndHowToAllowThem) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace test_usb
 }  // namespace palpate

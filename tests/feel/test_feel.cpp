@@ -16,7 +16,7 @@
 #include "tests/support/allocations.hpp"
 
 namespace palpate {
-namespace {
+namespace test_feel {
 
 constexpr double dt = 1e-3;
 
@@ -163,5 +163,5 @@ TEST(Feel, AllocatesNothingInATick) {
   EXPECT_LT(sum.x(), 0.0);
 }
 
-}  // namespace
+}  // namespace test_feel
 }  // namespace palpate

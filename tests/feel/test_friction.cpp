@@ -9,7 +9,7 @@
 #include "palpate/feel/friction.hpp"
 
 namespace palpate {
-namespace {
+namespace test_friction {
 
 constexpr double dt = 1e-3;
 constexpr double push = 3.0;  // [N]
@@ -180,5 +180,5 @@ TEST(Friction, OfHoneyGrowsWithTheSpeed) {
   EXPECT_NEAR(slide(friction, 0.1, 0.1).back().x(), -2.0 * push * 0.1, 1e-12);
 }
 
-}  // namespace
+}  // namespace test_friction
 }  // namespace palpate

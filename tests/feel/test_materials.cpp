@@ -18,7 +18,7 @@
 #include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate {
-namespace {
+namespace test_materials {
 
 constexpr double pi = std::numbers::pi;
 
@@ -445,5 +445,5 @@ TEST(Materials, OfASceneAreThoseOfItsParametersWhereTheMapHasNone) {
   EXPECT_NEAR(-tick.force.x() / tick.force.z(), 0.4, 0.02);
 }
 
-}  // namespace
+}  // namespace test_materials
 }  // namespace palpate

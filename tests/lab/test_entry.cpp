@@ -24,7 +24,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
-namespace {
+namespace test_entry {
 
 namespace fs = std::filesystem;
 using test::fails_saying;
@@ -273,7 +273,8 @@ TEST_F(Pipes, ThatFailSayHow) {
   EXPECT_TRUE(fails("exec sleep 60", "neither ends nor writes for 0.3 s", soon));
   EXPECT_TRUE(fails("exec <&- >&-; exec sleep 60", "closed its end"));
   EXPECT_TRUE(fails(program("sys.exit(4)"), "status 4"));
-  EXPECT_TRUE(fails(program("print('debugging', t); out = [0] * 9"), "print nothing else"));
+  EXPECT_TRUE(
+      fails(program("print('debugging', t, flush=True); out = [0] * 9"), "print nothing else"));
   EXPECT_TRUE(fails(program("out = [math.nan] * 9"), "not finite"));
 }
 
@@ -299,5 +300,5 @@ TEST(PipeExample, HoldsAPlane) {
                            "own methods alone", "bench-entry"));
 }
 
-}  // namespace
+}  // namespace test_entry
 }  // namespace palpate::lab

@@ -23,7 +23,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
-namespace {
+namespace test_experiments {
 
 namespace fs = std::filesystem;
 
@@ -440,5 +440,5 @@ TEST(Direct, LosesTheSideOnAThinPlate) {
   EXPECT_TRUE(direct->tick({0, 0, -0.04}, 0.0).force.isZero()) << "out of its radius: popped";
 }
 
-}  // namespace
+}  // namespace test_experiments
 }  // namespace palpate::lab

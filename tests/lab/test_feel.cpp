@@ -25,7 +25,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
-namespace {
+namespace test_feel {
 
 // An exact plane z = 0, or the truth if it has one, with a spring of Table 2; and what a test adds.
 class Plane final : public LabMethod {
@@ -324,5 +324,5 @@ TEST(MaterialsExperiment, TellsIceFromRubberAndSandpaper) {
       test::fails_saying([&] { experiment.cells(experiment, options); }, "rubbr", "", "rubber"));
 }
 
-}  // namespace
+}  // namespace test_feel
 }  // namespace palpate::lab

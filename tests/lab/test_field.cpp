@@ -22,7 +22,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab::field {
-namespace {
+namespace test_field {
 
 Body at_rest(ShapePtr shape, const Vec3& place = Vec3::Zero()) {
   return {std::move(shape), Eigen::Isometry3d(Eigen::Translation3d(place)), nullptr};
@@ -505,5 +505,5 @@ TEST_F(Field, ScoresTheMeanOfTheClasses) {
       << scores.note;
 }
 
-}  // namespace
+}  // namespace test_field
 }  // namespace palpate::lab::field

@@ -22,7 +22,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
-namespace {
+namespace test_methods {
 
 constexpr double spacing = 1.5e-3;  // [m] of the points
 constexpr double r_c = 5e-3;
@@ -666,5 +666,5 @@ TEST(MethodsTable, PutsTheRulerAboveAPublishedMethodAndCountsCosts) {
   for (const auto& row : scores.rows) EXPECT_EQ(row.size(), scores.columns.size());
 }
 
-}  // namespace
+}  // namespace test_methods
 }  // namespace palpate::lab

@@ -15,7 +15,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
-namespace {
+namespace test_pop {
 
 class Pop : public ::testing::Test {
  protected:
@@ -260,5 +260,5 @@ TEST(Play, DeliversFramesLateAndInOrderAndLeavesOutWhatIsDropped) {
   }
 }
 
-}  // namespace
+}  // namespace test_pop
 }  // namespace palpate::lab

@@ -12,7 +12,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
-namespace {
+namespace test_real {
 
 Table touch(const std::string& method, const std::string& recording) {
   const test::TemporaryFolder folder;
@@ -72,5 +72,5 @@ TEST(Real, SightHoldsMoreOfARealTableThanThePaper) {
     EXPECT_LT(sum(sight, "lost", action) + 2.0, sum(paper, "lost", action)) << action;
 }
 
-}  // namespace
+}  // namespace test_real
 }  // namespace palpate::lab

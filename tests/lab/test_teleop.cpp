@@ -13,7 +13,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate::lab {
-namespace {
+namespace test_teleop {
 
 TeleopCase over(std::string_view way, double round_trip, bool poor = false) {
   LinkQuality link{.delay = 0.5 * round_trip};
@@ -151,5 +151,5 @@ TEST(Teleop, MakesItsTable) {
       test::fails_saying([&] { teleop.cells(teleop, options); }, "rust", "no such", "rest"));
 }
 
-}  // namespace
+}  // namespace test_teleop
 }  // namespace palpate::lab

@@ -14,7 +14,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
-namespace {
+namespace test_zwidth {
 
 ZHolding holding(std::string_view device, std::string_view hand) {
   for (const ZHolding& one : z_holdings()) {
@@ -92,5 +92,5 @@ TEST(ZWidth, IsAnExperimentWithAFigure) {
                                  "did you mean 'plane'?"));
 }
 
-}  // namespace
+}  // namespace test_zwidth
 }  // namespace palpate::lab

@@ -9,7 +9,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_node_parameters {
 
 using ros::ParameterValue;
 
@@ -89,5 +89,5 @@ TEST_F(NodeParametersTest, ListsByPrefixAndDepth) {
   EXPECT_TRUE(parameters_.list({"meth"}, 0).names.empty());
 }
 
-}  // namespace
+}  // namespace test_node_parameters
 }  // namespace palpate

@@ -25,7 +25,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_ros_node {
 
 using ros::ParameterValue;
 
@@ -252,5 +252,5 @@ TEST_F(RosNodeTest, RefusesWhatIsNoName) {
       "--publish-rate", "too low", "1 to 1000"));
 }
 
-}  // namespace
+}  // namespace test_ros_node
 }  // namespace palpate

@@ -15,7 +15,7 @@
 #include "tests/support/grids.hpp"
 
 namespace palpate {
-namespace {
+namespace test_paper {
 
 using test::flat_grid;
 using test::grid;
@@ -421,5 +421,5 @@ TEST(Paper, TrustsAVelocityNoLongerThanItIsToldTo) {
   EXPECT_LT(later.force.z() - force, 600.0 * 0.1 * 0.1 + 0.1);
 }
 
-}  // namespace
+}  // namespace test_paper
 }  // namespace palpate

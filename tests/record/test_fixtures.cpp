@@ -7,7 +7,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_fixtures {
 
 // About where LoopSession's hand goes.
 std::shared_ptr<const FixtureSet> fixtures_about_the_hand() {
@@ -60,5 +60,5 @@ TEST(RecordedFixtures, AreReplayedBitForBit) {
   }
 }
 
-}  // namespace
+}  // namespace test_fixtures
 }  // namespace palpate

@@ -16,7 +16,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_golden {
 
 // What decides the last bits of a build beside the source: compiler and vector set. Empty where the
 // build is not one whose hashes are kept.
@@ -105,5 +105,5 @@ INSTANTIATE_TEST_SUITE_P(Methods, Golden, ::testing::ValuesIn(names_of_methods()
                            return name;
                          });
 
-}  // namespace
+}  // namespace test_golden
 }  // namespace palpate

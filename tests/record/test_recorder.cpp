@@ -25,7 +25,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_recorder {
 
 using test::FakeDevice;
 using test::LoopSession;
@@ -245,17 +245,6 @@ TEST(Recorder, AskedToStopReturnsAtOnceAndSaysWhenItIsDone) {
   EXPECT_EQ(recorder.status().trouble, "");
 }
 
-TEST(Recorder, StoresImagesUncompressedWhereItLagsBehindAndCountsThem) {
-  const TemporaryFolder folder;
-  LoopSession session("paper");
-  session.record(folder.path() / "bag", {.compress_below = 0});
-  session.run(200);
-  session.recorder().stop();
-  EXPECT_EQ(session.recorder().status().stored_frames, 7U);
-  SessionReader reader(folder.path() / "bag");
-  EXPECT_TRUE(replay(reader).identical());
-}
-
 TEST(Recorder, CountsFramesThatItHasNoRoomForAndAReplaySaysSo) {
   const TemporaryFolder folder;
   LoopSession session("paper");
@@ -364,5 +353,5 @@ TEST(Recorder, EndsWithAMessageWhereItsFolderIsTakenAwayAndTheLoopGoesOn) {
   session.run(100);
 }
 
-}  // namespace
+}  // namespace test_recorder
 }  // namespace palpate

@@ -12,7 +12,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_replay {
 
 using test::fails_saying;
 using test::press_info;
@@ -137,5 +137,5 @@ TEST(ReplayOf, ABagOfOthersIsRefused) {
                            "not a session of palpate's", "recording:"));
 }
 
-}  // namespace
+}  // namespace test_replay
 }  // namespace palpate

@@ -19,7 +19,7 @@
 #include "tests/support/data.hpp"
 
 namespace palpate {
-namespace {
+namespace test_touching_recordings {
 
 constexpr double r_c = 5e-3;
 
@@ -234,5 +234,5 @@ TEST(TouchingNoise, SightHoldsMostOfWhatAHandHeldKinectShowsAndThePapersMethodLo
   EXPECT_EQ(held_by_paper, 0U);
 }
 
-}  // namespace
+}  // namespace test_touching_recordings
 }  // namespace palpate

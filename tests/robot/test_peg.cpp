@@ -11,7 +11,7 @@
 #include "tests/robot/task.hpp"
 
 namespace palpate::robot {
-namespace {
+namespace test_peg {
 
 const Eigen::Vector2d hole_place{-0.13, -0.16};  // [m]
 constexpr double top = 0.03;                     // [m] of the board
@@ -176,5 +176,5 @@ TEST(PegTable, DISABLED_OfHolesDelaysAndSensors) {
   }
 }
 
-}  // namespace
+}  // namespace test_peg
 }  // namespace palpate::robot

@@ -13,7 +13,7 @@
 #include "robot/simulated_cell.hpp"
 
 namespace palpate::robot {
-namespace {
+namespace test_simulated_camera {
 
 const DepthImage& image_of(const Frame& frame) {
   return dynamic_cast<const DepthImage&>(*frame.cloud);
@@ -151,5 +151,5 @@ TEST(SimulatedCell, SaysWhatIsWrongWithAUri) {
   EXPECT_NE(message("mujoco:desk?latency=1s").find("latency"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace test_simulated_camera
 }  // namespace palpate::robot

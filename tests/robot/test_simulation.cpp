@@ -15,7 +15,7 @@
 #include "robot/simulation.hpp"
 
 namespace palpate::robot {
-namespace {
+namespace test_simulation {
 
 constexpr double pi = std::numbers::pi;
 const Vec3 home(0.0, 0.0, 0.15);
@@ -306,5 +306,5 @@ TEST(Simulation, RunsInRealTimeUntilItIsStopped) {
   EXPECT_GE(simulation.state().t, end);
 }
 
-}  // namespace
+}  // namespace test_simulation
 }  // namespace palpate::robot

@@ -11,7 +11,7 @@
 #include "tests/robot/task.hpp"
 
 namespace palpate::robot {
-namespace {
+namespace test_tasks {
 
 class Tasks : public ::testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(Delays, Tasks, ::testing::Values(0.0, 0.25),
@@ -85,5 +85,5 @@ TEST(ArmsShadow, FeelsWhatTheArmHides) {
   EXPECT_EQ(deepest, 0.0);
 }
 
-}  // namespace
+}  // namespace test_tasks
 }  // namespace palpate::robot

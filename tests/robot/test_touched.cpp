@@ -11,7 +11,7 @@
 #include "tests/robot/task.hpp"
 
 namespace palpate::robot {
-namespace {
+namespace test_touched {
 
 constexpr double top = 0.03;  // [m] of the plate
 
@@ -75,5 +75,5 @@ TEST(TouchingHard, ChangesNothingWhereAThingIsHard) {
   EXPECT_NEAR(felt.second, felt.first, 0.02 * felt.first);
 }
 
-}  // namespace
+}  // namespace test_touched
 }  // namespace palpate::robot

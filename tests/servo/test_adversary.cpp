@@ -8,7 +8,7 @@
 #include "tests/support/sanitized.hpp"
 
 namespace palpate {
-namespace {
+namespace test_adversary {
 
 constexpr std::uint64_t ticks = test::sanitized ? 50'000 : 1'000'000;
 
@@ -23,5 +23,5 @@ TEST(Adversary, GetsNoForceThatBreaksAPromise) {
   EXPECT_GT(adversary.forceful_ticks(), ticks / 50) << "nothing was at stake";
 }
 
-}  // namespace
+}  // namespace test_adversary
 }  // namespace palpate

@@ -8,7 +8,7 @@
 #include "palpate/servo/safety.hpp"
 
 namespace palpate {
-namespace {
+namespace test_correction_tank {
 
 constexpr double period = 1e-3;  // [s]
 
@@ -188,5 +188,5 @@ TEST(CorrectionLink, HoldsBackWhatAFrameWouldGive) {
   EXPECT_EQ(last.flags & correction_cut, 0U);
 }
 
-}  // namespace
+}  // namespace test_correction_tank
 }  // namespace palpate

@@ -23,7 +23,7 @@
 #include "tests/support/sanitized.hpp"
 
 namespace palpate {
-namespace {
+namespace test_cycle {
 
 using test::FakeDevice;
 using test::flat_grid;
@@ -650,5 +650,5 @@ TEST(Cycle, SwitchesMethodsWithoutLeavingOneOnesVelocityToTheNext) {
   EXPECT_NEAR(press_while_methods_change({"sight", "paper"}).z(), papers, 0.1);
 }
 
-}  // namespace
+}  // namespace test_cycle
 }  // namespace palpate

@@ -18,7 +18,7 @@
 #include "tests/support/grids.hpp"
 
 namespace palpate {
-namespace {
+namespace test_device_loop {
 
 using test::FakeDevice;
 
@@ -432,5 +432,5 @@ TEST(Clutch, IsWorkedByTheButtonOfThePlacement) {
   EXPECT_TRUE(record.tick.hip.isZero()) << "the HIP stays";
 }
 
-}  // namespace
+}  // namespace test_device_loop
 }  // namespace palpate

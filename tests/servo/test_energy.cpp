@@ -13,7 +13,7 @@
 #include "tests/support/sanitized.hpp"
 
 namespace palpate {
-namespace {
+namespace test_energy {
 
 constexpr std::uint64_t honest_contacts = test::sanitized ? 30 : 400;
 constexpr std::uint64_t free_swings = test::sanitized ? 10 : 80;
@@ -260,5 +260,5 @@ TEST(EnergyMonitor, IgnoresASurfaceThatTakesEnergy) {
   }
 }
 
-}  // namespace
+}  // namespace test_energy
 }  // namespace palpate

@@ -7,7 +7,7 @@
 #include "palpate/servo/force_watchdog.hpp"
 
 namespace palpate {
-namespace {
+namespace test_force_watchdog {
 
 struct SwitchedDevice final : Device {
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
@@ -90,5 +90,5 @@ TEST(ForceWatchdog, AsksADeviceThatRefusesOnceASecondAndSaysWhy) {
   EXPECT_EQ(watchdog.refusal(), "");
 }
 
-}  // namespace
+}  // namespace test_force_watchdog
 }  // namespace palpate

@@ -9,7 +9,7 @@
 #include "palpate/servo/freshness.hpp"
 
 namespace palpate {
-namespace {
+namespace test_freshness {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double inf = std::numeric_limits<double>::infinity();
@@ -221,5 +221,5 @@ TEST(Freshness, JudgesACameraThatComesBackAnew) {
   EXPECT_EQ(cameras.freshness.at(cameras.t).age, inf);
 }
 
-}  // namespace
+}  // namespace test_freshness
 }  // namespace palpate

@@ -10,7 +10,7 @@
 #include "palpate/servo/mailbox.hpp"
 
 namespace palpate {
-namespace {
+namespace test_mailbox {
 
 TEST(Mailbox, IsEmptyUntilSomethingIsPutAndAfterItWasTaken) {
   Mailbox<int> box;
@@ -95,5 +95,5 @@ TEST(Mailbox, GivesWholeValuesInOrderAndTheLastOneWhileTheWriterFloodsIt) {
   EXPECT_EQ(box.taken() + box.dropped(), static_cast<std::uint64_t>(count));
 }
 
-}  // namespace
+}  // namespace test_mailbox
 }  // namespace palpate

@@ -13,7 +13,7 @@
 #include "tests/support/grids.hpp"
 
 namespace palpate {
-namespace {
+namespace test_passivity_observer {
 
 constexpr double stiffness = 600.0;  // [N/m]
 constexpr double period = 1e-3;      // [s]
@@ -213,5 +213,5 @@ TEST(PassivityObserver, SeesInACycleTheForceThatWasSentInTheDevicesOwnAxes) {
   EXPECT_EQ(record.energy.relative.generating, 1U);
 }
 
-}  // namespace
+}  // namespace test_passivity_observer
 }  // namespace palpate

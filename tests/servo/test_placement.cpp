@@ -15,7 +15,7 @@
 #include "tests/support/grids.hpp"
 
 namespace palpate {
-namespace {
+namespace test_placement {
 
 TEST(PlacementTable, GivesBackWhatWasSetAndLeavesTheRestAlone) {
   Placement placement;
@@ -220,5 +220,5 @@ TEST(StiffnessWarnings, NameTheDevicesOwnBoundAndThatOfASampledWall) {
   EXPECT_TRUE(stiffness_warnings(device, 5000.0, 1.0, 1000.0).empty());
 }
 
-}  // namespace
+}  // namespace test_placement
 }  // namespace palpate

@@ -18,7 +18,7 @@
 #include "tests/support/sanitized.hpp"
 
 namespace palpate {
-namespace {
+namespace test_safety {
 
 using test::fails_saying;
 
@@ -923,5 +923,5 @@ TEST(SafetyParameters, AreRefusedByNameAndRange) {
   EXPECT_THROW(SafetyChain({.max_force = 0.0}), Error);
 }
 
-}  // namespace
+}  // namespace test_safety
 }  // namespace palpate

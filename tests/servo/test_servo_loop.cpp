@@ -15,7 +15,7 @@
 #include "tests/support/grids.hpp"
 
 namespace palpate {
-namespace {
+namespace test_servo_loop {
 
 using test::FakeDevice;
 
@@ -149,5 +149,5 @@ TEST(ServoLoop, CanBeDestroyedBeforeItStartedAndStoppedTwice) {
   EXPECT_EQ(device.writes, writes);
 }
 
-}  // namespace
+}  // namespace test_servo_loop
 }  // namespace palpate

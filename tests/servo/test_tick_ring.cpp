@@ -9,7 +9,7 @@
 #include "palpate/servo/tick_ring.hpp"
 
 namespace palpate {
-namespace {
+namespace test_tick_ring {
 
 struct Record {
   std::uint64_t number = 0;
@@ -87,5 +87,5 @@ TEST(TickRing, NeverGivesATornRecordAndAccountsForAllWhileTheWriterLapsItsReader
   EXPECT_EQ(unaccounted, 0);
 }
 
-}  // namespace
+}  // namespace test_tick_ring
 }  // namespace palpate

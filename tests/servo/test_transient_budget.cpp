@@ -7,7 +7,7 @@
 #include "palpate/servo/transient_budget.hpp"
 
 namespace palpate {
-namespace {
+namespace test_transient_budget {
 
 constexpr double dt = 1e-3;
 constexpr double up = 1.0;
@@ -105,5 +105,5 @@ TEST(TransientBudget, IsNothingWhileSomethingIsAmiss) {
   EXPECT_TRUE(hand.chain.run(hand.input).flags & input_refused);
 }
 
-}  // namespace
+}  // namespace test_transient_budget
 }  // namespace palpate

@@ -17,7 +17,7 @@
 #include "tests/support/grids.hpp"
 
 namespace palpate {
-namespace {
+namespace test_weight_support {
 
 constexpr double weight = 0.05;               // [kg]
 constexpr double newtons = weight * 9.80665;  // [N]
@@ -159,5 +159,5 @@ TEST(WeightSupport, NeverGivesMoreThanANewtonOrTheLimit) {
   EXPECT_TRUE(test::fails_saying(check, "down", "length 1"));
 }
 
-}  // namespace
+}  // namespace test_weight_support
 }  // namespace palpate

@@ -22,7 +22,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_camera_feed {
 
 using test::fails_saying;
 
@@ -704,5 +704,5 @@ TEST(CameraFeed, EndsAtOnceInAPauseHoweverLong) {
   EXPECT_TRUE(feed.join(bound));
 }
 
-}  // namespace
+}  // namespace test_camera_feed
 }  // namespace palpate

@@ -11,7 +11,7 @@
 #include "tests/support/sanitized.hpp"
 
 namespace palpate {
-namespace {
+namespace test_camera_registration {
 
 struct Seen {
   Frame frame;
@@ -80,5 +80,5 @@ TEST(CameraRegistration, RefusesCamerasThatSeeDifferentThings) {
                                  "too little", "rough start"));
 }
 
-}  // namespace
+}  // namespace test_camera_registration
 }  // namespace palpate

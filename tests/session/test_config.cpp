@@ -12,7 +12,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_config {
 
 using test::fails_saying;
 
@@ -242,5 +242,5 @@ TEST(SessionConfig, IsEditedWithoutLosingWhatElseIsInTheFile) {
   EXPECT_TRUE(fails_saying([&] { return edited("rat = 3"); }, "session.toml:1:", "'rat'"));
 }
 
-}  // namespace
+}  // namespace test_config
 }  // namespace palpate

@@ -13,7 +13,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_paint {
 
 using test::fails_saying;
 
@@ -117,5 +117,5 @@ TEST(Paint, RefusesWhatCannotBe) {
       fails_saying([&] { return paint.add(dab(Vec3(0, 1, 0.5), 0.01, "ice")), 0; }, "clear"));
 }
 
-}  // namespace
+}  // namespace test_paint
 }  // namespace palpate

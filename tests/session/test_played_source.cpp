@@ -14,7 +14,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_played_source {
 
 using test::fails_saying;
 using test::MadeSource;
@@ -177,5 +177,5 @@ TEST(PosedSource, RefusesACloudOfAnotherKind) {
   EXPECT_TRUE(fails_saying([&] { return source->next()->stamp; }, "made:", "pose"));
 }
 
-}  // namespace
+}  // namespace test_played_source
 }  // namespace palpate

@@ -14,7 +14,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_point_capture {
 
 using test::fails_saying;
 
@@ -157,5 +157,5 @@ TEST(CapturePoints, EndsAtAFaultOfTheDevice) {
   EXPECT_FALSE(device.forced);
 }
 
-}  // namespace
+}  // namespace test_point_capture
 }  // namespace palpate

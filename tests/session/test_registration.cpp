@@ -13,7 +13,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_registration {
 
 using test::fails_saying;
 
@@ -157,5 +157,5 @@ TEST(ReadPairs, ReadsACsvFileAndNamesFileAndLineOfWhatIsWrong) {
   EXPECT_EQ(read_points(folder.write("points.csv", "x,y,z\n1,2,3\n")).front(), Vec3(1, 2, 3));
 }
 
-}  // namespace
+}  // namespace test_registration
 }  // namespace palpate

@@ -22,7 +22,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_session {
 
 using test::fails_saying;
 using test::MadeSource;
@@ -574,5 +574,5 @@ TEST(Session, RefusesAMethodThatCannotTouchWhatTheCamerasSee) {
   EXPECT_EQ(session.settings().parameters.coupling.stiffness, 600.0);
 }
 
-}  // namespace
+}  // namespace test_session
 }  // namespace palpate

@@ -31,7 +31,7 @@
 #include "tests/support/sanitized.hpp"
 
 namespace palpate {
-namespace {
+namespace test_session_faults {
 
 using test::MadeSource;
 using test::wall;
@@ -615,5 +615,5 @@ TEST(SessionFaultsByChance, TwoAtATimeBreakNoPromise) {
   }
 }
 
-}  // namespace
+}  // namespace test_session_faults
 }  // namespace palpate

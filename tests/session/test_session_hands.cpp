@@ -33,7 +33,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_session_hands {
 
 using test::fails_saying;
 using test::MadeSource;
@@ -448,5 +448,5 @@ TEST(LiveSessionHands, AreRecordedFromTheMiddleOfASession) {
   }
 }
 
-}  // namespace
+}  // namespace test_session_hands
 }  // namespace palpate

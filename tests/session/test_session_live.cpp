@@ -25,7 +25,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_session_live {
 
 using test::fails_saying;
 using test::wall;
@@ -458,5 +458,5 @@ TEST(LiveSession, IsChangedAndWatchedFromSeveralThreads) {
   EXPECT_EQ(session.settings().method, "sight");
 }
 
-}  // namespace
+}  // namespace test_session_live
 }  // namespace palpate

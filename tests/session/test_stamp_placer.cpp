@@ -10,7 +10,7 @@
 #include "palpate/session/stamp_placer.hpp"
 
 namespace palpate {
-namespace {
+namespace test_stamp_placer {
 
 constexpr double period = 1.0 / 30.0;  // [s]
 
@@ -245,5 +245,5 @@ TEST(StampPlacer, StaysWithinMillisecondsOfTheTruthPlusTheLeastLatency) {
   EXPECT_LT(worst, 0.0035);
 }
 
-}  // namespace
+}  // namespace test_stamp_placer
 }  // namespace palpate

@@ -9,7 +9,7 @@
 #include "tests/session/fakes.hpp"
 
 namespace palpate {
-namespace {
+namespace test_summary {
 
 constexpr double r_c = 0.005;  // [m]
 
@@ -78,5 +78,5 @@ TEST(Summary, TakesTheCameraThatSeesTheProxyLeastBehind) {
   EXPECT_FALSE(least_behind({}, Vec3(0.0, 0.0, 0.5), r_c));
 }
 
-}  // namespace
+}  // namespace test_summary
 }  // namespace palpate

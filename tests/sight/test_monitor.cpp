@@ -19,7 +19,7 @@
 #include "tests/support/grids.hpp"
 
 namespace palpate {
-namespace {
+namespace test_monitor {
 
 constexpr double interval = 1.0 / 30.0;
 constexpr double r_c = 5e-3;
@@ -363,5 +363,5 @@ TEST(SightTracker, CountsTheTimeOfAHoldFromItsBeginning) {
   }
 }
 
-}  // namespace
+}  // namespace test_monitor
 }  // namespace palpate

@@ -21,7 +21,7 @@
 #include "tests/support/grids.hpp"
 
 namespace palpate {
-namespace {
+namespace test_sight {
 
 using test::flat_grid;
 using test::grid;
@@ -854,5 +854,5 @@ TEST(Sight, BearsEmptyFramesAndStampsThatStandStill) {
   EXPECT_NEAR(again.proxy.z(), r_c, 1e-4);
 }
 
-}  // namespace
+}  // namespace test_sight
 }  // namespace palpate

@@ -19,7 +19,7 @@
 #include "tests/support/sanitized.hpp"
 
 namespace palpate {
-namespace {
+namespace test_sight_safety {
 
 constexpr double interval = 1.0 / 30.0;
 constexpr double max_force = 20.0;
@@ -231,5 +231,5 @@ TEST(SightSafety, AsksForAFiniteForceAfterTwoFramesOfTheSameStamp) {
   }
 }
 
-}  // namespace
+}  // namespace test_sight_safety
 }  // namespace palpate

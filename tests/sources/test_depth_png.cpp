@@ -13,7 +13,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_depth_png {
 
 using test::fails_saying;
 using test::png_of;
@@ -166,5 +166,5 @@ TEST(DepthPng, NamesAFileThatCannotBeReadOrWritten) {
   EXPECT_TRUE(fails_saying([&] { write_depth_png(missing, 0, 3, depth); }, "0x3"));
 }
 
-}  // namespace
+}  // namespace test_depth_png
 }  // namespace palpate

@@ -14,7 +14,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_depth_recording {
 
 using test::fails_saying;
 using test::TemporaryFolder;
@@ -360,5 +360,5 @@ TEST(DepthFolder, NamesWhatIsWrongWithIt) {
   EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?fps=0"); }, "'fps'"));
 }
 
-}  // namespace
+}  // namespace test_depth_recording
 }  // namespace palpate

@@ -10,7 +10,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_depth_rvl {
 
 using test::fails_saying;
 
@@ -82,5 +82,5 @@ TEST(DepthRvl, RejectsSizesThatDoNotMatch) {
   EXPECT_TRUE(fails_saying([&] { return encode_depth_rvl(-3, -2, depth); }, "-3x-2"));
 }
 
-}  // namespace
+}  // namespace test_depth_rvl
 }  // namespace palpate

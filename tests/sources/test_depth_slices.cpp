@@ -9,7 +9,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_depth_slices {
 
 using test::fails_saying;
 using Slice = std::vector<std::byte>;
@@ -124,5 +124,5 @@ TEST(DepthSlices, RejectWhatCannotBe) {
   EXPECT_TRUE(fails_saying([&] { slices_of(1, {1, 2, 3}); }, "depth image", "320x90"));
 }
 
-}  // namespace
+}  // namespace test_depth_slices
 }  // namespace palpate

@@ -10,7 +10,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_intrinsics_file {
 
 using nlohmann::json;
 using test::fails_saying;
@@ -153,5 +153,5 @@ TEST(Intrinsics, SayHowTheSensorMeasures) {
   EXPECT_TRUE(fails_saying([&] { return parse(object); }, "k.json", "sensor_kind"));
 }
 
-}  // namespace
+}  // namespace test_intrinsics_file
 }  // namespace palpate

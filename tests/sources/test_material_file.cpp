@@ -15,7 +15,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_material_file {
 
 using test::fails_saying;
 
@@ -163,5 +163,5 @@ TEST(ColourKey, TakesTheNearestColourWithinItsTolerance) {
   EXPECT_EQ(label({0xff, 0xff, 0xff}), 0);
 }
 
-}  // namespace
+}  // namespace test_material_file
 }  // namespace palpate

@@ -15,7 +15,7 @@
 #include "tests/support/point_files.hpp"
 
 namespace palpate {
-namespace {
+namespace test_pcd {
 
 using test::bytes_of;
 using test::fails_saying;
@@ -450,5 +450,5 @@ TEST(Pcd, ReadsRealScenesOfDepthCameras) {
                    {-0.0227141383, -0.0466103078, 0.99151716}});
 }
 
-}  // namespace
+}  // namespace test_pcd
 }  // namespace palpate

@@ -10,7 +10,7 @@
 #include "tests/support/point_files.hpp"
 
 namespace palpate {
-namespace {
+namespace test_ply {
 
 using test::bytes_of;
 using test::fails_saying;
@@ -482,5 +482,5 @@ TEST(Ply, ReadsWhatOtherParsersReadAndRejectsWhatTheyReject) {
   EXPECT_EQ(static_cast<std::size_t>(files), accepted.size() + rejected.size());
 }
 
-}  // namespace
+}  // namespace test_ply
 }  // namespace palpate

@@ -1,19 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/sources/natural_order.hpp"
+#include "palpate/sources/point_file.hpp"
 #include "palpate/sources/source.hpp"
 
+#include "tests/support/data.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/point_files.hpp"
 
 namespace palpate {
-namespace {
+namespace test_point_file_source {
 
 using test::fails_saying;
 using test::TemporaryFolder;
@@ -184,6 +188,57 @@ TEST(PointFiles, CarryTheColoursOfAnOrganisedCloudAndOfAMesh) {
   EXPECT_EQ(coloured->colour->rgb, (std::vector<std::uint8_t>{1, 2, 3, 4, 5, 6, 7, 8, 9}));
 }
 
+TEST(PointFiles, OfADepthCameraAreDepthImagesInColourThatShareTheCamera) {
+  const TemporaryFolder folder;
+  for (const char* name : {"0.pcd", "1.pcd"}) {
+    std::string file =
+        "FIELDS x y z rgb\nSIZE 8 8 8 4\nTYPE F F F U\nWIDTH 32\nHEIGHT 24\nPOINTS 768\n"
+        "DATA ascii\n";
+    for (int v = 0; v < 24; ++v) {
+      for (int u = 0; u < 32; ++u) {
+        const double z = 900.0 + 10.0 * ((u * v) % 17);  // [mm]
+        file += u == v ? "nan nan nan"
+                       : std::to_string((u - 15.5) / 40.0 * z) + " " +
+                             std::to_string((v - 11.5) / 40.0 * z) + " " + std::to_string(z);
+        file += " " + std::to_string(u) + "\n";
+      }
+    }
+    folder.write(name, file);
+  }
+  const auto source = open_source("pcd:" + folder.path().string() + "?scale=1mm");
+  const auto first = source->next();
+  const auto second = source->next();
+  const auto* image = dynamic_cast<const DepthImage*>(first->cloud.get());
+  ASSERT_NE(image, nullptr);
+  EXPECT_NEAR(image->intrinsics().fx, 40.0, 1e-4);
+  EXPECT_NEAR(image->intrinsics().cy, 11.5, 1e-4);
+  EXPECT_FALSE(image->deproject(5, 5).has_value());
+  EXPECT_NEAR(image->deproject(6, 5)->z(), 1.03, 1e-5);
+  ASSERT_NE(first->colour, nullptr);
+  EXPECT_EQ(first->colour->rgb[3 * (5 * 32 + 6) + 2], 6);
+  EXPECT_EQ(&image->rays(), &dynamic_cast<const DepthImage&>(*second->cloud).rays());
+}
+
+TEST(PointFiles, OfKinectsAreDepthImagesThatLoseNoPoint) {
+  PALPATE_DATA_OR_SKIP(scenes, "single_pcl_kinect_scenes");
+  for (const char* name :
+       {"capture0001.pcd", "mOSD_learn0.pcd", "mOSD_learn33.pcd",
+        "milk_cartoon_all_small_clorox.pcd", "table_scene_mug_stereo_textured.pcd"}) {
+    const std::string path = (scenes / name).string();
+    const auto frame = open_source("pcd:" + path)->next();
+    const auto* image = dynamic_cast<const DepthImage*>(frame->cloud.get());
+    ASSERT_NE(image, nullptr) << name;
+    const PointFile file = read_pcd(path);
+    for (std::size_t i = 0; i < file.points.size(); ++i) {
+      const auto point =
+          image->deproject(static_cast<int>(i % file.width), static_cast<int>(i / file.width));
+      ASSERT_EQ(point.has_value(), file.points[i].allFinite()) << name << ", point " << i;
+      if (!point) continue;
+      ASSERT_LT((*point - file.points[i]).norm(), 1e-4) << name << ", point " << i;
+    }
+  }
+}
+
 TEST(PointFiles, GoOnAfterAFileThatCannotBeUsed) {
   const TemporaryFolder folder;
   folder.write("0.pcd", pcd(0));
@@ -218,5 +273,5 @@ TEST(PointFiles, TakeOnlyOptionsThatTheyKnow) {
   EXPECT_TRUE(open_source(uri + "?fps=30hz&voxel=5mm&scale=1mm")->next().has_value());
 }
 
-}  // namespace
+}  // namespace test_point_file_source
 }  // namespace palpate

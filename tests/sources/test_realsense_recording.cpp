@@ -21,7 +21,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_realsense_recording {
 
 using test::fails_saying;
 using test::RealSenseRecording;
@@ -289,5 +289,5 @@ TEST(RealSenseLens, RefusesTextsThatAreNone) {
   EXPECT_TRUE(fails_saying(parse(good.substr(0, good.find("model"))), "model"));
 }
 
-}  // namespace
+}  // namespace test_realsense_recording
 }  // namespace palpate

@@ -13,7 +13,7 @@
 #include "tests/support/data.hpp"
 
 namespace palpate {
-namespace {
+namespace test_recorded_depth {
 
 struct Span {
   double low, high;
@@ -152,5 +152,5 @@ TEST(RecordedDepth, OfASingleBasketWithDistortionGivenAsOptions) {
                    {1, 640, 480, {0.80, 0.82}, {0.3, 3.0}});
 }
 
-}  // namespace
+}  // namespace test_recorded_depth
 }  // namespace palpate

@@ -31,7 +31,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_recording {
 
 using test::fails_saying;
 using test::TemporaryFolder;
@@ -257,7 +257,7 @@ TEST_F(ForeignBag, WithABadFrameGoesOnBehindIt) {
   const auto source = open();
   EXPECT_TRUE(source->next());
   const auto next = [&] { return source->next(); };
-  EXPECT_TRUE(fails_saying(next, "rgb8", "message 3 of /camera/depth"));
+  EXPECT_TRUE(fails_saying(next, "rgb8", "message 2 of /camera/depth"));
   EXPECT_TRUE(fails_saying(next, "23 bytes"));
   EXPECT_TRUE(fails_saying(next, "do not fit"));
   EXPECT_TRUE(fails_saying(next, "4x3", "4x2"));
@@ -450,5 +450,5 @@ TEST_F(ForeignBag, OfARealLidarIsRead) {
   EXPECT_LT(points.point(0).norm(), 300.0);
 }
 
-}  // namespace
+}  // namespace test_recording
 }  // namespace palpate

@@ -12,7 +12,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_scene {
 
 using test::fails_saying;
 
@@ -148,5 +148,5 @@ TEST(Scene, UnknownNamesAndImpossibleValuesAreRefused) {
   EXPECT_THROW(Scene({}), Error);
 }
 
-}  // namespace
+}  // namespace test_scene
 }  // namespace palpate

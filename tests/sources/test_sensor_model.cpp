@@ -16,7 +16,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_sensor_model {
 
 using test::fails_saying;
 
@@ -349,5 +349,5 @@ TEST(Sensor, RefusesValuesThatCannotBe) {
                    "7 values"));
 }
 
-}  // namespace
+}  // namespace test_sensor_model
 }  // namespace palpate

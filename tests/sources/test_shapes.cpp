@@ -12,7 +12,7 @@
 #include "palpate/sources/shapes.hpp"
 
 namespace palpate {
-namespace {
+namespace test_shapes {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
@@ -173,5 +173,5 @@ TEST(Shapes, ARayBesideOrAwayFromThemHitsNothing) {
   }
 }
 
-}  // namespace
+}  // namespace test_shapes
 }  // namespace palpate

@@ -14,7 +14,7 @@
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
-namespace {
+namespace test_source {
 
 using test::fails_saying;
 
@@ -155,5 +155,5 @@ TEST(Source, OfFilesTakesTheKindOfSensorThatItIsTold) {
                                  "structured-light", "time-of-flight"));
 }
 
-}  // namespace
+}  // namespace test_source
 }  // namespace palpate

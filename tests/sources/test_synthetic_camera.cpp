@@ -12,7 +12,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_synthetic_camera {
 
 using test::fails_saying;
 
@@ -194,5 +194,5 @@ TEST(SyntheticCamera, OptionsThatCannotBeAreNamed) {
   EXPECT_TRUE(fails_saying([] { return camera("desk?fov=180deg"); }, "'fov'"));
 }
 
-}  // namespace
+}  // namespace test_synthetic_camera
 }  // namespace palpate

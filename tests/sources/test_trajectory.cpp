@@ -9,7 +9,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_trajectory {
 
 using test::fails_saying;
 
@@ -123,5 +123,5 @@ TEST(PoseMatrices, NameTheOneThatIsNotRigid) {
   }
 }
 
-}  // namespace
+}  // namespace test_trajectory
 }  // namespace palpate

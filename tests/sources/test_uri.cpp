@@ -11,7 +11,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_uri {
 
 using test::fails_saying;
 
@@ -106,5 +106,5 @@ TEST(OpenSource, ListsTheKnownSchemesForAnUnknownOne) {
   EXPECT_THROW(open_source("folder"), Error);
 }
 
-}  // namespace
+}  // namespace test_uri
 }  // namespace palpate

@@ -19,7 +19,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_telelink {
 
 constexpr double long_enough = 60.0;  // [s] on a busy machine
 constexpr const char* scene = "synthetic:plane?size=160x120&noise=0.5mm";
@@ -210,5 +210,5 @@ TEST(Robots, APointFollowsAndStopsByItself) {
   EXPECT_GT(tool->state()->position.z(), 3e-3);
 }
 
-}  // namespace
+}  // namespace test_telelink
 }  // namespace palpate

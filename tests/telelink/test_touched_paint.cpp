@@ -10,7 +10,7 @@
 #include "palpate/telelink/touched_paint.hpp"
 
 namespace palpate {
-namespace {
+namespace test_touched_paint {
 
 const Vec3 here(0.1, 0.0, 0.03);
 
@@ -59,5 +59,5 @@ TEST(PaintTouched, IgnoresWhatCannotBeSaying) {
   EXPECT_EQ(after({0.1, 0.0, 0.03, 0.0, 0.0, 1.0, 300.0, 0.5}), "");
 }
 
-}  // namespace
+}  // namespace test_touched_paint
 }  // namespace palpate

@@ -12,7 +12,7 @@
 #include "palpate/teleop/behind_arm.hpp"
 
 namespace palpate {
-namespace {
+namespace test_behind_arm {
 
 constexpr int width = 80, height = 64;
 constexpr double units = 1e4;  // readings a metre
@@ -105,5 +105,5 @@ TEST_F(BehindArmTest, RefusesImagesOfAnotherSize) {
   EXPECT_THROW(BehindArm(0, 4), Error);
 }
 
-}  // namespace
+}  // namespace test_behind_arm
 }  // namespace palpate

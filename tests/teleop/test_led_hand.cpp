@@ -15,7 +15,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_led_hand {
 
 constexpr double tick = 1e-3;  // [s]
 
@@ -200,5 +200,5 @@ TEST(LinkLimits, FadeWhenFramesAreOlderThanTheLinkMakesThem) {
   validate(far);
 }
 
-}  // namespace
+}  // namespace test_led_hand
 }  // namespace palpate

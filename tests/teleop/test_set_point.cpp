@@ -19,7 +19,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_set_point {
 
 constexpr double tick = 1e-3;  // [s]
 const Vec3 up = Vec3::UnitZ();
@@ -328,5 +328,5 @@ TEST(SimulatedToolTest, IsLateByItsLagAndDoesNotOvershoot) {
   EXPECT_NEAR(tool.place().z(), end, 1e-5);
 }
 
-}  // namespace
+}  // namespace test_set_point
 }  // namespace palpate

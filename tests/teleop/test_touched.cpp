@@ -10,7 +10,7 @@
 #include "palpate/teleop/touched.hpp"
 
 namespace palpate {
-namespace {
+namespace test_touched {
 
 constexpr double dt = 2e-3;      // [s]
 constexpr double radius = 5e-3;  // [m]
@@ -120,5 +120,5 @@ TEST(Disbelief, SaysWhatCannotBe) {
   EXPECT_EQ(why(here, up, {}, {}), "it says nothing");
 }
 
-}  // namespace
+}  // namespace test_touched
 }  // namespace palpate

@@ -11,7 +11,7 @@
 #include "palpate/viewer/protocol.hpp"
 
 namespace palpate {
-namespace {
+namespace test_protocol {
 
 template <class Number>
 Number at(const std::vector<std::byte>& bytes, std::size_t offset) {
@@ -62,6 +62,32 @@ TEST(Protocol, SendsADepthImageAsItLiesInMemory) {
   EXPECT_EQ(message.payload.size(), 12u);
 }
 
+TEST(Protocol, SendsColoursAsTheyLieInMemoryAndSaysWhose) {
+  const std::vector<std::uint16_t> depth(6);
+  auto colour = std::make_shared<ColourImage>();
+  colour->width = 3;
+  colour->height = 2;
+  colour->rgb.assign(18, 7);
+  FrameHeader header{.width = 3, .height = 2, .colour = colour};
+  const ViewerMessage registered = depth_message(header, depth, nullptr);
+  EXPECT_EQ(at<std::uint8_t>(registered.head, 3), 1);
+  EXPECT_EQ(registered.head.size(), 96u);
+  EXPECT_EQ(registered.colour, colour) << "it was copied";
+  header.height = 1;
+  EXPECT_THROW(depth_message(header, std::span(depth).first(3), nullptr), Error);
+  colour->camera = ColourImage::Camera{};
+  colour->camera->intrinsics.fx = 400.0;
+  colour->camera->world_from_camera.translation() = Vec3(1.0, 2.0, 3.0);
+  const ViewerMessage own = depth_message(header, std::span(depth).first(3), nullptr);
+  EXPECT_EQ(at<std::uint8_t>(own.head, 3), 2);
+  ASSERT_EQ(own.head.size(), 168u);
+  EXPECT_EQ(at<std::uint32_t>(own.head, 96), 3u);
+  EXPECT_EQ(at<float>(own.head, 104), 400.0F);
+  EXPECT_EQ(at<float>(own.head, 120 + 4 * 3), -1.0F) << "from the world to the camera";
+  colour->rgb.pop_back();
+  EXPECT_THROW(depth_message(header, std::span(depth).first(3), nullptr), Error);
+}
+
 TEST(Protocol, RefusesPayloadsOfAnotherSize) {
   FrameHeader header;
   header.width = 3;
@@ -102,7 +128,7 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
         {100.0 - 0.001 * static_cast<double>(i), 1.0F, 0.5F, 2.0F, 3e-6F, 4e-4F, -5e-4F});
   const ViewerMessage message = ticks_message(batch);
   EXPECT_EQ(at<std::uint16_t>(message.head, 2), TickBatch::max_samples);
-  ASSERT_EQ(message.head.size(), 88 + 28 * TickBatch::max_samples);
+  ASSERT_EQ(message.head.size(), 112 + 28 * TickBatch::max_samples);
   EXPECT_EQ(at<std::uint32_t>(message.head, 4), 5u);
   EXPECT_EQ(at<double>(message.head, 8), 100.0);
   EXPECT_EQ(at<std::uint32_t>(message.head, 16), 1u << 12);
@@ -110,10 +136,10 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   EXPECT_EQ(at<std::int32_t>(message.head, 76), -1);
   EXPECT_EQ(at<float>(message.head, 80), 0.25F);
   EXPECT_EQ(at<float>(message.head, 84), 10.0F);
-  EXPECT_NEAR(at<float>(message.head, 88), 0.010, 1e-6) << "the first ten are the oldest";
-  EXPECT_EQ(at<float>(message.head, 88 + 16), 3e-6F);
-  EXPECT_EQ(at<float>(message.head, 88 + 20), 4e-4F);
-  EXPECT_EQ(at<float>(message.head, 88 + 24), -5e-4F);
+  EXPECT_NEAR(at<float>(message.head, 112), 0.010, 1e-6) << "the first ten are the oldest";
+  EXPECT_EQ(at<float>(message.head, 112 + 16), 3e-6F);
+  EXPECT_EQ(at<float>(message.head, 112 + 20), 4e-4F);
+  EXPECT_EQ(at<float>(message.head, 112 + 24), -5e-4F);
 }
 
 TEST(Protocol, UnderstandsAHandThatIsHeldOrLetGo) {
@@ -262,5 +288,5 @@ TEST(Protocol, SurvivesAnyBytes) {
   }
 }
 
-}  // namespace
+}  // namespace test_protocol
 }  // namespace palpate

@@ -11,7 +11,7 @@
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace {
+namespace test_roles {
 
 using test::fails_saying;
 
@@ -159,5 +159,5 @@ TEST(GuessLimit, RemembersOnlySoManyAddresses) {
   EXPECT_EQ(limit.pause("first", 1.0), 0.0);
 }
 
-}  // namespace
+}  // namespace test_roles
 }  // namespace palpate

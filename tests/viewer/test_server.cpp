@@ -24,7 +24,7 @@
 #include "tests/viewer/client.hpp"
 
 namespace palpate {
-namespace {
+namespace test_server {
 
 // Remembers what pages asked of it.
 class FakeHost final : public ViewerHost {
@@ -300,7 +300,7 @@ TEST_F(ViewerServerTest, IntroducesItselfAndTellsOfTicks) {
   EXPECT_EQ(presence["viewers"], 1);
   const std::string first = page.until_kind(2);
   const std::string second = page.until_kind(2);
-  ASSERT_EQ(first.size(), 88u);
+  ASSERT_EQ(first.size(), 112u);
   EXPECT_NE(first, second);
 }
 
@@ -661,5 +661,5 @@ TEST(ViewerServer, ClosesAConnectionWhoseRequestDoesNotCome) {
       << error.message();
 }
 
-}  // namespace
+}  // namespace test_server
 }  // namespace palpate

@@ -22,7 +22,7 @@
 #include "tests/viewer/client.hpp"
 
 namespace palpate {
-namespace {
+namespace test_session_host {
 
 using nlohmann::json;
 using test::fails_saying;
@@ -332,5 +332,5 @@ TEST(SessionHost, SaysThatARecordingFolderCannotBeMade) {
       fails_saying(hosted.asking(SetRecording{true}, Role::operating), "--record-folder", "file"));
 }
 
-}  // namespace
+}  // namespace test_session_host
 }  // namespace palpate

@@ -4,7 +4,7 @@
 #include "palpate/viewer/tick_batcher.hpp"
 
 namespace palpate {
-namespace {
+namespace test_tick_batcher {
 
 constexpr double r_c = 0.005;  // [m]
 
@@ -47,6 +47,24 @@ TEST(TickBatcher, ShowsTheNewestTickAndForgetsNoFlag) {
   EXPECT_EQ(batch->safety, std::uint32_t{force_cut});
   batcher.add(tick_at(1.002), r_c);
   EXPECT_EQ(batcher.take()->flags, 0u) << "flags of the batch before";
+}
+
+TEST(TickBatcher, TellsWhatFixturesAskForAndWhereTheyKeepTheHand) {
+  TickBatcher batcher(5);
+  ServoTick record = tick_at(1.0);
+  record.tick.force = Vec3(0.0, 0.0, 2.0);
+  record.region = Vec3(0.0, 0.0, 3.0);  // more along the same way: not their sum
+  record.guidance = Vec3(4.0, 0.0, 0.0);
+  record.place = Vec3(0.0, 0.0, 0.02);
+  record.fixtures = 5;
+  batcher.add(record, r_c);
+  const auto batch = batcher.take();
+  ASSERT_TRUE(batch);
+  EXPECT_DOUBLE_EQ(batch->asked_force, 5.0);
+  EXPECT_DOUBLE_EQ(batch->region, 3.0);
+  EXPECT_DOUBLE_EQ(batch->guidance, 4.0);
+  EXPECT_EQ(batch->place.z(), 0.02);
+  EXPECT_EQ(batch->fixtures, 5u);
 }
 
 TEST(TickBatcher, KeepsTheExtremesOfEachSample) {
@@ -98,5 +116,5 @@ TEST(TickBatcher, MeasuresPenetrationFromTheSurfaceNotFromTheProxy) {
   EXPECT_FLOAT_EQ(penetration({0.0, 0.0, -0.0025}, Vec3::Zero()), 0.0025F) << "no normal is known";
 }
 
-}  // namespace
+}  // namespace test_tick_batcher
 }  // namespace palpate

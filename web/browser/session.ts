@@ -130,7 +130,7 @@ export function placeWhere(
 export async function drawn(page: Page): Promise<void> {
   await page.waitForFunction(() => {
     const { view, newest } = (window as unknown as { palpate: any }).palpate ?? {};
-    return view?.drawings > 3 && view.drawnPoints > 1000 && newest().state && newest().tick;
+    return view?.drawings > 3 && view.drawnPoints > 100 && newest().state && newest().tick;
   });
 }
 

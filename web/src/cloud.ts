@@ -3,13 +3,19 @@
 // deprojects its own pixel there (section 4.2 of the paper), so no thread ever walks the frame.
 
 import * as THREE from "three";
-import type { Vec3 } from "./protocol";
-import type { Frame, Rays } from "./protocol";
+import { length, sub } from "./camera_math";
+import type { Frame, Rays, Vec3 } from "./protocol";
 import { SeenSurface } from "./surface";
 import { drawsFaces } from "./thinning";
 
 const POINTS_PER_ROW = 1024;
 const LEAST_POINTS = 2000; // that are drawn of an unorganised cloud, if it has as many
+
+// Here and not in each of a point's pixels, of which software draws millions.
+const SCREEN = /* glsl */ `
+vec3 toLinear(vec3 c) { return pow(c, vec3(2.2)); }
+vec3 toScreen(vec3 c) { return pow(c, vec3(1.0 / 2.2)); }
+`;
 
 const vertexShader = /* glsl */ `
 precision highp float;
@@ -17,7 +23,7 @@ precision highp int;
 precision highp usampler2D;
 #ifdef POINTS
 uniform highp sampler2D points;
-uniform float pointSpacing;    // [m] about, between neighbours
+uniform vec2 pointSpacing;     // [m], [-] of the distance: about, between neighbours
 #else
 uniform usampler2D depth;
 uniform vec4 intrinsics;
@@ -36,8 +42,16 @@ uniform vec3 nearColour, middleColour, farColour, glow;
 uniform vec3 proxy;
 uniform vec3 radii;            // r_1, r_3; what the paper's psi falls from and to
 uniform vec3 light;
+uniform bool tinted;
+#ifdef TINT
+uniform highp sampler2D tint;  // red, green and blue beside each other
+uniform ivec2 tintSize;
+uniform vec4 tintLens;         // of a colour camera; fx 0: the pixels are the depth's
+uniform mat4 tintFromWorld;
+#endif
 out vec3 colour;
 
+${SCREEN}
 bool pointAt(ivec2 pixel, out vec3 p) {
 #ifdef POINTS
   int i = pixel.y * size.x + pixel.x;
@@ -77,6 +91,26 @@ float shade(ivec2 pixel, vec3 p) {
 #endif
 }
 
+// Of the colour image; false: it does not see this place.
+bool tintAt(ivec2 pixel, vec3 world, out vec3 found) {
+#ifdef TINT
+  int i = pixel.y * size.x + pixel.x;
+  if (tintLens.x > 0.0) {
+    vec3 q = (tintFromWorld * vec4(world, 1.0)).xyz;
+    ivec2 at = ivec2(floor(q.xy / q.z * tintLens.xy + tintLens.zw + 0.5));
+    if (q.z <= 0.0 || any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, tintSize)))
+      return false;
+    i = at.y * tintSize.x + at.x;
+  }
+  ivec2 at = ivec2(3 * (i % ${POINTS_PER_ROW}), i / ${POINTS_PER_ROW});
+  found = vec3(texelFetch(tint, at, 0).r, texelFetch(tint, at + ivec2(1, 0), 0).r,
+               texelFetch(tint, at + ivec2(2, 0), 0).r);
+  return tinted;
+#else
+  return false;
+#endif
+}
+
 // psi of (2)
 float weight(float r) {
   if (r < radii.x) return 1.0;
@@ -100,16 +134,19 @@ void main() {
   float t = clamp((p.z - range.x) / (range.y - range.x), 0.0, 1.0);
   colour = t < 0.5 ? mix(nearColour, middleColour, 2.0 * t)
                    : mix(middleColour, farColour, 2.0 * t - 1.0);
-  colour *= shade(pixel, p);
+  vec3 own;
+  if (tintAt(pixel, world, own)) colour = toLinear(own);
+  else colour *= shade(pixel, p);
   float w = weight(distance(world, proxy));
-  colour = mix(colour, glow, 0.85 * sqrt(w));
+  colour = toScreen(mix(colour, glow, 0.85 * sqrt(w)));
 
 #ifdef POINTS
-  float spacing = pointSpacing;
+  float spacing = pointSpacing.x + pointSpacing.y * length(p);
 #else
   float spacing = float(stride) * p.z / intrinsics.x;
 #endif
-  gl_PointSize = clamp(1.7 * spacing * pixelsPerMetre / gl_Position.w, smallest, 48.0);
+  // A little more than the gap, which is wider along a surface that is seen aslant.
+  gl_PointSize = clamp(1.4 * spacing * pixelsPerMetre / gl_Position.w, smallest, 48.0);
 }
 `;
 
@@ -119,6 +156,11 @@ precision highp float;
 uniform mat4 worldFromCamera;
 uniform vec2 range;
 uniform vec3 nearColour, middleColour, farColour;
+uniform bool tinted;
+#ifdef TINT
+in vec3 own;
+#endif
+${SCREEN}
 out vec3 colour;
 out vec3 place;
 void main() {
@@ -127,6 +169,9 @@ void main() {
   float t = clamp((position.z - range.x) / (range.y - range.x), 0.0, 1.0);
   colour = t < 0.5 ? mix(nearColour, middleColour, 2.0 * t)
                    : mix(middleColour, farColour, 2.0 * t - 1.0);
+#ifdef TINT
+  if (tinted) colour = toLinear(own);
+#endif
 }
 `;
 
@@ -145,13 +190,11 @@ void main() {
 `;
 
 const fragmentShader = /* glsl */ `
-precision highp float;
+precision mediump float;
 in vec3 colour;
 out vec4 fragment;
 void main() {
-  vec2 d = gl_PointCoord - 0.5;
-  if (dot(d, d) > 0.25) discard;
-  fragment = linearToOutputTexel(vec4(colour, 1.0));
+  fragment = vec4(colour, 1.0);
 }
 `;
 
@@ -184,7 +227,9 @@ export class CameraCloud {
   private rays: THREE.DataTexture | null = null;
   private readonly material: THREE.ShaderMaterial;
   private measuredRange = false;
-  private spacing = 0; // [m] about, between neighbours of points without an image
+  private tint: THREE.DataTexture | null = null;
+  private spacing: Spacing = [0.002, 0]; // of points without an image
+  private measuredSpacing = 0; // of so many points
 
   constructor() {
     this.material = new THREE.ShaderMaterial({
@@ -197,7 +242,12 @@ export class CameraCloud {
         rays: { value: null },
         intrinsics: { value: new THREE.Vector4(1, 1, 0, 0) },
         metresPerUnit: { value: 1 },
-        pointSpacing: { value: 0.002 },
+        pointSpacing: { value: new THREE.Vector2() },
+        tinted: { value: true },
+        tint: { value: null },
+        tintSize: { value: new THREE.Vector2(1, 1) },
+        tintLens: { value: new THREE.Vector4() },
+        tintFromWorld: { value: new THREE.Matrix4() },
         size: { value: new THREE.Vector2(1, 1) },
         stride: { value: 1 },
         worldFromCamera: { value: new THREE.Matrix4() },
@@ -237,19 +287,22 @@ export class CameraCloud {
     const isPoints = frame.points !== null;
     this.define("POINTS", isPoints);
     this.define("RAYS", frame.hasRays);
-    if (isPoints) this.upload(paddedPoints(frame.points!), 3 * POINTS_PER_ROW, false);
-    else this.upload(frame.depth!, frame.width, true);
+    this.define("TINT", frame.colour !== null);
+    this.texture = isPoints
+      ? refilled(this.texture, padded(frame.points!), 3 * POINTS_PER_ROW, FLOATS)
+      : refilled(this.texture, frame.depth!, frame.width, DEPTHS);
     uniforms.depth!.value = this.texture;
     uniforms.points!.value = this.texture;
+    this.showColour(frame.colour);
     uniforms.intrinsics!.value.fromArray(frame.intrinsics);
-    if (isPoints) this.spacing = spacingOf(frame.points!);
+    // It costs more than a drawing: again where another cloud has come.
+    if (isPoints && Math.abs(frame.width - this.measuredSpacing) > 0.1 * this.measuredSpacing) {
+      this.spacing = spacingOf(frame.points!);
+      this.measuredSpacing = frame.width;
+    }
     uniforms.metresPerUnit!.value = frame.metresPerUnit;
     uniforms.size!.value.set(frame.width, frame.height);
-    const pose = frame.worldFromCamera;
-    // prettier-ignore
-    uniforms.worldFromCamera!.value.set(
-      pose[0], pose[1], pose[2], pose[3], pose[4], pose[5], pose[6], pose[7],
-      pose[8], pose[9], pose[10], pose[11], 0, 0, 0, 1);
+    setPose(uniforms.worldFromCamera!.value as THREE.Matrix4, frame.worldFromCamera);
     this.frame = frame;
     this.seen = new SeenSurface(frame, this.lens);
     this.object.visible = !frame.hasRays || this.rays !== null;
@@ -259,8 +312,7 @@ export class CameraCloud {
 
   /** Gives back what the graphics card holds. */
   dispose(): void {
-    this.texture?.dispose();
-    this.rays?.dispose();
+    for (const texture of [this.texture, this.rays, this.tint]) texture?.dispose();
     this.material.dispose();
     this.object.geometry.dispose();
     this.faces.geometry.dispose();
@@ -295,10 +347,11 @@ export class CameraCloud {
     this.faces.visible = faces > 0 && drawsFaces(faces, stride);
     if (this.frame.points) {
       // Of a mesh, the faces show what is between its corners.
-      uniforms.pointSpacing!.value = this.faces.visible ? 0 : this.spacing;
       // They have no rows: one of as many of them as of an image's pixels, but some always.
       const most = Math.max(1, Math.floor(this.frame.width / LEAST_POINTS));
       uniforms.stride!.value = stride = Math.min(stride * stride, most);
+      const wider = this.faces.visible ? 0 : Math.sqrt(stride);
+      uniforms.pointSpacing!.value.set(wider * this.spacing[0], wider * this.spacing[1]);
     }
     const columns = Math.ceil(this.frame.width / stride);
     const rows = Math.ceil(this.frame.height / stride);
@@ -308,6 +361,23 @@ export class CameraCloud {
   setProxy(at: Vec3, r1: number, r3: number): void {
     this.material.uniforms.proxy!.value.fromArray(at);
     this.material.uniforms.radii!.value.set(r1, r3, 0);
+  }
+
+  /** Has it colours of its own? */
+  get hasColour(): boolean {
+    return this.frame?.colour != null;
+  }
+
+  /** Draws its own colours, where it has any, or those of depth. */
+  setTinted(tinted: boolean): void {
+    this.material.uniforms.tinted!.value = tinted;
+  }
+
+  /** [m] between what is measured about a place of the world. */
+  spacingAt(place: Vec3): number {
+    const away = length(sub(place, this.seen?.eye ?? place));
+    if (this.frame?.points) return this.spacing[0] + this.spacing[1] * away;
+    return away / (this.frame?.intrinsics[0] ?? 1);
   }
 
   setLight(direction: Vec3): void {
@@ -322,7 +392,7 @@ export class CameraCloud {
   }
 
   // `prepare` says whether they are drawn.
-  private takeFaces({ points, triangles }: Frame): void {
+  private takeFaces({ points, triangles, colour }: Frame): void {
     if (!triangles) {
       this.faces.visible = false;
       return;
@@ -331,37 +401,28 @@ export class CameraCloud {
     geometry.dispose(); // another's buffers
     geometry.setAttribute("position", new THREE.BufferAttribute(points!, 3));
     geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+    if (colour && !colour.camera)
+      geometry.setAttribute("own", new THREE.BufferAttribute(colour.rgb, 3, true));
+  }
+
+  private showColour(colour: Frame["colour"]): void {
+    if (!colour) return;
+    const { tint, tintSize, tintLens, tintFromWorld } = this.material.uniforms;
+    this.tint = refilled(this.tint, padded(colour.rgb), 3 * POINTS_PER_ROW, BYTES);
+    tint!.value = this.tint;
+    tintSize!.value.set(colour.width, colour.height);
+    tintLens!.value.fromArray(colour.camera?.intrinsics ?? [0, 0, 0, 0]);
+    if (colour.camera) setPose(tintFromWorld!.value, colour.camera.cameraFromWorld);
   }
 
   private define(name: string, wanted: boolean): void {
-    const defines = (this.material.defines ??= {});
-    if (wanted === name in defines) return;
-    if (wanted) defines[name] = "";
-    else delete defines[name];
-    this.material.needsUpdate = true;
-  }
-
-  private upload(data: Uint16Array | Float32Array, width: number, isDepth: boolean): void {
-    const height = data.length / width;
-    const fits = this.texture?.image.width === width && this.texture.image.height === height;
-    if (!fits || this.texture!.userData.isDepth !== isDepth) {
-      this.texture?.dispose();
-      this.texture = nearest(
-        isDepth
-          ? new THREE.DataTexture(
-              null,
-              width,
-              height,
-              THREE.RedIntegerFormat,
-              THREE.UnsignedShortType,
-            )
-          : new THREE.DataTexture(null, width, height, THREE.RedFormat, THREE.FloatType),
-      );
-      this.texture.internalFormat = isDepth ? "R16UI" : "R32F";
-      this.texture.userData.isDepth = isDepth;
+    for (const material of [this.material, this.faces.material]) {
+      const defines = (material.defines ??= {});
+      if (wanted === name in defines) continue;
+      if (wanted) defines[name] = "";
+      else delete defines[name];
+      material.needsUpdate = true;
     }
-    this.texture!.image = { data: data as unknown as Uint8Array<ArrayBuffer>, width, height };
-    this.texture!.needsUpdate = true;
   }
 
   // The colours' ends follow the 2nd and 98th of a hundred readings spread over the frame.
@@ -387,24 +448,89 @@ export class CameraCloud {
   }
 }
 
-// [m] between neighbours, about: as of a square sheet of that many points.
-function spacingOf(points: Float32Array): number {
-  const count = points.length / 3;
-  if (count < 2) return 0.002;
-  const step = 3 * Math.max(1, Math.floor(count / 500));
-  const sides = [0, 1, 2].map((i) => {
-    const sorted = [...Array(Math.ceil(points.length / step)).keys()]
-      .map((k) => points[k * step + i]!)
-      .sort((a, b) => a - b);
-    return sorted[Math.floor(0.97 * sorted.length)]! - sorted[Math.floor(0.03 * sorted.length)]!;
-  });
-  return Math.max(0.0005, Math.hypot(...sides) / Math.sqrt(2 * count));
+/** Between neighbours: [m], and of the distance from the sensor [-]; one of them is 0. */
+type Spacing = readonly [number, number];
+
+const SPACING_SAMPLES = 200;
+const SPACING_READINGS = 1e7;
+
+/**
+ * About, from the fourth nearest of some points, which is as far in a grid as where they lie by
+ * chance. A scanner that turns sees the farther the sparser: whichever fits better is taken.
+ */
+export function spacingOf(points: Float32Array): Spacing {
+  const count = Math.floor(points.length / 3);
+  if (count < 6) return [0.002, 0];
+  const samples = Math.max(8, Math.min(SPACING_SAMPLES, Math.floor(SPACING_READINGS / count)));
+  const step = Math.max(1, Math.floor(count / samples));
+  const [fixed, growing]: [number[], number[]] = [[], []];
+  for (let i = 0; i < count; i += step) {
+    const [x, y, z] = [points[3 * i]!, points[3 * i + 1]!, points[3 * i + 2]!];
+    const least = [Infinity, Infinity, Infinity, Infinity]; // squares, the largest last
+    for (let k = 0; k < points.length; k += 3) {
+      const square = (points[k]! - x) ** 2 + (points[k + 1]! - y) ** 2 + (points[k + 2]! - z) ** 2;
+      // Of points that are there twice, one.
+      if (!(square > 0 && square < least[3]!)) continue;
+      least[3] = square;
+      for (let at = 3; at > 0 && least[at]! < least[at - 1]!; --at)
+        [least[at], least[at - 1]] = [least[at - 1]!, least[at]!];
+    }
+    const away = Math.hypot(x, y, z);
+    if (!(least[3]! < Infinity && away > 0)) continue;
+    fixed.push(Math.sqrt(least[3]!));
+    growing.push(Math.sqrt(least[3]!) / away);
+  }
+  if (fixed.length === 0) return [0.002, 0];
+  const [one, other] = [fixed, growing].map((values) => {
+    const sorted = values.sort((a, b) => a - b);
+    const at = (share: number) => sorted[Math.floor(share * (sorted.length - 1))]!;
+    return { middle: at(0.5), spread: at(0.9) / at(0.1) };
+  }) as [{ middle: number; spread: number }, { middle: number; spread: number }];
+  return other.spread < 0.7 * one.spread ? [0, other.middle] : [one.middle, 0];
 }
 
-// Whole rows of a texture; the points beyond are never drawn.
-function paddedPoints(points: Float32Array): Float32Array {
+function setPose(to: THREE.Matrix4, pose: ArrayLike<number>): void {
+  const m = [...Array.from(pose), 0, 0, 0, 1] as Parameters<THREE.Matrix4["set"]>;
+  to.set(...m);
+}
+
+interface Texels {
+  format: THREE.PixelFormat;
+  type: THREE.TextureDataType;
+  internal: THREE.PixelFormatGPU;
+}
+const DEPTHS: Texels = {
+  ...{ format: THREE.RedIntegerFormat, type: THREE.UnsignedShortType, internal: "R16UI" },
+};
+const FLOATS: Texels = { format: THREE.RedFormat, type: THREE.FloatType, internal: "R32F" };
+const BYTES: Texels = { format: THREE.RedFormat, type: THREE.UnsignedByteType, internal: "R8" };
+
+// The same texture with other data, or another where they do not fit it.
+function refilled(
+  texture: THREE.DataTexture | null,
+  data: Uint16Array | Float32Array | Uint8Array,
+  width: number,
+  { format, type, internal }: Texels,
+): THREE.DataTexture {
+  const height = data.length / width;
+  const { image } = texture ?? {};
+  if (image?.width !== width || image.height !== height || texture?.internalFormat !== internal) {
+    texture?.dispose();
+    texture = nearest(new THREE.DataTexture(null, width, height, format, type));
+    texture.internalFormat = internal;
+    texture.unpackAlignment = 1;
+  }
+  texture!.image = { data: data as unknown as Uint8Array<ArrayBuffer>, width, height };
+  texture!.needsUpdate = true;
+  return texture!;
+}
+
+// Whole rows of a texture; what is beyond is never drawn.
+function padded<Numbers extends Float32Array | Uint8Array>(numbers: Numbers): Numbers {
   const row = 3 * POINTS_PER_ROW;
-  const padded = new Float32Array(Math.max(1, Math.ceil(points.length / row)) * row);
-  padded.set(points);
-  return padded;
+  const size = Math.max(1, Math.ceil(numbers.length / row)) * row;
+  if (numbers.length === size) return numbers;
+  const made = new (numbers.constructor as new (size: number) => Numbers)(size);
+  made.set(numbers);
+  return made;
 }

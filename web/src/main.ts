@@ -7,7 +7,7 @@ import { fixtureLines, Fixtures } from "./fixtures";
 import { HandInput, isForForm } from "./hand";
 import { length } from "./camera_math";
 import { handsLines, handsText } from "./more_hands";
-import { latchedText, mayOperate, Panel, roleNames } from "./panel";
+import { cameraText, latchedText, mayOperate, Panel, roleNames } from "./panel";
 import { Plots } from "./plots";
 import {
   encodeHand,
@@ -21,11 +21,11 @@ import { robotLines, robotText } from "./robot";
 import { GHOST_TRAIL, SceneView, type Palette } from "./scene";
 import { Senses } from "./senses";
 import { handAt, Timeline, trailAt } from "./timeline";
-import { depthBelow, flagNames, SteadyWhy, why } from "./why";
+import { flagNames, SteadyWhy, why } from "./why";
 
 const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 const DISENGAGED = 1 << 6; // SafetyFlag
-const STATES = ["free", "contact", "entrenched"] as const;
+const NUMBERS = 100; // [ms] between changes of what is written: faster, nobody reads it
 
 const plots = new Plots(get("plots"));
 let state: State | null = null;
@@ -130,7 +130,7 @@ const connection = new Connection({
     panel.update(newest);
     brush.update(newest);
     fixtures.update(newest);
-    view.showFixtures(newest.fixtures.flatMap(fixtureLines));
+    view.showFixtures(newest.fixtures.map((one) => ({ name: one.name, ends: fixtureLines(one) })));
     const { dabs, materials } = newest.paint;
     view.showPaint(
       dabs.map(({ place, normal, radius, material }) => ({
@@ -143,15 +143,10 @@ const connection = new Connection({
     timeline.show(newest, performance.now());
     const { r_c, r_1, r_3 } = newest.parameters;
     view.setRadii({ r_c: r_c ?? 0.005, r_1: r_1 ?? 0.005, r_3: r_3 ?? 0.01 });
-    const troubled = newest.cameras.find((camera) => camera.state !== "live");
-    const first = newest.cameras[0];
-    get("camera").textContent = troubled
-      ? `camera ${troubled.state}`
-      : first
-        ? `${first.uri} · ${first.rate.toFixed(0)} Hz`
-        : "no camera";
+    write("camera", cameraText(newest));
+    get("camera").title = newest.cameras.map(({ uri }) => uri).join(", ");
     const latched = latchedText(newest);
-    if (get("latched-text").textContent !== latched) get("latched-text").textContent = latched;
+    write("latched-text", latched);
     get("latched").hidden = !latched;
     get("reset-faults").hidden = !mayOperate(newest);
     const record = get<HTMLButtonElement>("record");
@@ -176,14 +171,12 @@ const connection = new Connection({
   },
   moreHands(hands) {
     view.showHands(hands, handsLines(hands));
-    const said = handsText(hands);
-    if (get("more-hands").textContent !== said) get("more-hands").textContent = said;
+    write("more-hands", handsText(hands));
     get("more-hands").hidden = false;
   },
   robot(robot) {
-    view.showRobot(robot.tool, robot.radius, robotLines(robot));
-    const said = robotText(robot);
-    if (get("robot").textContent !== said) get("robot").textContent = said;
+    view.showRobot(robot.tool, robot.radius, robot.links, robotLines(robot));
+    write("robot", robotText(robot));
     get("robot").hidden = false;
   },
   refused(reason) {
@@ -199,6 +192,7 @@ const connection = new Connection({
       plots.add(message.samples);
       senses.take(message, performance.now());
       view.showTick(message);
+      view.showActing(message.fixtures);
     }
   },
 });
@@ -232,39 +226,42 @@ function contactRadius(): number {
   return state?.parameters.r_c ?? 0.005;
 }
 
-function showWhy(now: number): void {
+function write(id: string, text: string): void {
+  const box = get(id);
+  if (box.textContent !== text) box.textContent = text;
+}
+
+// All that is said of the force comes from one tick, and changes at once.
+let written = 0; // [ms]
+function showTick(now: number): void {
+  if (now - written < NUMBERS) return;
+  written = now;
   const flags = new Set([
     ...flagNames(tick?.flags ?? 0, introduced?.flags ?? []),
     ...flagNames(tick?.safety ?? 0, introduced?.safety_flags ?? []),
   ]);
   const { connected } = connection;
-  const { text, link } = steadyWhy.show(why({ connected, tick, flags, hand: whose, state }), now);
-  if (get("why-text").textContent !== text) get("why-text").textContent = text;
-  if (get("why-link").textContent !== link) get("why-link").textContent = link;
-}
-
-function showTick(now: number): void {
-  showWhy(now);
+  const acting = flagNames(tick?.fixtures ?? 0, state?.fixtures ?? []);
+  const [clearance, spacing] = [view.clearance(), view.spacing()];
+  const facts = { connected, tick, flags, hand: whose, state, acting, clearance, spacing };
+  const { word, detail, text, link } = steadyWhy.show(why(facts), now);
+  write("force", connected && tick ? length(tick.force).toFixed(2) : "–");
+  write("state", word);
+  get("state").dataset.state = String(tick?.state ?? 0);
+  write("detail", detail);
+  write("why-text", text);
+  write("why-link", link);
   if (!tick) return;
-  const newtons = length(tick.force);
-  get("force").textContent = newtons.toFixed(2);
-  const word = STATES[tick.state] ?? "";
-  get("state").textContent = word;
-  get("state").dataset.state = String(tick.state);
-  const above = tick.state !== 0 ? -depthBelow(tick, contactRadius()) : view.clearance();
-  get("detail").textContent =
-    above === null
-      ? ""
-      : above < 0
-        ? `hand ${(-1e3 * above).toFixed(1)} mm inside`
-        : `hand ${(1e3 * above).toFixed(above < 0.01 ? 1 : 0)} mm above`;
   panel.showSafety(tick.safety, now);
   const said = tick.state === 0 ? "free" : "touching";
-  if (said !== announced) get("announce").textContent = announced = said;
+  if (said !== announced) write("announce", (announced = said));
   const range = view.depthRange();
+  document.body.dataset.drawn = view.showsColour ? "colour" : "depth";
+  get("colour").hidden = !view.hasColour;
+  get("colour").setAttribute("aria-pressed", String(view.showsColour));
   if (range) {
-    get("legend-near").textContent = `${range[0].toFixed(2)} m`;
-    get("legend-far").textContent = `${range[1].toFixed(2)} m`;
+    write("legend-near", `${range[0].toFixed(2)} m`);
+    write("legend-far", `${range[1].toFixed(2)} m`);
   }
 }
 
@@ -293,6 +290,9 @@ function follow(): void {
   view.setFollowing(following);
   get("follow").setAttribute("aria-pressed", String(following));
 }
+function switchColour(): void {
+  view.setTinted(!view.isTinted);
+}
 function record(): void {
   if (state?.recording.possible && mayOperate(state))
     connection.ask({ record: state.recording.path === null });
@@ -307,7 +307,10 @@ function help(): void {
 function applyTheme(theme: string): void {
   document.documentElement.dataset.theme = theme;
   const style = getComputedStyle(document.documentElement);
-  const names = ["near", "middle", "far", "force", "hip", "proxy", "calm", "text"] as const;
+  const names = [
+    ...["near", "middle", "far", "force", "hip", "proxy", "calm", "text", "ground"],
+    "fixture",
+  ];
   view.setPalette(
     Object.fromEntries(
       names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]),
@@ -339,6 +342,13 @@ for (const [id, set] of [
 get("follow").addEventListener("click", follow);
 get("record").addEventListener("click", record);
 get("reset-faults").addEventListener("click", () => connection.ask({ reset_faults: true }));
+get("colour").addEventListener("click", switchColour);
+get("more-plots").addEventListener("click", () => {
+  const all = get("more-plots").getAttribute("aria-expanded") !== "true";
+  get("more-plots").setAttribute("aria-expanded", String(all));
+  write("more-plots", all ? "Fewer figures" : "More figures");
+  plots.show(all);
+});
 get("reset").addEventListener("click", () => view.resetView());
 get("theme").addEventListener("click", switchTheme);
 get("ask").addEventListener("click", help);
@@ -359,6 +369,7 @@ addEventListener("keydown", (event) => {
   if (isForForm(event) || event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === "?") help();
   if (event.code === "KeyF") follow();
+  if (event.code === "KeyC") switchColour();
   if (event.code === "KeyV") view.resetView();
   if (event.code === "KeyR") record();
   if (event.code === "KeyT") switchTheme();

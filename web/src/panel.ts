@@ -52,6 +52,30 @@ export function sceneName(uri: string): string {
   return scheme === "synthetic" ? name : (/([^/?]+)\/*(\?.*)?$/.exec(name)?.[0] ?? uri);
 }
 
+/** What is looked at, whether it goes on, and what of it was left out. */
+export function cameraText({
+  cameras,
+  playback,
+}: Pick<State, "cameras" | "playback">): string {
+  const troubled = cameras.find(({ state }) => state !== "live");
+  if (troubled) return `${sceneName(troubled.uri)} · ${troubled.state}`;
+  const first = cameras[0];
+  if (!first) return "no camera";
+  const isLast = first.place === first.frames - 1;
+  const how =
+    first.frames === 1
+      ? "still picture"
+      : first.frames > 1 && playback?.paused
+        ? isLast && !playback.loop
+          ? "ended, its last frame stays"
+          : "paused"
+        : `${first.rate.toFixed(0)} Hz`;
+  const dropped = cameras.reduce((sum, camera) => sum + camera.dropped, 0);
+  const frames = dropped === 1 ? "frame" : "frames";
+  const lost = dropped > 0 ? ` · ${dropped.toLocaleString("en")} ${frames} dropped` : "";
+  return `${sceneName(first.uri)} · ${how}${lost}`;
+}
+
 /** What is to be said while faults are latched; empty: none is. */
 export function latchedText({ role, latched_by }: Pick<State, "role" | "latched_by">): string {
   if (latched_by.length === 0) return "";
@@ -239,6 +263,23 @@ function symbol(text: string): HTMLElement {
   return made;
 }
 
+function sizeText(bytes: number): string {
+  return bytes >= 1e9 ? `${(bytes / 1e9).toFixed(1)} GB` : `${(bytes / 1e6).toFixed(0)} MB`;
+}
+
+/** How long a recording is, and how large. */
+export function recordingClock({ seconds, bytes }: State["recording"]): string {
+  const whole = Math.floor(seconds);
+  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")} · ${sizeText(bytes)}`;
+}
+
+function recordingText(recording: State["recording"]): string {
+  const { path, message, room } = recording;
+  if (path === null) return message || "off";
+  const left = room === null ? "" : `, room for ${sizeText(room)}`;
+  return `${path}: ${recordingClock(recording)}${left}`;
+}
+
 export interface PanelActions {
   setParameter(name: string, value: number): void;
   setLimit(name: string, value: number): void;
@@ -251,6 +292,11 @@ export class Panel {
   private readonly root = get("panel");
   private readonly method = get<HTMLSelectElement>("method-name");
   private readonly scene = get<HTMLSelectElement>("scene");
+  private readonly opener = element(
+    "button",
+    { id: "open-recording", className: "tool", hidden: true },
+    element("span", {}, "Open recording"),
+  );
   private rows = new Map<string, Row>();
   private limits = new Map<string, Row>();
   private placement = new Map<string, Row>();
@@ -274,6 +320,8 @@ export class Panel {
     this.open("touch");
     this.method.addEventListener("change", () => this.actions.setMethod(this.method.value));
     this.scene.addEventListener("change", () => this.actions.openScene(this.scene.value));
+    get("record").after(this.opener);
+    this.opener.addEventListener("click", () => this.actions.openScene(this.opener.value));
   }
 
   open(tab: string): void {
@@ -349,6 +397,7 @@ export class Panel {
   }
 
   update(state: State): void {
+    this.showRecording(state);
     if (document.activeElement !== this.method) this.method.value = state.method;
     if (document.activeElement !== this.scene) this.scene.value = state.cameras[0]?.uri ?? "";
     get("method-meaning").textContent =
@@ -391,6 +440,16 @@ export class Panel {
     }
   }
 
+  /** Clock and size in the record button while it records; the way into the recording after. */
+  private showRecording({ recording, role }: State): void {
+    const text = recording.path ? recordingClock(recording) : "Record";
+    const label = get("record").querySelector("span")!;
+    if (label.textContent !== text) label.textContent = text;
+    this.opener.hidden = recording.open === null || role !== "operating";
+    this.opener.title = recording.message;
+    this.opener.value = recording.open ?? "";
+  }
+
   private showFacts(state: State): void {
     const { servo } = state;
     const microseconds = (seconds: number) => `${(1e6 * seconds).toFixed(1)} µs`;
@@ -418,7 +477,7 @@ export class Panel {
           `${state.energy.contacts.toLocaleString("en")} contacts, ` +
           `above 0.1 mJ in ${state.energy.relative.generating.toLocaleString("en")}`,
       ],
-      ["Recording", state.recording.path ?? (state.recording.message || "off")],
+      ["Recording", recordingText(state.recording)],
       ["This page", roleNames[state.role].name],
       ["Version", this.hello?.version ?? ""],
     ];

@@ -7,6 +7,8 @@ const SPAN = 10; // [s] shown
 const INTERVAL = 66; // [ms] between drawings
 const GAP = 0.25; // [s] without samples: no line is drawn across
 
+const FIRST = 2; // of the quantities, that are shown until more are asked for
+
 interface Quantity {
   title: string;
   unit: string;
@@ -70,6 +72,7 @@ export class Plots {
   private samples: (Sample & { gap?: boolean })[] = [];
   private plots: Plot[] = [];
   private drawn = 0;
+  private quantities: readonly Quantity[] = QUANTITIES.slice(0, FIRST);
 
   constructor(private readonly parent: HTMLElement) {
     this.build();
@@ -88,6 +91,12 @@ export class Plots {
     this.samples.push(...samples);
     const first = this.samples.findIndex((sample) => sample.t >= newest.t - SPAN);
     if (first > 0) this.samples.splice(0, first);
+  }
+
+  /** All quantities, or the first. */
+  show(all: boolean): void {
+    this.quantities = all ? QUANTITIES : QUANTITIES.slice(0, FIRST);
+    this.recolour();
   }
 
   /** What the plots show, the oldest first. */
@@ -124,7 +133,7 @@ export class Plots {
     const css = (name: string) => style.getPropertyValue(name).trim();
     // The page's letters grow with the window: those of the axes do too.
     const grown = (pixels: number) => Math.round((pixels * parseFloat(style.fontSize)) / 14);
-    this.plots = QUANTITIES.map((quantity, i) => {
+    this.plots = this.quantities.map((quantity, i) => {
       const article = document.createElement("article");
       article.className = "plot";
       const header = document.createElement("header");
@@ -138,7 +147,7 @@ export class Plots {
       host.setAttribute("role", "img");
       article.append(header, host);
       this.parent.append(article);
-      const last = i === QUANTITIES.length - 1;
+      const last = i === this.quantities.length - 1;
       const axis = {
         stroke: css("--muted"),
         font: `${grown(11)}px ${style.fontFamily}`,

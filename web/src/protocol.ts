@@ -5,14 +5,25 @@ export type Vec3 = readonly [number, number, number];
 
 const Kind = { frame: 1, ticks: 2, rays: 3, path: 4, hand: 16, shown: 17 } as const;
 const Format = { depth: 0, depthWithRays: 1, points: 2 } as const;
+const Colours = { none: 0, registered: 1, ownCamera: 2 } as const;
 
 const FRAME_HEADER = 96;
-const TICKS_HEADER = 88;
+const COLOUR_HEADER = 72;
+const TICKS_HEADER = 112;
 const SAMPLE_FLOATS = 7;
 const RAYS_HEADER = 12;
 const PATH_HEADER = 8;
 const HAND_BYTES = 32;
 const SHOWN_BYTES = 8;
+
+/** An image in visible light: red, green and blue, row by row. */
+export interface Colour {
+  width: number;
+  height: number;
+  rgb: Uint8Array;
+  /** of a colour camera of its own; null: pixel for pixel that of the depth, or of the points */
+  camera: { intrinsics: Frame["intrinsics"]; cameraFromWorld: Float32Array } | null;
+}
 
 /** One capture of a camera: raw depth as it came, or points that have no image. */
 export interface Frame {
@@ -35,6 +46,7 @@ export interface Frame {
   points: Float32Array | null;
   /** three of the points each; null: they are not the corners of a mesh */
   triangles: Uint32Array | null;
+  colour: Colour | null;
 }
 
 /** The newest tick and what the plots need of those since the message before. */
@@ -56,8 +68,16 @@ export interface Ticks {
   surfaceVelocity: number;
   /** [-] of the safety chain: 0 disengaged, 1 nothing faded */
   gain: number;
-  /** [N] length of the force that the method asks for */
+  /** [N] length of all that is asked for: by the surface and by fixtures */
   askedForce: number;
+  /** [m] where the surface and forbidden regions keep the hand */
+  place: Vec3;
+  /** [N] length of what forbidden regions ask for */
+  region: number;
+  /** [N] likewise, guides and viscous regions */
+  guidance: number;
+  /** bit i: fixture i of the state gives a force */
+  fixtures: number;
   samples: Sample[];
 }
 
@@ -112,9 +132,20 @@ function decodeFrame(buffer: ArrayBuffer, view: DataView): Frame {
   const count = width * height;
   const isPoints = format === Format.points;
   need(format <= Format.points, `frame format ${format}`);
+  const colours = view.getUint8(3);
+  need(colours <= Colours.ownCamera, `colours ${colours}`);
+  const ownCamera = colours === Colours.ownCamera;
+  const header = FRAME_HEADER + (ownCamera ? COLOUR_HEADER : 0);
+  need(buffer.byteLength >= header, "a frame without its header");
   const triangles = isPoints ? view.getUint32(92, true) : 0;
-  const size = FRAME_HEADER + count * (isPoints ? 12 : 2) + 12 * triangles;
-  need(buffer.byteLength === size, "a frame cut short");
+  const measured = header + count * (isPoints ? 12 : 2) + 12 * triangles; // [bytes]
+  const size = ownCamera
+    ? ([view.getUint32(96, true), view.getUint32(100, true)] as const)
+    : ([width, height] as const);
+  const colourBytes = colours === Colours.none ? 0 : 3 * size[0] * size[1];
+  need(buffer.byteLength === measured + colourBytes, "a frame cut short");
+  const lens = (at: number) =>
+    [0, 4, 8, 12].map((i) => view.getFloat32(at + i, true)) as unknown as Frame["intrinsics"];
   return {
     kind: "frame",
     camera: view.getUint8(1),
@@ -122,16 +153,27 @@ function decodeFrame(buffer: ArrayBuffer, view: DataView): Frame {
     stamp: view.getFloat64(8, true),
     width,
     height,
-    intrinsics: [24, 28, 32, 36].map((at) =>
-      view.getFloat32(at, true),
-    ) as unknown as Frame["intrinsics"],
+    intrinsics: lens(24),
     metresPerUnit: view.getFloat32(40, true),
     worldFromCamera: new Float32Array(buffer.slice(44, 92)),
     hasRays: format === Format.depthWithRays,
-    depth: isPoints ? null : new Uint16Array(buffer, FRAME_HEADER, count),
-    points: isPoints ? new Float32Array(buffer, FRAME_HEADER, 3 * count) : null,
-    triangles:
-      triangles > 0 ? new Uint32Array(buffer, FRAME_HEADER + 12 * count, 3 * triangles) : null,
+    depth: isPoints ? null : new Uint16Array(buffer, header, count),
+    points: isPoints ? new Float32Array(buffer, header, 3 * count) : null,
+    triangles: triangles > 0 ? new Uint32Array(buffer, header + 12 * count, 3 * triangles) : null,
+    colour:
+      colourBytes === 0
+        ? null
+        : {
+            width: size[0],
+            height: size[1],
+            rgb: new Uint8Array(buffer, measured, colourBytes),
+            camera: ownCamera
+              ? {
+                  intrinsics: lens(104),
+                  cameraFromWorld: new Float32Array(buffer.slice(120, 168)),
+                }
+              : null,
+          },
   };
 }
 
@@ -171,6 +213,10 @@ function decodeTicks(buffer: ArrayBuffer, view: DataView): Ticks {
     surfaceVelocity: view.getFloat32(72, true),
     gain: view.getFloat32(80, true),
     askedForce: view.getFloat32(84, true),
+    place: vec3(view, 88),
+    region: view.getFloat32(100, true),
+    guidance: view.getFloat32(104, true),
+    fixtures: view.getUint32(108, true),
     frame: view.getInt32(76, true),
     samples,
   };
@@ -284,6 +330,8 @@ export interface CameraState {
   rate: number;
   /** live, ended, or what went wrong */
   state: string;
+  /** frames that were not handed over, so as to keep up */
+  dropped: number;
   /** of a recording; 0: it has no end, or is none */
   frames: number;
   /** number of the frame shown last */
@@ -375,8 +423,6 @@ export interface State {
   parameters: Record<string, number>;
   safety: Record<string, number>;
   placement: Record<string, number>;
-  hand: "you" | "other" | "free";
-  viewers: number;
   cameras: CameraState[];
   /** null: nothing is a recording */
   playback: Playback | null;
@@ -420,6 +466,13 @@ export interface State {
     message: string;
     /** why the last was ended by its limits; empty: it was not */
     ended: string;
+    /** [s] and [bytes] of the one that is on, or else of the last */
+    seconds: number;
+    bytes: number;
+    /** [bytes] until the limit or the disk's free space ends it; null: not known */
+    room: number | null;
+    /** the last one as a scene; null: there is none that is whole */
+    open: string | null;
   };
 }
 

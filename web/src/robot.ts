@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot that the hand leads: what is said of it, and where its lines go.
+// A robot that the hand leads: what is said of it, and where its force goes.
 
 import { add, length, scale } from "./camera_math";
-import type { RobotState, Vec3 } from "./protocol";
+import type { RobotState } from "./protocol";
 
 const ARROW = 0.02; // [m] of a line for each N that the tool presses with
 const SILENCE = 0.5; // [s] after which what was heard last is old
@@ -19,9 +19,7 @@ export function robotText({ name, tool, trouble, led, age, latency, force }: Rob
   return parts.join(" · ");
 }
 
-/** The arm, and the force on its tool, as lines: their ends, x y z after one another. */
-export function robotLines({ tool, links, force }: RobotState): number[] {
-  const lines: (readonly [Vec3, Vec3])[] = links.slice(1).map((at, i) => [links[i]!, at]);
-  if (tool && length(force) > 0) lines.push([tool, add(tool, scale(force, ARROW))]);
-  return lines.flatMap(([from, to]) => [...from, ...to]);
+/** The force on its tool as a line: its ends, x y z after one another. */
+export function robotLines({ tool, force }: Pick<RobotState, "tool" | "force">): number[] {
+  return tool && length(force) > 0 ? [...tool, ...add(tool, scale(force, ARROW))] : [];
 }

@@ -25,7 +25,7 @@ import { firstView, offCentre, type Room } from "./first_view";
 import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";
 import type { Frame, OtherHand, Rays, Ticks, Vec3 } from "./protocol";
 import type { Spot } from "./surface";
-import { Thinning } from "./thinning";
+import { SOFTWARE_LEVEL, Thinning } from "./thinning";
 
 const ARROW_PER_NEWTON = 0.055; // of the view's height
 const LONGEST_ARROW = 0.4; // likewise
@@ -34,8 +34,11 @@ const TRAIL = 360; // ticks messages
 /** Places of the line behind the recorded hand. */
 export const GHOST_TRAIL = 60;
 const MOST_DABS = 500; // of paint
+const MOST_LINKS = 32; // of a robot's arm
 const PAINT_LAYER = 5e-3; // [m] before the surface
 const SPOT_SIZE = 9; // [px] of the ring under the pointer
+const REST = 300; // [ms] without a change, after which the view is drawn finely
+const SOFTWARE_INTERVAL = 28; // [ms] at least between drawings where a processor draws
 
 export interface Radii {
   r_c: number;
@@ -52,6 +55,8 @@ export interface Palette {
   proxy: string;
   calm: string;
   text: string;
+  ground: string;
+  fixture: string;
 }
 
 function ringTexture(): THREE.Texture {
@@ -66,8 +71,28 @@ function ringTexture(): THREE.Texture {
   return new THREE.CanvasTexture(canvas);
 }
 
-function isSoftwareRenderer(renderer: THREE.WebGLRenderer): boolean {
-  const gl = renderer.getContext();
+// A name that faces the eye and keeps its size on the screen.
+function nameSprite(name: string, colour: string): THREE.Sprite {
+  const canvas = document.createElement("canvas");
+  const context = canvas.getContext("2d")!;
+  const font = "600 44px system-ui, sans-serif";
+  context.font = font;
+  canvas.width = Math.ceil(context.measureText(name).width) + 8;
+  canvas.height = 56;
+  context.font = font;
+  context.fillStyle = colour;
+  context.fillText(name, 4, 44);
+  const map = new THREE.CanvasTexture(canvas);
+  const sprite = new THREE.Sprite(
+    new THREE.SpriteMaterial({ map, depthTest: false, sizeAttenuation: false }),
+  );
+  const high = 0.022; // of the distance
+  sprite.scale.set((high * canvas.width) / canvas.height, high, 1);
+  sprite.center.set(0, 0);
+  return sprite;
+}
+
+function isSoftwareRenderer(gl: WebGL2RenderingContext): boolean {
   const info = gl.getExtension("WEBGL_debug_renderer_info");
   const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
   return /swiftshader|llvmpipe|softpipe|software/i.test(name);
@@ -75,7 +100,7 @@ function isSoftwareRenderer(renderer: THREE.WebGLRenderer): boolean {
 
 export class SceneView {
   orbit: Orbit = lookAt([0.2, -0.4, 0.5], [0, 0, 0], [0, 0, 1]);
-  readonly thinning = new Thinning();
+  readonly thinning: Thinning;
   /** How many frames have been shown. */
   frames = 0;
   /** How many points the last drawing was given, for tests and the session's facts. */
@@ -100,16 +125,20 @@ export class SceneView {
   private readonly shadow: THREE.Mesh<THREE.CircleGeometry, THREE.MeshBasicMaterial>;
   private readonly spot: THREE.Mesh<THREE.RingGeometry, THREE.MeshBasicMaterial>;
   private readonly grid: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
-  private readonly fixtures: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  // Each with its name; those that give a force in another colour.
+  private readonly fixtures = new THREE.Group();
+  private readonly idle = new THREE.LineBasicMaterial({ transparent: true, opacity: 0.8 });
+  private readonly acting = new THREE.LineBasicMaterial();
   private readonly frusta: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   private readonly paint: THREE.InstancedMesh<THREE.CircleGeometry, THREE.MeshBasicMaterial>;
   // The robot that the hand leads.
   private readonly tool: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
-  private readonly arm: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly arm: THREE.InstancedMesh<THREE.CylinderGeometry, THREE.MeshStandardMaterial>;
+  private readonly push: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
   // The hands beside the first: proxies and HIPs in turn.
   private readonly otherBalls: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>[] = [];
   private readonly otherLines: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
-  private fixtureEnds: number[] = []; // of their lines, as they are drawn
+  private fixturesDrawn = "";
   private readonly dab = new THREE.Object3D(); // where one of them is
   private readonly axes = new THREE.AxesHelper(AXES_LENGTH);
   // The hand that was recorded.
@@ -131,16 +160,23 @@ export class SceneView {
   private room: Room = { width: 1, height: 1, left: 0, top: 0, right: 1, bottom: 1 };
   private following = false;
   private stale = true;
-  private lastDrawing = 0;
+  private lastDrawing = 0; // [ms] 0: measured
+  private drawnAt = -Infinity; // [ms]
+  private tinted = true;
   private readonly software: boolean;
 
   /** Throws if the browser has no WebGL 2. */
   constructor(private readonly canvas: HTMLCanvasElement) {
     const probe = document.createElement("canvas").getContext("webgl2");
     if (!probe) throw new Error("this browser has no WebGL 2");
+    this.software = isSoftwareRenderer(probe);
     probe.getExtension("WEBGL_lose_context")?.loseContext();
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
-    this.software = isSoftwareRenderer(this.renderer);
+    this.thinning = new Thinning(this.software ? SOFTWARE_LEVEL : 0);
+    // A processor that draws has no time for four samples a pixel, nor to mix the page's ground in.
+    const fine = !this.software;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: fine, alpha: fine });
+    // Asking how the shaders do waits for them to be made, one after the other.
+    this.renderer.debug.checkShaderErrors = import.meta.env.DEV;
 
     const ball = new THREE.SphereGeometry(1, 48, 32);
     this.proxy = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ roughness: 0.35 }));
@@ -158,22 +194,20 @@ export class SceneView {
       new THREE.SpriteMaterial({ map: ringTexture(), depthTest: false, sizeAttenuation: false }),
     );
     this.tool = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ roughness: 0.4 }));
-    const line = (points: number): THREE.BufferGeometry =>
-      new THREE.BufferGeometry().setAttribute(
-        "position",
-        new THREE.BufferAttribute(new Float32Array(3 * points), 3),
-      );
-    this.link = new THREE.Line(line(2), new THREE.LineBasicMaterial({ depthTest: false }));
+    this.link = new THREE.Line(
+      new THREE.BufferGeometry(),
+      new THREE.LineBasicMaterial({ depthTest: false }),
+    );
     this.plumb = new THREE.Line(
-      line(2),
+      new THREE.BufferGeometry(),
       new THREE.LineDashedMaterial({ dashSize: 0.004, gapSize: 0.003 }),
     );
     this.trail = new THREE.Line(
-      line(TRAIL),
+      new THREE.BufferGeometry(),
       new THREE.LineBasicMaterial({ transparent: true, opacity: 0.7 }),
     );
     this.ghostTrail = new THREE.Line(
-      line(GHOST_TRAIL),
+      new THREE.BufferGeometry(),
       new THREE.LineBasicMaterial({ transparent: true, opacity: 0.6, depthTest: false }),
     );
     const flat = { depthTest: false, transparent: true, side: THREE.DoubleSide } as const;
@@ -194,9 +228,13 @@ export class SceneView {
     this.paint.frustumCulled = false;
     const thin = (opacity: number) => new THREE.LineBasicMaterial({ transparent: true, opacity });
     this.grid = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.16));
-    this.fixtures = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.8));
     this.frusta = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.5));
-    this.arm = new THREE.LineSegments(new THREE.BufferGeometry(), thin(1));
+    this.arm = new THREE.InstancedMesh(
+      new THREE.CylinderGeometry(1, 1, 1, 12).translate(0, 0.5, 0),
+      new THREE.MeshStandardMaterial({ roughness: 0.6 }),
+      MOST_LINKS,
+    );
+    this.push = new THREE.LineSegments(new THREE.BufferGeometry(), thin(1));
     this.otherLines = new THREE.LineSegments(new THREE.BufferGeometry(), thin(1));
     this.pin = new THREE.Mesh(
       new THREE.CylinderGeometry(0.09, 0.09, 1, 12).translate(0, 0.5, 0),
@@ -213,9 +251,9 @@ export class SceneView {
     this.arrow.add(this.shaft, this.head);
     const lines = [
       ...[this.link, this.plumb, this.trail, this.ghostTrail],
-      ...[this.grid, this.frusta, this.fixtures, this.arm, this.otherLines],
+      ...[this.grid, this.frusta, this.push, this.otherLines],
     ];
-    for (const object of lines) object.frustumCulled = false;
+    for (const object of [...lines, this.arm]) object.frustumCulled = false;
     this.shadow.renderOrder = this.ghostTrail.renderOrder = this.ghost.renderOrder = 1;
     this.spot.renderOrder = 1;
     this.hip.renderOrder = 3;
@@ -225,7 +263,7 @@ export class SceneView {
     const marks = [
       ...[this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin],
       ...[this.shadow, this.spot, this.grid, this.frusta, this.axes],
-      ...[this.ghost, this.ghostTrail, this.paint, this.fixtures, this.tool, this.arm],
+      ...[this.ghost, this.ghostTrail, this.paint, this.tool, this.arm, this.push],
       this.otherLines,
     ];
     for (const mark of marks) mark.visible = false;
@@ -233,6 +271,7 @@ export class SceneView {
     this.scene.add(
       ...marks,
       this.arrow,
+      this.fixtures,
       this.lamp,
       new THREE.HemisphereLight(0xffffff, 0x8899aa, 1.6),
     );
@@ -262,7 +301,9 @@ export class SceneView {
     this.spot.material.color = colour(palette.calm);
     this.grid.material.color = colour(palette.text);
     this.frusta.material.color = colour(palette.calm);
-    this.fixtures.material.color = colour(palette.force);
+    if (this.software) this.renderer.setClearColor(colour(palette.ground), 1);
+    this.idle.color = colour(palette.fixture);
+    this.acting.color = this.push.material.color = colour(palette.force);
     this.tool.material.color = this.arm.material.color = colour(palette.calm);
     this.arrowMaterial.color = colour(palette.force);
     this.arrowMaterial.emissive = colour(palette.force).multiplyScalar(0.35);
@@ -286,31 +327,57 @@ export class SceneView {
     this.touch();
   }
 
-  /** Virtual fixtures as lines: their ends, x y z after one another [m, world]. */
-  showFixtures(ends: readonly number[]): void {
-    if (ends.length === this.fixtureEnds.length && ends.every((x, i) => x === this.fixtureEnds[i]))
-      return;
-    this.fixtureEnds = [...ends];
-    this.fixtures.geometry.dispose();
-    this.fixtures.geometry = new THREE.BufferGeometry().setAttribute(
-      "position",
-      new THREE.Float32BufferAttribute(ends as number[], 3),
-    );
-    this.fixtures.visible = ends.length > 0;
+  /** Virtual fixtures by their names, as lines: their ends, x y z after one another [m, world]. */
+  showFixtures(fixtures: readonly { name: string; ends: number[] }[]): void {
+    const wanted = JSON.stringify(fixtures);
+    if (wanted === this.fixturesDrawn) return;
+    this.fixturesDrawn = wanted;
+    for (const { children } of this.fixtures.children)
+      for (const part of children as (THREE.LineSegments | THREE.Sprite)[]) {
+        if (part instanceof THREE.Sprite) part.material.map!.dispose(), part.material.dispose();
+        else part.geometry.dispose();
+      }
+    this.fixtures.clear();
+    for (const { name, ends } of fixtures) {
+      const lines = new THREE.LineSegments(new THREE.BufferGeometry(), this.idle);
+      lines.frustumCulled = false;
+      this.setLine(lines, ends);
+      const highest = Math.max(...ends.filter((_, i) => i % 3 === 2));
+      const at = ends.indexOf(highest, 2) - 2;
+      const label = nameSprite(name, this.palette.text);
+      label.position.set(ends[at] ?? 0, ends[at + 1] ?? 0, ends[at + 2] ?? 0);
+      this.fixtures.add(new THREE.Group().add(lines, label));
+    }
     this.touch();
   }
 
-  /** A robot that is led: its tool [m], null where it is not known, and its lines. */
-  showRobot(tool: Vec3 | null, radius: number, ends: readonly number[]): void {
+  /** Which of the fixtures give a force, a bit each. */
+  showActing(bits: number): void {
+    this.fixtures.children.forEach(({ children }, i) => {
+      const lines = children[0] as THREE.LineSegments;
+      const material = (bits & (1 << i)) !== 0 ? this.acting : this.idle;
+      if (lines.material !== material) this.touch();
+      lines.material = material;
+    });
+  }
+
+  /** A robot that is led: its tool [m], null where it is not known, its links and lines. */
+  showRobot(tool: Vec3 | null, radius: number, links: readonly Vec3[], ends: number[]): void {
     this.tool.visible = tool !== null;
     if (tool) this.tool.position.set(...tool);
     this.tool.scale.setScalar(radius);
-    this.arm.geometry.dispose();
-    this.arm.geometry = new THREE.BufferGeometry().setAttribute(
-      "position",
-      new THREE.Float32BufferAttribute(ends as number[], 3),
-    );
-    this.arm.visible = ends.length > 0;
+    const thick = 1.5 * radius;
+    this.arm.count = Math.min(Math.max(links.length - 1, 0), MOST_LINKS);
+    for (let i = 0; i < this.arm.count; ++i) {
+      const along = sub(links[i + 1]!, links[i]!);
+      const long = length(along);
+      this.stand(this.dab, links[i]!, long > 0 ? unit(along) : [0, 1, 0], thick, long);
+      this.dab.updateMatrix();
+      this.arm.setMatrixAt(i, this.dab.matrix);
+    }
+    this.arm.visible = this.arm.count > 0;
+    this.arm.instanceMatrix.needsUpdate = true;
+    this.setLine(this.push, ends);
     this.touch();
   }
 
@@ -334,12 +401,7 @@ export class SceneView {
       pulled.material.color.copy(this.hip.material.color);
     });
     this.otherLines.material.color.copy(this.hip.material.color);
-    this.otherLines.geometry.dispose();
-    this.otherLines.geometry = new THREE.BufferGeometry().setAttribute(
-      "position",
-      new THREE.Float32BufferAttribute(ends as number[], 3),
-    );
-    this.otherLines.visible = ends.length > 0;
+    this.setLine(this.otherLines, ends);
     this.touch();
   }
 
@@ -424,11 +486,46 @@ export class SceneView {
   }
 
   showTick(tick: Ticks): void {
+    const before = this.tick;
+    const moves = (["hip", "place", "force", "normal"] as const).some(
+      (part) => !before || length(sub(tick[part], before[part])) > 1e-5,
+    );
     this.tick = tick;
+    // What rests is not drawn anew thirty times a second.
+    if (!moves && this.trailPoints.length === 0 && tick.state === before?.state) return;
     if (tick.state !== 0) this.trailPoints.push(...tick.proxy);
     else this.trailPoints.splice(0, 6); // it fades from its tail while nothing is touched
     this.trailPoints.splice(0, this.trailPoints.length - 3 * TRAIL);
     this.touch();
+  }
+
+  /** Have the cameras colours of their own? */
+  get hasColour(): boolean {
+    return [...this.clouds.values()].some((cloud) => cloud.hasColour);
+  }
+
+  /** Are they drawn? */
+  get showsColour(): boolean {
+    return this.tinted && this.hasColour;
+  }
+
+  /** Draws the cameras' own colours, where they have any, or those of depth. */
+  setTinted(tinted: boolean): void {
+    this.tinted = tinted;
+    for (const cloud of this.clouds.values()) cloud.setTinted(tinted);
+    this.touch();
+  }
+
+  get isTinted(): boolean {
+    return this.tinted;
+  }
+
+  /** [m] between what is measured about the hand; null: nothing is. */
+  spacing(): number | null {
+    if (!this.tick || this.clouds.size === 0) return null;
+    const { proxy } = this.tick;
+    const at = this.under?.spot.at ?? proxy;
+    return Math.min(...[...this.clouds.values()].map((cloud) => cloud.spacingAt(at)));
   }
 
   /** Where the hand was when this was recorded [m]; null: it was not. */
@@ -506,9 +603,13 @@ export class SceneView {
     // What a drawing costs shows in when the browser is ready for the next.
     if (this.lastDrawing > 0) this.thinning.measure((now - this.lastDrawing) / 1000);
     this.lastDrawing = 0;
-    if (!this.stale || !this.palette) return false;
+    if (!this.palette || (this.software && now - this.drawnAt < SOFTWARE_INTERVAL)) return false;
+    const rests = !this.stale && now - this.drawnAt > REST;
+    if (!this.stale && (!rests || this.thinning.resting || !this.thinning.canRefine)) return false;
     this.stale = false;
-    this.lastDrawing = now;
+    this.thinning.resting = rests;
+    this.drawnAt = now;
+    this.lastDrawing = rests ? 0 : now; // what is drawn once may take its time
 
     const at = eye(this.orbit);
     const { up, right } = axes(this.orbit);
@@ -551,6 +652,7 @@ export class SceneView {
     if (!cloud) {
       cloud = new CameraCloud();
       cloud.setColours(this.cloudColours());
+      cloud.setTinted(this.tinted);
       this.clouds.set(camera, cloud);
       this.scene.add(cloud.object, cloud.faces);
     }
@@ -606,23 +708,11 @@ export class SceneView {
   // Once: from what is seen at first. A moving camera's frustum moves with it.
   private placeCameras(): void {
     const frames = [...this.clouds.values()].flatMap(({ frame }) => frame ?? []);
-    const put = (lines: typeof this.grid, points: readonly number[]) => {
-      const position = lines.geometry.getAttribute("position");
-      if (position?.array.length === points.length)
-        (position.array as Float32Array).set(points);
-      else
-        lines.geometry.setAttribute(
-          "position",
-          new THREE.BufferAttribute(Float32Array.from(points), 3),
-        );
-      lines.geometry.getAttribute("position").needsUpdate = true;
-      lines.visible = points.length > 0;
-    };
-    put(this.frusta, frames.flatMap(cameraLines));
+    this.setLine(this.frusta, frames.flatMap(cameraLines));
     if (this.grid.visible || !this.home) return;
     const first = this.clouds.values().next().value!;
     const floor = floorUnder(first.seen?.places(2000) ?? [], this.orbit.up);
-    put(this.grid, floor ? gridLines(floor, this.orbit.up) : []);
+    this.setLine(this.grid, floor ? gridLines(floor, this.orbit.up) : []);
     this.axes.visible = true;
   }
 
@@ -634,21 +724,21 @@ export class SceneView {
       mark.position.set(...at);
       mark.scale.setScalar(size);
     };
-    place(this.proxy, tick.proxy, r_c);
+    place(this.proxy, tick.place, r_c); // forbidden regions keep it, too
     place(this.hip, tick.hip, 0.3 * r_c);
     // The ring is there to find the proxy from afar; near by, the sphere speaks for itself.
-    const size = metresPerPixel(depthOf(this.orbit, tick.proxy), this.height);
+    const size = metresPerPixel(depthOf(this.orbit, tick.place), this.height);
     place(
       this.ring,
-      tick.proxy,
+      tick.place,
       ((2 * 15) / Math.max(this.height, 1)) * Math.tan(FIELD_OF_VIEW / 2),
     );
     const radius = r_c / size;
     this.ring.material.opacity = Math.min(1, Math.max(0, (24 - radius) / 12)) * 0.85;
     this.ring.visible = this.ring.material.opacity > 0;
 
-    this.setLine(this.link, [...tick.proxy, ...tick.hip]);
-    this.link.visible = length(sub(tick.hip, tick.proxy)) > 0.3 * r_c;
+    this.setLine(this.link, [...tick.place, ...tick.hip]);
+    this.link.visible = length(sub(tick.hip, tick.place)) > 0.3 * r_c;
 
     const hasNormal = length(tick.normal) > 0.5;
     this.pin.visible = hasNormal;
@@ -659,7 +749,7 @@ export class SceneView {
     this.arrow.visible = newtons > 0.01;
     if (this.arrow.visible) {
       const direction = unit(tick.force);
-      const foot = [0, 1, 2].map((i) => tick.proxy[i]! + r_c * direction[i]!) as unknown as Vec3;
+      const foot = [0, 1, 2].map((i) => tick.place[i]! + r_c * direction[i]!) as unknown as Vec3;
       const thickness = 0.006 * size * this.height;
       const headLength = Math.min(0.4 * shown, 4 * thickness);
       this.stand(this.shaft, [0, 0, 0], [0, 1, 0], thickness * 0.55, shown - headLength);
@@ -671,18 +761,18 @@ export class SceneView {
     const under = (this.under = this.underHand());
     const near = under !== null && Math.abs(under.height) < 0.5;
     this.shadow.visible = near && under.height > 0.5 * r_c;
-    this.plumb.visible = near && !touching;
+    this.plumb.visible = false;
     if (near) {
       this.lay(this.shadow, under.spot, Math.max(r_c, 5 * size));
       this.setLine(this.plumb, [...tick.proxy, ...under.spot.at]);
       this.plumb.computeLineDistances();
+      this.plumb.visible = !touching;
     }
     this.spot.visible = this.pointedAt !== null;
     if (this.pointedAt) {
       const pixel = metresPerPixel(depthOf(this.orbit, this.pointedAt.at), this.height);
       this.lay(this.spot, this.pointedAt, SPOT_SIZE * pixel);
     }
-    this.trail.visible = this.trailPoints.length > 3;
     this.setLine(this.trail, this.trailPoints);
   }
 
@@ -707,9 +797,15 @@ export class SceneView {
   }
 
   private setLine(line: THREE.Line, points: readonly number[]): void {
-    const position = line.geometry.getAttribute("position") as THREE.BufferAttribute;
-    position.array.set(points.slice(0, position.array.length));
+    let position = line.geometry.getAttribute("position") as THREE.BufferAttribute | undefined;
+    if (!position || position.array.length < points.length) {
+      line.geometry.dispose(); // the buffer that was too small
+      position = new THREE.BufferAttribute(new Float32Array(points.length), 3);
+      line.geometry.setAttribute("position", position);
+    }
+    position.array.set(points);
     position.needsUpdate = true;
     line.geometry.setDrawRange(0, points.length / 3);
+    line.visible = points.length > 0;
   }
 }

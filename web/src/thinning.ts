@@ -9,7 +9,7 @@ const LEVELS = [
   [6, 1],
   [6, 0.6],
 ] as const;
-const SLOW = 1 / 22;
+const SLOW = 1 / 28;
 const FAST = 1 / 45;
 const PATIENCE = 45;
 
@@ -21,6 +21,11 @@ export function drawsFaces(faces: number, stride: number): boolean {
   return faces <= MOST_FACES / stride ** 2;
 }
 
+/** At first where no graphics card draws: what is coarse at once is better than fine and late. */
+export const SOFTWARE_LEVEL = 3;
+/** Of a view that rests: all there is, or what software draws in the time of a click. */
+const REST_LEVEL = { card: 0, software: 1 };
+
 /**
  * Chooses how many points are drawn, from how long frames take: fewer at once when it is slow,
  * more again only when it has been fast for long, and never back to what was slow a moment ago.
@@ -28,18 +33,34 @@ export function drawsFaces(faces: number, stride: number): boolean {
  * are never left out.
  */
 export class Thinning {
-  private level = 0;
+  /** Nothing moves: the view is drawn once as finely as it can be. */
+  resting = false;
   private average: number | null = null;
   private fastFrames = 0;
   private patience = PATIENCE;
+  private readonly rest: number;
+
+  /** @param level  to begin with: SOFTWARE_LEVEL without a graphics card */
+  constructor(private level = 0) {
+    this.rest = level === 0 ? REST_LEVEL.card : REST_LEVEL.software;
+  }
 
   get stride(): number {
-    return LEVELS[this.level]![0];
+    return this.shown[0];
   }
 
   /** Of the picture, beside what the screen could show. */
   get resolution(): number {
-    return LEVELS[this.level]![1];
+    return this.shown[1];
+  }
+
+  /** Would a view that rests be finer? */
+  get canRefine(): boolean {
+    return this.rest < this.level;
+  }
+
+  private get shown() {
+    return LEVELS[this.resting ? Math.min(this.rest, this.level) : this.level]!;
   }
 
   /** [s] between drawn frames, smoothed; null before the first. */

@@ -1,32 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
-// Why the force is what it is, in one line, from the flags that the program sends.
+// What the hand feels and why: two words and one sentence, all from one state of the program.
 
 import { dot, length, sub } from "./camera_math";
-import type { Hello, State, Ticks } from "./protocol";
+import type { State, Ticks } from "./protocol";
 
-/** A sentence, and the name of the flag that decides; empty: none does. */
+/** What is said of the force. No part contradicts another, nor the newtons beside it. */
 export interface Why {
+  /** what the hand does: free, kept off, guided, contact, entrenched */
+  word: string;
+  /** how far it is from the surface; empty: that is not known */
+  detail: string;
+  /** one sentence, which begins with "No force" where a connected program sends none, only there */
   text: string;
+  /** the flag that decides; empty: none does */
   link: string;
   /** place in the order: the lower, the more it decides */
   rank: number;
 }
 
-/** What the line is made of. */
+/** What it is made of. */
 export interface Facts {
   connected: boolean;
-  tick: Pick<
-    Ticks,
-    "state" | "hip" | "proxy" | "normal" | "gain" | "askedForce" | "force"
-  > | null;
+  tick: Omit<Ticks, "kind" | "samples" | "t" | "steps"> | null;
   /** names of the flags that are set */
   flags: ReadonlySet<string>;
   hand: "you" | "other" | "free";
   state: Pick<State, "latched_by" | "device" | "parameters"> | null;
+  /** names of the fixtures that give a force */
+  acting: readonly string[];
+  /** [m] of the proxy above what is seen, below 0 behind it; null: nothing is seen there */
+  clearance: number | null;
+  /** [m] between what is measured about the hand; null: not known */
+  spacing: number | null;
 }
 
 /** Names of the bits that are set, in one of the program's tables. */
-export function flagNames(bits: number, table: Hello["flags"]): string[] {
+export function flagNames(bits: number, table: readonly { name: string }[]): string[] {
   return table.filter((_, i) => (bits & (1 << i)) !== 0).map(({ name }) => name);
 }
 
@@ -39,109 +48,210 @@ export function depthBelow(tick: Pick<Ticks, "hip" | "proxy" | "normal">, r_c: n
   return (length(tick.normal) > 0.5 ? dot(out, tick.normal) : length(out)) - r_c;
 }
 
-const newtons = (value: number) => `${value.toFixed(1)} N`;
+const LEAST_FORCE = 0.005; // [N] less is written as 0.00
+const BEHIND = 0.002; // [m] below what is seen: less is noise
+const ALIKE = 0.1; // [-] by which the stiffness that acts may differ from the one that is set
 
-// In the order in which they decide. Empty: this does not say why.
-const RULES: readonly [flag: string, say: (facts: Facts) => string][] = [
+type Tick = NonNullable<Facts["tick"]>;
+type Say = (facts: Facts & { tick: Tick }) => string;
+
+const sent = ({ force }: Tick) => length(force);
+const isLeft = ({ state, hand }: Pick<Facts, "state" | "hand">) =>
+  state?.device.takes_hand === true && hand === "free";
+const touches = ({ state }: Tick) => state !== 0;
+const newtons = (value: number, digits = 1) => `${value.toFixed(digits)} N`;
+const millimetres = (metres: number) => (1e3 * metres).toFixed(metres < 0.01 ? 1 : 0);
+
+// Is the force that is sent less than what is asked for, so that somebody could notice?
+const falls = (tick: Tick) => tick.askedForce - sent(tick) > Math.max(0.02, 0.05 * tick.askedForce);
+const changes = (tick: Tick) =>
+  Math.abs(tick.askedForce - sent(tick)) > Math.max(0.02, 0.05 * tick.askedForce);
+
+function fixtures({ tick, acting }: Parameters<Say>[0]): string {
+  if (Math.max(tick.region, tick.guidance) < LEAST_FORCE) return "";
+  return acting.map((name) => `“${name}”`).join(" and ") || "a fixture that is gone";
+}
+
+function asked(facts: Parameters<Say>[0]): string {
+  const { tick } = facts;
+  const askers = [touches(tick) ? "the surface" : "", fixtures(facts)].filter(Boolean);
+  return `${askers.join(" and ") || "the method"} asked for ${newtons(tick.askedForce)}.`;
+}
+
+// Why no force is sent, in the order in which they decide. Empty: this does not say why.
+const NONE: readonly [flag: string, say: Say][] = [
   [
     "fault_latched",
     ({ state }) =>
-      `No force: faults came again and again (${(state?.latched_by ?? []).join(", ")}); ` +
-      "the operator resets them.",
+      `faults came again and again (${(state?.latched_by ?? []).join(", ")}), and the operator ` +
+      "has to reset them.",
   ],
-  ["output_refused", () => "No force: the safety chain's own result broke its bounds."],
-  ["input_refused", () => "No force: the hand or the method gave a number that is not finite."],
-  ["direction_refused", () => "No force: the surface normal contradicts the force's direction."],
-  ["non_finite_input", () => "No force: the hand's place is not finite."],
-  ["no_frame", () => "No force: there is no frame to touch yet."],
-  ["frame_lost", () => "No force: a camera has sent no usable frame for too long."],
-  ["hand_too_fast", () => "No force: the hand was faster than it may be."],
-  ["stalled", () => "The force starts again from nothing: the loop missed its deadlines."],
-  ["disengaged", disengaged],
-  ["free_space_released", () => "No force: the camera sees free space around the hand."],
-  ["proxy_let_go", () => "No force: the proxy was too far from the hand and starts anew there."],
-  ["frame_fading", () => "Fading: a camera's newest frame is old."],
-  ["surface_hidden", ({ tick }) => (touches(tick) ? "Held: something hides the surface." : "")],
+  ["output_refused", () => "the safety chain's own result broke its bounds."],
+  ["input_refused", () => "the hand or the method gave a number that is not finite."],
+  ["direction_refused", () => "the surface normal contradicts the force's direction."],
+  ["non_finite_input", () => "the hand's place is not finite."],
+  ["no_frame", () => "there is no frame to touch yet."],
+  ["frame_lost", () => "a camera has sent no usable frame for too long."],
+  ["hand_too_fast", () => "the hand was faster than it may be."],
   [
-    "ramping",
-    ({ tick }) =>
-      touches(tick) ? `Rising gently: ${Math.round(100 * (tick?.gain ?? 0))} % so far.` : "",
+    "disengaged",
+    (facts) => (touches(facts.tick) && !isLeft(facts) ? "pull back, then push in again." : ""),
   ],
-  ["returned_to_front", () => "Rising: the proxy was behind the surface and was brought back."],
-  ["pop_through_suspected", () => "In doubt: the proxy may be behind the surface."],
-  ["frame_late", () => "May only fall: a camera's next frame is overdue."],
-  ["energy_cut", () => "Softened: the surface kept up an oscillation."],
-  ["oscillation_cut", () => "Softened: the force swung fast, again and again."],
-  ["continuous_cut", ({ tick }) => `Limited: the motors are warm; ${asked(tick)}`],
-  ["force_cut", ({ tick }) => `Limited to what is allowed; ${asked(tick)}`],
-  ["force_saturated", () => "Limited by the method's max force."],
+  ["free_space_released", () => "the camera sees free space around the hand."],
+  ["proxy_let_go", () => "the proxy was too far from the hand and starts anew there."],
+];
+
+// What changes a force that is asked for, likewise.
+const LESS: readonly [flag: string, say: Say][] = [
+  ["stalled", () => "Starting again from nothing, as the loop missed its deadlines."],
+  ["frame_fading", () => "Fading, as a camera's newest frame is old."],
+  ["surface_hidden", ({ tick }) => (touches(tick) ? "Held, as something hides the surface." : "")],
+  ["ramping", ({ tick }) => `Rising gently, ${Math.round(100 * tick.gain)} % so far.`],
+  ["returned_to_front", () => "Rising, as the proxy was behind the surface and was brought back."],
+  ["pop_through_suspected", () => "In doubt, as the proxy may be behind the surface."],
+  ["frame_late", () => "It may only fall, as a camera's next frame is overdue."],
+  ["energy_cut", () => "Softened, as the surface kept up an oscillation."],
+  ["oscillation_cut", () => "Softened, as the force swung fast, again and again."],
+  [
+    "continuous_cut",
+    (facts) => (falls(facts.tick) ? `Limited, as the motors are warm; ${asked(facts)}` : ""),
+  ],
+  [
+    "force_cut",
+    (facts) => (falls(facts.tick) ? `Limited to what is allowed; ${asked(facts)}` : ""),
+  ],
+  ["force_saturated", ({ tick }) => (touches(tick) ? "Limited by the method's max force." : "")],
   [
     "pull_removed",
-    ({ tick }) => (differs(tick) ? "The part that pulled into the surface is removed." : ""),
+    ({ tick }) => (changes(tick) ? "Less, as what pulled into the surface is removed." : ""),
   ],
   [
     "correction_cut",
-    ({ tick }) => (differs(tick) ? "Coming slowly: the surface was corrected under the hand." : ""),
+    ({ tick }) => (changes(tick) ? "Coming slowly, as the surface was corrected under it." : ""),
   ],
-  ["slew_cut", ({ tick }) => (differs(tick) ? "Changing as fast as it may." : "")],
+  ["slew_cut", ({ tick }) => (changes(tick) ? "Changing as fast as it may." : "")],
 ];
 
-// Does the force that is sent differ from what the method asks for, so that somebody could notice?
-function differs(tick: Facts["tick"]): boolean {
-  if (!tick) return false;
-  const sent = length(tick.force);
-  return Math.abs(sent - tick.askedForce) > Math.max(0.02, 0.05 * tick.askedForce);
+// Nothing is sent, and no flag says why.
+function noForce({ tick, state, hand, clearance, spacing }: Parameters<Say>[0]): string {
+  const r_c = state?.parameters.r_c ?? 0;
+  if (isLeft({ state, hand }))
+    return "nobody holds the hand; press on the surface to touch it.";
+  if (touches(tick))
+    return depthBelow(tick, r_c) > 0
+      ? "the surface asks for none here."
+      : "the sphere touches, the hand is still above the surface.";
+  if (tick.frame < 0) return "there is nothing to touch yet.";
+  if (spacing !== null && spacing > r_c && (clearance ?? 0) < r_c)
+    return (
+      `points ${millimetres(spacing)} mm apart are too sparse for a sphere of ` +
+      `${millimetres(2 * r_c)} mm.`
+    );
+  if (clearance === null) return "nothing is seen under the hand.";
+  return clearance < -BEHIND
+    ? "the hand is behind what the camera sees; pull it out and press again."
+    : "the hand is in the air.";
 }
 
-function touches(tick: Facts["tick"]): boolean {
-  return tick !== null && tick.state !== 0;
-}
-
-function asked(tick: Facts["tick"]): string {
-  return `the method asks for ${newtons(tick?.askedForce ?? 0)}.`;
-}
-
-function disengaged({ tick, hand, state }: Facts): string {
-  if (state?.device.takes_hand && hand === "free")
-    return "No force: nobody holds the hand. Press on the surface.";
-  if (touches(tick)) return "No force yet: pull back, then push in again.";
-  return "";
-}
-
-/** The one line. */
-export function why(facts: Facts): Why {
-  const { tick, state, flags } = facts;
-  if (!facts.connected) return { text: "No word from the program.", link: "", rank: -3 };
-  if (!tick) return { text: "No tick yet.", link: "", rank: -2 };
-  const fault = state?.device.fault;
-  if (fault) return { text: `The hand is lost: ${fault}`, link: "hand", rank: -1 };
-  for (const [rank, [link, say]] of RULES.entries()) {
-    const text = flags.has(link) ? say(facts) : "";
-    if (text) return { text, link, rank };
+// A force is sent, and no flag changes it.
+function plainForce(facts: Parameters<Say>[0]): string {
+  const { tick, state } = facts;
+  const who = fixtures(facts);
+  if (who) {
+    const verb = facts.acting.length > 1 ? "give" : "gives";
+    return touches(tick)
+      ? `${capital(who)} ${verb} a part of it, and the surface the rest.`
+      : `${capital(who)} ${verb} this force.`;
   }
-  const stiffness = state?.parameters.stiffness ?? 0;
+  if (!touches(tick)) return "Fading, as the contact has ended.";
   const depth = depthBelow(tick, state?.parameters.r_c ?? 0);
-  const text = !touches(tick)
-    ? "No force: the hand is in the air."
-    : depth > 0
-      ? `Stiffness ${stiffness.toFixed(0)} N/m times ${(1e3 * depth).toFixed(1)} mm.`
-      : "No force yet: the sphere touches, the hand is still above the surface.";
-  return { text, link: "", rank: RULES.length };
+  if (depth <= 0) return "Fading, as the hand is out of the surface.";
+  const set = state?.parameters.stiffness ?? 0;
+  const acts = sent(tick) / depth;
+  const shown = Math.abs(acts - set) <= ALIKE * set ? set : Number(acts.toPrecision(2));
+  return `Stiffness ${shown.toFixed(0)} N/m times ${(1e3 * depth).toFixed(1)} mm.`;
+}
+
+const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
+const small = (text: string) => text.charAt(0).toLowerCase() + text.slice(1);
+
+function said(
+  rules: readonly [string, Say][],
+  facts: Parameters<Say>[0],
+  first: number,
+): Pick<Why, "text" | "link" | "rank"> | null {
+  for (const [i, [link, say]] of rules.entries()) {
+    const text = facts.flags.has(link) ? say(facts) : "";
+    if (text) return { text, link, rank: first + i };
+  }
+  return null;
+}
+
+function sentence(facts: Facts & { tick: Tick }): Pick<Why, "text" | "link" | "rank"> {
+  const { tick, flags } = facts;
+  const fault = facts.state?.device.fault;
+  if (fault) return { text: `No force: the hand is lost: ${fault}`, link: "hand", rank: -1 };
+  const plain = { link: "", rank: NONE.length + LESS.length };
+  if (sent(tick) >= LEAST_FORCE)
+    return said(LESS, facts, NONE.length) ?? { text: plainForce(facts), ...plain };
+  // A flag of some ticks ago says nothing of a hand that is where no force is asked for.
+  const less = tick.askedForce >= LEAST_FORCE ? said(LESS, facts, NONE.length) : null;
+  const none = said(NONE, facts, 0);
+  if (none) return { ...none, text: `No force: ${none.text}` };
+  if (less) return { ...less, text: `No force yet: ${small(less.text)}` };
+  return {
+    text: `No force: ${noForce(facts)}`,
+    ...(flags.has("disengaged") ? { ...plain, link: "disengaged" } : plain),
+  };
+}
+
+/** The one word, the one distance and the one sentence. */
+export function why(facts: Facts): Why {
+  const nothing = { word: "", detail: "", link: "" };
+  if (!facts.connected) return { ...nothing, text: "No word from the program.", rank: -3 };
+  const { tick, clearance, state } = facts;
+  if (!tick) return { ...nothing, text: "No tick yet.", rank: -2 };
+  const height = touches(tick) ? -depthBelow(tick, state?.parameters.r_c ?? 0) : clearance;
+  const inside = touches(tick) ? "inside" : "behind";
+  const isIn = height !== null && height < (touches(tick) ? 0 : -BEHIND);
+  return {
+    ...sentence({ ...facts, tick }),
+    word: touches(tick)
+      ? (["", "contact", "entrenched"][tick.state] ?? "contact")
+      : tick.region >= LEAST_FORCE
+        ? "kept off"
+        : tick.guidance >= LEAST_FORCE
+          ? "guided"
+          : "free",
+    detail:
+      height === null
+        ? ""
+        : isIn
+          ? `hand ${(-1e3 * height).toFixed(1)} mm ${inside}`
+          : `hand ${millimetres(Math.max(height, 0))} mm above`,
+  };
 }
 
 const PATIENCE = 500; // [ms]
 
-/** Keeps a line long enough to be read, unless one comes that decides more. */
+/**
+ * Keeps a sentence long enough to be read, unless one comes that decides more, or the hand does
+ * something else: then what was said is no longer true.
+ */
 export class SteadyWhy {
   private shown: Why | null = null;
   private seen = 0;
 
   show(newest: Why, now: number): Why {
-    const same = this.shown?.link === newest.link && this.shown.rank === newest.rank;
-    if (same || !this.shown || newest.rank < this.shown.rank || now - this.seen > PATIENCE) {
+    const { shown } = this;
+    const isNone = ({ text }: Why) => text.startsWith("No force");
+    const isStill =
+      shown !== null && shown.word === newest.word && isNone(shown) === isNone(newest);
+    const same = shown?.link === newest.link && shown.rank === newest.rank;
+    if (same || !isStill || newest.rank < shown.rank || now - this.seen > PATIENCE) {
       this.shown = newest;
       this.seen = now;
     }
-    return this.shown;
+    return { ...this.shown!, detail: newest.detail };
   }
 }

@@ -20,7 +20,7 @@ function drawn(faces: number, stride: number) {
   return {
     faces: cloud.faces.visible,
     points: cloud.object.geometry.drawRange.count,
-    spacing: (cloud.object.material as ShaderMaterial).uniforms.pointSpacing!.value as number,
+    spacing: (cloud.object.material as ShaderMaterial).uniforms.pointSpacing!.value.x as number,
   };
 }
 

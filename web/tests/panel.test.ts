@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import { expect, test } from "vitest";
 import {
+  cameraText,
   enteredNumber,
   latchedText,
   maySetLimit,
@@ -89,4 +90,22 @@ test("warnings are sentences, one after the other", () => {
   expect(warningText(["walls are stiff; set 400", "it may swing"])).toBe(
     "Walls are stiff; set 400. It may swing.",
   );
+});
+
+test("what is looked at says whether it goes on, and what was left out", () => {
+  const camera = {
+    ...{ uri: "tum:/data/desk", kind: "", sensor: "unknown", rate: 30, state: "live" },
+    ...{ dropped: 0, frames: 0, place: 0, time: 0 },
+  };
+  const playback = { paused: false, loop: false, speed: 1 };
+  const said = (more: Partial<typeof camera>, how: typeof playback | null = playback) =>
+    cameraText({ cameras: [{ ...camera, ...more }], playback: how });
+  expect(said({}, null)).toBe("desk · 30 Hz");
+  expect(said({ frames: 1 })).toBe("desk · still picture");
+  expect(said({ frames: 90, dropped: 1200 })).toBe("desk · 30 Hz · 1,200 frames dropped");
+  const paused = { ...playback, paused: true };
+  expect(said({ frames: 90, place: 4 }, paused)).toBe("desk · paused");
+  expect(said({ frames: 90, place: 89 }, paused)).toBe("desk · ended, its last frame stays");
+  expect(said({ state: "searching: unplugged" })).toBe("desk · searching: unplugged");
+  expect(cameraText({ cameras: [], playback: null })).toBe("no camera");
 });

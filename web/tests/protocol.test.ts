@@ -34,7 +34,7 @@ function frameMessage(
 }
 
 function ticksMessage(samples: number[][]): ArrayBuffer {
-  const buffer = new ArrayBuffer(88 + 28 * samples.length);
+  const buffer = new ArrayBuffer(112 + 28 * samples.length);
   const view = new DataView(buffer);
   view.setUint8(0, 2);
   view.setUint8(1, 1);
@@ -48,7 +48,9 @@ function ticksMessage(samples: number[][]): ArrayBuffer {
   view.setInt32(76, -1, true);
   view.setFloat32(80, 0.5, true);
   view.setFloat32(84, 12, true);
-  samples.flat().forEach((value, i) => view.setFloat32(88 + 4 * i, value, true));
+  [13, 14, 15, 2, 0.5].forEach((value, i) => view.setFloat32(88 + 4 * i, value, true));
+  view.setUint32(108, 5, true);
+  samples.flat().forEach((value, i) => view.setFloat32(112 + 4 * i, value, true));
   return buffer;
 }
 
@@ -97,6 +99,29 @@ describe("a frame", () => {
     expect(frame.depth).toBeNull();
   });
 
+  test("has colours of its own pixels, or of another camera", () => {
+    const rgb = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18];
+    const payload = new Uint8Array(12 + 18);
+    payload.set(rgb, 12);
+    const message = frameMessage(0, payload.buffer, 3, 2);
+    expect(() => decode(message)).toThrow("cut short");
+    new DataView(message).setUint8(3, 1);
+    expect((decode(message) as Frame).colour).toMatchObject({ width: 3, height: 2, camera: null });
+    expect([...(decode(message) as Frame).colour!.rgb]).toEqual(rgb);
+    const other = new Uint8Array(72 + 12 + 6);
+    other.set([7, 8, 9, 10, 11, 12], 72 + 12);
+    const own = frameMessage(0, other.buffer, 3, 2);
+    const view = new DataView(own);
+    view.setUint8(3, 2);
+    [2, 1].forEach((value, i) => view.setUint32(96 + 4 * i, value, true));
+    for (let i = 0; i < 16; ++i) view.setFloat32(104 + 4 * i, i, true);
+    const { depth, colour } = decode(own) as Frame;
+    expect(depth).toHaveLength(6);
+    expect([...colour!.rgb]).toEqual([7, 8, 9, 10, 11, 12]);
+    expect(colour!.camera!.intrinsics).toEqual([0, 1, 2, 3]);
+    expect([...colour!.camera!.cameraFromWorld].slice(0, 2)).toEqual([4, 5]);
+  });
+
   test("is refused when it is cut short or its format is not known", () => {
     expect(() => decode(frameMessage(0, new ArrayBuffer(11), 3, 2))).toThrow("cut short");
     expect(() => decode(frameMessage(0, new ArrayBuffer(12), 3, 2).slice(0, 60))).toThrow("header");
@@ -116,7 +141,8 @@ describe("ticks", () => {
     expect(ticks.hip).toEqual([1, 2, 3]);
     expect(ticks.force).toEqual([10, 11, 12]);
     expect(ticks.frame).toBe(-1);
-    expect(ticks).toMatchObject({ gain: 0.5, askedForce: 12 });
+    expect(ticks).toMatchObject({ gain: 0.5, askedForce: 12, place: [13, 14, 15] });
+    expect(ticks).toMatchObject({ region: 2, guidance: 0.5, fixtures: 5 });
     expect(ticks.samples[0]!.t).toBeCloseTo(99.99);
     expect(ticks.samples[1]).toEqual({
       ...{ t: 100, force: 5, penetration: 6, steps: 7, tickTime: 8 },
@@ -125,7 +151,7 @@ describe("ticks", () => {
   });
 
   test("are refused when they are cut short", () => {
-    expect(() => decode(ticksMessage([[1, 2, 3, 4, 5, 6, 7]]).slice(0, 100))).toThrow("cut short");
+    expect(() => decode(ticksMessage([[1, 2, 3, 4, 5, 6, 7]]).slice(0, 120))).toThrow("cut short");
   });
 });
 

@@ -69,6 +69,7 @@ export function seen(scene: Scene, eye: Vec3, target: Vec3, noise: () => number 
     depth,
     points: null,
     triangles: null,
+    colour: null,
   };
 }
 

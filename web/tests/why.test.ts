@@ -23,8 +23,9 @@ test("flags have the names of the program's table", () => {
 const facts = (flags: string[], more: Partial<Facts> = {}): Facts => ({
   connected: true,
   tick: {
-    ...{ state: 1, gain: 0.4, askedForce: 9, force: [0, 0, 2] as const },
-    ...{ hip: [0, 0, -0.002], proxy: [0, 0, r_c], normal: up },
+    ...{ state: 1, gain: 0.4, askedForce: 9, force: [0, 0, 1.2] as const, frame: 7 },
+    ...{ hip: [0, 0, -0.002], proxy: [0, 0, r_c], normal: up, place: [0, 0, r_c] },
+    ...{ region: 0, guidance: 0, fixtures: 0, flags: 0, safety: 0, surfaceVelocity: 0 },
   },
   flags: new Set(flags),
   hand: "you",
@@ -33,15 +34,25 @@ const facts = (flags: string[], more: Partial<Facts> = {}): Facts => ({
     device: { uri: "mouse:", kind: "mouse", takes_hand: true, fault: "", warnings: [] },
     parameters: { stiffness: 600, r_c },
   },
+  acting: [],
+  clearance: 0.03,
+  spacing: 0.001,
   ...more,
 });
-const air = { ...facts([]).tick!, state: 0 };
+type Tick = NonNullable<Facts["tick"]>;
+const tick = (more: Partial<Tick>): Tick => ({ ...facts([]).tick!, ...more });
+const air = tick({ state: 0, force: [0, 0, 0], askedForce: 0, normal: [0, 0, 0] });
+const none = tick({ force: [0, 0, 0] });
 
 describe("why the force is what it is", () => {
   test("the coupling's own numbers, if nothing else decides", () => {
     expect(why(facts([])).text).toBe("Stiffness 600 N/m times 2.0 mm.");
+    expect(why(facts([])).detail).toBe("hand 2.0 mm inside");
+    expect(why(facts([], { tick: tick({ force: [0, 0, 0.24] }) })).text).toBe(
+      "Stiffness 120 N/m times 2.0 mm.", // of another material
+    );
     expect(why(facts([], { tick: air })).text).toContain("in the air");
-    const touches = { ...facts([]).tick!, hip: [0, 0, 0.002] as const };
+    const touches = tick({ hip: [0, 0, 0.002], force: [0, 0, 0], askedForce: 0 });
     expect(why(facts([], { tick: touches })).text).toContain("still above the surface");
   });
 
@@ -52,30 +63,72 @@ describe("why the force is what it is", () => {
     ["surface_hidden", /hides/],
     ["frame_fading", /frame is old/],
     ["frame_late", /overdue/],
-    ["frame_lost", /No force.*no usable frame/],
-    ["no_frame", /no frame to touch/],
-    ["disengaged", /pull back/],
-    ["fault_latched", /input_refused/],
     ["energy_cut", /oscillation/],
-  ])("%s is named", (flag, text) => {
+  ])("%s, which changes it, is named", (flag, text) => {
     expect(why(facts([flag]))).toMatchObject({ link: flag, text: expect.stringMatching(text) });
   });
 
+  test.each([
+    ["frame_lost", /^No force.*no usable frame/],
+    ["no_frame", /^No force.*no frame to touch/],
+    ["disengaged", /^No force.*pull back/],
+    ["fault_latched", /^No force.*input_refused/],
+  ])("%s, which takes it away, is named", (flag, text) => {
+    const said = why(facts([flag, "slew_cut"], { tick: none }));
+    expect(said).toMatchObject({ link: flag, text: expect.stringMatching(text) });
+    expect(why(facts([flag])).text).not.toContain("No force"); // it did so some ticks ago
+  });
+
   test("what takes the force away comes before what limits it", () => {
-    expect(why(facts(["slew_cut", "force_cut", "ramping"])).link).toBe("ramping");
-    expect(why(facts(["ramping", "disengaged"])).link).toBe("disengaged");
-    expect(why(facts(["disengaged", "frame_lost", "frame_fading"])).link).toBe("frame_lost");
-    expect(why(facts(["frame_lost", "fault_latched"])).link).toBe("fault_latched");
+    const link = (flags: string[]) => why(facts(flags, { tick: none })).link;
+    expect(link(["slew_cut", "force_cut", "ramping"])).toBe("ramping");
+    expect(link(["ramping", "disengaged"])).toBe("disengaged");
+    expect(link(["disengaged", "frame_lost", "frame_fading"])).toBe("frame_lost");
+    expect(link(["frame_lost", "fault_latched"])).toBe("fault_latched");
   });
 
   test("what changes the force by nothing that is noticed is not why", () => {
-    const tick = { ...facts([]).tick!, askedForce: 2.01 };
-    expect(why(facts(["slew_cut", "pull_removed"], { tick })).text).toContain("Stiffness");
+    const asks = tick({ askedForce: 1.21 });
+    expect(why(facts(["slew_cut", "pull_removed"], { tick: asks })).text).toContain("Stiffness");
     expect(why(facts(["slew_cut"])).link).toBe("slew_cut");
   });
 
+  test("a fixture that gives a part of the force is named, also where all is limited", () => {
+    const both = tick({ region: 2, askedForce: 5.3, force: [0, 0, 3.3] });
+    const acting = ["keep off 1"];
+    expect(why(facts(["force_cut"], { tick: both, acting })).text).toBe(
+      "Limited to what is allowed; the surface and “keep off 1” asked for 5.3 N.",
+    );
+    expect(why(facts([], { tick: both, acting })).text).toMatch(/“keep off 1” gives a part of it/);
+    const alone = { ...both, state: 0, askedForce: 2, force: [0, 0, 2] as Vec3 };
+    expect(why(facts(["force_cut"], { tick: alone, acting }))).toMatchObject({
+      word: "kept off",
+      text: "“keep off 1” gives this force.",
+    });
+    const guided = { ...alone, region: 0, guidance: 2 };
+    expect(why(facts([], { tick: guided, acting: ["a", "b"] }))).toMatchObject({
+      word: "guided",
+      text: "“a” and “b” give this force.",
+    });
+    expect(why(facts([], { tick: alone })).text).toContain("A fixture that is gone");
+  });
+
+  test("no force has its true reason: in the air, behind, nothing there, too sparse", () => {
+    const said = (more: Partial<Facts>) => why(facts([], { tick: air, ...more }));
+    expect(said({})).toMatchObject({ detail: "hand 30 mm above" });
+    expect(said({ clearance: -0.03 })).toMatchObject({
+      detail: "hand 30.0 mm behind",
+      text: expect.stringContaining("behind what the camera sees"),
+    });
+    expect(said({ clearance: null }).text).toContain("nothing is seen under the hand");
+    expect(said({ clearance: 0, spacing: 0.04 }).text).toContain("40 mm apart are too sparse");
+    expect(said({ spacing: 0.04 }).text).toContain("in the air");
+    expect(said({ tick: { ...air, frame: -1 } }).text).toContain("nothing to touch yet");
+  });
+
   test("a hand that nobody holds, that is lost, or a program that is silent", () => {
-    expect(why(facts(["disengaged"], { hand: "free" })).text).toMatch(/nobody holds.*Press/);
+    const free = why(facts(["disengaged"], { hand: "free", tick: none }));
+    expect(free.text).toMatch(/nobody holds.*press/);
     expect(why(facts(["disengaged"], { tick: air })).text).toContain("in the air");
     const { state } = facts([]);
     const lost = { ...state!, device: { ...state!.device, fault: "unplugged" } };
@@ -87,15 +140,73 @@ describe("why the force is what it is", () => {
   test("in the air a ramp says nothing", () => {
     expect(why(facts(["ramping", "surface_hidden"], { tick: air })).text).toContain("in the air");
   });
+
+  test("no combination contradicts itself", () => {
+    const flags = [
+      ...["", "fault_latched", "output_refused", "input_refused", "direction_refused", "no_frame"],
+      ...["non_finite_input", "frame_lost", "hand_too_fast", "stalled", "disengaged", "ramping"],
+      ...["free_space_released", "proxy_let_go", "frame_fading", "surface_hidden", "frame_late"],
+      ...["returned_to_front", "pop_through_suspected", "energy_cut", "oscillation_cut"],
+      ...["continuous_cut", "force_cut", "force_saturated", "pull_removed", "correction_cut"],
+      ...["slew_cut", "step_budget_hit", "frame_stale"],
+    ];
+    const each = function* () {
+      for (const first of flags)
+        for (const second of ["", "disengaged"])
+          for (const state of [0, 1, 2])
+            for (const force of [0, 1.2, 3.3])
+              for (const [region, guidance] of [[0, 0], [2, 0], [0, 2], [2, 2]] as const)
+                for (const askedForce of [0, 1.2, 5.3])
+                  for (const clearance of [null, -0.03, 0.03])
+                    for (const hand of ["you", "free"] as const)
+                      yield [
+                        { state, force, askedForce, region, guidance },
+                        { first, second, clearance, hand },
+                      ] as const;
+    };
+    let count = 0;
+    for (const [
+      { state, force, askedForce, region, guidance },
+      { first, second, clearance, hand },
+    ] of each()) {
+      const acting = region + guidance > 0 ? ["fence"] : [];
+      const now = tick({ state, force: [0, 0, force], region, guidance, askedForce });
+      const input = { tick: now, acting, clearance, hand };
+      const { word, detail, text, link } = why(facts([first, second], input));
+      const wrong = [
+        !/^[A-Z“][^.]*(\d\.\d[^.]*)*\.$/.test(text) && "not one sentence",
+        text.startsWith("No force") !== (force === 0) && "force and words differ",
+        /in the air/.test(text) && (state !== 0 || /inside|behind/.test(detail)) && "in the air",
+        word === "free" && (state !== 0 || region > 0 || guidance > 0) && "not free",
+        /inside|contact|entrenched/.test(`${word} ${detail}`) && state === 0 && "not in contact",
+        link && ![first, second].includes(link) && "a flag that is not set",
+        // Of one force there is one number; what was asked for is more, and is called that.
+        [...text.matchAll(/([\d.]+) N\b(?!\/)/g)].some(
+          ([, n]) => !(/asked for/.test(text) && +n! > force && +n! === askedForce),
+        ) && "another number",
+        /(gives|give|asked for)\b/.test(text) && region + guidance > 0 !== /fence/.test(text) &&
+          "a fixture that is not named",
+      ].filter(Boolean);
+      if (wrong.length > 0)
+        throw new Error(
+          `${wrong}: ${JSON.stringify({ word, detail, text, first, second, ...input })}`,
+        );
+      ++count;
+    }
+    expect(count).toBeGreaterThan(30_000);
+  });
 });
 
-test("a line stays long enough to be read, unless a graver one comes", () => {
+test("a line stays to be read, unless a graver one comes or it is no longer true", () => {
   const steady = new SteadyWhy();
-  const [cut, plain, lost] = [["slew_cut"], [], ["frame_lost"]].map((flags) => why(facts(flags)));
-  expect(steady.show(plain!, 0)).toBe(plain);
-  expect(steady.show(cut!, 10)).toBe(cut);
-  expect(steady.show(plain!, 100)).toBe(cut);
-  expect(steady.show(lost!, 110)).toBe(lost);
-  expect(steady.show(plain!, 500)).toBe(lost);
-  expect(steady.show(plain!, 700)).toBe(plain);
+  const [cut, plain, ramp] = [["slew_cut"], [], ["ramping"]].map((flags) => why(facts(flags)));
+  expect(steady.show(plain!, 0)).toEqual(plain);
+  expect(steady.show(cut!, 10)).toEqual(cut);
+  expect(steady.show(plain!, 100)).toEqual(cut);
+  expect(steady.show(ramp!, 110)).toEqual(ramp);
+  expect(steady.show(plain!, 500)).toEqual(ramp);
+  expect(steady.show(plain!, 700)).toEqual(plain);
+  expect(steady.show(ramp!, 800)).toEqual(ramp);
+  const free = why(facts([], { tick: air }));
+  expect(steady.show(free, 810)).toEqual(free);
 });

@@ -1,0 +1,352 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/session/press.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "palpate/core/error.hpp"
+#include "palpate/core/pose.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double farthest_jump = 0.08;       // [m] of what a pixel sees, that is flown to
+constexpr double slack = 0.01;               // [m] by which the hand may be behind where it is led
+constexpr double look_radius = 8e-3;         // [m] about the place that is pressed
+constexpr std::size_t most_looked_at = 512;  // points there
+constexpr double most_too_deep = 5e-3;       // [m] deeper than asked, before the hand gives way
+constexpr double most_missed = 0.25;         // [s] without a force, after which it tries again
+
+std::string name_of(Pixel pixel) {
+  return "pixel " + std::to_string(pixel.u) + "," + std::to_string(pixel.v);
+}
+
+bool contains(const Intrinsics& k, Pixel pixel) {
+  return pixel.u >= 0 && pixel.u < k.width && pixel.v >= 0 && pixel.v < k.height;
+}
+
+void check_inside(const Intrinsics& k, Pixel pixel) {
+  if (contains(k, pixel)) return;
+  throw Error(name_of(pixel), "it lies outside the image",
+              "give a column from 0 to " + std::to_string(k.width - 1) + " and a row from 0 to " +
+                  std::to_string(k.height - 1));
+}
+
+// The pixel nearest to one at which there is something; none if there is nothing.
+template <class IsThere>
+std::optional<Pixel> nearest_pixel(const Intrinsics& k, Pixel pixel, const IsThere& is_there) {
+  if (contains(k, pixel) && is_there(pixel.u, pixel.v)) return pixel;
+  std::optional<Pixel> nearest;
+  std::int64_t least = std::numeric_limits<std::int64_t>::max();
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) {
+      const std::int64_t du = u - pixel.u;
+      const std::int64_t dv = v - pixel.v;
+      if (du * du + dv * dv >= least || !is_there(u, v)) continue;
+      least = du * du + dv * dv;
+      nearest = Pixel{u, v};
+    }
+  }
+  return nearest;
+}
+
+// Is there a surface about a pixel that carries a proxy, and not an edge? Readings on two circles
+// about it, of half of `radius` [m] and all of it, are of about its depth.
+bool is_firm(const DepthImage& image, Pixel pixel, double radius) {
+  constexpr int directions = 8;
+  constexpr int most_missing = 2;
+  constexpr double steepest = 1.7;  // [-] of the depth to the distance: 60 degrees
+  constexpr double noise = 0.01;    // [1/m] of depth, times its square
+  const auto depth = median_depth(image, pixel);
+  if (!depth || !image.deproject(pixel.u, pixel.v)) return false;
+  const Intrinsics& k = image.intrinsics();
+  int missing = 0;
+  for (const double share : {0.5, 1.0}) {
+    const double away = std::clamp(share * radius * k.fx / *depth, 1.0, 40.0);  // [px]
+    for (int i = 0; i < directions; ++i) {
+      const double angle = 2.0 * std::numbers::pi * i / directions;
+      const Pixel beside{pixel.u + static_cast<int>(std::lround(away * std::cos(angle))),
+                         pixel.v + static_cast<int>(std::lround(away * std::sin(angle)))};
+      const auto there = contains(k, beside) && image.deproject(beside.u, beside.v)
+                             ? median_depth(image, beside)
+                             : std::nullopt;
+      const double most = steepest * away / k.fx * *depth + noise * *depth * *depth;
+      missing += there && std::abs(*there - *depth) <= most ? 0 : 1;
+    }
+  }
+  return missing <= most_missing;
+}
+
+// The pixel itself if it measured something and `itself` will do, or else the nearest that is firm,
+// or at least measured something.
+std::optional<Pixel> nearest_surface(const DepthImage& image, Pixel pixel, double radius,
+                                     bool itself) {
+  const auto is_measured_there = [&](int u, int v) { return image.deproject(u, v).has_value(); };
+  if (itself && contains(image.intrinsics(), pixel) && is_measured_there(pixel.u, pixel.v))
+    return pixel;
+  const auto firm = nearest_pixel(image.intrinsics(), pixel, [&](int u, int v) {
+    return is_firm(image, {u, v}, radius);
+  });
+  return firm ? firm : nearest_pixel(image.intrinsics(), pixel, is_measured_there);
+}
+
+void check(const char* name, double value, double min, double max, const char* unit) {
+  if (value >= min && value <= max) return;
+  throw Error(name, shortest(value) + " " + unit + " is out of range",
+              "give " + shortest(min) + " to " + shortest(max) + " " + unit);
+}
+
+}  // namespace
+
+Pixel parse_pixel(std::string_view text, const std::string& subject) {
+  Pixel pixel;
+  const char* const end = text.data() + text.size();
+  const auto column = std::from_chars(text.data(), end, pixel.u);
+  const bool comma = column.ec == std::errc{} && column.ptr != end && *column.ptr == ',';
+  const auto row = comma ? std::from_chars(column.ptr + 1, end, pixel.v) : column;
+  if (!comma || row.ec != std::errc{} || row.ptr != end) {
+    throw Error(subject, "'" + std::string(text) + "' is not a pixel",
+                "give column and row, such as 320,240");
+  }
+  return pixel;
+}
+
+std::optional<double> median_depth(const DepthImage& image, Pixel pixel) noexcept {
+  constexpr int half = 3;
+  const Intrinsics& k = image.intrinsics();
+  std::array<std::uint16_t, (2 * half + 1) * (2 * half + 1)> near{};
+  std::size_t count = 0;
+  for (int v = std::max(pixel.v - half, 0); v <= std::min(pixel.v + half, k.height - 1); ++v) {
+    for (int u = std::max(pixel.u - half, 0); u <= std::min(pixel.u + half, k.width - 1); ++u) {
+      const auto place = static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width) +
+                         static_cast<std::size_t>(u);
+      const std::uint16_t raw = image.depth()[place];
+      if (is_measured(raw)) near[count++] = raw;
+    }
+  }
+  if (count == 0) return std::nullopt;
+  auto* const middle = near.data() + count / 2;
+  std::nth_element(near.data(), middle, near.data() + count);
+  return *middle / image.units_per_metre();
+}
+
+Vec3 surface_at(const DepthImage& image, Pixel pixel) {
+  const Intrinsics& k = image.intrinsics();
+  check_inside(k, pixel);
+  const auto depth = median_depth(image, pixel);
+  const Eigen::Vector2d ray = image.rays().ray(pixel.u, pixel.v);
+  if (!depth || !ray.allFinite()) {
+    const auto near =
+        nearest_pixel(k, pixel, [&](int u, int v) { return image.deproject(u, v).has_value(); });
+    throw Error(name_of(pixel), "nothing was measured there",
+                near ? "the nearest measured pixel is " + std::to_string(near->u) + "," +
+                           std::to_string(near->v)
+                     : "the whole frame is empty: check the camera");
+  }
+  return image.world_from_camera() * (*depth * Vec3(ray.x(), ray.y(), 1.0));
+}
+
+// The line of sight through a pixel's coordinates, which may lie between pixels.
+std::optional<Press::Line> Press::look(double u, double v) {
+  const Pixel pixel{static_cast<int>(std::lround(u)), static_cast<int>(std::lround(v))};
+  const auto* points = dynamic_cast<const PointCloud*>(cloud_);
+  if (points != nullptr && view_ && !seen_) {
+    seen_.emplace(*view_, *points);
+    drawn_ = std::make_shared<DepthImage>(seen_->image());
+  }
+  const auto* image = points != nullptr ? drawn_.get() : dynamic_cast<const DepthImage*>(cloud_);
+  if (image == nullptr) return std::nullopt;
+  const auto near = nearest_surface(*image, pixel, look_radius, !missed_once_);
+  if (!near) return std::nullopt;
+  const Eigen::Isometry3d& pose = image->world_from_camera();
+  if (points != nullptr) {
+    const Vec3 way = points->point(*seen_->at(near->u, near->v)) - pose.translation();
+    return Line{pose.translation(), way.normalized(), way.norm(), *near};
+  }
+  Eigen::Vector2d ray = image->rays().ray(near->u, near->v);
+  const Intrinsics& k = image->intrinsics();
+  if (*near == pixel) ray += Eigen::Vector2d((u - pixel.u) / k.fx, (v - pixel.v) / k.fy);
+  const Vec3 direction(ray.x(), ray.y(), 1.0);
+  return Line{pose.translation(), pose.linear() * direction.normalized(),
+              *median_depth(*image, *near) * direction.norm(), *near};
+}
+
+// Where the slide has come to.
+std::optional<Press::Line> Press::look_on_the_way() {
+  const Pixel& to = *options_.slide_to;
+  return look(slides_from_.u + slid_ * (to.u - slides_from_.u),
+              slides_from_.v + slid_ * (to.v - slides_from_.v));
+}
+
+Press::Press(const Cloud& first, Pixel at, const PressOptions& options)
+    : options_(options), asked_(at), cloud_(&first), behind_(-options.approach) {
+  check("press depth", options.depth, 0.0, 0.1, "m");
+  check("press speed", options.speed, 1e-3, 2.0, "m/s");
+  check("press approach", options.approach, 1e-3, 1.0, "m");
+  check("press hold", options.hold, 0.0, 60.0, "s");
+  check("press patience", options.patience, 0.0, 600.0, "s");
+  Intrinsics size;
+  if (const auto* points = dynamic_cast<const PointCloud*>(&first)) {
+    view_ = proposed_view(*points);
+    size = view_->rays->intrinsics();
+  } else if (const auto* image = dynamic_cast<const DepthImage*>(&first)) {
+    size = image->intrinsics();
+  } else {
+    throw Error("press", "what is seen is neither an image nor points", "give a path");
+  }
+  check_inside(size, at);
+  const auto line = look(at.u, at.v);
+  if (!line)
+    throw Error(name_of(at), "nothing was measured there, nor anywhere else in the frame",
+                "check the camera");
+  line_ = *line;
+  goal_range_ = line_.range;
+  slides_from_ = line_.pixel;
+  hip_ = line_.at(behind_);
+  if (const auto& to = options.slide_to) {
+    check_inside(size, *to);
+    way_ = (look(to->u, to->v)->at(0.0) - line_.at(0.0)).norm();
+  }
+}
+
+void Press::frame(const Cloud& cloud) {
+  cloud_ = &cloud;
+  seen_.reset();
+  if (phase_ == Phase::slide) {
+    if (const auto line = look_on_the_way()) lead(*line);
+  } else if (committed_) {
+    follow();
+  } else if (const auto line = look(asked_.u, asked_.v)) {
+    lead(*line);
+  }
+}
+
+// The hand goes where the line leads; in the air it waits before a surface that is elsewhere, or
+// that has come nearer than it looked.
+void Press::lead(const Line& line) {
+  const double ahead = line.range - (hip_ - line.from).dot(line.along);  // [m] of the hand
+  const bool jumped = (line.at(0.0) - line_.at(0.0)).norm() > farthest_jump;
+  if (phase_ == Phase::down && (jumped || ahead < commits)) behind_ = -options_.approach;
+  line_ = line;
+  goal_range_ = line.range;
+}
+
+// The surface at the place that is pressed, by the points about the line of sight to it.
+void Press::follow() {
+  const Vec3 surface = line_.at(0.0);
+  const double radius = std::max(0.5 * look_radius, 1.5 * cloud_->spacing(surface));
+  gather(*cloud_, Beam{surface, radius, look_radius * 4.0, line_.along}, most_looked_at, *patch_);
+  std::vector<double> along;
+  for (std::size_t i = 0; i < patch_->size(); ++i)
+    along.push_back(Vec3(patch_->x()[i], patch_->y()[i], patch_->z()[i]).dot(line_.along));
+  if (along.empty()) return;
+  const auto middle = along.begin() + static_cast<std::ptrdiff_t>(along.size() / 2);
+  std::nth_element(along.begin(), middle, along.end());
+  goal_range_ = line_.range + *middle;
+}
+
+// Back before the surface, after what the pixel sees.
+void Press::begin_again() {
+  phase_ = Phase::down;
+  committed_ = false;
+  missed_once_ = true;
+  behind_ = -options_.approach;
+  felt_ = missed_ = 0.0;
+  if (const auto line = look(asked_.u, asked_.v)) lead(*line);
+}
+
+// A surface that comes towards the hand pushes it away, and does not get pressed deeper.
+void Press::give_way(double dt, const Tick* last) {
+  const double depth = rest_ && last->state != ContactState::free_motion
+                           ? (last->hip - last->proxy).norm() - *rest_
+                           : 0.0;
+  if (depth > options_.depth + most_too_deep)
+    behind_ = std::max(behind_ - follows * dt, -options_.approach);
+  else
+    behind_ = std::min(behind_ + options_.speed * dt, options_.depth);
+}
+
+void Press::advance(double dt, const Tick* last) {
+  const bool felt = last != nullptr && !last->force.isZero(0.0);
+  if (felt && !rest_) rest_ = (last->hip - last->proxy).norm();
+  const double away = (hip_ - line_.at(behind_)).norm();  // [m] of where it is to be
+  const bool in_time = spent_ < options_.patience + options_.hold;
+  const auto next = [&](Phase phase) {
+    phase_ = phase;
+    felt_ = missed_ = 0.0;
+  };
+  felt_ += felt ? dt : 0.0;
+  missed_ = felt ? 0.0 : missed_ + dt;
+  switch (phase_) {
+    case Phase::down:
+      if (away < slack) behind_ = std::min(behind_ + options_.speed * dt, options_.depth);
+      committed_ = committed_ || (behind_ > -commits && away < slack);
+      if (behind_ >= options_.depth) next(Phase::hold);
+      if (!in_time) next(Phase::lift);
+      break;
+    case Phase::hold:
+      give_way(dt, last);
+      if (felt_ >= options_.hold || !in_time)
+        next(options_.slide_to && in_time ? Phase::slide : Phase::lift);
+      else if (missed_ > most_missed)
+        begin_again();
+      break;
+    case Phase::slide:
+      if (away < slack) slid_ = std::min(slid_ + options_.speed * dt / std::max(way_, 1e-6), 1.0);
+      if (const auto line = look_on_the_way()) lead(*line);
+      if (slid_ >= 1.0 && away < slack) next(Phase::stay);
+      break;
+    case Phase::stay:
+      give_way(dt, last);
+      if (felt_ + missed_ >= options_.hold) next(Phase::lift);
+      break;
+    case Phase::lift:
+      behind_ = std::max(behind_ - options_.speed * dt, -options_.approach);
+      if (behind_ <= -options_.approach) next(Phase::done);
+      break;
+    case Phase::done:
+      break;
+  }
+}
+
+const Vec3& Press::step(double t, const Tick* last) {
+  const double dt = t_ ? std::max(t - *t_, 0.0) : 0.0;
+  t_ = t;
+  spent_ += dt;
+  advance(dt, last);
+  line_.range += std::clamp(goal_range_ - line_.range, -follows * dt, follows * dt);
+  const bool in_the_air = phase_ == Phase::down && !committed_;
+  const double fastest = in_the_air ? std::max(travel, options_.speed) : options_.speed + follows;
+  const Vec3 way = line_.at(behind_) - hip_;
+  const double length = way.norm();
+  hip_ += length > fastest * dt ? Vec3(fastest * dt / length * way) : way;
+  return hip_;
+}
+
+void touch_along(FrameSequence& frames, Method& method, Press& press, double rate,
+                 const std::function<bool(const Tick&)>& on_tick) {
+  std::shared_ptr<const Cloud> seen;
+  std::optional<Tick> last;
+  touch(
+      frames, method, {frames.upcoming_stamp(0), press.hip()}, rate,
+      [&](double t) -> std::optional<Vec3> {
+        if (press.done()) return std::nullopt;
+        if (frames.newest().front() != seen) {
+          seen = frames.newest().front();
+          press.frame(*seen);
+        }
+        return press.step(t, last ? &*last : nullptr);
+      },
+      [&](const Tick& tick) {
+        last = tick;
+        return on_tick(tick);
+      });
+}
+
+}  // namespace palpate

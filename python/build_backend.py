@@ -24,21 +24,25 @@ import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 NOT_SOURCES = {".git", "build", "node_modules", "dist", "__pycache__"}
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+TITLE = f"{PROJECT['name']}-{PROJECT['version']}"
 
 
-def _project():
-    with open(ROOT / "pyproject.toml", "rb") as file:
-        return tomllib.load(file)["project"]
-
-
-def _metadata(project):
-    lines = ["Metadata-Version: 2.1", f"Name: {project['name']}", f"Version: {project['version']}",
-             f"Summary: {project['description']}", f"License: {project['license']['text']}",
-             f"Requires-Python: {project['requires-python']}"]
-    lines += [f"Requires-Dist: {name}" for name in project["dependencies"]]
+def _metadata():
+    lines = ["Metadata-Version: 2.1", f"Name: {PROJECT['name']}", f"Version: {PROJECT['version']}",
+             f"Summary: {PROJECT['description']}", f"License: {PROJECT['license']['text']}",
+             f"Requires-Python: {PROJECT['requires-python']}"]
+    lines += [f"Requires-Dist: {name}" for name in PROJECT["dependencies"]]
     lines += ["Description-Content-Type: text/markdown", "",
-              (ROOT / project["readme"]).read_text(encoding="utf-8")]
+              (ROOT / PROJECT["readme"]).read_text(encoding="utf-8")]
     return "\n".join(lines)
+
+
+def _tag():
+    """What the wheel is good for."""
+    python = f"cp{sys.version_info.major}{sys.version_info.minor}"
+    platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+    return f"{python}-{python}-{platform}"
 
 
 def _say(text):
@@ -112,24 +116,27 @@ def get_requires_for_build_sdist(config_settings=None):
     return []
 
 
+def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
+    """Writes what is known without building, and returns its folder's name."""
+    info = pathlib.Path(metadata_directory) / f"{TITLE}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(_metadata(), encoding="utf-8")
+    (info / "WHEEL").write_text("Wheel-Version: 1.0\nGenerator: palpate\n"
+                                f"Root-Is-Purelib: false\nTag: {_tag()}\n", encoding="utf-8")
+    return info.name
+
+
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     """Makes the wheel and returns its file's name."""
-    project = _project()
-    python = f"cp{sys.version_info.major}{sys.version_info.minor}"
-    platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
-    tag = f"{python}-{python}-{platform}"
-    info = f"{project['name']}-{project['version']}.dist-info"
-    name = f"{project['name']}-{project['version']}-{tag}.whl"
+    name = f"{TITLE}-{_tag()}.whl"
     with tempfile.TemporaryDirectory(prefix="palpate-wheel-") as temporary:
-        package, programs = _install(pathlib.Path(temporary), config_settings)
-        members = {f"palpate/{file.name}": file.read_bytes() for file in sorted(package.iterdir())
-                   if file.is_file()}
-        scripts = f"{project['name']}-{project['version']}.data/scripts"
-        members |= {f"{scripts}/{file.name}": file.read_bytes()
-                    for file in sorted(programs.iterdir())}
-    members[f"{info}/METADATA"] = _metadata(project).encode()
-    members[f"{info}/WHEEL"] = ("Wheel-Version: 1.0\nGenerator: palpate\n"
-                                f"Root-Is-Purelib: false\nTag: {tag}\n").encode()
+        temporary = pathlib.Path(temporary)
+        info = prepare_metadata_for_build_wheel(temporary)
+        package, programs = _install(temporary, config_settings)
+        members = {f"{below}/{file.name}": file.read_bytes()
+                   for below, folder in (("palpate", package), (f"{TITLE}.data/scripts", programs),
+                                         (info, temporary / info))
+                   for file in sorted(folder.iterdir()) if file.is_file()}
     record = []
     for path, content in members.items():
         digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
@@ -148,13 +155,11 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
 
 def build_sdist(sdist_directory, config_settings=None):
     """Packs the sources and returns the file's name."""
-    project = _project()
-    top = f"{project['name']}-{project['version']}"
     with tempfile.TemporaryDirectory(prefix="palpate-sdist-") as temporary:
-        copy = pathlib.Path(temporary) / top
+        copy = pathlib.Path(temporary) / TITLE
         shutil.copytree(ROOT, copy, symlinks=True,
                         ignore=lambda folder, names: NOT_SOURCES.intersection(names))
-        (copy / "PKG-INFO").write_text(_metadata(project), encoding="utf-8")
-        with tarfile.open(pathlib.Path(sdist_directory) / f"{top}.tar.gz", "w:gz") as archive:
-            archive.add(copy, arcname=top)
-    return f"{top}.tar.gz"
+        (copy / "PKG-INFO").write_text(_metadata(), encoding="utf-8")
+        with tarfile.open(pathlib.Path(sdist_directory) / f"{TITLE}.tar.gz", "w:gz") as archive:
+            archive.add(copy, arcname=TITLE)
+    return f"{TITLE}.tar.gz"

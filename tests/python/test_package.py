@@ -132,7 +132,7 @@ class Package(unittest.TestCase):
                     shown += read
             self.assertEqual(os.waitpid(child, 0)[1], 0, shown)
             self.assertRegex(shown, b"palpate: built 3 of 9\r\n")
-            self.assertNotIn(b"Building\r\n", shown)  # which pip hides
+            self.assertNotIn(b"] Building", shown)  # which pip hides
             for command in ([f"{folder}/bin/palpate"], [python, "-m", "palpate"]):
                 for arguments, says in (("--version", f"palpate {palpate.__version__}"),
                                         ("eval --list-methods", "god-object")):
@@ -160,7 +160,8 @@ class Package(unittest.TestCase):
 
     def test_a_numpy_newer_than_its_pybind11_is_refused(self):
         header = pathlib.Path("/usr/include/pybind11/detail/common.h")
-        if not header.exists() or int(re.search(r"VERSION_MINOR (\d+)", header.read_text())[1]) > 11:
+        text = header.read_text() if header.exists() else "VERSION_MINOR 99"
+        if int(re.search(r"VERSION_MINOR (\d+)", text)[1]) > 11:
             self.skipTest("this pybind11 knows numpy 2")
         with tempfile.TemporaryDirectory() as folder:
             (pathlib.Path(folder) / "numpy.py").write_text("__version__ = '2.1.0'\n")

@@ -127,12 +127,12 @@ std::shared_ptr<DepthImage> make_image(const py::array& depth, const Camera& cam
 }
 
 std::shared_ptr<PointCloud> make_points(const PointsIn& points,
-                                        const std::optional<Vec3>& viewpoint, double voxel) {
+                                        const std::optional<Vec3>& viewpoint) {
   std::vector<Vec3> list;
   list.reserve(static_cast<std::size_t>(points.rows()));
   for (Eigen::Index i = 0; i < points.rows(); ++i) list.emplace_back(points.row(i).transpose());
   const py::gil_scoped_release released;
-  return std::make_shared<PointCloud>(list, viewpoint, voxel);
+  return std::make_shared<PointCloud>(list, viewpoint);
 }
 
 Points rows_of(const std::vector<Vec3>& points) {
@@ -390,9 +390,8 @@ void define_clouds(py::module_& m) {
           "All measured points [m, world], an array (n, 3).");
 
   py::class_<PointCloud, Cloud, std::shared_ptr<PointCloud>>(
-      m, "PointCloud", "Points in no particular order, sorted once into a hash of voxels.")
+      m, "PointCloud", "Points in no particular order, sorted once.")
       .def(py::init(&make_points), py::arg("points"), py::arg("viewpoint") = py::none(),
-           py::arg("voxel") = 0.010,
            "Points (n, 3) [m, world], and from where they were seen, if that is known.")
       .def("__len__", &PointCloud::size)
       .def_property_readonly("viewpoint", &PointCloud::viewpoint)
@@ -404,7 +403,7 @@ void define_clouds(py::module_& m) {
               rows.row(static_cast<Eigen::Index>(i)) = cloud.point(i).transpose();
             return rows;
           },
-          "All finite points [m, world], an array (n, 3), in the order of the voxels.");
+          "All finite points [m, world], an array (n, 3), sorted along a space-filling curve.");
 }
 
 void define_renderer(py::module_& m) {

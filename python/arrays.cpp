@@ -65,12 +65,37 @@ py::array array_of(const std::vector<CycleRecord>& ticks) {
   return copied(ticks);
 }
 
-Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const char* subject) {
+void check_shape(const py::array& array, const std::string& name,
+                 const std::vector<py::ssize_t>& shape, const std::string& give) {
+  const std::vector<py::ssize_t> given(array.shape(), array.shape() + array.ndim());
+  const auto is_needed = [&](auto begin, auto end) {
+    return std::equal(begin, end, shape.begin(), shape.end(),
+                      [](auto length, auto needed) { return length == needed || needed == 0; });
+  };
+  if (is_needed(given.begin(), given.end())) return;
+  std::string needed;
+  for (const py::ssize_t length : shape)
+    needed += (needed.empty() ? "" : ", ") + (length == 0 ? "n" : std::to_string(length));
+  throw Error(name,
+              "its shape is " + py::cast<std::string>(py::str(array.attr("shape"))) + ", not (" +
+                  needed + (shape.size() == 1 ? ",)" : ")"),
+              "give " + (is_needed(given.rbegin(), given.rend()) ? name + ".T" : give));
+}
+
+Vec3 vector_of(const Numbers& numbers, const char* name) {
+  if (numbers.size() != 3 || numbers.shape(0) != 3)  // a column will do
+    check_shape(numbers, name, {3}, "x, y and z in the world's frame");
+  return {numbers.data()[0], numbers.data()[1], numbers.data()[2]};
+}
+
+Eigen::Isometry3d pose_of(const Numbers& matrix, const char* name) {
+  const char* const give = "a homogeneous matrix, with the translation [m] in its last column";
+  check_shape(matrix, name, {4, 4}, give);
   Eigen::Isometry3d pose;
-  pose.matrix() = matrix;
-  check_rigid(pose, subject);
-  if (matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-    throw Error(subject, "its last row is not 0 0 0 1", "give a 4x4 homogeneous matrix");
+  pose.matrix() = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix.data());
+  check_rigid(pose, name);
+  if (pose.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+    throw Error(name, "its last row is not 0 0 0 1", std::string("give ") + give);
   return pose;
 }
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <pybind11/eigen.h>
@@ -21,7 +23,8 @@ namespace palpate::python {
 namespace py = pybind11;
 
 using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
-using PointsIn = Eigen::Ref<const Points>;
+/// An argument that is an array; numpy makes one of a sequence.
+using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// A tick as a record of a structured array.
 struct TickRecord {
@@ -53,8 +56,17 @@ CycleRecord record_of(const ServoTick& tick);
 py::array array_of(const std::vector<TickRecord>& ticks);
 py::array array_of(const std::vector<CycleRecord>& ticks);
 
-/// A 4x4 matrix as a rigid pose. @throws Error naming `subject` if it is none.
-Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const char* subject);
+/// @param shape  what is needed; 0 for any length
+/// @param give   what an array of that shape holds
+/// @throws Error that names both shapes, unless they are the same
+void check_shape(const py::array& array, const std::string& name,
+                 const std::vector<py::ssize_t>& shape, const std::string& give);
+
+/// Three numbers as a place or direction in the world. @throws Error naming `name`
+Vec3 vector_of(const Numbers& numbers, const char* name);
+
+/// A 4x4 matrix as a rigid pose. @throws Error naming `name` if it is none.
+Eigen::Isometry3d pose_of(const Numbers& matrix, const char* name);
 
 /// Numbers by their names. @throws TypeError for what is no number
 std::vector<std::pair<std::string, double>> numbers_of(const py::dict& values);

@@ -19,15 +19,16 @@
 namespace palpate::python {
 namespace {
 
+constexpr const char* image_shape = "the rows and columns of its camera";
+constexpr const char* point_shape = "a row of x, y and z [m, world] for each point";
+
 std::vector<std::uint8_t> bytes_of(const py::object& array, const char* what, const Intrinsics& k) {
   if (!py::isinstance<py::array_t<std::uint8_t>>(array))
-    throw py::type_error(std::string(what) + ": it has to be an array of uint8");
+    throw py::type_error(std::string(what) + ": it has to be an array of uint8; give " + what +
+                         ".astype(numpy.uint8)");
   const auto pixels =
       py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>::ensure(array);
-  if (pixels.ndim() != 2 || pixels.shape(0) != k.height || pixels.shape(1) != k.width)
-    throw Error(what, "its shape is " + py::cast<std::string>(py::str(array.attr("shape"))),
-                "give one of (" + std::to_string(k.height) + ", " + std::to_string(k.width) +
-                    "), rows and columns of the camera");
+  check_shape(pixels, what, {k.height, k.width}, image_shape);
   return {pixels.data(), pixels.data() + pixels.size()};
 }
 
@@ -101,7 +102,7 @@ MaterialsOf make_materials(const py::object& what) {
 /// Takes the array's own memory, which stays alive as long as the image does.
 std::shared_ptr<DepthImage> make_image(const py::array& depth, const Camera& camera,
                                        double units_per_metre,
-                                       const std::optional<Eigen::Matrix4d>& world_from_camera,
+                                       const std::optional<Numbers>& world_from_camera,
                                        const std::optional<MaterialsOf>& materials,
                                        const py::object& labels, const py::object& brightness) {
   const Intrinsics& k = camera.intrinsics();
@@ -109,10 +110,7 @@ std::shared_ptr<DepthImage> make_image(const py::array& depth, const Camera& cam
     throw py::type_error("depth: it has to be an array of uint16, not of " +
                          py::cast<std::string>(py::str(depth.dtype())) +
                          "; for metres, numpy.round(metres * 1000).astype(numpy.uint16)");
-  if (depth.ndim() != 2 || depth.shape(0) != k.height || depth.shape(1) != k.width)
-    throw Error("depth", "its shape is " + py::cast<std::string>(py::str(depth.attr("shape"))),
-                "give one of (" + std::to_string(k.height) + ", " + std::to_string(k.width) +
-                    "), rows and columns of the camera");
+  check_shape(depth, "depth", {k.height, k.width}, image_shape);
   if ((depth.flags() & py::array::c_style) == 0)
     throw Error("depth", "its rows do not follow one another in memory",
                 "give numpy.ascontiguousarray(depth)");
@@ -126,13 +124,16 @@ std::shared_ptr<DepthImage> make_image(const py::array& depth, const Camera& cam
   return image;
 }
 
-std::shared_ptr<PointCloud> make_points(const PointsIn& points,
-                                        const std::optional<Vec3>& viewpoint) {
+std::shared_ptr<PointCloud> make_points(const Numbers& points,
+                                        const std::optional<Numbers>& viewpoint) {
+  check_shape(points, "points", {0, 3}, point_shape);
   std::vector<Vec3> list;
-  list.reserve(static_cast<std::size_t>(points.rows()));
-  for (Eigen::Index i = 0; i < points.rows(); ++i) list.emplace_back(points.row(i).transpose());
+  list.reserve(static_cast<std::size_t>(points.shape(0)));
+  for (py::ssize_t i = 0; i < points.shape(0); ++i) list.emplace_back(points.data(i));
+  std::optional<Vec3> from;
+  if (viewpoint) from = vector_of(*viewpoint, "viewpoint");
   const py::gil_scoped_release released;
-  return std::make_shared<PointCloud>(list, viewpoint);
+  return std::make_shared<PointCloud>(list, from);
 }
 
 Points rows_of(const std::vector<Vec3>& points) {
@@ -160,24 +161,24 @@ class Renderer {
     trouble_->rethrow();
   }
 
-  Tick tick(const Vec3& hip, double t) {
-    const Tick tick = method_->tick(hip, t);
+  Tick tick(const Numbers& hip, double t) {
+    const Tick tick = method_->tick(vector_of(hip, "hip"), t);
     trouble_->rethrow();
     return tick;
   }
 
-  py::array ticks(const PointsIn& hips, const Eigen::Ref<const Eigen::VectorXd>& times) {
-    if (hips.rows() != times.size())
-      throw Error(
-          "ticks",
-          std::to_string(hips.rows()) + " HIPs for " + std::to_string(times.size()) + " times",
-          "give one time [s] for each HIP");
-    py::array_t<TickRecord> records(hips.rows());
+  py::array ticks(const Numbers& hips, const Numbers& times) {
+    check_shape(hips, "hips", {0, 3}, point_shape);
+    check_shape(times, "times", {hips.shape(0)}, "one time [s] for each of the hips");
+    const py::ssize_t count = hips.shape(0);
+    py::array_t<TickRecord> records(count);
     TickRecord* record = records.mutable_data();
+    const double* hip = hips.data();
+    const double* time = times.data();
     {
       const py::gil_scoped_release released;
-      for (Eigen::Index i = 0; i < hips.rows() && !trouble_->first; ++i)
-        record[i] = record_of(method_->tick(hips.row(i).transpose(), times[i]));
+      for (py::ssize_t i = 0; i < count && !trouble_->first; ++i)
+        record[i] = record_of(method_->tick(Vec3(hip + 3 * i), time[i]));
     }
     trouble_->rethrow();
     return records;
@@ -190,7 +191,7 @@ class Renderer {
     parameters_ = changed;
   }
 
-  void seat(const Vec3& proxy) { method_->seat(proxy); }
+  void seat(const Numbers& proxy) { method_->seat(vector_of(proxy, "proxy")); }
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
 
  private:
@@ -309,7 +310,7 @@ void define_clouds(py::module_& m) {
   py::class_<Cloud, std::shared_ptr<Cloud>>(m, "Cloud", "Whatever can be touched.")
       .def(
           "near",
-          [](const Cloud& cloud, const Vec3& centre, double radius) {
+          [](const Cloud& cloud, const Numbers& centre, double radius) {
             return CloudView(&cloud).near(centre, radius);
           },
           py::arg("centre"), py::arg("radius"),
@@ -445,7 +446,7 @@ void define_renderer(py::module_& m) {
       .def(
           "frame",
           [](Renderer& self, const py::array& depth, const Camera& camera, double stamp,
-             const std::optional<Eigen::Matrix4d>& world_from_camera, double units_per_metre,
+             const std::optional<Numbers>& world_from_camera, double units_per_metre,
              const std::optional<MaterialsOf>& materials, const py::object& labels,
              const py::object& brightness) {
             self.frame(make_image(depth, camera, units_per_metre, world_from_camera, materials,
@@ -460,8 +461,10 @@ void define_renderer(py::module_& m) {
           "DepthImage has it.")
       .def(
           "frame",
-          [](Renderer& self, const PointsIn& points, double stamp,
-             const std::optional<Vec3>& viewpoint) {
+          [](Renderer& self, const Numbers& points, double stamp,
+             const std::optional<Numbers>& viewpoint) {
+            check_shape(points, "points", {0, 3},
+                        std::string(point_shape) + ", or a depth image with camera=");
             self.frame(make_points(points, viewpoint, 0.010), stamp);
           },
           py::arg("points"), py::kw_only(), py::arg("stamp"), py::arg("viewpoint") = py::none(),

@@ -22,7 +22,8 @@ std::optional<Vec3> CloudView::viewpoint() {
   return patch.view_count() > 0 ? patch.view(0).viewpoint : std::nullopt;
 }
 
-Points CloudView::near(const Vec3& centre, double radius) {
+Points CloudView::near(const Numbers& about, double radius) {
+  const Vec3 centre = vector_of(about, "centre");
   const Patch& patch = gathered(Ball{centre, radius});
   Points points(static_cast<Eigen::Index>(patch.size()), 3);
   for (std::size_t i = 0; i < patch.size(); ++i) {
@@ -87,10 +88,10 @@ Tick PythonMethod::tick(const Vec3& hip, double t) noexcept {
     if (answer.size() != 2 && answer.size() != 3)
       throw Error("method", "its tick gave " + std::to_string(answer.size()) + " values",
                   "return (proxy, force) or (proxy, force, normal)");
-    const auto proxy = py::cast<Vec3>(answer[0]);
-    const auto force = py::cast<Vec3>(answer[1]);
-    const Vec3 normal =
-        answer.size() == 3 ? py::cast<Vec3>(answer[2]) : Vec3((proxy - hip).stableNormalized());
+    const Vec3 proxy = vector_of(py::cast<Numbers>(answer[0]), "proxy");
+    const Vec3 force = vector_of(py::cast<Numbers>(answer[1]), "force");
+    const Vec3 normal = answer.size() == 3 ? vector_of(py::cast<Numbers>(answer[2]), "normal")
+                                           : Vec3((proxy - hip).stableNormalized());
     if (!is_place(proxy) || !force.allFinite() || !normal.allFinite())
       throw Error("method", "its tick gave a number that is not finite",
                   "return a proxy [m] and a force [N]");

@@ -18,7 +18,7 @@ class CloudView {
   void end() noexcept { cloud_ = nullptr; }
   /// Points [m, world] within `radius` [m] of `centre`, at most Patch::capacity.
   /// @throws Error after the method's next frame.
-  [[nodiscard]] Points near(const Vec3& centre, double radius);
+  [[nodiscard]] Points near(const Numbers& about, double radius);
   /// [m] world: from where the first camera's points were seen; none if that is not known.
   [[nodiscard]] std::optional<Vec3> viewpoint();
 

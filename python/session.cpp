@@ -52,8 +52,7 @@ std::vector<SessionHandOptions> hands_of(const py::iterable& hands) {
         else if (name == "scale")
           hand.placement.workspace_scale = py::cast<double>(value);
         else if (name == "world_from_device")
-          hand.placement.world_from_device =
-              pose_of(py::cast<Eigen::Matrix4d>(value), "world_from_device");
+          hand.placement.world_from_device = pose_of(py::cast<Numbers>(value), "world_from_device");
         else
           throw Error("hands", "a hand has no '" + name + "'",
                       "give device, name, world_from_device and scale");
@@ -89,7 +88,7 @@ class PythonSession {
  public:
   PythonSession(const py::object& camera, const std::string& device, const std::string& method,
                 bool free_running, double rate, const std::string& record, double stroke_time,
-                const std::optional<Eigen::Matrix4d>& world_from_device, double scale,
+                const std::optional<Numbers>& world_from_device, double scale,
                 const py::dict& limits, bool without_watchdog,
                 const std::optional<std::string>& fixtures, const py::iterable& hands,
                 const std::optional<MaterialsOf>& materials,
@@ -296,7 +295,7 @@ void define_session(py::module_& m) {
       "        session.run(5.0)\n\n"
       "`with` starts it, and takes the force off the device before anything else at the end.")
       .def(py::init<const py::object&, const std::string&, const std::string&, bool, double,
-                    const std::string&, double, const std::optional<Eigen::Matrix4d>&, double,
+                    const std::string&, double, const std::optional<Numbers>&, double,
                     const py::dict&, bool, const std::optional<std::string>&, const py::iterable&,
                     const std::optional<MaterialsOf>&, const std::optional<py::function>&,
                     const py::kwargs&>(),

@@ -95,12 +95,10 @@ std::vector<std::string> uris_of(const py::object& camera) {
 HipPath path_of(const py::object& path) {
   if (py::isinstance<py::str>(path) || py::hasattr(path, "__fspath__"))
     return HipPath::read_csv(py::cast<std::string>(py::str(path)));
-  const auto rows = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(path);
-  if (!rows || rows.ndim() != 2 || rows.shape(1) != 4) {
-    PyErr_Clear();
-    throw Error("path", "it is neither a file nor rows of four numbers",
-                "give a CSV file, or an array (n, 4) of t [s] and x, y, z [m, world]");
-  }
+  const char* const give = "a row of t [s] and x, y, z [m, world] for each sample, or a CSV file";
+  const auto rows = Numbers::ensure(path);  // which clears Python's error
+  if (!rows) throw Error("path", "it is neither a file nor an array", std::string("give ") + give);
+  check_shape(rows, "path", {0, 4}, give);
   std::vector<HipPath::Sample> samples;
   const auto at = rows.unchecked<2>();
   for (py::ssize_t i = 0; i < rows.shape(0); ++i)

@@ -3,11 +3,14 @@
 
 import ast
 import base64
+import contextlib
 import hashlib
 import importlib.util
 import os
 import pathlib
+import pty
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -70,6 +73,7 @@ class Package(unittest.TestCase):
             site = pathlib.Path(folder) / "site"
             with zipfile.ZipFile(pathlib.Path(folder) / name) as wheel:
                 wheel.extractall(site)
+                modes = {info.filename: info.external_attr >> 16 for info in wheel.infolist()}
             (record,) = site.glob("palpate-*.dist-info/RECORD")
             for line in record.read_text().splitlines():
                 path, digest, _ = line.rsplit(",", 2)
@@ -77,11 +81,95 @@ class Package(unittest.TestCase):
                     content = (site / path).read_bytes()
                     theirs = base64.urlsafe_b64encode(hashlib.sha256(content).digest())
                     self.assertEqual(digest, "sha256=" + theirs.rstrip(b"=").decode(), path)
+            scripts = [path for path in modes if "/scripts/" in path]
+            self.assertEqual(scripts, [f"palpate-{palpate.__version__}.data/scripts/{each}"
+                                       for each in ("palpate", "palpate-lab")])
+            self.assertEqual({modes[path] for path in scripts}, {0o100755})
             where = subprocess.run(
                 [sys.executable, "-c", "import palpate; print(palpate.__file__)"],
                 env={**os.environ, "PYTHONPATH": str(site)}, capture_output=True, text=True,
                 check=True).stdout
             self.assertIn(str(site), where)
+
+    def environment(self, folder, *options):
+        """A virtual environment's Python."""
+        subprocess.run([sys.executable, "-m", "venv", *options, folder], check=True)
+        return str(pathlib.Path(folder) / "bin" / "python")
+
+    def test_numpy_is_asked_for_before_anything_is_built(self):
+        code = "import build_backend as b; print(b.get_requires_for_build_wheel())"
+        for options, status in (((), 1), (("--system-site-packages",), 0)):
+            with tempfile.TemporaryDirectory() as folder:
+                run = subprocess.run(
+                    [self.environment(folder, "--without-pip", *options), "-c", code],
+                    env={**os.environ, "PYTHONPATH": str(SOURCES / "python"),
+                         "PIP_BUILD_TRACKER": folder}, capture_output=True, text=True, check=False)
+                self.assertEqual(run.returncode, status, run.stderr)
+                if status:
+                    self.assertRegex(run.stderr, rf"\Apalpate: {folder}/bin/python has no numpy; "
+                                     r".*python3-numpy.*--system-site-packages\n\Z")
+                else:
+                    self.assertEqual(run.stdout, "[]\n")
+
+    @unittest.skipUnless(importlib.util.find_spec("ensurepip"), "python3-venv is not installed")
+    def test_pip_installs_package_and_program_and_shows_how_far_it_is(self):
+        with tempfile.TemporaryDirectory() as folder:
+            python = self.environment(folder, "--system-site-packages")
+            tools = pathlib.Path(folder) / "tools"  # a build with something to do
+            tools.mkdir()
+            (tools / "cmake").write_text("#!/bin/sh\necho '[3/9] Building'\n"
+                                         f"exec {shutil.which('cmake')} \"$@\"\n")
+            (tools / "cmake").chmod(0o755)
+            plain = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+            pip = [python, "-m", "pip", "install", "--no-index", "--config-settings",
+                   f"build-dir={os.environ['PALPATE_BUILD']}", str(SOURCES)]
+            child, terminal = pty.fork()
+            if child == 0:
+                os.execve(python, pip, {**plain, "PATH": f"{tools}:{os.environ['PATH']}"})
+            shown = b""
+            with contextlib.suppress(OSError), open(terminal, "rb", buffering=0) as screen:
+                while read := screen.read(4096):
+                    shown += read
+            self.assertEqual(os.waitpid(child, 0)[1], 0, shown)
+            self.assertRegex(shown, b"palpate: built 3 of 9\r\n")
+            self.assertNotIn(b"] Building", shown)  # which pip hides
+            for command in ([f"{folder}/bin/palpate"], [python, "-m", "palpate"]):
+                for arguments, says in (("--version", f"palpate {palpate.__version__}"),
+                                        ("eval --list-methods", "god-object")):
+                    run = subprocess.run([*command, *arguments.split()], env=plain, cwd=SOURCES,
+                                         capture_output=True, text=True, check=True)
+                    self.assertIn(says, run.stdout)
+
+    def test_the_clones_root_has_the_package_that_is_installed_or_says_that_none_is(self):
+        def run(**environment):
+            return subprocess.run([sys.executable, "-c", "import palpate.bench as b\nprint(b)"],
+                                  cwd=SOURCES, env={**os.environ, **environment}, text=True,
+                                  capture_output=True, check=False)
+        self.assertIn(os.environ["PYTHONPATH"], run().stdout)
+        self.assertRegex(run(PYTHONPATH="").stderr.splitlines()[-1],
+                         r"^ImportError: palpate is not installed for .*pip install \.")
+
+    def test_python_runs_the_program_that_is_on_the_path(self):
+        program = pathlib.Path(os.environ["PALPATE_PROGRAM"])
+        for path, says in ((program.parent, f"palpate {palpate.__version__}"),
+                           ("/nowhere", "is not installed")):
+            run = subprocess.run([sys.executable, "-m", "palpate", "--version"], text=True,
+                                 env={**os.environ, "PATH": str(path)}, capture_output=True,
+                                 check=False)
+            self.assertIn(says, run.stdout + run.stderr)
+
+    def test_a_numpy_newer_than_its_pybind11_is_refused(self):
+        header = pathlib.Path("/usr/include/pybind11/detail/common.h")
+        text = header.read_text() if header.exists() else "VERSION_MINOR 99"
+        if int(re.search(r"VERSION_MINOR (\d+)", text)[1]) > 11:
+            self.skipTest("this pybind11 knows numpy 2")
+        with tempfile.TemporaryDirectory() as folder:
+            (pathlib.Path(folder) / "numpy.py").write_text("__version__ = '2.1.0'\n")
+            run = subprocess.run([sys.executable, "-c", "import palpate"], text=True, check=False,
+                                 env={**os.environ,
+                                      "PYTHONPATH": f"{folder}:{os.environ['PYTHONPATH']}"},
+                                 capture_output=True)
+            self.assertRegex(run.stderr.splitlines()[-1], "^ImportError: .*numpy 2.*'numpy<2'")
 
     def test_the_examples_of_its_page_run(self):
         page = (SOURCES / "docs/python.md").read_text()

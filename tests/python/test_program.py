@@ -51,7 +51,7 @@ class Trace(unittest.TestCase):
     def test_refuses_what_is_no_path(self):
         for arguments, says in (({}, "one of path and press"),
                                 ({"path": "nowhere.csv"}, "nowhere.csv"),
-                                ({"path": [[1, 2, 3]]}, "rows of four"),
+                                ({"path": [[1, 2, 3]]}, r"its shape is \(1, 3\), not \(n, 4\)"),
                                 ({"press": (900, 0)}, "900"),
                                 ({"press": (80, 60), "rate": 0.0}, "rate")):
             with self.assertRaisesRegex(palpate.Error, says):

@@ -149,6 +149,73 @@ class Renderer(unittest.TestCase):
         tick = touch.tick((numpy.nan, 0, 0), 0.0)
         self.assertEqual(tuple(tick.force), (0, 0, 0))
 
+    def test_names_the_shape_that_is_needed_and_the_one_that_was_given(self):
+        zeros = numpy.zeros
+        touch, ones = self.touch(), numpy.ones((48, 64), numpy.uint8)
+        wood = palpate.Materials("wood")
+        image = palpate.DepthImage(wall(), CAMERA)
+
+        def session(**keywords):
+            return palpate.Session("synthetic:plane?size=64x48", free_running=True, **keywords)
+
+        class Answers(palpate.Method):
+            def __init__(self, *answer):
+                self.answer = answer
+
+            def frame(self, cloud, stamp):
+                pass
+
+            def tick(self, hip, t):
+                return self.answer
+
+        def answered(*answer):
+            mine = palpate.Renderer(Answers(*answer))
+            mine.frame(wall(), camera=CAMERA, stamp=0.0)
+            mine.tick((0, 0, 0), 0.0)
+
+        for call, name, given, needed in (
+                (lambda: touch.tick(zeros(4), 0.0), "hip", "(4,)", "(3,)"),
+                (lambda: touch.tick(0.5, 0.0), "hip", "()", "(3,)"),
+                (lambda: touch.seat([0, 0]), "proxy", "(2,)", "(3,)"),
+                (lambda: touch.ticks(zeros(3), [0.0]), "hips", "(3,)", "(n, 3)"),
+                (lambda: touch.ticks(zeros((5, 2)), zeros(5)), "hips", "(5, 2)", "(n, 3)"),
+                (lambda: touch.ticks(zeros((5, 3)), zeros((5, 2))), "times", "(5, 2)", "(5,)"),
+                (lambda: touch.ticks(zeros((5, 3)), zeros(4)), "times", "(4,)", "(5,)"),
+                (lambda: touch.frame(zeros((3, 9)), stamp=0.0), "points", "(3, 9)", "points.T"),
+                (lambda: touch.frame(zeros((9, 4)), stamp=0.0), "points", "(9, 4)", "(n, 3)"),
+                (lambda: touch.frame(wall(), stamp=0.0), "points", "(48, 64)", "camera="),
+                (lambda: touch.frame(wall().T, camera=CAMERA, stamp=0.0), "depth", "(64, 48)",
+                 "depth.T"),
+                (lambda: touch.frame(wall()[None], camera=CAMERA, stamp=0.0), "depth",
+                 "(1, 48, 64)", "(48, 64)"),
+                (lambda: palpate.PointCloud(zeros((9, 3)), viewpoint=zeros(2)), "viewpoint",
+                 "(2,)", "(3,)"),
+                (lambda: palpate.PointCloud(zeros(9)), "points", "(9,)", "(n, 3)"),
+                (lambda: image.near(zeros(2), 0.01), "centre", "(2,)", "(3,)"),
+                (lambda: palpate.DepthImage(wall(), CAMERA, world_from_camera=numpy.eye(3)),
+                 "world_from_camera", "(3, 3)", "(4, 4)"),
+                (lambda: palpate.DepthImage(wall(), CAMERA, materials=wood, labels=ones.T),
+                 "labels", "(64, 48)", "labels.T"),
+                (lambda: palpate.DepthImage(wall(), CAMERA, brightness=ones[1:]),
+                 "brightness", "(47, 64)", "(48, 64)"),
+                (lambda: palpate.trace("synthetic:plane", zeros((9, 3))), "path", "(9, 3)",
+                 "(n, 4)"),
+                (lambda: session(world_from_device=zeros(16)), "world_from_device", "(16,)",
+                 "(4, 4)"),
+                (lambda: session(hands=[{"device": "hand:", "world_from_device": numpy.eye(3)}]),
+                 "world_from_device", "(3, 3)", "(4, 4)"),
+                (lambda: answered(zeros(2), zeros(3)), "proxy", "(2,)", "(3,)"),
+                (lambda: answered(zeros(3), zeros((3, 3))), "force", "(3, 3)", "(3,)"),
+                (lambda: answered(zeros(3), zeros(3), 1.0), "normal", "()", "(3,)")):
+            with self.subTest(name=name, given=given):
+                with self.assertRaises(palpate.Error) as caught:
+                    call()
+                text = str(caught.exception)
+                self.assertTrue(text.startswith(f"{name}: its shape is {given}, not "), text)
+                self.assertIn(needed, text)
+                self.assertRegex(text, "; give ")
+        self.assertEqual(touch.tick(zeros((3, 1)), 0.0).hip.shape, (3,))  # a column will do
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -220,9 +220,9 @@ std::vector<SearchCosts> search_costs(const Subject& subject, const Parameters& 
   if (dynamic_cast<const PointCloud*>(&frame) == nullptr)
     add("depth image", std::nullopt, many, [&] { return gathered(frame); });
 
-  std::optional<PointCloud> hash;
-  const Distribution hash_build = measure(budget, 1, [&] { hash.emplace(points); });
-  add("voxel hash", hash_build, many, [&] { return gathered(*hash); });
+  std::optional<PointCloud> boxes;
+  const Distribution boxes_build = measure(budget, 1, [&] { boxes.emplace(points); });
+  add("point cloud", boxes_build, many, [&] { return gathered(*boxes); });
 
   std::unique_ptr<KdTree> tree;
   const Distribution tree_build =

@@ -125,7 +125,7 @@ std::shared_ptr<DepthImage> make_image(const py::array& depth, const Camera& cam
 }
 
 std::shared_ptr<PointCloud> make_points(const Numbers& points,
-                                        const std::optional<Numbers>& viewpoint, double voxel) {
+                                        const std::optional<Numbers>& viewpoint) {
   check_shape(points, "points", {0, 3}, point_shape);
   std::vector<Vec3> list;
   list.reserve(static_cast<std::size_t>(points.shape(0)));
@@ -133,7 +133,7 @@ std::shared_ptr<PointCloud> make_points(const Numbers& points,
   std::optional<Vec3> from;
   if (viewpoint) from = vector_of(*viewpoint, "viewpoint");
   const py::gil_scoped_release released;
-  return std::make_shared<PointCloud>(list, from, voxel);
+  return std::make_shared<PointCloud>(list, from);
 }
 
 Points rows_of(const std::vector<Vec3>& points) {
@@ -391,9 +391,8 @@ void define_clouds(py::module_& m) {
           "All measured points [m, world], an array (n, 3).");
 
   py::class_<PointCloud, Cloud, std::shared_ptr<PointCloud>>(
-      m, "PointCloud", "Points in no particular order, sorted once into a hash of voxels.")
+      m, "PointCloud", "Points in no particular order, sorted once.")
       .def(py::init(&make_points), py::arg("points"), py::arg("viewpoint") = py::none(),
-           py::arg("voxel") = 0.010,
            "Points (n, 3) [m, world], and from where they were seen, if that is known.")
       .def("__len__", &PointCloud::size)
       .def_property_readonly("viewpoint", &PointCloud::viewpoint)
@@ -405,7 +404,7 @@ void define_clouds(py::module_& m) {
               rows.row(static_cast<Eigen::Index>(i)) = cloud.point(i).transpose();
             return rows;
           },
-          "All finite points [m, world], an array (n, 3), in the order of the voxels.");
+          "All finite points [m, world], an array (n, 3), sorted along a space-filling curve.");
 }
 
 void define_renderer(py::module_& m) {

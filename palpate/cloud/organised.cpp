@@ -16,6 +16,7 @@ namespace {
 
 constexpr int smallest_side = 16;  // [px]
 constexpr std::size_t fewest_measured = 100;
+constexpr std::size_t largest_side = 16384;  // [px]
 constexpr std::size_t most_fitted = 20'000;  // of the points, evenly taken
 constexpr double largest_residual = 0.5;     // [px]
 constexpr double least_share = 0.999;        // of the points that must fit
@@ -206,6 +207,22 @@ std::shared_ptr<const DepthImage> depth_image_of(std::span<const Vec3> points,
   raw.reserve(depth.size());
   for (const double d : depth) raw.push_back(static_cast<std::uint16_t>(std::lround(d * units)));
   return std::make_shared<DepthImage>(camera.rays, std::move(raw), units, camera.world_from_camera);
+}
+
+std::shared_ptr<const DepthImage> OrganisedClouds::image(std::span<const Vec3> points,
+                                                         std::size_t width, std::size_t height,
+                                                         const std::optional<Vec3>& viewpoint,
+                                                         const Eigen::Isometry3d& pose) {
+  if (width < 2 || height < 2 || std::max(width, height) > largest_side) return nullptr;
+  std::shared_ptr<const DepthImage> image;
+  if (camera_) image = depth_image_of(points, *camera_);
+  if (!image) {
+    camera_ = fit_camera(points, static_cast<int>(width), static_cast<int>(height), viewpoint);
+    if (camera_) image = depth_image_of(points, *camera_);
+  }
+  if (!image || pose.matrix().isIdentity(0.0)) return image;
+  return std::make_shared<DepthImage>(camera_->rays, image->depth(), image->units_per_metre(),
+                                      pose * camera_->world_from_camera);
 }
 
 }  // namespace palpate

@@ -33,4 +33,22 @@ struct GridCamera {
 [[nodiscard]] std::shared_ptr<const DepthImage> depth_image_of(std::span<const Vec3> points,
                                                                const GridCamera& camera);
 
+/// The organised clouds of one camera, one after the other: it is fitted to the first of them, and
+/// again to one that does not fit.
+class OrganisedClouds {
+ public:
+  /// The points as the depth image of their camera, or null if a pinhole camera did not see them
+  /// so.
+  /// @param points     as in fit_camera, in a frame in which the camera stands still
+  /// @param viewpoint  in that frame, as in fit_camera
+  /// @param pose       of that frame in the world
+  std::shared_ptr<const DepthImage> image(
+      std::span<const Vec3> points, std::size_t width, std::size_t height,
+      const std::optional<Vec3>& viewpoint = std::nullopt,
+      const Eigen::Isometry3d& pose = Eigen::Isometry3d::Identity());
+
+ private:
+  std::optional<GridCamera> camera_;
+};
+
 }  // namespace palpate

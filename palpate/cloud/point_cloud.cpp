@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -13,17 +14,39 @@
 namespace palpate {
 namespace {
 
-// A voxel's number along each axis takes 21 bits of its 64-bit key.
-constexpr std::int64_t most_voxels = (1 << 21) - 1;
+// A number along each axis takes 16 bits of a point's 48-bit place on the curve.
+constexpr double cells = 1 << 16;
+// Boxes that meet a search, at most; a power of two. A search of more of them stops at larger ones.
+constexpr std::size_t most_runs = 256;
+constexpr std::size_t points_in_leaf = 16;
+// Of a beam's points so many times are looked at as are wanted: its boxes hold points beside it.
+constexpr std::size_t looked_at_per_wanted = 4;
 
-std::uint64_t key_of(std::int64_t i, std::int64_t j, std::int64_t k) {
-  return static_cast<std::uint64_t>(i) | static_cast<std::uint64_t>(j) << 21U |
-         static_cast<std::uint64_t>(k) << 42U;
+// Two zeros between each two of the lower 16 bits.
+std::uint64_t spread(std::uint64_t bits) {
+  bits = (bits | bits << 32U) & 0x001f'0000'0000'ffffULL;
+  bits = (bits | bits << 16U) & 0x001f'0000'ff00'00ffULL;
+  bits = (bits | bits << 8U) & 0x100f'00f0'0f00'f00fULL;
+  bits = (bits | bits << 4U) & 0x10c3'0c30'c30c'30c3ULL;
+  return (bits | bits << 2U) & 0x1249'2492'4924'9249ULL;
 }
 
-// Fibonacci hashing: neighbouring voxels land far apart.
-std::size_t slot_of(std::uint64_t key, std::size_t slots) {
-  return (key * 0x9E3779B97F4A7C15ULL) >> (64U - static_cast<unsigned>(std::bit_width(slots) - 1));
+struct Place {
+  std::uint64_t on_curve;
+  std::uint32_t point;
+};
+
+// By radix, 12 bits at a time; equal ones keep their order.
+void sort(std::vector<Place>& places) {
+  std::vector<Place> sorted(places.size());
+  for (unsigned shift = 0; shift < 48; shift += 12) {
+    const auto digit = [&](const Place& place) { return place.on_curve >> shift & 0xfffU; };
+    std::array<std::uint32_t, 0x1000> next{};
+    for (const Place& place : places) ++next[digit(place)];
+    std::exclusive_scan(next.begin(), next.end(), next.begin(), 0U);
+    for (const Place& place : places) sorted[next[digit(place)]++] = place;
+    places.swap(sorted);
+  }
 }
 
 void push(const Vec3& p, Patch& patch) {
@@ -35,117 +58,62 @@ void push_if_inside(const Vec3& point, const Ball& ball, Patch& patch) {
   if (p.squaredNorm() <= ball.radius * ball.radius) push(p, patch);
 }
 
-// Numbers the voxels in the order in which they are met.
-class VoxelNumbers {
- public:
-  std::uint32_t number_of(std::uint64_t key) {
-    // Neighbours in a file are neighbours in space, mostly.
-    if (!keys_.empty() && key == keys_[last_]) return last_;
-    if (2 * (keys_.size() + 1) > slots_.size()) grow();
-    std::size_t slot = slot_of(key, slots_.size());
-    while (slots_[slot] != none && keys_[slots_[slot]] != key)
-      slot = (slot + 1) & (slots_.size() - 1);
-    if (slots_[slot] == none) {
-      slots_[slot] = static_cast<std::uint32_t>(keys_.size());
-      keys_.push_back(key);
-    }
-    last_ = slots_[slot];
-    return last_;
-  }
-  [[nodiscard]] const std::vector<std::uint64_t>& keys() const { return keys_; }
-  /// For each slot of a table that is at most half full, the number of its voxel or `none`.
-  [[nodiscard]] const std::vector<std::uint32_t>& slots() const { return slots_; }
-
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-
- private:
-  void grow() {
-    slots_.assign(2 * slots_.size(), none);
-    for (std::uint32_t number = 0; number < keys_.size(); ++number) {
-      std::size_t slot = slot_of(keys_[number], slots_.size());
-      while (slots_[slot] != none) slot = (slot + 1) & (slots_.size() - 1);
-      slots_[slot] = number;
-    }
-  }
-
-  std::vector<std::uint64_t> keys_;
-  std::vector<std::uint32_t> slots_ = std::vector<std::uint32_t>(16, none);
-  std::uint32_t last_ = 0;
-};
-
 }  // namespace
 
-PointCloud::PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoint, double voxel)
-    : voxel_(voxel), viewpoint_(viewpoint) {
-  if (!(voxel >= 1e-3 && voxel <= 1.0)) {
-    throw Error("voxel size", std::to_string(voxel) + " m is not in 0.001 to 1 m",
-                "give about the radius of a search, such as 0.01");
-  }
-  Vec3 low = Vec3::Constant(std::numeric_limits<double>::max());
-  Vec3 high = Vec3::Constant(std::numeric_limits<double>::lowest());
-  std::size_t finite = 0;
-  for (const Vec3& p : points) {
-    if (!p.allFinite()) continue;
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-    ++finite;
-  }
-  non_finite_ = points.size() - finite;
-  if (finite == 0) return;
-  if (finite > std::numeric_limits<std::uint32_t>::max()) {
-    throw Error("point cloud", std::to_string(finite) + " points are more than can be numbered",
+// Of those boxes of one level of the tree that meet a search: runs of `length` points each.
+struct PointCloud::Runs {
+  std::array<std::uint32_t, most_runs> number;  // the run begins at number * length
+  std::size_t count;
+  std::size_t length;
+};
+
+PointCloud::PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoint)
+    : viewpoint_(viewpoint) {
+  if (points.size() > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error("point cloud",
+                std::to_string(points.size()) + " points are more than can be numbered",
                 "split it");
   }
-  corner_ = low;
-  extent_ = high - low;
-  // The extent of finite coordinates can still overflow; halves cannot.
-  const double half_extent = (0.5 * high - 0.5 * low).maxCoeff();
-  voxel_ = std::max(voxel_, 2.0 * (half_extent / static_cast<double>(most_voxels - 1)));
-
-  const auto voxel_key = [this](const Vec3& p) {
-    const Eigen::Array<double, 3, 1> index =
-        ((p - corner_) / voxel_).array().min(static_cast<double>(most_voxels)).floor();
-    return key_of(static_cast<std::int64_t>(index.x()), static_cast<std::int64_t>(index.y()),
-                  static_cast<std::int64_t>(index.z()));
-  };
-
-  // Number the voxels, give each its run of points, then put the points in their runs.
-  VoxelNumbers voxels;
-  std::vector<std::uint32_t> voxel_of;
-  voxel_of.reserve(finite);
-  std::vector<std::uint32_t> next;  // per voxel: how many points; then where its next one goes
-  for (const Vec3& p : points) {
-    if (!p.allFinite()) continue;
-    const std::uint32_t number = voxels.number_of(voxel_key(p));
-    if (number == next.size()) next.push_back(0);
-    ++next[number];
-    voxel_of.push_back(number);
+  Box all;
+  std::vector<Place> places;
+  places.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points[i].allFinite()) continue;
+    all.low = all.low.cwiseMin(points[i]);
+    all.high = all.high.cwiseMax(points[i]);
+    places.push_back({0, static_cast<std::uint32_t>(i)});
   }
-  cells_.assign(voxels.slots().size(), Cell{0, 0, 0});
-  std::uint32_t total = 0;
-  for (std::size_t slot = 0; slot < cells_.size(); ++slot) {
-    const std::uint32_t number = voxels.slots()[slot];
-    if (number == VoxelNumbers::none) continue;
-    const std::uint32_t count = next[number];
-    cells_[slot] = {voxels.keys()[number], total, total + count};
-    next[number] = total;
-    total += count;
+  non_finite_ = points.size() - places.size();
+  if (places.empty()) return;
+  // The extent of finite coordinates can overflow; halves cannot.
+  const double half_extent = (0.5 * all.high - 0.5 * all.low).maxCoeff();
+  const double cells_per_half = half_extent > 0.0 ? (cells - 1.0) / half_extent : 0.0;
+  for (Place& place : places) {
+    const Vec3 cell = (0.5 * points[place.point] - 0.5 * all.low) * cells_per_half;
+    place.on_curve = spread(static_cast<std::uint64_t>(cell.x())) |
+                     spread(static_cast<std::uint64_t>(cell.y())) << 1U |
+                     spread(static_cast<std::uint64_t>(cell.z())) << 2U;
   }
-  x_.resize(finite);
-  y_.resize(finite);
-  z_.resize(finite);
-  auto number = voxel_of.begin();
-  for (const Vec3& p : points) {
-    if (!p.allFinite()) continue;
-    const std::size_t i = next[*number++]++;
-    x_[i] = p.x();
-    y_[i] = p.y();
-    z_[i] = p.z();
+  sort(places);
+
+  points_.reserve(places.size());
+  const std::size_t leaves = std::bit_ceil((places.size() + points_in_leaf - 1) / points_in_leaf);
+  boxes_.resize(2 * leaves);
+  for (const Place& place : places) {
+    const Vec3& point = points[place.point];
+    Box& leaf = boxes_[leaves + points_.size() / points_in_leaf];
+    leaf.low = leaf.low.cwiseMin(point);
+    leaf.high = leaf.high.cwiseMax(point);
+    points_.push_back(point);
+  }
+  for (std::size_t k = leaves - 1; k > 0; --k) {
+    boxes_[k].low = boxes_[2 * k].low.cwiseMin(boxes_[2 * k + 1].low);
+    boxes_[k].high = boxes_[2 * k].high.cwiseMax(boxes_[2 * k + 1].high);
   }
 }
 
-PointCloud::PointCloud(Surface surface, std::optional<Vec3> viewpoint, double voxel)
-    : PointCloud(std::span<const Vec3>(surface.points), viewpoint, voxel) {
+PointCloud::PointCloud(Surface surface, std::optional<Vec3> viewpoint)
+    : PointCloud(std::span<const Vec3>(surface.points), viewpoint) {
   const std::size_t count = surface.points.size();
   if (!surface.normals.empty() && surface.normals.size() != count)
     throw Error("surface", "its normals are not as many as its points", "give one for each");
@@ -159,113 +127,76 @@ PointCloud::PointCloud(Surface surface, std::optional<Vec3> viewpoint, double vo
   surface_ = std::make_shared<const Surface>(std::move(surface));
 }
 
-const PointCloud::Cell* PointCloud::find(std::uint64_t key) const noexcept {
-  const std::size_t slots = cells_.size();
-  std::size_t slot = slot_of(key, slots);
-  // At most half of the slots are in use, so a probe ends at an empty one.
-  while (cells_[slot].begin != cells_[slot].end) {
-    if (cells_[slot].key == key) return &cells_[slot];
-    slot = (slot + 1) & (slots - 1);
-  }
-  return nullptr;
-}
-
-// The cells that meet the box from `low` to `high` [m, world].
-template <class Visit>
-void PointCloud::for_each_cell(const Vec3& low, const Vec3& high,
-                               const Visit& visit) const noexcept {
-  Index first{};
-  Index last{};
-  for (int axis = 0; axis < 3; ++axis) {
-    const double from = std::max(low[axis] - corner_[axis], 0.0);
-    const double to = std::min(high[axis] - corner_[axis], extent_[axis]);
-    if (!(from <= to)) return;
-    first[axis] = static_cast<std::int64_t>(from / voxel_);
-    last[axis] = static_cast<std::int64_t>(to / voxel_);
-  }
-  for (std::int64_t k = first[2]; k <= last[2]; ++k) {
-    for (std::int64_t j = first[1]; j <= last[1]; ++j) {
-      for (std::int64_t i = first[0]; i <= last[0]; ++i) {
-        if (const Cell* cell = find(key_of(i, j, k))) visit(*cell);
-      }
+// Goes down level by level, while the boxes that `touches` says to meet the search are not too
+// many.
+template <class Touches>
+PointCloud::Runs PointCloud::runs_where(const Touches& touches) const noexcept {
+  Runs runs{{0}, 1, boxes_.size() / 2 * points_in_leaf};
+  for (std::size_t first = 2; first < boxes_.size(); first *= 2) {
+    Runs halves;
+    halves.count = 0;
+    halves.length = runs.length / 2;
+    for (std::size_t i = 0; i < 2 * runs.count; ++i) {
+      const std::size_t number = 2 * std::size_t{runs.number[i / 2]} + i % 2;
+      if (!touches(boxes_[first + number])) continue;
+      if (halves.count == most_runs) return runs;
+      halves.number[halves.count++] = static_cast<std::uint32_t>(number);
     }
+    runs = halves;
   }
+  return runs;
 }
 
+// Every `stride`-th point of the runs, one after the other.
 template <class Visit>
-void PointCloud::for_each_cell(const Ball& ball, const Visit& visit) const noexcept {
-  const Vec3 half = Vec3::Constant(ball.radius);
-  for_each_cell(Vec3(ball.centre - half), Vec3(ball.centre + half), visit);
-}
-
-// Layer of voxels by layer of voxels along the axis that the beam follows most: in each, the cells
-// of the box around its piece of the beam. Layers are visited once, whatever the direction.
-template <class Visit>
-void PointCloud::for_each_cell(const Beam& beam, const SightCone& cone,
-                               const Visit& visit) const noexcept {
-  const Vec3& direction = cone.axis();
-  int along = 0;
-  direction.cwiseAbs().maxCoeff(&along);
-  const double slope = std::abs(direction[along]);
-  const double widest = std::max(cone.radius_at(cone.reach()), cone.radius_at(-cone.reach()));
-  const double half_length = cone.reach() * slope + widest;
-  const double centre = beam.through[along] - corner_[along];
-  const double from = std::max(centre - half_length, 0.0);
-  const double to = std::min(centre + half_length, extent_[along]);
-  if (!(from <= to)) return;
-  const auto last = static_cast<std::int64_t>(to / voxel_);
-  for (auto layer = static_cast<std::int64_t>(from / voxel_); layer <= last; ++layer) {
-    // Points of the cone whose coordinate `along` lies in this layer, give or take its radius.
-    const double middle = ((static_cast<double>(layer) + 0.5) * voxel_ - centre) / direction[along];
-    const double half_piece = (0.5 * voxel_ + widest) / slope;
-    const double radius =
-        std::max(cone.radius_at(middle - half_piece), cone.radius_at(middle + half_piece));
-    if (radius <= 0.0) continue;
-    const Vec3 at = beam.through + middle * direction;
-    // To the side, a cone that leans moves by at most half a piece times its lean.
-    Vec3 half = (direction.cwiseAbs() * half_piece).array() + radius;
-    half[along] = 0.0;
-    Vec3 low = at - half;
-    Vec3 high = at + half;
-    low[along] = high[along] = corner_[along] + (static_cast<double>(layer) + 0.5) * voxel_;
-    // The last layer's middle may lie beyond the last point.
-    low[along] = high[along] = std::min(low[along], corner_[along] + extent_[along]);
-    for_each_cell(low, high, visit);
+void PointCloud::for_each_point(const Runs& runs, std::size_t stride,
+                                const Visit& visit) const noexcept {
+  std::size_t ahead = 0;
+  for (std::size_t run = 0; run < runs.count; ++run) {
+    const std::size_t begin = runs.number[run] * runs.length;
+    const std::size_t end = std::min(begin + runs.length, points_.size());
+    std::size_t i = begin + ahead;
+    for (; i < end; i += stride) visit(points_[i]);
+    ahead = i - end;
   }
 }
 
 void PointCloud::gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept {
   patch.start_view(viewpoint_);
-  if (x_.empty()) return;
-  std::size_t candidates = 0;
-  for_each_cell(ball, [&](const Cell& cell) { candidates += cell.end - cell.begin; });
-  const std::size_t stride = candidates / std::max<std::size_t>(max_points, 1) + 1;
-  if (stride > 1) patch.mark_thinned(1.0 / static_cast<double>(stride));
-  for_each_cell(ball, [&](const Cell& cell) {
-    for (std::size_t i = cell.begin; i < cell.end; i += stride) {
-      push_if_inside(point(i), ball, patch);
-    }
+  if (points_.empty()) return;
+  const double squared_radius = ball.radius * ball.radius;
+  const Runs runs = runs_where([&](const Box& box) {
+    const Vec3 away = (box.low - ball.centre).cwiseMax(ball.centre - box.high);
+    return away.cwiseMax(0.0).squaredNorm() <= squared_radius;
   });
+  const std::size_t stride = runs.count * runs.length / std::max<std::size_t>(max_points, 1) + 1;
+  if (stride > 1) patch.mark_thinned(1.0 / static_cast<double>(stride));
+  for_each_point(runs, stride, [&](const Vec3& point) { push_if_inside(point, ball, patch); });
 }
 
 void PointCloud::gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept {
   patch.start_view(viewpoint_);
-  if (x_.empty()) return;
+  if (points_.empty()) return;
   const SightCone cone(beam, viewpoint_);
-  std::size_t inside = 0;
-  for_each_cell(beam, cone, [&](const Cell& cell) {
-    for (std::size_t i = cell.begin; i < cell.end; ++i) {
-      if (cone.holds(point(i) - beam.through)) ++inside;
-    }
+  const Runs runs = runs_where([&](const Box& box) {
+    if (box.low.x() > box.high.x()) return false;
+    const double radius = (0.5 * box.high - 0.5 * box.low).norm();
+    return cone.meets(0.5 * box.low + 0.5 * box.high - beam.through, radius);
   });
-  const std::size_t stride = inside / std::max<std::size_t>(max_points, 1) + 1;
-  if (stride > 1) patch.mark_thinned(1.0 / static_cast<double>(stride));
+  const std::size_t wanted = std::max<std::size_t>(max_points, 1);
+  const std::size_t looked_at_stride =
+      runs.count * runs.length / (looked_at_per_wanted * wanted) + 1;
+  std::size_t inside = 0;
+  for_each_point(runs, looked_at_stride, [&](const Vec3& point) {
+    if (cone.holds(point - beam.through)) ++inside;
+  });
+  const std::size_t stride = inside / wanted + 1;
+  if (looked_at_stride * stride > 1)
+    patch.mark_thinned(1.0 / static_cast<double>(looked_at_stride * stride));
   std::size_t next = 0;
-  for_each_cell(beam, cone, [&](const Cell& cell) {
-    for (std::size_t i = cell.begin; i < cell.end; ++i) {
-      const Vec3 p = point(i) - beam.through;
-      if (cone.holds(p) && next++ % stride == 0) push(p, patch);
-    }
+  for_each_point(runs, looked_at_stride, [&](const Vec3& point) {
+    const Vec3 p = point - beam.through;
+    if (cone.holds(p) && next++ % stride == 0) push(p, patch);
   });
 }
 

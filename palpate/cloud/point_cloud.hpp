@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -20,21 +21,19 @@ struct Surface {
   std::vector<std::array<std::uint32_t, 3>> triangles{};  ///< counter-clockwise from outside
 };
 
-/// Points in no particular order, sorted once into a hash of voxels on the camera's thread.
+/// Points in no particular order: sorted once, on the camera's thread, along a space-filling curve,
+/// below a balanced tree of boxes. A search looks at a bounded number of boxes and points, however
+/// many there are.
 class PointCloud final : public Cloud {
  public:
-  /// O(points). Non-finite points are left out and counted.
+  /// O(points log points). Non-finite points are left out and counted.
   /// @param points     [m] world
   /// @param viewpoint  [m] world: from where they were seen (PCD's VIEWPOINT), if known
-  /// @param voxel      [m] edge; about the radius of a search is best. Widened if the cloud is so
-  ///                   large that voxels could not be numbered.
-  /// @throws Error if `voxel` is not in 0.001 to 1 m.
-  explicit PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoint = std::nullopt,
-                      double voxel = 0.010);
+  /// @throws Error if there are more points than 32 bits can number.
+  explicit PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoint = std::nullopt);
   /// The same, keeping the further properties beside the points.
   /// @throws Error also if normals, image or triangles do not fit the points.
-  explicit PointCloud(Surface surface, std::optional<Vec3> viewpoint = std::nullopt,
-                      double voxel = 0.010);
+  explicit PointCloud(Surface surface, std::optional<Vec3> viewpoint = std::nullopt);
 
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
   void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
@@ -42,34 +41,29 @@ class PointCloud final : public Cloud {
   /// All points as given, non-finite ones included, with their further properties; or null.
   [[nodiscard]] const Surface* surface() const noexcept { return surface_.get(); }
 
-  [[nodiscard]] std::size_t size() const noexcept { return x_.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return points_.size(); }
   /// How many points were left out because a coordinate was not finite.
   [[nodiscard]] std::size_t non_finite() const noexcept { return non_finite_; }
-  [[nodiscard]] Vec3 point(std::size_t i) const noexcept { return {x_[i], y_[i], z_[i]}; }
-  /// [m] the edge of a voxel.
-  [[nodiscard]] double voxel() const noexcept { return voxel_; }
+  /// The finite points, in the order of the curve. A cloud made of them has the same order.
+  [[nodiscard]] const Vec3& point(std::size_t i) const noexcept { return points_[i]; }
   [[nodiscard]] const std::optional<Vec3>& viewpoint() const noexcept { return viewpoint_; }
 
  private:
-  struct Cell {
-    std::uint64_t key;
-    std::uint32_t begin, end;  // points; empty slots have begin == end
+  struct Box {
+    Vec3 low = Vec3::Constant(std::numeric_limits<double>::max());
+    Vec3 high = Vec3::Constant(std::numeric_limits<double>::lowest());
   };
-  using Index = std::array<std::int64_t, 3>;
+  struct Runs;
 
-  [[nodiscard]] const Cell* find(std::uint64_t key) const noexcept;
+  template <class Touches>
+  [[nodiscard]] Runs runs_where(const Touches& touches) const noexcept;
   template <class Visit>
-  void for_each_cell(const Ball& ball, const Visit& visit) const noexcept;
-  template <class Visit>
-  void for_each_cell(const Vec3& low, const Vec3& high, const Visit& visit) const noexcept;
-  template <class Visit>
-  void for_each_cell(const Beam& beam, const SightCone& cone, const Visit& visit) const noexcept;
+  void for_each_point(const Runs& runs, std::size_t stride, const Visit& visit) const noexcept;
 
-  std::vector<double> x_, y_, z_;  // sorted by voxel
-  std::vector<Cell> cells_;        // open addressing, a power of two
-  Vec3 corner_ = Vec3::Zero();     // smallest coordinates
-  Vec3 extent_ = Vec3::Zero();
-  double voxel_;
+  std::vector<Vec3> points_;  // [m] along the curve
+  // Of a binary tree, the root at 1, the halves of k at 2 k and 2 k + 1. Each leaf has a run of
+  // points; leaves beyond the last point have an empty box.
+  std::vector<Box> boxes_;
   std::optional<Vec3> viewpoint_;
   std::size_t non_finite_ = 0;
   std::shared_ptr<const Surface> surface_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string_view>
@@ -115,6 +116,17 @@ class SightCone {
     const double radius = radius_at(along);
     return std::abs(along) <= reach_ && radius > 0.0 &&
            p.squaredNorm() - along * along <= radius * radius;
+  }
+
+  /// May a ball of `radius` [m] about `centre` [m, relative to `through`, world axes] meet it? Also
+  /// true of some that just miss it.
+  [[nodiscard]] bool meets(const Vec3& centre, double radius) const noexcept {
+    radius += 1e-9 * centre.lpNorm<1>();  // more than rounding
+    const double along = centre.dot(axis_);
+    const double away = radius + std::max(radius_at(along + radius), 0.0);
+    // Whatever is not comparable may meet it.
+    return !(std::abs(along) > reach_ + radius) &&
+           !(centre.squaredNorm() - along * along > away * away);
   }
 
   /// [-] unit, away from the viewpoint where there is one.

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "palpate/cloud/depth_image.hpp"
+#include "palpate/cloud/organised.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/clock_relation.hpp"
@@ -54,14 +55,13 @@ constexpr dds::Quality of_static_tf{.reliable = true, .keeps_for_late = true, .d
 struct CameraOptions {
   std::string uri = {}, topic = {}, info_topic = {}, fixed_frame = {}, stamps = {};
   std::optional<double> units = {};  // [1/m]
-  double voxel = 0.01;               // [m]
   double patience = 5.0;             // [s] for the camera to be there
   bool reliable = false;             // what is lost on the way is sent again
 };
 
 CameraOptions camera_options(const Uri& uri) {
-  constexpr std::array<std::string_view, 8> options{"reliable",    "info",   "units", "voxel",
-                                                    "fixed_frame", "stamps", "wait",  "sensor"};
+  constexpr std::array<std::string_view, 7> options{"reliable", "info", "units", "fixed_frame",
+                                                    "stamps",   "wait", "sensor"};
   uri.allow_only(options);
   CameraOptions wanted{.uri = uri.text(), .topic = uri.path()};
   if (wanted.topic.size() < 2 || wanted.topic.front() != '/')
@@ -71,7 +71,6 @@ CameraOptions camera_options(const Uri& uri) {
   wanted.info_topic = uri.text_option("info", "");
   wanted.reliable = uri.has("reliable");
   if (uri.has("units")) wanted.units = uri.number_option("units", 1000.0, 1.0, 1e6);
-  wanted.voxel = uri.number_option("voxel", wanted.voxel, 1e-4, 1.0, "m");
   wanted.fixed_frame = uri.text_option("fixed_frame", "");
   wanted.patience = uri.number_option("wait", wanted.patience, 0.1, 600.0, "s");
   wanted.stamps = uri.text_option("stamps", "");
@@ -89,6 +88,7 @@ struct Pending {
   std::vector<std::uint16_t> depth;
   double units = 0.0;  // [1/m]
   std::optional<std::vector<Vec3>> points;
+  std::size_t columns = 0, rows = 0;  // of points
 };
 
 bool is_of_camera(const std::string& type) {
@@ -361,6 +361,8 @@ class Camera final : public LiveCamera {
       while (const auto cloud = clouds_->take<ros::PointCloud2>()) {
         Pending& next = begin(cloud->header);
         next.points = points_of(*cloud, name);
+        next.columns = cloud->width;
+        next.rows = cloud->height;
         info_.details = "PointCloud2";
       }
     } else if (images_) {
@@ -474,8 +476,12 @@ class Camera final : public LiveCamera {
     frame.stamp = pending_->stamp - (clock_ ? clock_->relation().difference() : 0.0);
     frame.arrival = pending_->arrival;
     if (pending_->points) {
-      for (Vec3& point : *pending_->points) point = pose * point;
-      frame.cloud = std::make_shared<PointCloud>(*pending_->points, std::nullopt, wanted_.voxel);
+      frame.cloud = organised_.image(*pending_->points, pending_->columns, pending_->rows,
+                                     std::nullopt, pose);
+      if (!frame.cloud) {
+        for (Vec3& point : *pending_->points) point = pose * point;
+        frame.cloud = std::make_shared<PointCloud>(*pending_->points);
+      }
     } else {
       frame.cloud =
           std::make_shared<DepthImage>(rays_, std::move(pending_->depth), pending_->units, pose);
@@ -495,6 +501,7 @@ class Camera final : public LiveCamera {
   LiveTransforms transforms_;
   std::shared_ptr<const ViewingRays> rays_;
   std::optional<Pending> pending_;
+  OrganisedClouds organised_;
   bool decided_ = false;
   std::string fixed_;  // frame of TF in which points are; empty: the camera's own
 };

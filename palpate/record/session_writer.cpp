@@ -182,13 +182,10 @@ void SessionWriter::points(std::size_t camera, double stamp, const PointCloud& c
     const std::array<double, 3> point = array_of(cloud.point(i));
     std::memcpy(message.data.data() + i * point_step, point.data(), point_step);
   }
-  // A voxel that was widened to fit is so again.
-  constexpr double widest = 1.0;  // [m]
   const Vec3 viewpoint = cloud.viewpoint().value_or(Vec3::Zero());
-  const ros::Float64MultiArray exact{
-      .label = "stamp,voxel,has_viewpoint,viewpoint",
-      .data = {stamp, std::min(cloud.voxel(), widest), cloud.viewpoint() ? 1.0 : 0.0, viewpoint.x(),
-               viewpoint.y(), viewpoint.z()}};
+  const ros::Float64MultiArray exact{.label = "stamp,unused,has_viewpoint,viewpoint",
+                                     .data = {stamp, 0.0, cloud.viewpoint() ? 1.0 : 0.0,
+                                              viewpoint.x(), viewpoint.y(), viewpoint.z()}};
   write(topics.points, at, message);
   write(topics.exact, at, exact);
 }

@@ -317,13 +317,15 @@ std::optional<Frame> BagCamera::read_points(std::size_t number, const ros::Point
     const double taken = stamp(number, message.header);
     const std::optional<Eigen::Isometry3d> pose = pose_at(taken);
     if (!pose) return std::nullopt;
+    if (auto image = organised_.image(points, message.width, message.height, std::nullopt, *pose))
+      return Frame{taken, std::move(image)};
     for (Vec3& point : points) point = *pose * point;
-    return Frame{taken, std::make_shared<PointCloud>(points, std::nullopt, options_.voxel)};
+    return Frame{taken, std::make_shared<PointCloud>(points)};
   }
   const std::vector<double> numbers = exact(number, 6);
   std::optional<Vec3> viewpoint;
   if (numbers[2] != 0.0) viewpoint = Vec3(numbers[3], numbers[4], numbers[5]);
-  return Frame{numbers[0], std::make_shared<PointCloud>(points, viewpoint, numbers[1])};
+  return Frame{numbers[0], std::make_shared<PointCloud>(points, viewpoint)};
 }
 
 std::optional<Frame> BagCamera::frame(std::size_t number) {

@@ -12,6 +12,7 @@
 #include "palpate/bag/messages.hpp"
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/frame.hpp"
+#include "palpate/cloud/organised.hpp"
 #include "palpate/sources/bag_transforms.hpp"
 #include "palpate/sources/source.hpp"
 
@@ -28,7 +29,7 @@ struct CameraTopics {
   /// Depth: stamp [s], units per metre, world_from_camera (3 x 4, row by row); where something is
   /// known of the materials, which message of `materials` and which of `material_table` they are,
   /// from 1, 0 for none.
-  /// Points: stamp [s], voxel [m], 1 if a viewpoint follows, the viewpoint [m].
+  /// Points: stamp [s], an unused number, 1 if a viewpoint follows, the viewpoint [m].
   std::string exact;
   /// CompressedImage, "mono16; png": of each pixel the label of its material, and in the upper
   /// eight bits the brightness, if `format` ends with that. Written when it changes.
@@ -56,7 +57,6 @@ class BagCamera {
  public:
   struct Options {
     std::optional<double> units;  ///< [1/m] of raw depth; 32FC1 is rounded to it
-    double voxel = 0.010;         ///< [m] of a PointCloud that palpate did not record
     std::string fixed_frame{};    ///< of TF; "none": TF is left aside; empty: the one that is there
   };
 
@@ -106,6 +106,7 @@ class BagCamera {
   bool is_realsense_ = false;
   std::optional<BagTransforms> transforms_;
   std::shared_ptr<const ViewingRays> rays_;  // of the frame read last
+  OrganisedClouds organised_;
   std::map<std::string, std::vector<BagReader::Place>> material_places_;
   std::shared_ptr<const MaterialMap> materials_;        // of the frame read last
   double material_image_ = 0.0, material_table_ = 0.0;  // its messages

@@ -17,8 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t largest_image_side = 16384;  // [px] of a camera's image
-
 // For example "640x480 points, binary, x float32, y float32, z float32, _ uint8 x 4".
 std::string details_of(const PointFile& file) {
   std::string text =
@@ -61,7 +59,7 @@ std::optional<Frame> PointFileSource::next(double /*timeout*/) {
   const double stamp = static_cast<double>(k) / options_.fps;
   const bool is_image = file.width > 1 && file.height > 1;
   if (!is_image && file.normals.empty() && file.triangles.empty())
-    return Frame{stamp, std::make_shared<PointCloud>(file.points, file.viewpoint, options_.voxel)};
+    return Frame{stamp, std::make_shared<PointCloud>(file.points, file.viewpoint)};
   for (Vec3& normal : file.normals) {
     const double length = normal.norm();
     normal = length > 0.0 && std::isfinite(length) ? Vec3(normal / length) : Vec3::Zero();
@@ -74,15 +72,7 @@ std::optional<Frame> PointFileSource::next(double /*timeout*/) {
     colour->rgb = std::move(file.colours);
   }
   if (is_image) {
-    // Files of one camera share what was fitted to the first of them.
-    std::shared_ptr<const DepthImage> image;
-    if (camera_) image = depth_image_of(file.points, *camera_);
-    if (!image) {
-      camera_ =
-          fit_camera(file.points, static_cast<int>(std::min(file.width, largest_image_side)),
-                     static_cast<int>(std::min(file.height, largest_image_side)), file.viewpoint);
-      if (camera_) image = depth_image_of(file.points, *camera_);
-    }
+    auto image = organised_.image(file.points, file.width, file.height, file.viewpoint);
     if (image) return Frame{stamp, std::move(image), std::move(colour)};
   }
   Surface surface{.points = std::move(file.points),
@@ -92,8 +82,7 @@ std::optional<Frame> PointFileSource::next(double /*timeout*/) {
     surface.columns = static_cast<int>(file.width);
     surface.rows = static_cast<int>(file.height);
   }
-  return Frame{stamp,
-               std::make_shared<PointCloud>(std::move(surface), file.viewpoint, options_.voxel),
+  return Frame{stamp, std::make_shared<PointCloud>(std::move(surface), file.viewpoint),
                std::move(colour)};
 }
 
@@ -104,11 +93,10 @@ std::size_t PointFileSource::skip(std::size_t count) {
 }
 
 std::unique_ptr<Source> open_point_files(const Uri& uri) {
-  constexpr std::array<std::string_view, 4> known{"fps", "voxel", "scale", "sensor"};
+  constexpr std::array<std::string_view, 3> known{"fps", "scale", "sensor"};
   uri.allow_only(known);
   const PointFileSource::Options options{
       .fps = uri.number_option("fps", 30.0, 1e-3, 1e6, "Hz"),
-      .voxel = uri.number_option("voxel", 0.010, 1e-4, 10.0, "m"),
       .scale = uri.number_option("scale", 1.0, 1e-9, 1e9, "m"),
   };
   const bool is_pcd = uri.scheme() == "pcd";

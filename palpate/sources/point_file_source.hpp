@@ -21,9 +21,8 @@ namespace palpate {
 class PointFileSource final : public Source {
  public:
   struct Options {
-    double fps = 30.0;     ///< [Hz] > 0
-    double voxel = 0.010;  ///< [m] of the PointCloud, > 0
-    double scale = 1.0;    ///< [m] length of one unit of the files: 0.001 for millimetres; > 0
+    double fps = 30.0;   ///< [Hz] > 0
+    double scale = 1.0;  ///< [m] length of one unit of the files: 0.001 for millimetres; > 0
   };
   using Reader = PointFile (*)(const std::filesystem::path&);
 
@@ -41,10 +40,10 @@ class PointFileSource final : public Source {
   Options options_;
   SourceInfo info_;
   std::size_t next_ = 0;
-  std::optional<GridCamera> camera_;  // of the organised frame read last
+  OrganisedClouds organised_;
 };
 
-/// Opens `pcd:FILE|DIR` or `ply:FILE|DIR`, with `?fps=30`, `voxel=10mm` and `scale=1mm` (the
+/// Opens `pcd:FILE|DIR` or `ply:FILE|DIR`, with `?fps=30` and `scale=1mm` (the
 /// length of one unit of the files).
 /// @throws Error if there is no such file or folder, the folder holds no such file, or an option
 ///         is not known or out of range. The files themselves are read by `next`.

@@ -69,12 +69,12 @@ class PosedSource final : public Source {
       Surface moved = *surface;
       for (Vec3& point : moved.points) point = pose_ * point;
       for (Vec3& normal : moved.normals) normal = pose_.linear() * normal;
-      return std::make_shared<PointCloud>(std::move(moved), viewpoint, points->voxel());
+      return std::make_shared<PointCloud>(std::move(moved), viewpoint);
     }
     std::vector<Vec3> moved;
     moved.reserve(points->size());
     for (std::size_t i = 0; i < points->size(); ++i) moved.push_back(pose_ * points->point(i));
-    return std::make_shared<PointCloud>(moved, viewpoint, points->voxel());
+    return std::make_shared<PointCloud>(moved, viewpoint);
   }
 
   std::unique_ptr<Source> source_;

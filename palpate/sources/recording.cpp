@@ -80,13 +80,11 @@ class Recording final : public Source {
 }  // namespace
 
 std::unique_ptr<Source> open_recording(const Uri& uri) {
-  constexpr std::array<std::string_view, 5> known{"topic", "units", "voxel", "fixed_frame",
-                                                  "sensor"};
+  constexpr std::array<std::string_view, 4> known{"topic", "units", "fixed_frame", "sensor"};
   uri.allow_only(known);
   BagCamera::Options options;
   if (uri.has("units")) options.units = uri.number_option("units", 1000.0, 1e-3, 1e7, "px");
   options.fixed_frame = uri.text_option("fixed_frame", "");
-  options.voxel = uri.number_option("voxel", options.voxel, 1e-3, 1.0, "m");
   return std::make_unique<Recording>(uri, options, SourceInfo{.uri = uri.text(), .kind = {}});
 }
 

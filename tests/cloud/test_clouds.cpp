@@ -153,7 +153,7 @@ TEST(PointCloud, FindsExactlyWhatBruteForceFinds) {
     for (int i = 0; i < 2000; ++i)
       points.emplace_back(size * Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1),
                                       0.1 * std::round(scene.uniform(-3, 3))));
-    const PointCloud cloud(points, std::nullopt, std::exp(scene.uniform(-5, -1)));
+    const PointCloud cloud(points);
     const BruteForceCloud oracle(points);
     for (int i = 0; i < 20; ++i) {
       const double radius = scene.uniform(0.001, 0.2);
@@ -203,7 +203,7 @@ TEST(PointCloud, FindsInABeamWhatBruteForceFinds) {
     std::optional<Vec3> viewpoint;
     if (seed % 3 != 0)
       viewpoint = 2.0 * Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1), scene.uniform(-1, 1));
-    const PointCloud cloud(points, viewpoint, std::exp(scene.uniform(-5, -1)));
+    const PointCloud cloud(points, viewpoint);
     const BruteForceCloud oracle(points, viewpoint);
     for (int i = 0; i < 20; ++i) {
       const Vec3 axis = Vec3(scene.uniform(-1, 1), scene.uniform(-1, 1), scene.uniform(-1, 1));
@@ -253,6 +253,48 @@ TEST(PointCloud, ThinsABallThatHoldsMoreThanAPatchAndSaysSo) {
   for (std::size_t i = 0; i < patch.size(); ++i)
     mean += Vec3(patch.x()[i], patch.y()[i], patch.z()[i]) / static_cast<double>(patch.size());
   EXPECT_LT(mean.norm(), 0.0005) << "thinned evenly, not cut off";
+}
+
+TEST(PointCloud, ThinsEvenlyASheetThatHoldsMoreThanABeamWants) {
+  RandomScene scene(2);
+  std::vector<Vec3> points;
+  for (int i = 0; i < 300000; ++i)
+    points.emplace_back(scene.uniform(-1, 1), scene.uniform(-1, 1), 1.0);
+  const PointCloud cloud(points, Vec3::Zero());
+  constexpr std::size_t wanted = 640;
+  Patch patch;
+  for (const double radius : {0.03, 0.05, 0.3}) {
+    const Beam beam{Vec3(0.2, -0.1, 1.0), radius, 0.3, Vec3::UnitZ()};
+    gather(cloud, beam, wanted, patch);
+    const SightCone cone(beam, Vec3::Zero());
+    const auto held = std::count_if(points.begin(), points.end(), [&](const Vec3& point) {
+      return cone.holds(point - beam.through);
+    });
+    EXPECT_EQ(patch.thinned(), held > static_cast<int>(wanted)) << radius;
+    EXPECT_LE(patch.size(), wanted);
+    EXPECT_GE(patch.size(), std::min<std::size_t>(static_cast<std::size_t>(held), wanted / 3));
+    EXPECT_NEAR(static_cast<double>(patch.size()) / patch.share(), held, 0.1 * held) << radius;
+    std::array<std::size_t, 4> quarters{};
+    for (std::size_t i = 0; i < patch.size(); ++i)
+      ++quarters[(patch.x()[i] > 0.0F ? 1 : 0) + (patch.y()[i] > 0.0F ? 2 : 0)];
+    for (const std::size_t quarter : quarters) {
+      EXPECT_NEAR(static_cast<double>(quarter), static_cast<double>(patch.size()) / 4.0,
+                  0.3 * static_cast<double>(patch.size()) / 4.0)
+          << radius;
+    }
+  }
+}
+
+TEST(PointCloud, KeepsItsOrderWhenItIsMadeAgain) {
+  RandomScene scene(3);
+  std::vector<Vec3> points(1000, Vec3(0.5, 0.5, 0.5));
+  for (int i = 0; i < 1000; ++i)
+    points.emplace_back(scene.uniform(-1, 1), scene.uniform(-1, 1), scene.uniform(-1, 1));
+  const PointCloud once(points);
+  std::vector<Vec3> sorted;
+  for (std::size_t i = 0; i < once.size(); ++i) sorted.push_back(once.point(i));
+  const PointCloud twice(sorted);
+  for (std::size_t i = 0; i < once.size(); ++i) ASSERT_EQ(twice.point(i), sorted[i]) << i;
 }
 
 TEST(DepthImage, ThinsAWindowThatHoldsMoreThanAPatchAndSaysSo) {
@@ -547,13 +589,13 @@ TEST(Clouds, AllGiveTheSameProxyToRounding) {
   }
   const DepthImage image(std::make_shared<ViewingRays>(k), depth, 10000.0);
   const std::vector<Vec3> points = image.points();
-  const PointCloud hashed(points);
+  const PointCloud sorted(points);
   const BruteForceCloud oracle(points);
   Paper a;
   Paper b;
   Paper c;
   a.frame(image, 0);
-  b.frame(hashed, 0);
+  b.frame(sorted, 0);
   c.frame(oracle, 0);
   double largest = 0.0;
   for (int i = 0; i < 400; ++i) {

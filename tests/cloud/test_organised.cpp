@@ -114,5 +114,27 @@ TEST(OrganisedClouds, WithManyPointsOutOfPlaceStayPoints) {
   EXPECT_FALSE(fit_camera(points, 80, 60, std::nullopt).has_value());
 }
 
+TEST(OrganisedClouds, OfACameraThatMovesAreFittedOnce) {
+  const Eigen::Isometry3d mount = turned(Vec3(0.1, 0.0, 0.2));
+  const auto points = seen_from(mount);
+  OrganisedClouds clouds;
+  const auto first = clouds.image(points, 80, 60);
+  ASSERT_NE(first, nullptr);
+  const Eigen::Isometry3d moved = turned(Vec3(3.0, -2.0, 1.5));
+  const auto second = clouds.image(points, 80, 60, std::nullopt, moved);
+  ASSERT_NE(second, nullptr);
+  EXPECT_EQ(second->shared_rays(), first->shared_rays());
+  for (int u = 0; u < 80; u += 5) {
+    const Vec3& given = points[static_cast<std::size_t>(30 * 80 + u)];
+    const auto point = second->deproject(u, 30);
+    ASSERT_EQ(point.has_value(), given.allFinite());
+    if (!point) continue;
+    EXPECT_LT((*point - moved * given).norm(), 0.6 / second->units_per_metre() + 1e-6);
+  }
+  EXPECT_EQ(clouds.image(points, 4800, 1), nullptr) << "one row is no image";
+  const auto other = seen_from(turned(Vec3(0.0, 0.3, 0.0)));
+  EXPECT_NE(clouds.image(other, 80, 60), nullptr) << "fitted anew";
+}
+
 }  // namespace test_organised
 }  // namespace palpate

@@ -176,7 +176,7 @@ TEST_F(Ros2Camera, GivesCloudsOfAnyWidth) {
       width = width == 2 ? 3 : 2;
     };
   });
-  const auto source = open("ros2:/camera/points?voxel=5mm");
+  const auto source = open("ros2:/camera/points");
   bool two = false;
   bool three = false;
   while (!two || !three) {

@@ -268,9 +268,9 @@ TEST(PointFiles, TakeOnlyOptionsThatTheyKnow) {
   EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?fsp=30"); }, "fsp", "fps"));
   EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?fps=0"); }, "fps"));
   EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?fps=30mm"); }, "fps"));
-  EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?voxel=0"); }, "voxel"));
+  EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?scale=0"); }, "scale"));
   EXPECT_TRUE(fails_saying([&] { return open_source(uri + "?scale=-1"); }, "scale"));
-  EXPECT_TRUE(open_source(uri + "?fps=30hz&voxel=5mm&scale=1mm")->next().has_value());
+  EXPECT_TRUE(open_source(uri + "?fps=30hz&scale=1mm")->next().has_value());
 }
 
 }  // namespace test_point_file_source

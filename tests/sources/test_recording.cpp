@@ -209,6 +209,30 @@ TEST_F(ForeignBag, OfPointsIsReadWhereverItsFieldsLie) {
   EXPECT_EQ(points.point(1), Vec3(0.2, -0.25, 0.5));
 }
 
+TEST_F(ForeignBag, OfOrganisedPointsIsTheDepthImageOfTheirCamera) {
+  constexpr std::uint32_t width = 40, height = 30;
+  ros::PointCloud2 cloud{.header = header_at(100 * second),
+                         .height = height,
+                         .width = width,
+                         .fields = {{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}},
+                         .point_step = 16,
+                         .row_step = 16 * width,
+                         .data = std::vector<std::byte>(16 * width * height)};
+  for (std::uint32_t i = 0; i < width * height; ++i) {
+    const float u = static_cast<float>(i % width), v = static_cast<float>(i / width);
+    const float z = 0.8F + 0.1F * std::sin(0.3F * u);
+    const std::array point = {(u - 20.0F) / 35.0F * z, (v - 15.0F) / 35.0F * z, z};
+    std::memcpy(cloud.data.data() + 16 * i, point.data(), sizeof point);
+  }
+  write("/camera/points", 0, cloud);
+  const auto frame = open()->next();
+  const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
+  EXPECT_NEAR(image.intrinsics().fx, 35.0, 1e-3);
+  const double z = 0.8 + 0.1 * std::sin(0.3 * 25);
+  const Vec3 point(5.0 / 35.0 * z, -12.0 / 35.0 * z, z);
+  EXPECT_LT((image.deproject(25, 3).value() - point).norm(), 1e-4);
+}
+
 TEST_F(ForeignBag, OfSeveralCamerasSaysWhichOneItReads) {
   write("/a/depth/camera_info", 0, info_of(4, 3));
   write("/b/depth/camera_info", 0, info_of(4, 3));

@@ -116,7 +116,7 @@ export class Press {
     return this.spot;
   }
 
-  /** In the air the hand goes wherever the pixel's surface is; once it touches, it stays with it. */
+  /** A hand in the air goes wherever its pixel's surface is; one that touches stays there. */
   get inAir(): boolean {
     return !this.touching;
   }
@@ -135,7 +135,7 @@ export class Press {
     this.way = flight(this.place, above(spot), this.ahead);
   }
 
-  /** The pointer rests, and a new frame says where its spot is: follows it, in contact calmly. */
+  /** The pointer rests, and a new frame says where its spot is: follows, in contact calmly. */
   follow(spot: Spot): void {
     const away = sub(spot.at, this.spot.at);
     if (this.inAir && this.chased + length(away) <= LONGEST_CHASE) {

@@ -510,6 +510,12 @@ export class SceneView {
     return this.tinted && this.hasColour;
   }
 
+  /** Is the world the camera's own frame, as no pose is known? */
+  get inOwnFrame(): boolean {
+    const frames = [...this.clouds.values()].flatMap(({ frame }) => frame ?? []);
+    return frames.some((frame) => frame.worldFromCamera.every((x, i) => x === +(i % 5 === 0)));
+  }
+
   /** Draws the cameras' own colours, where they have any, or those of depth. */
   setTinted(tinted: boolean): void {
     this.tinted = tinted;

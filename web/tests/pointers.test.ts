@@ -53,7 +53,8 @@ test("a press is where its pointer is", () => {
 });
 
 describe("the nearest surface about a place", () => {
-  const beside = (hole: (place: Place) => boolean) => (place: Place) => (hole(place) ? null : place);
+  const beside = (hole: (place: Place) => boolean) => (place: Place) =>
+    hole(place) ? null : place;
   const within = (radius: number) => beside(({ x, y }) => Math.hypot(x, y) < radius);
 
   test("is the place itself where there is one", () => {

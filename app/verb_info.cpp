@@ -170,6 +170,8 @@ int info(const InfoOptions& options) {
   if (!about.details.empty()) first["details"] = about.details;
   if (const auto* image = dynamic_cast<const DepthImage*>(frame->cloud.get())) {
     first.update(describe(*image));
+    if (about.frames != 1 && image->world_from_camera().matrix().isIdentity(0.0))
+      json["poses"] = "none: the world is the camera's own frame, so a hand goes with the camera";
   } else if (const auto* cloud = dynamic_cast<const PointCloud*>(frame->cloud.get())) {
     first.update(describe(*cloud));
   }

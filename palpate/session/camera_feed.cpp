@@ -620,6 +620,7 @@ bool CameraFeed::Worker::run_recording() {
   }
   if (!open_) {
     set_state(CameraState::ended);
+    while (frames > 0 && wait_until(last_time_ + options_.still_interval)) show_again();
     return false;
   }
   if (!stay_at_end()) return true;
@@ -653,6 +654,7 @@ void CameraFeed::Worker::deliver(FedFrame fed) {
       }
     }
     status_.last_frame = fed.frame.stamp;
+    status_.stays_valid = !fed.is_new;
   }
   const std::lock_guard lock(sink_mutex_);
   if (is_connected_) sink_(fed);
@@ -680,7 +682,7 @@ CameraStatus CameraFeed::Worker::status() const {
       status.text = "looking for it again" + because;
       break;
     case CameraState::ended:
-      status.text = "ended";
+      status.text = status.stays_valid ? "ended, its last frame stays" : "ended";
       break;
     case CameraState::stopped:
       status.text = "stopped";

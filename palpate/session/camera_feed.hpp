@@ -35,6 +35,8 @@ std::shared_ptr<FeedClock> machine_clock();
 
 /// [s] at which a picture that stays valid is shown again: 30 Hz, as a camera would.
 inline constexpr double still_interval = 1.0 / 30.0;
+/// [s] of a recording that begins again at its end; a shorter one stays on its last frame.
+inline constexpr double shortest_loop = 2.0;
 
 /// When a camera is given up, looked for again and shown. Times in seconds.
 struct FeedOptions {
@@ -67,8 +69,8 @@ struct Playback {
 struct FedFrame {
   Frame frame;                ///< its stamp is on the servo loop's clock [s, CLOCK_MONOTONIC]
   double source_stamp = 0.0;  ///< [s] the stamp that the source gave it
-  /// False where the only frame of a recording is shown again: a still picture is not captured,
-  /// so its stamp is the time at which it is shown.
+  /// False where a recording's frame is shown again: what stays is not captured, so its stamp is
+  /// the time at which it is shown.
   bool is_new = true;
   /// Time has jumped before it: the recording began again, or goes on from another place.
   bool after_jump = false;
@@ -79,7 +81,7 @@ enum class CameraState : std::uint8_t {
   live,       ///< frames come
   frozen,     ///< a live camera gives the same picture again and again
   searching,  ///< it is gone and is looked for again
-  ended,      ///< a recording that cannot be opened again is over
+  ended,      ///< a recording that cannot be opened again is over, and stays on its last frame
   stopped,    ///< by request_stop
 };
 
@@ -101,6 +103,9 @@ struct CameraStatus {
   double latency = 0.0;                ///< [s] usual time from capture to arrival (live cameras)
   std::optional<double> last_frame{};  ///< [s, CLOCK_MONOTONIC] stamp of the newest frame
   std::string trouble;                 ///< the error met last; a live camera's next frame clears it
+  /// What it showed last is declared valid until another frame replaces it: a still picture, a
+  /// recording that is paused or has ended. What a live camera saw that stopped never is.
+  bool stays_valid = false;
   std::string doubt;         ///< why its unit of depth may be wrong; empty if nothing speaks for it
   Playback playback;         ///< of a recording
   std::size_t recorded = 0;  ///< frames of a recording; 0: not known, or no recording
@@ -114,8 +119,9 @@ struct CameraStatus {
 /// Frames reach the sink with their stamps of capture, brought to the servo loop's clock by one
 /// constant offset, so that intervals between stamps stay what the camera measured:
 /// - A recording plays at the pace of its stamps; each pass has its offset. Where decoding is too
-///   slow, frames come late or are left out (`dropped`); the stamps stay. What ends begins again; a
-///   recording of one frame is shown again at 30 Hz with new stamps (FedFrame::is_new is false).
+///   slow, frames come late or are left out (`dropped`); the stamps stay. What ends begins again. A
+///   frame that stays, as it is the only one, or the recording is paused or has ended, is shown
+///   again at 30 Hz with new stamps (FedFrame::is_new is false; CameraStatus::stays_valid).
 /// - A live camera's clock is followed as StampPlacer says; stamps that cannot be true are replaced
 ///   by the time of arrival, and counted.
 ///

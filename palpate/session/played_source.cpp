@@ -39,10 +39,11 @@ std::optional<Frame> PlayedSource::read() {
     }
     const bool is_first = frames_in_pass_ == 0;
     const bool is_usable = frame->cloud && std::isfinite(frame->stamp);
-    const double interval = is_first ? 0.0 : frame->stamp - source_stamp_;  // [s]
+    const double interval = is_first ? 0.0 : frame->stamp - shown_.source_stamp;  // [s]
     if (is_usable && (is_first || (interval > 0.0 && interval <= longest_gap))) return frame;
     if (is_usable && (interval < -stamp_step_back || interval > longest_gap)) {
       offset_ = last_ + interval_ - frame->stamp;
+      has_jumped_ = true;
       ++status_.stamp_problems[static_cast<std::size_t>(StampProblem::jumped)];
       return frame;
     }
@@ -64,17 +65,18 @@ const Frame& PlayedSource::first_frame() {
   return *next_;
 }
 
-// The frame after the last: of a recording that is over, the first again.
+// The frame after the last: of a recording that is over, the first again, unless it stays.
 void PlayedSource::read_next() {
   next_ = read();
   if (next_ || !has_ended_) return;
-  if (frames_in_pass_ <= 1) {
+  if (!open_ || last_ - pass_began_ < shortest_loop) {
     is_still_ = true;
     return;
   }
   source_ = open_();
   frames_in_pass_ = 0;
   has_ended_ = false;
+  has_jumped_ = true;
   next_ = read();
   if (!next_) throw Error(status_.uri, "it has no frames any more", "check the recording");
   offset_ = last_ + interval_ - next_->stamp;
@@ -84,31 +86,29 @@ std::optional<FedFrame> PlayedSource::next_until(double t) {
   begin();
   if (is_still_) {
     if (last_ + still_interval > t) return std::nullopt;
-    last_ += still_interval;
-    Frame frame = still_;
-    frame.stamp = last_;
-    return FedFrame{.frame = std::move(frame), .source_stamp = still_.stamp, .is_new = false};
+    shown_.frame.stamp = last_ += still_interval;
+    shown_.is_new = shown_.after_jump = false;
+    status_.stays_valid = true;
+    return shown_;
   }
   if (!next_) read_next();
   if (!next_) return std::nullopt;
   const double stamp = next_->stamp + offset_;
   if (stamp > t) return std::nullopt;
-  FedFrame fed{.frame = std::move(*next_), .source_stamp = next_->stamp};
-  fed.frame.stamp = stamp;
+  shown_ = {.frame = std::move(*next_), .source_stamp = next_->stamp};
+  shown_.after_jump = std::exchange(has_jumped_, false);
+  shown_.frame.stamp = stamp;
   if (frames_in_pass_ == 0) {
-    still_ = fed.frame;
-    still_.stamp = fed.source_stamp;
+    pass_began_ = stamp;
   } else if (stamp > last_) {
     interval_ = stamp - last_;
   }
   last_ = stamp;
-  source_stamp_ = fed.source_stamp;
   ++frames_in_pass_;
   ++status_.frames;
   status_.last_frame = stamp;
-  if (frames_in_pass_ > 1) still_ = {};
   read_next();
-  return fed;
+  return shown_;
 }
 
 }  // namespace palpate

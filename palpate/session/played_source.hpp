@@ -12,12 +12,13 @@ namespace palpate {
 
 /// A recording or simulation played on the caller's clock, which may run as fast as the machine
 /// can. No thread; each frame comes, but those whose stamp is not later than that of the frame
-/// before. As with a CameraFeed, stamps of capture stay what they are but for one offset a pass,
-/// what ends begins again, and a recording of one frame is shown again at 30 Hz.
+/// before. As with a CameraFeed, stamps of capture stay what they are but for one offset a pass;
+/// what ends begins again, and time jumps there (FedFrame::after_jump); a recording of less than
+/// `shortest_loop`, or that cannot be opened again, stays on its last frame, at 30 Hz.
 class PlayedSource {
  public:
   /// @param source  open; not live
-  /// @param open    opens it again at its end
+  /// @param open    opens it again at its end; empty: it cannot be
   /// @throws Error if the source is live.
   PlayedSource(std::unique_ptr<Source> source, std::function<std::unique_ptr<Source>()> open);
 
@@ -38,11 +39,12 @@ class PlayedSource {
   std::unique_ptr<Source> source_;
   std::function<std::unique_ptr<Source>()> open_;
   std::optional<Frame> next_;  // read already
-  Frame still_;                // the only frame of a recording
-  bool is_still_ = false;
-  bool has_ended_ = false;  // this pass
+  FedFrame shown_;             // given last
+  bool is_still_ = false;      // it stays
+  bool has_jumped_ = false;    // in time, before the frame to come
+  bool has_ended_ = false;     // this pass
   std::uint64_t frames_in_pass_ = 0;
-  double source_stamp_ = 0.0;     // [s] of the last frame, by the source's clock
+  double pass_began_ = 0.0;       // [s] on the caller's clock
   double offset_ = 0.0;           // [s] from the source's clock to the caller's
   double last_ = 0.0;             // [s] stamp of the last frame on the caller's clock
   double interval_ = 1.0 / 30.0;  // [s] of the last two frames

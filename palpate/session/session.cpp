@@ -33,7 +33,6 @@ namespace {
 using Seconds = std::chrono::duration<double>;
 
 constexpr double first_frame_timeout = 10.0;  // [s] for a live camera to start up
-constexpr double shortest_loop = 2.0;         // [s] of a recording; others stay on their last frame
 constexpr double press = 0.008;               // [m] of the built-in path
 constexpr auto housekeeping_interval = std::chrono::milliseconds(10);
 constexpr auto stop_poll_interval = std::chrono::milliseconds(5);
@@ -461,20 +460,19 @@ class Session::Impl {
       source = open();
     }
     sensors_.push_back(source->info().sensor);
+    const SourceInfo& known = source->info();
+    const double length = known.frames
+                              ? static_cast<double>(*known.frames) / known.frame_rate.value_or(30.0)
+                              : std::numeric_limits<double>::infinity();  // [s]
+    // A hand that strokes is out of the surface before the recording begins again.
+    if (length >= shortest_loop) options_.stroke_time = std::min(options_.stroke_time, length);
     if (!is_live()) {
-      if (!open)
-        open = [uri = camera.uri]() -> std::unique_ptr<Source> {
-          throw Error(uri, "it has ended and cannot be opened again", "run a shorter session");
-        };
-      played_.push_back(std::make_unique<PlayedSource>(std::move(source), open));
+      played_.push_back(std::make_unique<PlayedSource>(std::move(source), std::move(open)));
       return played_.back()->first_frame().cloud;
     }
     feeds_.push_back(std::make_unique<CameraFeed>(
         std::move(source), FeedOptions{.schemes = options_.sources}, std::move(open)));
-    const SourceInfo& info = feeds_.back()->info();
-    if (info.frames &&
-        static_cast<double>(*info.frames) < shortest_loop * info.frame_rate.value_or(30.0))
-      feeds_.back()->set_playback({.loop = false});
+    if (length < shortest_loop) feeds_.back()->set_playback({.loop = false});
     const std::optional<Frame> first = feeds_.back()->first_frame(first_frame_timeout);
     if (!first)
       throw Error(camera.uri, "it has delivered no frame in " + seconds_text(first_frame_timeout),

@@ -26,7 +26,7 @@ class MouseDevice;
 /// A camera of a session: a source by its URI, or one that is open.
 struct SessionCamera {
   std::string uri = {};  ///< opened by SessionOptions::sources
-  /// Used in place of the URI, which only names it then. It cannot be opened again when it ends.
+  /// Used in place of the URI, which only names it then. When it ends, its last frame stays.
   std::unique_ptr<Source> source = {};
   /// Where it stands; none: the source's own pose.
   std::optional<Eigen::Isometry3d> world_from_camera = {};
@@ -71,8 +71,9 @@ struct SessionOptions {
   /// although it states no watchdog (DeviceInfo::watchdog) of at most 0.5 s: if this process is
   /// killed, its last force stays. `open_guarded` gives a device a watchdog.
   bool without_watchdog = false;
-  double stroke_time = 20.0;  ///< [s] of the built-in path of `hand:` and `script:`
-  std::string record = {};    ///< folder to record into from the start; empty: none
+  /// [s] of the built-in path of `hand:` and `script:`; less where a recording begins again before
+  double stroke_time = 20.0;
+  std::string record = {};  ///< folder to record into from the start; empty: none
   /// [s] that `stop` waits for the disk of a recording while that takes nothing; six times that in
   /// all. What is not written then is said in RecordingState::message.
   double record_patience = 10.0;

@@ -34,13 +34,20 @@ struct RecordedImage {
   fs::path labels{};  // of materials; empty where none was asked for
 };
 
+// Where nobody asked for colour, there is touching without it.
+std::string colour_left_out(const Error& error) {
+  return std::string("colour is left out: ") + error.what();
+}
+
 class DepthRecording final : public Source {
  public:
-  DepthRecording(const RecordedCamera& camera, std::vector<RecordedImage> images, SourceInfo info)
+  DepthRecording(const RecordedCamera& camera, std::vector<RecordedImage> images, SourceInfo info,
+                 bool colour_is_asked_for)
       : camera_(camera),
         rays_(std::make_shared<const ViewingRays>(camera.intrinsics)),
         images_(std::move(images)),
-        info_(std::move(info)) {
+        info_(std::move(info)),
+        colour_is_asked_for_(colour_is_asked_for) {
     info_.sensor = camera.sensor;
   }
 
@@ -68,11 +75,16 @@ class DepthRecording final : public Source {
       frame.labels =
           std::make_shared<const std::vector<std::uint8_t>>(std::move(labels.brightness));
     }
-    if (!image.colour.empty()) {
+    if (image.colour.empty()) return frame;
+    try {
       ColourPng colour = read_colour_png(image.colour);
       check_size(image.colour, colour.width, colour.height);
       frame.colour = std::make_shared<const ColourImage>(
           ColourImage{colour.width, colour.height, std::move(colour.rgb)});
+    } catch (const Error& error) {
+      if (colour_is_asked_for_) throw;
+      for (RecordedImage& each : images_) each.colour.clear();
+      info_.notes.push_back(colour_left_out(error));
     }
     return frame;
   }
@@ -101,6 +113,7 @@ class DepthRecording final : public Source {
   std::vector<RecordedImage> images_;
   std::size_t next_ = 0;
   SourceInfo info_;
+  bool colour_is_asked_for_;
 };
 
 std::string read_text(const fs::path& path) {
@@ -262,18 +275,27 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
   for (const auto& [what, member] :
        {std::pair("brightness", &RecordedImage::brightness),
         std::pair("colour", &RecordedImage::colour), std::pair("labels", &RecordedImage::labels)}) {
-    if (!uri.has(what)) continue;
-    const fs::path file = folder / uri.text_option(what, "");
+    const bool is_usual =
+        what == std::string_view("colour") && fs::exists(folder / "rgb.txt", error);
+    const std::string named = uri.text_option(what, is_usual ? "rgb.txt" : "none");
+    if (named == "none") continue;
+    const fs::path file = folder / named;
     if (!fs::is_regular_file(file, error)) {
       throw Error(uri.text(), "has no list of images " + file.filename().string(),
                   "name one as depth.txt is, such as " + std::string(what) + "=rgb.txt");
     }
-    associate(file, what, member, images, info);
+    try {
+      associate(file, what, member, images, info);
+    } catch (const Error& damaged) {
+      if (uri.has(what)) throw;
+      info.notes.push_back(colour_left_out(damaged));
+    }
   }
   if (images.size() > 1) info.frame_rate = median_rate(images);
   if (stamps == "relative") start_clock(images, info);
   info.frames = images.size();
-  return std::make_unique<DepthRecording>(camera, std::move(images), std::move(info));
+  return std::make_unique<DepthRecording>(camera, std::move(images), std::move(info),
+                                          uri.has("colour"));
 }
 
 std::unique_ptr<Source> open_depth(const Uri& uri) {
@@ -354,7 +376,7 @@ std::unique_ptr<Source> open_depth(const Uri& uri) {
   start_clock(images, info);
   info.frames = images.size();
   if (is_folder) info.frame_rate = fps;
-  return std::make_unique<DepthRecording>(*camera, std::move(images), std::move(info));
+  return std::make_unique<DepthRecording>(*camera, std::move(images), std::move(info), true);
 }
 
 }  // namespace palpate

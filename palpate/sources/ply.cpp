@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
 #include "palpate/core/error.hpp"
 #include "palpate/sources/files.hpp"
 #include "palpate/sources/point_file.hpp"
@@ -162,7 +164,7 @@ bool ask_for(const std::array<std::string_view, 3>& names, Element& element,
   return true;
 }
 
-// Asks for the points' colours, if there is one red, one green and one blue of type uchar.
+// Asks for the points' colours, if there is one red, one green and one blue, of bytes or floats.
 void ask_for_colours(Element& element, std::vector<std::uint8_t>& into) {
   constexpr std::array<std::string_view, 3> names{"red", "green", "blue"};
   std::array<Property*, 3> found{};
@@ -170,7 +172,9 @@ void ask_for_colours(Element& element, std::vector<std::uint8_t>& into) {
     const auto* const name = std::find(names.begin(), names.end(), property.name);
     if (name == names.end()) continue;
     Property*& place = found[static_cast<std::size_t>(name - names.begin())];
-    if (place != nullptr || property.length || property.type != Scalar::uint8) return;
+    const bool is_known = property.type == Scalar::uint8 || property.type == Scalar::float32 ||
+                          property.type == Scalar::float64;
+    if (place != nullptr || property.length || !is_known) return;
     place = &property;
   }
   if (std::find(found.begin(), found.end(), nullptr) != found.end()) return;
@@ -178,6 +182,21 @@ void ask_for_colours(Element& element, std::vector<std::uint8_t>& into) {
     found[channel]->colours = &into;
     found[channel]->axis = static_cast<int>(channel);
   }
+}
+
+// Puts a colour's channel, a byte or a float from 0 to 1, where it goes. Nothing depends on a
+// colour: one that is no number is black.
+void set_colour(const Property& property, std::size_t row, double value) {
+  const double scaled = property.type == Scalar::uint8 ? value : 255.0 * value;
+  (*property.colours)[3 * row + static_cast<std::size_t>(property.axis)] =
+      static_cast<std::uint8_t>(scaled > 0.0 ? std::lround(std::min(scaled, 255.0)) : 0);
+}
+
+void load_colour(const Property& property, std::size_t row, const std::byte* value,
+                 std::endian order) {
+  set_colour(property, row, detail::visit_scalar(property.type, [&](auto kind) {
+               return static_cast<double>(detail::load<decltype(kind)>(value, order));
+             }));
 }
 
 // Asks for the lists of corners, if the element has them.
@@ -276,10 +295,7 @@ void read_ascii_row(Cursor& file, const Element& element, std::size_t row, Faces
       }
       (*property.into)[row][property.axis] = *number;
     } else if (property.colours != nullptr) {
-      // Nothing depends on a colour: one that is no number is black.
-      const auto value = std::min<std::uint64_t>(detail::to_count(token).value_or(0), 255);
-      (*property.colours)[3 * row + static_cast<std::size_t>(property.axis)] =
-          static_cast<std::uint8_t>(value);
+      set_colour(property, row, detail::to_number(token).value_or(0.0));
     }
   }
   if (!detail::next_token(*line).empty()) {
@@ -322,8 +338,7 @@ void read_binary_row(Cursor& file, const Element& element, std::endian order, st
       detail::load_column(value, 0, property.type, order, {&(*property.into)[row], 1},
                           property.axis);
     } else if (property.colours != nullptr) {
-      (*property.colours)[3 * row + static_cast<std::size_t>(property.axis)] =
-          static_cast<std::uint8_t>(*value);
+      load_colour(property, row, value, order);
     }
   }
 }
@@ -360,8 +375,7 @@ void read_element(Cursor& file, const Element& element, std::string_view encodin
       }
       if (property.colours != nullptr) {
         for (std::size_t row = 0; row < element.rows; ++row)
-          (*property.colours)[3 * row + static_cast<std::size_t>(property.axis)] =
-              static_cast<std::uint8_t>(column[row * least_bytes]);
+          load_colour(property, row, column + row * least_bytes, order);
       }
       column += property.least_bytes();
     }

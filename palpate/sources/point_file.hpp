@@ -34,7 +34,7 @@ struct PointFile {
   /// A PLY's faces: indices of points, in the order of the file. Polygons are fanned, strips cut.
   std::vector<std::array<std::uint32_t, 3>> triangles;
   /// Red, green and blue of each point in its order, 3 values each: a PCD's rgb or rgba, a PLY's
-  /// red, green and blue of type uchar. Empty without.
+  /// red, green and blue, of bytes or of floats from 0 to 1. Empty without.
   std::vector<std::uint8_t> colours;
   /// Position of the camera in the frame of the points: the translation of PCD's
   /// VIEWPOINT, or view_px view_py view_pz of the `camera` element that PCL writes into a PLY.

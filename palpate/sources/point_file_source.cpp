@@ -58,7 +58,7 @@ std::optional<Frame> PointFileSource::next(double /*timeout*/) {
   }
   const double stamp = static_cast<double>(k) / options_.fps;
   const bool is_image = file.width > 1 && file.height > 1;
-  if (!is_image && file.normals.empty() && file.triangles.empty())
+  if (!is_image && file.normals.empty() && file.triangles.empty() && file.colours.empty())
     return Frame{stamp, std::make_shared<PointCloud>(file.points, file.viewpoint)};
   for (Vec3& normal : file.normals) {
     const double length = normal.norm();

@@ -254,6 +254,7 @@ std::string SessionHost::state() {
                        {"sensor", name_of(status.sensor)},
                        {"rate", status.rate},
                        {"state", status.text},
+                       {"stays_valid", status.stays_valid},
                        {"dropped", status.dropped},
                        {"frames", status.recorded},
                        {"place", status.place},

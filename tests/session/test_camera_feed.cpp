@@ -128,6 +128,7 @@ class Playing {
   };
   std::shared_ptr<FakeClock> clock = std::make_shared<FakeClock>();
   std::vector<Given> given;
+  std::vector<bool> stays_valid;                                   // what the status said then
   std::vector<double> opened;                                      // [s] attempts to open it again
   std::function<void(CameraFeed&)> on_given = [](CameraFeed&) {};  // after each frame
   FeedOptions options;
@@ -156,6 +157,7 @@ class Playing {
     };
     feed.start([&](const FedFrame& fed) {
       given.push_back({fed, clock->now() - start});
+      stays_valid.push_back(feed.status().stays_valid);
       on_given(feed);
     });
     EXPECT_TRUE(feed.join(bound));
@@ -227,6 +229,7 @@ TEST(CameraFeed, PausesARecordingAndGoesOnAtAnotherSpeed) {
     EXPECT_FALSE(fed.after_jump) << k;
     const bool is_still = k >= 10 && k < 40;
     EXPECT_EQ(fed.is_new, !is_still) << k;
+    EXPECT_EQ(run.stays_valid[k], is_still) << k;
     if (is_still) {
       EXPECT_EQ(fed.source_stamp, run.given[9].fed.source_stamp);
     }
@@ -367,14 +370,25 @@ TEST(CameraFeed, GoesOnAfterFramesThatCannotBeReadAndBeginsAnewAfterTenInARow) {
   EXPECT_EQ(run.given[19].fed.source_stamp, 0.0);
 }
 
-TEST(CameraFeed, EndsARecordingThatCannotBeOpenedAgain) {
+TEST(CameraFeed, StaysOnTheLastFrameOfARecordingThatCannotBeOpenedAgain) {
   Playing run;
-  const CameraStatus status = run.until(10.0, run.source(frames(5, 0.0), recording));
-  EXPECT_EQ(run.given.size(), 5U);
+  const CameraStatus status = run.until(2.0, run.source(frames(5, 0.0), recording));
+  ASSERT_GT(run.given.size(), 50U);
+  for (std::size_t k = 0; k < run.given.size(); ++k) {
+    const auto& [fed, at] = run.given[k];
+    EXPECT_EQ(fed.is_new, k < 5);
+    EXPECT_FALSE(fed.after_jump);
+    if (k >= 5) EXPECT_EQ(fed.source_stamp, 4 / 30.0);
+    if (k >= 5) EXPECT_NEAR(run.start + at, fed.frame.stamp, 0.05) << "it is as of now";
+  }
   EXPECT_EQ(status.state, CameraState::ended);
-  EXPECT_EQ(status.text, "ended");
+  EXPECT_EQ(status.text, "ended, its last frame stays");
+  EXPECT_TRUE(status.stays_valid);
+  EXPECT_EQ(status.frames, 5U);
   Playing empty;
-  EXPECT_EQ(empty.until(10.0, empty.source({}, recording)).text, "ended");
+  const CameraStatus of_nothing = empty.until(10.0, empty.source({}, recording));
+  EXPECT_EQ(of_nothing.text, "ended");
+  EXPECT_FALSE(of_nothing.stays_valid);
 }
 
 TEST(CameraFeed, GivesALiveCamerasStampsWithAConstantOffset) {
@@ -521,7 +535,10 @@ TEST(CameraFeed, HandsTheFirstFrameOverThatWasReadBefore) {
   ASSERT_TRUE(feed.first_frame(0.0));
   EXPECT_EQ(feed.first_frame(0.0)->stamp, 5.0) << "it is read once";
   std::vector<double> stamps;
-  feed.start([&](const FedFrame& fed) { stamps.push_back(fed.source_stamp); });
+  feed.start([&](const FedFrame& fed) {
+    stamps.push_back(fed.source_stamp);
+    if (stamps.size() == 2) feed.request_stop();
+  });
   EXPECT_TRUE(feed.join(bound));
   EXPECT_EQ(stamps, (std::vector<double>{5.0, 5.0 + 1 / 30.0}));
 

@@ -50,12 +50,42 @@ TEST(PlayedSource, GivesEachFrameWhenItIsDueWithOneOffset) {
   EXPECT_EQ(source.status().frames, 4U);
 }
 
-TEST(PlayedSource, BeginsAgainAnIntervalAfterTheLastFrame) {
-  PlayedSource source(stamped({0.0, 0.1, 0.2}), [] { return stamped({5.0, 5.1, 5.2}); });
-  const std::vector<FedFrame> frames = played(source, 0.55);
-  ASSERT_EQ(frames.size(), 6U);
-  for (std::size_t k = 0; k < frames.size(); ++k)
-    EXPECT_NEAR(frames[k].frame.stamp, 0.1 * static_cast<double>(k), 1e-12);
+// The k-th frame of a recording of 2.5 s.
+std::vector<double> slow(double first) {
+  return {first, first + 0.5, first + 1.0, first + 1.5, first + 2.0, first + 2.5};
+}
+
+TEST(PlayedSource, BeginsAgainAnIntervalAfterTheLastFrameAndSaysThatTimeJumps) {
+  PlayedSource source(stamped(slow(0.0)), [] { return stamped(slow(50.0)); });
+  const std::vector<FedFrame> frames = played(source, 6.2);
+  ASSERT_EQ(frames.size(), 13U);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    EXPECT_NEAR(frames[k].frame.stamp, 0.5 * static_cast<double>(k), 1e-12);
+    EXPECT_TRUE(frames[k].is_new);
+    EXPECT_EQ(frames[k].after_jump, k == 6 || k == 12) << k;
+  }
+  EXPECT_FALSE(source.status().stays_valid);
+}
+
+TEST(PlayedSource, StaysOnItsLastFrameWhereItIsShortOrCannotBeginAgain) {
+  const auto open = [] { return stamped({}); };
+  PlayedSource brief(stamped({4.0, 4.1, 4.2}), open);
+  PlayedSource given(stamped(slow(4.0)), {});
+  for (auto& [source, last] : {std::pair<PlayedSource&, double>(brief, 0.2), {given, 2.5}}) {
+    EXPECT_FALSE(source.first_frame().cloud == nullptr);
+    const std::vector<FedFrame> frames = played(source, last + 0.11);
+    const auto count = static_cast<std::ptrdiff_t>(frames.size());
+    ASSERT_GT(count, 5);
+    for (auto fed = frames.begin(); fed != frames.end(); ++fed) {
+      const double after = static_cast<double>(fed - frames.end() + 4) / 30.0;
+      EXPECT_FALSE(fed->after_jump);
+      EXPECT_EQ(fed->is_new, after < 0.01);
+      if (!fed->is_new) EXPECT_NEAR(fed->frame.stamp, last + after, 1e-9);
+      if (!fed->is_new)
+        EXPECT_EQ(fed->frame.cloud, frames[static_cast<std::size_t>(count - 4)].frame.cloud);
+    }
+    EXPECT_TRUE(source.status().stays_valid);
+  }
 }
 
 TEST(PlayedSource, ShowsASingleFrameAgainAtThirtyHertz) {
@@ -68,11 +98,12 @@ TEST(PlayedSource, ShowsASingleFrameAgainAtThirtyHertz) {
     EXPECT_FALSE(frames[k].is_new);
     EXPECT_EQ(frames[k].frame.cloud, frames[0].frame.cloud);
   }
+  EXPECT_TRUE(source.status().stays_valid);
 }
 
 TEST(PlayedSource, LeavesOutFramesWhoseStampsCannotBeTrue) {
   PlayedSource source(stamped({nan, 0.0, 0.1, 0.1, 0.05, nan, 0.2}), [] { return stamped({0.0}); });
-  const std::vector<FedFrame> frames = played(source, 0.25);
+  const std::vector<FedFrame> frames = played(source, 0.22);
   ASSERT_EQ(frames.size(), 3U);
   for (std::size_t k = 0; k < frames.size(); ++k)
     EXPECT_NEAR(frames[k].frame.stamp, 0.1 * static_cast<double>(k), 1e-12);
@@ -86,6 +117,8 @@ TEST(PlayedSource, GoesOnWhenItsClockIsSet) {
   ASSERT_EQ(frames.size(), 6U);
   for (std::size_t k = 0; k < frames.size(); ++k)
     EXPECT_NEAR(frames[k].frame.stamp, 0.1 * static_cast<double>(k), 1e-3);
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    EXPECT_EQ(frames[k].after_jump, k == 2 || k == 4) << k;
 }
 
 TEST(PlayedSource, EndsEachLookAtASourceThatRepeatsOneStampForEver) {
@@ -114,8 +147,8 @@ TEST(PlayedSource, RefusesLiveCamerasAndEmptyRecordings) {
         return PlayedSource(stamped({nan, nan}), open).first_frame().stamp;
       },
       "made:"));
-  PlayedSource gone(stamped({0.0, 0.1}), open);
-  EXPECT_TRUE(fails_saying([&] { return played(gone, 1.0).size(); }, "no frames any more"));
+  PlayedSource gone(stamped(slow(0.0)), open);
+  EXPECT_TRUE(fails_saying([&] { return played(gone, 4.0).size(); }, "no frames any more"));
 }
 
 TEST(PosedSource, PutsDepthImagesAndPointsWhereTheCameraStands) {

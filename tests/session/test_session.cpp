@@ -415,6 +415,64 @@ TEST(Session, GoesOnWithAPictureOfOneFrameAndARecordingThatEnds) {
   }
 }
 
+// The wall goes away by 30 mm, and the hand after it; where the recording begins again, the wall is
+// that far before the hand.
+TEST(Session, DoesNotFeelTheJumpWhereARecordingBeginsAgain) {
+  constexpr double pass = 2.5;  // [s]
+  const auto depth = [](double t) { return wall_depth + 0.012 * std::fmod(t, pass); };
+  SessionOptions options = on_the_wall();
+  options.sources.add(
+      {"leaving", "", [=](const Uri&) -> std::unique_ptr<Source> {
+         return std::make_unique<MadeSource>([=](int k) -> std::optional<Frame> {
+           const double t = k / 30.0;
+           if (t >= pass) return std::nullopt;
+           return Frame{t, wall(static_cast<std::uint16_t>(std::lround(1e3 * depth(t))))};
+         });
+       }});
+  options.cameras.clear();
+  options.cameras.push_back({.uri = "leaving:"});
+  const auto at = [&](double t, double behind) {
+    return HipPath::Sample{t, {0.0, 0.0, depth(t) + behind}};
+  };
+  options.device = std::make_unique<ScriptedDevice>(HipPath({at(0.0, -0.05),
+                                                             at(1.0, -0.05),
+                                                             at(1.1, 0.005),
+                                                             at(2.4999, 0.005),
+                                                             {3.0, {0.0, 0.0, depth(2.4999)}},
+                                                             at(3.3, -0.05),
+                                                             at(3.6, -0.05),
+                                                             at(3.8, 0.005),
+                                                             at(4.4, 0.005)}),
+                                                    false);
+  const Outcome run = play(std::move(options), 4.4);
+  const double before = run.ticks[2490].force.norm();
+  EXPECT_GT(before, 1.5);
+  for (std::size_t i = 2490; i < 3600; ++i) {
+    ASSERT_LE(run.ticks[i].force.norm(), i < 2600 ? before + 0.2 : 0.0) << i << " ms";
+  }
+  EXPECT_GT(run.ticks[4390].force.norm(), 1.5) << "the hand has engaged anew";
+}
+
+TEST(Session, StrokesARecordingBeforeItBeginsAgain) {
+  SessionOptions options;
+  const SourceInfo info{.uri = "made:", .kind = "made", .frames = 90, .frame_rate = 30.0};
+  options.sources.add({"made", "", [=](const Uri&) -> std::unique_ptr<Source> {
+                         return std::make_unique<MadeSource>(
+                             [](int k) -> std::optional<Frame> {
+                               if (k == 90) return std::nullopt;
+                               return Frame{k / 30.0, wall()};
+                             },
+                             info);
+                       }});
+  options.cameras.push_back({.uri = "made:"});
+  options.pace = Pace::free_running;
+  const Outcome run = play(std::move(options), 3.5);
+  EXPECT_GT(run.state.summary.contact_ticks, 1000U);
+  for (std::size_t i = 2950; i < run.ticks.size(); ++i) {
+    ASSERT_EQ(run.ticks[i].tick.state, ContactState::free_motion) << i;
+  }
+}
+
 TEST(Session, StopsAndTakesTheForceOffWhereASourceThrows) {
   SessionOptions options;
   options.cameras.push_back({.source = std::make_unique<MadeSource>([](int k) -> Frame {

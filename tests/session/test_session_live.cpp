@@ -419,6 +419,47 @@ TEST(LiveSession, LetsGoOfTheHandWhereTimeJumpsInARecording) {
   EXPECT_EQ(session.settings().scene, 2U);
 }
 
+// A source that has one frame says that it is valid for as long as nothing replaces it; of a camera
+// that stops nobody knows what it would see by now.
+TEST(LiveSession, GoesOnFeelingAStillPictureAndNotWhatAStoppedCameraSaw) {
+  constexpr double lost_age = 0.3;  // [s]
+  constexpr double slack = 0.05;    // [s]
+  for (const bool is_live : {false, true}) {
+    const auto captured = std::make_shared<std::atomic<double>>(0.0);  // [s] the last frame
+    const auto has_ended = std::make_shared<std::atomic<bool>>(false);
+    SessionOptions options = patient(std::make_shared<Log>());
+    options.settings.safety.fade_age = 0.5 * lost_age;
+    options.settings.safety.lost_age = lost_age;
+    options.cameras.front().source = std::make_unique<test::MadeSource>(
+        [=](int k) -> std::optional<Frame> {
+          if (k == (is_live ? 100 : 1)) {
+            *has_ended = true;
+            return std::nullopt;
+          }
+          if (k > 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+          *captured = monotonic_now();
+          return Frame{*captured, wall(static_cast<std::uint16_t>(500 + k % 2))};
+        },
+        SourceInfo{.uri = "made:", .kind = "made", .live = is_live});
+    Session session(std::move(options));
+    auto ticks = session.ticks();
+    session.start();
+    bool is_felt = false, is_felt_late = false;
+    double last = 0.0;  // [s]
+    EXPECT_TRUE(comes_true([&] {
+      for (ServoTick tick{}; ticks.try_pop(tick);) {
+        last = tick.tick.t;
+        const bool is_late = *has_ended && tick.tick.t > *captured + lost_age + slack;
+        (is_late ? is_felt_late : is_felt) |= !tick.force.isZero(0.0);
+      }
+      return is_felt_late || (*has_ended && last > *captured + 10.0 * lost_age);
+    }));
+    EXPECT_EQ(is_felt_late, !is_live);
+    EXPECT_TRUE(is_felt || !is_live);
+    EXPECT_EQ(session.state().cameras.front().stays_valid, !is_live);
+  }
+}
+
 TEST(LiveSession, IsChangedAndWatchedFromSeveralThreads) {
   Session session(patient(std::make_shared<Log>()));
   session.start();

@@ -150,7 +150,7 @@ TEST(TumRecording, GivesEachFrameTheVisibleImageNextToItInTime) {
   folder.write("rgb.txt",
                "99.985 rgb/a.png\n100.008 rgb/b.png\n100.53 rgb/a.png\n101.02 rgb/a.png\n");
   EXPECT_TRUE(image_of(folder.open()->next()).brightness().empty()) << "unless it is asked for";
-  const auto source = folder.open("brightness=rgb.txt");
+  const auto source = folder.open("brightness=rgb.txt&colour=none");
   ASSERT_EQ(source->info().notes.size(), 1U);
   EXPECT_EQ(source->info().notes[0].substr(0, 37), "1 of 3 frames have no brightness: rgb");
   EXPECT_EQ(image_of(source->next()).brightness(), std::vector<std::uint8_t>(12, 20));
@@ -162,7 +162,7 @@ TEST(TumRecording, GivesEachFrameTheVisibleImageNextToItInTime) {
   EXPECT_TRUE(fails_saying([&] { return folder.open("brightness=grey.txt"); }, "grey.txt"));
 }
 
-TEST(TumRecording, GivesEachFrameTheColoursNextToItInTimeOnRequest) {
+TEST(TumRecording, GivesEachFrameTheColoursNextToItInTime) {
   const TumFolder folder;
   std::string samples;
   for (int v = 0; v < 3; ++v) {
@@ -170,10 +170,11 @@ TEST(TumRecording, GivesEachFrameTheColoursNextToItInTimeOnRequest) {
     for (int u = 0; u < 4; ++u)
       samples += {static_cast<char>(u), static_cast<char>(v), static_cast<char>(200)};
   }
+  EXPECT_TRUE(folder.open()->info().notes.empty());
   folder.write("seen.png", test::png_of(4, 3, 8, test::rgb, samples));
   folder.write("rgb.txt", "100.008 seen.png\n101.02 seen.png\n");
-  EXPECT_EQ(folder.open()->next()->colour, nullptr) << "unless it is asked for";
-  const auto source = folder.open("colour=rgb.txt");
+  EXPECT_EQ(folder.open("colour=none")->next()->colour, nullptr);
+  const auto source = folder.open();
   ASSERT_EQ(source->info().notes.size(), 1U);
   EXPECT_EQ(source->info().notes[0].substr(0, 33), "1 of 3 frames have no colour: rgb");
   const auto frame = source->next();
@@ -190,6 +191,18 @@ TEST(TumRecording, GivesEachFrameTheColoursNextToItInTimeOnRequest) {
   folder.write("seen.png", test::png_of(1, 1, 8, test::grey, std::string(2, '\0')));
   EXPECT_TRUE(
       fails_saying([&] { return folder.open("colour=rgb.txt")->next(); }, "seen.png", "1x1"));
+  // Who did not ask for colour touches without it.
+  const auto plain = folder.open();
+  for (int k = 0; k < 3; ++k) {
+    const auto without = plain->next();
+    ASSERT_TRUE(without);
+    EXPECT_EQ(without->colour, nullptr);
+  }
+  ASSERT_EQ(plain->info().notes.size(), 2U);
+  EXPECT_EQ(plain->info().notes[1].substr(0, 20), "colour is left out: ");
+  EXPECT_NE(plain->info().notes[1].find("1x1"), std::string::npos);
+  folder.write("rgb.txt", "no number\n");
+  EXPECT_TRUE(folder.open()->next());
   EXPECT_TRUE(fails_saying([&] { return folder.open("colour=no.txt"); }, "no.txt", "colour="));
 }
 

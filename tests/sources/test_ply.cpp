@@ -77,10 +77,32 @@ TEST(Ply, GivesTheColoursInEveryEncodingWithAndWithoutLists) {
       EXPECT_EQ(cloud.points[1], Vec3(1, 2, 3));
     }
   }
-  const std::string rest = "property float red\nproperty uchar green\nproperty uchar blue\n";
+  const std::string rest = "property int red\nproperty uchar green\nproperty uchar blue\n";
   EXPECT_TRUE(parse(header("ascii", "element vertex 1\n" + vertices + rest) + "1 2 3 0 1 2\n")
                   .colours.empty())
       << "colours of another type are passed over";
+}
+
+TEST(Ply, TakesColoursInFloatsForSharesOfTheBrightest) {
+  for (const std::string encoding : encodings) {
+    for (const bool lists : {false, true}) {
+      Values values(encoding);
+      values.add(1.0F).add(2.0F).add(3.0F).add(1.0F).add(std::uint8_t{7}).add(0.4);
+      if (lists) values.add(std::uint8_t{1}).add(std::uint8_t{9});
+      values.end_row();
+      values.add(1.0F).add(2.0F).add(3.0F).add(-1.0F).add(std::uint8_t{255}).add(3e9);
+      if (lists) values.add(std::uint8_t{0});
+      values.end_row();
+      const PointFile cloud =
+          parse(header(encoding, "element vertex 2\n" + vertices +
+                                     "property float red\nproperty uchar green\n"
+                                     "property double blue\n" +
+                                     (lists ? "property list uchar uchar more\n" : "")) +
+                values.text());
+      EXPECT_EQ(cloud.colours, (std::vector<std::uint8_t>{255, 7, 102, 0, 255, 255}))
+          << encoding << lists;
+    }
+  }
 }
 
 // Three vertices among others' elements, with a list in the middle of each vertex.

@@ -166,7 +166,7 @@ TEST(PointFiles, KeepTheImageOfAnOrganisedCloudWithItsHoles) {
   EXPECT_EQ(cloud_of(*frame).size(), 3U);
 }
 
-TEST(PointFiles, CarryTheColoursOfAnOrganisedCloudAndOfAMesh) {
+TEST(PointFiles, CarryTheColours) {
   const TemporaryFolder folder;
   const std::string image =
       "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nWIDTH 2\nHEIGHT 2\nPOINTS 4\nDATA ascii\n"
@@ -186,6 +186,15 @@ TEST(PointFiles, CarryTheColoursOfAnOrganisedCloudAndOfAMesh) {
   EXPECT_EQ(coloured->colour->width, 3);
   EXPECT_EQ(coloured->colour->height, 1);
   EXPECT_EQ(coloured->colour->rgb, (std::vector<std::uint8_t>{1, 2, 3, 4, 5, 6, 7, 8, 9}));
+  // Of points alone, too: each beside its own.
+  const std::string loose =
+      "FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nWIDTH 3\nHEIGHT 1\nPOINTS 3\nDATA ascii\n"
+      "9 0 1 1\nnan nan nan 2\n0 1 1 3\n";
+  const auto points = open_source("pcd:" + folder.write("1.pcd", loose).string())->next();
+  ASSERT_NE(points->colour, nullptr);
+  EXPECT_EQ(points->colour->rgb, (std::vector<std::uint8_t>{0, 0, 1, 0, 0, 2, 0, 0, 3}));
+  ASSERT_NE(cloud_of(*points).surface(), nullptr);
+  EXPECT_EQ(cloud_of(*points).surface()->points[2], Vec3(0, 1, 1));
 }
 
 TEST(PointFiles, OfADepthCameraAreDepthImagesInColourThatShareTheCamera) {

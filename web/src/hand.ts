@@ -47,7 +47,8 @@ export class HandInput {
   private target: Vec3 = [0, 0, 0];
   private readonly pointers = new Pointers();
   private press: Press | null = null;
-  private pressed: { x: number; y: number; frames: number } | null = null; // aimed at last
+  // Where the pointer was last, and where a surface was seen for it, in how many frames.
+  private pressed: { pointer: Place; at: Place; frames: number } | null = null;
   private readonly keys = new Set<string>();
   private timer = 0;
   private shiftHeld = false;
@@ -93,8 +94,8 @@ export class HandInput {
   showPointer(): void {
     if (this.press) return this.view.setPointer(this.press.aimedAt);
     if (!this.over) return;
-    const spot = this.host.takesHand() ? this.view.spotUnder(this.over.x, this.over.y) : null;
-    this.view.setPointer(spot);
+    const spot = this.host.takesHand() ? this.view.surfaceNear(this.over)?.spot : null;
+    this.view.setPointer(spot ?? null);
     this.canvas.dataset.over = spot ? "surface" : "";
     this.over = null;
   }
@@ -142,18 +143,18 @@ export class HandInput {
       // It is up again already: the next that is heard of it says so.
     }
     const at = { x: event.clientX, y: event.clientY };
-    const spot = this.host.takesHand() ? this.view.spotUnder(at.x, at.y) : null;
+    const near = this.host.takesHand() ? this.view.surfaceNear(at) : null;
     const turns = event.shiftKey || event.ctrlKey;
     const pressed = this.pointers.pressing !== null;
-    const may = { press: spot !== null && this.host.newest() !== null };
+    const may = { press: near !== null && this.host.newest() !== null };
     const gesture = this.pointers.down(event.pointerId, at, event.button, turns, may);
     if (pressed && this.pointers.pressing === null) this.release();
     this.canvas.dataset.gesture = gesture;
-    if (gesture !== "press" || !spot || !this.take()) return;
+    if (gesture !== "press" || !near || !this.take()) return;
     this.byKeys = false;
     const ahead = (place: Vec3) => this.view.ahead(place);
-    this.press = new Press(this.target, spot, this.host.touch(), ahead);
-    this.pressed = { ...at, frames: this.view.frames };
+    this.press = new Press(this.target, near.spot, this.host.touch(), ahead);
+    this.pressed = { pointer: at, at: near.at, frames: this.view.frames };
     this.start();
   }
 
@@ -237,25 +238,29 @@ export class HandInput {
   }
 
   private pressStep(press: Press, seconds: number): void {
-    const at = this.pointers.pressing;
-    const last = this.pressed;
-    if (!at || !last) return;
-    const moved = at.x !== last.x || at.y !== last.y;
-    if (moved || this.view.frames !== last.frames) {
-      const spot = this.view.spotUnder(at.x, at.y);
-      if (!moved) {
-        if (spot) press.follow(spot);
-      } else if (spot) {
-        press.aim(spot);
-      } else {
-        this.slideOverHole(press, at);
-      }
-      this.pressed = { ...at, frames: this.view.frames };
+    const pointer = this.pointers.pressing;
+    if (!pointer || !this.pressed) return;
+    const { x, y } = this.pressed.pointer;
+    const moved = pointer.x !== x || pointer.y !== y;
+    if (moved || this.view.frames !== this.pressed.frames) {
+      const at = this.aimAnew(press, pointer, moved);
+      this.pressed = { pointer: { ...pointer }, at, frames: this.view.frames };
     }
     const target = press.step(seconds, this.host.newest());
     if (target.every((x, i) => x === this.target[i])) return;
     this.target = target;
     this.host.moved(Grip.held, target);
+  }
+
+  // What is pressed now that the pointer moved, or a frame came.
+  private aimAnew(press: Press, pointer: Place, moved: boolean): Place {
+    const at = moved ? pointer : this.pressed!.at;
+    const spot = this.view.spotUnder(at.x, at.y);
+    const near = spot ? { at, spot } : press.inAir ? this.view.surfaceNear(pointer) : null;
+    if (!near && moved) this.slideOverHole(press, pointer);
+    else if (near && moved) press.aim(near.spot);
+    else if (near) press.follow(near.spot);
+    return near?.at ?? at;
   }
 
   private slideOverHole(press: Press, at: Place): void {

@@ -127,7 +127,7 @@ const connection = new Connection({
     role.dataset.role = newest.role;
     role.textContent = roleNames[newest.role].name;
     role.title = roleNames[newest.role].may;
-    panel.update(newest);
+    panel.update(newest, view.inOwnFrame);
     brush.update(newest);
     fixtures.update(newest);
     view.showFixtures(newest.fixtures.map((one) => ({ name: one.name, ends: fixtureLines(one) })));

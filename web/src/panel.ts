@@ -62,14 +62,13 @@ export function cameraText({
   const first = cameras[0];
   if (!first) return "no camera";
   const isLast = first.place === first.frames - 1;
-  const how =
+  const stays =
     first.frames === 1
       ? "still picture"
-      : first.frames > 1 && playback?.paused
-        ? isLast && !playback.loop
-          ? "ended, its last frame stays"
-          : "paused"
-        : `${first.rate.toFixed(0)} Hz`;
+      : isLast && !playback?.loop
+        ? "ended, its last frame stays"
+        : "paused";
+  const how = first.stays_valid ? stays : `${first.rate.toFixed(0)} Hz`;
   const dropped = cameras.reduce((sum, camera) => sum + camera.dropped, 0);
   const frames = dropped === 1 ? "frame" : "frames";
   const lost = dropped > 0 ? ` · ${dropped.toLocaleString("en")} ${frames} dropped` : "";
@@ -396,7 +395,8 @@ export class Panel {
     );
   }
 
-  update(state: State): void {
+  /** @param inOwnFrame  cameras whose poses nobody knows */
+  update(state: State, inOwnFrame: boolean): void {
     this.showRecording(state);
     if (document.activeElement !== this.method) this.method.value = state.method;
     if (document.activeElement !== this.scene) this.scene.value = state.cameras[0]?.uri ?? "";
@@ -421,7 +421,7 @@ export class Panel {
     get("safety-lead").textContent =
       `${total.toLocaleString("en")} interventions of the safety chain; suspected pop-throughs: ` +
       `${state.pop_throughs}.`;
-    this.showFacts(state);
+    this.showFacts(state, inOwnFrame);
   }
 
   // Greys out what the page may not do, and says why.
@@ -450,15 +450,19 @@ export class Panel {
     this.opener.value = recording.open ?? "";
   }
 
-  private showFacts(state: State): void {
+  private showFacts(state: State, inOwnFrame: boolean): void {
     const { servo } = state;
     const microseconds = (seconds: number) => `${(1e6 * seconds).toFixed(1)} µs`;
-    const facts: [string, string][] = [
-      ...state.cameras.map(({ uri, kind, sensor, rate, state: how }, i): [string, string] => [
+    type Fact = [string, string];
+    const facts: Fact[] = [
+      ...state.cameras.map(({ uri, kind, sensor, rate, state: how }, i): Fact => [
         state.cameras.length > 1 ? `Camera ${i + 1}` : "Camera",
         `${uri} · ${kind}${sensor === "unknown" ? "" : `, ${sensor}`}` +
           (how === "live" ? `, ${rate.toFixed(1)} Hz` : ` · ${how}`),
       ]),
+      ...(inOwnFrame && state.cameras[0]?.frames !== 1
+        ? [["World", "the camera's own frame, no pose being known: the hand goes with it"] as Fact]
+        : []),
       [
         "Hand",
         [state.device.uri, state.device.kind, state.device.fault].filter(Boolean).join(" · "),

@@ -21,6 +21,35 @@ export interface Motion {
 }
 
 const CLOSE = 10; // [px] two fingers this close do not pinch
+const REACHES = [6, 12, 24, 48, 96]; // [px] from a place that shows nothing, where one looks
+const DIRECTIONS = 8;
+const OPEN = 2; // directions at most in which a hole shows nothing; beyond, it is the background
+
+/**
+ * What is found at a place of the picture, or, in a hole, at the nearest place where there is
+ * something; null: the place is not surrounded by anything.
+ */
+export function nearestAbout<Found>(
+  at: Place,
+  look: (place: Place) => Found | null,
+): { at: Place; found: Found } | null {
+  const found = look(at);
+  if (found) return { at, found };
+  let nearest: { at: Place; found: Found; reach: number } | null = null;
+  let open = 0;
+  for (let i = 0; i < DIRECTIONS && open <= OPEN; ++i) {
+    // Opposite sides first: beside a surface, that ends the search.
+    const angle = (2 * Math.PI * ((i >> 1) + (i % 2) * (DIRECTIONS / 2))) / DIRECTIONS;
+    const isThere = REACHES.some((reach) => {
+      const place = { x: at.x + reach * Math.cos(angle), y: at.y + reach * Math.sin(angle) };
+      const found = look(place);
+      if (found && (!nearest || reach < nearest.reach)) nearest = { at: place, found, reach };
+      return found !== null;
+    });
+    if (!isThere) ++open;
+  }
+  return open > OPEN ? null : nearest;
+}
 
 export class Pointers {
   private readonly pointers = new Map<number, { at: Place; gesture: Gesture }>();

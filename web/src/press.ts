@@ -12,6 +12,8 @@ export const HOVER = 0.025;
 export const TRAVEL = 0.6;
 /** [m/s] along a surface that is touched. */
 export const SLIDE = 0.3;
+/** [m] that a hand in the air flies after what frames show where the pointer rests. */
+export const LONGEST_CHASE = 2;
 
 const PRESS_FORCE = 2; // [N] that a press settles at: clear, and within a small device's 3.3 N
 const DEPTHS = [0.0015, 0.015] as const; // [m] least and most that it takes for that
@@ -26,7 +28,7 @@ const JUMP = 0.08; // [m] a spot that is farther from the last is flown to, not 
 const WAIT = -0.001; // [m] depth at which a hand waits to be engaged: it is asked to feel nothing
 const SLACK = 0.02; // [m] by which the hand may be ahead of its proxy, besides the depth
 const CLEAR = 0.015; // [m] before all that is seen, on a flight
-const SETTLE = 0.2; // of what a new frame says of the spot of a pointer that rests
+const SETTLE = 0.2; // of what a new frame says of the spot of a hand that touches
 const LONGEST_STEP = 0.05; // [s] a page that was busy makes no larger step
 
 /** What the newest tick says. */
@@ -87,6 +89,8 @@ export class Press {
   private way: Vec3[];
   private depth = -HOVER; // [m] of the hand below the spot's plane
   private wanted: number; // [m] depth below the surface that is felt; negative: above it
+  private touching = false;
+  private chased = 0; // [m] that frames have led the hand since the pointer moved
 
   /**
    * @param start  [m] where the hand is
@@ -112,8 +116,18 @@ export class Press {
     return this.spot;
   }
 
+  /** A hand in the air goes wherever its pixel's surface is; one that touches stays there. */
+  get inAir(): boolean {
+    return !this.touching;
+  }
+
   /** The pointer moved: slides there, or flies where it is far. */
   aim(spot: Spot): void {
+    this.chased = 0;
+    this.go(spot);
+  }
+
+  private go(spot: Spot): void {
     const away = length(sub(spot.at, this.spot.at));
     this.spot = spot;
     if (!this.travelling && away < JUMP) return;
@@ -121,9 +135,13 @@ export class Press {
     this.way = flight(this.place, above(spot), this.ahead);
   }
 
-  /** The pointer rests, and a new frame says where its spot is: follows it, calmly. */
+  /** The pointer rests, and a new frame says where its spot is: follows, in contact calmly. */
   follow(spot: Spot): void {
     const away = sub(spot.at, this.spot.at);
+    if (this.inAir && this.chased + length(away) <= LONGEST_CHASE) {
+      if (length(away) > JUMP) this.chased += length(away);
+      return this.go(spot);
+    }
     if (length(away) > JUMP) return; // something has come between
     this.spot = {
       at: add(this.spot.at, scale(away, SETTLE)),
@@ -139,6 +157,7 @@ export class Press {
   /** Where the hand is to be, `seconds` after the last call. */
   step(seconds: number, felt: Felt | null): Vec3 {
     const dt = clamp(seconds, 0, LONGEST_STEP);
+    this.touching = felt?.touching ?? false;
     if (this.travelling) {
       let left = TRAVEL * dt;
       while (left > 0 && this.way.length > 0) {

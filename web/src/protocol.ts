@@ -330,6 +330,8 @@ export interface CameraState {
   rate: number;
   /** live, ended, or what went wrong */
   state: string;
+  /** what is shown is declared valid until it is replaced: no live camera that stopped */
+  stays_valid: boolean;
   /** frames that were not handed over, so as to keep up */
   dropped: number;
   /** of a recording; 0: it has no end, or is none */

@@ -23,6 +23,7 @@ import {
 } from "./camera_math";
 import { firstView, offCentre, type Room } from "./first_view";
 import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";
+import { nearestAbout, type Place } from "./pointers";
 import type { Frame, OtherHand, Rays, Ticks, Vec3 } from "./protocol";
 import type { Spot } from "./surface";
 import { SOFTWARE_LEVEL, Thinning } from "./thinning";
@@ -509,6 +510,12 @@ export class SceneView {
     return this.tinted && this.hasColour;
   }
 
+  /** Is the world the camera's own frame, as no pose is known? */
+  get inOwnFrame(): boolean {
+    const frames = [...this.clouds.values()].flatMap(({ frame }) => frame ?? []);
+    return frames.some((frame) => frame.worldFromCamera.every((x, i) => x === +(i % 5 === 0)));
+  }
+
   /** Draws the cameras' own colours, where they have any, or those of depth. */
   setTinted(tinted: boolean): void {
     this.tinted = tinted;
@@ -570,6 +577,16 @@ export class SceneView {
       if (met && (!best || met.distance < best.distance)) best = met;
     }
     return best?.spot ?? null;
+  }
+
+  /** The same, and where; in a hole of a camera's image, the nearest surface about it. */
+  surfaceNear(at: Place): { at: Place; spot: Spot } | null {
+    // Points without an image are met from some way beside them, and looking at many takes long.
+    const hasImage = [...this.clouds.values()].some(({ seen }) => seen?.unordered === 0);
+    const near = nearestAbout(at, (place) =>
+      place === at || hasImage ? this.spotUnder(place.x, place.y) : null,
+    );
+    return near && { at: near.at, spot: near.found };
   }
 
   /** Where a pointer would press; null: nowhere. */

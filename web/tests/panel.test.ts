@@ -95,17 +95,23 @@ test("warnings are sentences, one after the other", () => {
 test("what is looked at says whether it goes on, and what was left out", () => {
   const camera = {
     ...{ uri: "tum:/data/desk", kind: "", sensor: "unknown", rate: 30, state: "live" },
-    ...{ dropped: 0, frames: 0, place: 0, time: 0 },
+    ...{ stays_valid: false, dropped: 0, frames: 0, place: 0, time: 0 },
   };
   const playback = { paused: false, loop: false, speed: 1 };
   const said = (more: Partial<typeof camera>, how: typeof playback | null = playback) =>
     cameraText({ cameras: [{ ...camera, ...more }], playback: how });
   expect(said({}, null)).toBe("desk · 30 Hz");
-  expect(said({ frames: 1 })).toBe("desk · still picture");
+  const stays_valid = true;
+  expect(said({ frames: 1, stays_valid })).toBe("desk · still picture");
   expect(said({ frames: 90, dropped: 1200 })).toBe("desk · 30 Hz · 1,200 frames dropped");
   const paused = { ...playback, paused: true };
-  expect(said({ frames: 90, place: 4 }, paused)).toBe("desk · paused");
-  expect(said({ frames: 90, place: 89 }, paused)).toBe("desk · ended, its last frame stays");
+  const again = { ...paused, loop: true };
+  expect(said({ frames: 90, place: 4, stays_valid }, again)).toBe("desk · paused");
+  const ended = "ended, its last frame stays";
+  expect(said({ frames: 90, place: 89, stays_valid }, paused)).toBe(`desk · ${ended}`);
+  expect(said({ frames: 90, place: 89, stays_valid }, again)).toBe("desk · paused");
+  // What a camera that stopped saw is not declared valid, whatever its place.
+  expect(said({ place: 89, state: "waiting: no frame for 0.4 s" })).toContain("waiting");
   expect(said({ state: "searching: unplugged" })).toBe("desk · searching: unplugged");
   expect(cameraText({ cameras: [], playback: null })).toBe("no camera");
 });

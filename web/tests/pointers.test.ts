@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-import { expect, test } from "vitest";
-import { Pointers } from "../src/pointers";
+import { describe, expect, test } from "vitest";
+import { nearestAbout, Pointers, type Place } from "../src/pointers";
 
 const SURFACE = { press: true };
 const BESIDE = { press: false };
@@ -50,4 +50,30 @@ test("a press is where its pointer is", () => {
   expect(pointers.move(9, at(1, 1), 1)).toBeNull();
   pointers.clear();
   expect(pointers.pressing).toBeNull();
+});
+
+describe("the nearest surface about a place", () => {
+  const beside = (hole: (place: Place) => boolean) => (place: Place) =>
+    hole(place) ? null : place;
+  const within = (radius: number) => beside(({ x, y }) => Math.hypot(x, y) < radius);
+
+  test("is the place itself where there is one", () => {
+    expect(nearestAbout({ x: 3, y: 4 }, within(2))?.at).toEqual({ x: 3, y: 4 });
+  });
+
+  test("is beside a hole that is surrounded, on the side that is nearest", () => {
+    expect(nearestAbout(at(0), within(30))).not.toBeNull();
+    const near = nearestAbout(at(15), within(30))!;
+    expect(near.at.x).toBeGreaterThan(29);
+    expect(near.at.y).toBeCloseTo(0, 9);
+    expect(near.found).toBe(near.at);
+    // A hole that reaches out of the picture
+    const gap = ({ x, y }: Place) => Math.abs(x) < 12 && y > -30;
+    expect(nearestAbout(at(0), beside(gap))!.at.y).toBeCloseTo(0, 9);
+  });
+
+  test("is nothing beside what is seen, nor in the middle of nothing", () => {
+    expect(nearestAbout(at(0), beside(({ x }) => x < 5))).toBeNull();
+    expect(nearestAbout(at(0), within(1000))).toBeNull();
+  });
 });

@@ -9,6 +9,7 @@ import {
   approach,
   flight,
   HOVER,
+  LONGEST_CHASE,
   outOf,
   Press,
   SLIDE,
@@ -237,12 +238,58 @@ test("whatever spots it is aimed at, the hand is never faster than it may be", (
   expect(Math.max(...speeds(world.path))).toBeLessThanOrEqual(TRAVEL * 1.0001);
 });
 
-test("frames move the spot of a pointer that rests calmly, what passes before it does not", () => {
+test("frames move the spot of a hand that touches calmly, what passes before it does not", () => {
+  const world = new World([0, 0, 0.05]);
   const press = new Press([0, 0, 0.05], floor(0), { r_c, stiffness }, overFloor);
+  world.run(press, 1.5);
   press.follow({ at: [0, 0, 0.01], normal: up });
   expect(press.aimedAt.at[2]).toBeCloseTo(0.002, 9);
   press.follow({ at: [0, 0, 0.3], normal: up });
   expect(press.aimedAt.at[2]).toBeCloseTo(0.002, 9);
+});
+
+describe("a hand in the air", () => {
+  const overFirst = [0.3, 0.2, 0.3] as const;
+  const hand = { r_c, stiffness };
+
+  test("goes after what the pixel sees, however far that has gone", () => {
+    const world = new World([...overFirst], () => -0.2);
+    const press = new Press([...overFirst], floor(0), hand, overFloor);
+    world.run(press, 0.2);
+    // A camera that moves, or another frame of a recording: 0.2 m deeper, 0.15 m aside.
+    press.follow({ at: [0.15, 0, -0.2], normal: up });
+    world.run(press, 3);
+    expect(world.force).toBeCloseTo(2, 1);
+    expect(world.feel().hip[0]).toBeCloseTo(0.15, 3);
+    expect(Math.max(...speeds(world.path))).toBeLessThanOrEqual(TRAVEL * 1.0001);
+  });
+
+  test("is before a surface that comes nearer on its way down, and never pushed through it", () => {
+    const world = new World([0, 0, 0.05], (t) => Math.min(0.1, 0.1 * t));
+    const press = new Press([0, 0, 0.05], floor(0), hand, (place) => ({
+      distance: place[2] - world.surface,
+      towards: up,
+    }));
+    for (let i = 0; i < 150; ++i) {
+      if (i % 2 === 0) press.follow({ at: [0, 0, world.surface], normal: up });
+      world.run(press, STEP);
+      expect(world.feel().hip[2]).toBeGreaterThan(world.surface - 0.012);
+    }
+    expect(world.force).toBeCloseTo(2, 1);
+  });
+
+  test("does not chase a pixel without end that flickers between two surfaces", () => {
+    const press = new Press([0, 0, 0.5], floor(0), hand, () => null);
+    const path: Vec3[] = [];
+    for (let i = 0; i < 1000; ++i) {
+      if (i % 40 === 0) press.follow(floor(i % 80 === 0 ? 0.5 : 0));
+      const hip = press.step(STEP, null);
+      path.push(hip);
+    }
+    const way = speeds(path).reduce((sum, speed) => sum + speed * STEP, 0);
+    expect(way).toBeLessThan(0.6 + LONGEST_CHASE + 2 * HOVER + 0.1);
+    expect(path.slice(-200).every((place) => length(sub(place, path.at(-1)!)) < 0.05)).toBe(true);
+  });
 });
 
 describe("let go", () => {

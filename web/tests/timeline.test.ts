@@ -12,7 +12,8 @@ test("times are minutes and seconds", () => {
 
 test("the timeline is of the longest recording, and of no live camera or still picture", () => {
   const camera = (uri: string, frames: number): CameraState => {
-    const live = { kind: "", sensor: "unknown", dropped: 0, rate: 30, state: "live" };
+    const live = { kind: "", sensor: "unknown", dropped: 0,
+    stays_valid: false, rate: 30, state: "live" };
     return { uri, ...live, frames, place: 0, time: 0 };
   };
   expect(longest([camera("synthetic:desk", 0), camera("pcd:one", 1)])).toBeNull();

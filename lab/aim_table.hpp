@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "lab/experiment.hpp"
+#include "lab/plot.hpp"
 #include "lab/table.hpp"
 
 namespace palpate::lab {
@@ -34,5 +37,9 @@ class AimTable {
 
 /// A measure as the table names it. @param unit  empty where it has none
 std::string measure_text(std::string_view name, std::string_view unit);
+
+/// Each measure of a table's columns "scene", "measure", "aim" and "value" divided by its aim, if
+/// it has one and `keep(row)` is true; what is exact or lost has no mark.
+Figure figure_of_aims(const Table& table, const std::function<bool(std::size_t)>& keep);
 
 }  // namespace palpate::lab

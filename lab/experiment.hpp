@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "lab/method.hpp"
+#include "lab/plot.hpp"
 #include "lab/table.hpp"
 #include "palpate/core/parameters.hpp"
 
@@ -64,8 +65,7 @@ struct Experiment {
   std::vector<std::string_view> default_methods;  ///< empty: it compares none
   bool has_grid;                                  ///< takes --grid
   std::vector<Cell> (*cells)(const Experiment&, const ExperimentOptions&);
-  /// gnuplot commands that draw the figure from the file named by the variable `csv`.
-  std::string_view plot;
+  Figure (*figure)(const Table&);
   std::vector<Claim> (*claims)(const Table&);
   /// A bench has scores; what redraws the paper has none.
   Scores (*scores)(const Table&) = nullptr;

@@ -3,11 +3,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
-#include <cstdlib>
+#include <cmath>
 #include <cstring>
 #include <fstream>
-#include <memory>
 #include <sstream>
 
 #include <fmt/format.h>
@@ -36,57 +34,6 @@ std::string command_line(const Experiment& experiment, const ExperimentOptions& 
   if (!options.recording.empty()) line += " --recording " + options.recording;
   if (options.seed != 1) line += fmt::format(" --seed {}", options.seed);
   return line;
-}
-
-// Quoted for gnuplot: single quotes take everything as it is, and double themselves.
-std::string in_quotes(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? std::string("''") : std::string(1, c);
-  return result + "'";
-}
-
-// Draws NAME.svg from NAME.csv; an empty path where there is no gnuplot.
-fs::path draw(const Experiment& experiment, const ExperimentOptions& options,
-              const fs::path& folder) {
-  const fs::path csv = folder / (std::string(experiment.name) + ".csv");
-  const fs::path figure = folder / (std::string(experiment.name) + ".svg");
-  std::string methods;
-  for (const std::string& name : methods_of(experiment, options))
-    methods += (methods.empty() ? "" : " ") + name;
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> gnuplot(
-      popen("gnuplot 2>/dev/null", "w"), pclose);  // NOLINT(cert-env33-c): gnuplot is the user's
-  if (!gnuplot) return {};
-  fs::remove(figure);
-  fmt::print(gnuplot.get(),
-             "set terminal svg size 860,480 font 'sans,13' background rgb 'white'\n"
-             "set output {}\ncsv = {}\nmethods = {}\nset datafile separator ','\n"
-             "set grid lc rgb '#dddddd'\n{}",
-             in_quotes(figure.string()), in_quotes(csv.string()), in_quotes(methods),
-             experiment.plot);
-  return figure;
-}
-
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += c;
-    }
-  }
-  return result;
 }
 
 std::string read(const fs::path& file) {
@@ -177,16 +124,66 @@ Point Cloud Data</i>, IEEE Transactions on Haptics, 2013: its figures and claims
 Lengths are in units of r_c = 5 mm where the paper's are.</p>
 )";
 
+// Of what `bench --growth` writes: a tick against what might make it grow.
+Figure growth_figure(const Table& table) {
+  Figure figure{{}, 3};
+  const auto add = [&](std::string_view series, std::string_view column, Axis x) {
+    const Points ticks = points(table, {{"series", series}}, column, "tick_us");
+    figure.panels.push_back({.x = std::move(x),
+                             .y = {.label = "tick [µs]", .low = 0.0},
+                             .series = {{"", ticks, Line::solid, Mark::disc, 0}}});
+  };
+  add("image_width", "x", {"image width [px]"});
+  add("focal_length", "points", {"points in the patch"});
+  add("cameras", "x", {"cameras"});
+  add("frame_rate", "x", {"frame rate [Hz]"});
+  add("depth_mm", "x", {"depth of the hand [mm]"});
+  add("unorganised", "x", {.label = "unorganised points", .log = true});
+  return figure;
+}
+
+// Of what `trace` writes: heights and force along y, as in Fig. 16.
+Figure slide_figure(const Table& table) {
+  Panel height{.x = {"along y [m]"}, .y = {"height z [m]"}};
+  Panel force{.x = height.x, .y = {"force [N]"}};
+  height.series = {
+      {"hand (HIP)", points(table, Where{}, "hip_y", "hip_z"), Line::dashed, Mark::none, grey},
+      {"proxy", points(table, Where{}, "proxy_y", "proxy_z")}};
+  Points felt;
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    felt.push_back({table.number(row, "hip_y"),
+                    std::hypot(table.number(row, "force_x"), table.number(row, "force_y"),
+                               table.number(row, "force_z"))});
+  force.series = {{"force", felt}};
+  return {{height, force}};
+}
+
 }  // namespace
+
+fs::path draw(const fs::path& csv) {
+  const std::string name = csv.stem().string();
+  const std::string text = read(csv);
+  if (text.empty())
+    throw Error(csv.string(), "there is no such file, or nothing in it",
+                "give a CSV that eval, bench --growth or trace wrote");
+  const Table table(csv.string(), text);
+  const fs::path file = fs::path(csv).replace_extension(".svg");
+  if (name == "growth")
+    write(file, svg(growth_figure(table), "ticks against what might make them grow"));
+  else if (table.has("hip_x") && !table.has("method"))
+    write(file, svg(slide_figure(table), "a hand that presses and slides"));
+  else
+    write(file, svg(find_experiment(name).figure(table), find_experiment(name).summary));
+  return file;
+}
 
 Result make_result(const Experiment& experiment, const ExperimentOptions& options,
                    std::string_view csv, const fs::path& folder) {
   const Table table(std::string(experiment.name) + ".csv", csv);
   Result result{&experiment, command_line(experiment, options), experiment.claims(table),
-                draw(experiment, options, folder), std::nullopt};
+                folder / (std::string(experiment.name) + ".svg"), std::nullopt};
+  write(result.figure, svg(experiment.figure(table), experiment.summary));
   if (experiment.scores != nullptr) result.scores = experiment.scores(table);
-  std::error_code error;
-  if (fs::file_size(result.figure, error) == 0 || error) result.figure.clear();
   return result;
 }
 
@@ -196,7 +193,7 @@ std::string result_as_text(const Result& result) {
     text += fmt::format("  {}: {}\n    paper: {}\n    ours:  {}\n    {}\n", claim.where,
                         claim.words, claim.paper, claim.ours, claim.verdict);
   if (result.scores) text += scores_as_text(*result.scores);
-  return text;
+  return text + "  drawn in " + result.figure.string() + "\n";
 }
 
 fs::path write_report(const std::vector<Result>& results, const fs::path& folder) {
@@ -213,20 +210,15 @@ fs::path write_report(const std::vector<Result>& results, const fs::path& folder
   for (const Result& result : results) {
     page += fmt::format("<h2>{}</h2>\n<p>{}<br><code>{}</code></p>\n", result.experiment->name,
                         escaped(result.experiment->summary), escaped(result.command));
-    std::string image;
-    if (!result.figure.empty()) {
-      const std::string svg = read(result.figure);
-      const std::size_t begin = svg.find("<svg");
-      image = fmt::format("\n![{}](images/{})\n", result.experiment->name,
-                          result.figure.filename().string());
-      page += "<figure>" + (begin == std::string::npos ? svg : svg.substr(begin)) + "</figure>\n";
-    }
+    const std::string image = fmt::format("\n![{}](images/{})\n", result.experiment->name,
+                                          result.figure.filename().string());
+    page += "<figure>" + read(result.figure) + "</figure>\n";
     if (result.scores) {
       page += scores_as_html(*result.scores);
       bench += fmt::format("## {}\n\n{}: `{}`\n\n{}{}\n", result.experiment->name,
                            result.experiment->summary, result.command,
                            scores_as_markdown(*result.scores), image);
-    } else if (!image.empty()) {
+    } else {
       figures += fmt::format("\n## {}\n\n{}\n{}", result.experiment->name,
                              result.experiment->summary, image);
     }

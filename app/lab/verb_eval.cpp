@@ -36,6 +36,7 @@ struct EvalOptions {
   std::vector<std::string> families;
   std::vector<std::string> fixed;
   std::string case_text;
+  std::vector<std::string> drawn;
   bool resume = false;
   bool list_methods = false;
   bool list_experiments = false;
@@ -93,6 +94,8 @@ int list(const EvalOptions& options) {
 
 int eval(const EvalOptions& options) {
   if (options.list_methods || options.list_experiments) return list(options);
+  for (const std::string& csv : options.drawn) fmt::print("drawn in {}\n", lab::draw(csv).string());
+  if (!options.drawn.empty()) return 0;
   if (options.name.empty())
     throw Error("eval", "no experiment is given", "see 'palpate eval --list' for their names");
   const bool all = options.name == "all";
@@ -186,6 +189,8 @@ Verb add_eval(CLI::App& program) {
   command->add_option("--seed", options->seed, "of all noise (1)");
   command->add_option("--jobs", options->jobs, "threads (one a core)");
   command->add_flag("--resume", options->resume, "go on from an interrupted run's finished cells");
+  command->add_option("--draw", options->drawn,
+                      "only draw these CSV files, of experiments, bench --growth or trace, anew");
   command->add_flag("--list", options->list_experiments, "list the experiments");
   command->add_flag("--list-methods", options->list_methods, "list the methods, one a line");
   options->parameters.add_parameters_to(*command);

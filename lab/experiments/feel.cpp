@@ -213,17 +213,11 @@ Scores feel_scores(const Table& table) {
   return scores.scores(note);
 }
 
-constexpr std::string_view feel_plot = R"gp(
-set ylabel "measured / aim"
-set logscale y
-set yrange [0.001:1000]
-set xtics rotate by -55 noenhanced font ",9"
-set key outside right top
-set bmargin 12
-set arrow from graph 0, first 1 to graph 1, first 1 nohead lw 2 lc rgb "#444444"
-ratio(m) = sprintf("< awk -F, 'NR > 1 && $6 > 0 && ($3 == \"path\" || $3 == \"free\") {k = $2 \" \" $4; if (!(k in at)) {at[k] = ++n; name[n] = k} if ($1 == \"%s\") r[at[k]] = $7 / $6} END {for (i = 1; i <= n; i++) print i \",\" name[i] \",\" (i in r && r[i] > 0 ? r[i] : \"NaN\")}' %s", m, csv)
-plot for [m in methods] ratio(m) using 1:3:xtic(2) with points pt 7 title m
-)gp";
+Figure feel_figure(const Table& table) {
+  return figure_of_aims(table, [&](std::size_t row) {
+    return table.text(row, "loop") == "path" || table.text(row, "loop") == "free";
+  });
+}
 
 }  // namespace
 
@@ -234,7 +228,7 @@ Experiment feel_experiment() {
           {"paper", "sight", "ideal"},
           true,
           feel_cells,
-          feel_plot,
+          feel_figure,
           no_claims,
           feel_scores};
 }

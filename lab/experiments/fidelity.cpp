@@ -388,18 +388,9 @@ Scores fidelity_scores(const Table& table) {
       "* misses the aim; - was lost in every repeat. What is measured and how: docs/pop.md.");
 }
 
-constexpr std::string_view fidelity_plot = R"gp(
-set ylabel "measured / aim"
-set logscale y
-set yrange [0.001:1000]
-set xtics rotate by -55 noenhanced font ",10"
-set key outside right top
-set bmargin 10
-set arrow from graph 0, first 1 to graph 1, first 1 nohead lw 2 lc rgb "#444444"
-# One place for every measure that has an aim; what is exact or lost has no point.
-ratio(m) = sprintf("< awk -F, 'NR > 1 && $5 > 0 {k = $2 \" \" $3; if (!(k in at)) {at[k] = ++n; name[n] = k} if ($1 == \"%s\") r[at[k]] = $6 / $5} END {for (i = 1; i <= n; i++) print i \",\" name[i] \",\" (i in r && r[i] > 0 ? r[i] : \"NaN\")}' %s", m, csv)
-plot for [m in methods] ratio(m) using 1:3:xtic(2) with points pt 7 title m
-)gp";
+Figure fidelity_figure(const Table& table) {
+  return figure_of_aims(table, [](std::size_t) { return true; });
+}
 
 }  // namespace
 
@@ -418,7 +409,7 @@ Experiment fidelity_experiment() {
                         {"paper", "sight"},
                         true,
                         fidelity_cells,
-                        fidelity_plot,
+                        fidelity_figure,
                         no_claims,
                         fidelity_scores};
   experiment.plays_programs = true;

@@ -234,16 +234,18 @@ Scores field_scores(const Table& table) {
   return scores;
 }
 
-constexpr std::string_view field_plot = R"gp(
-set ylabel "right [%]"
-set yrange [0:105]
-set xtics rotate by -40 noenhanced
-set bmargin 7
-set key outside right top
-right(m) = sprintf("< awk -F, '$1==\"%s\" && $5==\"-\" {if (!($2 in n)) order[++k]=$2; n[$2]+=1; r[$2]+=$7} END {for (i=1;i<=k;i++) print order[i], 100*r[order[i]]/n[order[i]]}' %s", m, csv)
-set datafile separator " "
-plot for [m in methods] right(m) using 0:2:xtic(1) with points pt 7 ps 1.2 title m
-)gp";
+Figure field_figure(const Table& table) {
+  const auto known_class = [&](std::size_t row) {
+    return table.text(row, "unknown") == "-" ? table.text(row, "class") : std::string();
+  };
+  const auto share = [&](const std::vector<std::size_t>& rows) {
+    double right = 0.0;
+    for (const std::size_t row : rows) right += table.number(row, "right");
+    return 100.0 * right / static_cast<double>(rows.size());
+  };
+  return {
+      {by_group(table, known_class, share, {.label = "right [%]", .low = -2.0, .high = 102.0})}};
+}
 
 }  // namespace
 
@@ -256,7 +258,7 @@ Experiment field_experiment() {
           {"paper", "sight"},
           false,
           field_cells,
-          field_plot,
+          field_figure,
           no_claims,
           field_scores};
 }

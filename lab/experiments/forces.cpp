@@ -120,14 +120,22 @@ std::vector<Claim> hold_claims(const Table& table) {
            "the white noise of section 5 is the easy case"}};
 }
 
-constexpr std::string_view hold_plot = R"gp(
-set xlabel "noise sigma [mm]"
-set ylabel "contact error [mm]"
-set key outside right top
-plot for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "white" ? $3 : NaN):7 with linespoints pt 7 lw 2 title m." bias, white", \
-     for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "white" ? $3 : NaN):8 with linespoints pt 6 lw 2 dt 2 title m." jitter, white", \
-     for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "correlated" ? $3 : NaN):8 with linespoints pt 4 lw 2 dt 3 title m." jitter, correlated"
-)gp";
+Figure hold_figure(const Table& table) {
+  Panel panel{.x = {"noise sigma [mm]"}, .y = {"contact error [mm]"}};
+  int colour = 0;
+  for (const std::string& method : methods_in(table)) {
+    const auto of = [&](std::string_view noise, std::string_view y) {
+      return points(table, {{"method", method}, {"noise", noise}}, "sigma_mm", y);
+    };
+    panel.series.push_back(
+        {method + " bias, white", of("white", "bias_mm"), Line::solid, Mark::disc, colour});
+    panel.series.push_back(
+        {method + " jitter, white", of("white", "jitter_mm"), Line::dashed, Mark::ring, colour});
+    panel.series.push_back({method + " jitter, correlated", of("correlated", "jitter_mm"),
+                            Line::dotted, Mark::square, colour++});
+  }
+  return {{panel}};
+}
 
 std::vector<Cell> force_cells(const Experiment& experiment, const ExperimentOptions& options) {
   std::vector<Cell> cells;
@@ -186,15 +194,12 @@ std::vector<Claim> force_claims(const Table& table) {
            : "differs"}};
 }
 
-constexpr std::string_view force_plot = R"gp(
-set xlabel "time [s]"
-set ylabel "force [N]"
-set xrange [2:3]
-set key outside right top
-plot csv using (strcol(1) eq "paper" ? $2 : NaN):4 with lines lw 2 dt 2 lc rgb "#2ca02c" title "ideal", \
-     csv using (strcol(1) eq "paper" ? $2 : NaN):3 with lines lw 2 lc rgb "#1f77b4" title "paper", \
-     csv using (strcol(1) eq "paper-as-printed" ? $2 : NaN):3 with lines lw 1 lc rgb "#d62728" title "as printed"
-)gp";
+Figure force_figure(const Table& table) {
+  Panel panel{.x = {.label = "time [s]", .low = 2.0, .high = 3.0}, .y = {"force [N]"}};
+  add_reference(panel, table, "ideal", "t", "ideal_n");
+  add_methods(panel, table, "t", "force_n");
+  return {{panel}};
+}
 
 // Into a resting plane and half out again, 5 mm to and fro at 5 Hz, never leaving it; with more and
 // more damping.
@@ -257,12 +262,11 @@ std::vector<Claim> damping_claims(const Table& table) {
            : "differs"}};
 }
 
-constexpr std::string_view damping_plot = R"gp(
-set xlabel "damping k_d [N s/m]"
-set ylabel "work on the hand in a cycle [mJ]"
-set key top left
-plot for [m in methods] csv using (strcol(1) eq m ? $2 : NaN):3 with linespoints pt 7 lw 2 title m
-)gp";
+Figure damping_figure(const Table& table) {
+  Panel panel{.x = {"damping k_d [N s/m]"}, .y = {"work on the hand in a cycle [mJ]"}};
+  add_methods(panel, table, "damping", "work_mj", {1.0, 1.0}, true);
+  return {{panel}};
+}
 
 }  // namespace
 
@@ -273,7 +277,7 @@ Experiment hold_experiment() {
           {"paper", "ideal"},
           true,
           hold_cells,
-          hold_plot,
+          hold_figure,
           hold_claims};
 }
 
@@ -284,7 +288,7 @@ Experiment force_experiment() {
           {"paper", "paper-as-printed"},
           false,
           force_cells,
-          force_plot,
+          force_figure,
           force_claims};
 }
 
@@ -295,7 +299,7 @@ Experiment damping_experiment() {
           {"paper", "paper-as-printed"},
           false,
           damping_cells,
-          damping_plot,
+          damping_figure,
           damping_claims};
 }
 

@@ -164,15 +164,13 @@ std::vector<Claim> single_lift_claims(const Table& table) {
            least > 0.0 ? "reproduced: never below the cloud" : "differs: lost"}};
 }
 
-constexpr std::string_view single_lift_plot = R"gp(
-set xlabel "time [s]"
-set ylabel "height y [r_c]"
-set key top left
-r = 5e-3
-plot csv using (strcol(1) eq word(methods,1) ? $2 : NaN):($3/r) with lines lw 1.5 lc rgb "#888888" title "true surface", \
-     csv using (strcol(1) eq word(methods,1) ? $2 : NaN):($5/r) with lines lw 1.5 dt 2 lc rgb "#888888" title "HIP", \
-     for [i=1:words(methods)] csv using (strcol(1) eq word(methods,i) ? $2 : NaN):($6/r) with linespoints pt 7 ps 0.6 lw 1.5 lc i title word(methods,i)
-)gp";
+Figure single_lift_figure(const Table& table) {
+  Panel panel{.x = {"time [s]"}, .y = {"height y [r_c]"}};
+  add_reference(panel, table, "true surface", "t", "true_y", {1.0, 5e-3}, Line::solid);
+  add_reference(panel, table, "HIP", "t", "hip_y", {1.0, 5e-3});
+  add_methods(panel, table, "t", "proxy_y", {1.0, 5e-3}, true);
+  return {{panel}};
+}
 
 // Fig. 13's axes: 76 noise levels up to 3 r_c and 71 accelerations up to 1400 r_c/s^2.
 constexpr double most_noise = 3.0;
@@ -277,23 +275,31 @@ std::vector<Claim> lift_claims(const Table& table) {
   return claims;
 }
 
-constexpr std::string_view lift_plot = R"gp(
-set xlabel "acceleration a [r_c/s^2]"
-set ylabel "noise sigma [r_c]"
-set xrange [0:1400]
-set yrange [0:3]
-set key outside top right
-r_1 = 4.99e-3
-r_c = 5e-3
-h(s) = 5.5e4*s**4 - 6.7e3*s**3 + 63*s**2 + s - 4.1e-5
-e(s) = 2.9e10*s**5 - 6.4e8*s**4 + 4.8e6*s**3 - 1.2e4*s**2 + 16*s
-# (25) with (20), solved for a at noise s
-bound(s) = (r_1 + h(s) - 0.1/30*e(s)) / (1.0/900 + 9.0/900*e(s)) / r_c
-set parametric
-set trange [0:3]
-plot csv using (strcol(1) eq "paper" && $5 == 0 ? $2 : NaN):3 with points pt 5 ps 0.35 lc rgb "#1f77b4" title "held by paper", \
-     bound(t*r_c),t with lines lw 2 lc rgb "#d62728" title "(25)"
-)gp";
+// A panel a method: what it held, and (25) with (20), solved for the acceleration.
+Figure lift_figure(const Table& table) {
+  constexpr double r_c = 5e-3;
+  constexpr double r_1 = 4.99e-3;
+  Points bound;
+  for (double noise = 0.0; noise <= most_noise; noise += 0.01) {
+    const double e = printed_e(noise * r_c);
+    bound.push_back({(r_1 + printed_h(noise * r_c) - 0.1 / f_c * e) /
+                         (1.0 / (f_c * f_c) + 9.0 / (f_c * f_c) * e) / r_c,
+                     noise});
+  }
+  Figure figure;
+  for (const std::string& method : methods_in(table))
+    figure.panels.push_back(
+        {.title = method,
+         .x = {.label = "acceleration a [r_c/s²]", .low = 0.0, .high = most_acceleration},
+         .y = {.label = "noise sigma [r_c]", .low = 0.0, .high = most_noise},
+         .series = {
+             {"held",
+              points(table, {{"method", method}, {"popped", "0"}}, "acceleration_rc", "noise_rc"),
+              Line::none, Mark::dot},
+             {"(25)", bound}}});
+  figure.columns = std::clamp<std::size_t>(figure.panels.size(), 1, 2);
+  return figure;
+}
 
 // Section 6.2: lifts without acceleration.
 constexpr int bound_levels = 21;
@@ -397,18 +403,15 @@ std::vector<Claim> bound_claims(const Table& table) {
                                  from)}};
 }
 
-constexpr std::string_view bound_plot = R"gp(
-set xlabel "noise sigma [r_c]"
-set ylabel "thickness h [mm]"
-set y2label "e_n"
-set y2tics
-set ytics nomirror
-set key top left
-plot csv using 2:($4*1e3) with linespoints pt 7 ps 0.5 lw 2 lc rgb "#1f77b4" title "h", \
-     csv using 2:($6*1e3) with lines lw 2 dt 2 lc rgb "#1f77b4" title "(23)", \
-     csv using 2:5 axes x1y2 with linespoints pt 7 ps 0.5 lw 2 lc rgb "#d62728" title "e_n", \
-     csv using 2:7 axes x1y2 with lines lw 2 dt 2 lc rgb "#d62728" title "(24)"
-)gp";
+Figure bound_figure(const Table& table) {
+  Panel thickness{.x = {"noise sigma [r_c]"}, .y = {"thickness h [mm]"}};
+  Panel error{.x = thickness.x, .y = {"normal error e_n"}};
+  add_methods(thickness, table, "noise_rc", "h_m", {1.0, 1e-3}, true);
+  add_reference(thickness, table, "(23) and (24)", "noise_rc", "printed_h_m", {1.0, 1e-3});
+  add_methods(error, table, "noise_rc", "e_n", {1.0, 1.0}, true);
+  add_reference(error, table, "(23) and (24)", "noise_rc", "printed_e_n");
+  return {{thickness, error}};
+}
 
 // How far nothing was lost, and from where on something was.
 struct Reach {
@@ -506,18 +509,20 @@ std::vector<Claim> speed_claims(const Table& table) {
   return claims;
 }
 
-constexpr std::string_view speed_plot = R"gp(
-set xlabel "velocity [r_c/s]"
-set ylabel "lifts lost of 5"
-set logscale x
-set yrange [-0.2:5.2]
-set key top left
-lost(m,o) = sprintf("< awk -F, '$1==\"%s\" && $2==\"%s\" {n[$3]+=$5} END {for (v in n) print v, n[v]}' %s | sort -n", m, o, csv)
-set datafile separator " "
-plot lost("fixed-step","sudden") using 1:2 with linespoints pt 7 lw 2 title "fixed-step, sudden", \
-     lost("paper","sudden") using 1:2 with linespoints pt 7 lw 2 title "paper, sudden", \
-     lost("paper","gradual") using 1:2 with linespoints pt 7 lw 2 title "paper, gradual"
-)gp";
+Figure speed_figure(const Table& table) {
+  Panel panel{.x = {.label = "velocity [r_c/s]", .log = true},
+              .y = {.label = "lifts lost of 5", .low = -0.2, .high = 5.2}};
+  int colour = 0;
+  for (const std::string& method : methods_in(table)) {
+    const auto lost = [&](std::string_view onset) {
+      return sums(points(table, {{"method", method}, {"onset", onset}}, "velocity_rc", "popped"));
+    };
+    panel.series.push_back({method + ", sudden", lost("sudden"), Line::solid, Mark::disc, colour});
+    panel.series.push_back(
+        {method + ", gradual", lost("gradual"), Line::dashed, Mark::ring, colour++});
+  }
+  return {{panel}};
+}
 
 constexpr std::array contact_speeds = {0.05, 0.1, 0.14, 0.15, 0.16, 0.2, 0.3,
                                        0.5,  1.0, 2.0,  3.0,  5.0,  8.0};
@@ -559,16 +564,13 @@ std::vector<Claim> first_contact_claims(const Table& table) {
            "what the print leaves unsaid: a surface from free space is lost above r_1 f_c"}};
 }
 
-constexpr std::string_view first_contact_plot = R"gp(
-set xlabel "speed [m/s]"
-set ylabel "lost of 20"
-set logscale x
-set yrange [-0.5:20.5]
-set key top left
-lost(m) = sprintf("< awk -F, '$1==\"%s\" {n[$2]+=$4} END {for (v in n) print v, n[v]}' %s | sort -n", m, csv)
-set datafile separator " "
-plot for [m in methods] lost(m) using 1:2 with linespoints pt 7 lw 2 title m
-)gp";
+Figure first_contact_figure(const Table& table) {
+  Panel panel{.x = {.label = "speed [m/s]", .log = true},
+              .y = {.label = "lost of 20", .low = -0.5, .high = 20.5}};
+  add_methods(panel, table, "speed", "popped", {1.0, 1.0}, true);
+  for (Series& series : panel.series) series.points = sums(series.points);
+  return {{panel}};
+}
 
 }  // namespace
 
@@ -579,7 +581,7 @@ Experiment single_lift_experiment() {
           {"paper", "fixed-step", "sight"},
           false,
           single_lift_cells,
-          single_lift_plot,
+          single_lift_figure,
           single_lift_claims};
 }
 
@@ -590,7 +592,7 @@ Experiment lift_experiment() {
           {"fixed-step", "paper"},
           true,
           lift_cells,
-          lift_plot,
+          lift_figure,
           lift_claims};
 }
 
@@ -601,7 +603,7 @@ Experiment bound_experiment() {
           {"paper"},
           false,
           bound_cells,
-          bound_plot,
+          bound_figure,
           bound_claims};
 }
 
@@ -612,7 +614,7 @@ Experiment speed_experiment() {
           {"fixed-step", "paper"},
           false,
           speed_cells,
-          speed_plot,
+          speed_figure,
           speed_claims};
 }
 
@@ -623,7 +625,7 @@ Experiment first_contact_experiment() {
           {"fixed-step", "paper", "paper-as-printed"},
           false,
           first_contact_cells,
-          first_contact_plot,
+          first_contact_figure,
           first_contact_claims};
 }
 

@@ -147,31 +147,45 @@ Scores material_scores(const Table& table) {
   return scores;
 }
 
-constexpr std::string_view material_plot = R"gp(
-names = "ice metal wood sandpaper rubber foam"
-of(m, from, to) = sprintf("< awk -F, '$1 == \"%s\" && $2 >= %g && $2 < %g' %s", m, from, to, csv)
-set multiplot layout 2,2
-set key outside right top noenhanced
-set grid
-set title "a strike at 0.15 m/s"
-set xlabel "time [ms]"
-set ylabel "normal force [N]"
-plot for [m in names] of(m, 1.925, 2.0) using (1e3*($2-1.9333)):5 with lines lw 1.5 title m
-set title "a slow press"
-set xlabel "depth of the hand [mm]"
-plot for [m in names] of(m, 2.6, 3.6) using 3:5 with lines lw 1.5 notitle
-set title "a stroke at 60 mm/s, held 3 mm deep"
-set xlabel "way of the hand [mm]"
-set ylabel "force along the surface [N]"
-plot for [m in names] of(m, 4.2, 4.866) using 4:6 with lines lw 1.5 notitle
-set title "the same, a tenth of a second of it"
-set xlabel "time [ms]"
-set ylabel "normal force, less its mean [N]"
-set yrange [-3.2:0.7]
-mean(m) = real(system(sprintf("awk -F, '$1 == \"%s\" && $2 >= 4.6 && $2 < 4.7 {s += $5; n++} END {print s / n}' %s", m, csv)))
-plot for [i=1:words(names)] of(word(names, i), 4.6, 4.7) using (1e3*($2-4.6)):($5-mean(word(names, i))-0.5*(i-1)) with lines lw 1.5 lc i notitle
-unset multiplot
-)gp";
+Figure material_figure(const Table& table) {
+  const Axis normal{"normal force [N]"};
+  Figure figure{{{.title = "a strike at 0.15 m/s", .x = {"time [ms]"}, .y = normal},
+                 {.title = "a slow press", .x = {"depth of the hand [mm]"}, .y = normal},
+                 {.title = "a stroke at 60 mm/s, held 3 mm deep",
+                  .x = {"way of the hand [mm]"},
+                  .y = {"force along the surface [N]"}},
+                 {.title = "the same, a tenth of a second of it",
+                  .x = {"time [ms]"},
+                  .y = {"normal, less its mean [N]"}}},
+                2};
+  std::vector<std::string> names;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string& name = table.text(row, "material");
+    if (!names.empty() && names.back() == name) continue;
+    names.push_back(name);
+    const auto of = [&](double from, double to, std::string_view x, std::string_view y) {
+      const auto during = [&](std::size_t other) {
+        const double t = table.number(other, "t");
+        return table.text(other, "material") == name && t >= from - 1e-9 && t < to - 1e-9;
+      };
+      return points(table, during, x, y);
+    };
+    Points hit = of(1.925, 2.0, "t", "normal");
+    for (auto& point : hit) point[0] = 1e3 * (point[0] - engaged - above / strike);
+    Points shaking = of(4.6, 4.7, "t", "normal");
+    double mean = 0.0;
+    for (const auto& point : shaking) mean += point[1] / static_cast<double>(shaking.size());
+    const double below = 0.5 * static_cast<double>(names.size() - 1);  // a line each
+    for (auto& point : shaking) point = {1e3 * (point[0] - 4.6), point[1] - mean - below};
+    figure.panels[0].series.push_back({name, hit});
+    figure.panels[1].series.push_back(
+        {name, of(press_from, press_from + press_for, "depth", "normal")});
+    figure.panels[2].series.push_back(
+        {name, of(stroke_from, stroke_from + stroke_for, "along", "tangential")});
+    figure.panels[3].series.push_back({name, shaking});
+  }
+  return figure;
+}
 
 }  // namespace
 
@@ -182,7 +196,7 @@ Experiment materials_experiment() {
           {},
           false,
           material_cells,
-          material_plot,
+          material_figure,
           no_claims,
           material_scores};
 }

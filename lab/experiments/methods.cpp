@@ -271,17 +271,26 @@ Scores methods_scores(const Table& table) {
   return scores;
 }
 
-constexpr std::string_view methods_plot = R"gp(
-set ylabel "pop score [%]"
-set xlabel "cost of a frame and its ticks [us of 33 ms]"
-set logscale x
-set yrange [0:105]
-set key off
-point = sprintf("< awk -F, '$2==\"pop\" {p[$1]=$3} $2==\"frame\" {f[$1]=$3} $2==\"tick\" {t[$1]=$3} END {for (m in p) print f[m]+33*t[m], p[m], m}' %s", csv)
-set datafile separator " "
-plot point using 1:2 with points pt 7 lc rgb "#1f77b4", \
-     point using 1:2:3 with labels left offset 0.7,0.3 noenhanced font ",9"
-)gp";
+Figure methods_figure(const Table& table) {
+  constexpr double ticks = 33.0;  // of a frame
+  Panel score{.x = {.label = "pop score [%]", .low = -2.0, .high = 102.0}};
+  Panel cost{.x = {.label = "cost of a frame and its ticks [µs]", .log = true}};
+  score.series = {{"", {}, Line::none, Mark::disc, 0}};
+  cost.series = score.series;
+  for (const std::string& method : methods_in(table)) {
+    std::map<std::string, double> found;
+    for (std::size_t row = 0; row < table.rows(); ++row) {
+      if (table.text(row, "method") == method && table.text(row, "value") != "-")
+        found[table.text(row, "measure")] = table.number(row, "value");
+    }
+    score.y.names.push_back(method);
+    const auto place = static_cast<double>(score.y.names.size());
+    score.series[0].points.push_back({found["pop"], place});
+    cost.series[0].points.push_back({found["frame"] + ticks * found["tick"], place});
+  }
+  cost.y.names = score.y.names;
+  return {{score, cost}, 2};
+}
 
 }  // namespace
 
@@ -292,7 +301,7 @@ Experiment methods_experiment() {
                         {},
                         true,
                         methods_cells,
-                        methods_plot,
+                        methods_figure,
                         no_claims,
                         methods_scores};
   static const MethodRegistry all = methods();

@@ -366,16 +366,19 @@ Scores pop_scores(const Table& table) {
   return scores;
 }
 
-constexpr std::string_view pop_plot = R"gp(
-set ylabel "held [%]"
-set yrange [0:105]
-set xtics rotate by -40 noenhanced
-set bmargin 7
-set key outside right top
-held(m) = sprintf("< awk -F, '$1==\"%s\" {if (!($2 in n)) order[++k]=$2; n[$2]+=$4; l[$2]+=$5} END {for (i=1;i<=k;i++) print order[i], 100*(n[order[i]]-l[order[i]])/n[order[i]]}' %s", m, csv)
-set datafile separator " "
-plot for [m in methods] held(m) using 0:2:xtic(1) with points pt 7 ps 1.2 title m
-)gp";
+Figure pop_figure(const Table& table) {
+  const auto family = [&](std::size_t row) { return table.text(row, "family"); };
+  const auto held = [&](const std::vector<std::size_t>& rows) {
+    double cases = 0.0;
+    double lost = 0.0;
+    for (const std::size_t row : rows) {
+      cases += table.number(row, "cases");
+      lost += table.number(row, "lost");
+    }
+    return 100.0 * (cases - lost) / cases;
+  };
+  return {{by_group(table, family, held, {.label = "held [%]", .low = -2.0, .high = 102.0})}};
+}
 
 }  // namespace
 
@@ -417,7 +420,7 @@ Experiment pop_experiment() {
       {"paper", "sight"},
       false,
       pop_cells,
-      pop_plot,
+      pop_figure,
       no_claims,
       pop_scores};
   experiment.plays_programs = true;

@@ -359,15 +359,24 @@ Scores real_scores(const Table& table) {
   return scores;
 }
 
-constexpr std::string_view real_plot = R"gp(
-set xlabel "distance from the camera [m]"
-set ylabel "force in 20 to 400 Hz [N rms]"
-set logscale y
-set key outside right top
-plot for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "hold" && $5 == 0 ? $4 : NaN):8 with points pt 7 title m." held", \
-     for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "moving" && $5 == 0 ? $4 : NaN):8 with points pt 6 title m." moving", \
-     for [m in methods] csv using (strcol(1) eq m && strcol(2) eq "hold" && $5 == 1 ? $4 : NaN):(5) with points pt 2 ps 1.5 title m." lost"
-)gp";
+Figure real_figure(const Table& table) {
+  Panel panel{.x = {"distance from the camera [m]"},
+              .y = {.label = "force in 20 to 400 Hz [N rms]", .log = true}};
+  int colour = 0;
+  for (const std::string& method : methods_in(table)) {
+    const auto of = [&](std::string_view action, std::string_view lost, std::string_view y) {
+      return points(table, {{"method", method}, {"action", action}, {"lost", lost}}, "distance_m",
+                    y);
+    };
+    panel.series.push_back(
+        {method + " held", of("hold", "0", "felt_n"), Line::none, Mark::disc, colour});
+    panel.series.push_back(
+        {method + " moving", of("moving", "0", "felt_n"), Line::none, Mark::ring, colour});
+    panel.series.push_back(  // where there is nothing to measure: at 1 N
+        {method + " lost", of("hold", "1", "lost"), Line::none, Mark::cross, colour++});
+  }
+  return {{panel}};
+}
 
 // Everything that the cases of a recording depend on.
 std::string hash_of(const Recording& recording) {
@@ -427,7 +436,7 @@ Experiment real_experiment() {
       {"paper", "sight"},
       false,
       real_cells,
-      real_plot,
+      real_figure,
       no_claims,
       real_scores};
   experiment.takes_recording = true;

@@ -297,19 +297,15 @@ std::vector<Claim> scan_claims(const Table& table) {
                    : "differs: this machine is slower"}};
 }
 
-constexpr std::string_view scan_plot = R"gp(
-set multiplot layout 2,1
-set key outside right top
-set xlabel "along the scan y [m]"
-set ylabel "z [m]"
-first = word(methods, 1)
-plot csv every 4 using (strcol(1) eq first ? $5 : NaN):7 with lines lw 1 lc rgb "#bbbbbb" title "surface", \
-     csv every 4 using (strcol(1) eq first ? $3 : NaN):4 with lines lw 2 dt 2 lc rgb "#888888" title "HIP", \
-     for [i=1:words(methods)] csv every 4 using (strcol(1) eq word(methods,i) ? $5 : NaN):6 with lines lw 2 lc i title word(methods,i)
-set ylabel "force [N]"
-plot for [i=1:words(methods)] csv every 4 using (strcol(1) eq word(methods,i) ? $3 : NaN):8 with lines lw 1.5 lc i title word(methods,i)
-unset multiplot
-)gp";
+Figure scan_figure(const Table& table) {
+  Panel height{.x = {"along the scan y [m]"}, .y = {"z [m]"}};
+  Panel force{.x = height.x, .y = {"force [N]"}};
+  add_reference(height, table, "surface", "proxy_y", "surface_z", {1.0, 1.0}, Line::solid);
+  add_reference(height, table, "HIP", "hip_y", "hip_z");
+  add_methods(height, table, "proxy_y", "proxy_z");
+  add_methods(force, table, "hip_y", "force_n");
+  return {{height, force}};
+}
 
 }  // namespace
 
@@ -320,7 +316,7 @@ Experiment scan_experiment() {
                         {"paper", "ideal"},
                         false,
                         scan_cells,
-                        scan_plot,
+                        scan_figure,
                         scan_claims};
   experiment.takes_recording = true;
   return experiment;

@@ -80,20 +80,15 @@ std::vector<Claim> flat_claims(const Table& table) {
                : "differs"}};
 }
 
-constexpr std::string_view flat_plot = R"gp(
-set multiplot layout 2,1
-set xlabel "time [s]"
-set ylabel "height y [m]"
-set key outside right top
-plot csv every 4 using (strcol(1) eq "paper" ? $2 : NaN):4 with lines lw 2 dt 2 lc rgb "#888888" title "HIP", \
-     csv every 4 using (strcol(1) eq "paper" ? $2 : NaN):6 with lines lw 2 lc rgb "#1f77b4" title "proxy"
-set ylabel "contact point y [mm]"
-set xrange [1.2:3.9]
-set yrange [-0.2:0.1]
-plot csv every 4 using (strcol(1) eq "paper" ? $2 : NaN):($7*1e3) with lines lw 2 lc rgb "#1f77b4" title "paper", \
-     csv every 4 using (strcol(1) eq "ideal" ? $2 : NaN):($7*1e3) with lines lw 1 lc rgb "#2ca02c" title "ideal"
-unset multiplot
-)gp";
+Figure flat_figure(const Table& table) {
+  Panel height{.x = {"time [s]"}, .y = {"height y [m]"}};
+  Panel contact{.x = {.label = "time [s]", .low = 1.2, .high = 3.9},
+                .y = {.label = "contact point y [mm]", .low = -0.2, .high = 0.1}};
+  add_reference(height, table, "HIP", "t", "hip_y");
+  add_methods(height, table, "t", "proxy_y");
+  add_methods(contact, table, "t", "contact_y", {1.0, 1e-3});
+  return {{height, contact}};
+}
 
 // The HIP jumps from the resting proxy to `depth` below the plane; when is the proxy on it?
 std::vector<Cell> jump_cells(const Experiment& experiment, const ExperimentOptions& options) {
@@ -147,13 +142,11 @@ std::vector<Claim> jump_claims(const Table& table) {
            all && ticks == 1 ? "reproduced: in the tick of the jump" : "differs"}};
 }
 
-constexpr std::string_view jump_plot = R"gp(
-set xlabel "depth of the jump [r_c]"
-set ylabel "steps to the surface"
-set key center right
-set yrange [0:*]
-plot for [m in methods] csv using (strcol(1) eq m ? $2 : NaN):4 with linespoints pt 7 lw 2 title m
-)gp";
+Figure jump_figure(const Table& table) {
+  Panel panel{.x = {"depth of the jump [r_c]"}, .y = {.label = "steps to the surface", .low = 0.0}};
+  add_methods(panel, table, "jump_rc", "steps", {1.0, 1.0}, true);
+  return {{panel}};
+}
 
 // 5.3: a 300 x 100 grid shaped as a triangle wave with growing amplitude.
 std::vector<Cell> corners_cells(const Experiment& experiment, const ExperimentOptions& options) {
@@ -228,15 +221,12 @@ std::vector<Claim> corners_claims(const Table& table) {
                         : "differs"}};
 }
 
-constexpr std::string_view corners_plot = R"gp(
-set xlabel "x [r_c]"
-set ylabel "height [r_c]"
-set key outside right top
-r = 5e-3
-plot csv every 4 using (strcol(1) eq "paper" ? $5/r : NaN):($7/r) with points pt 7 ps 0.2 lc rgb "#bbbbbb" title "surface", \
-     csv every 4 using (strcol(1) eq "ideal" ? $5/r : NaN):($6/r) with lines lw 2 lc rgb "#2ca02c" title "best a sphere can do", \
-     csv every 4 using (strcol(1) eq "paper" ? $5/r : NaN):($6/r) with lines lw 2 lc rgb "#1f77b4" title "paper"
-)gp";
+Figure corners_figure(const Table& table) {
+  Panel panel{.x = {"x [r_c]"}, .y = {"height [r_c]"}};
+  add_reference(panel, table, "surface", "contact_x", "true_z", {5e-3, 5e-3}, Line::dotted);
+  add_methods(panel, table, "contact_x", "contact_z", {5e-3, 5e-3});
+  return {{panel}};
+}
 
 }  // namespace
 
@@ -247,7 +237,7 @@ Experiment flat_experiment() {
           {"paper", "ideal"},
           false,
           flat_cells,
-          flat_plot,
+          flat_figure,
           flat_claims};
 }
 
@@ -258,7 +248,7 @@ Experiment jump_experiment() {
           {"fixed-step", "paper"},
           false,
           jump_cells,
-          jump_plot,
+          jump_figure,
           jump_claims};
 }
 
@@ -269,7 +259,7 @@ Experiment corners_experiment() {
           {"paper", "ideal"},
           false,
           corners_cells,
-          corners_plot,
+          corners_figure,
           corners_claims};
 }
 

@@ -243,21 +243,24 @@ Scores teleop_scores(const Table& table) {
   return scores;
 }
 
-constexpr std::string_view teleop_plot = R"gp(
-set xlabel "round trip [ms]"
-set key outside right top noenhanced
-set grid y
-set multiplot layout 2,1
-of(w, s, c) = sprintf("< awk -F, '$1 == \"%s\" && $2 == \"rest\" && $3 == \"%s\" && $5 == \"even\" {print $4 \",\" $%d}' %s", w, s, c, csv)
-set ylabel "force on the hand [N]"
-plot of("palpate", "d4xx", 6) using 1:2 with linespoints lw 2 title "palpate, D4xx", \
-     for [w in "position-force wave tdpa"] of(w, "ideal", 6) using 1:2 with linespoints title w
-set ylabel "swing of the robot's tool [mm]"
-set logscale y
-plot of("palpate", "d4xx", 12) using 1:2 with linespoints lw 2 title "palpate, D4xx", \
-     for [w in "position-force wave tdpa"] of(w, "ideal", 12) using 1:2 with linespoints title w
-unset multiplot
-)gp";
+Figure teleop_figure(const Table& table) {
+  Figure figure{
+      {{.y = {"force on the hand [N]"}}, {.y = {.label = "swing of the tool [mm]", .log = true}}}};
+  for (const std::string_view way : {"palpate", "position-force", "wave", "tdpa"}) {
+    const bool ours = way == "palpate";
+    for (std::size_t i = 0; i < 2; ++i)
+      figure.panels[i].series.push_back({ours ? "palpate, D4xx" : std::string(way),
+                                         points(table,
+                                                {{"way", way},
+                                                 {"scene", "rest"},
+                                                 {"sensor", ours ? "d4xx" : "ideal"},
+                                                 {"link", "even"}},
+                                                "round_trip", i == 0 ? "force" : "swing"),
+                                         Line::solid, ours ? Mark::disc : Mark::ring});
+  }
+  for (Panel& panel : figure.panels) panel.x.label = "round trip [ms]";
+  return figure;
+}
 
 }  // namespace
 
@@ -268,7 +271,7 @@ Experiment teleop_experiment() {
           {"palpate", "position-force", "wave", "tdpa"},
           false,
           teleop_cells,
-          teleop_plot,
+          teleop_figure,
           no_claims,
           teleop_scores};
 }

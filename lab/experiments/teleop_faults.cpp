@@ -242,12 +242,17 @@ Scores episode_scores(const Table& table) {
   return scores;
 }
 
-constexpr std::string_view episode_plot = R"gp(
-set xlabel "contact of the tool [N]"
-set ylabel "share of episodes"
-set key outside right top noenhanced
-plot for [f in "none link camera operator robot"] sprintf("< awk -F, '$1 == \"%s\" {print $6}' %s | sort -g | awk '{v[NR] = $1} END {for (i = 1; i <= NR; i++) print v[i] \",\" i / NR}'", f, csv) using 1:2 with steps lw 2 title f
-)gp";
+Figure episode_figure(const Table& table) {
+  Panel panel{.x = {"contact of the tool [N]"}, .y = {"share of episodes"}};
+  for (const std::string_view fault : faults) {
+    Points share = points(table, {{"fault", fault}}, "contact", "contact");
+    std::sort(share.begin(), share.end());
+    for (std::size_t i = 0; i < share.size(); ++i)
+      share[i][1] = static_cast<double>(i + 1) / static_cast<double>(share.size());
+    panel.series.push_back({std::string(fault), share, Line::steps});
+  }
+  return {{panel}};
+}
 
 }  // namespace
 
@@ -258,7 +263,7 @@ Experiment teleop_faults_experiment() {
           {},
           false,
           episode_cells,
-          episode_plot,
+          episode_figure,
           no_claims,
           episode_scores};
 }

@@ -258,18 +258,28 @@ Scores tradeoff_scores(const Table& table) {
   return scores;
 }
 
-constexpr std::string_view tradeoff_plot = R"gp(
-set xlabel "jitter at rest [mm rms]"
-set ylabel "largest lag behind 0.1 m/s [mm]"
-set logscale x
-set yrange [0:*]
-set key outside right top
-of(m, d) = sprintf("< awk -F, '$1 ~ /^%s$/ && $2 == %s && $3 == 0.1 && $4 > 0 {print $6, $7}' %s", m, d, csv)
-set datafile separator " "
-far = "0.45 0.7 0.95"
-plot for [i=1:3] of("mean-[0-9]+", word(far, i)) using 1:2 with linespoints pt 7 ps 0.5 lw 1.5 lc i title "means of 1 to 32 frames, ".word(far, i)." m", \
-     for [k=1:words(methods)] for [i=1:3] of(word(methods, k), word(far, i)) using 1:2 with points pt (2*k+3) ps 1.6 lc i title word(methods, k).", ".word(far, i)." m"
-)gp";
+Figure tradeoff_figure(const Table& table) {
+  Panel panel{.x = {.label = "jitter at rest [mm rms]", .log = true},
+              .y = {.label = "largest lag behind 0.1 m/s [mm]", .low = 0.0}};
+  const auto is_mean = [](std::string_view method) { return method.substr(0, 5) == "mean-"; };
+  const auto add = [&](std::string_view method, Line line, Mark mark) {
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      const auto keep = [&](std::size_t row) {
+        const std::string& name = table.text(row, "method");
+        return (line == Line::solid ? is_mean(name) : name == method) &&
+               table.number(row, "distance_m") == distances[i] &&
+               table.number(row, "speed") == 0.1 && table.number(row, "held") > 0.0;
+      };
+      panel.series.push_back({fmt::format("{}, {} m", method, distances[i]),
+                              points(table, keep, "jitter_mm", "lag_mm"), line, mark,
+                              static_cast<int>(i)});
+    }
+  };
+  add("means of 1 to 32 frames", Line::solid, Mark::dot);
+  for (const std::string& method : methods_in(table))
+    if (!is_mean(method)) add(method, Line::none, mark_of(panel.series.size() / distances.size()));
+  return {{panel}};
+}
 
 }  // namespace
 
@@ -280,7 +290,7 @@ Experiment tradeoff_experiment() {
           {"paper", "sight"},
           false,
           tradeoff_cells,
-          tradeoff_plot,
+          tradeoff_figure,
           no_claims,
           tradeoff_scores};
 }

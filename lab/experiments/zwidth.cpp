@@ -312,21 +312,48 @@ Scores zwidth_scores(const Table& table) {
   return scores;
 }
 
-constexpr std::string_view zwidth_plot = R"gp(
-set ylabel "largest stiffness that decays [N/m]"
-set logscale y
-set yrange [50:10000]
-set xtics rotate by -55 noenhanced font ",9"
-set key outside right top noenhanced
-set bmargin 11
-set grid y
-of(m, w, c) = sprintf("< awk -F, 'NR > 1 {k = $1 \" \" $2 \" k_d=\" $7; if (!(k in at)) {at[k] = ++n; name[n] = k}} NR > 1 && (\"%s\" == \"\" || ($5 == \"%s\" && $6 == \"%s\")) {v = $%d; if (!(k in r) || v < r[k]) r[k] = v} END {for (i = 1; i <= n; i++) print i \",\" name[i] \",\" (name[i] in r ? r[name[i]] : \"NaN\")}' %s", m, m, w, c, csv)
-plot of("", "", 9) using 1:3:xtic(2) with points pt 1 ps 1.2 lw 2 lc rgb "#999999" title "2(b+k_d)/(T+2t_d)", \
-     of("", "", 10) using 1:3 with points pt 2 ps 1.4 lw 2 lc rgb "#444444" title "linear loop, no friction", \
-     1500 lw 1 dt 2 lc rgb "#bbbbbb" title "1,500 N/m", \
-     for [k=1:words(methods)] of(word(methods, k), "straight", 8) using ($1-0.12+0.08*k):3 with points pt 7 lc k title word(methods, k).", worst scene", \
-     for [k=1:words(methods)] of(word(methods, k), "chain", 8) using ($1-0.12+0.08*k):3 with points pt 6 ps 1.5 lc k title word(methods, k).", through the chain"
-)gp";
+// The worst of scenes and cameras, beside theory.
+Figure zwidth_figure(const Table& table) {
+  const auto wall = [&](std::size_t row) {
+    return fmt::format("{} {} k_d={}", table.text(row, "device"), table.text(row, "hand"),
+                       table.text(row, "damping"));
+  };
+  const auto least = [&](std::string_view column, std::string_view way) {
+    return by_group(table, wall,
+                    [&, column, way](const std::vector<std::size_t>& rows) {
+                      double worst = anything;
+                      for (const std::size_t row : rows)
+                        if (table.text(row, "way") == way)
+                          worst = std::min(worst, table.number(row, column));
+                      return worst;
+                    },
+                    {.label = "largest stiffness that decays [N/m]",
+                     .log = true,
+                     .low = 50.0,
+                     .high = 10000.0});
+  };
+  Panel panel = least("stiffness", "straight");
+  const std::size_t methods = panel.series.size();
+  for (const Series& chain : least("stiffness", "chain").series) panel.series.push_back(chain);
+  for (std::size_t i = 0; i < 2 * methods; ++i) {
+    Series& series = panel.series[i];
+    series.name += i < methods ? ", worst scene" : ", through the chain";
+    series.mark = i < methods ? Mark::disc : Mark::ring;
+    series.colour = static_cast<int>(i % methods);
+    for (auto& point : series.points) point[1] += 0.2 * (series.colour - 1);  // side by side
+  }
+  const auto beside = [&](std::string_view column, std::string name, Mark mark) {
+    for (const Series& any : least(column, "straight").series) {  // the same for all methods
+      panel.series.push_back({std::move(name), any.points, Line::none, mark, grey});
+      return;
+    }
+  };
+  beside("bound", "2(b+k_d)/(T+2t_d)", Mark::plus);
+  beside("linear", "linear loop, no friction", Mark::cross);
+  panel.series.push_back(
+      {"1,500 N/m", {{1500.0, -anything}, {1500.0, anything}}, Line::dashed, Mark::none, grey});
+  return {{panel}};
+}
 
 }  // namespace
 
@@ -337,7 +364,7 @@ Experiment zwidth_experiment() {
           {"paper", "sight", "ideal"},
           false,
           zwidth_cells,
-          zwidth_plot,
+          zwidth_figure,
           no_claims,
           zwidth_scores};
 }

@@ -62,7 +62,7 @@ FIELD = re.compile(r"^lab/(field/.*|experiments/field)\.[ch]pp$")
 NOT_FIELD = re.compile(r"^(palpate/sources/|lab/experiments/(?!field\.)|lab/grid_cloud\.)")
 
 IGNORED = re.compile(r"\.git$|\.cache$|build|out$|node_modules$|__pycache__$|dist$")
-CODE = re.compile(r"\.(cpp|hpp|py|ts|js|cmake|in|gp|sh)$|CMakeLists\.txt$"
+CODE = re.compile(r"\.(cpp|hpp|py|ts|js|cmake|in|sh)$|CMakeLists\.txt$"
                   r"|^scripts/(\w+/)*\w+$|^\.ci/")
 TEXT = re.compile(CODE.pattern + r"|\.(md|json|toml|csv|html|css|yaml|yml)$")
 MACHINE_PATH = re.compile(r"/(?:home|root|work|tmp|Users)/\w")

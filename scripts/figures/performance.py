@@ -10,37 +10,12 @@ import csv
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PANELS = [  # the last: how far tics are apart; auto: a logarithmic axis
-    ("image_width", "image width [px]", "size of the image", "500"),
-    ("focal_length", "points in the patch", "points: focal length 150 to 2400 px", "400"),
-    ("cameras", "cameras", "cameras", "1"),
-    ("frame_rate", "frame rate [Hz]", "frame rate", "50"),
-    ("depth_mm", "depth of the hand [mm]", "free motion (< 0) and contact", "10"),
-    ("unorganised", "points in the cloud", "unorganised points", "auto"),
-]
-
-
-def draw(folder, rows, image):
-    """Six panels of tick against what might make it grow."""
-    script = ['set terminal svg size 900,520 font "sans,12" background rgb "white"',
-              f'set output "{image}"', "set multiplot layout 2,3",
-              'set grid lc rgb "#dddddd"', "unset key", 'set ylabel "tick [us]"']
-    for series, label, title, tics in PANELS:
-        x = "points" if series == "focal_length" else "x"
-        points = [(float(r[x]), float(r["tick_us"])) for r in rows if r["series"] == series]
-        data = pathlib.Path(folder) / f"{series}.dat"
-        data.write_text("".join(f"{a} {b}\n" for a, b in points))
-        script += [f'set title "{title}"', f'set xlabel "{label}"', f"set xtics {tics}",
-                   'set logscale x; set format x "10^{%L}"' if tics == "auto"
-                   else 'unset logscale x; set format x "%g"',
-                   f"set yrange [0:{1.25 * max(b for _, b in points):.3f}]",
-                   f'plot "{data}" with linespoints lw 2 pt 7 ps 0.6 lc rgb "#1f77b4"']
-    subprocess.run(["gnuplot"], input="\n".join(script), text=True, check=True)
 
 
 def kernel_table(scenes):
@@ -223,7 +198,8 @@ def main(build, results=None):
         installed = pathlib.Path(work) / "installed"
         subprocess.run(["cmake", "--install", build, "--prefix", installed], check=True,
                        stdout=subprocess.DEVNULL)
-        draw(work, rows, ROOT / "docs/images/growth.svg")
+        subprocess.run([program, "eval", "--draw", folder / "growth.csv"], check=True)
+        shutil.copy(folder / "growth.svg", ROOT / "docs/images")
         (ROOT / "docs/performance.md").write_text(page(result, sight, rows, build,
                                                                  installed))
 

@@ -17,6 +17,7 @@
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 
+#include "tests/lab/drawn.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"
@@ -30,7 +31,9 @@ namespace fs = std::filesystem;
 class Lab : public ::testing::Test {
  protected:
   [[nodiscard]] Table run(std::string_view name, const ExperimentOptions& options) const {
-    return {name, csv(name, options, 2)};
+    Table table(name, csv(name, options, 2));
+    expect_drawn(find_experiment(name).figure(table));
+    return table;
   }
 
   [[nodiscard]] std::string csv(std::string_view name, const ExperimentOptions& options, int jobs,
@@ -360,6 +363,15 @@ TEST_F(Lab, MakesAPageAndATableOfEveryClaim) {
   const Experiment& experiment = find_experiment("jump");
   const std::string text = csv("jump", {}, 2);
   const Result result = make_result(experiment, {}, text, file("jump").parent_path());
+  EXPECT_NE(result_as_text(result).find("drawn in " + result.figure.string()), std::string::npos);
+  const auto bytes = [&] {
+    std::ifstream figure(result.figure);
+    return std::string(std::istreambuf_iterator<char>(figure), {});
+  };
+  const std::string figure = bytes();
+  EXPECT_EQ(csv("jump", {}, 1), text);
+  EXPECT_EQ(draw(file("jump")), result.figure);
+  EXPECT_EQ(bytes(), figure) << "drawn anew of another run's file";
   ASSERT_EQ(result.claims.size(), 1U);
   EXPECT_EQ(result.claims[0].verdict.substr(0, 10), "reproduced");
   const fs::path page = write_report({result}, file("jump").parent_path());
@@ -367,6 +379,7 @@ TEST_F(Lab, MakesAPageAndATableOfEveryClaim) {
   std::ostringstream html;
   html << in.rdbuf();
   EXPECT_NE(html.str().find("less than 1 ms"), std::string::npos);
+  EXPECT_NE(html.str().find(figure), std::string::npos);
   EXPECT_FALSE(fs::exists(page.parent_path() / "bench.md")) << "no bench was run";
   EXPECT_EQ(html.str().find("src="), std::string::npos) << "the page needs nothing beside it";
 }

@@ -20,6 +20,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/feel/feel.hpp"
 
+#include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -284,6 +285,11 @@ TEST(Feel, JudgesTheScenesThatAreAskedFor) {
   const Experiment& feel = find_experiment("feel");
   const Table table("feel", run_experiment(feel, options, {}, folder.path() / "feel.csv"));
   ASSERT_EQ(table.rows(), 7U);
+  const Table ratios("feel",
+                     "method,scene,loop,measure,aim,value\nm,rest,path,felt,2,4\n"
+                     "m,rest,path,runs,-,4\nm,rest,chain,felt,2,4\nm,rest,free,step,1,0\n");
+  expect_drawn(feel.figure(ratios));
+  EXPECT_EQ(feel.figure(ratios).panels.at(0).series.at(0).points, (Points{{2.0, 1.0}, {0.0, 2.0}}));
   const Scores scores = feel.scores(table);
   ASSERT_EQ(scores.rows.size(), 8U);
   EXPECT_EQ(scores.rows[1],
@@ -304,6 +310,7 @@ TEST(MaterialsExperiment, TellsIceFromRubberAndSandpaper) {
   const test::TemporaryFolder folder;
   const Table table("materials",
                     run_experiment(experiment, options, {}, folder.path() / "materials.csv"));
+  expect_drawn(experiment.figure(table));
   const Scores scores = experiment.scores(table);
   ASSERT_EQ(scores.rows.size(), 3U);
   const auto number = [&](std::size_t row, std::size_t column) {

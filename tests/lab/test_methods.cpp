@@ -17,6 +17,7 @@
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/sources/source.hpp"
 
+#include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -661,6 +662,7 @@ TEST(MethodsTable, PutsTheRulerAboveAPublishedMethodAndCountsCosts) {
   EXPECT_GT(value("surfels", "corners"), 0.1);
   EXPECT_GT(value("surfels", "frame"), 10.0 * value("ideal", "frame"));
   EXPECT_GT(value("surfels", "memory"), 0.01) << "MB: a patch and a tree";
+  expect_drawn(experiment.figure(table));
   const Scores scores = experiment.scores(table);
   ASSERT_EQ(scores.rows.size(), 2U);
   for (const auto& row : scores.rows) EXPECT_EQ(row.size(), scores.columns.size());

@@ -10,6 +10,7 @@
 #include "lab/runner.hpp"
 #include "palpate/devices/sampled_wall.hpp"
 
+#include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -84,6 +85,7 @@ TEST(ZWidth, IsAnExperimentWithAFigure) {
   const Experiment& zwidth = find_experiment("zwidth");
   const Table table("zwidth", run_experiment(zwidth, options, {}, folder.path() / "zwidth.csv"));
   EXPECT_EQ(table.rows(), 4U * 3U * 2U) << "devices, hands, ways";
+  expect_drawn(zwidth.figure(table));
   const Scores scores = zwidth.scores(table);
   EXPECT_EQ(scores.rows.size(), 12U);
   EXPECT_EQ(scores.rows.front().size(), scores.columns.size());

@@ -122,6 +122,10 @@ inline constexpr auto time_reference = [](auto& way, auto& m) {
   way.number(m.time_ref.nanosec);
   way.text(m.source);
 };
+inline constexpr auto transform = [](auto& way, auto& m) {
+  way.array(m.translation);
+  way.array(m.rotation);
+};
 inline constexpr auto transforms = [](auto& way, auto& m) { walk_transforms(way, m); };
 inline constexpr auto float32 = [](auto& way, auto& m) { way.number(m.data); };
 inline constexpr auto key_value = [](auto& way, auto& m) {

@@ -51,6 +51,9 @@ std::vector<std::byte> encode(const WrenchStamped& message) {
 std::vector<std::byte> encode(const TimeReference& message) {
   return encode_by(message, time_reference);
 }
+std::vector<std::byte> encode(const Transform& message) {
+  return encode_by(message, transform);
+}
 std::vector<std::byte> encode(const TFMessage& message) {
   return encode_by(message, transforms);
 }
@@ -89,6 +92,7 @@ std::vector<std::byte> from_ros1(std::string_view type, std::span<const std::byt
   if (type == CompressedImage::type) return in_cdr<CompressedImage>(bytes, name, compressed);
   if (type == CameraInfo::type) return in_cdr<CameraInfo>(bytes, name, camera);
   if (type == PointCloud2::type) return in_cdr<PointCloud2>(bytes, name, points);
+  if (type == Transform::type) return in_cdr<Transform>(bytes, name, transform);
   if (type == TFMessage::type) return in_cdr<TFMessage>(bytes, name, transforms);
   if (type == Float32::type) return in_cdr<Float32>(bytes, name, float32);
   if (type == KeyValue::type) return in_cdr<KeyValue>(bytes, name, key_value);
@@ -124,6 +128,10 @@ WrenchStamped decode(std::span<const std::byte> bytes, const std::string& name) 
 template <>
 TimeReference decode(std::span<const std::byte> bytes, const std::string& name) {
   return decode_by<TimeReference>(bytes, name, time_reference);
+}
+template <>
+Transform decode(std::span<const std::byte> bytes, const std::string& name) {
+  return decode_by<Transform>(bytes, name, transform);
 }
 template <>
 TFMessage decode(std::span<const std::byte> bytes, const std::string& name) {

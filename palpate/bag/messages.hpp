@@ -102,6 +102,12 @@ struct TimeReference {
   std::string source;
 };
 
+struct Transform {
+  static constexpr std::string_view type = "geometry_msgs/msg/Transform";
+  std::array<double, 3> translation{};                 ///< [m]
+  std::array<double, 4> rotation{0.0, 0.0, 0.0, 1.0};  ///< x y z w
+};
+
 struct TransformStamped {
   Header header;  ///< frame_id: the parent
   std::string child_frame_id;
@@ -169,6 +175,7 @@ std::vector<std::byte> encode(const PointCloud2& message);
 std::vector<std::byte> encode(const PoseStamped& message);
 std::vector<std::byte> encode(const WrenchStamped& message);
 std::vector<std::byte> encode(const TimeReference& message);
+std::vector<std::byte> encode(const Transform& message);
 std::vector<std::byte> encode(const TFMessage& message);
 std::vector<std::byte> encode(const Float64MultiArray& message);
 std::vector<std::byte> encode(const Float32& message);
@@ -181,7 +188,7 @@ std::vector<std::byte> encode(const Wrench& message);
 std::vector<std::byte> encode(const OmniFeedback& message);
 
 /// A message of ROS 1, in CDR. Known are Image, CompressedImage, CameraInfo, PointCloud2,
-/// TFMessage, Float32, KeyValue and String.
+/// Transform, TFMessage, Float32, KeyValue and String.
 /// @param type  as ROS 2 names it  @param name  of the message, for errors
 /// @throws Error if it is of another type, or damaged.
 std::vector<std::byte> from_ros1(std::string_view type, std::span<const std::byte> bytes,
@@ -205,6 +212,8 @@ template <>
 WrenchStamped decode(std::span<const std::byte> bytes, const std::string& name);
 template <>
 TimeReference decode(std::span<const std::byte> bytes, const std::string& name);
+template <>
+Transform decode(std::span<const std::byte> bytes, const std::string& name);
 template <>
 TFMessage decode(std::span<const std::byte> bytes, const std::string& name);
 template <>

@@ -79,6 +79,25 @@ BagCamera::BagCamera(BagReader& bag, const std::string& topic, const Options& op
     exact_places_ = bag.places(exact_topic_);
   if (type_ != ros::PointCloud2::type) find_lens(camera);
   follow_transforms();
+  if (type_ != ros::PointCloud2::type && !is_ours() && !places_.empty()) find_colour();
+}
+
+void BagCamera::find_colour() {
+  const std::string topic = BagColour::topic_beside(bag_, topic_);
+  if (topic.empty()) return;
+  try {
+    colour_.emplace(bag_, topic, topic_, first_header().frame_id,
+                    transforms_ ? &*transforms_ : nullptr);
+  } catch (const Error& error) {
+    colour_note_ = std::string("colour is left out: ") + error.what();
+  }
+}
+
+ros::Header BagCamera::first_header() const {
+  const std::vector<std::byte> first = bag_.read(places_.front());
+  return type_ == ros::PointCloud2::type ? ros::decode<ros::PointCloud2>(first, name(0)).header
+         : type_ == ros::Image::type     ? ros::decode<ros::Image>(first, name(0)).header
+                                         : ros::decode<ros::CompressedImage>(first, name(0)).header;
 }
 
 void BagCamera::find_lens(const std::string& camera) {
@@ -105,12 +124,7 @@ void BagCamera::follow_transforms() {
     throw Error("fixed frame " + options_.fixed_frame, "is not in the bag: it has no TF",
                 "leave it out");
   }
-  const std::vector<std::byte> first = bag_.read(places_.front());
-  const ros::Header header =
-      type_ == ros::PointCloud2::type ? ros::decode<ros::PointCloud2>(first, name(0)).header
-      : type_ == ros::Image::type     ? ros::decode<ros::Image>(first, name(0)).header
-                                      : ros::decode<ros::CompressedImage>(first, name(0)).header;
-  transforms_.emplace(bag_, header.frame_id, options_.fixed_frame);
+  transforms_.emplace(bag_, first_header().frame_id, options_.fixed_frame);
 }
 
 std::string BagCamera::pose_note() const {
@@ -254,7 +268,10 @@ std::optional<Frame> BagCamera::read_depth(std::size_t number, ros::Image image)
     const double taken = stamp(number, image.header);
     const std::optional<Eigen::Isometry3d> pose = pose_at(taken);
     if (!pose) return std::nullopt;
-    return Frame{taken, std::make_shared<DepthImage>(seen, std::move(depth), units, *pose)};
+    return Frame{
+        .stamp = taken,
+        .cloud = std::make_shared<DepthImage>(seen, std::move(depth), units, *pose),
+        .colour = colour_ ? colour_->at(places_[number].nanoseconds, taken, *pose) : nullptr};
   }
   const std::vector<double> numbers = exact(number, 14);
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
@@ -317,10 +334,19 @@ std::optional<Frame> BagCamera::read_points(std::size_t number, const ros::Point
     const double taken = stamp(number, message.header);
     const std::optional<Eigen::Isometry3d> pose = pose_at(taken);
     if (!pose) return std::nullopt;
+    std::shared_ptr<ColourImage> colour;
+    if (std::vector<std::uint8_t> rgb = rgb_of(message); !rgb.empty()) {
+      colour = std::make_shared<ColourImage>();
+      colour->width = static_cast<int>(message.width);
+      colour->height = static_cast<int>(message.height);
+      colour->rgb = std::move(rgb);
+    }
     if (auto image = organised_.image(points, message.width, message.height, std::nullopt, *pose))
-      return Frame{taken, std::move(image)};
+      return Frame{taken, std::move(image), std::move(colour)};
     for (Vec3& point : points) point = *pose * point;
-    return Frame{taken, std::make_shared<PointCloud>(points)};
+    if (!colour) return Frame{taken, std::make_shared<PointCloud>(points)};
+    Surface surface{.points = std::move(points)};
+    return Frame{taken, std::make_shared<PointCloud>(std::move(surface)), std::move(colour)};
   }
   const std::vector<double> numbers = exact(number, 6);
   std::optional<Vec3> viewpoint;

@@ -13,6 +13,7 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/frame.hpp"
 #include "palpate/cloud/organised.hpp"
+#include "palpate/sources/bag_colour.hpp"
 #include "palpate/sources/bag_transforms.hpp"
 #include "palpate/sources/source.hpp"
 
@@ -82,12 +83,16 @@ class BagCamera {
   [[nodiscard]] SensorKind sensor() const;
   /// In which frame the points are, in a line; empty where the bag itself says it with each frame.
   [[nodiscard]] std::string pose_note() const;
+  /// Why there is no colour although the bag has images of it; else empty.
+  [[nodiscard]] const std::string& colour_note() const { return colour_note_; }
   /// The encoding of the frame read last.
   [[nodiscard]] const std::string& details() const { return details_; }
 
  private:
   void find_lens(const std::string& camera);
   void follow_transforms();
+  void find_colour();
+  [[nodiscard]] ros::Header first_header() const;
   std::optional<Frame> read_depth(std::size_t number, ros::Image image);
   std::optional<Frame> read_points(std::size_t number, const ros::PointCloud2& message);
   [[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(double stamp) const;
@@ -105,6 +110,8 @@ class BagCamera {
   std::vector<BagReader::Place> places_, info_places_, exact_places_, units_places_;
   bool is_realsense_ = false;
   std::optional<BagTransforms> transforms_;
+  std::optional<BagColour> colour_;
+  std::string colour_note_;
   std::shared_ptr<const ViewingRays> rays_;  // of the frame read last
   OrganisedClouds organised_;
   std::map<std::string, std::vector<BagReader::Place>> material_places_;

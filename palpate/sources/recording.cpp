@@ -28,6 +28,7 @@ class Recording final : public Source {
     info_.frame_rate = camera_.frame_rate();
     if (std::string note = camera_.pose_note(); !note.empty())
       info_.notes.push_back(std::move(note));
+    if (!camera_.colour_note().empty()) info_.notes.push_back(camera_.colour_note());
     std::optional<Frame> first;
     while (!(first = camera_.frame(next_)) && next_ + 1 < camera_.frames()) ++next_;
     if (!first)

@@ -20,7 +20,8 @@ namespace {
 constexpr std::size_t config_header = 12;  // of compressedDepth: int32, 2 x float32
 constexpr std::string_view slice_packing = "slice rvl";
 constexpr std::string_view units_key = "units_per_metre=";
-constexpr double least_units = 1.0, most_units = 1e6;  // [1/m]
+constexpr std::uint8_t uint32 = 6, float32 = 7, float64 = 8;  // PointField::datatype
+constexpr double least_units = 1.0, most_units = 1e6;         // [1/m]
 
 template <class T>
 T value_at(std::span<const std::byte> bytes, std::size_t at, bool swapped = false) {
@@ -42,8 +43,6 @@ struct Axes {
 };
 
 Axes axes_of(const ros::PointCloud2& message, const std::string& name) {
-  constexpr std::uint8_t float32 = 7;
-  constexpr std::uint8_t float64 = 8;
   constexpr std::array<std::string_view, 3> wanted{"x", "y", "z"};
   Axes axes;
   for (std::size_t axis = 0; axis < wanted.size(); ++axis) {
@@ -110,13 +109,10 @@ double depth_units(const std::string& format, const std::string& name) {
   return units;
 }
 
-std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
-                                     const std::string& name) {
-  const bool floats = is_float(image.encoding);
-  if (!floats && image.encoding != "16UC1" && image.encoding != "mono16")
-    throw Error(name, "is an image of encoding '" + image.encoding + "', not of depth",
-                "name a topic of 16UC1 or 32FC1 with ?topic=");
-  const std::size_t size = floats ? 4 : 2;
+namespace {
+
+// @param size  [bytes] of a pixel
+void check_size(const ros::Image& image, std::size_t size, const std::string& name) {
   if (image.width == 0 || image.height == 0 || image.width > largest_side ||
       image.height > largest_side || image.step < image.width * size ||
       image.data.size() / image.height < image.step)
@@ -125,6 +121,38 @@ std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
                     std::to_string(image.height) + " pixels in " +
                     std::to_string(image.data.size()) + " bytes, which do not fit",
                 "it may be damaged");
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> rgb_of(const ros::Image& image, const std::string& name) {
+  const std::string& encoding = image.encoding;
+  const bool is_rgb = encoding == "rgb8" || encoding == "rgba8";
+  if (!is_rgb && encoding != "bgr8" && encoding != "bgra8")
+    throw Error(name, "is an image of encoding '" + encoding + "', not of colour",
+                "record rgb8 or bgr8");
+  const std::size_t size = encoding.size() - 1;  // [bytes] of a pixel: one for each letter
+  check_size(image, size, name);
+  std::vector<std::uint8_t> rgb;
+  rgb.reserve(3 * std::size_t{image.width} * image.height);
+  for (std::size_t v = 0; v < image.height; ++v) {
+    for (std::size_t u = 0; u < image.width; ++u) {
+      const std::size_t at = v * image.step + u * size;
+      for (std::size_t channel : {0U, 1U, 2U})
+        rgb.push_back(static_cast<std::uint8_t>(image.data[at + (is_rgb ? channel : 2 - channel)]));
+    }
+  }
+  return rgb;
+}
+
+std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
+                                     const std::string& name) {
+  const bool floats = is_float(image.encoding);
+  if (!floats && image.encoding != "16UC1" && image.encoding != "mono16")
+    throw Error(name, "is an image of encoding '" + image.encoding + "', not of depth",
+                "name a topic of 16UC1 or 32FC1 with ?topic=");
+  const std::size_t size = floats ? 4 : 2;
+  check_size(image, size, name);
   const bool swapped = (image.is_bigendian != 0) != (std::endian::native == std::endian::big);
   std::vector<std::uint16_t> depth(std::size_t{image.width} * image.height);
   for (std::size_t v = 0, i = 0; v < image.height; ++v) {
@@ -224,6 +252,28 @@ ros::CompressedImage depth_slice(const ros::Header& header, std::span<const std:
 
 bool is_depth_slice(const ros::CompressedImage& message) {
   return message.format.find(slice_packing) != std::string::npos;
+}
+
+std::vector<std::uint8_t> rgb_of(const ros::PointCloud2& message) {
+  const auto field = std::find_if(message.fields.begin(), message.fields.end(), [](const auto& f) {
+    return (f.name == "rgb" || f.name == "rgba") && (f.datatype == uint32 || f.datatype == float32);
+  });
+  if (field == message.fields.end() || field->offset + std::size_t{4} > message.point_step)
+    return {};
+  const bool swapped = message.is_bigendian != (std::endian::native == std::endian::big);
+  const std::size_t row = std::size_t{message.width} * message.point_step;
+  const std::size_t row_step = message.height > 1 ? message.row_step : row;
+  std::vector<std::uint8_t> rgb;
+  rgb.reserve(3 * std::size_t{message.width} * message.height);
+  for (std::size_t v = 0; v < message.height; ++v) {
+    for (std::size_t u = 0; u < message.width; ++u) {
+      const auto packed = value_at<std::uint32_t>(
+          message.data, v * row_step + u * message.point_step + field->offset, swapped);
+      for (const unsigned shift : {16U, 8U, 0U})
+        rgb.push_back(static_cast<std::uint8_t>(packed >> shift));
+    }
+  }
+  return rgb;
 }
 
 std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name) {

@@ -37,6 +37,10 @@ double depth_units(const std::string& format, const std::string& name);
 std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
                                      const std::string& name);
 
+/// The colours of an image of rgb8, bgr8, rgba8 or bgra8, row by row: red, green, blue.
+/// @throws Error if it is of another encoding, or damaged.
+std::vector<std::uint8_t> rgb_of(const ros::Image& image, const std::string& name);
+
 /// The image in a message of compressed_depth_image_transport. Floats, which are stored as rounded
 /// inverse depth, are returned as 16UC1 in `units`. @throws Error if it is none, or damaged.
 ros::Image unpacked(ros::CompressedImage message, double units, const std::string& name);
@@ -67,6 +71,10 @@ ros::CompressedImage depth_slice(const ros::Header& header, std::span<const std:
                                  double units_per_metre);
 /// Is it one?
 bool is_depth_slice(const ros::CompressedImage& message);
+
+/// The colours of all points, row by row: red, green, blue; empty without `rgb` or `rgba`.
+/// @pre points_of took the message
+std::vector<std::uint8_t> rgb_of(const ros::PointCloud2& message);
 
 /// All points, row by row, in the frame of the message; what was not measured is not a number.
 /// @throws Error without x, y and z, or if it is damaged.

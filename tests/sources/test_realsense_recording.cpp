@@ -66,7 +66,8 @@ TEST_P(RealSenseFileOfEitherKind, IsReadWithItsLensUnitAndStamps) {
   EXPECT_EQ(source->info().sensor, SensorKind::stereo);
   EXPECT_EQ(source->info().frames, 3U);
   EXPECT_NEAR(*source->info().frame_rate, 30.3, 0.01);
-  EXPECT_TRUE(source->info().notes.empty()) << "colour and infrared are no depth";
+  ASSERT_EQ(source->info().notes.size(), 1U) << "colour and infrared are no depth";
+  EXPECT_TRUE(source->info().notes[0].starts_with("colour is left out: "));
   for (int i = 0; i < 3; ++i) {
     const auto frame = source->next();
     ASSERT_TRUE(frame);
@@ -96,6 +97,38 @@ TEST_F(RealSenseFile, WhoseUnitChangesIsReadByTheUnitOfTheTime) {
   EXPECT_DOUBLE_EQ(units(*source->next()), 1000.0);
   EXPECT_DOUBLE_EQ(units(*source->next()), 4000.0);
   EXPECT_DOUBLE_EQ(units(*open("?units=2000")->next()), 2000.0);
+}
+
+TEST_F(RealSenseFile, GivesItsColourFromWhereThatCameraStands) {
+  const std::string colour = "/device_0/sensor_1/Color_0";
+  {
+    auto recording = create();
+    recording.describe(lens, "0.001000");
+    recording.image(1000 * milliseconds, 4, 3, depth_);
+    recording.text(colour + "/camera_info", 0,
+                   "width=1;height=1;fx=9;ppx=0.5;fy=8;ppy=0.25;model=Inverse Brown Conrady;"
+                   "coeffs=0.1,0,0,0,0");
+    recording.write(colour + "/image/data", ros::Image::type, 1010 * milliseconds,
+                    ros::encode(ros::Image{.header = {},
+                                           .height = 1,
+                                           .width = 1,
+                                           .encoding = "rgb8",
+                                           .step = 3,
+                                           .data = std::vector<std::byte>(3, std::byte{7})}));
+    // From the device's first stream: a point before the depth camera is 15 mm more to the right
+    // before the colour camera, which is the first's left neighbour.
+    recording.write("/device_0/sensor_0/Depth_0/tf/0", ros::Transform::type, 0,
+                    ros::encode(ros::Transform{.translation = {0.05, 0, 0}}));
+    recording.write(colour + "/tf/0", ros::Transform::type, 0,
+                    ros::encode(ros::Transform{.translation = {0.065, 0, 0}}));
+  }
+  const auto frame = open()->next();
+  ASSERT_TRUE(frame && frame->colour && frame->colour->camera);
+  EXPECT_EQ(frame->colour->rgb, (std::vector<std::uint8_t>{7, 7, 7}));
+  EXPECT_EQ(frame->colour->camera->intrinsics,
+            (Intrinsics{.width = 1, .height = 1, .fx = 9, .fy = 8, .cx = 0.5, .cy = 0.25}));
+  EXPECT_TRUE(frame->colour->camera->world_from_camera.translation().isApprox(
+      Eigen::Vector3d(-0.015, 0, 0), 1e-12));
 }
 
 TEST_F(RealSenseFile, WithoutAUnitAsksForIt) {
@@ -213,7 +246,8 @@ TEST_F(RealSenseFile, OfRos1IsReadWithItsLensUnitAndStamps) {
   EXPECT_EQ(source->info().kind, "RealSense recording");
   EXPECT_EQ(source->info().sensor, SensorKind::structured_light);
   EXPECT_EQ(source->info().frames, 3U);
-  EXPECT_TRUE(source->info().notes.empty());
+  ASSERT_EQ(source->info().notes.size(), 1U);
+  EXPECT_NE(source->info().notes[0].find("no CameraInfo"), std::string::npos);
   for (int i = 0; i < 3; ++i) {
     const auto frame = source->next();
     ASSERT_TRUE(frame);
@@ -254,6 +288,10 @@ TEST(RealSenseRecorded, InABagOfRos1IsWhatWasTakenOutOfIt) {
   EXPECT_EQ(recorded.depth(), extracted.depth());
   EXPECT_EQ(recorded.intrinsics(), extracted.intrinsics());
   EXPECT_EQ(recorded.units_per_metre(), extracted.units_per_metre());
+  ASSERT_TRUE(frame->colour && frame->colour->camera);
+  EXPECT_EQ(frame->colour->rgb.size(), std::size_t{3} * 640 * 480);
+  // The colour camera of a D4xx is some 15 mm to the left of its depth's.
+  EXPECT_NEAR(frame->colour->camera->world_from_camera.translation().x(), -0.015, 0.003);
   EXPECT_TRUE(source->next());
   EXPECT_FALSE(source->next());
 }

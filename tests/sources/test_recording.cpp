@@ -37,6 +37,7 @@ using test::fails_saying;
 using test::TemporaryFolder;
 
 constexpr std::int64_t second = 1'000'000'000;
+constexpr std::int64_t milli = 1'000'000;
 constexpr const char* depth_topic = "/camera/depth/image_rect_raw";
 constexpr const char* info_topic = "/camera/depth/camera_info";
 
@@ -233,6 +234,91 @@ TEST_F(ForeignBag, OfOrganisedPointsIsTheDepthImageOfTheirCamera) {
   EXPECT_LT((image.deproject(25, 3).value() - point).norm(), 1e-4);
 }
 
+// Pixel i is of red i, green 2 i, blue 3 i.
+ros::Image colours(std::int64_t at, const std::string& frame, const std::string& encoding) {
+  std::vector<std::byte> bytes;
+  for (int i = 0; i < 6; ++i) {
+    std::array<int, 4> channels{i, 2 * i, 3 * i, 255};
+    if (encoding.starts_with("bgr")) std::swap(channels[0], channels[2]);
+    for (std::size_t c = 0; c + 1 < encoding.size(); ++c)
+      bytes.push_back(static_cast<std::byte>(channels[c]));
+    if (i % 3 == 2) bytes.push_back(std::byte{0xee});  // padding
+  }
+  return {.header = {ros::Time::at(at), frame},
+          .height = 2,
+          .width = 3,
+          .encoding = encoding,
+          .step = static_cast<std::uint32_t>(3 * (encoding.size() - 1) + 1),
+          .data = bytes};
+}
+
+const std::vector<std::uint8_t> six_colours{0, 0, 0, 1, 2, 3,  2, 4,  6,
+                                            3, 6, 9, 4, 8, 12, 5, 10, 15};
+constexpr const char* colour_topic = "/camera/color/image_raw";
+constexpr const char* colour_info = "/camera/color/camera_info";
+
+TEST_F(ForeignBag, GivesTheColourImageNearestInTime) {
+  write(info_topic, 0, info_of(4, 3));
+  write(colour_info, 0, info_of(3, 2));
+  write("/camera/infra/rgb_unlike", 0,
+        colours(0, "elsewhere", "rgb8"));  // no CameraInfo, farther off
+  for (const std::int64_t at : {0, 100, 400})
+    write(depth_topic, at * milli, image_16uc1(at, depth_));
+  write(colour_topic, 90 * milli, colours(0, "/camera_depth_optical_frame", "bgra8"));
+  write(colour_topic, 250 * milli, image_16uc1(0, depth_));
+  const auto source = open();
+  const auto frame = source->next();
+  ASSERT_TRUE(frame && frame->colour);
+  EXPECT_EQ(frame->colour->width, 3);
+  EXPECT_EQ(frame->colour->height, 2);
+  EXPECT_EQ(frame->colour->rgb, six_colours);
+  ASSERT_TRUE(frame->colour->camera);
+  EXPECT_EQ(frame->colour->camera->intrinsics,
+            (Intrinsics{.width = 3, .height = 2, .fx = 50, .fy = 51, .cx = 1.5, .cy = 1}));
+  EXPECT_TRUE(frame->colour->camera->world_from_camera.matrix().isIdentity(0.0));
+  EXPECT_NE(source->next()->colour, nullptr);
+  EXPECT_EQ(source->next()->colour, nullptr) << "none within 0.1 s";
+}
+
+TEST_F(ForeignBag, SaysWhyItsColourIsLeftOut) {
+  write(info_topic, 0, info_of(4, 3));
+  write(depth_topic, 0, image_16uc1(0, depth_));
+  write(colour_topic, 0, colours(0, "camera_color_optical_frame", "rgb8"));
+  write(colour_info, 0, info_of(3, 2));
+  const auto source = open();
+  EXPECT_EQ(source->next()->colour, nullptr);
+  ASSERT_EQ(source->info().notes.size(), 2U);
+  EXPECT_NE(source->info().notes[1].find("colour is left out: topic /camera/color"),
+            std::string::npos);
+  EXPECT_NE(source->info().notes[1].find("/tf_static"), std::string::npos);
+}
+
+TEST_F(ForeignBag, OfPointsGivesTheirColours) {
+  for (const std::uint8_t type : {6, 7}) {
+    ros::PointCloud2 cloud{.header = header_at(0),
+                           .width = 2,
+                           .fields = {{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}, {"rgb", 12, type}},
+                           .point_step = 16,
+                           .row_step = 32,
+                           .data = std::vector<std::byte>(32)};
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto packed = static_cast<std::uint32_t>(0xff102030 + i);
+      const float x = static_cast<float>(2 - i);
+      std::memcpy(cloud.data.data() + 16 * i, &x, 4);
+      std::memcpy(cloud.data.data() + 16 * i + 12, &packed, 4);
+    }
+    write("/points_" + std::to_string(type), 0, cloud);
+  }
+  for (const char* topic : {"/points_6", "/points_7"}) {
+    const auto frame = open("?topic=" + std::string(topic))->next();
+    ASSERT_TRUE(frame && frame->colour);
+    EXPECT_EQ(frame->colour->rgb, (std::vector<std::uint8_t>{16, 32, 48, 16, 32, 49}));
+    const auto& cloud = dynamic_cast<const PointCloud&>(*frame->cloud);
+    ASSERT_NE(cloud.surface(), nullptr);
+    EXPECT_EQ(cloud.surface()->points[0].x(), 2.0);
+  }
+}
+
 TEST_F(ForeignBag, OfSeveralCamerasSaysWhichOneItReads) {
   write("/a/depth/camera_info", 0, info_of(4, 3));
   write("/b/depth/camera_info", 0, info_of(4, 3));
@@ -240,12 +326,12 @@ TEST_F(ForeignBag, OfSeveralCamerasSaysWhichOneItReads) {
   write("/a/depth/image", 0, image_16uc1(0, depth_));
   write("/a/color/image", 0, image_16uc1(0, depth_));
   const auto source = open();
-  ASSERT_EQ(source->info().notes.size(), 2U);
+  ASSERT_EQ(source->info().notes.size(), 3U) << "the last of them of a colour without its lens";
   EXPECT_EQ(source->info().notes[0],
             "/a/depth/image is read; also there, by ?topic=: /b/depth/image");
   EXPECT_EQ(source->info().notes[1],
             "the bag has no TF (/tf, /tf_static): points are in the camera's own frame");
-  EXPECT_EQ(open("?topic=/b/depth/image")->info().notes.size(), 1U);
+  EXPECT_EQ(open("?topic=/b/depth/image")->info().notes.size(), 2U);
 }
 
 TEST_F(ForeignBag, ThatCannotBeTouchedIsRefusedWithTheReason) {
@@ -392,6 +478,27 @@ TEST_F(BagWithTransforms, GivesTheCamerasPoseBetweenThem) {
   }
 }
 
+TEST_F(BagWithTransforms, SayWhereTheColourCameraStands) {
+  write_tf({0.1, 0.5});
+  write_frames({0.2});
+  const Eigen::Quaterniond turned(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()));
+  const Eigen::Vector3d beside(0.015, 0.0, 0.001);
+  write("/tf_static", 0,
+        ros::TFMessage{{transform("camera_depth_optical_frame", "colour", 0.0, beside, turned)}});
+  write(colour_info, 0, info_of(3, 2));
+  write(colour_topic, 0, colours(0, "colour", "rgb8"));
+  Eigen::Isometry3d depth_from_colour(turned);
+  depth_from_colour.translation() = beside;
+  // In odom, and where nothing leads there.
+  for (const char* options : {"", "?fixed_frame=base_link"}) {
+    const auto frame = open(options)->next();
+    ASSERT_TRUE(frame && frame->colour && frame->colour->camera);
+    const auto& image = dynamic_cast<const DepthImage&>(*frame->cloud);
+    const Eigen::Isometry3d wanted = image.world_from_camera() * depth_from_colour;
+    EXPECT_LT((frame->colour->camera->world_from_camera.matrix() - wanted.matrix()).norm(), 1e-9);
+  }
+}
+
 TEST_F(BagWithTransforms, LeavesFramesOutThatTheyDoNotCover) {
   write_tf({0.1, 0.2, 2.0, 2.1});
   write_frames({0.0, 0.15, 0.5, 2.05, 3.0});
@@ -426,10 +533,17 @@ TEST_F(BagWithTransforms, TakesTheFixedFrameThatIsNamed) {
 TEST_F(BagWithTransforms, SaysWhereNoFixedFrameLeadsToTheCamera) {
   write_tf({});
   write_frames({0.2});
+  write("/tf_static", 0,
+        ros::TFMessage{{transform("camera_depth_optical_frame", "colour", 0.0,
+                                  Eigen::Vector3d(1, 2, 3), Eigen::Quaterniond::Identity())}});
+  write(colour_info, 0, info_of(3, 2));
+  write(colour_topic, 0, colours(0, "colour", "rgb8"));
   const auto source = open();
   ASSERT_EQ(source->info().notes.size(), 1U);
   EXPECT_NE(source->info().notes[0].find("?fixed_frame=base_link"), std::string::npos);
   const auto frame = source->next();
+  ASSERT_NE(frame->colour, nullptr) << "its camera is beside the depth's, wherever that is";
+  EXPECT_LT((frame->colour->camera->world_from_camera.translation() - Vec3(1, 2, 3)).norm(), 1e-9);
   EXPECT_TRUE(dynamic_cast<const DepthImage&>(*frame->cloud)
                   .world_from_camera()
                   .isApprox(Eigen::Isometry3d::Identity()));

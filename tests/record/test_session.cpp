@@ -135,7 +135,7 @@ TEST(Session, KeepsPointsInTheOrderInWhichTheyAreGathered) {
   std::vector<Vec3> points;
   for (int i = 0; i < 5000; ++i) points.emplace_back(uniform(random), uniform(random), 0.1);
   points.emplace_back(Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
-  const auto cloud = std::make_shared<const PointCloud>(points, Vec3(0, 0, 1.0 / 3.0), 0.007);
+  const auto cloud = std::make_shared<const PointCloud>(points, Vec3(0, 0, 1.0 / 3.0));
   const std::shared_ptr<const Cloud> seen = cloud;
   {
     SessionWriter writer(folder.path() / "bag", press_info(), 0.0);

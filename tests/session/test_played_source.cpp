@@ -80,9 +80,9 @@ TEST(PlayedSource, StaysOnItsLastFrameWhereItIsShortOrCannotBeginAgain) {
       const double after = static_cast<double>(fed - frames.end() + 4) / 30.0;
       EXPECT_FALSE(fed->after_jump);
       EXPECT_EQ(fed->is_new, after < 0.01);
-      if (!fed->is_new) EXPECT_NEAR(fed->frame.stamp, last + after, 1e-9);
-      if (!fed->is_new)
-        EXPECT_EQ(fed->frame.cloud, frames[static_cast<std::size_t>(count - 4)].frame.cloud);
+      if (fed->is_new) continue;
+      EXPECT_NEAR(fed->frame.stamp, last + after, 1e-9);
+      EXPECT_EQ(fed->frame.cloud, frames[static_cast<std::size_t>(count - 4)].frame.cloud);
     }
     EXPECT_TRUE(source.status().stays_valid);
   }

@@ -294,7 +294,7 @@ TEST_F(ForeignBag, SaysWhyItsColourIsLeftOut) {
 }
 
 TEST_F(ForeignBag, OfPointsGivesTheirColours) {
-  for (const std::uint8_t type : {6, 7}) {
+  for (const std::uint8_t type : {std::uint8_t{6}, std::uint8_t{7}}) {
     ros::PointCloud2 cloud{.header = header_at(0),
                            .width = 2,
                            .fields = {{"x", 0, 7}, {"y", 4, 7}, {"z", 8, 7}, {"rgb", 12, type}},

@@ -465,7 +465,7 @@ void define_renderer(py::module_& m) {
              const std::optional<Numbers>& viewpoint) {
             check_shape(points, "points", {0, 3},
                         std::string(point_shape) + ", or a depth image with camera=");
-            self.frame(make_points(points, viewpoint, 0.010), stamp);
+            self.frame(make_points(points, viewpoint), stamp);
           },
           py::arg("points"), py::kw_only(), py::arg("stamp"), py::arg("viewpoint") = py::none(),
           "The same from points (n, 3) [m, world].")

@@ -58,7 +58,7 @@ ProposedView proposed_view(const PointCloud& cloud) {
   const Vec3 eye = cloud.viewpoint().value_or(Vec3::Zero());
   Vec3 forward = Vec3::Zero();
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const Vec3 p = cloud.point(i);
+    const Vec3& p = cloud.point(i);
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
     if (const Vec3 away = p - eye; away.squaredNorm() > 0.0) forward += away.normalized();

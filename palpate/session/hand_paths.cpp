@@ -92,7 +92,7 @@ Vec3 hover_place(const Cloud& cloud) {
   middle /= static_cast<double>(points->size());
   Vec3 nearest = points->point(0);
   for (std::size_t i = 1; i < points->size(); ++i) {
-    const Vec3 point = points->point(i);
+    const Vec3& point = points->point(i);
     if ((point - middle).squaredNorm() < (nearest - middle).squaredNorm()) nearest = point;
   }
   const Vec3 from = points->viewpoint().value_or(Vec3::Zero());

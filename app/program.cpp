@@ -68,6 +68,14 @@ void become(std::string_view program, char** argv) {
   execv(path.c_str(), argv);
 }
 
+// Is it a file, a folder or a URI, and no verb?
+bool is_scene(const std::string& word, const std::vector<std::string>& verbs) {
+  std::error_code unused;
+  return !word.empty() && word.front() != '-' &&
+         std::find(verbs.begin(), verbs.end(), word) == verbs.end() &&
+         (word.find(':') != std::string::npos || std::filesystem::exists(word, unused));
+}
+
 int run_verb(int argc, char** argv, std::span<const AddVerb> own_verbs) {
   CLI::App program("Feel what a depth camera sees.", "palpate");
   program.set_version_flag("--version", "palpate " PALPATE_VERSION);
@@ -98,8 +106,13 @@ int run_verb(int argc, char** argv, std::span<const AddVerb> own_verbs) {
                     std::string(other) + " with CMake's -DPALPATE_LAB=ON");
   }
   program.footer(footer);
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  // `palpate FILE` touches it.
+  if (!arguments.empty() && is_scene(arguments.front(), words))
+    arguments.insert(arguments.begin(), {"run", "--camera"});
+  std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
   try {
-    program.parse(argc, argv);
+    program.parse(arguments);
   } catch (const CLI::CallForHelp& help) {
     return program.exit(help);
   } catch (const CLI::CallForVersion& version) {

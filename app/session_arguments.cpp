@@ -6,6 +6,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/pose.hpp"
+#include "palpate/drivers/drivers.hpp"
 
 namespace palpate::app {
 namespace {
@@ -87,7 +88,8 @@ void SessionArguments::add_to(CLI::App& command) {
                      "address at which browsers find the page (127.0.0.1: this machine's alone). "
                      "Beyond this machine the tokens travel in clear: better leave it, and tunnel "
                      "from the other machine, ssh -L 8642:localhost:8642 THIS_MACHINE");
-  command.add_option("--port", port_, "port of the page (8642, or any if that is taken; 0: any)");
+  command.add_option("--port", port_, "port of the page (8642, or any if that is taken; 0: any)")
+      ->check(CLI::Range(0, 65535));
   command
       .add_option("--token", token_,
                   "what a page must know to look on and to hold the hand; made up if --listen "
@@ -123,13 +125,16 @@ bool SessionArguments::names_cameras() const {
 SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
   SessionConfig config = method_.session(methods);
   if (!cameras_.empty()) config.cameras = chosen(cameras_, config.cameras);
-  for (CameraConfig& camera : config.cameras) camera.uri = with_material(camera.uri, material_);
+  for (CameraConfig& camera : config.cameras)
+    camera.uri = with_material(source_uri(camera.uri, all_sources()), material_);
   if (!devices_.empty()) {
     config.device = devices_.front();
     // Of a hand that the file knows, all but where it is plugged in stays.
     config.more_hands.resize(devices_.size() - 1);
     for (std::size_t i = 1; i < devices_.size(); ++i) config.more_hands[i - 1].device = devices_[i];
   }
+  if (!config.device.empty()) config.device = all_devices().with_scheme(config.device);
+  for (HandConfig& hand : config.more_hands) hand.device = all_devices().with_scheme(hand.device);
   if (bubble_) config.placement.bubble_radius = *bubble_;
   if (handle_weight_) config.placement.handle_weight = *handle_weight_;
   apply_placement(device_pose_, scale_, clutch_button_, config.placement);
@@ -150,7 +155,7 @@ SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
   if (record_folder_) config.record_folder = *record_folder_;
   if (record_limit_) config.record_limit = *record_limit_;
   if (listen_) config.server.listen = *listen_;
-  if (port_) config.server.port = port_;
+  if (port_) config.server.port = static_cast<std::uint16_t>(*port_);
   if (token_) config.server.token = *token_;
   if (operator_token_) config.server.operator_token = *operator_token_;
   if (no_browser_) config.server.browser = false;

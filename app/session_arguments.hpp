@@ -30,7 +30,7 @@ class SessionArguments {
   std::optional<std::string> listen_, token_, operator_token_;
   std::optional<double> rate_, scale_, bubble_, handle_weight_, record_limit_;
   std::optional<int> clutch_button_;
-  std::optional<std::uint16_t> port_;
+  std::optional<int> port_;
   bool no_browser_ = false, without_watchdog_ = false;
   MethodOptions method_;
 };

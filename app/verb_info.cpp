@@ -142,10 +142,11 @@ Json describe_pixel(const Cloud& cloud, const std::string& text, const std::stri
               "leave out --at, or give a source of depth images");
 }
 
-int info(const InfoOptions& options) {
+int info(InfoOptions options) {
   if (options.uri.empty())
     throw Error("info", "it is not said of what",
                 "name a source, such as `palpate info synthetic:desk`; docs/sources.md has all");
+  options.uri = source_uri(options.uri, all_sources());
   const std::unique_ptr<Source> source = open_source(options.uri, all_sources());
   const SourceInfo& about = source->info();
   Json json = {{"uri", about.uri}, {"kind", about.kind}, {"live", about.live}};

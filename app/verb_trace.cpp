@@ -17,6 +17,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/core/sensor.hpp"
 #include "palpate/devices/hip_path.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/session/frame_sequence.hpp"
 #include "palpate/session/press.hpp"
@@ -45,7 +46,8 @@ std::optional<Press> press_of(const TraceOptions& options, const FrameSequence& 
 }
 
 int trace(TraceOptions options) {
-  for (std::string& camera : options.cameras) camera = with_material(camera, options.material);
+  for (std::string& camera : options.cameras)
+    camera = with_material(source_uri(camera, all_sources()), options.material);
   if (!(options.rate >= 1.0 && options.rate <= 100000.0))
     throw Error("--rate", std::to_string(options.rate) + " Hz is not a tick rate",
                 "give 1 to 100000");

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cctype>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -54,7 +56,8 @@ class Registry {
       known += (known.empty() ? "" : ", ") + std::string(entry.name) + suffix_;
     }
     const std::string quoted = "'" + std::string(name) + suffix_ + "'";
-    const std::string_view near = nearest_name(name, names);
+    std::string_view near = nearest_name(name, names);
+    if (near.empty()) near = named_in_summary(name);
     const std::string what =
         subject.empty() ? "there is no such " + noun_ : "unknown " + noun_ + " " + quoted;
     throw Error(subject.empty() ? noun_ + " " + quoted : subject, what,
@@ -62,11 +65,33 @@ class Registry {
                     "known here: " + known);
   }
 
+  /// `text` with its scheme: a name of an entry may stand without the suffix.
+  /// @throws Error if it has no scheme and names no entry, as find() does.
+  [[nodiscard]] std::string with_scheme(const std::string& text) const {
+    if (text.find(':') != std::string::npos) return text;
+    return std::string(find(text, "'" + text + "'").name) + suffix_;
+  }
+
   /// In the order in which they are shown.
   [[nodiscard]] const std::vector<Entry>& entries() const& { return entries_; }
   const std::vector<Entry>& entries() const&& = delete;  // they would be gone with the registry
 
  private:
+  // The first entry whose summary has the word: who writes "omega" means "force-dimension".
+  [[nodiscard]] std::string_view named_in_summary(std::string_view word) const {
+    constexpr std::size_t shortest = 4;
+    const auto equal = [](unsigned char a, unsigned char b) {
+      return std::tolower(a) == std::tolower(b);
+    };
+    for (const Entry& entry : entries_) {
+      const std::string_view summary = entry.summary;
+      if (word.size() >= shortest && std::search(summary.begin(), summary.end(), word.begin(),
+                                                 word.end(), equal) != summary.end())
+        return entry.name;
+    }
+    return {};
+  }
+
   std::string noun_, suffix_;
   std::vector<Entry> entries_;
 };

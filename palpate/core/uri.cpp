@@ -55,7 +55,7 @@ Uri::Uri(std::string_view text) : text_(text) {
   const std::size_t colon = text.find(':');
   if (colon == std::string_view::npos || !is_scheme(text.substr(0, colon))) {
     throw Error("'" + text_ + "'", "does not start with a scheme",
-                "write SCHEME:PATH, such as tum:" + (text.empty() ? "DIR" : text_));
+                "write SCHEME:PATH, such as synthetic:desk");
   }
   scheme_ = text.substr(0, colon);
   std::string_view rest = text.substr(colon + 1);

@@ -64,8 +64,12 @@ std::vector<std::string> BagCamera::topics_of(const BagReader& bag) {
 BagCamera::BagCamera(BagReader& bag, const std::string& topic, const Options& options)
     : bag_(bag), topic_(topic), options_(options) {
   const BagReader::Topic* found = bag.find(topic);
-  if (found == nullptr)
-    throw Error("topic " + topic, "is not in the bag", "see what is with ros2 bag info");
+  if (found == nullptr) {
+    std::string known;
+    for (const std::string& name : topics_of(bag)) known += (known.empty() ? "" : ", ") + name;
+    throw Error("topic " + topic, "is not in the bag",
+                known.empty() ? "it has no depth images or points" : "give one of " + known);
+  }
   type_ = found->type;
   if (type_ != ros::Image::type && type_ != ros::CompressedImage::type &&
       type_ != ros::PointCloud2::type)

@@ -77,12 +77,29 @@ std::string uri_of_file(const std::filesystem::path& file) {
   throw Error(file.filename().string(), "cannot be touched as a file of its own", remedy);
 }
 
+std::string source_uri(const std::string& text, const Registry<SourceScheme>& schemes) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (text.find(':') != std::string::npos || !fs::exists(text, error))
+    return schemes.with_scheme(text);
+  if (!fs::is_directory(text, error)) return uri_of_file(text);
+  const fs::path folder(text);
+  for (const auto& [file, scheme] :
+       {std::pair("depth.txt", "tum:"), std::pair("metadata.yaml", "recording:"),
+        std::pair("intrinsics.json", "depth:"), std::pair("../intrinsics.json", "depth:")}) {
+    if (fs::exists(folder / file, error)) return scheme + text;
+  }
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const fs::path ending = entry.path().extension();
+    if (ending == ".pcd" || ending == ".ply") return ending.string().substr(1) + ":" + text;
+  }
+  throw Error(text, "this folder has nothing to touch",
+              "give one with depth.txt (TUM), intrinsics.json and depth images, metadata.yaml "
+              "(ROS 2 bag), .pcd or .ply files");
+}
+
 std::unique_ptr<Source> open_source(std::string_view text, const Registry<SourceScheme>& schemes) {
-  if (std::error_code error;
-      text.find(':') == std::string_view::npos && std::filesystem::is_regular_file(text, error))
-    throw Error("'" + std::string(text) + "'", "does not start with a scheme",
-                "write " + uri_of_file(text));
-  const Uri uri(text);
+  const Uri uri(source_uri(std::string(text), schemes));
   std::optional<Eigen::Isometry3d> pose;
   if (uri.has("pose"))
     pose = parse_pose(uri.text_option("pose", ""), uri.text() + ": option 'pose'");

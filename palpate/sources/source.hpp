@@ -105,6 +105,12 @@ SensorKind sensor_option(const Uri& uri, SensorKind known);
 /// @throws Error for any other ending, saying what to do with such a file.
 std::string uri_of_file(const std::filesystem::path& file);
 
+/// The URI of what a person names: a URI, a scheme without its colon, or a file or folder without a
+/// scheme. A folder is a TUM sequence, depth images, a ROS 2 bag, or PCD or PLY files.
+/// @throws Error if it is none of these.
+std::string source_uri(const std::string& text,
+                       const Registry<SourceScheme>& schemes = standard_sources());
+
 /// Opens a source by its URI. Whatever the scheme, `pose=x,y,z,qx,qy,qz,qw` says where the camera
 /// stands, as parse_pose reads it: see with_pose(); and `material=NAME` or `material=FILE.toml`
 /// what its surfaces are made of: see with_materials().

@@ -281,6 +281,22 @@ TEST_F(Program, RunsHeadlessOnTheSyntheticDesk) {
     EXPECT_TRUE(summary.contains(key)) << key;
 }
 
+// A grid of points 4 mm apart, 0.5 m away.
+TEST_F(Program, TouchesAFileThatIsNamedAlone) {
+  std::string points;
+  for (int v = -25; v <= 25; ++v) {
+    for (int u = -25; u <= 25; ++u)
+      points += std::to_string(0.004 * u) + " " + std::to_string(0.004 * v) + " 0.5\n";
+  }
+  const std::string file = write("grid.pcd",
+                                 "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
+                                 "WIDTH 2601\nHEIGHT 1\nPOINTS 2601\nDATA ascii\n" +
+                                     points);
+  const Outcome outcome = run(file + " --headless --duration 4 --json");
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_GT(nlohmann::json::parse(outcome.out)["contact_ticks"], 500);
+}
+
 // Live, so by the wall clock: what is told at the end is of the kind that a headless run tells.
 TEST_F(Program, RunsALiveSessionAndSaysWhereItsPageIs) {
   const Outcome outcome =
@@ -686,7 +702,7 @@ TEST_F(Program, SaysWhatToDoWithASourceThatIsNone) {
   expect_refusal("info recording:" + write("walk.bag", "#ROSBAG V1.2\n"),
                  {"walk.bag", "ROS 1", "rosbag reindex"});
   expect_refusal("info recording:" + write("scan.mkv", "x"), {"scan.mkv", "video", "depth:FOLDER"});
-  expect_refusal("info " + write("cup.ply", "ply"), {"cup.ply", "write ply:"});
+  expect_refusal("info " + write("cup.jpg", "x"), {"cup.jpg", ".pcd, .ply"});
   // Six digits, whatever the sums behind them.
   const Outcome at = run("info synthetic:desk --at 300,200");
   EXPECT_NE(at.out.find("depth_m: 0.7331\n"), std::string::npos) << at.out;
@@ -724,6 +740,8 @@ TEST_F(Program, RefusesBadInputInOneLineThatNamesIt) {
                  {"max_device_farce", "max_device_force"});
   expect_refusal("run --record-limit 0", {"record_limit", "0.001"});
   expect_refusal("run --device mouze:", {"mouze", "mouse"});
+  expect_refusal("run --device omega", {"'omega'", "did you mean 'force-dimension:'"});
+  expect_refusal("run --port 99999", {"--port", "99999", "65535"});
   expect_refusal("run --rate 10", {"10"});
 }
 

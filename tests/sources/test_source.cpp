@@ -109,6 +109,22 @@ TEST(OpenSource, SaysTheNearestSchemeAndASummaryOfEach) {
   }
 }
 
+TEST(OpenSource, TakesAFileOrFolderWithoutAScheme) {
+  const test::TemporaryFolder folder;
+  const std::string cup = folder.write("cup.ply", "ply").string();
+  EXPECT_EQ(source_uri(cup), "ply:" + cup);
+  EXPECT_EQ(source_uri(folder.path()), "ply:" + folder.path().string());
+  folder.write("intrinsics.json", "{}");
+  EXPECT_EQ(source_uri(folder.path()), "depth:" + folder.path().string());
+  folder.write("depth.txt", "");
+  EXPECT_EQ(source_uri(folder.path()), "tum:" + folder.path().string());
+  EXPECT_EQ(source_uri("synthetic"), "synthetic:");
+  EXPECT_EQ(source_uri("pcd:" + cup), "pcd:" + cup) << "a URI stays as it is";
+  const test::TemporaryFolder empty;
+  EXPECT_TRUE(fails_saying([&] { return source_uri(empty.path()); }, "nothing to touch", "TUM"));
+  EXPECT_TRUE(fails_saying([] { return source_uri("nowhere.ply"); }, "'nowhere.ply'"));
+}
+
 TEST(Source, ThatIsARecordingSaysSoAndLeavesOutFramesOnRequest) {
   const test::TemporaryFolder folder;
   for (int k = 0; k < 5; ++k)

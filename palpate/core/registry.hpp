@@ -16,7 +16,7 @@ namespace palpate {
 /// What can be chosen by name: methods, kinds of source, kinds of device.
 ///
 /// A value without global state: copy the library's, add entries of your own, and hand it to a
-/// Session. `Entry` has a member `name`, a string.
+/// Session. `Entry` has the strings `name` and `summary`.
 template <class Entry>
 class Registry {
  public:

@@ -50,11 +50,16 @@ TEST(Tick, KnowsWhatCanBeAPlace) {
 struct Named {
   std::string name;
   int value = 0;
+  std::string summary = {};
 };
 
 TEST(Registry, FindsByNameAndNamesTheNearestAndAllOthers) {
-  Registry<Named> registry("fruit", ":", {{"apple", 1}, {"pear", 2}});
+  Registry<Named> registry("fruit", ":", {{"apple", 1, "Bramley and others"}, {"pear", 2}});
   EXPECT_EQ(registry.find("pear").value, 2);
+  EXPECT_EQ(registry.with_scheme("pear"), "pear:");
+  EXPECT_EQ(registry.with_scheme("plum:x"), "plum:x");
+  EXPECT_TRUE(test::fails_saying([&] { return registry.with_scheme("bramley"); },
+                                 "did you mean 'apple:'"));
   EXPECT_EQ(registry.try_find("plum"), nullptr);
   EXPECT_TRUE(test::fails_saying([&] { return registry.find("aple"); }, "'apple:'", "pear:"));
   EXPECT_TRUE(test::fails_saying([&] { return registry.find("aple", "aple:x"); }, "aple:x",

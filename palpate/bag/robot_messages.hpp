@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "palpate/bag/node_messages.hpp"
+#include "palpate/bag/messages.hpp"
 
 // What robots of ROS 2 say besides their poses and wrenches.
 namespace palpate::ros {
@@ -16,12 +16,7 @@ struct TwistStamped {
   Header header;
   std::array<double, 3> linear{}, angular{};  ///< [m/s], [rad/s]
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    walk_header(way, m.header);
-    way.array(m.linear);
-    way.array(m.angular);
-  }
+  static void walk(auto& way, auto& m) { way(m.header, m.linear, m.angular); }
 };
 
 struct JointState {
@@ -30,25 +25,7 @@ struct JointState {
   std::vector<std::string> name;
   std::vector<double> position, velocity, effort;  ///< as long as `name`, or empty
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    walk_header(way, m.header);
-    way.texts(m.name);
-    way.numbers(m.position);
-    way.numbers(m.velocity);
-    way.numbers(m.effort);
-  }
-};
-
-/// A text that is told once and kept for those that come later.
-struct Text {
-  static constexpr std::string_view type = "std_msgs/msg/String";
-  std::string data;
-
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.text(m.data);
-  }
+  static void walk(auto& way, auto& m) { way(m.header, m.name, m.position, m.velocity, m.effort); }
 };
 
 }  // namespace palpate::ros

@@ -51,8 +51,8 @@ class OperatorEnd::Impl {
         contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
         links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
         joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
-        faults_(participant_, topics_.fault, ros::Text{}, kept_for_late),
-        regions_(participant_, topics_.regions, ros::Text{}, kept_for_late),
+        faults_(participant_, topics_.fault, ros::String{}, kept_for_late),
+        regions_(participant_, topics_.regions, ros::String{}, kept_for_late),
         touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
         thread_([this] { run(); }) {}
   ~Impl() {
@@ -153,8 +153,8 @@ class OperatorEnd::Impl {
       for (std::size_t i = 0; i + 2 < links->data.size(); i += 3)
         view_.state->links.emplace_back(links->data[i], links->data[i + 1], links->data[i + 2]);
     }
-    while (const auto fault = take<ros::Text>(faults_)) view_.state->fault = fault->data;
-    while (const auto regions = take<ros::Text>(regions_)) use_regions(regions->data);
+    while (const auto fault = take<ros::String>(faults_)) view_.state->fault = fault->data;
+    while (const auto regions = take<ros::String>(regions_)) use_regions(regions->data);
     while (const auto message = take<ros::Float64MultiArray>(touched_)) {
       const Touched touched = touched_of(*message);
       view_.touched = touched;

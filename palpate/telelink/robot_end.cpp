@@ -124,12 +124,12 @@ class RobotEnd::Impl {
         contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
         links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
         joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
-        faults_(participant_, topics_.fault, ros::Text{}, kept_for_late),
-        region_texts_(participant_, topics_.regions, ros::Text{}, kept_for_late),
+        faults_(participant_, topics_.fault, ros::String{}, kept_for_late),
+        region_texts_(participant_, topics_.regions, ros::String{}, kept_for_late),
         touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
         learner_(robot_->info().tool_radius) {
-    region_texts_.write(ros::Text{fixtures_json(*regions_)});
-    faults_.write(ros::Text{""});
+    region_texts_.write(ros::String{fixtures_json(*regions_)});
+    faults_.write(ros::String{""});
   }
   ~Impl() { detach(); }
   Impl(const Impl&) = delete;
@@ -272,7 +272,7 @@ class RobotEnd::Impl {
   void say(const std::string& fault) {
     if (fault == said_) return;
     said_ = fault;
-    faults_.write(ros::Text{fault});
+    faults_.write(ros::String{fault});
   }
 
   // A message that is damaged counts as none.

@@ -36,22 +36,14 @@ union Event {
 };
 
 struct Library {
-  Library()
-      : library({.name = "spacenav: (libspnav)",
-                 .files = {"libspnav.so.0", "libspnav.so.1", "libspnav.so"},
-                 .variable = "PALPATE_SPNAV",
-                 .remedy = "install it: apt install libspnav0 spacenavd"}) {
-    library.find(open, "spnav_open");
-    library.find(close, "spnav_close");
-    library.find(fd, "spnav_fd");
-    library.find(poll_event, "spnav_poll_event");
-  }
-
-  SharedLibrary library;
-  int (*open)() = nullptr;
-  int (*close)() = nullptr;
-  int (*fd)() = nullptr;
-  int (*poll_event)(Event* event) = nullptr;
+  SharedLibrary library{{.name = "spacenav: (libspnav)",
+                         .files = {"libspnav.so.0", "libspnav.so.1", "libspnav.so"},
+                         .variable = "PALPATE_SPNAV",
+                         .remedy = "install it: apt install libspnav0 spacenavd"}};
+  int (*open)() = library.find("spnav_open");
+  int (*close)() = library.find("spnav_close");
+  int (*fd)() = library.find("spnav_fd");
+  int (*poll_event)(Event* event) = library.find("spnav_poll_event");
 };
 
 class Puck final : public Sticks {

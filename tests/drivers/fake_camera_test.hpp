@@ -44,9 +44,9 @@ class FakeCameraTest : public ::testing::Test {
   /// A function of the fake library's own.
   template <class Result, class... Arguments>
   [[nodiscard]] Result ask(const char* symbol, Arguments... arguments) const {
-    Result (*function)(Arguments...) = nullptr;
-    SharedLibrary({.name = "fake", .files = {file_}, .variable = {}, .remedy = {}})
-        .find(function, symbol);
+    Result (*function)(Arguments...) =
+        SharedLibrary({.name = "fake", .files = {file_}, .variable = {}, .remedy = {}})
+            .find(symbol);
     return function(arguments...);
   }
   /// What was made by the library and not given back.

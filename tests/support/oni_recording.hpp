@@ -18,13 +18,11 @@ inline void record_oni(const std::string& library, const std::string& file, int 
   const SharedLibrary runtime(
       {.name = "OpenNI2", .files = {library}, .variable = {}, .remedy = {}});
   const auto ask = [&runtime]<class... Arguments>(const char* symbol, Arguments... arguments) {
-    int (*function)(Arguments...) = nullptr;
-    runtime.find(function, symbol);
+    int (*function)(Arguments...) = runtime.find(symbol);
     if (function(arguments...) != 0) throw std::runtime_error(symbol);
   };
   const auto end = [&runtime](const char* symbol, Handle handle) {
-    void (*function)(Handle) = nullptr;
-    runtime.find(function, symbol);
+    void (*function)(Handle) = runtime.find(symbol);
     function(handle);
   };
   const auto camera = openni2_driver().open_camera(Uri("openni2:"));  // keeps the runtime alive

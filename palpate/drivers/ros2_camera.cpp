@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/ros2_camera.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,6 +17,7 @@
 #include "palpate/drivers/clock_relation.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/live_camera.hpp"
+#include "palpate/drivers/ros2.hpp"
 #include "palpate/drivers/ros2_publisher.hpp"
 #include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"

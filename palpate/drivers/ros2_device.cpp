@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/ros2_device.hpp"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -14,6 +12,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
+#include "palpate/drivers/ros2.hpp"
 #include "palpate/drivers/wake_up.hpp"
 #include "palpate/drivers/words.hpp"
 #include "palpate/servo/mailbox.hpp"

@@ -22,10 +22,11 @@ inline const DepthImage& image_of(const Frame& frame) {
 /// Tests of a driver against a fake library, whose cameras do what a text says (fake_camera.hpp).
 class FakeCameraTest : public ::testing::Test {
  protected:
+  /// @param driver    its name
   /// @param variable  of the environment that names the library
   /// @param file      below the folder of fakes
-  FakeCameraTest(Driver driver, const std::string& variable, const std::string& file)
-      : driver_(std::move(driver)),
+  FakeCameraTest(const std::string& driver, const std::string& variable, const std::string& file)
+      : driver_(standard_drivers().find(driver)),
         file_(PALPATE_FAKES "/" + file),
         variable_(variable, file_),
         camera_(std::make_unique<Environment>("FAKE_CAMERA", "fast")) {}

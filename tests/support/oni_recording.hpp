@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "palpate/drivers/openni2_camera.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/shared_library.hpp"
 
 namespace palpate::test {
@@ -25,7 +25,7 @@ inline void record_oni(const std::string& library, const std::string& file, int 
     void (*function)(Handle) = runtime.find(symbol);
     function(handle);
   };
-  const auto camera = openni2_driver().open_camera(Uri("openni2:"));  // keeps the runtime alive
+  const auto camera = open_source("openni2:", all_sources());  // keeps the runtime alive
   Handle device = nullptr;
   Handle stream = nullptr;
   Handle recorder = nullptr;

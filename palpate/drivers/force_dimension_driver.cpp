@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/force_dimension.hpp"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -15,6 +13,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/devices/device_body.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
 #include "palpate/drivers/usb.hpp"
@@ -514,6 +513,12 @@ DriverReport look() {
 }  // namespace
 }  // namespace force_dimension
 
+/// Force Dimension's arms (omega, delta, sigma, lambda) and Novint's Falcon, by Force Dimension's
+/// library libdrd or libdhd: `force-dimension:[SERIAL]`, polled.
+///
+/// Device frame: x to the right, y away from the user, z up, origin in the middle of the workspace.
+/// The arm's firmware takes its force away when no force was sent for `watchdog` (20 ms), whatever
+/// has become of this process; sessions may rely on it (DeviceInfo::watchdog).
 Driver force_dimension_driver() {
   return {.name = "force-dimension",
           .summary = "Force Dimension's omega, delta, sigma and lambda, and the Novint Falcon",

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/realsense_camera.hpp"
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -15,6 +13,7 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
 #include "palpate/drivers/words.hpp"
@@ -617,6 +616,17 @@ class Camera final : public LiveCamera {
 
 namespace palpate {
 
+/// `realsense:` or `realsense:SERIAL`, by librealsense2, which is loaded when it is asked for.
+///
+/// Options: `width`, `height` [px] and `fps` [Hz] of the depth, its default otherwise; `colour`
+/// adds colour images; `preset` (`default`, `hand`, `high-accuracy`, `high-density`,
+/// `medium-density`), `laser` (0: off, else [mW]) and `exposure` [s], which switches automatic
+/// exposure off, are left as they are unless given.
+///
+/// The unit of depth is that of each frame. Stamps of the global and the system's time are on
+/// StampClock::system, which shows the camera's latency; a camera that offers neither is followed
+/// by its own clock. A frame that says it has the camera's own time all the same, as the first ones
+/// after the start do, gets the time at which it arrived.
 Driver realsense_driver() {
   return {.name = "realsense",
           .summary = "realsense:SERIAL, a RealSense camera by librealsense2",

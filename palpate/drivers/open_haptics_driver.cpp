@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/open_haptics.hpp"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -13,6 +11,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/devices/device_body.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
 #include "palpate/drivers/usb.hpp"
@@ -520,6 +519,12 @@ DriverReport look() {
 }  // namespace
 }  // namespace open_haptics
 
+/// 3D Systems' Touch and Touch X, SensAble's Phantoms, by the HD layer of OpenHaptics (libHD):
+/// `touch:[NAME]`, whose scheduler calls the cycle (Device::drives).
+///
+/// Device frame: x to the right, y away from the user, z up, origin as the vendor has it, in the
+/// middle of the workspace. What the hardware does when its computer dies is not documented, so a
+/// program holds it by a guard (open_guarded).
 Driver open_haptics_driver() {
   return {.name = "touch",
           .summary = "3D Systems' Touch and Touch X, SensAble's Phantoms, by OpenHaptics",

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/gamepad.hpp"
-
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/rate_hand.hpp"
 #include "palpate/drivers/shared_library.hpp"
 #include "palpate/drivers/words.hpp"
@@ -164,6 +163,8 @@ DriverReport look() {
 }  // namespace
 }  // namespace gamepad
 
+/// A game controller by SDL2: `gamepad:[INDEX]`. Its left stick moves the hand sideways and away,
+/// its right stick up and down, by rate control; a contact is felt as rumble.
 Driver gamepad_driver() {
   return {.name = "gamepad",
           .summary = "a game controller by SDL2: moves the hand, rumbles at a contact",

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/spacenav.hpp"
-
 #include <algorithm>
 #include <memory>
 #include <string>
@@ -8,6 +6,7 @@
 #include <poll.h>
 
 #include "palpate/core/error.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/rate_hand.hpp"
 #include "palpate/drivers/shared_library.hpp"
 
@@ -117,6 +116,8 @@ DriverReport look() {
 }  // namespace
 }  // namespace spacenav
 
+/// 3Dconnexion's SpaceMouse and the like, by libspnav and its daemon spacenavd: `spacenav:`. It
+/// moves the hand by rate control and gives no force.
 Driver spacenav_driver() {
   return {.name = "spacenav",
           .summary = "a SpaceMouse by spacenavd: moves the hand, gives no force",

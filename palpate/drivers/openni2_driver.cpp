@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/openni2_camera.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,6 +14,7 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
 #include "palpate/drivers/words.hpp"
@@ -422,6 +421,13 @@ class Camera final : public LiveCamera {
 
 namespace palpate {
 
+/// `openni2:`, `openni2:SERIAL` or `openni2:FILE.oni`, by OpenNI2's C interface, which is loaded
+/// when it is asked for: Kinect v1, Xtion, Carmine, Astra. A path may also be an address as
+/// OpenNI2 lists it.
+///
+/// Options: `width`, `height` [px] and `fps` [Hz] of the depth, otherwise the largest
+/// size up to 640 x 480; `colour` adds colour images, with the depth registered to them by the
+/// device. Mirroring, on by default in OpenNI2, is switched off. A recording plays at its own pace.
 Driver openni2_driver() {
   return {.name = "openni2",
           .summary = "openni2:SERIAL|FILE.oni, a Kinect v1, Xtion, Carmine or Astra by OpenNI2",

@@ -47,19 +47,11 @@ class Registry {
   /// @throws Error for an unknown name, naming the nearest one and listing all.
   [[nodiscard]] const Entry& find(std::string_view name, const std::string& subject = {}) const {
     if (const Entry* entry = try_find(name)) return *entry;
-    std::vector<std::string_view> names;
-    std::string known;
-    for (const Entry& entry : entries_) {
-      names.push_back(entry.name);
-      known += (known.empty() ? "" : ", ") + std::string(entry.name) + suffix_;
-    }
     const std::string quoted = "'" + std::string(name) + suffix_ + "'";
-    const std::string_view near = nearest_name(name, names);
     const std::string what =
         subject.empty() ? "there is no such " + noun_ : "unknown " + noun_ + " " + quoted;
     throw Error(subject.empty() ? noun_ + " " + quoted : subject, what,
-                (near.empty() ? "" : "did you mean '" + std::string(near) + suffix_ + "'? ") +
-                    "known here: " + known);
+                did_you_mean(name, names_of(entries_), suffix_));
   }
 
   /// In the order in which they are shown.

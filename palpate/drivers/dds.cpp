@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/drivers/cyclone_api.hpp"
 #include "palpate/drivers/shared_library.hpp"
 
@@ -181,19 +182,6 @@ std::string user_data_of(const Library& library, const cyclone::Qos* qos) {
   return text;
 }
 
-// "a=1;b=2;" is how ROS writes it. Empty where the key is not there.
-std::string value_of(const std::string& user_data, std::string_view key) {
-  const std::string begin = std::string(key) + "=";
-  std::size_t at = 0;
-  while (at < user_data.size()) {
-    const std::size_t end = std::min(user_data.find(';', at), user_data.size());
-    if (user_data.compare(at, begin.size(), begin) == 0)
-      return user_data.substr(at + begin.size(), end - at - begin.size());
-    at = end + 1;
-  }
-  return {};
-}
-
 Guid guid_of(const Library& library, cyclone::Entity entity) {
   cyclone::Guid guid{};
   library.guid(entity, &guid);
@@ -207,7 +195,7 @@ std::optional<std::string> client_of(const Library& library, cyclone::Endpoint* 
   if (endpoint == nullptr) return std::nullopt;
   std::string client(reinterpret_cast<const char*>(endpoint->participant_key),
                      sizeof(endpoint->participant_key));
-  client += value_of(user_data_of(library, endpoint->qos), "clientid");
+  client += value_of(user_data_of(library, endpoint->qos), "clientid").value_or("");
   library.free_endpoint(endpoint);
   return client;
 }
@@ -357,7 +345,8 @@ Generation Participant::generation() {
     if (endpoint.topic_name != nodes_topic || found == Generation::from_iron ||
         std::equal(own.begin(), own.end(), std::begin(endpoint.participant_key)))
       return;
-    const bool is_new = !value_of(user_data_of(*library_, endpoint.qos), "typehash").empty();
+    const bool is_new =
+        !value_of(user_data_of(*library_, endpoint.qos), "typehash").value_or("").empty();
     found = is_new ? Generation::from_iron : Generation::to_humble;
   });
   return found;

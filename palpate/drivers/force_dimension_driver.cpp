@@ -12,12 +12,12 @@
 #include <sys/utsname.h>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/devices/device_body.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
 #include "palpate/drivers/usb.hpp"
-#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {

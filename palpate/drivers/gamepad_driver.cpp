@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/rate_hand.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/drivers/words.hpp"
 
 namespace palpate {
 namespace gamepad {

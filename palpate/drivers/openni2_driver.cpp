@@ -14,10 +14,10 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::openni2 {

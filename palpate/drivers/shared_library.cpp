@@ -8,7 +8,7 @@
 #include <link.h>
 
 #include "palpate/core/error.hpp"
-#include "palpate/drivers/words.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate {
 namespace {

@@ -2,13 +2,13 @@
 #include "palpate/sources/files.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <fstream>
 #include <string>
 #include <system_error>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/sources/natural_order.hpp"
 
 namespace palpate {
@@ -51,10 +51,8 @@ std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder,
   std::vector<std::filesystem::path> files;
   try {
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-      std::string found = entry.path().extension().string();
-      std::transform(found.begin(), found.end(), found.begin(),
-                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-      if (found == extension && !entry.is_directory()) files.push_back(entry.path());
+      if (lower_case(entry.path().extension().string()) == extension && !entry.is_directory())
+        files.push_back(entry.path());
     }
   } catch (const std::filesystem::filesystem_error& error) {
     throw Error(folder.string(), "cannot be listed: " + error.code().message(),

@@ -134,7 +134,7 @@ class OperatorEnd::Impl {
 
   void hear(double now) {
     const std::lock_guard lock(mutex_);
-    while (const auto tool = take<ros::PoseStamped>(tools_)) {
+    while (const auto tool = tools_.take_whole<ros::PoseStamped>()) {
       const Vec3 position(tool->position[0], tool->position[1], tool->position[2]);
       if (!is_place(position)) continue;
       if (!view_.state) view_.state.emplace();
@@ -142,20 +142,20 @@ class OperatorEnd::Impl {
       view_.state->t = now;
     }
     if (!view_.state) return;
-    while (const auto twist = take<ros::TwistStamped>(twists_))
+    while (const auto twist = twists_.take_whole<ros::TwistStamped>())
       view_.state->velocity = Vec3(twist->linear[0], twist->linear[1], twist->linear[2]);
-    while (const auto contact = take<ros::WrenchStamped>(contacts_))
+    while (const auto contact = contacts_.take_whole<ros::WrenchStamped>())
       view_.state->force = Vec3(contact->force[0], contact->force[1], contact->force[2]);
-    while (const auto joints = take<ros::JointState>(joints_))
+    while (const auto joints = joints_.take_whole<ros::JointState>())
       view_.state->joints = joints->position;
-    while (const auto links = take<ros::Float64MultiArray>(links_)) {
+    while (const auto links = links_.take_whole<ros::Float64MultiArray>()) {
       view_.state->links.clear();
       for (std::size_t i = 0; i + 2 < links->data.size(); i += 3)
         view_.state->links.emplace_back(links->data[i], links->data[i + 1], links->data[i + 2]);
     }
-    while (const auto fault = take<ros::String>(faults_)) view_.state->fault = fault->data;
-    while (const auto regions = take<ros::String>(regions_)) use_regions(regions->data);
-    while (const auto message = take<ros::Float64MultiArray>(touched_)) {
+    while (const auto fault = faults_.take_whole<ros::String>()) view_.state->fault = fault->data;
+    while (const auto regions = regions_.take_whole<ros::String>()) use_regions(regions->data);
+    while (const auto message = touched_.take_whole<ros::Float64MultiArray>()) {
       const Touched touched = touched_of(*message);
       view_.touched = touched;
       view_.ignored = learns_
@@ -198,18 +198,6 @@ class OperatorEnd::Impl {
       settings.safety.lost_age = now.lost_age;
     });
     followed_ = latency;
-  }
-
-  // A message that is damaged counts as none.
-  template <class Message>
-  static std::optional<Message> take(dds::Reader& reader) {
-    for (;;) {
-      try {
-        return reader.take<Message>();
-      } catch (const Error&) {
-        continue;
-      }
-    }
   }
 
   Session& session_;

@@ -193,10 +193,10 @@ class RobotEnd::Impl {
   }
 
   void hear(double now) {
-    while (const auto press = take<ros::WrenchStamped>(presses_))
+    while (const auto press = presses_.take_whole<ros::WrenchStamped>())
       lead_.press = Vec3(press->force[0], press->force[1], press->force[2]);
     bool any = false;
-    while (const auto place = take<ros::PoseStamped>(places_)) {
+    while (const auto place = places_.take_whole<ros::PoseStamped>()) {
       const std::int64_t stamp = place->header.stamp.nanoseconds();
       // What was overtaken on the way is late; a stamp long before begins anew.
       constexpr std::int64_t anew = 1'000'000'000;  // [ns]
@@ -273,18 +273,6 @@ class RobotEnd::Impl {
     if (fault == said_) return;
     said_ = fault;
     faults_.write(ros::String{fault});
-  }
-
-  // A message that is damaged counts as none.
-  template <class Message>
-  static std::optional<Message> take(dds::Reader& reader) {
-    for (;;) {
-      try {
-        return reader.take<Message>();
-      } catch (const Error&) {
-        continue;
-      }
-    }
   }
 
   std::unique_ptr<Robot> robot_;

@@ -317,4 +317,23 @@ struct ParticipantEntitiesInfo {
   static void walk(auto& way, auto& m) { way(m.participant, m.nodes); }
 };
 
+// ---------------------------------------------------------------------------- robots
+
+struct TwistStamped {
+  static constexpr std::string_view type = "geometry_msgs/msg/TwistStamped";
+  Header header;
+  std::array<double, 3> linear{}, angular{};  ///< [m/s], [rad/s]
+
+  static void walk(auto& way, auto& m) { way(m.header, m.linear, m.angular); }
+};
+
+struct JointState {
+  static constexpr std::string_view type = "sensor_msgs/msg/JointState";
+  Header header;
+  std::vector<std::string> name;
+  std::vector<double> position, velocity, effort;  ///< as long as `name`, or empty
+
+  static void walk(auto& way, auto& m) { way(m.header, m.name, m.position, m.velocity, m.effort); }
+};
+
 }  // namespace palpate::ros

@@ -20,7 +20,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/core/text.hpp"
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/drivers/wake_up.hpp"
+#include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/web_socket.hpp"
 #include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/realtime.hpp"

@@ -13,8 +13,8 @@
 #include "palpate/core/error.hpp"
 #include "palpate/core/text.hpp"
 #include "palpate/drivers/dds.hpp"
+#include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/ros2.hpp"
-#include "palpate/drivers/wake_up.hpp"
 #include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/realtime.hpp"
 

@@ -6,11 +6,11 @@
 #include "palpate/core/pose.hpp"
 #include "palpate/core/text.hpp"
 #include "palpate/core/uri.hpp"
+#include "palpate/sources/bag_camera.hpp"
 #include "palpate/sources/depth_recording.hpp"
 #include "palpate/sources/material_file.hpp"
 #include "palpate/sources/point_file_source.hpp"
 #include "palpate/sources/posed_source.hpp"
-#include "palpate/sources/recording.hpp"
 #include "palpate/sources/source.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 

@@ -11,12 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/bag/robot_messages.hpp"
+#include "palpate/bag/node_messages.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/sources/fixture_file.hpp"
 #include "palpate/telelink/topics.hpp"
-#include "palpate/telelink/touched_message.hpp"
 #include "palpate/telelink/touched_paint.hpp"
 #include "palpate/teleop/lead.hpp"
 #include "palpate/teleop/link_limits.hpp"

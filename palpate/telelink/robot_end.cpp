@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/bag/robot_messages.hpp"
+#include "palpate/bag/node_messages.hpp"
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
@@ -21,7 +21,7 @@
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/fixture_file.hpp"
 #include "palpate/telelink/topics.hpp"
-#include "palpate/telelink/touched_message.hpp"
+#include "palpate/telelink/touched_paint.hpp"
 #include "palpate/teleop/approach_watch.hpp"
 #include "palpate/teleop/force_zero.hpp"
 #include "palpate/teleop/touched.hpp"

@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-#include "palpate/bag/robot_messages.hpp"
+#include "palpate/bag/node_messages.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/tick.hpp"
 #include "palpate/drivers/dds.hpp"

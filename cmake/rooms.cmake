@@ -137,6 +137,26 @@ function(palpate_room name)
   endif()
 endfunction()
 
+# palpate_list_drivers(TARGET FUNCTION): adds to TARGET the function
+# std::vector<Driver> palpate::FUNCTION(), what the current folder's files NAME_driver.cpp give by
+# their functions Driver palpate::NAME_driver(). So a new driver is one file.
+function(palpate_list_drivers target function)
+  file(GLOB files CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} *_driver.cpp)
+  list(TRANSFORM files REPLACE "\\.cpp$" "()")
+  list(JOIN files ", " called)
+  set(list ${CMAKE_CURRENT_BINARY_DIR}/${function}.cpp)
+  file(CONFIGURE OUTPUT ${list} @ONLY CONTENT [[
+#include "palpate/drivers/drivers.hpp"
+namespace palpate {
+Driver @called@;
+std::vector<Driver> @function@() {
+  return {@called@};
+}
+}  // namespace palpate
+]])
+  target_sources(${target} PRIVATE ${list})
+endfunction()
+
 # palpate_test(NAME LINKS <libraries...>): all .cpp files of the current folder as one GoogleTest
 # program test_NAME, each TEST of it a ctest test.
 function(palpate_test name)

@@ -14,7 +14,6 @@
 #include <zstd.h>
 
 #include "palpate/bag/checksum.hpp"
-#include "palpate/bag/definitions.hpp"
 #include "palpate/bag/mcap_format.hpp"
 #include "palpate/bag/messages.hpp"
 #include "palpate/core/error.hpp"

@@ -38,35 +38,13 @@ struct CField {
 
 class Lay;
 
-/// A message that walks over its own fields, as those of node_messages.hpp do.
-template <class Message>
-concept Walked = requires(Lay& way, const Message& message) {
-  Message::walk(way, message);
-};
-
 /// A message as a C struct, and what lies where in it: what C bindings of DDS take. Structs within
 /// are dissolved into their fields. Long sequences of numbers are not copied: they point into the
 /// message, which must outlive this. A sequence is {uint32 most, uint32 length, pointer, bool}.
 class CSample {
  public:
-  explicit CSample(const Image& message);
-  explicit CSample(const CompressedImage& message);
-  explicit CSample(const CameraInfo& message);
-  explicit CSample(const PointCloud2& message);
-  explicit CSample(const PoseStamped& message);
-  explicit CSample(const WrenchStamped& message);
-  explicit CSample(const TimeReference& message);
-  explicit CSample(const TFMessage& message);
-  explicit CSample(const Float64MultiArray& message);
-  explicit CSample(const Bool& message);
-  explicit CSample(const Point& message);
-  explicit CSample(const Vector3& message);
-  explicit CSample(const Wrench& message);
-  explicit CSample(const OmniFeedback& message);
-  template <Walked Message>
-  explicit CSample(const Message& message) {
-    lay(message, [](auto& way, auto& m) { Message::walk(way, m); });
-  }
+  template <Walkable Message>
+  explicit CSample(const Message& message);
   CSample(const CSample&) = delete;
   CSample& operator=(const CSample&) = delete;
 
@@ -76,8 +54,6 @@ class CSample {
 
  private:
   friend class Lay;
-  template <class Message, class Walk>
-  void lay(const Message& message, const Walk& walk);
 
   std::vector<std::byte> bytes_;
   std::vector<CField> fields_;
@@ -90,57 +66,12 @@ class Lay {
  public:
   explicit Lay(CSample& sample) : sample_(sample) {}
 
+  /// The fields of a message, in this order.
+  template <class... Fields>
+  void operator()(const Fields&... fields) {
+    (lay(fields), ...);
+  }
   void begin_header() {}
-  template <class T>
-  void number(const T& value) {
-    put(value, {.kind = CField::Kind::number, .offset = 0, .size = sizeof(T)});
-  }
-  void flag(const bool& value) { put(value, {.kind = CField::Kind::flag, .offset = 0}); }
-  void text(const std::string& value) {
-    const char* const kept = sample_.texts_.emplace_back(value).c_str();
-    put(kept, {.kind = CField::Kind::text, .offset = 0});
-  }
-  void bytes(const std::vector<std::byte>& value) { numbers(value); }
-  template <class T>
-  void numbers(const std::vector<T>& values) {
-    sequence_of(values.size(), values.data(),
-                {.kind = CField::Kind::numbers, .offset = 0, .size = sizeof(T)});
-  }
-  void texts(const std::vector<std::string>& values) {
-    std::vector<std::byte>& elements = sample_.elements_.emplace_back();
-    for (const std::string& value : values) {
-      const char* const kept = sample_.texts_.emplace_back(value).c_str();
-      const auto* const bytes = reinterpret_cast<const std::byte*>(&kept);
-      elements.insert(elements.end(), bytes, bytes + sizeof(kept));
-    }
-    sequence_of(values.size(), elements.data(), {.kind = CField::Kind::texts, .offset = 0});
-  }
-  template <class T, std::size_t n>
-  void array(const std::array<T, n>& values) {
-    put(values, {.kind = CField::Kind::array, .offset = 0, .size = sizeof(T), .count = n},
-        sizeof(T));
-  }
-  template <class T, class Each>
-  void sequence(const std::vector<T>& values, std::size_t /*least*/, const Each& each) {
-    const auto outer_bytes = std::exchange(bytes_, {});
-    const auto outer_fields = std::exchange(fields_, {});
-    std::vector<std::byte>& elements = sample_.elements_.emplace_back();
-    const T none{};
-    each(values.empty() ? none : values.front());  // what an element is made of
-    const std::vector<CField> fields = fields_;
-    const std::size_t size = aligned(bytes_.size(), largest_alignment);
-    for (const T& value : values) {
-      bytes_.clear();
-      fields_.clear();
-      each(value);
-      bytes_.resize(size);
-      elements.insert(elements.end(), bytes_.begin(), bytes_.end());
-    }
-    bytes_ = outer_bytes;
-    fields_ = outer_fields;
-    sequence_of(values.size(), elements.data(),
-                {.kind = CField::Kind::structs, .offset = 0, .size = size, .fields = fields});
-  }
 
   void finish() {
     bytes_.resize(aligned(bytes_.size(), largest_alignment));
@@ -156,11 +87,63 @@ class Lay {
   };
   static constexpr std::size_t largest_alignment = 8;
 
+  template <class T>
+  void lay(const T& value) {
+    if constexpr (Walkable<T>)
+      T::walk(*this, value);
+    else
+      put(value, {.kind = CField::Kind::number, .offset = 0, .size = sizeof(T)});
+  }
+  void lay(const bool& value) { put(value, {.kind = CField::Kind::flag, .offset = 0}); }
+  void lay(const std::string& value) {
+    put(kept(value), {.kind = CField::Kind::text, .offset = 0});
+  }
+  template <class T, std::size_t n>
+  void lay(const std::array<T, n>& values) {
+    put(values, {.kind = CField::Kind::array, .offset = 0, .size = sizeof(T), .count = n},
+        sizeof(T));
+  }
+  void lay(const std::vector<std::string>& values) {
+    std::vector<std::byte>& elements = sample_.elements_.emplace_back();
+    for (const std::string& value : values) {
+      const char* const text = kept(value);
+      const auto* const bytes = reinterpret_cast<const std::byte*>(&text);
+      elements.insert(elements.end(), bytes, bytes + sizeof(text));
+    }
+    put_sequence(values.size(), elements.data(), {.kind = CField::Kind::texts, .offset = 0});
+  }
+  template <Plain T>
+  void lay(const std::vector<T>& values) {
+    put_sequence(values.size(), values.data(),
+                 {.kind = CField::Kind::numbers, .offset = 0, .size = sizeof(T)});
+  }
+  template <class T>
+  void lay(const std::vector<T>& values) {
+    const auto outer_bytes = std::exchange(bytes_, {});
+    const auto outer_fields = std::exchange(fields_, {});
+    std::vector<std::byte>& elements = sample_.elements_.emplace_back();
+    lay(values.empty() ? T{} : values.front());  // what an element is made of
+    const std::vector<CField> fields = fields_;
+    const std::size_t size = aligned(bytes_.size(), largest_alignment);
+    for (const T& value : values) {
+      bytes_.clear();
+      fields_.clear();
+      lay(value);
+      bytes_.resize(size);
+      elements.insert(elements.end(), bytes_.begin(), bytes_.end());
+    }
+    bytes_ = outer_bytes;
+    fields_ = outer_fields;
+    put_sequence(values.size(), elements.data(),
+                 {.kind = CField::Kind::structs, .offset = 0, .size = size, .fields = fields});
+  }
+
+  const char* kept(const std::string& text) { return sample_.texts_.emplace_back(text).c_str(); }
   static std::size_t aligned(std::size_t size, std::size_t alignment) {
     return (size + alignment - 1) / alignment * alignment;
   }
 
-  void sequence_of(std::size_t count, const void* elements, CField field) {
+  void put_sequence(std::size_t count, const void* elements, CField field) {
     const auto length = static_cast<std::uint32_t>(count);
     put(CSequence{length, length, elements, false}, std::move(field), alignof(CSequence));
   }
@@ -178,10 +161,10 @@ class Lay {
   std::vector<CField> fields_;
 };
 
-template <class Message, class Walk>
-void CSample::lay(const Message& message, const Walk& walk) {
+template <Walkable Message>
+CSample::CSample(const Message& message) {
   Lay way(*this);
-  walk(way, message);
+  way(message);
   way.finish();
 }
 

@@ -16,6 +16,17 @@
 
 namespace palpate {
 
+/// A message, or what one consists of: hands its fields to `way`, all at once and in the order of
+/// its definition.
+template <class T>
+concept Walkable = requires(int& way, const T& message) {
+  T::walk(way, message);
+};
+
+/// What is copied as it lies in memory.
+template <class T>
+concept Plain = std::is_arithmetic_v<T> || std::is_same_v<T, std::byte>;
+
 /// Writes a message as ROS 2 does: OMG CDR, version 1, little-endian, behind the four bytes that
 /// say so. A number lies at a multiple of its size, counted from behind those four bytes.
 class CdrWriter {
@@ -30,7 +41,7 @@ class CdrWriter {
   }
   template <class T>
   void put_array(std::span<const T> values) {
-    static_assert(std::is_arithmetic_v<T>);
+    static_assert(Plain<T>);
     if (values.empty()) return;
     align(sizeof(T));
     append(values.data(), values.size());
@@ -48,10 +59,39 @@ class CdrWriter {
     bytes_.push_back(std::byte{0});
   }
 
+  /// The fields of a message, in this order.
+  template <class... Fields>
+  void operator()(const Fields&... fields) {
+    (put_field(fields), ...);
+  }
+  void begin_header() {}
+
   [[nodiscard]] std::vector<std::byte> take() { return std::move(bytes_); }
 
  private:
   static constexpr std::size_t header = 4;
+
+  template <class T>
+  void put_field(const T& value) {
+    if constexpr (Walkable<T>)
+      T::walk(*this, value);
+    else
+      put(value);
+  }
+  void put_field(const std::string& text) { put_string(text); }
+  template <class T, std::size_t n>
+  void put_field(const std::array<T, n>& values) {
+    put_array(std::span<const T>(values));
+  }
+  template <class T>
+  void put_field(const std::vector<T>& values) {
+    if constexpr (Plain<T>) {
+      put_sequence(std::span(values));
+    } else {
+      put(static_cast<std::uint32_t>(values.size()));
+      for (const T& value : values) put_field(value);
+    }
+  }
 
   void align(std::size_t size) {
     const std::size_t past = (bytes_.size() - header) % size;
@@ -80,8 +120,6 @@ class CdrReader {
   /// @throws Error if it is not plain CDR.
   CdrReader(std::span<const std::byte> message, std::string name, Layout layout = Layout::cdr);
 
-  [[nodiscard]] Layout layout() const { return layout_; }
-
   /// @throws Error if the message ends before.
   template <class T>
   T get() {
@@ -105,7 +143,43 @@ class CdrReader {
   /// How many elements of at least `size` bytes follow.
   std::size_t get_count(std::size_t size);
 
+  /// The fields of a message, in this order.
+  template <class... Fields>
+  void operator()(Fields&... fields) {
+    (get_field(fields), ...);
+  }
+  /// A header of ROS 1 begins with a number that ROS 2 has no more.
+  void begin_header() {
+    if (layout_ == Layout::ros1) static_cast<void>(get<std::uint32_t>());
+  }
+
  private:
+  template <class T>
+  void get_field(T& value) {
+    if constexpr (Walkable<T>)
+      T::walk(*this, value);
+    else
+      value = get<T>();
+  }
+  void get_field(bool& value) { value = get<std::uint8_t>() != 0; }
+  void get_field(std::string& text) { text = get_string(); }
+  template <class T, std::size_t n>
+  void get_field(std::array<T, n>& values) {
+    for (T& value : values) get_field(value);
+  }
+  template <class T>
+  void get_field(std::vector<T>& values) {
+    values.clear();
+    if constexpr (std::is_same_v<T, std::byte>) {
+      const std::span<const std::byte> bytes = get_bytes();
+      values.assign(bytes.begin(), bytes.end());
+    } else if constexpr (Plain<T>) {
+      values = get_sequence<T>();
+    } else {  // grows with what is there: none is as short as what is asked for
+      for (std::size_t left = get_count(1); left > 0; --left) get_field(values.emplace_back());
+    }
+  }
+
   void align(std::size_t size);
   std::span<const std::byte> take(std::size_t count);
 

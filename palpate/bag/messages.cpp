@@ -1,20 +1,68 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/bag/messages.hpp"
 
-#include "palpate/bag/cdr_ways.hpp"
-#include "palpate/bag/message_walks.hpp"
+#include <algorithm>
+#include <array>
+#include <utility>
+#include <vector>
+
 #include "palpate/core/error.hpp"
 
 namespace palpate::ros {
 namespace {
 
-template <class Message, class Walk>
-std::vector<std::byte> in_cdr(std::span<const std::byte> bytes, const std::string& name,
-                              const Walk& walk) {
-  Get get(bytes, name, CdrReader::Layout::ros1);
-  Message message;
-  walk(get, message);
-  return encode_by(message, walk);
+template <class... Known>
+std::vector<std::byte> in_cdr(std::string_view type, std::span<const std::byte> bytes,
+                              const std::string& name) {
+  std::vector<std::byte> cdr;
+  const auto encoded_as = [&]<class Message>(const Message*) {
+    if (type != Message::type) return false;
+    cdr = encode(decode<Message>(bytes, name, CdrReader::Layout::ros1));
+    return true;
+  };
+  if (!(encoded_as(static_cast<const Known*>(nullptr)) || ...))
+    throw Error(name, "is of " + std::string(type) + ", which is not read from bags of ROS 1",
+                "name another topic");
+  return cdr;
+}
+
+// Types without "msg/", and their fields, as ROS 2's packages define them.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 21> definitions{{
+    {"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"},
+    {"std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"},
+    {"std_msgs/String", "string data\n"},
+    {"std_msgs/Float64MultiArray", "std_msgs/MultiArrayLayout layout\nfloat64[] data\n"},
+    {"std_msgs/MultiArrayLayout", "std_msgs/MultiArrayDimension[] dim\nuint32 data_offset\n"},
+    {"std_msgs/MultiArrayDimension", "string label\nuint32 size\nuint32 stride\n"},
+    {"sensor_msgs/CompressedImage", "std_msgs/Header header\nstring format\nuint8[] data\n"},
+    {"sensor_msgs/CameraInfo",
+     "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\n"
+     "float64[9] k\nfloat64[9] r\nfloat64[12] p\nuint32 binning_x\nuint32 binning_y\n"
+     "sensor_msgs/RegionOfInterest roi\n"},
+    {"sensor_msgs/RegionOfInterest",
+     "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n"},
+    {"sensor_msgs/PointCloud2",
+     "std_msgs/Header header\nuint32 height\nuint32 width\nsensor_msgs/PointField[] fields\n"
+     "bool is_bigendian\nuint32 point_step\nuint32 row_step\nuint8[] data\nbool is_dense\n"},
+    {"sensor_msgs/PointField", "string name\nuint32 offset\nuint8 datatype\nuint32 count\n"},
+    {"geometry_msgs/PoseStamped", "std_msgs/Header header\ngeometry_msgs/Pose pose\n"},
+    {"geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"},
+    {"geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"},
+    {"geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"},
+    {"geometry_msgs/WrenchStamped", "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n"},
+    {"geometry_msgs/Wrench", "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n"},
+    {"geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n"},
+    {"tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms\n"},
+    {"geometry_msgs/TransformStamped",
+     "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"},
+    {"geometry_msgs/Transform",
+     "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"},
+}};
+
+std::string_view fields_of(std::string_view type) {
+  const auto* const found = std::find_if(definitions.begin(), definitions.end(),
+                                         [&](const auto& each) { return each.first == type; });
+  return found == definitions.end() ? std::string_view() : found->second;
 }
 
 }  // namespace
@@ -30,149 +78,30 @@ Time Time::at(std::int64_t nanoseconds) {
   return {static_cast<std::int32_t>(sec), static_cast<std::uint32_t>(rest)};
 }
 
-std::vector<std::byte> encode(const Image& message) {
-  return encode_by(message, image);
-}
-std::vector<std::byte> encode(const CompressedImage& message) {
-  return encode_by(message, compressed);
-}
-std::vector<std::byte> encode(const CameraInfo& message) {
-  return encode_by(message, camera);
-}
-std::vector<std::byte> encode(const PointCloud2& message) {
-  return encode_by(message, points);
-}
-std::vector<std::byte> encode(const PoseStamped& message) {
-  return encode_by(message, pose);
-}
-std::vector<std::byte> encode(const WrenchStamped& message) {
-  return encode_by(message, wrench);
-}
-std::vector<std::byte> encode(const TimeReference& message) {
-  return encode_by(message, time_reference);
-}
-std::vector<std::byte> encode(const Transform& message) {
-  return encode_by(message, transform);
-}
-std::vector<std::byte> encode(const TFMessage& message) {
-  return encode_by(message, transforms);
-}
-std::vector<std::byte> encode(const Float32& message) {
-  return encode_by(message, float32);
-}
-std::vector<std::byte> encode(const KeyValue& message) {
-  return encode_by(message, key_value);
-}
-std::vector<std::byte> encode(const String& message) {
-  return encode_by(message, string);
-}
-
-std::vector<std::byte> encode(const Float64MultiArray& message) {
-  return encode_by(message, multi_array);
-}
-std::vector<std::byte> encode(const Bool& message) {
-  return encode_by(message, boolean);
-}
-std::vector<std::byte> encode(const Point& message) {
-  return encode_by(message, point);
-}
-std::vector<std::byte> encode(const Vector3& message) {
-  return encode_by(message, point);
-}
-std::vector<std::byte> encode(const Wrench& message) {
-  return encode_by(message, plain_wrench);
-}
-std::vector<std::byte> encode(const OmniFeedback& message) {
-  return encode_by(message, omni_feedback);
-}
-
 std::vector<std::byte> from_ros1(std::string_view type, std::span<const std::byte> bytes,
                                  const std::string& name) {
-  if (type == Image::type) return in_cdr<Image>(bytes, name, image);
-  if (type == CompressedImage::type) return in_cdr<CompressedImage>(bytes, name, compressed);
-  if (type == CameraInfo::type) return in_cdr<CameraInfo>(bytes, name, camera);
-  if (type == PointCloud2::type) return in_cdr<PointCloud2>(bytes, name, points);
-  if (type == Transform::type) return in_cdr<Transform>(bytes, name, transform);
-  if (type == TFMessage::type) return in_cdr<TFMessage>(bytes, name, transforms);
-  if (type == Float32::type) return in_cdr<Float32>(bytes, name, float32);
-  if (type == KeyValue::type) return in_cdr<KeyValue>(bytes, name, key_value);
-  if (type == String::type) return in_cdr<String>(bytes, name, string);
-  throw Error(name, "is of " + std::string(type) + ", which is not read from bags of ROS 1",
-              "name another topic");
+  return in_cdr<Image, CompressedImage, CameraInfo, PointCloud2, Transform, TFMessage, Float32,
+                KeyValue, String>(type, bytes, name);
 }
 
-template <>
-Image decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<Image>(bytes, name, image);
-}
-template <>
-CompressedImage decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<CompressedImage>(bytes, name, compressed);
-}
-template <>
-CameraInfo decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<CameraInfo>(bytes, name, camera);
-}
-template <>
-PointCloud2 decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<PointCloud2>(bytes, name, points);
-}
-template <>
-PoseStamped decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<PoseStamped>(bytes, name, pose);
-}
-template <>
-WrenchStamped decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<WrenchStamped>(bytes, name, wrench);
-}
-template <>
-TimeReference decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<TimeReference>(bytes, name, time_reference);
-}
-template <>
-Transform decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<Transform>(bytes, name, transform);
-}
-template <>
-TFMessage decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<TFMessage>(bytes, name, transforms);
-}
-template <>
-Float32 decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<Float32>(bytes, name, float32);
-}
-template <>
-KeyValue decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<KeyValue>(bytes, name, key_value);
-}
-template <>
-String decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<String>(bytes, name, string);
-}
-
-template <>
-Float64MultiArray decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<Float64MultiArray>(bytes, name, multi_array);
-}
-template <>
-Bool decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<Bool>(bytes, name, boolean);
-}
-template <>
-Point decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<Point>(bytes, name, point);
-}
-template <>
-Vector3 decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<Vector3>(bytes, name, point);
-}
-template <>
-Wrench decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<Wrench>(bytes, name, plain_wrench);
-}
-template <>
-OmniFeedback decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<OmniFeedback>(bytes, name, omni_feedback);
+std::string definition_of(std::string_view type) {
+  std::string name(type);
+  if (const std::size_t at = name.find("/msg/"); at != std::string::npos) name.erase(at, 4);
+  std::string text;
+  std::vector<std::string_view> types{name};
+  for (std::size_t i = 0; i < types.size(); ++i) {
+    const std::string_view fields = fields_of(types[i]);
+    if (i > 0) text += std::string(80, '=') + "\nMSG: " + std::string(types[i]) + "\n";
+    text += fields;
+    // What its fields consist of: a type with a package's name before it.
+    for (std::size_t line = 0; line < fields.size(); line = fields.find('\n', line) + 1) {
+      const std::string_view part = fields.substr(line, fields.find_first_of(" [", line) - line);
+      if (part.find('/') != std::string_view::npos &&
+          std::find(types.begin(), types.end(), part) == types.end())
+        types.push_back(part);
+    }
+  }
+  return text;
 }
 
 }  // namespace palpate::ros

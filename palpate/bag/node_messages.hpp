@@ -4,28 +4,15 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "palpate/bag/c_sample.hpp"
-#include "palpate/bag/cdr_ways.hpp"
-#include "palpate/bag/header_walk.hpp"
 #include "palpate/bag/messages.hpp"
 
 // What a node of ROS 2 says besides what recordings hold: reports, parameters, services, and which
-// nodes there are. Each message walks over its own fields, in the order of their definitions.
+// nodes there are. As in messages.hpp.
 namespace palpate::ros {
-
-template <Walked Message>
-std::vector<std::byte> encode(const Message& message) {
-  return encode_by(message, [](auto& way, auto& m) { Message::walk(way, m); });
-}
-template <Walked Message>
-Message decode(std::span<const std::byte> bytes, const std::string& name) {
-  return decode_by<Message>(bytes, name, [](auto& way, auto& m) { Message::walk(way, m); });
-}
 
 // ---------------------------------------------------------------------------- reports
 
@@ -34,31 +21,21 @@ struct Vector3Stamped {
   Header header;
   std::array<double, 3> vector{};
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    walk_header(way, m.header);
-    way.array(m.vector);
-  }
+  static void walk(auto& way, auto& m) { way(m.header, m.vector); }
 };
 
 struct UInt8 {
   static constexpr std::string_view type = "std_msgs/msg/UInt8";
   std::uint8_t data = 0;
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.number(m.data);
-  }
+  static void walk(auto& way, auto& m) { way(m.data); }
 };
 
 struct UInt32 {
   static constexpr std::string_view type = "std_msgs/msg/UInt32";
   std::uint32_t data = 0;
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.number(m.data);
-  }
+  static void walk(auto& way, auto& m) { way(m.data); }
 };
 
 struct DiagnosticStatus {
@@ -66,6 +43,8 @@ struct DiagnosticStatus {
   std::uint8_t level = ok;
   std::string name{}, message{}, hardware_id{};
   std::vector<KeyValue> values;
+
+  static void walk(auto& way, auto& m) { way(m.level, m.name, m.message, m.hardware_id, m.values); }
 };
 
 struct DiagnosticArray {
@@ -73,20 +52,7 @@ struct DiagnosticArray {
   Header header;
   std::vector<DiagnosticStatus> status;
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    walk_header(way, m.header);
-    way.sequence(m.status, 17, [&way](auto& each) {
-      way.number(each.level);
-      way.text(each.name);
-      way.text(each.message);
-      way.text(each.hardware_id);
-      way.sequence(each.values, 8, [&way](auto& value) {
-        way.text(value.key);
-        way.text(value.value);
-      });
-    });
-  }
+  static void walk(auto& way, auto& m) { way(m.header, m.status); }
 };
 
 /// As from ROS 2 Galactic on. Textures and meshes are left empty, and are not read.
@@ -102,51 +68,25 @@ struct Marker {
   std::array<float, 4> colour{};                          ///< red, green, blue, opacity: 0 to 1
   std::array<std::uint32_t, 2> lifetime{};                ///< [s], [ns]; 0: for ever
   std::vector<std::array<double, 3>> points;              ///< [m]
+
+  static void walk(auto& way, auto& m) {
+    bool frame_locked = false, embedded = false;
+    std::vector<std::array<float, 4>> colours;
+    std::string text;  // the names of texture and meshes, and the texture's format
+    Header texture;
+    std::vector<std::byte> data;
+    std::vector<std::array<float, 2>> coordinates;
+    way(m.header, m.ns, m.id, m.kind, m.action, m.position, m.orientation, m.scale, m.colour,
+        m.lifetime, frame_locked, m.points, colours, text, texture, text, data, coordinates, text,
+        text, text, data, embedded);
+  }
 };
 
 struct MarkerArray {
   static constexpr std::string_view type = "visualization_msgs/msg/MarkerArray";
   std::vector<Marker> markers;
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.sequence(m.markers, 200, [&way](auto& marker) { walk_marker(way, marker); });
-  }
-
- private:
-  template <class Way, class Self>
-  static void walk_marker(Way& way, Self& m) {
-    walk_header(way, m.header);
-    way.text(m.ns);
-    way.number(m.id);
-    way.number(m.kind);
-    way.number(m.action);
-    way.array(m.position);
-    way.array(m.orientation);
-    way.array(m.scale);
-    way.array(m.colour);
-    way.array(m.lifetime);
-    bool frame_locked = false;
-    way.flag(frame_locked);
-    way.sequence(m.points, 24, [&way](auto& point) { way.array(point); });
-    std::vector<std::array<float, 4>> colours;
-    way.sequence(colours, 16, [&way](auto& colour) { way.array(colour); });
-    std::string text;
-    way.text(text);  // texture_resource
-    Header texture;
-    walk_header(way, texture);
-    way.text(text);  // its format
-    std::vector<std::byte> data;
-    way.bytes(data);
-    std::vector<std::array<float, 2>> coordinates;
-    way.sequence(coordinates, 8, [&way](auto& coordinate) { way.array(coordinate); });
-    way.text(text);
-    way.text(text);  // mesh_resource
-    way.text(text);  // mesh_file
-    way.bytes(data);
-    bool embedded = false;
-    way.flag(embedded);
-  }
+  static void walk(auto& way, auto& m) { way(m.markers); }
 };
 
 // ---------------------------------------------------------------------------- parameters
@@ -166,22 +106,13 @@ struct ParameterValue {
   }
   friend bool operator==(const ParameterValue&, const ParameterValue&) = default;
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.number(m.type);
-    way.flag(m.bool_value);
-    way.number(m.integer_value);
-    way.number(m.double_value);
-    way.text(m.string_value);
-    std::vector<std::byte> bytes;
-    way.bytes(bytes);
-    way.bytes(bytes);  // bools
+  static void walk(auto& way, auto& m) {
+    std::vector<std::byte> bytes, bools;
     std::vector<std::int64_t> integers;
-    way.numbers(integers);
     std::vector<double> doubles;
-    way.numbers(doubles);
     std::vector<std::string> texts;
-    way.texts(texts);
+    way(m.type, m.bool_value, m.integer_value, m.double_value, m.string_value, bytes, bools,
+        integers, doubles, texts);
   }
 };
 
@@ -189,11 +120,7 @@ struct Parameter {
   std::string name;
   ParameterValue value;
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.text(m.name);
-    ParameterValue::walk(way, m.value);
-  }
+  static void walk(auto& way, auto& m) { way(m.name, m.value); }
 };
 
 struct ParameterEvent {
@@ -202,16 +129,7 @@ struct ParameterEvent {
   std::string node;
   std::vector<Parameter> added, changed, deleted;
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.number(m.stamp.sec);
-    way.number(m.stamp.nanosec);
-    way.text(m.node);
-    const auto each = [&way](auto& parameter) { Parameter::walk(way, parameter); };
-    way.sequence(m.added, 48, each);
-    way.sequence(m.changed, 48, each);
-    way.sequence(m.deleted, 48, each);
-  }
+  static void walk(auto& way, auto& m) { way(m.stamp, m.node, m.added, m.changed, m.deleted); }
 };
 
 /// A range from, to, step; a step of 0 leaves everything between.
@@ -219,6 +137,8 @@ template <class Number, class Step = Number>
 struct ParameterRange {
   Number from{}, to{};
   Step step{};
+
+  static void walk(auto& way, auto& m) { way(m.from, m.to, m.step); }
 };
 
 struct ParameterDescriptor {
@@ -230,21 +150,9 @@ struct ParameterDescriptor {
   std::vector<ParameterRange<double>> floating_point_range;                ///< at most one
   std::vector<ParameterRange<std::int64_t, std::uint64_t>> integer_range;  ///< at most one
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.text(m.name);
-    way.number(m.type);
-    way.text(m.description);
-    way.text(m.additional_constraints);
-    way.flag(m.read_only);
-    way.flag(m.dynamic_typing);
-    const auto each = [&way](auto& range) {
-      way.number(range.from);
-      way.number(range.to);
-      way.number(range.step);
-    };
-    way.sequence(m.floating_point_range, 24, each);
-    way.sequence(m.integer_range, 24, each);
+  static void walk(auto& way, auto& m) {
+    way(m.name, m.type, m.description, m.additional_constraints, m.read_only, m.dynamic_typing,
+        m.floating_point_range, m.integer_range);
   }
 };
 
@@ -252,11 +160,7 @@ struct SetParametersResult {
   bool successful = false;
   std::string reason;
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.flag(m.successful);
-    way.text(m.reason);
-  }
+  static void walk(auto& way, auto& m) { way(m.successful, m.reason); }
 };
 
 // ---------------------------------------------------------------------------- services
@@ -267,11 +171,7 @@ struct RequestHeader {
   std::uint64_t client = 0;   ///< the client's own name for itself
   std::int64_t sequence = 0;  ///< of the request
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.number(m.client);
-    way.number(m.sequence);
-  }
+  static void walk(auto& way, auto& m) { way(m.client, m.sequence); }
 };
 
 struct SetParameters {
@@ -280,22 +180,14 @@ struct SetParameters {
     RequestHeader header{};
     std::vector<Parameter> parameters;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      way.sequence(m.parameters, 48, [&way](auto& p) { Parameter::walk(way, p); });
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.parameters); }
   };
   struct Reply {
     static constexpr std::string_view type = "rcl_interfaces/srv/SetParameters_Response";
     RequestHeader header{};
     std::vector<SetParametersResult> results;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      way.sequence(m.results, 8, [&way](auto& r) { SetParametersResult::walk(way, r); });
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.results); }
   };
 };
 
@@ -305,21 +197,14 @@ struct SetParametersAtomically {
     RequestHeader header{};
     std::vector<Parameter> parameters;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      SetParameters::Request::walk(way, m);
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.parameters); }
   };
   struct Reply {
     static constexpr std::string_view type = "rcl_interfaces/srv/SetParametersAtomically_Response";
     RequestHeader header{};
     SetParametersResult result;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      SetParametersResult::walk(way, m.result);
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.result); }
   };
 };
 
@@ -329,22 +214,14 @@ struct GetParameters {
     RequestHeader header{};
     std::vector<std::string> names;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      way.texts(m.names);
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.names); }
   };
   struct Reply {
     static constexpr std::string_view type = "rcl_interfaces/srv/GetParameters_Response";
     RequestHeader header{};
     std::vector<ParameterValue> values;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      way.sequence(m.values, 44, [&way](auto& value) { ParameterValue::walk(way, value); });
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.values); }
   };
 };
 
@@ -354,21 +231,14 @@ struct GetParameterTypes {
     RequestHeader header{};
     std::vector<std::string> names;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      GetParameters::Request::walk(way, m);
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.names); }
   };
   struct Reply {
     static constexpr std::string_view type = "rcl_interfaces/srv/GetParameterTypes_Response";
     RequestHeader header{};
     std::vector<std::uint8_t> types;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      way.numbers(m.types);
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.types); }
   };
 };
 
@@ -378,21 +248,14 @@ struct DescribeParameters {
     RequestHeader header{};
     std::vector<std::string> names;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      GetParameters::Request::walk(way, m);
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.names); }
   };
   struct Reply {
     static constexpr std::string_view type = "rcl_interfaces/srv/DescribeParameters_Response";
     RequestHeader header{};
     std::vector<ParameterDescriptor> descriptors;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      way.sequence(m.descriptors, 24, [&way](auto& d) { ParameterDescriptor::walk(way, d); });
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.descriptors); }
   };
 };
 
@@ -403,24 +266,14 @@ struct ListParameters {
     std::vector<std::string> prefixes;
     std::uint64_t depth = 0;  ///< 0: any
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      way.texts(m.prefixes);
-      way.number(m.depth);
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.prefixes, m.depth); }
   };
   struct Reply {
     static constexpr std::string_view type = "rcl_interfaces/srv/ListParameters_Response";
     RequestHeader header{};
     std::vector<std::string> names, prefixes;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      way.texts(m.names);
-      way.texts(m.prefixes);
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.names, m.prefixes); }
   };
 };
 
@@ -430,11 +283,7 @@ struct Trigger {
     RequestHeader header{};
     std::uint8_t empty = 0;  ///< IDL has no struct without a field; ROS sends this byte
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      way.number(m.empty);
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.empty); }
   };
   struct Reply {
     static constexpr std::string_view type = "std_srvs/srv/Trigger_Response";
@@ -442,12 +291,7 @@ struct Trigger {
     bool success = false;
     std::string message;
 
-    template <class Way, class Self>
-    static void walk(Way& way, Self& m) {
-      RequestHeader::walk(way, m.header);
-      way.flag(m.success);
-      way.text(m.message);
-    }
+    static void walk(auto& way, auto& m) { way(m.header, m.success, m.message); }
   };
 };
 
@@ -462,21 +306,34 @@ struct ParticipantEntitiesInfo {
   struct Node {
     std::string node_namespace, node_name;
     std::vector<Identity> readers, writers;
+
+    static void walk(auto& way, auto& m) {
+      way(m.node_namespace, m.node_name, m.readers, m.writers);
+    }
   };
   Identity participant{};
   std::vector<Node> nodes;
 
-  template <class Way, class Self>
-  static void walk(Way& way, Self& m) {
-    way.array(m.participant);
-    way.sequence(m.nodes, 16, [&way](auto& node) {
-      way.text(node.node_namespace);
-      way.text(node.node_name);
-      const auto each = [&way](auto& identity) { way.array(identity); };
-      way.sequence(node.readers, size, each);
-      way.sequence(node.writers, size, each);
-    });
-  }
+  static void walk(auto& way, auto& m) { way(m.participant, m.nodes); }
+};
+
+// ---------------------------------------------------------------------------- robots
+
+struct TwistStamped {
+  static constexpr std::string_view type = "geometry_msgs/msg/TwistStamped";
+  Header header;
+  std::array<double, 3> linear{}, angular{};  ///< [m/s], [rad/s]
+
+  static void walk(auto& way, auto& m) { way(m.header, m.linear, m.angular); }
+};
+
+struct JointState {
+  static constexpr std::string_view type = "sensor_msgs/msg/JointState";
+  Header header;
+  std::vector<std::string> name;
+  std::vector<double> position, velocity, effort;  ///< as long as `name`, or empty
+
+  static void walk(auto& way, auto& m) { way(m.header, m.name, m.position, m.velocity, m.effort); }
 };
 
 }  // namespace palpate::ros

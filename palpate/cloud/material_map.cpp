@@ -100,17 +100,12 @@ const MaterialTable& standard_materials() {
 }
 
 const NamedMaterial& standard_material(std::string_view name) {
-  std::vector<std::string_view> names;
-  std::string known;
-  for (const NamedMaterial& m : standard_materials().materials) {
+  const auto& materials = standard_materials().materials;
+  for (const NamedMaterial& m : materials) {
     if (m.name == name) return m;
-    names.emplace_back(m.name);
-    known += (known.empty() ? "" : ", ") + m.name;
   }
-  const std::string_view near = nearest_name(name, names);
-  throw Error(
-      "material '" + std::string(name) + "'", "there is none of that name",
-      (near.empty() ? "" : "did you mean '" + std::string(near) + "'? ") + "known are " + known);
+  throw Error("material '" + std::string(name) + "'", "there is none of that name",
+              did_you_mean(name, names_of(materials)));
 }
 
 LabelImage::LabelImage(std::shared_ptr<const MaterialTable> table, std::vector<std::uint8_t> labels,

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "palpate/core/text.hpp"
+
 namespace palpate {
 namespace {
 
@@ -35,6 +37,15 @@ std::string_view nearest_name(std::string_view word, std::span<const std::string
     }
   }
   return best;
+}
+
+std::string did_you_mean(std::string_view name, std::span<const std::string_view> known,
+                         std::string_view suffix) {
+  const std::string end(suffix);
+  const std::string near(nearest_name(name, known));
+  std::string list;
+  for (const std::string_view each : known) add_to_list(list, std::string(each) + end);
+  return (near.empty() ? "" : "did you mean '" + near + end + "'? ") + "known here: " + list;
 }
 
 }  // namespace palpate

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
-#include <cctype>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -10,6 +8,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/nearest_name.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate {
 
@@ -49,20 +48,11 @@ class Registry {
   /// @throws Error for an unknown name, naming the nearest one and listing all.
   [[nodiscard]] const Entry& find(std::string_view name, const std::string& subject = {}) const {
     if (const Entry* entry = try_find(name)) return *entry;
-    std::vector<std::string_view> names;
-    std::string known;
-    for (const Entry& entry : entries_) {
-      names.push_back(entry.name);
-      known += (known.empty() ? "" : ", ") + std::string(entry.name) + suffix_;
-    }
     const std::string quoted = "'" + std::string(name) + suffix_ + "'";
-    std::string_view near = nearest_name(name, names);
-    if (near.empty()) near = named_in_summary(name);
     const std::string what =
         subject.empty() ? "there is no such " + noun_ : "unknown " + noun_ + " " + quoted;
     throw Error(subject.empty() ? noun_ + " " + quoted : subject, what,
-                (near.empty() ? "" : "did you mean '" + std::string(near) + suffix_ + "'? ") +
-                    "known here: " + known);
+                did_you_mean(name, names_of(entries_), suffix_));
   }
 
   /// `text` with its scheme: a name of an entry may stand without the suffix.
@@ -77,19 +67,15 @@ class Registry {
   const std::vector<Entry>& entries() const&& = delete;  // they would be gone with the registry
 
  private:
-  // The first entry whose summary has the word: who writes "omega" means "force-dimension".
-  [[nodiscard]] std::string_view named_in_summary(std::string_view word) const {
+  // Who writes "omega" means "force-dimension": the entry that has the word in its summary, where
+  // no name is like it.
+  [[nodiscard]] std::string_view or_of_summary(std::string_view word) const {
     constexpr std::size_t shortest = 4;
-    const auto equal = [](unsigned char a, unsigned char b) {
-      return std::tolower(a) == std::tolower(b);
-    };
+    if (word.size() < shortest || !nearest_name(word, names_of(entries_)).empty()) return word;
     for (const Entry& entry : entries_) {
-      const std::string_view summary = entry.summary;
-      if (word.size() >= shortest && std::search(summary.begin(), summary.end(), word.begin(),
-                                                 word.end(), equal) != summary.end())
-        return entry.name;
+      if (lower_case(entry.summary).find(lower_case(word)) != std::string::npos) return entry.name;
     }
-    return {};
+    return word;
   }
 
   std::string noun_, suffix_;

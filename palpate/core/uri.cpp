@@ -11,6 +11,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/core/nearest_name.hpp"
 #include "palpate/core/parameters.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate {
 namespace {
@@ -40,13 +41,6 @@ bool is_scheme(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '-' || c == '+';
   });
-}
-
-std::string lower_case(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return lower;
 }
 
 }  // namespace
@@ -151,16 +145,9 @@ void Uri::allow_only(std::span<const std::string_view> own) const {
   std::vector<std::string_view> known(own.begin(), own.end());
   known.insert(known.end(), taken_.begin(), taken_.end());
   for (const auto& [key, value] : options_) {
-    if (std::find(known.begin(), known.end(), key) != known.end()) {
-      continue;
-    }
-    const std::string_view nearest = nearest_name(key, known);
-    std::string remedy = nearest.empty() ? "" : "did you mean '" + std::string(nearest) + "'? ";
-    remedy += known.empty() ? "it takes none" : "known here:";
-    for (const std::string_view name : known) {
-      remedy += " " + std::string(name);
-    }
-    throw Error(text_, "unknown option '" + key + "'", remedy);
+    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+    throw Error(text_, "unknown option '" + key + "'",
+                known.empty() ? "it takes none" : did_you_mean(key, known));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/parameter_table.hpp"
 #include "palpate/core/pose.hpp"
 
 namespace palpate {
@@ -61,21 +62,14 @@ const auto& row_of(const Rows& rows, std::string_view name, const char* noun,
               "choose one of: " + known);
 }
 
-void check_body(const char* name, double value, double min, double max, const char* unit) {
-  if (value >= min && value <= max) return;
-  throw Error(std::string("device model: ") + name,
-              shortest(value) + " " + unit + " is out of range",
-              "give a value from " + shortest(min) + " to " + shortest(max));
-}
-
 }  // namespace
 
 void validate(const DeviceBody& body) {
-  check_body("mass", body.mass, 1e-3, 10.0, "kg");
-  check_body("damping", body.damping, 0.0, 100.0, "N s/m");
-  check_body("friction", body.friction, 0.0, 10.0, "N");
-  check_body("resolution", body.resolution, 0.0, 0.01, "m");
-  check_body("delay", body.delay, 0.0, 0.01, "s");
+  check_range("device model", "mass", "kg", 1e-3, 10.0, body.mass);
+  check_range("device model", "damping", "N s/m", 0.0, 100.0, body.damping);
+  check_range("device model", "friction", "N", 0.0, 10.0, body.friction);
+  check_range("device model", "resolution", "m", 0.0, 0.01, body.resolution);
+  check_range("device model", "delay", "s", 0.0, 0.01, body.delay);
 }
 
 const DevicePreset& device_preset(std::string_view name) {

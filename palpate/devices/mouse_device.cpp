@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/parameter_table.hpp"
 
 namespace palpate {
 namespace {
@@ -13,12 +14,6 @@ void check_place(const Vec3& place) {
   constexpr double farthest = 1e6;  // [m]
   if (place.allFinite() && place.cwiseAbs().maxCoeff() <= farthest) return;
   throw Error("mouse", "a place is not finite or farther than 1000 km", "give metres");
-}
-
-void check_mouse(const char* name, double value, double min, double max) {
-  if (value >= min && value <= max) return;
-  throw Error("mouse: " + std::string(name), std::to_string(value) + " is out of range",
-              "give a value from " + std::to_string(min) + " to " + std::to_string(max));
 }
 
 }  // namespace
@@ -33,9 +28,9 @@ MouseDevice::MouseDevice(const Vec3& start, double response, double max_speed, s
       target_{.position = start, .present = false},
       position_(start) {
   check_place(start);
-  check_mouse("response", response, 1e-3, 1.0);
-  check_mouse("max_speed", max_speed, 0.01, 10.0);
-  check_mouse("silence", silence, 0.2, 60.0);
+  check_range("mouse", "response", "s", 1e-3, 1.0, response);
+  check_range("mouse", "max_speed", "m/s", 0.01, 10.0, max_speed);
+  check_range("mouse", "silence", "s", 0.2, 60.0, silence);
 }
 
 void MouseDevice::aim(const MouseTarget& target) {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "palpate/core/error.hpp"
+#include "palpate/core/parameter_table.hpp"
 
 namespace palpate {
 namespace {
@@ -18,14 +18,6 @@ constexpr double longest_gap = 0.1;                     // [s] of simulated time
 constexpr std::array<double, 3> tones{8.3, 9.7, 11.9};  // [Hz] physiological tremor
 constexpr double shake_from = 20.0;                     // [Hz] no hand moves so fast by itself
 constexpr double shake_time = 0.25;                     // [s]
-
-void check_hand(std::string_view name, double value, double min, double max,
-                std::string_view unit) {
-  if (value >= min && value <= max) return;
-  throw Error("simulated hand: " + std::string(name),
-              std::to_string(value) + " " + std::string(unit) + " is out of range",
-              "give a value from " + std::to_string(min) + " to " + std::to_string(max));
-}
 
 void keep_largest(std::atomic<double>& largest, double value) noexcept {
   if (value > largest.load(std::memory_order_relaxed))
@@ -42,10 +34,10 @@ SimulatedHand::SimulatedHand(HipPath target, const HandModel& model, std::string
       path_(std::move(target)),
       model_(model) {
   const bool held = !model_.body || model_.mass > 0.0;
-  check_hand("mass", model_.mass, held ? 0.01 : 0.0, 10.0, "kg");
-  check_hand("stiffness", model_.stiffness, model_.body ? 0.0 : 1.0, 1e4, "N/m");
-  check_hand("damping", model_.damping, 0.0, 1e3, "N s/m");
-  check_hand("tremor", model_.tremor, 0.0, 0.01, "m");
+  check_range("simulated hand", "mass", "kg", held ? 0.01 : 0.0, 10.0, model_.mass);
+  check_range("simulated hand", "stiffness", "N/m", model_.body ? 0.0 : 1.0, 1e4, model_.stiffness);
+  check_range("simulated hand", "damping", "N s/m", 0.0, 1e3, model_.damping);
+  check_range("simulated hand", "tremor", "m", 0.0, 0.01, model_.tremor);
   if (const auto& body = model_.body) {
     validate(*body);
     info_.kind = "simulated hand on a device";

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/drivers/cyclone_api.hpp"
 #include "palpate/drivers/shared_library.hpp"
 
@@ -18,96 +19,69 @@ namespace palpate::dds {
 // All functions are Cyclone's C API but the last three, with which it hands out messages as they
 // came.
 struct Library {
-  Library()
-      : library({.name = "ros2: (Cyclone DDS)",
-                 .files = {"libddsc.so.0debian", "libddsc.so.0t64", "libddsc.so.0", "libddsc.so"},
-                 .variable = "PALPATE_CYCLONEDDS",
-                 .remedy = "install it: apt install libddsc0debian, or libddsc0t64 (the package "
-                           "that cyclonedds-dev needs)"}) {
-    library.find(set_log_mask, "dds_set_log_mask");
-    library.find(create_domain, "dds_create_domain");
-    library.find(create_participant, "dds_create_participant");
-    library.find(remove, "dds_delete");
-    library.find(create_topic, "dds_create_topic");
-    library.find(create_reader, "dds_create_reader");
-    library.find(create_writer, "dds_create_writer");
-    library.find(create_waitset, "dds_create_waitset");
-    library.find(attach, "dds_waitset_attach");
-    library.find(wait, "dds_waitset_wait");
-    library.find(set_status_mask, "dds_set_status_mask");
-    library.find(read, "dds_read");
-    library.find(return_loan, "dds_return_loan");
-    library.find(write, "dds_write");
-    library.find(wait_for_acks, "dds_wait_for_acks");
-    library.find(matched_readers, "dds_get_matched_subscriptions");
-    library.find(matched_writers, "dds_get_matched_publications");
-    library.find(reason, "dds_strretcode");
-    library.find(create_qos, "dds_create_qos");
-    library.find(delete_qos, "dds_delete_qos");
-    library.find(set_reliability, "dds_qset_reliability");
-    library.find(set_durability, "dds_qset_durability");
-    library.find(set_history, "dds_qset_history");
-    library.find(set_lifespan, "dds_qset_lifespan");
-    library.find(set_deadline, "dds_qset_deadline");
-    library.find(set_user_data, "dds_qset_userdata");
-    library.find(user_data, "dds_qget_userdata");
-    library.find(guid, "dds_get_guid");
-    library.find(matched_reader, "dds_get_matched_subscription_data");
-    library.find(matched_writer, "dds_get_matched_publication_data");
-    library.find(free_endpoint, "dds_builtintopic_free_endpoint");
-    library.find(free, "dds_free");
-    library.find(take_cdr, "dds_takecdr");
-    library.find(cdr_reference, "ddsi_serdata_to_ser_ref");
-    library.find(cdr_unreference, "ddsi_serdata_to_ser_unref");
-    library.find(cdr_size, "ddsi_serdata_size");
-    library.find(cdr_release, "ddsi_serdata_unref");
-  }
-
-  SharedLibrary library;
-  void (*set_log_mask)(std::uint32_t) = nullptr;
-  cyclone::Entity (*create_domain)(std::uint32_t, const char*) = nullptr;
-  cyclone::Entity (*create_participant)(std::uint32_t, const cyclone::Qos*, const void*) = nullptr;
-  cyclone::Result (*remove)(cyclone::Entity) = nullptr;
+  SharedLibrary library{
+      {.name = "ros2: (Cyclone DDS)",
+       .files = {"libddsc.so.0debian", "libddsc.so.0t64", "libddsc.so.0", "libddsc.so"},
+       .variable = "PALPATE_CYCLONEDDS",
+       .remedy = "install it: apt install libddsc0debian, or libddsc0t64 (the package "
+                 "that cyclonedds-dev needs)"}};
+  void (*set_log_mask)(std::uint32_t) = library.find("dds_set_log_mask");
+  cyclone::Entity (*create_domain)(std::uint32_t, const char*) = library.find("dds_create_domain");
+  cyclone::Entity (*create_participant)(std::uint32_t, const cyclone::Qos*,
+                                        const void*) = library.find("dds_create_participant");
+  cyclone::Result (*remove)(cyclone::Entity) = library.find("dds_delete");
   cyclone::Entity (*create_topic)(cyclone::Entity, const cyclone::TopicDescriptor*, const char*,
-                                  const cyclone::Qos*, const void*) = nullptr;
+                                  const cyclone::Qos*,
+                                  const void*) = library.find("dds_create_topic");
   cyclone::Entity (*create_reader)(cyclone::Entity, cyclone::Entity, const cyclone::Qos*,
-                                   const void*) = nullptr;
+                                   const void*) = library.find("dds_create_reader");
   cyclone::Entity (*create_writer)(cyclone::Entity, cyclone::Entity, const cyclone::Qos*,
-                                   const void*) = nullptr;
-  cyclone::Entity (*create_waitset)(cyclone::Entity) = nullptr;
-  cyclone::Result (*attach)(cyclone::Entity, cyclone::Entity, std::intptr_t) = nullptr;
+                                   const void*) = library.find("dds_create_writer");
+  cyclone::Entity (*create_waitset)(cyclone::Entity) = library.find("dds_create_waitset");
+  cyclone::Result (*attach)(cyclone::Entity, cyclone::Entity,
+                            std::intptr_t) = library.find("dds_waitset_attach");
   cyclone::Result (*wait)(cyclone::Entity, std::intptr_t*, std::size_t,
-                          cyclone::Duration) = nullptr;
-  cyclone::Result (*set_status_mask)(cyclone::Entity, std::uint32_t) = nullptr;
+                          cyclone::Duration) = library.find("dds_waitset_wait");
+  cyclone::Result (*set_status_mask)(cyclone::Entity,
+                                     std::uint32_t) = library.find("dds_set_status_mask");
   cyclone::Result (*read)(cyclone::Entity, void**, cyclone::SampleInfo*, std::size_t,
-                          std::uint32_t) = nullptr;
-  cyclone::Result (*return_loan)(cyclone::Entity, void**, std::int32_t) = nullptr;
-  cyclone::Result (*write)(cyclone::Entity, const void*) = nullptr;
-  cyclone::Result (*wait_for_acks)(cyclone::Entity, cyclone::Duration) = nullptr;
-  cyclone::Result (*matched_readers)(cyclone::Entity, std::uint64_t*, std::size_t) = nullptr;
-  cyclone::Result (*matched_writers)(cyclone::Entity, std::uint64_t*, std::size_t) = nullptr;
-  const char* (*reason)(cyclone::Result) = nullptr;
-  cyclone::Qos* (*create_qos)() = nullptr;
-  void (*delete_qos)(cyclone::Qos*) = nullptr;
-  void (*set_reliability)(cyclone::Qos*, int, cyclone::Duration) = nullptr;
-  void (*set_durability)(cyclone::Qos*, int) = nullptr;
-  void (*set_history)(cyclone::Qos*, int, std::int32_t) = nullptr;
-  void (*set_lifespan)(cyclone::Qos*, cyclone::Duration) = nullptr;
-  void (*set_deadline)(cyclone::Qos*, cyclone::Duration) = nullptr;
-  void (*set_user_data)(cyclone::Qos*, const void*, std::size_t) = nullptr;
-  bool (*user_data)(const cyclone::Qos*, void**, std::size_t*) = nullptr;
-  cyclone::Result (*guid)(cyclone::Entity, cyclone::Guid*) = nullptr;
-  cyclone::Endpoint* (*matched_reader)(cyclone::Entity, std::uint64_t) = nullptr;
-  cyclone::Endpoint* (*matched_writer)(cyclone::Entity, std::uint64_t) = nullptr;
-  void (*free_endpoint)(cyclone::Endpoint*) = nullptr;
-  void (*free)(void*) = nullptr;
+                          std::uint32_t) = library.find("dds_read");
+  cyclone::Result (*return_loan)(cyclone::Entity, void**,
+                                 std::int32_t) = library.find("dds_return_loan");
+  cyclone::Result (*write)(cyclone::Entity, const void*) = library.find("dds_write");
+  cyclone::Result (*wait_for_acks)(cyclone::Entity,
+                                   cyclone::Duration) = library.find("dds_wait_for_acks");
+  cyclone::Result (*matched_readers)(cyclone::Entity, std::uint64_t*,
+                                     std::size_t) = library.find("dds_get_matched_subscriptions");
+  cyclone::Result (*matched_writers)(cyclone::Entity, std::uint64_t*,
+                                     std::size_t) = library.find("dds_get_matched_publications");
+  const char* (*reason)(cyclone::Result) = library.find("dds_strretcode");
+  cyclone::Qos* (*create_qos)() = library.find("dds_create_qos");
+  void (*delete_qos)(cyclone::Qos*) = library.find("dds_delete_qos");
+  void (*set_reliability)(cyclone::Qos*, int,
+                          cyclone::Duration) = library.find("dds_qset_reliability");
+  void (*set_durability)(cyclone::Qos*, int) = library.find("dds_qset_durability");
+  void (*set_history)(cyclone::Qos*, int, std::int32_t) = library.find("dds_qset_history");
+  void (*set_lifespan)(cyclone::Qos*, cyclone::Duration) = library.find("dds_qset_lifespan");
+  void (*set_deadline)(cyclone::Qos*, cyclone::Duration) = library.find("dds_qset_deadline");
+  void (*set_user_data)(cyclone::Qos*, const void*,
+                        std::size_t) = library.find("dds_qset_userdata");
+  bool (*user_data)(const cyclone::Qos*, void**, std::size_t*) = library.find("dds_qget_userdata");
+  cyclone::Result (*guid)(cyclone::Entity, cyclone::Guid*) = library.find("dds_get_guid");
+  cyclone::Endpoint* (*matched_reader)(cyclone::Entity, std::uint64_t) =
+      library.find("dds_get_matched_subscription_data");
+  cyclone::Endpoint* (*matched_writer)(cyclone::Entity, std::uint64_t) =
+      library.find("dds_get_matched_publication_data");
+  void (*free_endpoint)(cyclone::Endpoint*) = library.find("dds_builtintopic_free_endpoint");
+  void (*free)(void*) = library.find("dds_free");
   cyclone::Result (*take_cdr)(cyclone::Entity, cyclone::Serdata**, std::uint32_t,
-                              cyclone::SampleInfo*, std::uint32_t) = nullptr;
+                              cyclone::SampleInfo*, std::uint32_t) = library.find("dds_takecdr");
   cyclone::Serdata* (*cdr_reference)(const cyclone::Serdata*, std::size_t, std::size_t,
-                                     iovec*) = nullptr;
-  void (*cdr_unreference)(cyclone::Serdata*, const iovec*) = nullptr;
-  std::uint32_t (*cdr_size)(const cyclone::Serdata*) = nullptr;
-  void (*cdr_release)(cyclone::Serdata*) = nullptr;
+                                     iovec*) = library.find("ddsi_serdata_to_ser_ref");
+  void (*cdr_unreference)(cyclone::Serdata*,
+                          const iovec*) = library.find("ddsi_serdata_to_ser_unref");
+  std::uint32_t (*cdr_size)(const cyclone::Serdata*) = library.find("ddsi_serdata_size");
+  void (*cdr_release)(cyclone::Serdata*) = library.find("ddsi_serdata_unref");
 };
 
 namespace {
@@ -208,19 +182,6 @@ std::string user_data_of(const Library& library, const cyclone::Qos* qos) {
   return text;
 }
 
-// "a=1;b=2;" is how ROS writes it. Empty where the key is not there.
-std::string value_of(const std::string& user_data, std::string_view key) {
-  const std::string begin = std::string(key) + "=";
-  std::size_t at = 0;
-  while (at < user_data.size()) {
-    const std::size_t end = std::min(user_data.find(';', at), user_data.size());
-    if (user_data.compare(at, begin.size(), begin) == 0)
-      return user_data.substr(at + begin.size(), end - at - begin.size());
-    at = end + 1;
-  }
-  return {};
-}
-
 Guid guid_of(const Library& library, cyclone::Entity entity) {
   cyclone::Guid guid{};
   library.guid(entity, &guid);
@@ -234,7 +195,7 @@ std::optional<std::string> client_of(const Library& library, cyclone::Endpoint* 
   if (endpoint == nullptr) return std::nullopt;
   std::string client(reinterpret_cast<const char*>(endpoint->participant_key),
                      sizeof(endpoint->participant_key));
-  client += value_of(user_data_of(library, endpoint->qos), "clientid");
+  client += value_of(user_data_of(library, endpoint->qos), "clientid").value_or("");
   library.free_endpoint(endpoint);
   return client;
 }
@@ -384,7 +345,8 @@ Generation Participant::generation() {
     if (endpoint.topic_name != nodes_topic || found == Generation::from_iron ||
         std::equal(own.begin(), own.end(), std::begin(endpoint.participant_key)))
       return;
-    const bool is_new = !value_of(user_data_of(*library_, endpoint.qos), "typehash").empty();
+    const bool is_new =
+        !value_of(user_data_of(*library_, endpoint.qos), "typehash").value_or("").empty();
     found = is_new ? Generation::from_iron : Generation::to_humble;
   });
   return found;

@@ -14,6 +14,7 @@
 
 #include "palpate/bag/c_sample.hpp"
 #include "palpate/bag/messages.hpp"
+#include "palpate/core/error.hpp"
 
 // ROS 2's topics without ROS: by Eclipse Cyclone DDS's library, which is loaded when it is asked
 // for. Topics and types have the names that ROS gives them: /camera/depth/image_raw,
@@ -119,6 +120,17 @@ class Reader {
     std::optional<Message> message;
     take([&](std::span<const std::byte> cdr) { message = ros::decode<Message>(cdr, topic_); });
     return message;
+  }
+  /// As `take`, but a message that is damaged counts as none.
+  template <class Message>
+  std::optional<Message> take_whole() {
+    for (;;) {
+      try {
+        return take<Message>();
+      } catch (const Error&) {
+        continue;
+      }
+    }
   }
   /// How many writers there are now.
   [[nodiscard]] int writers() const;

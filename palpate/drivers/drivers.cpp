@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/drivers/drivers.hpp"
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
-#include "palpate/drivers/camera_drivers.hpp"
-#include "palpate/drivers/device_drivers.hpp"
-
 namespace palpate {
 
+std::vector<Driver> listed_drivers();  // made by CMake of this folder's files *_driver.cpp
+
 Registry<Driver> standard_drivers() {
-  Registry<Driver> drivers("driver", ":", camera_drivers());
-  for (Driver& driver : device_drivers()) drivers.add(std::move(driver));
-  return drivers;
+  std::vector<Driver> drivers = listed_drivers();
+  std::stable_partition(drivers.begin(), drivers.end(),
+                        [](const Driver& driver) { return driver.open_camera != nullptr; });
+  return {"driver", ":", std::move(drivers)};
 }
 
 Registry<SourceScheme> all_sources(const Registry<Driver>& drivers) {

@@ -54,7 +54,8 @@ struct Driver {
   bool needs_guard = false;
 };
 
-/// The library's own drivers: of cameras and of haptic devices. A program adds to a copy.
+/// The library's own drivers, cameras first: what palpate/drivers/NAME_driver.cpp gives by a
+/// function `Driver NAME_driver()`. A program adds to a copy.
 Registry<Driver> standard_drivers();
 
 /// Kinds of source: standard_sources() and the cameras among the drivers.

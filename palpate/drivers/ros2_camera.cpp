@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/ros2_camera.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,11 +14,12 @@
 #include "palpate/cloud/organised.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/drivers/clock_relation.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/live_camera.hpp"
+#include "palpate/drivers/ros2.hpp"
 #include "palpate/drivers/ros2_publisher.hpp"
-#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/depth_slices.hpp"
 #include "palpate/sources/ros_frames.hpp"

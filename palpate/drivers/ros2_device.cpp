@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/ros2_device.hpp"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -13,9 +11,10 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/drivers/dds.hpp"
-#include "palpate/drivers/wake_up.hpp"
-#include "palpate/drivers/words.hpp"
+#include "palpate/drivers/reopener.hpp"
+#include "palpate/drivers/ros2.hpp"
 #include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -274,12 +273,12 @@ class Hand final : public Device {
   // ---- The listener's thread, and before that the constructor's.
   void hear() {
     if (buttons_) {
-      while (const auto button = take<ros::Bool>(*buttons_))
+      while (const auto button = buttons_->take_whole<ros::Bool>())
         newest_.state.buttons = button->data ? 1U : 0U;
     }
     bool any = false;
     if (poses_) {
-      while (const auto pose = take<ros::PoseStamped>(*poses_)) {
+      while (const auto pose = poses_->take_whole<ros::PoseStamped>()) {
         const auto& [qx, qy, qz, qw] = pose->orientation;
         const Eigen::Quaterniond turn(qw, qx, qy, qz);
         newest_.state.orientation.reset();
@@ -290,23 +289,11 @@ class Hand final : public Device {
         any = place(pose->position) || any;
       }
     } else {
-      while (const auto point = take<ros::Point>(*points_)) any = place(point->xyz) || any;
+      while (const auto point = points_->take_whole<ros::Point>()) any = place(point->xyz) || any;
     }
     if (any) seen_.put(newest_);
     silent_.store(monotonic_now() - newest_.time > wanted_.silence, std::memory_order_release);
-  }
-  // A message that is damaged counts as none.
-  template <class Message>
-  static std::optional<Message> take(dds::Reader& reader) {
-    for (;;) {
-      try {
-        return reader.take<Message>();
-      } catch (const Error&) {
-        continue;
-      }
-    }
-  }
-  // A place that is none is as good as no pose.
+  }  // A place that is none is as good as no pose.
   bool place(const std::array<double, 3>& xyz) {
     const Vec3 in_topic(xyz[0], xyz[1], xyz[2]);
     if (!in_topic.allFinite()) return false;

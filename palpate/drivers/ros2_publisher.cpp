@@ -91,18 +91,15 @@ struct Ros2CameraPublisher::Topics {
   void listen() {
     while (!ends) {
       participant.wait(longest_wait);
-      try {
-        while (const auto report = reports.take<ros::Float64MultiArray>()) {
-          if (report->data.size() != 3) continue;
-          const std::lock_guard lock(rate_mutex);
-          rate.report(monotonic_now(), report->data[0], report->data[1], report->data[2]);
-        }
-        while (const auto question = questions.take<ros::TimeReference>())
-          answers.write(ros::TimeReference{.header = {wall_clock(), ""},
-                                           .time_ref = question->header.stamp,
-                                           .source = question->source});
-      } catch (const Error&) {  // what is damaged has no answer
+      while (const auto report = reports.take_whole<ros::Float64MultiArray>()) {
+        if (report->data.size() != 3) continue;
+        const std::lock_guard lock(rate_mutex);
+        rate.report(monotonic_now(), report->data[0], report->data[1], report->data[2]);
       }
+      while (const auto question = questions.take_whole<ros::TimeReference>())
+        answers.write(ros::TimeReference{.header = {wall_clock(), ""},
+                                         .time_ref = question->header.stamp,
+                                         .source = question->source});
     }
   }
 

@@ -5,13 +5,11 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "palpate/bag/node_messages.hpp"
-#include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
 
 namespace palpate::dds {
@@ -45,7 +43,7 @@ class Service {
   /// its own with a later call, up to `patience` from now on.
   /// @param now  [s] on any one clock
   void serve(double now) {
-    while (const std::optional<Request> request = next()) {
+    while (const auto request = requests_.template take_whole<Request>()) {
       Reply reply = answer_(*request);
       reply.header = request->header;
       waiting_.push_back({std::move(reply), requests_.sender(), now});
@@ -74,17 +72,6 @@ class Service {
     std::uint64_t client;
     double since;
   };
-
-  // The next request that can be read.
-  std::optional<Request> next() {
-    for (;;) {
-      try {
-        return requests_.template take<Request>();
-      } catch (const Error&) {  // damaged: nobody can be told
-        continue;
-      }
-    }
-  }
 
   std::string name_, identity_;
   Reader requests_;

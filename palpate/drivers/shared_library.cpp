@@ -8,7 +8,7 @@
 #include <link.h>
 
 #include "palpate/core/error.hpp"
-#include "palpate/drivers/words.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate {
 namespace {
@@ -67,12 +67,16 @@ SharedLibrary::SharedLibrary(const LibraryNames& names) : name_(names.name), rem
   throw Error(name_, "its library is not there (looked for " + list + ")", remedy_ + set);
 }
 
-void* SharedLibrary::address_of(const char* symbol, bool needed) const {
-  void* address = dlsym(handle_, symbol);
-  if (address == nullptr && needed)
+SharedLibrary::Symbol SharedLibrary::find(const char* symbol) const {
+  const Symbol found = try_find(symbol);
+  if (found.address == nullptr)
     throw Error(name_, path_ + " has no function " + symbol + ": it is of another version",
                 remedy_);
-  return address;
+  return found;
+}
+
+SharedLibrary::Symbol SharedLibrary::try_find(const char* symbol) const {
+  return {dlsym(handle_, symbol)};
 }
 
 }  // namespace palpate

@@ -28,23 +28,20 @@ class SharedLibrary {
   /// The file that was loaded.
   [[nodiscard]] const std::string& path() const { return path_; }
 
-  /// Points `function` at the library's function `symbol`; the pointer's type is its C signature.
+  /// A function of the library: becomes a pointer of whatever type it is given to, which is to be
+  /// its C signature: int (*close)(char) = library.find("dhdClose").
+  struct Symbol {
+    void* address;
+    template <class Function>
+    requires std::is_function_v<Function>
+    operator Function*() const { return reinterpret_cast<Function*>(address); }
+  };
   /// @throws Error naming library and symbol if there is none of that name.
-  template <class Function>
-  void find(Function*& function, const char* symbol) const {
-    static_assert(std::is_function_v<Function>);
-    function = reinterpret_cast<Function*>(address_of(symbol, true));
-  }
+  [[nodiscard]] Symbol find(const char* symbol) const;
   /// As `find`, for what older versions lack: null then.
-  template <class Function>
-  void try_find(Function*& function, const char* symbol) const {
-    static_assert(std::is_function_v<Function>);
-    function = reinterpret_cast<Function*>(address_of(symbol, false));
-  }
+  [[nodiscard]] Symbol try_find(const char* symbol) const;
 
  private:
-  [[nodiscard]] void* address_of(const char* symbol, bool needed) const;
-
   std::string name_, remedy_, path_;
   void* handle_ = nullptr;
 };

@@ -13,9 +13,10 @@
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/frame.hpp"
 #include "palpate/cloud/organised.hpp"
+#include "palpate/core/uri.hpp"
 #include "palpate/sources/bag_colour.hpp"
-#include "palpate/sources/bag_transforms.hpp"
 #include "palpate/sources/source.hpp"
+#include "palpate/sources/transforms.hpp"
 
 namespace palpate {
 
@@ -47,7 +48,7 @@ constexpr std::string_view material_format_with_brightness = "mono16; png; label
 ///
 /// Depth images of encoding 16UC1, mono16 [mm] and 32FC1 [m], raw or compressedDepth (PNG), with a
 /// CameraInfo beside them; PointCloud2 with x, y and z. In other bags the camera's pose is what
-/// their transforms say (bag_transforms.hpp); where they lead from no fixed frame to the camera,
+/// their transforms say (transforms.hpp); where they lead from no fixed frame to the camera,
 /// points are in the camera's own frame.
 ///
 /// Recordings of librealsense (2.58 and later) keep the lens and the unit of depth in texts:
@@ -119,5 +120,17 @@ class BagCamera {
   double material_image_ = 0.0, material_table_ = 0.0;  // its messages
   std::string details_;
 };
+
+/// Opens `recording:PATH`: the frames of a session that palpate recorded, to the bit, or of any bag
+/// of ROS 2 (in SQLite or MCAP) or ROS 1 with depth images or points (bag_camera.hpp), a
+/// RealSense's among them. Stamps count from the first frame.
+///
+/// `topic=/NAME` chooses among several topics; `units=1000` is the number of raw depth units per
+/// metre, to which depth in floats is rounded (5000: 0.2 mm, up to 13 m); `fixed_frame=odom` is the
+/// frame of TF in which points are, and `none` leaves TF aside. Frames for whose time a bag that
+/// has TF has no transform are left out. For a frame that cannot be read next() throws an Error;
+/// the call after it goes on with the next frame.
+/// @throws Error if the bag cannot be used, or holds no frames.
+std::unique_ptr<Source> open_recording(const Uri& uri);
 
 }  // namespace palpate

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstdlib>
 #include <string_view>
 #include <utility>
 
 #include "palpate/bag/messages.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/sources/realsense_lens.hpp"
 #include "palpate/sources/ros_frames.hpp"
 #include "palpate/sources/transforms.hpp"
@@ -20,9 +20,7 @@ namespace {
 constexpr std::int64_t farthest = 100'000'000;  // [ns] from a depth image
 
 bool is_colour(const BagReader::Topic& topic) {
-  std::string name = topic.name;
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string name = lower_case(topic.name);
   return topic.type == ros::Image::type && !is_topic_of_depth(topic.name, topic.type) &&
          (name.find("color") != std::string::npos || name.find("colour") != std::string::npos ||
           name.find("rgb") != std::string::npos);

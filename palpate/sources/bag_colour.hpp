@@ -11,7 +11,7 @@
 
 #include "palpate/bag/bag_reader.hpp"
 #include "palpate/cloud/frame.hpp"
-#include "palpate/sources/bag_transforms.hpp"
+#include "palpate/sources/transforms.hpp"
 
 namespace palpate {
 

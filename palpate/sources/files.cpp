@@ -2,16 +2,28 @@
 #include "palpate/sources/files.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <fstream>
 #include <string>
 #include <system_error>
 
 #include "palpate/core/error.hpp"
-#include "palpate/sources/natural_order.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate {
+namespace {
+
+constexpr std::string_view digits = "0123456789";
+
+// Cuts the digits that `rest` begins with from it; returns them without leading zeros.
+std::string_view take_number(std::string_view& rest) noexcept {
+  std::string_view number = rest.substr(0, rest.find_first_not_of(digits));
+  rest.remove_prefix(number.size());
+  number.remove_prefix(std::min(number.find_first_not_of('0'), number.size()));
+  return number;
+}
+
+}  // namespace
 
 std::vector<std::byte> read_file(const std::filesystem::path& path, std::uintmax_t max_bytes) {
   std::error_code error;
@@ -51,10 +63,8 @@ std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder,
   std::vector<std::filesystem::path> files;
   try {
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-      std::string found = entry.path().extension().string();
-      std::transform(found.begin(), found.end(), found.begin(),
-                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-      if (found == extension && !entry.is_directory()) files.push_back(entry.path());
+      if (lower_case(entry.path().extension().string()) == extension && !entry.is_directory())
+        files.push_back(entry.path());
     }
   } catch (const std::filesystem::filesystem_error& error) {
     throw Error(folder.string(), "cannot be listed: " + error.code().message(),
@@ -65,6 +75,26 @@ std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder,
               return natural_less(a.filename().native(), b.filename().native());
             });
   return files;
+}
+
+bool natural_less(std::string_view a, std::string_view b) noexcept {
+  std::string_view x = a, y = b;
+  while (!x.empty() && !y.empty()) {
+    const bool x_number = digits.find(x.front()) != std::string_view::npos;
+    const bool y_number = digits.find(y.front()) != std::string_view::npos;
+    if (x_number && y_number) {
+      const std::string_view m = take_number(x), n = take_number(y);
+      if (m != n) {
+        return m.size() != n.size() ? m.size() < n.size() : m < n;
+      }
+    } else if (x.front() != y.front()) {
+      return x.substr(0, 1) < y.substr(0, 1);
+    } else {
+      x.remove_prefix(1);
+      y.remove_prefix(1);
+    }
+  }
+  return x.empty() && y.empty() ? a < b : x.empty();
 }
 
 }  // namespace palpate

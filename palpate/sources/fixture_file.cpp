@@ -30,13 +30,7 @@ Choice choice_of(std::string_view name, std::span<const std::string_view> names,
                  const std::string& what) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found != names.end()) return static_cast<Choice>(found - names.begin());
-  std::string known;
-  for (const std::string_view each : names)
-    known += (known.empty() ? "" : ", ") + std::string(each);
-  const std::string_view near = nearest_name(name, names);
-  throw Error(
-      what, "there is no '" + std::string(name) + "'",
-      (near.empty() ? "" : "did you mean '" + std::string(near) + "'? ") + "known here: " + known);
+  throw Error(what, "there is no '" + std::string(name) + "'", did_you_mean(name, names));
 }
 
 template <class Choice>

@@ -267,16 +267,12 @@ constexpr std::array rows{
 
 const Row& find_row(std::string_view name) {
   std::vector<std::string_view> names;
-  std::string known;
   for (const Row& row : rows) {
     if (row.info.name == name) return row;
     names.push_back(row.info.name);
-    known += (known.empty() ? "" : " ") + std::string(row.info.name);
   }
-  const std::string_view near = nearest_name(name, names);
   throw Error("synthetic:" + std::string(name), "there is no such scene",
-              (near.empty() ? "" : "did you mean '" + std::string(near) + "'? ") +
-                  ("known here: " + known));
+              did_you_mean(name, names));
 }
 
 }  // namespace

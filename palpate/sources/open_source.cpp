@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <cctype>
 #include <optional>
 #include <utility>
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/pose.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/core/uri.hpp"
+#include "palpate/sources/bag_camera.hpp"
 #include "palpate/sources/depth_recording.hpp"
 #include "palpate/sources/material_file.hpp"
 #include "palpate/sources/point_file_source.hpp"
 #include "palpate/sources/posed_source.hpp"
-#include "palpate/sources/recording.hpp"
 #include "palpate/sources/source.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 
@@ -59,9 +58,7 @@ const Registry<SourceScheme>& standard_sources() {
 }
 
 std::string uri_of_file(const std::filesystem::path& file) {
-  std::string ending = file.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = lower_case(file.extension().string());
   for (const auto& [known, scheme] :
        {std::pair(".pcd", "pcd:"), std::pair(".ply", "ply:"), std::pair(".db3", "recording:"),
         std::pair(".mcap", "recording:"), std::pair(".bag", "recording:")}) {

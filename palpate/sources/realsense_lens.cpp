@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate {
 namespace {
@@ -19,17 +20,6 @@ std::optional<double> number_of(std::string_view text) {
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
     return std::nullopt;
   return value;
-}
-
-// What stands between `key=` and the next ';'; none if the key is not there.
-std::optional<std::string_view> value_of(std::string_view text, std::string_view key) {
-  while (!text.empty()) {
-    const std::string_view pair = text.substr(0, text.find(';'));
-    text.remove_prefix(std::min(text.size(), pair.size() + 1));
-    if (pair.substr(0, pair.find('=')) == key && pair.size() > key.size())
-      return pair.substr(key.size() + 1);
-  }
-  return std::nullopt;
 }
 
 }  // namespace

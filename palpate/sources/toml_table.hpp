@@ -43,15 +43,10 @@ class TomlTable {
       : table_(table), file_(std::move(file)), title_(std::move(title)) {
     for (const auto& [key, value] : table_) {
       if (std::find(keys.begin(), keys.end(), key.str()) != keys.end()) continue;
-      const std::string_view near = nearest_name(key.str(), keys);
-      std::string known;
-      for (const std::string_view name : keys)
-        known += (known.empty() ? "" : ", ") + std::string(name);
       throw Error(at_line(file_, key.source().begin.line),
                   "there is no setting '" + std::string(key.str()) + "'" +
                       (title_.empty() ? "" : " in " + title_),
-                  (near.empty() ? "" : "did you mean '" + std::string(near) + "'? ") +
-                      "known here: " + known);
+                  did_you_mean(key.str(), keys));
     }
   }
 

@@ -11,12 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/bag/robot_messages.hpp"
+#include "palpate/bag/node_messages.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/sources/fixture_file.hpp"
 #include "palpate/telelink/topics.hpp"
-#include "palpate/telelink/touched_message.hpp"
 #include "palpate/telelink/touched_paint.hpp"
 #include "palpate/teleop/lead.hpp"
 #include "palpate/teleop/link_limits.hpp"
@@ -51,8 +50,8 @@ class OperatorEnd::Impl {
         contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
         links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
         joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
-        faults_(participant_, topics_.fault, ros::Text{}, kept_for_late),
-        regions_(participant_, topics_.regions, ros::Text{}, kept_for_late),
+        faults_(participant_, topics_.fault, ros::String{}, kept_for_late),
+        regions_(participant_, topics_.regions, ros::String{}, kept_for_late),
         touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
         thread_([this] { run(); }) {}
   ~Impl() {
@@ -134,7 +133,7 @@ class OperatorEnd::Impl {
 
   void hear(double now) {
     const std::lock_guard lock(mutex_);
-    while (const auto tool = take<ros::PoseStamped>(tools_)) {
+    while (const auto tool = tools_.take_whole<ros::PoseStamped>()) {
       const Vec3 position(tool->position[0], tool->position[1], tool->position[2]);
       if (!is_place(position)) continue;
       if (!view_.state) view_.state.emplace();
@@ -142,20 +141,20 @@ class OperatorEnd::Impl {
       view_.state->t = now;
     }
     if (!view_.state) return;
-    while (const auto twist = take<ros::TwistStamped>(twists_))
+    while (const auto twist = twists_.take_whole<ros::TwistStamped>())
       view_.state->velocity = Vec3(twist->linear[0], twist->linear[1], twist->linear[2]);
-    while (const auto contact = take<ros::WrenchStamped>(contacts_))
+    while (const auto contact = contacts_.take_whole<ros::WrenchStamped>())
       view_.state->force = Vec3(contact->force[0], contact->force[1], contact->force[2]);
-    while (const auto joints = take<ros::JointState>(joints_))
+    while (const auto joints = joints_.take_whole<ros::JointState>())
       view_.state->joints = joints->position;
-    while (const auto links = take<ros::Float64MultiArray>(links_)) {
+    while (const auto links = links_.take_whole<ros::Float64MultiArray>()) {
       view_.state->links.clear();
       for (std::size_t i = 0; i + 2 < links->data.size(); i += 3)
         view_.state->links.emplace_back(links->data[i], links->data[i + 1], links->data[i + 2]);
     }
-    while (const auto fault = take<ros::Text>(faults_)) view_.state->fault = fault->data;
-    while (const auto regions = take<ros::Text>(regions_)) use_regions(regions->data);
-    while (const auto message = take<ros::Float64MultiArray>(touched_)) {
+    while (const auto fault = faults_.take_whole<ros::String>()) view_.state->fault = fault->data;
+    while (const auto regions = regions_.take_whole<ros::String>()) use_regions(regions->data);
+    while (const auto message = touched_.take_whole<ros::Float64MultiArray>()) {
       const Touched touched = touched_of(*message);
       view_.touched = touched;
       view_.ignored = learns_
@@ -198,18 +197,6 @@ class OperatorEnd::Impl {
       settings.safety.lost_age = now.lost_age;
     });
     followed_ = latency;
-  }
-
-  // A message that is damaged counts as none.
-  template <class Message>
-  static std::optional<Message> take(dds::Reader& reader) {
-    for (;;) {
-      try {
-        return reader.take<Message>();
-      } catch (const Error&) {
-        continue;
-      }
-    }
   }
 
   Session& session_;

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/bag/robot_messages.hpp"
+#include "palpate/bag/node_messages.hpp"
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
@@ -21,7 +21,7 @@
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/fixture_file.hpp"
 #include "palpate/telelink/topics.hpp"
-#include "palpate/telelink/touched_message.hpp"
+#include "palpate/telelink/touched_paint.hpp"
 #include "palpate/teleop/approach_watch.hpp"
 #include "palpate/teleop/force_zero.hpp"
 #include "palpate/teleop/touched.hpp"
@@ -124,12 +124,12 @@ class RobotEnd::Impl {
         contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
         links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
         joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
-        faults_(participant_, topics_.fault, ros::Text{}, kept_for_late),
-        region_texts_(participant_, topics_.regions, ros::Text{}, kept_for_late),
+        faults_(participant_, topics_.fault, ros::String{}, kept_for_late),
+        region_texts_(participant_, topics_.regions, ros::String{}, kept_for_late),
         touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
         learner_(robot_->info().tool_radius) {
-    region_texts_.write(ros::Text{fixtures_json(*regions_)});
-    faults_.write(ros::Text{""});
+    region_texts_.write(ros::String{fixtures_json(*regions_)});
+    faults_.write(ros::String{""});
   }
   ~Impl() { detach(); }
   Impl(const Impl&) = delete;
@@ -193,10 +193,10 @@ class RobotEnd::Impl {
   }
 
   void hear(double now) {
-    while (const auto press = take<ros::WrenchStamped>(presses_))
+    while (const auto press = presses_.take_whole<ros::WrenchStamped>())
       lead_.press = Vec3(press->force[0], press->force[1], press->force[2]);
     bool any = false;
-    while (const auto place = take<ros::PoseStamped>(places_)) {
+    while (const auto place = places_.take_whole<ros::PoseStamped>()) {
       const std::int64_t stamp = place->header.stamp.nanoseconds();
       // What was overtaken on the way is late; a stamp long before begins anew.
       constexpr std::int64_t anew = 1'000'000'000;  // [ns]
@@ -272,19 +272,7 @@ class RobotEnd::Impl {
   void say(const std::string& fault) {
     if (fault == said_) return;
     said_ = fault;
-    faults_.write(ros::Text{fault});
-  }
-
-  // A message that is damaged counts as none.
-  template <class Message>
-  static std::optional<Message> take(dds::Reader& reader) {
-    for (;;) {
-      try {
-        return reader.take<Message>();
-      } catch (const Error&) {
-        continue;
-      }
-    }
+    faults_.write(ros::String{fault});
   }
 
   std::unique_ptr<Robot> robot_;

@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-#include "palpate/bag/robot_messages.hpp"
+#include "palpate/bag/node_messages.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/tick.hpp"
 #include "palpate/drivers/dds.hpp"
@@ -216,7 +216,7 @@ class Ros2Robot final : public Robot {
  private:
   bool hear() {
     bool any = false;
-    while (const auto pose = take<ros::PoseStamped>(*poses_)) {
+    while (const auto pose = poses_->take_whole<ros::PoseStamped>()) {
       const Vec3 position(pose->position[0], pose->position[1], pose->position[2]);
       if (!is_place(position)) continue;
       const double t = monotonic_now();
@@ -229,31 +229,19 @@ class Ros2Robot final : public Robot {
       any = true;
     }
     if (wrenches_) {
-      while (const auto wrench = take<ros::WrenchStamped>(*wrenches_)) {
+      while (const auto wrench = wrenches_->take_whole<ros::WrenchStamped>()) {
         const Vec3 force(wrench->force[0], wrench->force[1], wrench->force[2]);
         if (force.allFinite()) state_.force = force;
       }
     }
     if (joints_) {
-      while (const auto joints = take<ros::JointState>(*joints_)) {
+      while (const auto joints = joints_->take_whole<ros::JointState>()) {
         info_.joint_names = joints->name;
         state_.joints = joints->position;
       }
     }
     return any;
   }
-  // A message that is damaged counts as none.
-  template <class Message>
-  static std::optional<Message> take(dds::Reader& reader) {
-    for (;;) {
-      try {
-        return reader.take<Message>();
-      } catch (const Error&) {
-        continue;
-      }
-    }
-  }
-
   RobotInfo info_;
   dds::Participant participant_;
   std::optional<dds::Writer> commands_;

@@ -25,6 +25,7 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/viewer/admission.hpp"
 #include "palpate/viewer/page.hpp"
 
@@ -62,9 +63,7 @@ std::string host_of(std::string_view authority) {
   } else {
     authority = authority.substr(0, authority.rfind(':'));
   }
-  std::string host(authority);
-  for (char& c : host) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return host;
+  return lower_case(authority);
 }
 
 bool is_loopback_name(const std::string& host) {

@@ -22,10 +22,11 @@ inline const DepthImage& image_of(const Frame& frame) {
 /// Tests of a driver against a fake library, whose cameras do what a text says (fake_camera.hpp).
 class FakeCameraTest : public ::testing::Test {
  protected:
+  /// @param driver    its name
   /// @param variable  of the environment that names the library
   /// @param file      below the folder of fakes
-  FakeCameraTest(Driver driver, const std::string& variable, const std::string& file)
-      : driver_(std::move(driver)),
+  FakeCameraTest(const std::string& driver, const std::string& variable, const std::string& file)
+      : driver_(standard_drivers().find(driver)),
         file_(PALPATE_FAKES "/" + file),
         variable_(variable, file_),
         camera_(std::make_unique<Environment>("FAKE_CAMERA", "fast")) {}
@@ -44,9 +45,9 @@ class FakeCameraTest : public ::testing::Test {
   /// A function of the fake library's own.
   template <class Result, class... Arguments>
   [[nodiscard]] Result ask(const char* symbol, Arguments... arguments) const {
-    Result (*function)(Arguments...) = nullptr;
-    SharedLibrary({.name = "fake", .files = {file_}, .variable = {}, .remedy = {}})
-        .find(function, symbol);
+    Result (*function)(Arguments...) =
+        SharedLibrary({.name = "fake", .files = {file_}, .variable = {}, .remedy = {}})
+            .find(symbol);
     return function(arguments...);
   }
   /// What was made by the library and not given back.

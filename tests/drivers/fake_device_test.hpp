@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <string>
-#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -18,10 +17,11 @@ namespace palpate::test {
 /// Tests of a haptic device's driver against a fake library, whose device lies on a workbench.
 class FakeDeviceTest : public ::testing::Test {
  protected:
+  /// @param driver    its name
   /// @param variable  of the environment that names the library
   /// @param library   below the folder of fakes
-  FakeDeviceTest(Driver driver, const std::string& variable, const std::string& library)
-      : driver_(std::move(driver)), library_(variable, PALPATE_FAKES "/" + library) {}
+  FakeDeviceTest(const std::string& driver, const std::string& variable, const std::string& library)
+      : driver_(standard_drivers().find(driver)), library_(variable, PALPATE_FAKES "/" + library) {}
 
   std::unique_ptr<Device> open(const std::string& uri) const {
     return driver_.open_device(Uri(uri));

@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/drivers/force_dimension.hpp"
-
 #include "tests/drivers/fake_device_test.hpp"
 #include "tests/support/environment.hpp"
 #include "tests/support/errors.hpp"
@@ -15,7 +13,7 @@ namespace test_force_dimension {
 class ForceDimension : public test::FakeDeviceTest {
  protected:
   ForceDimension()
-      : FakeDeviceTest(force_dimension_driver(), "PALPATE_FORCE_DIMENSION", "force-dimension") {}
+      : FakeDeviceTest("force-dimension", "PALPATE_FORCE_DIMENSION", "force-dimension") {}
 };
 
 TEST_F(ForceDimension, TellsWhatItIs) {

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/drivers/freenect_camera.hpp"
 #include "palpate/servo/realtime.hpp"
 
 #include "tests/drivers/fake_camera_test.hpp"
@@ -19,8 +18,7 @@ using test::image_of;
 
 class Freenect : public test::FakeCameraTest {
  protected:
-  Freenect()
-      : FakeCameraTest(freenect_driver(), "PALPATE_LIBFREENECT", "freenect/libfreenect.so.0.5") {}
+  Freenect() : FakeCameraTest("freenect", "PALPATE_LIBFREENECT", "freenect/libfreenect.so.0.5") {}
 };
 
 TEST_F(Freenect, GivesMillimetresThroughTheLensThatItWasCalibratedFor) {

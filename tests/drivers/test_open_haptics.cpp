@@ -6,8 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/drivers/open_haptics.hpp"
-
 #include "tests/drivers/fake_device_test.hpp"
 
 namespace palpate {
@@ -15,7 +13,7 @@ namespace test_open_haptics {
 
 class OpenHaptics : public test::FakeDeviceTest {
  protected:
-  OpenHaptics() : FakeDeviceTest(open_haptics_driver(), "PALPATE_OPENHAPTICS", "openhaptics") {}
+  OpenHaptics() : FakeDeviceTest("touch", "PALPATE_OPENHAPTICS", "openhaptics") {}
   static void wait_until(const std::function<bool()>& done) {
     while (!done()) std::this_thread::yield();
   }

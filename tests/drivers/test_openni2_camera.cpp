@@ -9,8 +9,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/drivers/openni2_camera.hpp"
-
 #include "tests/drivers/fake_camera_test.hpp"
 #include "tests/fakes/fake_camera.hpp"
 #include "tests/support/environment.hpp"
@@ -27,7 +25,7 @@ using test::image_of;
 
 class OpenNi2 : public test::FakeCameraTest {
  protected:
-  OpenNi2() : FakeCameraTest(openni2_driver(), "PALPATE_OPENNI2", "openni2/libOpenNI2.so.0") {}
+  OpenNi2() : FakeCameraTest("openni2", "PALPATE_OPENNI2", "openni2/libOpenNI2.so.0") {}
 };
 
 TEST_F(OpenNi2, GivesDepthUnmirroredByItsFieldOfView) {
@@ -127,8 +125,7 @@ TEST_F(OpenNi2, IsReported) {
 // The stock runtime, with a camera of the tests' own.
 class StockOpenNi2 : public test::FakeCameraTest {
  protected:
-  StockOpenNi2()
-      : FakeCameraTest(openni2_driver(), "PALPATE_OPENNI2", "openni2-stock/libOpenNI2.so.0") {}
+  StockOpenNi2() : FakeCameraTest("openni2", "PALPATE_OPENNI2", "openni2-stock/libOpenNI2.so.0") {}
   void SetUp() override {
     if (!std::filesystem::exists(PALPATE_FAKES "/openni2-stock/OpenNI2/Drivers/libVirtual.so.0"))
       GTEST_SKIP() << "it needs the package libopenni2-dev";

@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/drivers/realsense_camera.hpp"
 #include "palpate/servo/realtime.hpp"
 
 #include "tests/drivers/fake_camera_test.hpp"
@@ -25,8 +24,7 @@ double system_now() {
 
 class RealSense : public test::FakeCameraTest {
  protected:
-  RealSense()
-      : FakeCameraTest(realsense_driver(), "PALPATE_LIBREALSENSE", "realsense/librealsense2.so") {}
+  RealSense() : FakeCameraTest("realsense", "PALPATE_LIBREALSENSE", "realsense/librealsense2.so") {}
 
   [[nodiscard]] float option(int which) const { return ask<float>("fake_option", which); }
 };

@@ -87,9 +87,7 @@ ros::CameraInfo a_lens(std::int64_t stamp) {
 
 class Ros2Camera : public ::testing::Test {
  protected:
-  static std::unique_ptr<Source> open(const std::string& uri) {
-    return ros2_driver().open_camera(Uri(uri));
-  }
+  static std::unique_ptr<Source> open(const std::string& uri) { return open_ros2_camera(Uri(uri)); }
   static Frame frame_of(Source& camera) {
     std::optional<Frame> frame = camera.next(long_enough);
     if (!frame) throw std::runtime_error("no frame came");
@@ -286,7 +284,7 @@ TEST_F(Ros2Camera, SaysWhatIsThereInstead) {
                                  "sensor_msgs/msg/CameraInfo", "not of a camera"));
   EXPECT_TRUE(test::fails_saying([] { return open("ros2:"); }, "names no topic"));
   EXPECT_TRUE(test::fails_saying([] { return open("ros2:/a?stamps=mine"); }, "stamps=mine"));
-  const DriverReport report = ros2_driver().look();
+  const DriverReport report = standard_drivers().find("ros2").look();
   EXPECT_EQ(report.problem, "");
   EXPECT_NE(report.library, "");
 }

@@ -19,7 +19,6 @@
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/ros2.hpp"
-#include "palpate/drivers/ros2_device.hpp"
 #include "palpate/servo/realtime.hpp"
 
 #include "tests/drivers/dds_test.hpp"
@@ -139,9 +138,7 @@ constexpr Ros2Hand plain{.name = "",
 
 class Ros2Device : public ::testing::Test {
  protected:
-  static std::unique_ptr<Device> open(const std::string& uri) {
-    return ros2_driver().open_device(Uri(uri));
-  }
+  static std::unique_ptr<Device> open(const std::string& uri) { return open_ros2_device(Uri(uri)); }
   // Pushes until the node holds what `is_there` looks for.
   template <class Condition>
   static bool push_until(Device& device, const Vec3& force, const Condition& is_there) {
@@ -249,8 +246,7 @@ TEST_F(Ros2Device, SaysWhatIsMissingOrWrong) {
 // What the test below starts as a process of its own: a session that pushes.
 TEST(Ros2Session, DISABLED_PushesUntilItIsKilled) {
   const auto device = open_guarded([] {
-    return ros2_driver().open_device(
-        Uri("ros2:?pose=/hand/pose&force=/hand/force&silence=1s&wait=25s"));
+    return open_ros2_device(Uri("ros2:?pose=/hand/pose&force=/hand/force&silence=1s&wait=25s"));
   });
   device->enable();
   for (;;) {

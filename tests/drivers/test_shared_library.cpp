@@ -22,8 +22,7 @@ LibraryNames vendor() {
 }
 
 int added(const SharedLibrary& library) {
-  int (*add)(int, int) = nullptr;
-  library.find(add, "vendor_add");
+  int (*add)(int, int) = library.find("vendor_add");
   return add(40, 2);
 }
 
@@ -33,11 +32,10 @@ TEST(SharedLibrary, TriesItsFilesInOrderAndCallsTheirFunctions) {
   const SharedLibrary library(names);
   EXPECT_EQ(library.path(), folder + "/libvendor.so.2");
   EXPECT_EQ(added(library), 42);
-  double (*half)(double) = nullptr;
-  library.try_find(half, "vendor_half");
+  double (*half)(double) = library.try_find("vendor_half");
   ASSERT_NE(half, nullptr);
   EXPECT_EQ(half(3.0), 1.5);
-  library.try_find(half, "vendor_quarter");
+  half = library.try_find("vendor_quarter");
   EXPECT_EQ(half, nullptr);
 }
 
@@ -76,9 +74,8 @@ TEST(SharedLibrary, SaysWhatIsMissingAndWhatToDo) {
 TEST(SharedLibrary, NamesAFunctionThatItDoesNotHave) {
   const test::Environment set("PALPATE_TEST_VENDOR", folder);
   const SharedLibrary library(vendor());
-  int (*function)(int) = nullptr;
-  EXPECT_TRUE(test::fails_saying([&] { return library.find(function, "vendor_subtract"), 0; },
-                                 "Vendor's SDK", "libvendor.so.2 has no function vendor_subtract",
+  EXPECT_TRUE(test::fails_saying([&] { return library.find("vendor_subtract"); }, "Vendor's SDK",
+                                 "libvendor.so.2 has no function vendor_subtract",
                                  "another version", "install it"));
 }
 

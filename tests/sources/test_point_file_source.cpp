@@ -8,7 +8,7 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
-#include "palpate/sources/natural_order.hpp"
+#include "palpate/sources/files.hpp"
 #include "palpate/sources/point_file.hpp"
 #include "palpate/sources/source.hpp"
 

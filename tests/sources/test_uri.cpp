@@ -97,7 +97,7 @@ TEST(Uri, WithoutAnOptionIsAsIfItHadNotBeenGiven) {
   EXPECT_FALSE(Uri("tum:a?pose=1").without("pose").has("pose"));
   constexpr std::array<std::string_view, 1> own{"fps"};
   EXPECT_TRUE(fails_saying([&] { Uri("tum:a?pos=1").without("pose").allow_only(own); }, "'pos'",
-                           "did you mean 'pose'", "fps pose"));
+                           "did you mean 'pose'", "fps, pose"));
 }
 
 TEST(OpenSource, ListsTheKnownSchemesForAnUnknownOne) {

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "palpate/drivers/openni2_camera.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/shared_library.hpp"
 
 namespace palpate::test {
@@ -18,16 +18,14 @@ inline void record_oni(const std::string& library, const std::string& file, int 
   const SharedLibrary runtime(
       {.name = "OpenNI2", .files = {library}, .variable = {}, .remedy = {}});
   const auto ask = [&runtime]<class... Arguments>(const char* symbol, Arguments... arguments) {
-    int (*function)(Arguments...) = nullptr;
-    runtime.find(function, symbol);
+    int (*function)(Arguments...) = runtime.find(symbol);
     if (function(arguments...) != 0) throw std::runtime_error(symbol);
   };
   const auto end = [&runtime](const char* symbol, Handle handle) {
-    void (*function)(Handle) = nullptr;
-    runtime.find(function, symbol);
+    void (*function)(Handle) = runtime.find(symbol);
     function(handle);
   };
-  const auto camera = openni2_driver().open_camera(Uri("openni2:"));  // keeps the runtime alive
+  const auto camera = open_source("openni2:", all_sources());  // keeps the runtime alive
   Handle device = nullptr;
   Handle stream = nullptr;
   Handle recorder = nullptr;

@@ -6,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/telelink/touched_message.hpp"
 #include "palpate/telelink/touched_paint.hpp"
 
 namespace palpate {

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/ros2.hpp"
-
 #include <cmath>
 #include <fstream>
 #include <string>
 
 #include "palpate/drivers/dds.hpp"
-#include "palpate/drivers/ros2_camera.hpp"
-#include "palpate/drivers/ros2_device.hpp"
+#include "palpate/drivers/drivers.hpp"
+#include "palpate/drivers/ros2.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/ros_frames.hpp"
 
@@ -45,6 +43,8 @@ DriverReport look() {
 }  // namespace
 }  // namespace ros2
 
+/// `ros2:/TOPIC` as a camera and `ros2:PRESET` as a device: topics of ROS 2 on the network, without
+/// ROS (docs/ros.md).
 Driver ros2_driver() {
   return {.name = "ros2",
           .summary =

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/gamepad.hpp"
-
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -10,9 +8,10 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/rate_hand.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/drivers/words.hpp"
 
 namespace palpate {
 namespace gamepad {
@@ -30,26 +29,7 @@ struct Version {
 };
 
 struct Sdl {
-  Sdl()
-      : library({.name = "gamepad: (SDL2)",
-                 .files = {"libSDL2-2.0.so.0", "libSDL2.so"},
-                 .variable = "PALPATE_SDL2",
-                 .remedy = "install it: apt install libsdl2-2.0-0"}) {
-    library.find(set_hint, "SDL_SetHint");
-    library.find(init, "SDL_InitSubSystem");
-    library.find(quit, "SDL_QuitSubSystem");
-    library.find(get_error, "SDL_GetError");
-    library.find(get_version, "SDL_GetVersion");
-    library.find(count, "SDL_NumJoysticks");
-    library.find(is_pad, "SDL_IsGameController");
-    library.find(open, "SDL_GameControllerOpen");
-    library.find(close, "SDL_GameControllerClose");
-    library.find(name, "SDL_GameControllerName");
-    library.find(update, "SDL_GameControllerUpdate");
-    library.find(is_attached, "SDL_GameControllerGetAttached");
-    library.find(axis, "SDL_GameControllerGetAxis");
-    library.find(button, "SDL_GameControllerGetButton");
-    library.find(rumble, "SDL_GameControllerRumble");
+  Sdl() {
     set_hint("SDL_NO_SIGNAL_HANDLERS", "1");  // Ctrl-C ends the session
     set_hint("SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS", "1");
     if (init(game_controllers) != 0)
@@ -69,22 +49,26 @@ struct Sdl {
     return -1;
   }
 
-  SharedLibrary library;
-  int (*set_hint)(const char* name, const char* value) = nullptr;
-  int (*init)(std::uint32_t flags) = nullptr;
-  void (*quit)(std::uint32_t flags) = nullptr;
-  const char* (*get_error)() = nullptr;
-  void (*get_version)(Version* version) = nullptr;
-  int (*count)() = nullptr;
-  int (*is_pad)(int index) = nullptr;
-  void* (*open)(int index) = nullptr;
-  void (*close)(void* pad) = nullptr;
-  const char* (*name)(void* pad) = nullptr;
-  void (*update)() = nullptr;
-  int (*is_attached)(void* pad) = nullptr;
-  std::int16_t (*axis)(void* pad, int axis) = nullptr;
-  std::uint8_t (*button)(void* pad, int button) = nullptr;
-  int (*rumble)(void* pad, std::uint16_t low, std::uint16_t high, std::uint32_t ms) = nullptr;
+  SharedLibrary library{{.name = "gamepad: (SDL2)",
+                         .files = {"libSDL2-2.0.so.0", "libSDL2.so"},
+                         .variable = "PALPATE_SDL2",
+                         .remedy = "install it: apt install libsdl2-2.0-0"}};
+  int (*set_hint)(const char* name, const char* value) = library.find("SDL_SetHint");
+  int (*init)(std::uint32_t flags) = library.find("SDL_InitSubSystem");
+  void (*quit)(std::uint32_t flags) = library.find("SDL_QuitSubSystem");
+  const char* (*get_error)() = library.find("SDL_GetError");
+  void (*get_version)(Version* version) = library.find("SDL_GetVersion");
+  int (*count)() = library.find("SDL_NumJoysticks");
+  int (*is_pad)(int index) = library.find("SDL_IsGameController");
+  void* (*open)(int index) = library.find("SDL_GameControllerOpen");
+  void (*close)(void* pad) = library.find("SDL_GameControllerClose");
+  const char* (*name)(void* pad) = library.find("SDL_GameControllerName");
+  void (*update)() = library.find("SDL_GameControllerUpdate");
+  int (*is_attached)(void* pad) = library.find("SDL_GameControllerGetAttached");
+  std::int16_t (*axis)(void* pad, int axis) = library.find("SDL_GameControllerGetAxis");
+  std::uint8_t (*button)(void* pad, int button) = library.find("SDL_GameControllerGetButton");
+  int (*rumble)(void* pad, std::uint16_t low, std::uint16_t high,
+                std::uint32_t ms) = library.find("SDL_GameControllerRumble");
 };
 
 class Pad final : public Sticks {
@@ -179,6 +163,8 @@ DriverReport look() {
 }  // namespace
 }  // namespace gamepad
 
+/// A game controller by SDL2: `gamepad:[INDEX]`. Its left stick moves the hand sideways and away,
+/// its right stick up and down, by rate control; a contact is felt as rumble.
 Driver gamepad_driver() {
   return {.name = "gamepad",
           .summary = "a game controller by SDL2: moves the hand, rumbles at a contact",

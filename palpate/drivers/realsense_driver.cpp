@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/realsense_camera.hpp"
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -15,9 +13,10 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/realsense_lens.hpp"
 
@@ -87,69 +86,12 @@ LibraryNames library_names() {
   return names;
 }
 
+std::string version_of(int code) {
+  return version_text({code / 10000, code / 100 % 100, code % 100});
+}
+
 class Api {
  public:
-  Api() : library_(library_names()) {
-    library_.find(get_api_version, "rs2_get_api_version");
-    library_.find(get_error_message, "rs2_get_error_message");
-    library_.find(free_error, "rs2_free_error");
-    version = call(get_api_version);
-    if (version / 10000 != 2)
-      throw Error("librealsense2", library_.path() + " is of version " + version_text(),
-                  "install 2.50 or later");
-    library_.find(create_context, "rs2_create_context");
-    library_.find(delete_context, "rs2_delete_context");
-    library_.find(query_devices, "rs2_query_devices");
-    library_.find(get_device_count, "rs2_get_device_count");
-    library_.find(delete_device_list, "rs2_delete_device_list");
-    library_.find(device_list_contains, "rs2_device_list_contains");
-    library_.find(create_device, "rs2_create_device");
-    library_.find(delete_device, "rs2_delete_device");
-    library_.find(supports_device_info, "rs2_supports_device_info");
-    library_.find(get_device_info, "rs2_get_device_info");
-    library_.find(query_sensors, "rs2_query_sensors");
-    library_.find(get_sensors_count, "rs2_get_sensors_count");
-    library_.find(delete_sensor_list, "rs2_delete_sensor_list");
-    library_.find(create_sensor, "rs2_create_sensor");
-    library_.find(delete_sensor, "rs2_delete_sensor");
-    library_.find(is_sensor_extendable_to, "rs2_is_sensor_extendable_to");
-    library_.find(supports_option, "rs2_supports_option");
-    library_.find(get_option, "rs2_get_option");
-    library_.find(set_option, "rs2_set_option");
-    library_.find(create_pipeline, "rs2_create_pipeline");
-    library_.find(delete_pipeline, "rs2_delete_pipeline");
-    library_.find(create_config, "rs2_create_config");
-    library_.find(delete_config, "rs2_delete_config");
-    library_.find(config_enable_device, "rs2_config_enable_device");
-    library_.find(config_enable_stream, "rs2_config_enable_stream");
-    library_.find(pipeline_start, "rs2_pipeline_start_with_config");
-    library_.find(pipeline_stop, "rs2_pipeline_stop");
-    library_.find(pipeline_wait, "rs2_pipeline_try_wait_for_frames");
-    library_.find(profile_get_device, "rs2_pipeline_profile_get_device");
-    library_.find(delete_pipeline_profile, "rs2_delete_pipeline_profile");
-    library_.find(embedded_frames_count, "rs2_embedded_frames_count");
-    library_.find(extract_frame, "rs2_extract_frame");
-    library_.find(release_frame, "rs2_release_frame");
-    library_.find(get_frame_data, "rs2_get_frame_data");
-    library_.find(get_frame_width, "rs2_get_frame_width");
-    library_.find(get_frame_height, "rs2_get_frame_height");
-    library_.find(get_frame_stride, "rs2_get_frame_stride_in_bytes");
-    library_.find(get_frame_timestamp, "rs2_get_frame_timestamp");
-    library_.find(get_frame_domain, "rs2_get_frame_timestamp_domain");
-    library_.find(supports_metadata, "rs2_supports_frame_metadata");
-    library_.find(get_metadata, "rs2_get_frame_metadata");
-    library_.find(get_units, "rs2_depth_frame_get_units");
-    library_.find(get_stream_profile, "rs2_get_frame_stream_profile");
-    library_.find(get_profile_data, "rs2_get_stream_profile_data");
-    library_.find(get_intrinsics, "rs2_get_video_stream_intrinsics");
-    library_.find(get_extrinsics, "rs2_get_extrinsics");
-    library_.try_find(get_stream_profiles, "rs2_get_stream_profiles");
-    library_.try_find(count_profiles, "rs2_get_stream_profiles_count");
-    library_.try_find(get_profile, "rs2_get_stream_profile");
-    library_.try_find(is_default_profile, "rs2_is_stream_profile_default");
-    library_.try_find(delete_profiles, "rs2_delete_stream_profiles_list");
-  }
-
   // @throws Refusal with the library's words
   template <class Result, class... Declared, class... Given>
   Result call(Result (*function)(Declared...), Given... given) const {
@@ -164,70 +106,96 @@ class Api {
     }
   }
 
-  [[nodiscard]] std::string version_text() const {
-    return palpate::version_text({version / 10000, version / 100 % 100, version % 100});
-  }
-  [[nodiscard]] const std::string& path() const { return library_.path(); }
-
-  int version = 0;
-  int (*get_api_version)(LibraryError**) = nullptr;
-  const char* (*get_error_message)(const LibraryError*) = nullptr;
-  void (*free_error)(LibraryError*) = nullptr;
-  Context* (*create_context)(int, LibraryError**) = nullptr;
-  void (*delete_context)(Context*) = nullptr;
-  DeviceList* (*query_devices)(const Context*, LibraryError**) = nullptr;
-  int (*get_device_count)(const DeviceList*, LibraryError**) = nullptr;
-  void (*delete_device_list)(DeviceList*) = nullptr;
-  int (*device_list_contains)(const DeviceList*, const CameraDevice*, LibraryError**) = nullptr;
-  CameraDevice* (*create_device)(const DeviceList*, int, LibraryError**) = nullptr;
-  void (*delete_device)(CameraDevice*) = nullptr;
-  int (*supports_device_info)(const CameraDevice*, int, LibraryError**) = nullptr;
-  const char* (*get_device_info)(const CameraDevice*, int, LibraryError**) = nullptr;
-  SensorList* (*query_sensors)(const CameraDevice*, LibraryError**) = nullptr;
-  int (*get_sensors_count)(const SensorList*, LibraryError**) = nullptr;
-  void (*delete_sensor_list)(SensorList*) = nullptr;
-  DepthSensor* (*create_sensor)(const SensorList*, int, LibraryError**) = nullptr;
-  void (*delete_sensor)(DepthSensor*) = nullptr;
-  int (*is_sensor_extendable_to)(const DepthSensor*, int, LibraryError**) = nullptr;
-  int (*supports_option)(const DepthSensor*, int, LibraryError**) = nullptr;
-  float (*get_option)(const DepthSensor*, int, LibraryError**) = nullptr;
-  void (*set_option)(const DepthSensor*, int, float, LibraryError**) = nullptr;
-  Pipeline* (*create_pipeline)(Context*, LibraryError**) = nullptr;
-  void (*delete_pipeline)(Pipeline*) = nullptr;
-  PipelineConfig* (*create_config)(LibraryError**) = nullptr;
-  void (*delete_config)(PipelineConfig*) = nullptr;
-  void (*config_enable_device)(PipelineConfig*, const char*, LibraryError**) = nullptr;
+  SharedLibrary library{library_names()};
+  int (*get_api_version)(LibraryError**) = library.find("rs2_get_api_version");
+  const char* (*get_error_message)(const LibraryError*) = library.find("rs2_get_error_message");
+  void (*free_error)(LibraryError*) = library.find("rs2_free_error");
+  int version = supported_version();
+  Context* (*create_context)(int, LibraryError**) = library.find("rs2_create_context");
+  void (*delete_context)(Context*) = library.find("rs2_delete_context");
+  DeviceList* (*query_devices)(const Context*, LibraryError**) = library.find("rs2_query_devices");
+  int (*get_device_count)(const DeviceList*, LibraryError**) = library.find("rs2_get_device_count");
+  void (*delete_device_list)(DeviceList*) = library.find("rs2_delete_device_list");
+  int (*device_list_contains)(const DeviceList*, const CameraDevice*,
+                              LibraryError**) = library.find("rs2_device_list_contains");
+  CameraDevice* (*create_device)(const DeviceList*, int,
+                                 LibraryError**) = library.find("rs2_create_device");
+  void (*delete_device)(CameraDevice*) = library.find("rs2_delete_device");
+  int (*supports_device_info)(const CameraDevice*, int,
+                              LibraryError**) = library.find("rs2_supports_device_info");
+  const char* (*get_device_info)(const CameraDevice*, int,
+                                 LibraryError**) = library.find("rs2_get_device_info");
+  SensorList* (*query_sensors)(const CameraDevice*,
+                               LibraryError**) = library.find("rs2_query_sensors");
+  int (*get_sensors_count)(const SensorList*,
+                           LibraryError**) = library.find("rs2_get_sensors_count");
+  void (*delete_sensor_list)(SensorList*) = library.find("rs2_delete_sensor_list");
+  DepthSensor* (*create_sensor)(const SensorList*, int,
+                                LibraryError**) = library.find("rs2_create_sensor");
+  void (*delete_sensor)(DepthSensor*) = library.find("rs2_delete_sensor");
+  int (*is_sensor_extendable_to)(const DepthSensor*, int,
+                                 LibraryError**) = library.find("rs2_is_sensor_extendable_to");
+  int (*supports_option)(const DepthSensor*, int,
+                         LibraryError**) = library.find("rs2_supports_option");
+  float (*get_option)(const DepthSensor*, int, LibraryError**) = library.find("rs2_get_option");
+  void (*set_option)(const DepthSensor*, int, float,
+                     LibraryError**) = library.find("rs2_set_option");
+  Pipeline* (*create_pipeline)(Context*, LibraryError**) = library.find("rs2_create_pipeline");
+  void (*delete_pipeline)(Pipeline*) = library.find("rs2_delete_pipeline");
+  PipelineConfig* (*create_config)(LibraryError**) = library.find("rs2_create_config");
+  void (*delete_config)(PipelineConfig*) = library.find("rs2_delete_config");
+  void (*config_enable_device)(PipelineConfig*, const char*,
+                               LibraryError**) = library.find("rs2_config_enable_device");
   void (*config_enable_stream)(PipelineConfig*, int, int, int, int, int, int,
-                               LibraryError**) = nullptr;
-  PipelineProfile* (*pipeline_start)(Pipeline*, PipelineConfig*, LibraryError**) = nullptr;
-  void (*pipeline_stop)(Pipeline*, LibraryError**) = nullptr;
-  int (*pipeline_wait)(Pipeline*, LibraryFrame**, unsigned, LibraryError**) = nullptr;
-  CameraDevice* (*profile_get_device)(PipelineProfile*, LibraryError**) = nullptr;
-  void (*delete_pipeline_profile)(PipelineProfile*) = nullptr;
-  int (*embedded_frames_count)(LibraryFrame*, LibraryError**) = nullptr;
-  LibraryFrame* (*extract_frame)(LibraryFrame*, int, LibraryError**) = nullptr;
-  void (*release_frame)(LibraryFrame*) = nullptr;
-  const void* (*get_frame_data)(const LibraryFrame*, LibraryError**) = nullptr;
-  int (*get_frame_width)(const LibraryFrame*, LibraryError**) = nullptr;
-  int (*get_frame_height)(const LibraryFrame*, LibraryError**) = nullptr;
-  int (*get_frame_stride)(const LibraryFrame*, LibraryError**) = nullptr;
-  double (*get_frame_timestamp)(const LibraryFrame*, LibraryError**) = nullptr;  // [ms]
-  int (*get_frame_domain)(const LibraryFrame*, LibraryError**) = nullptr;
-  int (*supports_metadata)(const LibraryFrame*, int, LibraryError**) = nullptr;
-  long long (*get_metadata)(const LibraryFrame*, int, LibraryError**) = nullptr;
-  float (*get_units)(const LibraryFrame*, LibraryError**) = nullptr;  // [m]
-  const StreamProfile* (*get_stream_profile)(const LibraryFrame*, LibraryError**) = nullptr;
+                               LibraryError**) = library.find("rs2_config_enable_stream");
+  PipelineProfile* (*pipeline_start)(Pipeline*, PipelineConfig*, LibraryError**) =
+      library.find("rs2_pipeline_start_with_config");
+  void (*pipeline_stop)(Pipeline*, LibraryError**) = library.find("rs2_pipeline_stop");
+  int (*pipeline_wait)(Pipeline*, LibraryFrame**, unsigned,
+                       LibraryError**) = library.find("rs2_pipeline_try_wait_for_frames");
+  CameraDevice* (*profile_get_device)(PipelineProfile*, LibraryError**) =
+      library.find("rs2_pipeline_profile_get_device");
+  void (*delete_pipeline_profile)(PipelineProfile*) = library.find("rs2_delete_pipeline_profile");
+  int (*embedded_frames_count)(LibraryFrame*,
+                               LibraryError**) = library.find("rs2_embedded_frames_count");
+  LibraryFrame* (*extract_frame)(LibraryFrame*, int,
+                                 LibraryError**) = library.find("rs2_extract_frame");
+  void (*release_frame)(LibraryFrame*) = library.find("rs2_release_frame");
+  const void* (*get_frame_data)(const LibraryFrame*,
+                                LibraryError**) = library.find("rs2_get_frame_data");
+  int (*get_frame_width)(const LibraryFrame*, LibraryError**) = library.find("rs2_get_frame_width");
+  int (*get_frame_height)(const LibraryFrame*,
+                          LibraryError**) = library.find("rs2_get_frame_height");
+  int (*get_frame_stride)(const LibraryFrame*,
+                          LibraryError**) = library.find("rs2_get_frame_stride_in_bytes");
+  double (*get_frame_timestamp)(const LibraryFrame*,
+                                LibraryError**) = library.find("rs2_get_frame_timestamp");  // [ms]
+  int (*get_frame_domain)(const LibraryFrame*,
+                          LibraryError**) = library.find("rs2_get_frame_timestamp_domain");
+  int (*supports_metadata)(const LibraryFrame*, int,
+                           LibraryError**) = library.find("rs2_supports_frame_metadata");
+  long long (*get_metadata)(const LibraryFrame*, int,
+                            LibraryError**) = library.find("rs2_get_frame_metadata");
+  float (*get_units)(const LibraryFrame*,
+                     LibraryError**) = library.find("rs2_depth_frame_get_units");  // [m]
+  const StreamProfile* (*get_stream_profile)(const LibraryFrame*, LibraryError**) =
+      library.find("rs2_get_frame_stream_profile");
   void (*get_profile_data)(const StreamProfile*, int*, int*, int*, int*, int*,
-                           LibraryError**) = nullptr;
-  void (*get_intrinsics)(const StreamProfile*, LibraryIntrinsics*, LibraryError**) = nullptr;
+                           LibraryError**) = library.find("rs2_get_stream_profile_data");
+  void (*get_intrinsics)(const StreamProfile*, LibraryIntrinsics*,
+                         LibraryError**) = library.find("rs2_get_video_stream_intrinsics");
   void (*get_extrinsics)(const StreamProfile*, const StreamProfile*, LibraryExtrinsics*,
-                         LibraryError**) = nullptr;
+                         LibraryError**) = library.find("rs2_get_extrinsics");
   // For the report alone
-  StreamProfileList* (*get_stream_profiles)(DepthSensor*, LibraryError**) = nullptr;
-  int (*count_profiles)(const StreamProfileList*, LibraryError**) = nullptr;
-  const StreamProfile* (*get_profile)(const StreamProfileList*, int, LibraryError**) = nullptr;
-  int (*is_default_profile)(const StreamProfile*, LibraryError**) = nullptr;
-  void (*delete_profiles)(StreamProfileList*) = nullptr;
+  StreamProfileList* (*get_stream_profiles)(DepthSensor*, LibraryError**) =
+      library.try_find("rs2_get_stream_profiles");
+  int (*count_profiles)(const StreamProfileList*,
+                        LibraryError**) = library.try_find("rs2_get_stream_profiles_count");
+  const StreamProfile* (*get_profile)(const StreamProfileList*, int,
+                                      LibraryError**) = library.try_find("rs2_get_stream_profile");
+  int (*is_default_profile)(const StreamProfile*,
+                            LibraryError**) = library.try_find("rs2_is_stream_profile_default");
+  void (*delete_profiles)(StreamProfileList*) = library.try_find("rs2_delete_stream_profiles_list");
 
  private:
   void check(LibraryError* error) const {
@@ -237,8 +205,13 @@ class Api {
     free_error(error);
     throw Refusal(message);
   }
-
-  SharedLibrary library_;
+  [[nodiscard]] int supported_version() const {
+    const int found = call(get_api_version);
+    if (found / 10000 != 2)
+      throw Error("librealsense2", library.path() + " is of version " + version_of(found),
+                  "install 2.50 or later");
+    return found;
+  }
 };
 
 // What the library made, given back to it at the end.
@@ -330,7 +303,7 @@ std::optional<double> default_rate(const Api& api, const CameraDevice* device) {
 
 DriverReport look() {
   const Api api;
-  DriverReport report{.library = api.path(), .version = api.version_text()};
+  DriverReport report{.library = api.library.path(), .version = version_of(api.version)};
   try {
     const Owned<Context> context(api.call(api.create_context, api.version), api.delete_context);
     const Owned<DeviceList> devices(api.call(api.query_devices, context.get()),
@@ -643,6 +616,17 @@ class Camera final : public LiveCamera {
 
 namespace palpate {
 
+/// `realsense:` or `realsense:SERIAL`, by librealsense2, which is loaded when it is asked for.
+///
+/// Options: `width`, `height` [px] and `fps` [Hz] of the depth, its default otherwise; `colour`
+/// adds colour images; `preset` (`default`, `hand`, `high-accuracy`, `high-density`,
+/// `medium-density`), `laser` (0: off, else [mW]) and `exposure` [s], which switches automatic
+/// exposure off, are left as they are unless given.
+///
+/// The unit of depth is that of each frame. Stamps of the global and the system's time are on
+/// StampClock::system, which shows the camera's latency; a camera that offers neither is followed
+/// by its own clock. A frame that says it has the camera's own time all the same, as the first ones
+/// after the start do, gets the time at which it arrived.
 Driver realsense_driver() {
   return {.name = "realsense",
           .summary = "realsense:SERIAL, a RealSense camera by librealsense2",

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/haply.hpp"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -20,9 +18,10 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/core/error.hpp"
-#include "palpate/drivers/wake_up.hpp"
+#include "palpate/core/text.hpp"
+#include "palpate/drivers/drivers.hpp"
+#include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/web_socket.hpp"
-#include "palpate/drivers/words.hpp"
 #include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/realtime.hpp"
 
@@ -493,6 +492,12 @@ DriverReport look() {
 }  // namespace
 }  // namespace haply
 
+/// Haply's Inverse3, Inverse3x and Minverse, by their Inverse Service: `haply:[DEVICE_ID]`, JSON
+/// over a WebSocket on a thread of its own, so that a service that hangs never holds a tick.
+///
+/// Device frame: x to the right, y away from the user, z up, origin in the middle of the workspace.
+/// What the service does with the last force when it is not spoken to any more is not documented
+/// with a time, so a program holds it by a guard (open_guarded).
 Driver haply_driver() {
   return {.name = "haply",
           .summary = "Haply's Inverse3, Inverse3x and Minverse, by their Inverse Service",

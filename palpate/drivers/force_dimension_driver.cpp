@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/force_dimension.hpp"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -14,11 +12,12 @@
 #include <sys/utsname.h>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/devices/device_body.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
 #include "palpate/drivers/usb.hpp"
-#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
@@ -71,39 +70,6 @@ LibraryNames names() {
 
 // The functions of the SDK that are used. ID is what opening returned.
 struct Sdk {
-  Sdk() : library(names()) {
-    library.find(get_device_count, "dhdGetDeviceCount");
-    library.find(open, "dhdOpen");
-    library.find(open_id, "dhdOpenID");
-    library.find(open_serial, "dhdOpenSerial");
-    library.find(close, "dhdClose");
-    library.find(stop, "dhdStop");
-    library.find(get_system_type, "dhdGetSystemType");
-    library.find(get_system_name, "dhdGetSystemName");
-    library.find(get_serial_number, "dhdGetSerialNumber");
-    library.find(get_sdk_version, "dhdGetSDKVersion");
-    library.find(error_get_last_str, "dhdErrorGetLastStr");
-    library.find(get_position, "dhdGetPosition");
-    library.find(get_linear_velocity, "dhdGetLinearVelocity");
-    library.find(get_orientation_frame, "dhdGetOrientationFrame");
-    library.find(set_force, "dhdSetForce");
-    library.find(enable_force, "dhdEnableForce");
-    library.find(set_brakes, "dhdSetBrakes");
-    library.find(set_gravity_compensation, "dhdSetGravityCompensation");
-    library.find(set_max_force, "dhdSetMaxForce");
-    library.find(get_button_mask, "dhdGetButtonMask");
-    library.find(emulate_button, "dhdEmulateButton");
-    library.find(get_status, "dhdGetStatus");
-    library.find(has_wrist, "dhdHasWrist");
-    library.find(has_gripper, "dhdHasGripper");
-    library.find(enable_expert_mode, "dhdEnableExpertMode");
-    library.find(set_watchdog, "dhdSetWatchdog");
-    library.try_find(drd_open_id, "drdOpenID");
-    library.try_find(drd_is_initialized, "drdIsInitialized");
-    library.try_find(drd_auto_init, "drdAutoInit");
-    library.try_find(drd_stop, "drdStop");
-  }
-
   [[nodiscard]] std::string version() const {
     int major = 0;
     int minor = 0;
@@ -128,38 +94,41 @@ struct Sdk {
                : std::to_string(number);
   }
 
-  SharedLibrary library;
-  int (*get_device_count)() = nullptr;
-  int (*open)() = nullptr;
-  int (*open_id)(char index) = nullptr;
-  int (*open_serial)(int serial) = nullptr;
-  int (*close)(char id) = nullptr;
-  int (*stop)(char id) = nullptr;
-  int (*get_system_type)(char id) = nullptr;
-  const char* (*get_system_name)(char id) = nullptr;
-  int (*get_serial_number)(unsigned short* number, char id) = nullptr;
-  void (*get_sdk_version)(int* major, int* minor, int* release, int* revision) = nullptr;
-  const char* (*error_get_last_str)() = nullptr;
-  int (*get_position)(double* x, double* y, double* z, char id) = nullptr;         // [m]
-  int (*get_linear_velocity)(double* x, double* y, double* z, char id) = nullptr;  // [m/s]
-  int (*get_orientation_frame)(double rows[3][3], char id) = nullptr;
-  int (*set_force)(double x, double y, double z, char id) = nullptr;  // [N]
-  int (*enable_force)(unsigned char on, char id) = nullptr;
-  int (*set_brakes)(int on, char id) = nullptr;
-  int (*set_gravity_compensation)(int on, char id) = nullptr;
-  int (*set_max_force)(double newtons, char id) = nullptr;
-  unsigned (*get_button_mask)(char id) = nullptr;
-  int (*emulate_button)(unsigned char on, char id) = nullptr;
-  int (*get_status)(int* status, char id) = nullptr;
-  bool (*has_wrist)(char id) = nullptr;
-  bool (*has_gripper)(char id) = nullptr;
-  int (*enable_expert_mode)() = nullptr;
-  int (*set_watchdog)(unsigned char units, char id) = nullptr;
+  SharedLibrary library{names()};
+  int (*get_device_count)() = library.find("dhdGetDeviceCount");
+  int (*open)() = library.find("dhdOpen");
+  int (*open_id)(char index) = library.find("dhdOpenID");
+  int (*open_serial)(int serial) = library.find("dhdOpenSerial");
+  int (*close)(char id) = library.find("dhdClose");
+  int (*stop)(char id) = library.find("dhdStop");
+  int (*get_system_type)(char id) = library.find("dhdGetSystemType");
+  const char* (*get_system_name)(char id) = library.find("dhdGetSystemName");
+  int (*get_serial_number)(unsigned short* number, char id) = library.find("dhdGetSerialNumber");
+  void (*get_sdk_version)(int* major, int* minor, int* release,
+                          int* revision) = library.find("dhdGetSDKVersion");
+  const char* (*error_get_last_str)() = library.find("dhdErrorGetLastStr");
+  int (*get_position)(double* x, double* y, double* z,
+                      char id) = library.find("dhdGetPosition");  // [m]
+  int (*get_linear_velocity)(double* x, double* y, double* z,
+                             char id) = library.find("dhdGetLinearVelocity");  // [m/s]
+  int (*get_orientation_frame)(double rows[3][3], char id) = library.find("dhdGetOrientationFrame");
+  int (*set_force)(double x, double y, double z, char id) = library.find("dhdSetForce");  // [N]
+  int (*enable_force)(unsigned char on, char id) = library.find("dhdEnableForce");
+  int (*set_brakes)(int on, char id) = library.find("dhdSetBrakes");
+  int (*set_gravity_compensation)(int on, char id) = library.find("dhdSetGravityCompensation");
+  int (*set_max_force)(double newtons, char id) = library.find("dhdSetMaxForce");
+  unsigned (*get_button_mask)(char id) = library.find("dhdGetButtonMask");
+  int (*emulate_button)(unsigned char on, char id) = library.find("dhdEmulateButton");
+  int (*get_status)(int* status, char id) = library.find("dhdGetStatus");
+  bool (*has_wrist)(char id) = library.find("dhdHasWrist");
+  bool (*has_gripper)(char id) = library.find("dhdHasGripper");
+  int (*enable_expert_mode)() = library.find("dhdEnableExpertMode");
+  int (*set_watchdog)(unsigned char units, char id) = library.find("dhdSetWatchdog");
   // Of libdrd alone:
-  int (*drd_open_id)(char id) = nullptr;
-  bool (*drd_is_initialized)(char id) = nullptr;
-  int (*drd_auto_init)(char id) = nullptr;
-  int (*drd_stop)(bool force_on, char id) = nullptr;
+  int (*drd_open_id)(char id) = library.try_find("drdOpenID");
+  bool (*drd_is_initialized)(char id) = library.try_find("drdIsInitialized");
+  int (*drd_auto_init)(char id) = library.try_find("drdAutoInit");
+  int (*drd_stop)(bool force_on, char id) = library.try_find("drdStop");
 };
 
 // What the arms are good for, by the SDK's type; CHAI3D's table.
@@ -544,6 +513,12 @@ DriverReport look() {
 }  // namespace
 }  // namespace force_dimension
 
+/// Force Dimension's arms (omega, delta, sigma, lambda) and Novint's Falcon, by Force Dimension's
+/// library libdrd or libdhd: `force-dimension:[SERIAL]`, polled.
+///
+/// Device frame: x to the right, y away from the user, z up, origin in the middle of the workspace.
+/// The arm's firmware takes its force away when no force was sent for `watchdog` (20 ms), whatever
+/// has become of this process; sessions may rely on it (DeviceInfo::watchdog).
 Driver force_dimension_driver() {
   return {.name = "force-dimension",
           .summary = "Force Dimension's omega, delta, sigma and lambda, and the Novint Falcon",

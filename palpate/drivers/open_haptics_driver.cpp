@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/open_haptics.hpp"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -13,6 +11,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/devices/device_body.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
 #include "palpate/drivers/usb.hpp"
@@ -81,29 +80,6 @@ LibraryNames names() {
 }
 
 struct Hd {
-  Hd() : library(names()) {
-    library.find(init_device, "hdInitDevice");
-    library.find(disable_device, "hdDisableDevice");
-    library.find(make_current_device, "hdMakeCurrentDevice");
-    library.find(begin_frame, "hdBeginFrame");
-    library.find(end_frame, "hdEndFrame");
-    library.find(enable, "hdEnable");
-    library.find(disable, "hdDisable");
-    library.find(get_double, "hdGetDoublev");
-    library.find(get_integer, "hdGetIntegerv");
-    library.find(get_string, "hdGetString");
-    library.find(set_double, "hdSetDoublev");
-    library.find(get_error, "hdGetError");
-    library.find(get_error_string, "hdGetErrorString");
-    library.find(schedule_asynchronous, "hdScheduleAsynchronous");
-    library.find(unschedule, "hdUnschedule");
-    library.find(set_scheduler_rate, "hdSetSchedulerRate");
-    library.find(start_scheduler, "hdStartScheduler");
-    library.find(stop_scheduler, "hdStopScheduler");
-    library.find(check_calibration, "hdCheckCalibration");
-    library.find(update_calibration, "hdUpdateCalibration");
-  }
-
   // The newest error, and none is left.
   unsigned take_errors() const noexcept {
     unsigned newest = success;
@@ -155,28 +131,29 @@ struct Hd {
     return *std::max_element(values.begin(), values.end());
   }
 
-  SharedLibrary library;
-  unsigned (*init_device)(const char* name) = nullptr;
-  void (*disable_device)(unsigned device) = nullptr;
-  void (*make_current_device)(unsigned device) = nullptr;
-  void (*begin_frame)(unsigned device) = nullptr;
-  void (*end_frame)(unsigned device) = nullptr;
-  void (*enable)(unsigned what) = nullptr;
-  void (*disable)(unsigned what) = nullptr;
-  void (*get_double)(unsigned name, double* values) = nullptr;
-  void (*get_integer)(unsigned name, int* values) = nullptr;
-  const char* (*get_string)(unsigned name) = nullptr;
-  void (*set_double)(unsigned name, const double* values) = nullptr;
-  ErrorInfo (*get_error)() = nullptr;
-  const char* (*get_error_string)(unsigned code) = nullptr;
+  SharedLibrary library{names()};
+  unsigned (*init_device)(const char* name) = library.find("hdInitDevice");
+  void (*disable_device)(unsigned device) = library.find("hdDisableDevice");
+  void (*make_current_device)(unsigned device) = library.find("hdMakeCurrentDevice");
+  void (*begin_frame)(unsigned device) = library.find("hdBeginFrame");
+  void (*end_frame)(unsigned device) = library.find("hdEndFrame");
+  void (*enable)(unsigned what) = library.find("hdEnable");
+  void (*disable)(unsigned what) = library.find("hdDisable");
+  void (*get_double)(unsigned name, double* values) = library.find("hdGetDoublev");
+  void (*get_integer)(unsigned name, int* values) = library.find("hdGetIntegerv");
+  const char* (*get_string)(unsigned name) = library.find("hdGetString");
+  void (*set_double)(unsigned name, const double* values) = library.find("hdSetDoublev");
+  ErrorInfo (*get_error)() = library.find("hdGetError");
+  const char* (*get_error_string)(unsigned code) = library.find("hdGetErrorString");
   unsigned long (*schedule_asynchronous)(unsigned (*callback)(void*), void* data,
-                                         unsigned short priority) = nullptr;
-  void (*unschedule)(unsigned long handle) = nullptr;
-  void (*set_scheduler_rate)(unsigned long hertz) = nullptr;
-  void (*start_scheduler)() = nullptr;
-  void (*stop_scheduler)() = nullptr;
-  unsigned (*check_calibration)() = nullptr;
-  void (*update_calibration)(unsigned style) = nullptr;
+                                         unsigned short priority) =
+      library.find("hdScheduleAsynchronous");
+  void (*unschedule)(unsigned long handle) = library.find("hdUnschedule");
+  void (*set_scheduler_rate)(unsigned long hertz) = library.find("hdSetSchedulerRate");
+  void (*start_scheduler)() = library.find("hdStartScheduler");
+  void (*stop_scheduler)() = library.find("hdStopScheduler");
+  unsigned (*check_calibration)() = library.find("hdCheckCalibration");
+  void (*update_calibration)(unsigned style) = library.find("hdUpdateCalibration");
 };
 
 // What the models are good for, by a part of the vendor's name; CHAI3D's table.
@@ -542,6 +519,12 @@ DriverReport look() {
 }  // namespace
 }  // namespace open_haptics
 
+/// 3D Systems' Touch and Touch X, SensAble's Phantoms, by the HD layer of OpenHaptics (libHD):
+/// `touch:[NAME]`, whose scheduler calls the cycle (Device::drives).
+///
+/// Device frame: x to the right, y away from the user, z up, origin as the vendor has it, in the
+/// middle of the workspace. What the hardware does when its computer dies is not documented, so a
+/// program holds it by a guard (open_guarded).
 Driver open_haptics_driver() {
   return {.name = "touch",
           .summary = "3D Systems' Touch and Touch X, SensAble's Phantoms, by OpenHaptics",

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/v4l2_camera.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -23,6 +21,7 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/sources/intrinsics_file.hpp"
 
@@ -281,6 +280,12 @@ class Camera final : public LiveCamera {
 
 namespace palpate {
 
+/// `v4l2:/dev/videoN?intrinsics=FILE.json`, a depth camera that the kernel itself drives: a node
+/// that gives Z16, as the RealSense D400 series does.
+///
+/// V4L2 tells neither lens nor unit: FILE.json does (intrinsics_file.hpp), and its size is the one
+/// that is asked for. Option `fps` [Hz]. Stamps are the kernel's, on StampClock::monotonic, as all
+/// drivers of cameras in it have them: when a frame's first or last bytes arrived.
 Driver v4l2_driver() {
   return {.name = "v4l2",
           .summary = "v4l2:/dev/videoN?intrinsics=FILE.json, depth as Z16 by the kernel",

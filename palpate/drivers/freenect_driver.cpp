@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/freenect_camera.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,9 +13,10 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::freenect {
@@ -58,55 +57,32 @@ constexpr const char* plug_in =
     "plug it in, with its power supply; if it is, install the package libfreenect0.5 with its udev "
     "rules, modprobe -r gspca_kinect, and end other programs that use it";
 
-class Api {
- public:
-  Api()
-      : library_({.name = "libfreenect",
-                  .files = {"libfreenect.so.0.5", "libfreenect.so.0", "libfreenect.so"},
-                  .variable = "PALPATE_LIBFREENECT",
-                  .remedy = "install the package libfreenect0.5"}) {
-    library_.find(init, "freenect_init");
-    library_.find(shut_down, "freenect_shutdown");
-    library_.find(set_log_level, "freenect_set_log_level");
-    library_.find(select_parts, "freenect_select_subdevices");
-    library_.find(count, "freenect_num_devices");
-    library_.try_find(list, "freenect_list_device_attributes");
-    library_.try_find(free_list, "freenect_free_device_attributes");
-    library_.find(open, "freenect_open_device");
-    library_.find(open_serial, "freenect_open_device_by_camera_serial");
-    library_.find(close, "freenect_close_device");
-    library_.find(find_mode, "freenect_find_depth_mode");
-    library_.find(set_mode, "freenect_set_depth_mode");
-    library_.find(set_callback, "freenect_set_depth_callback");
-    library_.find(start, "freenect_start_depth");
-    library_.find(stop, "freenect_stop_depth");
-    library_.find(process, "freenect_process_events_timeout");
-    library_.try_find(copy_registration, "freenect_copy_registration");
-    library_.try_find(destroy_registration, "freenect_destroy_registration");
-  }
-  [[nodiscard]] const std::string& path() const { return library_.path(); }
-
-  int (*init)(UsbContext**, void*) = nullptr;
-  int (*shut_down)(UsbContext*) = nullptr;
-  void (*set_log_level)(UsbContext*, int) = nullptr;
-  void (*select_parts)(UsbContext*, int) = nullptr;
-  int (*count)(UsbContext*) = nullptr;
-  int (*list)(UsbContext*, Attributes**) = nullptr;
-  void (*free_list)(Attributes*) = nullptr;
-  int (*open)(UsbContext*, Kinect**, int) = nullptr;
-  int (*open_serial)(UsbContext*, Kinect**, const char*) = nullptr;
-  int (*close)(Kinect*) = nullptr;
-  FrameMode (*find_mode)(int, int) = nullptr;
-  int (*set_mode)(Kinect*, FrameMode) = nullptr;
-  void (*set_callback)(Kinect*, void (*)(Kinect*, void*, std::uint32_t)) = nullptr;
-  int (*start)(Kinect*) = nullptr;
-  int (*stop)(Kinect*) = nullptr;
-  int (*process)(UsbContext*, timeval*) = nullptr;
-  Registration (*copy_registration)(Kinect*) = nullptr;
-  int (*destroy_registration)(Registration*) = nullptr;
-
- private:
-  SharedLibrary library_;
+struct Api {
+  SharedLibrary library{{.name = "libfreenect",
+                         .files = {"libfreenect.so.0.5", "libfreenect.so.0", "libfreenect.so"},
+                         .variable = "PALPATE_LIBFREENECT",
+                         .remedy = "install the package libfreenect0.5"}};
+  int (*init)(UsbContext**, void*) = library.find("freenect_init");
+  int (*shut_down)(UsbContext*) = library.find("freenect_shutdown");
+  void (*set_log_level)(UsbContext*, int) = library.find("freenect_set_log_level");
+  void (*select_parts)(UsbContext*, int) = library.find("freenect_select_subdevices");
+  int (*count)(UsbContext*) = library.find("freenect_num_devices");
+  int (*list)(UsbContext*, Attributes**) = library.try_find("freenect_list_device_attributes");
+  void (*free_list)(Attributes*) = library.try_find("freenect_free_device_attributes");
+  int (*open)(UsbContext*, Kinect**, int) = library.find("freenect_open_device");
+  int (*open_serial)(UsbContext*, Kinect**,
+                     const char*) = library.find("freenect_open_device_by_camera_serial");
+  int (*close)(Kinect*) = library.find("freenect_close_device");
+  FrameMode (*find_mode)(int, int) = library.find("freenect_find_depth_mode");
+  int (*set_mode)(Kinect*, FrameMode) = library.find("freenect_set_depth_mode");
+  void (*set_callback)(Kinect*,
+                       void (*)(Kinect*, void*,
+                                std::uint32_t)) = library.find("freenect_set_depth_callback");
+  int (*start)(Kinect*) = library.find("freenect_start_depth");
+  int (*stop)(Kinect*) = library.find("freenect_stop_depth");
+  int (*process)(UsbContext*, timeval*) = library.find("freenect_process_events_timeout");
+  Registration (*copy_registration)(Kinect*) = library.try_find("freenect_copy_registration");
+  int (*destroy_registration)(Registration*) = library.try_find("freenect_destroy_registration");
 };
 
 using OwnedContext = std::unique_ptr<UsbContext, int (*)(UsbContext*)>;
@@ -136,7 +112,7 @@ std::vector<std::string> serials(const Api& api, UsbContext* context) {
 
 DriverReport look() {
   const Api api;
-  DriverReport report{.library = api.path()};
+  DriverReport report{.library = api.library.path()};
   const OwnedContext context = context_of(api);
   for (const std::string& serial : serials(api, context.get()))
     report.found.push_back({.uri = "freenect:" + serial,
@@ -270,6 +246,12 @@ class Camera final : public LiveCamera {
 
 namespace palpate {
 
+/// `freenect:` or `freenect:SERIAL`, a Kinect v1 by libfreenect, which is loaded when it is asked
+/// for: 640 x 480 at 30 Hz.
+///
+/// Option `depth`: `mm` (the default), `registered` (to the colour camera's view) or `11bit`, the
+/// sensor's own steps, made distances of 0.1 mm here. Stamps are times of arrival: the camera's own
+/// are of no documented unit.
 Driver freenect_driver() {
   return {.name = "freenect",
           .summary = "freenect:SERIAL, a Kinect v1 by libfreenect",

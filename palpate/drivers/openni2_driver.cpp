@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/openni2_camera.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,9 +14,10 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/text.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/drivers/words.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::openni2 {
@@ -72,35 +71,8 @@ std::string text_of(const std::array<char, 256>& text) {
   return {text.begin(), std::find(text.begin(), text.end(), '\0')};
 }
 
-class Api {
- public:
-  Api()
-      : library_({.name = "OpenNI2",
-                  .files = {"libOpenNI2.so.0", "libOpenNI2.so"},
-                  .variable = "PALPATE_OPENNI2",
-                  .remedy = "install the package libopenni2-0"}) {
-    library_.find(initialize, "oniInitialize");
-    library_.find(shut_down, "oniShutdown");
-    library_.find(get_version, "oniGetVersion");
-    library_.find(get_extended_error, "oniGetExtendedError");
-    library_.find(get_device_list, "oniGetDeviceList");
-    library_.find(release_device_list, "oniReleaseDeviceList");
-    library_.find(device_open, "oniDeviceOpen");
-    library_.find(device_close, "oniDeviceClose");
-    library_.find(device_get_info, "oniDeviceGetInfo");
-    library_.find(device_get_modes, "oniDeviceGetSensorInfo");
-    library_.find(device_get_property, "oniDeviceGetProperty");
-    library_.find(device_set_property, "oniDeviceSetProperty");
-    library_.find(registration_supported, "oniDeviceIsImageRegistrationModeSupported");
-    library_.find(create_stream, "oniDeviceCreateStream");
-    library_.find(stream_destroy, "oniStreamDestroy");
-    library_.find(stream_start, "oniStreamStart");
-    library_.find(stream_stop, "oniStreamStop");
-    library_.find(stream_read, "oniStreamReadFrame");
-    library_.find(stream_get_property, "oniStreamGetProperty");
-    library_.find(stream_set_property, "oniStreamSetProperty");
-    library_.find(wait_for_any, "oniWaitForAnyStream");
-    library_.find(frame_release, "oniFrameRelease");
+struct Api {
+  Api() {
     if (initialize(api_version) != ok)
       throw Error("OpenNI2", "it does not start: " + said(),
                   "install the package libopenni2-0 with its drivers");
@@ -131,33 +103,34 @@ class Api {
     int size = static_cast<int>(text.size());
     return device_get_property(device, which, text.data(), &size) == ok ? text_of(text) : "";
   }
-  [[nodiscard]] const std::string& path() const { return library_.path(); }
 
-  int (*initialize)(int) = nullptr;
-  void (*shut_down)() = nullptr;
-  Version (*get_version)() = nullptr;
-  const char* (*get_extended_error)() = nullptr;
-  int (*get_device_list)(DeviceInfo**, int*) = nullptr;
-  int (*release_device_list)(DeviceInfo*) = nullptr;
-  int (*device_open)(const char*, Device**) = nullptr;
-  int (*device_close)(Device*) = nullptr;
-  int (*device_get_info)(Device*, DeviceInfo*) = nullptr;
-  const SensorModes* (*device_get_modes)(Device*, int) = nullptr;
-  int (*device_get_property)(Device*, int, void*, int*) = nullptr;
-  int (*device_set_property)(Device*, int, const void*, int) = nullptr;
-  int (*registration_supported)(Device*, int) = nullptr;
-  int (*create_stream)(Device*, int, Stream**) = nullptr;
-  void (*stream_destroy)(Stream*) = nullptr;
-  int (*stream_start)(Stream*) = nullptr;
-  void (*stream_stop)(Stream*) = nullptr;
-  int (*stream_read)(Stream*, ImageFrame**) = nullptr;
-  int (*stream_get_property)(Stream*, int, void*, int*) = nullptr;
-  int (*stream_set_property)(Stream*, int, const void*, int) = nullptr;
-  int (*wait_for_any)(Stream**, int, int*, int) = nullptr;
-  void (*frame_release)(ImageFrame*) = nullptr;
-
- private:
-  SharedLibrary library_;
+  SharedLibrary library{{.name = "OpenNI2",
+                         .files = {"libOpenNI2.so.0", "libOpenNI2.so"},
+                         .variable = "PALPATE_OPENNI2",
+                         .remedy = "install the package libopenni2-0"}};
+  int (*initialize)(int) = library.find("oniInitialize");
+  void (*shut_down)() = library.find("oniShutdown");
+  Version (*get_version)() = library.find("oniGetVersion");
+  const char* (*get_extended_error)() = library.find("oniGetExtendedError");
+  int (*get_device_list)(DeviceInfo**, int*) = library.find("oniGetDeviceList");
+  int (*release_device_list)(DeviceInfo*) = library.find("oniReleaseDeviceList");
+  int (*device_open)(const char*, Device**) = library.find("oniDeviceOpen");
+  int (*device_close)(Device*) = library.find("oniDeviceClose");
+  int (*device_get_info)(Device*, DeviceInfo*) = library.find("oniDeviceGetInfo");
+  const SensorModes* (*device_get_modes)(Device*, int) = library.find("oniDeviceGetSensorInfo");
+  int (*device_get_property)(Device*, int, void*, int*) = library.find("oniDeviceGetProperty");
+  int (*device_set_property)(Device*, int, const void*, int) = library.find("oniDeviceSetProperty");
+  int (*registration_supported)(Device*,
+                                int) = library.find("oniDeviceIsImageRegistrationModeSupported");
+  int (*create_stream)(Device*, int, Stream**) = library.find("oniDeviceCreateStream");
+  void (*stream_destroy)(Stream*) = library.find("oniStreamDestroy");
+  int (*stream_start)(Stream*) = library.find("oniStreamStart");
+  void (*stream_stop)(Stream*) = library.find("oniStreamStop");
+  int (*stream_read)(Stream*, ImageFrame**) = library.find("oniStreamReadFrame");
+  int (*stream_get_property)(Stream*, int, void*, int*) = library.find("oniStreamGetProperty");
+  int (*stream_set_property)(Stream*, int, const void*, int) = library.find("oniStreamSetProperty");
+  int (*wait_for_any)(Stream**, int, int*, int) = library.find("oniWaitForAnyStream");
+  void (*frame_release)(ImageFrame*) = library.find("oniFrameRelease");
 };
 
 template <class Thing, class Close>
@@ -169,7 +142,7 @@ DriverReport look() {
   const Api api;
   const Version version = api.get_version();
   DriverReport report{
-      .library = api.path(),
+      .library = api.library.path(),
       .version = version_text({version.major, version.minor, version.maintenance, version.build})};
   for (const DeviceInfo& info : api.devices()) {
     const std::string uri = text_of(info.uri);
@@ -448,6 +421,13 @@ class Camera final : public LiveCamera {
 
 namespace palpate {
 
+/// `openni2:`, `openni2:SERIAL` or `openni2:FILE.oni`, by OpenNI2's C interface, which is loaded
+/// when it is asked for: Kinect v1, Xtion, Carmine, Astra. A path may also be an address as
+/// OpenNI2 lists it.
+///
+/// Options: `width`, `height` [px] and `fps` [Hz] of the depth, otherwise the largest
+/// size up to 640 x 480; `colour` adds colour images, with the depth registered to them by the
+/// device. Mirroring, on by default in OpenNI2, is switched off. A recording plays at its own pace.
 Driver openni2_driver() {
   return {.name = "openni2",
           .summary = "openni2:SERIAL|FILE.oni, a Kinect v1, Xtion, Carmine or Astra by OpenNI2",

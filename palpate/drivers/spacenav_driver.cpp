@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/drivers/spacenav.hpp"
-
 #include <algorithm>
 #include <memory>
 #include <string>
@@ -8,6 +6,7 @@
 #include <poll.h>
 
 #include "palpate/core/error.hpp"
+#include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/rate_hand.hpp"
 #include "palpate/drivers/shared_library.hpp"
 
@@ -36,22 +35,14 @@ union Event {
 };
 
 struct Library {
-  Library()
-      : library({.name = "spacenav: (libspnav)",
-                 .files = {"libspnav.so.0", "libspnav.so.1", "libspnav.so"},
-                 .variable = "PALPATE_SPNAV",
-                 .remedy = "install it: apt install libspnav0 spacenavd"}) {
-    library.find(open, "spnav_open");
-    library.find(close, "spnav_close");
-    library.find(fd, "spnav_fd");
-    library.find(poll_event, "spnav_poll_event");
-  }
-
-  SharedLibrary library;
-  int (*open)() = nullptr;
-  int (*close)() = nullptr;
-  int (*fd)() = nullptr;
-  int (*poll_event)(Event* event) = nullptr;
+  SharedLibrary library{{.name = "spacenav: (libspnav)",
+                         .files = {"libspnav.so.0", "libspnav.so.1", "libspnav.so"},
+                         .variable = "PALPATE_SPNAV",
+                         .remedy = "install it: apt install libspnav0 spacenavd"}};
+  int (*open)() = library.find("spnav_open");
+  int (*close)() = library.find("spnav_close");
+  int (*fd)() = library.find("spnav_fd");
+  int (*poll_event)(Event* event) = library.find("spnav_poll_event");
 };
 
 class Puck final : public Sticks {
@@ -125,6 +116,8 @@ DriverReport look() {
 }  // namespace
 }  // namespace spacenav
 
+/// 3Dconnexion's SpaceMouse and the like, by libspnav and its daemon spacenavd: `spacenav:`. It
+/// moves the hand by rate control and gives no force.
 Driver spacenav_driver() {
   return {.name = "spacenav",
           .summary = "a SpaceMouse by spacenavd: moves the hand, gives no force",

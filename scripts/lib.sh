@@ -20,22 +20,20 @@ in_cache() {
 }
 
 # progress: of ninja's output, what went wrong; and every five seconds how far it has come. Serves
-# where no terminal shows ninja's own line.
+# where no terminal shows ninja's own line. It reads until ninja ends, even if nobody reads what it
+# says any more: a reader that ends before would end the build with SIGPIPE, without a word.
 progress() {
-  local line built total shown='' next=0 status=0
-  while IFS= read -r -t 1 line || { status=$?; ((status > 128)); }; do
-    if ((status == 0)); then
-      if [[ $line =~ ^@([0-9]+)/([0-9]+)\  ]]; then
-        built=${BASH_REMATCH[1]} total=${BASH_REMATCH[2]}
-      elif [[ $line != ninja:\ Entering* && $line != "ninja: no work"* && $line != "-- "* ]]; then
-        echo "$line" >&2
+  local line next=0
+  trap '' PIPE
+  while IFS= read -r line || [[ $line ]]; do
+    if [[ $line =~ ^@([0-9]+)/([0-9]+)\  ]]; then
+      if ((SECONDS >= next)); then
+        say "building ${BASH_REMATCH[1]} of ${BASH_REMATCH[2]}"
+        next=$((SECONDS + 5))
       fi
+    elif [[ $line != ninja:\ Entering* && $line != "ninja: no work"* && $line != "-- "* ]]; then
+      echo "$line" >&2
     fi
-    if ((SECONDS >= next)) && [[ ${total-} && $built/$total != "$shown" ]]; then
-      say "building $built of $total"
-      shown=$built/$total next=$((SECONDS + 5))
-    fi
-    status=0
   done
 }
 
@@ -69,7 +67,7 @@ build_in() {
   if [[ -t 2 ]]; then
     "${ninja[@]}" >&2
   else
-    NINJA_STATUS='@%f/%t ' "${ninja[@]}" 2>&1 | progress
+    NINJA_STATUS='@%f/%t ' "${ninja[@]}" 2>&1 | { progress || true; }
   fi
 }
 

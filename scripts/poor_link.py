@@ -56,20 +56,29 @@ class Link:
         self.random = random.Random(1)
         self.is_open = True
         self.down_from = self.down_until = math.inf
-        self.taps = [self.tap(name) for name in SIDES]
-        for name, address in zip(SIDES, ("10.77.0.1/24", "10.77.0.2/24")):
-            run("ip", "netns", "add", name)
-            run("ip", "link", "set", name, "netns", name)
-            up = f"link set {name} up"
-            for command in (f"addr add {address} dev {name}", up, "link set lo up"):
-                run("ip", "-n", name, *command.split())
+        self.taps = []
         self.thread = threading.Thread(target=self.carry)
-        self.thread.start()
+        try:
+            for name, address in zip(SIDES, ("10.77.0.1/24", "10.77.0.2/24")):
+                self.taps.append(self.tap(name))
+                run("ip", "netns", "add", name)
+                run("ip", "link", "set", name, "netns", name)
+                up = f"link set {name} up"
+                for command in (f"addr add {address} dev {name}", up, "link set lo up"):
+                    run("ip", "-n", name, *command.split())
+            self.thread.start()
+        except BaseException:  # what was begun is undone
+            self.close()
+            raise
 
     @staticmethod
     def tap(name):
         tap = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
-        fcntl.ioctl(tap, TUNSETIFF, struct.pack("16sH", name.encode(), TAP_WITHOUT_HEADER))
+        try:
+            fcntl.ioctl(tap, TUNSETIFF, struct.pack("16sH", name.encode(), TAP_WITHOUT_HEADER))
+        except BaseException:
+            os.close(tap)
+            raise
         return tap
 
     def go_down(self, at, seconds):
@@ -113,7 +122,8 @@ class Link:
 
     def close(self):
         self.is_open = False
-        self.thread.join()
+        if self.thread.is_alive():
+            self.thread.join()
         for tap in self.taps:
             os.close(tap)
         remove_namespaces()

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scripts where what they call is slow or fails."""
+
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import types
+import unittest
+import unittest.mock
+
+SCRIPTS = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(SCRIPTS))
+import poor_link  # noqa: E402
+
+BUILD = f"set -euo pipefail; source {SCRIPTS}/lib.sh; build_in build"
+
+
+class Build(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        (self.folder / "build").mkdir()
+        (self.folder / "build" / "build.ninja").touch()
+        (self.folder / "build" / "CMakeCache.txt").write_text(
+            f"CMAKE_HOME_DIRECTORY:INTERNAL={self.folder}\n")
+
+    def build(self, ninja, stderr):
+        for name, script in (("ninja", ninja), ("cmake", "")):
+            program = self.folder / name
+            program.write_text(f"#!/bin/sh\n{script}\n")
+            program.chmod(0o755)
+        path = f"{self.folder}:{os.environ['PATH']}"
+        return subprocess.run(["bash", "-c", BUILD], cwd=self.folder, stderr=stderr, timeout=60,
+                              env={**os.environ, "PATH": path}, check=False)
+
+    def test_shows_errors_whole_however_slowly_they_come_and_fails_as_the_build_does(self):
+        done = self.build("printf '@1/2 a.cpp\\nb.cpp: '; sleep 1.5; printf 'error\\n@2/2 b.cpp\\n'"
+                          "; printf 'the end'; exit 3", subprocess.PIPE)
+        self.assertEqual(done.stderr.decode().splitlines()[-3:],
+                         ["bash: building 1 of 2", "b.cpp: error", "the end"])
+        self.assertEqual(done.returncode, 3)
+
+    def test_goes_on_when_nobody_reads_what_it_says(self):
+        reader, writer = os.pipe()
+        os.close(reader)
+        done = self.build("for i in 1 2 3 4 5; do echo warning || exit 1; sleep 0.05; done; "
+                          "touch built", writer)
+        os.close(writer)
+        self.assertEqual(done.returncode, 0)
+        self.assertTrue((self.folder / "built").exists())
+
+
+class PoorLink(unittest.TestCase):
+    def test_undoes_what_was_begun_where_a_later_step_fails(self):
+        done = []
+
+        def run(command, **_):
+            done.append(" ".join(command))
+            if "addr" in command:
+                raise subprocess.CalledProcessError(2, command)
+
+        opened = set(os.listdir("/proc/self/fd"))
+        with unittest.mock.patch("subprocess.run", run), unittest.mock.patch.object(
+                poor_link.Link, "tap", lambda _, name: os.open("/dev/null", os.O_RDWR)):
+            with self.assertRaises(subprocess.CalledProcessError):
+                poor_link.Link(types.SimpleNamespace())
+        first = poor_link.SIDES[0]
+        self.assertIn(f"ip netns add {first}", done)
+        self.assertIn(f"ip netns del {first}", done)
+        self.assertEqual(set(os.listdir("/proc/self/fd")), opened)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -267,12 +267,13 @@ TEST(PointCloud, ThinsEvenlyASheetThatHoldsMoreThanABeamWants) {
     const Beam beam{Vec3(0.2, -0.1, 1.0), radius, 0.3, Vec3::UnitZ()};
     gather(cloud, beam, wanted, patch);
     const SightCone cone(beam, Vec3::Zero());
-    const auto held = std::count_if(points.begin(), points.end(), [&](const Vec3& point) {
-      return cone.holds(point - beam.through);
-    });
-    EXPECT_EQ(patch.thinned(), held > static_cast<int>(wanted)) << radius;
+    const auto held =
+        static_cast<double>(std::count_if(points.begin(), points.end(), [&](const Vec3& point) {
+          return cone.holds(point - beam.through);
+        }));
+    EXPECT_EQ(patch.thinned(), held > static_cast<double>(wanted)) << radius;
     EXPECT_LE(patch.size(), wanted);
-    EXPECT_GE(patch.size(), std::min<std::size_t>(static_cast<std::size_t>(held), wanted / 3));
+    EXPECT_GE(static_cast<double>(patch.size()), std::min(held, wanted / 3.0));
     EXPECT_NEAR(static_cast<double>(patch.size()) / patch.share(), held, 0.1 * held) << radius;
     std::array<std::size_t, 4> quarters{};
     for (std::size_t i = 0; i < patch.size(); ++i)

@@ -79,10 +79,9 @@ void validate(const MaterialTable& table) {
   }
   std::set<std::string_view> names;
   for (const NamedMaterial& m : table.materials) {
-    if (m.name.empty()) throw Error("material", "one has no name", "give each its name");
+    if (m.name.empty()) throw Error("material", "a material has no name", "give each its name");
     if (!names.insert(m.name).second)
-      throw Error("material '" + m.name + "'", "there are two of that name",
-                  "give each a name of its own");
+      throw Error("material '" + m.name + "'", "the name is used twice", "use different names");
     if (!(m.tolerance >= 1.0 && m.tolerance <= 100.0))
       throw Error("material '" + m.name + "'", "its tolerance is out of range",
                   "give 1 to 100, such as 15");
@@ -109,7 +108,7 @@ const NamedMaterial& standard_material(std::string_view name) {
   }
   const std::string_view near = nearest_name(name, names);
   throw Error(
-      "material '" + std::string(name) + "'", "there is none of that name",
+      "material '" + std::string(name) + "'", "there is no material of that name",
       (near.empty() ? "" : "did you mean '" + std::string(near) + "'? ") + "known are " + known);
 }
 

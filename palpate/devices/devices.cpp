@@ -95,7 +95,7 @@ std::unique_ptr<Device> open_mouse(const Uri& uri, const Path& /*path*/) {
 }  // namespace
 
 Registry<DeviceScheme> standard_devices() {
-  return {"kind of device",
+  return {"type of device",
           ":",
           {{"script", "follows a recorded path, independent of the force", open_script},
            {"hand", "a simulated person that follows a path and yields to the force", open_hand},

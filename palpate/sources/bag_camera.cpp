@@ -65,7 +65,7 @@ BagCamera::BagCamera(BagReader& bag, const std::string& topic, const Options& op
     : bag_(bag), topic_(topic), options_(options) {
   const BagReader::Topic* found = bag.find(topic);
   if (found == nullptr)
-    throw Error("topic " + topic, "is not in the bag", "see what is with ros2 bag info");
+    throw Error("topic " + topic, "is not in the bag", "list the topics with ros2 bag info");
   type_ = found->type;
   if (type_ != ros::Image::type && type_ != ros::CompressedImage::type &&
       type_ != ros::PointCloud2::type)
@@ -89,7 +89,7 @@ void BagCamera::find_colour() {
     colour_.emplace(bag_, topic, topic_, first_header().frame_id,
                     transforms_ ? &*transforms_ : nullptr);
   } catch (const Error& error) {
-    colour_note_ = std::string("colour is left out: ") + error.what();
+    colour_note_ = std::string("colour is skipped: ") + error.what();
   }
 }
 
@@ -113,7 +113,7 @@ void BagCamera::find_lens(const std::string& camera) {
   units_topic_ = parent(camera) + "/option/" + name + "/value";
   units_places_ = bag_.places(units_topic_);
   if (units_places_.empty() && !options_.units)
-    throw Error("topic " + topic_, "has no unit of depth on " + units_topic_,
+    throw Error("topic " + topic_, "has no depth unit on " + units_topic_,
                 "give the raw values per metre, such as ?units=1000");
 }
 
@@ -130,15 +130,15 @@ void BagCamera::follow_transforms() {
 std::string BagCamera::pose_note() const {
   if (is_ours() || is_realsense_) return {};
   if (!transforms_)
-    return std::string(options_.fixed_frame == "none" ? "TF is left aside"
+    return std::string(options_.fixed_frame == "none" ? "TF is not used"
                                                       : "the bag has no TF (/tf, /tf_static)") +
-           ": points are in the camera's own frame";
+           ": points are in the camera frame";
   if (transforms_->fixed_frame().empty())
-    return "TF leads from none of map, odom and world to the camera: points are in its own frame; "
-           "?fixed_frame=" +
-           transforms_->root() + " takes them farther";
+    return "TF connects none of map, odom and world with the camera: points are in the camera "
+           "frame; ?fixed_frame=" +
+           transforms_->root() + " transforms them to the topmost TF frame";
   return "points are in " + transforms_->fixed_frame() +
-         ", by TF; frames for whose time it has no transform are left out";
+         ", by TF; frames without a transform at their time are dropped";
 }
 
 // The identity where TF does not lead to the camera; none where it does, but not at that time.

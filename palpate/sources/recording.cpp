@@ -33,7 +33,7 @@ class Recording final : public Source {
     while (!(first = camera_.frame(next_)) && next_ + 1 < camera_.frames()) ++next_;
     if (!first)
       throw Error(info_.uri, "its TF has no transform for the time of any frame",
-                  "leave TF aside with ?fixed_frame=none");
+                  "ignore TF with ?fixed_frame=none");
     first_ = first->stamp;
     info_.start_time = first_;
   }

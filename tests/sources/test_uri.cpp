@@ -102,7 +102,7 @@ TEST(Uri, WithoutAnOptionIsAsIfItHadNotBeenGiven) {
 
 TEST(OpenSource, ListsTheKnownSchemesForAnUnknownOne) {
   EXPECT_TRUE(fails_saying([] { return open_source("kinect:0"); },
-                           "unknown kind of source 'kinect:'; known here:"));
+                           "unknown type of source 'kinect:'; known here:"));
   EXPECT_THROW(open_source("folder"), Error);
 }
 

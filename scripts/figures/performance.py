@@ -19,8 +19,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def kernel_table(scenes):
-    lines = ["| scene | points | steps per tick | step | gather | tick | p99 | p99.9 | max | frame() "
-             "| limit | tick / limit |", "|---|" + "---:|" * 11]
+    lines = ["| scene | points | steps per tick | step | gather | tick | p99 | p99.9 | max "
+             "| frame() | limit | tick / limit |", "|---|" + "---:|" * 11]
     for scene in scenes:
         k = scene["kernel"]
         tick = k["tick"]
@@ -119,8 +119,8 @@ palpate bench --growth --out .
 {kernel_table(result['scenes'])}
 
 *limit* is a loop that only loads and adds the same points, as often as the tick reads them, and
-the same pixels, as often as it gathers. It includes neither the roots and quotients of equations (2)
-and (9) nor the second pass of a step in free motion or out of entrenchment. Its passes also overlap
+the same pixels, as often as it gathers. It includes neither the roots and quotients of equations
+(2) and (9) nor the second pass of a step in free motion or out of entrenchment. Its passes overlap
 in the processor, whereas each proxy step must wait for the results of the step before, sums and
 quotient included. The fewer the points, the larger the share of this waiting time. The aim was a
 tick within three times the limit; it is missed, as the last column shows.
@@ -134,7 +134,8 @@ ticks then only follow the fitted surface, and some (p99) repeat the fit.
 
 ## Compared with alternatives
 
-One sphere of 11 mm in the same frame: time to build the structure for each frame, and to query it.
+One sphere of 11 mm in the same frame: time to build the structure for each frame, and to query
+it.
 
 {search_table(result['scenes'])}
 
@@ -160,7 +161,7 @@ includes generating its points, and runs in the camera thread.
 
 The process held {result['resident_bytes'] / 2**20:.0f} MiB after all of `palpate bench`, frames,
 trees and samples included. From a first to a second session, once warm, it grew by
-{result['resident_growth_bytes'] / 1024:.0f} KiB, including the samples of the measurement; a tick does
+{result['resident_growth_bytes'] / 1024:.0f} KiB, including samples of the measurement; a tick does
 not allocate (`tests/core`). The program is {size_of(program) / 2**20:.1f} MiB, all
 that is installed
 {size_of(installed) / 2**20:.1f} MiB.
@@ -170,11 +171,11 @@ Compiling for Release with tests, one core's seconds by folder: {folders}. The l
 
 ## Guaranteed by tests
 
-`tests/cost`: the versions of each loop for SSE2, AVX2 and AVX-512 are disassembled and must be vector
-code of that width; all three give the same points, single lengths to 5 nm and sums of unit vectors
-to 2e-5; the steps and gathers of a slide are bounded, and so are the instructions of a tick, counted
-by valgrind (6408 when the bound was set, with 8.3 steps over 90 points on AVX2); the core compiles
-for aarch64 if there is a cross compiler.
+`tests/cost`: the versions of each loop for SSE2, AVX2 and AVX-512 are disassembled and must be
+vector code of that width; all three give the same points, single lengths to 5 nm and sums of
+unit vectors to 2e-5; the steps and gathers of a slide are bounded, and so are the instructions of a
+tick, counted by valgrind (6408 when the bound was set, with 8.3 steps over 90 points on AVX2); the
+core compiles for aarch64 if there is a cross compiler.
 """
 
 

@@ -27,18 +27,20 @@ constexpr double gravity = 9.80665;  // [m/s^2]
 void ask_for_consent(const DeviceCheck& check, const ProbeOptions& options) {
   if (check.agreed) return;
   if (isatty(STDIN_FILENO) != 1)
-    throw Error("doctor --device " + check.uri, "it moves the device, and nobody has agreed to it",
-                "stand beside it and add --yes");
-  fmt::print(stderr,
-             "palpate: {} will move its handle by itself, to and fro along each axis, for up to a "
-             "minute,\n  with at most {} N and no farther than {:.0f} mm. Put the handle into the "
-             "middle of its workspace,\n  free to move, hands off, the emergency stop within "
-             "reach. Type yes to begin: ",
-             check.uri, options.force, 1e3 * options.travel);
+    throw Error("doctor --device " + check.uri,
+                "the measurement moves the device and was not confirmed",
+                "clear the space around the handle, stay next to the device, and add --yes");
+  fmt::print(
+      stderr,
+      "palpate: {} will move its handle by itself, back and forth along each axis, for up to a "
+      "minute,\n  with at most {} N and {:.0f} mm. Put the handle in the centre of its "
+      "workspace,\n  free to move, hands off, the emergency stop within reach. Type yes to begin: ",
+      check.uri, options.force, 1e3 * options.travel);
   std::string answer;
   std::getline(std::cin, answer);
   if (answer != "yes")
-    throw Error("doctor --device " + check.uri, "it was not agreed to", "type yes, or add --yes");
+    throw Error("doctor --device " + check.uri, "the measurement was not confirmed",
+                "type yes, or add --yes");
 }
 
 // A device with motors must let go by itself when this process is killed.
@@ -56,8 +58,8 @@ std::unique_ptr<Device> open_watched(const DeviceCheck& check) {
   const bool watched = info.watchdog && *info.watchdog <= longest_watchdog;
   if (info.limits.motors && !info.simulated && !watched && !check.without_watchdog)
     throw Error(check.uri,
-                "it states no watchdog that takes the force away when this process is killed",
-                "with an emergency stop at hand add --without-watchdog");
+                "it has no watchdog that switches the force off when this process is killed",
+                "keep an emergency stop within reach and add --without-watchdog");
   return device;
 }
 
@@ -118,41 +120,40 @@ std::string report_text(const Json& report) {
                                  report["kind"].get<std::string>());
   for (const Json& axis : report["axes"])
     text += fmt::format(
-        "  along {}: {} g, damping {} N s/m, friction {} N, load {} N ({} swings)\n",
+        "  {} axis: {} g, damping {} N s/m, friction {} N, load {} N ({} strokes)\n",
         axis["axis"].get<std::string>(), with_error(axis["mass_kg"], 1e3, 1),
         with_error(axis["damping_ns_m"], 1.0, 2), with_error(axis["friction_n"], 1.0, 3),
         with_error(axis["load_n"], 1.0, 3), axis["swings"].get<int>());
   if (!report["delay_s"].is_null())
-    text += fmt::format("  from a force that is sent to one that acts: {} ms\n",
-                        with_error(report["delay_s"], 1e3, 2));
+    text += fmt::format("  actuation delay: {} ms\n", with_error(report["delay_s"], 1e3, 2));
   const auto line = [&](const char* key, const char* what, double scale, const char* unit) {
     if (!report[key].is_null())
       text += fmt::format("  {}: {:.4g} {}\n", what, scale * report[key].get<double>(), unit);
   };
-  line("resolution_m", "smallest change of the position", 1e3, "mm");
-  line("noise_m", "noise of the position at rest, rms", 1e3, "mm");
+  line("resolution_m", "position resolution", 1e3, "mm");
+  line("noise_m", "position noise at rest, rms", 1e3, "mm");
   line("tick_rate_hz", "ticks", 1.0, "a second");
-  line("update_rate_hz", "new positions", 1.0, "a second");
-  line("largest_force_n", "largest force that was sent", 1.0, "N");
-  line("farthest_m", "farthest that the handle moved", 1e3, "mm");
+  line("update_rate_hz", "position updates", 1.0, "a second");
+  line("largest_force_n", "largest test force", 1.0, "N");
+  line("farthest_m", "largest displacement of the handle", 1e3, "mm");
   text += "\n";
   if (const Json& proposal = report["proposal"]; !proposal.is_null()) {
     text += fmt::format(
-        "Proposed: --rate {:.0f} --set stiffness={:.0f} --set damping={:g}\n"
-        "  ({:.0f} N/m without a damper; a handle that nobody holds then comes to rest)\n",
+        "Proposed: --rate {:.0f} --set stiffness={:.0f} --set damping={:g}\n  ({:.0f} N/m without "
+        "damping; with these values a released handle is stable)\n",
         proposal["rate_hz"].get<double>(), std::floor(proposal["stiffness_n_m"].get<double>()),
         proposal["damping_ns_m"].get<double>(),
         std::floor(proposal["undamped_stiffness_n_m"].get<double>()));
     if (proposal.contains("handle_weight_kg"))
       text += fmt::format(
-          "  a handle of {:.0f} g is felt; down is ({:.2f}, {:.2f}, {:.2f}) of the "
-          "device\n",
+          "  uncompensated handle mass: {:.0f} g; direction of gravity in the device frame: "
+          "({:.2f}, {:.2f}, {:.2f})\n",
           1e3 * proposal["handle_weight_kg"].get<double>(), proposal["down"][0].get<double>(),
           proposal["down"][1].get<double>(), proposal["down"][2].get<double>());
   } else {
-    text += "Nothing is proposed: the figures are too uncertain\n";
+    text += "No proposal: the values are too uncertain\n";
   }
-  text += report["sure"].get<bool>() ? "These figures fit each other\n" : "";
+  text += report["sure"].get<bool>() ? "The values are consistent\n" : "";
   for (const Json& doubt : report["doubts"])
     text += fmt::format("  - {}\n", doubt.get<std::string>());
   return text;
@@ -165,7 +166,7 @@ int check_device(const DeviceCheck& check) {
   const std::unique_ptr<Device> device = open_watched(check);
   const DeviceInfo& info = device->info();
   if (!info.limits.motors)
-    throw Error("doctor --device " + check.uri, "it has no motors that could move its handle",
+    throw Error("doctor --device " + check.uri, "it has no motors",
                 "give a haptic device, or a simulated one: hand:?device=touch&grip=none");
   if (!info.simulated) ask_for_consent(check, options);
   std::atomic<bool> cancelled{false};
@@ -174,7 +175,7 @@ int check_device(const DeviceCheck& check) {
   {
     const EndingSignals signals([&cancelled] { cancelled = true; });
     if (!info.simulated && isatty(STDERR_FILENO) == 1)
-      fmt::print(stderr, "palpate: measuring; Ctrl-C takes the force away\n");
+      fmt::print(stderr, "palpate: measuring; Ctrl-C switches the force off\n");
     found = measure_device(*device, options);
   }
   const Json report = report_json(info, found, propose(info, found));

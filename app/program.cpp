@@ -130,7 +130,7 @@ int run_verb(int argc, char** argv, std::span<const AddVerb> own_verbs) {
                   "see 'palpate " + verb.command->get_name() + " --help'");
     return verb.action();
   }
-  refuse_extras(program, words, "verb", "see 'palpate --help'");
+  refuse_extras(program, words, "subcommand", "see 'palpate --help'");
   std::fputs(program.help().c_str(), stdout);
   return wrong_usage;
 }

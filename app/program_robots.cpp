@@ -14,8 +14,7 @@ std::string usual_cell() {
 }
 
 std::string robots_help() {
-  return "what is led, and the camera with it where it has one (" + usual_cell() +
-         "): " + standard_robots_help();
+  return "robot, with its camera if it has one (" + usual_cell() + "): " + standard_robots_help();
 }
 
 }  // namespace palpate::app

@@ -8,13 +8,16 @@ namespace palpate::app {
 std::string text_of(const BagCheck& check) {
   if (!check.damage.empty()) return "the recording is damaged: " + check.damage;
   std::string text =
-      "the recording has no checksums (it is older than they are, or others wrote it): damage may "
-      "go unnoticed";
+      "the recording has no checksums (it is older, or written by another program): damage may not "
+      "be detected";
   if (check.has_checksums) {
     text = fmt::format("checksums of all {} messages are right", check.messages - check.unchecked);
     if (check.unchecked > 0) text += fmt::format("; {} others have none", check.unchecked);
   }
-  if (!check.closed) text += "; it was not closed, and ends with what was whole then";
+  if (!check.closed)
+    text +=
+        "; it was not closed (its program was probably killed), and contains only the completely "
+        "written messages";
   return text;
 }
 

@@ -41,7 +41,7 @@ void introduce_device(const DeviceInfo& device, const std::string& hand,
   std::string text = hand.empty() ? "" : hand + ": ";
   text += fmt::format("{}: {}", device.uri, device.kind);
   if (!device.serial.empty()) text += ", serial number " + device.serial;
-  text += fmt::format("; at most {:.2g} N, {:.2g} N for long", device.limits.max_force,
+  text += fmt::format("; at most {:.2g} N, {:.2g} N continuously", device.limits.max_force,
                       device.limits.continuous_force);
   if (device.limits.max_stiffness)
     text += fmt::format(", walls up to {:.0f} N/m", *device.limits.max_stiffness);
@@ -49,11 +49,10 @@ void introduce_device(const DeviceInfo& device, const std::string& hand,
     const Vec3 size = 1e3 * (device.reach->highest - device.reach->lowest);
     text += fmt::format(", {:.0f} x {:.0f} x {:.0f} mm", size.x(), size.y(), size.z());
   }
-  if (device.watchdog)
-    text += fmt::format(", its watchdog lets go after {:.0f} ms", 1e3 * *device.watchdog);
+  if (device.watchdog) text += fmt::format(", watchdog {:.0f} ms", 1e3 * *device.watchdog);
   const Registry<Driver> drivers = standard_drivers();
   if (const Driver* driver = drivers.try_find(Uri(device.uri).scheme()))
-    text += "; its driver was tried on " + driver->tried;
+    text += "; driver tested with " + driver->tried;
   fmt::print(stderr, "palpate: {}\n", text);
   for (const std::string& line : stiffness_warnings(device, settings.parameters.coupling.stiffness,
                                                     settings.placement.workspace_scale, rate))
@@ -119,7 +118,7 @@ SessionOptions options_of(const RunOptions& options, const SessionConfig& config
 std::string late_ticks(const SessionOptions& options) {
   const std::string& name = options.settings.method;
   if (options.methods.find(name).bounded) return {};
-  return fmt::format("palpate: {} is a method of the lab: its ticks can come late\n", name);
+  return fmt::format("palpate: {} is a method of the lab: its ticks can be late\n", name);
 }
 
 int finish(Session& session, bool json, const std::string& ended) {
@@ -130,7 +129,7 @@ int finish(Session& session, bool json, const std::string& ended) {
   if (const std::string& folder = state.recording.folder;
       !folder.empty() && !state.recording.failed)
     fmt::print(stderr,
-               "palpate: its forces again: palpate replay {0}; touch it: palpate run --camera "
+               "palpate: check its forces: palpate replay {0}; touch it: palpate run --camera "
                "recording:{0}\n",
                folder);
   const std::string text = json ? json_of(state.summary, recording, state.cameras, session.timing(),

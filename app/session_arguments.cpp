@@ -46,74 +46,77 @@ void apply_placement(const std::optional<std::string>& pose, const std::optional
 void SessionArguments::add_to(CLI::App& command) {
   command
       .add_option("--camera", cameras_,
-                  "where frames come from (synthetic:desk?noise=1mm); may be given several times; "
-                  "?pose=x,y,z,qx,qy,qz,qw says where the camera stands")
+                  "source of the frames (synthetic:desk?noise=1mm); may be given several times; "
+                  "?pose=x,y,z,qx,qy,qz,qw sets the camera pose")
       ->allow_extra_args(false);
-  command.add_option(
-      "--material", material_,
-      "what the cameras' surfaces are made of: wood or another name of `palpate "
-      "parameters` for all of them, or a TOML file that tells materials by colour or "
-      "label");
+  command.add_option("--material", material_,
+                     "material of the surfaces: wood or another name of `palpate parameters` for "
+                     "all of them, or a TOML file that assigns materials by colour or label");
   command.add_option("--fixtures", fixtures_,
                      "TOML file of virtual fixtures: forbidden regions, guides, viscous regions");
   command
-      .add_option("--device", devices_,
-                  "the hand: mouse: in the page (the default), hand: a simulated person (the "
-                  "default of --headless), script:FILE.csv a path; given several times, a hand "
-                  "for each")
+      .add_option(
+          "--device", devices_,
+          "haptic device: mouse: on the page (the default), hand: a simulated user (the default "
+          "with --headless), script:FILE.csv a path; given several times, one hand for each")
       ->allow_extra_args(false);
-  command.add_option("--device-pose", device_pose_,
-                     "where the device lies in the scene: x,y,z,qx,qy,qz,qw [m], or the TOML file "
-                     "that palpate calibrate wrote; of several hands the first's, as are --scale, "
-                     "--bubble, --handle-weight and --clutch-button: [[hand]] of --config has "
-                     "those of the others");
-  command.add_option("--scale", scale_, "scene metres per device metre (1)");
-  command.add_option("--bubble", bubble_,
-                     "metres from the middle of the device's workspace beyond which the hand sends "
-                     "the HIP on (rate control), to reach what the device does not; 0: none (0)");
+  command.add_option(
+      "--device-pose", device_pose_,
+      "pose of the device in the scene: x,y,z,qx,qy,qz,qw [m], or the TOML file that palpate "
+      "calibrate wrote. With several hands, this option and --scale, --bubble, --handle-weight and "
+      "--clutch-button are for the first; set those of the others in [[hand]] of --config");
+  command.add_option("--scale", scale_, "motion scale: scene metres per device metre (1)");
+  command.add_option(
+      "--bubble", bubble_,
+      "radius [m] around the centre of the device workspace outside which the HIP keeps moving in "
+      "that direction (rate control), to reach points outside the workspace; 0: off (0)");
   command.add_option("--handle-weight", handle_weight_,
-                     "kilograms of the handle that the motors hold up, where the device does not: "
-                     "`palpate doctor --device` measures it; 0: none (0)");
+                     "handle mass [kg] that the motors compensate, for a device without gravity "
+                     "compensation; `palpate doctor --device` measures it; 0: off (0)");
   command.add_option("--clutch-button", clutch_button_,
-                     "while this button of the device is pressed the HIP stays: 0 to 31");
+                     "clutch: while this button of the device is pressed the HIP stays, 0 to 31");
   command
       .add_option("--limit", limits_,
                   "set a safety limit, NAME=VALUE in SI units; see `palpate parameters`")
       ->allow_extra_args(false);
-  command.add_flag("--without-watchdog", without_watchdog_,
-                   "allow a device whose motors no watchdog switches off more than engage_force: "
-                   "if the program is killed, its last force stays");
-  command.add_option("--rate", rate_, "ticks a second (1000)");
+  command.add_flag(
+      "--without-watchdog", without_watchdog_,
+      "allow forces above engage_force on a device that has motors but no watchdog of at most 0.5 "
+      "s. Danger: if this program is killed, the device keeps the last force");
+  command.add_option("--rate", rate_, "ticks per second (1000)");
   command.add_option("--listen", listen_,
-                     "address at which browsers find the page (127.0.0.1: this machine's alone). "
-                     "Beyond this machine the tokens travel in clear: better leave it, and tunnel "
-                     "from the other machine, ssh -L 8642:localhost:8642 THIS_MACHINE");
-  command.add_option("--port", port_, "port of the page (8642, or any if that is taken; 0: any)")
+                     "address on which the page is served (127.0.0.1: only for this computer). "
+                     "Tokens are sent unencrypted over the network: a tunnel from the other "
+                     "computer is safer, ssh -L 8642:localhost:8642 THIS_COMPUTER");
+  command.add_option("--port", port_, "port of the page (8642, or any if that is in use; 0: any)")
       ->check(CLI::Range(0, 65535));
   command
       .add_option("--token", token_,
-                  "what a page must know to look on and to hold the hand; made up if --listen "
-                  "lets other machines in")
+                  "access token for viewing and for controlling the HIP; generated if --listen "
+                  "allows other computers")
       ->envname("PALPATE_TOKEN");
   command
-      .add_option("--operator-token", operator_token_,
-                  "what the operator's page must know, which alone changes method, placement and "
-                  "limits, and records; made up and printed if it is not given. Other accounts of "
-                  "this machine see a command line, not the environment")
+      .add_option(
+          "--operator-token", operator_token_,
+          "access token of the operator: only a page with this token can change method, placement "
+          "and limits, and record. If omitted, it is generated and printed. Other users of this "
+          "computer can read the command line; use the environment variable instead")
       ->envname("PALPATE_OPERATOR_TOKEN");
   command
       .add_option("--operator-limit", operator_limits_,
-                  "the loosest value to which the operator's page may set a safety limit, "
+                  "least strict value that the operator may set for a safety limit on the page, "
                   "NAME=VALUE in SI units (the end of its range)")
       ->allow_extra_args(false);
-  command.add_flag("--no-browser", no_browser_, "only say where the page is");
-  command.add_option("--record", record_,
-                     "write the session into this folder, a ROS 2 bag; palpate replay checks it");
+  command.add_flag("--no-browser", no_browser_,
+                   "print the address of the page, but do not open a browser");
+  command.add_option(
+      "--record", record_,
+      "record the session into this folder as a ROS 2 bag; check it with palpate replay");
   command.add_option("--record-folder", record_folder_,
-                     "where the recordings go that the page starts (the current folder)");
+                     "folder for recordings started on the page (the current folder)");
   command.add_option("--record-limit", record_limit_,
-                     "GB of all recordings that the page starts; the last is ended there, or when "
-                     "less than 1 GB is free (20)");
+                     "total size [GB] of the recordings started on the page; recording ends there, "
+                     "or when less than 1 GB is free (20)");
   method_.add_to(command);
   command.get_option("--config")->description("read the session from a TOML file");
 }

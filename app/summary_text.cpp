@@ -66,20 +66,20 @@ nlohmann::ordered_json object_of(const Summary& summary) {
 std::string hand_line(const Summary& summary) {
   const auto ticks = static_cast<double>(std::max<std::size_t>(summary.ticks, 1));
   std::string text = fmt::format(
-      "{} ticks over {:.3f} s, {} frames, in contact {:.1f} % of the time, largest force asked "
-      "{:.3f} N, sent {:.3f} N, {:.2f} steps a tick, suspected pop-throughs {}",
+      "{} ticks over {:.3f} s, {} frames, in contact {:.1f} % of the time, largest force requested "
+      "{:.3f} N, sent {:.3f} N, {:.2f} steps per tick, suspected pop-throughs {}",
       summary.ticks, summary.duration(), summary.frames,
       100.0 * static_cast<double>(summary.contact_ticks) / ticks, summary.largest_asked,
       summary.largest_sent, static_cast<double>(summary.steps) / ticks, summary.pop_throughs);
   if (summary.late_ticks > 0) text += fmt::format(", late ticks {}", summary.late_ticks);
   if (const auto hits = ticks_with(summary, step_budget_hit); hits > 0)
-    text += fmt::format(", step budget spent in {} ticks", hits);
+    text += fmt::format(", step limit reached in {} ticks", hits);
   if (const auto thinned = ticks_with(summary, patch_thinned); thinned > 0)
     text += fmt::format(", points thinned in {} ticks", thinned);
   if (const ServoEnergy& energy = summary.energy; energy.contacts > 0)
     text += fmt::format(
-        "; contacts {}, energy made beside the surface's motion {:.2f} mJ, {:.2f} mJ in the worst, "
-        "more than {:.1f} mJ in {}",
+        "; {} contacts, energy generated relative to the moving surface {:.2f} mJ, {:.2f} mJ in "
+        "the worst contact, more than {:.1f} mJ in {} contacts",
         energy.contacts, 1e3 * energy.relative.made, 1e3 * summary.worst_relative,
         1e3 * PortEnergy::least_made, energy.relative.generating);
   return text;

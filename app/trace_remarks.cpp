@@ -114,8 +114,8 @@ void TraceRemarks::look_at_start(const Tick& tick,
   if (const auto behind = least_behind(cameras, tick.hip, r_c_)) {
     if (*behind > 0.0) {
       start_ = fmt::format(
-          "{} inside, {} behind the surface that the camera sees; begin in the air before it",
-          where, length_text(*behind));
+          "{} inside, {} behind the visible surface; begin in free space in front of it", where,
+          length_text(*behind));
       return;
     }
     before = -*behind;
@@ -128,9 +128,9 @@ void TraceRemarks::look_at_start(const Tick& tick,
     }
   }
   if (before && *before < r_c_)
-    start_ = fmt::format(
-        "{} in contact, {} from the surface, which a sphere of r_c = {} touches; begin farther off",
-        where, length_text(*before), length_text(r_c_));
+    start_ =
+        fmt::format("{} in contact, {} from the surface, less than r_c = {}; begin farther away",
+                    where, length_text(*before), length_text(r_c_));
 }
 
 void TraceRemarks::measure(const Tick& tick,
@@ -159,16 +159,16 @@ void TraceRemarks::measure(const Tick& tick,
 
 std::string TraceRemarks::nothing_met() const {
   if (nearest_ == std::numeric_limits<double>::infinity())
-    return "nothing was touched: the frames hold no point";
+    return "nothing was touched: the frames have no points";
   std::string text = fmt::format(
-      "nothing was touched: the path came no nearer than {} to a point, at t = {:.3f} s; "
-      "the points then reached from {}, the path reaches from {}",
+      "nothing was touched: the path came no nearer than {} to a point, at t = {:.3f} s; the "
+      "points then extended from {}, the path extends from {}",
       length_text(nearest_), nearest_t_, box_text(nearest_extent_), box_text(path_));
   if (fits_scaled(path_, 1.0, nearest_extent_)) return text;
   if (fits_scaled(path_, 1e-3, nearest_extent_))
-    return text + "; is the path in millimetres? metres are wanted";
+    return text + "; is the path in millimetres? use metres";
   if (fits_scaled(path_, 1e3, nearest_extent_))
-    return text + "; is the cloud in millimetres? give ?scale=1mm, or units= of depth images";
+    return text + "; is the cloud in millimetres? set ?scale=1mm, or units= for depth images";
   return text + "; are both in metres and in the world frame?";
 }
 
@@ -190,20 +190,19 @@ void TraceRemarks::count_points(const Tick& tick,
 // The one reason why a touch gave no force, or too little.
 std::string TraceRemarks::hardly_felt(std::span<const ShownFrames> shown) const {
   const std::string begin =
-      fmt::format("it was touched and hardly felt, with {:.2f} N at most: ", largest_);
+      fmt::format("the surface was touched with hardly any force, {:.2f} N at most: ", largest_);
   // A single frame is a picture, however old.
   std::size_t frames = 0;
   for (const ShownFrames& each : shown) frames += each.count;
   if (frames > 1 && 2 * stale_ > contact_)
-    return begin + "the frames had stopped, and a camera's last frame gives no force for long";
+    return begin + "the frames had stopped, and the force ends soon after a camera's last frame";
   if (is_press_ && points_about_ < enough_about)
-    return begin +
-           fmt::format(
-               "its points are too sparse for a proxy with r_c = {}, of which {} lay within "
-               "twice that; give a smaller ?scale, or a larger proxy",
-               length_text(r_c_), points_about_);
+    return begin + fmt::format(
+                       "its points are too sparse for a proxy with r_c = {}: only {} were within "
+                       "twice that radius; use a smaller ?scale, or a larger proxy",
+                       length_text(r_c_), points_about_);
   return begin +
-         "an edge, or something narrower than the proxy, which slid off it; press farther inside";
+         "the proxy slid off an edge or an object narrower than the proxy; press farther inside";
 }
 
 std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
@@ -214,15 +213,16 @@ std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
     double first = std::numeric_limits<double>::infinity();
     for (const ShownFrames& frames : shown) first = std::min(first, frames.first);
     if (first > last_t_) {
-      lines.push_back(fmt::format(
-          "nothing was touched: the first frame comes at t = {:.3f} s, the path ended at {:.3f} s; "
-          "give the path the frames' times",
-          first, last_t_));
+      lines.push_back(
+          fmt::format("nothing was touched: the first frame is at t = {:.3f} s, the path ended at "
+                      "{:.3f} s; use the times of the frames in the path",
+                      first, last_t_));
       return lines;
     }
-    lines.push_back(fmt::format(
-        "there was no frame before t = {:.3f} s: the path began {:.3f} s before it, in nothing",
-        first, first - first_t_));
+    lines.push_back(
+        fmt::format("there was no frame before t = {:.3f} s: the path began {:.3f} s earlier, "
+                    "without a surface",
+                    first, first - first_t_));
   }
   if (!is_press_ && !start_.empty()) lines.push_back(start_);
   for (std::size_t i = 0; i < shown.size(); ++i) {
@@ -231,10 +231,10 @@ std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
     const double interval = (frames.last - frames.first) / static_cast<double>(frames.count - 1);
     const double left = last_t_ - frames.last;
     if (left > std::max(2.0 * interval, grace))
-      lines.push_back(fmt::format(
-          "{}: its frames ended at t = {:.3f} s, {:.3f} s before the hand's way, which touched the "
-          "last one from there on, as a still picture",
-          uris[i], frames.last, left));
+      lines.push_back(
+          fmt::format("{}: its frames ended at t = {:.3f} s, {:.3f} s before the path; the rest of "
+                      "the path used the last frame as a static image",
+                      uris[i], frames.last, left));
   }
   if (!touched_)
     lines.push_back(nothing_met());

@@ -83,7 +83,7 @@ std::vector<Target> targets_at_pixels(const CalibrateOptions& options,
   CameraConfig camera = config.cameras.front();
   if (options.camera && *options.camera != camera.uri) camera = {.uri = *options.camera};
   const std::shared_ptr<const DepthImage> image =
-      first_image(camera.uri, "name a depth camera with --camera, or give points with --points");
+      first_image(camera.uri, "name a depth camera with --camera, or points with --points");
   const Eigen::Isometry3d moved =
       camera.world_from_camera ? *camera.world_from_camera * image->world_from_camera().inverse()
                                : Eigen::Isometry3d::Identity();
@@ -117,11 +117,11 @@ std::vector<PointPair> touched_pairs(const CalibrateOptions& options, const Sess
   };
   fmt::print(stderr,
              "palpate: the device gets no force; at each point press a button of the device, or "
-             "rest there for half a second\n");
+             "hold still for half a second\n");
   ask();
   const std::vector<Vec3> touched =
       capture_points(*device, targets.size(), options.timeout, [&](const Vec3& point) {
-        fmt::print(stderr, "palpate: taken at {} of the device\n", text_of_point(point));
+        fmt::print(stderr, "palpate: captured at {} in the device frame\n", text_of_point(point));
         ++next;
         ask();
       });
@@ -133,10 +133,10 @@ std::vector<PointPair> touched_pairs(const CalibrateOptions& options, const Sess
 void check_residuals(const PlacementFit& fit, double most) {
   const auto worst = std::max_element(fit.residuals.begin(), fit.residuals.end());
   if (*worst <= most) return;
-  throw Error(fmt::format("point {}", worst - fit.residuals.begin() + 1),
-              fmt::format("it is off by {:.1f} mm, more than {:.1f} mm", 1e3 * *worst, 1e3 * most),
-              "touch the points again, in the order in which they are asked for, or raise "
-              "--max-residual");
+  throw Error(
+      fmt::format("point {}", worst - fit.residuals.begin() + 1),
+      fmt::format("its residual is {:.1f} mm, more than {:.1f} mm", 1e3 * *worst, 1e3 * most),
+      "touch the points again, in the requested order, or raise --max-residual");
 }
 
 // Where two cameras stand to one another; prints what a session's file says of them.
@@ -163,9 +163,9 @@ int calibrate_cameras(const CalibrateOptions& options) {
   } else if (Uri(cameras[1].uri).has("pose")) {
     start = world_from_first.inverse() * second->world_from_camera();
   } else {
-    throw Error("--start", "where the second camera stands to the first is not known roughly",
-                "give x,y,z,qx,qy,qz,qw of it in the first's optical frame (x right, y down, z "
-                "forward), right to 10 cm and 10 degrees");
+    throw Error("--start", "the initial estimate of the second camera's pose is missing",
+                "set x,y,z,qx,qy,qz,qw of the second camera in the first's optical frame (x right, "
+                "y down, z forward), accurate to 10 cm and 10 degrees");
   }
   const CameraFit fit = register_cameras(*first, *second, start);
   const Eigen::Isometry3d world_from_second = world_from_first * fit.first_from_second;
@@ -185,9 +185,9 @@ int calibrate_cameras(const CalibrateOptions& options) {
   const double turned =
       Eigen::AngleAxisd(start.linear().transpose() * fit.first_from_second.linear()).angle();
   fmt::print(stderr,
-             "palpate: {:.0f} % of the second image fits what the first camera sees, to {:.1f} mm; "
-             "{:.1f} degrees from the start; noise leaves {:.2f} mm and {:.3f} degrees open "
-             "(standard deviation; a wrong lens or unit of depth comes on top)\n",
+             "palpate: overlap {:.0f} %, residual {:.1f} mm; {:.1f} degrees from the initial "
+             "estimate; uncertainty due to noise {:.2f} mm and {:.3f} degrees (standard deviation; "
+             "without errors of the intrinsics or the depth unit)\n",
              100.0 * fit.overlap, 1e3 * fit.rms, degrees * turned, 1e3 * fit.shift_deviation(),
              degrees * fit.turn_deviation());
   fmt::print(
@@ -208,7 +208,7 @@ int calibrate(const CalibrateOptions& options) {
     throw Error("calibrate", "it needs one of --at, --points, --pairs and --cameras",
                 "give --at U,V three times or more, with --camera and --device");
   if (options.fit_scale && options.scale)
-    throw Error("--scale", "the scale cannot be both given and fitted", "leave one out");
+    throw Error("--scale", "the scale is both given and fitted", "remove one of the two options");
   SessionConfig config;
   std::error_code unused;
   const bool exists = options.out && std::filesystem::exists(*options.out, unused);
@@ -231,7 +231,7 @@ int calibrate(const CalibrateOptions& options) {
     fmt::print("{}\n", json.dump(2));
   } else {
     for (std::size_t i = 0; i < pairs.size(); ++i) {
-      fmt::print("point {}  device {}  scene {}  off by {:.2f} mm\n", i + 1,
+      fmt::print("point {}  device {}  scene {}  residual {:.2f} mm\n", i + 1,
                  text_of_point(pairs[i].device), text_of_point(pairs[i].world),
                  1e3 * fit.residuals[i]);
     }
@@ -253,17 +253,18 @@ int calibrate(const CalibrateOptions& options) {
 }  // namespace
 
 Verb add_calibrate(CLI::App& program) {
-  CLI::App* command = program.add_subcommand(
-      "calibrate", "find where a device lies in the scene, from points that it touches");
+  CLI::App* command = program.add_subcommand("calibrate",
+                                             "estimate the pose of a device in the scene from "
+                                             "points that it touches, or of a second camera");
   const auto options = std::make_shared<CalibrateOptions>();
-  CLI::Option* const cameras = command->add_option(
-      "--cameras", options->cameras,
-      "instead of a device's pose: find where the second of two cameras stands, from what both "
-      "see of a scene at rest");
+  CLI::Option* const cameras =
+      command->add_option("--cameras", options->cameras,
+                          "instead of a device pose: estimate the pose of the second camera from "
+                          "the common view of a static scene");
   cameras->expected(0, 2);
   command->add_option("--start", options->start,
-                      "of --cameras: rough pose of the second camera in the first's optical frame, "
-                      "x,y,z,qx,qy,qz,qw [m] (or as --config has it)");
+                      "for --cameras: initial estimate of the second camera's pose in the first's "
+                      "optical frame, x,y,z,qx,qy,qz,qw [m] (default: from --config)");
   command->add_option("--device", options->device,
                       "the device that touches the points; it gets no force");
   command->add_option("--camera", options->camera, "the camera that sees them");
@@ -278,11 +279,11 @@ Verb add_calibrate(CLI::App& program) {
   command->add_option("--config", options->config,
                       "take camera, device and scale from a session's TOML file");
   command->add_option("--out", options->out,
-                      "write the pose into this TOML file and keep what else is in it");
+                      "write the pose into this TOML file and keep the rest of the file");
   command->add_option("--scale", options->scale, "scene metres per device metre (1)");
-  command->add_flag("--fit-scale", options->fit_scale, "find the scale from the points as well");
+  command->add_flag("--fit-scale", options->fit_scale, "also estimate the scale from the points");
   command->add_option("--max-residual", options->max_residual,
-                      "write nothing if a point is off by more [m] (0.01)");
+                      "write nothing if a residual is larger [m] (0.01)");
   command->add_option("--timeout", options->timeout, "seconds for all points (300)");
   command->add_flag("--json", options->json, "print the result as a JSON object");
   return {command, [options, cameras] {

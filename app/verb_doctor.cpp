@@ -59,9 +59,9 @@ Json look_at_time(const DoctorOptions& options, std::vector<std::string>& advice
   const bool fit = seconds(0.999) <= most_late && late_share <= most_late_ticks;
   if (!fit)
     advice.push_back(
-        fmt::format("ticks come late ({:.0f} us at 99.9 %, {} of {} not in time): end other "
-                    "programs, take what "
-                    "is refused above, or a kernel with PREEMPT_RT",
+        fmt::format("servo ticks are late (wake-up latency {:.0f} us at 99.9 %, {} of {} deadlines "
+                    "missed): close other programs, grant the real-time permissions listed here, "
+                    "or install a PREEMPT_RT kernel",
                     1e6 * seconds(0.999), late, wake_up.count()));
   advice.insert(advice.begin(), granted.advice.begin(), granted.advice.end());
   return {{"fit", fit},
@@ -81,15 +81,15 @@ Json look_at_time(const DoctorOptions& options, std::vector<std::string>& advice
 Json look_at_processor(const Machine& machine, std::vector<std::string>& advice) {
   for (const std::string& governor : machine.governors) {
     if (governor == "performance") continue;
-    advice.push_back("the cores' clocks follow the governor '" + governor +
-                     "': choose 'performance', with cpupower frequency-set -g performance");
+    advice.push_back("the CPU frequency governor is '" + governor +
+                     "': set it to 'performance' with cpupower frequency-set -g performance");
   }
   if (std::thread::hardware_concurrency() < 2)
-    advice.emplace_back("there is one core: cameras and page will delay the servo loop");
+    advice.emplace_back("there is only one core: cameras and page will delay the servo loop");
   if (machine.is_virtual)
     advice.emplace_back(
-        "this is a virtual machine, whose host may hold up any tick: use a machine of its own for "
-        "hands");
+        "this is a virtual machine; its host can delay any servo tick: use a physical computer "
+        "when a person holds the device");
   return {{"processor", machine.processor},
           {"cores", std::thread::hardware_concurrency()},
           {"vector_set", vector_set_in_use()},
@@ -115,10 +115,11 @@ Json look_at_devices(const Machine& machine, const Registry<Driver>& drivers,
                      {"kind", device.kind},
                      {"driver", known ? driver->name + ":" : ""}});
     if (!known)
-      advice.push_back(device.name + ": this version has no driver for it" +
-                       (device.kind == "camera" ? "; record a ROS 2 bag of depth and touch it with "
-                                                  "--camera recording:BAG"
-                                                : ""));
+      advice.push_back(
+          device.name + ": this version has no driver for it" +
+          (device.kind == "camera"
+               ? "; record its depth in a ROS 2 bag and open it with --camera recording:BAG"
+               : ""));
   }
   return found;
 }
@@ -126,7 +127,7 @@ Json look_at_devices(const Machine& machine, const Registry<Driver>& drivers,
 // Empty where nobody says.
 std::string sensor_text(SensorKind sensor) {
   if (sensor == SensorKind::unknown) return {};
-  return fmt::format("{} (noise taken for {})", name_of(sensor), noise_text(sensor));
+  return fmt::format("{} (assumed noise: {})", name_of(sensor), noise_text(sensor));
 }
 
 // What each driver finds: library or service, and what is plugged in.
@@ -194,7 +195,7 @@ std::string drivers_text(const Json& drivers) {
   std::string text = "\nDrivers\n";
   for (const Json& driver : drivers) {
     const auto word = [&](const char* key) { return driver[key].get<std::string>(); };
-    text += fmt::format("  {} {}; tried on {}\n", word("name"), word("summary"), word("tried"));
+    text += fmt::format("  {} {}; tested with {}\n", word("name"), word("summary"), word("tried"));
     if (!word("library").empty())
       text += fmt::format("    found {}{}\n", word("library"),
                           word("version").empty() ? "" : ", version " + word("version"));
@@ -219,10 +220,9 @@ std::string doctor_text(const Json& report) {
   const Json& time = report["realtime"];
   const auto microseconds = [&](const char* key) { return 1e6 * time[key].get<double>(); };
   std::string text = fmt::format(
-      "{} for haptics at {} Hz\n\nA loop that does nothing, {} ticks\n"
-      "  woke up late by {:.0f} us at 50 %, {:.0f} at 99 %, {:.0f} at 99.9 %, {:.0f} at most; "
-      "{} ticks late\n"
-      "  real-time {}, memory {}, core {}, cores {}\n",
+      "{} for haptics at {} Hz\n\nEmpty servo loop, {} ticks\n  wake-up latency: {:.0f} us median, "
+      "{:.0f} at 99 %, {:.0f} at 99.9 %, {:.0f} maximum; {} deadlines missed\n  real-time "
+      "scheduling: {}; memory: {}; core: {}; cores: {}\n",
       report["fit"].get<bool>() ? "Fit" : "Not fit", time["rate_hz"].get<double>(),
       time["ticks"].get<std::uint64_t>(), microseconds("wake_up_p50_s"),
       microseconds("wake_up_p99_s"), microseconds("wake_up_p999_s"), microseconds("wake_up_max_s"),
@@ -239,10 +239,10 @@ std::string doctor_text(const Json& report) {
                         device["driver"].get<std::string>().empty()
                             ? "no driver"
                             : "driver " + device["driver"].get<std::string>());
-  if (report["devices"].empty()) text += "  none was found\n";
+  if (report["devices"].empty()) text += "  none found\n";
   text += drivers_text(report["drivers"]);
   text += "\nVersions\n" + listed(report["versions"]);
-  if (!report["advice"].empty()) text += "\nWhat can be done\n";
+  if (!report["advice"].empty()) text += "\nRecommended actions\n";
   for (const Json& line : report["advice"])
     text += fmt::format("  - {}\n", line.get<std::string>());
   return text;
@@ -256,7 +256,7 @@ int run(const DoctorOptions& options) {
   }
   if (options.device.agreed || options.device.without_watchdog)
     throw Error("doctor", "--yes and --without-watchdog are for a device",
-                "add --device URI, or leave them out");
+                "add --device URI, or remove these options");
   if (!(options.seconds >= 0.1 && options.seconds <= 3600.0))
     throw Error("--seconds", fmt::format("{} s is too short or too long", options.seconds),
                 "give 0.1 to 3600");
@@ -287,19 +287,20 @@ int run(const DoctorOptions& options) {
 
 Verb add_doctor(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "doctor", "is this machine fit for haptics, what is plugged in, and what to do");
+      "doctor",
+      "check this computer for haptics, list connected cameras and devices, and recommend actions");
   const auto options = std::make_shared<DoctorOptions>();
-  command->add_option("--seconds", options->seconds, "how long to measure (3)");
-  command->add_option("--rate", options->rate, "ticks a second (1000)");
+  command->add_option("--seconds", options->seconds, "duration of the measurement [s] (3)");
+  command->add_option("--rate", options->rate, "ticks per second (1000)");
   command->add_flag("--json", options->json, "print a JSON object");
   command->add_option("--device", options->device.uri,
-                      "measure this haptic device instead, by moving its handle with less than "
-                      "0.5 N: mass, damping, friction, delay, and what stiffness they bear");
+                      "measure this haptic device instead, by moving its handle with less than 0.5 "
+                      "N: mass, damping, friction, delay, and the largest stable stiffness");
   command->add_flag("--yes", options->device.agreed,
-                    "agree to that: the handle is free to move and nobody holds it");
+                    "confirm the measurement: the handle is free to move and nobody holds it");
   command->add_flag("--without-watchdog", options->device.without_watchdog,
-                    "also where nothing takes the force away when the program is killed: an "
-                    "emergency stop is at hand");
+                    "measure a device without a watchdog. Danger: if this program is killed, the "
+                    "last force stays on; keep an emergency stop within reach");
   return {command, [options] { return run(*options); }};
 }
 

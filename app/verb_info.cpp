@@ -138,14 +138,15 @@ Json describe_pixel(const Cloud& cloud, const std::string& text, const std::stri
   if (const auto* points = dynamic_cast<const PointCloud*>(&cloud);
       points != nullptr && points->surface() != nullptr && points->surface()->columns > 0)
     return describe(probe_pixel(*points, u, v), u, v);
-  throw Error(uri, "its points are no image, so there is no pixel " + text,
-              "leave out --at, or give a source of depth images");
+  throw Error(uri, "its points are not an image, so there is no pixel " + text,
+              "remove --at, or use a source of depth images");
 }
 
 int info(InfoOptions options) {
   if (options.uri.empty())
-    throw Error("info", "it is not said of what",
-                "name a source, such as `palpate info synthetic:desk`; docs/sources.md has all");
+    throw Error(
+        "info", "no source is given",
+        "name one, such as `palpate info synthetic:desk`; docs/sources.md lists all sources");
   options.uri = source_uri(options.uri, all_sources());
   const std::unique_ptr<Source> source = open_source(options.uri, all_sources());
   const SourceInfo& about = source->info();
@@ -165,14 +166,14 @@ int info(InfoOptions options) {
   if (!frame && about.live)
     throw Error(options.uri, fmt::format("it has delivered no frame in {} s", first_frame_timeout),
                 "check the camera, its cable and its permissions");
-  if (!frame) throw Error(options.uri, "it has no frames", "give a source with at least one");
+  if (!frame) throw Error(options.uri, "it has no frames", "use a source with at least one frame");
   if (!about.notes.empty()) json["notes"] = about.notes;  // a live camera's come with its frame
   Json first = {{"stamp_s", frame->stamp}};
   if (!about.details.empty()) first["details"] = about.details;
   if (const auto* image = dynamic_cast<const DepthImage*>(frame->cloud.get())) {
     first.update(describe(*image));
     if (about.frames != 1 && image->world_from_camera().matrix().isIdentity(0.0))
-      json["poses"] = "none: the world is the camera's own frame, so a hand goes with the camera";
+      json["poses"] = "none: the world frame is the camera frame, so the HIP moves with the camera";
   } else if (const auto* cloud = dynamic_cast<const PointCloud*>(frame->cloud.get())) {
     first.update(describe(*cloud));
   }

@@ -11,9 +11,9 @@
 namespace palpate::app {
 
 Verb add_methods(CLI::App& program) {
-  CLI::App* command = program.add_subcommand("methods", "list what --method can be");
+  CLI::App* command = program.add_subcommand("methods", "list the methods for --method");
   const auto names = std::make_shared<bool>(false);
-  command->add_flag("--names", *names, "the names alone, in one line");
+  command->add_flag("--names", *names, "only the names, in one line");
   return {command, [names] {
             const MethodRegistry methods = program_methods();
             for (const MethodInfo& method : methods.entries()) {

@@ -25,7 +25,7 @@ int print_parameters() {
     fmt::print("{:<18} {:<4} {:<11} {:>12.6g} {:>9g} {:>9g}  {}\n", row.name, "", row.unit,
                row.default_value, row.min, row.max, row.meaning);
   }
-  fmt::print("\nmaterials (--material), with what differs from a surface that has no feel:\n");
+  fmt::print("\nmaterials (--material), with the values that differ from the default surface:\n");
   for (const NamedMaterial& named : standard_materials().materials) {
     std::string numbers;
     for (const MaterialInfo& row : material_table()) {
@@ -43,7 +43,8 @@ int print_parameters() {
 
 Verb add_parameters(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "parameters", "list what --set, --limit and --material can set: default, range and meaning");
+      "parameters",
+      "list the values for --set, --limit and --material: default, range and meaning");
   return {command, print_parameters};
 }
 

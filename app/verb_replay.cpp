@@ -39,7 +39,7 @@ std::string replay_text(const ReplayReport& report) {
                   report.frames, replay_text(report.asked, report.ticks),
                   report.sent_unchecked.empty() ? replay_text(report.sent, report.ticks)
                                                 : "not checked: " + report.sent_unchecked);
-  if (!report.broken_off.empty()) text += "the replay broke off: " + report.broken_off + "\n";
+  if (!report.broken_off.empty()) text += "the replay stopped: " + report.broken_off + "\n";
   return text + app::text_of(report.check) + "\n";
 }
 
@@ -110,9 +110,9 @@ int run(const ReplayOptions& options) {
 
 Verb add_replay(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "replay", "runs a recorded session's method again and says whether every force is the same");
+      "replay", "run a recorded session again and check that every force is the same");
   const auto options = std::make_shared<ReplayOptions>();
-  command->add_option("recording", options->path, "folder that run --record made")->required();
+  command->add_option("recording", options->path, "folder of the recording")->required();
   command->add_flag("--json", options->json, "print a JSON object");
   return {command, [options] { return run(*options); }};
 }

@@ -57,19 +57,19 @@ int run_node(const RosOptions& options) {
 }  // namespace
 
 Verb add_ros(CLI::App& program) {
-  CLI::App* command = program.add_subcommand("ros", "touch a scene as a node of ROS 2");
+  CLI::App* command = program.add_subcommand("ros", "run a session as a ROS 2 node");
   const auto options = std::make_shared<RosOptions>();
   options->run.headless = options->run.in_real_time = true;
   options->run.session.add_to(*command);
   command->add_option("--name", options->node.name,
-                      "of the node (palpate), with its namespace: cell_3/palpate");
-  command->add_option("--frame", options->node.frame, "frame_id of what it publishes (world)");
+                      "name of the node (palpate), with its namespace: cell_3/palpate");
+  command->add_option("--frame", options->node.frame, "frame_id of the published messages (world)");
   command->add_option("--publish-rate", options->node.rate,
-                      "[Hz] of poses, force, contact and flags (100), 1 to 1000");
+                      "rate [Hz] of poses, force, contact and flags (100), 1 to 1000");
   command->add_option("--duration", options->run.duration, "seconds of the session (until Ctrl-C)");
   command->add_flag("--json", options->run.json, "print the summary as a JSON object");
   command->add_flag("--print-config", options->run.print_config,
-                    "print the session that these options describe as a TOML file, and end");
+                    "print the session of these options as a TOML file, and exit");
   return {command, [options] { return run_node(*options); }};
 }
 

@@ -124,11 +124,12 @@ int run_headless(const RunOptions& options, const SessionConfig& config, Guarded
 void print_reach(const ServerConfig& config, const ViewerServer& server) {
   const std::vector<std::string> addresses = reachable_addresses(config.listen);
   if (addresses.empty()) {
-    fmt::print(stderr, "palpate: no other machine can reach this one: it has no network address\n");
+    fmt::print(stderr,
+               "palpate: no other computer can reach this one: it has no network address\n");
     return;
   }
   for (const std::string& address : addresses)
-    fmt::print(stderr, "palpate: from another machine or a phone, open {}\n", server.url(address));
+    fmt::print(stderr, "palpate: from another computer or a phone, open {}\n", server.url(address));
   if (isatty(STDERR_FILENO) == 1)
     std::fputs(qr_code(server.url(addresses.front())).c_str(), stderr);
 }
@@ -137,13 +138,13 @@ void print_links(const ServerConfig& config, const ViewerServer& server) {
   fmt::print(stderr, "palpate: open {} in a browser; Ctrl-C ends the session\n",
              server.operator_url());
   fmt::print(stderr,
-             "palpate: that is the operator's link; to look on or to hold the hand, open {}\n",
+             "palpate: that is the operator's link; for viewing or controlling the HIP, open {}\n",
              server.url());
   if (!is_loopback(config.listen)) {
     print_reach(config, server);
     fmt::print(stderr,
-               "palpate: tokens and pictures travel in clear; palpate run --help says at "
-               "--listen how to tunnel\n");
+               "palpate: tokens and images are sent unencrypted; see --listen in palpate run "
+               "--help for a tunnel\n");
   }
   if (config.browser && isatty(STDERR_FILENO) == 1) show_in_browser(server.opening_url());
 }
@@ -272,16 +273,17 @@ int run_session(const RunOptions& options, const SessionConfig& config) {
 }
 
 Verb add_run(CLI::App& program) {
-  CLI::App* command = program.add_subcommand("run", "touch a scene");
+  CLI::App* command = program.add_subcommand(
+      "run", "run a session with the page: touch cameras, recordings or simulated scenes");
   const auto options = std::make_shared<RunOptions>();
   options->session.add_to(*command);
   command->add_option("--duration", options->duration,
                       "seconds of the session (until Ctrl-C; headless 10)");
   command->add_flag("--headless", options->headless,
-                    "no page; recordings and simulations run as fast as the machine can");
+                    "no page; recordings and simulations run as fast as the computer can");
   command->add_flag("--json", options->json, "print the summary as a JSON object");
   command->add_flag("--print-config", options->print_config,
-                    "print the session that these options describe as a TOML file, and end");
+                    "print the session of these options as a TOML file, and exit");
   return {command, [options] { return run(*options); }};
 }
 

@@ -51,11 +51,10 @@ int serve(const ServeOptions& options) {
     else
       publisher.publish(*image, since_1970(fed.frame.stamp));
   });
-  fmt::print(
-      stderr,
-      "palpate: serves {} as ros2:{} in domain {}, and for links that lose packets as ros2:{}; "
-      "Ctrl-C ends it\n",
-      options.camera, publisher.topic(), publisher.domain(), publisher.slices_topic());
+  fmt::print(stderr,
+             "palpate: publishes {} as ros2:{} in domain {}, and for lossy networks as ros2:{}; "
+             "Ctrl-C ends it\n",
+             options.camera, publisher.topic(), publisher.domain(), publisher.slices_topic());
   const double end = monotonic_now() + options.duration;
   while (interruption.signal() == 0 && is_depth &&
          (options.duration == 0.0 || monotonic_now() < end))
@@ -63,8 +62,8 @@ int serve(const ServeOptions& options) {
   feed.stop();
   const CameraStatus status = feed.status();
   if (!is_depth)
-    throw Error(options.camera, "gives points, not depth images", "serve a depth camera");
-  fmt::print("{} frames served at {:.1f} Hz\n", status.frames, status.rate);
+    throw Error(options.camera, "it gives points, not depth images", "use a depth camera");
+  fmt::print("{} frames published at {:.1f} Hz\n", status.frames, status.rate);
   return interruption.signal() == 0 ? 0 : exit_status_of(interruption.signal());
 }
 
@@ -72,13 +71,13 @@ int serve(const ServeOptions& options) {
 
 Verb add_serve_camera(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "serve-camera", "publish a camera's depth on the network of ROS 2, to the bit");
+      "serve-camera", "publish a camera's depth images on the ROS 2 network, lossless");
   const auto options = std::make_shared<ServeOptions>();
-  command->add_option("--camera", options->camera, "what to serve, e.g. realsense:");
-  command->add_option("--name", options->name, "of its topics (camera): /NAME/depth/...");
+  command->add_option("--camera", options->camera, "camera to publish, e.g. realsense:");
+  command->add_option("--name", options->name, "name in its topics (camera): /NAME/depth/...");
   command
       ->add_option("--packing", options->packing,
-                   "rvl: fast (usual); png: larger delay, for readers that know no RVL")
+                   "rvl: fast (default); png: more delay, for subscribers without RVL")
       ->transform(CLI::CheckedTransformer(std::map<std::string, DepthPacking>{
           {"rvl", DepthPacking::rvl}, {"png", DepthPacking::png}}));
   command->add_option("--duration", options->duration, "[s] after which it ends (0: never)");

@@ -72,7 +72,7 @@ int operate(const OperatorOptions& options) {
         session,
         OperatorEndOptions{
             .name = options.name, .index = !options.no_index && is_device, .learn = options.learn});
-    fmt::print(stderr, "palpate: leads /{} in domain {}; Ctrl-C ends it\n", options.name,
+    fmt::print(stderr, "palpate: teleoperates /{} in domain {}; Ctrl-C ends it\n", options.name,
                end->domain());
     return {nullptr, [&end](std::nullptr_t) { end.reset(); }};
   };
@@ -88,9 +88,9 @@ int operate(const OperatorOptions& options) {
       picture.tool = view.state->position;
       picture.links = view.state->links;
       picture.force = view.state->force;
-      picture.trouble = view.heard ? view.state->fault : "the robot is not heard any more";
+      picture.trouble = view.heard ? view.state->fault : "no messages from the robot any more";
     } else {
-      picture.trouble = "nothing is heard of the robot yet";
+      picture.trouble = "no messages from the robot yet";
     }
     say_trouble(said, picture.trouble);
     return picture;
@@ -106,15 +106,15 @@ int guard(const RobotOptions& options) {
     return 0;
   }
   if (!config.device.empty())
-    throw Error("--device", "the hand is at the operator's end",
-                "leave it out, and start palpate teleop operator --device there");
+    throw Error("--device", "the haptic device is at the operator's end",
+                "remove this option, and start palpate teleop operator --device there");
   run.usual_port = robot_port;
   if (options.is_beside) run.whose_page = "the robot's end has a page, too:";
   const Cell cell = open_cell(options.robot);
   const bool own_camera = cell.camera && !run.session.names_cameras();
   if (!own_camera && !run.session.names_cameras())
-    throw Error("--camera", options.robot + " has none of its own",
-                "give the robot's, such as --camera realsense:");
+    throw Error("--camera", options.robot + " has no camera",
+                "set the robot's camera, such as --camera realsense:");
   RobotEndOptions wishes = options.end;
   if (!config.fixtures.empty())
     wishes.fixtures = std::make_shared<const FixtureSet>(read_fixtures(config.fixtures));
@@ -136,7 +136,7 @@ int guard(const RobotOptions& options) {
   };
   run.beside.attach = [&](Session& session) -> std::shared_ptr<void> {
     end.attach(session);
-    fmt::print(stderr, "palpate: {} ({}) is led by /{} in domain {}; Ctrl-C ends it\n",
+    fmt::print(stderr, "palpate: {} ({}) is teleoperated by /{} in domain {}; Ctrl-C ends it\n",
                end.info().uri, end.info().kind, options.end.name, end.domain());
     return {nullptr, [&end](std::nullptr_t) { end.detach(); }};
   };
@@ -204,28 +204,32 @@ void add_running(CLI::App& command, RunOptions& run) {
   command.add_flag("--headless", run.headless, "no page");
   command.add_flag("--json", run.json, "print the summary as a JSON object");
   command.add_flag("--print-config", run.print_config,
-                   "print the session that these options describe as a TOML file, and end");
+                   "print the session of these options as a TOML file, and exit");
 }
 
 void add_learn(CLI::App& command, OperatorOptions& options) {
-  command.add_flag("--learn", options.learn,
-                   "what the robot's tool touches is felt as soft and rough as it was found");
+  command.add_flag(
+      "--learn", options.learn,
+      "render surfaces that the robot touched with the stiffness and friction measured there");
 }
 
 }  // namespace
 
 Verb add_teleop(CLI::App& program) {
   CLI::App* command =
-      program.add_subcommand("teleop", "lead a robot by hand, and feel what its camera sees");
+      program.add_subcommand("teleop", "teleoperate a robot, and feel what its camera sees");
   command->require_subcommand(0, 1);
   const auto operating = std::make_shared<OperatorOptions>();
-  CLI::App* hand = command->add_subcommand("operator", "the hand's end of a link");
+  CLI::App* hand =
+      command->add_subcommand("operator", "the operator's end, with the haptic device");
   add_running(*hand, operating->run);
-  hand->add_option("--name", operating->name, "of the robot's topics (robot): /NAME/teleop/...");
+  hand->add_option("--name", operating->name,
+                   "name of the robot in its topics (robot): /NAME/teleop/...");
   hand->add_flag("--whole-images", operating->whole_images,
-                 "read depth images that are sent again where lost, not slices");
+                 "subscribe to whole depth images with reliable delivery instead of image slices");
   hand->add_flag("--no-index", operating->no_index,
-                 "the robot comes to where the hand is; else the scene comes to the hand");
+                 "do not shift the scene at the start: the robot moves to the device position "
+                 "(default: the scene is shifted so that the device starts at the tool)");
   add_learn(*hand, *operating);
   operating->run.in_real_time = true;
 
@@ -233,17 +237,18 @@ Verb add_teleop(CLI::App& program) {
   CLI::App* arm = command->add_subcommand("robot", "the robot's end: its camera and its arm");
   add_running(*arm, robot->run);
   arm->add_option("--robot", robot->robot, robots_help());
-  arm->add_option("--name", robot->end.name, "of its topics (robot): /NAME/teleop/...");
+  arm->add_option("--name", robot->end.name,
+                  "name of the robot in its topics (robot): /NAME/teleop/...");
   arm->add_flag("--beside", robot->is_beside)->group("");  // not for people
   arm->add_option("--margin", robot->end.margin,
-                  "[m] by which the tool stays away from what is seen (0.002)");
+                  "distance [m] of the tool from the visible surface (0.002)");
   arm->add_option("--press", robot->end.press_share,
-                  "share of the operator's force with which the tool presses, 0 (usual) to 1");
+                  "fraction of the operator's force with which the tool presses, 0 (default) to 1");
   const auto both = std::make_shared<OperatorOptions>();
   both->run.in_real_time = both->robot_starts = true;
   add_running(*command, both->run);
   add_learn(*command, *both);
-  command->add_option("--robot", robot->robot, "both ends on this machine: as of teleop robot");
+  command->add_option("--robot", robot->robot, "both ends on this computer: as for teleop robot");
   command->add_option("--name", both->name, "of the robot's topics (robot)");
   return {command, [hand, arm, operating, robot, both] {
             if (hand->parsed()) return operate(*operating);

@@ -52,8 +52,7 @@ int trace(TraceOptions options) {
     throw Error("--rate", std::to_string(options.rate) + " Hz is not a tick rate",
                 "give 1 to 100000");
   if (options.json && options.out == "-")
-    throw Error("--json", "the trace itself goes to standard output",
-                "name a file for it with --out");
+    throw Error("--json", "the trace itself goes to standard output", "name a file with --out");
   if (options.path.empty() == options.press.empty())
     throw Error("trace", "it needs one of --path and --press",
                 "give a CSV file with --path, or a pixel of the first frame with --press U,V");
@@ -99,8 +98,7 @@ int trace(TraceOptions options) {
   if (press && press->pixel() != parse_pixel(options.press, "--press") && options.slide_to.empty())
     fmt::print(
         stderr,
-        "palpate: pixel {} shows nothing that can be pressed: {},{} was pressed, the nearest "
-        "that does\n",
+        "palpate: pixel {} has no surface to press: the nearest one that has, {},{}, was pressed\n",
         options.press, press->pixel().u, press->pixel().v);
   for (const std::string& remark : remarks.lines(playback.shown(), options.cameras))
     fmt::print(stderr, "palpate: {}\n", remark);
@@ -108,8 +106,8 @@ int trace(TraceOptions options) {
   const bool is_whole = press ? press->done() : summary.ticks == static_cast<std::size_t>(ticks);
   if (!is_whole)
     fmt::print(stderr,
-               "palpate: interrupted: {} has {}{} ticks, in whole lines; the same command "
-               "again makes the same lines and goes on to the end\n",
+               "palpate: interrupted: {} has {}{} ticks, in complete lines; the same command again "
+               "writes the same lines and continues to the end\n",
                writer.name(), summary.ticks, press ? "" : fmt::format(" of {}", ticks));
   if (options.json) {
     std::fputs(json_of(summary).c_str(), stdout);
@@ -123,30 +121,30 @@ int trace(TraceOptions options) {
 
 Verb add_trace(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "trace", "a recording and a HIP path in, a CSV of ticks out; exactly repeatable");
+      "trace",
+      "run a HIP path or a press over a source, and write a CSV of ticks; exactly repeatable");
   const auto options = std::make_shared<TraceOptions>();
   command
       ->add_option("--camera", options->cameras,
-                   "where frames come from, e.g. tum:DIR; may be given several times")
+                   "source of the frames, e.g. tum:DIR; may be given several times")
       ->required()
       ->allow_extra_args(false);
   command->add_option("--material", options->material,
-                      "what its surfaces are made of, such as wood, or a TOML file");
+                      "material of its surfaces, such as wood, or a TOML file");
   command->add_option("--path", options->path, "CSV of the HIP's path: t,x,y,z in s and m, world");
-  command->add_option(
-      "--press", options->press,
-      "instead of a path: press what this pixel sees, U,V, in the newest frame, along "
-      "the line of sight, and lift again");
+  command->add_option("--press", options->press,
+                      "instead of a path: press the surface at this pixel, U,V, in the newest "
+                      "frame, along the line of sight, and lift again");
   command->add_option("--slide-to", options->slide_to,
-                      "with --press: stroke the surface to this pixel before lifting, U,V");
+                      "with --press: slide along the surface to this pixel before lifting, U,V");
   command->add_option("--press-depth", options->pressing.depth,
                       "with --press: how far behind the surface [m] (0.008)");
   command->add_option("--press-speed", options->pressing.speed,
                       "with --press: speed down, along and up [m/s] (0.05)");
   command->add_option("--press-hold", options->pressing.hold,
                       "with --press: time to stay before sliding and before lifting [s] (0.5)");
-  command->add_option("--out", options->out, "where the trace goes, - for standard output");
-  command->add_option("--rate", options->rate, "ticks a second (1000)");
+  command->add_option("--out", options->out, "file of the trace, - for standard output");
+  command->add_option("--rate", options->rate, "ticks per second (1000)");
   command->add_flag("--json", options->json, "print the summary as a JSON object");
   options->method.add_to(*command);
   return {command, [options] { return trace(*options); }};

@@ -76,7 +76,7 @@ Subject noisy_points(std::size_t points, double spacing) {
 Subject recorded(const std::string& name, std::shared_ptr<const Cloud> frame) {
   const std::vector<Vec3> points = points_of(*frame);
   if (points.empty()) {
-    throw Error(name, "its first frame measured nothing", "give a source that sees a surface");
+    throw Error(name, "its first frame has no measurement", "give a source that sees a surface");
   }
   Vec3 eye = Vec3::Zero();
   Vec3 surface = points[points.size() / 2];

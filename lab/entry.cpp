@@ -38,7 +38,7 @@ constexpr int format_version = 1;
 constexpr int parts = 4;                    // of `fidelity`, each with noise of its own
 constexpr double same_measure = 1e-3;       // [-] measures that differ by less are the same
 constexpr std::size_t most_different = 20;  // one difference in so many may be rounding
-constexpr const char* not_given = "not played: no recording was given";
+constexpr const char* not_given = "not run: no recording was given";
 
 // A case, or a scene of `fidelity` in one of its parts.
 struct Item {
@@ -153,7 +153,7 @@ Plan plan_of(const EntryOptions& options) {
                 "write for example --repeats 5");
   if (options.seed >= 1ULL << 48U)
     throw Error(fmt::format("--seed {}", options.seed), "it is 2^48 or more",
-                "leave it out: then it is drawn by chance");
+                "remove it: then it is random");
   Plan plan;
   plan_pop(options, plan);
   plan_fidelity(options, plan);
@@ -378,7 +378,7 @@ std::string make_entry(const EntryOptions& options, const EntryRun& run,
   out << text << std::flush;
   if (!out)
     throw Error(file.string(), std::string("it cannot be written: ") + std::strerror(errno),
-                "give --out a file that you may write");
+                "use a file with write permission");
   return text;
 }
 
@@ -391,10 +391,10 @@ Json read_entry(const fs::path& file) {
                 "give a file that bench-entry wrote");
   Json entry = Json::parse(in, nullptr, false);
   if (!entry.is_object() || !entry.contains("palpate_entry"))
-    throw Error(file.string(), "it is no entry of the bench", "give a file that bench-entry wrote");
+    throw Error(file.string(), "it is not a benchmark entry", "give a file that bench-entry wrote");
   if (entry["palpate_entry"] != format_version)
-    throw Error(file.string(), "it is of another version of the bench's entries",
-                "check it with the version of palpate that it names");
+    throw Error(file.string(), "it is an entry of another version",
+                "check it with the palpate version that it states");
   return entry;
 }
 
@@ -439,13 +439,12 @@ std::optional<std::string> difference(const Item& item, const std::string& enter
       if (!more_a || !more_b) break;
     }
     if (same) return std::nullopt;
-    return fmt::format("{}: entered {}; played {}", item.text, entered, played);
+    return fmt::format("{}: in the entry {}; now {}", item.text, entered, played);
   }
   const auto words = [](const std::string& line) {
     return line == "11" ? "held and right" : line == "10" ? "held, not right" : "lost";
   };
-  return fmt::format("{}: entered as {}; played, it is {}", item.text, words(entered),
-                     words(played));
+  return fmt::format("{}: in the entry {}; now {}", item.text, words(entered), words(played));
 }
 
 // The lines that the outcomes of an entry were made from, one an item of the plan.
@@ -483,7 +482,7 @@ EntryCheck check_parsed(const Json& entry, std::size_t sample, std::uint64_t cha
   options.own_methods = own_methods;
   if (entry.at("kind") != kind_of(options))
     throw Error(options.method, "it is a method written in Python",
-                "play it again there: palpate.bench.check(FILE, METHOD)");
+                "check it in Python: palpate.bench.check(FILE, METHOD)");
   static_cast<void>(summary_of(options));
   options.recordings = recordings_of(entry, recordings, options.seed, check);
   const Plan plan = plan_of(renamed(options));
@@ -493,10 +492,10 @@ EntryCheck check_parsed(const Json& entry, std::size_t sample, std::uint64_t cha
     if (entry.at("cases_sha256") != hash_of_cases(plan))
       check.faults.emplace_back("its cases are not those that its seed gives in this version");
     if (entry.at("outcomes") != outcomes_of(plan, entered))
-      check.faults.emplace_back("it has outcomes of more cases than it says");
+      check.faults.emplace_back("it has outcomes of more cases than it states");
   }
   if (entry.at("scores") != scores_of(entry.at("outcomes")))
-    check.faults.emplace_back("its scores are not what its outcomes come to");
+    check.faults.emplace_back("its scores do not match its outcomes");
 
   std::vector<std::size_t> order(plan.items.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -529,10 +528,10 @@ EntryCheck check_entry(const fs::path& file, std::size_t sample, std::uint64_t c
   try {
     return check_parsed(entry, sample, chance, recordings, own_methods, runner, scratch);
   } catch (const Json::exception& error) {
-    throw Error(file.string(), std::string("it is no whole entry: ") + error.what(),
+    throw Error(file.string(), std::string("it is incomplete: ") + error.what(),
                 "give a file that bench-entry wrote");
   } catch (const std::out_of_range&) {
-    throw Error(file.string(), "it has outcomes of fewer cases than it says",
+    throw Error(file.string(), "it has outcomes of fewer cases than it states",
                 "give a file that bench-entry wrote");
   }
 }

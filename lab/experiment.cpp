@@ -54,8 +54,8 @@ std::vector<std::string> methods_of(const Experiment& experiment,
       if (!experiment.plays_programs)
         throw Error("--methods " + name,
                     "the experiment '" + std::string(experiment.name) +
-                        "' plays the lab's own methods alone",
-                    "give a program to pop, fidelity, real or bench-entry");
+                        "' runs only the methods of the lab",
+                    "use a program only with pop, fidelity, real or bench-entry");
       continue;
     }
     if (!is_own) static_cast<void>(methods().find(name));

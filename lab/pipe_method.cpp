@@ -30,7 +30,8 @@ extern char** environ;
 namespace palpate::lab {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the pipe's numbers are little-endian");
+static_assert(std::endian::native == std::endian::little,
+              "the numbers of the pipe are little-endian");
 
 constexpr std::string_view scheme = "pipe:";
 constexpr int version = 1;
@@ -198,8 +199,8 @@ class Program {
                             : WIFSIGNALED(status)
                                 ? fmt::format("it ended by signal {}", WTERMSIG(status))
                                 : fmt::format("it ended with status {}", WEXITSTATUS(status));
-    throw Error(name_, how + " before the bench was done with it",
-                "what it said is above; run the command by itself to see whether it starts");
+    throw Error(name_, how + " before the benchmark had finished",
+                "its output is above; run the command by itself to test it");
   }
 
   std::string name_;
@@ -248,7 +249,7 @@ Message message_of(const std::string& name, const Cloud& cloud, double stamp) {
     return message;
   }
   throw Error(name, "a frame is neither a depth image nor points, so it cannot be sent",
-              "give it scenes of one camera");
+              "use scenes with one camera");
 }
 
 class PipeMethod final : public LabMethod, public FallibleMethod {

@@ -91,8 +91,8 @@ void Polygons::check(const Cloud& cloud) {
              points != nullptr && points->size() > 0) {
     const Surface* surface = points->surface();
     if (surface != nullptr && (!surface->triangles.empty() || surface->columns > 0)) return;
-    throw Error("frame", "it is of points alone, and the method touches polygons",
-                "give a PLY with faces, an organised PCD or a depth camera");
+    throw Error("frame", "it has only points, and the method needs polygons",
+                "use a PLY with faces, an organised PCD or a depth camera");
   }
 }
 

@@ -106,7 +106,7 @@ class FinishedCells {
   void check() const {
     if (!out_)
       throw Error(path_.string(), std::string("cannot be written: ") + std::strerror(errno),
-                  "give --out a folder that you may write to, with room on its disk");
+                  "use a folder with write permission and free disk space");
   }
 
   fs::path path_;
@@ -246,7 +246,7 @@ std::string run_experiment(const Experiment& experiment, const ExperimentOptions
   out << csv << std::flush;
   if (!out)
     throw Error(file.string(), std::string("cannot be written: ") + std::strerror(errno),
-                "give --out a folder that you may write to, with room on its disk");
+                "use a folder with write permission and free disk space");
   return csv;
 }
 

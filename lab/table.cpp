@@ -63,7 +63,7 @@ double Table::number(std::size_t row, std::string_view column) const {
   double value = 0.0;
   const auto [rest, error] = std::from_chars(field.data(), field.data() + field.size(), value);
   if (error != std::errc{} || rest != field.data() + field.size())
-    throw Error(subject_, "'" + field + "' in column '" + std::string(column) + "' is no number",
+    throw Error(subject_, "'" + field + "' in column '" + std::string(column) + "' is not a number",
                 "run the experiment again");
   return value;
 }

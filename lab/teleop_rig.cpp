@@ -331,7 +331,7 @@ std::unique_ptr<Coupling> make_coupling(const TeleopCase& one, SimulatedHand& ha
   if (one.way == "position-force") return std::make_unique<PositionForce>(one, hand, peak);
   if (one.way == "wave") return std::make_unique<Wave>(one, hand, peak);
   if (one.way == "tdpa") return std::make_unique<Tdpa>(one, hand, peak);
-  throw Error("teleop", "there is no way '" + std::string(one.way) + "'",
+  throw Error("teleop", "there is no coupling '" + std::string(one.way) + "'",
               "there are palpate, position-force, wave and tdpa");
 }
 

@@ -225,9 +225,9 @@ int report(const BenchOptions& options) {
   }
   const KernelCosts& k = one_metre.kernel;
   fmt::print(
-      "\n{}: {:.0f} proxy steps a millisecond; a whole tick takes {:.2f} of one nanoflann query,\n"
-      "and handing a frame over 1/{:.0f} of building its tree. After warm-up, memory grew by {} "
-      "bytes.\n",
+      "\n{}: {:.0f} proxy steps per millisecond; a whole tick takes {:.2f} of one nanoflann "
+      "query,\nand passing a frame on 1/{:.0f} of building its tree. After warm-up, memory grew by "
+      "{} bytes.\n",
       one_metre.name, 1e3 / std::max(k.step.median, 1e-6),
       k.tick.median / std::max(tree.query.median, 1e-6),
       tree.build->median / std::max(k.frame.median, 1e-6), growth);
@@ -279,14 +279,17 @@ int report_growth(const BenchOptions& options) {
 }  // namespace
 
 Verb add_bench(CLI::App& program) {
-  CLI::App* command =
-      program.add_subcommand("bench", "what a tick costs here, beside what one could use instead");
+  CLI::App* command = program.add_subcommand(
+      "bench", "measure the time per tick on this computer, compared with alternatives");
   const auto options = std::make_shared<BenchOptions>();
   options->method.add_to(*command);
-  command->add_option("--camera", options->camera, "measure on this source's first frame, too");
+  command->add_option("--camera", options->camera,
+                      "also measure on the first frame of this source");
   command->add_flag("--json", options->json, "print a JSON object");
-  command->add_flag("--quick", options->quick, "few repetitions: does it work, not how fast");
-  command->add_flag("--growth", options->growth, "how a tick's cost grows, as DIR/growth.csv");
+  command->add_flag("--quick", options->quick,
+                    "few repetitions: a quick test without accurate times");
+  command->add_flag("--growth", options->growth,
+                    "measure how the time per tick grows, as DIR/growth.csv");
   command->add_option("--out", options->out, "folder for --growth")->type_name("DIR");
   return {command,
           [options] { return options->growth ? report_growth(*options) : report(*options); }};

@@ -46,8 +46,8 @@ std::uint64_t by_chance() {
 // One thread a core, or one a rank; a line of progress where a person watches.
 lab::RunnerOptions runner_options(int jobs, std::shared_ptr<Progress>& progress) {
   if (jobs < 0 || jobs > 1024)
-    throw Error("--jobs " + std::to_string(jobs), "that many threads make no sense",
-                "give 1 to 1024, or 0 for one a core");
+    throw Error("--jobs " + std::to_string(jobs), "the number of threads is out of range",
+                "use 1 to 1024, or 0 for one per core");
   const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   lab::RunnerOptions runner;
   runner.jobs = jobs > 0 ? jobs : lab::Ranks::size() > 1 ? 1 : cores;
@@ -99,7 +99,7 @@ int enter(const EntryArguments& arguments) {
 }
 
 int check(const CheckArguments& arguments) {
-  if (arguments.sample == 0) throw Error("--sample 0", "nothing would be played", "give 1 or more");
+  if (arguments.sample == 0) throw Error("--sample 0", "no case would be run", "give 1 or more");
   std::shared_ptr<Progress> progress;
   const lab::RunnerOptions runner = runner_options(arguments.jobs, progress);
   const lab::EntryCheck check =
@@ -110,10 +110,10 @@ int check(const CheckArguments& arguments) {
   for (const std::string& fault : check.faults) fmt::print("{}\n", fault);
   for (const std::string& difference : check.differences) fmt::print("{}\n", difference);
   for (const std::string& name : check.left_out)
-    fmt::print("not played: {}, give it with --recording\n", name);
-  fmt::print("{}: {} of {} cases and scenes played again, {} differ\n",
-             check.holds ? "it holds" : "it does not hold", check.played, check.entered,
-             check.differences.size());
+    fmt::print("not run: {}, set it with --recording\n", name);
+  fmt::print("{}: {} of {} cases and scenes run again, {} differ\n",
+             check.holds ? "the entry is valid" : "the entry is not valid", check.played,
+             check.entered, check.differences.size());
   return check.holds ? 0 : 1;
 }
 
@@ -121,36 +121,37 @@ int check(const CheckArguments& arguments) {
 
 Verb add_bench_entry(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "bench-entry", "plays a method on the whole bench and writes an entry for the leaderboard");
+      "bench-entry", "run a method on the whole benchmark and write an entry for the leaderboard");
   const auto options = std::make_shared<EntryArguments>();
   command
       ->add_option("method", options->entry.method,
                    "a name of `palpate eval --list-methods`, or a program: 'pipe:COMMAND'")
       ->required();
   command->add_option("--out", options->out, "the entry's file (entry.json)");
-  command->add_option("--seed", options->seed, "that cases are drawn from (by chance)");
-  command->add_option("--cases", options->entry.cases, "of each family (25)");
+  command->add_option("--seed", options->seed, "random seed of the cases (default: random)");
+  command->add_option("--cases", options->entry.cases, "number of cases of each family (25)");
   command->add_option("--repeats", options->entry.repeats,
-                      "of each scene of fidelity, in each of four parts (5)");
+                      "repeats of each scene of fidelity, in each of four parts (5)");
   command
-      ->add_option("--recording", options->entry.recordings,
-                   "of a camera at rest, e.g. depth:FOLDER?frames=8; may be given several times")
+      ->add_option(
+          "--recording", options->entry.recordings,
+          "recording of a camera at rest, e.g. depth:FOLDER?frames=8; may be given several times")
       ->allow_extra_args(false);
   command->add_option("--jobs", options->jobs, "threads (one a core)");
   command->add_flag("--resume", options->resume,
-                    "go on from an interrupted run's finished cases, with its --seed");
+                    "continue from the finished cases of an interrupted run, with its --seed");
   return {command, [options] { return enter(*options); }};
 }
 
 Verb add_bench_check(CLI::App& program) {
-  CLI::App* command = program.add_subcommand(
-      "bench-check", "plays a sample of an entry again and says whether it holds");
+  CLI::App* command =
+      program.add_subcommand("bench-check", "run a sample of an entry again and check it");
   const auto options = std::make_shared<CheckArguments>();
   command->add_option("entry", options->file, "its file")->required();
-  command->add_option("--sample", options->sample, "how many cases and scenes (20)");
+  command->add_option("--sample", options->sample, "number of cases and scenes (20)");
   command
       ->add_option("--recording", options->recordings,
-                   "that the entry was made with; may be given several times")
+                   "recording with which the entry was made; may be given several times")
       ->allow_extra_args(false);
   command->add_option("--jobs", options->jobs, "threads (one a core)");
   return {command, [options] { return check(*options); }};

@@ -61,7 +61,7 @@ lab::ExperimentOptions experiment_options(const EvalOptions& options) {
   result.methods = options.methods;
   if (options.seed < 0)
     throw Error("--seed " + std::to_string(options.seed), "it is negative",
-                "give a whole number from 0 on");
+                "use a whole number from 0 on");
   result.seed = static_cast<std::uint64_t>(options.seed);
   if (!options.grid.empty()) result.grid = parse_grid(options.grid);
   if (options.cases < 0 || options.cases > 10'000'000)
@@ -111,16 +111,16 @@ int eval(const EvalOptions& options) {
     throw Error("--grid", "the experiment '" + options.name + "' has no grid", "leave it out");
   if (!all && !given.recording.empty() && !experiments.front()->takes_recording)
     throw Error("--recording", "the experiment '" + options.name + "' is a simulation",
-                "leave it out, or give it to scan");
+                "remove this option, or use scan");
   if (options.jobs < 0 || options.jobs > 1024)
-    throw Error("--jobs " + std::to_string(options.jobs), "that many threads make no sense",
-                "give 1 to 1024, or 0 for one a core");
+    throw Error("--jobs " + std::to_string(options.jobs), "the number of threads is out of range",
+                "use 1 to 1024, or 0 for one per core");
 
   std::error_code error;
   fs::create_directories(options.out, error);
   if (error)
-    throw Error("--out " + options.out, "the folder cannot be made: " + error.message(),
-                "give a folder that you may write to");
+    throw Error("--out " + options.out, "the folder cannot be created: " + error.message(),
+                "use a folder with write permission");
   lab::RunnerOptions runner;
   const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   // Under MPI a rank is a core.
@@ -158,7 +158,7 @@ int eval(const EvalOptions& options) {
 
 Verb add_eval(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "eval", "experiments: the paper's figures and claims, and the bench for other methods");
+      "eval", "run experiments: the paper's figures and claims, and the benchmark of methods");
   const auto options = std::make_shared<EvalOptions>();
   command->add_option("experiment", options->name, "its name, or all; see --list");
   command->add_option("--out", options->out, "folder for CSV, plots and the report (eval)");
@@ -169,16 +169,14 @@ Verb add_eval(CLI::App& program) {
       ->allow_extra_args(false);
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
   command->add_option("--cases", options->cases,
-                      "pop, field: how many of each family or class (50, 5); tradeoff: repeats; "
-                      "feel: free hands");
+                      "pop, field: number of cases of each family or class (50, 5); tradeoff: "
+                      "repeats; feel: hands in free space");
   command
       ->add_option("--families", options->families,
                    "pop, methods, field, fidelity, feel: which, separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command
-      ->add_option("--fix", options->fixed,
-                   "pop, field: KEY=VALUE instead of a value drawn by chance")
+  command->add_option("--fix", options->fixed, "pop, field: KEY=VALUE instead of a random value")
       ->allow_extra_args(false);
   command->add_option("--case", options->case_text,
                       "pop, field: one case as a run printed it, pop:... or field:...");
@@ -186,13 +184,15 @@ Verb add_eval(CLI::App& program) {
   command->add_option(
       "--recording", options->recording,
       "scan, real: touch a recording, e.g. tum:FOLDER, instead of the synthetic desk");
-  command->add_option("--seed", options->seed, "of all noise (1)");
+  command->add_option("--seed", options->seed, "random seed of all noise (1)");
   command->add_option("--jobs", options->jobs, "threads (one a core)");
-  command->add_flag("--resume", options->resume, "go on from an interrupted run's finished cells");
-  command->add_option("--draw", options->drawn,
-                      "only draw these CSV files, of experiments, bench --growth or trace, anew");
+  command->add_flag("--resume", options->resume,
+                    "continue from the finished cells of an interrupted run");
+  command->add_option(
+      "--draw", options->drawn,
+      "only draw the figures of these CSV files, of experiments, bench --growth or trace");
   command->add_flag("--list", options->list_experiments, "list the experiments");
-  command->add_flag("--list-methods", options->list_methods, "list the methods, one a line");
+  command->add_flag("--list-methods", options->list_methods, "list the methods, one per line");
   options->parameters.add_parameters_to(*command);
   return {command, [options] { return eval(*options); }};
 }

@@ -20,7 +20,7 @@ std::string usual_cell() {
 }
 
 std::string robots_help() {
-  return "what is led, and the camera with it where it has one (" + usual_cell() +
+  return "robot, with its camera if it has one (" + usual_cell() +
          "): mujoco:desk?KEY=VALUE&...: a simulated arm at a table; " + standard_robots_help();
 }
 

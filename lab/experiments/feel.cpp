@@ -201,7 +201,7 @@ Scores feel_scores(const Table& table) {
           measure.aim, values);
     }
   }
-  std::string note = "* misses the aim. What is measured and how: docs/feel.md.";
+  std::string note = "* misses the aim. Measures: docs/feel.md.";
   for (const std::string& method : scores.methods()) {
     for (std::size_t row = 0; row < table.rows(); ++row) {
       if (table.text(row, "method") != method || table.text(row, "case") == "-") continue;
@@ -223,7 +223,7 @@ Figure feel_figure(const Table& table) {
 
 Experiment feel_experiment() {
   return {"feel",
-          "what a hand feels: open loop, with a device and a hand, and through the safety chain",
+          "force quality: open loop, with a device and a hand, and through the safety chain",
           "method,scene,loop,measure,unit,aim,value,case",
           {"paper", "sight", "ideal"},
           true,

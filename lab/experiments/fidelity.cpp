@@ -385,7 +385,7 @@ Scores fidelity_scores(const Table& table) {
                values);
   }
   return scores.scores(
-      "* misses the aim; - was lost in every repeat. What is measured and how: docs/pop.md.");
+      "* misses the aim; - popped through in every repeat. Measures: docs/pop.md.");
 }
 
 Figure fidelity_figure(const Table& table) {
@@ -404,7 +404,7 @@ bool is_without_chance(std::string_view scene) {
 
 Experiment fidelity_experiment() {
   Experiment experiment{"fidelity",
-                        "how near the contact and the force are to the true ones, beside the aims",
+                        "accuracy of contact and force, compared with the aims",
                         "method,scene,measure,unit,aim,value",
                         {"paper", "sight"},
                         true,

@@ -175,9 +175,8 @@ std::string alarm_text(const Table& table, const std::string& method) {
   };
   const double behind = sum("time_behind_s");
   return fmt::format(
-      "{}: {:.1f} s behind in {:.0f} s, {:.1f} % of that with an alarm; false alarms in {:.2f} % "
-      "of "
-      "the rest; {:.0f} of {:.0f} times in front again within 0.2 s",
+      "{}: behind for {:.1f} s of {:.0f} s, {:.1f} % of that flagged; false positives in {:.2f} % "
+      "of the rest; {:.0f} of {:.0f} times in front again within 0.2 s",
       method, behind, sum("time_s"), behind > 0.0 ? 100.0 * sum("alarmed_s") / behind : 100.0,
       100.0 * sum("false_alarm_s") / std::max(sum("time_s") - behind, 1e-3), sum("quick_returns"),
       sum("times_behind"));
@@ -205,8 +204,9 @@ Scores field_scores(const Table& table) {
   for (auto& [name, sums] : sensors)
     scores.rows.push_back(line_of("all before " + name, sums, methods));
   scores.note =
-      "The score is the mean over the classes of the shares, of the cases that can be known; step "
-      "is the median of the cases' largest change of force in a tick. docs/field.md has the rules.";
+      "The score is the mean over the classes of the shares, of the observable cases; step is the "
+      "median over the cases of the largest change of force in a tick. docs/field.md has the "
+      "rules.";
   std::vector<std::string> last = {"score", "", ""};
   for (const std::string& method : methods) {
     double held = 0.0;
@@ -220,8 +220,9 @@ Scores field_scores(const Table& table) {
       ++count;
       if (sum.right == sum.known) continue;
       scores.note += fmt::format(
-          "\n{}, {}: of {} cases {} lost, {} with a force in free space (up to {:.2f} N), {} numb, "
-          "{} with a force on the wrong side; palpate eval field --methods {} --case '{}'",
+          "\n{}, {}: {} cases: {} popped through, {} with a force in free space (up to {:.2f} N), "
+          "{} with a missing force, {} with a force in the opposite direction; palpate eval field "
+          "--methods {} --case '{}'",
           method, name, sum.known, sum.known - sum.held, sum.ghost, sum.worst_ghost, sum.numb,
           sum.wrong, method, sum.first_not_right);
     }
@@ -251,7 +252,8 @@ Figure field_figure(const Table& table) {
 
 Experiment field_experiment() {
   return {"field",
-          "the field set: scenes, sensors and hands that share no code with those of pop and feel",
+          "the field set: independent scenes, sensors and HIP paths, which share no code with "
+          "those of pop and feel",
           "method,class,sensor,number,unknown,lost,right,behind_s,ghost_n,numb,wrong_side,"
           "worst_step_n,time_s,time_behind_s,alarmed_s,false_alarm_s,times_behind,quick_returns,"
           "text,values",

@@ -115,8 +115,8 @@ std::vector<Claim> hold_claims(const Table& table) {
   }
   return {{"6.2", "pop through never occurred without acceleration up to 2 r_c (white noise)", "0",
            fmt::format("{:g} in the minutes held", white), white == 0 ? "reproduced" : "differs"},
-          {"not in the paper", "noise as real cameras have it is correlated over some pixels", "-",
-           fmt::format("{:g} pop-throughs of a resting plane", lost),
+          {"not in the paper", "the noise of real cameras is correlated over some pixels", "-",
+           fmt::format("{:g} pop-throughs of a static plane", lost),
            "the white noise of section 5 is the easy case"}};
 }
 
@@ -258,7 +258,7 @@ std::vector<Claim> damping_claims(const Table& table) {
                    "{:.2f} mJ",
                    -corrected, printed),
        corrected < 0.0 && printed > 0.0
-           ? "reproduced with the sign of k_d corrected; as printed, it drives the hand"
+           ? "reproduced with the sign of k_d corrected; as printed, it generates energy"
            : "differs"}};
 }
 
@@ -272,7 +272,7 @@ Figure damping_figure(const Table& table) {
 
 Experiment hold_experiment() {
   return {"hold",
-          "a resting plane for a minute, fresh noise in every frame",
+          "a static plane for a minute, new noise in every frame",
           "method,noise,sigma_mm,seed,seconds,popped,bias_mm,jitter_mm,force_step_n,felt_n",
           {"paper", "ideal"},
           true,
@@ -283,7 +283,7 @@ Experiment hold_experiment() {
 
 Experiment force_experiment() {
   return {"force",
-          "4.6: what the hand feels of a plane that moves by 20 mm at 1 Hz",
+          "4.6: the force of a plane that moves by 20 mm at 1 Hz",
           "method,t,force_n,ideal_n,contact_z,true_z",
           {"paper", "paper-as-printed"},
           false,
@@ -294,7 +294,7 @@ Experiment force_experiment() {
 
 Experiment damping_experiment() {
   return {"damping",
-          "4.6: the work of a resting plane on a hand that goes to and fro",
+          "4.6: the work of a static plane on a hand that moves back and forth",
           "method,damping,work_mj",
           {"paper", "paper-as-printed"},
           false,

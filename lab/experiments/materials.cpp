@@ -140,19 +140,18 @@ Scores material_scores(const Table& table) {
          fmt::format("{:.1f}", shaking(rests, duration))});
   }
   scores.note = fmt::format(
-      "Strike: the force beyond what is held afterwards, at {} m/s. Friction: tangential over "
-      "normal "
-      "force at {} m/s. Stroke and rest: the force from 20 to 400 Hz. docs/materials.md.",
+      "Strike: the force above the static force afterwards, at {} m/s. Friction: tangential over "
+      "normal force at {} m/s. Stroke and rest: the force from 20 to 400 Hz. docs/materials.md.",
       strike, stroke_speed);
   return scores;
 }
 
 Figure material_figure(const Table& table) {
   const Axis normal{"normal force [N]"};
-  Figure figure{{{.title = "a strike at 0.15 m/s", .x = {"time [ms]"}, .y = normal},
-                 {.title = "a slow press", .x = {"depth of the hand [mm]"}, .y = normal},
-                 {.title = "a stroke at 60 mm/s, held 3 mm deep",
-                  .x = {"way of the hand [mm]"},
+  Figure figure{{{.title = "an impact at 0.15 m/s", .x = {"time [ms]"}, .y = normal},
+                 {.title = "a slow press", .x = {"depth of the HIP [mm]"}, .y = normal},
+                 {.title = "a slide at 60 mm/s, 3 mm deep",
+                  .x = {"travel of the HIP [mm]"},
                   .y = {"force along the surface [N]"}},
                  {.title = "the same, a tenth of a second of it",
                   .x = {"time [ms]"},
@@ -191,7 +190,7 @@ Figure material_figure(const Table& table) {
 
 Experiment materials_experiment() {
   return {"materials",
-          "what a strike, a press and a stroke feel like on each standard material",
+          "force of an impact, a press and a slide on each standard material",
           "material,t,depth,along,normal,tangential",
           {},
           false,

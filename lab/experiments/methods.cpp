@@ -267,14 +267,14 @@ Scores methods_scores(const Table& table) {
     }
     scores.rows.push_back(std::move(line));
   }
-  scores.note = "- was lost in every repeat. What each column is: docs/methods.md.";
+  scores.note = "- popped through in every repeat. The columns: docs/methods.md.";
   return scores;
 }
 
 Figure methods_figure(const Table& table) {
   constexpr double ticks = 33.0;  // of a frame
   Panel score{.x = {.label = "pop score [%]", .low = -2.0, .high = 102.0}};
-  Panel cost{.x = {.label = "cost of a frame and its ticks [µs]", .log = true}};
+  Panel cost{.x = {.label = "time of a frame and its ticks [µs]", .log = true}};
   score.series = {{"", {}, Line::none, Mark::disc, 0}};
   cost.series = score.series;
   for (const std::string& method : methods_in(table)) {
@@ -296,7 +296,7 @@ Figure methods_figure(const Table& table) {
 
 Experiment methods_experiment() {
   Experiment experiment{"methods",
-                        "every method side by side: what holds, how exact, at which cost",
+                        "all methods in one table: pop-through, accuracy, time",
                         "method,measure,value",
                         {},
                         true,

@@ -227,7 +227,7 @@ std::vector<const PopFamily*> families_of(const ExperimentOptions& options) {
                          [&](const PopRange& range) { return range.key == key; });
     });
     if (!known || fixed.find('=') == std::string::npos)
-      throw Error("--fix " + fixed, "no family that is run draws '" + key + "'",
+      throw Error("--fix " + fixed, "none of the families has a value '" + key + "'",
                   "write KEY=VALUE with a key of docs/pop.md");
   }
   return families;
@@ -323,8 +323,9 @@ Scores pop_scores(const Table& table) {
   std::vector<double> held(methods.size(), 0.0);
   std::vector<double> right(methods.size(), 0.0);
   scores.note =
-      "The score is the mean over the families of the share held, and of the share right: held, "
-      "no force in free space, none on the wrong side, and not numb. docs/pop.md has the rules.";
+      "The score is the mean over the families of the share held, and of the share right: no "
+      "pop-through, no force in free space, none in the opposite direction, none missing. "
+      "docs/pop.md has the rules.";
   for (const std::string& family : families) {
     std::vector<std::string> line = {family};
     for (std::size_t m = 0; m < methods.size(); ++m) {
@@ -337,8 +338,8 @@ Scores pop_scores(const Table& table) {
       right[m] += sum.right / sum.cases;
       if (sum.ghost + sum.numb + sum.wrong > 0.0)
         scores.note += fmt::format(
-            "\n{}, {}: of {:g} cases {:g} with a force in free space (up to {:.2f} N), {:g} numb, "
-            "{:g} with a force on the wrong side",
+            "\n{}, {}: {:g} cases: {:g} with a force in free space (up to {:.2f} N), {:g} with a "
+            "missing force, {:g} with a force in the opposite direction",
             methods[m], family, sum.cases, sum.ghost, sum.worst_ghost, sum.numb, sum.wrong);
       // None where all of them are lost, too: the next line plays one of those.
       if (!sum.not_right.empty())
@@ -349,8 +350,8 @@ Scores pop_scores(const Table& table) {
             fmt::format("\npalpate eval pop --methods {} --case '{}'", methods[m], sum.simplest);
       if (sum.change > 0.0)
         scores.note += fmt::format(
-            "\n{}, {}: the force of what was held changed by up to {:.3f} N, because of what "
-            "passed by up to {:.3f} N; by more than {:g} N in {:g} of {:g}",
+            "\n{}, {}: in cases without pop-through the force changed by up to {:.3f} N; the "
+            "change caused by the occluder was at most {:.3f} N, and above {:g} N in {:g} of {:g}",
             methods[m], family, sum.change, sum.caused, noticed, sum.noticeable, sum.cases);
     }
     scores.rows.push_back(std::move(line));
@@ -414,7 +415,7 @@ bool is_lost(const std::string& method, const PopCase& c, const Parameters& para
 Experiment pop_experiment() {
   Experiment experiment{
       "pop",
-      "is the surface ever lost? families of cases drawn by chance, failures shrunk",
+      "pop-through in families of random cases, failures reduced to simple ones",
       "method,family,from,cases,lost,dipped,worst_step_n,worst_change_n,worst_caused_n,"
       "noticeable,first_lost,simplest,ghost,numb,wrong,right,worst_ghost_n,first_not_right",
       {"paper", "sight"},

@@ -126,8 +126,7 @@ Recording open_recording(const std::string& uri, std::size_t most = most_places)
   for (std::size_t i = 0; i < a.size(); i += 7) {
     if (is_measured(a[i]) && is_measured(b[i])) change.push_back(std::abs(int{a[i]} - int{b[i]}));
   }
-  if (change.empty())
-    throw Error(uri, "its frames have nothing in common", "give another recording");
+  if (change.empty()) throw Error(uri, "its frames do not overlap", "give another recording");
   std::nth_element(change.begin(), change.begin() + static_cast<std::ptrdiff_t>(change.size() / 2),
                    change.end());
   recording.at_rest = change[change.size() / 2] <= 0.008 * first.units_per_metre();
@@ -355,7 +354,8 @@ Scores real_scores(const Table& table) {
                              of_held("felt_n"), of_held("step_n"), of_held("range_n")});
     }
   }
-  scores.note = "Medians over the places that were held. What is done and measured: docs/pop.md.";
+  scores.note =
+      "Medians over the positions without pop-through. Actions and measures: docs/pop.md.";
   return scores;
 }
 
@@ -431,7 +431,7 @@ RealCases draw_real_cases(const std::string& uri, const std::string& name, std::
 Experiment real_experiment() {
   Experiment experiment{
       "real",
-      "on what a camera recorded, at rest and cut out and moved exactly",
+      "recordings of a camera, at rest and with exact composed motion",
       "method,action,place,distance_m,lost,suspected,error_mm,felt_n,step_n,range_n",
       {"paper", "sight"},
       false,

@@ -285,14 +285,14 @@ std::vector<Claim> scan_claims(const Table& table) {
   return {
       {"5.4", "typically converges in 1-2 proxy steps each time the haptic device moves",
        "1-2 steps",
-       fmt::format("median {:g} steps a tick, {:.0f} % of ticks in at most 2", median, 100 * few),
+       fmt::format("median {:g} steps per tick, {:.0f} % of ticks in at most 2", median, 100 * few),
        median <= 2 ? "reproduced"
                    : "differs: theta = 0.1 degrees and gamma = 3/10 need more where noise turns "
                      "the normal from step to step"},
       {"5.4", "runs at a maximum rate of 30 kHz (state, normal vector and step size)", "30 kHz",
        fmt::format("{:.1f} MHz on one core", 1e-6 * rate),
-       rate > 30e3 ? fmt::format("reproduced, and {:.0f} times as fast: a later machine, and only "
-                                 "the pixel window about the proxy is read",
+       rate > 30e3 ? fmt::format("reproduced, and {:.0f} times as fast: a newer computer, and only "
+                                 "the pixel window around the proxy is read",
                                  rate / 30e3)
                    : "differs: this machine is slower"}};
 }
@@ -311,7 +311,7 @@ Figure scan_figure(const Table& table) {
 
 Experiment scan_experiment() {
   Experiment experiment{"scan",
-                        "5.4, Fig. 16: over a ramp and a box that a synthetic Kinect sees",
+                        "5.4, Fig. 16: over a ramp and a box seen by a synthetic Kinect",
                         "method,t,hip_y,hip_z,proxy_y,proxy_z,surface_z,force_n,steps,touching",
                         {"paper", "ideal"},
                         false,

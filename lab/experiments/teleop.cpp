@@ -185,7 +185,7 @@ std::vector<Cell> teleop_cells(const Experiment& experiment, const ExperimentOpt
     const auto& known = teleop_ways();
     const auto known_way = std::find(known.begin(), known.end(), way);
     if (known_way == known.end())
-      throw Error("--methods " + way, "teleop has no such way to couple",
+      throw Error("--methods " + way, "teleop has no such coupling",
                   "did you mean '" + std::string(nearest_name(way, known)) + "'?");
     for (const std::string_view scene : scenes) {
       if (!options.families.empty() && std::find(options.families.begin(), options.families.end(),
@@ -239,13 +239,13 @@ Scores teleop_scores(const Table& table) {
   scores.note =
       "The worst of round trips from 0 to 500 ms, with and without jitter of 30 ms and 5 % loss. "
       "Worst, %: of the force against that without delay. Aims: 5 %, 0.05 mm, 0.1 mJ; depth 0.5 mm "
-      "(rest), 1 mm (bob, come); 5 N. What is measured: docs/teleop.md.";
+      "(rest), 1 mm (bob, come); 5 N. Measures: docs/teleop.md.";
   return scores;
 }
 
 Figure teleop_figure(const Table& table) {
-  Figure figure{
-      {{.y = {"force on the hand [N]"}}, {.y = {.label = "swing of the tool [mm]", .log = true}}}};
+  Figure figure{{{.y = {"force on the hand [N]"}},
+                 {.y = {.label = "position deviation of the tool [mm]", .log = true}}}};
   for (const std::string_view way : {"palpate", "position-force", "wave", "tdpa"}) {
     const bool ours = way == "palpate";
     for (std::size_t i = 0; i < 2; ++i)
@@ -266,7 +266,7 @@ Figure teleop_figure(const Table& table) {
 
 Experiment teleop_experiment() {
   return {"teleop",
-          "a hand leads a robot over a link: ours beside force links, by delay, jitter and loss",
+          "teleoperation of a robot, compared with force coupling, by delay, jitter and loss",
           "way,scene,sensor,round_trip,link,force,most_force,shake,energy,depth,contact,swing",
           {"palpate", "position-force", "wave", "tdpa"},
           false,

@@ -236,9 +236,8 @@ Scores episode_scores(const Table& table) {
     }
   }
   scores.note =
-      "Stops within: until the tool is slower than 10 mm/s. Unseen: a surface that moves before "
-      "a "
-      "camera that is dark. What is measured: docs/teleop.md.";
+      "Stops within: until the tool is slower than 10 mm/s. Unseen: a surface that moves while the "
+      "camera sends no frames. Measures: docs/teleop.md.";
   return scores;
 }
 
@@ -258,7 +257,7 @@ Figure episode_figure(const Table& table) {
 
 Experiment teleop_faults_experiment() {
   return {"teleop-faults",
-          "a robot that is led while link, camera or a process fails: fixtures, force, stops",
+          "teleoperation while network, camera or a process fails: fixtures, force, stops",
           "fault,scene,sensor,number,breach,contact,unseen,rise,force,stop",
           {},
           false,

@@ -253,8 +253,8 @@ Scores tradeoff_scores(const Table& table) {
     }
   }
   scores.note =
-      "mean-N is a plain mean over the last N frames and 30 mm about the contact, for comparison. "
-      "What is measured: docs/pop.md.";
+      "mean-N is a simple mean over the last N frames and 30 mm around the contact, for "
+      "comparison. Measures: docs/pop.md.";
   return scores;
 }
 
@@ -285,7 +285,7 @@ Figure tradeoff_figure(const Table& table) {
 
 Experiment tradeoff_experiment() {
   return {"tradeoff",
-          "lag behind a surface that begins to move, against jitter while it rests",
+          "lag behind a surface that begins to move, against noise at rest",
           "method,distance_m,speed,held,lost,jitter_mm,lag_mm,lag_frames",
           {"paper", "sight"},
           false,

@@ -307,8 +307,8 @@ Scores zwidth_scores(const Table& table) {
     scores.rows.push_back(std::move(line));
   }
   scores.note =
-      "Largest stiffness [N/m] that decays, from the worst to the best of scenes and cameras; "
-      "k_d in N s/m. What is measured and how: docs/feel.md.";
+      "Largest stable stiffness [N/m], from the worst to the best of scenes and cameras; k_d in N "
+      "s/m. Measures: docs/feel.md.";
   return scores;
 }
 
@@ -319,18 +319,15 @@ Figure zwidth_figure(const Table& table) {
                        table.text(row, "damping"));
   };
   const auto least = [&](std::string_view column, std::string_view way) {
-    return by_group(table, wall,
-                    [&, column, way](const std::vector<std::size_t>& rows) {
-                      double worst = anything;
-                      for (const std::size_t row : rows)
-                        if (table.text(row, "way") == way)
-                          worst = std::min(worst, table.number(row, column));
-                      return worst;
-                    },
-                    {.label = "largest stiffness that decays [N/m]",
-                     .log = true,
-                     .low = 50.0,
-                     .high = 10000.0});
+    return by_group(
+        table, wall,
+        [&, column, way](const std::vector<std::size_t>& rows) {
+          double worst = anything;
+          for (const std::size_t row : rows)
+            if (table.text(row, "way") == way) worst = std::min(worst, table.number(row, column));
+          return worst;
+        },
+        {.label = "largest stable stiffness [N/m]", .log = true, .low = 50.0, .high = 10000.0});
   };
   Panel panel = least("stiffness", "straight");
   const std::size_t methods = panel.series.size();
@@ -359,7 +356,7 @@ Figure zwidth_figure(const Table& table) {
 
 Experiment zwidth_experiment() {
   return {"zwidth",
-          "how stiff a surface may be: device, hand, scene and method, through the safety chain",
+          "largest stable stiffness: device, hand, scene and method, through the safety chain",
           "device,hand,scene,camera,method,way,damping,stiffness,bound,linear",
           {"paper", "sight", "ideal"},
           false,

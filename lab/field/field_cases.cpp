@@ -73,7 +73,7 @@ class Draw {
     const auto [found, is_new] = values_.emplace(key, value);
     if (!is_new && (found->second.low != low || found->second.high != high))
       throw Error("field: " + std::string(key), "two values have this name",
-                  "give each value of a class and its sensors a name of its own");
+                  "use different names for the values of a class and its sensors");
     return value.value;
   }
 
@@ -817,11 +817,12 @@ constexpr std::array makers = {
           belt_under},
     Maker{{"belt-beside", "a box arrives beside the pressing hand and stays"}, belt_beside},
     Maker{{"belt-ride", "a long box moves on under the hand that rests on it"}, belt_ride},
-    Maker{{"wedge-under", "a slanting board is pushed under the resting hand and stays"},
+    Maker{{"wedge-under", "an inclined board is pushed under the HIP at rest and stays"},
           wedge_under},
     Maker{{"table-dome", "a dome on a turntable passes under the resting hand, or stops there"},
           table_dome},
-    Maker{{"table-follow", "the hand goes round with a thing on a turntable"}, table_follow},
+    Maker{{"table-follow", "the HIP moves in a circle with an object on a turntable"},
+          table_follow},
     Maker{{"arm-over", "an arm reaches in over the pressing hand, and leaves or stays"}, arm_over},
     Maker{{"arm-under", "a visitor's hand is laid under the waiting hand, which presses on it"},
           arm_under},

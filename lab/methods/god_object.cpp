@@ -179,16 +179,17 @@ std::unique_ptr<Method> make(const Parameters& parameters) {
 }  // namespace
 
 std::vector<MethodInfo> god_object_methods() {
-  return {{"god-object", "a point held by polygons ([3]; depth images tessellated: [10], [11])",
-           make<false, true, false>},
-          {"god-object-kept", "the same, kept in world space when a frame arrives",
-           make<false, false, false>},
-          {"sphere-proxy", "a sphere held by polygons ([4]; depth images tessellated)",
-           make<true, true, false>},
-          {"sphere-proxy-kept", "the same, kept in world space when a frame arrives",
-           make<true, false, false>},
-          {"force-shading", "god-object whose force has the normal interpolated between corners",
-           make<false, true, true>}};
+  return {
+      {"god-object", "a point constrained by polygons ([3]; depth images tessellated: [10], [11])",
+       make<false, true, false>},
+      {"god-object-kept", "the same, kept in world space when a frame arrives",
+       make<false, false, false>},
+      {"sphere-proxy", "a sphere constrained by polygons ([4]; depth images tessellated)",
+       make<true, true, false>},
+      {"sphere-proxy-kept", "the same, kept in world space when a frame arrives",
+       make<true, false, false>},
+      {"force-shading", "god-object whose force has the normal interpolated between corners",
+       make<false, true, true>}};
 }
 
 }  // namespace palpate::lab

@@ -81,11 +81,11 @@ class Ideal final : public LabMethod {
 MethodInfo ideal_method(const Truth& truth) {
   const auto make = [truth](const Parameters& parameters) {
     if (!truth)
-      throw Error("method 'ideal'", "there is no analytic truth here",
+      throw Error("method 'ideal'", "there is no analytic ground truth here",
                   "choose another method, or a synthetic scene");
     return std::make_unique<Ideal>(parameters, truth);
   };
-  return {"ideal", "the proxy on the true surface: the ruler", make, false};
+  return {"ideal", "the proxy on the true surface: the ground-truth reference", make, false};
 }
 
 }  // namespace palpate::lab

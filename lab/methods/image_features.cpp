@@ -97,7 +97,7 @@ std::unique_ptr<Method> make(const Parameters& parameters) {
 
 std::vector<MethodInfo> image_features_methods() {
   return {
-      {"image-features", "height and texture of the image at the HIP's own pixel ([14])", make}};
+      {"image-features", "height and texture of the image at the pixel of the HIP ([14])", make}};
 }
 
 }  // namespace palpate::lab

@@ -104,7 +104,7 @@ std::vector<MethodInfo> surfels_methods() {
   return {{"surfels", "implicit surface of total-least-squares normals ([13], second form, [16])",
            of_one},
           {"surfels-3", "the same over the last three frames", of_a_few},
-          {"point-normals", "a point set that came with its normals ([6])", of_given}};
+          {"point-normals", "a point set with given normals ([6])", of_given}};
 }
 
 }  // namespace palpate::lab

@@ -178,7 +178,7 @@ std::unique_ptr<Method> make(const Parameters& parameters) {
 }  // namespace
 
 std::vector<MethodInfo> tsdf_methods() {
-  return {{"tsdf", "64^3 voxels of signed distance about the proxy, frames fused", make}};
+  return {{"tsdf", "64^3 voxels of signed distance around the proxy, fused over frames", make}};
 }
 
 }  // namespace palpate::lab

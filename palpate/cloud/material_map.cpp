@@ -79,10 +79,9 @@ void validate(const MaterialTable& table) {
   }
   std::set<std::string_view> names;
   for (const NamedMaterial& m : table.materials) {
-    if (m.name.empty()) throw Error("material", "one has no name", "give each its name");
+    if (m.name.empty()) throw Error("material", "a material has no name", "give each its name");
     if (!names.insert(m.name).second)
-      throw Error("material '" + m.name + "'", "there are two of that name",
-                  "give each a name of its own");
+      throw Error("material '" + m.name + "'", "the name is used twice", "use different names");
     if (!(m.tolerance >= 1.0 && m.tolerance <= 100.0))
       throw Error("material '" + m.name + "'", "its tolerance is out of range",
                   "give 1 to 100, such as 15");
@@ -104,7 +103,7 @@ const NamedMaterial& standard_material(std::string_view name) {
   for (const NamedMaterial& m : materials) {
     if (m.name == name) return m;
   }
-  throw Error("material '" + std::string(name) + "'", "there is none of that name",
+  throw Error("material '" + std::string(name) + "'", "there is no material of that name",
               did_you_mean(name, names_of(materials)));
 }
 

@@ -116,13 +116,15 @@ PointCloud::PointCloud(Surface surface, std::optional<Vec3> viewpoint)
     : PointCloud(std::span<const Vec3>(surface.points), viewpoint) {
   const std::size_t count = surface.points.size();
   if (!surface.normals.empty() && surface.normals.size() != count)
-    throw Error("surface", "its normals are not as many as its points", "give one for each");
+    throw Error("surface", "the number of normals differs from the number of points",
+                "give one for each");
   const auto image = static_cast<std::int64_t>(surface.columns) * surface.rows;
   if (image != 0 && image != static_cast<std::int64_t>(count))
-    throw Error("surface", "its points are not columns times rows", "give each place one, or NaN");
+    throw Error("surface", "the number of points is not columns times rows",
+                "set every point, missing ones to NaN");
   for (const auto& triangle : surface.triangles) {
     if (*std::max_element(triangle.begin(), triangle.end()) >= count)
-      throw Error("surface", "a triangle's corner is none of its points", "number them from 0");
+      throw Error("surface", "a triangle has an invalid vertex number", "number them from 0");
   }
   surface_ = std::make_shared<const Surface>(std::move(surface));
 }

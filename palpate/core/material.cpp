@@ -74,8 +74,8 @@ Material material_of(const Parameters& p) {
 std::span<const MaterialInfo> material_table() {
   static const std::array table{
       MaterialInfo{"stiffness", "", "N/m", 1e5, 10.0, 1e5,
-                   "spring of the surface; the session's stiffness is felt where that is less",
-                   "ours (feel)", [](const Material& m) { return m.stiffness; },
+                   "stiffness of the surface, limited to the session's stiffness", "ours (feel)",
+                   [](const Material& m) { return m.stiffness; },
                    [](Material& m, double v) { m.stiffness = v; }},
       as_parameter<cushion_of>("cushion"),
       as_parameter<friction_of>("friction"),

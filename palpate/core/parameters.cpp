@@ -62,7 +62,7 @@ constexpr std::array table = {
                   [](const Parameters& p) { return p.coupling.max_force; },
                   [](Parameters& p, double v) { p.coupling.max_force = v; }},
     ParameterInfo{"frame_rate", "f_c", "Hz", 30.0, 0.1, 1000.0,
-                  "frame rate assumed before two stamps are known", "(3), (13)",
+                  "frame rate assumed until there are two timestamps", "(3), (13)",
                   [](const Parameters& p) { return p.motion.frame_rate; },
                   [](Parameters& p, double v) { p.motion.frame_rate = v; }},
     ParameterInfo{"max_extrapolation", "", "s", 0.1, 0.0, 10.0,
@@ -83,8 +83,8 @@ constexpr std::array table = {
         "ours (sight)", [](const Parameters& p) { return p.sight.hardest_strike; },
         [](Parameters& p, double v) { p.sight.hardest_strike = v; }},
     ParameterInfo{"return_speed", "", "m/s", 0.01, 1e-3, 10.0,
-                  "speed at which a surface comes back to a hand inside it, after it was hidden, "
-                  "lost or too old; a free handle is pushed out at twice that at most",
+                  "speed at which a surface returns to a HIP inside it, after it was occluded, "
+                  "lost or too old; a released handle is pushed out at twice that at most",
                   "ours (sight)", [](const Parameters& p) { return p.sight.return_speed; },
                   [](Parameters& p, double v) { p.sight.return_speed = v; }},
     ParameterInfo{"side_depth", "", "m", 0.1, 0.0, 1.0,
@@ -92,13 +92,14 @@ constexpr std::array table = {
                   "ours (sight)", [](const Parameters& p) { return p.sight.side_depth; },
                   [](Parameters& p, double v) { p.sight.side_depth = v; }},
     ParameterInfo{"usual_noise", "", "m", 0.0, 0.0, 0.1,
-                  "noise of the depth camera at 1 m, until it has been measured; 0: as usual for "
-                  "its kind; less finds a motion sooner, and in noise",
+                  "depth noise (standard deviation) at 1 m until it has been measured; 0: default "
+                  "of the sensor type. Smaller: motion is detected earlier, but noise is more "
+                  "often mistaken for motion",
                   "ours (sight)", [](const Parameters& p) { return p.sight.usual_noise; },
                   [](Parameters& p, double v) { p.sight.usual_noise = v; }},
     ParameterInfo{"noise_growth", "", "-", 0, 0, 2,
-                  "power of the distance with which usual_noise grows: 2 where the camera "
-                  "triangulates, 1 where it times light; 0: as usual for its kind",
+                  "power of the distance with which usual_noise grows: 2 for triangulation, 1 for "
+                  "time of flight; 0: default of the sensor type",
                   "ours (sight)",
                   [](const Parameters& p) { return double{1} * p.sight.noise_growth; },
                   [](Parameters& p, double v) { p.sight.noise_growth = static_cast<int>(v); }},
@@ -107,14 +108,14 @@ constexpr std::array table = {
         "standard deviations that noise explains; less finds a change sooner, more averages more",
         "ours (sight)", [](const Parameters& p) { return p.sight.confidence; },
         [](Parameters& p, double v) { p.sight.confidence = v; }},
-    ParameterInfo{
-        "least_share", "", "-", 0.3, 0.05, 0.9,
-        "share of a beam's points that makes a surface; less feels finer things, and strays",
-        "ours (sight)", [](const Parameters& p) { return p.sight.least_share; },
-        [](Parameters& p, double v) { p.sight.least_share = v; }},
+    ParameterInfo{"least_share", "", "-", 0.3, 0.05, 0.9,
+                  "minimum fraction of the points in the viewing cone that makes a surface. "
+                  "Smaller: finer objects are felt, but also outliers",
+                  "ours (sight)", [](const Parameters& p) { return p.sight.least_share; },
+                  [](Parameters& p, double v) { p.sight.least_share = v; }},
     ParameterInfo{"widest_disc", "", "m", 85e-3, 11e-3, 85e-3,
-                  "radius that a fit is averaged over at most; less is noisier, and sooner right "
-                  "about small bodies",
+                  "maximum radius of the fitted area. Smaller: more noise, but small objects are "
+                  "correct earlier",
                   "ours (sight)", [](const Parameters& p) { return p.sight.widest_disc; },
                   [](Parameters& p, double v) { p.sight.widest_disc = v; }},
     ParameterInfo{"averaged_frames", "", "frames", 64, 1, 64,
@@ -127,8 +128,8 @@ constexpr std::array table = {
                   "ours (sight)", [](const Parameters& p) { return p.sight.rest_odds; },
                   [](Parameters& p, double v) { p.sight.rest_odds = v; }},
     ParameterInfo{"motion_memory", "", "-", 0.85, 0.3, 0.99,
-                  "by which what a frame says of a motion fades from frame to frame; more is "
-                  "steadier, and later at a turn",
+                  "forgetting factor of the motion estimate, per frame. Larger: smoother motion, "
+                  "but a change of direction is followed later",
                   "ours (sight)", [](const Parameters& p) { return p.sight.motion_memory; },
                   [](Parameters& p, double v) { p.sight.motion_memory = v; }},
     ParameterInfo{"curvature_sd", "", "1/m", 15.0, 1.0, 1e6,
@@ -137,35 +138,35 @@ constexpr std::array table = {
                   "ours (sight)", [](const Parameters& p) { return p.sight.curvature_sd; },
                   [](Parameters& p, double v) { p.sight.curvature_sd = v; }},
     ParameterInfo{"blend", "", "intervals", 0.85, 0.01, 1.0,
-                  "share of the time between frames over which the force follows a correction; "
-                  "less is truer in motion, more is smoother",
+                  "fraction of the frame interval over which the force follows a correction. "
+                  "Smaller: more accurate in motion; larger: smoother",
                   "ours (sight)", [](const Parameters& p) { return p.sight.blend; },
                   [](Parameters& p, double v) { p.sight.blend = v; }},
-    ParameterInfo{"evidence_frames", "", "frames", 2, 1, 10,
-                  "frames in a row that must show a proxy behind its surface before it is brought "
-                  "back; fewer are sooner, and wrong in noise",
-                  "ours (sight)",
-                  [](const Parameters& p) { return double{1} * p.sight.evidence_frames; },
-                  [](Parameters& p, double v) { p.sight.evidence_frames = static_cast<int>(v); }},
+    ParameterInfo{
+        "evidence_frames", "", "frames", 2, 1, 10,
+        "consecutive frames that must show a proxy behind the surface before it is moved back to "
+        "the front. Fewer: earlier correction, but more false corrections from noise",
+        "ours (sight)", [](const Parameters& p) { return double{1} * p.sight.evidence_frames; },
+        [](Parameters& p, double v) { p.sight.evidence_frames = static_cast<int>(v); }},
     ParameterInfo{"friction", "μ_s", "-", 0.0, 0.0, 2.0,
                   "static coefficient of friction of every surface; 0: none", "ours (feel)",
                   [](const Parameters& p) { return p.friction.friction; },
                   [](Parameters& p, double v) { p.friction.friction = v; }},
     ParameterInfo{"kinetic_share", "", "-", 0.8, 0.1, 1.0,
-                  "share of the friction that is left in fast sliding; less sticks and slips more",
-                  "ours (feel)", [](const Parameters& p) { return p.friction.kinetic_share; },
+                  "ratio of kinetic to static friction. Smaller: more stick-slip", "ours (feel)",
+                  [](const Parameters& p) { return p.friction.kinetic_share; },
                   [](Parameters& p, double v) { p.friction.kinetic_share = v; }},
     ParameterInfo{"viscosity", "", "s/m", 0.0, 0.0, 5.0,
-                  "by which the coefficient of friction grows with the sliding speed, as in honey",
+                  "increase of the friction coefficient with the sliding speed, as in honey",
                   "ours (feel)", [](const Parameters& p) { return p.friction.viscosity; },
                   [](Parameters& p, double v) { p.friction.viscosity = v; }},
     ParameterInfo{"stribeck_speed", "v_s", "m/s", 0.02, 1e-3, 1.0,
-                  "sliding speed at which static friction has become kinetic", "ours (feel)",
+                  "sliding speed at which friction changes from static to kinetic", "ours (feel)",
                   [](const Parameters& p) { return p.friction.stribeck_speed; },
                   [](Parameters& p, double v) { p.friction.stribeck_speed = v; }},
     ParameterInfo{"bristle_stiffness", "σ_0", "N/m", 600.0, 10.0, 1e5,
-                  "spring that holds a hand where it sticks; more sticks harder, and must stay "
-                  "within what the device can render",
+                  "stiffness of the static friction. Larger: harder sticking; the device must be "
+                  "able to render it",
                   "ours (feel)", [](const Parameters& p) { return p.friction.bristle_stiffness; },
                   [](Parameters& p, double v) { p.friction.bristle_stiffness = v; }},
     ParameterInfo{"bristle_damping", "σ_1", "N s/m", 1.0, 0.0, 1e3,
@@ -173,11 +174,11 @@ constexpr std::array table = {
                   "positions",
                   "ours (feel)", [](const Parameters& p) { return p.friction.bristle_damping; },
                   [](Parameters& p, double v) { p.friction.bristle_damping = v; }},
-    ParameterInfo{"cushion", "λ", "s/m", 0.0, 0.0, 5.0,
-                  "share by which the force grows for each m/s at which the hand presses in; more "
-                  "bounces less",
-                  "Hunt and Crossley 1975", [](const Parameters& p) { return p.contact.cushion; },
-                  [](Parameters& p, double v) { p.contact.cushion = v; }},
+    ParameterInfo{
+        "cushion", "λ", "s/m", 0.0, 0.0, 5.0,
+        "relative increase of the force for each m/s of inward speed. Larger: less bouncing",
+        "Hunt and Crossley 1975", [](const Parameters& p) { return p.contact.cushion; },
+        [](Parameters& p, double v) { p.contact.cushion = v; }},
     ParameterInfo{"tap", "A", "N s/m", 0.0, 0.0, 50.0,
                   "force of an impact's ringing for each m/s of its speed, up to 1 N; 0: none",
                   "Okamura et al. 2001", [](const Parameters& p) { return p.tap.tap; },
@@ -185,9 +186,8 @@ constexpr std::array table = {
     ParameterInfo{"tap_frequency", "f", "Hz", 100.0, 5.0, 400.0, "of an impact's ringing",
                   "Okamura et al. 2001", [](const Parameters& p) { return p.tap.tap_frequency; },
                   [](Parameters& p, double v) { p.tap.tap_frequency = v; }},
-    ParameterInfo{"tap_decay", "B", "1/s", 80.0, 50.0, 1000.0,
-                  "rate at which an impact's ringing dies away", "Okamura et al. 2001",
-                  [](const Parameters& p) { return p.tap.tap_decay; },
+    ParameterInfo{"tap_decay", "B", "1/s", 80.0, 50.0, 1000.0, "decay rate of the impact vibration",
+                  "Okamura et al. 2001", [](const Parameters& p) { return p.tap.tap_decay; },
                   [](Parameters& p, double v) { p.tap.tap_decay = v; }},
     ParameterInfo{"grain", "", "-", 0.0, 0.0, 0.3,
                   "vibration while stroking, rms, as a share of the normal force; 0: none",
@@ -198,8 +198,8 @@ constexpr std::array table = {
                   [](const Parameters& p) { return p.texture.grain_length; },
                   [](Parameters& p, double v) { p.texture.grain_length = v; }},
     ParameterInfo{"relief", "", "m", 0.0, -5e-3, 5e-3,
-                  "height of what is white above what is black in the camera's image; 0: flat",
-                  "ours (feel)", [](const Parameters& p) { return p.texture.relief; },
+                  "height of white above black in the camera image; 0: flat", "ours (feel)",
+                  [](const Parameters& p) { return p.texture.relief; },
                   [](Parameters& p, double v) { p.texture.relief = v; }},
 };
 

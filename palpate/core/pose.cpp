@@ -46,7 +46,7 @@ Eigen::Isometry3d parse_pose(std::string_view text, const std::string& subject) 
   const Eigen::Vector3d translation(numbers[0], numbers[1], numbers[2]);
   const Eigen::Quaterniond rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
   if (translation.cwiseAbs().maxCoeff() > farthest)
-    throw Error(subject, "the position is farther than 1000 km", remedy);
+    throw Error(subject, "the position is beyond 1000 km", remedy);
   if (!(std::abs(rotation.norm() - 1.0) <= 0.01))
     throw Error(subject, "the quaternion's length is " + shortest(rotation.norm()), remedy);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();

@@ -8,19 +8,18 @@ namespace {
 
 constexpr std::array<TickFlagInfo, tick_flag_count> flag_table{{
     {"step_budget_hit",
-     "the proxy had not converged and goes on in the next tick; raise "
-     "step_budget"},
-    {"patch_thinned", "more points were near than a patch holds; move the camera away"},
-    {"force_saturated", "the coupling asked for more than max_force; lower the stiffness"},
-    {"non_finite_input", "the hand's position or the time was not finite"},
+     "the proxy has not converged and continues in the next tick; raise step_budget"},
+    {"patch_thinned", "more points were nearby than a patch can store; move the camera away"},
+    {"force_saturated", "the coupling requested more than max_force; lower the stiffness"},
+    {"non_finite_input", "the HIP position or the time is not finite"},
     {"no_frame", "there is no frame to touch yet"},
     {"stamp_not_increasing", "a camera's clock stood still or ran backwards"},
     {"frame_stale", "the newest frame is older than max_extrapolation"},
     {"normal_undefined", "the points' directions cancel out; the last normal was used"},
-    {"surface_hidden", "an occluder hides the surface: it is held where it was"},
+    {"surface_hidden", "the surface is occluded: the last estimate is used"},
     {"pop_through_suspected", "the proxy was found behind the surface that the camera sees"},
-    {"free_space_released", "the camera sees free space around the hand: the force was taken off"},
-    {"proxy_let_go", "the proxy was farther from its hand than can be and was put there"},
+    {"free_space_released", "the camera sees free space around the HIP: the force was set to zero"},
+    {"proxy_let_go", "the proxy was too far from the HIP for a contact and was reset to it"},
     {"returned_to_front", "the proxy was behind the surface and was brought back in front of it"},
 }};
 

@@ -108,7 +108,7 @@ double Uri::number_option(std::string_view key, double fallback, double min, dou
         }
       }
       throw Error(subject, "the unit of '" + value + "' does not fit",
-                  fitting.empty() ? "give a plain number" : "units known here: " + fitting);
+                  fitting.empty() ? "give a plain number" : "valid units: " + fitting);
     }
     number *= known->factor;
   }

@@ -457,7 +457,7 @@ std::unique_ptr<Device> open_guarded(const std::function<std::unique_ptr<Device>
     kill(guard, SIGKILL);
     waitpid(guard, &status, 0);
     munmap(shared, sizeof(Memory));
-    throw Error(trouble, "the device cannot be guarded");
+    throw Error(trouble, "the device could not be opened in its guard process");
   }
   return std::make_unique<GuardedDevice>(memory, guard);
 }

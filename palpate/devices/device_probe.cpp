@@ -232,9 +232,9 @@ class Watcher {
     if ((tick.safety & let_go) != 0) {
       const DeviceFault fault = fault_of(tick.hand);
       const std::string text = device_.fault_text();
-      ended = fault != DeviceFault::none
-                  ? (text.empty() ? std::string(describe(fault)) : text)
-                  : "the device let go: nobody holds it, or the safety chain took the force away";
+      ended = fault != DeviceFault::none ? (text.empty() ? std::string(describe(fault)) : text)
+                                         : "the device disengaged: it reports no hand, or the "
+                                           "safety chain set the force to zero";
       exciter_.stop();
       return false;
     }
@@ -255,7 +255,7 @@ class Watcher {
 [[noreturn]] void never_ready(Device& device) {
   const std::string text = device.fault_text();
   throw Error(device.info().uri, "it gives no force" + (text.empty() ? "" : ": " + text),
-              "see that it is switched on and calibrated, and that nothing holds its force back");
+              "check that it is switched on and calibrated, and that its force is enabled");
 }
 
 void run_simulated(Device& device, const ProbeOptions& options,
@@ -326,7 +326,7 @@ std::string text_of(End end, const ProbeOptions& options) {
       return {};
     case End::too_far:
       return "the handle went more than " + rounded(1e3 * options.travel, 0) +
-             " mm away: take its weight off, or begin in the middle of its workspace";
+             " mm away: support its weight, or start in the centre of its workspace";
     case End::too_fast:
       return "the handle became faster than " + shortest(options.top_speed) + " m/s";
     case End::too_long:

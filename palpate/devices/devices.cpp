@@ -80,7 +80,7 @@ std::unique_ptr<Device> open_mouse(const Uri& uri, const Path& /*path*/) {
                                                     "response", "max_speed", "silence"};
   uri.allow_only(options);
   if (!uri.path().empty()) {
-    throw Error(uri.text(), "a mouse has no '" + uri.path() + "'", "write mouse: alone");
+    throw Error(uri.text(), "a mouse has no '" + uri.path() + "'", "write only mouse:");
   }
   const auto coordinate = [&](std::string_view key) {
     return uri.number_option(key, 0.0, -1e6, 1e6, "m");
@@ -95,11 +95,11 @@ std::unique_ptr<Device> open_mouse(const Uri& uri, const Path& /*path*/) {
 }  // namespace
 
 Registry<DeviceScheme> standard_devices() {
-  return {"kind of device",
+  return {"type of device",
           ":",
-          {{"script", "follows a recorded path, whatever the force", open_script},
+          {{"script", "follows a recorded path, independent of the force", open_script},
            {"hand", "a simulated person that follows a path and yields to the force", open_hand},
-           {"mouse", "led from the viewer's page, made smooth", open_mouse}}};
+           {"mouse", "controlled from the page, smoothed", open_mouse}}};
 }
 
 std::unique_ptr<Device> open_device(std::string_view text, const Path& path,

@@ -24,7 +24,7 @@ constexpr std::array<std::string_view, 4> columns{"t", "x", "y", "z"};
 std::string fault(const HipPath::Sample& sample, std::span<const HipPath::Sample> before) {
   if (!std::isfinite(sample.t)) return "t is not finite";
   if (!sample.hip.allFinite()) return "x, y or z is not finite";
-  if (sample.hip.cwiseAbs().maxCoeff() > farthest) return "the place is farther than 1000 km";
+  if (sample.hip.cwiseAbs().maxCoeff() > farthest) return "the position is beyond 1000 km";
   if (before.empty()) return {};
   if (!(sample.t > before.back().t)) return "t does not increase";
   if (sample.t - before.front().t > longest) return "the path is longer than 1000000 s";

@@ -13,7 +13,7 @@ namespace {
 void check_place(const Vec3& place) {
   constexpr double farthest = 1e6;  // [m]
   if (place.allFinite() && place.cwiseAbs().maxCoeff() <= farthest) return;
-  throw Error("mouse", "a place is not finite or farther than 1000 km", "give metres");
+  throw Error("mouse", "the position is not finite or beyond 1000 km", "give metres");
 }
 
 }  // namespace

@@ -94,10 +94,10 @@ DiagnosticStatus loop_status(const SessionReport& report) {
   DiagnosticStatus made = status("servo loop", DiagnosticStatus::ok, "runs");
   if (report.tick_rate == 0.0) {
     made.level = DiagnosticStatus::error;
-    made.message = "no tick comes";
+    made.message = "there are no ticks";
   } else if (report.tick_rate < least_share * state.rate || report.late_ticks > 0) {
     made.level = DiagnosticStatus::warn;
-    made.message = "ticks come late; see palpate doctor";
+    made.message = "ticks are late; see palpate doctor";
   }
   made.values = {{"rate [Hz]", number(report.tick_rate)},
                  {"rate asked for [Hz]", number(state.rate)},
@@ -137,7 +137,7 @@ DiagnosticStatus contact_status(const Contact& contact, bool held) {
   const ServoTick& newest = contact.ticks.newest;
   DiagnosticStatus made =
       status(contact.name + "contact", DiagnosticStatus::ok, to_string(newest.tick.state));
-  if (held) made.message += "; the force is held back (~/release ends that)";
+  if (held) made.message += "; the force is paused (~/release ends this)";
   if (contact.latched_by != 0) {
     made.level = DiagnosticStatus::error;
     made.message = "no force: latched by " + names_of(contact.latched_by, safety_flag_names()) +

@@ -52,7 +52,7 @@ NodeName checked_name(const std::string& text) {
     before = c;
   }
   if (!is_good)
-    throw Error("--name", "'" + text + "' is none for a node",
+    throw Error("--name", "'" + text + "' is not a valid node name",
                 "write letters, digits and _, such as palpate or cell_3/palpate");
   const std::size_t slash = path.rfind('/');
   if (slash == std::string::npos) return {"/", path};
@@ -168,7 +168,7 @@ class RosNode::Impl {
         release_(participant_, name_ + "/release", 10,
                  [this](const auto&) {
                    return done([this] { session_.hold(false); },
-                               "the hand engages away from surfaces");
+                               "the device engages in free space");
                  }),
         reset_(participant_, name_ + "/reset_faults", 11,
                [this](const auto&) {

@@ -45,7 +45,7 @@ std::unique_ptr<SessionReader> SessionReader::parent_of(const std::filesystem::p
     if (!parent->info_.frames_in_parent) return parent;
   } catch (const Error& error) {
     throw Error(path.string(),
-                std::string("needs the recording of its session's first hand: ") + error.what(),
+                std::string("needs the recording of the first hand: ") + error.what(),
                 "leave it in the folder in which it was made");
   }
   throw Error(path.string(), "lies in a recording that has no frames either",
@@ -141,8 +141,8 @@ std::shared_ptr<const Cloud> SessionReader::cloud(std::size_t camera, std::size_
 std::shared_ptr<const Cloud> SessionReader::cloud(const PutFrame& frame) {
   if (parent_) return parent_->cloud(frame);
   if (frame.parts.empty())
-    throw Error("recording", "a frame was left out of it when it was made",
-                "the machine or its disk was too slow to record all of them");
+    throw Error("recording", "a frame was dropped during recording",
+                "the computer or its disk was too slow to record all frames");
   std::vector<std::shared_ptr<const Cloud>> clouds;
   for (const auto& [camera, number] : frame.parts) clouds.push_back(cloud(camera, number));
   if (clouds.size() == 1) return clouds.front();

@@ -96,7 +96,7 @@ void SessionWriter::frame(std::uint64_t number, double stamp,
       } else if (const auto* cloud = dynamic_cast<const PointCloud*>(cameras[i].get())) {
         points(i, stamp, *cloud);
       } else {
-        throw Error("frame " + std::to_string(number), "is of a kind that cannot be recorded",
+        throw Error("frame " + std::to_string(number), "has a type that cannot be recorded",
                     "record depth images or points");
       }
       camera.newest = cameras[i];

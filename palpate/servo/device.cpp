@@ -12,12 +12,12 @@ struct Row {
 // In DeviceFault's order.
 constexpr std::array rows{
     Row{"none", ""},
-    Row{"not_calibrated", "the device is not calibrated; calibrate it as its manual says"},
+    Row{"not_calibrated", "the device is not calibrated; calibrate it as described in its manual"},
     Row{"disconnected", "the device does not answer; check its cable, power and driver"},
     Row{"overheated", "the motors are too hot; let them cool down for some minutes"},
     Row{"emergency_stop",
         "the emergency stop or dead man's switch is open; close it when it is safe to do so"},
-    Row{"busy", "another program holds the device; close that program"},
+    Row{"busy", "another program uses the device; close that program"},
     Row{"refused_command", "the device did not accept the force; switch it off and on again"},
     Row{"other", "the device reports a fault; see its manual, or switch it off and on again"},
     Row{"another_hand", "another hand of this session has a fault or does not answer; see there"},

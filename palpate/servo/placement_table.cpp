@@ -63,16 +63,16 @@ constexpr std::array placement_rows{
     PlacementInfo{"yaw", "", "rad", 0.0, -pi, pi, "then about the world's z axis", "", angle<2>,
                   set_angle<2>},
     PlacementInfo{"bubble_radius", "", "m", 0.0, 0.0, 1.0,
-                  "a hand that is farther from the middle of its device sends the HIP on (rate "
-                  "control); 0: none",
+                  "radius around the centre of the device workspace outside which rate control "
+                  "moves the HIP on; 0: off",
                   "Dominjon et al. 2005", [](const Placement& p) { return p.bubble_radius; },
                   [](Placement& p, double v) { p.bubble_radius = v; }},
     PlacementInfo{"bubble_speed", "", "m/s", 0.1, 0.001, 1.0,
-                  "of the HIP in the scene, when the hand is 2 cm beyond the bubble or farther", "",
+                  "speed of the HIP in the scene, from 2 cm outside this radius on", "",
                   [](const Placement& p) { return p.bubble_speed; },
                   [](Placement& p, double v) { p.bubble_speed = v; }},
     PlacementInfo{"handle_weight", "", "kg", 0.0, 0.0, 0.1,
-                  "of the handle that the motors hold up, where the device does not; 0: none", "",
+                  "handle mass that the motors compensate; 0: off", "",
                   [](const Placement& p) { return p.handle_weight; },
                   [](Placement& p, double v) { p.handle_weight = v; }},
 };

@@ -43,24 +43,24 @@ constexpr std::array<std::string_view, safety_flag_count> flag_names{
 constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the device or the method gave a number that is not finite, or time ran backwards",
     "the part of the force that pulled into the surface was removed",
-    "the force is at its limit: the method asked for more than the user or the device allows",
+    "the force is at its limit: the method requested more than the user or the device allows",
     "the force is limited because the motors are warm",
-    "the force changes more slowly than the method asked",
+    "the force changes more slowly than the method requested",
     "the surface is softened because the force swung fast, again and again",
-    "no force: the hand is not engaged; it engages away from surfaces, once it is asked to feel "
-    "next to nothing",
-    "the force is coming up gradually after the hand engaged or after an interruption",
+    "no force: the device is not engaged; move away from the surface: it engages when the "
+    "requested force is nearly zero",
+    "the force is ramping up after engaging or after an interruption",
     "the force may only fall: a camera's next frame is overdue",
     "the force fades: a camera's newest frame is old",
     "no force: a camera has sent no frame that can be used for too long",
-    "no force: the hand was faster than it may be",
+    "no force: the hand was faster than max_speed",
     "the force starts again from nothing: the loop missed its deadlines",
     "no force: the method's surface normal contradicts the direction from the HIP to the proxy",
     "no force: repeated faults; an operator has to reset the safety chain",
     "the surface is softened because it kept up an oscillation",
-    "no force: the safety chain's own result broke its bounds; please report it",
-    "the surface comes more slowly: a correction would have done more work on the hand than it "
-    "may"};
+    "no force: the result of the safety chain violated its limits; please report it",
+    "the force is reduced: a correction would have transferred more energy to the hand than "
+    "frame_work"};
 
 using P = SafetyParameters;
 template <double P::*member>
@@ -81,51 +81,52 @@ constexpr SafetyParameterInfo row(std::string_view name, std::string_view unit,
 
 constexpr std::array table{
     row<&P::max_force>("max_device_force", "N", 3.3, 0.0, 50.0,
-                       "the user's limit; the device's own may be lower"),
+                       "the user's limit; the device's limit may be lower"),
     row<&P::continuous_time>("continuous_time", "s", 20.0, 1.0, 600.0,
                              "time constant of the motors' heat"),
     row<&P::initial_heat>(
         "initial_heat", "-", 1.0, 0.0, 1.0,
-        "heat of the motors at the start, as a share of what they bear; 1 if unknown"),
+        "motor temperature at the start, as a fraction of the thermal limit; 1 if unknown"),
     row<&P::rise_rate>("rise_rate", "N/s", 500.0, 1.0, 1e5,
                        "largest rate of change of the force, unless towards zero"),
     row<&P::fall_rate>("fall_rate", "N/s", 2000.0, 1.0, 1e5,
-                       "largest rate at which the force shrinks"),
-    row<&P::swing>("swing", "N", 0.5, 0.01, 10.0, "a smaller swing of the force is no oscillation"),
+                       "largest rate at which the force decreases"),
+    row<&P::swing>("swing", "N", 0.5, 0.01, 10.0, "minimum amplitude of a force oscillation"),
     row<&P::swing_time>("swing_time", "s", 0.025, 1e-3, 0.5,
-                        "a slower swing of the force is no oscillation"),
+                        "maximum half period of a force oscillation"),
     row<&P::swing_count>("swing_count", "-", 8.0, 2.0, 100.0,
-                         "swings in a row that are an oscillation"),
+                         "consecutive half periods that count as an oscillation"),
     row<&P::cycle_distance>("cycle_distance", "m", 1e-3, 1e-4, 0.05,
-                            "a smaller swing of the hand is no cycle of an oscillation"),
+                            "minimum amplitude of the hand in an oscillation cycle"),
     row<&P::cycle_count>("cycle_count", "-", 6.0, 3.0, 100.0,
-                         "cycles in a row that generate energy, which are an oscillation"),
+                         "consecutive energy-generating cycles that count as an oscillation"),
     row<&P::cut_memory>("cut_memory", "s", 30.0, 1.0, 600.0,
-                        "time constant with which a cut for generated energy is forgotten"),
+                        "time constant with which the stiffness recovers after it was reduced for "
+                        "generated energy"),
     row<&P::frame_work>("frame_work", "J", 1.0, 0.0, 1.0,
-                        "work that a frame's corrections may do on the hand, beside what the "
-                        "contact has dissipated; 1: no limit"),
+                        "energy that the corrections of one frame may transfer to the hand, in "
+                        "addition to the energy that the contact has dissipated; 1: no limit"),
     row<&P::engage_force>("engage_force", "N", 0.2, 0.0, 3.0,
-                          "the hand engages while less than this is asked for"),
+                          "the device engages while the requested force is below this"),
     row<&P::engage_ticks>("engage_ticks", "ticks", 10.0, 1.0, 1e5,
-                          "ticks in a row below engage_force that engage the hand"),
+                          "consecutive ticks below engage_force that engage the device"),
     row<&P::ramp_time>("ramp_time", "s", 1.5, 0.01, 10.0, "from no force to all of it"),
     row<&P::late_intervals>("late_intervals", "intervals", 3.0, 1.0, 100.0,
-                            "of a camera without a frame, after which the force may only fall"),
+                            "frame intervals without a frame after which the force may only fall"),
     row<&P::fade_age>("fade_age", "s", 0.1, 0.01, 5.0,
                       "age of the newest frame from which the force fades"),
     row<&P::lost_age>("lost_age", "s", 0.5, 0.02, 10.0,
-                      "age of the newest frame at which the hand disengages"),
-    row<&P::future_tolerance>("future_tolerance", "s", 0.05, 0.0, 1.0,
-                              "a stamp farther ahead of the loop's clock is not fresh"),
+                      "age of the newest frame at which the device disengages"),
+    row<&P::future_tolerance>(
+        "future_tolerance", "s", 0.05, 0.0, 1.0,
+        "a frame with a timestamp farther ahead of the loop's clock is not fresh"),
     row<&P::max_speed>("max_speed", "m/s", 1.5, 0.05, 20.0,
-                       "a faster hand gets no force, then a ramp"),
+                       "above this speed of the hand there is no force, then a ramp"),
     row<&P::stall_time>("stall_time", "s", 5e-3, 2e-3, 0.1,
-                        "a tick that comes later starts a ramp"),
+                        "a longer delay of a tick starts a ramp"),
     row<&P::fault_count>("fault_count", "-", 3.0, 1.0, 16.0,
-                         "faults within fault_time, after which an operator has to reset"),
-    row<&P::fault_time>("fault_time", "s", 2.0, 0.0, 600.0,
-                        "time within which faults add up to a latched one"),
+                         "faults within fault_time that latch until an operator resets them"),
+    row<&P::fault_time>("fault_time", "s", 2.0, 0.0, 600.0, "time window for fault_count"),
 };
 
 constexpr std::string_view noun = "safety parameter";

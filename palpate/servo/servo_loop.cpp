@@ -232,7 +232,7 @@ DeviceStatus ServoLoop::device_status() const {
   }
   if (started_ && !stopped_ && !status.ticking) {
     status.text = "no tick for " + std::to_string(std::lround(1e3 * silent)) +
-                  " ms: the device is disabled until ticks come again";
+                  " ms: the device is disabled until ticks resume";
     return status;
   }
   status.text = watchdog_.refusal();

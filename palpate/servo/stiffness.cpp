@@ -18,10 +18,10 @@ std::vector<std::string> stiffness_warnings(const DeviceInfo& device, double sti
                        " N/m or less");
   };
   if (device.limits.max_stiffness)
-    warn(*device.limits.max_stiffness, "what the device is good for");
+    warn(*device.limits.max_stiffness, "the rated stiffness of the device");
   if (device.damping)
     warn(2.0 * *device.damping / (1.0 / rate + 2.0 * device.delay.value_or(0.0)),
-         "above which a handle that nobody holds may swing (2b/(T + 2 t_d))");
+         "above which a released handle may oscillate (2b/(T + 2 t_d))");
   return warnings;
 }
 

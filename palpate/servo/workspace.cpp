@@ -24,7 +24,7 @@ void validate(const Placement& placement) {
                 "give metres of the device, from 0 (no bubble) to 1");
   if (!(placement.bubble_speed >= 1e-3 && placement.bubble_speed <= 1.0))
     throw Error("bubble_speed", std::to_string(placement.bubble_speed) + " is out of range",
-                "give metres a second in the scene, from 0.001 to 1");
+                "give metres per second in the scene, from 0.001 to 1");
   if (!(placement.handle_weight >= 0.0 && placement.handle_weight <= 0.1))
     throw Error("handle_weight", std::to_string(placement.handle_weight) + " is out of range",
                 "give kilograms from 0 (the device holds its handle) to 0.1");

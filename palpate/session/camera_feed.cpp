@@ -77,8 +77,8 @@ std::string doubt_of(const Cloud& cloud, const DepthRange& range) {
   const double share = static_cast<double>(elsewhere) / static_cast<double>(measured + 1);
   if (measured < fewest_points || share <= most_elsewhere) return {};
   return std::to_string(std::lround(100.0 * share)) +
-         " % of its points lie outside what it can measure (" + metres(range.nearest) + " to " +
-         metres(range.farthest) + " m): look at its unit of depth";
+         " % of its points are outside the camera's measuring range (" + metres(range.nearest) +
+         " to " + metres(range.farthest) + " m): check the unit of its depth values";
 }
 
 // Which sentence tells a person of a problem with stamps.
@@ -89,11 +89,11 @@ std::string_view remark_of(StampProblem problem) {
     case StampProblem::drifted:
       return "its clock drifted away";
     case StampProblem::from_the_future:
-      return "its stamps are from the future; times of arrival are used";
+      return "its timestamps are in the future; arrival times are used";
     case StampProblem::too_old:
       return "its frames arrive old";
     case StampProblem::not_increasing:
-      return "its stamps do not increase";
+      return "its timestamps do not increase";
     case StampProblem::none:
       break;
   }
@@ -676,7 +676,7 @@ CameraStatus CameraFeed::Worker::status() const {
       status.text = "live";
       break;
     case CameraState::frozen:
-      status.text = "frozen: it gives the same picture again and again";
+      status.text = "frozen: it sends the same image repeatedly";
       break;
     case CameraState::searching:
       status.text = "looking for it again" + because;
@@ -751,7 +751,7 @@ void CameraFeed::set_playback(const Playback& playback) {
 
 void CameraFeed::seek(double share) {
   if (!(share >= 0.0 && share <= 1.0))
-    throw Error("playback", "there is no place " + number_text(share) + " in a recording",
+    throw Error("playback", "there is no position " + number_text(share) + " in a recording",
                 "give 0, its beginning, to 1, its end");
   worker_->seek(share);
 }

@@ -217,11 +217,12 @@ void check_information(const Equations& sum) {
   const Vec6 weakest = solver.eigenvectors().col(0);
   const bool turns = weakest.head<3>().norm() > weakest.tail<3>().norm();
   const Vec3 axis = (turns ? weakest.head<3>() : weakest.tail<3>()).normalized();
-  throw Error("the two cameras",
-              std::string("what both see leaves open a ") +
-                  (turns ? "turn about " : "shift along ") + in_words(axis) +
-                  " of the first camera's axes",
-              "let both see surfaces that face three ways, such as a box on the table");
+  throw Error(
+      "the two cameras",
+      std::string("the common view does not determine the ") +
+          (turns ? "rotation about " : "translation along ") + in_words(axis) +
+          " in the frame of the first camera",
+      "place an object with faces in three directions, such as a box, in view of both cameras");
 }
 
 }  // namespace
@@ -261,8 +262,8 @@ CameraFit register_cameras(const DepthImage& first, const DepthImage& second,
     }
     if (static_cast<double>(pairs.size()) <
         std::max(least_overlap * static_cast<double>(points.size()), 50.0))
-      throw Error("the two cameras", "too little of what the second sees lies where the first sees",
-                  "turn them to the same scene, or give a better rough start");
+      throw Error("the two cameras", "the two views overlap too little",
+                  "point both cameras at the same scene, or use a better initial estimate");
     sum = equations_of(pairs, gate);
     const Vec6 motion = step_of(sum);
     const Vec3 turn = motion.head<3>() / sum.radius;
@@ -284,8 +285,8 @@ CameraFit register_cameras(const DepthImage& first, const DepthImage& second,
     throw Error("the two cameras",
                 "their surfaces do not fit: " + std::to_string(std::lround(100.0 * agreement)) +
                     " % agree, to " + std::to_string(std::lround(1e3 * sum.deviation)) + " mm",
-                "give a start that is right to 10 cm and 10 degrees, keep the scene at rest, and "
-                "check the units of depth");
+                "use an initial estimate accurate to 10 cm and 10 degrees, keep the scene at rest, "
+                "and check the depth units");
   Mat6 unscaled = sum.information;
   unscaled.topRows<3>() *= sum.radius;
   unscaled.leftCols<3>() *= sum.radius;

@@ -166,19 +166,20 @@ std::string placement_lines(const Placement& placement) {
                    "x, y, z in m; quaternion x, y, z, w");
   text += key_line("scale", toml_number(placement.workspace_scale),
                    "0.001 to 1000: scene metres per device metre");
-  text += placement.clutch_button
-              ? key_line("clutch_button", std::to_string(*placement.clutch_button),
-                         "0 to 31: the HIP stays while it is pressed")
-              : key_line("# clutch_button", "0", "0 to 31: the HIP stays while it is pressed");
+  text +=
+      placement.clutch_button
+          ? key_line("clutch_button", std::to_string(*placement.clutch_button),
+                     "0 to 31: the HIP stays while this button is pressed")
+          : key_line("# clutch_button", "0", "0 to 31: the HIP stays while this button is pressed");
   text += key_line("bubble_radius", toml_number(placement.bubble_radius),
-                   "m of the device, 0 to 1: rate control beyond it; 0: none");
+                   "m of the device, 0 to 1: rate control outside this radius; 0: off");
   text += key_line("bubble_speed", toml_number(placement.bubble_speed),
-                   "m/s in the scene, 0.001 to 1: 2 cm beyond the bubble");
+                   "m/s in the scene, 0.001 to 1: from 2 cm outside this radius on");
   text += key_line("handle_weight", toml_number(placement.handle_weight),
-                   "kg, 0 to 0.1: of the handle that the motors hold up; 0: none");
+                   "kg, 0 to 0.1: handle mass that the motors compensate; 0: off");
   for (int axis = 0; axis < 3; ++axis)
     text += key_line(std::string("down_") + "xyz"[axis], toml_number(placement.down[axis]),
-                     "of the device's axes: which way the handle's weight pulls");
+                     "direction of gravity in the device frame");
   return text;
 }
 
@@ -206,7 +207,7 @@ void edit(std::vector<std::string>& lines, const toml::table& root, const std::s
   if (placement->is_inline()) {
     throw Error(at_line(name, placement->source().begin.line),
                 "an inline table cannot be edited by a program",
-                "write [placement] on a line of its own, and each key on one below it");
+                "write [placement] on a separate line, and each key on a line below it");
   }
   const toml::node* node = placement->get(key);
   if (node == nullptr) {
@@ -299,16 +300,17 @@ std::string to_toml(const SessionConfig& config) {
   std::string text = "# A palpate session; docs/session.md describes each key.\n";
   text += key_line("method", toml_text(config.method), "how forces are computed");
   text += key_line("rate", toml_number(config.rate), "Hz, 100 to 100000: ticks of the servo loop");
-  text += key_line("device", toml_text(config.device), "URI of the hand; \"\": the usual one");
+  text +=
+      key_line("device", toml_text(config.device), "URI of the haptic device; \"\": the default");
   text += key_line("without_watchdog", config.without_watchdog ? "true" : "false",
-                   "allow motors more than engage_force that no watchdog switches off");
+                   "allow forces above engage_force on a device with motors but no watchdog");
   text +=
       key_line("fixtures", toml_text(config.fixtures), "TOML file of virtual fixtures; \"\": none");
   text += key_line("record", toml_text(config.record), "folder to record into; \"\": none");
   text += key_line("record_folder", toml_text(config.record_folder),
-                   "where a page's recordings go; \"\": the current folder");
+                   "folder of recordings started on the page; \"\": the current folder");
   text += key_line("record_limit", toml_number(config.record_limit),
-                   "GB, 0.001 to 1000000: of all that pages record in a session");
+                   "GB, 0.001 to 1000000: total of the recordings started on the page");
   for (const CameraConfig& camera : config.cameras) {
     text += "\n[[camera]]\n";
     text += "uri = " + toml_text(camera.uri) + "\n";
@@ -323,7 +325,7 @@ std::string to_toml(const SessionConfig& config) {
   text += "\n[placement]\n" + placement_lines(config.placement);
   for (const HandConfig& hand : config.more_hands) {
     text += "\n[[hand]]\n";
-    text += key_line("device", toml_text(hand.device), "URI of another hand");
+    text += key_line("device", toml_text(hand.device), "URI of a further haptic device");
     if (!hand.name.empty()) text += "name = " + toml_text(hand.name) + "\n";
     text += placement_lines(hand.placement);
   }
@@ -339,17 +341,19 @@ std::string to_toml(const SessionConfig& config) {
   if (!config.operator_limits.empty()) {
     text += "\n[operator_limits]\n";
     for (const auto& [name, value] : config.operator_limits)
-      text += key_line(name, toml_number(value), "the loosest value for the operator's page");
+      text += key_line(name, toml_number(value), "least strict value that the operator may set");
   }
   text += "\n[server]\n";
-  text += key_line("listen", toml_text(config.server.listen), "address at which browsers find it");
+  text +=
+      key_line("listen", toml_text(config.server.listen), "address on which the page is served");
   text += config.server.port
               ? key_line("port", std::to_string(*config.server.port), "0 to 65535; 0: any")
               : key_line("# port", "8642", "0 to 65535; 0: any");
-  text += key_line("token", toml_text(config.server.token), "what a page must know; \"\": nothing");
+  text += key_line("token", toml_text(config.server.token), "access token of the page; \"\": none");
   text += key_line("operator_token", toml_text(config.server.operator_token),
-                   "what the operator's page must know; \"\": one is made");
-  text += key_line("browser", config.server.browser ? "true" : "false", "open one at the start");
+                   "access token of the operator; \"\": generated");
+  text +=
+      key_line("browser", config.server.browser ? "true" : "false", "open a browser at the start");
   return text;
 }
 
@@ -375,7 +379,7 @@ std::string with_placement(std::string_view text, const std::string& name,
                      got.world_from_device.isApprox(placement.world_from_device, 1e-12);
   if (!right) {
     throw Error(name, "its [placement] is written in a way that a program cannot edit",
-                "write [placement] on a line of its own, and each key on one below it");
+                "write [placement] on a separate line, and each key on a line below it");
   }
   return edited;
 }

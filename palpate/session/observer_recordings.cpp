@@ -60,10 +60,11 @@ void ObserverRecordings::start() {
     std::filesystem::create_directories(rules_.folder, error);
     if (error)
       throw Error("--record-folder " + rules_.folder.string(), error.message(),
-                  "give a folder that can be written to");
+                  "use a folder with write permission");
   }
   const std::string reason = reason_to_end();
-  if (!reason.empty()) throw Error("recording", reason, "make room, or start another session");
+  if (!reason.empty())
+    throw Error("recording", reason, "free some space, or start another session");
   const std::filesystem::path folder = new_folder(rules_.folder);
   session_.start_recording(folder.string());
   {

@@ -92,7 +92,9 @@ void Paint::define(const NamedMaterial& material) {
 
 void Paint::add(const Dab& dab) {
   if (!is_place(dab.place) || !(dab.radius >= smallest && dab.radius <= largest))
-    throw Error("brush", "its place or radius cannot be", "give a radius from 1 mm to 100 mm");
+    throw Error("brush",
+                "the position is not finite or beyond 1000 km, or the radius is out of range",
+                "use a point on the surface and a radius from 1 mm to 100 mm");
   const std::lock_guard lock(mutex_);
   MaterialTable table = table_ ? *table_ : with_standard(base_.get());
   add_missing(table, defined_);
@@ -103,8 +105,8 @@ void Paint::add(const Dab& dab) {
   });
   if (same != dabs_.end()) dabs_.erase(same);
   if (dabs_.size() >= most)
-    throw Error("brush", "there are " + std::to_string(most) + " dabs already",
-                "clear the paint, or take a wider brush");
+    throw Error("brush", "there are " + std::to_string(most) + " painted spots already",
+                "clear the paint, or use a wider brush");
   dabs_.push_back(dab);
 }
 

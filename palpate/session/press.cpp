@@ -147,7 +147,7 @@ Vec3 surface_at(const DepthImage& image, Pixel pixel) {
     throw Error(name_of(pixel), "nothing was measured there",
                 near ? "the nearest measured pixel is " + std::to_string(near->u) + "," +
                            std::to_string(near->v)
-                     : "the whole frame is empty: check the camera");
+                     : "the frame is empty: check the camera");
   }
   return image.world_from_camera() * (*depth * Vec3(ray.x(), ray.y(), 1.0));
 }
@@ -198,7 +198,7 @@ Press::Press(const Cloud& first, Pixel at, const PressOptions& options)
   } else if (const auto* image = dynamic_cast<const DepthImage*>(&first)) {
     size = image->intrinsics();
   } else {
-    throw Error("press", "what is seen is neither an image nor points", "give a path");
+    throw Error("press", "the frame is neither an image nor points", "give a path");
   }
   check_inside(size, at);
   const auto line = look(at.u, at.v);

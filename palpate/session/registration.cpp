@@ -157,8 +157,7 @@ PlacementFit fit_placement(std::span<const PointPair> pairs, const FitOptions& o
     throw Error("calibration points",
                 "distances in the scene are " + shortest(std::round(1e3 * ratio) / 1e3) +
                     " times those on the device, not " + shortest(options.scale),
-                "give both in metres and check the order of the points, or let the scale be "
-                "fitted");
+                "use metres for both and check the order of the points, or fit the scale");
   }
   const Rigid fit = best_fit(pairs, options, false);
   constexpr double noticeable = 5e-3;  // [m] more than a good calibration leaves

@@ -63,7 +63,7 @@ class Recording final : public Source {
     while (!(first = camera_.frame(next_)) && next_ + 1 < camera_.frames()) ++next_;
     if (!first)
       throw Error(info_.uri, "its TF has no transform for the time of any frame",
-                  "leave TF aside with ?fixed_frame=none");
+                  "ignore TF with ?fixed_frame=none");
     first_ = first->stamp;
     info_.start_time = first_;
   }
@@ -161,7 +161,7 @@ void BagCamera::find_colour() {
     colour_.emplace(bag_, topic, topic_, first_header().frame_id,
                     transforms_ ? &*transforms_ : nullptr);
   } catch (const Error& error) {
-    colour_note_ = std::string("colour is left out: ") + error.what();
+    colour_note_ = std::string("colour is skipped: ") + error.what();
   }
 }
 
@@ -185,7 +185,7 @@ void BagCamera::find_lens(const std::string& camera) {
   units_topic_ = parent(camera) + "/option/" + name + "/value";
   units_places_ = bag_.places(units_topic_);
   if (units_places_.empty() && !options_.units)
-    throw Error("topic " + topic_, "has no unit of depth on " + units_topic_,
+    throw Error("topic " + topic_, "has no depth unit on " + units_topic_,
                 "give the raw values per metre, such as ?units=1000");
 }
 
@@ -202,15 +202,15 @@ void BagCamera::follow_transforms() {
 std::string BagCamera::pose_note() const {
   if (is_ours() || is_realsense_) return {};
   if (!transforms_)
-    return std::string(options_.fixed_frame == "none" ? "TF is left aside"
+    return std::string(options_.fixed_frame == "none" ? "TF is not used"
                                                       : "the bag has no TF (/tf, /tf_static)") +
-           ": points are in the camera's own frame";
+           ": points are in the camera frame";
   if (transforms_->fixed_frame().empty())
-    return "TF leads from none of map, odom and world to the camera: points are in its own frame; "
-           "?fixed_frame=" +
-           transforms_->root() + " takes them farther";
+    return "TF connects none of map, odom and world with the camera: points are in the camera "
+           "frame; ?fixed_frame=" +
+           transforms_->root() + " transforms them to the topmost TF frame";
   return "points are in " + transforms_->fixed_frame() +
-         ", by TF; frames for whose time it has no transform are left out";
+         ", by TF; frames without a transform at their time are dropped";
 }
 
 // The identity where TF does not lead to the camera; none where it does, but not at that time.

@@ -100,7 +100,7 @@ BagColour::BagColour(BagReader& bag, const std::string& topic, const std::string
   const std::string& own = first.header.frame_id;
   if (plain_frame(own) == plain_frame(frame)) return;
   if (pose == nullptr)
-    throw Error("topic " + topic_, "nothing says where its camera stands from that of the depth",
+    throw Error("topic " + topic_, "its camera pose relative to the depth camera is unknown",
                 "record /tf_static, too");
   const bool in_world = !pose->fixed_frame().empty();
   const std::string& fixed = in_world ? pose->fixed_frame() : pose->root();

@@ -36,7 +36,7 @@ struct RecordedImage {
 
 // Where nobody asked for colour, there is touching without it.
 std::string colour_left_out(const Error& error) {
-  return std::string("colour is left out: ") + error.what();
+  return std::string("colour is skipped: ") + error.what();
 }
 
 class DepthRecording final : public Source {
@@ -157,7 +157,7 @@ void select(const Uri& uri, std::vector<RecordedImage>& images) {
   if (start >= images.size()) {
     throw Error(uri.text(),
                 "has " + std::to_string(images.size()) +
-                    " frames, none is left after start=" + std::to_string(start),
+                    " frames, none remains after start=" + std::to_string(start),
                 "start earlier");
   }
   images.erase(images.begin(), images.begin() + static_cast<std::ptrdiff_t>(start));
@@ -175,13 +175,13 @@ void place(const Uri& uri, const Trajectory& trajectory, const std::string& traj
   });
   const std::size_t lost = all - images.size();
   if (images.empty()) {
-    throw Error(uri.text(), "no frame has a pose in " + trajectory_name + " at its stamp",
+    throw Error(uri.text(), "no frame has a pose in " + trajectory_name + " at its timestamp",
                 "check that both use the same clock, or give poses=none");
   }
   if (lost > 0) {
     info.notes.push_back(std::to_string(lost) + " of " + std::to_string(all) +
-                         " frames are left out: " + trajectory_name +
-                         " has no pose at their stamps");
+                         " frames are dropped: " + trajectory_name +
+                         " has no pose at their timestamps");
   }
 }
 
@@ -268,7 +268,7 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
   if (poses != "none") {
     const fs::path file = folder / poses;
     if (!fs::exists(file, error)) {
-      throw Error(uri.text(), "has no " + poses, "give poses=none for the camera's own frame");
+      throw Error(uri.text(), "has no " + poses, "use poses=none for the camera frame");
     }
     place(uri, parse_trajectory(read_text(file), file.string()), poses, images, info);
   }

@@ -61,7 +61,7 @@ class NibbleReader {
       value |= (nibble & 7U) << shift;
       if ((nibble & 8U) == 0) return value;
     }
-    throw Error(name_, "holds a number of too many digits", "it may be damaged");
+    throw Error(name_, "has a number with too many digits", "it may be damaged");
   }
 
  private:
@@ -137,13 +137,13 @@ DepthPng parse_depth_rvl(std::span<const std::byte> bytes, const std::string& na
     const std::size_t zeros = reader.number();
     const std::size_t values = reader.number();
     if (zeros + values == 0 || zeros + values > count - image.depth.size())
-      throw Error(name, "holds other pixels than it promises", "it may be damaged");
+      throw Error(name, "has a different number of pixels than declared", "it may be damaged");
     image.depth.resize(image.depth.size() + zeros);
     for (std::size_t i = 0; i < values; ++i) {
       const std::uint32_t folded = reader.number();
       previous += folded % 2 == 0 ? std::int64_t{folded / 2} : -std::int64_t{folded / 2} - 1;
       if (previous < 1 || previous > 65535)
-        throw Error(name, "holds a depth that none can be", "it may be damaged");
+        throw Error(name, "has a depth value out of range", "it may be damaged");
       image.depth.push_back(static_cast<std::uint16_t>(previous));
     }
   }

@@ -115,9 +115,9 @@ class SourceWithMaterials final : public Source {
     }
     if (key_) {
       if (!frame.colour)
-        throw Error(info().uri, "materials are told by colour, and its frames have none",
-                    "ask for them, such as by colour=rgb.txt of a recording, or leave the "
-                    "materials out");
+        throw Error(
+            info().uri, "materials are assigned by colour, but its frames have no colour",
+            "enable colour, such as by colour=rgb.txt for a recording, or remove the materials");
       return std::make_shared<ColourMap>(materials_.table, key_, frame.colour);
     }
     const auto label = static_cast<std::uint8_t>(materials_.everywhere ? 1 : 0);

@@ -101,7 +101,7 @@ std::vector<Part> wedge(const Uri& uri) {
   const double opening = angle(uri, "angle", pi / 2.0, 0.1, pi - 0.01);
   const std::string edge = uri.text_option("edge", "convex");
   if (edge != "convex" && edge != "concave") {
-    throw Error(uri.text() + ": option 'edge'", "'" + edge + "' is not a kind of edge",
+    throw Error(uri.text() + ": option 'edge'", "'" + edge + "' is not a type of edge",
                 "give convex or concave");
   }
   const double rise = std::cos(0.5 * opening) * (edge == "convex" ? -1.0 : 1.0) * 2.0;
@@ -258,9 +258,7 @@ constexpr std::array rows{
     Row{{"layers", "the edge of a plate above a resting plane", layers_options}, layers},
     Row{{"occluder", "an arm that sweeps along x above a resting plane", occluder_options},
         occluder},
-    Row{{"desk",
-         "a ramp and a box as in Fig. 15, a ball (it takes the motion), a tin, a washboard",
-         {}},
+    Row{{"desk", "a ramp and a box as in Fig. 15, a ball (which can move), a can, a washboard", {}},
         desk},
     Row{{"moving", "a desk with a slab that bobs at 1 Hz, 20 mm from end to end", {}}, moving_desk},
 };

@@ -46,7 +46,7 @@ void Source::cancel() noexcept {}
 
 const Registry<SourceScheme>& standard_sources() {
   static const Registry<SourceScheme> schemes(
-      "kind of source", ":",
+      "type of source", ":",
       {{"synthetic", "synthetic:SCENE, a simulated depth camera", open_synthetic},
        {"pcd", "pcd:FILE|DIR, point clouds of the Point Cloud Library", open_point_files},
        {"ply", "ply:FILE|DIR, point clouds and meshes", open_point_files},
@@ -71,7 +71,7 @@ std::string uri_of_file(const std::filesystem::path& file) {
     remedy = "start the program with --camera depth:FOLDER or tum:FOLDER, of all its images";
   if (ending == ".mkv")
     remedy = "write its depth as 16-bit PNGs, then start the program with --camera depth:FOLDER";
-  throw Error(file.filename().string(), "cannot be touched as a file of its own", remedy);
+  throw Error(file.filename().string(), "cannot be opened as a single file", remedy);
 }
 
 std::string source_uri(const std::string& text, const Registry<SourceScheme>& schemes) {

@@ -20,7 +20,7 @@ using detail::Scalar;
 
 constexpr const char* not_pcd = "check that this is a PCD file";
 constexpr const char* correct_header = "correct the header";
-constexpr const char* write_anew = "write the file anew";
+constexpr const char* write_anew = "write the file again";
 
 // The values of each line of the header, by keyword.
 using PcdHeader = std::map<std::string_view, std::vector<std::string_view>>;

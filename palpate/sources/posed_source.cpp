@@ -38,7 +38,7 @@ class PosedSource final : public Source {
     info_ = source_->info();
     if (uri_.empty()) return;
     info_.uri = uri_;
-    info_.notes.emplace_back("the camera's pose is that of ?pose=, whatever else is said of it");
+    info_.notes.emplace_back("the camera pose is set by ?pose=; other poses are ignored");
   }
   // A colour camera stays where it is beside the depth camera.
   [[nodiscard]] std::shared_ptr<const ColourImage> posed(const ColourImage& colour,
@@ -62,7 +62,7 @@ class PosedSource final : public Source {
     const auto* points = dynamic_cast<const PointCloud*>(&cloud);
     if (points == nullptr)
       throw Error(info().uri, "its frames are neither depth images nor points",
-                  "leave the camera's pose out");
+                  "remove the camera pose");
     std::optional<Vec3> viewpoint = points->viewpoint();
     if (viewpoint) viewpoint = pose_ * *viewpoint;
     if (const Surface* surface = points->surface()) {

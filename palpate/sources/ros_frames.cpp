@@ -284,7 +284,7 @@ std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& 
     throw Error(name, "has rows that overlap", "it may be damaged");
   const std::size_t row_step = message.height > 1 ? message.row_step : row;
   if (row > message.data.size() || message.height - 1 > (message.data.size() - row) / row_step)
-    throw Error(name, "promises more points than it holds", "it may be damaged");
+    throw Error(name, "declares more points than it contains", "it may be damaged");
   const bool swapped = message.is_bigendian != (std::endian::native == std::endian::big);
   std::vector<Vec3> points;
   points.reserve(std::size_t{message.width} * message.height);

@@ -56,7 +56,7 @@ PointFile parse_stl(std::span<const std::byte> bytes, std::string_view name) {
   constexpr std::size_t header = 84;
   constexpr std::size_t facet = 50;
   const auto fail = [&](const std::string& what) {
-    throw Error(std::string(name), what, "write the mesh anew as a binary STL");
+    throw Error(std::string(name), what, "write the mesh again as a binary STL");
   };
   PointFile file;
   Welder welder(file);

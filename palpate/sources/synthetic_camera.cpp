@@ -199,7 +199,7 @@ CameraSetup camera_setup(const Uri& uri) {
   CameraSetup setup;
   const Pair size = pair_option(uri, "size", {640, 480}, 1, 16384, false);
   if (size.first != std::floor(size.first) || size.second != std::floor(size.second)) {
-    throw Error(uri.text() + ": option 'size'", "there are no parts of a pixel",
+    throw Error(uri.text() + ": option 'size'", "a number of pixels must be whole",
                 "write such as size=640x480");
   }
   setup.intrinsics = pinhole(static_cast<int>(size.first), static_cast<int>(size.second),

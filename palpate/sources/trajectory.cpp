@@ -50,10 +50,11 @@ void for_each_stamped_line(std::string_view text, const std::string& name, std::
           remedy);
     }
     const std::optional<double> stamp = to_finite(fields[0]);
-    if (!stamp) throw Error(where, "the stamp is not a finite number", remedy);
+    if (!stamp) throw Error(where, "the timestamp is not a finite number", remedy);
     if (before && *stamp <= *before) {
-      throw Error(where, *stamp < *before ? "the stamp goes backwards" : "the stamp repeats",
-                  "stamps must increase from line to line");
+      throw Error(where,
+                  *stamp < *before ? "the timestamp goes backwards" : "the timestamp repeats",
+                  "timestamps must increase from line to line");
     }
     before = stamp;
     visit(where, *stamp, fields);

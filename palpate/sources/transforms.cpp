@@ -47,7 +47,7 @@ Trajectory::Sample sample_of(const ros::TransformStamped& transform, const std::
   const Eigen::Vector3d translation(x, y, z);
   if (!translation.allFinite() || !(std::abs(rotation.norm() - 1.0) < 0.01))
     throw Error(name, "has a transform to " + transform.child_frame_id + " that is not rigid",
-                "leave TF aside with ?fixed_frame=none");
+                "ignore TF with ?fixed_frame=none");
   return {1e-9 * static_cast<double>(transform.header.stamp.nanoseconds()), translation,
           rotation.normalized()};
 }

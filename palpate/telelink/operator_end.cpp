@@ -159,7 +159,7 @@ class OperatorEnd::Impl {
       view_.touched = touched;
       view_.ignored = learns_
                           ? paint_touched(session_.paint(), session_.settings().parameters, touched)
-                          : "the operator does not learn";
+                          : "ignored: the operator's end was started without --learn";
     }
   }
 

@@ -78,7 +78,7 @@ RobotState first_of(Robot& robot) {
   for (;;) {
     if (std::optional<RobotState> state = robot.state()) return *std::move(state);
     if (monotonic_now() > end)
-      throw Error(robot.info().uri, "the robot does not say where it is",
+      throw Error(robot.info().uri, "the robot does not report its position",
                   "switch it on, and check its topics");
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }

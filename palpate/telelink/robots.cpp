@@ -182,9 +182,9 @@ class Ros2Robot final : public Robot {
     while (!hear()) {
       if (monotonic_now() > end)
         throw Error(uri.text(),
-                    "no pose comes as PoseStamped on " + pose + " in domain " +
+                    "no PoseStamped messages on " + pose + " in domain " +
                         std::to_string(participant_.domain()),
-                    "start the arm's controller, or name its topic by pose=");
+                    "start the arm's controller, or set its topic with pose=");
       participant_.wait(0.05);
     }
   }
@@ -209,7 +209,7 @@ class Ros2Robot final : public Robot {
     constexpr double silence = 0.5;  // [s]
     state_.fault.clear();
     if (monotonic_now() - state_.t > silence)
-      state_.fault = "the arm has told no pose for " + number_text(silence) + " s";
+      state_.fault = "no pose of the arm for " + number_text(silence) + " s";
     return state_;
   }
 
@@ -255,11 +255,11 @@ class Ros2Robot final : public Robot {
 
 Registry<RobotScheme> standard_robots() {
   return {
-      "kind of robot",
+      "type of robot",
       ":",
-      {{"ros2", "an arm of ROS 2 that takes poses",
+      {{"ros2", "a ROS 2 arm that accepts poses",
         [](const Uri& uri) -> std::unique_ptr<Robot> { return std::make_unique<Ros2Robot>(uri); }},
-       {"point", "a ball that follows and touches nothing, to try a link",
+       {"point", "a ball that follows without contacts, to test a network link",
         [](const Uri& uri) -> std::unique_ptr<Robot> {
           return std::make_unique<PointRobot>(uri);
         }}}};

@@ -29,7 +29,7 @@ std::string paint_touched(Paint& paint, const Parameters& parameters, const Touc
     if ((dab.place - touched.place).norm() > std::max(dab.radius, touched_radius)) continue;
     painted = painted || !dab.material.starts_with(prefix);
   }
-  if (painted) return "somebody has painted there";
+  if (painted) return "ignored: a user has painted there";
 
   Material material = material_of(parameters);
   std::string name(prefix);
@@ -45,7 +45,7 @@ std::string paint_touched(Paint& paint, const Parameters& parameters, const Touc
   }
   // Newer touches count more; one that slid says nothing of how soft it is.
   if (touched.stiffness) paint.erase(touched.place, touched_radius);
-  if (!soft && !touched.friction) return "it is as hard as what is rendered";
+  if (!soft && !touched.friction) return "ignored: it is not softer than the rendered stiffness";
   try {
     paint.define({.name = name, .material = material});
     paint.add({.place = touched.place,

@@ -25,13 +25,15 @@ void validate(const LeadLimits& limits) {
   if (limits.reach && (limits.reach->isEmpty() || !limits.reach->min().allFinite() ||
                        !limits.reach->max().allFinite()))
     throw Error("teleop, reach", "is no box",
-                "give the least corner before the greatest one, in metres");
+                "give the minimum corner, then the maximum corner, in metres");
 }
 
 LedHand::LedHand(const Vec3& begin, const LeadLimits& limits, std::string uri)
     : limits_(limits), tool_(begin), place_(begin) {
   validate(limits);
-  if (!is_place(begin)) throw Error("teleop", "the tool begins nowhere", "give a place in metres");
+  if (!is_place(begin))
+    throw Error("teleop", "the start position of the tool is not finite or beyond 1000 km",
+                "set a position in metres");
   info_.uri = std::move(uri);
   info_.kind = "led from afar";
   info_.limits = no_motors;

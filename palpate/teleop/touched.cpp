@@ -31,12 +31,13 @@ std::string_view disbelief(const Touched& touched) noexcept {
   const auto within = [](const std::optional<double>& value, double least, double most) {
     return !value || (*value >= least && *value <= most);  // no number is not
   };
-  if (!is_place(touched.place)) return "its place is none";
-  if (!(std::abs(touched.normal.norm() - 1.0) < 0.01)) return "its normal is none";
+  if (!is_place(touched.place)) return "position is not finite";
+  if (!(std::abs(touched.normal.norm() - 1.0) < 0.01)) return "normal is not a unit vector";
   if (!within(touched.stiffness, Touched::softest, Touched::hardest))
-    return "its stiffness cannot be";
-  if (!within(touched.friction, 0.0, Touched::most_friction)) return "its friction cannot be";
-  if (!touched.stiffness && !touched.friction) return "it says nothing";
+    return "stiffness is out of range";
+  if (!within(touched.friction, 0.0, Touched::most_friction))
+    return "friction coefficient is out of range";
+  if (!touched.stiffness && !touched.friction) return "contains neither stiffness nor friction";
   return {};
 }
 
@@ -44,7 +45,8 @@ std::optional<Touched> TouchLearner::next(double t, const Vec3& tool, const Vec3
                                           const Vec3& force, const Vec3& normal) noexcept {
   if (!is_place(tool) || !velocity.allFinite() || !force.allFinite() || !std::isfinite(t) ||
       force.norm() > absurd) {
-    if (touching_) why_not_ = "the robot told a force or a place that cannot be";
+    if (touching_)
+      why_not_ = "the robot reported a force or a position that is not finite or out of range";
     touching_ = false;
     was_free_ = false;
     return std::nullopt;
@@ -116,7 +118,7 @@ std::optional<Touched> TouchLearner::taught() noexcept {
     found.stiffness = Touched::hardest;
   else if (!(line[1] * touch.deepest > least_spring * touch.peak &&
              left < (1.0 - least_fit) * variance && touch.depth < most_left * touch.deepest))
-    why_not_ = "it does not give way as a spring does";
+    why_not_ = "the contact is not elastic";
   else
     found.stiffness = std::clamp(line[1], Touched::softest, Touched::hardest);
 

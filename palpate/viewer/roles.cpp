@@ -60,15 +60,15 @@ void check_allowed(const Command& command, Role role) {
   if (std::holds_alternative<ResetFaults>(command))
     throw Error("latched fault", "only the operator resets it", operator_remedy);
   if (role == Role::holding) return;
-  const std::string remedy = "take the hand, or " + std::string(operator_remedy);
+  const std::string remedy = "take control of the HIP, or " + std::string(operator_remedy);
   if (std::holds_alternative<ResetHand>(command))
-    throw Error("hand", "only the page that has it resets it", "take the hand");
+    throw Error("hand", "only the page that controls the HIP can reset it", "take the hand");
   if (std::holds_alternative<SetSafetyParameter>(command))
-    throw Error("safety limit", "a page that looks on does not change it", remedy);
+    throw Error("safety limit", "this page is for viewing only", remedy);
   if (std::holds_alternative<SetBrush>(command) || std::holds_alternative<DropBrush>(command) ||
       std::holds_alternative<ClearPaint>(command))
-    throw Error("brush", "a page that looks on does not paint", remedy);
-  throw Error("parameter", "a page that looks on does not change it", remedy);
+    throw Error("brush", "this page is for viewing only", remedy);
+  throw Error("parameter", "this page is for viewing only", remedy);
 }
 
 Stricter stricter_direction(std::string_view limit) {
@@ -84,8 +84,9 @@ LimitBounds::LimitBounds(const SafetyParameters& start,
     SafetyParameters checked;
     set_parameter(checked, name, value);
     if (stricter_direction(name) == Stricter::neither)
-      throw Error("--operator-limit " + name, "that limit has no strict end",
-                  "give one such as max_device_force or max_speed");
+      throw Error("--operator-limit " + name,
+                  "neither a smaller nor a larger value of this limit is always safer",
+                  "use another limit, such as max_device_force or max_speed");
   }
 }
 
@@ -103,8 +104,7 @@ void LimitBounds::check(std::string_view name, double value, Role role) const {
                   "start the session with another");
     return;
   }
-  if (role == Role::looking)
-    throw Error(subject, "a page that looks on does not change it", "take the hand");
+  if (role == Role::looking) throw Error(subject, "this page is for viewing only", "take the hand");
   if (stricter == Stricter::neither)
     throw Error(subject, "only the operator changes it", operator_remedy);
   if (!is_looser(stricter, value, row.get(operators_))) return;

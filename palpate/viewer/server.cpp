@@ -304,18 +304,18 @@ class ViewerServer::Impl final : public Hub {
     check_token("--operator-token", operator_token_);
     if (operator_token_.size() < shortest_token)
       throw Error("--operator-token", "it must have at least 8 characters",
-                  "give a longer one, or none to have one made");
+                  "use a longer one, or none to have one generated");
     if (operator_token_ == token_)
       throw Error("--operator-token", "it is the same as --token", "give another");
     boost::system::error_code error;
     const auto address = asio::ip::make_address(options.listen, error);
     if (error)
       throw Error("--listen " + options.listen, "it is not an IP address",
-                  "give 127.0.0.1, or 0.0.0.0 for everybody who has the token");
+                  "use 127.0.0.1, or 0.0.0.0 for everybody with the token");
     beyond_loopback_ = !address.is_loopback();
     if (beyond_loopback_ && token_.size() < shortest_token)
-      throw Error("--token", "beyond this machine it must have at least 8 characters",
-                  "give a longer one, or none to have one made");
+      throw Error("--token", "for other computers it must have at least 8 characters",
+                  "use a longer one, or none to have one generated");
     listen({address, options.port});
     const std::string host_name = address.is_unspecified() ? asio::ip::host_name()
                                   : address.is_v6()        ? "[" + address.to_string() + "]"
@@ -421,11 +421,11 @@ class ViewerServer::Impl final : public Hub {
 
   void moved_hand(PageSession& page, const HandMessage& hand) override {
     if (!host_.takes_hand()) {
-      if (hand.held) page.explain("hand: no page moves this session's device");
+      if (hand.held) page.explain("hand: this session's device is not controlled by a page");
       return;
     }
     if (hand_owner_ != nullptr && hand_owner_ != &page) {
-      if (hand.held) page.explain("hand: another page has it; wait until it lets go");
+      if (hand.held) page.explain("hand: another page controls the HIP; wait until it releases");
       return;
     }
     if (!hand.held) {
@@ -444,7 +444,7 @@ class ViewerServer::Impl final : public Hub {
       check_allowed(command, role);
       if (std::holds_alternative<ResetHand>(command) && hand_owner_ != nullptr &&
           hand_owner_ != &page)
-        throw Error("hand", "another page has it", "wait until it lets go");
+        throw Error("hand", "another page controls the HIP", "wait until it releases");
       host_.command(command, role);
       send_state(pages_);
     } catch (const std::exception& error) {
@@ -512,11 +512,11 @@ class ViewerServer::Impl final : public Hub {
     if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
     if (error == asio::error::address_in_use)
       throw Error(subject, "another program listens there",
-                  "give another port, or --port 0 for any that is free");
+                  "use another port, or --port 0 for any free port");
     if (error == asio::error::access_denied)
       throw Error(subject, "this account may not listen there",
-                  "give a port from 1024 on, or --port 0 for any that is free");
-    if (error) throw Error(subject, error.message(), "give an address of this machine");
+                  "use a port from 1024 on, or --port 0 for any free port");
+    if (error) throw Error(subject, error.message(), "use an address of this computer");
     port_ = acceptor_.local_endpoint().port();
   }
 

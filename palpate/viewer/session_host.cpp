@@ -167,7 +167,8 @@ std::string SessionHost::hello() {
 
 void SessionHost::forbid(const Forbid& wanted) {
   if (!touched_)
-    throw Error("fixture", "nothing has been touched yet", "touch what the hand is to keep off");
+    throw Error("fixture", "nothing has been touched yet",
+                "touch the object that is to be forbidden");
   Fixture region{.name = {},
                  .kind = FixtureKind::forbidden,
                  .shape = FixtureShape::seen,
@@ -180,7 +181,7 @@ void SessionHost::forbid(const Forbid& wanted) {
 void SessionHost::guide(const Guide& wanted) {
   constexpr double shortest = 0.01;  // [m] from end to end of a path; else it is a place
   if (stroke_.empty())
-    throw Error("fixture", "nothing has been stroked yet", "stroke where the hand is to be guided");
+    throw Error("fixture", "there was no contact yet", "slide along the path of the guide first");
   double length = 0.0;
   for (std::size_t i = 1; i < stroke_.size(); ++i) length += (stroke_[i] - stroke_[i - 1]).norm();
   Fixture line{.name = {}, .kind = FixtureKind::guide, .shape = FixtureShape::point};
@@ -214,7 +215,8 @@ void SessionHost::remove_fixture(const std::string& name) {
     std::vector<Fixture> all =
         settings.fixtures ? settings.fixtures->fixtures() : std::vector<Fixture>{};
     if (std::erase_if(all, [&](const Fixture& fixture) { return fixture.name == name; }) == 0)
-      throw Error("fixture '" + name + "'", "there is none of that name", "see the page's list");
+      throw Error("fixture '" + name + "'", "there is no fixture of that name",
+                  "see the list on the page");
     settings.fixtures = all.empty() ? nullptr : std::make_shared<const FixtureSet>(all);
   });
 }
@@ -475,7 +477,7 @@ void SessionHost::command(const Command& command, Role role) {
         !scene->uri.empty() && scene->uri == recorded_scene(session_->state().recording);
     if (!(is_offered || is_recorded) || !rules_.open_scene)
       throw Error("scene", "'" + scene->uri + "' is not among those of this session",
-                  "choose one of the list, or start the program with --camera");
+                  "choose one of the list, or restart the program with --camera");
     rules_.open_scene(scene->uri);
   } else if (const auto* seek = std::get_if<Seek>(&command)) {
     session_->seek(seek->share);

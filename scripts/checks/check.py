@@ -69,6 +69,22 @@ MACHINE_PATH = re.compile(r"/(?:home|root|work|tmp|Users)/\w")
 CXX = re.compile(r"\.[ch]pp$")  # clang-format knows what can be broken
 COLUMNS = 100
 
+# Phrases that readers whose second language is English trip over, and what to write instead; in
+# the docs and in the strings of the program (help texts, messages).
+REPLACEMENTS = {
+    r"anew": "again", r"tried (on|against)": "tested with", r"stand-ins?": "simulated ...",
+    r"fakes?": "mock ...", r"in trouble": "has a fault", r"lets? go": "releases",
+    r"than can be": "out of range (give the range)", r"by chance": "at random",
+    r"who(ever|soever)": "the operator, the user", r"bobs": "oscillates vertically",
+    r"to and fro": "back and forth", r"foretells?": "predicts", r"knocks?": "force spike",
+    r"before an? (exact|noisy|D4xx)": "seen by, in front of", r"is looked for": "is searched for",
+    r"places? (is|are) none": "position is not finite", r"looks on": "views only",
+    r"good for": "rated for", r"what is (seen|felt|touched)": "the visible surface, the force, ...",
+    r"times light": "time-of-flight", r"goes? round": "moves around", r"mend(s|ed)?": "fix",
+}
+REPLACEMENTS = {phrase.replace(" ", r"\s+"): words for phrase, words in REPLACEMENTS.items()}
+BANNED = re.compile("|".join(rf"\b(?:{phrase})\b" for phrase in REPLACEMENTS), re.IGNORECASE)
+
 
 def files(root, wanted):
     """Paths below root, relative to it and sorted, whose name matches `wanted`."""
@@ -208,7 +224,7 @@ def check_text(root):
                 faults.append(f"{path}:{number}: link to {place}, which is not there")
             elif anchor and anchor not in anchors(target.read_text(encoding="utf-8")):
                 faults.append(f"{path}:{number}: {target.name} has no heading #{anchor}")
-    faults += unsaid_messages(root)
+    faults += unsaid_messages(root) + banned_phrases(root)
     readme, example = root / "README.md", root / "examples/touch_a_plane.cpp"
     if readme.exists():
         quoted = re.findall(r"^```cpp\n(.*?)^```", readme.read_text(encoding="utf-8"), re.M | re.S)
@@ -223,6 +239,22 @@ def check_text(root):
             if not any(block.group(1) in program for program in programs):
                 number = text[:block.start()].count("\n") + 1
                 faults.append(f"docs/library.md:{number}: its C++ is in no example, to the letter")
+    return faults
+
+
+def banned_phrases(root):
+    """Phrases of REPLACEMENTS in the docs (without code) and in the program's strings."""
+    faults = []
+    for path in files(root, re.compile(r"^(docs/.*|[^/]*)\.md$|^app/.*\.cpp$")):
+        text = (root / path).read_text(encoding="utf-8")
+        said = re.sub(r"`[^`\n]*`", "", without_code(text)) if path.endswith(".md") else \
+            "\n".join(" ".join(re.findall(r'"((?:[^"\\]|\\.)*)"', line.split("//")[0]))
+                      for line in text.split("\n"))
+        for found in BANNED.finditer(said):
+            better = next(words for phrase, words in REPLACEMENTS.items()
+                          if re.fullmatch(phrase, found.group(), re.IGNORECASE))
+            number = said[:found.start()].count("\n") + 1
+            faults.append(f"{path}:{number}: '{found.group()}': write '{better}'")
     return faults
 
 

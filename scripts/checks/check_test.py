@@ -93,6 +93,13 @@ class Text(Tree):
     def faults(self):
         return check.check_text(self.root)
 
+    def test_a_banned_phrase_is_found_in_docs_and_strings_and_not_in_code(self):
+        self.write("docs/a.md", "It lets\ngo.\n\n```\nbegin anew\n```\n`anew` is code.\n")
+        self.write("app/a.cpp", SPDX + 'say("it begins "\n    "anew");  // "anew" is a comment\n')
+        self.assertEqual(check.banned_phrases(self.root),
+                         ["app/a.cpp:3: 'anew': write 'again'",
+                          "docs/a.md:1: 'lets\ngo': write 'releases'"])
+
     def test_a_clean_tree_is_fine(self):
         self.write("palpate/core/a.cpp", SPDX + "x" * check.COLUMNS + "\n")
         self.write("docs/a.md", "# Some `title` here\n[b](b.md#part-2-more) [c](#some-title-here)"
@@ -183,7 +190,7 @@ class Leaderboard(Tree):
                                  self.entry("ideal", 100, 90, 100),
                                  self.entry("c", 90, 85, 95, ["depth:table"])])
         rows = [line.split(" | ")[:2] for line in text.splitlines() if "`" in line and "|" in line]
-        self.assertEqual(rows, [["| 1", "`c`"], ["| ruler", "`ideal`"], ["| 1", "`b`"],
+        self.assertEqual(rows, [["| 1", "`c`"], ["| reference", "`ideal`"], ["| 1", "`b`"],
                                 ["| 2", "`a`"]])
 
 

@@ -19,8 +19,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def kernel_table(scenes):
-    lines = ["| scene | points | steps a tick | step | gather | tick | p99 | p99.9 | max | frame() "
-             "| limit | tick / limit |", "|---|" + "---:|" * 11]
+    lines = ["| scene | points | steps per tick | step | gather | tick | p99 | p99.9 | max "
+             "| frame() | limit | tick / limit |", "|---|" + "---:|" * 11]
     for scene in scenes:
         k = scene["kernel"]
         tick = k["tick"]
@@ -98,15 +98,15 @@ def page(result, sight, rows, build, installed):
     program = build / "app/palpate"
     folders, slowest = build_times(build)
     tick = result["tick_us_median"]
-    return f"""# What a tick costs
+    return f"""# Performance
 
 Made by `scripts/figures/performance.py`: do not edit, run it again. Times are microseconds of the
-thread's own processor time. Ticks are timed one by one, what is shorter in batches of 64. A noisy
-plane (1 mm, readings in millimetres) is pressed 5 mm deep and stroked at 0.1 m/s; Table 2's
-parameters; frames at 30 Hz, ticks at 1 kHz.
+thread's own processor time. Ticks are timed one by one, shorter parts in batches of 64. The HIP
+presses 5 mm deep into a noisy plane (1 mm, units of millimetres) and slides at 0.1 m/s; parameters
+of Table 2; frames at 30 Hz, ticks at 1 kHz.
 
 Machine: {result['processor']}, {os.cpu_count()} cores, loops in {result['vector_set']}. It is a
-virtual machine that others were using at the same time: medians and ratios hold, maxima are theirs.
+virtual machine under other load: medians and ratios are valid, maxima are due to that load.
 
 ```
 palpate bench --json >bench.json
@@ -114,45 +114,46 @@ palpate bench --method sight --json >sight.json
 palpate bench --growth --out .
 ```
 
-## The kernel
+## Time per tick, `paper`
 
 {kernel_table(result['scenes'])}
 
-*limit* is a loop that only loads and adds the same points, as often as the tick looks around, and
-the same pixels, as often as it gathers. It counts neither the roots and quotients of equations (2)
-and (9) nor the second look that a step in free motion or out of entrenchment takes. Nor does it
-wait: its passes run into one another, where a step begins with what the one before has found, sums,
-quotient and all. The fewer the points, the more of a tick is that wait. The aim was a tick within
-three times the limit; it is missed: the last column says by how much.
+*limit* is a loop that only loads and adds the same points, as often as the tick reads them, and
+the same pixels, as often as it gathers. It includes neither the roots and quotients of equations
+(2) and (9) nor the second pass of a step in free motion or out of entrenchment. Its passes overlap
+in the processor, whereas each proxy step must wait for the results of the step before, sums and
+quotient included. The fewer the points, the larger the share of this waiting time. The aim was a
+tick within three times the limit; it is missed, as the last column shows.
 
 ### Sight
 
-The same with `--method sight`, whose work is done when a frame is handed over, on the thread that
-ticks; most ticks then only follow the fitted surface, and some (p99) fit it anew.
+The same with `--method sight`, which works mainly when a frame arrives, in the servo thread; most
+ticks then only follow the fitted surface, and some (p99) repeat the fit.
 
 {sight_table(sight['scenes'])}
 
-## Beside what one could use instead
+## Compared with alternatives
 
-One ball of 11 mm on the same frame: what has to be built for each frame, and the query.
+One sphere of 11 mm in the same frame: time to build the structure for each frame, and to query
+it.
 
 {search_table(result['scenes'])}
 
-Queries at 1 m in units of our gather: {ratios}; and we have nothing to build. The trees are
-given their points, where a depth camera gives none; PCL's organised search, which needs no tree,
-needs the whole image deprojected.
+Queries at 1 m in units of our gather: {ratios}; the depth image needs no building. The trees
+get points, but a depth camera gives an image; PCL's organised search needs no tree, but the whole
+image must be deprojected.
 A whole tick, with its {one_metre['kernel']['steps_per_tick']:.1f} steps, takes
-{tick / tree:.1f} times one nanoflann query. Handing a frame over takes
+{tick / tree:.1f} times one nanoflann query. Passing a frame on takes
 {1e3 * result['frame_us_median']:.1f} ns; building the tree takes
 {result['kdtree_build_us_median'] / 1e3:.0f} ms, more than there is between two frames at 30 Hz.
 {'' if pcl else "PCL was not installed where this was made." + chr(10)}
-## How it grows
+## Scaling
 
-![Ticks against what might make them grow](images/growth.svg)
+![Time per tick against possible influences](images/growth.svg)
 
-Flat in the size of the image, the frame rate and the size of an unorganised cloud; linear in the
-points of the patch, hence in the cameras that see it. *build* of an unorganised cloud includes
-making its points up, and is paid on the camera's thread.
+Constant in the image size, the frame rate and the size of an unorganised cloud; linear in the
+points of the patch, hence in the number of cameras that see it. *build* of an unorganised cloud
+includes generating its points, and runs in the camera thread.
 
 {growth_table(rows)}
 
@@ -160,22 +161,21 @@ making its points up, and is paid on the camera's thread.
 
 The process held {result['resident_bytes'] / 2**20:.0f} MiB after all of `palpate bench`, frames,
 trees and samples included. From a first to a second session, once warm, it grew by
-{result['resident_growth_bytes'] / 1024:.0f} KiB, samples of the measurement included; a tick does
+{result['resident_growth_bytes'] / 1024:.0f} KiB, including samples of the measurement; a tick does
 not allocate (`tests/core`). The program is {size_of(program) / 2**20:.1f} MiB, all
 that is installed
 {size_of(installed) / 2**20:.1f} MiB.
 
 Compiling for Release with tests, one core's seconds by folder: {folders}. The longest files:
-{slowest}. Two cores share them; templates (Eigen's, Boost's, nanoflann's) take most of it.
+{slowest}. This is divided over two cores; templates (Eigen, Boost, nanoflann) take most of it.
 
-## What the tests hold fast
+## Guaranteed by tests
 
-`tests/cost`: each loop's clone for SSE2, AVX2 and AVX-512 is disassembled and must be vector code
-of that width; all three agree on the same points, on single lengths to 5 nm and on sums of unit
-vectors to 2e-5; a slide's steps and gathers have bounds; so have the instructions of a
-tick, counted by
-valgrind (6408 when the bound was set, with 8.3 steps over 90 points on AVX2); the kernel compiles
-for aarch64 where there is a cross compiler.
+`tests/cost`: the versions of each loop for SSE2, AVX2 and AVX-512 are disassembled and must be
+vector code of that width; all three give the same points, single lengths to 5 nm and sums of
+unit vectors to 2e-5; the steps and gathers of a slide are bounded, and so are the instructions of a
+tick, counted by valgrind (6408 when the bound was set, with 8.3 steps over 90 points on AVX2); the
+core compiles for aarch64 if there is a cross compiler.
 """
 
 

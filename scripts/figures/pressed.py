@@ -110,7 +110,7 @@ def press(program: str, uri: str, pixel: tuple[int, int], out: Path):
                 felt += math.hypot(*(float(row[f"force_{axis}"]) for axis in "xyz")) > 1.0
     # Which pixel was pressed instead, and when frames ended, are no reasons.
     said = [line.removeprefix("palpate: ") for line in done.stderr.splitlines()
-            if "the nearest that does" not in line and "its frames ended" not in line]
+            if "the nearest one that has" not in line and "its frames ended" not in line]
     return ticks, felt, seconds, said[-1] if said else ""
 
 

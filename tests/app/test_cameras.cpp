@@ -169,7 +169,7 @@ TEST_F(CameraProgram, ListsWhatIsPluggedIn) {
   EXPECT_EQ(full["realsense:"]["found"][1]["uri"], "realsense:100000000002");
   EXPECT_EQ(full["realsense:"]["found"][1]["firmware"], "5.16.0.1");
   EXPECT_EQ(full["realsense:"]["found"][1]["noise"],
-            "stereo (noise taken for 5 mm at 1 m, growing with the square of distance)");
+            "stereo (assumed noise: 5 mm at 1 m, growing with the square of distance)");
   EXPECT_EQ(full["openni2:"]["version"], "2.2.0.33");
   for (const char* name : {"openni2:", "freenect:"}) {
     ASSERT_EQ(full[name]["found"].size(), 2U) << name;

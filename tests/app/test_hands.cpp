@@ -466,7 +466,7 @@ TEST_F(ForceDimensionHands, AreMeasuredBelowHalfANewtonAndLetGo) {
 }
 
 TEST_F(ForceDimensionHands, AreNotMovedWithoutConsent) {
-  expect_refusal("doctor --device force-dimension:", {"nobody has agreed", "--yes"});
+  expect_refusal("doctor --device force-dimension:", {"was not confirmed", "--yes"});
   EXPECT_EQ(bench.largest, 0.0);
   expect_refusal("doctor --yes", {"--device URI"});
   expect_refusal("doctor --yes --device spacenav:0", {"spacenav:0"});

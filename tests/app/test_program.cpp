@@ -331,7 +331,7 @@ TEST_F(Program, MakesATokenForOtherMachines) {
           "--camera synthetic:plane?size=160x120");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.err.find("/?token="), std::string::npos) << outcome.err;
-  EXPECT_NE(outcome.err.find("in clear"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("unencrypted"), std::string::npos) << outcome.err;
 }
 
 TEST_F(Program, PrintsTheAddressesThatOthersReach) {
@@ -496,7 +496,7 @@ TEST_F(Program, InfoSaysWhatIsAtAPixel) {
   expect_refusal(small + " --at 3", {"--at", "'3'", "--at 320,240"});
   expect_refusal(small + " --at 3,4x", {"--at", "3,4x"});
   const std::string points = write("two.pcd", "FIELDS x y z\nPOINTS 2\nDATA ascii\n0 0 1\n0 0 2\n");
-  expect_refusal("info pcd:" + points + " --at 0,0", {"no image", "--at"});
+  expect_refusal("info pcd:" + points + " --at 0,0", {"not an image", "--at"});
 }
 
 TEST_F(ProgramWithLab, TouchesTheFacesOfAPlyFile) {
@@ -697,7 +697,7 @@ TEST_F(ProgramWithLab, RunsTheCommandsOfTheReadmeAndTheDocs) {
 }
 
 TEST_F(Program, SaysWhatToDoWithASourceThatIsNone) {
-  expect_refusal("info", {"info: it is not said of what", "synthetic:desk"});
+  expect_refusal("info", {"info: no source is given", "synthetic:desk"});
   expect_refusal("info tum:", {"'tum:'", "names no folder", "tum:FOLDER"});
   expect_refusal("info recording:" + write("walk.bag", "#ROSBAG V1.2\n"),
                  {"walk.bag", "ROS 1", "rosbag reindex"});
@@ -879,7 +879,7 @@ TEST_F(Program, LooksAtTheMachineAndSaysWhatToDo) {
   }
   const std::string text = run("doctor --seconds 0.2").out;
   for (const char* part :
-       {"for haptics at 1000 Hz", "woke up late by", "Cameras and haptic", "Versions"})
+       {"for haptics at 1000 Hz", "wake-up latency", "Cameras and haptic", "Versions"})
     EXPECT_NE(text.find(part), std::string::npos) << part << " is not in\n" << text;
   expect_refusal("doctor --seconds 0", {"--seconds"});
 }

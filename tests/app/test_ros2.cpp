@@ -71,8 +71,8 @@ TEST_F(Ros2Program, SaysWhatAnEndOfALinkLacks) {
     EXPECT_NE(refused.err.find(what), std::string::npos) << refused.err;
   };
   refuses("--robot point:", "none of its own; give the robot's");
-  refuses("--robot pint: --camera synthetic:plane", "unknown kind of robot");
-  refuses("--device mouse:", "the hand is at the operator's end");
+  refuses("--robot pint: --camera synthetic:plane", "unknown type of robot");
+  refuses("--device mouse:", "the haptic device is at the operator's end");
   refuses("--margin -1", "margin");
   refuses("--name 'a b'", "none for a topic");
 }

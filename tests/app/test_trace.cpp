@@ -66,8 +66,8 @@ TEST_F(Trace, SaysHowNearAPathCameThatTouchedNothing) {
   const std::string points = "pcd:" + cloud("three.pcd", {{0, 0, 1}, {0, 0, 2}, {0.1, 0, 1.5}});
   const std::string aside = remarks(points, "0,3,0,0.6\n1,0.3,0,0.6\n");
   EXPECT_NEAR(number_behind(aside, "came no nearer than "), 500.0, 5.0) << aside;
-  EXPECT_TRUE(says(aside, "the points then reached from (0, 0, 1) to (0.1, 0, 2) m")) << aside;
-  EXPECT_TRUE(says(aside, "the path reaches from (0.3, 0, 0.6) to (3, 0, 0.6) m")) << aside;
+  EXPECT_TRUE(says(aside, "the points then extended from (0, 0, 1) to (0.1, 0, 2) m")) << aside;
+  EXPECT_TRUE(says(aside, "the path extends from (0.3, 0, 0.6) to (3, 0, 0.6) m")) << aside;
   EXPECT_TRUE(says(aside, "in metres and in the world frame?")) << aside;
   EXPECT_EQ(test::lines_in(aside), 1U) << aside;
 
@@ -129,8 +129,7 @@ TEST_F(Trace, SaysThatFramesEndedBeforeThePath) {
   const std::string touching = ",0,0,0.02\n";
   const std::string end = ",0,0,-0.002\n";
   const std::string longer = remarks(frames, "0" + touching + "1" + end);
-  EXPECT_TRUE(
-      says(longer, frames + ": its frames ended at t = 0.200 s, 0.800 s before the hand's way"))
+  EXPECT_TRUE(says(longer, frames + ": its frames ended at t = 0.200 s, 0.800 s before the path"))
       << longer;
   EXPECT_EQ(remarks(frames, "0" + touching + "0.38" + end), "")
       << "less than two frames' intervals";
@@ -155,8 +154,7 @@ TEST_F(Trace, SaysThatThePathBeganBeforeTheFrames) {
       << early;
   EXPECT_EQ(test::lines_in(early), 1U) << early;
   const std::string over = remarks(floor_seen, "-2,0,0,0.03\n-1.5,0,0,-0.004\n");
-  EXPECT_TRUE(says(over, "the first frame comes at t = 0.000 s, the path ended at -1.500 s"))
-      << over;
+  EXPECT_TRUE(says(over, "the first frame is at t = 0.000 s, the path ended at -1.500 s")) << over;
   EXPECT_EQ(test::lines_in(over), 1U) << over;
 }
 

@@ -65,7 +65,7 @@ TEST(Pose, RefusesWhatIsNone) {
   EXPECT_TRUE(fails_saying(parsing("1,2,inf,0,0,0,1"), "'inf'"));
   EXPECT_TRUE(fails_saying(parsing("1,2,3,0,0,0,0"), "length is 0"));
   EXPECT_TRUE(fails_saying(parsing("1,2,3,0,0,0,2"), "length is 2"));
-  EXPECT_TRUE(fails_saying(parsing("1,2,3e7,0,0,0,1"), "farther"));
+  EXPECT_TRUE(fails_saying(parsing("1,2,3e7,0,0,0,1"), "beyond"));
   EXPECT_EQ(parse_pose("1 2 3 0 0 0 1", "pose").translation(), Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(parse_pose("1,2,3,0,0,0,1.001", "pose").linear(), Eigen::Matrix3d::Identity());
 }

@@ -151,7 +151,7 @@ TEST(MeasureDevice, EndsWithoutAForceWhenTheHandleGoesTooFarOrTheDeviceLetsGo) {
   ends(fast, "faster than");
   Wrapped absent("device=touch&grip=none");
   absent.absent_from = 3.0;
-  ends(absent, "nobody holds it");
+  ends(absent, "reports no hand");
   Wrapped faulty("device=touch&grip=none");
   faulty.faulty_from = 3.0;
   ends(faulty, "cool");

@@ -366,9 +366,9 @@ TEST(OpenDevice, SaysWhatIsWrongWithAName) {
     return [uri] { return open_device(uri) != nullptr; };
   };
   EXPECT_TRUE(fails_saying(opening("mous:"), "mous:", "did you mean 'mouse:'?"));
-  EXPECT_TRUE(fails_saying(opening("tum:x"), "unknown kind of device", "script:, hand:, mouse:"));
+  EXPECT_TRUE(fails_saying(opening("tum:x"), "unknown type of device", "script:, hand:, mouse:"));
   EXPECT_TRUE(fails_saying(opening("mouse"), "scheme"));
-  EXPECT_TRUE(fails_saying(opening("mouse:x"), "mouse:x", "write mouse: alone"));
+  EXPECT_TRUE(fails_saying(opening("mouse:x"), "mouse:x", "write only mouse:"));
   EXPECT_TRUE(fails_saying(opening("script:"), "no path to follow", "script:FILE.csv"));
   EXPECT_TRUE(fails_saying(opening("script:/nonexistent.csv"), "/nonexistent.csv"));
   EXPECT_TRUE(fails_saying(opening("hand:x.csv?mas=1"), "'mas'", "did you mean 'mass'?"));

@@ -87,7 +87,7 @@ TEST(HipPath, NamesTheFileAndTheLineThatIsWrong) {
            {"t,x,y,z\n0,1 2,0,0\n", ".csv: line 2: x is not a number"},
            {"t,x,y,z\n0,0x1,0,0\n", ".csv: line 2: x is not a number"},
            {"t,x,y,z\n0,1e999,0,0\n", ".csv: line 2: x is not a number"},
-           {"t,x,y,z\n0,2e6,0,0\n", ".csv: line 2: the place is farther than 1000 km"},
+           {"t,x,y,z\n0,2e6,0,0\n", ".csv: line 2: the position is beyond 1000 km"},
            {"t,x,y,z\n0,0,0,0\n1e15,0,0,0\n", ".csv: line 3: the path is longer than 1000000 s"},
            {"t,x,z\n0,0,0\n", ".csv: line 1: the header has no column 'y'"},
            {"0,0,0,0\n1,0,0,0\n", ".csv: line 1: the header has no column 't'"},

@@ -170,9 +170,9 @@ TEST_F(Entries, SayWhatIsWrongWithThem) {
   const fs::path path = file("entry.json");
   EXPECT_TRUE(fails_saying([&] { return check(path, 1); }, "cannot be read", "bench-entry"));
   write(path, "{\"a\": ");
-  EXPECT_TRUE(fails_saying([&] { return check(path, 1); }, "no entry of the bench"));
+  EXPECT_TRUE(fails_saying([&] { return check(path, 1); }, "not a benchmark entry"));
   write(path, R"({"palpate_entry": 1, "method": "paper"})");
-  EXPECT_TRUE(fails_saying([&] { return check(path, 1); }, "no whole entry"));
+  EXPECT_TRUE(fails_saying([&] { return check(path, 1); }, "incomplete"));
   write(path, R"({"palpate_entry": 2})");
   EXPECT_TRUE(fails_saying([&] { return check(path, 1); }, "another version"));
   EntryOptions options = small();
@@ -297,7 +297,7 @@ TEST(PipeExample, HoldsAPlane) {
   EXPECT_TRUE(judgement.right);
   options.methods = {method};
   EXPECT_TRUE(fails_saying([&] { return methods_of(find_experiment("lift"), options); },
-                           "own methods alone", "bench-entry"));
+                           "only the methods of the lab", "bench-entry"));
 }
 
 }  // namespace test_entry

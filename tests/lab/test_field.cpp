@@ -501,7 +501,7 @@ TEST_F(Field, ScoresTheMeanOfTheClasses) {
   EXPECT_EQ(scores.rows.back(), (Line{"score", "", "", "75.0", "25.0", ""}));
   EXPECT_NE(scores.note.find("palpate eval field --methods m --case 'field:b?seed=4'"),
             std::string::npos);
-  EXPECT_NE(scores.note.find("m: 1.0 s behind in 11 s, 60.0 % of that with an alarm; false alarms "
+  EXPECT_NE(scores.note.find("m: behind for 1.0 s of 11 s, 60.0 % of that flagged; false positives "
                              "in 0.50 % of the rest; 2 of 3 times in front again within 0.2 s"),
             std::string::npos)
       << scores.note;

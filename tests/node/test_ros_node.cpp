@@ -245,7 +245,7 @@ TEST_F(RosNodeTest, RefusesWhatIsNoName) {
   for (const char* name : {"", "my node", "3rd", "a//b", "a/", "a/2b"})
     EXPECT_TRUE(test::fails_saying(
         [&] { return std::make_unique<RosNode>(*session_, RosNodeOptions{.name = name}); },
-        "--name", "none for a node", "palpate"))
+        "--name", "not a valid node name", "palpate"))
         << name;
   EXPECT_TRUE(test::fails_saying(
       [&] { return std::make_unique<RosNode>(*session_, RosNodeOptions{.rate = 0.0}); },

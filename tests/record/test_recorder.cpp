@@ -257,7 +257,7 @@ TEST(Recorder, CountsFramesThatItHasNoRoomForAndAReplaySaysSo) {
   SessionReader reader(folder.path() / "bag");
   const ReplayReport report = replay(reader);
   EXPECT_EQ(report.ticks, 0U);
-  EXPECT_NE(report.broken_off.find("left out"), std::string::npos) << report.broken_off;
+  EXPECT_NE(report.broken_off.find("dropped"), std::string::npos) << report.broken_off;
 }
 
 TEST(Recorder, CountsTicksThatItHasNoRoomFor) {

@@ -71,7 +71,7 @@ TEST(TouchingHard, ChangesNothingWhereAThingIsHard) {
   Task task(exact + "&tilt=20deg&arm=remembered", hand, 0.0, {.press_share = 1.0});
   const Felt felt = press(task);
   ASSERT_TRUE(task.touched());
-  EXPECT_EQ(task.ignored(), "it is as hard as what is rendered");
+  EXPECT_EQ(task.ignored(), "ignored: it is not softer than the rendered stiffness");
   EXPECT_NEAR(felt.second, felt.first, 0.02 * felt.first);
 }
 

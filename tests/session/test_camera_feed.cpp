@@ -488,7 +488,7 @@ TEST(CameraFeed, GivesNoFreshnessToAPictureThatStaysTheSame) {
   run.options.frozen_frames = 10;
   const CameraStatus status = run.until(6.0, run.source(steps, live));
   EXPECT_EQ(status.state, CameraState::frozen);
-  EXPECT_EQ(status.text, "frozen: it gives the same picture again and again");
+  EXPECT_EQ(status.text, "frozen: it sends the same image repeatedly");
   EXPECT_EQ(run.given.size(), 109U);
   EXPECT_NEAR(*status.last_frame, run.given.back().fed.frame.stamp, 1e-9) << "the age shows";
   Playing recovered;
@@ -522,8 +522,8 @@ TEST(CameraFeed, DoubtsAUnitThatPutsTheSceneWhereTheCameraCannotMeasure) {
   const CameraStatus doubted = run.until(2.0, std::make_unique<WallInAnotherUnit>(run.clock));
   EXPECT_EQ(doubted.state, CameraState::live);
   EXPECT_EQ(doubted.text,
-            "live; 99 % of its points lie outside what it can measure (0.30 to 3.00 m): look at "
-            "its unit of depth");
+            "live; 99 % of its points are outside the camera's measuring range (0.30 to 3.00 m): "
+            "check the unit of its depth values");
   Playing longer;
   const CameraStatus mended = longer.until(5.0, std::make_unique<WallInAnotherUnit>(longer.clock));
   EXPECT_EQ(mended.text, "live");

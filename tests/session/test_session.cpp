@@ -170,7 +170,7 @@ TEST(Session, AsksWhatFramesAreMadeOfAndKeepsAHandOffOneMaterial) {
   };
   EXPECT_NE(play(std::move(wrong), 0.1).state.cameras[0].doubt.find("3 pixels"), std::string::npos);
   Fixture box{.name = "box", .size = Vec3::Constant(0.1), .material = "nerve"};
-  EXPECT_TRUE(fails_saying([&] { validate(box); }, "'box'", "leave material out"));
+  EXPECT_TRUE(fails_saying([&] { validate(box); }, "'box'", "remove material"));
 }
 
 TEST(Session, TakesTheNoiseThatIsUsualForTheCamerasKindUnlessItIsSet) {

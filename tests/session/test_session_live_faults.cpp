@@ -39,7 +39,7 @@ enum class LiveFault {
   off,            // delivers nothing
   hung,           // a read does not return
   unplugged,      // each read throws
-  frozen,         // the same picture with new stamps
+  frozen,         // the same image with new stamps
   slow,           // a frame in 0.6 s
   intermittent,   // frames for 0.1 s, none for 0.6 s
   stuck_clock,    // new pictures with the same stamp
@@ -244,7 +244,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Combine(testing::Values(Cell{LiveFault::off, true, "Off", "no frame"},
                                      Cell{LiveFault::hung, true, "Hung", "it hangs"},
                                      Cell{LiveFault::unplugged, true, "Unplugged", "plug it in"},
-                                     Cell{LiveFault::frozen, true, "Frozen", "the same picture"},
+                                     Cell{LiveFault::frozen, true, "Frozen", "the same image"},
                                      Cell{LiveFault::slow, true, "Slow", ""},
                                      Cell{LiveFault::intermittent, true, "Intermittent", ""},
                                      Cell{LiveFault::stuck_clock, false, "StuckClock",

@@ -99,7 +99,7 @@ TEST(TumRecording, StartsLateAndEndsEarlyOnRequest) {
   EXPECT_EQ(frame->stamp, 0.0);
   EXPECT_EQ(image_of(frame).depth().front(), 1001);
   EXPECT_FALSE(source->next());
-  EXPECT_TRUE(fails_saying([&] { return folder.open("start=3"); }, "none is left"));
+  EXPECT_TRUE(fails_saying([&] { return folder.open("start=3"); }, "none remains"));
   EXPECT_TRUE(fails_saying([&] { return folder.open("frames=0"); }, "'frames'"));
   EXPECT_TRUE(fails_saying([&] { return folder.open("start=0.5"); }, "not a whole number"));
 }
@@ -199,7 +199,7 @@ TEST(TumRecording, GivesEachFrameTheColoursNextToItInTime) {
     EXPECT_EQ(without->colour, nullptr);
   }
   ASSERT_EQ(plain->info().notes.size(), 2U);
-  EXPECT_EQ(plain->info().notes[1].substr(0, 20), "colour is left out: ");
+  EXPECT_EQ(plain->info().notes[1].substr(0, 20), "colour is skipped: ");
   EXPECT_NE(plain->info().notes[1].find("1x1"), std::string::npos);
   folder.write("rgb.txt", "no number\n");
   EXPECT_TRUE(folder.open()->next());
@@ -252,7 +252,7 @@ TEST(TumRecording, NamesWhatIsWrongWithTheFolder) {
   EXPECT_TRUE(fails("units=0", "'units'"));
   EXPECT_TRUE(fails("poses=missing.txt", "has no missing.txt"));
   folder.write("depth.txt", "100.0 0.png\n99.0 1.png\n");
-  EXPECT_TRUE(fails("", "depth.txt:2: the stamp goes backwards"));
+  EXPECT_TRUE(fails("", "depth.txt:2: the timestamp goes backwards"));
   folder.write("intrinsics.json", "{}");
   EXPECT_TRUE(fails("", "has no 'width'"));
   std::filesystem::remove(folder.path() / "depth.txt");

@@ -70,9 +70,11 @@ TEST(DepthRvl, RejectsWhatCannotBe) {
   EXPECT_TRUE(fails({0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 0, 0}, "0x2 pixels"));
   EXPECT_TRUE(fails({0, 64, 0, 0, 0, 64, 0, 0, 0, 0, 0, 0}, "16384x16384 pixels"));
   EXPECT_TRUE(fails({255, 255, 255, 255, 1, 0, 0, 0, 0, 0, 0, 0}, "4294967295x1 pixels"));
-  EXPECT_TRUE(fails({2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0x30}, "other pixels"));  // three zeros
-  EXPECT_TRUE(fails({2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0}, "other pixels"));     // none at all
-  EXPECT_TRUE(fails({2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0x10, 0x02}, "that none can be"));  // below 0
+  EXPECT_TRUE(
+      fails({2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0x30}, "different number of pixels"));  // three zeros
+  EXPECT_TRUE(
+      fails({2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0}, "different number of pixels"));  // none at all
+  EXPECT_TRUE(fails({2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0x10, 0x02}, "out of range"));  // below 0
   EXPECT_TRUE(fails({2, 0, 0, 0, 1, 0, 0, 0, 255, 255, 255, 255, 255, 255, 255, 255}, "digits"));
 }
 

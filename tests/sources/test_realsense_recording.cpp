@@ -67,7 +67,7 @@ TEST_P(RealSenseFileOfEitherKind, IsReadWithItsLensUnitAndStamps) {
   EXPECT_EQ(source->info().frames, 3U);
   EXPECT_NEAR(*source->info().frame_rate, 30.3, 0.01);
   ASSERT_EQ(source->info().notes.size(), 1U) << "colour and infrared are no depth";
-  EXPECT_TRUE(source->info().notes[0].starts_with("colour is left out: "));
+  EXPECT_TRUE(source->info().notes[0].starts_with("colour is skipped: "));
   for (int i = 0; i < 3; ++i) {
     const auto frame = source->next();
     ASSERT_TRUE(frame);

@@ -288,7 +288,7 @@ TEST_F(ForeignBag, SaysWhyItsColourIsLeftOut) {
   const auto source = open();
   EXPECT_EQ(source->next()->colour, nullptr);
   ASSERT_EQ(source->info().notes.size(), 2U);
-  EXPECT_NE(source->info().notes[1].find("colour is left out: topic /camera/color"),
+  EXPECT_NE(source->info().notes[1].find("colour is skipped: topic /camera/color"),
             std::string::npos);
   EXPECT_NE(source->info().notes[1].find("/tf_static"), std::string::npos);
 }
@@ -330,7 +330,7 @@ TEST_F(ForeignBag, OfSeveralCamerasSaysWhichOneItReads) {
   EXPECT_EQ(source->info().notes[0],
             "/a/depth/image is read; also there, by ?topic=: /b/depth/image");
   EXPECT_EQ(source->info().notes[1],
-            "the bag has no TF (/tf, /tf_static): points are in the camera's own frame");
+            "the bag has no TF (/tf, /tf_static): points are in the camera frame");
   EXPECT_EQ(open("?topic=/b/depth/image")->info().notes.size(), 2U);
 }
 

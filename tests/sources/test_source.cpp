@@ -49,7 +49,7 @@ TEST(OpenSource, OpensASchemeThatAProgramAddedToACopyOfTheRegistry) {
   camera->cancel();
   EXPECT_TRUE(open_source("synthetic:plane?size=4x3", schemes)->next());
   EXPECT_EQ(standard_sources().entries().size(), standard) << "the library's own is not changed";
-  EXPECT_TRUE(fails_saying([] { return open_source("two-points:"); }, "unknown kind of source",
+  EXPECT_TRUE(fails_saying([] { return open_source("two-points:"); }, "unknown type of source",
                            "synthetic:", "recording:"));
   EXPECT_TRUE(fails_saying([&] { schemes.add({"tum", "", {}}); }, "'tum:'", "already"));
 }

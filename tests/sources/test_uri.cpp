@@ -76,7 +76,7 @@ TEST(Uri, RejectsWhatIsNotANumberOrNotInRange) {
 TEST(Uri, RejectsAUnitThatDoesNotFit) {
   const Uri uri("depth:d?fps=30mm&fx=525mm");
   EXPECT_TRUE(fails_saying([&] { return uri.number_option("fps", 30, 1, 1000, "Hz"); },
-                           "units known here: hz, khz"));
+                           "valid units: hz, khz"));
   EXPECT_TRUE(
       fails_saying([&] { return uri.number_option("fx", 30, 1, 1000, "px"); }, "plain number"));
 }
@@ -102,7 +102,7 @@ TEST(Uri, WithoutAnOptionIsAsIfItHadNotBeenGiven) {
 
 TEST(OpenSource, ListsTheKnownSchemesForAnUnknownOne) {
   EXPECT_TRUE(fails_saying([] { return open_source("kinect:0"); },
-                           "unknown kind of source 'kinect:'; known here:"));
+                           "unknown type of source 'kinect:'; known here:"));
   EXPECT_THROW(open_source("folder"), Error);
 }
 

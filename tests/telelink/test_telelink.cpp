@@ -139,7 +139,7 @@ TEST_F(Telelink, LeadsTheRobotToTheHandAndNotThroughWhatIsSeen) {
   const RobotView view = operator_end_->robot();
   EXPECT_NEAR(view.touched->place.x(), 0.05, 5e-3);
   EXPECT_EQ(view.touched->stiffness, Touched::hardest);
-  EXPECT_EQ(view.ignored, "it is as hard as what is rendered");
+  EXPECT_EQ(view.ignored, "ignored: it is not softer than the rendered stiffness");
 }
 
 TEST_F(Telelink, StopsTheRobotWithItsOperator) {
@@ -175,14 +175,14 @@ TEST_F(Telelink, TellsTheOperatorWhatTheRobotMayNotDo) {
 
 TEST(Robots, SayWhatTheyNeed) {
   EXPECT_TRUE(
-      test::fails_saying([] { open_robot("pint:"); }, "pint", "unknown kind of robot", "point:"));
+      test::fails_saying([] { open_robot("pint:"); }, "pint", "unknown type of robot", "point:"));
   EXPECT_TRUE(test::fails_saying([] { open_robot("point:?lag=9"); }, "lag", "9", ""));
   const test::OwnNetwork network;
   EXPECT_TRUE(test::fails_saying([] { open_robot("ros2:?pose=/arm/pose"); },
                                  "ros2:", "names no topic", "command="));
   EXPECT_TRUE(
       test::fails_saying([] { open_robot("ros2:?pose=/arm/pose&command=/arm/go&wait=0.2"); },
-                         "ros2:", "no pose comes", "pose="));
+                         "ros2:", "no PoseStamped messages", "pose="));
 }
 
 TEST(Robots, APointFollowsAndStopsByItself) {

@@ -27,7 +27,7 @@ TEST(PaintTouched, PaintsWhatIsSofterThanWhatIsRendered) {
   EXPECT_EQ(paint_touched(paint, {}, {.place = here, .stiffness = 300.0}), "");
   EXPECT_EQ(painted(paint).size(), 1u);
   EXPECT_EQ(paint_touched(paint, {}, {.place = here, .stiffness = 601.0}),
-            "it is as hard as what is rendered");
+            "ignored: it is not softer than the rendered stiffness");
   EXPECT_TRUE(painted(paint).empty());
   EXPECT_EQ(paint_touched(paint, {}, {.place = here, .friction = 0.42}), "");
   EXPECT_EQ(painted(paint), std::vector<std::string>{"touched friction 0.4"});
@@ -37,7 +37,7 @@ TEST(PaintTouched, LeavesWhatAPersonPainted) {
   Paint paint;
   paint.add({.place = here, .radius = 0.01, .material = "foam"});
   EXPECT_EQ(paint_touched(paint, {}, {.place = here, .stiffness = 300.0}),
-            "somebody has painted there");
+            "ignored: a user has painted there");
   EXPECT_EQ(painted(paint), std::vector<std::string>{"foam"});
 }
 
@@ -49,11 +49,12 @@ TEST(PaintTouched, IgnoresWhatCannotBeSaying) {
     message.data = std::move(data);
     return paint_touched(paint, {}, touched_of(message));
   };
-  EXPECT_EQ(after({0.1, 0.0, 0.03, 0.0, 0.0, 1.0, 1e12, nan}), "its stiffness cannot be");
-  EXPECT_EQ(after({0.1, 0.0, 0.03, 0.0, 0.0, 1.0, -300.0, nan}), "its stiffness cannot be");
-  EXPECT_EQ(after({nan, 0.0, 0.03, 0.0, 0.0, 1.0, 300.0, nan}), "its place is none");
-  EXPECT_EQ(after({0.1, 0.0, 0.03, 0.0, 0.0, 1.0, nan, nan}), "it says nothing");
-  EXPECT_EQ(after({0.1}), "it says nothing");
+  EXPECT_EQ(after({0.1, 0.0, 0.03, 0.0, 0.0, 1.0, 1e12, nan}), "stiffness is out of range");
+  EXPECT_EQ(after({0.1, 0.0, 0.03, 0.0, 0.0, 1.0, -300.0, nan}), "stiffness is out of range");
+  EXPECT_EQ(after({nan, 0.0, 0.03, 0.0, 0.0, 1.0, 300.0, nan}), "position is not finite");
+  EXPECT_EQ(after({0.1, 0.0, 0.03, 0.0, 0.0, 1.0, nan, nan}),
+            "contains neither stiffness nor friction");
+  EXPECT_EQ(after({0.1}), "contains neither stiffness nor friction");
   EXPECT_TRUE(painted(paint).empty());
   EXPECT_EQ(after({0.1, 0.0, 0.03, 0.0, 0.0, 1.0, 300.0, 0.5}), "");
 }

@@ -64,7 +64,7 @@ TEST_F(Touching, TakesNoPushedThingForASpring) {
     return Vec3(0.0, 0.0, pushes ? 1.5 : 0.0);
   });
   EXPECT_FALSE(found);
-  EXPECT_EQ(learner_.why_not(), "it does not give way as a spring does");
+  EXPECT_EQ(learner_.why_not(), "the contact is not elastic");
 }
 
 TEST_F(Touching, TellsFrictionOfWhatItSlidesOn) {
@@ -95,11 +95,11 @@ TEST_F(Touching, LearnsNothingFromShortWeakOrWrongForces) {
   EXPECT_EQ(told([](const Vec3& at, const Vec3&) {
               return Vec3(0.0, 0.0, depth(at) > 3e-3 ? nan : std::max(0.0, 400.0 * depth(at)));
             }),
-            "the robot told a force or a place that cannot be");
+            "the robot reported a force or a position that is not finite or out of range");
   EXPECT_EQ(told([](const Vec3& at, const Vec3&) {
               return Vec3(0.0, 0.0, depth(at) > 3e-3 ? 1e6 : std::max(0.0, 400.0 * depth(at)));
             }),
-            "the robot told a force or a place that cannot be");
+            "the robot reported a force or a position that is not finite or out of range");
 }
 
 TEST(Disbelief, SaysWhatCannotBe) {
@@ -110,14 +110,14 @@ TEST(Disbelief, SaysWhatCannotBe) {
   const Vec3 here(0.1, 0.0, 0.0);
   const Vec3 up = Vec3::UnitZ();
   EXPECT_EQ(why(here, up, 300.0, 0.5), "");
-  EXPECT_EQ(why({nan, 0.0, 0.0}, up, 300.0, {}), "its place is none");
-  EXPECT_EQ(why(here, 3.0 * up, 300.0, {}), "its normal is none");
-  EXPECT_EQ(why(here, Vec3::Constant(nan), 300.0, {}), "its normal is none");
+  EXPECT_EQ(why({nan, 0.0, 0.0}, up, 300.0, {}), "position is not finite");
+  EXPECT_EQ(why(here, 3.0 * up, 300.0, {}), "normal is not a unit vector");
+  EXPECT_EQ(why(here, Vec3::Constant(nan), 300.0, {}), "normal is not a unit vector");
   for (const double wrong : {-300.0, 0.0, 1e9, nan})
-    EXPECT_EQ(why(here, up, wrong, {}), "its stiffness cannot be") << wrong;
+    EXPECT_EQ(why(here, up, wrong, {}), "stiffness is out of range") << wrong;
   for (const double wrong : {-0.1, 50.0, nan})
-    EXPECT_EQ(why(here, up, {}, wrong), "its friction cannot be") << wrong;
-  EXPECT_EQ(why(here, up, {}, {}), "it says nothing");
+    EXPECT_EQ(why(here, up, {}, wrong), "friction coefficient is out of range") << wrong;
+  EXPECT_EQ(why(here, up, {}, {}), "contains neither stiffness nor friction");
 }
 
 }  // namespace test_touched

@@ -55,7 +55,7 @@ class FakeHost final : public ViewerHost {
 
   std::filesystem::path begin_file(const std::string& name, std::uint64_t size) override {
     static_cast<void>(size);
-    if (name == "song.mp3") throw Error(name, "cannot be touched");
+    if (name == "song.mp3") throw Error(name, "cannot be opened");
     return folder_.path() / name;
   }
   void end_file(const std::filesystem::path& file, bool whole) override {
@@ -201,7 +201,7 @@ TEST_F(ViewerServerTest, TakesAFileFromTheOperatorsPageAlone) {
 
   const auto refused = send_file(server.port(), "/file?name=song.mp3&token=operator-123", "x");
   EXPECT_EQ(refused.result(), http::status::unprocessable_entity);
-  EXPECT_EQ(refused.body().substr(0, 28), "song.mp3: cannot be touched");
+  EXPECT_EQ(refused.body().substr(0, 28), "song.mp3: cannot be opened");
 }
 
 TEST_F(ViewerServerTest, LetsGoOfAFileThatDoesNotArriveInFull) {
@@ -358,7 +358,7 @@ TEST_F(ViewerServerTest, GivesTheOneHandToWhoComesFirst) {
   second.move_hand(false, 0.0, 0.0, 0.0);  // nor may it let go what it does not hold
   EXPECT_NE(second.until("error").get<std::string>().find("another page"), std::string::npos);
   second.send_text(R"({"reset": true})");
-  EXPECT_NE(second.until("error").get<std::string>().find("resets"), std::string::npos);
+  EXPECT_NE(second.until("error").get<std::string>().find("can reset it"), std::string::npos);
   EXPECT_EQ(host.hands(), 1u);
   first.move_hand(false, 0.0, 0.0, 0.0);
   EXPECT_FALSE(host.hand_number(2)) << "let go";
@@ -533,7 +533,7 @@ TEST_F(ViewerServerTest, TellsEachPageItsRoleAndTheRolesOfTheHand) {
 TEST_F(ViewerServerTest, LetsThePageWithTheHandSetParametersAndNoMore) {
   Page page(server.port());
   page.send_text(R"({"set": {"name": "stiffness", "value": 1}})");
-  EXPECT_NE(page.until("error").get<std::string>().find("looks on"), std::string::npos);
+  EXPECT_NE(page.until("error").get<std::string>().find("viewing only"), std::string::npos);
   page.move_hand(true, 0.1, 0.2, 0.3);
   page.send_text(R"({"method": "paper"})");
   EXPECT_NE(page.until("error").get<std::string>().find("operator"), std::string::npos);
@@ -568,7 +568,7 @@ TEST_F(ViewerServerTest, GivesNoPageTheHandOfADeviceThatPagesDoNotMove) {
   page.move_hand(true, 0.1, 0.2, 0.3);
   EXPECT_NE(page.until("error").get<std::string>().find("device"), std::string::npos);
   page.send_text(R"({"set": {"name": "stiffness", "value": 1}})");
-  EXPECT_NE(page.until("error").get<std::string>().find("looks on"), std::string::npos);
+  EXPECT_NE(page.until("error").get<std::string>().find("viewing only"), std::string::npos);
   EXPECT_EQ(host.hands(), 0u);
   EXPECT_EQ(host.commands(), 0);
 }

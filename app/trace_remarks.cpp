@@ -43,7 +43,7 @@ void add_points(const DepthImage& image, int step, std::vector<Vec3>& points) {
 }
 
 void add_points(const Cloud& cloud, std::vector<Vec3>& points) {
-  if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
+  if (const DepthImage* image = cloud.image()) {
     const auto pixels = static_cast<double>(image->depth().size());
     const int step = static_cast<int>(std::ceil(std::sqrt(pixels / enough_points)));
     const std::size_t before = points.size();
@@ -53,7 +53,7 @@ void add_points(const Cloud& cloud, std::vector<Vec3>& points) {
       points.resize(before);
       add_points(*image, 1, points);
     }
-  } else if (const auto* unordered = dynamic_cast<const PointCloud*>(&cloud)) {
+  } else if (const PointCloud* unordered = cloud.point_cloud()) {
     const std::size_t step = unordered->size() / enough_points + 1;
     for (std::size_t i = 0; i < unordered->size(); i += step) points.push_back(unordered->point(i));
   }
@@ -121,7 +121,7 @@ void TraceRemarks::look_at_start(const Tick& tick,
     before = -*behind;
   } else {
     for (const auto& cloud : cameras) {
-      const auto* unordered = dynamic_cast<const PointCloud*>(cloud.get());
+      const PointCloud* unordered = cloud ? cloud->point_cloud() : nullptr;
       if (unordered == nullptr) continue;
       const auto distance = nearest_within(*unordered, tick.hip, r_c_);
       if (distance && (!before || *distance < *before)) before = distance;
@@ -177,7 +177,7 @@ void TraceRemarks::count_points(const Tick& tick,
                                 std::span<const std::shared_ptr<const Cloud>> cameras) {
   points_about_ = 0;
   for (const auto& cloud : cameras) {
-    if (dynamic_cast<const PointCloud*>(cloud.get()) == nullptr) {
+    if (!cloud || cloud->point_cloud() == nullptr) {
       points_about_ = enough_about;
       return;
     }

@@ -73,7 +73,8 @@ std::shared_ptr<const DepthImage> first_image(const std::string& uri, const std:
   const std::unique_ptr<Source> source = open_source(uri, all_sources());
   constexpr double first_frame_time = 10.0;  // [s] a live camera that gives nothing gives up
   const std::optional<Frame> frame = source->next(first_frame_time);
-  auto image = frame ? std::dynamic_pointer_cast<const DepthImage>(frame->cloud) : nullptr;
+  std::shared_ptr<const DepthImage> image;
+  if (frame) image = {frame->cloud, frame->cloud->image()};
   if (!image) throw Error(uri, frame ? "it has no depth image" : "it has no frames", remedy);
   return image;
 }

@@ -133,9 +133,8 @@ Json describe(const PixelProbe& probe, int u, int v) {
 
 Json describe_pixel(const Cloud& cloud, const std::string& text, const std::string& uri) {
   const auto [u, v] = pixel_of(text);
-  if (const auto* image = dynamic_cast<const DepthImage*>(&cloud))
-    return describe(probe_pixel(*image, u, v), u, v);
-  if (const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+  if (const DepthImage* image = cloud.image()) return describe(probe_pixel(*image, u, v), u, v);
+  if (const PointCloud* points = cloud.point_cloud();
       points != nullptr && points->surface() != nullptr && points->surface()->columns > 0)
     return describe(probe_pixel(*points, u, v), u, v);
   throw Error(uri, "its points are not an image, so there is no pixel " + text,
@@ -170,11 +169,11 @@ int info(InfoOptions options) {
   if (!about.notes.empty()) json["notes"] = about.notes;  // a live camera's come with its frame
   Json first = {{"stamp_s", frame->stamp}};
   if (!about.details.empty()) first["details"] = about.details;
-  if (const auto* image = dynamic_cast<const DepthImage*>(frame->cloud.get())) {
+  if (const DepthImage* image = frame->cloud->image()) {
     first.update(describe(*image));
     if (about.frames != 1 && image->world_from_camera().matrix().isIdentity(0.0))
       json["poses"] = "none: the world frame is the camera frame, so the HIP moves with the camera";
-  } else if (const auto* cloud = dynamic_cast<const PointCloud*>(frame->cloud.get())) {
+  } else if (const PointCloud* cloud = frame->cloud->point_cloud()) {
     first.update(describe(*cloud));
   }
   if (frame->colour)

@@ -45,7 +45,7 @@ int serve(const ServeOptions& options) {
   CameraFeed feed(options.camera);
   std::atomic<bool> is_depth{true};
   feed.start([&](const FedFrame& fed) {
-    const auto* image = dynamic_cast<const DepthImage*>(fed.frame.cloud.get());
+    const DepthImage* image = fed.frame.cloud->image();
     if (image == nullptr)
       is_depth = false;
     else

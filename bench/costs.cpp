@@ -57,7 +57,7 @@ class Session {
  public:
   Session(const Subject& subject, const MethodChoice& method, const Hand& hand)
       : subject_(subject), hand_(hand), touch(make_method(method.name, method.parameters)) {
-    touch->frame(*subject.frames.front(), 0.0);
+    touch->observe({*subject.frames.front(), 0.0});
     const Vec3 start = hip_at(subject, hand, 0.0);
     touch->seat(start - (std::max(hand.depth, 0.0) + 0.03) * subject.into);
     constexpr int settling = 200;
@@ -69,7 +69,8 @@ class Session {
     return static_cast<double>(frames_) <= (now() + 1.0 / hand_.tick_rate) * hand_.frame_rate;
   }
   void frame(const std::vector<const Cloud*>& clouds) {
-    touch->frame(*clouds[frames_ % clouds.size()], static_cast<double>(frames_) / hand_.frame_rate);
+    touch->observe(
+        {*clouds[frames_ % clouds.size()], static_cast<double>(frames_) / hand_.frame_rate});
     ++frames_;
   }
   [[nodiscard]] Vec3 next_hip() const {
@@ -134,12 +135,12 @@ void measure_ticks(const Subject& subject, const MethodChoice& method, const Han
 
 // The pixels that a gather has to look at.
 double measure_window(const Cloud& cloud, const Ball& ball, double budget) {
-  if (const auto* set = dynamic_cast<const CloudSet*>(&cloud)) {
+  if (!cloud.parts().empty()) {
     double sum = 0.0;
-    for (const auto& each : set->clouds()) sum += measure_window(*each, ball, budget);
+    for (const Cloud* part : cloud.parts()) sum += measure_window(*part, ball, budget);
     return sum;
   }
-  const auto* image = dynamic_cast<const DepthImage*>(&cloud);
+  const DepthImage* image = cloud.image();
   if (image == nullptr) return 0.0;
   const Eigen::Isometry3d camera_from_world = image->world_from_camera().inverse();
   const auto window = image->rays().window(camera_from_world * ball.centre, ball.radius);
@@ -189,8 +190,8 @@ KernelCosts kernel_costs(const Subject& subject, const MethodChoice& method, con
   std::size_t frames = 0;
   costs.frame = measure(budget, many, [&] {
     ++frames;
-    touch.frame(*subject.frames[frames % subject.frames.size()],
-                static_cast<double>(frames) / hand.frame_rate);
+    touch.observe({*subject.frames[frames % subject.frames.size()],
+                   static_cast<double>(frames) / hand.frame_rate});
   });
   return costs;
 }
@@ -217,7 +218,7 @@ std::vector<SearchCosts> search_costs(const Subject& subject, const Parameters& 
     return patch.size();
   };
 
-  if (dynamic_cast<const PointCloud*>(&frame) == nullptr)
+  if (frame.point_cloud() == nullptr)
     add("depth image", std::nullopt, many, [&] { return gathered(frame); });
 
   std::optional<PointCloud> boxes;

@@ -79,7 +79,7 @@ std::vector<PclSearch> pcl_searches(const Cloud& frame, const std::vector<Vec3>&
                           in_world));
   searches.push_back(made("PCL octree", std::make_shared<pcl::search::Octree<pcl::PointXYZ>>(leaf),
                           given, in_world));
-  if (const auto* image = dynamic_cast<const DepthImage*>(&frame))
+  if (const DepthImage* image = frame.image())
     searches.push_back(made(
         "PCL organised", std::make_shared<pcl::search::OrganizedNeighbor<pcl::PointXYZ>>(sorted),
         [=] { return organised(*image); }, image->world_from_camera().inverse()));

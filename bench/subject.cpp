@@ -80,7 +80,7 @@ Subject recorded(const std::string& name, std::shared_ptr<const Cloud> frame) {
   }
   Vec3 eye = Vec3::Zero();
   Vec3 surface = points[points.size() / 2];
-  if (const auto* image = dynamic_cast<const DepthImage*>(frame.get())) {
+  if (const DepthImage* image = frame->image()) {
     eye = image->world_from_camera().translation();
     // The measured pixel nearest to the image's middle.
     const Intrinsics& k = image->intrinsics();
@@ -96,7 +96,7 @@ Subject recorded(const std::string& name, std::shared_ptr<const Cloud> frame) {
         }
       }
     }
-  } else if (const auto* cloud = dynamic_cast<const PointCloud*>(frame.get())) {
+  } else if (const PointCloud* cloud = frame->point_cloud()) {
     eye = cloud->viewpoint().value_or(Vec3::Zero());
   }
   const Vec3 sight = surface - eye;
@@ -109,16 +109,16 @@ Subject recorded(const std::string& name, std::shared_ptr<const Cloud> frame) {
 }
 
 std::vector<Vec3> points_of(const Cloud& cloud) {
-  if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) return image->points();
+  if (const DepthImage* image = cloud.image()) return image->points();
   std::vector<Vec3> points;
-  if (const auto* list = dynamic_cast<const PointCloud*>(&cloud)) {
+  if (const PointCloud* list = cloud.point_cloud()) {
     points.reserve(list->size());
     for (std::size_t i = 0; i < list->size(); ++i) points.push_back(list->point(i));
-  } else if (const auto* set = dynamic_cast<const CloudSet*>(&cloud)) {
-    for (const auto& each : set->clouds()) {
-      const std::vector<Vec3> more = points_of(*each);
-      points.insert(points.end(), more.begin(), more.end());
-    }
+    return points;
+  }
+  for (const Cloud* part : cloud.parts()) {
+    const std::vector<Vec3> more = points_of(*part);
+    points.insert(points.end(), more.begin(), more.end());
   }
   return points;
 }

@@ -12,17 +12,17 @@
 class Cushion final : public palpate::Method {
  public:
   void seat(const palpate::Vec3& /*proxy*/) noexcept override {}  // it remembers nothing
-  void frame(const palpate::Cloud& cloud, double /*stamp*/) noexcept override {
-    cloud_ = &cloud;
+  void observe(const palpate::Observation& seen) noexcept override {
+    seen_.take(seen.camera, seen.cloud);
     ++number_;
   }
 
   palpate::Tick tick(const palpate::Vec3& hip, double t) noexcept override {
     palpate::Tick tick = palpate::free_tick(hip, t, number_);
-    if (cloud_ == nullptr) return tick;
+    if (seen_.parts().empty()) return tick;
     const palpate::Ball ball{.centre = hip, .radius = 0.02};
     patch_.start(ball);
-    cloud_->gather(ball, palpate::Patch::capacity, patch_);
+    seen_.gather(ball, palpate::Patch::capacity, patch_);
     if (patch_.size() == 0 || !patch_.view(0).viewpoint) return tick;
     const palpate::Vec3 towards_camera = (*patch_.view(0).viewpoint - hip).normalized();
     double height = 0.0;  // [m] of the points over the hand
@@ -42,7 +42,7 @@ class Cushion final : public palpate::Method {
   }
 
  private:
-  const palpate::Cloud* cloud_ = nullptr;  // lives until the next frame
+  palpate::ObservedClouds seen_;  // of all cameras, as one
   palpate::Patch patch_;
   double stiffness_ = 0.0;  // [N/m]
   std::int64_t number_ = -1;

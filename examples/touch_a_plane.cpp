@@ -11,7 +11,7 @@ int main() {
   const palpate::DepthImage wall(rays, std::vector<std::uint16_t>(640 * 480, 1000), 1000.0);
 
   const std::unique_ptr<palpate::Method> touch = palpate::make_method();
-  touch->frame(wall, 0.0);
+  touch->observe({wall, 0.0});
   for (int ms = 0; ms <= 40; ++ms) {  // a hand pushes through the wall at 1 m/s
     const double t = 1e-3 * ms;
     const palpate::Tick tick = touch->tick({0.0, 0.0, 0.98 + t}, t);

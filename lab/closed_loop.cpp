@@ -59,7 +59,7 @@ class StraightLoop final : public TouchLoop {
       : method_(std::move(method)), held_(std::move(held)) {}
 
   void frame(const std::shared_ptr<const Cloud>& cloud, double stamp, double /*t*/) override {
-    method_->frame(*cloud, stamp);
+    method_->observe({*cloud, stamp});
     in_use_ = cloud;  // only now may the frame before go
   }
 

@@ -26,7 +26,7 @@ bool LocalPoints::cover(const Vec3& place) {
   centre_ = place;
   newest_.clear();
   normals_.clear();
-  const auto* given = dynamic_cast<const PointCloud*>(cloud_);
+  const PointCloud* given = cloud_->point_cloud();
   if (window_ == 1 && given != nullptr && given->surface() != nullptr &&
       !given->surface()->normals.empty()) {
     const Surface& surface = *given->surface();

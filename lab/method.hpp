@@ -33,6 +33,10 @@ Truth truth_of(const std::shared_ptr<const Scene>& scene);
 /// method without a proxy reports the point it pushes the hand towards, r_c above the surface.
 class LabMethod : public Method {
  public:
+  void observe(const Observation& seen) noexcept final {
+    clouds_.take(seen.camera, seen.cloud);
+    frame(clouds_, seen.stamp);
+  }
   void set_parameters(const Parameters& parameters) final {
     validate(parameters);
     parameters_ = parameters;
@@ -41,12 +45,17 @@ class LabMethod : public Method {
 
  protected:
   explicit LabMethod(const Parameters& parameters) : parameters_(parameters) {}
+  /// Any camera has a new frame.
+  /// @param all    what each camera saw last; the same object each time
+  /// @param stamp  [s] of the new frame
+  virtual void frame(const Cloud& all, double stamp) noexcept = 0;
   /// Called after a change, for members derived from the parameters.
   virtual void parameters_changed() {}
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
 
  private:
   Parameters parameters_;
+  ObservedClouds clouds_;
 };
 
 /// A method that can fail in its ticks, which cannot throw: `play` asks after each.

@@ -232,7 +232,7 @@ Message message_of(const std::string& name, const Cloud& cloud, double stamp) {
     message.reserve(12 * points);
     return message;
   };
-  if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
+  if (const DepthImage* image = cloud.image()) {
     const Intrinsics& k = image->intrinsics();
     const auto width = static_cast<std::size_t>(k.width);
     const auto height = static_cast<std::size_t>(k.height);
@@ -243,7 +243,7 @@ Message message_of(const std::string& name, const Cloud& cloud, double stamp) {
     }
     return message;
   }
-  if (const auto* points = dynamic_cast<const PointCloud*>(&cloud)) {
+  if (const PointCloud* points = cloud.point_cloud()) {
     Message message = head(points->viewpoint().value_or(Vec3::Constant(nan)), 0, 0, points->size());
     for (std::size_t i = 0; i < points->size(); ++i) add_point(message, points->point(i));
     return message;

@@ -62,7 +62,7 @@ void play(Method& method, const Scenario& scenario, const OnTick& on_tick) {
   for (std::int64_t i = 0; i <= ticks; ++i) {
     const double t = static_cast<double>(i) / scenario.tick_rate;
     arrivals.until(t, [&method](const std::shared_ptr<const Cloud>& cloud, double stamp) {
-      method.frame(*cloud, stamp);
+      method.observe({*cloud, stamp});
     });
     const Tick tick = method.tick(scenario.hip(t), t);
     if (fallible != nullptr) fallible->rethrow();

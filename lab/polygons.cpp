@@ -85,9 +85,9 @@ std::optional<double> meets_line(const Vec3& from, const Vec3& way, double radiu
 }  // namespace
 
 void Polygons::check(const Cloud& cloud) {
-  if (const auto* set = dynamic_cast<const CloudSet*>(&cloud)) {
-    for (const auto& member : set->clouds()) check(*member);
-  } else if (const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+  if (!cloud.parts().empty()) {
+    for (const Cloud* part : cloud.parts()) check(*part);
+  } else if (const PointCloud* points = cloud.point_cloud();
              points != nullptr && points->size() > 0) {
     const Surface* surface = points->surface();
     if (surface != nullptr && (!surface->triangles.empty() || surface->columns > 0)) return;
@@ -149,9 +149,9 @@ void Polygons::add_mesh(const Surface& mesh) {
 
 void Polygons::add(const Cloud& cloud, const Vec3& place) {
   const Vec3 hole = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
-  if (const auto* set = dynamic_cast<const CloudSet*>(&cloud)) {
-    for (const auto& member : set->clouds()) add(*member, place);
-  } else if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
+  if (!cloud.parts().empty()) {
+    for (const Cloud* part : cloud.parts()) add(*part, place);
+  } else if (const DepthImage* image = cloud.image()) {
     const Eigen::Isometry3d& world_from_camera = image->world_from_camera();
     const auto window = image->rays().window(world_from_camera.inverse() * place, reach_);
     std::vector<Vec3> points;
@@ -165,7 +165,7 @@ void Polygons::add(const Cloud& cloud, const Vec3& place) {
     if (!window.empty())
       add_grid(points, window.u_end - window.u_begin, window.v_end - window.v_begin,
                world_from_camera.translation());
-  } else if (const auto* points = dynamic_cast<const PointCloud*>(&cloud)) {
+  } else if (const PointCloud* points = cloud.point_cloud()) {
     if (points->surface() == nullptr) return;
     const Surface& surface = *points->surface();
     if (!surface.triangles.empty()) return add_mesh(surface);
@@ -193,7 +193,7 @@ void Polygons::add(const Cloud& cloud, const Vec3& place) {
 void Polygons::cover(const Vec3& place) {
   if (cloud_ == nullptr) return;
   if (!stale_ && (place - centre_).norm() <= reach_ / 3.0) return;
-  const auto* points = dynamic_cast<const PointCloud*>(cloud_);
+  const PointCloud* points = cloud_->point_cloud();
   const bool is_mesh =
       points != nullptr && points->surface() != nullptr && !points->surface()->triangles.empty();
   if (!stale_ && is_mesh) return;  // all of it is here

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Numbers that can be set, what can be touched, and a method that touches it.
+#include <array>
 #include <optional>
 #include <string>
 #include <utility>
@@ -151,13 +152,16 @@ class Renderer {
     method_ = method_of(method, parameters_, trouble_);
   }
 
-  void frame(const std::shared_ptr<Cloud>& cloud, double stamp) {
+  void frame(const std::shared_ptr<Cloud>& cloud, double stamp, std::size_t number) {
+    if (number >= clouds_.size())
+      throw Error("camera_number", std::to_string(number) + " is out of range",
+                  "number cameras from 0 to " + std::to_string(clouds_.size() - 1));
     method_->check(*cloud);
     {
       const py::gil_scoped_release released;
-      method_->frame(*cloud, stamp);
+      method_->observe({*cloud, stamp, number});
     }
-    cloud_ = cloud;  // only now may the frame before go
+    clouds_[number] = cloud;  // only now may the camera's frame before go
     trouble_->rethrow();
   }
 
@@ -198,7 +202,7 @@ class Renderer {
   Parameters parameters_;
   std::shared_ptr<Trouble> trouble_ = std::make_shared<Trouble>();
   std::unique_ptr<Method> method_;
-  std::shared_ptr<Cloud> cloud_;
+  std::array<std::shared_ptr<Cloud>, Patch::max_views> clouds_;  // by camera
 };
 
 py::dict values_of(const Parameters& parameters) {
@@ -442,33 +446,36 @@ void define_renderer(py::module_& m) {
            "A method by its name (palpate.methods()) or an object of a class derived from\n"
            "palpate.Method; parameters by their names (palpate.parameters()), in SI units.")
       .def("frame", &Renderer::frame, py::arg("cloud"), py::arg("stamp"),
-           "Takes a frame into use: a DepthImage or PointCloud, and when it was captured [s].")
+           py::arg("camera_number") = 0,
+           "Takes a frame into use: a DepthImage or PointCloud, and when it was captured [s]; "
+           "where\n"
+           "there are several cameras, which one's it is, from 0. What the others saw stays.")
       .def(
           "frame",
           [](Renderer& self, const py::array& depth, const Camera& camera, double stamp,
              const std::optional<Numbers>& world_from_camera, double units_per_metre,
              const std::optional<MaterialsOf>& materials, const py::object& labels,
-             const py::object& brightness) {
+             const py::object& brightness, std::size_t number) {
             self.frame(make_image(depth, camera, units_per_metre, world_from_camera, materials,
                                   labels, brightness),
-                       stamp);
+                       stamp, number);
           },
           py::arg("depth"), py::kw_only(), py::arg("camera"), py::arg("stamp"),
           py::arg("world_from_camera") = py::none(), py::arg("units_per_metre") = 1000.0,
           py::arg("materials") = py::none(), py::arg("labels") = py::none(),
-          py::arg("brightness") = py::none(),
+          py::arg("brightness") = py::none(), py::arg("camera_number") = 0,
           "The same from a depth image, uint16 (height, width), without a copy; the rest as\n"
           "DepthImage has it.")
       .def(
           "frame",
           [](Renderer& self, const Numbers& points, double stamp,
-             const std::optional<Numbers>& viewpoint) {
+             const std::optional<Numbers>& viewpoint, std::size_t number) {
             check_shape(points, "points", {0, 3},
                         std::string(point_shape) + ", or a depth image with camera=");
-            self.frame(make_points(points, viewpoint), stamp);
+            self.frame(make_points(points, viewpoint), stamp, number);
           },
           py::arg("points"), py::kw_only(), py::arg("stamp"), py::arg("viewpoint") = py::none(),
-          "The same from points (n, 3) [m, world].")
+          py::arg("camera_number") = 0, "The same from points (n, 3) [m, world].")
       .def("tick", &Renderer::tick, py::arg("hip"), py::arg("t"),
            "Moves the proxy towards the HIP [m, world] at time t [s] and renders the force.")
       .def("ticks", &Renderer::ticks, py::arg("hips"), py::arg("times"),

@@ -61,15 +61,16 @@ void PythonMethod::seat(const Vec3& proxy) noexcept {
   }
 }
 
-void PythonMethod::frame(const Cloud& cloud, double stamp) noexcept {
+void PythonMethod::observe(const Observation& seen) noexcept {
+  clouds_.take(seen.camera, seen.cloud);
   ++frames_;
   if (trouble_->first) return;
   const py::gil_scoped_acquire gil;
   try {
     if (view_) view_->end();
-    view_ = std::make_shared<CloudView>(&cloud);
+    view_ = std::make_shared<CloudView>(&clouds_);
     view_object_ = py::cast(view_);
-    object_.attr("frame")(view_object_, stamp);
+    object_.attr("frame")(view_object_, seen.stamp);
   } catch (...) {
     trouble_->first = std::current_exception();
   }

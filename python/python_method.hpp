@@ -46,13 +46,14 @@ class PythonMethod final : public Method {
   ~PythonMethod() override;
 
   void seat(const Vec3& proxy) noexcept override;
-  void frame(const Cloud& cloud, double stamp) noexcept override;
+  void observe(const Observation& seen) noexcept override;
   Tick tick(const Vec3& hip, double t) noexcept override;
   void set_parameters(const Parameters& parameters) override;
 
  private:
   py::object object_;
   py::object tick_;
+  ObservedClouds clouds_;
   std::shared_ptr<CloudView> view_;
   py::object view_object_;
   std::shared_ptr<Trouble> trouble_;

@@ -68,7 +68,7 @@ FeelFigures play_free_hands(const std::vector<Contestant>& contestants, const Fe
       const double t = 1e-3 * i;
       arrivals.until(t, [&](const std::shared_ptr<const Cloud>& cloud, double stamp) {
         for (Player& player : players) {
-          if (t <= stages[player.hand].scenario.duration) player.method->frame(*cloud, stamp);
+          if (t <= stages[player.hand].scenario.duration) player.method->observe({*cloud, stamp});
         }
       });
       for (Player& player : players) {

@@ -189,7 +189,7 @@ Cost measure_cost(const std::string& name, const ExperimentOptions& options) {
   for (int k = 0; k < 30; ++k) {
     const double stamp = k / 30.0;
     const double begin = thread_seconds();
-    method->frame(*frames[static_cast<std::size_t>(k) % frames.size()].cloud, stamp);
+    method->observe({*frames[static_cast<std::size_t>(k) % frames.size()].cloud, stamp});
     for (int i = 0; i < 33; ++i) {
       const double t = stamp + 1e-3 * i;
       const Vec3 hip(0.0, 0.0, std::max(0.03 - 0.1 * t, -0.010));

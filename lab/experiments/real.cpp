@@ -108,7 +108,7 @@ Recording open_recording(const std::string& uri, std::size_t most = most_places)
   while (recording.frames.size() < most_frames) {
     const std::optional<Frame> frame = source->next();
     if (!frame) break;
-    auto image = std::dynamic_pointer_cast<const DepthImage>(frame->cloud);
+    std::shared_ptr<const DepthImage> image(frame->cloud, frame->cloud->image());
     if (!image)
       throw Error(uri, "it has no depth images",
                   "give a recording of depth images, such as tum:FOLDER or depth:FOLDER");

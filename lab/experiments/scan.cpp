@@ -176,9 +176,8 @@ Subject recorded(const std::string& recording) {
     if (!frame) break;
     frames.push_back(std::move(*frame));
   }
-  const auto first =
-      frames.empty() ? nullptr : std::dynamic_pointer_cast<const DepthImage>(frames.front().cloud);
-  if (!first)
+  const DepthImage* first = frames.empty() ? nullptr : frames.front().cloud->image();
+  if (first == nullptr)
     throw Error(recording, "it has no depth image to scan across",
                 "give a recording of depth images, such as tum:FOLDER or depth:FOLDER");
   const auto hip = std::make_shared<const std::vector<Vec3>>(stroke_along(*first, recording));
@@ -202,7 +201,7 @@ Subject recorded(const std::string& recording) {
               },
           .surface =
               [=](const Vec3& p, const Frame& newest) {
-                const auto* image = dynamic_cast<const DepthImage*>(newest.cloud.get());
+                const DepthImage* image = newest.cloud ? newest.cloud->image() : nullptr;
                 const auto behind = image ? distance_behind(*image, p, 2e-3) : std::nullopt;
                 return behind ? *behind - (camera_from_world * p).z()
                               : std::numeric_limits<double>::quiet_NaN();
@@ -223,7 +222,7 @@ std::string scan(const std::string& name, const ExperimentOptions& options) {
     const double t = i * 1e-3;
     if (static_cast<double>(next) / subject.frame_rate <= t + 1e-9) {
       Frame frame = subject.frame(next++);
-      method->frame(*frame.cloud, frame.stamp);
+      method->observe({*frame.cloud, frame.stamp});
       in_use = std::move(frame);  // only now may the frame before go
     }
     const Vec3 hip = subject.hip(t);
@@ -259,7 +258,7 @@ double step_rate() {
   const Subject subject = synthetic_desk(1);
   const Frame frame = subject.frame(0);
   Paper paper;
-  paper.frame(*frame.cloud, 0.0);
+  paper.observe({*frame.cloud, 0.0});
   const auto now = [] {
     timespec t{};
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);

@@ -170,7 +170,7 @@ std::vector<Cell> corners_cells(const Experiment& experiment, const ExperimentOp
       const double speed = 10.0 * r_c;  // [m/s]
       const std::unique_ptr<Cloud> cloud = grid.capture(0, 0.0);
       method->seat(Vec3(from, 0.1 * r_c, height(from, 0.0) + 3.0 * r_c));
-      method->frame(*cloud, 0.0);
+      method->observe({*cloud, 0.0});
       std::string rows;
       const auto ticks = static_cast<int>((to - from) / speed * 1000.0);
       for (int i = 0; i <= ticks; ++i) {

@@ -76,8 +76,8 @@ class Chorus final : public Method {
   void seat(const Vec3& proxy) noexcept override {
     for (const auto& member : members_) member->seat(proxy);
   }
-  void frame(const Cloud& cloud, double stamp) noexcept override {
-    for (const auto& member : members_) member->frame(cloud, stamp);
+  void observe(const Observation& seen) noexcept override {
+    for (const auto& member : members_) member->observe(seen);
   }
   Tick tick(const Vec3& hip, double t) noexcept override {
     for (std::size_t i = 0; i < members_.size(); ++i) ticks_[i] = members_[i]->tick(hip, t);

@@ -126,7 +126,7 @@ Outcome play_field(Stage& stage, const std::vector<Method*>& methods, const Para
     for (; next < stage.shots.size() && stage.shots[next].arrives <= t + 1e-9; ++next) {
       const Shot& shot = stage.shots[next];
       std::shared_ptr<const DepthImage> frame = sensor.capture(stage.scene, shot.captured);
-      for (Method* method : methods) method->frame(*frame, shot.stamp);
+      for (Method* method : methods) method->observe({*frame, shot.stamp});
       in_use = std::move(frame);  // only now may the frame before go
       if (!still) shown = Snapshot(stage.scene, shot.captured);
       if (contact && shown.distance(ruler_proxy) < r_c - jump) outcome.unknown = "fast";

@@ -66,7 +66,7 @@ class ImageFeatures final : public LabMethod {
  private:
   // [m] Of the pixel that sees the HIP.
   [[nodiscard]] double texture(const Vec3& hip) const {
-    const auto* image = dynamic_cast<const DepthImage*>(cloud_);
+    const DepthImage* image = cloud_->image();
     if (image == nullptr || image->brightness().empty()) return 0.0;
     const Vec3 seen = image->world_from_camera().inverse() * hip;
     const auto window = image->rays().window(seen, around);

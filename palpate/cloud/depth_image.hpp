@@ -136,6 +136,7 @@ class DepthImage final : public Cloud {
   void sample(const Vec3& place, const Vec3& normal, double radius,
               SurfaceSample& sample) const noexcept override;
 
+  [[nodiscard]] const DepthImage* image() const noexcept override { return this; }
   /// What its pixels feel like; null: nothing is known. Set before the image is shared.
   [[nodiscard]] const std::shared_ptr<const MaterialMap>& materials() const noexcept {
     return materials_;

@@ -224,59 +224,10 @@ CloudSet::CloudSet(std::vector<std::shared_ptr<const Cloud>> clouds) : clouds_(s
                 std::to_string(clouds_.size()) + " are more than can be touched at once",
                 "give at most " + std::to_string(Patch::max_views));
   }
-  for (const auto& cloud : clouds_) {
-    if (!cloud) throw Error("set of clouds", "one of them is missing", "leave it out");
+  for (std::size_t i = 0; i < clouds_.size(); ++i) {
+    if (!clouds_[i]) throw Error("set of clouds", "one of them is missing", "leave it out");
+    take(i, *clouds_[i]);
   }
-}
-
-void CloudSet::gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept {
-  for (const auto& cloud : clouds_) cloud->gather(ball, max_points / clouds_.size(), patch);
-}
-
-void CloudSet::gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept {
-  for (const auto& cloud : clouds_) cloud->gather(beam, max_points / clouds_.size(), patch);
-}
-
-void CloudSet::gather_sides(const Ball& ball, const Sides& sides, std::size_t max_points,
-                            Patch& patch) const noexcept {
-  for (const auto& cloud : clouds_)
-    cloud->gather_sides(ball, sides, max_points / clouds_.size(), patch);
-}
-
-void CloudSet::gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t max_points,
-                            Patch& patch) const noexcept {
-  for (const auto& cloud : clouds_)
-    cloud->gather_sheet(ball, sheet, max_points / clouds_.size(), patch);
-}
-
-void CloudSet::gather_of(std::string_view material, const Ball& ball, std::size_t max_points,
-                         Patch& patch) const noexcept {
-  for (const auto& cloud : clouds_)
-    cloud->gather_of(material, ball, max_points / clouds_.size(), patch);
-}
-
-bool CloudSet::has_materials() const noexcept {
-  return std::any_of(clouds_.begin(), clouds_.end(),
-                     [](const auto& cloud) { return cloud->has_materials(); });
-}
-
-bool CloudSet::has_brightness() const noexcept {
-  return std::any_of(clouds_.begin(), clouds_.end(),
-                     [](const auto& cloud) { return cloud->has_brightness(); });
-}
-
-void CloudSet::sample(const Vec3& place, const Vec3& normal, double radius,
-                      SurfaceSample& sample) const noexcept {
-  for (const auto& cloud : clouds_) cloud->sample(place, normal, radius, sample);
-}
-
-double CloudSet::spacing(const Vec3& place) const noexcept {
-  double least = 0.0;
-  for (const auto& cloud : clouds_) {
-    const double spacing = cloud->spacing(place);
-    if (spacing > 0.0 && (least == 0.0 || spacing < least)) least = spacing;
-  }
-  return least;
 }
 
 }  // namespace palpate

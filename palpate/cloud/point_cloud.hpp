@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "palpate/core/cloud.hpp"
+#include "palpate/core/observed_clouds.hpp"
 
 namespace palpate {
 
@@ -38,6 +38,7 @@ class PointCloud final : public Cloud {
   void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
   void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
 
+  [[nodiscard]] const PointCloud* point_cloud() const noexcept override { return this; }
   /// All points as given, non-finite ones included, with their further properties; or null.
   [[nodiscard]] const Surface* surface() const noexcept { return surface_.get(); }
 
@@ -83,32 +84,11 @@ class BruteForceCloud final : public Cloud {
   std::optional<Vec3> viewpoint_;
 };
 
-/// Several clouds touched at once, each with its own pose and viewpoint.
-class CloudSet final : public Cloud {
+/// Several clouds that belong together, touched at once, each with its own pose and viewpoint.
+class CloudSet final : public ObservedClouds {
  public:
   /// @throws Error if there are more than Patch::max_views clouds, or one is null.
   explicit CloudSet(std::vector<std::shared_ptr<const Cloud>> clouds);
-
-  /// Each cloud may fill an equal share of the patch.
-  void gather(const Ball& ball, std::size_t max_points, Patch& patch) const noexcept override;
-  void gather(const Beam& beam, std::size_t max_points, Patch& patch) const noexcept override;
-  void gather_sides(const Ball& ball, const Sides& sides, std::size_t max_points,
-                    Patch& patch) const noexcept override;
-  void gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t max_points,
-                    Patch& patch) const noexcept override;
-  void gather_of(std::string_view material, const Ball& ball, std::size_t max_points,
-                 Patch& patch) const noexcept override;
-  /// That of the cloud that knows the smallest.
-  [[nodiscard]] double spacing(const Vec3& place) const noexcept override;
-  [[nodiscard]] bool has_materials() const noexcept override;
-  [[nodiscard]] bool has_brightness() const noexcept override;
-  /// All clouds that know something there. The brightness is that of the first.
-  void sample(const Vec3& place, const Vec3& normal, double radius,
-              SurfaceSample& sample) const noexcept override;
-
-  [[nodiscard]] const std::vector<std::shared_ptr<const Cloud>>& clouds() const noexcept {
-    return clouds_;
-  }
 
  private:
   std::vector<std::shared_ptr<const Cloud>> clouds_;

@@ -4,12 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include "palpate/core/material.hpp"
 #include "palpate/core/patch.hpp"
 
 namespace palpate {
+
+class DepthImage;
+class PointCloud;
 
 /// A narrow cone of lines of sight from the viewpoint through a place.
 struct Beam {
@@ -95,6 +99,13 @@ class Cloud {
   /// [servo] As `gather`.
   virtual void sample(const Vec3& /*place*/, const Vec3& /*normal*/, double /*radius*/,
                       SurfaceSample& /*sample*/) const noexcept {}
+
+  /// The cloud as a depth image; null if it is none, or of several clouds.
+  [[nodiscard]] virtual const DepthImage* image() const noexcept { return nullptr; }
+  /// The cloud as points without an order; null if it is none such, or of several clouds.
+  [[nodiscard]] virtual const PointCloud* point_cloud() const noexcept { return nullptr; }
+  /// The clouds that it is made of; empty if it is one by itself.
+  [[nodiscard]] virtual std::span<const Cloud* const> parts() const noexcept { return {}; }
 };
 
 /// A beam as one viewpoint sees it.

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "palpate/core/cloud.hpp"
+#include "palpate/core/observed_clouds.hpp"
 #include "palpate/core/parameters.hpp"
 #include "palpate/core/registry.hpp"
 #include "palpate/core/tick.hpp"
@@ -17,8 +17,8 @@ namespace palpate {
 /// Values in, values out: no thread, clock or file, so the same calls give the same ticks, bit for
 /// bit, on the same machine. Not thread-safe: one thread calls all functions.
 ///
-/// Methods are switched by making another one, seating it where the proxy is and handing it the
-/// newest frame: what the old one remembered ends with it.
+/// Methods are switched by making another one, seating it where the proxy is and handing it
+/// what each camera saw last: what the old one remembered ends with it.
 class Method {
  public:
   virtual ~Method() = default;
@@ -27,12 +27,12 @@ class Method {
   /// Without it the first tick starts the proxy at its HIP. A place that is not finite is ignored.
   virtual void seat(const Vec3& proxy) noexcept = 0;
 
-  /// Takes a new frame into use.
+  /// Takes what a camera saw into use, once; what other cameras saw stays as it is.
   ///
   /// [servo] No allocation, lock, system call; see MethodInfo::bounded.
-  /// @param cloud  lives until the next call of `frame`, or as long as the method
-  /// @param stamp  [s] when it was captured, on the clock of `tick`
-  virtual void frame(const Cloud& cloud, double stamp) noexcept = 0;
+  /// @param seen  its stamp is on the clock of `tick`; its cloud lives as long as Observation says,
+  ///              or as long as the method
+  virtual void observe(const Observation& seen) noexcept = 0;
 
   /// Moves the proxy towards the HIP and renders the force.
   ///

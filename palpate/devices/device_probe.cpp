@@ -62,7 +62,7 @@ class Exciter final : public Method {
   explicit Exciter(const ProbeOptions& options) : options_(options) {}
 
   void seat(const Vec3& /*proxy*/) noexcept override {}
-  void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override {}
+  void observe(const Observation& /*seen*/) noexcept override {}
   void set_parameters(const Parameters& /*parameters*/) override {}
 
   // [servo]

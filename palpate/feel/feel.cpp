@@ -43,7 +43,7 @@ void Feel::take(const Parameters& parameters) noexcept {
 }
 
 void Feel::look_whether_to_feel() noexcept {
-  feels_ = has_feel(scene_, stiffness_) || (cloud_ != nullptr && cloud_->has_materials());
+  feels_ = has_feel(scene_, stiffness_) || clouds_.has_materials();
   if (feels_) return;
   forget_contact();
   hand_.reset();
@@ -69,9 +69,9 @@ void Feel::seat(const Vec3& proxy) noexcept {
   hand_.reset();
 }
 
-void Feel::frame(const Cloud& cloud, double stamp) noexcept {
-  method_->frame(cloud, stamp);
-  cloud_ = &cloud;
+void Feel::observe(const Observation& seen) noexcept {
+  method_->observe(seen);
+  clouds_.take(seen.camera, seen.cloud);
   looked_ = false;
   look_whether_to_feel();
 }
@@ -98,11 +98,11 @@ void Feel::look_at_surface(const Tick& tick) noexcept {
   looked_at_ = foot;
   here_ = scene_;
   slope_ = Vec3::Zero();
-  if (cloud_ == nullptr || tick.normal.isZero() ||
-      !(cloud_->has_materials() || scene_.texture.relief != 0.0))
+  if (clouds_.parts().empty() || tick.normal.isZero() ||
+      !(clouds_.has_materials() || scene_.texture.relief != 0.0))
     return;
   SurfaceSample sample;
-  cloud_->sample(foot, tick.normal, averaged, sample);
+  clouds_.sample(foot, tick.normal, averaged, sample);
   here_ = blend(sample, scene_, stiffness_);
   if (sample.has_slope) slope_ = sample.slope;
 }

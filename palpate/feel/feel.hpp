@@ -27,7 +27,7 @@ class Feel final : public Method {
   Feel(std::unique_ptr<Method> method, const Parameters& parameters);
 
   void seat(const Vec3& proxy) noexcept override;
-  void frame(const Cloud& cloud, double stamp) noexcept override;
+  void observe(const Observation& seen) noexcept override;
   Tick tick(const Vec3& hip, double t) noexcept override;
   void set_parameters(const Parameters& parameters) override;
   [[nodiscard]] const Patch* patch() const noexcept override { return method_->patch(); }
@@ -52,8 +52,8 @@ class Feel final : public Method {
   Texture texture(const Vec3& push, const Movement& movement) noexcept;
 
   std::unique_ptr<Method> method_;
-  const Cloud* cloud_ = nullptr;  // the frame in use; lives as long as the method has it
-  bool feels_ = false;            // is there anything to add?
+  ObservedClouds clouds_;
+  bool feels_ = false;  // is there anything to add?
   double max_force_ = 0.0;
   double stiffness_ = 0.0;
   double contact_radius_ = 0.0;

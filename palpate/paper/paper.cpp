@@ -31,10 +31,12 @@ void Paper::seat(const Vec3& proxy) noexcept {
   mover_.invalidate();
 }
 
-void Paper::frame(const Cloud& cloud, double stamp) noexcept {
+void Paper::observe(const Observation& seen) noexcept {
   const bool as_printed = variant_ == Variant::as_printed;
-  frame_.take(cloud, stamp, 1.0 / parameters_.motion.frame_rate, as_printed);
+  frame_.take(seen, 1.0 / parameters_.motion.frame_rate, as_printed);
   mover_.invalidate();
+  // Another camera's picture of the same moment: nothing can have moved since.
+  if (frame_.in_order() && !frame_.advances()) return;
   velocity_update_due_ = false;
   // Without contact there is no normal to move along and nothing to measure a velocity against:
   // the estimate starts again from 0 (the print leaves this open).

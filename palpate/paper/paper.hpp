@@ -23,7 +23,7 @@ class Paper final : public Method {
 
   void seat(const Vec3& proxy) noexcept override;
   /// Movement step 1 of section 4.3, Eq. (3). [servo] O(1)
-  void frame(const Cloud& cloud, double stamp) noexcept override;
+  void observe(const Observation& seen) noexcept override;
   /// Movement steps 2 to 7 of section 4.3 until the proxy rests, and the force (4.6). [servo] At
   /// most step_budget steps over at most Patch::capacity points each.
   Tick tick(const Vec3& hip, double t) noexcept override;

@@ -81,26 +81,19 @@ Recorder::Status Recorder::status() const {
   return status;
 }
 
-void Recorder::frame(std::uint64_t number, double stamp,
-                     std::vector<std::shared_ptr<const Cloud>> cameras) {
+void Recorder::frame(std::uint64_t number, double stamp, std::size_t camera,
+                     std::shared_ptr<const Cloud> cloud) {
   const std::lock_guard lock(mutex_);
   if (stopping_) return;
-  if (!options_.with_frames) cameras.clear();
   auto frame = std::make_shared<PutFrame>(
-      PutFrame{.number = number, .stamp = stamp, .cameras = std::move(cameras), .fresh = {}});
+      PutFrame{.number = number, .stamp = stamp, .camera = camera, .cloud = {}});
   if (options_.with_frames && entries_.size() >= options_.most_frames) {
     ++status_.lost_frames;
-    frame->cameras.clear();
-    frame->left_out = true;
+  } else if (options_.with_frames) {
+    frame->cloud = std::move(cloud);
+    const bool is_known = std::exchange(newest_[camera], frame->cloud) == frame->cloud;
+    frame->ready = is_known || frame->cloud->image() == nullptr;
   }
-  if (newest_.size() < frame->cameras.size()) newest_.resize(frame->cameras.size());
-  for (std::size_t i = 0; i < frame->cameras.size(); ++i) {
-    const auto& cloud = frame->cameras[i];
-    if (cloud == newest_[i]) continue;
-    newest_[i] = cloud;
-    if (dynamic_cast<const DepthImage*>(cloud.get()) != nullptr) frame->fresh.push_back(cloud);
-  }
-  frame->ready = frame->fresh.empty();
   if (!frame->ready) {
     to_pack_.push_back(frame);
     wake_packer_.notify_one();
@@ -198,7 +191,7 @@ void Recorder::collect_ticks() {
       if (!begun_) {
         if ((tick.hand & method_switched) == 0) {
           proxy_ = tick.tick.proxy;
-          frame_before_ = tick.frame_number;
+          tick_before_ = tick.number;
           // Only now, so that the tick before the first is known.
           if (renew_) std::exchange(renew_, nullptr)();
           continue;
@@ -208,14 +201,20 @@ void Recorder::collect_ticks() {
       ticks.push_back(tick);
     }
     // After the ticks, so that none lacks its frame.
-    for (AdoptedFrame frame; cycle_.frames.try_pop(frame);) frames_after_.push_back(frame);
-    std::erase_if(frames_after_,
-                  [this](const AdoptedFrame& frame) { return frame.number <= frame_before_; });
+    for (AdoptedFrame frame; cycle_.frames.try_pop(frame);) {
+      // Of those before the first recorded tick, the last one of each camera is in use there.
+      if (frame.tick <= tick_before_) {
+        std::erase_if(frames_taken_, [&](const AdoptedFrame& before) {
+          return before.cameras[0].camera == frame.cameras[0].camera;
+        });
+      }
+      frames_taken_.push_back(frame);
+    }
     const std::lock_guard lock(mutex_);
     if (failed_) return;
     if (begun_) {
-      adopted_.insert(adopted_.end(), frames_after_.begin(), frames_after_.end());
-      frames_after_.clear();
+      adopted_.insert(adopted_.end(), frames_taken_.begin(), frames_taken_.end());
+      frames_taken_.clear();
     }
     if (begun_) status_.lost_ticks = cycle_.ticks.lost() + overflowed_;
     for (const ServoTick& tick : ticks) {
@@ -240,8 +239,7 @@ void Recorder::pack() {
         frame = std::move(to_pack_.front());
         to_pack_.pop_front();
       }
-      PackedClouds packed;
-      for (const auto& cloud : frame->fresh) packed[cloud.get()] = packed_image(*cloud);
+      PackedImage packed = packed_image(*frame->cloud);
       const std::lock_guard lock(mutex_);
       frame->packed = std::move(packed);
       frame->ready = true;
@@ -313,10 +311,12 @@ void Recorder::write_entries() {
     }
     if (const auto* put = std::get_if<std::shared_ptr<PutFrame>>(&*entry)) {
       const PutFrame& frame = **put;
-      if (frame.left_out) {
-        writer_->left_out(frame.number, frame.stamp);
+      if (frame.cloud) {
+        const bool is_packed = !frame.packed.depth.empty();
+        writer_->frame(frame.number, frame.stamp, frame.camera, frame.cloud,
+                       is_packed ? &frame.packed : nullptr);
       } else if (options_.with_frames) {
-        writer_->frame(frame.number, frame.stamp, frame.cameras, frame.packed);
+        writer_->left_out(frame.number, frame.stamp);
       }
       frame_written_ = frame.number;
     } else {

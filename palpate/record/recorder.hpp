@@ -6,6 +6,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -65,8 +66,8 @@ class Recorder {
 
   /// A frame that the loop got, with its number there, in their order. Any thread. Does not wait
   /// for the disk.
-  /// @param cameras  as SessionWriter::frame's
-  void frame(std::uint64_t number, double stamp, std::vector<std::shared_ptr<const Cloud>> cameras);
+  void frame(std::uint64_t number, double stamp, std::size_t camera,
+             std::shared_ptr<const Cloud> cloud);
   /// Settings that the loop got. Any thread. Does not wait for the disk.
   void settings(const NumberedSettings& settings, double t);
 
@@ -93,11 +94,10 @@ class Recorder {
   struct PutFrame {
     std::uint64_t number;
     double stamp;
-    std::vector<std::shared_ptr<const Cloud>> cameras;
-    std::vector<std::shared_ptr<const Cloud>> fresh;  // of these, the images to pack
-    bool left_out = false;
-    PackedClouds packed{};
-    bool ready = false;  // guarded by mutex_, as are packed and fresh until it is set
+    std::size_t camera;
+    std::shared_ptr<const Cloud> cloud;  // null: left out
+    PackedImage packed{};
+    bool ready = true;  // guarded by mutex_, as is packed until it is set
   };
   struct SetSettings {
     NumberedSettings settings;
@@ -124,10 +124,10 @@ class Recorder {
   CycleReader cycle_;
   std::function<void()> renew_;
   bool begun_ = false;
-  std::optional<Vec3> proxy_;               // [m] in the tick before the first recorded one
-  std::uint64_t frame_before_ = 0;          // in use in that tick
-  std::vector<AdoptedFrame> frames_after_;  // that one
-  std::uint64_t overflowed_ = 0;            // ticks that found no room in collected_
+  std::optional<Vec3> proxy_;                 // [m] in the tick before the first recorded one
+  std::optional<std::uint64_t> tick_before_;  // its number
+  std::vector<AdoptedFrame> frames_taken_;    // not handed on yet: the last before it, and later
+  std::uint64_t overflowed_ = 0;              // ticks that found no room in collected_
 
   // The writing thread's.
   SessionInfo info_;
@@ -139,11 +139,11 @@ class Recorder {
   mutable std::mutex mutex_;
   std::condition_variable wake_collector_, wake_packer_, wake_writer_, progress_;
   // All below are guarded by mutex_.
-  std::deque<Entry> entries_;                         // to be written, in this order
-  std::deque<std::shared_ptr<PutFrame>> to_pack_;     // of these, what no thread has taken yet
-  std::deque<ServoTick> collected_;                   // ticks to be written
-  std::deque<AdoptedFrame> adopted_;                  // to be written before them
-  std::vector<std::shared_ptr<const Cloud>> newest_;  // of each camera, as handed over
+  std::deque<Entry> entries_;                      // to be written, in this order
+  std::deque<std::shared_ptr<PutFrame>> to_pack_;  // of these, what no thread has taken yet
+  std::deque<ServoTick> collected_;                // ticks to be written
+  std::deque<AdoptedFrame> adopted_;               // to be written before them
+  std::map<std::size_t, std::shared_ptr<const Cloud>> newest_;  // of each camera, as handed over
   std::uint64_t entries_handed_ = 0;
   std::optional<double> seated_at_;  // [s] when the seat in info_ has to be written anew
   std::optional<Vec3> seat_;

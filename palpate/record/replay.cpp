@@ -114,16 +114,21 @@ class CycleRerun final : public Rerun {
         cycle_(make_method(settings_.method, settings_.parameters, methods_), device_, settings_),
         ticks_(cycle_.reader()) {
     if (!session.state()) return;
-    const bool in_use_before =
-        first.frame_number > 0 && !session.adopted().contains(first.frame_number);
-    if (!in_use_before) {
-      cycle_.restore(*session.state(), nullptr, 0.0);
-      return;
+    // What was in use before, of each camera.
+    std::vector<FrameInUse> in_use;
+    const auto use = [&](std::uint64_t number) {
+      for (FrameInUse& frame : session.seen(number)) in_use.push_back(std::move(frame));
+      frame_number_ = std::max(frame_number_, number);
+      ++frames_;
+    };
+    bool any_known = false;
+    for (const auto& [number, frame] : session.adopted()) {
+      any_known = any_known || frame.tick;
+      if (frame.tick && *frame.tick < first.number) use(number);
     }
-    const SessionReader::PutFrame& frame = put_frame(first.frame_number);
-    cycle_.restore(*session.state(), session.cloud(frame), frame.stamp);
-    frame_number_ = first.frame_number;
-    ++frames_;
+    if (!any_known && first.frame_number > 0 && !session.adopted().contains(first.frame_number))
+      use(first.frame_number);
+    cycle_.restore(*session.state(), in_use);
   }
 
   ServoTick tick(const ServoTick& recorded) override {
@@ -138,7 +143,7 @@ class CycleRerun final : public Rerun {
       cycle_.set_settings(settings_);
     }
     if ((recorded.hand & faults_reset) != 0) cycle_.reset_faults();
-    if (recorded.frame_number != frame_number_) adopt(recorded.frame_number);
+    for (const std::uint64_t number : session_.taken_in(recorded, frame_number_)) put(number);
     device_.set_hand(recorded);
     cycle_.run({.t = recorded.tick.t,
                 .wake_up_ns = recorded.wake_up_ns,
@@ -151,23 +156,25 @@ class CycleRerun final : public Rerun {
   [[nodiscard]] std::uint64_t frames() const override { return frames_; }
 
  private:
-  const SessionReader::PutFrame& put_frame(std::uint64_t number) const {
-    const auto frame = session_.frames().find(number);
-    if (frame == session_.frames().end())
-      throw Error("recording", "lacks frame " + std::to_string(number),
-                  "the disk was too slow, or the recording is damaged");
-    return frame->second;
-  }
-
-  void adopt(std::uint64_t number) {
+  void put(std::uint64_t number) {
     const auto adopted = session_.adopted().find(number);
     if (adopted == session_.adopted().end())
       throw Error("recording", "lacks how frame " + std::to_string(number) + " was handed over",
                   "it may be damaged");
-    const AdoptedFrame& frame = adopted->second;
-    cycle_.put_frame(session_.cloud(put_frame(number)), frame.stamp,
-                     std::span(frame.cameras.data(), frame.camera_count), frame.put_at);
-    frame_number_ = number;
+    AdoptedFrame frame = adopted->second;
+    const std::span<CameraFrame> cameras(frame.cameras.data(), frame.camera_count);
+    for (const FrameInUse& seen : session_.seen(number)) {
+      // In an old recording its camera need not be the first.
+      const auto own = std::find_if(cameras.begin(), cameras.end(), [&](const CameraFrame& each) {
+        return each.camera == seen.camera;
+      });
+      if (own == cameras.end())
+        throw Error("recording", "has a frame " + std::to_string(number) + " of another camera",
+                    "it may be damaged");
+      std::iter_swap(cameras.begin(), own);
+      cycle_.put_frame(seen.cloud, frame.stamp, cameras, frame.put_at);
+    }
+    frame_number_ = std::max(frame_number_, number);
     ++frames_;
   }
 
@@ -210,13 +217,16 @@ class MethodRerun final : public Rerun {
       method_ = make_method(settings_.method, settings_.parameters, methods_);
       method_->seat(last_proxy_);
       last_normal_ = Vec3::Zero();
-      if (recorded.frame_number == frame_number_ && cloud_) method_->frame(*cloud_, stamp_);
+      if (recorded.frame_number == frame_number_) {
+        for (const FrameInUse& frame : in_use_)
+          if (frame.cloud) method_->observe({*frame.cloud, frame.stamp, frame.camera});
+      }
     }
     ++ticks_;
     adopt(recorded.frame_number);
-    if ((recorded.hand & proxy_reseated) != 0 && cloud_) {
+    if ((recorded.hand & proxy_reseated) != 0 && !seen_.parts().empty()) {
       method_->seat(
-          free_side(*cloud_, last_proxy_, last_normal_, settings_.parameters.proxy.r_c(), patch_));
+          free_side(seen_, last_proxy_, last_normal_, settings_.parameters.proxy.r_c(), patch_));
     }
     ServoTick again = recorded;
     again.tick = method_->tick(recorded.tick.hip, recorded.tick.t);
@@ -238,10 +248,11 @@ class MethodRerun final : public Rerun {
     auto frame = last;
     if (session_.info().kind == SessionInfo::Kind::headless) frame = put.upper_bound(frame_number_);
     for (; frame != std::next(last); ++frame) {
-      std::shared_ptr<const Cloud> cloud = session_.cloud(frame->second);
-      stamp_ = frame->second.stamp;
-      method_->frame(*cloud, stamp_);
-      cloud_ = std::move(cloud);  // only now may the one before go
+      for (FrameInUse& seen : session_.seen(frame->first)) {
+        method_->observe({*seen.cloud, seen.stamp, seen.camera});
+        seen_.take(seen.camera, *seen.cloud);
+        in_use_[seen.camera] = std::move(seen);  // only now may the one before go
+      }
       ++frames_;
     }
     frame_number_ = number;
@@ -254,8 +265,8 @@ class MethodRerun final : public Rerun {
   std::unique_ptr<Method> method_;
   std::uint64_t ticks_ = 0;
   std::uint64_t frame_number_ = 0;
-  std::shared_ptr<const Cloud> cloud_;
-  double stamp_ = 0.0;  // [s] of cloud_
+  std::array<FrameInUse, Freshness::max_cameras> in_use_;  // by camera
+  ObservedClouds seen_;                                    // these
   Patch patch_;
   Vec3 last_proxy_ = Vec3::Zero();
   Vec3 last_normal_ = Vec3::Zero();

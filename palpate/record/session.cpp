@@ -234,6 +234,7 @@ std::vector<double> row_of(const AdoptedFrame& frame) {
   std::vector<double> row{static_cast<double>(frame.number), frame.stamp, frame.put_at};
   for (std::size_t i = 0; i < frame.camera_count; ++i)
     row.insert(row.end(), {static_cast<double>(frame.cameras[i].camera), frame.cameras[i].stamp});
+  if (frame.tick) row.push_back(static_cast<double>(*frame.tick));
   return row;
 }
 
@@ -245,11 +246,11 @@ AdoptedFrame adopted_of(std::span<const double> row, const std::string& name) {
       throw Error(name, "has a number of " + std::to_string(value), "it may be damaged");
     return static_cast<std::uint64_t>(value);
   };
-  if (row.size() < fixed || row.size() % 2 != fixed % 2 ||
-      row.size() > fixed + 2 * Freshness::max_cameras)
+  if (row.size() < fixed || row.size() > fixed + 2 * Freshness::max_cameras + 1)
     throw Error(name, "has " + std::to_string(row.size()) + " numbers", "it may be damaged");
   AdoptedFrame frame{.number = whole(row[0]), .stamp = row[1], .put_at = row[2]};
-  for (std::size_t i = fixed; i < row.size(); i += 2)
+  if (row.size() % 2 != fixed % 2) frame.tick = whole(row.back());
+  for (std::size_t i = fixed; i + 1 < row.size(); i += 2)
     frame.cameras[frame.camera_count++] = {.camera = whole(row[i]), .stamp = row[i + 1]};
   return frame;
 }

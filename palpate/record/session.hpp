@@ -68,7 +68,7 @@ std::vector<double> whole_row_of(const ServoTick& tick);    ///< all, as they ar
 ///         energy_columns(), or those and fixture_columns().
 ServoTick tick_of(std::span<const double> row, const std::string& name);
 
-/// number, stamp, put_at, and for each camera its number and when its frame was captured.
+/// number, stamp, put_at, for each camera its number and when its frame was captured, and the tick.
 std::vector<double> row_of(const AdoptedFrame& frame);
 /// @throws Error naming `name` if it is damaged.
 AdoptedFrame adopted_of(std::span<const double> row, const std::string& name);

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "palpate/bag/messages.hpp"
-#include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 
 namespace palpate {
@@ -65,19 +64,12 @@ SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
     const NumberedSettings settings = settings_from_json(message.data, name);
     settings_[settings.number] = settings.settings;
   });
-  read_all<ros::Float64MultiArray>(
-      session_topic::frame, [&](const auto& message, const auto& name) {
-        const std::vector<double>& row = message.data;
-        if (row.size() < 2 || row.size() % 2 != 0)
-          throw Error(name, "has " + std::to_string(row.size()) + " numbers", "it may be damaged");
-        PutFrame& frame = frames_[whole(row[0], name)];
-        frame.stamp = row[1];
-        for (std::size_t i = 2; i < row.size(); i += 2)
-          frame.parts.emplace_back(whole(row[i], name), whole(row[i + 1], name));
-      });
+  read_frames();
   read_all<ros::Float64MultiArray>(session_topic::adopted,
                                    [&](const auto& message, const auto& name) {
                                      const AdoptedFrame frame = adopted_of(message.data, name);
+                                     if (!adopted_.contains(frame.number) && frame.tick)
+                                       taken_[*frame.tick].push_back(frame.number);
                                      adopted_[frame.number] = frame;
                                    });
   read_all<ros::Float64MultiArray>(
@@ -91,6 +83,30 @@ SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
         std::copy(row.begin(), row.end(), state_->numbers.begin());
       });
   ticks_ = bag_.places(session_topic::tick);
+}
+
+void SessionReader::read_frames() {
+  std::map<std::size_t, std::size_t> newest;  // image of each camera
+  read_all<ros::Float64MultiArray>(
+      session_topic::frame, [&](const auto& message, const auto& name) {
+        const std::vector<double>& row = message.data;
+        if (row.size() < 2 || row.size() % 2 != 0)
+          throw Error(name, "has " + std::to_string(row.size()) + " numbers", "it may be damaged");
+        PutFrame& frame = frames_[whole(row[0], name)];
+        frame.stamp = row[1];
+        for (std::size_t i = 2; i < row.size(); i += 2)
+          frame.images.emplace_back(whole(row[i], name), whole(row[i + 1], name));
+        // An old recording names what all cameras saw last; what has changed was new.
+        if (frame.images.size() > 1) {
+          std::vector<std::pair<std::size_t, std::size_t>> fresh;
+          for (const auto& image : frame.images) {
+            const auto known = newest.find(image.first);
+            if (known == newest.end() || known->second != image.second) fresh.push_back(image);
+          }
+          if (!fresh.empty()) frame.images = std::move(fresh);
+        }
+        for (const auto& [camera, image] : frame.images) newest[camera] = image;
+      });
 }
 
 ServoTick SessionReader::tick(std::size_t index) {
@@ -138,15 +154,30 @@ std::shared_ptr<const Cloud> SessionReader::cloud(std::size_t camera, std::size_
   return entry.cloud;
 }
 
-std::shared_ptr<const Cloud> SessionReader::cloud(const PutFrame& frame) {
-  if (parent_) return parent_->cloud(frame);
-  if (frame.parts.empty())
+std::vector<std::uint64_t> SessionReader::taken_in(const ServoTick& tick,
+                                                   std::uint64_t before) const {
+  if (const auto taken = taken_.find(tick.number); taken != taken_.end()) return taken->second;
+  if (!taken_.empty() || tick.frame_number == before) return {};
+  return {tick.frame_number};
+}
+
+std::vector<FrameInUse> SessionReader::seen(std::uint64_t number) {
+  if (parent_) return parent_->seen(number);
+  const auto found = frames_.find(number);
+  if (found == frames_.end())
+    throw Error("recording", "lacks frame " + std::to_string(number),
+                "the disk was too slow, or the recording is damaged");
+  const PutFrame& frame = found->second;
+  if (frame.images.empty())
     throw Error("recording", "a frame was dropped during recording",
                 "the computer or its disk was too slow to record all frames");
-  std::vector<std::shared_ptr<const Cloud>> clouds;
-  for (const auto& [camera, number] : frame.parts) clouds.push_back(cloud(camera, number));
-  if (clouds.size() == 1) return clouds.front();
-  return std::make_shared<CloudSet>(std::move(clouds));
+  std::vector<FrameInUse> all;
+  for (const auto& [camera, image] : frame.images) {
+    if (camera >= Freshness::max_cameras)
+      throw Error("recording", "has a camera " + std::to_string(camera), "it may be damaged");
+    all.push_back({.cloud = cloud(camera, image), .stamp = frame.stamp, .camera = camera});
+  }
+  return all;
 }
 
 }  // namespace palpate

@@ -39,8 +39,9 @@ class SessionReader {
   /// A frame as the renderer got it.
   struct PutFrame {
     double stamp = 0.0;  ///< [s]
-    /// Which camera's which frame; none if the frame was left out of the recording.
-    std::vector<std::pair<std::size_t, std::size_t>> parts;
+    /// Which camera's which image; none if the frame was left out of the recording. More than one
+    /// only in an old recording.
+    std::vector<std::pair<std::size_t, std::size_t>> images;
   };
   /// By their number.
   [[nodiscard]] const std::map<std::uint64_t, PutFrame>& frames() const {
@@ -51,8 +52,12 @@ class SessionReader {
   /// What the cycle remembered before the first tick; none of a session from its start, of an old
   /// recording, or of another version's state.
   [[nodiscard]] const std::optional<CycleState>& state() const { return state_; }
-  /// What the cameras saw. @throws Error if it is damaged or was left out.
-  [[nodiscard]] std::shared_ptr<const Cloud> cloud(const PutFrame& frame);
+  /// The numbers of the frames that a tick took into use.
+  /// @param before  the highest taken before it
+  [[nodiscard]] std::vector<std::uint64_t> taken_in(const ServoTick& tick,
+                                                    std::uint64_t before) const;
+  /// What was seen, and by which camera. @throws Error if it is damaged or was left out.
+  [[nodiscard]] std::vector<FrameInUse> seen(std::uint64_t number);
 
  private:
   [[nodiscard]] std::size_t numbers_of_a_tick();
@@ -63,6 +68,7 @@ class SessionReader {
   };
 
   static std::unique_ptr<SessionReader> parent_of(const std::filesystem::path& path);
+  void read_frames();
   std::shared_ptr<const Cloud> cloud(std::size_t camera, std::size_t number);
   template <class Message, class Take>
   void read_all(std::string_view topic, const Take& take);
@@ -74,6 +80,7 @@ class SessionReader {
   std::map<std::uint64_t, ServoSettings> settings_;
   std::map<std::uint64_t, PutFrame> frames_;
   std::map<std::uint64_t, AdoptedFrame> adopted_;
+  std::map<std::uint64_t, std::vector<std::uint64_t>> taken_;  // numbers of frames, by tick
   std::optional<CycleState> state_;
   std::map<std::size_t, Camera> cameras_;
 };

@@ -25,7 +25,7 @@ std::array<double, 3> array_of(const Vec3& v) {
 }  // namespace
 
 PackedImage packed_image(const Cloud& image) {
-  const auto* depth = dynamic_cast<const DepthImage*>(&image);
+  const DepthImage* depth = image.image();
   if (depth == nullptr) throw Error("cloud", "is not a depth image", "pack depth images alone");
   const Intrinsics& k = depth->intrinsics();
   PackedImage packed{.depth = encode_depth_rvl(k.width, k.height, depth->depth()), .materials = {}};
@@ -79,40 +79,34 @@ void SessionWriter::settings(const NumberedSettings& settings, double t) {
   write(session_topic::settings, nanoseconds(t), ros::String{to_json(settings)}, true);
 }
 
-void SessionWriter::frame(std::uint64_t number, double stamp,
-                          std::span<const std::shared_ptr<const Cloud>> cameras,
-                          const PackedClouds& packed) {
-  if (cameras_.size() < cameras.size()) cameras_.resize(cameras.size());
-  // Number, stamp, and for each camera in use which one and which of its frames.
-  ros::Float64MultiArray row{.label = "number,stamp,camera,frame,...",
-                             .data = {static_cast<double>(number), stamp}};
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    if (!cameras[i]) continue;
-    Camera& camera = cameras_[i];
-    if (camera.newest != cameras[i]) {
-      if (const auto* image = dynamic_cast<const DepthImage*>(cameras[i].get())) {
-        const auto made = packed.find(image);
-        depth(i, stamp, *image, made == packed.end() ? packed_image(*image) : made->second);
-      } else if (const auto* cloud = dynamic_cast<const PointCloud*>(cameras[i].get())) {
-        points(i, stamp, *cloud);
-      } else {
-        throw Error("frame " + std::to_string(number), "has a type that cannot be recorded",
-                    "record depth images or points");
-      }
-      camera.newest = cameras[i];
-      ++camera.frames;
+void SessionWriter::frame(std::uint64_t number, double stamp, std::size_t index,
+                          const std::shared_ptr<const Cloud>& cloud, const PackedImage* packed) {
+  if (cameras_.size() <= index) cameras_.resize(index + 1);
+  Camera& camera = cameras_[index];
+  if (camera.newest != cloud) {
+    if (const DepthImage* image = cloud->image()) {
+      depth(index, stamp, *image, packed == nullptr ? packed_image(*image) : *packed);
+    } else if (const PointCloud* unordered = cloud->point_cloud()) {
+      points(index, stamp, *unordered);
+    } else {
+      throw Error("frame " + std::to_string(number), "has a type that cannot be recorded",
+                  "record depth images or points");
     }
-    row.data.push_back(static_cast<double>(i));
-    row.data.push_back(static_cast<double>(camera.frames - 1));
+    camera.newest = cloud;
+    ++camera.frames;
   }
-  write(session_topic::frame, nanoseconds(stamp), row);
+  write(session_topic::frame, nanoseconds(stamp),
+        ros::Float64MultiArray{
+            .label = "number,stamp,camera,frame",
+            .data = {static_cast<double>(number), stamp, static_cast<double>(index),
+                     static_cast<double>(camera.frames - 1)}});
   ++frames_;
 }
 
 void SessionWriter::left_out(std::uint64_t number, double stamp) {
   // The row of a frame that names no camera.
   write(session_topic::frame, nanoseconds(stamp),
-        ros::Float64MultiArray{.label = "number,stamp,camera,frame,...",
+        ros::Float64MultiArray{.label = "number,stamp,camera,frame",
                                .data = {static_cast<double>(number), stamp}});
 }
 
@@ -192,7 +186,7 @@ void SessionWriter::points(std::size_t camera, double stamp, const PointCloud& c
 
 void SessionWriter::adopted(const AdoptedFrame& frame) {
   write(session_topic::adopted, nanoseconds(frame.put_at),
-        ros::Float64MultiArray{"number,stamp,put_at,camera,captured,...", row_of(frame)});
+        ros::Float64MultiArray{"number,stamp,put_at,camera,captured,...,tick", row_of(frame)});
 }
 
 void SessionWriter::state(const CycleState& state, double t) {

@@ -5,9 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -30,9 +28,6 @@ struct PackedImage {
 /// @throws Error for a cloud that is not a DepthImage.
 PackedImage packed_image(const Cloud& image);
 
-/// What was packed beforehand, by the image that it was made of.
-using PackedClouds = std::map<const Cloud*, PackedImage>;
-
 /// Writes a session as a ROS 2 bag (docs/recording.md): standard messages for whoever looks at it,
 /// and beside them every number that a replay needs, to the bit. Used on one thread.
 class SessionWriter {
@@ -53,15 +48,13 @@ class SessionWriter {
   /// @param t  [s] when they were set
   void settings(const NumberedSettings& settings, double t);
   /// A frame, before or after the ticks that use it.
-  /// @param number   as ServoTick::frame_number; increasing
-  /// @param stamp    [s] as the renderer got it
-  /// @param cameras  what each camera saw last, null before its first frame. What a camera saw
-  ///                 before is not written again.
-  /// @param packed   of these images; one that is missing is made here
+  /// @param number  as ServoTick::frame_number; increasing
+  /// @param stamp   [s] as the renderer got it
+  /// @param cloud   what that camera saw; not written again if it is what it saw before
+  /// @param packed  that image; null: it is packed here
   /// @throws Error also for a cloud that is neither a DepthImage nor a PointCloud.
-  void frame(std::uint64_t number, double stamp,
-             std::span<const std::shared_ptr<const Cloud>> cameras,
-             const PackedClouds& packed = {});
+  void frame(std::uint64_t number, double stamp, std::size_t camera,
+             const std::shared_ptr<const Cloud>& cloud, const PackedImage* packed = nullptr);
   /// Notes that a frame is not in the recording, for want of time or space.
   void left_out(std::uint64_t number, double stamp);
   /// How a frame was taken into use, before the ticks that use it.

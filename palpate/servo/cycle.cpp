@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -83,7 +84,9 @@ std::uint64_t Cycle::put_frame(std::shared_ptr<const Cloud> cloud, double stamp,
     }
     frame.cameras[frame.camera_count++] = camera;
   }
-  return frames_.put(std::move(frame));
+  frame.number = ++frames_put_;
+  frames_[cameras.front().camera].put(std::move(frame));
+  return frames_put_;
 }
 
 std::uint64_t Cycle::set_settings(const ServoSettings& settings) {
@@ -165,31 +168,82 @@ std::vector<std::string> cycle_state_names() {
   return std::move(name.names);
 }
 
-void Cycle::restore(const CycleState& state, std::shared_ptr<const Cloud> cloud, double stamp) {
+void Cycle::restore(const CycleState& state, std::span<const FrameInUse> frames) {
   GetState get(state);
   walk(get, *this);
   if (!get.at_end())
     throw Error("state of the cycle", "has too many numbers",
                 "it may be damaged, or of another version of palpate");
-  if (!cloud) return;
-  frames_.put({.cloud = std::move(cloud), .stamp = stamp});
-  static_cast<void>(frames_.take());
+  for (const FrameInUse& frame : frames) {
+    CapturedFrame kept{.cloud = frame.cloud, .stamp = frame.stamp, .camera_count = 1};
+    kept.cameras[0] = {.camera = frame.camera, .stamp = frame.stamp};
+    frames_[frame.camera].put(std::move(kept));
+    static_cast<void>(frames_[frame.camera].take());
+    seen_.take(frame.camera, *frame.cloud);
+  }
+}
+
+// For whoever records.
+void Cycle::tell_of(const CapturedFrame& frame) noexcept {
+  adopted_.push({.number = frame.number,
+                 .stamp = frame.stamp,
+                 .put_at = frame.put_at,
+                 .cameras = frame.cameras,
+                 .camera_count = frame.camera_count,
+                 .tick = taken_in_[frame.cameras[0].camera]});
+}
+
+// Frames that came since the tick before, in the order of their stamps. A method that takes over
+// gets what is in use of the other cameras, too. True if one came.
+bool Cycle::adopt_frames(bool method_switched, double t) noexcept {
+  struct Due {
+    double stamp;  // [s]
+    const CapturedFrame* frame;
+    bool is_new;
+  };
+  std::array<Due, Freshness::max_cameras> due;
+  std::size_t count = 0;
+  bool any_new = false;
+  for (auto& mailbox : frames_) {
+    const CapturedFrame* frame = mailbox.take();
+    const bool is_new = frame != nullptr;
+    if (!is_new && method_switched && mailbox.taken_last().cloud) frame = &mailbox.taken_last();
+    if (frame == nullptr) continue;
+    any_new = any_new || is_new;
+    const double stamp =
+        std::isfinite(frame->stamp) ? frame->stamp : -std::numeric_limits<double>::infinity();
+    due[count++] = {stamp, frame, is_new};
+  }
+  std::sort(due.begin(), due.begin() + count, [](const Due& a, const Due& b) {
+    return a.stamp != b.stamp ? a.stamp < b.stamp
+                              : a.frame->cameras[0].camera < b.frame->cameras[0].camera;
+  });
+  for (const Due& each : std::span(due.data(), count)) {
+    const CapturedFrame& frame = *each.frame;
+    method_->observe({*frame.cloud, frame.stamp, frame.cameras[0].camera});
+    if (each.is_new)
+      adopt_frame(frame, t);
+    else
+      tell_of(frame);  // a recording may begin here
+  }
+  return any_new;
 }
 
 void Cycle::adopt_frame(const CapturedFrame& frame, double t) noexcept {
-  method_->frame(*frame.cloud, frame.stamp);
+  const std::size_t camera = frame.cameras[0].camera;
+  seen_.take(camera, *frame.cloud);
+  taken_in_[camera] = number_;
   // Arrived when it was put; if that is not on the loop's clock, now.
   const double arrived = frame.put_at <= t ? frame.put_at : t;
   freshness_.adopt({frame.cameras.data(), frame.camera_count}, arrived,
                    safety_.parameters().future_tolerance);
   last_stamp_ = frame.stamp;
-  adopted_.push({.number = frames_.number(),
-                 .stamp = frame.stamp,
-                 .put_at = frame.put_at,
-                 .cameras = frame.cameras,
-                 .camera_count = frame.camera_count});
+  frame_number_ = std::max(frame_number_, frame.number);
+  tell_of(frame);
   add(statistics_.frames_adopted, 1);
-  statistics_.frames_dropped.store(frames_.dropped(), std::memory_order_relaxed);
+  std::uint64_t dropped = 0;
+  for (const auto& mailbox : frames_) dropped += mailbox.dropped();
+  statistics_.frames_dropped.store(dropped, std::memory_order_relaxed);
   statistics_.hand_over.add(nanoseconds(t - frame.put_at));
 }
 
@@ -208,23 +262,17 @@ void Cycle::run(const Wake& wake) noexcept {
   const std::uint64_t resets = fault_resets_.load(std::memory_order_relaxed);
   const bool reset = std::exchange(fault_resets_done_, resets) != resets;
   if (reset) safety_.reset();
-  bool new_frame = false;
-  if (const CapturedFrame* frame = frames_.take()) {
-    new_frame = true;
-    adopt_frame(*frame, t);
-  } else if (const auto& in_use = frames_.taken_last(); switched && in_use.cloud) {
-    method_->frame(*in_use.cloud, in_use.stamp);
-  }
+  const bool new_frame = adopt_frames(switched, t);
 
   const Vec3 hip = workspace_.hip_in_world(hand, t);
   bool reseated = false;
   // Where the hand is in the scene has changed at once, or the scene has: the hand is disengaged,
   // and the proxy starts anew on the free side.
   const bool jumped = std::exchange(placement_changed_, false);
-  if (const auto& frame = frames_.taken_last(); frame.cloud && (safety_.stalls_at(t) || jumped)) {
+  const bool sees = !seen_.parts().empty();
+  if (sees && (safety_.stalls_at(t) || jumped)) {
     reseated = true;
-    method_->seat(
-        free_side(*frame.cloud, last_proxy_, last_normal_, parameters_.proxy.r_c(), patch_));
+    method_->seat(free_side(seen_, last_proxy_, last_normal_, parameters_.proxy.r_c(), patch_));
   }
   const Tick tick = method_->tick(hip, t);
   last_proxy_ = tick.proxy;
@@ -235,7 +283,7 @@ void Cycle::run(const Wake& wake) noexcept {
                                                 .surface_force = tick.force - tick.transient,
                                                 .surface_motion = tick.surface_motion,
                                                 .hand = holds && !safety_.stalls_at(t),
-                                                .cloud = frames_.taken_last().cloud.get(),
+                                                .cloud = sees ? &seen_ : nullptr,
                                                 .new_frame = new_frame});
   workspace_.feel(tick.force + fixtures.region);
 
@@ -297,7 +345,7 @@ void Cycle::run(const Wake& wake) noexcept {
                          .frame_stamp = last_stamp_,
                          .frame_age = age.age,
                          .number = number_++,
-                         .frame_number = frames_.number(),
+                         .frame_number = frame_number_,
                          .settings_number = changes_.number(),
                          .safety = safe.flags,
                          .wake_up_ns = wake.wake_up_ns,

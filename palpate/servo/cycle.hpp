@@ -80,10 +80,10 @@ struct ServoTick {
   Vec3 position = Vec3::Zero();       ///< [m] of the hand, device frame
   double gain = 0.0;                  ///< [-] of the safety chain
   ServoEnergy energy;                 ///< that the forces sent before have given to the hand
-  double frame_stamp = 0.0;           ///< [s] of the frame in use; 0 before the first
+  double frame_stamp = 0.0;           ///< [s] of the frame taken last; 0 before the first
   double frame_age = 0.0;             ///< [s] of the oldest camera's; infinite before the first
   std::uint64_t number = 0;           ///< of the cycle, from 0
-  std::uint64_t frame_number = 0;     ///< of the frame in use, from 1 as put; 0 before the first
+  std::uint64_t frame_number = 0;     ///< of the newest in use, from 1 as put; 0 before the first
   std::uint64_t settings_number = 0;  ///< of those in use, from 1 as set; 0: the first ones
   std::uint32_t safety = 0;           ///< SafetyFlag bits
   std::uint32_t wake_up_ns = 0;       ///< as in Wake
@@ -112,6 +112,13 @@ struct CycleStatistics {
   std::atomic<double> heat{0.0};             ///< [-] of the motors, as SafetyChain::heat
 };
 
+/// A frame that a cycle has in use.
+struct FrameInUse {
+  std::shared_ptr<const Cloud> cloud;
+  double stamp = 0.0;      ///< [s] as the method got it
+  std::size_t camera = 0;  ///< which captured it
+};
+
 /// Reads all that went into a loop's cycles and came out of them: what a recorder needs. Each part
 /// is of one thread; none must outlive the cycle.
 struct CycleReader {
@@ -122,8 +129,8 @@ struct CycleReader {
   TickRing<CycleState>::Reader states;
 };
 
-/// One cycle of the loop: device read, newest frame, renderer, fixtures, safety chain, device
-/// write.
+/// One cycle of the loop: device read, each camera's newest frame, renderer, fixtures, safety
+/// chain, device write.
 ///
 /// Knows no clock: a thread, a test or a free-running session calls `run` with the time. `run` is
 /// one thread's, the servo's; what comes from elsewhere goes through mailboxes and out by the ring,
@@ -141,19 +148,18 @@ class Cycle {
   /// keeps its word). `wake.t` is on the clock of the frames' stamps.
   void run(const Wake& wake) noexcept;
 
-  /// Hands a frame over; the newest wins. The camera's thread, one at a time.
+  /// Hands a frame of the only camera over; the newest wins. One thread at a time.
   /// Frames are released here or on destruction, never in a tick.
   /// @param stamp  [s] when it was captured, on the loop's clock
   /// @param now    [s] on the loop's clock: measures how long the hand-over takes
   /// @return its number, as in ServoTick::frame_number
   std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp, double now);
 
-  /// The same for a cloud made of several cameras' newest frames: each camera's freshness is judged
-  /// by itself, and the one that is worst off decides.
-  /// @param stamp    [s] what the method is told: later than that of the frame before
-  /// @param cameras  an entry for each camera that has to be alive, whether or not its frame is
-  /// new;
-  ///                 a camera that is left out is no longer waited for
+  /// The same of one of several cameras: of each the newest wins, and a tick takes those that came
+  /// in the order of their stamps and then of the cameras' numbers. Each camera's freshness is
+  /// judged by itself, and the one that is worst off decides.
+  /// @param cameras  the camera that captured it, then the others that have to be alive, each with
+  ///                 the stamp of its newest frame; one that is left out is no longer waited for
   /// @throws Error if there are none, or a number is not below Freshness::max_cameras.
   std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp,
                           std::span<const CameraFrame> cameras, double now);
@@ -168,10 +174,10 @@ class Cycle {
   std::uint64_t set_settings(const ServoSettings& settings);
 
   /// Switches to another method, which remembers nothing, in the next cycle: it gets the settings'
-  /// parameters, the proxy's place and the newest frame, and begins from there. What it does then
-  /// follows from what it is given, so a recording can begin here in mid-session. The hand may
-  /// notice: method `sight` brings the force up over most of a frame's interval, as it does any
-  /// change that a frame brings. Any thread but the servo's.
+  /// parameters, the proxy's place and each camera's newest frame, and begins from there. What it
+  /// does then follows from what it is given, so a recording can begin here in mid-session. The
+  /// hand may notice: method `sight` brings the force up over most of a frame's interval, as it
+  /// does any change that a frame brings. Any thread but the servo's.
   /// @return the number of the settings, as in ServoTick::settings_number
   /// @throws Error if they do not validate or the method refuses its parameters.
   std::uint64_t set_method(std::shared_ptr<Method> method, const ServoSettings& settings);
@@ -193,18 +199,18 @@ class Cycle {
   /// Makes a new cycle remember what another one did. Before its first `run`, then with set_method
   /// as at that time: for replays.
   /// @param state  as a CycleReader gave it
-  /// @param cloud  of the frame in use at that time; null if there was none
-  /// @param stamp  [s] of that frame
+  /// @param frames  of each camera, the one in use at that time
   /// @throws Error if the state is damaged or of another version.
-  void restore(const CycleState& state, std::shared_ptr<const Cloud> cloud, double stamp);
+  void restore(const CycleState& state, std::span<const FrameInUse> frames);
 
  private:
   struct CapturedFrame {
     std::shared_ptr<const Cloud> cloud;
     double stamp = 0.0;
     double put_at = 0.0;
-    std::array<CameraFrame, Freshness::max_cameras> cameras{};
+    std::array<CameraFrame, Freshness::max_cameras> cameras{};  // its own first
     std::size_t camera_count = 0;
+    std::uint64_t number = 0;  // among all that were put
   };
 
   /// Settings, and the method that they are for.
@@ -214,7 +220,9 @@ class Cycle {
   };
 
   bool adopt_change(const Change& change) noexcept;
+  bool adopt_frames(bool method_switched, double t) noexcept;
   void adopt_frame(const CapturedFrame& frame, double t) noexcept;
+  void tell_of(const CapturedFrame& frame) noexcept;
   void keep_statistics(const ServoTick& record, double sent) noexcept;
   template <class Way, class Self>
   static void walk(Way& way, Self& self);
@@ -233,7 +241,8 @@ class Cycle {
   mutable std::mutex writers_;  // of changes, kept apart; the servo never takes it
   Change newest_change_;        // guarded by writers_
   Mailbox<Change> changes_;
-  Mailbox<CapturedFrame> frames_;
+  std::array<Mailbox<CapturedFrame>, Freshness::max_cameras> frames_;  // by camera
+  std::uint64_t frames_put_ = 0;                                       // of who puts them
   TickRing<ServoTick> ring_;
   TickRing<AdoptedFrame> adopted_{1024};
   TickRing<CycleState> states_{8};
@@ -243,9 +252,12 @@ class Cycle {
   std::uint64_t number_ = 0;
   Vec3 last_proxy_ = Vec3::Zero();
   Vec3 last_normal_ = Vec3::Zero();
-  double last_stamp_ = 0.0;         // [s] of the frame in use
-  std::uint64_t scene_ = 0;         // in use, as ServoSettings::scene
-  bool placement_changed_ = false;  // or the scene, before this tick
+  double last_stamp_ = 0.0;                                       // [s] of the frame taken last
+  std::uint64_t frame_number_ = 0;                                // the highest taken
+  ObservedClouds seen_;                                           // in use
+  std::array<std::uint64_t, Freshness::max_cameras> taken_in_{};  // tick that took each of them
+  std::uint64_t scene_ = 0;                                       // in use, as ServoSettings::scene
+  bool placement_changed_ = false;                                // or the scene, before this tick
   Freshness freshness_;
   PassivityObserver passivity_;
   FixtureStage fixtures_;

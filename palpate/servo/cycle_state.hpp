@@ -26,8 +26,11 @@ struct AdoptedFrame {
   std::uint64_t number = 0;  ///< as ServoTick::frame_number
   double stamp = 0.0;        ///< [s] as the method got it
   double put_at = 0.0;       ///< [s] on the loop's clock: when it was handed over
-  std::array<CameraFrame, Freshness::max_cameras> cameras{};  ///< the first `camera_count` count
+  /// The first `camera_count` count: the camera that captured it, then the others.
+  std::array<CameraFrame, Freshness::max_cameras> cameras{};
   std::uint64_t camera_count = 0;
+  /// Number of the cycle that took it, as ServoTick::number; none in an old recording.
+  std::optional<std::uint64_t> tick{};
 };
 
 /// All that a cycle remembers from tick to tick, but for its method and its settings, as numbers:

@@ -30,8 +30,10 @@ void Freshness::adopt(std::span<const CameraFrame> frames, double arrived,
     if (frame.camera >= max_cameras) continue;
     Camera& camera = cameras_[frame.camera];
     listed[frame.camera] = camera.expected = true;
-    // In a set of several cameras most stamps are those of the set before.
-    if (!std::isfinite(frame.stamp) || frame.stamp == camera.last_stamp) continue;
+    // Most stamps of other cameras are known; what is older than that was overtaken.
+    const bool is_new = &frame == frames.data() ? frame.stamp != camera.last_stamp
+                                                : frame.stamp > camera.last_stamp;
+    if (!std::isfinite(frame.stamp) || !is_new) continue;
     const bool fresh = frame.stamp > camera.last_stamp && frame.stamp <= arrived + tolerance;
     if (fresh) {
       const double interval = frame.stamp - camera.last_stamp;

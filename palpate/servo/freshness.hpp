@@ -26,10 +26,10 @@ class Freshness {
  public:
   static constexpr std::size_t max_cameras = 16;
 
-  /// Takes note of a set of frames. Cameras that are not in it are no longer waited for.
-  /// @param frames     one entry for each camera that has to be alive; numbers beyond max_cameras
-  ///                   are ignored
-  /// @param arrived    [s] when the newest of them arrived, on the loop's clock
+  /// Takes note of a frame. Cameras that are not in `frames` are no longer waited for.
+  /// @param frames     the new frame, then the newest of each other camera that has to be alive, as
+  ///                   far as that is known; numbers beyond max_cameras are ignored
+  /// @param arrived    [s] when the new one arrived, on the loop's clock
   /// @param tolerance  [s] how far ahead of `arrived` a stamp may be
   void adopt(std::span<const CameraFrame> frames, double arrived, double tolerance) noexcept;
 

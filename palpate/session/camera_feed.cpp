@@ -57,14 +57,14 @@ std::string tenths(double seconds) {
 // Are two captures the same to the bit? Points of clouds are not compared.
 bool is_same_picture(const Cloud* a, const Cloud* b) {
   if (a == b) return a != nullptr;
-  const auto* first = dynamic_cast<const DepthImage*>(a);
-  const auto* second = dynamic_cast<const DepthImage*>(b);
+  const DepthImage* first = a == nullptr ? nullptr : a->image();
+  const DepthImage* second = b == nullptr ? nullptr : b->image();
   return first != nullptr && second != nullptr && first->depth() == second->depth();
 }
 
 // What speaks against a frame's unit of depth; empty if nothing does.
 std::string doubt_of(const Cloud& cloud, const DepthRange& range) {
-  const auto* image = dynamic_cast<const DepthImage*>(&cloud);
+  const DepthImage* image = cloud.image();
   if (image == nullptr) return {};
   std::size_t measured = 0;
   std::size_t elsewhere = 0;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/session/camera_feed.hpp"
@@ -42,7 +41,7 @@ FrameSequence::FrameSequence(std::vector<std::unique_ptr<Source>> sources) {
   newest_.resize(cameras_.size());
 }
 
-void FrameSequence::adopt_until(double t, const std::function<void(const Cloud&, double)>& adopt) {
+void FrameSequence::adopt_until(double t, const std::function<void(const Observation&)>& adopt) {
   for (;;) {
     Camera* due = nullptr;
     for (Camera& camera : cameras_) {
@@ -52,16 +51,9 @@ void FrameSequence::adopt_until(double t, const std::function<void(const Cloud&,
     if (due == nullptr) break;
     due->newest = std::move(*due->next);
     due->next = due->source->next();
-
-    std::vector<std::shared_ptr<const Cloud>> clouds;
-    for (const Camera& camera : cameras_) {
-      if (camera.newest.cloud) clouds.push_back(camera.newest.cloud);
-    }
-    std::shared_ptr<const Cloud> cloud =
-        clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds));
-    adopt(*cloud, due->newest.stamp);
-    in_use_ = std::move(cloud);  // only now may the frame before go
-    newest_[static_cast<std::size_t>(due - cameras_.data())] = due->newest.cloud;
+    const auto number = static_cast<std::size_t>(due - cameras_.data());
+    adopt({*due->newest.cloud, due->newest.stamp, number});
+    newest_[number] = due->newest.cloud;  // only now may the frame before go
     ++due->adopted;
     ++adopted_;
     shown_ = due->newest.stamp;
@@ -72,7 +64,7 @@ void FrameSequence::adopt_until(double t, const std::function<void(const Cloud&,
   });
   if (!is_valid || adopted_ < 2 || shown_ + still_interval > t) return;
   shown_ += still_interval * std::floor((t - shown_) / still_interval);
-  adopt(*in_use_, shown_);
+  for (std::size_t i = 0; i < cameras_.size(); ++i) adopt({*newest_[i], shown_, i});
 }
 
 std::vector<ShownFrames> FrameSequence::shown() const {
@@ -119,7 +111,7 @@ void touch(FrameSequence& frames, Method& method, const HipPath::Sample& first, 
   method.seat(first.hip);
   for (std::int64_t i = 0;; ++i) {
     const double t = first.t + static_cast<double>(i) / rate;
-    frames.adopt_until(t, [&](const Cloud& cloud, double stamp) { method.frame(cloud, stamp); });
+    frames.adopt_until(t, [&](const Observation& seen) { method.observe(seen); });
     const std::optional<Vec3> hip = hand(t);
     if (!hip || !on_tick(method.tick(*hip, t))) return;
   }

@@ -24,7 +24,7 @@ struct ShownFrames {
 };
 
 /// Frames of one or several cameras in the order of their stamps, each adopted at the first tick at
-/// or after it. Several cameras are touched at once: each new frame replaces its camera's last.
+/// or after it.
 ///
 /// When all have ended, what they saw last is valid: it is shown again at 30 Hz, with the stamps of
 /// then. A single frame is not, as methods take it for a picture anyway.
@@ -35,10 +35,10 @@ class FrameSequence {
   /// Of sources that are open. @throws Error as above.
   explicit FrameSequence(std::vector<std::unique_ptr<Source>> sources);
 
-  /// Hands every frame stamped at or before `t` [s], and its stamp, to `adopt`, oldest first; after
-  /// the last, that one again. A frame lives until the next has been handed over.
+  /// Hands every frame stamped at or before `t` [s] to `adopt`, oldest first; after the last, each
+  /// camera's last again. A frame lives until its camera's next has been handed over.
   /// @throws Error if a frame cannot be read.
-  void adopt_until(double t, const std::function<void(const Cloud&, double)>& adopt);
+  void adopt_until(double t, const std::function<void(const Observation&)>& adopt);
 
   /// @throws Error if the method cannot touch what a camera shows first.
   void check(const Method& method) const;
@@ -71,7 +71,6 @@ class FrameSequence {
   };
   std::vector<Camera> cameras_;
   std::vector<std::shared_ptr<const Cloud>> newest_;
-  std::shared_ptr<const Cloud> in_use_;
   std::size_t adopted_ = 0;
   double shown_ = 0.0;  // [s] stamp handed over last
 };

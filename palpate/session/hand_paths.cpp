@@ -73,7 +73,7 @@ HipPath stroke_path(const DepthImage& image, double duration, double press) {
 
 Vec3 hover_place(const Cloud& cloud) {
   constexpr double hover = 0.05;  // [m]
-  if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
+  if (const DepthImage* image = cloud.image()) {
     const Intrinsics& k = image->intrinsics();
     Vec3 camera = image->world_from_camera().translation();
     // Outwards from the middle until something was measured.
@@ -85,7 +85,7 @@ Vec3 hover_place(const Cloud& cloud) {
     }
     return camera;
   }
-  const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+  const PointCloud* points = cloud.point_cloud();
   if (points == nullptr || points->size() == 0) return Vec3::Zero();
   Vec3 middle = Vec3::Zero();
   for (std::size_t i = 0; i < points->size(); ++i) middle += points->point(i);

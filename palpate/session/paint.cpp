@@ -126,7 +126,7 @@ std::vector<Dab> Paint::dabs() const {
 }
 
 std::vector<std::string> Paint::names(const Cloud& cloud) {
-  const auto* image = dynamic_cast<const DepthImage*>(&cloud);
+  const DepthImage* image = cloud.image();
   const MaterialMap* map = image == nullptr ? nullptr : image->materials().get();
   std::vector<std::string> names;
   for (const NamedMaterial& m :
@@ -138,7 +138,7 @@ std::vector<std::string> Paint::names(const Cloud& cloud) {
 std::shared_ptr<const Cloud> Paint::on(const std::shared_ptr<const Cloud>& cloud,
                                        std::size_t camera) {
   const std::lock_guard lock(mutex_);
-  const auto* image = dynamic_cast<const DepthImage*>(cloud.get());
+  const DepthImage* image = cloud->image();
   if (image == nullptr) return cloud;
   const MaterialMap* map = image->materials().get();
   const auto base = map == nullptr ? nullptr : map->table();

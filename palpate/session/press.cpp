@@ -155,12 +155,12 @@ Vec3 surface_at(const DepthImage& image, Pixel pixel) {
 // The line of sight through a pixel's coordinates, which may lie between pixels.
 std::optional<Press::Line> Press::look(double u, double v) {
   const Pixel pixel{static_cast<int>(std::lround(u)), static_cast<int>(std::lround(v))};
-  const auto* points = dynamic_cast<const PointCloud*>(cloud_);
+  const PointCloud* points = cloud_->point_cloud();
   if (points != nullptr && view_ && !seen_) {
     seen_.emplace(*view_, *points);
     drawn_ = std::make_shared<DepthImage>(seen_->image());
   }
-  const auto* image = points != nullptr ? drawn_.get() : dynamic_cast<const DepthImage*>(cloud_);
+  const DepthImage* image = points != nullptr ? drawn_.get() : cloud_->image();
   if (image == nullptr) return std::nullopt;
   const auto near = nearest_surface(*image, pixel, look_radius, !missed_once_);
   if (!near) return std::nullopt;
@@ -192,10 +192,10 @@ Press::Press(const Cloud& first, Pixel at, const PressOptions& options)
   check("press hold", options.hold, 0.0, 60.0, "s");
   check("press patience", options.patience, 0.0, 600.0, "s");
   Intrinsics size;
-  if (const auto* points = dynamic_cast<const PointCloud*>(&first)) {
+  if (const PointCloud* points = first.point_cloud()) {
     view_ = proposed_view(*points);
     size = view_->rays->intrinsics();
-  } else if (const auto* image = dynamic_cast<const DepthImage*>(&first)) {
+  } else if (const DepthImage* image = first.image()) {
     size = image->intrinsics();
   } else {
     throw Error("press", "the frame is neither an image nor points", "give a path");

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <future>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <set>
 #include <span>
@@ -72,8 +73,8 @@ std::unique_ptr<Device> open_hand(const SessionOptions& options, const std::stri
   std::optional<HipPath> path;
   const bool follows_path = uri.scheme() == "hand" || uri.scheme() == "script";
   if (follows_path && uri.path().empty()) {
-    const auto* points = dynamic_cast<const PointCloud*>(&seen);
-    if (const auto* image = dynamic_cast<const DepthImage*>(&seen))
+    const PointCloud* points = seen.point_cloud();
+    if (const DepthImage* image = seen.image())
       path = stroke_path(*image, options.stroke_time, press);
     else if (points != nullptr && points->size() > 0)
       path = stroke_path(SeenPoints(proposed_view(*points), *points).image(), options.stroke_time,
@@ -150,6 +151,7 @@ class Session::Impl {
     validate(options_.settings);
     newest_.resize(options_.cameras.size());
     stamps_.resize(options_.cameras.size());
+    numbers_.resize(options_.cameras.size());
     for (std::size_t i = 0; i < stamps_.size(); ++i) stamps_[i].camera = i;
     std::vector<std::shared_ptr<const Cloud>> first;
     for (SessionCamera& camera : options_.cameras)
@@ -547,7 +549,7 @@ class Session::Impl {
   // What the session's options say that a frame is made of.
   std::shared_ptr<const Cloud> with_materials(std::shared_ptr<const Cloud> cloud,
                                               std::size_t camera) {
-    const auto* image = dynamic_cast<const DepthImage*>(cloud.get());
+    const DepthImage* image = cloud->image();
     if (!options_.materials || image == nullptr) return cloud;
     std::string trouble;
     try {
@@ -574,20 +576,15 @@ class Session::Impl {
     std::shared_ptr<const Cloud> painted =
         paint_.on(with_materials(fed.frame.cloud, camera), camera);
     const std::lock_guard lock(frames_mutex_);
-    newest_[camera] = std::move(painted);
     stamps_[camera].stamp = fed.frame.stamp;
-    std::vector<std::shared_ptr<const Cloud>> clouds;
-    for (const auto& cloud : newest_) {
-      if (cloud) clouds.push_back(cloud);
-    }
-    stamp_ = std::max(fed.frame.stamp, stamp_ + 1e-6);  // of two cameras in the wrong order
-    const std::shared_ptr<const Cloud> cloud =
-        clouds.size() == 1 ? clouds.front() : std::make_shared<CloudSet>(std::move(clouds));
+    std::vector<CameraFrame> cameras = stamps_;
+    std::swap(cameras.front(), cameras[camera]);
     // Each hand counts the same frames, so a frame has the same number for all.
     for (const auto& hand : hands_) {
-      frame_number_ = hand->cycle().put_frame(cloud, stamp_, stamps_, now());
-      if (hand->recorder) hand->recorder->frame(frame_number_, stamp_, newest_);
+      numbers_[camera] = hand->cycle().put_frame(painted, fed.frame.stamp, cameras, now());
+      if (hand->recorder) hand->recorder->frame(numbers_[camera], fed.frame.stamp, camera, painted);
     }
+    newest_[camera] = std::move(painted);
     ++frames_;
   }
 
@@ -672,8 +669,12 @@ class Session::Impl {
     {
       const std::lock_guard lock(frames_mutex_);
       for (std::size_t i = 0; i < hands_.size(); ++i) {
-        // The first tick of the recording uses this frame, or one that is yet to come.
-        if (frame_number_ > 0) opened[i].recorder->frame(frame_number_, stamp_, newest_);
+        // The first tick of the recording uses these frames, or some that are yet to come.
+        std::map<std::uint64_t, std::size_t> cameras;  // by the number of their newest frame
+        for (std::size_t camera = 0; camera < newest_.size(); ++camera)
+          if (newest_[camera]) cameras[numbers_[camera]] = camera;
+        for (const auto& [number, camera] : cameras)
+          opened[i].recorder->frame(number, stamps_[camera].stamp, camera, newest_[camera]);
         hands_[i]->recorder = std::move(opened[i].recorder);
       }
     }
@@ -771,11 +772,10 @@ class Session::Impl {
   std::atomic<bool> stopped_{false};
 
   mutable std::mutex frames_mutex_;  // taken by the cameras' threads; never held for long
-  std::vector<std::shared_ptr<const Cloud>> newest_;             // guarded by frames_mutex_
-  std::vector<CameraFrame> stamps_;                              // guarded by frames_mutex_
+  std::vector<std::shared_ptr<const Cloud>> newest_;  // guarded by frames_mutex_
+  std::vector<CameraFrame> stamps_;                   // of these; guarded by frames_mutex_
   std::array<std::string, Patch::max_views> materials_trouble_;  // guarded by frames_mutex_
-  double stamp_ = -std::numeric_limits<double>::infinity();      // guarded by frames_mutex_
-  std::uint64_t frame_number_ = 0;                               // guarded by frames_mutex_
+  std::vector<std::uint64_t> numbers_;                           // guarded by frames_mutex_
   std::size_t frames_ = 0;                                       // guarded by frames_mutex_
 
   mutable std::mutex control_;  // settings and recordings; taken before frames_mutex_

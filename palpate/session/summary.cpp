@@ -11,7 +11,7 @@ std::optional<double> least_behind(std::span<const std::shared_ptr<const Cloud>>
                                    const Vec3& proxy, double r_c) {
   std::optional<double> least;
   for (const auto& cloud : cameras) {
-    const auto* image = dynamic_cast<const DepthImage*>(cloud.get());
+    const DepthImage* image = cloud ? cloud->image() : nullptr;
     if (image == nullptr) continue;
     const std::optional<double> behind = distance_behind(*image, proxy, r_c);
     if (behind && (!least || *behind < *least)) least = behind;

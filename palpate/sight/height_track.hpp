@@ -22,7 +22,7 @@ struct HeightTrack {
 };
 
 /// The most heights that are looked at; older ones are left out.
-inline constexpr std::size_t most_heights = 64;
+inline constexpr std::size_t most_heights = 128;
 
 /// The height of a surface at rest [m], averaged over as much of the past as agrees with the
 /// present.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bitset>
 #include <cstdint>
 
 #include "palpate/core/cloud.hpp"
@@ -45,8 +46,16 @@ class Monitor {
   void set(const SightParameters& parameters) noexcept;
   /// Forgets on which side of the surface the proxy is.
   void forget() noexcept;
-  /// A new frame is in use: looks at the one before are void.
-  void start_frame() noexcept { hand_.fresh = proxy_.fresh = frame_judged_ = false; }
+  /// A camera's new frame is in use: looks at the one before are void. What has to be so in several
+  /// frames in a row has to be so in as many of each camera.
+  void start_frame(std::size_t camera = 0) noexcept {
+    hand_.fresh = proxy_.fresh = false;
+    if (frame_judged_ && seen_.test(camera)) {
+      frame_judged_ = false;
+      seen_.reset();
+    }
+    seen_.set(camera);
+  }
 
   /// Judges a tick. To be called once each tick, in free motion too: the side is learned there.
   Verdict judge(const Cloud& cloud, const Contact& contact) noexcept;
@@ -77,10 +86,11 @@ class Monitor {
   Patch patch_;
   Look hand_, proxy_;
   Side side_ = Side::unknown;
-  Look last_front_;            // the last look that showed the proxy in front
-  bool frame_judged_ = false;  // is the newest frame counted in `frames_behind_`?
-  int frames_behind_ = 0;      // frames in a row that show the proxy behind its surface
-  int frames_past_edge_ = 0;   // frames in a row that show it beyond an edge
+  Look last_front_;                     // the last look that showed the proxy in front
+  std::bitset<Patch::max_views> seen_;  // cameras whose frame came since the last one was judged
+  bool frame_judged_ = false;           // is the newest frame counted in `frames_behind_`?
+  int frames_behind_ = 0;               // frames in a row that show the proxy behind its surface
+  int frames_past_edge_ = 0;            // frames in a row that show it beyond an edge
 };
 
 }  // namespace palpate

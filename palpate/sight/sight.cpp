@@ -48,9 +48,10 @@ void Sight::seat(const Vec3& proxy) noexcept {
   blend_offset_ = Vec3::Zero();
 }
 
-// [s] between the newest two frames; the nominal one where their stamps do not increase.
+// [s] between the newest two frames of the newest one's camera; the nominal one where their stamps
+// do not increase.
 double Sight::interval() const noexcept {
-  return frame_.in_order() ? frame_.interval() : 1.0 / parameters_.motion.frame_rate;
+  return frame_.in_order() ? frame_.camera_interval() : 1.0 / parameters_.motion.frame_rate;
 }
 
 // [m/s] of the surface along its frame's axis, as it is rendered at time t [s].
@@ -61,14 +62,16 @@ double Sight::surface_speed(double t) const noexcept {
 }
 
 // A frame seen along the lines of sight: docs/sight.md, 3.
-void Sight::frame(const Cloud& cloud, double stamp) noexcept {
-  frame_.take(cloud, stamp, 1.0 / parameters_.motion.frame_rate);
-  timing_.frame(frame_.stamp(), frame_.in_order() && frame_.count() > 1 ? frame_.interval() : 0.0);
+void Sight::observe(const Observation& seen) noexcept {
+  if (seen.camera >= Patch::max_views) return;
+  frame_.take(seen, 1.0 / parameters_.motion.frame_rate);
+  timing_.frame(frame_.stamp(),
+                frame_.in_order() && frame_.count() > 1 ? frame_.camera_interval() : 0.0);
   mover_.invalidate();
   blend_due_ = true;
   // The surface's own velocity, by which the force would go on changing without this frame.
   carried_rate_ = surface_speed(hand_velocity_.t());
-  monitor_.start_frame();
+  monitor_.start_frame(seen.camera);
   points_moved_ = Vec3::Zero();
   if (!proxy_.at) return;
   // A hidden surface is kept only while the proxy is near it.
@@ -79,8 +82,9 @@ void Sight::frame(const Cloud& cloud, double stamp) noexcept {
   }
   constexpr double infinite = std::numeric_limits<double>::infinity();
   using Event = SightTracker::Event;
-  const Event event = tracker_.frame(cloud, frame_.stamp(), interval(), *proxy_.at,
-                                     proxy_.touching ? parameters_.sight.hardest_strike : infinite);
+  const Event event =
+      tracker_.frame(*frame_.cloud(), seen.camera, frame_.camera_stamp(), interval(), *proxy_.at,
+                     proxy_.touching ? parameters_.sight.hardest_strike : infinite);
   if (event != Event::followed && event != Event::jumped) return;
   // Side repair: the proxy was on the surface's free side and must be there still. If it will move
   // over points, it must be in front of this frame's points, not only of their average.

@@ -24,7 +24,7 @@ class Sight final : public Method {
   explicit Sight(const Parameters& parameters = {});
 
   void seat(const Vec3& proxy) noexcept override;
-  void frame(const Cloud& cloud, double stamp) noexcept override;
+  void observe(const Observation& seen) noexcept override;
   Tick tick(const Vec3& hip, double t) noexcept override;
   void set_parameters(const Parameters& parameters) override;
 

@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
+#include <limits>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -29,6 +30,8 @@ constexpr double structure_floor = 50e-6;
 constexpr double unnoticed_noise = 50e-6;
 // Upper 99 % confidence bounds of a variance estimated from 1 to 5 samples, in multiples of it.
 constexpr std::array upper_bounds = {6000.0, 400.0, 120.0, 50.0, 28.0};
+// [m] Places of a fit that differ by less are the same.
+constexpr double same_centre = 1e-6;
 // [-] standard deviations. A disc in use needs so much stronger evidence against it: a change is
 // felt.
 constexpr double hysteresis = 0.5;
@@ -103,21 +106,33 @@ double SurfaceEstimate::height_sd() const noexcept {
 }
 
 double SurfaceEstimate::beam_sd() const noexcept {
-  return std::sqrt(variance(0));
+  double most = 0.0;
+  for (std::size_t i = 0; i < is_known_.size(); ++i)
+    if (is_known_[i]) most = std::max(most, variance(0, i));
+  return std::sqrt(most > 0.0 ? most : variance(0, camera_));
+}
+
+double SurfaceEstimate::variance(std::size_t rung) const noexcept {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < is_known_.size(); ++i)
+    if (is_known_[i]) least = std::min(least, variance(rung, i));
+  return std::isfinite(least) ? least : variance(rung, camera_);
 }
 
 // Variance of one frame's height in a disc [m^2]: the usual one of a depth camera, until enough
 // frames have been measured; then the measured one, with a margin for how few they were.
-double SurfaceEstimate::variance(std::size_t rung) const noexcept {
-  const Scatter& scatter = scatter_[rung];
+double SurfaceEstimate::variance(std::size_t rung, std::size_t camera) const noexcept {
+  const std::array<Scatter, rungs>& scatters = scatter_[camera];
+  const Scatter& scatter = scatters[rung];
   // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
   const double most = 4.0 * spread_ + 0.5e-3;
-  const double grown = parameters_.noise_growth == 1 ? distance_ : squared(distance_);
+  const double grown =
+      parameters_.noise_growth == 1 ? distances_[camera] : squared(distances_[camera]);
   const double usual =
       squared(std::min(parameters_.usual_noise * grown, most)) + 0.03 * squared(spread_) + 1e-12;
   // Noise falls with the area it is averaged over: a wider disc's is the least of this one's.
   double wider = 0.0;
-  for (std::size_t j = rung + 1; j < rungs; ++j) wider = std::max(wider, scatter_[j].variance);
+  for (std::size_t j = rung + 1; j < rungs; ++j) wider = std::max(wider, scatters[j].variance);
   if (scatter.samples < 1.0) return std::max(usual, wider);
   const double measured = std::max({scatter.variance * (1.0 + 4.0 / scatter.samples), scatter.least,
                                     std::min(scatter.at_rest, 4.0 * scatter.variance)}) +
@@ -179,8 +194,10 @@ SurfaceContact SurfaceEstimate::contact(const Vec3& point, double t, double reac
           surface_.strongest_rise()};
 }
 
-void SurfaceEstimate::start_frame(double stamp, double interval) noexcept {
-  if (!(stamp > stamp_ && stamp - stamp_ <= longest_gap)) {
+void SurfaceEstimate::start_frame(std::size_t camera, double stamp, double interval) noexcept {
+  const bool follows = stamp > stamp_ || (stamp == stamp_ && camera != camera_);
+  camera_ = camera;
+  if (!(follows && stamp - stamp_ <= longest_gap)) {
     stop();
     settled_ = 0;
   }
@@ -304,7 +321,11 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
     if (settled_ == 0) rested_ = 0;
     settled_ += goes_on && settled_ == 1 ? 2 : 1;
     newest_ = (newest_ + 1) % history;
-    count_ = std::min(count_ + 1, history);
+    count_ = std::min(count_ + 1, most_frames());
+    evidence(0).camera = camera_;
+    is_known_.fill(false);
+    for (std::size_t i = 0; i < count_; ++i) is_known_[evidence(i).camera] = true;
+    cameras_ = static_cast<std::size_t>(std::count(is_known_.begin(), is_known_.end(), true));
   }
   Evidence& now = evidence(0);
   now.stamp = stamp_;
@@ -325,8 +346,8 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   look_at_cells(foot, look, new_frame);
 
   // Where there is noise to average away, look farther.
-  const bool noisy =
-      scatter_[1].samples >= 1.0 ? scatter_[1].variance > squared(20e-6) : spread_ > 0.1e-3;
+  const Scatter& inner = scatter_[now.camera][1];
+  const bool noisy = inner.samples >= 1.0 ? inner.variance > squared(20e-6) : spread_ > 0.1e-3;
   const std::size_t most = most_rungs();
   if (noisy && most > inner_rungs) {
     const double widest = radii_[most - 1];
@@ -349,6 +370,14 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   }
   estimate(foot, new_frame);
   if (!look.partial) judge(foot);
+  now.smooth = smooth_;
+  // What one camera sees whole another may see cut off by a shadow, in turn.
+  std::array<bool, Patch::max_views> is_judged{};
+  for (std::size_t i = 0; i < count_ && cameras_ > 1 && !look.partial; ++i) {
+    const Evidence& e = evidence(i);
+    if (std::exchange(is_judged[e.camera], true) || stamp_ - e.stamp > longest_gap) continue;
+    smooth_ = smooth_ || (e.smooth && (e.centre - foot).squaredNorm() < squared(same_centre));
+  }
   centre_ = foot;
   if (foot.norm() > 4e-3 * coarseness()) move_origin(foot);
   return true;
@@ -366,8 +395,11 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   std::array<std::size_t, rungs> frames{};
   std::size_t chosen = 0;
   const std::size_t averaged =
-      std::min(count_, static_cast<std::size_t>(parameters_.averaged_frames));
+      std::min(count_, cameras_ * static_cast<std::size_t>(parameters_.averaged_frames));
   for (std::size_t j = 0; j < now.rungs; ++j) {
+    std::array<double, Patch::max_views> doubts{};
+    for (std::size_t c = 0; c < doubts.size(); ++c)
+      if (is_known_[c]) doubts[c] = doubt(j, c);
     // Evidence from frames whose disc overlaps this one's well.
     const double farthest = squared(overlap(j));
     Shape::Sums sums = Shape::Sums::Zero();
@@ -380,14 +412,14 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       if (j < e.lost || e.rungs <= j || (e.centre - foot).squaredNorm() > farthest) break;
       // A partly hidden disc determines the height, but hardly the slope.
       if (!e.whole && n > 0) continue;
-      sums += e.shape[j].sums;
+      sums += 1.0 / doubts[e.camera] * e.shape[j].sums;
       if (++whole == std::size_t{2} << filled && filled < slope_windows) {
         windows[filled++] = {Shape::matrix(sums), Shape::right_side(sums)};
       }
     }
     frames[j] = n;
     const double points = std::max(now.shape[j].points, 1.0);
-    Scatter& scatter = scatter_[j];
+    Scatter& scatter = scatter_[now.camera][j];
     // Weight of the curvature prior in points, with correlated noise counted by its effect.
     const double prior =
         variance(j) * points / cm2 / squared(parameters_.curvature_sd * Moments::unit);
@@ -401,21 +433,29 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
     confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / cm2,
                    parameters_.confidence + 1.0);
     const double above = shapes[j].dot(basis);
-    double usual_extent = 0.0;
+    std::array<double, Patch::max_views> own_frames{};
+    for (std::size_t i = 0; i < n; ++i) ++own_frames[evidence(i).camera];
+    std::array<double, Patch::max_views> usual_extent{};
+    std::array<HeightSample, 5> h;  // of this camera, without what it is worth beside others
+    std::size_t own = 0;
     for (std::size_t i = 0; i < n; ++i) {
       const Evidence& e = evidence(i);
       heights[j][i] = {
           e.stamp, (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * Moments::unit};
-      usual_extent += e.extent[j] / static_cast<double>(n);
+      usual_extent[e.camera] += e.extent[j] / own_frames[e.camera];
     }
     // A disc that an occluder begins to hide has fewer points and more noise.
     for (std::size_t i = 0; i < n; ++i) {
-      const double share = evidence(i).extent[j] / usual_extent;
-      if (share < 0.8) heights[j][i].doubt = 1.0 / squared(std::max(share, 0.1));
+      const Evidence& e = evidence(i);
+      HeightSample& height = heights[j][i];
+      const double share = e.extent[j] / usual_extent[e.camera];
+      if (share < 0.8) height.doubt = 1.0 / squared(std::max(share, 0.1));
+      if (e.camera == now.camera && own < h.size()) h[own++] = height;
+      height.doubt *= doubts[e.camera];
     }
-    if (new_frame && n >= 5 && now.whole) {
+    if (cameras_ > 1) align_cameras(std::span(heights[j].data(), n));
+    if (new_frame && own == h.size() && now.whole) {
       // Fourth differences do not see a smooth motion; their variance is 70 times a height's.
-      const auto& h = heights[j];
       const double fourth =
           h[0].height - 4.0 * h[1].height + 6.0 * h[2].height - 4.0 * h[3].height + h[4].height;
       double change =
@@ -428,7 +468,8 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       scatter.samples = std::min(scatter.samples + 1.0, 40.0);
       scatter.variance += (change - scatter.variance) / scatter.samples;
     }
-    if (new_frame) scatter.at_rest = variance_at_rest(heights[j], std::min(n, rested_));
+    if (new_frame)
+      scatter.at_rest = doubts[now.camera] * variance_at_rest(heights[j], std::min(n, rested_));
   }
   // Lepski's rule: the widest disc that agrees with all narrower ones determines the height. The
   // differences between discs are taken frame by frame, so that motion cancels and their scatter is
@@ -439,8 +480,8 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   // Until a disc's noise has been measured over time, what its points scatter counts at most: the
   // usual noise of a camera would let a wide disc agree that reaches beyond a body.
   constexpr double unmeasured = 0.5;  // [-] of the spread
-  const auto measured = [this](std::size_t j) {
-    return scatter_[j].samples > static_cast<double>(upper_bounds.size());
+  const auto measured = [&](std::size_t j) {
+    return scatter_[now.camera][j].samples > static_cast<double>(upper_bounds.size());
   };
   const auto expected = [&](std::size_t j) {
     return measured(j) ? variance(j) : std::min(variance(j), squared(unmeasured * spread_));
@@ -469,7 +510,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       // Noise falls at most with the area it is averaged over, so the difference from the next
       // narrower disc is a lower bound of a disc's noise.
       if (i + 1 == j && n >= 4) {
-        scatter_[j].least =
+        scatter_[now.camera][j].least =
             (1.0 + 2.0 / count) * about_mean / count / (squared(radii_[j] / radii_[i]) - 1.0);
       }
       // Few differences may happen to be alike: what the heights' noise lets expect counts as
@@ -514,6 +555,43 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   surface_.c.tail<3>() /= Moments::unit;
   above_mean_ = since.front().height - height;
   surface_.c[0] = height - shapes[chosen].dot(basis) * Moments::unit;
+}
+
+// Where cameras' poses are not quite right, their heights differ by what is no motion: takes from
+// each camera's how far they lie above those of the others, interpolated in time, so that the mean
+// stays. Of the newest frames.
+void SurfaceEstimate::align_cameras(std::span<HeightSample> heights) noexcept {
+  const std::size_t n = heights.size();
+  constexpr std::size_t none = history;
+  std::array<std::size_t, history> newer;  // frame of another camera; the next older one likewise
+  std::array<std::size_t, history> older;
+  const auto camera = [this](std::size_t i) { return evidence(i).camera; };
+  for (std::size_t i = 0; i < n; ++i)
+    newer[i] = i == 0 ? none : camera(i - 1) != camera(i) ? i - 1 : newer[i - 1];
+  for (std::size_t i = n; i-- > 0;)
+    older[i] = i + 1 == n ? none : camera(i + 1) != camera(i) ? i + 1 : older[i + 1];
+  struct Sums {
+    double difference = 0.0, count = 0.0, weight = 0.0;
+  };
+  std::array<Sums, Patch::max_views> sums{};
+  double weight = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    Sums& own = sums[camera(i)];
+    own.weight += 1.0 / heights[i].doubt;
+    weight += 1.0 / heights[i].doubt;
+    if (newer[i] == none || older[i] == none) continue;
+    const HeightSample& after = heights[newer[i]];
+    const HeightSample& before = heights[older[i]];
+    const double time = after.stamp - before.stamp;
+    const double share = time > 0.0 ? (heights[i].stamp - before.stamp) / time : 0.5;
+    own.difference += heights[i].height - before.height - share * (after.height - before.height);
+    ++own.count;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const Sums& own = sums[camera(i)];
+    if (own.count > 0.0)
+      heights[i].height -= own.difference / own.count * (1.0 - own.weight / weight);
+  }
 }
 
 // Means of the inner patch's points in cells of a square about `foot`. Structure stays from frame

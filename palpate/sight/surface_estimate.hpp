@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <span>
 
 #include "palpate/core/cloud.hpp"
 #include "palpate/sight/height_track.hpp"
@@ -37,8 +38,9 @@ class SurfaceEstimate {
   };
 
   void set(const SightParameters& parameters) noexcept;
-  /// A frame at `stamp` [s], `interval` [s] after the one before, will be measured.
-  void start_frame(double stamp, double interval) noexcept;
+  /// A frame of `camera` at `stamp` [s], `interval` [s] after that camera's one before, will be
+  /// measured.
+  void start_frame(std::size_t camera, double stamp, double interval) noexcept;
   /// Begins with the surface at `foot` [m, world], with heights along `up` [-]. Earlier frames are
   /// forgotten. False if there are too few points.
   bool start(const Cloud& cloud, const Vec3& foot, const Vec3& up) noexcept;
@@ -57,8 +59,8 @@ class SurfaceEstimate {
   void stop() noexcept { velocity_ = 0.0; }
   /// It may be another one from here on: earlier frames no longer count.
   void forget_frames() noexcept { count_ = 0; }
-  /// Distance of the sensor [m], from which its noise is assumed until that has been measured.
-  void set_distance(double distance) noexcept { distance_ = distance; }
+  /// Distance of a camera [m], from which its noise is assumed until that has been measured.
+  void set_distance(std::size_t camera, double distance) noexcept { distances_[camera] = distance; }
   /// Makes discs wide enough for an image whose points lie `spacing` [m] apart (0: not known), so
   /// that the narrowest holds some 28 of them. Before `start`.
   void set_spacing(double spacing) noexcept;
@@ -81,6 +83,8 @@ class SurfaceEstimate {
   [[nodiscard]] double normal_velocity() const noexcept {
     return velocity_ * surface_.normal(centre_).z();
   }
+  /// Whose frame was measured last; `move_to` needs that camera's cloud.
+  [[nodiscard]] std::size_t camera() const noexcept { return ring_[newest_].camera; }
   [[nodiscard]] double stamp() const noexcept { return stamp_; }        ///< [s]
   [[nodiscard]] double interval() const noexcept { return interval_; }  ///< [s]
   /// How far the surface has moved along `up` at time t [s] since its frame [m].
@@ -93,9 +97,9 @@ class SurfaceEstimate {
   [[nodiscard]] bool jumped() const noexcept { return jumped_; }
   /// Spread of the measured points about the surface [m]: how far noise can reach.
   [[nodiscard]] double spread() const noexcept { return spread_; }
-  /// Standard deviation of one frame's height of the surface [m], as measured.
+  /// Standard deviation of one frame's height of the surface [m], as measured; of the best camera.
   [[nodiscard]] double height_sd() const noexcept;
-  /// The same of the narrowest disc, which is as wide as the beam [m].
+  /// The same of the narrowest disc, which is as wide as the beam [m]; of the worst camera.
   [[nodiscard]] double beam_sd() const noexcept;
   /// How far the newest frame's own points may lie above the averaged surface [m].
   [[nodiscard]] double clearance() const noexcept {
@@ -120,6 +124,7 @@ class SurfaceEstimate {
 
  private:
   static constexpr std::size_t history = most_heights;
+  static constexpr std::size_t frames_of_a_camera = 64;
   static constexpr int cells_per_side = 4;
   static constexpr std::size_t cells = cells_per_side * cells_per_side;
 
@@ -141,6 +146,8 @@ class SurfaceEstimate {
   /// What was measured in one frame.
   struct Evidence {
     double stamp = 0.0;
+    std::size_t camera = 0;
+    bool smooth = false;  // the fit described the surface
     Vec2 centre = Vec2::Zero();
     bool whole = true;      // no occluder hid a part of it
     std::size_t rungs = 0;  // how many were measured
@@ -199,7 +206,18 @@ class SurfaceEstimate {
   [[nodiscard]] Evidence& evidence(std::size_t age) noexcept {
     return ring_[(newest_ + history - age) % history];
   }
+  [[nodiscard]] double variance(std::size_t rung, std::size_t camera) const noexcept;
+  /// The least of all cameras' whose frames are remembered.
   [[nodiscard]] double variance(std::size_t rung) const noexcept;
+  /// A height's variance in multiples of that.
+  [[nodiscard]] double doubt(std::size_t rung, std::size_t camera) const noexcept {
+    return cameras_ == 1 ? 1.0 : variance(rung, camera) / variance(rung);
+  }
+  void align_cameras(std::span<HeightSample> heights) noexcept;
+  /// How many frames are remembered: as many seconds of several cameras.
+  [[nodiscard]] std::size_t most_frames() const noexcept {
+    return std::min(history, cameras_ * frames_of_a_camera);
+  }
   /// How many discs may be used.
   [[nodiscard]] std::size_t most_rungs() const noexcept;
 
@@ -225,13 +243,16 @@ class SurfaceEstimate {
   std::size_t rested_ = 0;  // frames since it moved
   bool jumped_ = false;
   bool smooth_ = false;
-  double above_mean_ = 0.0;  // [m] the newest frame's height over the average
-  double distance_ = 0.0;    // [m] from the viewpoint
+  double above_mean_ = 0.0;                        // [m] the newest frame's height over the average
+  std::size_t camera_ = 0;                         // of the frame that is measured
+  std::size_t cameras_ = 1;                        // of the frames that are remembered
+  std::array<bool, Patch::max_views> is_known_{};  // those
+  std::array<double, Patch::max_views> distances_{};   // [m] from the viewpoints
   std::array<double, rungs> radii_ = narrowest_discs;  // [m] of the discs
   double cell_size_ = 4.5e-3;                          // [m]
 
   // The sensor's noise is kept when a contact ends.
-  std::array<Scatter, rungs> scatter_;
+  std::array<std::array<Scatter, rungs>, Patch::max_views> scatter_;  // by camera
   Scatter cell_scatter_;
 };
 

@@ -36,6 +36,8 @@ constexpr std::size_t beside_points = 640;
 // From so many frames on, a jump is compared with `hardest_strike`.
 constexpr std::size_t well_known = 4;
 constexpr float nothing = -1e3F;
+// [-] cosine: a camera sees a surface that faces it within 70 degrees.
+constexpr double faces_at = 0.35;
 
 // The viewpoint of the view that contributed most of the patch's points; none if it has none.
 std::optional<Vec3> main_viewpoint(const Patch& patch) {
@@ -96,16 +98,62 @@ SightTracker::Event SightTracker::hold(double since) noexcept {
   return Event::hidden;
 }
 
-SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double interval,
-                                        const Vec3& proxy, double hardest_strike) noexcept {
+SightTracker::Ring SightTracker::nothing_beside() noexcept {
+  Ring ring;
+  ring.fill(nothing);
+  return ring;
+}
+
+// The camera that measures most on its lines of sight through a place.
+std::size_t SightTracker::best_camera(const ObservedClouds& clouds, const Vec3& place) noexcept {
+  std::size_t best = 0;
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    const Cloud* cloud = clouds.of(i);
+    if (cloud == nullptr) continue;
+    if (clouds.parts().size() == 1) return i;
+    gather(*cloud, Beam{place, surface_.resolution(), reach, surface_.frame().up}, beam_points,
+           patch_);
+    if (patch_.size() > most || clouds.of(best) == nullptr) best = i;
+    most = std::max(most, patch_.size());
+  }
+  return best;
+}
+
+// Does the newest frame of another camera that faces the surface show it at `place`?
+bool SightTracker::others_show(const ObservedClouds& clouds, std::size_t camera, const Vec3& place,
+                               const Vec3& normal, double gate) noexcept {
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    const double since = views_[camera].stamp - views_[i].stamp;
+    if (i == camera || clouds.of(i) == nullptr || !(since <= SurfaceEstimate::longest_gap))
+      continue;
+    const std::optional<Seen> shown = look_at(*clouds.of(i), place, surface_.resolution());
+    if (shown && shown->line.dot(normal) > faces_at &&
+        std::abs(shown->above * shown->line.dot(normal)) <= gate)
+      return true;
+  }
+  return false;
+}
+
+SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_t camera,
+                                        double stamp, double interval, const Vec3& proxy,
+                                        double hardest_strike) noexcept {
+  const Cloud& cloud = *clouds.of(camera);
+  View& view = views_[camera];
+  view.stamp = stamp;
+  view.interval = interval;
   if (!tracking_) {
-    surface_.start_frame(stamp, interval);
-    watch(cloud, proxy);
+    surface_.start_frame(camera, stamp, interval);
+    watch(clouds, proxy);
     return tracking_ ? Event::followed : Event::none;
   }
+  const bool alone = clouds.parts().size() == 1;
+  const double elapsed = alone ? interval : stamp - surface_.stamp();
+  // What was captured before the newest evidence says nothing about now.
+  if (!alone && elapsed < 0.0 && elapsed >= -SurfaceEstimate::longest_gap) return Event::none;
   // Where the surface is expected: below the proxy, moved by its velocity.
   const LocalFrame& axes = surface_.frame();
-  const double expected = surface_.velocity() * std::min(interval, SurfaceEstimate::longest_gap);
+  const double expected = surface_.velocity() * std::min(elapsed, SurfaceEstimate::longest_gap);
   const Vec3 hand = axes.local_from_world(proxy);
   Vec2 foot = surface_.surface().nearest(hand, hand.head<2>(), surface_.centre(),
                                          holding_ ? serves_while_held : 2.0 * serves);
@@ -118,7 +166,7 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   gather(cloud, Beam{place, shadow_radius * surface_.coarseness(), occluder_reach, axes.up},
          wide_beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
-  if (viewpoint) surface_.set_distance((*viewpoint - place).norm());
+  if (viewpoint) surface_.set_distance(camera, (*viewpoint - place).norm());
   const Vec3 line = viewpoint ? Vec3((*viewpoint - place).normalized()) : axes.up;
   const bool from_behind = line.dot(axes.up) < 0.0;
   std::array<float, wide_beam_points> heights;
@@ -164,10 +212,6 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     seen += counts ? 1 : 0;
   }
 
-  const double previous_stamp = surface_.stamp();
-  surface_.start_frame(stamp, interval);
-  Event event = Event::followed;
-  double jump = 0.0;  // [m] along up, from where it was expected
   bool there = near >= SurfaceEstimate::least_points &&
                static_cast<double>(near) >= least_share_ * static_cast<double>(seen);
   // Of a surface that moved beyond the gate, the tail of the noise is still inside.
@@ -175,6 +219,16 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     const float middle = kth_smallest(std::span(near_above.data(), near), near / 2);
     there = std::abs(middle) <= 0.5F * gate;
   }
+  if (!alone) {
+    const Vec3 normal = axes.direction_in_world(moved.normal(foot));
+    const bool is_faced = viewpoint && line.dot(normal) > faces_at;
+    if (!(there && is_faced) && others_show(clouds, camera, place, normal, wide))
+      return Event::none;
+  }
+  const double previous_stamp = surface_.stamp();
+  surface_.start_frame(camera, stamp, interval);
+  Event event = Event::followed;
+  double jump = 0.0;  // [m] along up, from where it was expected
   if (!there) {
     const std::optional<Layer> layer =
         first_layer(std::span(heights.data(), seen),
@@ -187,8 +241,8 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     if (!layer) return hold(previous_stamp);
     jump = layer->height / std::max(line.dot(axes.up), 0.2);
     const bool nearer = jump > 0.0;
-    if (nearer && (holding_ ||
-                   is_occluder(look_beside(cloud, place), jump + expected, jump, hardest_strike))) {
+    if (nearer && (holding_ || is_occluder(view.beside, look_beside(cloud, place), jump + expected,
+                                           jump, hardest_strike))) {
       return hold(previous_stamp);
     }
     event = Event::jumped;
@@ -201,11 +255,11 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
   // them lie in a stereo camera's shadow beside one.
   const bool stays = foot == surface_.centre();
   const double all_near = static_cast<double>(near) / share;
-  if (!stays || all_near > near_usual_) near_usual_ = all_near;
-  const bool covered = before >= 3 || all_near < 0.75 * near_usual_;
-  shadowed_ = covered && stays && (shadowed_ || resumed || !covered_);
-  covered_ = covered;
-  if (!surface_.add(cloud, foot, {wide, event == Event::jumped, shadowed_})) {
+  if (!stays || all_near > view.near_usual) view.near_usual = all_near;
+  const bool covered = before >= 3 || all_near < 0.75 * view.near_usual;
+  view.shadowed = covered && stays && (view.shadowed || resumed || !view.covered);
+  view.covered = covered;
+  if (!surface_.add(cloud, foot, {wide, event == Event::jumped, view.shadowed})) {
     surface_.shift(-expected - jump);
     // What is seen behind it is not hidden by anything: the surface ends here, as over a hole.
     if (jump < 0.0) {
@@ -215,24 +269,26 @@ SightTracker::Event SightTracker::frame(const Cloud& cloud, double stamp, double
     return hold(previous_stamp);
   }
   holding_ = false;
-  beside_ = look_beside(cloud, surface_.place());
+  view.beside = look_beside(cloud, surface_.place());
   return event;
 }
 
-void SightTracker::watch(const Cloud& cloud, const Vec3& proxy) noexcept {
+void SightTracker::watch(const ObservedClouds& clouds, const Vec3& proxy) noexcept {
   if (tracking_) {
     if (holding_) return;
     const Vec2 below = surface_.frame().local_from_world(proxy).head<2>();
     if ((below - surface_.centre()).norm() < 5e-3) return;
   }
   tracking_ = false;
+  const std::size_t camera = best_camera(clouds, proxy);
+  const Cloud& cloud = *clouds.of(camera);
   surface_.set_spacing(cloud.spacing(proxy));
   gather(cloud, Beam{proxy, surface_.resolution(), reach, surface_.frame().up}, beam_points,
          patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   if (!viewpoint) return;  // no line of sight to follow
   const Vec3 line = (*viewpoint - proxy).normalized();
-  surface_.set_distance((*viewpoint - proxy).norm());
+  surface_.set_distance(camera, (*viewpoint - proxy).norm());
   std::array<float, beam_points> heights;
   const std::size_t seen = heights_along(patch_, line, heights);
   const std::optional<Layer> layer =
@@ -240,10 +296,11 @@ void SightTracker::watch(const Cloud& cloud, const Vec3& proxy) noexcept {
   if (!layer || layer->height > 0.0) return;  // nothing, or the proxy is hidden behind it
   const Vec3 place = proxy + layer->height * line;
   surface_.set_spacing(cloud.spacing(place));
-  start(cloud, place, line);
+  start(clouds, camera, place, line);
 }
 
-void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& normal) noexcept {
+void SightTracker::touch(const ObservedClouds& clouds, const Vec3& foot,
+                         const Vec3& normal) noexcept {
   if (holding_) return;
   if (tracking_) {
     const Vec3 local = surface_.frame().local_from_world(foot);
@@ -253,9 +310,14 @@ void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& norma
     if (faces(normal) && away < 12e-3 &&
         std::abs(off) < 3e-3 + 4.0 * (surface_.spread() + surface_.height_sd())) {
       if (away < serves) return;
-      if (surface_.move_to(cloud, at, {surface_.gate(), false, shadowed_})) return;
+      const std::size_t measured_by = surface_.camera();
+      if (surface_.move_to(*clouds.of(measured_by), at,
+                           {surface_.gate(), false, views_[measured_by].shadowed}))
+        return;
     }
   }
+  const std::size_t camera = best_camera(clouds, foot);
+  const Cloud& cloud = *clouds.of(camera);
   // Where the camera sees the surface well behind this place, the contact from behind is with a
   // stray point.
   const std::optional<Seen> seen = look_at(cloud, foot, surface_.resolution());
@@ -268,30 +330,38 @@ void SightTracker::touch(const Cloud& cloud, const Vec3& foot, const Vec3& norma
   Vec3 up = normal;
   if (viewpoint) {
     const Vec3 line = (*viewpoint - foot).normalized();
-    surface_.set_distance((*viewpoint - foot).norm());
+    surface_.set_distance(camera, (*viewpoint - foot).norm());
     if (std::abs(line.dot(normal)) > 0.5) up = line.dot(normal) > 0.0 ? line : Vec3(-line);
   }
-  start(cloud, foot, up);
+  start(clouds, camera, foot, up);
 }
 
-bool SightTracker::slide(const Cloud& cloud, const Vec3& foot) noexcept {
+bool SightTracker::slide(const ObservedClouds& clouds, const Vec3& foot) noexcept {
   if (!tracking_ || holding_) return false;
+  const std::size_t camera = surface_.camera();
+  const Cloud& cloud = *clouds.of(camera);
   if (const double spacing = cloud.spacing(foot); surface_.misfits(spacing)) {
     surface_.set_spacing(spacing);
-    start(cloud, foot, surface_.frame().up);
+    start(clouds, camera, foot, surface_.frame().up);
     return tracking_;
   }
   const Vec2 at = surface_.frame().local_from_world(foot).head<2>();
-  return surface_.move_to(cloud, at, {surface_.gate(), false, shadowed_});
+  return surface_.move_to(cloud, at, {surface_.gate(), false, views_[camera].shadowed});
 }
 
-// Begins to follow the surface at `foot`.
-void SightTracker::start(const Cloud& cloud, const Vec3& foot, const Vec3& up) noexcept {
+// Begins to follow the surface at `foot`, in a camera's newest frame.
+void SightTracker::start(const ObservedClouds& clouds, std::size_t camera, const Vec3& foot,
+                         const Vec3& up) noexcept {
+  const Cloud& cloud = *clouds.of(camera);
   holding_ = false;
-  shadowed_ = false;
-  covered_ = false;
+  for (View& view : views_) {
+    view.shadowed = view.covered = false;
+    if (&view != &views_[camera]) view.beside = nothing_beside();
+  }
+  if (clouds.parts().size() > 1)
+    surface_.start_frame(camera, views_[camera].stamp, views_[camera].interval);
   tracking_ = surface_.start(cloud, foot, up);
-  if (tracking_) beside_ = look_beside(cloud, surface_.place());
+  if (tracking_) views_[camera].beside = look_beside(cloud, surface_.place());
 }
 
 std::optional<SightTracker::Seen> SightTracker::look_at(const Cloud& cloud, const Vec3& place,
@@ -306,14 +376,16 @@ std::optional<SightTracker::Seen> SightTracker::look_at(const Cloud& cloud, cons
   return Seen{kth_smallest(std::span(heights.data(), seen), seen / 2), line};
 }
 
-std::optional<Vec3> SightTracker::in_front(const Cloud& cloud, const Vec3& before,
+std::optional<Vec3> SightTracker::in_front(const ObservedClouds& clouds, const Vec3& before,
                                            const Vec3& after, double radius) noexcept {
   // A proxy that goes round an edge has the surface beside or behind it all the way, or comes from
   // farther away.
   const double farthest = 4.0 * radius;
   const double way = (after - before).norm();
-  if (!tracking_ || holding_ || covered_ || way < 0.5 * radius || way > farthest)
+  if (!tracking_ || holding_ || views_[surface_.camera()].covered || way < 0.5 * radius ||
+      way > farthest)
     return std::nullopt;
+  const Cloud& cloud = *clouds.of(best_camera(clouds, after));
   const std::optional<Seen> now = look_at(cloud, after, radius);
   if (!now || now->above < 0.0 || now->above > farthest) return std::nullopt;
   const std::optional<Seen> then = look_at(cloud, before, radius);
@@ -323,8 +395,7 @@ std::optional<Vec3> SightTracker::in_front(const Cloud& cloud, const Vec3& befor
 
 // For each sector and ring beside the contact, the height of the point nearest to the camera.
 SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& place) noexcept {
-  Ring ring;
-  ring.fill(nothing);
+  Ring ring = nothing_beside();
   const LocalFrame& axes = surface_.frame();
   gather(cloud, Beam{place, beside_bands.back(), reach, axes.up}, beside_points, patch_);
   points_.take(patch_, axes);
@@ -355,7 +426,7 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
 // would need a larger acceleration than `hardest_strike`.
 // @param height  [m] of what is seen now, above where the surface was
 // @param jump    [m] above where it was expected
-bool SightTracker::is_occluder(const Ring& now, double height, double jump,
+bool SightTracker::is_occluder(const Ring& ring_before, const Ring& now, double height, double jump,
                                double hardest_strike) const noexcept {
   const double interval = surface_.interval();
   const double strike = 0.5 * hardest_strike * (interval * interval);
@@ -368,7 +439,7 @@ bool SightTracker::is_occluder(const Ring& now, double height, double jump,
   std::size_t same_before = 0;
   std::size_t unchanged = 0;
   for (std::size_t i = 0; i < now.size(); ++i) {
-    const double before = beside_[i];
+    const double before = ring_before[i];
     if (before > nearer && std::abs(before - height) < std::min(30e-3, 0.6 * height)) return true;
     if (std::abs(before) < tolerance) {
       ++same_before;

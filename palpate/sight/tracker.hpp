@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "palpate/core/cloud.hpp"
+#include "palpate/core/observed_clouds.hpp"
 #include "palpate/sight/surface_estimate.hpp"
 
 namespace palpate {
@@ -30,7 +30,7 @@ class SightTracker {
  public:
   /// What became of the surface in a new frame.
   enum class Event {
-    none,      ///< there is nothing to follow
+    none,      ///< there is nothing to follow, or nothing that other cameras do not show better
     followed,  ///< it is where it was expected
     jumped,    ///< it is elsewhere on the line of sight
     hidden,    ///< by an occluder, or nothing was measured: held as it was
@@ -39,31 +39,36 @@ class SightTracker {
   void set(const SightParameters& parameters) noexcept;
   void forget() noexcept { tracking_ = holding_ = false; }
 
-  /// Takes a new frame into use. @param proxy  [m] world
+  /// Takes a camera's new frame into use: it alone says what is new, and where it does not show the
+  /// surface the others' newest ones may.
+  /// @param clouds     what each camera saw last, this frame included
+  /// @param stamp     [s] of the frame
+  /// @param interval  [s] after that camera's one before
+  /// @param proxy     [m] world
   /// @param hardest_strike  [m/s^2] a layer that would need a larger acceleration is an occluder;
   ///                        infinite for a surface that is not touched yet
-  Event frame(const Cloud& cloud, double stamp, double interval, const Vec3& proxy,
-              double hardest_strike) noexcept;
+  Event frame(const ObservedClouds& clouds, std::size_t camera, double stamp, double interval,
+              const Vec3& proxy, double hardest_strike) noexcept;
   /// Looks for a surface to follow behind a proxy in free space, unless one is followed there.
-  void watch(const Cloud& cloud, const Vec3& proxy) noexcept;
+  void watch(const ObservedClouds& clouds, const Vec3& proxy) noexcept;
   /// Follows the surface at a contact that was made with its points.
   /// @param foot    [m] world
   /// @param normal  [-] unit, world, towards the proxy
-  void touch(const Cloud& cloud, const Vec3& foot, const Vec3& normal) noexcept;
+  void touch(const ObservedClouds& clouds, const Vec3& foot, const Vec3& normal) noexcept;
   /// Fits the surface anew around `foot` [m, world], a place on it. False if it ends before there.
-  bool slide(const Cloud& cloud, const Vec3& foot) noexcept;
+  bool slide(const ObservedClouds& clouds, const Vec3& foot) noexcept;
 
   /// Where to put a proxy that passed through a surface on its way from `before` to `after` [m,
   /// world]: in front of it, on the line of sight through `after`. None if it passed through
   /// nothing, or went round an edge.
   /// @param radius  [m] of the proxy
-  [[nodiscard]] std::optional<Vec3> in_front(const Cloud& cloud, const Vec3& before,
+  [[nodiscard]] std::optional<Vec3> in_front(const ObservedClouds& clouds, const Vec3& before,
                                              const Vec3& after, double radius) noexcept;
 
   [[nodiscard]] bool tracking() const noexcept { return tracking_; }
   /// Is the surface so well described by its fit that the proxy can rest on that?
   [[nodiscard]] bool smooth() const noexcept {
-    return tracking_ && (surface_.smooth() || holding_ || shadowed_);
+    return tracking_ && (surface_.smooth() || holding_ || views_[surface_.camera()].shadowed);
   }
   [[nodiscard]] bool holding() const noexcept { return holding_; }
   [[nodiscard]] double held_since() const noexcept { return held_since_; }  ///< [s]
@@ -87,7 +92,22 @@ class SightTracker {
   static constexpr std::size_t bands = 5;
   using Ring = std::array<float, sectors * bands>;
 
-  void start(const Cloud& cloud, const Vec3& foot, const Vec3& up) noexcept;
+  // How a camera sees the surface and what is beside it.
+  struct View {
+    double stamp = 0.0;            // [s] of its newest frame
+    double interval = 1.0 / 30.0;  // [s]
+    bool covered = false;          // an occluder hides a part of the disc
+    bool shadowed = false;         // and arrived while the contact stayed in place
+    double near_usual = 0.0;       // points of the surface in the beam without an occluder
+    Ring beside = nothing_beside();
+  };
+  static Ring nothing_beside() noexcept;
+
+  void start(const ObservedClouds& clouds, std::size_t camera, const Vec3& foot,
+             const Vec3& up) noexcept;
+  [[nodiscard]] std::size_t best_camera(const ObservedClouds& clouds, const Vec3& place) noexcept;
+  [[nodiscard]] bool others_show(const ObservedClouds& clouds, std::size_t camera,
+                                 const Vec3& place, const Vec3& normal, double gate) noexcept;
   Event hold(double since) noexcept;
   /// The median of what is measured within `radius` [m] of the line of sight through `place`.
   struct Seen {
@@ -97,7 +117,7 @@ class SightTracker {
   [[nodiscard]] std::optional<Seen> look_at(const Cloud& cloud, const Vec3& place,
                                             double radius) noexcept;
   [[nodiscard]] Ring look_beside(const Cloud& cloud, const Vec3& place) noexcept;
-  [[nodiscard]] bool is_occluder(const Ring& now, double height, double jump,
+  [[nodiscard]] bool is_occluder(const Ring& before, const Ring& now, double height, double jump,
                                  double hardest_strike) const noexcept;
 
   Patch patch_;
@@ -107,10 +127,7 @@ class SightTracker {
   bool tracking_ = false;
   bool holding_ = false;
   double held_since_ = 0.0;
-  bool covered_ = false;     // an occluder hides a part of the disc
-  bool shadowed_ = false;    // and arrived while the contact stayed in place
-  double near_usual_ = 0.0;  // points of the surface in the beam without an occluder
-  Ring beside_{};
+  std::array<View, Patch::max_views> views_;  // by camera
 };
 
 }  // namespace palpate

@@ -92,7 +92,7 @@ class SourceWithMaterials final : public Source {
   std::optional<Frame> next(double timeout) override {
     std::optional<Frame> frame = source_->next(timeout);
     if (!frame) return frame;
-    const auto* image = dynamic_cast<const DepthImage*>(frame->cloud.get());
+    const DepthImage* image = frame->cloud->image();
     if (image == nullptr) return frame;
     auto felt = std::make_shared<DepthImage>(*image);
     felt->set_materials(map_of(*frame, image->depth().size()));

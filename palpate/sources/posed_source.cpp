@@ -45,21 +45,20 @@ class PosedSource final : public Source {
                                                          const Cloud& cloud) const {
     auto moved = std::make_shared<ColourImage>(colour);
     Eigen::Isometry3d world_from_depth = Eigen::Isometry3d::Identity();
-    if (const auto* image = dynamic_cast<const DepthImage*>(&cloud))
-      world_from_depth = image->world_from_camera();
+    if (const DepthImage* image = cloud.image()) world_from_depth = image->world_from_camera();
     moved->camera->world_from_camera =
         pose_ * world_from_depth.inverse() * colour.camera->world_from_camera;
     return moved;
   }
   [[nodiscard]] std::shared_ptr<const Cloud> posed(const Cloud& cloud) const {
-    if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
+    if (const DepthImage* image = cloud.image()) {
       auto moved =
           std::make_shared<DepthImage>(image->shared_rays(), image->depth(),
                                        image->units_per_metre(), pose_, image->brightness());
       moved->set_materials(image->materials());
       return moved;
     }
-    const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+    const PointCloud* points = cloud.point_cloud();
     if (points == nullptr)
       throw Error(info().uri, "its frames are neither depth images nor points",
                   "remove the camera pose");

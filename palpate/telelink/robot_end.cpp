@@ -143,7 +143,7 @@ class RobotEnd::Impl {
   }
 
   void on_frame(std::size_t camera, const FedFrame& fed) {
-    const auto* image = dynamic_cast<const DepthImage*>(fed.frame.cloud.get());
+    const DepthImage* image = fed.frame.cloud->image();
     // What others touch is the first camera's.
     if (camera == 0 && image != nullptr) publisher_.publish(*image, since_1970(fed.frame.stamp));
     const std::lock_guard lock(mutex_);

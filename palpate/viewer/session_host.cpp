@@ -530,7 +530,7 @@ void SessionHost::show(std::size_t number, const FedFrame& fed) {
   header.camera = camera;
   header.number = numbers_[camera]++;
   header.stamp = frame.stamp;
-  if (const auto* image = dynamic_cast<const DepthImage*>(frame.cloud.get())) {
+  if (const auto* image = frame.cloud->image()) {
     const Intrinsics& k = image->intrinsics();
     header.width = static_cast<std::uint32_t>(k.width);
     header.height = static_cast<std::uint32_t>(k.height);
@@ -544,7 +544,7 @@ void SessionHost::show(std::size_t number, const FedFrame& fed) {
     if (header.has_rays && header.number == 0) describe(camera, image->rays());
     header.colour = frame.colour;
     server->show(camera, depth_message(header, image->depth(), frame.cloud));
-  } else if (const auto* points = dynamic_cast<const PointCloud*>(frame.cloud.get())) {
+  } else if (const auto* points = frame.cloud->point_cloud()) {
     std::vector<float> xyz;
     std::vector<std::uint32_t> triangles;
     const auto put = [&](const Vec3& point) {

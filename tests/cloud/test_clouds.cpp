@@ -595,9 +595,9 @@ TEST(Clouds, AllGiveTheSameProxyToRounding) {
   Paper a;
   Paper b;
   Paper c;
-  a.frame(image, 0);
-  b.frame(sorted, 0);
-  c.frame(oracle, 0);
+  a.observe({image, 0});
+  b.observe({sorted, 0});
+  c.observe({oracle, 0});
   double largest = 0.0;
   for (int i = 0; i < 400; ++i) {
     const Vec3 hip(-0.02 + 1e-4 * i, 0.001, 0.23 + std::min(i, 100) * 2.5e-4);

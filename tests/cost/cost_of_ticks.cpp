@@ -12,12 +12,12 @@ int main(int argc, char** argv) {
   const int ticks = argc > 1 ? std::atoi(argv[1]) : 0;
   const palpate::bench::Subject subject = palpate::bench::noisy_plane(160, 120, 525.0, 1.0);
   palpate::Paper paper;
-  paper.frame(*subject.frames.front(), 0.0);
+  paper.observe({*subject.frames.front(), 0.0});
   paper.seat(subject.surface - 0.03 * subject.into);
   long steps = 0;
   for (int i = 0; i < ticks; ++i) {
     const double t = 1e-3 * i;
-    if (i % 33 == 32) paper.frame(*subject.frames[static_cast<std::size_t>(i / 33 % 2)], t);
+    if (i % 33 == 32) paper.observe({*subject.frames[static_cast<std::size_t>(i / 33 % 2)], t});
     const double along = 0.01 * std::abs(std::fmod(10.0 * t, 2.0) - 1.0);
     steps += paper.tick(subject.surface + 0.005 * subject.into + along * subject.along, t).steps;
   }

@@ -36,7 +36,7 @@ class Plane {
       const double stamp = frame / 30.0;
       std::shared_ptr<const Cloud> cloud =
           camera_->capture(stamp, static_cast<std::uint64_t>(frame)).cloud;
-      method.frame(*cloud, stamp);
+      method.observe({*cloud, stamp});
       in_use = std::move(cloud);
       for (int i = 0; i < 33; ++i) {
         const double t = stamp + i * dt;
@@ -120,7 +120,7 @@ TEST(Feel, TakesWhateverHandsSend) {
   const std::shared_ptr<const Cloud> cloud = camera->capture(0.0, 0).cloud;
   constexpr double infinite = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 20000; ++i) {
-    if (i % 33 == 0) whole->frame(*cloud, i * dt);
+    if (i % 33 == 0) whole->observe({*cloud, i * dt});
     Vec3 hip = 0.02 * Vec3(noise(random), noise(random), noise(random));
     double t = i * dt;
     if (i % 97 == 0) hip.x() = std::nan("");
@@ -153,7 +153,7 @@ TEST(Feel, AllocatesNothingInATick) {
   const auto camera = open_synthetic_camera(Uri("synthetic:plane?size=160x120&sensor=ideal"));
   const std::shared_ptr<const Cloud> cloud = camera->capture(0.0, 0).cloud;
   whole->seat(Vec3(0, 0, 0.03));
-  whole->frame(*cloud, 0.0);
+  whole->observe({*cloud, 0.0});
   if (!test::memory_is_counted) GTEST_SKIP() << "the sanitizer has its own operator new";
   const test::MemoryCalls calls;
   Vec3 sum = Vec3::Zero();

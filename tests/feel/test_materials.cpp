@@ -27,7 +27,7 @@ class Flat final : public Method {
  public:
   explicit Flat(const Parameters& parameters) : parameters_(parameters) {}
   void seat(const Vec3& /*proxy*/) noexcept override {}
-  void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override {}
+  void observe(const Observation& /*seen*/) noexcept override {}
   Tick tick(const Vec3& hip, double t) noexcept override {
     Tick tick;
     tick.t = t;
@@ -123,8 +123,8 @@ TEST(Materials, AreAsHardAsTheMapSays) {
         }
       }
       image->set_materials(std::make_shared<LabelImage>(shared, std::move(labels)));
-      method->frame(*image, stamp);
-      bare->frame(*image, stamp);
+      method->observe({*image, stamp});
+      bare->observe({*image, stamp});
       in_use = image;
       for (int i = 0; i < 33; ++i) {
         const double t = stamp + i * 1e-3;
@@ -161,7 +161,7 @@ Sweep sweep(double friction, double speed) {
   const auto wall =
       labelled_wall(table, [](const Vec3& p) -> std::uint8_t { return p.x() < 0.0 ? 1 : 2; });
   const auto feel = around_flat(parameters);
-  feel->frame(*wall, 0.0);
+  feel->observe({*wall, 0.0});
   Sweep sweep;
   Vec3 last_force = Vec3::Zero();
   Vec3 last_hip = pressed(-0.01, -0.03);
@@ -292,7 +292,7 @@ TEST(Tap, IsOneForEachImpactBeforeANoisyCamera) {
       const double stamp = frame / 30.0;
       std::shared_ptr<const Cloud> cloud =
           camera->capture(stamp, static_cast<std::uint64_t>(frame)).cloud;
-      method->frame(*cloud, stamp);
+      method->observe({*cloud, stamp});
       in_use = cloud;
       for (int i = 0; i < 33; ++i) {
         const double t = stamp + i * 1e-3;
@@ -388,7 +388,7 @@ TEST(Relief, LeansAgainstWhatGetsBrighter) {
       table, [](const Vec3&) -> std::uint8_t { return 1; },
       [](const Vec3& p) { return 0.5 + 0.4 * std::sin(2.0 * pi * p.x() / wave); });
   const auto feel = around_flat(parameters);
-  feel->frame(*wall, 0.0);
+  feel->observe({*wall, 0.0});
   for (int i = 0; i < 400; ++i) {
     const double x = -0.02 + i * 1e-4;
     const Tick tick = feel->tick(pressed(0.003, x), i * 1e-3);
@@ -414,7 +414,7 @@ TEST(Materials, AreFeltWithinTheLimitWhateverTheHandDoes) {
   std::normal_distribution<double> noise(0.0, 1.0);
   Vec3 hip = pressed(0.002);
   for (int i = 0; i < 20000; ++i) {
-    if (i % 33 == 0) feel->frame(*wall, i * 1e-3);
+    if (i % 33 == 0) feel->observe({*wall, i * 1e-3});
     hip += 3e-4 * Vec3(noise(random), noise(random), noise(random));
     hip = hip.cwiseMax(Vec3(-0.05, -0.03, -0.01)).cwiseMin(Vec3(0.05, 0.03, 0.012));
     Vec3 given = hip;
@@ -436,7 +436,7 @@ TEST(Materials, OfASceneAreThoseOfItsParametersWhereTheMapHasNone) {
   const auto wall = labelled_wall(
       soft_and_hard(), [](const Vec3& p) -> std::uint8_t { return p.x() < 0.0 ? 1 : 0; });
   const auto feel = around_flat(parameters);
-  feel->frame(*wall, 0.0);
+  feel->observe({*wall, 0.0});
   EXPECT_NEAR(feel->tick(pressed(0.002, -0.02), 0.0).hardness, 0.25, 1e-9);
   feel->tick(pressed(-0.02, 0.02), 0.1);
   Tick tick;

@@ -24,7 +24,7 @@ void read_all(const fs::path& path) {
   test::succeeds([&] {
     SessionReader session(path);
     for (const auto& frame : session.frames())
-      test::succeeds([&] { static_cast<void>(session.cloud(frame.second)); });
+      test::succeeds([&] { static_cast<void>(session.seen(frame.first)); });
     static_cast<void>(replay(session));
   });
   test::succeeds([&] {

@@ -243,7 +243,7 @@ TEST_F(Pipes, SendParametersSeatsFramesAndHips) {
   const DepthImage image(std::make_shared<const ViewingRays>(Intrinsics{2, 1, 1, 1, 0, 0, {}}),
                          std::vector<std::uint16_t>{0, 500}, 1000.0,
                          Eigen::Isometry3d(Eigen::Translation3d(0, 0, 7)));
-  framed->frame(image, 0.25);
+  framed->observe({image, 0.25});
   const Tick tick = framed->tick(Vec3::Zero(), 1.0);
   EXPECT_EQ(tick.force, Vec3(0.25, 7, 212)) << "stamp, viewpoint, 2 x 1 pixels, 2 points";
   EXPECT_EQ(tick.normal, Vec3(0.5, 0, 13)) << "the second pixel's x, a hole before, all numbers";
@@ -251,7 +251,7 @@ TEST_F(Pipes, SendParametersSeatsFramesAndHips) {
   EXPECT_EQ(tick.frame, 0);
 
   const std::vector<Vec3> points = {Vec3(0.125, 0, 0)};
-  framed->frame(PointCloud(points, Vec3::Zero()), 0.5);
+  framed->observe({PointCloud(points, Vec3::Zero()), 0.5});
   EXPECT_EQ(asked(*framed).z(), 1) << "in no order, one point";
 }
 
@@ -283,7 +283,7 @@ TEST_F(Pipes, ThatStopReadingAreGivenUp) {
   const DepthImage image(
       std::make_shared<const ViewingRays>(Intrinsics{640, 480, 500, 500, 320, 240, {}}),
       std::vector<std::uint16_t>(std::size_t{640} * 480, 500), 1000.0);
-  method->frame(image, 0.0);
+  method->observe({image, 0.0});
   EXPECT_TRUE(fails_saying([&] { return asked(*method); }, "neither ends nor reads"));
   EXPECT_EQ(method->tick(Vec3::Zero(), 1.0).force, Vec3::Zero()) << "it is left alone from then on";
 }

@@ -439,7 +439,7 @@ TEST(Ideal, RestsOnASphereWhereTheHipIs) {
 TEST(Direct, PushesInProportionToTheDepthBelowAPlane) {
   const PointCloud plane(test::flat_grid(), Vec3(0, 0, 1));
   const auto direct = make_method("direct", {});
-  direct->frame(plane, 0.0);
+  direct->observe({plane, 0.0});
   EXPECT_NEAR(direct->tick({0, 0, -0.004}, 0.0).force.z(), 600.0 * 0.004, 1e-6);
   EXPECT_NEAR(direct->tick({0, 0, -0.008}, 0.0).force.z(), 600.0 * 0.008, 1e-6);
   EXPECT_TRUE(direct->tick({0, 0, 0.004}, 0.0).force.isZero());
@@ -449,7 +449,7 @@ TEST(Direct, LosesTheSideOnAThinPlate) {
   // Seen from above only, the plate pushes a hand out upwards however far it came through.
   const PointCloud plane(test::flat_grid(), Vec3(0, 0, 1));
   const auto direct = make_method("direct", {});
-  direct->frame(plane, 0.0);
+  direct->observe({plane, 0.0});
   EXPECT_TRUE(direct->tick({0, 0, -0.04}, 0.0).force.isZero()) << "out of its radius: popped";
 }
 

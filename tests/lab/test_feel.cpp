@@ -35,7 +35,7 @@ class Plane final : public LabMethod {
   Plane(const MethodSetup& setup, Fault fault)
       : LabMethod(setup.parameters), truth_(setup.truth), fault_(std::move(fault)) {}
   void seat(const Vec3& /*proxy*/) noexcept override {}
-  void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override {}
+  void frame(const Cloud& /*all*/, double /*stamp*/) noexcept override {}
   Tick tick(const Vec3& hip, double t) noexcept override {
     Tick tick;
     tick.t = t;

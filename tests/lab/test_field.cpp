@@ -303,7 +303,7 @@ class Faulty final : public LabMethod {
         ideal_(make_method("ideal", {Parameters{}, truth_of(stage.scene)})),
         fault_(fault) {}
   void seat(const Vec3& proxy) noexcept override { ideal_->seat(proxy); }
-  void frame(const Cloud& cloud, double stamp) noexcept override { ideal_->frame(cloud, stamp); }
+  void frame(const Cloud& all, double stamp) noexcept override { ideal_->observe({all, stamp}); }
   Tick tick(const Vec3& hip, double t) noexcept override {
     Tick tick = ideal_->tick(hip, t);
     switch (fault_) {

@@ -46,7 +46,7 @@ Tick go(Method& method, const Vec3& from, const Vec3& to) {
 // Onto a cloud from above, and how the hand is held there.
 Tick press(Method& method, const Cloud& cloud, const Vec3& to) {
   method.seat(Vec3(to.x(), to.y(), 0.03));
-  method.frame(cloud, 0.0);
+  method.observe({cloud, 0.0});
   return go(method, Vec3(to.x(), to.y(), 0.03), to);
 }
 
@@ -87,7 +87,7 @@ TEST_P(EveryMethod, FeelsNothingWithoutAFrameOrPoints) {
   const auto method = make_method(GetParam(), {});
   EXPECT_TRUE(method->tick({0, 0, -0.01}, 0.0).force.isZero());
   const PointCloud nothing(std::vector<Vec3>{}, camera);
-  method->frame(nothing, 0.0);
+  method->observe({nothing, 0.0});
   const Tick tick = method->tick({0, 0, -0.02}, 0.001);
   EXPECT_TRUE(tick.force.isZero());
   EXPECT_TRUE(tick.proxy.allFinite());
@@ -101,7 +101,7 @@ TEST_P(EveryMethod, StaysFiniteUnderFiveMillimetresOfNoise) {
   std::unique_ptr<Cloud> in_use;
   for (int frame = 0; frame < 10; ++frame) {
     auto cloud = grid.capture(static_cast<std::uint64_t>(frame), 0.0);
-    method->frame(*cloud, frame / 30.0);
+    method->observe({*cloud, frame / 30.0});
     in_use = std::move(cloud);
     for (int i = 0; i < 33; ++i) {
       const double t = (frame + i / 33.0) / 30.0;
@@ -140,7 +140,7 @@ TEST(PointBoxes, CatchesOnTheStairsOfATiltedPlane) {
   const auto method = make_method("point-boxes", {});
   // Uphill along it, 8 mm below: the foot of the hand on the plane is 3.2 mm behind the hand.
   method->seat({-0.02, 0.0, 0.02});
-  method->frame(plane, 0.0);
+  method->observe({plane, 0.0});
   go(*method, {-0.02, 0.0, 0.02}, {-0.02, 0.0, -0.018});
   const Tick tick = go(*method, {-0.02, 0.0, -0.018}, {0.02, 0.0, 0.002});
   EXPECT_LT(tick.proxy.x(), 0.0) << "it was stopped by a step";
@@ -173,7 +173,7 @@ TEST(RadialFields, IsLostToASurfaceThatMovesByMoreThanItsShell) {
     const PointCloud risen(test::flat_grid(travel), camera);
     const auto method = make_method("radial-fields", {});
     const Tick before = press(*method, plane, {0.0, 0.0, -0.008});
-    method->frame(risen, 1.0 / 30.0);
+    method->observe({risen, 1.0 / 30.0});
     const Tick tick = method->tick(before.hip, 0.5);
     EXPECT_EQ(tick.proxy.z() > 0.0, travel < 2.66e-3) << travel;
   }
@@ -212,7 +212,7 @@ TEST(Surfels, OverThreeFramesJittersLessAtRestAndLagsBehindWhatMoves) {
       for (int k = 0; k < 40; ++k) {
         const double height = moves ? 0.001 * k : 0.0;
         auto cloud = grid.capture(static_cast<std::uint64_t>(k), height);
-        method->frame(*cloud, k / 30.0);
+        method->observe({*cloud, k / 30.0});
         in_use = std::move(cloud);
         for (int i = 0; i < 4; ++i) {
           const Tick tick = method->tick({0, 0, height - 0.02}, (k + i / 4.0) / 30.0);
@@ -256,7 +256,7 @@ TEST(GodObject, RestsInTheCornerOfThreePlanes) {
     const double apart = std::string(name) == "sphere-proxy" ? r_c : 0.0;
     const auto method = make_method(name, {});
     method->seat({0.02, 0.02, 0.02});
-    method->frame(corner, 0.0);
+    method->observe({corner, 0.0});
     const Vec3 hip(-0.004, -0.003, -0.002);
     const Tick tick = go(*method, {0.02, 0.02, 0.02}, hip);
     const Vec3 rest = Vec3::Constant(apart);
@@ -313,7 +313,7 @@ TEST(GodObject, IsPushedOutOfACubesFaceByWhichItCameIn) {
   for (const char* name : {"god-object", "god-object-kept", "force-shading"}) {
     const auto method = make_method(name, {});
     method->seat({0.01, 0.0, 0.07});
-    method->frame(file.cloud(), 0.0);
+    method->observe({file.cloud(), 0.0});
     go(*method, {0.01, 0.0, 0.07}, {0.01, 0.0, 0.03});
     // Now 20 mm below the top and 5 mm from a side, which would be the nearer.
     const Tick tick = go(*method, {0.01, 0.0, 0.03}, {0.045, 0.01, 0.03});
@@ -336,7 +336,7 @@ TEST(GodObject, RestsInEdgesAndCornersOfARoom) {
                           Case{{-0.057, 0.051, 0.054}, {-wall, wall, wall}}}) {  // a corner: three
       const auto method = make_method(name, {});
       method->seat(Vec3::Zero());
-      method->frame(file.cloud(), 0.0);
+      method->observe({file.cloud(), 0.0});
       const Tick tick = go(*method, Vec3::Zero(), c.hip);
       const Vec3 rest = is_sphere ? tick.proxy : contact(tick);
       EXPECT_LT((rest - c.rest).norm(), 1e-6) << name;
@@ -381,7 +381,7 @@ TEST(ForceShading, TurnsTheForceSmoothlyOverTheFacetsOfAMesh) {
     const auto method = make_method(name, {});
     const double deep = radius - 0.002;
     method->seat(0.06 * out(0.0));
-    method->frame(ball.cloud(), 0.0);
+    method->observe({ball.cloud(), 0.0});
     Vec3 before = go(*method, 0.06 * out(0.0), deep * out(0.0)).force;
     double step = 0.0;
     double off = 0.0;
@@ -471,7 +471,7 @@ TEST(GodObject, IsLostWhereItIsKeptAndASurfaceRisesOverIt) {
     const PointCloud high = seen([](double, double) { return 0.003; });
     const auto method = make_method(name, {});
     const Tick before = press(*method, low, {0.0003, 0.0002, -0.008});
-    method->frame(high, 1.0 / 30.0);
+    method->observe({high, 1.0 / 30.0});
     const Tick tick = method->tick(before.hip, 0.5);
     EXPECT_EQ(tick.proxy.z() > 0.0, held) << name;
     if (held) {
@@ -479,7 +479,7 @@ TEST(GodObject, IsLostWhereItIsKeptAndASurfaceRisesOverIt) {
     }
     // Further than r_c, and all are lost.
     const PointCloud higher = seen([](double, double) { return 0.020; });
-    method->frame(higher, 2.0 / 30.0);
+    method->observe({higher, 2.0 / 30.0});
     EXPECT_TRUE(method->tick(before.hip, 0.6).force.isZero()) << name;
   }
 }
@@ -494,7 +494,7 @@ TEST(ForceShading, SmoothsTheFacetsOfABall) {
   const auto worst = [&](const char* name) {
     const auto method = make_method(name, {});
     method->seat({0, 0, 0.06});
-    method->frame(cloud, 0.0);
+    method->observe({cloud, 0.0});
     go(*method, {0, 0, 0.06}, {0, 0, 0.035});
     double largest = 0.0;
     for (int i = 0; i <= 120; ++i) {
@@ -516,7 +516,7 @@ TEST(PointNormals, KeepsTheSideThatItsNormalsTell) {
   const PointCloud cloud(std::move(ceiling), camera);
   const auto method = make_method("point-normals", {});
   method->seat({0, 0, -0.02});
-  method->frame(cloud, 0.0);
+  method->observe({cloud, 0.0});
   const Tick tick = go(*method, {0, 0, -0.02}, {0, 0, 0.006});
   EXPECT_NEAR(tick.force.z(), -stiffness * 0.006, 1e-3);
 }
@@ -539,7 +539,7 @@ TEST(ImageFeatures, FeelsHeightAndBrightnessAtItsOwnPixel) {
   const auto source = open_source("synthetic:plane?brightness=20mm&distance=0.5m&tilt=0");
   const Frame frame = *source->next();
   const auto method = make_method("image-features", {});
-  method->frame(*frame.cloud, 0.0);
+  method->observe({*frame.cloud, 0.0});
   for (const double seen : {-0.005, -0.0025, 0.0, 0.0025, 0.005}) {
     const double height = 0.5e-3 * (0.5 + 0.5 * std::sin(2.0 * std::numbers::pi * seen / 0.02));
     const Tick tick = method->tick({seen * 0.508 / 0.5, 0.0, -0.008}, 0.0);
@@ -552,7 +552,7 @@ TEST(ImageFeatures, PushesAHandThatIsBehindAnOccluder) {
   // A hand over a table is under an arm: the image knows only the arm.
   const PointCloud arm = seen([](double, double) { return 0.02; });
   const auto method = make_method("image-features", {});
-  method->frame(arm, 0.0);
+  method->observe({arm, 0.0});
   EXPECT_GT(method->tick({0, 0, 0.0}, 0.0).force.z(), 10.0);
 }
 
@@ -576,7 +576,7 @@ TEST(Tsdf, SmoothsNoiseOverFramesAndLagsBehindWhatMoves) {
     for (int k = 0; k < 20; ++k) {
       const double height = moves ? -0.0005 * k : 0.0;
       auto cloud = grid.capture(static_cast<std::uint64_t>(k), height);
-      method->frame(*cloud, k / 30.0);
+      method->observe({*cloud, k / 30.0});
       in_use = std::move(cloud);
       Tick tick{};
       for (int i = 0; i < 4; ++i) tick = method->tick({0, 0, height - 0.012}, (k + i / 4.0) / 30.0);
@@ -605,7 +605,7 @@ double energy_kept(double stiffness_, double damping) {
   setup.parameters.coupling.stiffness = stiffness_;
   setup.parameters.coupling.max_force = 1e3;
   const auto method = make_method("virtual-coupling", setup);
-  method->frame(plane, 0.0);
+  method->observe({plane, 0.0});
   const double mass = 0.05;
   const double weight = 2.0;  // [N] holds the hand on the surface
   double z = -0.001 - weight / stiffness_;

@@ -224,7 +224,7 @@ TEST(Play, DeliversFramesLateAndInOrderAndLeavesOutWhatIsDropped) {
   class Recorder final : public Method {
    public:
     void seat(const Vec3& /*proxy*/) noexcept override {}
-    void frame(const Cloud& /*cloud*/, double stamp) noexcept override { stamps.push_back(stamp); }
+    void observe(const Observation& seen) noexcept override { stamps.push_back(seen.stamp); }
     Tick tick(const Vec3& hip, double t) noexcept override {
       arrived.resize(stamps.size(), t);
       return {.t = t,

@@ -36,7 +36,7 @@ TEST(Paper, RestsOneContactRadiusAboveAPlane) {
   const BruteForceCloud plane(flat_grid());
   Paper paper;
   paper.seat({0.0002, 0.0003, 0.02});
-  paper.frame(plane, 0.0);
+  paper.observe({plane, 0.0});
   const Tick tick = settle(paper, {0.0002, 0.0003, -0.010});
   EXPECT_NE(tick.state, ContactState::free_motion);
   EXPECT_GE(tick.proxy.z(), lowest_rest(r_c, spacing) - shell);
@@ -50,7 +50,7 @@ TEST(Paper, MovesThroughFreeSpaceToTheHipInOneTick) {
   const BruteForceCloud plane(flat_grid());
   Paper paper;
   paper.seat({0, 0, 0.05});
-  paper.frame(plane, 0.0);
+  paper.observe({plane, 0.0});
   const Vec3 hip(0.13, -0.2, 0.31);
   const Tick tick = paper.tick(hip, 0.001);
   EXPECT_LT((tick.proxy - hip).norm(), 1e-9);
@@ -61,7 +61,7 @@ TEST(Paper, MovesThroughFreeSpaceToTheHipInOneTick) {
 TEST(Paper, IsOnTheSurfaceInTheSameTickAsAJumpToSixRadiiBelowIt) {
   const BruteForceCloud plane(flat_grid());
   Paper paper;
-  paper.frame(plane, 0.0);
+  paper.observe({plane, 0.0});
   settle(paper, {0, 0, r_c});
   const Tick tick = paper.tick({0, 0, -6 * r_c}, 1.0);
   EXPECT_GE(tick.proxy.z(), lowest_rest(r_c, spacing) - shell);
@@ -75,7 +75,7 @@ TEST(Paper, RestsOnATiltedPlaneAlongItsNormal) {
   const Vec3 n = Vec3(-slope, 0, 1).normalized();
   Paper paper;
   paper.seat({0, 0, 0.02});
-  paper.frame(tilt, 0.0);
+  paper.observe({tilt, 0.0});
   const Vec3 hip = -0.01 * n + Vec3(0, 0.0004, 0);
   const Tick tick = settle(paper, hip);
   // Points lie at most spacing/cos(30) apart along the slope.
@@ -99,7 +99,7 @@ TEST(Paper, RestsOneContactRadiusOutsideASphere) {
     const Vec3 n = direction.normalized();
     Paper paper;
     paper.seat(0.06 * n);
-    paper.frame(sphere, 0.0);
+    paper.observe({sphere, 0.0});
     const Tick tick = settle(paper, 0.03 * n);
     EXPECT_NEAR(tick.proxy.norm(), radius + r_c, 0.12e-3);
     EXPECT_GT(tick.proxy.normalized().dot(n), 0.999);
@@ -111,7 +111,7 @@ TEST(Paper, RestsInAWedgeWhereASphereFits) {
   const BruteForceCloud wedge(grid(1e-3, 60, [](double x, double) { return std::abs(x); }));
   Paper paper;
   paper.seat({0.0, 0, 0.03});
-  paper.frame(wedge, 0.0);
+  paper.observe({wedge, 0.0});
   const Tick tick = settle(paper, {0.0, 0, -0.01});
   EXPECT_NEAR(tick.proxy.z(), r_c * std::numbers::sqrt2, 0.15e-3);
   EXPECT_NEAR(tick.proxy.x(), 0.0, 0.15e-3);
@@ -128,7 +128,7 @@ TEST(Paper, PassesAGapWiderThanItselfAndNotANarrowerOne) {
   const auto depth_reached = [](const Cloud& cloud) {
     Paper paper;
     paper.seat({0, 0, 0.02});
-    paper.frame(cloud, 0.0);
+    paper.observe({cloud, 0.0});
     return settle(paper, {0, 0, -0.02}).proxy.z();
   };
   EXPECT_NEAR(depth_reached(gap(2.2 * r_c)), -0.02, 1e-6);
@@ -160,8 +160,8 @@ TEST(Paper, TurnsTheForceWithTheScene) {
     Paper b;
     a.seat(start);
     b.seat(turn * start);
-    a.frame(here, 0.0);
-    b.frame(there, 0.0);
+    a.observe({here, 0.0});
+    b.observe({there, 0.0});
     const Tick tick_a = settle(a, hip);
     const Tick tick_b = settle(b, turn * hip);
     EXPECT_LT((turn * tick_a.proxy - tick_b.proxy).norm(), 5e-5);
@@ -179,8 +179,8 @@ TEST(Paper, DoesNotCareInWhichOrderPointsCome) {
   Paper b;
   a.seat({0.0004, 0.0001, 0.02});
   b.seat({0.0004, 0.0001, 0.02});
-  a.frame(ordered, 0.0);
-  b.frame(shuffled, 0.0);
+  a.observe({ordered, 0.0});
+  b.observe({shuffled, 0.0});
   const Tick tick_a = settle(a, {0.0004, 0.0001, -0.01});
   const Tick tick_b = settle(b, {0.0004, 0.0001, -0.01});
   EXPECT_LT((tick_a.proxy - tick_b.proxy).norm(), 2e-5);
@@ -191,10 +191,10 @@ TEST(Paper, GivesTheSameTicksBitForBitOnEveryRun) {
   const BruteForceCloud plane(flat_grid());
   const auto run = [&] {
     Paper paper;
-    paper.frame(plane, 0.0);
+    paper.observe({plane, 0.0});
     std::vector<double> out;
     for (int i = 0; i < 400; ++i) {
-      if (i % 33 == 0) paper.frame(plane, i * 1e-3);
+      if (i % 33 == 0) paper.observe({plane, i * 1e-3});
       const Tick tick = paper.tick({i * 1e-5, 2e-4, 0.01 - i * 5e-5}, i * 1e-3);
       for (int k = 0; k < 3; ++k) out.push_back(tick.force[k]);
       for (int k = 0; k < 3; ++k) out.push_back(tick.proxy[k]);
@@ -207,7 +207,7 @@ TEST(Paper, GivesTheSameTicksBitForBitOnEveryRun) {
 TEST(Paper, FeelsNothingWhereThereAreNoPoints) {
   const BruteForceCloud empty({});
   Paper paper;
-  paper.frame(empty, 0.0);
+  paper.observe({empty, 0.0});
   const Tick tick = settle(paper, {1, 2, 3});
   EXPECT_TRUE(tick.force.isZero());
   EXPECT_EQ(tick.proxy, Vec3(1, 2, 3));
@@ -226,7 +226,7 @@ TEST(Paper, AnswersANonFiniteHipWithNoForceAndStaysWhereItIs) {
   const BruteForceCloud plane(flat_grid());
   Paper paper;
   paper.seat({0, 0, 0.01});
-  paper.frame(plane, 0.0);
+  paper.observe({plane, 0.0});
   const Tick before = settle(paper, {0, 0, -0.01});
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300}) {
@@ -244,7 +244,7 @@ TEST(Paper, NeverAsksForMoreThanTheForceLimit) {
   parameters.coupling.max_force = 3.3;
   Paper paper(parameters);
   paper.seat({0, 0, 0.02});
-  paper.frame(plane, 0.0);
+  paper.observe({plane, 0.0});
   const Tick tick = settle(paper, {0, 0, -1.0});
   EXPECT_NEAR(tick.force.norm(), 3.3, 1e-9);
   EXPECT_TRUE(tick.flags & force_saturated);
@@ -256,7 +256,7 @@ TEST(Paper, KeepsItsWorkWithinTheStepBudgetAndSaysWhenItIsSpent) {
   parameters.proxy.step_budget = 5;
   Paper paper(parameters);
   paper.seat({0, 0, r_c});
-  paper.frame(plane, 0.0);
+  paper.observe({plane, 0.0});
   const Tick tick = paper.tick({0.1, 0, -0.01}, 0.0);
   EXPECT_EQ(tick.steps, 5);
   EXPECT_TRUE(tick.flags & step_budget_hit);
@@ -267,7 +267,7 @@ TEST(Paper, KeepsTheForceOnWhileSlidingOverASurfaceAtRest) {
   const BruteForceCloud plane(flat_grid(0.0, spacing, 100));
   Paper paper;
   paper.seat({-0.05, 0, 0.02});
-  paper.frame(plane, 0.0);
+  paper.observe({plane, 0.0});
   settle(paper, {-0.05, 0.0003, -0.005});
   for (int i = 0; i < 1000; ++i) {  // 0.1 m/s
     const Tick tick = paper.tick({-0.05 + i * 1e-4, 0.0003, -0.005}, 0.05 + i * 1e-3);
@@ -297,7 +297,7 @@ Lift lift(Paper& paper, double velocity, int frames, double f_c = 30.0) {
     const int frame = static_cast<int>(std::floor(t * f_c + 1e-9));
     if (frame != adopted) {
       clouds.push_back(std::make_unique<BruteForceCloud>(flat_grid(velocity * frame / f_c)));
-      paper.frame(*clouds.back(), frame / f_c);
+      paper.observe({*clouds.back(), frame / f_c});
       adopted = frame;
     }
     // The HIP keeps 30 mm below the true surface.
@@ -326,7 +326,7 @@ TEST(Velocity, CarriesTheProxyWhereTheFixedStepMethodLosesIt) {
     Tick tick{};
     for (int frame = 0; frame < 12; ++frame) {
       clouds.push_back(std::make_unique<BruteForceCloud>(flat_grid(height)));
-      paper.frame(*clouds.back(), frame / 30.0);
+      paper.observe({*clouds.back(), frame / 30.0});
       for (int i = 0; i < 33; ++i)
         tick = paper.tick({0, 0, height - 0.03}, frame / 30.0 + i * 1e-3);
       velocity += 1.5 / 30.0;  // 300 r_c/s^2, below the bound of 898 (14)
@@ -362,7 +362,7 @@ TEST(Erratum16, ADamperOpposesAHipThatMovesAwayFromTheProxy) {
     parameters.coupling.damping = 2.0;
     Paper paper(parameters, variant);
     paper.seat({0, 0, 0.01});
-    paper.frame(plane, 0.0);
+    paper.observe({plane, 0.0});
     Tick tick{};
     for (int i = 0; i <= 100; ++i) tick = paper.tick({0, 0, -1e-4 * i}, i * 1e-3);
     return tick.force.z();  // pressing at 0.1 m/s, 10 mm deep: spring 6 N, damper 0.2 N
@@ -381,7 +381,7 @@ TEST(Erratum14, TheNoiseFreeBoundIsR1TimesTheFrameRateSquared) {
     for (int frame = 0; frame < 22; ++frame) {
       clouds.push_back(std::make_unique<BruteForceCloud>(flat_grid(height)));
       if (frame == 0) paper.seat({0, 0, height + 0.01});
-      paper.frame(*clouds.back(), frame / 30.0);
+      paper.observe({*clouds.back(), frame / 30.0});
       for (int i = 0; i < 33; ++i) {
         const Tick tick = paper.tick({0, 0, height - 0.03}, frame / 30.0 + i * 1e-3);
         if (tick.proxy.z() < height) return false;
@@ -401,9 +401,9 @@ TEST(Paper, DerivesNoVelocityFromStampsThatDoNotIncrease) {
   const BruteForceCloud high(flat_grid(0.002));
   Paper paper;
   paper.seat({0, 0, 0.01});
-  paper.frame(low, 1.0);
+  paper.observe({low, 1.0});
   settle(paper, {0, 0, -0.01}, 1.0);
-  paper.frame(high, 1.0);
+  paper.observe({high, 1.0});
   const Tick tick = paper.tick({0, 0, -0.01}, 1.1);
   EXPECT_TRUE(tick.flags & stamp_not_increasing);
   EXPECT_EQ(tick.surface_velocity, 0.0);

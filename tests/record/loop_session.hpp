@@ -47,7 +47,7 @@ class LoopSession {
         SessionInfo{.kind = SessionInfo::Kind::live, .version = "test", .limits = DeviceLimits{}},
         cycle_->full_reader(), is_on ? [this] { begin_anew(); } : std::function<void()>{}, options);
     recorder_->settings({settings_number_, settings_}, now());
-    if (frame_ > 0) recorder_->frame(frame_, stamp_, {cloud_});
+    if (frame_ > 0) recorder_->frame(frame_, stamp_, 0, cloud_);
   }
 
   void run(int ticks) {
@@ -61,7 +61,7 @@ class LoopSession {
             {{.camera = 0, .stamp = stamp_}, {.camera = 3, .stamp = stamp_ - 0.02}}};
         const std::size_t count = tick_ % 99 == 0 ? 2 : 1;
         frame_ = cycle_->put_frame(cloud_, stamp_, std::span(cameras.data(), count), now() - 1e-3);
-        if (recorder_ && handing_) recorder_->frame(frame_, stamp_, {cloud_});
+        if (recorder_ && handing_) recorder_->frame(frame_, stamp_, 0, cloud_);
       }
       if (tick_ % 70 == 69) {
         settings_.parameters.coupling.stiffness += 100.0 / 3.0;  // a few times

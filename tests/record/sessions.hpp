@@ -53,9 +53,9 @@ inline std::vector<ServoTick> record_press(SessionWriter& writer, const Paramete
     if (i % 33 == 0) {
       const double stamp = i * 1e-3 - 1e-4 / 3.0;
       const auto fresh = wavy_floor(i / 33);
-      touch->frame(*fresh, stamp);
+      touch->observe({*fresh, stamp});
       cloud = fresh;
-      writer.frame(static_cast<std::uint64_t>(i / 33 + 1), stamp, std::span(&cloud, 1));
+      writer.frame(static_cast<std::uint64_t>(i / 33 + 1), stamp, 0, cloud);
     }
     ServoTick record{};
     record.tick = touch->tick(place(i), i * 1e-3);

@@ -145,8 +145,8 @@ ReplayReport replay_changed(const std::function<void(ServoTick&)>& change) {
     for (std::uint64_t i = 0; i <= reader.tick(reader.ticks() - 1).settings_number; ++i)
       writer.settings({i, reader.settings(i)}, 0.0);
     for (const auto& [number, frame] : reader.frames()) {
-      const auto cloud = reader.cloud(frame);
-      writer.frame(number, frame.stamp, std::span(&cloud, 1));
+      const auto cloud = reader.seen(number).front().cloud;
+      writer.frame(number, frame.stamp, 0, cloud);
       writer.adopted(reader.adopted().at(number));
     }
     for (std::size_t i = 0; i < reader.ticks(); ++i) {
@@ -236,7 +236,7 @@ TEST(Recorder, AskedToStopReturnsAtOnceAndSaysWhenItIsDone) {
   recorder.request_stop();
   EXPECT_FALSE(recorder.done());
   EXPECT_TRUE(recorder.status().closing);
-  recorder.frame(1, 0.0, {wavy_floor(0)});  // comes too late
+  recorder.frame(1, 0.0, 0, wavy_floor(0));  // comes too late
   EXPECT_EQ(recorder.status().frames_waiting, 0U);
   held_up.count_down();
   recorder.stop();
@@ -298,7 +298,7 @@ std::shared_ptr<const DepthImage> noisy_floor(unsigned seed) {
     const double now = 1e-3 * tick;
     if (tick % 33 == 0) {
       const auto& cloud = floors[static_cast<std::size_t>(tick / 33 % 2)];
-      recorder.frame(cycle.put_frame(cloud, now, now), now, {cloud});
+      recorder.frame(cycle.put_frame(cloud, now, now), now, 0, cloud);
     }
     device.hand.position = Vec3(0.0, 0.0, 0.98 + 1e-5 * (tick % 4000));
     cycle.run({.t = now});

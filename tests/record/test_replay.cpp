@@ -63,8 +63,8 @@ ReplayReport replay_changed(const std::function<bool(ServoTick&)>& change) {
     writer.settings({}, 0.0);
     for (const auto& [number, frame] : reader.frames()) {
       if (number == 4) continue;  // of ticks 99 to 119
-      const auto cloud = reader.cloud(frame);
-      writer.frame(number, frame.stamp, std::span(&cloud, 1));
+      const auto cloud = reader.seen(number).front().cloud;
+      writer.frame(number, frame.stamp, 0, cloud);
     }
     for (ServoTick& tick : ticks) {
       if (change(tick)) writer.tick(tick);

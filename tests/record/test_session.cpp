@@ -102,23 +102,24 @@ TEST(Session, KeepsEachBitOfADepthImage) {
   std::vector<std::shared_ptr<const Cloud>> cameras{wavy_floor(0), wavy_floor(1, true)};
   {
     SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
-    writer.frame(4, 1.0 / 3.0, cameras);
-    cameras[1] = wavy_floor(2, true);
-    writer.frame(5, 2.0 / 3.0, cameras);
+    writer.frame(3, 0.0, 0, cameras[0]);
+    writer.frame(4, 1.0 / 3.0, 1, wavy_floor(2, true));
+    writer.frame(5, 2.0 / 3.0, 1, cameras[1]);
+    writer.frame(6, 1.0, 0, cameras[0]);  // the same again
     writer.close();
   }
   SessionReader reader(folder.path() / "bag");
-  ASSERT_EQ(reader.frames().size(), 2U);
-  const auto& frame = reader.frames().at(5);
-  EXPECT_EQ(frame.stamp, 2.0 / 3.0);
+  ASSERT_EQ(reader.frames().size(), 4U);
+  EXPECT_EQ(reader.frames().at(5).stamp, 2.0 / 3.0);
   // The first camera's image was not written again.
-  using Parts = std::vector<std::pair<std::size_t, std::size_t>>;
-  EXPECT_EQ(frame.parts, (Parts{{0, 0}, {1, 1}}));
-  const auto cloud = reader.cloud(frame);
-  const auto* set = dynamic_cast<const CloudSet*>(cloud.get());
-  ASSERT_NE(set, nullptr);
+  using Images = std::vector<std::pair<std::size_t, std::size_t>>;
+  EXPECT_EQ(reader.frames().at(5).images, (Images{{1, 1}}));
+  EXPECT_EQ(reader.frames().at(6).images, (Images{{0, 0}}));
   for (std::size_t i = 0; i < 2; ++i) {
-    const auto* read = dynamic_cast<const DepthImage*>(set->clouds()[i].get());
+    const std::vector<FrameInUse> seen = reader.seen(6 - i);
+    ASSERT_EQ(seen.size(), 1U);
+    EXPECT_EQ(seen.front().camera, i);
+    const DepthImage* read = seen.front().cloud->image();
     const auto& wrote = dynamic_cast<const DepthImage&>(*cameras[i]);
     ASSERT_NE(read, nullptr);
     EXPECT_EQ(read->depth(), wrote.depth());
@@ -139,11 +140,11 @@ TEST(Session, KeepsPointsInTheOrderInWhichTheyAreGathered) {
   const std::shared_ptr<const Cloud> seen = cloud;
   {
     SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
-    writer.frame(1, 0.0, std::span(&seen, 1));
+    writer.frame(1, 0.0, 0, seen);
     writer.close();
   }
   SessionReader reader(folder.path() / "bag");
-  const auto read = reader.cloud(reader.frames().at(1));
+  const auto read = reader.seen(1).front().cloud;
   const auto patch_of = [](const Cloud& from) {
     auto patch = std::make_unique<Patch>();
     gather(from, Ball{Vec3(0.01, 0.0, 0.1), 0.02}, *patch);
@@ -290,7 +291,7 @@ bool read_all(const fs::path& file) {
   bool whole = false;
   try {
     SessionReader reader(file);
-    for (const auto& [number, frame] : reader.frames()) static_cast<void>(reader.cloud(frame));
+    for (const auto& [number, frame] : reader.frames()) static_cast<void>(reader.seen(number));
     whole = replay(reader).broken_off.empty();
     const auto source = open_source("recording:" + file.string());
     while (source->next()) {

@@ -68,7 +68,7 @@ std::optional<Place> smooth_place(const Cloud& cloud, const Vec3& point, const V
 std::vector<Place> places_on(const Cloud& cloud, std::size_t most) {
   std::vector<Vec3> candidates;
   Vec3 eye = Vec3::Zero();
-  if (const auto* image = dynamic_cast<const DepthImage*>(&cloud)) {
+  if (const DepthImage* image = cloud.image()) {
     eye = image->world_from_camera().translation();
     const Intrinsics& k = image->intrinsics();
     for (int v = k.height / 24; v < k.height; v += k.height / 24) {
@@ -133,12 +133,12 @@ TEST_P(Touching, PressesAndSlidesOnARestingSurfaceWithoutPoppingThrough) {
     const auto method = make_method("paper");
     const Vec3 side = place.normal.unitOrthogonal();
     method->seat(place.point + 0.03 * place.normal);
-    method->frame(*frame->cloud, 0.0);
+    method->observe({*frame->cloud, 0.0});
     double largest = 0.0;
     for (int i = 0; i <= 900; ++i) {  // 10 mm deep within 0.3 s, then 10 mm sideways and back
       const double height = std::max(0.03 - i * (0.04 / 300), -0.01);
       const double slide = i < 300 ? 0.0 : 0.010 * std::sin((i - 300) * 0.0104719755);
-      if (i % 33 == 32) method->frame(*frame->cloud, i * 1e-3);
+      if (i % 33 == 32) method->observe({*frame->cloud, i * 1e-3});
       const Tick tick = method->tick(place.point + height * place.normal + slide * side, i * 1e-3);
       ASSERT_TRUE(tick.force.allFinite() && tick.proxy.allFinite());
       ASSERT_LE(tick.force.norm(), 20.0);
@@ -167,7 +167,7 @@ Hold hold(const std::vector<Frame>& frames, const Place& place, std::string_view
   for (int i = 0; i <= ticks; ++i) {
     const double t = i * 1e-3;
     for (; next < frames.size() && frames[next].stamp <= t; ++next)
-      method->frame(*frames[next].cloud, frames[next].stamp);
+      method->observe({*frames[next].cloud, frames[next].stamp});
     const double height = std::max(0.02 - i * 2e-4, -0.01);
     const Tick tick = method->tick(place.point + height * place.normal, t);
     EXPECT_TRUE(tick.force.allFinite() && tick.proxy.allFinite());

@@ -99,7 +99,7 @@ class Adversary {
     Spoiled(std::unique_ptr<Method> method, std::uint64_t seed)
         : method_(std::move(method)), random_(seed) {}
     void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
-    void frame(const Cloud& cloud, double stamp) noexcept override { method_->frame(cloud, stamp); }
+    void observe(const Observation& seen) noexcept override { method_->observe(seen); }
     void set_parameters(const Parameters& p) override { method_->set_parameters(p); }
     Tick tick(const Vec3& hip, double t) noexcept override {
       Tick tick = method_->tick(hip, t);

@@ -423,7 +423,7 @@ TEST(Cycle, SeatsTheProxyOnTheFreeSideAfterAStall) {
 struct SwingingSurface final : Method {
   explicit SwingingSurface(double known) : known_velocity(known) {}
   void seat(const Vec3&) noexcept override {}
-  void frame(const Cloud&, double) noexcept override {}
+  void observe(const Observation& /*seen*/) noexcept override {}
   Tick tick(const Vec3& hip, double t) noexcept override {
     const double phase = omega * t;
     Tick tick = free_tick(hip, t, -1);
@@ -507,7 +507,7 @@ TEST(Cycle, AdoptsSettingsInTheNextCycleAndRefusesBadOnesAtTheDoor) {
 TEST(Cycle, KeepsGoingWithAMethodThatRefusesParameters) {
   struct Stubborn final : Method {
     void seat(const Vec3&) noexcept override {}
-    void frame(const Cloud&, double) noexcept override {}
+    void observe(const Observation& /*seen*/) noexcept override {}
     Tick tick(const Vec3& hip, double t) noexcept override { return free_tick(hip, t, -1); }
     void set_parameters(const Parameters& p) override {
       if (p.coupling.stiffness > 1000.0) throw Error("stiffness", "too much");

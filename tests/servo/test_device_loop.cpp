@@ -153,7 +153,7 @@ class HangingMethod final : public Method {
  public:
   explicit HangingMethod(Hang& hang, double newtons = 0.0) : hang_(hang), newtons_(newtons) {}
   void seat(const Vec3& /*proxy*/) noexcept override {}
-  void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override {}
+  void observe(const Observation& /*seen*/) noexcept override {}
   Tick tick(const Vec3& hip, double t) noexcept override {
     while (hang_.asked) {
       hang_.is_on = true;

@@ -159,7 +159,7 @@ TEST(PassivityObserver, LeavesOutWhatThePlacementMovesAndScalesBackToTheHand) {
 class Floor final : public Method {
  public:
   void seat(const Vec3& /*proxy*/) noexcept override {}
-  void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override {}
+  void observe(const Observation& /*seen*/) noexcept override {}
   Tick tick(const Vec3& hip, double t) noexcept override {
     Tick tick;
     tick.t = t;

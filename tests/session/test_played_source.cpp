@@ -159,7 +159,7 @@ TEST(PosedSource, PutsDepthImagesAndPointsWhereTheCameraStands) {
   const auto image = with_pose(stamped({4.0}), pose)->next();
   ASSERT_TRUE(image);
   EXPECT_EQ(image->stamp, 4.0);
-  const auto* posed = dynamic_cast<const DepthImage*>(image->cloud.get());
+  const DepthImage* posed = image->cloud->image();
   ASSERT_NE(posed, nullptr);
   EXPECT_TRUE(posed->world_from_camera().isApprox(pose, 0.0));
   EXPECT_EQ(posed->depth(), wall()->depth());

@@ -295,7 +295,7 @@ class OwnWall final : public Method {
  public:
   explicit OwnWall(double z) : z_(z) {}
   void seat(const Vec3& /*proxy*/) noexcept override {}
-  void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override { ++frame_; }
+  void observe(const Observation& /*seen*/) noexcept override { ++frame_; }
   Tick tick(const Vec3& hip, double t) noexcept override {
     Tick tick = free_tick(hip, t, frame_);
     if (hip.z() <= z_) return tick;
@@ -307,7 +307,7 @@ class OwnWall final : public Method {
   }
   void set_parameters(const Parameters& /*parameters*/) override {}
   void check(const Cloud& cloud) const override {
-    if (dynamic_cast<const DepthImage*>(&cloud) == nullptr)
+    if (cloud.image() == nullptr)
       throw Error("own-wall", "it touches depth images alone", "choose another method");
   }
 

@@ -241,7 +241,7 @@ class FaultyMethod final : public Method {
   FaultyMethod(const Parameters& parameters, std::vector<Failure> failures)
       : method_(make_method(default_method, parameters)), failures_(std::move(failures)) {}
   void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
-  void frame(const Cloud& cloud, double stamp) noexcept override { method_->frame(cloud, stamp); }
+  void observe(const Observation& seen) noexcept override { method_->observe(seen); }
   void set_parameters(const Parameters& parameters) override {
     method_->set_parameters(parameters);
   }

@@ -173,7 +173,7 @@ class HangingMethod final : public Method {
         ended_(std::move(ended)) {}
   ~HangingMethod() override { ended_->set_value(); }
   void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
-  void frame(const Cloud& cloud, double stamp) noexcept override { method_->frame(cloud, stamp); }
+  void observe(const Observation& seen) noexcept override { method_->observe(seen); }
   Tick tick(const Vec3& hip, double t) noexcept override {
     if (hangs) {
       is_hanging = true;

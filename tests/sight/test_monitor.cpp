@@ -199,7 +199,7 @@ void play(SyntheticCamera& camera, const Hip& hip, int ticks, const OnTick& on_t
     const double t = 1e-3 * i;
     if (t >= k * interval - 1e-9) {
       Frame next = *camera.next();
-      sight.frame(*next.cloud, next.stamp);
+      sight.observe({*next.cloud, next.stamp});
       frame = std::move(next);
       ++k;
     }
@@ -240,11 +240,11 @@ TEST(SightMonitor, LeavesNothingOfAForceWhereTheNewestFrameShowsFreeSpace) {
   double t = 0.0;
   Tick tick;
   for (int frame = 0; frame < 12; ++frame) {
-    sight.frame(plane, frame * interval);
+    sight.observe({plane, frame * interval});
     for (; t < (frame + 1) * interval; t += 1e-3) tick = sight.tick(hip, t);
   }
   ASSERT_GT(tick.force.z(), 1.0);
-  sight.frame(gone, 12 * interval);
+  sight.observe({gone, 12 * interval});
   EXPECT_EQ(sight.tick(hip, t).force, Vec3(0, 0, 0)) << "not even what is left of the old one";
 }
 
@@ -260,7 +260,7 @@ TEST(SightMonitor, FindsThePlaneAgainWithinTwoTenthsOfASecondAndWithoutAKick) {
   for (int k = 0; k < 60; ++k) {
     // Nothing is seen while the plane rises past the free hand.
     const PointCloud nothing(std::vector<Vec3>{}, eye);
-    sight.frame(k < 10 ? low : k < 20 ? nothing : high, k * interval);
+    sight.observe({k < 10 ? low : k < 20 ? nothing : high, k * interval});
     for (int i = 0; i < 33; ++i) {
       t = k * interval + i * 1e-3;
       const Tick tick = sight.tick({0, 0, 0}, t);
@@ -284,7 +284,7 @@ TEST(SightMonitor, AForceThatReturnsAfterTheStreamStoppedRisesSlowly) {
   for (int i = 0, k = 0; i < 4000; ++i) {
     const double t = 1e-3 * i;
     if (t >= k * interval - 1e-9) {
-      if (k < 30 || k > 40) sight.frame(plane, k * interval);
+      if (k < 30 || k > 40) sight.observe({plane, k * interval});
       ++k;
     }
     const double force = sight.tick({0, 0, i < 100 ? 0.03 : -0.01}, t).force.norm();
@@ -305,7 +305,7 @@ TEST(SightMonitor, FeelsARestingPlaneInFullHoweverSlowOrLateTheCamera) {
       for (int i = 0, k = 0; i < 4000; ++i) {
         const double t = 1e-3 * i;
         if (t >= k / rate + latency - 1e-9) {
-          sight.frame(plane, k / rate);
+          sight.observe({plane, k / rate});
           ++k;
         }
         const Tick tick = sight.tick({0, 0, t < 1.5 ? 0.03 : -0.01}, t);
@@ -350,13 +350,18 @@ TEST(SightTracker, CountsTheTimeOfAHoldFromItsBeginning) {
   for (int i = -20; i <= 20; ++i) points.emplace_back(1.2e-3 * i, 0.0, -0.1);
   const PointCloud line(points, eye);
   SightTracker tracker;
-  for (int k = 0; k < 10; ++k) tracker.frame(plane, k * interval, interval, Vec3(0, 0, r_c), 90.0);
+  ObservedClouds clouds;
+  const auto frame = [&](const PointCloud& cloud, int k) {
+    clouds.take(0, cloud);
+    tracker.frame(clouds, 0, k * interval, interval, Vec3(0, 0, r_c), 90.0);
+  };
+  for (int k = 0; k < 10; ++k) frame(plane, k);
   ASSERT_TRUE(tracker.tracking());
-  tracker.frame(nothing, 10 * interval, interval, Vec3(0, 0, r_c), 90.0);
+  frame(nothing, 10);
   ASSERT_TRUE(tracker.holding());
   const double since = tracker.held_since();
   for (int k = 11; k < 40; ++k) {
-    tracker.frame(line, k * interval, interval, Vec3(0, 0, r_c), 90.0);
+    frame(line, k);
     if (!tracker.holding()) break;
     EXPECT_EQ(tracker.held_since(), since) << k;
     EXPECT_NEAR(tracker.contact(Vec3(0, 0, 0.01), k * interval).distance, 0.01, 1e-4) << k;

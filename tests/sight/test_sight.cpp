@@ -39,7 +39,7 @@ using HipPath = std::function<Vec3(double t)>;
 
 // One frame and its ticks; the last one.
 Tick live_through(Method& method, const Cloud& cloud, double stamp, const HipPath& hip) {
-  method.frame(cloud, stamp);
+  method.observe({cloud, stamp});
   Tick tick;
   for (int i = 0; i < 33; ++i) tick = method.tick(hip(stamp + i * 1e-3), stamp + i * 1e-3);
   return tick;
@@ -217,14 +217,14 @@ TEST(SurfaceEstimate, TakesANarrowDiscForAtLeastAsNoisyAsAWiderOneIs) {
   constexpr double jitter = 6e-3;  // [m]
   constexpr double stride = 4e-3;  // [m] a frame
   SurfaceEstimate estimate;
-  estimate.set_distance(0.5);
+  estimate.set_distance(0, 0.5);
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   for (int frame = 0; frame < 12; ++frame) {
     const double z = jitter * normal(random);
     const PointCloud plane(
         test::grid(2e-3, 70, [&](double, double) { return z + 0.3e-3 * normal(random); }));
-    estimate.start_frame(frame * interval, interval);
+    estimate.start_frame(0, frame * interval, interval);
     if (frame == 0) {
       ASSERT_TRUE(estimate.start(plane, Vec3(0, 0, 0), Vec3::UnitZ()));
     } else {
@@ -403,7 +403,7 @@ TEST(Sight, LetsAHandOutOfTheShadowOfWhatCameBesideIt) {
         const double shadow = std::min(-0.2 + 0.4 * std::max(k - 15, 0) * interval, reach);
         const DepthImage image =
             camera.shoot([&](double x, double) { return x < shadow ? height : 0.0; }, 0.0, random);
-        sight.frame(image, k * interval);
+        sight.observe({image, k * interval});
         for (int i = 0; i < 33; ++i) {
           const double t = k * interval + i * 1e-3;
           const double up = std::max(t - 1.6, 0.0) * 0.3;
@@ -451,7 +451,7 @@ TEST(Sight, KeepsToTheFlanksOfReliefFinerThanTheProxy) {
   double squares = 0.0;
   int ticks = 0;
   for (int k = 0; k < 60; ++k) {
-    sight.frame(image, k * interval);
+    sight.observe({image, k * interval});
     for (int i = 0; i < 33; ++i) {
       const double t = k * interval + i * 1e-3;
       const Tick tick = sight.tick(Vec3(-0.01 + 0.01 * t, 0.0003, -0.01), t);
@@ -526,7 +526,7 @@ TEST(Sight, LeavesNothingOfAnOldForceOnAHandThatHasLeft) {
   for (int k = 0; k < 12; ++k) {
     const double height = k < 10 ? 0.0 : -0.001;
     const DepthImage image = camera.shoot([&](double, double) { return height; }, 0.0, random);
-    sight.frame(image, k * slow);
+    sight.observe({image, k * slow});
     for (int i = 0; i < 100; ++i) {
       const double t = k * slow + 1e-3 * i;
       const Tick tick = sight.tick(hand(t), t);
@@ -553,7 +553,7 @@ TEST(Sight, PullsNoHandThatLeavesASurfaceThatJustRose) {
   for (int k = 0; k < 12; ++k) {
     const double height = k < 10 ? 0.0 : 0.012;
     images.push_back(camera.shoot([&](double, double) { return height; }, 0.0, random));
-    sight.frame(images.back(), k * slow);
+    sight.observe({images.back(), k * slow});
     for (int i = 0; i < 100; ++i) {
       const double t = k * slow + 1e-3 * i;
       const Tick tick = sight.tick(hand(t), t);
@@ -625,7 +625,7 @@ TEST(Sight, FeelsASmallBoxFromItsFirstFramesOn) {
     images.reserve(12);
     for (int frame = 0; frame < 12; ++frame) {
       images.push_back(shoot());
-      sight.frame(images.back(), frame * slow);
+      sight.observe({images.back(), frame * slow});
       for (int i = 0; i < 125; ++i) {
         const double t = frame * slow + i * 1e-3;
         const Tick tick = sight.tick({0, 0, std::max(0.06 - 0.4 * t, -0.007)}, t);
@@ -659,7 +659,7 @@ TEST(Sight, ComesBackSlowlyWhateverTheFirstFramesCorrect) {
   ASSERT_EQ(tick.force.norm(), 0.0);
   for (; t < resumes + 2.0; t += interval) {
     images.push_back(camera.shoot([](double, double) { return 0.004; }, 1e-3, random));
-    sight.frame(images.back(), t);
+    sight.observe({images.back(), t});
     for (int i = 0; i < 33; ++i) {
       const double now = t + 1e-3 * i;
       tick = sight.tick(press(now), now);
@@ -704,7 +704,7 @@ TEST(Sight, RendersASineOfTwentyMillimetresWithoutStepsAndWithoutLag) {
     if (t >= frames * interval - 1e-9) {
       const double stamp = frames++ * interval;
       image.emplace(camera.shoot([&](double, double) { return height(stamp); }, 0.0, random));
-      sight.frame(*image, stamp);
+      sight.observe({*image, stamp});
     }
     const double force = sight.tick({0, 0, -0.0125}, t).force.z();
     if (i >= 1000) {
@@ -803,7 +803,7 @@ double sum_of_forces(const Parameters& parameters) {
                                         return z + noise(random) + (flies ? 0.08 : 0.0);
                                       }),
                            Vec3(0, 0, 1));
-    sight.frame(plane, frame * interval);
+    sight.observe({plane, frame * interval});
     for (int i = 0; i < 33; ++i) {
       const double t = frame * interval + 1e-3 * i;
       sum += sight.tick({0, 0, std::max(0.03 - 0.2 * t, -0.01)}, t).force.norm();

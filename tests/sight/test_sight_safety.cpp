@@ -137,9 +137,9 @@ TEST(SightSafety, StaysFiniteAndWithinTheForceLimitOnWhateverCamerasAndHandsSend
     double t = 0.0;
     for (int k = 0; k < 300; ++k) {
       // Mostly the plane, so that there is a contact to be upset.
-      sight.frame(share(random) < 0.5 ? *clouds[0] : *clouds[any(random)],
-                  share(random) < 0.05 ? std::numeric_limits<double>::quiet_NaN()
-                                       : t - (share(random) < 0.1 ? 1.0 : 0.0));
+      sight.observe({share(random) < 0.5 ? *clouds[0] : *clouds[any(random)],
+                     share(random) < 0.05 ? std::numeric_limits<double>::quiet_NaN()
+                                          : t - (share(random) < 0.1 ? 1.0 : 0.0)});
       for (int i = 0; i < 10; ++i) {
         t += share(random) < 0.01 ? 10.0 : 3e-3;
         const Vec3 hip = share(random) < 0.8 ? Vec3(0, 0, -0.01) : hostile_hip(random);
@@ -158,9 +158,9 @@ TEST(SightSafety, StaysFiniteOnPointsThatAreNoNumbers) {
     Sight sight;
     for (int k = 0; k < 30; ++k) {
       if (k % 3 == 2) {
-        sight.frame(garbage, k * interval);
+        sight.observe({garbage, k * interval});
       } else {
-        sight.frame(plane, k * interval);
+        sight.observe({plane, k * interval});
       }
       for (int i = 0; i < 33; ++i) {
         expect_sane(sight.tick(Vec3(0, 0, k < 2 ? 0.02 : -0.01), k * interval + i * 1e-3));
@@ -176,7 +176,7 @@ TEST(SightSafety, FeelsThePlaneAgainASecondAfterAnyHostileFrames) {
     Sight sight;
     Tick tick{};
     for (int k = 0; k < 60; ++k) {
-      sight.frame(k >= 20 && k < 25 ? *clouds[hostile] : *clouds[0], k * interval);
+      sight.observe({k >= 20 && k < 25 ? *clouds[hostile] : *clouds[0], k * interval});
       for (int i = 0; i < 33; ++i) {
         const bool lifted = k < 3 || (k >= 25 && k < 32);
         tick = sight.tick(Vec3(0.0, 0.0, lifted ? 0.03 : -0.01), k * interval + i * 1e-3);
@@ -199,7 +199,7 @@ TEST(SightSafety, NeitherAllocatesNorGathersMoreThanItsBounds) {
     const Counted& cloud = k % 2 == 0 ? all[0] : all[any(random)];
     cloud.gathers = 0;
     cloud.beam_points = 0;
-    sight.frame(cloud, k * interval);
+    sight.observe({cloud, k * interval});
     // A look along the beam, the contact near and far, beside it, and the audit.
     ASSERT_LE(cloud.gathers, 8);
     ASSERT_LE(cloud.beam_points, 8192U);
@@ -221,8 +221,8 @@ TEST(SightSafety, AsksForAFiniteForceAfterTwoFramesOfTheSameStamp) {
   const PointCloud plane(test::flat_grid(0.0, 1e-3, 40), Vec3(0, 0, 1));
   for (const double second : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
     Sight sight;
-    sight.frame(plane, 0.0);
-    sight.frame(plane, second);
+    sight.observe({plane, 0.0});
+    sight.observe({plane, second});
     for (int i = 0; i < 100; ++i) {
       const Tick tick = sight.tick({0, 0, 0.02 - 5e-4 * i}, 1e-3 * i);
       expect_sane(tick);

@@ -217,7 +217,7 @@ TEST(PointFiles, OfADepthCameraAreDepthImagesInColourThatShareTheCamera) {
   const auto source = open_source("pcd:" + folder.path().string() + "?scale=1mm");
   const auto first = source->next();
   const auto second = source->next();
-  const auto* image = dynamic_cast<const DepthImage*>(first->cloud.get());
+  const DepthImage* image = first->cloud->image();
   ASSERT_NE(image, nullptr);
   EXPECT_NEAR(image->intrinsics().fx, 40.0, 1e-4);
   EXPECT_NEAR(image->intrinsics().cy, 11.5, 1e-4);
@@ -235,7 +235,7 @@ TEST(PointFiles, OfKinectsAreDepthImagesThatLoseNoPoint) {
         "milk_cartoon_all_small_clorox.pcd", "table_scene_mug_stereo_textured.pcd"}) {
     const std::string path = (scenes / name).string();
     const auto frame = open_source("pcd:" + path)->next();
-    const auto* image = dynamic_cast<const DepthImage*>(frame->cloud.get());
+    const DepthImage* image = frame->cloud->image();
     ASSERT_NE(image, nullptr) << name;
     const PointFile file = read_pcd(path);
     for (std::size_t i = 0; i < file.points.size(); ++i) {

@@ -50,7 +50,7 @@ void expect_recording(const std::string& uri, const Expected& expected) {
   while (const auto frame = source->next()) {
     EXPECT_GT(frame->stamp, before);
     before = frame->stamp;
-    const auto* image = dynamic_cast<const DepthImage*>(frame->cloud.get());
+    const DepthImage* image = frame->cloud->image();
     ASSERT_NE(image, nullptr);
     EXPECT_EQ(image->intrinsics().width, expected.width);
     EXPECT_EQ(image->intrinsics().height, expected.height);

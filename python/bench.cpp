@@ -2,11 +2,14 @@
 // The lab's benches, also for methods written in Python.
 #include <atomic>
 #include <chrono>
+#include <cstdio>
 #include <future>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
+
+#include <unistd.h>
 
 #include "lab/entry.hpp"
 #include "lab/experiment.hpp"
@@ -44,15 +47,20 @@ std::vector<lab::OwnMethod> own_methods(const Own& own, const std::shared_ptr<Tr
 template <class Work>
 auto on_a_thread(int jobs, const std::shared_ptr<Trouble>& trouble, const Work& work) {
   std::atomic<bool> interrupted = false;
+  std::atomic<std::size_t> done = 0, total = 0;
   lab::RunnerOptions runner;
   runner.jobs = jobs;
-  runner.progress = [&](std::size_t, std::size_t) {
+  runner.progress = [&](std::size_t so_far, std::size_t of) {
+    done = so_far, total = of;
     if (interrupted) throw std::runtime_error("interrupted");
   };
+  const bool watched = isatty(STDERR_FILENO) == 1;
   const py::gil_scoped_release released;
   auto run = std::async(std::launch::async, [&] { return work(runner); });
   std::exception_ptr signal;
-  while (run.wait_for(bench_pause) != std::future_status::ready) {
+  for (std::size_t shown = 0; run.wait_for(bench_pause) != std::future_status::ready;) {
+    if (watched && done != shown)
+      std::fprintf(stderr, "\rbench: %zu of %zu", shown = done, total.load());
     if (signal) continue;
     try {
       check_signals();
@@ -61,6 +69,7 @@ auto on_a_thread(int jobs, const std::shared_ptr<Trouble>& trouble, const Work& 
       interrupted = true;
     }
   }
+  if (watched) std::fputs("\r\033[K", stderr);
   if (signal) std::rethrow_exception(signal);
   try {
     auto result = run.get();

@@ -261,7 +261,7 @@ void define_tables(py::module_& m) {
           all[py::str(method.name)] = method.summary;
         return all;
       },
-      "The methods that can be asked for by name: name -> what it is.");
+      "The available methods: name -> description.");
   m.def(
       "flags",
       [](std::uint32_t bits) {

@@ -84,11 +84,11 @@ def devices(build, seconds, folder):
         time.sleep(0.01)
         port = struct.unpack_from("d", memory, 8 * 6)[0]
     rows = [("`mouse:`", "mouse:", ()), ("`force-dimension:`", OMEGA, ()),
-            ("`touch:` by its guard", "touch:", ()),
+            ("`touch:` with its guard", "touch:", ()),
             ("`touch:` in its callback", "touch:", ("--without-watchdog",)),
-            ("`haply:` by its guard", f"haply:?port={port:.0f}", ()),
+            ("`haply:` with its guard", f"haply:?port={port:.0f}", ()),
             ("`spacenav:`", "spacenav:", ()), ("`gamepad:`", "gamepad:", ())]
-    print("| device | ticks a second | ticks late, p50 [us] | p99 | p99.9 | max |\n"
+    print("| device | ticks per second | ticks late, p50 [us] | p99 | p99.9 | max |\n"
           "|---|---|---|---|---|---|")
     try:
         for name, device, more in rows:

@@ -7,11 +7,11 @@
 
 namespace palpate {
 
-/// How far `point` lies behind what the camera measured around it, along the optical axis [m];
-/// negative in front. None where fewer than half of the pixels measured anything.
+/// Distance [m] along the optical axis from the measured surface to `point`: positive behind the
+/// surface, negative in front. Empty if fewer than half of the pixels have a measurement.
 ///
-/// The median over the footprint of a ball, so that it holds under noise and at edges; independent
-/// of how a proxy got to where it is. A proxy that was in front of a surface and is behind it now
+/// The median over the footprint of a sphere, so that it is valid with noise and at edges;
+/// independent of the path of a proxy. A proxy that was in front of a surface and is behind it now
 /// has probably popped through, or went around an edge.
 /// @param point   [m] world
 /// @param radius  [m] of the footprint, usually r_c

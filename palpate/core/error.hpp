@@ -6,11 +6,11 @@
 
 namespace palpate {
 
-/// What went wrong at the door (opening, parsing, configuring); never thrown inside a tick.
+/// Error in opening, parsing or configuring something; never thrown inside a tick.
 ///
 /// `what()` reads `WHAT: WHY; REMEDY` on one line: the file or argument, what was wrong with it,
-/// and what to do. Programs print it behind their own name. Parts may quote a damaged file: what
-/// controls a terminal becomes a space.
+/// and what to do. Programs print it after their name. Parts may quote a damaged file: terminal
+/// control characters become spaces.
 class Error : public std::runtime_error {
  public:
   /// @param subject  the file, option or argument concerned

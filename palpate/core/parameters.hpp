@@ -39,21 +39,21 @@ struct MotionParameters {
 struct SightParameters {
   double hidden_hold = 0.4;      ///< [s] the force of an occluded surface is kept in full this long
   double hidden_fade = 0.3;      ///< [s] and then fades out over this
-  double hardest_strike = 90.0;  ///< [m/s^2] a faster jump is taken for an occluder
-  double return_speed = 0.01;    ///< [m/s] at which a surface comes back that was hidden or lost
+  double hardest_strike = 90.0;  ///< [m/s^2] a faster jump is treated as an occluder
+  double return_speed = 0.01;    ///< [m/s] at which a surface returns after it was occluded or lost
   double side_depth = 0.1;       ///< [m] depth of the side faces synthesised behind visible edges
 
-  // The estimator's; docs/sight.md, 4 and 11, has what each of them trades.
-  // Of the camera, until it is measured. 0: as for_sensors has it for the camera's kind, and as
-  // unknown_noise and unknown_growth where nobody says.
+  // Parameters of the surface estimator; docs/sight.md, 4 and 11, describes their trade-offs. The
+  // next two describe the depth noise until it has been measured. 0: for_sensors sets the value of
+  // the sensor type; without it, unknown_noise and unknown_growth are used.
   double usual_noise = 0.0;     ///< [m] standard deviation at 1 m
   int noise_growth = 0;         ///< [-] power of the distance with which it grows: 1 or 2
   double confidence = 3.0;      ///< [-] standard deviations that noise explains
-  double least_share = 0.3;     ///< [-] of a beam's points: fewer are no surface
+  double least_share = 0.3;     ///< [-] of the points in the viewing cone: fewer are no surface
   double widest_disc = 85e-3;   ///< [m] radius that a fit is averaged over at most
   int averaged_frames = 64;     ///< that a fit is averaged over at most
   double rest_odds = 4.0;       ///< [-] logarithm, of rest against any motion, before a measurement
-  double motion_memory = 0.85;  ///< [-] by which what a frame says of the motion fades a frame
+  double motion_memory = 0.85;  ///< [-] forgetting factor of the motion estimate, per frame
   double curvature_sd = 15.0;   ///< [1/m] spread of curvatures that is expected
   double blend = 0.85;          ///< [intervals] over which the force follows a frame's correction
   int evidence_frames = 2;      ///< in a row that show a proxy behind its surface

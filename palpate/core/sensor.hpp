@@ -24,9 +24,8 @@ enum class SensorKind : std::uint8_t {
 /// The kind of that name; "structured-light", as options of a URI have it, is good too.
 [[nodiscard]] std::optional<SensorKind> sensor_named(std::string_view name) noexcept;
 
-/// What the noise of a kind of depth camera is taken to be until it has been measured: `at_1m`
-/// times the distance [m] to the power of `growth`. docs/sight.md, 4, has where the figures are
-/// from.
+/// Noise model of a type of depth camera, used until the noise has been measured: `at_1m` times the
+/// distance [m] to the power of `growth`. docs/cameras.md has the sources of the values.
 struct UsualNoise {
   double at_1m;  ///< [m] standard deviation
   int growth;    ///< [-] 2: triangulation; 1: time of flight
@@ -37,8 +36,8 @@ struct UsualNoise {
 /// "5 mm at 1 m, growing with the square of distance".
 [[nodiscard]] std::string noise_text(SensorKind sensor);
 
-/// Parameters of a method that touches what these cameras see: where `usual_noise` or
-/// `noise_growth` is left to the camera's kind (0), that of the noisiest of them at 1 m.
+/// Returns `parameters` with the noise model of these cameras: replaces `usual_noise` and
+/// `noise_growth`, each if it is 0, by the values of the sensor type with the largest noise at 1 m.
 [[nodiscard]] Parameters for_sensors(Parameters parameters, std::span<const SensorKind> sensors);
 
 }  // namespace palpate

@@ -21,40 +21,43 @@ const char* to_string(ContactState state) noexcept;
 
 /// Conditions that a tick met; bits of `Tick::flags`.
 enum TickFlag : std::uint32_t {
-  /// The proxy had not converged after `step_budget` steps: it goes on in the next tick. Raise
-  /// step_budget if this is regular and there is time.
+  /// The proxy had not converged after `step_budget` steps: it continues in the next tick. Raise
+  /// step_budget if this is frequent and there is time.
   step_budget_hit = 1u << 0,
-  /// More points were near than a patch holds; an even part of them was used. Move the camera away
-  /// or lower its resolution.
+  /// More points were nearby than a patch can store; an even part of them was used. Move the camera
+  /// away or lower its resolution.
   patch_thinned = 1u << 1,
-  /// The coupling asked for more than max_force.
+  /// The coupling requested more than max_force.
   force_saturated = 1u << 2,
   /// The HIP or the time was not finite: no force, and the proxy stayed.
   non_finite_input = 1u << 3,
   /// There is no frame to touch yet: no force, and the proxy is at the HIP.
   no_frame = 1u << 4,
-  /// The stamps of the last two frames do not increase by 1 ms or more: no velocity was derived
-  /// from them.
+  /// The timestamps of the last two frames do not increase by 1 ms or more: no velocity was
+  /// computed from them.
   stamp_not_increasing = 1u << 5,
-  /// The newest frame is older than max_extrapolation: the surface is taken to rest where it was
-  /// last predicted to be.
+  /// The newest frame is older than max_extrapolation: the surface is assumed to rest at the last
+  /// predicted position.
   frame_stale = 1u << 6,
   /// The points' directions cancel out, so there is no normal: the last one was used.
   normal_undefined = 1u << 7,
-  /// Method `sight`: the surface is hidden by an occluder or lies in a hole of the image. The proxy
-  /// rests on the remembered surface, and the force fades out if that lasts.
+  /// Method `sight`: the surface is occluded or lies in a hole of the image. The proxy rests on the
+  /// last estimate, and the force fades out if this lasts.
   surface_hidden = 1u << 8,
   /// Method `sight`: the newest frame shows the proxy behind the surface that it should be in front
   /// of, by more than noise explains. Set for as long as that frame is in use.
   pop_through_suspected = 1u << 9,
-  /// Method `sight`: the newest frame shows free space around the hand, or the force pointed away
-  /// from every camera without the surface having been met from behind: no force, and the proxy is
-  /// at the hand again. Set in the tick that does so, as the two below.
+  /// Method `sight`: contact was ended because the newest frame shows free space around the HIP, or
+  /// because the force pointed away from all cameras although the surface was not first touched
+  /// from behind. The force is zero and the proxy is reset to the HIP. Set only in that tick, as
+  /// are the next two flags.
   free_space_released = 1u << 10,
-  /// Method `sight`: the proxy was farther from its hand than can be and is at the hand again.
+  /// Method `sight`: the proxy was too far from the HIP for a contact (it moved away by more than
+  /// 0.3 m in one tick, or it is behind the surface and farther from the HIP than the penetration
+  /// at max_force). It is reset to the HIP and the force is zero.
   proxy_let_go = 1u << 11,
-  /// Method `sight`: the proxy was found behind the surface and was brought back in front of it;
-  /// the force rises as if the surface came back at `return_speed`.
+  /// Method `sight`: the proxy was behind the surface and was moved back to the front; the force
+  /// rises as if the surface returned at `return_speed`.
   returned_to_front = 1u << 12,
 };
 constexpr std::size_t tick_flag_count = 13;

@@ -31,7 +31,8 @@ class Uri {
   /// @throws Error if it is not a finite number in [min, max], or has a unit that does not fit.
   [[nodiscard]] double number_option(std::string_view key, double fallback, double min, double max,
                                      std::string_view si_unit = {}) const;
-  /// The same without an option that somebody else takes; allow_only() names it among the known.
+  /// Returns a copy without option `key`, which the caller has already handled. allow_only() still
+  /// lists it as a valid option.
   [[nodiscard]] Uri without(std::string_view key) const;
   /// @throws Error for any option that is not among `own`, naming the nearest.
   void allow_only(std::span<const std::string_view> own) const;

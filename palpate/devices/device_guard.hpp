@@ -37,13 +37,14 @@ class GuardGate {
   bool closed_ = true;      // until the first zero force
 };
 
-/// A device in a process of its own, which takes the force away when this one dies, is stopped or
-/// hangs: nothing that can happen to a session keeps a force on the device for longer than
-/// `GuardLimits::beat_time` and one period, but the machine's own end.
+/// Runs the device in a separate guard process, which sets the force to zero when the session
+/// process dies, is stopped or hangs. No failure of the session process keeps a force on the device
+/// for longer than `GuardLimits::beat_time` plus one period. A failure of the whole computer is not
+/// covered.
 ///
 /// The guard is forked here, opens the device, reads it once a period (a device that `drives()`: in
-/// its driver's callback) and writes what the session wrote last. The result is polled. What the
-/// session sees is one period older than without a guard. After the guard has taken a force away
+/// its driver's callback) and writes what the session wrote last. The result is polled. The
+/// session's data is one period older than without a guard. After the guard has set a force to zero
 /// the device reports a fault until the session has written a zero force. The guard ignores the
 /// signals that end a session, and ends by itself when its parent has ended.
 ///

@@ -49,7 +49,7 @@ struct DeviceMeasurement {
 ///         does not become ready within 5 s.
 DeviceMeasurement measure_device(Device& device, const ProbeOptions& options = {});
 
-/// What a measurement says of a session on the device.
+/// The settings that a measurement proposes for a session on the device.
 struct DeviceProposal {
   double rate = 1000.0;    ///< [Hz] of the ticks
   double undamped = 0.0;   ///< [N/m] stiffness without a damper
@@ -59,10 +59,11 @@ struct DeviceProposal {
   std::optional<Vec3> load = {};
 };
 
-/// Four fifths of what the linear loop decays with where nobody holds the handle (SampledWall), for
-/// the axis with the least damping, each figure at the unfavourable end of its uncertainty, and no
-/// more than the device states. Coulomb friction is a margin. Empty where a mass, a damping or the
-/// delay is too uncertain.
+/// Recommended stiffness: 80 % of the largest stiffness at which the linear model of the released
+/// handle (SampledWall) is stable, for the axis with the least damping, with delay and damping at
+/// the unfavourable end of their uncertainty and the mass as measured, and at most the rated
+/// stiffness. Coulomb friction is ignored and adds a margin. Empty if mass, damping or delay is too
+/// uncertain.
 std::optional<DeviceProposal> propose(const DeviceInfo& device,
                                       const DeviceMeasurement& measurement);
 

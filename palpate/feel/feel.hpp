@@ -13,14 +13,14 @@
 
 namespace palpate {
 
-/// What a surface feels like, around any method: the method renders how far away it is, and this
-/// makes it as soft, rough and ringing as the material there. docs/materials.md, docs/friction.md.
+/// Adds material effects (stiffness, friction, texture, impact vibration) to the force of any
+/// method. docs/materials.md, docs/friction.md.
 ///
-/// Proxy, normal and state stay the method's. Where nothing is to be felt but where a surface is,
-/// its ticks are passed on as they are, bit for bit.
+/// Proxy, normal and state remain those of the method. Without active material effects, the ticks
+/// are passed on unchanged, bit for bit.
 class Feel final : public Method {
  public:
-  /// [m] over which what is felt is averaged along the surface: no border is a step.
+  /// [m] over which materials are averaged along the surface: no border causes a step.
   static constexpr double averaged = 3e-3;
 
   /// @param method  what renders the normal force; not null

@@ -5,14 +5,13 @@
 
 namespace palpate {
 
-/// How much of the coupling's spring a hand feels, as it moves from one material to another.
+/// Fraction of the coupling stiffness that is rendered while the contact moves between materials.
 ///
-/// A spring K pressed in by u holds K u^2 / 2. Where it gets harder under a hand, by dK, somebody
-/// has to pay for dK u^2 / 2: a tank, which is filled by what the spring gives up where it gets
-/// softer, by what friction takes, and by a brake. Sliding on to what is harder is braked, as a
-/// hand that slides on to a harder body is by its edge; that work makes the spring harder. While
-/// the tank is empty the spring stays as it is, so a surface that is changed under a hand at rest
-/// changes when the hand comes off. Any way over any border takes at least as much as it gives.
+/// Raising the stiffness K by dK at penetration u needs the energy dK u^2 / 2. It is taken from an
+/// energy tank, which is filled by decreases of the stiffness, by friction, and by a braking force
+/// while the HIP slides towards a stiffer material. While the tank is empty, the stiffness does not
+/// rise, so a surface that becomes stiffer under a hand at rest does so only after the hand leaves.
+/// Crossing a border never generates energy.
 ///
 /// [servo] Nothing here allocates, locks or throws.
 class Hardness {

@@ -46,14 +46,14 @@ class PointMover {
   explicit PointMover(const Options& options) { set(options); }
   void set(const Options& options) noexcept;
 
-  /// The cloud or the proxy has changed: the next movement gathers anew.
+  /// The cloud or the proxy has changed: the next motion gathers again.
   void invalidate() noexcept { stale_ = true; }
 
-  /// The proxy has been put elsewhere: what is known of it is void.
+  /// The proxy position has been set: resets the state.
   void seat() noexcept;
 
-  /// Says whether the proxy is hidden behind what the cloud shows. Where it is, nothing is solid,
-  /// so sides of bodies are left out from then on until it is seen and farther than r_3 from them.
+  /// Sets whether the proxy is occluded by the measured surface. While it is, side faces are not
+  /// used, until it is visible again and farther than r_3 from them.
   void set_hidden(bool hidden) noexcept;
 
   /// Moves `proxy`, which must have a place, towards the HIP until it converges.

@@ -5,16 +5,15 @@
 
 namespace palpate {
 
-/// Limits the work that corrections of the surface do on the hand: a passivity controller.
+/// Passivity controller for corrections of the surface estimate.
 ///
-/// A force F on a spring K holds F^2 / 2K. Where that grows by more than the hand has pressed in,
-/// relative to the surface's own motion, something else has put it there: a frame that moved the
-/// surface, another fit, another stiffness or method, a gain on its way up. Each frame may put in a
-/// little. What is beyond that comes out of a tank, which holds what went the other way in this
-/// contact: corrections away from the hand, damping, friction. Where the tank is empty the force is
-/// what the hand's own work allows: to the hand, the surface stays where it was and comes as the
-/// next frames allow. The force only shrinks, without a step, and a surface that moves as it is
-/// tracked lifts a hand with all its force.
+/// A force F on a spring K stores F^2 / 2K. If this energy grows by more than the work of the hand
+/// relative to the surface, a correction (new frame, fit, stiffness, method or rising gain) has
+/// generated the difference. Each frame may add a little; more is taken from an energy tank, filled
+/// by corrections away from the hand, damping and friction in the same contact. If the tank is
+/// empty, the force is reduced to what the hand's own work allows: to the hand, the surface stays
+/// where it was. The force is only reduced, without a step, and a surface that moves as it is
+/// tracked lifts a hand with its full force.
 ///
 /// Work counts in the scene's metres. One thread. [servo] O(1); no allocation, lock, system call or
 /// exception.

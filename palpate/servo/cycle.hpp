@@ -53,7 +53,8 @@ struct NumberedSettings {
 enum HandFlag : std::uint32_t {
   hand_present = 1u << 0,
   hand_clutched = 1u << 1,
-  /// The proxy was seated on the surface's free side before the tick, as ticks were missed.
+  /// The proxy was reset to the free side of the surface before the tick, because ticks were
+  /// missed.
   proxy_reseated = 1u << 2,
   /// Another method took over before the tick, with the proxy where it was; see Cycle::set_method.
   method_switched = 1u << 3,
@@ -74,7 +75,8 @@ struct ServoTick {
   Tick tick;                     ///< the method's; `tick.force` is the force asked for
   Vec3 region = Vec3::Zero();    ///< [N] world: asked for by forbidden regions
   Vec3 guidance = Vec3::Zero();  ///< [N] world: asked for by guides and viscous regions
-  /// [m] world: the proxy, or where forbidden regions keep it beside that. A robot may go there.
+  /// [m] world: the proxy position, additionally displaced out of the forbidden regions. This
+  /// position is sent to a robot.
   Vec3 place = Vec3::Zero();
   Vec3 force = Vec3::Zero();          ///< [N] world: the force sent to the device
   Vec3 position = Vec3::Zero();       ///< [m] of the hand, device frame
@@ -164,8 +166,7 @@ class Cycle {
   std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp,
                           std::span<const CameraFrame> cameras, double now);
 
-  /// Ends a latched fault of the safety chain in the next cycle. An operator's decision. Any
-  /// thread.
+  /// Resets a latched fault of the safety chain in the next cycle, by an operator. Any thread.
   void reset_faults() noexcept { fault_resets_.fetch_add(1, std::memory_order_relaxed); }
 
   /// Takes effect in the next cycle. Any thread but the servo's.
@@ -173,11 +174,10 @@ class Cycle {
   /// @throws Error if they do not validate.
   std::uint64_t set_settings(const ServoSettings& settings);
 
-  /// Switches to another method, which remembers nothing, in the next cycle: it gets the settings'
-  /// parameters, the proxy's place and each camera's newest frame, and begins from there. What it
-  /// does then follows from what it is given, so a recording can begin here in mid-session. The
-  /// hand may notice: method `sight` brings the force up over most of a frame's interval, as it
-  /// does any change that a frame brings. Any thread but the servo's.
+  /// Replaces the method in the next cycle. The new method has no history: it gets the parameters
+  /// of `settings`, the current proxy position and the newest frame of each camera, so a recording can
+  /// start here in mid-session. The user may feel a change: the method `sight` raises the force over most of
+  /// one frame interval. Any thread but the servo's.
   /// @return the number of the settings, as in ServoTick::settings_number
   /// @throws Error if they do not validate or the method refuses its parameters.
   std::uint64_t set_method(std::shared_ptr<Method> method, const ServoSettings& settings);

@@ -33,17 +33,17 @@ struct AdoptedFrame {
   std::optional<std::uint64_t> tick{};
 };
 
-/// All that a cycle remembers from tick to tick, but for its method and its settings, as numbers:
-/// what the safety chain, the workspace and the frames' freshness need to go on from. The method is
-/// left out because the state is taken where another one takes over.
+/// State of a Cycle between two ticks as an array of numbers, without method and settings: safety
+/// chain, workspace, fixtures, energy observer and frame ages. The method is not included, because
+/// the state is saved when a new method takes over.
 struct CycleState {
   static constexpr std::size_t capacity = 1024;
   std::array<double, capacity> numbers{};  ///< the first `count` count; see cycle_state_names()
   std::uint64_t count = 0;
 };
 
-// Ways to walk over what an object remembers. Each class has a `walk(way, self)` that calls
-// `way(name, value)` for each value in turn, so that names, writing and reading cannot differ.
+// Visitors of the state of an object. Each class has a `walk(way, self)` that calls `way(name,
+// value)` for each value in turn, so that names, writing and reading cannot differ.
 
 /// Writes the values as numbers. [servo]
 class PutState {

@@ -7,14 +7,14 @@
 namespace palpate {
 namespace {
 
-// [s] Nobody taps faster than about 7 Hz: quicker cycles are nobody's intention.
+// [s] People tap at up to about 7 Hz: faster cycles are not voluntary.
 constexpr double voluntary = 0.125;
-// [s] Slower cycles than 2 Hz leave a person time to let go.
+// [s] Cycles slower than 1.7 Hz leave a person time to release the handle.
 constexpr double longest_cycle = 0.6;
 // [1/s] times the period of the ticks: of the elastic energy of a cycle, the share that a surface
 // sampled at that rate with a tick of delay generates when it is pressed at 12 Hz, the quickest
-// tremor: pi/2 * 1.5 T * 2 pi 12 Hz. A handle that nobody damps swings faster and generates more:
-// 0.2 to 0.5 of it at 14 to 20 Hz and 1 kHz.
+// tremor: pi/2 * 1.5 T * 2 pi 12 Hz. A released handle oscillates faster and generates more: 0.2 to
+// 0.5 of it at 14 to 20 Hz and 1 kHz.
 constexpr double quick_share = 178.0;
 // [-] the same for slower cycles, whatever the rate. Taps at 7 Hz with a light and hard contact
 // generate up to 0.3.

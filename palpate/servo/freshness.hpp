@@ -15,13 +15,13 @@ struct CameraFrame {
   double stamp = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// How old the pictures in use are, camera by camera, judged by stamps and by arrival.
+/// Age of the frames in use, per camera, from capture timestamps and arrival times.
 ///
-/// A frame is fresh if its stamp is later than the stamp before it from the same camera and no more
-/// than a tolerance ahead of the loop's clock. A camera that repeats a stamp, runs backwards or is
-/// on another clock delivers no fresh frames, however many arrive. The camera that is worst off
-/// counts: one that lives does not hide one that is dead. Knows no clock. One thread. [servo] No
-/// allocation, lock or system call; O(max_cameras).
+/// A frame is fresh if its timestamp is later than the previous one of the same camera and at most
+/// a tolerance ahead of the loop's clock. A camera that repeats a timestamp, runs backwards or uses
+/// another clock delivers no fresh frames, however many arrive. The worst camera counts, so a
+/// working camera does not mask a failed one. Uses no clock. One thread. [servo] No allocation,
+/// lock or system call; O(max_cameras).
 class Freshness {
  public:
   static constexpr std::size_t max_cameras = 16;

@@ -13,20 +13,19 @@ namespace palpate {
 
 /// Is something wrong with a hand, so that the others of its session must not push either?
 ///
-/// Its device reports a fault of its own, its safety chain has latched or refuses what it gets, or
-/// its ticks do not come. Not: nobody holds it, or it is clutched; nor a frame that is late, which
-/// every hand of a session sees for itself. [servo]
+/// Its device reports a fault, its safety chain has latched or rejects its input, or its ticks have
+/// stopped. Not: nobody holds the device, or it is clutched; nor a late frame, which every hand of
+/// a session detects itself. [servo]
 /// @param t        [s] now
 /// @param silence  [s] without a tick, the first included; infinite where no clock drives the ticks
 bool is_in_trouble(const CycleStatistics& hand, double t, double silence) noexcept;
 
-/// The device of one of several hands of a session: as it is, but that it reports
-/// DeviceFault::another_hand while one of the others is in trouble.
+/// Wrapper for the device of one hand in a session with several hands. It forwards all calls, and
+/// reports DeviceFault::another_hand while another hand has a fault.
 ///
-/// A person who holds something between two fingers or two hands is pushed by both; if one force
-/// went and the other stayed, that would be a kick. The fault takes this hand's force away as any
-/// fault of its device does, and after it the hand has to engage anew. As it comes from the
-/// device's read, it is recorded and replayed with the rest of it.
+/// If only one of two opposing forces stopped, the other would give the user a sudden push. The
+/// fault sets this hand's force to zero as any fault of its device does; afterwards the hand must
+/// engage again. Since it comes from the device's read, it is recorded and replayed.
 class LinkedDevice final : public Device {
  public:
   /// @param device  must not be null

@@ -11,8 +11,8 @@ namespace palpate {
 struct RealtimeRequest {
   bool enabled = true;      ///< false asks for nothing: for tests and for free-running work
   int priority = 80;        ///< SCHED_FIFO, 1 to 99; above the kernel's interrupt threads' 50
-  bool pin = true;          ///< stay on one core, of those that the process may use:
-  unsigned core = 0;        ///< the last but so many; the last again where there are fewer
+  bool pin = true;          ///< pin the thread to one core of the process's affinity mask
+  unsigned core = 0;        ///< index of that core counted from the last (0), modulo their number
   bool lock_memory = true;  ///< mlockall: no page is fetched from disk in a tick
 };
 

@@ -124,16 +124,17 @@ struct SafetyInput {
   Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world: the same as a vector, extrapolated
   double stiffness = 0.0;              ///< [N/m] of the surface; 0: not known
   bool new_frame = false;              ///< the first tick with a frame
-  /// [N] that the motors give beside `force`, whatever way: it takes from their limit and warms
-  /// them. Of a handle's weight.
+  /// [N] magnitude of the force that the motors apply in addition to `force` to support the
+  /// handle's weight. It reduces the available force and counts in the thermal model.
   double held = 0.0;
   /// [N] world: the part of `force` that is an impact's ringing: it may rise at once
   Vec3 transient = Vec3::Zero();
-  /// [N] world: the part of `force` that a grain makes as the hand slides. It is no swing of the
-  /// loop, as far as it is less than half of the force.
+  /// [N] world: the part of `force` that is texture vibration. Up to half of the force it does not
+  /// count as an oscillation of the loop.
   Vec3 vibration = Vec3::Zero();
-  /// [N] world: of forbidden regions, beside `force`. What is judged by normal and proxy is the
-  /// method's force alone. At the limit of the force it comes first, and guidance last.
+  /// [N] world: force of forbidden regions, in addition to `force`. Only the method's force is
+  /// tested against normal and proxy. At the force limit it has the highest priority, and guidance
+  /// the lowest.
   Vec3 region = Vec3::Zero();
   Vec3 guidance = Vec3::Zero();  ///< [N] world: of guides and viscous regions
 };
@@ -145,18 +146,17 @@ struct SafetyOutput {
   double gain;          ///< [-] 0 disengaged, 1 engaged and nothing faded
 };
 
-/// Last before the device, whatever made the force. Knows no clock and no renderer.
+/// Last stage before the device; independent of the rendering method and of clocks.
 ///
-/// Links that soften what oscillates come first, then those that judge and limit the force itself,
-/// then those that give a gain: it falls at once and rises over ramp_time. The slew limit is
-/// applied to the product, so that no link can make a step, and |force| never exceeds the larger of
-/// the last force and the limit. While a frame is late the force that is sent never grows. Faults
-/// disengage the hand, and several of them latch. The ringing of an impact is added behind the slew
-/// limit, within a TransientBudget and the limit of the force, and only as long as nothing is
-/// amiss, and no fixture gives a force.
+/// Order: (1) oscillation detectors scale the force down; (2) checks and limits of the force; (3)
+/// gain, which falls at once and rises over ramp_time; (4) slew limit on the result, so that no
+/// stage can cause a step. The magnitude of the force never exceeds the larger of the previous
+/// force and the limit. While a frame is late, the force never grows. Faults disengage the hand;
+/// repeated faults latch. The impact vibration is added after the slew limit, within a
+/// TransientBudget and the force limit, and only if there is no fault and no fixture force.
 class SafetyChain {
  public:
-  /// All links; the argument below leaves some out, which only tests of the chain may do.
+  /// All stages; the argument below can omit some, only for tests of the chain.
   static constexpr std::uint32_t all_links = (1u << safety_flag_count) - 1;
 
   /// @throws Error if the parameters do not validate or the device's limits are not positive.

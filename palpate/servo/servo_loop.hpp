@@ -57,16 +57,16 @@ class ServoLoop {
   /// device's first callback has come.
   /// @throws Error if the device cannot be enabled or started, or its callback does not come.
   void start();
-  /// Takes the force off the device before anything else ends: a zero force is the last write of
-  /// the thread that ticks; if that thread does not get there within 50 ms, the device is disabled
-  /// from here. Then the device is disabled and the threads end. A cycle that hangs, in the method
-  /// or the driver, is waited for one second at most. While one call is at work another one only
-  /// disables the device, at once. Any thread but the servo's.
+  /// Sets the force to zero, then stops the loop. The servo thread writes a zero force as its last
+  /// action; if this does not happen within 50 ms, the calling thread continues without it. In both
+  /// cases the device is then disabled and the threads end. A cycle that hangs, in the method or
+  /// the driver, is waited for 1 s at most. A concurrent second call only disables the device,
+  /// immediately. Any thread except the servo thread.
   /// @return false if a cycle (or Device::enable) hangs: its thread goes on until that returns and
   ///         then ends; the device stays disabled. Destroying this waits for it
   bool stop();
-  /// Asks the thread that ticks to end with a zero force, and returns at once: where several loops
-  /// are to end, no hand then waits for another one's. `stop` has to follow. Any thread.
+  /// Requests the servo thread to end with a zero force, and returns at once: with several loops,
+  /// no hand waits for another. `stop` has to follow. Any thread.
   void request_stop() noexcept;
   /// Has `stop` returned true? Any thread.
   [[nodiscard]] bool has_ended() const noexcept { return ended_.load(std::memory_order_acquire); }

@@ -8,9 +8,9 @@
 
 namespace palpate {
 
-/// What speaks against a stiffness on a device, a sentence with the remedy each: walls stiffer than
-/// its nominal ones, or than 2 b / (T + 2 t_d), above which a handle that nobody holds may swing.
-/// Empty for a device without motors, a simulated one, and where the figures are unknown.
+/// Returns warnings about a stiffness, each with a remedy: if it exceeds the rated stiffness of the
+/// device, or 2 b / (T + 2 t_d), above which a released handle may oscillate. Empty for a device
+/// without motors, a simulated device, or unknown device data.
 /// @param stiffness  [N/m] of the coupling
 /// @param scale      [-] of the workspace: forces are not scaled, so the hand feels as many times
 ///                   that stiffness

@@ -21,13 +21,14 @@ struct Placement {
   /// Button of the device that clutches while it is pressed, 0 to 31; none: only the device's own
   /// clutch does.
   std::optional<int> clutch_button = {};
-  /// [m, device] Radius of the bubble about the middle of the device's workspace: a hand within it
-  /// leads the HIP, one beyond its rim sends the HIP on as well (rate control); 0: no bubble.
+  /// [m, device] radius of the rate-control bubble around the workspace centre. Inside: position
+  /// control. Outside: in addition a velocity of the HIP in the direction of the handle (rate
+  /// control). 0: off.
   double bubble_radius = 0.0;
-  /// [m/s, scene] How fast the HIP goes on at most, from `bubble_rim` beyond the radius on.
+  /// [m/s, scene] largest velocity of rate control, from `bubble_rim` beyond the radius on.
   double bubble_speed = 0.1;
-  /// [kg] of the handle that the device itself does not hold up, 0 to 0.1; 0: none. The motors do,
-  /// beside the force of the surface and within the same limits (WeightSupport).
+  /// [kg] handle mass that the motors compensate, 0 to 0.1; 0: off. In addition to the surface
+  /// force and within the same limits (WeightSupport).
   double handle_weight = 0.0;
   Vec3 down = -Vec3::UnitZ();  ///< [-] device: which way that weight pulls, of length 1
 

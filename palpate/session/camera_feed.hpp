@@ -57,35 +57,34 @@ struct FeedOptions {
 /// A recording whose stamps go back by this much [s] begins anew there.
 inline constexpr double stamp_step_back = 1.0;
 
-/// How a recording is played. A live camera takes no notice of it.
+/// Playback of a recording. A live camera ignores it.
 struct Playback {
-  bool paused = false;  ///< the frame that was shown last is shown again and again, at 30 Hz
-  bool loop = true;     ///< what ends begins again; false: it pauses on its last frame
+  bool paused = false;  ///< the last frame is repeated at 30 Hz
+  bool loop = true;     ///< a recording that ends starts again; false: it pauses on its last frame
   double speed = 1.0;   ///< of its stamps
   static constexpr double slowest = 0.1, fastest = 4.0;
 };
 
-/// A frame as it is handed over.
+/// A frame as it is delivered to the servo loop.
 struct FedFrame {
   Frame frame;                ///< its stamp is on the servo loop's clock [s, CLOCK_MONOTONIC]
-  double source_stamp = 0.0;  ///< [s] the stamp that the source gave it
-  /// False where a recording's frame is shown again: what stays is not captured, so its stamp is
-  /// the time at which it is shown.
+  double source_stamp = 0.0;  ///< [s] the timestamp from the source
+  /// False for a repeated frame of a recording; its timestamp is the time of the repetition.
   bool is_new = true;
-  /// Time has jumped before it: the recording began again, or goes on from another place.
+  /// Time has jumped before this frame: the recording restarted, or was moved to another time.
   bool after_jump = false;
 };
 
 enum class CameraState : std::uint8_t {
-  waiting,    ///< open, but no frame has come lately
+  waiting,    ///< open, but without recent frames
   live,       ///< frames come
-  frozen,     ///< a live camera gives the same picture again and again
-  searching,  ///< it is gone and is looked for again
-  ended,      ///< a recording that cannot be opened again is over, and stays on its last frame
+  frozen,     ///< a live camera sends the same image repeatedly
+  searching,  ///< it is disconnected; the driver tries to reconnect
+  ended,      ///< a recording that cannot be opened again has ended, and stays on its last frame
   stopped,    ///< by request_stop
 };
 
-/// How a camera is doing.
+/// Status of a camera.
 struct CameraStatus {
   std::string uri, kind;
   SensorKind sensor = SensorKind::unknown;
@@ -93,8 +92,8 @@ struct CameraStatus {
   std::string text;          ///< the state in words, with what is wrong; "live"
   double rate = 0.0;         ///< [Hz] of the frames lately
   std::uint64_t frames = 0;  ///< handed over, each once
-  /// Not handed over: left out to keep up with a recording, frozen, unreadable, or with a stamp
-  /// that is not later than the last.
+  /// Dropped: to keep up with a recording, frozen, unreadable, or with a timestamp that is not
+  /// later than the last.
   std::uint64_t dropped = 0;
   std::uint64_t opened_again = 0;  ///< how often after it was gone
   std::uint64_t slowed = 0;        ///< how often a recording was slowed down, see longest_lag
@@ -103,10 +102,10 @@ struct CameraStatus {
   double latency = 0.0;                ///< [s] usual time from capture to arrival (live cameras)
   std::optional<double> last_frame{};  ///< [s, CLOCK_MONOTONIC] stamp of the newest frame
   std::string trouble;                 ///< the error met last; a live camera's next frame clears it
-  /// What it showed last is declared valid until another frame replaces it: a still picture, a
-  /// recording that is paused or has ended. What a live camera saw that stopped never is.
+  /// The last frame is declared valid until another one replaces it: a static image, or a recording
+  /// that is paused or has ended. Never true for a live camera that stopped.
   bool stays_valid = false;
-  std::string doubt;         ///< why its unit of depth may be wrong; empty if nothing speaks for it
+  std::string doubt;         ///< why its depth unit may be wrong; empty: no sign of it
   Playback playback;         ///< of a recording
   std::size_t recorded = 0;  ///< frames of a recording; 0: not known, or no recording
   std::size_t place = 0;     ///< of a recording: number of the frame shown last, from 0
@@ -114,10 +113,10 @@ struct CameraStatus {
   double recorded_time = 0.0;
 };
 
-/// One camera on a thread of its own.
+/// One camera in its own thread.
 ///
-/// Frames reach the sink with their stamps of capture, brought to the servo loop's clock by one
-/// constant offset, so that intervals between stamps stay what the camera measured:
+/// Frames reach the sink with their capture timestamps, shifted to the servo loop's clock by one
+/// constant offset, so that the intervals stay as the camera measured them:
 /// - A recording plays at the pace of its stamps; each pass has its offset. Where decoding is too
 ///   slow, frames come late or are left out (`dropped`); the stamps stay. What ends begins again. A
 ///   frame that stays, as it is the only one, or the recording is paused or has ended, is shown
@@ -126,10 +125,10 @@ struct CameraStatus {
 ///   by the time of arrival, and counted.
 ///
 /// A live camera that throws an Error three times in a row, or delivers nothing for `silence`, is
-/// closed and opened again after pauses that double from `first_pause` to `longest_pause`, for
-/// ever. A picture that stays the same to the bit is a camera that hangs: no noise is that
-/// constant. From the `frozen_frames`-th on it is not handed over, so that the age of the last
-/// frame shows.
+/// closed and opened again after pauses that double from `first_pause` to `longest_pause`, without
+/// end. Bit-identical depth images in a row mean that the camera hangs, because real images have
+/// noise. From the `frozen_frames`-th identical image on, frames are dropped, so that the frame age
+/// grows and the safety chain reacts.
 ///
 /// Where the source says what distances the camera can measure (SourceInfo::range), one frame in 30
 /// is held against it: if more than 30 % of the points lie elsewhere, `CameraStatus::doubt` says

@@ -56,10 +56,10 @@ struct SessionConfig {
   SafetyParameters safety;
   std::string fixtures = {};       ///< TOML file of virtual fixtures; empty: none
   std::string record = {};         ///< folder to record into; empty: none
-  std::string record_folder = {};  ///< where recordings go that a page starts; empty: the current
+  std::string record_folder = {};  ///< folder of recordings started on the page; empty: the current
   double record_limit = 20.0;      ///< [GB] of all recordings of a session that pages start
-  /// By name, the loosest value to which the operator's page may set a safety limit; of those that
-  /// are left out, the end of the range.
+  /// Per safety limit: the least strict value that the operator may set on the page; default: the
+  /// end of its range.
   std::map<std::string, double> operator_limits = {};
   ServerConfig server;
 };

@@ -58,12 +58,12 @@ struct SessionOptions {
   std::string device_uri = "hand:";
   std::unique_ptr<Device> device = {};  ///< used in place of the URI
   /// Further hands. They share cameras, method, parameters, limits and fixtures with the first, and
-  /// have a device, a loop, a method's memory and a safety chain each. While one of the hands is in
-  /// trouble (is_in_trouble), none of them has a force. At most Session::most_hands in all.
+  /// have a device, a loop, a method's memory and a safety chain each. While one of the hands has a
+  /// fault (is_in_trouble), none of them has a force. At most Session::most_hands in all.
   std::vector<SessionHandOptions> more_hands = {};
-  /// Method, its parameters, safety limits, placement of the first hand. Parameters that are left
-  /// to the cameras' kind (for_sensors) are set by it, also in what `settings()` and `state()`
-  /// give.
+  /// Method, its parameters, safety limits, placement of the first hand. Parameters with value 0
+  /// that depend on the sensor type are replaced by for_sensors(); settings() and state() return
+  /// the replaced values.
   ServoSettings settings = {};
   ServoOptions servo = {};  ///< rate, real-time rights
   Pace pace = Pace::real_time;

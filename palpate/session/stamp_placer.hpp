@@ -43,22 +43,21 @@ struct StampPlacerOptions {
   double settling = 1.0;    ///< [s] after a (re)start in which the offset may fall freely
 };
 
-/// Brings a camera's stamps of capture to the servo loop's clock, from the times of arrival.
+/// Converts capture timestamps of a camera to the servo loop's clock, from the arrival times.
 ///
-/// Model: arrival = stamp + offset + latency, latency >= 0. The offset is the lower envelope of
-/// arrival - stamp: the least of the last `window` seconds, which falls at once, as a latency
-/// cannot be negative, and grows by `max_drift` at most, so that a latency that grows is not taken
-/// for a drift. The least latency itself cannot be seen from arrivals: a stamp is placed that much
-/// too late, some 10 to 70 ms for USB cameras. While the clock keeps time the offset is constant,
-/// so that intervals between stamps stay what they were.
+/// Model: arrival = timestamp + offset + latency, latency >= 0. The offset is the minimum of
+/// arrival - timestamp over the last `window` seconds; it may fall at once and rise by `max_drift`
+/// at most, so that a growing latency is not mistaken for a drift. The minimum latency cannot be
+/// observed, so converted timestamps are late by it: some 10 to 70 ms for USB cameras. While the
+/// clock is accurate the offset is constant, so that intervals between timestamps stay the same.
 ///
-/// Clocks of this machine (StampClock::monotonic, system) have a known offset, which is used as
-/// long as the stamps agree with it.
+/// Clocks of this computer (StampClock::monotonic, system) have a known offset, which is used as
+/// long as the timestamps agree with it.
 ///
-/// A stamp that cannot be true (StampProblem) is replaced by the arrival less the usual latency;
-/// after three in a row that agree with one another the offset is measured anew (`jumped`). Late
-/// frames whose stamps follow each other regularly, such as those of a queue behind a stall, keep
-/// their stamps, however old they are.
+/// An implausible timestamp (StampProblem) is replaced by the arrival minus the typical latency;
+/// after three in a row that are consistent with one another the offset is estimated again
+/// (`jumped`). Late frames with regular timestamps, such as those of a queue behind a stall, keep
+/// their timestamps, however old they are.
 ///
 /// Values in, values out: no clock, no thread. Used on the camera's thread.
 class StampPlacer {

@@ -10,7 +10,7 @@
 
 namespace palpate {
 
-/// What a robot's tool found out about a surface by touching it.
+/// Contact parameters of a surface that a robot's tool measured by touching it.
 struct Touched {
   Vec3 place = Vec3::Zero();             ///< [m] world, on the surface
   Vec3 normal = Vec3::UnitZ();           ///< [-] unit, outward
@@ -18,23 +18,23 @@ struct Touched {
   std::optional<double> friction = {};   ///< [-] coefficient of Coulomb; empty: not known
 
   static constexpr double softest = 20.0;       ///< [N/m]
-  static constexpr double hardest = 5000.0;     ///< [N/m] what is harder is told as that
+  static constexpr double hardest = 5000.0;     ///< [N/m] higher values are reported as this
   static constexpr double most_friction = 2.0;  ///< [-]
 };
 
-/// Why it cannot be believed, whoever told it; empty: it can.
+/// Why the measurement is not plausible; empty: it is.
 std::string_view disbelief(const Touched& touched) noexcept;
 
-/// Learns stiffness and friction of what a robot's tool touches, from the force that the robot
-/// measures and where its tool is.
+/// Estimates stiffness and friction of the surface that a robot's tool touches, from the measured
+/// force and the tool position.
 ///
 /// A touch lasts while the force is above 0.1 N, from 0.2 N on, along the normal that the camera's
-/// surface had as it began. Stiffness is K of force = K depth + B speed, pressing and letting go,
-/// of a touch of 0.15 s and 0.5 N at least that stays within 5 mm; what is pressed in by less than
-/// half a millimetre is as hard as is told. That has to explain 80 % of the force, the spring alone
-/// half of its peak, and a quarter of the depth has to be gone when the force is: a thing that was
-/// pushed away does not come back, and is no spring. Friction is the mean drag over the normal
-/// force while the tool slides, over 10 mm at least. [servo]
+/// surface had as it began. Stiffness is K of force = K depth + B speed, while pressing and
+/// releasing, for a touch of at least 0.15 s and 0.5 N that stays within 5 mm; a penetration below
+/// half a millimetre counts as the highest stiffness. The model must explain 80 % of the force, the
+/// spring alone half of its peak, and a quarter of the depth must have recovered when the force is
+/// zero: an object that was pushed away does not recover, and is not elastic. Friction is the mean
+/// drag over the normal force while the tool slides, over 10 mm at least. [servo]
 class TouchLearner {
  public:
   /// @param radius  [m] of the ball at the tool's tip

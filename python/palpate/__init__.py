@@ -6,9 +6,9 @@
     touch.frame(depth, camera=camera, stamp=0.0)    # uint16, height x width
     tick = touch.tick(hip, t)                       # .force [N], .proxy [m]
 
-`trace` touches a recording along a path, `Source` gives frames of cameras and recordings,
-`Session` is cameras, a device, the method and the safety chain as one object, and `bench` compares
-methods, your own among them. All numbers are SI, all places in the world's frame.
+`trace` runs a HIP path over a recording, `Source` gives frames of cameras and recordings,
+`Session` combines cameras, a device, a method and the safety chain, and `bench` compares
+methods, including your own. All numbers are in SI units, all positions in the world frame.
 """
 
 from . import bench

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The lab's benches: how well does a method hold a surface that moves and is noisy?
+"""The lab's benchmarks: how well does a method keep contact with a moving, noisy surface?
 
     palpate.bench.pop("sight", cases=5)
     palpate.bench.pop(MyMethod(), cases=5)
@@ -20,7 +20,7 @@ from . import _core
 
 
 class Scores:
-    """What a bench came to: `columns` and `rows` of its table, a `note`, and the cases' `csv`."""
+    """The result of a benchmark: `columns` and `rows` of its table, a `note`, and a `csv` of cases."""
 
     def __init__(self, result):
         self.columns = result["columns"]
@@ -46,12 +46,12 @@ class Scores:
 
 
 def methods():
-    """The methods that the benches know by name: name -> what it is."""
+    """The methods of the benchmarks: name -> description."""
     return _core._bench_methods()
 
 
 def _named(method):
-    """A method's name, and what makes a fresh object of it: none for the lab's."""
+    """A method's name, and a factory of new objects: None for the lab's methods."""
     if isinstance(method, str):
         return method, None
     if isinstance(method, type):
@@ -69,7 +69,7 @@ def _run(name, wanted, cases, seed, families, jobs, parameters):
 
 
 def pop(method, *, cases=50, seed=1, families=(), jobs=1, **parameters):
-    """Does the method keep the proxy on the right side? `cases` of each family, drawn from `seed`.
+    """Does the proxy pop through? `cases` random cases of each family, from `seed`.
 
     method: a name, a class or an object derived from palpate.Method, or a list of these. Methods
     in Python gain nothing from more `jobs` than one.
@@ -78,7 +78,7 @@ def pop(method, *, cases=50, seed=1, families=(), jobs=1, **parameters):
 
 
 def fidelity(method, *, seed=1, families=(), jobs=1, **parameters):
-    """How true, quiet and still is the force, against 24 aims? Arguments as for `pop`."""
+    """Accuracy and noise of the force, compared with 24 aims. Arguments as for `pop`."""
     return _run("fidelity", method, None, seed, families, jobs, parameters)
 
 
@@ -93,11 +93,11 @@ def _processor():
 
 
 def entry(method, out="entry.json", *, seed=None, cases=25, repeats=5, recordings=(), jobs=1):
-    """Plays a method on the whole bench, writes an entry for the leaderboard and returns it.
+    """Runs a method on the whole benchmark, writes an entry for the leaderboard and returns it.
 
-    method: a name, 'pipe:COMMAND', or a class or an object derived from palpate.Method. seed: drawn
-    by chance unless given, so that nobody can tune to the cases. recordings: URIs, each of a camera
-    at rest. What an entry has in it: docs/bench-entries.md.
+    method: a name, 'pipe:COMMAND', or a class or an object derived from palpate.Method. seed:
+    random by default, so that methods cannot be tuned to the cases. recordings: URIs, each of a
+    camera at rest. docs/bench-entries.md describes the contents of an entry.
     """
     name, make = _named(method)
     run = {"date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"),
@@ -109,7 +109,7 @@ def entry(method, out="entry.json", *, seed=None, cases=25, repeats=5, recording
 
 
 def check(file, method=None, *, sample=20, recordings=(), jobs=1):
-    """Plays a sample of an entry again: does it hold? A dict with `holds`, `differences` and more.
+    """Runs a sample of an entry again and checks it: a dict with `holds`, `differences` and more.
 
     method: the class or object that the entry was made with, if it is written in Python.
     """

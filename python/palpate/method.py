@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a method of your own looks like."""
+"""The base class of methods in Python."""
 
 
 class Method:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ticks as a pandas DataFrame and as a figure, where pandas and matplotlib are installed."""
+"""Ticks as a pandas DataFrame and as a figure, if pandas and matplotlib are installed."""
 
 import numpy
 
@@ -23,7 +23,7 @@ def dataframe(ticks):
 
 
 def plot(ticks, axis=None, file=None):
-    """A figure of ticks: force [N] above, and how far proxy and HIP are apart [mm] below.
+    """A figure of ticks: force [N] above, distance between proxy and HIP [mm] below.
 
     axis: 0, 1 or 2 for one component of the force instead of its length. file: where it is
     written, e.g. "touch.png". Returns the matplotlib figure.

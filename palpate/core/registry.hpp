@@ -19,7 +19,7 @@ namespace palpate {
 template <class Entry>
 class Registry {
  public:
-  /// @param noun     what an entry is, for messages: "method", "kind of source"
+  /// @param noun     what an entry is, for messages: "method", "type of source"
   /// @param suffix   what follows a name where people write it: ":" for the scheme of a URI
   Registry(std::string noun, std::string suffix, std::vector<Entry> entries)
       : noun_(std::move(noun)), suffix_(std::move(suffix)) {

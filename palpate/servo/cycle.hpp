@@ -175,9 +175,9 @@ class Cycle {
   std::uint64_t set_settings(const ServoSettings& settings);
 
   /// Replaces the method in the next cycle. The new method has no history: it gets the parameters
-  /// of `settings`, the current proxy position and the newest frame of each camera, so a recording can
-  /// start here in mid-session. The user may feel a change: the method `sight` raises the force over most of
-  /// one frame interval. Any thread but the servo's.
+  /// of `settings`, the current proxy position and the newest frame of each camera, so a recording
+  /// can start here in mid-session. The user may feel a change: the method `sight` raises the force
+  /// over most of one frame interval. Any thread but the servo's.
   /// @return the number of the settings, as in ServoTick::settings_number
   /// @throws Error if they do not validate or the method refuses its parameters.
   std::uint64_t set_method(std::shared_ptr<Method> method, const ServoSettings& settings);

@@ -77,8 +77,12 @@ std::string uri_of_file(const std::filesystem::path& file) {
 std::string source_uri(const std::string& text, const Registry<SourceScheme>& schemes) {
   namespace fs = std::filesystem;
   std::error_code error;
-  if (text.find(':') != std::string::npos || !fs::exists(text, error))
-    return schemes.with_scheme(text);
+  if (text.find(':') != std::string::npos) return text;
+  if (!fs::exists(text, error)) {
+    if (text.find_first_of("./") == std::string::npos) return schemes.with_scheme(text);
+    throw Error("'" + text + "'", "there is no such file or folder",
+                "check the path; a source that is not a file is SCHEME:, such as synthetic:desk");
+  }
   if (!fs::is_directory(text, error)) return uri_of_file(text);
   const fs::path folder(text);
   for (const auto& [file, scheme] :

@@ -58,8 +58,8 @@ TEST(Registry, FindsByNameAndNamesTheNearestAndAllOthers) {
   EXPECT_EQ(registry.find("pear").value, 2);
   EXPECT_EQ(registry.with_scheme("pear"), "pear:");
   EXPECT_EQ(registry.with_scheme("plum:x"), "plum:x");
-  EXPECT_TRUE(test::fails_saying([&] { return registry.with_scheme("bramley"); },
-                                 "did you mean 'apple:'"));
+  EXPECT_TRUE(
+      test::fails_saying([&] { return registry.with_scheme("bramley"); }, "did you mean 'apple:'"));
   EXPECT_EQ(registry.try_find("plum"), nullptr);
   EXPECT_TRUE(test::fails_saying([&] { return registry.find("aple"); }, "'apple:'", "pear:"));
   EXPECT_TRUE(test::fails_saying([&] { return registry.find("aple", "aple:x"); }, "aple:x",

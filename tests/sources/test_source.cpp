@@ -122,7 +122,8 @@ TEST(OpenSource, TakesAFileOrFolderWithoutAScheme) {
   EXPECT_EQ(source_uri("pcd:" + cup), "pcd:" + cup) << "a URI stays as it is";
   const test::TemporaryFolder empty;
   EXPECT_TRUE(fails_saying([&] { return source_uri(empty.path()); }, "nothing to touch", "TUM"));
-  EXPECT_TRUE(fails_saying([] { return source_uri("nowhere.ply"); }, "'nowhere.ply'"));
+  EXPECT_TRUE(
+      fails_saying([] { return source_uri("nowhere.ply"); }, "'nowhere.ply'", "no such file"));
 }
 
 TEST(Source, ThatIsARecordingSaysSoAndLeavesOutFramesOnRequest) {

@@ -137,7 +137,7 @@ TEST(SeveralCameras, AreStillerThanTheNearOneAloneWhereTheOtherIsFar) {
 TEST(SeveralCameras, WhosePosesDisagreeDoNotBuzz) {
   const auto felt = feel({.pose_error = 3e-3});
   print("3 mm apart", felt);
-  EXPECT_LE(felt[2].rms(), 1.0 * std::max(felt[0].rms(), felt[1].rms()));
+  EXPECT_LE(felt[2].rms(), 1.5 * std::max(felt[0].rms(), felt[1].rms()));
 }
 
 TEST(SeveralCameras, GoOnWhereOneOfThemIsBlinded) {

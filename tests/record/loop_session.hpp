@@ -48,6 +48,8 @@ class LoopSession {
         cycle_->full_reader(), is_on ? [this] { begin_anew(); } : std::function<void()>{}, options);
     recorder_->settings({settings_number_, settings_}, now());
     if (frame_ > 0) recorder_->frame(frame_, stamp_, 0, cloud_);
+    if (second_.number > 0)
+      recorder_->frame(second_.number, second_.stamp, second_camera, second_.cloud);
   }
 
   void run(int ticks) {
@@ -59,10 +61,11 @@ class LoopSession {
         // Another camera is listed now and then, whose pictures come late.
         const std::array<CameraFrame, 2> cameras = {
             {{.camera = 0, .stamp = stamp_}, {.camera = 3, .stamp = stamp_ - 0.02}}};
-        const std::size_t count = tick_ % 99 == 0 ? 2 : 1;
+        const std::size_t count = tick_ % 99 == 0 || has_second ? 2 : 1;
         frame_ = cycle_->put_frame(cloud_, stamp_, std::span(cameras.data(), count), now() - 1e-3);
         if (recorder_ && handing_) recorder_->frame(frame_, stamp_, 0, cloud_);
       }
+      if (has_second && tick_ % 22 == 11) put_second();
       if (tick_ % 70 == 69) {
         settings_.parameters.coupling.stiffness += 100.0 / 3.0;  // a few times
         settings_number_ = cycle_->set_settings(settings_);
@@ -81,10 +84,24 @@ class LoopSession {
     }
   }
 
+  // Now and then in the same tick as the first camera's, with an older stamp.
+  void put_second() {
+    second_.cloud = floor(tick_ / 22 % 10);
+    second_.stamp = now() - 2e-3;
+    const std::array<CameraFrame, 2> cameras = {
+        {{.camera = second_camera, .stamp = second_.stamp}, {.camera = 0, .stamp = stamp_}}};
+    second_.number = cycle_->put_frame(second_.cloud, second_.stamp, cameras, now() - 1e-3);
+    if (recorder_ && handing_)
+      recorder_->frame(second_.number, second_.stamp, second_camera, second_.cloud);
+  }
+
   // What a recording in mid-session begins with: the same method made anew.
   void begin_anew() {
     recorder_->settings(cycle_->set_method(make_method(settings_.method)), now());
   }
+
+  static constexpr std::size_t second_camera = 3;
+  bool has_second = false;  ///< the other camera has frames of its own
 
   void hand_no_more_frames() { handing_ = false; }
   [[nodiscard]] Recorder& recorder() { return *recorder_; }
@@ -101,6 +118,11 @@ class LoopSession {
   std::shared_ptr<const Cloud> cloud_;
   double stamp_ = 0.0;
   std::uint64_t frame_ = 0;
+  struct {
+    std::shared_ptr<const Cloud> cloud;
+    double stamp = 0.0;
+    std::uint64_t number = 0;
+  } second_;
   int tick_ = 0;
   bool handing_ = true;
   std::unique_ptr<Recorder> recorder_;  // before the cycle, which it reads

@@ -129,6 +129,25 @@ TEST_P(RecorderOf, ASessionInItsMidstIsReplayedBitForBit) {
   EXPECT_EQ(report.sent_unchecked, "");
 }
 
+TEST_P(RecorderOf, ASessionOfTwoCamerasIsReplayedBitForBit) {
+  for (const int before : {0, 210}) {
+    const TemporaryFolder folder;
+    LoopSession session(GetParam());
+    session.has_second = true;
+    session.run(before);
+    session.record(folder.path() / "bag");
+    session.run(400);
+    session.recorder().stop();
+    EXPECT_EQ(session.recorder().status().trouble, "");
+    SessionReader reader(folder.path() / "bag");
+    const ReplayReport report = replay(reader);
+    EXPECT_TRUE(report.identical()) << test::text_of(report);
+    EXPECT_EQ(report.sent_unchecked, "");
+    ASSERT_GE(report.ticks, 350U);
+    EXPECT_GE(report.frames, 27U);  // each camera's
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Methods, RecorderOf, ::testing::Values("paper", "sight"),
                          [](const auto& each) { return std::string(each.param); });
 

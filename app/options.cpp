@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "app/program.hpp"
+#include "palpate/cloud/proposed_touch.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/methods/methods.hpp"
@@ -70,6 +71,7 @@ SessionConfig MethodOptions::session(const MethodRegistry& methods) const {
   for (const std::string& assignment : assignments_) {
     const auto [name, value] = parse_assignment("--set", assignment);
     set_parameter(config.parameters, name, value);
+    config.radii_chosen = config.radii_chosen || is_proxy_radius(name);
   }
   validate(config.parameters);
   return config;

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "app/point_remarks.hpp"
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/session/summary.hpp"
@@ -20,11 +21,6 @@ constexpr double felt_force = 1.0;            // [N] that anybody feels
 constexpr int least_felt = 100;               // [ticks] of it that make a press
 constexpr int enough_about = 8;               // points within two r_c of a proxy that rests
 constexpr double margin = 0.05;               // [m] around a cloud, within which a path is near it
-
-// Distances for people: millimetres up to a metre.
-std::string length_text(double metres) {
-  return metres < 1.0 ? fmt::format("{:.3g} mm", 1e3 * metres) : fmt::format("{:.4g} m", metres);
-}
 
 std::string box_text(const Eigen::AlignedBox3d& box) {
   const Vec3& low = box.min();
@@ -236,9 +232,12 @@ std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
                       "the path used the last frame as a static image",
                       uris[i], frames.last, left));
   }
-  if (!touched_)
+  const bool is_felt = is_press_ ? felt_ >= least_felt : largest_ > 0.0;
+  if (!is_felt && is_press_ && !sparse_.empty())
+    lines.push_back((touched_ ? "it was hardly felt: " : "nothing was touched: ") + sparse_);
+  else if (!touched_)
     lines.push_back(nothing_met());
-  else if (is_press_ ? felt_ < least_felt : largest_ == 0.0)
+  else if (!is_felt)
     lines.push_back(hardly_felt(shown));
   return lines;
 }

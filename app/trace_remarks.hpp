@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -26,7 +27,9 @@ class TraceRemarks {
  public:
   /// @param r_c       [m] of the proxy
   /// @param is_press  the hand is led by what is seen, so it began where it did on purpose
-  TraceRemarks(double r_c, bool is_press) : r_c_(r_c), is_press_(is_press) {}
+  /// @param sparse    why points cannot be felt anywhere (sparse_remark); empty: they can
+  TraceRemarks(double r_c, bool is_press, std::string sparse)
+      : r_c_(r_c), is_press_(is_press), sparse_(std::move(sparse)) {}
 
   /// Counts a tick. @param cameras  the newest frame of each; null before its first
   void count(const Tick& tick, std::span<const std::shared_ptr<const Cloud>> cameras);
@@ -45,6 +48,7 @@ class TraceRemarks {
 
   double r_c_;  // [m]
   bool is_press_;
+  std::string sparse_;
   bool any_tick_ = false, touched_ = false;
   int felt_ = 0;                 // ticks with a force that anybody feels
   int contact_ = 0, stale_ = 0;  // ticks in contact, and those of them with an old frame

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdlib>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <string>
@@ -13,11 +14,13 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "app/point_remarks.hpp"
 #include "app/recording_check.hpp"
 #include "app/verbs.hpp"
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/pixel_probe.hpp"
 #include "palpate/cloud/point_cloud.hpp"
+#include "palpate/cloud/proposed_touch.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/uri.hpp"
 #include "palpate/drivers/drivers.hpp"
@@ -87,17 +90,29 @@ Json describe(const DepthImage& image) {
 
 Json describe(const PointCloud& cloud) {
   std::vector<Vec3> points;
-  for (std::size_t i = 0; i < cloud.size(); ++i) points.push_back(cloud.point(i));
+  const Surface* given = cloud.surface();  // whose faces have further points
+  for (std::size_t i = 0; given == nullptr && i < cloud.size(); ++i)
+    points.push_back(cloud.point(i));
+  if (given != nullptr)
+    std::copy_if(given->points.begin(), given->points.end(), std::back_inserter(points),
+                 [](const Vec3& point) { return point.allFinite(); });
   Json json = extent(points);
+  const ProposedTouch proposed = proposed_touch(cloud);
+  json["extent_m"] = rounded(proposed.extent);
+  json["spacing_m"] = rounded(proposed.spacing);
+  json["proposed_scale"] = rounded(proposed.scale);
+  json["proposed_r_c_m"] = rounded(proposed.radius);
   json["non_finite"] = cloud.non_finite();
   if (cloud.viewpoint()) json["seen_from_m"] = numbers(*cloud.viewpoint());
-  if (const Surface* surface = cloud.surface()) {
-    if (surface->columns > 0) json["image"] = fmt::format("{}x{}", surface->columns, surface->rows);
-    if (!surface->triangles.empty()) json["triangles"] = surface->triangles.size();
-    if (!surface->normals.empty())
-      json["normals"] = std::count_if(surface->normals.begin(), surface->normals.end(),
-                                      [](const Vec3& normal) { return !normal.isZero(); });
+  if (given == nullptr) return json;
+  if (given->columns > 0) json["image"] = fmt::format("{}x{}", given->columns, given->rows);
+  if (!given->triangles.empty()) {
+    json["triangles"] = given->triangles.size();
+    json["points_on_triangles"] = cloud.size() - points.size();
   }
+  if (!given->normals.empty())
+    json["normals"] = std::count_if(given->normals.begin(), given->normals.end(),
+                                    [](const Vec3& normal) { return !normal.isZero(); });
   return json;
 }
 
@@ -175,6 +190,8 @@ int info(InfoOptions options) {
       json["poses"] = "none: the world frame is the camera frame, so the HIP moves with the camera";
   } else if (const PointCloud* cloud = frame->cloud->point_cloud()) {
     first.update(describe(*cloud));
+    const std::string remark = sparse_remark(*cloud, options.uri, proposed_touch(*cloud).radius);
+    if (!remark.empty()) json["advice"] = remark;
   }
   if (frame->colour)
     first["colour"] = fmt::format("{}x{}", frame->colour->width, frame->colour->height);

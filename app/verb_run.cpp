@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "app/opened_scenes.hpp"
+#include "app/point_remarks.hpp"
 #include "app/reach.hpp"
 #include "app/running_session.hpp"
 #include "app/signals.hpp"
@@ -27,6 +28,8 @@
 
 namespace palpate::app {
 namespace {
+
+constexpr double noticed_force = 1.0;  // [N] that anybody feels
 
 // One line that is written over and over while a person watches.
 void show_status(const ServoTick& record) {
@@ -96,6 +99,19 @@ std::vector<SceneChoice> scene_choices(const std::vector<CameraConfig>& given,
   return choices;
 }
 
+// How points without an image were felt, or why they were not.
+void say_of_points(const Cloud& cloud, Session& session, const SessionConfig& config) {
+  const double r_c = session.settings().parameters.proxy.r_c();
+  std::vector<std::string> remarks;
+  if (!config.radii_chosen) remarks.push_back(radius_remark(cloud, r_c));
+  if (session.state().summary.largest_sent < noticed_force)
+    remarks.push_back(sparse_remark(cloud, config.cameras.front().uri, r_c));
+  for (const std::string& remark : remarks) {
+    if (!remark.empty())
+      fmt::print(stderr, "palpate: {}: {}\n", config.cameras.front().uri, remark);
+  }
+}
+
 int run_headless(const RunOptions& options, const SessionConfig& config, GuardedDevices guarded,
                  Running& running) {
   SessionOptions wanted = options_of(options, config, session_methods());
@@ -117,6 +133,7 @@ int run_headless(const RunOptions& options, const SessionConfig& config, Guarded
   });
   if (watched && is_free) fmt::print(stderr, "\n");
   running.session = nullptr;
+  if (const auto seen = session.newest_clouds().front()) say_of_points(*seen, session, config);
   return finish(session, options.json);
 }
 

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "app/options.hpp"
+#include "app/point_remarks.hpp"
 #include "app/program_methods.hpp"
 #include "app/progress.hpp"
 #include "app/signals.hpp"
@@ -14,6 +15,7 @@
 #include "app/trace_csv.hpp"
 #include "app/trace_remarks.hpp"
 #include "app/verbs.hpp"
+#include "palpate/cloud/proposed_touch.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/sensor.hpp"
 #include "palpate/devices/hip_path.hpp"
@@ -68,15 +70,22 @@ int trace(TraceOptions options) {
       fmt::print(stderr, "palpate: {}: {}\n", about.uri, note);
   }
   const MethodRegistry methods = program_methods(&playback.source(0));
-  const MethodChoice choice = options.method.choice(methods);
-  const auto& [name, given] = choice;
-  const Parameters parameters = for_sensors(given, playback.sensors());
+  const SessionConfig config = options.method.session(methods);
+  const std::string& name = config.method;
+  Parameters parameters = for_sensors(config.parameters, playback.sensors());
+  std::vector<const Cloud*> seen;
+  for (std::size_t i = 0; i < playback.cameras(); ++i) seen.push_back(playback.upcoming(i));
+  if (!config.radii_chosen) parameters = for_points(parameters, seen);
+  const double r_c = parameters.proxy.r_c();
+  if (const std::string remark = radius_remark(*seen.front(), r_c);
+      !config.radii_chosen && !remark.empty())
+    fmt::print(stderr, "palpate: {}: {}\n", options.cameras.front(), remark);
   const std::unique_ptr<Method> method = make_method(name, parameters, methods);
+  const std::string sparse = sparse_remark(*seen.front(), options.cameras.front(), r_c);
   playback.check(*method);  // before a file is written over
   TraceWriter writer(options.out);
   Summary summary;
-  const double r_c = parameters.proxy.r_c();
-  TraceRemarks remarks(r_c, press.has_value());
+  TraceRemarks remarks(r_c, press.has_value(), sparse);
   const Interruption interruption;
   // Of a press that is not known before.
   const std::int64_t ticks = path ? ticks_along(*path, options.rate) : 0;

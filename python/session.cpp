@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "palpate/cloud/proposed_touch.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/sources/fixture_file.hpp"
 
@@ -104,6 +105,8 @@ class PythonSession {
     options.device_uri = device;
     options.settings.method = method;
     set_all(options.settings.parameters, parameters);
+    for (const auto& [name, value] : parameters)
+      options.radii_chosen = options.radii_chosen || is_proxy_radius(py::cast<std::string>(name));
     set_limits(options.settings.safety, limits);
     options.settings.placement.workspace_scale = scale;
     if (world_from_device)

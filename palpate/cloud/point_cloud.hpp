@@ -31,7 +31,7 @@ class PointCloud final : public Cloud {
   /// @param viewpoint  [m] world: from where they were seen (PCD's VIEWPOINT), if known
   /// @throws Error if there are more points than 32 bits can number.
   explicit PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoint = std::nullopt);
-  /// The same, keeping the further properties beside the points.
+  /// The same, keeping the further properties. On faces it lays points, 1.5 mm apart, at most 2^18.
   /// @throws Error also if normals, image or triangles do not fit the points.
   explicit PointCloud(Surface surface, std::optional<Vec3> viewpoint = std::nullopt);
 
@@ -45,7 +45,7 @@ class PointCloud final : public Cloud {
   [[nodiscard]] std::size_t size() const noexcept { return points_.size(); }
   /// How many points were left out because a coordinate was not finite.
   [[nodiscard]] std::size_t non_finite() const noexcept { return non_finite_; }
-  /// The finite points, in the order of the curve. A cloud made of them has the same order.
+  /// The finite points, those on faces too, along the curve. A cloud of them has the same order.
   [[nodiscard]] const Vec3& point(std::size_t i) const noexcept { return points_[i]; }
   [[nodiscard]] const std::optional<Vec3>& viewpoint() const noexcept { return viewpoint_; }
 

@@ -9,6 +9,7 @@
 #include <span>
 #include <sstream>
 
+#include "palpate/cloud/proposed_touch.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/nearest_name.hpp"
 #include "palpate/core/pose.hpp"
@@ -273,6 +274,10 @@ SessionConfig parse_session_config(std::string_view text, const std::string& nam
                    config.placement);
   if (const toml::node* hands = root.find("hand")) config.more_hands = read_hands(root, *hands);
   read_rows(root, "parameters", parameter_table(), config.parameters);
+  if (const toml::table* parameters = root.sub("parameters")) {
+    for (const auto& [key, value] : *parameters)
+      config.radii_chosen = config.radii_chosen || is_proxy_radius(key.str());
+  }
   read_rows(root, "safety", safety_parameter_table(), config.safety);
   read_operator_limits(root, config.operator_limits);
   read_server(root, config.server);
@@ -331,9 +336,13 @@ std::string to_toml(const SessionConfig& config) {
   }
   text += "\n[parameters]\n";
   for (const ParameterInfo& row : parameter_table()) {
-    // r_c is derived from the radii below it: setting it scales them.
-    const std::string line = row_line(row, row.get(config.parameters));
-    text += row.name == "r_c" ? "# " + line : line;
+    // r_c is derived from the radii below it: setting it scales them. Those that nobody chose are
+    // left to what is seen.
+    const double value = row.get(config.parameters);
+    const std::string line = row_line(row, value);
+    const bool is_left = row.name == "r_c" || (is_proxy_radius(row.name) && !config.radii_chosen &&
+                                               value == row.default_value);
+    text += is_left ? "# " + line : line;
   }
   text += "\n[safety]\n";
   for (const SafetyParameterInfo& row : safety_parameter_table())

@@ -50,7 +50,8 @@ struct SessionConfig {
   std::vector<HandConfig> more_hands = {};
   /// SessionOptions::without_watchdog: more than the engage force on motors that nothing watches.
   bool without_watchdog = false;
-  double rate = 1000.0;  ///< [Hz] of the servo loop, 100 to 100 000
+  bool radii_chosen = false;  ///< SessionOptions::radii_chosen: a radius is set here
+  double rate = 1000.0;       ///< [Hz] of the servo loop, 100 to 100 000
   std::string method = "sight";
   Parameters parameters;
   SafetyParameters safety;

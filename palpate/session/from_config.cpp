@@ -16,6 +16,7 @@ SessionOptions session_options(const SessionConfig& config) {
         {.name = hand.name, .device_uri = hand.device, .placement = hand.placement});
   options.settings.method = config.method;
   options.settings.parameters = config.parameters;
+  options.radii_chosen = config.radii_chosen;
   options.settings.safety = config.safety;
   options.settings.placement = config.placement;
   if (!config.fixtures.empty())

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "palpate/cloud/proposed_touch.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/pose.hpp"
 
@@ -162,7 +163,9 @@ std::optional<Press::Line> Press::look(double u, double v) {
   }
   const DepthImage* image = points != nullptr ? drawn_.get() : cloud_->image();
   if (image == nullptr) return std::nullopt;
-  const auto near = nearest_surface(*image, pixel, look_radius, !missed_once_);
+  // Points are drawn coarsely: what carries a proxy is to be seen on all sides of it.
+  const double firm = points != nullptr ? 3.0 * proposed_touch(*points).radius : look_radius;
+  const auto near = nearest_surface(*image, pixel, firm, !missed_once_);
   if (!near) return std::nullopt;
   const Eigen::Isometry3d& pose = image->world_from_camera();
   if (points != nullptr) {

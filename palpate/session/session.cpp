@@ -18,6 +18,7 @@
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
+#include "palpate/cloud/proposed_touch.hpp"
 #include "palpate/cloud/proposed_view.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/sensor.hpp"
@@ -162,6 +163,11 @@ class Session::Impl {
         refuse_without_watchdog(hand->device().info(), options_.settings.safety);
     }
     settings_ = for_cameras(options_.settings);
+    if (!options_.radii_chosen) {
+      std::vector<const Cloud*> seen;
+      for (const auto& cloud : first) seen.push_back(cloud.get());
+      settings_.parameters = for_points(settings_.parameters, seen);
+    }
     check_materials(settings_.fixtures.get(), first);
     proxy_radius_ = settings_.parameters.proxy.r_c();
     for (std::size_t i = 0; i < hands_.size(); ++i) {

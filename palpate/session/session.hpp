@@ -71,6 +71,9 @@ struct SessionOptions {
   /// although it states no watchdog (DeviceInfo::watchdog) of at most 0.5 s: if this process is
   /// killed, its last force stays. `open_guarded` gives a device a watchdog.
   bool without_watchdog = false;
+  /// Somebody chose the proxy's radii. If not, they are as for_points has them for what the cameras
+  /// see first.
+  bool radii_chosen = false;
   /// [s] of the built-in path of `hand:` and `script:`; less where a recording begins again before
   double stroke_time = 20.0;
   std::string record = {};  ///< folder to record into from the start; empty: none

@@ -10,6 +10,7 @@
 #include "palpate/cloud/organised.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/parameter_table.hpp"
 #include "palpate/sources/files.hpp"
 
 namespace palpate {
@@ -34,6 +35,11 @@ std::string details_of(const PointFile& file) {
     text += "; " + std::to_string(file.bytes_unread) + " bytes after them not read";
   }
   return text;
+}
+
+// [m] length of one unit of the files
+double scale_of(const Uri& uri) {
+  return uri.number_option("scale", 1.0, 1e-9, 1e9, "m");
 }
 
 }  // namespace
@@ -97,7 +103,7 @@ std::unique_ptr<Source> open_point_files(const Uri& uri) {
   uri.allow_only(known);
   const PointFileSource::Options options{
       .fps = uri.number_option("fps", 30.0, 1e-3, 1e6, "Hz"),
-      .scale = uri.number_option("scale", 1.0, 1e-9, 1e9, "m"),
+      .scale = scale_of(uri),
   };
   const bool is_pcd = uri.scheme() == "pcd";
   const std::string kind = is_pcd ? "PCD" : "PLY";
@@ -125,6 +131,18 @@ std::unique_ptr<Source> open_point_files(const Uri& uri) {
                   .sensor = sensor_option(uri, SensorKind::unknown)};
   return std::make_unique<PointFileSource>(std::move(files), is_pcd ? read_pcd : read_ply, options,
                                            std::move(info));
+}
+
+std::string rescaled(const std::string& uri, double times) {
+  const Uri parsed(uri);
+  if (parsed.scheme() != "pcd" && parsed.scheme() != "ply") return {};
+  const std::string source = parsed.scheme() + ":" + parsed.path();
+  std::string options = uri.substr(source.size());  // empty, or from '?' on
+  if (const std::size_t old = options.find("scale="); parsed.has("scale"))
+    options.erase(old, options.find('&', old) - old + 1);
+  if (options.empty()) options = "?";
+  if (options.back() != '?' && options.back() != '&') options += '&';
+  return source + options + "scale=" + number_text(times * scale_of(parsed));
 }
 
 }  // namespace palpate

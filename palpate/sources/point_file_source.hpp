@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "palpate/cloud/organised.hpp"
@@ -48,5 +49,9 @@ class PointFileSource final : public Source {
 /// @throws Error if there is no such file or folder, the folder holds no such file, or an option
 ///         is not known or out of range. The files themselves are read by `next`.
 std::unique_ptr<Source> open_point_files(const Uri& uri);
+
+/// The URI of a source whose lengths are `times` as long as those of this one; empty: it is none of
+/// point files, which have an option for that.
+std::string rescaled(const std::string& uri, double times);
 
 }  // namespace palpate

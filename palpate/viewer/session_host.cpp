@@ -14,6 +14,7 @@
 #include "palpate/record/recorded_hand.hpp"
 #include "palpate/servo/placement_table.hpp"
 #include "palpate/servo/stiffness.hpp"
+#include "palpate/sources/point_file_source.hpp"
 #include "palpate/sources/source.hpp"
 
 namespace palpate {
@@ -237,8 +238,22 @@ std::string SessionHost::recorded_scene(const RecordingState& recording) const {
   return "recording:" + recording.folder + (has_mark ? "?" : "");
 }
 
+// A scale that somebody chose is asked about no more.
+void SessionHost::look_at_points(const std::string& uri) {
+  if (proposed_) return;
+  const auto clouds = session_->newest_clouds();
+  const auto* points =
+      clouds.empty() ? nullptr : dynamic_cast<const PointCloud*>(clouds.front().get());
+  if (points == nullptr) return;
+  proposed_ = proposed_touch(*points);
+  const bool may_open = rules_.open_scene && !rules_.scenes.empty() && clouds.size() == 1;
+  if (may_open && proposed_->scale != 1.0 && !Uri(uri).has("scale"))
+    rescaled_uri_ = rescaled(uri, proposed_->scale);
+}
+
 std::string SessionHost::state() {
   SessionState state = session_->state();
+  look_at_points(state.cameras.front().uri);
   json parameters;
   json safety;
   json cameras = json::array();
@@ -266,6 +281,12 @@ std::string SessionHost::state() {
                   {"loop", status.playback.loop},
                   {"speed", status.playback.speed}};
   }
+  json points;
+  if (proposed_)
+    points = {{"extent", proposed_->extent},
+              {"spacing", proposed_->spacing},
+              {"scale", proposed_->scale},
+              {"rescaled", rescaled_uri_}};
   json latched_by = json::array();
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
     if ((state.latched_by >> i & 1U) != 0) latched_by.push_back(safety_flag_names()[i]);
@@ -317,6 +338,7 @@ std::string SessionHost::state() {
       {"placement", placement},
       {"cameras", cameras},
       {"playback", playback},
+      {"points", points},
       {"device",
        {{"uri", device.uri},
         {"kind", device.kind},
@@ -475,7 +497,8 @@ void SessionHost::command(const Command& command, Role role) {
                     [&](const SceneChoice& choice) { return choice.uri == scene->uri; });
     const bool is_recorded =
         !scene->uri.empty() && scene->uri == recorded_scene(session_->state().recording);
-    if (!(is_offered || is_recorded) || !rules_.open_scene)
+    const bool is_proposed = !scene->uri.empty() && scene->uri == rescaled_uri_;
+    if (!(is_offered || is_recorded || is_proposed) || !rules_.open_scene)
       throw Error("scene", "'" + scene->uri + "' is not among those of this session",
                   "choose one of the list, or restart the program with --camera");
     rules_.open_scene(scene->uri);

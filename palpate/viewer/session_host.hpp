@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/cloud/proposed_touch.hpp"
 #include "palpate/session/observer_recordings.hpp"
 #include "palpate/session/session.hpp"
 #include "palpate/viewer/dropped_files.hpp"
@@ -96,6 +97,7 @@ class SessionHost final : public ViewerHost {
  private:
   [[nodiscard]] std::vector<std::string> paintable() const;
   [[nodiscard]] std::string recorded_scene(const RecordingState& recording) const;
+  void look_at_points(const std::string& uri);
   void paint(const ServoTick& newest, double contact_radius);
   void describe(std::uint8_t camera, const ViewingRays& rays);
 
@@ -123,6 +125,9 @@ class SessionHost final : public ViewerHost {
   std::optional<SetBrush> brush_;  // what is touched is painted with; none: it is not
   std::optional<Vec3> dabbed_;     // [m] where the last dab was
   std::string brush_trouble_;      // why it does not paint
+  // Of the first camera, if it shows points without an image, once it has shown some.
+  std::optional<ProposedTouch> proposed_;
+  std::string rescaled_uri_;  // of the same scene as long as is proposed; empty: nobody is asked
   std::optional<TickRing<ServoTick>::Reader> reader_;
   std::optional<TickBatcher> batcher_;
   // A hand beside the first.

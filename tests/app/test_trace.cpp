@@ -15,6 +15,7 @@
 
 #include <Eigen/Core>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -144,8 +145,47 @@ TEST_F(Trace, SaysWhyAPressIsHardlyFelt) {
       run("trace --out " + path("trace.csv") +
           " --set stiffness=100 --camera pcd:" + cloud("sparse.pcd", sheet) + " --press 320,240");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_TRUE(says(outcome.err, "its points are too sparse")) << outcome.err;
+  EXPECT_TRUE(says(outcome.err, "too sparse for any proxy")) << outcome.err;
+  EXPECT_TRUE(says(outcome.err, "sparse.pcd?scale=0.1'")) << outcome.err;
   EXPECT_FALSE(says(outcome.err, "frames had stopped")) << outcome.err;
+}
+
+// A square of 31 x 31 points that a camera sees from 16 gaps away.
+std::vector<Place> square(double gap) {
+  std::vector<Place> points;
+  for (int i = 0; i < 31 * 31; ++i)
+    points.emplace_back(gap * (i % 31 - 15), gap * (i / 31 - 15), 16.0 * gap);
+  return points;
+}
+
+TEST_F(Trace, TouchesSparsePointsByALargerProxyUnlessOneIsChosen) {
+  const std::string press = "trace --out " + path("trace.csv") +
+                            " --camera pcd:" + cloud("sheet.pcd", square(0.01)) +
+                            " --press 325,245";  // between points
+  const Outcome felt = run(press + " --json");
+  ASSERT_EQ(felt.code, 0) << felt.err;
+  EXPECT_GT(nlohmann::json::parse(felt.out)["max_force_asked"].get<double>(), 2.0);
+  EXPECT_TRUE(says(felt.err, "the proxy has r_c = 10")) << felt.err;
+  EXPECT_TRUE(says(felt.err, "--set r_c=0.005 has the usual one")) << felt.err;
+  const Outcome usual = run(press + " --set r_c=0.005");
+  EXPECT_FALSE(says(usual.err, "the proxy has r_c")) << usual.err;
+}
+
+TEST_F(Trace, NamesTheScaleAtWhichPointsInMillimetresAreFelt) {
+  const std::string camera = "pcd:" + cloud("millimetres.pcd", square(10.0));
+  const std::string press = "trace --out " + path("trace.csv") + " --press 320,240 --camera ";
+  const std::string scaled = camera + "?scale=0.001";
+  const Outcome lost = run(press + camera);
+  EXPECT_TRUE(says(lost.err, "too sparse")) << lost.err;
+  EXPECT_TRUE(says(lost.err, "give --camera '" + scaled + "' to touch it 300 mm long")) << lost.err;
+  const Outcome felt = run(press + scaled + " --json");
+  EXPECT_GT(nlohmann::json::parse(felt.out)["max_force_asked"].get<double>(), 2.0) << felt.err;
+  const Outcome info = run("info --json " + camera);
+  const nlohmann::json about = nlohmann::json::parse(info.out);
+  EXPECT_EQ(about["first_frame"]["proposed_scale"], 1e-3);
+  EXPECT_EQ(about["first_frame"]["extent_m"], 300.0);
+  EXPECT_NEAR(about["first_frame"]["spacing_m"].get<double>(), 10.0, 2.0);
+  EXPECT_TRUE(says(about["advice"].get<std::string>(), scaled)) << info.out;
 }
 
 TEST_F(Trace, SaysThatThePathBeganBeforeTheFrames) {

@@ -7,6 +7,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/session/config.hpp"
+#include "palpate/session/from_config.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -119,6 +120,19 @@ TEST(SessionConfig, ComesBackWhateverTheValues) {
     set_parameter(config.parameters, "r_c", between(1e-3, 1e-2));
     expect_same(parse_session_config(to_toml(config), "session.toml"), config);
   }
+}
+
+TEST(SessionConfig, KnowsWhetherSomebodyChoseARadius) {
+  const auto parsed = [](const std::string& text) {
+    return parse_session_config(text, "session.toml");
+  };
+  EXPECT_FALSE(parsed("[parameters]\nstiffness = 500\n").radii_chosen);
+  EXPECT_TRUE(parsed("[parameters]\nr_c = 0.005\n").radii_chosen) << "the usual one, but chosen";
+  EXPECT_FALSE(parsed(to_toml({})).radii_chosen);
+  SessionConfig chosen;
+  chosen.radii_chosen = true;
+  EXPECT_TRUE(parsed(to_toml(chosen)).radii_chosen);
+  EXPECT_TRUE(session_options(chosen).radii_chosen);
 }
 
 TEST(SessionConfig, TakesWhatTheFileLeavesOutFromItsBase) {

@@ -596,6 +596,23 @@ TEST(Session, RefusesWhatItCannotRun) {
   EXPECT_TRUE(fails_saying([] { Session(on_the_wall()).start(); }, "free-running", "run"));
 }
 
+TEST(Session, TakesAProxyThatSparsePointsCarryUnlessOneIsChosen) {
+  const auto radius = [](bool chosen) {
+    SessionOptions options = on_the_wall();
+    options.cameras[0].source = std::make_unique<MadeSource>([](int k) {
+      std::vector<Vec3> sheet;
+      for (int i = 0; i < 400; ++i) sheet.emplace_back(0.01 * (i % 20), 0.01 * (i / 20), 0.5);
+      return Frame{k / 30.0, std::make_shared<PointCloud>(sheet)};
+    });
+    options.radii_chosen = chosen;
+    Session session(std::move(options));
+    session.change([](ServoSettings& settings) { settings.parameters.coupling.stiffness = 500.0; });
+    return session.settings().parameters.proxy.r_c();
+  };
+  EXPECT_GT(radius(false), 0.01);
+  EXPECT_EQ(radius(true), ProxyParameters{}.r_c());
+}
+
 TEST(Session, RefusesAMethodThatCannotTouchWhatTheCamerasSee) {
   const auto points = [] {
     return std::make_unique<MadeSource>([](int k) {

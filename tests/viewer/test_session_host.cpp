@@ -129,6 +129,38 @@ TEST(SessionHost, OpensNoSceneButThoseThatItLists) {
       fails_saying(without.asking(OpenScene{"synthetic:desk"}, Role::operating), "not among"));
 }
 
+TEST(SessionHost, ProposesTheLengthOfWhatIsTooLargeAndOpensItOnceItIsWanted) {
+  const test::TemporaryFolder folder;
+  std::string points = "FIELDS x y z\nPOINTS 400\nDATA ascii\n";
+  for (int i = 0; i < 400; ++i)
+    points += std::to_string(25 * (i % 20)) + " " + std::to_string(25 * (i / 20)) + " 900\n";
+  const std::string camera = "pcd:" + folder.write("millimetres.pcd", points).string();
+  const std::string scaled = camera + "?scale=0.001";
+  std::vector<std::string> opened;
+  const PageRules rules{.scenes = {{camera, "what the program was started with"}},
+                        .open_scene = [&](const std::string& uri) { opened.push_back(uri); }};
+  const auto seen = [&](const std::string& uri) {
+    SessionOptions options = wall_options("mouse:");
+    options.cameras.front().uri = uri;
+    SessionHost host("1.2.3", rules);
+    Session session(std::move(options));
+    host.attach(session);
+    EXPECT_TRUE(json::parse(host.state())["points"].is_null()) << "nothing was seen yet";
+    session.run(0.01);
+    json state = json::parse(host.state())["points"];
+    if (state["rescaled"] != "") host.command(OpenScene{state["rescaled"]}, Role::operating);
+    host.detach();
+    return state;
+  };
+  const json large = seen(camera);
+  EXPECT_EQ(large["extent"], 475.0);
+  EXPECT_EQ(large["scale"], 1e-3);
+  EXPECT_EQ(large["rescaled"], scaled);
+  EXPECT_EQ(opened, std::vector<std::string>{scaled});
+  EXPECT_EQ(seen(scaled)["rescaled"], "");
+  EXPECT_EQ(seen(camera + "?scale=1.0")["rescaled"], "") << "that was chosen";
+}
+
 TEST(SessionHost, OpensAFileThatArrivedInFull) {
   std::vector<std::string> opened;
   const auto files = std::make_shared<DroppedFiles>(1000);

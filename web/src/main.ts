@@ -9,6 +9,7 @@ import { length } from "./camera_math";
 import { handsLines, handsText } from "./more_hands";
 import { cameraText, latchedText, mayOperate, Panel, roleNames } from "./panel";
 import { Plots } from "./plots";
+import { radiusRemark, scaleQuestion } from "./proposal";
 import {
   encodeHand,
   encodeShown,
@@ -35,6 +36,8 @@ const senses = new Senses();
 const steadyWhy = new SteadyWhy();
 let tick: Ticks | null = null;
 let announced = "";
+let declined = ""; // scene at another size that was not wanted
+let remarked = "";
 let recordedHand: Float32Array | null = null;
 const arrived = new Map<number, Frame>();
 
@@ -116,6 +119,7 @@ const connection = new Connection({
     recordedHand = null;
     introduced = hello;
     if (hello.notice) toast(hello.notice, 15_000);
+    remarked = "";
     panel.introduce(hello);
     if (hello.token === "unknown") toast(unknownToken, 15_000);
   },
@@ -145,6 +149,12 @@ const connection = new Connection({
     view.setRadii({ r_c: r_c ?? 0.005, r_1: r_1 ?? 0.005, r_3: r_3 ?? 0.01 });
     write("camera", cameraText(newest));
     get("camera").title = newest.cameras.map(({ uri }) => uri).join(", ");
+    write("proposal-text", scaleQuestion(newest.points));
+    const proposed = newest.points?.rescaled ?? "";
+    get("proposal").hidden = !proposed || proposed === declined || !mayOperate(newest);
+    const usual = introduced?.parameters.find(({ name }) => name === "r_c")?.default ?? 0.005;
+    const remark = radiusRemark(newest.points, r_c ?? usual, usual);
+    if (remark && !remarked) toast((remarked = remark), 10_000);
     const latched = latchedText(newest);
     write("latched-text", latched);
     get("latched").hidden = !latched;
@@ -342,6 +352,13 @@ for (const [id, set] of [
 get("follow").addEventListener("click", follow);
 get("record").addEventListener("click", record);
 get("reset-faults").addEventListener("click", () => connection.ask({ reset_faults: true }));
+get("proposal-yes").addEventListener("click", () => {
+  if (state?.points) connection.ask({ open: state.points.rescaled });
+});
+get("proposal-no").addEventListener("click", () => {
+  declined = state?.points?.rescaled ?? "";
+  get("proposal").hidden = true;
+});
 get("colour").addEventListener("click", switchColour);
 get("more-plots").addEventListener("click", () => {
   const all = get("more-plots").getAttribute("aria-expanded") !== "true";

@@ -428,6 +428,12 @@ export interface State {
   cameras: CameraState[];
   /** null: nothing is a recording */
   playback: Playback | null;
+  /**
+   * the first camera's points without an image: how long all is and how far apart they are [m],
+   * by what their lengths are best multiplied, and the scene that is so long (empty: nobody is
+   * asked); null: none are there
+   */
+  points: { extent: number; spacing: number; scale: number; rescaled: string } | null;
   /** `warnings`: what speaks against the present stiffness on it */
   device: { uri: string; kind: string; takes_hand: boolean; fault: string; warnings: string[] };
   servo: {

@@ -438,6 +438,26 @@ describe.each([
         ),
       };
     });
+    // Nothing covers anything else, whatever is shown.
+    const covered = await page.evaluate(() => {
+      for (const id of ["timeline", "latched"]) document.getElementById(id)!.hidden = false;
+      const parts = [".brand", ".actions", "#hand", "#role", ".hud", ".latched", ".hint", ".legend"];
+      const boxes = [...parts, ".timeline", ".panel"].flatMap((selector) => {
+        const box = document.querySelector(selector)!.getBoundingClientRect();
+        return box.width > 0 ? [{ selector, box }] : [];
+      });
+      return boxes.flatMap(({ selector, box: a }, i) =>
+        boxes
+          .slice(i + 1)
+          .filter(
+            ({ box: b }) =>
+              Math.min(a.right, b.right) - Math.max(a.left, b.left) > 0.5 &&
+              Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 0.5,
+          )
+          .map((other) => `${selector} and ${other.selector}`),
+      );
+    });
+    expect(covered).toEqual([]);
     expect(boxes.scrolls).toBe(false);
     expect(boxes.view).toBeGreaterThan(height / 3);
     expect(boxes.inside).toEqual([true, true, true, true, true, true]);

@@ -2,10 +2,8 @@
 // The brush: what is touched gets another material.
 
 import { clamp } from "./camera_math";
-import { element } from "./panel";
+import { element, get, write } from "./dom";
 import type { State } from "./protocol";
-
-const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
 const NONE = "none";
 const ERASER = "erase";
@@ -73,8 +71,6 @@ export class Brush {
       this.material.value = paint.brush === null ? NONE : paint.brush.material || ERASER;
     if (document.activeElement !== this.radius && paint.brush)
       this.radius.value = String(1e3 * paint.brush.radius);
-    const about = get("brush-about");
-    const text = paintText(paint);
-    if (about.textContent !== text) about.textContent = text;
+    write(get("brush-about"), paintText(paint));
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files that are dropped onto the page, or chosen, to be touched.
 
+import { get } from "./dom";
 import { mayOperate } from "./panel";
 import type { Hello, State } from "./protocol";
 
@@ -30,8 +31,6 @@ export function whyNotSent(
     );
   return null;
 }
-
-const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
 export interface FileActions {
   /** the address to send a file of that name to */

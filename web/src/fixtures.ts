@@ -2,10 +2,8 @@
 // Virtual fixtures: where they are, as lines, and what the page adds and removes.
 
 import { posed } from "./camera_math";
-import { element } from "./panel";
+import { element, get } from "./dom";
 import type { FixtureState, Role, State, Vec3 } from "./protocol";
-
-const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
 const ROUND = 32; // sides of a circle
 const PLATE = 0.15; // [m] half of what is drawn of a plane

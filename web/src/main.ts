@@ -2,6 +2,7 @@
 import "./style.css";
 import { Brush, dabColour } from "./brush";
 import { Connection, unknownToken, type Presence } from "./connection";
+import { get, write as writeIn } from "./dom";
 import { Files } from "./files";
 import { fixtureLines, Fixtures } from "./fixtures";
 import { HandInput, isForForm } from "./hand";
@@ -24,7 +25,6 @@ import { Senses } from "./senses";
 import { handAt, Timeline, trailAt } from "./timeline";
 import { flagNames, SteadyWhy, why } from "./why";
 
-const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 const DISENGAGED = 1 << 6; // SafetyFlag
 const NUMBERS = 100; // [ms] between changes of what is written: faster, nobody reads it
 
@@ -237,8 +237,7 @@ function contactRadius(): number {
 }
 
 function write(id: string, text: string): void {
-  const box = get(id);
-  if (box.textContent !== text) box.textContent = text;
+  writeIn(get(id), text);
 }
 
 // All that is said of the force comes from one tick, and changes at once.

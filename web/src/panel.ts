@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Method, parameters, safety and session: what the program says of itself, and what can be set.
 
+import { element, get, write } from "./dom";
 import type { Hello, ParameterRow, Role, State } from "./protocol";
 
 /** What a page is called, and what it may do. */
@@ -78,7 +79,7 @@ export function cameraText({
 /** What is to be said while faults are latched; empty: none is. */
 export function latchedText({ role, latched_by }: Pick<State, "role" | "latched_by">): string {
   if (latched_by.length === 0) return "";
-  const what = `No force, as faults came again and again (${latched_by.join(", ")}).`;
+  const what = `Faults: ${latched_by.join(", ")}.`;
   return role === "operating"
     ? `${what} Find their cause, let go of the surface, then reset them.`
     : `${what} Only the operator resets them: open ${OPERATORS_LINK}.`;
@@ -145,18 +146,6 @@ export function stiffnessFirst<Row extends { name: string }>(rows: readonly Row[
   const isFirst = ({ name }: Row) => name === "stiffness";
   return [...rows.filter(isFirst), ...rows.filter((row) => !isFirst(row))];
 }
-
-export function element<Tag extends keyof HTMLElementTagNameMap>(
-  tag: Tag,
-  properties: Partial<HTMLElementTagNameMap[Tag]> = {},
-  ...children: (Node | string)[]
-): HTMLElementTagNameMap[Tag] {
-  const made = Object.assign(document.createElement(tag), properties);
-  made.append(...children);
-  return made;
-}
-
-const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
 /** One parameter: a slider, a number and the way back to the default. */
 class Row {
@@ -400,27 +389,28 @@ export class Panel {
     this.showRecording(state);
     if (document.activeElement !== this.method) this.method.value = state.method;
     if (document.activeElement !== this.scene) this.scene.value = state.cameras[0]?.uri ?? "";
-    get("method-meaning").textContent =
-      this.hello?.methods.find(({ name }) => name === state.method)?.meaning ?? "";
+    const method = this.hello?.methods.find(({ name }) => name === state.method);
+    write(get("method-meaning"), method?.meaning ?? "");
     const warning = get("stiffness-warning");
-    const text = warningText(state.device.warnings);
-    if (warning.textContent !== text) warning.textContent = text;
-    warning.hidden = !text;
+    write(warning, warningText(state.device.warnings));
+    warning.hidden = !warning.textContent;
     for (const [name, row] of this.rows) row.show(state.parameters[name] ?? Number.NaN);
     for (const [name, row] of this.limits) row.show(state.safety[name] ?? Number.NaN);
     for (const [name, row] of this.placement) row.show(state.placement[name] ?? Number.NaN);
     this.showRole(state.role);
     const count = (id: string, counts: readonly number[]) =>
       [...get(id).children].forEach((item, i) => {
-        item.lastElementChild!.textContent = (counts[i] ?? 0).toLocaleString("en");
+        write(item.lastElementChild!, (counts[i] ?? 0).toLocaleString("en"));
         item.classList.toggle("some", (counts[i] ?? 0) > 0);
       });
     count("flags", state.flag_ticks);
     count("interventions", state.interventions);
     const total = state.interventions.reduce((sum, n) => sum + n, 0);
-    get("safety-lead").textContent =
+    write(
+      get("safety-lead"),
       `${total.toLocaleString("en")} interventions of the safety chain; suspected pop-throughs: ` +
-      `${state.pop_throughs}.`;
+        `${state.pop_throughs}.`,
+    );
     this.showFacts(state, inOwnFrame);
   }
 
@@ -443,8 +433,7 @@ export class Panel {
   /** Clock and size in the record button while it records; the way into the recording after. */
   private showRecording({ recording, role }: State): void {
     const text = recording.path ? recordingClock(recording) : "Record";
-    const label = get("record").querySelector("span")!;
-    if (label.textContent !== text) label.textContent = text;
+    write(get("record").querySelector("span")!, text);
     this.opener.hidden = recording.open === null || role !== "operating";
     this.opener.title = recording.message;
     this.opener.value = recording.open ?? "";
@@ -489,9 +478,6 @@ export class Panel {
     const texts = facts.flat();
     if (list.children.length !== texts.length)
       list.replaceChildren(...texts.map((_, i) => element(i % 2 === 0 ? "dt" : "dd")));
-    texts.forEach((text, i) => {
-      const item = list.children[i]!;
-      if (item.textContent !== text) item.textContent = text;
-    });
+    texts.forEach((text, i) => write(list.children[i]!, text));
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
+import { element, write } from "./dom";
 import type { Sample } from "./protocol";
 
 const SPAN = 10; // [s] shown
@@ -19,10 +20,20 @@ interface Quantity {
   least: number;
   /** it may be below 0 */
   signed?: true;
+  /** the number beside the scene says it, of a newer tick */
+  isSaid?: true;
 }
 
 const QUANTITIES: readonly Quantity[] = [
-  { title: "Force", unit: "N", colour: "--force", of: (s) => s.force, digits: 2, least: 1 },
+  {
+    title: "Force",
+    unit: "N",
+    colour: "--force",
+    of: (s) => s.force,
+    digits: 2,
+    least: 1,
+    isSaid: true,
+  },
   {
     title: "Hand below the surface",
     unit: "mm",
@@ -30,6 +41,7 @@ const QUANTITIES: readonly Quantity[] = [
     of: (s) => 1e3 * s.penetration,
     digits: 1,
     least: 2,
+    isSaid: true,
   },
   {
     title: "Energy given in this contact",
@@ -115,7 +127,7 @@ export class Plots {
       const values = this.samples.map((sample) => (sample.gap ? null : quantity.of(sample)));
       chart.setData([times, values]);
       const text = `${values[values.length - 1]!.toFixed(quantity.digits)} ${quantity.unit}`.trim();
-      value.textContent = text;
+      write(value, quantity.isSaid ? quantity.unit : text);
       host.setAttribute("aria-label", `${quantity.title}, last ${SPAN} seconds; now ${text}`);
     }
   }
@@ -134,19 +146,11 @@ export class Plots {
     // The page's letters grow with the window: those of the axes do too.
     const grown = (pixels: number) => Math.round((pixels * parseFloat(style.fontSize)) / 14);
     this.plots = this.quantities.map((quantity, i) => {
-      const article = document.createElement("article");
-      article.className = "plot";
-      const header = document.createElement("header");
-      const title = document.createElement("b");
-      title.textContent = quantity.title;
-      const value = document.createElement("output");
-      value.ariaLive = "off"; // it changes fifteen times a second
-      header.append(title, value);
-      const host = document.createElement("div");
-      host.className = "canvas";
-      host.setAttribute("role", "img");
-      article.append(header, host);
-      this.parent.append(article);
+      // It changes fifteen times a second.
+      const value = element("output", { ariaLive: "off" });
+      const host = element("div", { className: "canvas", role: "img" });
+      const header = element("header", {}, element("b", {}, quantity.title), value);
+      this.parent.append(element("article", { className: "plot" }, header, host));
       const last = i === this.quantities.length - 1;
       const axis = {
         stroke: css("--muted"),

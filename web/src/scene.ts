@@ -35,6 +35,7 @@ const TRAIL = 360; // ticks messages
 /** Places of the line behind the recorded hand. */
 export const GHOST_TRAIL = 60;
 const MOST_DABS = 500; // of paint
+const LONGEST_NAME = 24; // letters of a fixture's name in the scene
 const MOST_LINKS = 32; // of a robot's arm
 const PAINT_LAYER = 5e-3; // [m] before the surface
 const SPOT_SIZE = 9; // [px] of the ring under the pointer
@@ -72,8 +73,9 @@ function ringTexture(): THREE.Texture {
   return new THREE.CanvasTexture(canvas);
 }
 
-// A name that faces the eye and keeps its size on the screen.
-function nameSprite(name: string, colour: string): THREE.Sprite {
+// A name that faces the eye and keeps its size on the screen; of a long one its beginning.
+function nameSprite(whole: string, colour: string): THREE.Sprite {
+  const name = whole.length > LONGEST_NAME ? `${whole.slice(0, LONGEST_NAME - 1)}…` : whole;
   const canvas = document.createElement("canvas");
   const context = canvas.getContext("2d")!;
   const font = "600 44px system-ui, sans-serif";

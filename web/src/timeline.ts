@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a recording is, and what stops it, moves it and sets its speed.
 
+import { get, write } from "./dom";
 import { mayOperate } from "./panel";
 import type { Command, Playback, State, Vec3 } from "./protocol";
 
@@ -55,8 +56,6 @@ export function trailAt(
   );
 }
 
-const get = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
-
 export class Timeline {
   private readonly place = get<HTMLInputElement>("place");
   private readonly speed = get<HTMLSelectElement>("speed");
@@ -106,7 +105,7 @@ export class Timeline {
     this.place.max = String(recording.frames - 1);
     this.place.value = String(recording.place);
     this.place.setAttribute("aria-valuetext", timeText(recording.time));
-    get("place-text").textContent = timeText(recording.time);
+    write(get("place-text"), timeText(recording.time));
   }
 
   private set(change: Partial<Playback>): void {

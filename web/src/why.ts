@@ -25,7 +25,7 @@ export interface Facts {
   /** names of the flags that are set */
   flags: ReadonlySet<string>;
   hand: "you" | "other" | "free";
-  state: Pick<State, "latched_by" | "device" | "parameters"> | null;
+  state: Pick<State, "device" | "parameters"> | null;
   /** names of the fixtures that give a force */
   acting: readonly string[];
   /** [m] of the proxy above what is seen, below 0 behind it; null: nothing is seen there */
@@ -80,12 +80,7 @@ function asked(facts: Parameters<Say>[0]): string {
 
 // Why no force is sent, in the order in which they decide. Empty: this does not say why.
 const NONE: readonly [flag: string, say: Say][] = [
-  [
-    "fault_latched",
-    ({ state }) =>
-      `faults came again and again (${(state?.latched_by ?? []).join(", ")}), and the operator ` +
-      "has to reset them.",
-  ],
+  ["fault_latched", () => "faults came again and again, and the operator has to reset them."],
   ["output_refused", () => "the safety chain's own result broke its bounds."],
   ["input_refused", () => "the hand or the method gave a number that is not finite."],
   ["direction_refused", () => "the surface normal contradicts the force's direction."],

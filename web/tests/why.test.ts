@@ -30,7 +30,6 @@ const facts = (flags: string[], more: Partial<Facts> = {}): Facts => ({
   flags: new Set(flags),
   hand: "you",
   state: {
-    latched_by: ["input_refused"],
     device: { uri: "mouse:", kind: "mouse", takes_hand: true, fault: "", warnings: [] },
     parameters: { stiffness: 600, r_c },
   },
@@ -72,7 +71,7 @@ describe("why the force is what it is", () => {
     ["frame_lost", /^No force.*no usable frame/],
     ["no_frame", /^No force.*no frame to touch/],
     ["disengaged", /^No force.*pull back/],
-    ["fault_latched", /^No force.*input_refused/],
+    ["fault_latched", /^No force.*again and again/],
   ])("%s, which takes it away, is named", (flag, text) => {
     const said = why(facts([flag, "slew_cut"], { tick: none }));
     expect(said).toMatchObject({ link: flag, text: expect.stringMatching(text) });

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <utility>
 #include <vector>
 
@@ -76,6 +77,11 @@ Time Time::at(std::int64_t nanoseconds) {
     --sec;
   }
   return {static_cast<std::int32_t>(sec), static_cast<std::uint32_t>(rest)};
+}
+
+Time Time::now() {
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  return at(std::chrono::duration_cast<std::chrono::nanoseconds>(since_1970).count());
 }
 
 std::vector<std::byte> from_ros1(std::string_view type, std::span<const std::byte> bytes,

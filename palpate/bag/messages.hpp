@@ -25,8 +25,11 @@ struct Time {
   [[nodiscard]] std::int64_t nanoseconds() const {
     return std::int64_t{1'000'000'000} * sec + nanosec;
   }
+  [[nodiscard]] double seconds() const { return 1e-9 * static_cast<double>(nanoseconds()); }
   /// Wrapped into what the fields can hold.
   static Time at(std::int64_t nanoseconds);
+  /// By the wall clock of this machine.
+  static Time now();
 
   static void walk(auto& way, auto& m) { way(m.sec, m.nanosec); }
 };

@@ -13,6 +13,7 @@
 #include "palpate/core/text.hpp"
 #include "palpate/drivers/cyclone_api.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/servo/realtime.hpp"
 
 namespace palpate::dds {
 
@@ -260,6 +261,11 @@ std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields) 
     code.push_back(cyclone::op_return);
   }
   return code;
+}
+
+ros::Time stamp_of(double monotonic) {
+  const double ago = monotonic_now() - monotonic;
+  return ros::Time::at(ros::Time::now().nanoseconds() - std::llround(1e9 * ago));
 }
 
 std::string dds_type(std::string_view type) {

@@ -188,6 +188,9 @@ Listening listening(const Reader& requests, std::uint64_t client, const Writer& 
 /// The instructions by which Cyclone DDS writes and reads such a struct.
 std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields);
 
+/// A time of the servo loop's clock [s] on the wall's, which stamps of ROS are on.
+ros::Time stamp_of(double monotonic);
+
 /// A type's name in DDS: "sensor_msgs::msg::dds_::Image_".
 std::string dds_type(std::string_view type);
 /// A topic's name in DDS, which for services depends on the type: "rt/camera/points",

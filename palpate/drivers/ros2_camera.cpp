@@ -108,7 +108,7 @@ class RemoteClock {
   void look() {
     while (const auto answer = answers_.take<ros::TimeReference>()) {
       if (answer->source != id_) continue;  // somebody else's
-      relation_.add(seconds(answer->time_ref), seconds(answer->header.stamp), monotonic_now());
+      relation_.add(answer->time_ref.seconds(), answer->header.stamp.seconds(), monotonic_now());
     }
     const double now = monotonic_now();
     if (now < next_) return;
@@ -127,9 +127,6 @@ class RemoteClock {
  private:
   static std::int64_t nanoseconds(double seconds) {
     return static_cast<std::int64_t>(std::llround(1e9 * seconds));
-  }
-  static double seconds(const ros::Time& time) {
-    return 1e-9 * static_cast<double>(time.nanoseconds());
   }
 
   dds::Writer questions_;
@@ -163,7 +160,7 @@ class SliceReader {
       if (!is_depth_slice(*message))
         throw Error(name, "is an image of format '" + message->format + "', not a slice of depth",
                     "name a topic that palpate serve-camera publishes");
-      const double stamp = 1e-9 * static_cast<double>(message->header.stamp.nanoseconds());
+      const double stamp = message->header.stamp.seconds();
       if (auto before = assembler_.add(message->data, stamp, monotonic_now(), name)) {
         count(*before);
         newest = std::move(before);
@@ -413,7 +410,7 @@ class Camera final : public LiveCamera {
   Pending& begin(const ros::Header& header) {
     pending_.emplace();
     pending_->arrival = monotonic_now();
-    pending_->stamp = 1e-9 * static_cast<double>(header.stamp.nanoseconds());
+    pending_->stamp = header.stamp.seconds();
     pending_->tf_frame = header.frame_id;
     return *pending_;
   }

@@ -123,12 +123,9 @@ class ForceWriter {
   void write(const Vec3& force, const std::string& frame) {
     const std::array<double, 3> xyz{force.x(), force.y(), force.z()};
     switch (kind_) {
-      case Kind::wrench_stamped: {
-        const auto now = std::chrono::system_clock::now().time_since_epoch();
-        const auto since = std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
-        writer_->write(ros::WrenchStamped{{ros::Time::at(since), frame}, xyz, {}});
+      case Kind::wrench_stamped:
+        writer_->write(ros::WrenchStamped{{ros::Time::now(), frame}, xyz, {}});
         break;
-      }
       case Kind::wrench:
         writer_->write(ros::Wrench{xyz, {}});
         break;
@@ -285,7 +282,7 @@ class Hand final : public Device {
         if (turn.coeffs().allFinite() && turn.norm() > 0.5)
           newest_.state.orientation =
               Eigen::Quaterniond(wanted_.device_from_topic) * turn.normalized();
-        newest_.state.stamp = 1e-9 * static_cast<double>(pose->header.stamp.nanoseconds());
+        newest_.state.stamp = pose->header.stamp.seconds();
         any = place(pose->position) || any;
       }
     } else {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cctype>
-#include <chrono>
 #include <cmath>
 #include <mutex>
 #include <thread>
@@ -41,13 +40,6 @@ std::string checked_name(const std::string& name) {
     throw Error("name", "'" + name + "' is none for a topic",
                 "write letters, digits and _, such as robot/camera");
   return name;
-}
-
-ros::Time wall_clock() {
-  using std::chrono::duration_cast;
-  using std::chrono::nanoseconds;
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return ros::Time::at(duration_cast<nanoseconds>(now).count());
 }
 
 }  // namespace
@@ -97,7 +89,7 @@ struct Ros2CameraPublisher::Topics {
         rate.report(monotonic_now(), report->data[0], report->data[1], report->data[2]);
       }
       while (const auto question = questions.take_whole<ros::TimeReference>())
-        answers.write(ros::TimeReference{.header = {wall_clock(), ""},
+        answers.write(ros::TimeReference{.header = {ros::Time::now(), ""},
                                          .time_ref = question->header.stamp,
                                          .source = question->source});
     }

@@ -5,7 +5,6 @@
 #include <array>
 #include <atomic>
 #include <cctype>
-#include <chrono>
 #include <cmath>
 #include <exception>
 #include <functional>
@@ -64,15 +63,6 @@ double checked_rate(double rate) {
     throw Error("--publish-rate", number_text(rate) + " Hz is too low or too high",
                 "give 1 to 1000");
   return rate;
-}
-
-// A time of the servo loop's clock on the wall's, which stamps of ROS are on.
-ros::Time stamp_of(double monotonic) {
-  using std::chrono::nanoseconds;
-  using std::chrono::system_clock;
-  const auto now =
-      std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count();
-  return ros::Time::at(now + std::llround(1e9 * (monotonic - monotonic_now())));
 }
 
 template <std::size_t size>
@@ -231,7 +221,7 @@ class RosNode::Impl {
     bool fresh = false;
     for (const auto& hand : hands_) {
       hand->read();
-      if (hand->fresh) hand->publish({stamp_of(hand->report.newest.tick.t), frame_});
+      if (hand->fresh) hand->publish({dds::stamp_of(hand->report.newest.tick.t), frame_});
       fresh = fresh || hand->fresh;
     }
     if (fresh && now >= due.markers) {
@@ -254,7 +244,7 @@ class RosNode::Impl {
     ros::MarkerArray all;
     for (std::size_t i = 0; i < hands_.size(); ++i) {
       const ServoTick& newest = hands_[i]->report.newest;
-      ros::MarkerArray markers = markers_of(newest, radius, {stamp_of(newest.tick.t), frame_});
+      ros::MarkerArray markers = markers_of(newest, radius, {dds::stamp_of(newest.tick.t), frame_});
       for (auto& marker : markers.markers) {
         marker.id = static_cast<std::int32_t>(i);
         all.markers.push_back(std::move(marker));
@@ -278,7 +268,8 @@ class RosNode::Impl {
     for (std::size_t i = 1; i < hands_.size(); ++i)
       report.more_hands.push_back({hands_[i]->second, session_.device(i).info()});
     for (const auto& hand : hands_) hand->second.flags = hand->second.safety = 0;
-    diagnostics_.write(diagnostics_of(report, session_.device().info(), {stamp_of(now), frame_}));
+    diagnostics_.write(
+        diagnostics_of(report, session_.device().info(), {dds::stamp_of(now), frame_}));
     tell_changes();
   }
 
@@ -392,7 +383,7 @@ class RosNode::Impl {
     }
     known_ = std::move(all);
     if (event.changed.empty()) return;
-    event.stamp = stamp_of(monotonic_now());
+    event.stamp = dds::stamp_of(monotonic_now());
     event.node = name_;
     events_.write(event);
   }

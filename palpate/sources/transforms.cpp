@@ -48,8 +48,7 @@ Trajectory::Sample sample_of(const ros::TransformStamped& transform, const std::
   if (!translation.allFinite() || !(std::abs(rotation.norm() - 1.0) < 0.01))
     throw Error(name, "has a transform to " + transform.child_frame_id + " that is not rigid",
                 "ignore TF with ?fixed_frame=none");
-  return {1e-9 * static_cast<double>(transform.header.stamp.nanoseconds()), translation,
-          rotation.normalized()};
+  return {transform.header.stamp.seconds(), translation, rotation.normalized()};
 }
 
 Eigen::Isometry3d pose_of(const Trajectory::Sample& sample) {

@@ -110,7 +110,7 @@ class OperatorEnd::Impl {
       bring_to_hand();
       return;
     }
-    const ros::Header header{ros_stamp(now), "world"};
+    const ros::Header header{dds::stamp_of(now), "world"};
     presses_.write(ros::WrenchStamped{header, components(lead.press), {}});
     places_.write(ros::PoseStamped{header, components(lead.place)});
   }

@@ -145,7 +145,8 @@ class RobotEnd::Impl {
   void on_frame(std::size_t camera, const FedFrame& fed) {
     const DepthImage* image = fed.frame.cloud->image();
     // What others touch is the first camera's.
-    if (camera == 0 && image != nullptr) publisher_.publish(*image, since_1970(fed.frame.stamp));
+    if (camera == 0 && image != nullptr)
+      publisher_.publish(*image, dds::stamp_of(fed.frame.stamp).seconds());
     const std::lock_guard lock(mutex_);
     if (watches_.size() <= camera) watches_.resize(camera + 1);
     watches_[camera].frame(fed.frame.cloud, fed.frame.stamp, state_.position);
@@ -257,7 +258,7 @@ class RobotEnd::Impl {
 
   void report(double now) {
     const RobotState at = state();
-    const ros::Header header{ros_stamp(now), "world"};
+    const ros::Header header{dds::stamp_of(now), "world"};
     tools_.write(ros::PoseStamped{header, components(at.position)});
     twists_.write(ros::TwistStamped{header, components(at.velocity)});
     contacts_.write(ros::WrenchStamped{header, components(contact_), {}});

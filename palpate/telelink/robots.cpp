@@ -194,12 +194,9 @@ class Ros2Robot final : public Robot {
   void command(const Vec3& position, const Vec3& /*velocity*/, double /*t*/) noexcept override {
     if (!is_place(position)) return;
     try {
-      const auto now = std::chrono::system_clock::now().time_since_epoch();
-      const auto since = std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
       // The tool keeps the orientation in which it was found.
-      commands_->write(ros::PoseStamped{{ros::Time::at(since), frame_},
-                                        {position.x(), position.y(), position.z()},
-                                        orientation_});
+      commands_->write(ros::PoseStamped{
+          {ros::Time::now(), frame_}, {position.x(), position.y(), position.z()}, orientation_});
     } catch (const std::exception&) {  // what is not sent stops the arm
     }
   }

@@ -2,14 +2,10 @@
 #pragma once
 
 #include <array>
-#include <chrono>
-#include <cmath>
 #include <string>
 
-#include "palpate/bag/messages.hpp"
 #include "palpate/core/patch.hpp"
 #include "palpate/drivers/dds.hpp"
-#include "palpate/servo/realtime.hpp"
 
 namespace palpate {
 
@@ -35,17 +31,6 @@ struct TeleopTopics {
 inline constexpr dds::Quality newest_alone{};
 inline constexpr dds::Quality each_one{.reliable = true};
 inline constexpr dds::Quality kept_for_late{.reliable = true, .keeps_for_late = true};
-
-/// A time of the servo loop's clock [s] on the wall's, since 1970.
-inline double since_1970(double monotonic) {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(now).count() + monotonic - monotonic_now();
-}
-
-/// The same as a stamp of ROS.
-inline ros::Time ros_stamp(double monotonic) {
-  return ros::Time::at(static_cast<std::int64_t>(std::llround(1e9 * since_1970(monotonic))));
-}
 
 inline std::array<double, 3> components(const Vec3& v) {
   return {v.x(), v.y(), v.z()};

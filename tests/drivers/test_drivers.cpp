@@ -44,7 +44,7 @@ TEST(Drivers, AreListedByTheirFilesAlone) {
   const Registry<Driver> drivers("driver", ":", strangers_drivers());
   ASSERT_EQ(drivers.entries().size(), 1U);
   const auto arm = open_device("stranger:", std::nullopt, all_devices(drivers));
-  EXPECT_EQ(arm->read().position, Vec3(1.0, 2.0, 3.0));
+  EXPECT_EQ(arm->read(0.0).position, Vec3(1.0, 2.0, 3.0));
 }
 
 TEST(Drivers, ReportWhatTheirLookMeets) {

@@ -133,7 +133,7 @@ TEST(SessionHost, ProposesTheLengthOfWhatIsTooLargeAndOpensItOnceItIsWanted) {
   const test::TemporaryFolder folder;
   std::string points = "FIELDS x y z\nPOINTS 400\nDATA ascii\n";
   for (int i = 0; i < 400; ++i)
-    points += std::to_string(25 * (i % 20)) + " " + std::to_string(25 * (i / 20)) + " 900\n";
+    points += std::to_string(15 * (i % 20)) + " " + std::to_string(15 * (i / 20)) + " 900\n";
   const std::string camera = "pcd:" + folder.write("millimetres.pcd", points).string();
   const std::string scaled = camera + "?scale=0.001";
   std::vector<std::string> opened;
@@ -153,7 +153,7 @@ TEST(SessionHost, ProposesTheLengthOfWhatIsTooLargeAndOpensItOnceItIsWanted) {
     return state;
   };
   const json large = seen(camera);
-  EXPECT_EQ(large["extent"], 475.0);
+  EXPECT_EQ(large["extent"], 285.0);
   EXPECT_EQ(large["scale"], 1e-3);
   EXPECT_EQ(large["rescaled"], scaled);
   EXPECT_EQ(opened, std::vector<std::string>{scaled});

@@ -23,7 +23,7 @@ class Error : public std::runtime_error {
  private:
   static std::string one_line(std::string text) {
     for (char& c : text) {
-      if ((c >= '\0' && c < ' ') || c == '\x7f') c = ' ';
+      if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
     }
     return text;
   }

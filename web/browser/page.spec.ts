@@ -418,7 +418,7 @@ test("what one page sets, all pages show", async () => {
 describe.each([
   [360, 640],
   [820, 1180],
-  [3840, 2160],
+  [2560, 1440],
 ])("at %i x %i", (width, height) => {
   test("everything has room", async () => {
     const page = await open(DESK, width, height);

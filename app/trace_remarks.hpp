@@ -25,7 +25,7 @@ namespace palpate::app {
 class TraceRemarks {
  public:
   /// @param r_c       [m] of the proxy
-  /// @param is_press  the hand is led by what is seen, so it began where it did on purpose
+  /// @param is_press  the hand is led by the visible surface, so it began where it did on purpose
   TraceRemarks(double r_c, bool is_press) : r_c_(r_c), is_press_(is_press) {}
 
   /// Counts a tick. @param cameras  the newest frame of each; null before its first

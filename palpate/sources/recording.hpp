@@ -16,7 +16,7 @@ namespace palpate {
 /// metre, to which depth in floats is rounded (5000: 0.2 mm, up to 13 m); `fixed_frame=odom` is the
 /// frame of TF in which points are, and `none` leaves TF aside. Frames for whose time a bag that
 /// has TF has no transform are left out. For a frame that cannot be read next() throws an Error;
-/// the call after it goes on with the next frame.
+/// the call after it continues with the next frame.
 /// @throws Error if the bag cannot be used, or holds no frames.
 std::unique_ptr<Source> open_recording(const Uri& uri);
 

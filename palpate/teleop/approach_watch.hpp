@@ -38,7 +38,7 @@ class ApproachWatch {
   ApproachWatch();
 
   /// A frame has come. Four gatherings of a ball. @param tool  [m] world
-  /// @param stamp  [s] later than those before; others begin anew
+  /// @param stamp  [s] later than those before; others begin again
   const Approach& frame(std::shared_ptr<const Cloud> cloud, double stamp, const Vec3& tool);
   [[nodiscard]] const Approach& newest() const { return approach_; }
   /// Would a tool pass through a surface of the newest frame on its straight way to its proxy? That

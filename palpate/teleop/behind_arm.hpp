@@ -13,7 +13,7 @@ namespace palpate {
 /// the arm and does not lose what is under it. A pixel's memory ends, and the pixel is a hole,
 /// - after `kept`;
 /// - where the arm is seen behind what is remembered: that has gone;
-/// - where what is seen around it has moved since the arm came, by more than 0.5 mm and four
+/// - where the visible surface around it has moved since the arm came, by more than 0.5 mm and four
 ///   standard deviations of the noise that is seen.
 /// What moves and is hidden wholly is remembered where it was: that is the price.
 class BehindArm {
@@ -38,7 +38,7 @@ class BehindArm {
   struct Block {
     bool hidden = false;  // partly
     bool moved = false;
-    double way = 0.0;    // [m] mean of what is seen, since the arm came, over some frames
+    double way = 0.0;    // [m] mean of the visible surface, since the arm came, over some frames
     double noise = 0.0;  // [m^2] variance of a pixel's way from one frame to the next
   };
   static constexpr int side = 16;  // [px] of a block

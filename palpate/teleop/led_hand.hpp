@@ -32,7 +32,8 @@ struct LeadLimits {
 void validate(const LeadLimits& limits);
 
 /// The hand at the robot's end of a link: what was led goes into a session there as any hand does,
-/// so that a camera beside the robot keeps its proxy, and with it the robot, out of what is seen.
+/// so that a camera beside the robot keeps its proxy, and with it the robot, out of the visible
+/// surface.
 ///
 /// Follows the newest lead at a limited speed. Where none comes, nobody leads any more, or nothing
 /// is seen, it rests where the tool is, and stays a hand: a surface that moves still pushes the

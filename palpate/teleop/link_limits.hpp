@@ -12,7 +12,7 @@ namespace palpate {
 /// and is lost 0.3 s later.
 /// @param latency  [s] capture to arrival, as it usually is; at most 1 s counts
 inline SafetyParameters for_link(SafetyParameters safety, double latency) noexcept {
-  constexpr double longest = 1.0;    // [s] nobody leads a robot by older pictures
+  constexpr double longest = 1.0;    // [s] nobody leads a robot by older images
   constexpr double fade_time = 0.3;  // [s]
   if (latency > 0.0) safety.fade_age += std::min(latency, longest);
   safety.lost_age = safety.fade_age + fade_time;

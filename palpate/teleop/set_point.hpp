@@ -14,8 +14,8 @@ namespace palpate {
 /// How the robot's set-point is made of the proxy at its end.
 struct SetPointOptions {
   double tool_radius = 5e-3;  ///< [m] as RobotInfo::tool_radius
-  /// [m] by which the tool stays away from what is seen: the proxy's radius at the robot's end is
-  /// larger by it
+  /// [m] by which the tool stays away from the visible surface: the proxy's radius at the robot's
+  /// end is larger by it
   double margin = 2e-3;
   double lag = 0.08;  ///< [s] as RobotInfo::lag: a surface that comes is led before by so much
   /// [N/m] as RobotInfo::stiffness; empty: it does not press
@@ -30,7 +30,7 @@ struct SetPointOptions {
 };
 
 /// The forbidden regions of a set as a robot has to keep them: they never give way. Guides, viscous
-/// regions and what is seen are left out; the proxy keeps out of what is seen.
+/// regions and the visible surface are left out; the proxy keeps out of the visible surface.
 std::shared_ptr<const FixtureSet> robot_fixtures(const FixtureSet& fixtures);
 
 /// @throws Error if one of them is out of range.
@@ -42,8 +42,8 @@ void validate(const SetPointOptions& options);
 ServoTick with_proxy_at(const Vec3& tool, ServoTick tick);
 
 /// Where the robot's tool is sent: the proxy at the robot's end, which its own camera keeps out of
-/// what is seen, and
-/// - farther from what is touched by twice the noise of the picture, and by the way that what moved
+/// the visible surface, and
+/// - farther from what is touched by twice the noise of the image, and by the way that what moved
 ///   in the last seconds makes in the robot's lag, and in the 0.2 s in which nobody notices that a
 ///   surface that was touched has turned: 20 mm at most;
 /// - from what comes, touched or not, by its speed times the robot's lag, so that the tool is out
@@ -53,7 +53,7 @@ ServoTick with_proxy_at(const Vec3& tool, ServoTick tick);
 /// - where it is pushed with `unwanted_force` more than that, or with more than `max_force`, seen
 ///   or not, away from what pushes.
 /// Forbidden regions come before all that. What comes moves it at once; a proxy that falls, as a
-/// noisy picture may let it, takes it along at `contact_speed` only.
+/// noisy image may let it, takes it along at `contact_speed` only.
 /// Values in, values out: no clock, no thread. [servo]
 class SetPoint {
  public:

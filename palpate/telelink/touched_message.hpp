@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// x, y, z [m], normal's x, y, z, stiffness [N/m], friction; what is not known is no number.
+/// x, y, z [m], normal's x, y, z, stiffness [N/m], friction; NaN: unknown.
 inline ros::Float64MultiArray message_of(const Touched& touched) {
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
   const Vec3& place = touched.place;

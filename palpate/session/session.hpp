@@ -197,8 +197,8 @@ class Session {
   /// @throws Error as `set`, and what `edit` throws; everything is then as it was
   void change(const std::function<void(ServoSettings&)>& edit);
   /// Says where a hand's device lies in the scene; takes effect in the next tick, and the hand has
-  /// to engage again. @throws Error, leaving everything as it was, if the placement is out of
-  /// range.
+  /// to engage again.
+  /// @throws Error, leaving everything as it was, if the placement is out of range.
   void place(std::size_t hand, const Placement& placement);
   /// How its recordings are played. The force goes to zero and ramps up again wherever time jumps.
   /// Real time. @throws Error as CameraFeed::set_playback and seek.

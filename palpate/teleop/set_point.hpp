@@ -44,8 +44,8 @@ ServoTick with_proxy_at(const Vec3& tool, ServoTick tick);
 /// The commanded position of the robot's tool: the proxy at the robot's end, which its camera keeps
 /// out of the visible surface,
 /// - plus a distance from the touched surface: twice the noise of the image, the speed of recent
-///   motion times the robot's lag, and 0.2 s of the surface's recent speed, in which a reversal goes
-///   unnoticed; 20 mm at most;
+///   motion times the robot's lag, and 0.2 s of the surface's recent speed, in which a reversal
+///   goes unnoticed; 20 mm at most;
 /// - away from approaching objects, touched or not, by their speed times the robot's lag
 ///   (ApproachWatch, and the method's velocity);
 /// - into the surface by the operator's force over the robot's stiffness, if the robot is to press;

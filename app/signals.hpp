@@ -39,7 +39,7 @@ class Interruption {
   Interruption(const Interruption&) = delete;
   Interruption& operator=(const Interruption&) = delete;
 
-  /// The signal that came first, 0 before. Of no lock; each call looks anew.
+  /// The signal that came first, 0 before. Of no lock; each call looks again.
   [[nodiscard]] int signal() const noexcept;
 
  private:

@@ -187,7 +187,7 @@ void TraceRemarks::count_points(const Tick& tick,
 std::string TraceRemarks::hardly_felt(std::span<const ShownFrames> shown) const {
   const std::string begin =
       fmt::format("the surface was touched with hardly any force, {:.2f} N at most: ", largest_);
-  // A single frame is a picture, however old.
+  // A single frame is a static image of any age.
   std::size_t frames = 0;
   for (const ShownFrames& each : shown) frames += each.count;
   if (frames > 1 && 2 * stale_ > contact_)
@@ -223,7 +223,7 @@ std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
   if (!is_press_ && !start_.empty()) lines.push_back(start_);
   for (std::size_t i = 0; i < shown.size(); ++i) {
     const ShownFrames& frames = shown[i];
-    if (!frames.ended || frames.count < 2) continue;  // one frame is a still picture
+    if (!frames.ended || frames.count < 2) continue;  // one frame is a still image
     const double interval = (frames.last - frames.first) / static_cast<double>(frames.count - 1);
     const double left = last_t_ - frames.last;
     if (left > std::max(2.0 * interval, grace))

@@ -26,7 +26,7 @@ namespace palpate::app {
 class TraceRemarks {
  public:
   /// @param r_c       [m] of the proxy
-  /// @param is_press  the hand is led by what is seen, so it began where it did on purpose
+  /// @param is_press  the hand is led by the visible surface, so it began where it did on purpose
   /// @param sparse    why points cannot be felt anywhere (sparse_remark); empty: they can
   TraceRemarks(double r_c, bool is_press, std::string sparse)
       : r_c_(r_c), is_press_(is_press), sparse_(std::move(sparse)) {}

@@ -15,7 +15,7 @@ namespace palpate::bench {
 /// How a hand moves while ticks are measured.
 struct Hand {
   double depth = 0.005;       ///< [m] beyond the surface; negative: above it, in free motion
-  double speed = 0.1;         ///< [m/s] to and fro along the surface
+  double speed = 0.1;         ///< [m/s] back and forth along the surface
   double amplitude = 0.02;    ///< [m]
   double frame_rate = 30.0;   ///< [Hz] of frames
   double tick_rate = 1000.0;  ///< [Hz] of ticks

@@ -15,7 +15,7 @@ std::function<double()> speed_of(const SimulatedHand& hand, double mass) {
   return [&hand, mass] { return std::sqrt(2.0 * hand.statistics().kinetic / mass); };
 }
 
-// A handle that is moved along a path until the hand on it feels nothing and lets go.
+// A handle that is moved along a path until the hand on it feels nothing and releases.
 class LetGo final : public Device {
  public:
   LetGo(const HipPath& path, const DevicePreset& device, double from)

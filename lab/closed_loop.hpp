@@ -30,7 +30,7 @@ HeldDevice on_path(const HipPath& path);
 HeldDevice in_hand(const HipPath& path, const Grip& grip, const DevicePreset& device,
                    std::uint64_t seed);
 
-/// A hand that follows a path exactly and lets go of the handle at the first tick after `from` [s]
+/// A hand that follows a path exactly and releases the handle at the first tick after `from` [s]
 /// whose force the device's friction holds: from then on the handle is free, and at rest at first.
 HeldDevice let_go(const HipPath& path, const DevicePreset& device, double from);
 

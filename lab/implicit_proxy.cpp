@@ -36,7 +36,7 @@ void ImplicitProxy::climb(const Field& field) {
   changed_ = false;
   const auto here = field(*point_);
   if (!here || here->value >= 0.0 || !(here->gradient.norm() > 1e-12)) {
-    touching_ = false;  // it may have sunk: approached anew
+    touching_ = false;  // it may have sunk: approached again
     return;
   }
   const Vec3 out = here->gradient.normalized();
@@ -86,7 +86,7 @@ bool ImplicitProxy::slide(const Field& field, const Vec3& hip, const Vec3& norma
     const Vec3 next = aside + i * step;
     if (inside(field, next) != rising) {
       const Vec3 found = rising ? between(field, next, last) : between(field, last, next);
-      // Only nearer to the HIP, or it would go to and fro for ever.
+      // Only nearer to the HIP, or it would go back and forth without end.
       if ((hip - found).norm() > way.norm() - at_rest) return false;
       point_ = found;
       return true;

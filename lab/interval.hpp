@@ -22,7 +22,7 @@ Interval wilson(std::size_t successes, std::size_t of);
 /// @param parts  at least one
 Interval mean_of(std::span<const Interval> parts);
 
-/// The mean of repeats that differ by chance alone: Student's t. One repeat says nothing: its
+/// The mean of repeats that differ at random alone: Student's t. One repeat says nothing: its
 /// bounds are infinite.
 /// @param repeats  at least one
 Interval student(std::span<const double> repeats);

@@ -52,7 +52,7 @@ class Arrivals {
 };
 
 /// Plays a scenario to a method: every frame at the first tick at or after it arrives, in order.
-/// @param on_tick  (const Tick&) -> bool, after each tick: go on?
+/// @param on_tick  (const Tick&) -> bool, after each tick: continue?
 template <class OnTick>
 void play(Method& method, const Scenario& scenario, const OnTick& on_tick) {
   Arrivals arrivals(scenario);

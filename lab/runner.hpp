@@ -14,14 +14,14 @@ namespace palpate::lab {
 /// How an experiment's cells are run.
 struct RunnerOptions {
   int jobs = 1;         ///< threads of this process
-  bool resume = false;  ///< go on from the cells that an interrupted run left behind
+  bool resume = false;  ///< continue from the cells that an interrupted run left behind
   std::function<void(std::size_t done, std::size_t total)> progress;  ///< after every cell
 };
 
 /// Runs an experiment and writes its CSV to `file`. Returns the CSV.
 ///
 /// Cells may end in any order; the CSV has them in theirs. Finished cells are kept in FILE.part
-/// until the CSV is whole, so an interrupted run can go on. Under MPI the ranks share the cells,
+/// until the CSV is whole, so an interrupted run can continue. Under MPI the ranks share the cells,
 /// rank 0 writes, and the other ranks return an empty text.
 /// @throws Error if the file cannot be written, or there is nothing that fits to resume.
 std::string run_experiment(const Experiment& experiment, const ExperimentOptions& options,

@@ -78,7 +78,7 @@ void set_all(Parameters& parameters, const py::kwargs& values);
 /// Lets Python handle a signal, such as Ctrl-C; throws what it raises. Takes the GIL.
 void check_signals();
 
-/// An object of Python's that C++ may let go of on any thread.
+/// An object of Python's that C++ may release on any thread.
 std::shared_ptr<const void> kept(py::object object);
 
 /// What the parts of the module define.

@@ -5,7 +5,7 @@
 
 namespace palpate::robot {
 
-// The four blocks around the hole, which are all of the body, are written anew.
+// The four blocks around the hole, which are all of the body, are written again.
 std::string desk_model(double hole) {
   constexpr double half_x = 0.0575;  // [m] of the board
   constexpr double half_y = 0.04;    // [m]

@@ -57,7 +57,7 @@ def cameras(build, seconds, folder):
     stock = build / "tests/fakes/libraries/openni2-stock"
     rows = [("`synthetic:`", SYNTHETIC, {}), ("`realsense:`", "realsense:", {}),
             ("`openni2:`", "openni2:", {}),
-            ("`openni2:`, the library itself", "openni2:", {"PALPATE_OPENNI2": str(stock)}),
+            ("`openni2:`, real library", "openni2:", {"PALPATE_OPENNI2": str(stock)}),
             ("`freenect:`", "freenect:", {}),
             ("`v4l2:`", f"v4l2:/dev/video77?intrinsics={lens}", kernel)]
     print("| camera | rate [Hz] | capture to arrival [ms] | arrival to force, p50, p99 [ms] "

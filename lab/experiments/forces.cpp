@@ -201,8 +201,8 @@ Figure force_figure(const Table& table) {
   return {{panel}};
 }
 
-// Into a resting plane and half out again, 5 mm to and fro at 5 Hz, never leaving it; with more and
-// more damping.
+// Into a resting plane and half out again, 5 mm back and forth at 5 Hz, never leaving it; with more
+// and more damping.
 std::vector<Cell> damping_cells(const Experiment& experiment, const ExperimentOptions& options) {
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options)) {

@@ -9,7 +9,7 @@ namespace palpate::lab {
 Experiment hold_experiment();
 /// What the hand feels while the surface moves: 1 Hz, 20 mm.
 Experiment force_experiment();
-/// Section 4.6: what damping does to a hand that goes to and fro in a resting plane.
+/// Section 4.6: what damping does to a hand that goes back and forth in a resting plane.
 Experiment damping_experiment();
 
 }  // namespace palpate::lab

@@ -131,7 +131,7 @@ PopCase shrink(const MethodMaker& make, PopCase c, const Parameters& parameters)
         next.values.find(range.key)->second = shrunk;
         if (!still_lost(next)) continue;
         c = next;
-        // Halving goes on only while it gains something.
+        // Halving continues only while it gains something.
         simpler = simpler || std::abs(shrunk - value) > 0.2 * std::abs(range.simple) + 1e-4;
         break;
       }

@@ -52,7 +52,7 @@ Judgement judge(const std::string& method, const PopCase& c, const ExperimentOpt
 /// Is the surface lost in a case? Nothing is shrunk: for tables of many methods.
 bool is_lost(const std::string& method, const PopCase& c, const Parameters& parameters);
 
-/// Does a method keep the proxy on the right side? Families of cases drawn by chance, each failure
+/// Does a method keep the proxy on the right side? Families of cases drawn at random, each failure
 /// shrunk to the simplest case that still fails. docs/pop.md has the rules.
 Experiment pop_experiment();
 

@@ -15,7 +15,7 @@
 
 namespace palpate::lab {
 
-/// Numbers by chance, the same on every machine.
+/// Numbers at random, the same on every machine.
 class Chance {
  public:
   explicit Chance(std::uint64_t seed) : bits_(seed) {}
@@ -32,7 +32,7 @@ Chance chance_of(std::string_view name, std::uint64_t seed, std::uint64_t index)
 /// A value to three digits, so that a printed case is exactly the one that was played.
 double rounded(double value);
 
-/// A value that a family of cases draws by chance.
+/// A value that a family of cases draws at random.
 struct PopRange {
   std::string_view key;
   double simple;     ///< the simplest there is: what a failure is shrunk towards

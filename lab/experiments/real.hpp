@@ -16,7 +16,7 @@ namespace palpate::lab {
 /// cut out of the recorded frames, with their noise, are moved along or across the lines of sight.
 Experiment real_experiment();
 
-/// One case on a recording: a place and a motion drawn by chance.
+/// One case on a recording: a place and a motion drawn at random.
 struct RealCase {
   std::string text;  ///< all that was drawn
   std::function<Judgement(const std::string& method, const ExperimentOptions& options)> play;

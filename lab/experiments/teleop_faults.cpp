@@ -42,7 +42,7 @@ class Chance {
   std::mt19937_64 random_;
 };
 
-// A plane or a ball on it, tilted by chance; one in two moves by up to 60 mm/s.
+// A plane or a ball on it, tilted at random; one in two moves by up to 60 mm/s.
 std::vector<Part> parts_of(Chance& chance) {
   const double slope = chance.between(0.0, 0.3);  // [rad]
   const Eigen::Isometry3d pose(

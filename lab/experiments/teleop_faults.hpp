@@ -10,8 +10,8 @@
 
 namespace palpate::lab {
 
-/// Hands that lead a robot by chance, while the link, the camera or one of the two processes fails:
-/// does the robot break a fixture, press too hard or go on? docs/teleop.md.
+/// Hands that lead a robot at random, while the link, the camera or one of the two processes fails:
+/// does the robot break a fixture, press too hard or continue? docs/teleop.md.
 Experiment teleop_faults_experiment();
 
 /// An episode: a scene before a noisy or an exact camera, a hand, a link, and what fails.

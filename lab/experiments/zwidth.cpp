@@ -30,7 +30,7 @@ constexpr double across = 0.12;       // [m] that it sees
 constexpr double above = 3e-3;   // [m]
 constexpr double down_at = 0.3;  // [s]
 constexpr double down_in = 0.1;  // [s] for a hand; a handle that nobody holds is let go
-constexpr double push = 1.0;     // [N] a Touch gives 0.88 N for ever
+constexpr double push = 1.0;     // [N] a Touch gives 0.88 N continuously
 constexpr double poke_at = 0.9;  // [s]
 constexpr double poke_for = 0.02;
 constexpr double poke_push = 2.0;  // [N] more; 0.04 N s throw 60 g at 0.6 m/s
@@ -129,14 +129,14 @@ ZScene::ZScene(std::string_view name, std::string_view sensor, std::uint64_t see
 
 Vec3 ZScene::touched_at(double r_c) const {
   // A sphere that comes down from above; the surfaces are symmetric about the z axis. Then the hand
-  // goes on by its radius before the coupling pushes.
+  // continues by its radius before the coupling pushes.
   Vec3 at(0.0, 0.0, 0.1);
   for (int i = 0; i < 200; ++i) at.z() -= truth_(at, 0.0).distance - r_c;
   return at - r_c * Vec3::UnitZ();
 }
 
 bool ZTrial::decays() const {
-  // A swing that goes on is there both times; a single kick, by a frame's noise, is not.
+  // A swing that continues is there both times; a single kick, by a frame's noise, is not.
   const bool rests = std::min(speed, speed_before) <= at_rest;
   return !cut && force >= least_force && (rests || speed <= left * speed_before);
 }
@@ -179,7 +179,7 @@ ZTrial poke(const ZLoop& loop, const Parameters& parameters, double stiffness) {
 }
 
 double largest_stiffness(const ZLoop& loop, const Parameters& parameters) {
-  // Upwards, as one step may decay by chance where softer ones do not.
+  // Upwards, as one step may decay at random where softer ones do not.
   double low = 0.0;
   double high = softest;
   while (poke(loop, parameters, high).decays()) {

@@ -19,7 +19,7 @@ constexpr double firm = 1.0;           // [N] both rulers' force from which a ha
 constexpr double least_share = 0.25;   // [-] of it
 constexpr double has_side = 0.5;       // [N] a ruler's force that has a side
 constexpr double opposite = -0.5;      // [-] cosine
-constexpr double jump = 0.015;         // [m] that may lie between what is and what is seen
+constexpr double jump = 0.015;         // [m] that may lie between what is and the visible surface
 constexpr double just_before = 0.002;  // [m] from the sphere: what is met there is what it touches
 
 bool inside(const Snapshot& scene, const Vec3& place) {

@@ -136,7 +136,7 @@ class Constrained final : public LabMethod {
     moves_ = 0;
     Vec3 before = *centre_;
     while (moves_ < most_moves) {
-      if (++moves_ % 6 == 0) {  // where more than three planes meet it would go on in a circle
+      if (++moves_ % 6 == 0) {  // where more than three planes meet it would continue in a circle
         if ((*centre_ - before).norm() < at_rest) break;
         before = *centre_;
       }

@@ -152,7 +152,7 @@ class PointBoxes final : public LabMethod {
     return hit;
   }
 
-  // Towards the HIP: each face that is met holds its coordinate, the others go on.
+  // Towards the HIP: each face that is met holds its coordinate, the others continue.
   int follow(const Vec3& hip) {
     std::array<bool, 3> held{};
     Vec3 goal = hip;

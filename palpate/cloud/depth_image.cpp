@@ -446,7 +446,7 @@ std::optional<double> DepthImage::seen_past(int u, int v, double z, double jump,
                                             int stride) const noexcept {
   // Largest hole that an edge search crosses: stereo cameras leave a shadow beside near objects.
   constexpr int widest_hole = 16;   // [px]
-  constexpr double steepest = 2.0;  // [-] depth over width of a surface that goes on past a hole
+  constexpr double steepest = 2.0;  // [-] depth over width of a surface that continues past a hole
   const Intrinsics& k = intrinsics();
   const auto beside = [&](int du, int dv) {
     const double pitch = z * (du != 0 ? 1.0 / k.fx : 1.0 / k.fy) * stride;
@@ -573,7 +573,7 @@ void DepthImage::gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t 
       for (int i = 0; i < 9; ++i) {
         around[static_cast<std::size_t>(i)] = look(u + i % 3 - 1, v + i / 3 - 1, z);
       }
-      // From the pixel to its four neighbours. Towards another surface it goes on as on the other
+      // From the pixel to its four neighbours. Towards another surface it continues as on the other
       // side; without either, across the line of sight.
       const auto step = [&](std::size_t to, std::size_t from, const Vec3& across) -> Vec3 {
         if (around[to].same) return around[to].p - here.p;

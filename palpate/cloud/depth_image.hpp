@@ -72,7 +72,7 @@ class DepthReadings {
  public:
   DepthReadings(std::vector<std::uint16_t> readings)  // NOLINT(google-explicit-constructor)
       : DepthReadings(std::make_shared<const std::vector<std::uint16_t>>(std::move(readings))) {}
-  /// @param owner  keeps `readings` alive; released on whichever thread lets go of the image last
+  /// @param owner  keeps `readings` alive; released on whichever thread releases the image last
   DepthReadings(std::span<const std::uint16_t> readings, std::shared_ptr<const void> owner)
       : readings_(readings), owner_(std::move(owner)) {}
 

@@ -11,10 +11,10 @@ namespace palpate {
 namespace {
 
 constexpr int view_width = 640, view_height = 480;  // [px]
-constexpr double filled = 0.95;                     // [-] of the picture, by the cloud
+constexpr double filled = 0.95;                     // [-] of the image, by the cloud
 const double widest = std::tan(1.2);                // [-] of the angle from the axis, about 69 deg
-const double outside = std::tan(0.35);  // [-] of half the picture's height, from a corner
-constexpr int largest_dot = 10;         // [px] half the side of a point's square
+const double outside = std::tan(0.35);              // [-] of half the image's height, from a corner
+constexpr int largest_dot = 10;                     // [px] half the side of a point's square
 
 // A camera at `eye` that looks along `forward` with `up` upwards.
 Eigen::Isometry3d looking(const Vec3& eye, const Vec3& forward, const Vec3& up) {
@@ -75,7 +75,7 @@ ProposedView proposed_view(const PointCloud& cloud) {
   const bool is_level = side.z() <= std::max(side.x(), side.y());
   const Vec3 back = (is_level ? Vec3(0.6, -0.9, 0.7) : Vec3(0.6, 0.5, 1.0)).normalized();
   const Vec3 up = is_level ? Vec3::UnitZ() : Vec3::UnitY();
-  // The ball about the cloud's box is in the picture from here.
+  // The ball about the cloud's box is in the image from here.
   const double distance = std::max(0.5 * side.norm(), 1e-3) / std::sin(std::atan(outside));
   const Eigen::Isometry3d pose = looking(0.5 * (low + high) + distance * back, -back, up);
   return view_from(pose, reach_of(cloud, pose));

@@ -243,7 +243,7 @@ class GuardTick {
     const double now = monotonic_now();
     device_.write(gate_.pass(now, beats_, wanted_), now);
     if (gate_.closed()) {
-      state.present = false;  // so that the session's safety chain lets go, and engages anew
+      state.present = false;  // so that the session's safety chain releases, and engages again
       if (state.fault == DeviceFault::none && beats_ > 0) state.fault = DeviceFault::other;
     }
     memory_.hand.write(hand_of(state));

@@ -24,7 +24,7 @@ class GuardGate {
   /// @param beats  how many forces the session has written so far
   /// @param force  [N] device frame: the newest of them
   /// @return [N] zero if none came for beat_time, and from then on until the session has written a
-  ///         zero force: a process that was stopped may go on in the middle of a tick.
+  ///         zero force: a process that was stopped may continue in the middle of a tick.
   Vec3 pass(double now, std::uint64_t beats, const Vec3& force);
 
   /// Is the session's force kept from the device?

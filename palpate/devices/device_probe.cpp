@@ -113,7 +113,7 @@ class Exciter final : public Method {
     if (!(t - began_ <= options_.time)) finish(End::too_long);
   }
 
-  // Rest, then for each axis and level: back to the start, and to and fro.
+  // Rest, then for each axis and level: back to the start, and back and forth.
   Vec3 excite(const Vec3& hip, double t) noexcept {
     const double since = t - stretch_began_;
     if (stretch_ == 0) {
@@ -217,7 +217,7 @@ class Watcher {
  public:
   Watcher(Exciter& exciter, Device& device) : exciter_(exciter), device_(device) {}
 
-  // True while it goes on.
+  // True while it continues.
   bool add(const ServoTick& tick) {
     constexpr std::uint32_t let_go =
         disengaged | input_refused | fault_latched | output_refused | hand_too_fast;

@@ -38,9 +38,9 @@ struct DeviceMeasurement {
   std::vector<std::string> doubts;         ///< why the figures may be wrong, a sentence each
 };
 
-/// Moves a handle that nobody holds, to and fro along each axis, by at most `force`, and fits its
-/// mechanics. Through the servo loop and its safety chain: the force is off at once, and stays off,
-/// when the handle goes too far or too fast, when the device reports a fault or no hand, when
+/// Moves a handle that nobody holds, back and forth along each axis, by at most `force`, and fits
+/// its mechanics. Through the servo loop and its safety chain: the force is off at once, and stays
+/// off, when the handle goes too far or too fast, when the device reports a fault or no hand, when
 /// `cancelled` says so, and when this thread or the loop hangs (ServoLoop; frames that it no longer
 /// gets). A simulated device is measured on a clock of its own, at once.
 ///

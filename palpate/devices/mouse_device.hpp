@@ -13,7 +13,7 @@ namespace palpate {
 /// Where a person at a screen wants the hand.
 struct MouseTarget {
   Vec3 position = Vec3::Zero();  ///< [m] device frame
-  bool present = true;           ///< false lets go: no force until it is back
+  bool present = true;           ///< false releases: no force until it is back
   bool clutched = false;         ///< true: the hand moves and the HIP stays
 };
 

@@ -11,11 +11,11 @@ namespace palpate {
 
 /// A hand that follows a path and does not care for forces.
 ///
-/// The path begins at the first `read`; after its end the hand rests, or begins anew.
+/// The path begins at the first `read`; after its end the hand rests, or begins again.
 class ScriptedDevice final : public Device {
  public:
   /// @param path    [m] device frame
-  /// @param repeat  begin anew after the end
+  /// @param repeat  begin again after the end
   ScriptedDevice(HipPath path, bool repeat, std::string uri = "script:");
 
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }

@@ -12,7 +12,7 @@ namespace {
 constexpr double highest_share = 0.4;
 // [-] frequency over `lowest`, from which the vibration has all of its strength.
 constexpr double all_of_it = 2.0;
-// [-] by which a frequency may change until its pole is computed anew: a sixth of a semitone.
+// [-] by which a frequency may change until its pole is computed again: a sixth of a semitone.
 constexpr double same_turn = 0.01;
 
 }  // namespace

@@ -29,7 +29,7 @@ class NodeParameters {
   /// As rcl_interfaces has it: those whose name is a prefix or lies below one, to that depth.
   [[nodiscard]] ros::ListParameters::Reply list(const std::vector<std::string>& prefixes,
                                                 std::uint64_t depth) const;
-  /// Whole numbers are taken for numbers, as people write them.
+  /// Whole numbers are treated as numbers, as people write them.
   /// @throws Error for an unknown name (naming the nearest), a value of another type or out of its
   ///         range, and what can be read alone.
   void set(ServoSettings& settings, const ros::Parameter& parameter) const;

@@ -206,7 +206,7 @@ class RosNode::Impl {
       try {
         participant_.wait(std::clamp(due.ticks - monotonic_now(), 0.0, longest_wait));
         work(due);
-      } catch (const std::exception& error) {  // the session goes on without what failed
+      } catch (const std::exception& error) {  // the session continues without what failed
         const std::lock_guard lock(trouble_mutex_);
         trouble_ = error.what();
       }

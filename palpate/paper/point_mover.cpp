@@ -10,7 +10,7 @@ namespace palpate {
 namespace {
 
 // A gather reaches beyond r_3 by as much as the proxy may travel, between these multiples of r_c:
-// less would make slow slides gather anew every few steps, more would make every loop longer.
+// less would make slow slides gather again every few steps, more would make every loop longer.
 constexpr double least_margin = 0.2;
 constexpr double most_margin = 4.0;
 

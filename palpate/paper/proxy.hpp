@@ -26,7 +26,7 @@ struct ProxyMovement {
 enum class MovementEnd {
   at_rest,       ///< converged by (8), or blocked
   budget_spent,  ///< after step_budget steps
-  patch_left,    ///< points are needed that the patch does not cover: gather, and go on
+  patch_left,    ///< points are needed that the patch does not cover: gather, and continue
 };
 
 /// Movement steps 2 to 7 of section 4.3, over and over: moves the proxy until it rests.

@@ -84,7 +84,7 @@ class Recorder {
   void stop();
   /// The same, but gives up when the disk has taken nothing for `patience` [s], or not all within
   /// six times that. The cycle's reader is not used any more then, and the bag is closed when the
-  /// disk goes on; only the destructor waits for that.
+  /// disk continues; only the destructor waits for that.
   /// @return done()
   bool try_stop(double patience);
   /// Any thread.
@@ -145,7 +145,7 @@ class Recorder {
   std::deque<AdoptedFrame> adopted_;               // to be written before them
   std::map<std::size_t, std::shared_ptr<const Cloud>> newest_;  // of each camera, as handed over
   std::uint64_t entries_handed_ = 0;
-  std::optional<double> seated_at_;  // [s] when the seat in info_ has to be written anew
+  std::optional<double> seated_at_;  // [s] when the seat in info_ has to be written again
   std::optional<Vec3> seat_;
   std::optional<CycleState> state_;  // at seated_at_
   Status status_;

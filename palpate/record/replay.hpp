@@ -37,7 +37,7 @@ struct ReplayReport {
   ReplayDifferences sent{};
   /// Why `sent` could not be compared, such as a recording that is too old; empty if it was.
   std::string sent_unchecked;
-  /// Why it could not go on to the end, such as ticks that the recorder lost; empty if it could.
+  /// Why it could not continue to the end, such as ticks that the recorder lost; empty if it could.
   std::string broken_off;
   /// What the checksums say of all messages, also of those that a replay does not need.
   BagCheck check{};
@@ -48,7 +48,7 @@ struct ReplayReport {
   }
 };
 
-/// Runs the loop's cycle anew, method and safety chain, on what went into it: a session's frames,
+/// Runs the loop's cycle again, method and safety chain, on what went into it: a session's frames,
 /// hands, settings and wake-up times. Compares each tick with the recorded one, bit for bit.
 ///
 /// Of recordings that lack what the chain needs, the method alone is run and compared. Where a

@@ -41,7 +41,7 @@ class SessionWriter {
 
   // Each throws Error if the disk is full or fails; what was committed before stays.
 
-  /// Says anew what the session is: the last time counts. Its epoch stays.
+  /// Says again what the session is: the last time counts. Its epoch stays.
   /// @param t  [s] when it was that
   void info(const SessionInfo& info, double t);
   /// Settings, before the first tick that uses them.

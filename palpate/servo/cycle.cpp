@@ -267,7 +267,7 @@ void Cycle::run(const Wake& wake) noexcept {
   const Vec3 hip = workspace_.hip_in_world(hand, t);
   bool reseated = false;
   // Where the hand is in the scene has changed at once, or the scene has: the hand is disengaged,
-  // and the proxy starts anew on the free side.
+  // and the proxy starts again on the free side.
   const bool jumped = std::exchange(placement_changed_, false);
   const bool sees = !seen_.parts().empty();
   if (sees && (safety_.stalls_at(t) || jumped)) {

@@ -34,7 +34,7 @@ struct ServoSettings {
   SafetyParameters safety;
   Placement placement;
   /// Counts what is in the scene: where it changes, as another recording is opened or time jumps in
-  /// one, the hand is disengaged and the proxy starts anew on the free side.
+  /// one, the hand is disengaged and the proxy starts again on the free side.
   std::uint64_t scene = 0;
   /// Virtual fixtures: forbidden regions, guides, viscous regions. Null: none.
   std::shared_ptr<const FixtureSet> fixtures = {};
@@ -181,7 +181,7 @@ class Cycle {
   /// @return the number of the settings, as in ServoTick::settings_number
   /// @throws Error if they do not validate or the method refuses its parameters.
   std::uint64_t set_method(std::shared_ptr<Method> method, const ServoSettings& settings);
-  /// The same with the settings that were set last: for one of the same name, made anew.
+  /// The same with the settings that were set last: for one of the same name, made again.
   NumberedSettings set_method(std::shared_ptr<Method> method);
 
   /// Sees every cycle from the next one on. Any thread.
@@ -236,7 +236,7 @@ class Cycle {
   Workspace workspace_;
   WeightSupport support_;
   Parameters parameters_;  // in use
-  Patch patch_;            // for seating the proxy anew
+  Patch patch_;            // for seating the proxy again
 
   mutable std::mutex writers_;  // of changes, kept apart; the servo never takes it
   Change newest_change_;        // guarded by writers_

@@ -19,7 +19,7 @@ constexpr double quick_share = 178.0;
 // [-] the same for slower cycles, whatever the rate. Taps at 7 Hz with a light and hard contact
 // generate up to 0.3.
 constexpr double slow_share = 0.35;
-// [cycles] that a slow cycle counts for: what is slow has more time to happen by chance.
+// [cycles] that a slow cycle counts for: what is slow has more time to happen at random.
 constexpr double slow_weight = 0.5;
 // [-] of those shares, enough while a cut is in force: a surface that was made softer swings more
 // slowly and generates less, and that a hand was there to do it is no longer likely.

@@ -13,7 +13,7 @@ namespace palpate {
 /// A passive surface gives back at most the energy that the hand put in: over a cycle of pressing
 /// and letting go, the work of the force on the hand, relative to the surface's own motion, is not
 /// positive. A sampled surface gives back more, by K (T/2 + t_d) times the integral of the squared
-/// velocity, and a device and hand that damp less than that swing for ever, at the frequency of
+/// velocity, and a device and hand that damp less than that swing without end, at the frequency of
 /// their mass on the surface's stiffness: 10 to 25 Hz on a desktop arm, less with a heavy one.
 ///
 /// Cycles are found in the hand's motion along the surface's normal, relative to the surface. Many

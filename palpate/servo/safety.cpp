@@ -270,7 +270,7 @@ double SafetyChain::peak() const noexcept {
   return std::max(std::min(parameters_.max_force, device_.max_force) - held_, 0.0);
 }
 
-// The share of the budget that is used up takes the peak down to what can be given for ever.
+// The share of the budget that is used up takes the peak down to the continuous force.
 double SafetyChain::peak_as_warm() const noexcept {
   const double cold = peak() + held_;
   if (!(device_.continuous_force < cold)) return peak();

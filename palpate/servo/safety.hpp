@@ -166,7 +166,7 @@ class SafetyChain {
   /// [servo] O(1), no allocation, lock, system call or exception.
   SafetyOutput run(const SafetyInput& input) noexcept;
 
-  /// Would a tick at `t` come after a stall? Then the proxy must be seated anew before it (see
+  /// Would a tick at `t` come after a stall? Then the proxy must be seated again before it (see
   /// `free_side`). [servo]
   [[nodiscard]] bool stalls_at(double t) const noexcept;
 

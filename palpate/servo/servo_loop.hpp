@@ -62,8 +62,8 @@ class ServoLoop {
   /// cases the device is then disabled and the threads end. A cycle that hangs, in the method or
   /// the driver, is waited for 1 s at most. A concurrent second call only disables the device,
   /// immediately. Any thread except the servo thread.
-  /// @return false if a cycle (or Device::enable) hangs: its thread goes on until that returns and
-  ///         then ends; the device stays disabled. Destroying this waits for it
+  /// @return false if a cycle (or Device::enable) hangs: its thread continues until that
+  ///         returns and then ends; the device stays disabled. Destroying this waits for it
   bool stop();
   /// Requests the servo thread to end with a zero force, and returns at once: with several loops,
   /// no hand waits for another. `stop` has to follow. Any thread.

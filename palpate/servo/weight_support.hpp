@@ -10,7 +10,7 @@ namespace palpate {
 class WeightSupport {
  public:
   static constexpr double ramp_time = 1.5;     ///< [s] slow enough to let go
-  static constexpr double longest_gap = 5e-3;  ///< [s] between two ticks; over more it starts anew
+  static constexpr double longest_gap = 5e-3;  ///< [s] between two ticks; over more it starts again
   static constexpr double most = 1.0;          ///< [N]
 
   /// @param t       [s] now

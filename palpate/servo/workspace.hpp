@@ -61,7 +61,7 @@ class Workspace {
   void place(const Placement& placement) noexcept { placement_ = placement; }
   [[nodiscard]] const Placement& placement() const noexcept { return placement_; }
 
-  /// The HIP [m, world]. While the hand is clutched the HIP stays, and goes on from there after.
+  /// The HIP [m, world]. While the hand is clutched the HIP stays, and continues from there after.
   /// A position that is not finite, or absurd, gives a HIP that is not finite and leaves no trace.
   /// @param t  [s] now, on the loop's clock
   Vec3 hip_in_world(const HandState& hand, double t) noexcept {

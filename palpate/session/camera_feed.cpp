@@ -253,7 +253,7 @@ class CameraFeed::Worker {
   CameraStatus status_;
   double last_heard_ = 0.0;           // [s] when the last frame came
   bool is_starting_ = true;           // no frame since it was opened
-  std::optional<double> read_until_;  // [s] when the read that goes on must have ended
+  std::optional<double> read_until_;  // [s] when the read that continues must have ended
   StampProblem last_problem_ = StampProblem::none;
   double last_problem_time_ = 0.0;  // [s]
   std::optional<double> sought_;    // place in the recording that was asked for, 0 to 1
@@ -516,7 +516,7 @@ bool CameraFeed::Worker::stay_at_end() {
   }
 }
 
-// One pass of a recording. False if it is over for ever.
+// One pass of a recording. False if it is over for good.
 bool CameraFeed::Worker::run_recording() {
   std::optional<Read> next = std::exchange(first_, std::nullopt);
   std::optional<Read> only;  // the first frame while it is the only one

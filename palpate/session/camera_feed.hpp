@@ -33,7 +33,7 @@ class FeedClock {
 /// This machine's clocks.
 std::shared_ptr<FeedClock> machine_clock();
 
-/// [s] at which a picture that stays valid is shown again: 30 Hz, as a camera would.
+/// [s] at which an image that stays valid is shown again: 30 Hz, as a camera would.
 inline constexpr double still_interval = 1.0 / 30.0;
 /// [s] of a recording that begins again at its end; a shorter one stays on its last frame.
 inline constexpr double shortest_loop = 2.0;
@@ -45,7 +45,7 @@ struct FeedOptions {
   double first_pause = 0.1;    ///< [s] before it is opened again; doubles with each failure
   double longest_pause = 5.0;  ///< [s] at most
   double waiting = 0.25;       ///< [s] without a frame after which its state says so
-  double still_interval = palpate::still_interval;  ///< [s] at which a still picture is shown again
+  double still_interval = palpate::still_interval;  ///< [s] at which a still image is shown again
   double longest_gap = 10.0;  ///< [s] between frames of a recording beyond which it is cut short
   double longest_lag = 1.0;   ///< [s] behind its stamps, beyond which a recording is slowed down
   int frozen_frames = 10;     ///< identical depth images in a row that make a live camera frozen
@@ -54,7 +54,7 @@ struct FeedOptions {
   std::shared_ptr<FeedClock> clock = machine_clock();
 };
 
-/// A recording whose stamps go back by this much [s] begins anew there.
+/// A recording whose stamps go back by this much [s] begins again there.
 inline constexpr double stamp_step_back = 1.0;
 
 /// Playback of a recording. A live camera ignores it.
@@ -173,7 +173,7 @@ class CameraFeed {
 
   /// From now on; of a recording. Any thread. @throws Error if the speed is out of range.
   void set_playback(const Playback& playback);
-  /// A recording goes on from another place: 0 is its first frame, 1 its last. Nothing happens
+  /// A recording continues from another place: 0 is its first frame, 1 its last. Nothing happens
   /// where it does not know how many frames it has. Any thread. @throws Error beyond 0 to 1.
   void seek(double share);
 

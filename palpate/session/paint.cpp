@@ -87,7 +87,7 @@ void Paint::define(const NamedMaterial& material) {
     throw Error("brush", "there are " + std::to_string(MaterialTable::most) + " materials already",
                 "name fewer in the camera's file");
   defined_.push_back(material);
-  table_.reset();  // made anew with the next frame
+  table_.reset();  // made again with the next frame
 }
 
 void Paint::add(const Dab& dab) {

@@ -11,7 +11,7 @@
 
 namespace palpate {
 
-/// A dab of a brush: what is seen within `radius` of a place is of a material.
+/// A dab of a brush: the visible surface within `radius` of a place is of a material.
 struct Dab {
   Vec3 place = Vec3::Zero();   ///< [m] world, on a surface
   double radius = 0.01;        ///< [m] across the line of sight

@@ -86,7 +86,7 @@ struct SessionOptions {
   Registry<DeviceScheme> devices = all_devices();
   /// Says what a camera's depth image is made of, before anything else sees it; null: what it came
   /// with. A map of another size, or an exception, is said in CameraStatus::doubt, and the frame
-  /// goes on as it came. A camera's thread, or the caller's of `run` where the session is
+  /// continues as it came. A camera's thread, or the caller's of `run` where the session is
   /// free-running.
   std::function<std::shared_ptr<const MaterialMap>(std::size_t camera, const DepthImage& image)>
       materials = {};
@@ -168,7 +168,7 @@ class Session {
   /// call is at work another one disables the device at once.
   void stop() noexcept;
 
-  /// Runs until `duration` [s] has passed (none: for ever) or `request_stop`, then stops.
+  /// Runs until `duration` [s] has passed (none: without end) or `request_stop`, then stops.
   /// Real time: starts what is not started. Free-running: runs the ticks on this thread.
   /// @param on_tick  free-running: sees each tick of the first hand
   /// @throws Error as `start`; free-running: what a source throws whose frame cannot be read. The
@@ -200,14 +200,15 @@ class Session {
   /// @throws Error as `set`, and what `edit` throws; everything is then as it was
   void change(const std::function<void(ServoSettings&)>& edit);
   /// Says where a hand's device lies in the scene; takes effect in the next tick, and the hand has
-  /// to engage anew. @throws Error, leaving everything as it was, if the placement is out of range.
+  /// to engage again.
+  /// @throws Error, leaving everything as it was, if the placement is out of range.
   void place(std::size_t hand, const Placement& placement);
   /// How its recordings are played. The force goes to zero and ramps up again wherever time jumps.
   /// Real time. @throws Error as CameraFeed::set_playback and seek.
   void set_playback(const Playback& playback);
   void seek(double share);
   /// Takes the force away, as fast as the safety chain's `fall_rate` says, and keeps it away while
-  /// everything else goes on. Afterwards the hand has to engage anew, so the force comes up
+  /// everything else continues. Afterwards the hand has to engage again, so the force comes up
   /// gradually.
   void hold(bool on);
   /// Ends latched faults of all hands' safety chains: an operator's decision.

@@ -14,7 +14,7 @@ namespace palpate {
 /// What was wrong with a stamp of capture.
 enum class StampProblem : std::uint8_t {
   none,
-  jumped,           ///< the camera's clock was reset; the offset was measured anew
+  jumped,           ///< the camera's clock was reset; the offset was measured again
   drifted,          ///< the clock, or the camera's latency, moved slowly beyond what is followed
   from_the_future,  ///< later than the frame's arrival
   too_old,          ///< older than `max_age` at arrival, or older than the frames before explain
@@ -70,7 +70,7 @@ class StampPlacer {
   /// @param known_offset  [s] of a clock of this machine: add it to a stamp to get CLOCK_MONOTONIC
   PlacedStamp place(double stamp, double arrival, double known_offset = 0.0);
 
-  /// Begins anew, as after the camera was opened again; times go on increasing.
+  /// Begins again, as after the camera was opened again; times continue increasing.
   void restart(StampClock clock);
 
   /// [s] from the camera's clock to CLOCK_MONOTONIC.
@@ -98,7 +98,7 @@ class StampPlacer {
   double latency_ = 0.0;  // [s]
   double settled_ = 0.0;  // [s] arrival from which the offset has settled
   double last_stamp_ = 0.0, last_arrival_ = 0.0;
-  double last_time_;           // [s] given last, for ever
+  double last_time_;           // [s] given last, over all passes
   int suspects_ = 0;           // stamps in a row that cannot be true and agree with one another
   double candidate_ = 0.0;     // [s] least difference of those
   int repeated_ = 0;           // stamps in a row that are equal

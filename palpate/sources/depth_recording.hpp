@@ -16,7 +16,7 @@ namespace palpate {
 //   start, frames                   number of the first frame, from 0; most frames to give
 // The raw values that intrinsics.json calls invalid or saturated become 0, a hole. For an image
 // that is missing, damaged or not of the camera's size, next() throws an Error; the call after it
-// goes on with the next image.
+// continues with the next image.
 
 /// Opens `tum:DIR`, the layout of the TUM RGB-D benchmark: depth.txt lists the images,
 /// groundtruth.txt the poses of the optical frame in the world (trajectory.hpp).

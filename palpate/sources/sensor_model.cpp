@@ -119,7 +119,7 @@ void blank_grazing_row(const Intrinsics& camera, double least_cosine, int v, con
 #pragma omp simd
   for (std::ptrdiff_t i = 1; i < width - 1; ++i) {
     const float z = truth[i];
-    // The smaller of both differences: beside an edge the surface goes on to one side only.
+    // The smaller of both differences: beside an edge the surface continues to one side only.
     const float left = z - truth[i - 1];
     const float right = truth[i + 1] - z;
     const float above = z - truth[i - width];

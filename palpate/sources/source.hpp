@@ -71,7 +71,7 @@ class Source {
   /// for a frame that has not been given yet; 0 looks without waiting.
   /// @return none: the end (recording), or no frame yet (live camera: time-out or `cancel`)
   /// @throws Error naming the file or camera that cannot be used. The source can be asked again: a
-  ///         recording goes on with the frame after it.
+  ///         recording continues with the frame after it.
   virtual std::optional<Frame> next(double timeout = no_timeout) = 0;
 
   /// Leaves out up to `count` frames without decoding them, for a reader that is too slow.

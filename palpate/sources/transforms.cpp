@@ -113,7 +113,7 @@ void LiveTransforms::add(const ros::TFMessage& message, bool moves, const std::s
     links_.add(transform, moves, name);
     std::deque<Trajectory::Sample>& line = samples_[plain_frame(transform.child_frame_id)];
     if (!goes_on || !moves) line.clear();
-    // A clock that was set back begins anew; several nodes' transforms may overtake one another.
+    // A clock that was set back begins again; several nodes' transforms may overtake one another.
     if (!line.empty() && sample.stamp < line.back().stamp - kept) line.clear();
     if (!line.empty() && !(sample.stamp > line.back().stamp)) continue;
     line.push_back(sample);

@@ -88,7 +88,7 @@ class OperatorEnd::Impl {
         look_due = now + look_interval;
         follow_latency();
       } catch (
-          const std::exception& error) {  // the session goes on; what is not sent stops a robot
+          const std::exception& error) {  // the session continues; what is not sent stops a robot
         const std::lock_guard lock(mutex_);
         if (!view_.state) view_.state.emplace();
         view_.state->fault = error.what();

@@ -11,38 +11,38 @@
 
 namespace palpate {
 
-/// What the operator's end of a link is told.
+/// Options of the operator's end.
 struct OperatorEndOptions {
   std::string name = "robot";  ///< of the robot's topics
-  /// The scene is brought to the hand when it begins, so that the hand is where the tool is.
+  /// The scene is shifted at the start, so that the device starts at the tool.
   bool index = true;
-  /// What the robot's tool found out by touching becomes the material of the surface there; see
+  /// Stiffness and friction measured by the robot become the material of the surface there; see
   /// paint_touched.
   bool learn = false;
 };
 
-/// The robot as its operator knows it.
+/// The robot's state at the operator's end.
 struct RobotView {
-  std::optional<RobotState> state;  ///< as it last said; its time is that of arrival
+  std::optional<RobotState> state;  ///< last received; its time is that of arrival
   double age = 0.0;                 ///< [s] since then
   bool heard = false;               ///< lately
-  bool led = false;                 ///< leads are sent now
-  double latency = 0.0;             ///< [s] of what is felt, capture to arrival
-  std::optional<Touched> touched;   ///< what it last found out by touching, believed or not
-  std::string ignored;              ///< why that changed nothing; empty: it did
+  bool led = false;                 ///< commands are being sent
+  double latency = 0.0;             ///< [s] of the rendered frame, capture to arrival
+  std::optional<Touched> touched;   ///< its last contact measurement, accepted or not
+  std::string ignored;              ///< why the measurement was ignored; empty: it was used
 };
 
-/// The operator's end of a link: sends where the proxy of a session is to the robot, and what the
-/// robot may not do to the session, as fixtures. The session's first camera is the robot's,
+/// The operator's end: sends the proxy position of a session to the robot, and adds the robot's
+/// limits to the session as fixtures. The session's first camera is the robot's,
 /// `ros2:/NAME/depth/image_raw/slices`.
 ///
-/// Nothing is sent while no hand leads (lead_of), so that a robot stops with its operator, whatever
-/// ends. What is old by the link alone is no reason for forces to fade: the limits of ages follow
-/// the link's latency (for_link), unless somebody else sets them.
+/// Nothing is sent without a valid command (lead_of), so that a robot stops with its operator in
+/// any failure. The network latency alone does not fade the force: the age limits follow it
+/// (for_link), unless the user sets them.
 class OperatorEnd {
  public:
   /// @param session  must outlive this
-  /// @throws Error if the name is none, or DDS is missing.
+  /// @throws Error if the name is not valid, or DDS is missing.
   OperatorEnd(Session& session, const OperatorEndOptions& options);
   ~OperatorEnd();
 

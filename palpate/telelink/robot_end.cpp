@@ -199,7 +199,7 @@ class RobotEnd::Impl {
     bool any = false;
     while (const auto place = places_.take_whole<ros::PoseStamped>()) {
       const std::int64_t stamp = place->header.stamp.nanoseconds();
-      // What was overtaken on the way is late; a stamp long before begins anew.
+      // What was overtaken on the way is late; a stamp long before begins again.
       constexpr std::int64_t anew = 1'000'000'000;  // [ns]
       if (stamp <= heard_ && stamp > heard_ - anew) continue;
       heard_ = stamp;

@@ -12,17 +12,17 @@
 
 namespace palpate {
 
-/// What the robot's end of a link is told.
+/// Options of the robot's end.
 struct RobotEndOptions {
   std::string name = "robot";  ///< of its topics: /NAME/...
   DepthPacking packing = DepthPacking::rvl;
   double margin = SetPointOptions{}.margin;  ///< [m] as SetPointOptions
   double press_share = 0.0;                  ///< [-] as SetPointOptions
-  /// Forbidden regions that the robot has, told to operators as well; null: none but its reach.
+  /// Forbidden regions of the robot, also sent to operators; null: only its workspace.
   std::shared_ptr<const FixtureSet> fixtures = {};
 };
 
-/// The robot's end of a link: serves the camera, hears leads, leads the robot.
+/// The robot's end: publishes the camera, receives commands, moves the robot.
 ///
 /// A session here has the led hand as its device and the robot's cameras; its proxy, which they
 /// keep out of what they see, is where the tool goes (SetPoint). Topics, all of ROS's own types: in
@@ -33,23 +33,23 @@ struct RobotEndOptions {
 class RobotEnd {
  public:
   /// Waits up to 5 s for the robot's first state.
-  /// @throws Error if the robot says nothing, an option is out of range, or DDS is missing.
+  /// @throws Error if the robot reports nothing, an option is out of range, or DDS is missing.
   RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options);
   ~RobotEnd();  ///< the robot rests
 
   /// The device of the session here. Once.
   [[nodiscard]] std::unique_ptr<Device> device();
-  /// What the settings of the session here have to be besides: radius of the proxy, fixtures.
+  /// Adds the settings that the session here needs: radius of the proxy, fixtures.
   void prepare(ServoSettings& settings) const;
   /// For SessionOptions::on_frame.
   void on_frame(std::size_t camera, const FedFrame& frame);
-  /// Begins to lead the robot. The session must outlive this, or `detach` come first.
+  /// Starts to command the robot. The session must outlive this, or `detach` come first.
   void attach(Session& session);
   void detach();
 
   [[nodiscard]] const RobotInfo& info() const;
   [[nodiscard]] std::uint32_t domain() const;
-  /// What the robot last said; where nothing leads it that is in `fault`.
+  /// The robot's last state; `fault` reports a missing command.
   [[nodiscard]] RobotState state() const;
   [[nodiscard]] bool is_led() const;
 

@@ -12,7 +12,7 @@
 
 namespace palpate {
 
-/// A kind of robot that can be led, by the scheme of its URI.
+/// A type of robot, by the scheme of its URI.
 struct RobotScheme {
   std::string name;     ///< the scheme
   std::string summary;  ///< one line
@@ -20,14 +20,14 @@ struct RobotScheme {
 };
 
 /// The library's:
-/// - `ros2:?command=/TOPIC&pose=/TOPIC`: an arm of ROS 2 that takes poses (docs/teleop.md has the
+/// - `ros2:?command=/TOPIC&pose=/TOPIC`: a ROS 2 arm that accepts poses (docs/teleop.md has the
 ///   options);
-/// - `point:`: a ball that follows as an arm with a loop of 4 Hz does and touches nothing, to try a
-///   link without a robot.
+/// - `point:`: a ball that follows like an arm with a loop of 4 Hz, without contacts, to test a
+///   network without a robot.
 Registry<RobotScheme> standard_robots();
 
-/// A robot in a synthetic scene (SimulatedTool): what its camera sees is what it touches. The scene
-/// moves as the camera shows it, and does not yield.
+/// A robot in a synthetic scene (SimulatedTool), which its camera sees. The scene moves as the
+/// camera shows it, and does not yield.
 class SceneRobot : public Robot {
  public:
   /// Where the scene stands in time, as the newest frame has it. Any thread.

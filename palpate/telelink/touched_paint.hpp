@@ -11,13 +11,13 @@
 
 namespace palpate {
 
-constexpr double touched_radius = 0.02;  ///< [m] about the place that is taken to be alike
+constexpr double touched_radius = 0.02;  ///< [m] around the contact that gets the same material
 
-/// Makes what a robot's tool found out the material of the surface there, where it is softer than
-/// what is rendered, or where friction is known. A place that was found hard, or that a person has
-/// painted, stays as it is. Materials change as those of a brush do: never by a step, and harder
-/// only as far as somebody pays for it (docs/materials.md).
-/// @param parameters  of the session: all but stiffness and friction is theirs
+/// Assigns the stiffness and friction measured by a robot's tool to the surface there, if the
+/// stiffness is lower than the rendered one, or if friction is known. Surfaces that were measured
+/// stiffer, or painted by a user, are not changed. Materials change as with the brush: never in a
+/// step, and stiffer only with energy from the tank (docs/materials.md). @param parameters of the
+/// session: used for all but stiffness and friction
 /// @return why nothing was done; empty: it was
 std::string paint_touched(Paint& paint, const Parameters& parameters, const Touched& touched);
 

@@ -11,24 +11,24 @@
 
 namespace palpate {
 
-/// Something that comes towards a tool.
+/// An object that approaches a tool.
 struct Approach {
-  double speed = 0.0;         ///< [m/s] towards the tool, of what comes; 0: nothing does
-  double gap = 0.0;           ///< [m] from `place` to what is nearest, when it was seen
+  double speed = 0.0;         ///< [m/s] approach speed; 0: nothing approaches
+  double gap = 0.0;           ///< [m] from `place` to the nearest point, when it was measured
   Vec3 place = Vec3::Zero();  ///< [m] world: where the tool was
-  Vec3 away = Vec3::UnitZ();  ///< [-] unit, world: from what comes to the tool
+  Vec3 away = Vec3::UnitZ();  ///< [-] unit, world: from the object to the tool
   double stamp = 0.0;         ///< [s] of the frame
   double noise = 0.0;         ///< [m] standard deviation of such a gap from frame to frame
 };
 
-/// Sees what comes towards a tool before it is touched, from one camera's frames alone.
+/// Detects objects that approach a tool before contact, only from the frames of one camera.
 ///
-/// A hand waits with its judgement until noise is told from motion (method `sight` needs up to 0.2
-/// s before a noisy camera); a robot that goes out of the way too early does no harm. The distances
-/// from where the tool is now to the nearest points of the last frames give a straight line over
-/// time. Its slope counts as a speed where it is steeper than `least_speed` and `least_ratio` times
-/// as large as its own uncertainty; half of that is enough for what came before. What moves
-/// sideways without coming nearer is none.
+/// A method may wait until it can distinguish noise from motion (`sight` needs up to 0.2 s with a
+/// noisy camera); a robot that retreats too early does no harm. The distances from the tool's
+/// position to the nearest points of the last frames give a straight line over time. Its slope
+/// counts as a speed if it exceeds `least_speed` and `least_ratio` times its standard error; half
+/// of that is enough for an object that approached before. A sideways motion without approach does
+/// not count.
 class ApproachWatch {
  public:
   static constexpr double reach = 0.06;         ///< [m] about the tool
@@ -38,19 +38,19 @@ class ApproachWatch {
   ApproachWatch();
 
   /// A frame has come. Four gatherings of a ball. @param tool  [m] world
-  /// @param stamp  [s] later than those before; others begin anew
+  /// @param stamp  [s] later than those before; others begin again
   const Approach& frame(std::shared_ptr<const Cloud> cloud, double stamp, const Vec3& tool);
   [[nodiscard]] const Approach& newest() const { return approach_; }
-  /// Would a tool pass through a surface of the newest frame on its straight way to its proxy? That
-  /// proxy has been lost, and no tool may follow it. What is only hidden from the camera may be
-  /// entered from the side. False without a frame. Looks every 10 ms: at most 17 gatherings of a
-  /// beam as wide as the tool.
+  /// Does the straight line from the tool to its proxy pass through a surface of the newest frame?
+  /// Then that proxy has been lost, and the tool must not follow it. Space that is only occluded
+  /// may be entered from the side. False without a frame. Looks every 10 ms: at most 17 gatherings
+  /// of a beam as wide as the tool.
   /// @param proxy, tool  [m, world]
   /// @param radius       [m] of the tool
   /// @param t            [s] now
   [[nodiscard]] bool is_between(const Vec3& proxy, const Vec3& tool, double radius,
                                 double t) noexcept;
-  /// [m] from the tool to what is nearest, in the newest frame; at most `reach`.
+  /// [m] from the tool to the nearest point of the newest frame; at most `reach`.
   [[nodiscard]] double clearance() const { return clearance_; }
 
  private:

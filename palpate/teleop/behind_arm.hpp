@@ -7,15 +7,17 @@
 
 namespace palpate {
 
-/// What a camera that stands still saw where a robot's arm now hides it.
+/// Fills the area that a robot's arm occludes with the surface that a fixed camera saw there
+/// before.
 ///
-/// The arm's own pixels are filled with what was last measured there, so that a hand does not feel
-/// the arm and does not lose what is under it. A pixel's memory ends, and the pixel is a hole,
+/// The pixels of the arm get the last measurement at that pixel, so that the user does not feel the
+/// arm and does not lose the surface under it. A stored value is deleted, and the pixel becomes a
+/// hole,
 /// - after `kept`;
-/// - where the arm is seen behind what is remembered: that has gone;
-/// - where what is seen around it has moved since the arm came, by more than 0.5 mm and four
-///   standard deviations of the noise that is seen.
-/// What moves and is hidden wholly is remembered where it was: that is the price.
+/// - if the arm is seen behind the stored value: that surface has gone;
+/// - if the visible surface around it has moved since the arm came, by more than 0.5 mm and four
+///   standard deviations of the noise.
+/// Drawback: an object that moves while completely occluded stays in the image at its old position.
 class BehindArm {
  public:
   struct Options {
@@ -38,7 +40,7 @@ class BehindArm {
   struct Block {
     bool hidden = false;  // partly
     bool moved = false;
-    double way = 0.0;    // [m] mean of what is seen, since the arm came, over some frames
+    double way = 0.0;    // [m] mean of the visible surface, since the arm came, over some frames
     double noise = 0.0;  // [m^2] variance of a pixel's way from one frame to the next
   };
   static constexpr int side = 16;  // [px] of a block

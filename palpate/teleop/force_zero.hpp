@@ -7,12 +7,12 @@
 
 namespace palpate {
 
-/// Zeroes a robot's force sensor while nothing is near the tool: its drift and the weight of a tool
-/// that keeps its orientation are no contact, from which a robot would retreat.
+/// Removes the bias of a robot's force sensor in free space: otherwise the robot would treat its
+/// drift and the weight of the tool as a contact and retreat.
 ///
-/// What is measured in free space is averaged over 2 s and taken off: all of it in the first half
-/// second, then only what is within 1 N of it. A sudden force in what looks free is a contact with
-/// what the camera does not see, and no drift. [one thread]
+/// The force in free space is averaged over 2 s and subtracted: all of it in the first half second,
+/// then only values within 1 N of it. A sudden force in free space is a contact with an object that
+/// the camera does not see, not drift. [one thread]
 class ForceZero {
  public:
   static constexpr double clear = 0.03;     ///< [m] nothing is nearer to a tool in free space

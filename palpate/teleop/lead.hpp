@@ -6,14 +6,14 @@
 
 namespace palpate {
 
-/// Where an operator leads a robot: all that crosses the link from the hand's end.
+/// Teleoperation command: all data that the operator's end sends.
 ///
-/// The place is the operator's proxy (ServoTick::place), never the HIP: what surfaces and fixtures
-/// keep the proxy out of at the operator's end, the robot is never asked to enter.
+/// The position is the operator's proxy (ServoTick::place), never the HIP: the robot is never
+/// commanded into surfaces and fixtures that stop the proxy at the operator's end.
 struct Lead {
   Vec3 place = Vec3::Zero();  ///< [m] world: where the tool is to be
   Vec3 press = Vec3::Zero();  ///< [N] world: with which the operator presses there
-  /// Does a hand lead? Not while it is absent, clutched, faulty, or sees nothing any more.
+  /// Is the command valid? Not while the device is released, clutched or faulty, or without frames.
   bool leads = false;
 };
 

@@ -13,17 +13,17 @@
 
 namespace palpate {
 
-/// How a robot follows leads.
+/// How a robot follows commands.
 struct LeadLimits {
-  double max_speed = 0.25;  ///< [m/s] in which a lead is followed: the reduced speed of ISO 10218
-  /// [m/s] the same while something is touched, and so much more for each metre that nothing is
-  /// near. A tool of 3 kg meets 10 kN/m with 5 N at 0.029 m/s, and one that is late cuts corners.
+  double max_speed = 0.25;  ///< [m/s] speed limit: the reduced speed of ISO 10218
+  /// [m/s] speed limit in contact; it rises with the clearance. A tool of 3 kg that hits a surface
+  /// of 10 kN/m at 0.029 m/s reaches 5 N, and a tool with lag cuts corners.
   double contact_speed = 0.03;
   double near_time = 0.2;  ///< [s] the clearance over this is the speed that it allows beyond that
-  /// [m] world: leads beyond it are followed to its boundary; empty: no limit
+  /// [m] world: commands beyond it are followed to its boundary; empty: no limit
   std::optional<Eigen::AlignedBox3d> reach = {};
-  /// [s] without a lead, after which the tool is stopped where it is. Longer than the link's
-  /// jitter; with the robot's own time to stop less than 100 ms.
+  /// [s] without a command, after which the tool is stopped where it is. Longer than the network
+  /// jitter; with the robot's stopping time less than 100 ms.
   double silence = 0.05;
   double resume_time = 0.5;  ///< [s] in which the speed comes back after a stop
 };
@@ -31,37 +31,38 @@ struct LeadLimits {
 /// @throws Error if a limit is not positive and finite, or the reach is empty.
 void validate(const LeadLimits& limits);
 
-/// The hand at the robot's end of a link: what was led goes into a session there as any hand does,
-/// so that a camera beside the robot keeps its proxy, and with it the robot, out of what is seen.
+/// The device at the robot's end: the received commands are the HIP of a session there, so that the
+/// camera at the robot keeps its proxy, and with it the robot, out of the visible surface.
 ///
-/// Follows the newest lead at a limited speed. Where none comes, nobody leads any more, or nothing
-/// is seen, it rests where the tool is, and stays a hand: a surface that moves still pushes the
-/// proxy, and the robot with it. Afterwards it takes up the lead from there, slowly at first.
+/// Follows the newest command at a limited speed. Without commands, operator or frames it rests at
+/// the tool and still counts as a hand: a moving surface pushes the proxy, and the robot with it.
+/// Afterwards it follows commands again from there, slowly at first.
 class LedHand final : public Device {
  public:
   /// @param begin  [m] world: where the tool is
   /// @throws Error as validate().
   explicit LedHand(const Vec3& begin, const LeadLimits& limits = {}, std::string uri = "teleop:");
 
-  /// A lead has come. One thread.
+  /// A command has arrived. One thread.
   /// @param now  [s] on the loop's clock
   void lead(const Lead& lead, double now);
-  /// Does the robot's end see what is there? Who does not is not led. Any thread.
+  /// Does the robot's end have frames? Without them commands are not followed. Any thread.
   void sees(bool yes) noexcept { sees_.store(yes, std::memory_order_relaxed); }
-  /// How far the tool is from what the robot's end sees [m]; 0 where its proxy touches. Any thread.
+  /// Distance from the tool to the visible surface at the robot's end [m]; 0 in contact. Any
+  /// thread.
   void clearance(double gap) noexcept { gap_.store(gap, std::memory_order_relaxed); }
-  /// Where the robot's tool is [m, world], as it says. One thread.
+  /// Reported position of the robot's tool [m, world]. One thread.
   void tool_is_at(const Vec3& place);
-  /// By how much forbidden regions keep the proxy from where the surface alone would have it
-  /// [m, world]; zero: they do not. The hand goes that way, so that the surface is looked for where
-  /// the tool may be: beyond a region's border it is another one. One thread, once a tick.
+  /// Displacement of the proxy by forbidden regions from its position on the surface [m, world];
+  /// zero: none. The HIP is displaced by the same vector, so that the surface is searched where the
+  /// tool may be: beyond the border of a region it may be another one. One thread, once a tick.
   void kept_out(const Vec3& way);
 
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
   HandState read(double t) noexcept override;
   void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
 
-  /// Is the tool being led? Any thread.
+  /// Does the tool follow commands? Any thread.
   [[nodiscard]] bool is_led() const noexcept { return led_.load(std::memory_order_relaxed); }
 
  private:

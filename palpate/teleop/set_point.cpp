@@ -15,15 +15,15 @@ constexpr double approach_time = 0.005;   // [s] in which a speed of the surface
 constexpr double press_time = 0.1;        // [s] in which a wanted force is reached
 constexpr double touching_force = 0.1;    // [N] who is to press with more is to touch
 constexpr double clear_deviations = 2.0;  // [-] of the camera's noise that it stays farther away
-constexpr double notice_time = 0.2;       // [s] after which a noisy picture shows a motion turned
+constexpr double notice_time = 0.2;       // [s] after which a noisy image shows a motion turned
 constexpr double farthest_clear = 0.02;   // [m] for noise and motion: 60 mm/s in lag and notice
 constexpr double lately_time = 2.0;       // [s] after which a motion is nearly forgotten
 constexpr double retreat_speed = 0.02;    // [m/s] for each N above that
 constexpr double farthest_retreat = 0.1;  // [m]
 constexpr double return_time = 1.0;       // [s] in which a retreat is taken back
 constexpr double longest_forecast = 0.3;  // [s]
-// [-] of the robot's lag by which a surface that comes is led before: 1 for a surface that goes on
-// as it does; half as much again as its speed is known late, and only about.
+// [-] of the robot's lag by which a surface that comes is led before: 1 for a surface that
+// continues as it does; half as much again as its speed is known late, and only about.
 constexpr double ahead = 1.5;
 constexpr double fastest_surface = 0.5;  // [m/s] that is led before
 constexpr double turn_time = 0.2;        // [s] in which a normal that turned round is believed
@@ -101,7 +101,7 @@ Vec3 SetPoint::way_out(const Vec3& place, const Approach& comes, double t) const
 }
 
 // The proxy goes away from what is touched as fast as that comes, and any other way only slowly, in
-// contact and for a while after: one that a noisy picture lets fall must not take the tool along.
+// contact and for a while after: one that a noisy image lets fall must not take the tool along.
 // Nor does it go fast against what pushes the tool: what is touched from behind is none of its; nor
 // along a normal that has just turned round, as it does where a proxy slips under a noisy surface.
 Vec3 SetPoint::followed(const Vec3& held, bool touches, const Vec3& force, double dt) noexcept {
@@ -167,7 +167,7 @@ SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool 
   // The first place of all lies outside of all regions; what would be out of the way may not.
   Vec3 goal = held_;
   if (began_) {
-    // Never into what is touched, by the picture or by the robot's own force.
+    // Never into what is touched, by the image or by the robot's own force.
     Vec3 out = way_out(held_, comes, tick.t);
     if (touches) out = without_part_against(normal_, out);
     if (size > touching_force) out = without_part_against(pushed / size, out);

@@ -11,49 +11,48 @@
 
 namespace palpate {
 
-/// How the robot's set-point is made of the proxy at its end.
+/// Options of the robot's set-point.
 struct SetPointOptions {
   double tool_radius = 5e-3;  ///< [m] as RobotInfo::tool_radius
-  /// [m] by which the tool stays away from what is seen: the proxy's radius at the robot's end is
-  /// larger by it
+  /// [m] by which the tool stays away from the visible surface: the proxy's radius at the robot's
+  /// end is larger by it
   double margin = 2e-3;
-  double lag = 0.08;  ///< [s] as RobotInfo::lag: a surface that comes is led before by so much
+  double lag = 0.08;  ///< [s] as RobotInfo::lag: time by which approaching surfaces are anticipated
   /// [N/m] as RobotInfo::stiffness; empty: it does not press
   std::optional<double> stiffness = {};
   double max_force = 5.0;       ///< [N] with which the tool may press, wanted or not
-  double unwanted_force = 1.0;  ///< [N] beyond a wanted one that it bears: the sensor's error
+  double unwanted_force = 1.0;  ///< [N] tolerated above the wanted force: the sensor's error
   double press_share = 0.0;     ///< [-] of the operator's force with which the tool presses, 0 to 1
   double max_speed = 0.5;       ///< [m/s] of the set-point itself
   double contact_speed = 0.05;  ///< [m/s] the same along and into what is touched
-  /// Into these the robot is not sent, whatever comes; see robot_fixtures(). Null: none
+  /// The robot is never sent into these; see robot_fixtures(). Null: none
   std::shared_ptr<const FixtureSet> fixtures = {};
 };
 
-/// The forbidden regions of a set as a robot has to keep them: they never give way. Guides, viscous
-/// regions and what is seen are left out; the proxy keeps out of what is seen.
+/// The forbidden regions of a set for a robot: they never yield. Guides, viscous regions and the
+/// visible surface are left out; the proxy keeps out of the visible surface.
 std::shared_ptr<const FixtureSet> robot_fixtures(const FixtureSet& fixtures);
 
 /// @throws Error if one of them is out of range.
 void validate(const SetPointOptions& options);
 
-/// What a tick at the robot's end counts for when its proxy has been lost
-/// (ApproachWatch::is_between): nothing is touched, and the proxy is where the tool is.
+/// A tick at the robot's end for a lost proxy (ApproachWatch::is_between): no contact, and the
+/// proxy is at the tool.
 /// @param tool  [m, world]
 ServoTick with_proxy_at(const Vec3& tool, ServoTick tick);
 
-/// Where the robot's tool is sent: the proxy at the robot's end, which its own camera keeps out of
-/// what is seen, and
-/// - farther from what is touched by twice the noise of the picture, and by the way that what moved
-///   in the last seconds makes in the robot's lag, and in the 0.2 s in which nobody notices that a
-///   surface that was touched has turned: 20 mm at most;
-/// - from what comes, touched or not, by its speed times the robot's lag, so that the tool is out
-///   of the way when it arrives (ApproachWatch, and the method's own velocity);
-/// - where the operator presses and the robot is to press too, into the surface by the force over
-///   the robot's stiffness;
-/// - where it is pushed with `unwanted_force` more than that, or with more than `max_force`, seen
-///   or not, away from what pushes.
-/// Forbidden regions come before all that. What comes moves it at once; a proxy that falls, as a
-/// noisy picture may let it, takes it along at `contact_speed` only.
+/// The commanded position of the robot's tool: the proxy at the robot's end, which its camera keeps
+/// out of the visible surface,
+/// - plus a distance from the touched surface: twice the noise of the image, the speed of recent
+///   motion times the robot's lag, and 0.2 s of the surface's recent speed, in which a reversal
+///   goes unnoticed; 20 mm at most;
+/// - away from approaching objects, touched or not, by their speed times the robot's lag
+///   (ApproachWatch, and the method's velocity);
+/// - into the surface by the operator's force over the robot's stiffness, if the robot is to press;
+/// - away from any contact, visible or not, with more than `unwanted_force` above that, or more
+///   than `max_force`.
+/// Forbidden regions have priority over all that. An approaching object moves it at once; a proxy
+/// that drops, perhaps because of image noise, moves it only at `contact_speed`.
 /// Values in, values out: no clock, no thread. [servo]
 class SetPoint {
  public:
@@ -66,8 +65,8 @@ class SetPoint {
 
   /// @param tick   at the robot's end
   /// @param press  [N] world: with which the operator presses
-  /// @param led    false: nobody leads, and the set-point may go back to where the tool is at once
-  /// @param comes  what comes towards the tool
+  /// @param led false: no command, and the set-point may return to the tool at once
+  /// @param comes the object that approaches the tool
   /// @param force  [N] world: of what the tool touches, on the tool; zero where it is not known
   Order next(const ServoTick& tick, const Vec3& press, bool led, const Approach& comes,
              const Vec3& force) noexcept;

@@ -8,8 +8,8 @@
 
 namespace palpate {
 
-/// A robot's tool as a model: a ball with the mass of what moves with it, led by a spring and
-/// damper of equal poles, before surfaces that are stiff springs. Deterministic.
+/// Model of a robot's tool: a ball with the moving mass, pulled by a critically damped spring, in
+/// contact with surfaces that are stiff springs. Deterministic.
 class SimulatedTool {
  public:
   struct Surface {

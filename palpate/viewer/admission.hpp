@@ -25,7 +25,7 @@ class GuessLimit {
  public:
   static constexpr std::size_t free_guesses = 8;      ///< wrong tokens before the first pause
   static constexpr double longest_pause = 300.0;      ///< [s]
-  static constexpr double memory = 3600.0;            ///< [s] after which an address begins anew
+  static constexpr double memory = 3600.0;            ///< [s] after which an address begins again
   static constexpr std::size_t max_addresses = 1024;  ///< remembered; then the oldest is forgotten
 
   /// [s] for which tokens from `address` are not looked at; 0: they are. @param t  [s] now

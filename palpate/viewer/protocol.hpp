@@ -136,7 +136,7 @@ struct SetPlayback {
   bool loop;
   double speed;
 };
-/// Recordings go on from another place: 0 is the first frame, 1 the last.
+/// Recordings continue from another place: 0 is the first frame, 1 the last.
 struct Seek {
   double share;
 };

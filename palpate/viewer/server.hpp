@@ -56,7 +56,7 @@ struct ViewerOptions {
 
 /// Serves the page and, by WebSocket, its sessions, on one thread of its own.
 ///
-/// Several pages can look; the first that takes the hand has it until it lets go, falls silent for
+/// Several pages can look; the first that takes the hand has it until it releases, falls silent for
 /// two seconds or is lost. A page that is slow gets fewer frames and never holds up anything.
 /// Requests for another host, from another origin or without the token are refused, malformed
 /// messages end their session. What a page may change depends on its Role; see docs/protocol.md.

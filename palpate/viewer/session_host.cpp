@@ -546,7 +546,7 @@ void SessionHost::end_file(const std::filesystem::path& file, bool whole) {
 void SessionHost::show(std::size_t number, const FedFrame& fed) {
   ViewerServer* server = server_.load(std::memory_order_acquire);
   const auto camera = static_cast<std::uint8_t>(number);
-  // A still picture came first before there was a server: what is shown again then is new to it.
+  // A still image came first before there was a server: what is shown again then is new to it.
   if (server == nullptr || (!fed.is_new && numbers_[camera] > 0)) return;
   const Frame& frame = fed.frame;
   FrameHeader header;

@@ -20,7 +20,7 @@ from . import _core
 
 
 class Scores:
-    """The result of a benchmark: its table (`columns`, `rows`), a `note`, and a `csv` of cases."""
+    """A benchmark result: `columns` and `rows` of its table, a `note`, and a `csv` of cases."""
 
     def __init__(self, result):
         self.columns = result["columns"]

@@ -441,8 +441,8 @@ describe.each([
     // Nothing covers anything else, whatever is shown.
     const covered = await page.evaluate(() => {
       for (const id of ["timeline", "latched"]) document.getElementById(id)!.hidden = false;
-      const parts = [".brand", ".actions", "#hand", "#role", ".hud", ".latched", ".hint", ".legend"];
-      const boxes = [...parts, ".timeline", ".panel"].flatMap((selector) => {
+      const over = [".brand", ".actions", "#hand", "#role", ".hud", ".latched", ".panel"];
+      const boxes = [...over, ".hint", ".legend", ".timeline"].flatMap((selector) => {
         const box = document.querySelector(selector)!.getBoundingClientRect();
         return box.width > 0 ? [{ selector, box }] : [];
       });

@@ -52,7 +52,7 @@ class Registry {
     const std::string what =
         subject.empty() ? "there is no such " + noun_ : "unknown " + noun_ + " " + quoted;
     throw Error(subject.empty() ? noun_ + " " + quoted : subject, what,
-                did_you_mean(name, names_of(entries_), suffix_));
+                did_you_mean(or_of_summary(name), names_of(entries_), suffix_));
   }
 
   /// `text` with its scheme: a name of an entry may stand without the suffix.

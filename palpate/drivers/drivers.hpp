@@ -38,7 +38,7 @@ struct DriverReport {
 struct Driver {
   std::string name;     ///< scheme of its URIs, without ':'
   std::string summary;  ///< what it drives, in a line
-  /// What it has been tried on, in a few words: "a fake library alone", "a Kinect v1".
+  /// What it has been tested with, in a few words: "a mock library only", "a Kinect v1".
   std::string tried;
   /// What USB devices it drives: "1451" for all of a vendor's, or "0403:cb48".
   std::vector<std::string> usb = {};

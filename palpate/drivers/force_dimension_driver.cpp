@@ -522,7 +522,7 @@ DriverReport look() {
 Driver force_dimension_driver() {
   return {.name = "force-dimension",
           .summary = "Force Dimension's omega, delta, sigma and lambda, and the Novint Falcon",
-          .tried = "a fake library alone",
+          .tried = "a mock library only",
           .usb = force_dimension::usb(),
           .open_device = force_dimension::open_arm,
           .look = reporting(force_dimension::look)};

@@ -255,7 +255,7 @@ namespace palpate {
 Driver freenect_driver() {
   return {.name = "freenect",
           .summary = "freenect:SERIAL, a Kinect v1 by libfreenect",
-          .tried = "a fake library, and the package's fakenect with depth=11bit",
+          .tried = "a mock library, and the package's fakenect with depth=11bit",
           .usb = {"045e:02ae"},
           .open_camera = [](const Uri& uri) -> std::unique_ptr<Source> {
             return std::make_unique<freenect::Camera>(uri);

@@ -168,7 +168,7 @@ DriverReport look() {
 Driver gamepad_driver() {
   return {.name = "gamepad",
           .summary = "a game controller by SDL2: moves the hand, rumbles at a contact",
-          .tried = "a fake library alone",
+          .tried = "a mock library only",
           .open_device = gamepad::open_pad,
           .look = reporting(gamepad::look)};
 }

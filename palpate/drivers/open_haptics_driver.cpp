@@ -528,7 +528,7 @@ DriverReport look() {
 Driver open_haptics_driver() {
   return {.name = "touch",
           .summary = "3D Systems' Touch and Touch X, SensAble's Phantoms, by OpenHaptics",
-          .tried = "a fake library alone",
+          .tried = "a mock library only",
           .usb = open_haptics::usb(),
           .open_device = open_haptics::open_pen,
           .look = reporting(open_haptics::look),

@@ -630,7 +630,7 @@ namespace palpate {
 Driver realsense_driver() {
   return {.name = "realsense",
           .summary = "realsense:SERIAL, a RealSense camera by librealsense2",
-          .tried = "a fake library alone",
+          .tried = "a mock library only",
           .usb = {"8086:0a", "8086:0b"},
           .open_camera = [](const Uri& uri) -> std::unique_ptr<Source> {
             return std::make_unique<realsense::Camera>(uri);

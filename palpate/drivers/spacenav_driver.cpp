@@ -121,7 +121,7 @@ DriverReport look() {
 Driver spacenav_driver() {
   return {.name = "spacenav",
           .summary = "a SpaceMouse by spacenavd: moves the hand, gives no force",
-          .tried = "a fake library alone",
+          .tried = "a mock library only",
           .usb = {"256f", "046d:c62"},
           .open_device = spacenav::open_puck,
           .look = reporting(spacenav::look)};

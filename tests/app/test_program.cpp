@@ -456,7 +456,7 @@ TEST_F(Program, PrintsTheOperatorsLinkAndTheViewers) {
   const Outcome made = run(session);
   ASSERT_EQ(made.code, 0) << made.err;
   EXPECT_NE(made.err.find("/?token="), std::string::npos) << made.err;
-  EXPECT_NE(made.err.find("to hold the hand, open http://127.0.0.1:"), std::string::npos)
+  EXPECT_NE(made.err.find("controlling the HIP, open http://127.0.0.1:"), std::string::npos)
       << made.err;
   const Outcome given = run(session, "PALPATE_OPERATOR_TOKEN=from-outside ");
   EXPECT_NE(given.err.find("/?token=from-outside in a browser"), std::string::npos) << given.err;
@@ -542,7 +542,7 @@ TEST_F(Program, SaysWhichFramesOfARecordingItLeavesOut) {
             "depth_units_per_metre": 1000})");
   write("tum/depth.txt", "100 0.png\n101 0.png\n");
   write("tum/groundtruth.txt", "101 0 0 0 0 0 0 1\n");
-  const std::string note = "1 of 2 frames are left out";
+  const std::string note = "1 of 2 frames are dropped";
   const Outcome info = run("info --json tum:" + path("tum"));
   ASSERT_EQ(info.code, 0) << info.err;
   const auto about = nlohmann::json::parse(info.out);

@@ -59,7 +59,7 @@ TEST_F(Ros2Program, LeadsARobotInAnotherProcess) {
   const Outcome both =
       run("teleop --headless --duration 3 --json --robot 'synthetic:plane?size=160x120&noise=1mm'");
   ASSERT_EQ(both.code, 0) << both.err;
-  EXPECT_NE(both.err.find("is led by /robot"), std::string::npos) << both.err;
+  EXPECT_NE(both.err.find("is teleoperated by /robot"), std::string::npos) << both.err;
   const auto summary = nlohmann::json::parse(both.out);
   EXPECT_GT(summary["ticks"], 1000);
 }
@@ -70,7 +70,7 @@ TEST_F(Ros2Program, SaysWhatAnEndOfALinkLacks) {
     EXPECT_EQ(refused.code, 2) << words;
     EXPECT_NE(refused.err.find(what), std::string::npos) << refused.err;
   };
-  refuses("--robot point:", "none of its own; give the robot's");
+  refuses("--robot point:", "has no camera; set the robot's camera");
   refuses("--robot pint: --camera synthetic:plane", "unknown type of robot");
   refuses("--device mouse:", "the haptic device is at the operator's end");
   refuses("--margin -1", "margin");

@@ -190,8 +190,7 @@ TEST_F(Trace, NamesTheScaleAtWhichPointsInMillimetresAreFelt) {
 
 TEST_F(Trace, SaysThatThePathBeganBeforeTheFrames) {
   const std::string early = remarks(floor_seen, "-0.5,0,0,0.03\n0.3,0,0,-0.004\n");
-  EXPECT_TRUE(says(early, "no frame before t = 0.000 s: the path began 0.500 s before it"))
-      << early;
+  EXPECT_TRUE(says(early, "no frame before t = 0.000 s: the path began 0.500 s earlier")) << early;
   EXPECT_EQ(test::lines_in(early), 1U) << early;
   const std::string over = remarks(floor_seen, "-2,0,0,0.03\n-1.5,0,0,-0.004\n");
   EXPECT_TRUE(says(over, "the first frame is at t = 0.000 s, the path ended at -1.500 s")) << over;

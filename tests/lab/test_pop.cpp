@@ -116,7 +116,7 @@ TEST_F(Pop, ThePaperLosesEverySweepOfAnOccluderAndTheFailureIsShrunkAndRunsAgain
   EXPECT_EQ(rerun.text(0, "first_lost"), table.text(0, "simplest"));
   const Scores scores = find_experiment("pop").scores(rerun);
   EXPECT_EQ(scores.rows.back()[2], "0.00");
-  EXPECT_NE(scores.note.find(", occluder: of 1 cases 0 with a force in free space"),
+  EXPECT_NE(scores.note.find(", occluder: 1 cases: 0 with a force in free space"),
             std::string::npos);
   EXPECT_EQ(scores.note.find("--case ''"), std::string::npos) << scores.note;
 }

@@ -108,7 +108,7 @@ TEST(Paint, RefusesWhatCannotBe) {
   EXPECT_TRUE(
       fails_saying([&] { return paint.add(dab(Vec3(0, 0, 0.5), 0.0, "ice")), 0; }, "radius"));
   EXPECT_TRUE(fails_saying(
-      [&] { return paint.add(dab(Vec3(std::nan(""), 0, 0.5), 0.01, "ice")), 0; }, "place"));
+      [&] { return paint.add(dab(Vec3(std::nan(""), 0, 0.5), 0.01, "ice")), 0; }, "position"));
   for (int i = 0; i < 50; ++i) paint.add(dab(Vec3(0.001 * (i % 3), 0, 0.5), 0.01, "ice"));
   EXPECT_EQ(paint.dabs().size(), 1U) << "a dab on another one takes its place";
   for (std::size_t i = paint.dabs().size(); i < Paint::most; ++i)

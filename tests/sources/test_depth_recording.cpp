@@ -111,7 +111,7 @@ TEST(TumRecording, LeavesOutFramesWithoutAPoseAndSaysSo) {
   EXPECT_EQ(source->info().frames, 2u);
   EXPECT_EQ(source->info().start_time, 100.5);
   ASSERT_EQ(source->info().notes.size(), 1u);
-  EXPECT_EQ(source->info().notes[0].find("1 of 3 frames are left out"), 0u);
+  EXPECT_EQ(source->info().notes[0].find("1 of 3 frames are dropped"), 0u);
   EXPECT_EQ(image_of(source->next()).depth().front(), 1001);
   folder.write("other.txt", "5 0 0 0 0 0 0 1\n");
   EXPECT_TRUE(fails_saying([&] { return folder.open("poses=other.txt"); }, "no frame has a pose"));
@@ -199,7 +199,7 @@ TEST(TumRecording, GivesEachFrameTheColoursNextToItInTime) {
     EXPECT_EQ(without->colour, nullptr);
   }
   ASSERT_EQ(plain->info().notes.size(), 2U);
-  EXPECT_EQ(plain->info().notes[1].substr(0, 20), "colour is skipped: ");
+  EXPECT_EQ(plain->info().notes[1].substr(0, 19), "colour is skipped: ");
   EXPECT_NE(plain->info().notes[1].find("1x1"), std::string::npos);
   folder.write("rgb.txt", "no number\n");
   EXPECT_TRUE(folder.open()->next());

@@ -82,7 +82,8 @@ TEST(MaterialFile, SaysWhichLineIsWrong) {
   EXPECT_TRUE(refuses("[[material]]\nname = 'a'\ncolour = 'red'\n", "m.toml:3", "#rrggbb"));
   EXPECT_TRUE(refuses("[[material]]\nname = 'a'\nlike = 'wod'\n", "m.toml:3", "'wood'"));
   EXPECT_TRUE(refuses("[[material]]\nname = 'a'\ntolerance = 0\n", "m.toml:3", "1 to 100"));
-  EXPECT_TRUE(refuses("[[material]]\nname = 'a'\n[[material]]\nname = 'a'\n", "m.toml", "two"));
+  EXPECT_TRUE(
+      refuses("[[material]]\nname = 'a'\n[[material]]\nname = 'a'\n", "m.toml", "used twice"));
   EXPECT_TRUE(refuses("material = 3\n", "m.toml", "no materials"));
   EXPECT_TRUE(refuses("[[material]\n", "m.toml:1", "docs/materials.md"));
   std::string many;

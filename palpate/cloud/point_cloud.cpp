@@ -105,7 +105,7 @@ std::vector<Vec3> points_and_faces(const Surface& surface) {
         a = 1.0 - a;
         b = 1.0 - b;
       }
-      points.push_back(surface.points[corners[0]] + a * side.first + b * side.second);
+      points.emplace_back(surface.points[corners[0]] + a * side.first + b * side.second);
     }
   }
   return points;

@@ -299,7 +299,7 @@ test("another scene is chosen on the page", async () => {
       );
     const toast = () => page.locator("#toast").textContent();
     await drop("song.mp3", "la");
-    await expect.poll(toast).toContain("song.mp3: cannot be touched");
+    await expect.poll(toast).toContain("song.mp3: cannot be opened");
     await drop("broken.ply", "ply\nformat nonsense\n");
     // Why it is refused, which comes with the session before, not that it is sent or has arrived
     await expect.poll(toast).toContain("broken.ply:");

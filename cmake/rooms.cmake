@@ -148,7 +148,7 @@ function(palpate_list_drivers target function)
   file(CONFIGURE OUTPUT ${list} @ONLY CONTENT [[
 #include "palpate/drivers/drivers.hpp"
 namespace palpate {
-Driver @called@;
+Driver @called@;  // NOLINT(readability-redundant-declaration): all of the folder as one file
 std::vector<Driver> @function@() {
   return {@called@};
 }

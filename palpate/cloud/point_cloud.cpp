@@ -140,7 +140,9 @@ PointCloud::PointCloud(std::span<const Vec3> points, std::optional<Vec3> viewpoi
   if (places.empty()) return;
   // The extent of finite coordinates can overflow; halves cannot.
   const double half_extent = (0.5 * all.high - 0.5 * all.low).maxCoeff();
-  const double cells_per_half = half_extent > 0.0 ? (cells - 1.0) / half_extent : 0.0;
+  // Points so near each other that this overflows are in one cell.
+  double cells_per_half = (cells - 1.0) / half_extent;
+  if (!std::isfinite(cells_per_half)) cells_per_half = 0.0;
   for (Place& place : places) {
     const Vec3 cell = (0.5 * points[place.point] - 0.5 * all.low) * cells_per_half;
     place.on_curve = spread(static_cast<std::uint64_t>(cell.x())) |

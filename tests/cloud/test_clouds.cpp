@@ -232,6 +232,14 @@ TEST(PointCloud, HoldsPointsSpreadOverTheRangeOfDoubles) {
   EXPECT_EQ(found(cloud, Ball{Vec3(0, 0, 0), 0.01}).size(), 1U);
 }
 
+TEST(PointCloud, HoldsPointsThatAreNearlyAtOnePlace) {
+  const double least = std::numeric_limits<double>::denorm_min();
+  const std::array points = {Vec3(0, 0, 0), Vec3(least, 0, 0), Vec3(0, 3 * least, 0)};
+  const PointCloud cloud(points);
+  EXPECT_EQ(cloud.size(), 3U);
+  EXPECT_EQ(found(cloud, Ball{Vec3(0, 0, 0), 0.01}).size(), 3U);
+}
+
 TEST(PointCloud, FindsNothingWhenItIsEmpty) {
   const PointCloud cloud(std::span<const Vec3>{});
   EXPECT_TRUE(found(cloud, Ball{Vec3(0, 0, 0), 1.0}).empty());

@@ -14,7 +14,6 @@
 #include "palpate/devices/device_guard.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/servo/stiffness.hpp"
-#include "palpate/session/from_config.hpp"
 
 namespace palpate::app {
 namespace {
@@ -22,7 +21,7 @@ namespace {
 // Can it run faster than time? Only where nothing but simulations and recordings takes part.
 bool can_run_freely(const SessionConfig& config) {
   const Registry<Driver> drivers = standard_drivers();
-  for (const CameraConfig& camera : config.cameras) {
+  for (const CameraSpec& camera : config.cameras) {
     if (drivers.try_find(Uri(camera.uri).scheme()) != nullptr) return false;
     if (open_source(camera.uri)->info().live) return false;
   }
@@ -30,9 +29,9 @@ bool can_run_freely(const SessionConfig& config) {
     const std::string scheme = Uri(device).scheme();
     return scheme == "hand" || scheme == "script";
   };
-  return is_simulated(config.device.empty() ? "hand:" : config.device) &&
-         std::all_of(config.more_hands.begin(), config.more_hands.end(),
-                     [&](const HandConfig& hand) { return is_simulated(hand.device); });
+  return std::all_of(config.hands.begin(), config.hands.end(), [&](const HandSpec& hand) {
+    return hand.device.empty() || is_simulated(hand.device);
+  });
 }
 
 // @param hand  its name; empty: it is the only one
@@ -87,16 +86,8 @@ GuardedDevices guarded_devices(const SessionConfig& config) {
     return open_guarded([&] { return driver->open_device(Uri(uri)); });
   };
   GuardedDevices devices;
-  devices.push_back(guarded(config.device));
-  for (const HandConfig& hand : config.more_hands) devices.push_back(guarded(hand.device));
+  for (const HandSpec& hand : config.hands) devices.push_back(guarded(hand.device));
   return devices;
-}
-
-void use(GuardedDevices devices, SessionOptions& session) {
-  if (devices.empty()) return;
-  session.device = std::move(devices.front());
-  for (std::size_t i = 1; i < devices.size(); ++i)
-    session.more_hands.at(i - 1).device = std::move(devices[i]);
 }
 
 SessionOptions options_of(const RunOptions& options, const SessionConfig& config,
@@ -104,9 +95,12 @@ SessionOptions options_of(const RunOptions& options, const SessionConfig& config
   if (options.duration && !(*options.duration >= 0.1 && *options.duration <= 86400.0))
     throw Error("--duration", fmt::format("{} s is too short or too long", *options.duration),
                 "give 0.1 to 86400 s");
-  SessionOptions session = session_options(config);
+  validate(config);
+  SessionOptions session;
+  static_cast<SessionSpec&>(session) = config;
   session.methods = std::move(methods);
-  if (config.device.empty()) session.device_uri = options.headless ? "hand:" : "mouse:";
+  std::string& device = session.hands.front().device;
+  if (device.empty()) device = options.headless ? "hand:" : "mouse:";
   session.version = PALPATE_VERSION;
   if (options.headless) {
     if (!options.in_real_time && can_run_freely(config)) session.pace = Pace::free_running;
@@ -116,7 +110,7 @@ SessionOptions options_of(const RunOptions& options, const SessionConfig& config
 }
 
 std::string late_ticks(const SessionOptions& options) {
-  const std::string& name = options.settings.method;
+  const std::string& name = options.method;
   if (options.methods.find(name).bounded) return {};
   return fmt::format("palpate: {} is a method of the lab: its ticks can be late\n", name);
 }
@@ -132,9 +126,9 @@ int finish(Session& session, bool json, const std::string& ended) {
                "palpate: check its forces: palpate replay {0}; touch it: palpate run --camera "
                "recording:{0}\n",
                folder);
-  const std::string text = json ? json_of(state.summary, recording, state.cameras, session.timing(),
-                                          &session.statistics().hand_over, state.more_hands)
-                                : text_of(state.summary, state.cameras, state.more_hands);
+  const std::string text = json ? json_of(state.hands, recording, state.cameras, session.timing(),
+                                          &session.statistics().hand_over)
+                                : text_of(state.hands, state.cameras);
   std::fputs(text.c_str(), stdout);
   return state.recording.failed ? 1 : 0;
 }

@@ -57,9 +57,6 @@ SessionOptions options_of(const RunOptions& options, const SessionConfig& config
 using GuardedDevices = std::vector<std::unique_ptr<Device>>;
 GuardedDevices guarded_devices(const SessionConfig& config);
 
-/// Gives the session these devices in place of what their URIs name.
-void use(GuardedDevices devices, SessionOptions& session);
-
 /// A line about a method whose ticks are not bounded; empty for any other.
 std::string late_ticks(const SessionOptions& options);
 

@@ -12,13 +12,13 @@ namespace palpate::app {
 namespace {
 
 // The cameras named on the command line, with what the file says of those of the same URI.
-std::vector<CameraConfig> chosen(const std::vector<std::string>& uris,
-                                 const std::vector<CameraConfig>& in_file) {
-  std::vector<CameraConfig> cameras;
+std::vector<CameraSpec> chosen(const std::vector<std::string>& uris,
+                               const std::vector<CameraSpec>& in_file) {
+  std::vector<CameraSpec> cameras;
   for (const std::string& uri : uris) {
     const auto known = std::find_if(in_file.begin(), in_file.end(),
-                                    [&](const CameraConfig& camera) { return camera.uri == uri; });
-    cameras.push_back(known == in_file.end() ? CameraConfig{.uri = uri} : *known);
+                                    [&](const CameraSpec& camera) { return camera.uri == uri; });
+    cameras.push_back(known == in_file.end() ? CameraSpec{.uri = uri} : *known);
   }
   return cameras;
 }
@@ -30,7 +30,8 @@ void apply_placement(const std::optional<std::string>& pose, const std::optional
   if (pose) {
     std::error_code unused;
     if (std::filesystem::is_regular_file(*pose, unused)) {
-      placement.world_from_device = read_session_config(*pose).placement.world_from_device;
+      placement.world_from_device =
+          read_session_config(*pose).hands.front().placement.world_from_device;
     } else if (pose->find(',') == std::string::npos && pose->find(' ') == std::string::npos) {
       throw Error("--device-pose " + *pose, "there is no such file",
                   "give x,y,z,qx,qy,qz,qw or the TOML file that palpate calibrate wrote");
@@ -128,19 +129,20 @@ bool SessionArguments::names_cameras() const {
 SessionConfig SessionArguments::config(const MethodRegistry& methods) const {
   SessionConfig config = method_.session(methods);
   if (!cameras_.empty()) config.cameras = chosen(cameras_, config.cameras);
-  for (CameraConfig& camera : config.cameras)
+  for (CameraSpec& camera : config.cameras)
     camera.uri = with_material(source_uri(camera.uri, all_sources()), material_);
   if (!devices_.empty()) {
-    config.device = devices_.front();
     // Of a hand that the file knows, all but where it is plugged in stays.
-    config.more_hands.resize(devices_.size() - 1);
-    for (std::size_t i = 1; i < devices_.size(); ++i) config.more_hands[i - 1].device = devices_[i];
+    config.hands.resize(devices_.size());
+    for (std::size_t i = 0; i < devices_.size(); ++i) config.hands[i].device = devices_[i];
   }
-  if (!config.device.empty()) config.device = all_devices().with_scheme(config.device);
-  for (HandConfig& hand : config.more_hands) hand.device = all_devices().with_scheme(hand.device);
-  if (bubble_) config.placement.bubble_radius = *bubble_;
-  if (handle_weight_) config.placement.handle_weight = *handle_weight_;
-  apply_placement(device_pose_, scale_, clutch_button_, config.placement);
+  for (HandSpec& hand : config.hands) {
+    if (!hand.device.empty()) hand.device = all_devices().with_scheme(hand.device);
+  }
+  Placement& placement = config.hands.front().placement;
+  if (bubble_) placement.bubble_radius = *bubble_;
+  if (handle_weight_) placement.handle_weight = *handle_weight_;
+  apply_placement(device_pose_, scale_, clutch_button_, placement);
   for (const std::string& limit : limits_) {
     const auto [name, value] = parse_assignment("--limit", limit);
     set_parameter(config.safety, name, value);

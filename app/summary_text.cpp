@@ -87,20 +87,20 @@ std::string hand_line(const Summary& summary) {
 
 }  // namespace
 
-std::string text_of(const Summary& summary, std::span<const CameraStatus> cameras,
-                    std::span<const SessionHandState> more_hands) {
-  std::string text = hand_line(summary) + "\n";
-  for (const SessionHandState& hand : more_hands)
+std::string text_of(std::span<const SessionHandState> hands,
+                    std::span<const CameraStatus> cameras) {
+  std::string text = hand_line(hands.front().summary) + "\n";
+  for (const SessionHandState& hand : hands.subspan(1))
     text += hand.name + ": " + hand_line(hand.summary) + "\n";
   for (const CameraStatus& camera : cameras) text += camera_line(camera);
   return text;
 }
 
-std::string json_of(const Summary& summary, const std::string& recording,
+std::string json_of(std::span<const SessionHandState> hands, const std::string& recording,
                     std::span<const CameraStatus> cameras, const Timing* timing,
-                    const Histogram* hand_over, std::span<const SessionHandState> more_hands) {
-  nlohmann::ordered_json object = object_of(summary);
-  for (const SessionHandState& hand : more_hands) {
+                    const Histogram* hand_over) {
+  nlohmann::ordered_json object = object_of(hands.front().summary);
+  for (const SessionHandState& hand : hands.subspan(1)) {
     nlohmann::ordered_json other = {{"name", hand.name}};
     other.update(object_of(hand.summary));
     object["more_hands"].push_back(std::move(other));

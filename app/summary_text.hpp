@@ -11,16 +11,15 @@
 
 namespace palpate::app {
 
-/// A summary in one line, for people, and one for each live camera and each further hand.
-std::string text_of(const Summary& summary, std::span<const CameraStatus> cameras = {},
-                    std::span<const SessionHandState> more_hands = {});
+/// A line for each hand, for people, and one for each live camera.
+std::string text_of(std::span<const SessionHandState> hands,
+                    std::span<const CameraStatus> cameras = {});
 /// The same as a JSON object, SI units.
 /// @param recording  how it went; empty: there was none
 /// @param timing     of a loop in real time; null: there was none
 /// @param hand_over  [ns] from a frame's arrival to the tick that used it; null: not known
-std::string json_of(const Summary& summary, const std::string& recording = {},
+std::string json_of(std::span<const SessionHandState> hands, const std::string& recording = {},
                     std::span<const CameraStatus> cameras = {}, const Timing* timing = nullptr,
-                    const Histogram* hand_over = nullptr,
-                    std::span<const SessionHandState> more_hands = {});
+                    const Histogram* hand_over = nullptr);
 
 }  // namespace palpate::app

@@ -81,7 +81,7 @@ std::shared_ptr<const DepthImage> first_image(const std::string& uri, const std:
 
 std::vector<Target> targets_at_pixels(const CalibrateOptions& options,
                                       const SessionConfig& config) {
-  CameraConfig camera = config.cameras.front();
+  CameraSpec camera = config.cameras.front();
   if (options.camera && *options.camera != camera.uri) camera = {.uri = *options.camera};
   const std::shared_ptr<const DepthImage> image =
       first_image(camera.uri, "name a depth camera with --camera, or points with --points");
@@ -105,7 +105,7 @@ std::vector<Target> targets_of(const CalibrateOptions& options, const SessionCon
 }
 
 std::vector<PointPair> touched_pairs(const CalibrateOptions& options, const SessionConfig& config) {
-  const std::string uri = options.device.value_or(config.device);
+  const std::string uri = options.device.value_or(config.hands.front().device);
   if (uri.empty())
     throw Error("--device", "no device is named", "name the one to calibrate, or give --pairs");
   const std::vector<Target> targets = targets_of(options, config);
@@ -142,7 +142,7 @@ void check_residuals(const PlacementFit& fit, double most) {
 
 // Where two cameras stand to one another; prints what a session's file says of them.
 int calibrate_cameras(const CalibrateOptions& options) {
-  std::vector<CameraConfig> cameras;
+  std::vector<CameraSpec> cameras;
   if (options.config) cameras = read_session_config(*options.config).cameras;
   if (!options.cameras.empty()) {
     cameras.clear();
@@ -220,9 +220,9 @@ int calibrate(const CalibrateOptions& options) {
   }
   const std::vector<PointPair> pairs =
       options.pairs ? read_pairs(*options.pairs) : touched_pairs(options, config);
-  const PlacementFit fit =
-      fit_placement(pairs, {.fit_scale = options.fit_scale,
-                            .scale = options.scale.value_or(config.placement.workspace_scale)});
+  const PlacementFit fit = fit_placement(
+      pairs, {.fit_scale = options.fit_scale,
+              .scale = options.scale.value_or(config.hands.front().placement.workspace_scale)});
   if (options.json) {
     const nlohmann::ordered_json json = {
         {"world_from_device", "[" + pose_text(fit.placement.world_from_device) + "]"},

@@ -31,7 +31,7 @@ int run_node(const RosOptions& options) {
   Running running;
   const EndingSignals signals([&] { running.end(); });
   SessionOptions wanted = options_of(options.run, config, session_methods());
-  use(std::move(guarded), wanted);
+  wanted.open_devices = std::move(guarded);
   const std::string warning = late_ticks(wanted);
   Session session(std::move(wanted));
   std::fputs(warning.c_str(), stderr);

@@ -83,7 +83,7 @@ PageRules page_rules(const SessionConfig& config) {
 
 // What the operator's page can choose: what the program was started with, what was opened last,
 // and the built-in scenes.
-std::vector<SceneChoice> scene_choices(const std::vector<CameraConfig>& given,
+std::vector<SceneChoice> scene_choices(const std::vector<CameraSpec>& given,
                                        const OpenedScenes& opened) {
   const std::string& first = given.front().uri;
   std::vector<SceneChoice> choices = {{first, "what the program was started with"}};
@@ -104,7 +104,7 @@ void say_of_points(const Cloud& cloud, Session& session, const SessionConfig& co
   const double r_c = session.settings().parameters.proxy.r_c();
   std::vector<std::string> remarks;
   if (!config.radii_chosen) remarks.push_back(radius_remark(cloud, r_c));
-  if (session.state().summary.largest_sent < noticed_force)
+  if (session.state().hands[0].summary.largest_sent < noticed_force)
     remarks.push_back(sparse_remark(cloud, config.cameras.front().uri, r_c));
   for (const std::string& remark : remarks) {
     if (!remark.empty())
@@ -115,7 +115,7 @@ void say_of_points(const Cloud& cloud, Session& session, const SessionConfig& co
 int run_headless(const RunOptions& options, const SessionConfig& config, GuardedDevices guarded,
                  Running& running) {
   SessionOptions wanted = options_of(options, config, session_methods());
-  use(std::move(guarded), wanted);
+  wanted.open_devices = std::move(guarded);
   if (options.beside.prepare) options.beside.prepare(wanted);
   const std::string warning = late_ticks(wanted);
   const bool is_free = wanted.pace == Pace::free_running;
@@ -184,7 +184,7 @@ Ending run_page(const RunOptions& options, SessionConfig& config, GuardedDevices
   };
   SessionHost host(PALPATE_VERSION, std::move(rules));
   SessionOptions wanted = options_of(options, config, session_methods());
-  use(std::move(guarded), wanted);
+  wanted.open_devices = std::move(guarded);
   wanted.on_frame = [&host](std::size_t camera, const FedFrame& frame) {
     host.show(camera, frame);
   };
@@ -236,11 +236,12 @@ int run_pages(const RunOptions& options, SessionConfig config, GuardedDevices gu
   ServerConfig& server = config.server;
   if (server.operator_token.empty()) server.operator_token = make_token();
   if (server.token.empty() && !is_loopback(server.listen)) server.token = make_token();
-  const std::vector<CameraConfig> given = config.cameras;
-  std::vector<CameraConfig> before = given;
+  const std::vector<CameraSpec> given = config.cameras;
+  std::vector<CameraSpec> before = given;
   // A device with motors is opened once: its hand is somewhere, and its guard is another process.
-  const bool may_choose = !options.beside.attach && config.more_hands.empty() &&
-                          (config.device.empty() || Uri(config.device).scheme() == "mouse");
+  const std::string& device = config.hands.front().device;
+  const bool may_choose = !options.beside.attach && config.hands.size() == 1 &&
+                          (device.empty() || Uri(device).scheme() == "mouse");
   PageRules rules = page_rules(config);
   rules.robot = options.beside.robot;
   if (may_choose) rules.files = std::make_shared<DroppedFiles>();
@@ -264,7 +265,7 @@ int run_pages(const RunOptions& options, SessionConfig config, GuardedDevices gu
     before = config.cameras;
     config.cameras = *ending.scene == given.front().uri
                          ? given
-                         : std::vector<CameraConfig>{{.uri = *ending.scene}};
+                         : std::vector<CameraSpec>{{.uri = *ending.scene}};
     config.record.clear();  // the recording of --record has ended with its session
   }
 }

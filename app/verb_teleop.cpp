@@ -105,7 +105,7 @@ int guard(const RobotOptions& options) {
     std::fputs(to_toml(config).c_str(), stdout);
     return 0;
   }
-  if (!config.device.empty())
+  if (!config.hands.front().device.empty())
     throw Error("--device", "the haptic device is at the operator's end",
                 "remove this option, and start palpate teleop operator --device there");
   run.usual_port = robot_port;
@@ -121,11 +121,11 @@ int guard(const RobotOptions& options) {
   RobotEnd end(cell.robot(), wishes);
   run.in_real_time = true;
   run.beside.prepare = [&](SessionOptions& session) {
-    end.prepare(session.settings);
-    session.device = end.device();
+    end.prepare(session);
     if (own_camera) {
       session.cameras.clear();
-      session.cameras.push_back({.uri = options.robot, .source = cell.camera()});
+      session.cameras.push_back({.uri = options.robot});
+      session.open_cameras.push_back(cell.camera());
     }
     session.on_frame = [&, shown = std::move(session.on_frame)](std::size_t camera,
                                                                 const FedFrame& frame) {

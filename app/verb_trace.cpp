@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -118,10 +119,12 @@ int trace(TraceOptions options) {
                "palpate: interrupted: {} has {}{} ticks, in complete lines; the same command again "
                "writes the same lines and continues to the end\n",
                writer.name(), summary.ticks, press ? "" : fmt::format(" of {}", ticks));
+  std::array<SessionHandState, 1> hand;
+  hand[0].summary = summary;
   if (options.json) {
-    std::fputs(json_of(summary).c_str(), stdout);
+    std::fputs(json_of(hand).c_str(), stdout);
   } else {
-    std::fputs(text_of(summary).c_str(), options.out == "-" ? stderr : stdout);
+    std::fputs(text_of(hand).c_str(), options.out == "-" ? stderr : stdout);
   }
   return is_whole ? 0 : exit_status_of(signal);
 }

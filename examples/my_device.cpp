@@ -42,7 +42,7 @@ int main() {
   options.devices.add(
       {"probe", "is lowered until it feels a newton: probe:?from=METRES",
        [](const palpate::Uri& uri, const auto& /*path*/) { return std::make_unique<Probe>(uri); }});
-  options.device_uri = "probe:?from=0.04";
+  options.hands[0].device = "probe:?from=0.04";
   options.cameras.push_back({.uri = "synthetic:plane?size=160x120"});
   options.pace = palpate::Pace::free_running;
   palpate::Session session(std::move(options));

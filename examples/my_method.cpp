@@ -37,7 +37,7 @@ class Cushion final : public palpate::Method {
     return tick;
   }
 
-  void set_parameters(const palpate::Parameters& parameters) override {
+  void set_parameters(const palpate::Parameters& parameters) noexcept override {
     stiffness_ = parameters.coupling.stiffness;
   }
 
@@ -56,7 +56,7 @@ int main() {
                          method->set_parameters(parameters);
                          return method;
                        }});
-  options.settings.method = "cushion";
+  options.method = "cushion";
   options.cameras.push_back({.uri = "synthetic:plane?noise=1mm&size=320x240"});
   options.pace = palpate::Pace::free_running;
   options.stroke_time = 6.0;

@@ -7,7 +7,7 @@
 int main() {
   palpate::SessionOptions options;
   options.cameras.push_back({.uri = "synthetic:desk?noise=1mm"});
-  options.device_uri = "hand:";
+  options.hands[0].device = "hand:";
   options.pace = palpate::Pace::free_running;  // as fast as the machine can
   options.stroke_time = 6.0;
   palpate::Session session(std::move(options));

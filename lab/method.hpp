@@ -37,8 +37,7 @@ class LabMethod : public Method {
     clouds_.take(seen.camera, seen.cloud);
     frame(clouds_, seen.stamp);
   }
-  void set_parameters(const Parameters& parameters) final {
-    validate(parameters);
+  void set_parameters(const Parameters& parameters) noexcept final {
     parameters_ = parameters;
     parameters_changed();
   }
@@ -50,7 +49,7 @@ class LabMethod : public Method {
   /// @param stamp  [s] of the new frame
   virtual void frame(const Cloud& all, double stamp) noexcept = 0;
   /// Called after a change, for members derived from the parameters.
-  virtual void parameters_changed() {}
+  virtual void parameters_changed() noexcept {}
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
 
  private:

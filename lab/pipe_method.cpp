@@ -299,7 +299,7 @@ class PipeMethod final : public LabMethod, public FallibleMethod {
   }
 
  protected:
-  void parameters_changed() override { begin(); }
+  void parameters_changed() noexcept override { begin(); }
 
  private:
   void begin() {

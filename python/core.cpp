@@ -191,7 +191,9 @@ class Renderer {
   void set(const py::kwargs& values) {
     Parameters changed = parameters_;
     set_all(changed, values);
+    validate(changed);
     method_->set_parameters(changed);
+    trouble_->rethrow();
     parameters_ = changed;
   }
 

@@ -108,14 +108,17 @@ Tick PythonMethod::tick(const Vec3& hip, double t) noexcept {
   return tick;
 }
 
-void PythonMethod::set_parameters(const Parameters& parameters) {
-  validate(parameters);
+void PythonMethod::set_parameters(const Parameters& parameters) noexcept {
   const py::gil_scoped_acquire gil;
-  if (!py::hasattr(object_, "set_parameters")) return;
-  py::dict values;
-  for (const ParameterInfo& row : parameter_table())
-    values[py::str(std::string(row.name))] = row.get(parameters);
-  object_.attr("set_parameters")(values);
+  try {
+    if (!py::hasattr(object_, "set_parameters")) return;
+    py::dict values;
+    for (const ParameterInfo& row : parameter_table())
+      values[py::str(std::string(row.name))] = row.get(parameters);
+    object_.attr("set_parameters")(values);
+  } catch (...) {
+    trouble_->first = std::current_exception();
+  }
 }
 
 std::unique_ptr<Method> method_of(const py::object& method, const Parameters& parameters,
@@ -123,7 +126,9 @@ std::unique_ptr<Method> method_of(const py::object& method, const Parameters& pa
   if (py::isinstance<py::str>(method))
     return make_method(py::cast<std::string>(method), parameters);
   auto made = std::make_unique<PythonMethod>(method, trouble);
+  validate(parameters);
   made->set_parameters(parameters);
+  trouble->rethrow();
   return made;
 }
 

@@ -48,7 +48,7 @@ class PythonMethod final : public Method {
   void seat(const Vec3& proxy) noexcept override;
   void observe(const Observation& seen) noexcept override;
   Tick tick(const Vec3& hip, double t) noexcept override;
-  void set_parameters(const Parameters& parameters) override;
+  void set_parameters(const Parameters& parameters) noexcept override;
 
  private:
   py::object object_;

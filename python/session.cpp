@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -36,18 +37,17 @@ std::shared_ptr<const FixtureSet> fixtures_of(const std::optional<std::string>& 
                                                 : read_fixtures(*what));
 }
 
-// Hands beside the first: each a device's URI, or a dict with it.
-std::vector<SessionHandOptions> hands_of(const py::iterable& hands) {
-  std::vector<SessionHandOptions> more;
+// Hands after the first: each a device's URI, or a dict with it.
+void add_hands(const py::iterable& hands, std::vector<HandSpec>& all) {
   for (const py::handle& each : hands) {
-    SessionHandOptions hand;
+    HandSpec hand;
     if (py::isinstance<py::str>(each)) {
-      hand.device_uri = py::cast<std::string>(each);
+      hand.device = py::cast<std::string>(each);
     } else {
       for (const auto& [key, value] : py::cast<py::dict>(each)) {
         const auto name = py::cast<std::string>(key);
         if (name == "device")
-          hand.device_uri = py::cast<std::string>(value);
+          hand.device = py::cast<std::string>(value);
         else if (name == "name")
           hand.name = py::cast<std::string>(value);
         else if (name == "scale")
@@ -59,9 +59,8 @@ std::vector<SessionHandOptions> hands_of(const py::iterable& hands) {
                       "give device, name, world_from_device and scale");
       }
     }
-    more.push_back(std::move(hand));
+    all.push_back(std::move(hand));
   }
-  return more;
 }
 
 // Asks a Python function, on a camera's thread, which of the materials each pixel is.
@@ -102,35 +101,33 @@ class PythonSession {
       for (const auto& uri : py::cast<std::vector<std::string>>(camera))
         options.cameras.push_back({.uri = uri});
     }
-    options.device_uri = device;
-    options.settings.method = method;
-    set_all(options.settings.parameters, parameters);
+    options.hands[0].device = device;
+    options.method = method;
+    set_all(options.parameters, parameters);
     for (const auto& [name, value] : parameters)
       options.radii_chosen = options.radii_chosen || is_proxy_radius(py::cast<std::string>(name));
-    set_limits(options.settings.safety, limits);
-    options.settings.placement.workspace_scale = scale;
+    set_limits(options.safety, limits);
+    Placement& placement = options.hands[0].placement;
+    placement.workspace_scale = scale;
     if (world_from_device)
-      options.settings.placement.world_from_device =
-          pose_of(*world_from_device, "world_from_device");
-    options.settings.fixtures = fixtures_of(fixtures);
-    options.servo.rate = rate;
+      placement.world_from_device = pose_of(*world_from_device, "world_from_device");
+    options.fixture_set = fixtures_of(fixtures);
+    options.rate = rate;
     options.pace = free_running ? Pace::free_running : Pace::real_time;
     options.without_watchdog = without_watchdog;
     options.stroke_time = stroke_time;
     options.record = record;
     options.version = PALPATE_VERSION;
-    options.more_hands = hands_of(hands);
+    add_hands(hands, options.hands);
     if (materials.has_value() != labels.has_value())
       throw Error("materials, labels", "one is of no use without the other",
                   "give materials=palpate.Materials(...) and labels=FUNCTION");
     if (labels) options.materials = labelled(*materials, *labels);
-    ran_.resize(1 + options.more_hands.size());
-    if (free_running_) {
-      for (std::size_t i = 1; i < ran_.size(); ++i)
-        options.more_hands[i - 1].on_tick = [this, i](const ServoTick& tick) {
-          ran_[i].push_back(record_of(tick));
-        };
-    }
+    ran_.resize(options.hands.size());
+    if (free_running_)
+      options.on_tick = [this](std::size_t hand, const ServoTick& tick) {
+        if (hand > 0) ran_[hand].push_back(record_of(tick));
+      };
     const py::gil_scoped_release released;
     session_.emplace(std::move(options));
     for (std::size_t i = 0; i < ran_.size(); ++i) readers_.push_back(session_->ticks(i));
@@ -239,21 +236,21 @@ class PythonSession {
     recording["failed"] = now.recording.failed;
     recording["closing"] = now.recording.closing;
     state["recording"] = recording;
-    state["ticks"] = now.summary.ticks;
-    state["late_ticks"] = now.summary.late_ticks;
-    state["contact_ticks"] = now.summary.contact_ticks;
-    state["largest_force"] = now.summary.largest_sent;
-    state["pop_throughs"] = now.summary.pop_throughs;
+    state["ticks"] = now.hands[0].summary.ticks;
+    state["late_ticks"] = now.hands[0].summary.late_ticks;
+    state["contact_ticks"] = now.hands[0].summary.contact_ticks;
+    state["largest_force"] = now.hands[0].summary.largest_sent;
+    state["pop_throughs"] = now.hands[0].summary.pop_throughs;
     py::dict interventions;
     const auto names = safety_flag_names();
     for (std::size_t i = 0; i < names.size(); ++i) {
-      if (now.interventions[i] > 0)
-        interventions[py::str(std::string(names[i]))] = now.interventions[i];
+      if (now.hands[0].interventions[i] > 0)
+        interventions[py::str(std::string(names[i]))] = now.hands[0].interventions[i];
     }
     state["interventions"] = interventions;
-    state["latched_by"] = now.latched_by;
+    state["latched_by"] = now.hands[0].latched_by;
     py::list hands;
-    for (const SessionHandState& hand : now.more_hands) {
+    for (const SessionHandState& hand : std::span(now.hands).subspan(1)) {
       py::dict each;
       each["name"] = hand.name;
       each["ticks"] = hand.summary.ticks;

@@ -83,7 +83,7 @@ class Chorus final : public Method {
     for (std::size_t i = 0; i < members_.size(); ++i) ticks_[i] = members_[i]->tick(hip, t);
     return ticks_.front();
   }
-  void set_parameters(const Parameters& parameters) override {
+  void set_parameters(const Parameters& parameters) noexcept override {
     for (const auto& member : members_) member->set_parameters(parameters);
   }
   [[nodiscard]] const std::vector<Tick>& ticks() const { return ticks_; }

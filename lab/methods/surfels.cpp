@@ -32,7 +32,7 @@ class Surfels final : public ImplicitMethod {
         points_(0.03, window) {}
 
  private:
-  void parameters_changed() override { set_reach(parameters().proxy.r_3); }
+  void parameters_changed() noexcept override { set_reach(parameters().proxy.r_3); }
 
   void take(const Cloud& cloud, const Vec3& /*place*/) override { points_.frame(cloud); }
 

@@ -42,8 +42,10 @@ class Method {
   virtual Tick tick(const Vec3& hip, double t) noexcept = 0;
 
   /// Changes parameters between two ticks; the proxy and its contact stay.
-  /// @throws Error if they do not validate, leaving the old ones in place.
-  virtual void set_parameters(const Parameters& parameters) = 0;
+  ///
+  /// [servo] No allocation, lock, system call; see MethodInfo::bounded.
+  /// @param parameters  must validate()
+  virtual void set_parameters(const Parameters& parameters) noexcept = 0;
 
   /// The patch that the last tick saw, for drawing and measuring; null if there is none.
   [[nodiscard]] virtual const Patch* patch() const noexcept { return nullptr; }

@@ -63,7 +63,7 @@ class Exciter final : public Method {
 
   void seat(const Vec3& /*proxy*/) noexcept override {}
   void observe(const Observation& /*seen*/) noexcept override {}
-  void set_parameters(const Parameters& /*parameters*/) override {}
+  void set_parameters(const Parameters& /*parameters*/) noexcept override {}
 
   // [servo]
   Tick tick(const Vec3& hip, double t) noexcept override {

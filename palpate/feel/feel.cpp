@@ -57,7 +57,7 @@ void Feel::forget_contact() noexcept {
   drag_ = Vec3::Zero();
 }
 
-void Feel::set_parameters(const Parameters& parameters) {
+void Feel::set_parameters(const Parameters& parameters) noexcept {
   method_->set_parameters(parameters);
   take(parameters);
 }

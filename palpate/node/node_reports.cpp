@@ -102,7 +102,7 @@ DiagnosticStatus loop_status(const SessionReport& report) {
   made.values = {{"rate [Hz]", number(report.tick_rate)},
                  {"rate asked for [Hz]", number(state.rate)},
                  {"late ticks", std::to_string(report.late_ticks)},
-                 {"late ticks in all", std::to_string(state.summary.late_ticks)},
+                 {"late ticks in all", std::to_string(state.hands[0].summary.late_ticks)},
                  {"method", state.settings.method}};
   return made;
 }
@@ -214,11 +214,12 @@ ros::DiagnosticArray diagnostics_of(const SessionReport& report, const DeviceInf
   for (const CameraStatus& camera : report.state.cameras)
     array.status.push_back(camera_status(camera, report.now));
   const SessionState& state = report.state;
-  array.status.push_back(
-      contact_status({"", report.ticks, state.latched_by, state.summary.pop_throughs}, state.held));
-  array.status.push_back(device_status("", report.ticks, state.device.text, device));
-  for (std::size_t i = 0; i < report.more_hands.size() && i < state.more_hands.size(); ++i) {
-    const SessionHandState& hand = state.more_hands[i];
+  array.status.push_back(contact_status(
+      {"", report.ticks, state.hands[0].latched_by, state.hands[0].summary.pop_throughs},
+      state.held));
+  array.status.push_back(device_status("", report.ticks, state.hands[0].device.text, device));
+  for (std::size_t i = 0; i < report.more_hands.size() && i + 1 < state.hands.size(); ++i) {
+    const SessionHandState& hand = state.hands[i + 1];
     const auto& [ticks, info] = report.more_hands[i];
     const std::string name = hand.name + " ";
     array.status.push_back(

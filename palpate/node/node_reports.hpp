@@ -43,7 +43,7 @@ struct SessionReport {
     TickReport ticks;
     DeviceInfo device;
   };
-  std::vector<Hand> more_hands = {};  ///< as SessionState::more_hands
+  std::vector<Hand> more_hands = {};  ///< SessionState::hands but the first
 };
 
 /// Loop, cameras, each hand's contact and device, and recording, each with its level.

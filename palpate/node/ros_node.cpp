@@ -261,10 +261,10 @@ class RosNode::Impl {
     const std::uint64_t ticks = session_.statistics().ticks.load();
     report.tick_rate =
         static_cast<double>(ticks - counted_ticks_) / std::max(now - counted_at_, 1e-3);
-    report.late_ticks = report.state.summary.late_ticks - counted_late_;
+    report.late_ticks = report.state.hands[0].summary.late_ticks - counted_late_;
     counted_at_ = now;
     counted_ticks_ = ticks;
-    counted_late_ = report.state.summary.late_ticks;
+    counted_late_ = report.state.hands[0].summary.late_ticks;
     for (std::size_t i = 1; i < hands_.size(); ++i)
       report.more_hands.push_back({hands_[i]->second, session_.device(i).info()});
     for (const auto& hand : hands_) hand->second.flags = hand->second.safety = 0;

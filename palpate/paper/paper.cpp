@@ -15,8 +15,7 @@ Paper::Paper(const Parameters& parameters, Variant variant)
   validate(parameters_);
 }
 
-void Paper::set_parameters(const Parameters& parameters) {
-  validate(parameters);
+void Paper::set_parameters(const Parameters& parameters) noexcept {
   parameters_ = parameters;
   mover_.set({.proxy = parameters.proxy, .fixed_step = variant_ == Variant::fixed_step});
 }

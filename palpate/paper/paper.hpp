@@ -27,7 +27,7 @@ class Paper final : public Method {
   /// Movement steps 2 to 7 of section 4.3 until the proxy rests, and the force (4.6). [servo] At
   /// most step_budget steps over at most Patch::capacity points each.
   Tick tick(const Vec3& hip, double t) noexcept override;
-  void set_parameters(const Parameters& parameters) override;
+  void set_parameters(const Parameters& parameters) noexcept override;
 
   [[nodiscard]] const Patch* patch() const noexcept override { return &mover_.patch(); }
 

@@ -103,10 +103,10 @@ void Recorder::frame(std::uint64_t number, double stamp, std::size_t camera,
   wake_writer_.notify_one();
 }
 
-void Recorder::settings(const NumberedSettings& settings, double t) {
+void Recorder::commands(const ServoCommands& commands, double t) {
   const std::lock_guard lock(mutex_);
   if (stopping_) return;
-  entries_.emplace_back(SetSettings{settings, t});
+  entries_.emplace_back(Told{commands, t});
   ++entries_handed_;
   wake_writer_.notify_one();
 }
@@ -320,9 +320,9 @@ void Recorder::write_entries() {
       }
       frame_written_ = frame.number;
     } else {
-      const auto& set = std::get<SetSettings>(*entry);
-      writer_->settings(set.settings, set.t);
-      settings_written_ = set.settings.number;
+      const auto& told = std::get<Told>(*entry);
+      writer_->commands(told.commands, told.t);
+      commands_written_ = told.commands.number;
     }
     const std::lock_guard lock(mutex_);
     ++entries_written_;
@@ -350,8 +350,8 @@ bool Recorder::write_ticks() {
     if (seated_at) info_.seat = seat_;
     while (!collected_.empty() && ticks.size() < most_at_once) {
       const ServoTick& tick = collected_.front();
-      if (tick.frame_number > frame_written_ || !settings_written_ ||
-          tick.settings_number > *settings_written_)
+      if (tick.frame_number > frame_written_ || !commands_written_ ||
+          tick.settings_number > *commands_written_)
         break;
       ticks.push_back(tick);
       collected_.pop_front();

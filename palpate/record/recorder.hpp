@@ -68,8 +68,8 @@ class Recorder {
   /// for the disk.
   void frame(std::uint64_t number, double stamp, std::size_t camera,
              std::shared_ptr<const Cloud> cloud);
-  /// Settings that the loop got. Any thread. Does not wait for the disk.
-  void settings(const NumberedSettings& settings, double t);
+  /// What the loop was told. Any thread. Does not wait for the disk.
+  void commands(const ServoCommands& commands, double t);
 
   /// Returns when what has come so far is written and committed, or the recording has ended. Waits
   /// for the disk: not for the servo's thread, a camera's or the page's.
@@ -99,11 +99,11 @@ class Recorder {
     PackedImage packed{};
     bool ready = true;  // guarded by mutex_, as is packed until it is set
   };
-  struct SetSettings {
-    NumberedSettings settings;
+  struct Told {
+    ServoCommands commands;
     double t;
   };
-  using Entry = std::variant<std::shared_ptr<PutFrame>, SetSettings>;
+  using Entry = std::variant<std::shared_ptr<PutFrame>, Told>;
 
   void collect();  // the thread that empties the ring
   void pack();     // the thread that packs images
@@ -133,7 +133,7 @@ class Recorder {
   SessionInfo info_;
   std::optional<SessionWriter> writer_;
   std::uint64_t frame_written_ = 0;                // its number
-  std::optional<std::uint64_t> settings_written_;  // their number
+  std::optional<std::uint64_t> commands_written_;  // their number
   std::uint64_t entries_written_ = 0;
 
   mutable std::mutex mutex_;

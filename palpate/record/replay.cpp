@@ -109,9 +109,8 @@ class CycleRerun final : public Rerun {
       : session_(session),
         methods_(methods),
         device_(session.info().limits.value()),
-        settings_(session.settings(first.settings_number)),
-        settings_number_(first.settings_number),
-        cycle_(make_method(settings_.method, settings_.parameters, methods_), device_, settings_),
+        commands_(session.commands(first.settings_number)),
+        cycle_(made_method(), device_, commands_),
         ticks_(cycle_.reader()) {
     if (!session.state()) return;
     // What was in use before, of each camera.
@@ -132,15 +131,11 @@ class CycleRerun final : public Rerun {
   }
 
   ServoTick tick(const ServoTick& recorded) override {
-    const bool new_settings = recorded.settings_number != settings_number_;
-    if (new_settings) {
-      settings_number_ = recorded.settings_number;
-      settings_ = session_.settings(settings_number_);
-    }
-    if ((recorded.hand & method_switched) != 0) {
-      cycle_.set_method(make_method(settings_.method, settings_.parameters, methods_), settings_);
-    } else if (new_settings) {
-      cycle_.set_settings(settings_);
+    const bool switched = (recorded.hand & method_switched) != 0;
+    if (switched || recorded.settings_number != commands_.number) {
+      commands_ = session_.commands(recorded.settings_number);
+      cycle_.command([&](ServoCommands& told) { told = commands_; },
+                     switched ? made_method() : nullptr);
     }
     if ((recorded.hand & faults_reset) != 0) cycle_.reset_faults();
     for (const std::uint64_t number : session_.taken_in(recorded, frame_number_)) put(number);
@@ -156,6 +151,10 @@ class CycleRerun final : public Rerun {
   [[nodiscard]] std::uint64_t frames() const override { return frames_; }
 
  private:
+  [[nodiscard]] std::shared_ptr<Method> made_method() const {
+    return make_method(commands_.settings.method, commands_.settings.parameters, methods_);
+  }
+
   void put(std::uint64_t number) {
     const auto adopted = session_.adopted().find(number);
     if (adopted == session_.adopted().end())
@@ -181,8 +180,7 @@ class CycleRerun final : public Rerun {
   SessionReader& session_;
   const MethodRegistry& methods_;
   ReplayDevice device_;
-  ServoSettings settings_;
-  std::uint64_t settings_number_;
+  ServoCommands commands_;
   Cycle cycle_;
   TickRing<ServoTick>::Reader ticks_;
   std::uint64_t frame_number_ = 0;
@@ -197,7 +195,7 @@ class MethodRerun final : public Rerun {
       : session_(session),
         methods_(methods),
         settings_number_(first.settings_number),
-        settings_(session.settings(settings_number_)),
+        settings_(session.commands(settings_number_).settings),
         method_(make_method(settings_.method, settings_.parameters, methods_)) {
     if (!session.info().seat) return;
     last_proxy_ = *session.info().seat;
@@ -209,7 +207,7 @@ class MethodRerun final : public Rerun {
     if (recorded.settings_number != settings_number_) {
       const std::string before = settings_.method;
       settings_number_ = recorded.settings_number;
-      settings_ = session_.settings(settings_number_);
+      settings_ = session_.commands(settings_number_).settings;
       switched = switched || settings_.method != before;
       if (!switched) method_->set_parameters(settings_.parameters);
     }

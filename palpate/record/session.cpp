@@ -305,8 +305,8 @@ SessionInfo session_from_json(const std::string& text, const std::string& name) 
   });
 }
 
-std::string to_json(const NumberedSettings& settings) {
-  const ServoSettings& all = settings.settings;
+std::string to_json(const ServoCommands& commands) {
+  const ServoSettings& all = commands.settings;
   json parameters;
   json safety;
   json pose = json::array();
@@ -314,7 +314,7 @@ std::string to_json(const NumberedSettings& settings) {
   for (const SafetyParameterInfo& row : safety_parameter_table())
     safety[row.name] = row.get(all.safety);
   for (int i = 0; i < 12; ++i) pose.push_back(all.placement.world_from_device(i / 4, i % 4));
-  json object = {{"number", settings.number},
+  json object = {{"number", commands.number},
                  {"method", all.method},
                  {"parameters", parameters},
                  {"safety", safety},
@@ -324,17 +324,18 @@ std::string to_json(const NumberedSettings& settings) {
                  {"bubble_speed", all.placement.bubble_speed},
                  {"handle_weight", all.placement.handle_weight},
                  {"down", {all.placement.down.x(), all.placement.down.y(), all.placement.down.z()}},
-                 {"scene", all.scene}};
+                 {"scene", commands.scene},
+                 {"hold", commands.hold}};
   if (all.placement.clutch_button) object["clutch_button"] = *all.placement.clutch_button;
   if (all.fixtures) object["fixtures"] = json::parse(fixtures_json(*all.fixtures));
   return object.dump();
 }
 
-NumberedSettings settings_from_json(const std::string& text, const std::string& name) {
+ServoCommands commands_from_json(const std::string& text, const std::string& name) {
   return parsed(text, name, [&](const json& object) {
-    NumberedSettings settings;
-    ServoSettings& all = settings.settings;
-    settings.number = whole_of<std::uint64_t>(object.at("number"), name);
+    ServoCommands commands;
+    ServoSettings& all = commands.settings;
+    commands.number = whole_of<std::uint64_t>(object.at("number"), name);
     all.method = object.at("method").get<std::string>();
     const json& parameters = object.at("parameters");
     for (const ParameterInfo& row : parameter_table()) {
@@ -363,11 +364,13 @@ NumberedSettings settings_from_json(const std::string& text, const std::string& 
         all.placement.down[axis] =
             object.at("down").at(static_cast<std::size_t>(axis)).get<double>();
     }
-    if (object.contains("scene")) all.scene = whole_of<std::uint64_t>(object.at("scene"), name);
+    if (object.contains("scene"))
+      commands.scene = whole_of<std::uint64_t>(object.at("scene"), name);
+    commands.hold = object.value("hold", false);
     if (object.contains("fixtures"))
       all.fixtures = fixtures_from_json(object.at("fixtures").dump(), name);
     validate(all);
-    return settings;
+    return commands;
   });
 }
 

@@ -41,7 +41,7 @@ std::filesystem::path hand_folder(const std::filesystem::path& first, const std:
 /// The topics of a session besides its cameras' (CameraTopics).
 namespace session_topic {
 constexpr std::string_view session = "/palpate/session";    ///< String, JSON: SessionInfo
-constexpr std::string_view settings = "/palpate/settings";  ///< String, JSON: each ServoSettings
+constexpr std::string_view settings = "/palpate/settings";  ///< String, JSON: each ServoCommands
 constexpr std::string_view frame = "/palpate/frame";        ///< Float64MultiArray: each frame put
 constexpr std::string_view adopted = "/palpate/adopted";    ///< Float64MultiArray: AdoptedFrame
 constexpr std::string_view state = "/palpate/state";        ///< Float64MultiArray: CycleState
@@ -77,8 +77,8 @@ std::string to_json(const SessionInfo& info);
 /// @throws Error naming `name` if it is damaged.
 SessionInfo session_from_json(const std::string& text, const std::string& name);
 
-std::string to_json(const NumberedSettings& settings);
+std::string to_json(const ServoCommands& commands);
 /// @throws Error naming `name` if it is damaged or does not validate.
-NumberedSettings settings_from_json(const std::string& text, const std::string& name);
+ServoCommands commands_from_json(const std::string& text, const std::string& name);
 
 }  // namespace palpate

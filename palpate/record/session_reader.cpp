@@ -61,8 +61,8 @@ SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
   });
   if (info_.frames_in_parent) parent_ = parent_of(path);
   read_all<ros::String>(session_topic::settings, [&](const auto& message, const auto& name) {
-    const NumberedSettings settings = settings_from_json(message.data, name);
-    settings_[settings.number] = settings.settings;
+    ServoCommands commands = commands_from_json(message.data, name);
+    commands_[commands.number] = std::move(commands);
   });
   read_frames();
   read_all<ros::Float64MultiArray>(session_topic::adopted,
@@ -130,9 +130,9 @@ bool SessionReader::has_fixtures() {
   return numbers_of_a_tick() > tick_columns().size() + energy_columns().size();
 }
 
-const ServoSettings& SessionReader::settings(std::uint64_t number) const {
-  const auto found = settings_.find(number);
-  if (found == settings_.end())
+const ServoCommands& SessionReader::commands(std::uint64_t number) const {
+  const auto found = commands_.find(number);
+  if (found == commands_.end())
     throw Error("recording", "has no settings " + std::to_string(number), "it may be damaged");
   return found->second;
 }

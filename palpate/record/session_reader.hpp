@@ -34,7 +34,7 @@ class SessionReader {
   /// Do its ticks have fixture_columns()?
   [[nodiscard]] bool has_fixtures();
   /// @throws Error if they are not in the recording.
-  [[nodiscard]] const ServoSettings& settings(std::uint64_t number) const;
+  [[nodiscard]] const ServoCommands& commands(std::uint64_t number) const;
 
   /// A frame as the renderer got it.
   struct PutFrame {
@@ -77,7 +77,7 @@ class SessionReader {
   SessionInfo info_;
   std::unique_ptr<SessionReader> parent_;  // of the first hand, if it has the frames
   std::vector<BagReader::Place> ticks_;
-  std::map<std::uint64_t, ServoSettings> settings_;
+  std::map<std::uint64_t, ServoCommands> commands_;
   std::map<std::uint64_t, PutFrame> frames_;
   std::map<std::uint64_t, AdoptedFrame> adopted_;
   std::map<std::uint64_t, std::vector<std::uint64_t>> taken_;  // numbers of frames, by tick

@@ -75,8 +75,8 @@ std::int64_t SessionWriter::nanoseconds(double t) const {
   return epoch_ + std::llround(1e9 * t);
 }
 
-void SessionWriter::settings(const NumberedSettings& settings, double t) {
-  write(session_topic::settings, nanoseconds(t), ros::String{to_json(settings)}, true);
+void SessionWriter::commands(const ServoCommands& commands, double t) {
+  write(session_topic::settings, nanoseconds(t), ros::String{to_json(commands)}, true);
 }
 
 void SessionWriter::frame(std::uint64_t number, double stamp, std::size_t index,

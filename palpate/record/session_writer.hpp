@@ -46,7 +46,7 @@ class SessionWriter {
   void info(const SessionInfo& info, double t);
   /// Settings, before the first tick that uses them.
   /// @param t  [s] when they were set
-  void settings(const NumberedSettings& settings, double t);
+  void commands(const ServoCommands& commands, double t);
   /// A frame, before or after the ticks that use it.
   /// @param number  as ServoTick::frame_number; increasing
   /// @param stamp   [s] as the renderer got it

@@ -48,19 +48,25 @@ void validate(const ServoSettings& settings) {
 
 Cycle::Cycle(std::shared_ptr<Method> method, Device& device, const ServoSettings& settings,
              std::size_t ring)
+    : Cycle(std::move(method), device, ServoCommands{.settings = settings}, ring) {}
+
+Cycle::Cycle(std::shared_ptr<Method> method, Device& device, const ServoCommands& commands,
+             std::size_t ring)
     : first_method_(std::move(method)),
       method_(first_method_.get()),
-      first_fixtures_(settings.fixtures),
+      first_fixtures_(commands.settings.fixtures),
       device_(device),
-      safety_(device.info().limits, settings.safety),
-      workspace_(settings.placement),
-      parameters_(settings.parameters),
-      newest_change_{settings, first_method_},
+      safety_(device.info().limits, commands.settings.safety),
+      workspace_(commands.settings.placement),
+      parameters_(commands.settings.parameters),
+      newest_change_{commands, first_method_},
       ring_(ring),
-      scene_(settings.scene) {
+      scene_(commands.scene),
+      on_hold_(commands.hold) {
   if (method_ == nullptr) throw Error("method", "there is none", "give one");
-  validate(settings);
-  method_->set_parameters(settings.parameters);
+  validate(commands.settings);
+  newest_change_.commands.number = 0;
+  method_->set_parameters(parameters_);
   fixtures_.use(first_fixtures_.get());
 }
 
@@ -89,49 +95,47 @@ std::uint64_t Cycle::put_frame(std::shared_ptr<const Cloud> cloud, double stamp,
   return frames_put_;
 }
 
+ServoCommands Cycle::command(const std::function<void(ServoCommands&)>& edit,
+                             std::shared_ptr<Method> method) {
+  const std::lock_guard lock(writers_);
+  ServoCommands commands = newest_change_.commands;
+  edit(commands);
+  validate(commands.settings);
+  commands.number = newest_change_.commands.number + 1;
+  if (method) {
+    method->set_parameters(commands.settings.parameters);
+    newest_change_.method = std::move(method);
+  }
+  newest_change_.commands = commands;
+  changes_.put(newest_change_);
+  return commands;
+}
+
 std::uint64_t Cycle::set_settings(const ServoSettings& settings) {
-  validate(settings);
-  const std::lock_guard lock(writers_);
-  newest_change_.settings = settings;
-  return changes_.put(newest_change_);
+  return command([&](ServoCommands& commands) { commands.settings = settings; }).number;
 }
 
-std::uint64_t Cycle::set_method(std::shared_ptr<Method> method, const ServoSettings& settings) {
-  if (!method) throw Error("method", "there is none", "give one");
-  validate(settings);
-  method->set_parameters(settings.parameters);
+ServoCommands Cycle::commands() const {
   const std::lock_guard lock(writers_);
-  newest_change_ = {settings, std::move(method)};
-  return changes_.put(newest_change_);
-}
-
-NumberedSettings Cycle::set_method(std::shared_ptr<Method> method) {
-  if (!method) throw Error("method", "there is none", "give one");
-  const std::lock_guard lock(writers_);
-  method->set_parameters(newest_change_.settings.parameters);
-  newest_change_.method = std::move(method);
-  const std::uint64_t number = changes_.put(newest_change_);
-  return {number, newest_change_.settings};
+  return newest_change_.commands;
 }
 
 // The proxy is all that another method is told of the one before. True if it is another.
 bool Cycle::adopt_change(const Change& change) noexcept {
-  safety_.set_parameters(change.settings.safety);
-  if (workspace_.placement() != change.settings.placement) {
-    workspace_.place(change.settings.placement);
-    placement_changed_ = number_ > 0;
-  }
-  if (std::exchange(scene_, change.settings.scene) != change.settings.scene)
-    placement_changed_ = number_ > 0;
-  parameters_ = change.settings.parameters;
-  fixtures_.use(change.settings.fixtures.get());
+  const ServoSettings& settings = change.commands.settings;
   const bool switched = change.method.get() != method_;
   method_ = change.method.get();
-  try {
-    method_->set_parameters(parameters_);
-  } catch (const Error&) {  // validated, so only a method with limits of its own comes here
-    add(statistics_.settings_refused, 1);
+  safety_.set_parameters(settings.safety);
+  parameters_ = settings.parameters;
+  method_->set_parameters(parameters_);
+  fixtures_.use(settings.fixtures.get());
+  if (workspace_.placement() != settings.placement) {
+    workspace_.place(settings.placement);
+    placement_changed_ = number_ > 0;
   }
+  if (std::exchange(scene_, change.commands.scene) != change.commands.scene)
+    placement_changed_ = number_ > 0;
+  on_hold_ = change.commands.hold;
   if (!switched) return false;
   if (number_ > 0) method_->seat(last_proxy_);
   last_normal_ = Vec3::Zero();
@@ -277,7 +281,7 @@ void Cycle::run(const Wake& wake) noexcept {
   const Tick tick = method_->tick(hip, t);
   last_proxy_ = tick.proxy;
   last_normal_ = tick.normal;
-  const bool holds = hand.present && !hand.clutched && !is_faulty(hand) && !jumped;
+  const bool holds = hand.present && !hand.clutched && !is_faulty(hand) && !jumped && !on_hold_;
   const FixtureOutput fixtures = fixtures_.run({.t = t,
                                                 .hip = hip,
                                                 .surface_force = tick.force - tick.transient,
@@ -292,7 +296,7 @@ void Cycle::run(const Wake& wake) noexcept {
   const double most_force = std::min(safety_.parameters().max_force, limits.max_force);
   double support = support_.run(t, gravity * workspace_.placement().handle_weight,
                                 std::min(most_force, limits.continuous_force),
-                                held && !jumped && safety_.latched_by() == 0);
+                                held && !jumped && !on_hold_ && safety_.latched_by() == 0);
 
   const Freshness::Age age = freshness_.at(t);
   const SafetyOutput safe = safety_.run(
@@ -346,13 +350,14 @@ void Cycle::run(const Wake& wake) noexcept {
                          .frame_age = age.age,
                          .number = number_++,
                          .frame_number = frame_number_,
-                         .settings_number = changes_.number(),
+                         .settings_number = changes_.taken_last().commands.number,
                          .safety = safe.flags,
                          .wake_up_ns = wake.wake_up_ns,
                          .previous_compute_ns = wake.previous_compute_ns,
                          .fixtures = fixtures.acting,
                          .hand = hand_bits(hand) | (reseated ? proxy_reseated : 0U) |
-                                 (switched ? method_switched : 0U) | (reset ? faults_reset : 0U)};
+                                 (switched ? method_switched : 0U) | (reset ? faults_reset : 0U) |
+                                 (on_hold_ ? force_on_hold : 0U)};
   ring_.push(record);
   keep_statistics(record, sent.norm());
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -26,16 +27,13 @@
 
 namespace palpate {
 
-/// Everything that can be changed while the loop runs.
+/// What a user sets, also while the loop runs.
 struct ServoSettings {
-  /// The method's name, for the record: Cycle::set_method is what switches.
+  /// The method's name, for the record: a new method object is what switches.
   std::string method = "sight";
   Parameters parameters;
   SafetyParameters safety;
   Placement placement;
-  /// Counts what is in the scene: where it changes, as another recording is opened or time jumps in
-  /// one, the hand is disengaged and the proxy starts again on the free side.
-  std::uint64_t scene = 0;
   /// Virtual fixtures: forbidden regions, guides, viscous regions. Null: none.
   std::shared_ptr<const FixtureSet> fixtures = {};
 };
@@ -43,10 +41,17 @@ struct ServoSettings {
 /// @throws Error if one of them does not validate.
 void validate(const ServoSettings& settings);
 
-/// Settings, and their number among those set.
-struct NumberedSettings {
+/// All that a cycle has been told. A snapshot, of which the newest is enough however many come
+/// between two ticks: what happens once is counted. A tick applies it in this order: method,
+/// settings, scene, hold.
+struct ServoCommands {
   std::uint64_t number = 0;  ///< as ServoTick::settings_number
   ServoSettings settings;
+  /// Counts changes of the whole scene, as where another recording is opened or time jumps in one:
+  /// the hand is disengaged, and the proxy starts again on the free side of the surface.
+  std::uint64_t scene = 0;
+  /// An operator keeps the force off: the hand is disengaged, and everything else continues.
+  bool hold = false;
 };
 
 /// What was done with the hand in a cycle; bits of `ServoTick::hand`.
@@ -62,6 +67,7 @@ enum HandFlag : std::uint32_t {
   hand_fault = 1u << 4,
   /// A latched fault of the safety chain was reset before the tick; see Cycle::reset_faults.
   faults_reset = 1u << 5,
+  force_on_hold = 1u << 6,  ///< ServoCommands::hold
 };
 constexpr unsigned hand_fault_shift = 8;  ///< bits 8 to 15 of `ServoTick::hand`: the DeviceFault
 
@@ -101,13 +107,12 @@ struct CycleStatistics {
   std::atomic<std::uint64_t> contact_ticks{0};
   std::atomic<std::uint64_t> frames_adopted{0};
   std::atomic<std::uint64_t> frames_dropped{0};  ///< overtaken by a newer one before any tick
-  std::atomic<std::uint64_t> settings_refused{0};
-  std::atomic<double> max_force{0.0};    ///< [N] sent
-  std::atomic<std::uint32_t> hand{0};    ///< HandFlag bits of the last tick
-  std::atomic<std::uint32_t> safety{0};  ///< SafetyFlag bits of the last tick
-  std::atomic<double> last_t{0.0};       ///< [s] of the last tick, once `ticks` are not 0
-  Histogram frame_age;                   ///< [ns] at each tick that had a frame
-  Histogram hand_over;                   ///< [ns] from put_frame to the tick that uses the frame
+  std::atomic<double> max_force{0.0};            ///< [N] sent
+  std::atomic<std::uint32_t> hand{0};            ///< HandFlag bits of the last tick
+  std::atomic<std::uint32_t> safety{0};          ///< SafetyFlag bits of the last tick
+  std::atomic<double> last_t{0.0};               ///< [s] of the last tick, once `ticks` are not 0
+  Histogram frame_age;                           ///< [ns] at each tick that had a frame
+  Histogram hand_over;  ///< [ns] from put_frame to the tick that uses the frame
   std::array<std::atomic<std::uint64_t>, safety_flag_count> interventions{};
   std::atomic<bool> force_out{false};        ///< the last tick sent a force other than zero
   std::atomic<std::uint32_t> latched_by{0};  ///< SafetyFlag bits, as SafetyChain::latched_by
@@ -145,6 +150,9 @@ class Cycle {
   /// @throws Error if the settings do not validate or the method refuses its parameters.
   Cycle(std::shared_ptr<Method> method, Device& device, const ServoSettings& settings = {},
         std::size_t ring = 8192);
+  /// The same of one that has been told more: for replays.
+  Cycle(std::shared_ptr<Method> method, Device& device, const ServoCommands& commands,
+        std::size_t ring = 8192);
 
   /// [servo] No allocation, deallocation, lock, system call or exception (as far as the device
   /// keeps its word). `wake.t` is on the clock of the frames' stamps.
@@ -169,20 +177,19 @@ class Cycle {
   /// Resets a latched fault of the safety chain in the next cycle, by an operator. Any thread.
   void reset_faults() noexcept { fault_resets_.fetch_add(1, std::memory_order_relaxed); }
 
-  /// Takes effect in the next cycle. Any thread but the servo's.
-  /// @return their number, as in ServoTick::settings_number
-  /// @throws Error if they do not validate.
+  /// Tells the cycle what `edit` makes of what it was told last; all of it takes effect in the same
+  /// cycle, the next one. Any thread but the servo's.
+  /// @param method  replaces the method; null: the same goes on. The new one has no history: it
+  ///                gets the parameters, the current proxy position and the newest frame of each
+  ///                camera, so a recording can start here in mid-session. The user may feel a
+  ///                change: the method `sight` raises the force over most of one frame interval.
+  /// @throws Error, changing nothing, if the settings do not validate
+  ServoCommands command(const std::function<void(ServoCommands&)>& edit,
+                        std::shared_ptr<Method> method = nullptr);
+  /// The same for settings alone. @return their number, as in ServoTick::settings_number
   std::uint64_t set_settings(const ServoSettings& settings);
-
-  /// Replaces the method in the next cycle. The new method has no history: it gets the parameters
-  /// of `settings`, the current proxy position and the newest frame of each camera, so a recording
-  /// can start here in mid-session. The user may feel a change: the method `sight` raises the force
-  /// over most of one frame interval. Any thread but the servo's.
-  /// @return the number of the settings, as in ServoTick::settings_number
-  /// @throws Error if they do not validate or the method refuses its parameters.
-  std::uint64_t set_method(std::shared_ptr<Method> method, const ServoSettings& settings);
-  /// The same with the settings that were set last: for one of the same name, made again.
-  NumberedSettings set_method(std::shared_ptr<Method> method);
+  /// What it was told last. Any thread but the servo's.
+  [[nodiscard]] ServoCommands commands() const;
 
   /// Sees every cycle from the next one on. Any thread.
   [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return ring_.reader(); }
@@ -213,9 +220,9 @@ class Cycle {
     std::uint64_t number = 0;  // among all that were put
   };
 
-  /// Settings, and the method that they are for.
+  /// What it was told, and the method that this is for.
   struct Change {
-    ServoSettings settings;
+    ServoCommands commands;
     std::shared_ptr<Method> method;
   };
 
@@ -256,7 +263,8 @@ class Cycle {
   std::uint64_t frame_number_ = 0;                                // the highest taken
   ObservedClouds seen_;                                           // in use
   std::array<std::uint64_t, Freshness::max_cameras> taken_in_{};  // tick that took each of them
-  std::uint64_t scene_ = 0;                                       // in use, as ServoSettings::scene
+  std::uint64_t scene_ = 0;                                       // in use, as ServoCommands::scene
+  bool on_hold_ = false;                                          // as ServoCommands::hold
   bool placement_changed_ = false;                                // or the scene, before this tick
   Freshness freshness_;
   PassivityObserver passivity_;

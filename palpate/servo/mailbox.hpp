@@ -39,12 +39,8 @@ class Mailbox {
 
   /// The value taken last (a default one before the first). Reader's thread.
   [[nodiscard]] const T& taken_last() const noexcept { return slots_[front_].value; }
-  /// How many values were taken. Reader's thread.
-  [[nodiscard]] std::uint64_t taken() const noexcept { return taken_; }
   /// How many were put before the one taken last and never taken. Reader's thread.
   [[nodiscard]] std::uint64_t dropped() const noexcept { return slots_[front_].number - taken_; }
-  /// The number of the one taken last, counting what was put from 1. Reader's thread.
-  [[nodiscard]] std::uint64_t number() const noexcept { return slots_[front_].number; }
 
  private:
   static constexpr unsigned unread = 4;  // a bit of middle_, beside the slot's index

@@ -85,12 +85,6 @@ class ServoLoop {
   std::uint64_t set_settings(const ServoSettings& settings) {
     return cycle_.set_settings(settings);
   }
-  std::uint64_t set_method(std::shared_ptr<Method> method, const ServoSettings& settings) {
-    return cycle_.set_method(std::move(method), settings);
-  }
-  NumberedSettings set_method(std::shared_ptr<Method> method) {
-    return cycle_.set_method(std::move(method));
-  }
   [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return cycle_.reader(); }
   [[nodiscard]] CycleReader full_reader() const { return cycle_.full_reader(); }
   [[nodiscard]] const CycleStatistics& statistics() const { return cycle_.statistics(); }

@@ -25,8 +25,8 @@ constexpr std::size_t largest_file = 1 << 20;  // [bytes]
 constexpr double lowest_record_limit = 0.001;  // [GB]
 constexpr double highest_record_limit = 1e6;
 
-CameraConfig read_camera(const TomlTable& root, const toml::node& node) {
-  CameraConfig camera;
+CameraSpec read_camera(const TomlTable& root, const toml::node& node) {
+  CameraSpec camera;
   if (node.is_string()) {
     camera.uri = **node.as_string();
     return camera;
@@ -41,8 +41,8 @@ CameraConfig read_camera(const TomlTable& root, const toml::node& node) {
   return camera;
 }
 
-std::vector<CameraConfig> read_cameras(const TomlTable& root, const toml::node& node) {
-  std::vector<CameraConfig> cameras;
+std::vector<CameraSpec> read_cameras(const TomlTable& root, const toml::node& node) {
+  std::vector<CameraSpec> cameras;
   if (const toml::array* array = node.as_array()) {
     for (const toml::node& element : *array) cameras.push_back(read_camera(root, element));
   } else {
@@ -70,14 +70,14 @@ void read_placement(const TomlTable& table, Placement& placement) {
   table.read("down_z", placement.down.z(), -1.0, 1.0, "");
 }
 
-HandConfig read_hand(const TomlTable& root, const toml::node& node) {
+HandSpec read_hand(const TomlTable& root, const toml::node& node) {
   if (!node.is_table()) root.fail(node, "a hand is not a table", "write [[hand]] and a device");
   constexpr std::array<std::string_view, 2> own_keys{"device", "name"};
   std::array<std::string_view, own_keys.size() + placement_keys.size()> keys;
   std::copy(placement_keys.begin(), placement_keys.end(),
             std::copy(own_keys.begin(), own_keys.end(), keys.begin()));
   const TomlTable table(*node.as_table(), root.file(), "[[hand]]", keys);
-  HandConfig hand{.device = ""};
+  HandSpec hand;
   table.read("device", hand.device);
   if (hand.device.empty())
     root.fail(node, "a hand has no 'device'", "write device = \"SCHEME:PATH\"");
@@ -86,14 +86,14 @@ HandConfig read_hand(const TomlTable& root, const toml::node& node) {
   return hand;
 }
 
-std::vector<HandConfig> read_hands(const TomlTable& root, const toml::node& node) {
-  std::vector<HandConfig> hands;
+// The hands after the first, which `device` and `placement` describe.
+void read_hands(const TomlTable& root, const toml::node& node, std::vector<HandSpec>& hands) {
+  hands.resize(1);
   if (const toml::array* array = node.as_array()) {
     for (const toml::node& element : *array) hands.push_back(read_hand(root, element));
   } else {
     hands.push_back(read_hand(root, node));
   }
-  return hands;
 }
 
 void read_operator_limits(const TomlTable& root, std::map<std::string, double>& limits) {
@@ -251,7 +251,7 @@ SessionConfig parse_session_config(std::string_view text, const std::string& nam
   SessionConfig config = base;
   if (const toml::node* cameras = root.find("camera"))
     config.cameras = read_cameras(root, *cameras);
-  root.read("device", config.device);
+  root.read("device", config.hands.front().device);
   root.read("without_watchdog", config.without_watchdog);
   root.read("rate", config.rate, lowest_rate, highest_rate, "Hz");
   root.read("method", config.method);
@@ -271,8 +271,8 @@ SessionConfig parse_session_config(std::string_view text, const std::string& nam
     with_line(method, [&] { check_method(config.method); });
   if (const toml::table* placement = root.sub("placement"))
     read_placement(TomlTable(*placement, root.file(), "[placement]", placement_keys),
-                   config.placement);
-  if (const toml::node* hands = root.find("hand")) config.more_hands = read_hands(root, *hands);
+                   config.hands.front().placement);
+  if (const toml::node* hands = root.find("hand")) read_hands(root, *hands, config.hands);
   read_rows(root, "parameters", parameter_table(), config.parameters);
   if (const toml::table* parameters = root.sub("parameters")) {
     for (const auto& [key, value] : *parameters)
@@ -305,8 +305,8 @@ std::string to_toml(const SessionConfig& config) {
   std::string text = "# A palpate session; docs/session.md describes each key.\n";
   text += key_line("method", toml_text(config.method), "how forces are computed");
   text += key_line("rate", toml_number(config.rate), "Hz, 100 to 100000: ticks of the servo loop");
-  text +=
-      key_line("device", toml_text(config.device), "URI of the haptic device; \"\": the default");
+  text += key_line("device", toml_text(config.hands.front().device),
+                   "URI of the haptic device; \"\": the default");
   text += key_line("without_watchdog", config.without_watchdog ? "true" : "false",
                    "allow forces above engage_force on a device with motors but no watchdog");
   text +=
@@ -316,7 +316,7 @@ std::string to_toml(const SessionConfig& config) {
                    "folder of recordings started on the page; \"\": the current folder");
   text += key_line("record_limit", toml_number(config.record_limit),
                    "GB, 0.001 to 1000000: total of the recordings started on the page");
-  for (const CameraConfig& camera : config.cameras) {
+  for (const CameraSpec& camera : config.cameras) {
     text += "\n[[camera]]\n";
     text += "uri = " + toml_text(camera.uri) + "\n";
     if (!camera.name.empty()) text += "name = " + toml_text(camera.name) + "\n";
@@ -327,8 +327,8 @@ std::string to_toml(const SessionConfig& config) {
       text += key_line("# world_from_camera", "[0, 0, 0, 0, 0, 0, 1]", comment);
     }
   }
-  text += "\n[placement]\n" + placement_lines(config.placement);
-  for (const HandConfig& hand : config.more_hands) {
+  text += "\n[placement]\n" + placement_lines(config.hands.front().placement);
+  for (const HandSpec& hand : std::span(config.hands).subspan(1)) {
     text += "\n[[hand]]\n";
     text += key_line("device", toml_text(hand.device), "URI of a further haptic device");
     if (!hand.name.empty()) text += "name = " + toml_text(hand.name) + "\n";
@@ -369,22 +369,22 @@ std::string to_toml(const SessionConfig& config) {
 std::string with_placement(std::string_view text, const std::string& name,
                            const Placement& placement) {
   validate(placement);
-  SessionConfig wanted = parse_session_config(text, name);
+  Placement wanted = parse_session_config(text, name).hands.front().placement;
   std::vector<std::string> lines = lines_of(text);
   edit(lines, parse_toml(text, name, remedy_toml), name, "world_from_device",
        toml_pose(placement.world_from_device));
   std::string edited = joined(lines);
-  const bool scale_matters = placement.workspace_scale != wanted.placement.workspace_scale;
+  const bool scale_matters = placement.workspace_scale != wanted.workspace_scale;
   if (scale_matters) {
     edit(lines, parse_toml(edited, name, remedy_toml), name, "scale",
          toml_number(placement.workspace_scale));
     edited = joined(lines);
   }
   // What was written must be what is read, and nothing else may have changed.
-  const Placement got = parse_session_config(edited, name).placement;
-  wanted.placement.workspace_scale = placement.workspace_scale;
+  const Placement got = parse_session_config(edited, name).hands.front().placement;
+  wanted.workspace_scale = placement.workspace_scale;
   const bool right = got.workspace_scale == placement.workspace_scale &&
-                     got.clutch_button == wanted.placement.clutch_button &&
+                     got.clutch_button == wanted.clutch_button &&
                      got.world_from_device.isApprox(placement.world_from_device, 1e-12);
   if (!right) {
     throw Error(name, "its [placement] is written in a way that a program cannot edit",
@@ -394,12 +394,11 @@ std::string with_placement(std::string_view text, const std::string& name,
 }
 
 void validate(const SessionConfig& config) {
-  for (const CameraConfig& camera : config.cameras) {
+  for (const CameraSpec& camera : config.cameras) {
     if (camera.world_from_camera)
       check_rigid(*camera.world_from_camera, "world_from_camera of " + camera.uri);
   }
-  validate(config.placement);
-  for (const HandConfig& hand : config.more_hands) validate(hand.placement);
+  for (const HandSpec& hand : config.hands) validate(hand.placement);
   validate(config.parameters);
   validate(config.safety);
   if (!(config.rate >= lowest_rate && config.rate <= highest_rate)) {

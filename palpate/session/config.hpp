@@ -8,30 +8,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
-#include <Eigen/Geometry>
-
-#include "palpate/core/parameters.hpp"
-#include "palpate/servo/safety.hpp"
-#include "palpate/servo/workspace.hpp"
+#include "palpate/session/session_spec.hpp"
 
 namespace palpate {
-
-/// A camera of a session.
-struct CameraConfig {
-  std::string uri;
-  /// Pose of the optical frame; none: the source's own.
-  std::optional<Eigen::Isometry3d> world_from_camera = {};
-  std::string name = {};  ///< for messages and the page; empty: the URI
-};
-
-/// A hand of a session beside the first.
-struct HandConfig {
-  std::string device = "hand:";  ///< URI
-  std::string name = {};         ///< empty: hand_2, hand_3, ...
-  Placement placement = {};
-};
 
 /// The page's server.
 struct ServerConfig {
@@ -42,21 +22,10 @@ struct ServerConfig {
   bool browser = true;                     ///< open one at the start, where there is a desktop
 };
 
-/// A whole session as one TOML file describes it. docs/session.md lists the keys.
-struct SessionConfig {
-  std::vector<CameraConfig> cameras{{.uri = "synthetic:desk?noise=1mm"}};
-  std::string device = {};  ///< URI; empty: the program's choice
-  Placement placement;
-  std::vector<HandConfig> more_hands = {};
-  /// SessionOptions::without_watchdog: more than the engage force on motors that nothing watches.
-  bool without_watchdog = false;
-  bool radii_chosen = false;  ///< SessionOptions::radii_chosen: a radius is set here
-  double rate = 1000.0;       ///< [Hz] of the servo loop, 100 to 100 000
-  std::string method = "sight";
-  Parameters parameters;
-  SafetyParameters safety;
-  std::string fixtures = {};       ///< TOML file of virtual fixtures; empty: none
-  std::string record = {};         ///< folder to record into; empty: none
+/// A session of the program as one TOML file describes it. docs/session.md lists the keys.
+struct SessionConfig : SessionSpec {
+  SessionConfig() { cameras = {{.uri = "synthetic:desk?noise=1mm"}}; }
+
   std::string record_folder = {};  ///< folder of recordings started on the page; empty: the current
   double record_limit = 20.0;      ///< [GB] of all recordings of a session that pages start
   /// Per safety limit: the least strict value that the operator may set on the page; default: the

@@ -27,6 +27,7 @@
 #include "palpate/session/hand_paths.hpp"
 #include "palpate/session/played_source.hpp"
 #include "palpate/session/session_hand.hpp"
+#include "palpate/sources/fixture_file.hpp"
 #include "palpate/sources/posed_source.hpp"
 
 namespace palpate {
@@ -46,7 +47,7 @@ std::string seconds_text(double seconds) {
   return std::to_string(static_cast<int>(seconds)) + " s";
 }
 
-std::function<std::unique_ptr<Source>()> opener(const SessionCamera& camera,
+std::function<std::unique_ptr<Source>()> opener(const CameraSpec& camera,
                                                 const Registry<SourceScheme>& sources) {
   if (camera.world_from_camera && Uri(camera.uri).has("pose"))
     throw Error(camera.uri, "its pose is given twice, by ?pose= and by world_from_camera",
@@ -141,28 +142,37 @@ void refuse_without_watchdog(const DeviceInfo& device, const SafetyParameters& s
 class Session::Impl {
  public:
   explicit Impl(SessionOptions options) : options_(std::move(options)) {
+    options_.cameras.resize(std::max(options_.cameras.size(), options_.open_cameras.size()));
+    options_.open_cameras.resize(options_.cameras.size());
     if (options_.cameras.empty())
       throw Error("camera", "the session has none", "give one, such as synthetic:desk");
     if (options_.cameras.size() > Patch::max_views)
       throw Error("camera", std::to_string(options_.cameras.size()) + " cameras are too many",
                   "give at most " + std::to_string(Patch::max_views));
-    if (!is_live() && !(options_.servo.rate >= 1.0 && options_.servo.rate <= 100'000.0))
-      throw Error("servo rate", std::to_string(options_.servo.rate) + " Hz is out of range",
+    if (!is_live() && !(options_.rate >= 1.0 && options_.rate <= 100'000.0))
+      throw Error("servo rate", std::to_string(options_.rate) + " Hz is out of range",
                   "give a rate from 1 to 100000 Hz");
-    validate(options_.settings);
+    settings_ = {.method = options_.method,
+                 .parameters = options_.parameters,
+                 .safety = options_.safety,
+                 .placement = options_.hands.empty() ? Placement() : options_.hands[0].placement,
+                 .fixtures = options_.fixture_set};
+    if (!settings_.fixtures && !options_.fixtures.empty())
+      settings_.fixtures = std::make_shared<const FixtureSet>(read_fixtures(options_.fixtures));
+    validate(settings_);
     newest_.resize(options_.cameras.size());
     stamps_.resize(options_.cameras.size());
     numbers_.resize(options_.cameras.size());
     for (std::size_t i = 0; i < stamps_.size(); ++i) stamps_[i].camera = i;
     std::vector<std::shared_ptr<const Cloud>> first;
-    for (SessionCamera& camera : options_.cameras)
-      first.push_back(with_materials(open_camera(camera), first.size()));
+    for (std::size_t i = 0; i < options_.cameras.size(); ++i)
+      first.push_back(
+          with_materials(open_camera(options_.cameras[i], std::move(options_.open_cameras[i])), i));
     open_hands(*first.front());
     for (const auto& hand : hands_) {
-      if (needs_watchdog())
-        refuse_without_watchdog(hand->device().info(), options_.settings.safety);
+      if (needs_watchdog()) refuse_without_watchdog(hand->device().info(), settings_.safety);
     }
-    settings_ = for_cameras(options_.settings);
+    settings_ = for_cameras(std::move(settings_));
     if (!options_.radii_chosen) {
       std::vector<const Cloud*> seen;
       for (const auto& cloud : first) seen.push_back(cloud.get());
@@ -171,7 +181,7 @@ class Session::Impl {
     check_materials(settings_.fixtures.get(), first);
     proxy_radius_ = settings_.parameters.proxy.r_c();
     for (std::size_t i = 0; i < hands_.size(); ++i) {
-      ServoOptions servo = options_.servo;
+      ServoOptions servo{.rate = options_.rate, .realtime = options_.realtime};
       servo.realtime.core += static_cast<unsigned>(i);
       hands_[i]->begin(open_method(settings_, first), settings_of(*hands_[i], settings_),
                        is_live() ? std::optional(servo) : std::nullopt);
@@ -276,17 +286,13 @@ class Session::Impl {
     SessionState state;
     for (const auto& feed : feeds_) state.cameras.push_back(feed->status());
     for (const auto& played : played_) state.cameras.push_back(played->status());
-    const SessionHandState first = report(*hands_.front());
-    state.device = first.device;
-    state.interventions = first.interventions;
-    state.latched_by = first.latched_by;
-    state.summary = first.summary;
+    for (const auto& hand : hands_) state.hands.push_back(report(*hand));
     const ServoLoop* loop = hands_.front()->loop();
-    state.rate = loop != nullptr ? loop->rate() : options_.servo.rate;
+    state.rate = loop != nullptr ? loop->rate() : options_.rate;
     state.running = started_ && !stopped_;
     {
       const std::lock_guard lock(frames_mutex_);
-      state.summary.frames = frames_;
+      for (SessionHandState& hand : state.hands) hand.summary.frames = frames_;
       for (std::size_t i = 0; i < state.cameras.size(); ++i) {
         std::string& doubt = state.cameras[i].doubt;
         const std::string& trouble = materials_trouble_[i];
@@ -296,11 +302,7 @@ class Session::Impl {
     const std::lock_guard lock(control_);
     state.settings = settings_;
     state.held = held_;
-    for (std::size_t i = 1; i < hands_.size(); ++i) {
-      state.more_hands.push_back(report(*hands_[i]));
-      state.more_hands.back().placement = hands_[i]->placement;
-      state.more_hands.back().summary.frames = state.summary.frames;
-    }
+    for (std::size_t i = 0; i < hands_.size(); ++i) state.hands[i].placement = hands_[i]->placement;
     if (is_recording() && std::any_of(hands_.begin(), hands_.end(), [](const auto& hand) {
           return !hand->recorder->status().trouble.empty();
         }))
@@ -332,10 +334,15 @@ class Session::Impl {
       if (needs_watchdog()) refuse_without_watchdog(hand->device().info(), settings.safety);
     }
     settings = for_cameras(std::move(settings));
-    settings.scene = settings_.scene;  // not for others to count
     validate(settings);
     if (settings.fixtures != settings_.fixtures) check_materials(settings.fixtures.get(), newest());
-    apply(settings, settings.method != settings_.method);
+    const bool with_new_methods = settings.method != settings_.method;
+    tell([&](SessionHand& hand,
+             ServoCommands& told) { told.settings = settings_of(hand, settings); },
+         with_new_methods ? &settings : nullptr);
+    hands_.front()->placement = settings.placement;
+    settings_ = settings;
+    proxy_radius_ = settings.parameters.proxy.r_c();
   }
 
   void place(std::size_t number, const Placement& placement) {
@@ -344,17 +351,15 @@ class Session::Impl {
     SessionHand& hand = *hands_.at(number);
     hand.placement = placement;
     if (number == 0) settings_.placement = placement;
-    const ServoSettings applied = as_held(settings_of(hand, settings_));
-    note(hand, {hand.cycle().set_settings(applied), applied});
+    note(hand,
+         hand.cycle().command([&](ServoCommands& told) { told.settings.placement = placement; }));
   }
 
   void hold(bool on) {
     const std::lock_guard lock(control_);
     if (held_ == on) return;
     held_ = on;
-    ServoSettings settings = settings_;
-    if (!on) ++settings.scene;  // the hands have to engage anew
-    apply(settings, false);
+    tell([&](SessionHand& /*hand*/, ServoCommands& told) { told.hold = on; });
   }
 
   void set_playback(const Playback& playback) {
@@ -419,23 +424,26 @@ class Session::Impl {
   [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }
 
   void open_hands(const Cloud& seen) {
-    if (options_.more_hands.size() + 1 > most_hands)
-      throw Error("hands", std::to_string(options_.more_hands.size() + 1) + " are too many",
+    std::vector<HandSpec>& hands = options_.hands;
+    hands.resize(std::max({hands.size(), options_.open_devices.size(), std::size_t{1}}));
+    options_.open_devices.resize(hands.size());
+    if (hands.size() > most_hands)
+      throw Error("hands", std::to_string(hands.size()) + " are too many",
                   "give at most " + std::to_string(most_hands));
-    const bool alone = options_.more_hands.empty();
-    const auto opened = [&](std::unique_ptr<Device> device, const std::string& uri) {
-      return device ? std::move(device) : open_hand(options_, uri, seen);
-    };
-    hands_.push_back(std::make_unique<SessionHand>(
-        alone ? "" : "hand_1", opened(std::move(options_.device), options_.device_uri),
-        options_.settings.placement));
-    for (SessionHandOptions& more : options_.more_hands) {
-      if (more.name.empty()) more.name = "hand_" + std::to_string(hands_.size() + 1);
-      check_name(more.name, hands_);
-      validate(more.placement);
-      hands_.push_back(
-          std::make_unique<SessionHand>(more.name, opened(std::move(more.device), more.device_uri),
-                                        more.placement, std::move(more.on_tick)));
+    const bool alone = hands.size() == 1;
+    for (std::size_t i = 0; i < hands.size(); ++i) {
+      HandSpec& hand = hands[i];
+      if (hand.name.empty() && !alone) hand.name = "hand_" + std::to_string(i + 1);
+      if (!hand.name.empty()) check_name(hand.name, hands_);
+      if (hand.device.empty()) hand.device = "hand:";
+      validate(hand.placement);
+      std::unique_ptr<Device> device = std::move(options_.open_devices[i]);
+      if (!device) device = open_hand(options_, hand.device, seen);
+      std::function<void(const ServoTick&)> on_tick;
+      if (options_.on_tick)
+        on_tick = [this, i](const ServoTick& tick) { options_.on_tick(i, tick); };
+      hands_.push_back(std::make_unique<SessionHand>(hand.name, std::move(device), hand.placement,
+                                                     std::move(on_tick)));
     }
     const auto mice = std::count_if(hands_.begin(), hands_.end(),
                                     [](const auto& hand) { return hand->mouse() != nullptr; });
@@ -456,8 +464,7 @@ class Session::Impl {
     return state;
   }
 
-  std::shared_ptr<const Cloud> open_camera(SessionCamera& camera) {
-    std::unique_ptr<Source> source = std::move(camera.source);
+  std::shared_ptr<const Cloud> open_camera(CameraSpec& camera, std::unique_ptr<Source> source) {
     std::function<std::unique_ptr<Source>()> open;
     if (source) {
       if (camera.uri.empty()) camera.uri = source->info().uri;
@@ -498,57 +505,46 @@ class Session::Impl {
     return method;
   }
 
-  // A hand's settings, where the session's are these.
-  [[nodiscard]] static ServoSettings settings_of(const SessionHand& hand, ServoSettings settings) {
-    settings.placement = hand.placement;
+  // A hand's settings, where the session's are these, which have the first one's placement.
+  [[nodiscard]] ServoSettings settings_of(const SessionHand& hand, ServoSettings settings) const {
+    if (&hand != hands_.front().get()) settings.placement = hand.placement;
     return settings;
   }
 
-  // What the cycle gets, for these settings of the user's: no force while it is held back.
-  [[nodiscard]] ServoSettings as_held(ServoSettings settings) const {
-    if (held_) settings.safety.max_force = 0.0;
-    return settings;
+  // With control_ held: what a hand's cycle was told.
+  void note(SessionHand& hand, const ServoCommands& told) {
+    if (hand.recorder) hand.recorder->commands(told, now());
   }
 
-  // With control_ held: what a hand has been given.
-  void note(SessionHand& hand, const NumberedSettings& given) {
-    hand.settings_number = given.number;
-    if (hand.recorder) hand.recorder->settings(given, now());
-  }
-
-  // With control_ held: settings that validate, to all hands; throws before any of them has them.
-  void apply(const ServoSettings& settings, bool with_new_methods) {
+  // With control_ held: all hands; throws before any of them is told.
+  // @param new_methods  the settings for which methods are made anew; null: the old ones go on
+  void tell(const std::function<void(SessionHand&, ServoCommands&)>& edit,
+            const ServoSettings* new_methods = nullptr) {
     std::vector<std::shared_ptr<Method>> methods(hands_.size());
-    if (with_new_methods) {
+    if (new_methods != nullptr) {
       const auto seen = newest();
-      for (auto& method : methods) method = open_method(settings, seen);
+      for (auto& method : methods) method = open_method(*new_methods, seen);
     }
-    hands_.front()->placement = settings.placement;
-    settings_ = settings;
-    proxy_radius_ = settings.parameters.proxy.r_c();
     for (std::size_t i = 0; i < hands_.size(); ++i) {
       SessionHand& hand = *hands_[i];
-      const ServoSettings applied = as_held(settings_of(hand, settings));
-      note(hand, {methods[i] ? hand.cycle().set_method(methods[i], applied)
-                             : hand.cycle().set_settings(applied),
-                  applied});
+      note(hand, hand.cycle().command([&](ServoCommands& told) { edit(hand, told); },
+                                      std::move(methods[i])));
     }
   }
 
   // What is seen jumps. Before the frame after the jump the hands are disengaged; after it methods
   // take over that remember nothing of before, on the free side of what is seen now.
-  void disengage(bool methods_begin_anew) {
+  void change_scene(bool methods_begin_anew) {
     const std::lock_guard lock(control_);
-    ServoSettings settings = settings_;
-    ++settings.scene;
-    apply(settings, methods_begin_anew);
+    tell([](SessionHand& /*hand*/, ServoCommands& told) { ++told.scene; },
+         methods_begin_anew ? &settings_ : nullptr);
   }
 
   // A camera's thread, or the free-running one: a frame to all who want it.
   void take(std::size_t camera, const FedFrame& fed) {
-    if (fed.after_jump) disengage(false);
+    if (fed.after_jump) change_scene(false);
     give(camera, fed);
-    if (fed.after_jump) disengage(true);
+    if (fed.after_jump) change_scene(true);
     if (options_.on_frame) options_.on_frame(camera, fed);
   }
 
@@ -599,10 +595,10 @@ class Session::Impl {
                 const std::atomic<bool>& stop_requested) {
     for (const auto& hand : hands_) hand->device().enable();
     started_ = true;
-    const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.servo.rate);
+    const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.rate);
     TickRing<ServoTick>::Reader reader = hands_.front()->cycle().reader();
     for (std::int64_t i = 0; i < ticks && !stop_requested.load(std::memory_order_relaxed); ++i) {
-      const double t = static_cast<double>(i) / options_.servo.rate;
+      const double t = static_cast<double>(i) / options_.rate;
       free_t_ = t;
       for (std::size_t camera = 0; camera < played_.size(); ++camera) {
         while (const auto frame = played_[camera]->next_until(t)) take(camera, *frame);
@@ -657,7 +653,9 @@ class Session::Impl {
         begin_anew = [this, &hand, promise = opened[i].promise, settings = settings_] {
           Recorder* recorder = promise->get_future().get();
           if (recorder != nullptr)
-            recorder->settings(hand.cycle().set_method(open_method(settings, newest())), now());
+            recorder->commands(
+                hand.cycle().command([](ServoCommands&) {}, open_method(settings, newest())),
+                now());
         };
       }
       try {
@@ -669,8 +667,7 @@ class Session::Impl {
         for (Opened& each : opened) each.promise->set_value(nullptr);
         throw;
       }
-      const ServoSettings applied = as_held(settings_of(hand, settings_));
-      opened[i].recorder->settings({hand.settings_number, applied}, now());
+      opened[i].recorder->commands(hand.cycle().commands(), now());
     }
     {
       const std::lock_guard lock(frames_mutex_);
@@ -695,7 +692,7 @@ class Session::Impl {
     using std::chrono::nanoseconds;
     using std::chrono::system_clock;
     SessionInfo info{.kind = SessionInfo::Kind::live, .version = options_.version};
-    for (const SessionCamera& camera : options_.cameras) info.cameras.push_back(camera.uri);
+    for (const CameraSpec& camera : options_.cameras) info.cameras.push_back(camera.uri);
     info.device = hand.device().info().uri;
     info.limits = hand.device().info().limits;
     info.epoch =

@@ -16,6 +16,7 @@
 #include "palpate/servo/servo_loop.hpp"
 #include "palpate/session/camera_feed.hpp"
 #include "palpate/session/paint.hpp"
+#include "palpate/session/session_spec.hpp"
 #include "palpate/session/summary.hpp"
 #include "palpate/sources/source.hpp"
 
@@ -23,60 +24,25 @@ namespace palpate {
 
 class MouseDevice;
 
-/// A camera of a session: a source by its URI, or one that is open.
-struct SessionCamera {
-  std::string uri = {};  ///< opened by SessionOptions::sources
-  /// Used in place of the URI, which only names it then. When it ends, its last frame stays.
-  std::unique_ptr<Source> source = {};
-  /// Where it stands; none: the source's own pose.
-  std::optional<Eigen::Isometry3d> world_from_camera = {};
-};
-
-/// Another hand of a session, beside the first: a second device, or the other finger of a gripper.
-struct SessionHandOptions {
-  /// For messages, topics and the page: small letters, digits and _, beginning with a letter.
-  /// Empty: hand_2, hand_3, ...
-  std::string name = {};
-  std::string device_uri = "hand:";     ///< opened by SessionOptions::devices
-  std::unique_ptr<Device> device = {};  ///< used in place of the URI
-  Placement placement = {};             ///< of this device
-  /// Free-running: sees each tick of this hand. The caller's thread of `run`.
-  std::function<void(const ServoTick&)> on_tick = {};
-};
-
 /// Whose time a session runs in.
 enum class Pace {
   real_time,     ///< this machine's clock: a person, a device, a live camera
   free_running,  ///< as fast as the machine can: recordings and simulations, a simulated hand
 };
 
-/// A whole session, as it begins. What has a default may be left out.
-struct SessionOptions {
-  std::vector<SessionCamera> cameras;  ///< 1 to Patch::max_views
-  /// Opened by `devices`. `mouse:` without a place starts before what the first camera sees;
-  /// `hand:` and `script:` without a file stroke it.
-  std::string device_uri = "hand:";
-  std::unique_ptr<Device> device = {};  ///< used in place of the URI
-  /// Further hands. They share cameras, method, parameters, limits and fixtures with the first, and
-  /// have a device, a loop, a method's memory and a safety chain each. While one of the hands has a
-  /// fault (is_in_trouble), none of them has a force. At most Session::most_hands in all.
-  std::vector<SessionHandOptions> more_hands = {};
-  /// Method, its parameters, safety limits, placement of the first hand. Parameters with value 0
-  /// that depend on the sensor type are replaced by for_sensors(); settings() and state() return
-  /// the replaced values.
-  ServoSettings settings = {};
-  ServoOptions servo = {};  ///< rate, real-time rights
+/// A whole session, as it begins: what describes it, what is open already, and what only code can
+/// give. What has a default may be left out.
+struct SessionOptions : SessionSpec {
+  /// Used in place of the cameras' URIs, by their numbers, where not null; cameras that `cameras`
+  /// lacks are added. When one ends, its last frame stays.
+  std::vector<std::unique_ptr<Source>> open_cameras = {};
+  /// Likewise of the hands.
+  std::vector<std::unique_ptr<Device>> open_devices{std::vector<std::unique_ptr<Device>>(1)};
+  std::shared_ptr<const FixtureSet> fixture_set = {};  ///< used in place of the file `fixtures`
+  RealtimeRequest realtime = {};
   Pace pace = Pace::real_time;
-  /// Real time: allows a device with motors to send more than SafetyParameters::engage_force
-  /// although it states no watchdog (DeviceInfo::watchdog) of at most 0.5 s: if this process is
-  /// killed, its last force stays. `open_guarded` gives a device a watchdog.
-  bool without_watchdog = false;
-  /// Somebody chose the proxy's radii. If not, they are as for_points has them for what the cameras
-  /// see first.
-  bool radii_chosen = false;
   /// [s] of the built-in path of `hand:` and `script:`; less where a recording begins again before
   double stroke_time = 20.0;
-  std::string record = {};  ///< folder to record into from the start; empty: none
   /// [s] that `stop` waits for the disk of a recording while that takes nothing; six times that in
   /// all. What is not written then is said in RecordingState::message.
   double record_patience = 10.0;
@@ -90,6 +56,8 @@ struct SessionOptions {
   /// free-running.
   std::function<std::shared_ptr<const MaterialMap>(std::size_t camera, const DepthImage& image)>
       materials = {};
+  /// Free-running: sees each tick of each hand. The caller's thread of `run`.
+  std::function<void(std::size_t hand, const ServoTick& tick)> on_tick = {};
   /// Sees each frame after the method got it. A camera's thread, or the caller's of `run` where the
   /// session is free-running. Must be quick and must not throw.
   std::function<void(std::size_t camera, const FedFrame& frame)> on_frame = {};
@@ -111,7 +79,7 @@ std::string size_text(double bytes);
 
 /// How a hand of a session does.
 struct SessionHandState {
-  std::string name;
+  std::string name;  ///< empty: it is the only one
   Placement placement;
   DeviceStatus device;  ///< of a session in real time
   Summary summary;
@@ -123,13 +91,8 @@ struct SessionHandState {
 struct SessionState {
   ServoSettings settings;
   std::vector<CameraStatus> cameras;
-  DeviceStatus device;
+  std::vector<SessionHandState> hands;  ///< one at least
   RecordingState recording;
-  Summary summary;
-  std::array<std::uint64_t, safety_flag_count> interventions{};
-  std::uint32_t latched_by = 0;  ///< SafetyFlag bits that hold the force off until `reset_faults`
-  /// The hands beside the first, which is what device, summary and so on above are of.
-  std::vector<SessionHandState> more_hands;
   double rate = 0.0;  ///< [Hz]
   bool running = false;
   bool held = false;  ///< by Session::hold
@@ -149,7 +112,9 @@ class Session {
  public:
   static constexpr std::size_t most_hands = 8;
 
-  /// Opens cameras and devices, waits for each camera's first frame, and makes the method.
+  /// Opens cameras and devices (`mouse:` without a place starts before what the first camera sees;
+  /// `hand:` and `script:` without a file stroke it), waits for each camera's first frame, and
+  /// makes the method.
   /// @throws Error if one of them cannot be used: a URI, a device, a method that cannot touch what
   ///         the cameras see, settings out of range, a force that needs a watchdog, a hand's name,
   ///         a fixture of a material that no camera knows.

@@ -75,7 +75,6 @@ class SessionHand {
  public:
   // Guarded by the session. The recorder reads the cycle, so it goes first.
   Placement placement;
-  std::uint64_t settings_number = 0;  ///< as in ServoTick
   std::unique_ptr<Recorder> recorder = {};
 };
 

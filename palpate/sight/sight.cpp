@@ -21,11 +21,11 @@ PointMover::Options mover_options(const Parameters& parameters) {
 
 Sight::Sight(const Parameters& parameters)
     : parameters_(parameters), mover_(mover_options(parameters)) {
+  validate(parameters);
   set_parameters(parameters);
 }
 
-void Sight::set_parameters(const Parameters& parameters) {
-  validate(parameters);
+void Sight::set_parameters(const Parameters& parameters) noexcept {
   parameters_ = parameters;
   mover_.set(mover_options(parameters));
   tracker_.set(parameters.sight);

@@ -135,11 +135,10 @@ class RobotEnd::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  std::unique_ptr<Device> device() { return std::make_unique<Borrowed>(hand_); }
-
-  void prepare(ServoSettings& settings) const {
-    set_parameter(settings.parameters, "r_c", robot_->info().tool_radius + options_.margin);
-    settings.fixtures = robot_fixtures(*regions_);
+  void prepare(SessionOptions& options) const {
+    options.open_devices.at(0) = std::make_unique<Borrowed>(hand_);
+    set_parameter(options.parameters, "r_c", robot_->info().tool_radius + options_.margin);
+    options.fixture_set = robot_fixtures(*regions_);
   }
 
   void on_frame(std::size_t camera, const FedFrame& fed) {
@@ -304,11 +303,8 @@ class RobotEnd::Impl {
 RobotEnd::RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
     : impl_(std::make_unique<Impl>(std::move(robot), options)) {}
 RobotEnd::~RobotEnd() = default;
-std::unique_ptr<Device> RobotEnd::device() {
-  return impl_->device();
-}
-void RobotEnd::prepare(ServoSettings& settings) const {
-  impl_->prepare(settings);
+void RobotEnd::prepare(SessionOptions& options) const {
+  impl_->prepare(options);
 }
 void RobotEnd::on_frame(std::size_t camera, const FedFrame& frame) {
   impl_->on_frame(camera, frame);

@@ -37,10 +37,8 @@ class RobotEnd {
   RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options);
   ~RobotEnd();  ///< the robot rests
 
-  /// The device of the session here. Once.
-  [[nodiscard]] std::unique_ptr<Device> device();
-  /// Adds the settings that the session here needs: radius of the proxy, fixtures.
-  void prepare(ServoSettings& settings) const;
+  /// Adds what the session here needs: its device, radius of the proxy, fixtures. Once.
+  void prepare(SessionOptions& options) const;
   /// For SessionOptions::on_frame.
   void on_frame(std::size_t camera, const FedFrame& frame);
   /// Starts to command the robot. The session must outlive this, or `detach` come first.

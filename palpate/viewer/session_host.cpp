@@ -261,6 +261,7 @@ std::string SessionHost::state() {
     parameters[std::string(row.name)] = row.get(state.settings.parameters);
   for (const SafetyParameterInfo& row : safety_parameter_table())
     safety[std::string(row.name)] = row.get(state.settings.safety);
+  const SessionHandState& first = state.hands.front();
   json playback;
   json placement;
   for (const PlacementInfo& row : placement_table())
@@ -289,12 +290,12 @@ std::string SessionHost::state() {
               {"rescaled", rescaled_uri_}};
   json latched_by = json::array();
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
-    if ((state.latched_by >> i & 1U) != 0) latched_by.push_back(safety_flag_names()[i]);
+    if ((first.latched_by >> i & 1U) != 0) latched_by.push_back(safety_flag_names()[i]);
   }
   const CycleStatistics& cycles = session_->statistics();
   json servo = {{"rate", state.rate},
                 {"ticks", cycles.ticks.load()},
-                {"late_ticks", state.summary.late_ticks},
+                {"late_ticks", first.summary.late_ticks},
                 {"frames_adopted", cycles.frames_adopted.load()},
                 {"frames_dropped", cycles.frames_dropped.load()}};
   if (const Timing* timing = session_->timing()) {
@@ -343,17 +344,18 @@ std::string SessionHost::state() {
        {{"uri", device.uri},
         {"kind", device.kind},
         {"takes_hand", mouse_ != nullptr},
-        {"fault", state.device.text},
+        {"fault", first.device.text},
         {"warnings", warnings}}},
       {"servo", servo},
-      {"interventions", state.interventions},
+      {"interventions", first.interventions},
       {"latched_by", latched_by},
-      {"flag_ticks", state.summary.flag_ticks},
-      {"pop_throughs", state.summary.pop_throughs},
+      {"on_hold", state.held},
+      {"flag_ticks", first.summary.flag_ticks},
+      {"pop_throughs", first.summary.pop_throughs},
       {"energy",
-       {{"contacts", state.summary.energy.contacts},
-        {"relative", energy_of(state.summary.energy.relative)},
-        {"absolute", energy_of(state.summary.energy.absolute)}}},
+       {{"contacts", first.summary.energy.contacts},
+        {"relative", energy_of(first.summary.energy.relative)},
+        {"absolute", energy_of(first.summary.energy.absolute)}}},
       {"fixtures", fixtures},
       {"paint",
        {{"brush", brush}, {"dabs", dabs}, {"materials", paintable()}, {"trouble", brush_trouble_}}},

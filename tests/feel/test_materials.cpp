@@ -45,7 +45,7 @@ class Flat final : public Method {
     tick.state = hip.z() < r_c ? ContactState::contact : ContactState::free_motion;
     return tick;
   }
-  void set_parameters(const Parameters& parameters) override { parameters_ = parameters; }
+  void set_parameters(const Parameters& parameters) noexcept override { parameters_ = parameters; }
 
  private:
   Parameters parameters_;

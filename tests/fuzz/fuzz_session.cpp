@@ -15,8 +15,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(test::text_of(data + 1, size - 1));
   test::succeeds([&] {
     if (data[0] % 3 == 0) {
-      const std::string once = to_json(settings_from_json(text, "fuzz"));
-      test::expect(to_json(settings_from_json(once, "again")) == once);
+      const std::string once = to_json(commands_from_json(text, "fuzz"));
+      test::expect(to_json(commands_from_json(once, "again")) == once);
     } else if (data[0] % 3 == 1) {
       const std::string once = to_json(session_from_json(text, "fuzz"));
       test::expect(to_json(session_from_json(once, "again")) == once);

@@ -238,7 +238,7 @@ TEST(Play, DeliversFramesLateAndInOrderAndLeavesOutWhatIsDropped) {
               .frame = 0,
               .flags = 0};
     }
-    void set_parameters(const Parameters& /*parameters*/) override {}
+    void set_parameters(const Parameters& /*parameters*/) noexcept override {}
     std::vector<double> stamps, arrived;
   };
   Recorder recorder;

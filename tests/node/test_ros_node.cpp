@@ -122,7 +122,7 @@ TEST_F(RosNodeTest, PublishesTicksAndReports) {
 TEST_F(RosNodeTest, PublishesEachHandOfTheSession) {
   SessionOptions options;
   options.cameras.push_back({.uri = "synthetic:plane?size=64x48"});
-  options.more_hands.push_back({.name = "left"});
+  options.hands.push_back({.name = "left"});
   begin(std::move(options));
   open();
   const auto any = [](const auto&) { return true; };

@@ -46,7 +46,7 @@ class LoopSession {
         folder,
         SessionInfo{.kind = SessionInfo::Kind::live, .version = "test", .limits = DeviceLimits{}},
         cycle_->full_reader(), is_on ? [this] { begin_anew(); } : std::function<void()>{}, options);
-    recorder_->settings({settings_number_, settings_}, now());
+    recorder_->commands(cycle_->commands(), now());
     if (frame_ > 0) recorder_->frame(frame_, stamp_, 0, cloud_);
     if (second_.number > 0)
       recorder_->frame(second_.number, second_.stamp, second_camera, second_.cloud);
@@ -68,8 +68,8 @@ class LoopSession {
       if (has_second && tick_ % 22 == 11) put_second();
       if (tick_ % 70 == 69) {
         settings_.parameters.coupling.stiffness += 100.0 / 3.0;  // a few times
-        settings_number_ = cycle_->set_settings(settings_);
-        if (recorder_) recorder_->settings({settings_number_, settings_}, now());
+        cycle_->set_settings(settings_);
+        if (recorder_) recorder_->commands(cycle_->commands(), now());
       }
       device_.hand.position = Vec3(0.03 + 1e-5 * tick_, -0.05, -0.02 - 1e-4 * std::min(tick_, 300));
       // It swings with 14 Hz, as a hand on a surface that oscillates does.
@@ -97,7 +97,8 @@ class LoopSession {
 
   // What a recording in mid-session begins with: the same method made anew.
   void begin_anew() {
-    recorder_->settings(cycle_->set_method(make_method(settings_.method)), now());
+    recorder_->commands(cycle_->command([](ServoCommands&) {}, make_method(settings_.method)),
+                        now());
   }
 
   static constexpr std::size_t second_camera = 3;

@@ -46,7 +46,7 @@ inline std::vector<ServoTick> record_press(SessionWriter& writer, const Paramete
   const auto place = [](int i) { return Vec3(0.03 + 1e-5 * i, -0.05, -0.01 - 4e-4 * i); };
   const auto touch = make_method(method, parameters);
   touch->seat(place(0));
-  writer.settings({.number = 0, .settings = {method, parameters, {}, {}}}, 0.0);
+  writer.commands({.settings = {method, parameters, {}, {}}}, 0.0);
   std::vector<ServoTick> recorded;
   std::shared_ptr<const Cloud> cloud;
   for (int i = 0; i < ticks; ++i) {

@@ -54,7 +54,7 @@ TEST(RecordedFixtures, AreReplayedBitForBit) {
     std::uint32_t acting = 0;
     for (std::size_t i = 0; i < reader.ticks(); ++i) acting |= reader.tick(i).fixtures;
     EXPECT_EQ(acting & 0b1101U, 0b1101U);  // what is replayed did something
-    const ServoSettings& settings = reader.settings(reader.tick(0).settings_number);
+    const ServoSettings& settings = reader.commands(reader.tick(0).settings_number).settings;
     ASSERT_TRUE(settings.fixtures);
     EXPECT_EQ(settings.fixtures->items().size(), 4U);
   }

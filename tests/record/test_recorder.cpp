@@ -162,7 +162,7 @@ ReplayReport replay_changed(const std::function<void(ServoTick&)>& change) {
   {
     SessionWriter writer(folder.path() / "changed", reader.info(), 0.0);
     for (std::uint64_t i = 0; i <= reader.tick(reader.ticks() - 1).settings_number; ++i)
-      writer.settings({i, reader.settings(i)}, 0.0);
+      writer.commands(reader.commands(i), 0.0);
     for (const auto& [number, frame] : reader.frames()) {
       const auto cloud = reader.seen(number).front().cloud;
       writer.frame(number, frame.stamp, 0, cloud);
@@ -310,7 +310,7 @@ std::shared_ptr<const DepthImage> noisy_floor(unsigned seed) {
   Recorder recorder(folder,
                     {.kind = SessionInfo::Kind::live, .version = "test", .limits = DeviceLimits{}},
                     cycle.full_reader(), {}, {.commit_interval = 0.02});
-  recorder.settings({}, 0.0);
+  recorder.commands({}, 0.0);
   const std::vector<std::shared_ptr<const Cloud>> floors{noisy_floor(1), noisy_floor(2)};
   std::uint64_t said = 0;
   for (int tick = 0;; ++tick) {

@@ -60,7 +60,7 @@ ReplayReport replay_changed(const std::function<bool(ServoTick&)>& change) {
   SessionReader reader(folder.path() / "bag");
   {
     SessionWriter writer(folder.path() / "changed", press_info(), 0.0);
-    writer.settings({}, 0.0);
+    writer.commands({}, 0.0);
     for (const auto& [number, frame] : reader.frames()) {
       if (number == 4) continue;  // of ticks 99 to 119
       const auto cloud = reader.seen(number).front().cloud;

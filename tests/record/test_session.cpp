@@ -163,7 +163,7 @@ TEST(Session, KeepsPointsInTheOrderInWhichTheyAreGathered) {
 }
 
 TEST(Session, KeepsEachBitOfTheSettings) {
-  NumberedSettings settings{.number = 9, .settings = {}};
+  ServoCommands settings{.number = 9, .settings = {}, .scene = 4, .hold = true};
   ServoSettings& all = settings.settings;
   all.method = "sight";
   for (const ParameterInfo& row : parameter_table()) {
@@ -176,8 +176,10 @@ TEST(Session, KeepsEachBitOfTheSettings) {
   all.placement.workspace_scale = 2.0 / 3.0;
   all.placement.clutch_button = 3;
   all.placement.world_from_device.rotate(Eigen::AngleAxisd(0.1 / 3.0, Vec3::UnitY()));
-  const NumberedSettings back = settings_from_json(to_json(settings), "settings");
+  const ServoCommands back = commands_from_json(to_json(settings), "settings");
   EXPECT_EQ(back.number, 9U);
+  EXPECT_EQ(back.scene, 4U);
+  EXPECT_TRUE(back.hold);
   EXPECT_EQ(back.settings.method, "sight");
   for (const ParameterInfo& row : parameter_table())
     EXPECT_EQ(bits(row.get(back.settings.parameters)), bits(row.get(all.parameters))) << row.name;
@@ -190,11 +192,11 @@ TEST(Session, KeepsEachBitOfTheSettings) {
 }
 
 TEST(Session, WithDamagedSettingsIsRefused) {
-  std::string text = to_json(NumberedSettings{});
-  EXPECT_TRUE(fails_saying([&] { return settings_from_json(text.substr(9), "it"); }, "it"));
+  std::string text = to_json(ServoCommands{});
+  EXPECT_TRUE(fails_saying([&] { return commands_from_json(text.substr(9), "it"); }, "it"));
   text.replace(text.find("\"sight\""), 7, "17");
-  EXPECT_TRUE(fails_saying([&] { return settings_from_json(text, "it"); }, "it"));
-  EXPECT_TRUE(fails_saying([&] { return settings_from_json("{}", "it"); }, "it"));
+  EXPECT_TRUE(fails_saying([&] { return commands_from_json(text, "it"); }, "it"));
+  EXPECT_TRUE(fails_saying([&] { return commands_from_json("{}", "it"); }, "it"));
   EXPECT_TRUE(fails_saying([&] { return session_from_json("[]", "it"); }, "it"));
   const std::string info = to_json(press_info());
   const std::size_t epoch = info.find("\"epoch_ns\":") + 11;
@@ -241,7 +243,7 @@ TEST(Session, IsThereUpToTheLastCommitWhenItsProgramIsKilled) {
 TEST(Session, EndsWithAMessageWhereTheDiskIsFullAndKeepsWhatWasCommitted) {
   const TemporaryFolder folder;
   SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
-  writer.settings({}, 0.0);
+  writer.commands({}, 0.0);
   std::uint64_t committed = 0;
   const auto fill = [&] {
     for (std::uint64_t i = 0;; ++i) {

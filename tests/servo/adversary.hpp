@@ -100,7 +100,7 @@ class Adversary {
         : method_(std::move(method)), random_(seed) {}
     void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
     void observe(const Observation& seen) noexcept override { method_->observe(seen); }
-    void set_parameters(const Parameters& p) override { method_->set_parameters(p); }
+    void set_parameters(const Parameters& p) noexcept override { method_->set_parameters(p); }
     Tick tick(const Vec3& hip, double t) noexcept override {
       Tick tick = method_->tick(hip, t);
       switch (random_() % 6000) {
@@ -263,7 +263,8 @@ class Adversary {
 
   void switch_method() {
     const auto& methods = standard_methods().entries();
-    cycle_.set_method(spoiled(methods[random_() % methods.size()].name), settings());
+    auto method = spoiled(methods[random_() % methods.size()].name);
+    cycle_.command([&](ServoCommands& told) { told.settings = settings(); }, std::move(method));
   }
 
   std::string verdict(double t, double since_last) {

@@ -331,17 +331,39 @@ TEST(Cycle, LetsGoOfTheHandWhereAnotherSceneBegins) {
   Session session;
   session.run_for(2.0);
   ASSERT_GT(session.press_to(-0.002).force.norm(), 0.5);
-  ServoSettings settings;
-  settings.scene = 1;
-  session.cycle.set_settings(settings);
+  session.cycle.command([](ServoCommands& told) { ++told.scene; });
   ServoTick record = session.run();
   EXPECT_TRUE(record.hand & proxy_reseated);
   EXPECT_EQ(record.gain, 0.0);
   // What is left of the force falls at fall_rate, and comes back over ramp_time at the soonest.
   for (int i = 0; i < 50; ++i) record = session.run();
   EXPECT_EQ(record.force.norm(), 0.0);
-  session.cycle.set_settings(settings);
+  session.cycle.set_settings({});
   EXPECT_FALSE(session.run().hand & proxy_reseated) << "the same scene";
+}
+
+TEST(Cycle, KeepsTheForceOffWhileItIsOnHold) {
+  Session session;
+  session.run_for(2.0);
+  const ServoTick before = session.press_to(-0.002);
+  ASSERT_GT(before.force.norm(), 0.5);
+  session.cycle.command([](ServoCommands& told) { told.hold = true; });
+  ServoTick record = session.run();
+  EXPECT_TRUE(record.hand & force_on_hold);
+  EXPECT_TRUE(record.safety & disengaged);
+  EXPECT_FALSE(record.safety & force_cut) << "no limit that nobody set";
+  EXPECT_LT(record.force.norm(), before.force.norm());
+  for (int i = 0; i < 50; ++i) record = session.run();
+  EXPECT_EQ(record.force.norm(), 0.0);
+  EXPECT_GT(record.tick.force.norm(), 0.5) << "the method goes on";
+  // Other commands do not end it, and afterwards the hand has to engage anew.
+  session.cycle.set_settings({});
+  EXPECT_TRUE(session.run().hand & force_on_hold);
+  session.cycle.command([](ServoCommands& told) { told.hold = false; });
+  for (int i = 0; i < 50; ++i) record = session.run();
+  EXPECT_FALSE(record.hand & force_on_hold);
+  EXPECT_EQ(record.force.norm(), 0.0);
+  EXPECT_TRUE(record.safety & disengaged);
 }
 
 TEST(Cycle, JudgesTheHandsSpeedOnTheDeviceWhateverTheScale) {
@@ -433,7 +455,7 @@ struct SwingingSurface final : Method {
     if (presses) tick.force.z() = std::max(-2.4 * std::sin(phase - 2e-3 * omega), 0.0);
     return tick;
   }
-  void set_parameters(const Parameters&) override {}
+  void set_parameters(const Parameters&) noexcept override {}
   static constexpr double amplitude = 4e-3;                       // [m]
   static constexpr double omega = 2.0 * std::numbers::pi * 14.0;  // [1/s]
   double known_velocity;                                          // [-] share that the method knows
@@ -502,25 +524,6 @@ TEST(Cycle, AdoptsSettingsInTheNextCycleAndRefusesBadOnesAtTheDoor) {
   settings.placement.world_from_device.linear() *= 2.0;
   EXPECT_THROW(session.cycle.set_settings(settings), Error);
   EXPECT_NEAR(session.run().force.z(), 0.3, 0.02);
-}
-
-TEST(Cycle, KeepsGoingWithAMethodThatRefusesParameters) {
-  struct Stubborn final : Method {
-    void seat(const Vec3&) noexcept override {}
-    void observe(const Observation& /*seen*/) noexcept override {}
-    Tick tick(const Vec3& hip, double t) noexcept override { return free_tick(hip, t, -1); }
-    void set_parameters(const Parameters& p) override {
-      if (p.coupling.stiffness > 1000.0) throw Error("stiffness", "too much");
-    }
-  };
-  FakeDevice device;
-  Cycle cycle(std::make_shared<Stubborn>(), device);
-  ServoSettings settings;
-  settings.parameters.coupling.stiffness = 2000.0;
-  cycle.set_settings(settings);
-  cycle.run({.t = 1.0});
-  EXPECT_EQ(cycle.statistics().settings_refused, 1U);
-  EXPECT_EQ(device.writes, 1);
 }
 
 TEST(Cycle, RefusesAFrameWithoutACloud) {
@@ -597,7 +600,8 @@ TEST(Cycle, GoesOnWithAnotherMethodWhereTheOldOneWas) {
   Session session;
   session.run_for(2.0);
   const ServoTick before = session.press_to(-0.001);
-  const std::uint64_t settings = session.cycle.set_method(make_method("paper")).number;
+  const std::uint64_t settings =
+      session.cycle.command([](ServoCommands&) {}, make_method("paper")).number;
   const test::MemoryCalls calls;
   session.cycle.run({.t = session.t += ms});
   EXPECT_EQ(calls.count(), 0U);
@@ -632,7 +636,8 @@ Vec3 press_while_methods_change(const std::vector<std::string>& names) {
     if (i >= 1000 && (i - 1000) % 300 == 0 && phase < names.size()) {
       ServoSettings settings;
       settings.method = names[phase];
-      cycle.set_method(make_method(settings.method), settings);
+      cycle.command([&](ServoCommands& told) { told.settings = settings; },
+                    make_method(settings.method));
     }
     device.hand.position = Vec3(0, 0, rises ? height + 0.02 - 0.025 * t : -0.015);
     cycle.run({.t = t});

@@ -166,7 +166,7 @@ class HangingMethod final : public Method {
     tick.force.z() = newtons_;
     return tick;
   }
-  void set_parameters(const Parameters& /*parameters*/) override {}
+  void set_parameters(const Parameters& /*parameters*/) noexcept override {}
 
  private:
   Hang& hang_;

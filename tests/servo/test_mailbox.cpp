@@ -27,9 +27,7 @@ TEST(Mailbox, GivesTheNewestAndCountsWhatItOvertook) {
   Mailbox<int> box;
   for (int i = 1; i <= 5; ++i) box.put(i);
   EXPECT_EQ(*box.take(), 5);
-  EXPECT_EQ(box.taken(), 1U);
   EXPECT_EQ(box.dropped(), 4U);
-  EXPECT_EQ(box.number(), 5U);
   box.put(6);
   EXPECT_EQ(*box.take(), 6);
   EXPECT_EQ(box.dropped(), 4U);
@@ -81,18 +79,20 @@ TEST(Mailbox, GivesWholeValuesInOrderAndTheLastOneWhileTheWriterFloodsIt) {
   });
   int last = 0;
   int wrong = 0;
+  std::uint64_t taken = 0;
   while (last < count) {
     const Pair* pair = box.take();
     if (pair == nullptr) {
       std::this_thread::yield();
       continue;
     }
+    ++taken;
     if (pair->a <= last || *pair->b != pair->a) ++wrong;
     last = pair->a;
   }
   writer.join();
   EXPECT_EQ(wrong, 0);
-  EXPECT_EQ(box.taken() + box.dropped(), static_cast<std::uint64_t>(count));
+  EXPECT_EQ(taken + box.dropped(), static_cast<std::uint64_t>(count));
 }
 
 }  // namespace test_mailbox

@@ -170,7 +170,7 @@ class Floor final : public Method {
     tick.surface_motion = motion;
     return tick;
   }
-  void set_parameters(const Parameters& /*parameters*/) override {}
+  void set_parameters(const Parameters& /*parameters*/) noexcept override {}
 
   double height = 0.0;
   Vec3 motion = Vec3::Zero();

@@ -7,7 +7,6 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/session/config.hpp"
-#include "palpate/session/from_config.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -28,10 +27,10 @@ SessionConfig everything() {
   SessionConfig config;
   config.cameras = {{.uri = "tum:/data/a b?x=\"1\"\\2", .world_from_camera = pose_of(1.0)},
                     {.uri = "synthetic:desk", .name = "left"}};
-  config.device = "hand:?device=touch";
-  config.placement = {pose_of(-2.0), 2.5, 1, 0.0625, 0.3, 0.045, Vec3(0.6, 0.0, -0.8)};
-  config.more_hands = {{.device = "script:a.csv", .name = "left", .placement = {pose_of(0.5), 0.5}},
-                       {.device = "hand:"}};
+  config.hands = {{.device = "hand:?device=touch",
+                   .placement = {pose_of(-2.0), 2.5, 1, 0.0625, 0.3, 0.045, Vec3(0.6, 0.0, -0.8)}},
+                  {.device = "script:a.csv", .name = "left", .placement = {pose_of(0.5), 0.5}},
+                  {.device = "hand:"}};
   config.without_watchdog = true;
   config.rate = 2000.0;
   config.method = "paper";
@@ -68,13 +67,11 @@ void expect_same(const SessionConfig& a, const SessionConfig& b) {
       EXPECT_TRUE(a.cameras[i].world_from_camera->isApprox(*b.cameras[i].world_from_camera, 1e-14));
     }
   }
-  EXPECT_EQ(a.device, b.device);
-  expect_same(a.placement, b.placement);
-  ASSERT_EQ(a.more_hands.size(), b.more_hands.size());
-  for (std::size_t i = 0; i < a.more_hands.size(); ++i) {
-    EXPECT_EQ(a.more_hands[i].device, b.more_hands[i].device);
-    EXPECT_EQ(a.more_hands[i].name, b.more_hands[i].name);
-    expect_same(a.more_hands[i].placement, b.more_hands[i].placement);
+  ASSERT_EQ(a.hands.size(), b.hands.size());
+  for (std::size_t i = 0; i < a.hands.size(); ++i) {
+    EXPECT_EQ(a.hands[i].device, b.hands[i].device);
+    EXPECT_EQ(a.hands[i].name, b.hands[i].name);
+    expect_same(a.hands[i].placement, b.hands[i].placement);
   }
   EXPECT_EQ(a.without_watchdog, b.without_watchdog);
   EXPECT_EQ(a.rate, b.rate);
@@ -132,15 +129,14 @@ TEST(SessionConfig, KnowsWhetherSomebodyChoseARadius) {
   SessionConfig chosen;
   chosen.radii_chosen = true;
   EXPECT_TRUE(parsed(to_toml(chosen)).radii_chosen);
-  EXPECT_TRUE(session_options(chosen).radii_chosen);
 }
 
 TEST(SessionConfig, TakesWhatTheFileLeavesOutFromItsBase) {
   expect_same(parse_session_config("", "empty.toml", everything()), everything());
   const SessionConfig config =
       parse_session_config("[placement]\nscale = 3\n", "session.toml", everything());
-  EXPECT_EQ(config.placement.workspace_scale, 3.0);
-  EXPECT_EQ(config.placement.clutch_button, 1);
+  EXPECT_EQ(config.hands[0].placement.workspace_scale, 3.0);
+  EXPECT_EQ(config.hands[0].placement.clutch_button, 1);
   EXPECT_EQ(config.method, "paper");
 }
 
@@ -204,7 +200,7 @@ TEST(SessionConfig, NamesFileAndLineOfWhatIsWrong) {
        {"\nrate = \u00e9", "\nrate = \u3042", "\nrate = 1.0\u0416", "\n\u00fc = 1", "\nrate = \xff",
         "\nrate = 1.0\xc3", "\xef\xbb\xbf\nrate = \xe2\x80"})
     EXPECT_TRUE(fails_saying(parsing(text), "session.toml:2:", "in UTF-8")) << text;
-  EXPECT_EQ(parse_session_config("device = \"\u3042\" # \u00e9", "s").device, "\u3042");
+  EXPECT_EQ(parse_session_config("device = \"\u3042\" # \u00e9", "s").hands[0].device, "\u3042");
   EXPECT_TRUE(fails_saying(
       [] {
         return parse_session_config("\nmethod = \"papr\"", "session.toml", {},
@@ -233,7 +229,7 @@ TEST(SessionConfig, IsEditedWithoutLosingWhatElseIsInTheFile) {
   const Placement placement{pose_of(0.7), 2.0, {}};
   const auto edited = [&](const std::string& text) {
     const std::string result = with_placement(text, "session.toml", placement);
-    const Placement got = parse_session_config(result, "session.toml").placement;
+    const Placement got = parse_session_config(result, "session.toml").hands[0].placement;
     EXPECT_TRUE(got.world_from_device.isApprox(placement.world_from_device, 1e-14)) << result;
     EXPECT_EQ(got.workspace_scale, 2.0) << result;
     return result;

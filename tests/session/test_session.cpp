@@ -40,8 +40,9 @@ HipPath pressing(double into = 0.005) {
 // A session on the wall.
 SessionOptions on_the_wall() {
   SessionOptions options;
-  options.cameras.push_back({.source = wall_source()});
-  options.device = std::make_unique<ScriptedDevice>(pressing(), false);
+  options.cameras.resize(1);
+  options.open_cameras.push_back(wall_source());
+  options.open_devices[0] = std::make_unique<ScriptedDevice>(pressing(), false);
   options.pace = Pace::free_running;
   return options;
 }
@@ -71,10 +72,10 @@ void expect_the_same(const Outcome& a, const Outcome& b) {
 
 TEST(Session, AsksForTheCouplingsForceAndSendsWhatTheLimitAllows) {
   SessionOptions options = on_the_wall();
-  options.device = std::make_unique<ScriptedDevice>(pressing(0.02), false);
+  options.open_devices[0] = std::make_unique<ScriptedDevice>(pressing(0.02), false);
   const Outcome run = play(std::move(options), 4.0);
   ASSERT_EQ(run.ticks.size(), 4000U);
-  const Summary& summary = run.state.summary;
+  const Summary& summary = run.state.hands[0].summary;
   EXPECT_EQ(summary.ticks, 4000U);
   EXPECT_EQ(summary.frames, 120U);
   // 600 N/m times 20 mm.
@@ -89,8 +90,8 @@ TEST(Session, AsksForTheCouplingsForceAndSendsWhatTheLimitAllows) {
 
 TEST(Session, KeepsALowerLimitFromItsSettings) {
   SessionOptions options = on_the_wall();
-  options.settings.safety.max_force = 1.25;
-  EXPECT_NEAR(play(std::move(options), 4.0).state.summary.largest_sent, 1.25, 1e-9);
+  options.safety.max_force = 1.25;
+  EXPECT_NEAR(play(std::move(options), 4.0).state.hands[0].summary.largest_sent, 1.25, 1e-9);
 }
 
 TEST(Session, GivesTheSameForcesBitForBit) {
@@ -98,15 +99,15 @@ TEST(Session, GivesTheSameForcesBitForBit) {
     const auto on_the_desk = [&] {
       SessionOptions options;
       options.cameras.push_back({.uri = "synthetic:desk?noise=1mm&size=320x240"});
-      options.settings.method = method;
+      options.method = method;
       options.pace = Pace::free_running;
       options.stroke_time = 4.0;
       return options;
     };
     const Outcome first = play(on_the_desk(), 4.0);
-    EXPECT_GT(first.state.summary.contact_ticks, 500U) << method;
-    EXPECT_GT(first.state.summary.largest_sent, 0.5) << method;
-    EXPECT_LE(first.state.summary.largest_sent, 3.3 + 1e-9) << method;
+    EXPECT_GT(first.state.hands[0].summary.contact_ticks, 500U) << method;
+    EXPECT_GT(first.state.hands[0].summary.largest_sent, 0.5) << method;
+    EXPECT_LE(first.state.hands[0].summary.largest_sent, 3.3 + 1e-9) << method;
     expect_the_same(first, play(on_the_desk(), 4.0));
   }
 }
@@ -138,7 +139,7 @@ TEST(Session, AsksWhatFramesAreMadeOfAndKeepsAHandOffOneMaterial) {
   const auto on_the_wall_at = [&](double x, const std::string& material) {
     // 10 mm before the wall.
     SessionOptions options = on_the_wall();
-    options.device = std::make_unique<ScriptedDevice>(
+    options.open_devices[0] = std::make_unique<ScriptedDevice>(
         HipPath({{0.0, {x, 0.0, wall_depth - 0.1}}, {1.0, {x, 0.0, wall_depth - 0.01}}}), false);
     options.materials = [=](std::size_t /*camera*/, const DepthImage& image) {
       std::vector<std::uint8_t> labels(image.depth().size());
@@ -150,16 +151,16 @@ TEST(Session, AsksWhatFramesAreMadeOfAndKeepsAHandOffOneMaterial) {
     off.world_from_fixture.translation().z() = wall_depth;
     off.size = Vec3::Constant(1.0);
     off.numbers.margin = 0.02;
-    options.settings.fixtures = std::make_shared<const FixtureSet>(std::vector{off});
+    options.fixture_set = std::make_shared<const FixtureSet>(std::vector{off});
     return options;
   };
   EXPECT_NEAR(play(on_the_wall_at(0.05, ""), 3.0).ticks.back().force.z(), -3.3, 0.01);
-  EXPECT_EQ(play(on_the_wall_at(-0.05, "nerve"), 3.0).state.summary.largest_sent, 0.0);
+  EXPECT_EQ(play(on_the_wall_at(-0.05, "nerve"), 3.0).state.hands[0].summary.largest_sent, 0.0);
   SessionOptions recorded = on_the_wall_at(0.05, "nerve");
   recorded.record = (folder.path() / "bag").string();
   EXPECT_NEAR(play(std::move(recorded), 3.0).ticks.back().force.z(), -3.3, 0.01);
   SessionReader reader(folder.path() / "bag");
-  EXPECT_EQ(reader.settings(0).fixtures->items()[0].fixture.material, "nerve");
+  EXPECT_EQ(reader.commands(0).settings.fixtures->items()[0].fixture.material, "nerve");
   EXPECT_TRUE(replay(reader).identical());
 
   EXPECT_TRUE(fails_saying([&] { const Session session(on_the_wall_at(0.0, "nerves")); },
@@ -176,7 +177,7 @@ TEST(Session, AsksWhatFramesAreMadeOfAndKeepsAHandOffOneMaterial) {
 TEST(Session, TakesTheNoiseThatIsUsualForTheCamerasKindUnlessItIsSet) {
   const auto on_a = [](SensorKind sensor) {
     SessionOptions options = on_the_wall();
-    options.cameras[0].source = std::make_unique<MadeSource>(
+    options.open_cameras[0] = std::make_unique<MadeSource>(
         [](int k) {
           return Frame{k / 30.0, wall()};
         },
@@ -205,7 +206,7 @@ TEST(Session, TakesTheNoiseThatIsUsualForTheCamerasKindUnlessItIsSet) {
   // What it took is in the recording, so that a replay needs to know no kind.
   const test::TemporaryFolder folder;
   SessionOptions options = on_a(SensorKind::time_of_flight);
-  options.settings.parameters.sight.usual_noise = 3e-3;
+  options.parameters.sight.usual_noise = 3e-3;
   options.record = (folder.path() / "bag").string();
   const Outcome recorded = play(std::move(options), 1.5);
   EXPECT_EQ(noise_of(recorded.state.settings), std::pair(3e-3, 1)) << "what is set wins";
@@ -266,7 +267,7 @@ TEST(Session, HoldsTheForceBackUntilTheHandEngagesAnew) {
                        {4.5, {0.0, 0.0, hover}},
                        {4.6, {0.0, 0.0, pressed}}});
   SessionOptions options = on_the_wall();
-  options.device = std::make_unique<ScriptedDevice>(twice, false);
+  options.open_devices[0] = std::make_unique<ScriptedDevice>(twice, false);
   Session session(std::move(options));
   std::vector<double> asked;
   std::vector<double> sent;
@@ -305,7 +306,7 @@ class OwnWall final : public Method {
     tick.force = 100.0 * (tick.proxy - hip);
     return tick;
   }
-  void set_parameters(const Parameters& /*parameters*/) override {}
+  void set_parameters(const Parameters& /*parameters*/) noexcept override {}
   void check(const Cloud& cloud) const override {
     if (cloud.image() == nullptr)
       throw Error("own-wall", "it touches depth images alone", "choose another method");
@@ -349,12 +350,12 @@ TEST(Session, RunsAMethodCameraAndDeviceOfOnesOwn) {
   options.sources.add({"own", "a wall", [](const Uri&) { return wall_source(); }});
   options.cameras.push_back({.uri = "own:"});
   options.methods = with_own_wall();
-  options.settings.method = "own-wall";
+  options.method = "own-wall";
   const auto seen = std::make_shared<OwnDevice::Seen>();
   options.devices.add({"own", "a device", [&](const Uri&, const std::optional<HipPath>&) {
                          return std::make_unique<OwnDevice>(seen, pressing());
                        }});
-  options.device_uri = "own:";
+  options.hands[0].device = "own:";
   options.pace = Pace::free_running;
   Session session(std::move(options));
   EXPECT_EQ(session.device().info().kind, "own device");
@@ -371,28 +372,28 @@ TEST(Session, TouchesWhereACameraStands) {
   options.cameras[0].world_from_camera = Eigen::Translation3d(0.0, 0.0, 1.0);
   std::vector<HipPath::Sample> samples = pressing().samples();
   for (HipPath::Sample& sample : samples) sample.hip.z() += 1.0;
-  options.device = std::make_unique<ScriptedDevice>(HipPath(samples), false);
+  options.open_devices[0] = std::make_unique<ScriptedDevice>(HipPath(samples), false);
   const Outcome there = play(std::move(options), 3.5);
   EXPECT_NEAR(there.ticks.back().force.norm(), 3.0, 0.05);
 
   SessionOptions away = on_the_wall();
   away.cameras[0].world_from_camera = Eigen::Translation3d(0.0, 0.0, 1.0);
-  EXPECT_EQ(play(std::move(away), 3.5).state.summary.largest_asked, 0.0);
+  EXPECT_EQ(play(std::move(away), 3.5).state.hands[0].summary.largest_asked, 0.0);
 }
 
 TEST(Session, TouchesWhatSeveralCamerasSee) {
   // The second stands beside the first and sees a wall that is nearer.
   SessionOptions options = on_the_wall();
-  options.cameras.push_back(
-      {.source = std::make_unique<MadeSource>([](int k) {
-         return Frame{k / 15.0, wall(480)};
-       }),
-       .world_from_camera = Eigen::Isometry3d(Eigen::Translation3d(0.5, 0.0, 0.0))});
-  options.device = std::make_unique<ScriptedDevice>(
+  options.open_cameras.push_back(std::make_unique<MadeSource>([](int k) {
+    return Frame{k / 15.0, wall(480)};
+  }));
+  options.cameras = {{},
+                     {.world_from_camera = Eigen::Isometry3d(Eigen::Translation3d(0.5, 0.0, 0.0))}};
+  options.open_devices[0] = std::make_unique<ScriptedDevice>(
       HipPath({{0.0, {0.5, 0.0, 0.43}}, {1.0, {0.5, 0.0, 0.43}}, {1.1, {0.5, 0.0, 0.483}}}), false);
   const Outcome run = play(std::move(options), 3.5);
   EXPECT_NEAR(run.ticks.back().force.norm(), 600.0 * 0.003, 0.1);
-  EXPECT_EQ(run.state.summary.frames, 105U + 53U);
+  EXPECT_EQ(run.state.hands[0].summary.frames, 105U + 53U);
   ASSERT_EQ(run.state.cameras.size(), 2U);
   EXPECT_EQ(run.state.cameras[1].frames, 53U);
 }
@@ -408,6 +409,7 @@ TEST(Session, GoesOnWithAPictureOfOneFrameAndARecordingThatEnds) {
                            });
                          }});
     options.cameras.clear();
+    options.open_cameras.clear();
     options.cameras.push_back({.uri = "short:"});
     const Outcome run = play(std::move(options), 3.5);
     EXPECT_NEAR(run.ticks.back().force.norm(), 3.0, 0.05) << frames << " frames";
@@ -430,20 +432,22 @@ TEST(Session, DoesNotFeelTheJumpWhereARecordingBeginsAgain) {
          });
        }});
   options.cameras.clear();
+  options.open_cameras.clear();
   options.cameras.push_back({.uri = "leaving:"});
   const auto at = [&](double t, double behind) {
     return HipPath::Sample{t, {0.0, 0.0, depth(t) + behind}};
   };
-  options.device = std::make_unique<ScriptedDevice>(HipPath({at(0.0, -0.05),
-                                                             at(1.0, -0.05),
-                                                             at(1.1, 0.005),
-                                                             at(2.4999, 0.005),
-                                                             {3.0, {0.0, 0.0, depth(2.4999)}},
-                                                             at(3.3, -0.05),
-                                                             at(3.6, -0.05),
-                                                             at(3.8, 0.005),
-                                                             at(4.4, 0.005)}),
-                                                    false);
+  options.open_devices[0] =
+      std::make_unique<ScriptedDevice>(HipPath({at(0.0, -0.05),
+                                                at(1.0, -0.05),
+                                                at(1.1, 0.005),
+                                                at(2.4999, 0.005),
+                                                {3.0, {0.0, 0.0, depth(2.4999)}},
+                                                at(3.3, -0.05),
+                                                at(3.6, -0.05),
+                                                at(3.8, 0.005),
+                                                at(4.4, 0.005)}),
+                                       false);
   const Outcome run = play(std::move(options), 4.4);
   const double before = run.ticks[2490].force.norm();
   EXPECT_GT(before, 1.5);
@@ -467,7 +471,7 @@ TEST(Session, StrokesARecordingBeforeItBeginsAgain) {
   options.cameras.push_back({.uri = "made:"});
   options.pace = Pace::free_running;
   const Outcome run = play(std::move(options), 3.5);
-  EXPECT_GT(run.state.summary.contact_ticks, 1000U);
+  EXPECT_GT(run.state.hands[0].summary.contact_ticks, 1000U);
   for (std::size_t i = 2950; i < run.ticks.size(); ++i) {
     ASSERT_EQ(run.ticks[i].tick.state, ContactState::free_motion) << i;
   }
@@ -475,12 +479,12 @@ TEST(Session, StrokesARecordingBeforeItBeginsAgain) {
 
 TEST(Session, StopsAndTakesTheForceOffWhereASourceThrows) {
   SessionOptions options;
-  options.cameras.push_back({.source = std::make_unique<MadeSource>([](int k) -> Frame {
-                               if (k == 90) throw Error("made:", "frame 90 is damaged", "mend it");
-                               return {k / 30.0, wall()};
-                             })});
+  options.open_cameras.push_back(std::make_unique<MadeSource>([](int k) -> Frame {
+    if (k == 90) throw Error("made:", "frame 90 is damaged", "mend it");
+    return {k / 30.0, wall()};
+  }));
   const auto seen = std::make_shared<OwnDevice::Seen>();
-  options.device = std::make_unique<OwnDevice>(seen, pressing());
+  options.open_devices[0] = std::make_unique<OwnDevice>(seen, pressing());
   options.pace = Pace::free_running;
   Session session(std::move(options));
   Vec3 last = Vec3::Zero();
@@ -498,7 +502,7 @@ TEST(Session, EndsWhenItIsAskedTo) {
     if (++ticks == 100) session.request_stop();
   });
   EXPECT_EQ(ticks, 100);
-  EXPECT_EQ(session.state().summary.ticks, 100U);
+  EXPECT_EQ(session.state().hands[0].summary.ticks, 100U);
   EXPECT_TRUE(fails_saying([&] { session.run(1.0); }, "session", "stopped"));
   session.stop();
 }
@@ -520,14 +524,14 @@ TEST(Session, ShowsItsFramesToWhoeverWatches) {
 
 TEST(Session, StartsAMouseBeforeWhatTheCameraSees) {
   SessionOptions options = on_the_wall();
-  options.device = nullptr;
-  options.device_uri = "mouse:?max_speed=0.5";
+  options.open_devices[0] = nullptr;
+  options.hands[0].device = "mouse:?max_speed=0.5";
   Session session(std::move(options));
   ASSERT_NE(session.mouse(), nullptr);
   EXPECT_NEAR(session.mouse()->start_position().z(), wall_depth - 0.05, 0.002);
   SessionOptions placed = on_the_wall();
-  placed.device = nullptr;
-  placed.device_uri = "mouse:?z=0.3";
+  placed.open_devices[0] = nullptr;
+  placed.hands[0].device = "mouse:?z=0.3";
   EXPECT_NEAR(Session(std::move(placed)).mouse()->start_position().z(), 0.3, 1e-12);
 }
 
@@ -541,7 +545,12 @@ testing::AssertionResult refuses(const Change& change, const Parts&... parts) {
 
 TEST(Session, RefusesWhatItCannotRun) {
   using Options = SessionOptions;
-  EXPECT_TRUE(refuses([](Options& o) { o.cameras.clear(); }, "camera", "synthetic:desk"));
+  EXPECT_TRUE(refuses(
+      [](Options& o) {
+        o.cameras.clear();
+        o.open_cameras.clear();
+      },
+      "camera", "synthetic:desk"));
   EXPECT_TRUE(refuses(
       [](Options& o) {
         while (o.cameras.size() <= Patch::max_views)
@@ -551,26 +560,28 @@ TEST(Session, RefusesWhatItCannotRun) {
   EXPECT_TRUE(refuses(
       [](Options& o) {
         o.cameras.clear();
+        o.open_cameras.clear();
         o.cameras.push_back({.uri = "synthetic:plane?pose=0,0,0,0,0,0,1",
                              .world_from_camera = Eigen::Isometry3d::Identity()});
       },
       "?pose=", "world_from_camera", "twice"));
-  EXPECT_TRUE(refuses([](Options& o) { o.settings.method = "sigth"; }, "sigth", "'sight'"));
+  EXPECT_TRUE(refuses([](Options& o) { o.method = "sigth"; }, "sigth", "'sight'"));
   EXPECT_TRUE(refuses(
       [](Options& o) {
         o.cameras.clear();
+        o.open_cameras.clear();
         o.cameras.push_back({.uri = "sinthetic:desk"});
       },
       "sinthetic", "'synthetic:'"));
   EXPECT_TRUE(refuses(
       [](Options& o) {
-        o.device = nullptr;
-        o.device_uri = "hnad:";
+        o.open_devices[0] = nullptr;
+        o.hands[0].device = "hnad:";
       },
       "hnad", "'hand:'"));
   EXPECT_TRUE(refuses(
       [](Options& o) {
-        o.cameras[0].source = std::make_unique<MadeSource>(
+        o.open_cameras[0] = std::make_unique<MadeSource>(
             [](int k) {
               return Frame{k / 30.0, wall()};
             },
@@ -579,18 +590,17 @@ TEST(Session, RefusesWhatItCannotRun) {
       "camera:1", "real time"));
   EXPECT_TRUE(refuses(
       [](Options& o) {
-        o.cameras[0].source =
+        o.open_cameras[0] =
             std::make_unique<MadeSource>([](int) -> std::optional<Frame> { return std::nullopt; });
       },
       "made:", "no frames"));
-  EXPECT_TRUE(refuses([](Options& o) { o.settings.safety.max_force = -1.0; }, "max_device_force"));
-  EXPECT_TRUE(
-      refuses([](Options& o) { o.settings.parameters.coupling.stiffness = -1.0; }, "stiffness"));
-  EXPECT_TRUE(refuses([](Options& o) { o.servo.rate = 0.0; }, "servo rate", "1 to 100000"));
+  EXPECT_TRUE(refuses([](Options& o) { o.safety.max_force = -1.0; }, "max_device_force"));
+  EXPECT_TRUE(refuses([](Options& o) { o.parameters.coupling.stiffness = -1.0; }, "stiffness"));
+  EXPECT_TRUE(refuses([](Options& o) { o.rate = 0.0; }, "servo rate", "1 to 100000"));
   EXPECT_TRUE(refuses(
       [](Options& o) {
         o.pace = Pace::real_time;
-        o.servo.rate = 10.0;
+        o.rate = 10.0;
       },
       "servo rate", "500 to 10000"));
   EXPECT_TRUE(fails_saying([] { Session(on_the_wall()).start(); }, "free-running", "run"));
@@ -599,7 +609,7 @@ TEST(Session, RefusesWhatItCannotRun) {
 TEST(Session, TakesAProxyThatSparsePointsCarryUnlessOneIsChosen) {
   const auto radius = [](bool chosen) {
     SessionOptions options = on_the_wall();
-    options.cameras[0].source = std::make_unique<MadeSource>([](int k) {
+    options.open_cameras[0] = std::make_unique<MadeSource>([](int k) {
       std::vector<Vec3> sheet;
       for (int i = 0; i < 400; ++i) sheet.emplace_back(0.01 * (i % 20), 0.01 * (i / 20), 0.5);
       return Frame{k / 30.0, std::make_shared<PointCloud>(sheet)};
@@ -622,15 +632,15 @@ TEST(Session, RefusesAMethodThatCannotTouchWhatTheCamerasSee) {
   };
   EXPECT_TRUE(refuses(
       [&](SessionOptions& o) {
-        o.cameras[0].source = points();
+        o.open_cameras[0] = points();
         o.methods = with_own_wall();
-        o.settings.method = "own-wall";
+        o.method = "own-wall";
       },
       "own-wall", "depth images", "another method"));
 
   // In mid-session everything stays as it was.
   SessionOptions options = on_the_wall();
-  options.cameras[0].source = points();
+  options.open_cameras[0] = points();
   options.methods = with_own_wall();
   Session session(std::move(options));
   session.run(0.1, [&](const ServoTick& tick) {

@@ -242,7 +242,7 @@ class FaultyMethod final : public Method {
       : method_(make_method(default_method, parameters)), failures_(std::move(failures)) {}
   void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
   void observe(const Observation& seen) noexcept override { method_->observe(seen); }
-  void set_parameters(const Parameters& parameters) override {
+  void set_parameters(const Parameters& parameters) noexcept override {
     method_->set_parameters(parameters);
   }
 
@@ -352,18 +352,18 @@ std::string violation_of(const Scenario& scenario) {
   for (std::size_t i = 0; i < good.size(); ++i) {
     good[i] = std::make_shared<std::vector<double>>();
     const Place place = i == 0 ? Place::first_camera : Place::second_camera;
-    options.cameras.push_back({.source = std::make_unique<MadeSource>(FaultyCamera(
-                                   scenario.motion, failures_of(scenario, place), good[i]))});
+    options.open_cameras.push_back(std::make_unique<MadeSource>(
+        FaultyCamera(scenario.motion, failures_of(scenario, place), good[i])));
   }
-  options.device = std::make_unique<FaultyHand>(scenario.motion, failures_of(scenario, Place::hand),
-                                                failures_of(scenario, Place::device));
+  options.open_devices[0] = std::make_unique<FaultyHand>(
+      scenario.motion, failures_of(scenario, Place::hand), failures_of(scenario, Place::device));
   options.methods.add(
       {.name = "faulty", .summary = "", .make = [&scenario](const Parameters& parameters) {
          return std::make_unique<FaultyMethod>(parameters, failures_of(scenario, Place::method));
        }});
-  options.settings.method = "faulty";
+  options.method = "faulty";
   options.pace = Pace::free_running;
-  const SafetyParameters limits = options.settings.safety;
+  const SafetyParameters limits = options.safety;
   Session session(std::move(options));
 
   // [s] since the newest good frame of the camera that is worst off, known without the session.
@@ -530,11 +530,11 @@ TEST(SessionFaults, TakeTheForceOfAPageAwayThatFallsSilent) {
     SCOPED_TRACE(fault_names[index_of(fault)]);
     const auto heard = std::make_shared<double>(0.0);
     SessionOptions options;
-    options.cameras.push_back({.source = test::wall_source()});
-    options.device = std::make_unique<FaultyPage>(fault, heard);
-    options.settings.safety.initial_heat = 0.0;
+    options.open_cameras.push_back(test::wall_source());
+    options.open_devices[0] = std::make_unique<FaultyPage>(fault, heard);
+    options.safety.initial_heat = 0.0;
     options.pace = Pace::free_running;
-    const double fall_time = options.settings.safety.max_force / options.settings.safety.fall_rate;
+    const double fall_time = options.safety.max_force / options.safety.fall_rate;
     Session session(std::move(options));
     std::vector<double> sent;
     std::uint32_t told = 0;

@@ -76,8 +76,8 @@ std::unique_ptr<Device> second_device() {
 
 SessionOptions on_the_wall(std::unique_ptr<Device> device) {
   SessionOptions options;
-  options.cameras.push_back({.source = wall_source()});
-  options.device = std::move(device);
+  options.open_cameras.push_back(wall_source());
+  options.open_devices[0] = std::move(device);
   options.pace = Pace::free_running;
   return options;
 }
@@ -89,17 +89,19 @@ struct Played {
 
 Played play(SessionOptions options, double duration) {
   Played played;
-  if (!options.more_hands.empty())
-    options.more_hands[0].on_tick = [&](const ServoTick& t) { played.second.push_back(t); };
+  options.on_tick = [&](std::size_t hand, const ServoTick& tick) {
+    (hand == 0 ? played.first : played.second).push_back(tick);
+  };
   Session session(std::move(options));
-  session.run(duration, [&](const ServoTick& tick) { played.first.push_back(tick); });
+  session.run(duration);
   played.state = session.state();
   return played;
 }
 
 SessionOptions with_two(std::unique_ptr<Device> first, std::unique_ptr<Device> second) {
   SessionOptions options = on_the_wall(std::move(first));
-  options.more_hands.push_back({.device = std::move(second)});
+  options.open_devices.push_back(std::move(second));
+  options.hands.resize(2);
   return options;
 }
 
@@ -123,10 +125,10 @@ TEST(SessionHands, EachFeelsWhatItWouldFeelAlone) {
   EXPECT_GT(force_at(both.second, 2.9), 2.0);
   expect_the_same(both.first, play(on_the_wall(first_device()), 3.0).first);
   expect_the_same(both.second, play(on_the_wall(second_device()), 3.0).first);
-  ASSERT_EQ(both.state.more_hands.size(), 1U);
-  EXPECT_EQ(both.state.more_hands[0].name, "hand_2");
-  EXPECT_EQ(both.state.more_hands[0].summary.ticks, 3000U);
-  EXPECT_GT(both.state.more_hands[0].summary.largest_sent, 2.0);
+  ASSERT_EQ(both.state.hands.size(), 2U);
+  EXPECT_EQ(both.state.hands[1].name, "hand_2");
+  EXPECT_EQ(both.state.hands[1].summary.ticks, 3000U);
+  EXPECT_GT(both.state.hands[1].summary.largest_sent, 2.0);
 }
 
 TEST(SessionHands, LoseTheirForceTogetherAndEngageAnew) {
@@ -186,7 +188,7 @@ TEST(SessionHands, AreRecordedAndReplayedBitForBit) {
                std::make_unique<TroubledHand>(pressing(0.02, 0.4), [](double t, HandState& hand) {
                  if (t > 1.5 && t < 1.6) hand.fault = DeviceFault::emergency_stop;
                }));
-  options.more_hands[0].name = "left";
+  options.hands[1].name = "left";
   options.record = bag.string();
   const Played both = play(std::move(options), 2.0);
   EXPECT_FALSE(both.state.recording.failed) << both.state.recording.message;
@@ -218,22 +220,22 @@ TEST(SessionHands, AreRecordedAndReplayedBitForBit) {
 TEST(SessionHands, HavePlacesOfTheirOwn) {
   SessionOptions options = with_two(first_device(), second_device());
   // Half a metre farther up, so that it never reaches the wall.
-  options.more_hands[0].placement.world_from_device.translation().z() = -0.5;
+  options.hands[1].placement.world_from_device.translation().z() = -0.5;
   Session session(std::move(options));
   std::size_t ticks = 0;
   session.run(1.5, [&](const ServoTick& /*tick*/) { ++ticks; });
   EXPECT_EQ(ticks, 1500U);
   const SessionState state = session.state();
-  EXPECT_GT(state.summary.largest_sent, 0.5);
-  EXPECT_EQ(state.more_hands[0].summary.contact_ticks, 0U);
+  EXPECT_GT(state.hands[0].summary.largest_sent, 0.5);
+  EXPECT_EQ(state.hands[1].summary.contact_ticks, 0U);
 
   Placement placement;
   placement.workspace_scale = 2.0;
   session.place(1, placement);
-  EXPECT_EQ(session.state().more_hands[0].placement.workspace_scale, 2.0);
+  EXPECT_EQ(session.state().hands[1].placement.workspace_scale, 2.0);
   EXPECT_EQ(session.settings().placement.workspace_scale, 1.0);
   session.change([](ServoSettings& settings) { settings.safety.max_force = 1.0; });
-  EXPECT_EQ(session.state().more_hands[0].placement.workspace_scale, 2.0) << "and stay";
+  EXPECT_EQ(session.state().hands[1].placement.workspace_scale, 2.0) << "and stay";
   placement.workspace_scale = -1.0;
   EXPECT_TRUE(fails_saying([&] { session.place(1, placement); }, "scale", ""));
   EXPECT_THROW(session.place(2, Placement()), std::out_of_range);
@@ -243,8 +245,9 @@ TEST(SessionHands, HavePlacesOfTheirOwn) {
 TEST(SessionHands, AreRefusedWithTheReason) {
   const auto two_named = [](const std::string& name, const std::string& other) {
     SessionOptions options = with_two(first_device(), second_device());
-    options.more_hands[0].name = name;
-    options.more_hands.push_back({.name = other, .device = second_device()});
+    options.hands[1].name = name;
+    options.hands.push_back({.name = other});
+    options.open_devices.push_back(second_device());
     const Session session(std::move(options));
   };
   EXPECT_NO_THROW(two_named("left", ""));
@@ -255,15 +258,15 @@ TEST(SessionHands, AreRefusedWithTheReason) {
   EXPECT_TRUE(fails_saying(
       [] {
         SessionOptions options = on_the_wall(first_device());
-        for (int i = 0; i < 8; ++i) options.more_hands.push_back({.device = second_device()});
+        for (int i = 0; i < 8; ++i) options.open_devices.push_back(second_device());
         const Session session(std::move(options));
       },
       "9", "at most 8"));
   EXPECT_TRUE(fails_saying(
       [] {
         SessionOptions options = on_the_wall(nullptr);
-        options.device_uri = "mouse:";
-        options.more_hands.push_back({.device_uri = "mouse:"});
+        options.hands[0].device = "mouse:";
+        options.hands.push_back({.device = "mouse:"});
         const Session session(std::move(options));
       },
       "mouse:", "one of them"));
@@ -277,11 +280,11 @@ TEST(SessionHands, OfAGripperPushEachOtherApart) {
   Eigen::Isometry3d opposite = Eigen::Isometry3d::Identity();
   opposite.linear() = Eigen::AngleAxisd(M_PI, Vec3::UnitX()).toRotationMatrix();
   opposite.translation().z() = 2.0 * wall_depth + thickness;
-  options.cameras.push_back({.source = wall_source(), .world_from_camera = opposite});
+  options.open_cameras.push_back(wall_source());
+  options.cameras = {{}, {.world_from_camera = opposite}};
   const double back = wall_depth + thickness;
-  options.more_hands.push_back(
-      {.device = std::make_unique<ScriptedDevice>(
-           HipPath({{0.0, {0, 0, back + 0.03}}, {2.0, {0, 0, back - 0.004}}}), false)});
+  options.open_devices.push_back(std::make_unique<ScriptedDevice>(
+      HipPath({{0.0, {0, 0, back + 0.03}}, {2.0, {0, 0, back - 0.004}}}), false));
   const Played fingers = play(std::move(options), 4.0);
   const Vec3 one = fingers.first.back().force;
   const Vec3 other = fingers.second.back().force;
@@ -371,13 +374,13 @@ std::unique_ptr<Source> living_wall() {
 SessionOptions live_with_two(const std::shared_ptr<LiveHand::Told>& one,
                              const std::shared_ptr<LiveHand::Told>& other) {
   SessionOptions options;
-  options.cameras.push_back({.source = living_wall()});
-  options.device = std::make_unique<LiveHand>(one);
-  options.more_hands.push_back({.device = std::make_unique<LiveHand>(other)});
-  options.settings.safety.fade_age = 5.0;
-  options.settings.safety.lost_age = 10.0;
-  options.settings.safety.late_intervals = 100.0;
-  options.settings.safety.stall_time = 0.1;
+  options.open_cameras.push_back(living_wall());
+  options.open_devices[0] = std::make_unique<LiveHand>(one);
+  options.open_devices.push_back(std::make_unique<LiveHand>(other));
+  options.safety.fade_age = 5.0;
+  options.safety.lost_age = 10.0;
+  options.safety.late_intervals = 100.0;
+  options.safety.stall_time = 0.1;
   return options;
 }
 
@@ -401,9 +404,9 @@ TEST(LiveSessionHands, LetGoWhereOneOfThemHangsAndAllEndTogether) {
   };
   EXPECT_TRUE(comes_true(sees_it));
   EXPECT_TRUE(comes_true([&] { return !one->force_out && !other->force_out; }));
-  EXPECT_EQ(session.state().device.text, describe(DeviceFault::another_hand));
-  EXPECT_TRUE(comes_true(
-      [&] { return session.state().more_hands[0].device.text.starts_with("no tick for"); }));
+  EXPECT_EQ(session.state().hands[0].device.text, describe(DeviceFault::another_hand));
+  EXPECT_TRUE(
+      comes_true([&] { return session.state().hands[1].device.text.starts_with("no tick for"); }));
   for (int i = 0; i < 50; ++i) {
     ASSERT_FALSE(one->force_out);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));

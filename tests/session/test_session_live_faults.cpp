@@ -148,12 +148,12 @@ bool comes_true(const std::function<bool()>& condition) {
 SessionOptions options_with(const std::vector<std::shared_ptr<CameraLog>>& logs) {
   SessionOptions options;
   for (const auto& log : logs)
-    options.cameras.push_back({.source = std::make_unique<FaultyLiveCamera>(log)});
-  options.device = std::make_unique<TappingDevice>();
-  options.settings.safety.fade_age = 0.1;
-  options.settings.safety.lost_age = lost_age;
-  options.settings.safety.ramp_time = 0.05;
-  options.settings.safety.stall_time = 0.1;
+    options.open_cameras.push_back(std::make_unique<FaultyLiveCamera>(log));
+  options.open_devices[0] = std::make_unique<TappingDevice>();
+  options.safety.fade_age = 0.1;
+  options.safety.lost_age = lost_age;
+  options.safety.ramp_time = 0.05;
+  options.safety.stall_time = 0.1;
   return options;
 }
 

@@ -82,8 +82,7 @@ class Telelink : public ::testing::Test {
     robot_end_ = std::make_unique<RobotEnd>(std::move(robot), RobotEndOptions{.name = "arm"});
     SessionOptions options;
     options.cameras.push_back({.uri = scene});
-    options.device = robot_end_->device();
-    robot_end_->prepare(options.settings);
+    robot_end_->prepare(options);
     options.on_frame = [this](std::size_t camera, const FedFrame& frame) {
       robot_end_->on_frame(camera, frame);
     };
@@ -95,7 +94,7 @@ class Telelink : public ::testing::Test {
   void operate(const Vec3& hand) {
     SessionOptions options;
     options.cameras.push_back({.uri = "ros2:/arm/depth/image_raw/slices?wait=25s"});
-    options.device = std::make_unique<ScriptedDevice>(HipPath({{0.0, hand}}), false);
+    options.open_devices[0] = std::make_unique<ScriptedDevice>(HipPath({{0.0, hand}}), false);
     operator_ = std::make_unique<Session>(std::move(options));
     operator_end_ = std::make_unique<OperatorEnd>(
         *operator_, OperatorEndOptions{.name = "arm", .index = false, .learn = true});

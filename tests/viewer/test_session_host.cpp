@@ -31,7 +31,7 @@ SessionOptions wall_options(const std::string& device) {
   SessionOptions options;
   options.cameras.push_back({.uri = "wall:"});
   options.sources.add({"wall", "", [](const Uri&) { return test::wall_source(); }});
-  options.device_uri = device;
+  options.hands[0].device = device;
   options.pace = Pace::free_running;
   return options;
 }
@@ -229,7 +229,7 @@ class StumblingDevice final : public Device {
 
 TEST(SessionHost, TellsALatchedFaultUntilTheOperatorResetsIt) {
   SessionOptions options = wall_options("hand:");
-  options.device = std::make_unique<StumblingDevice>();
+  options.open_devices[0] = std::make_unique<StumblingDevice>();
   Session session(std::move(options));
   SessionHost host("1.2.3");
   host.attach(session);
@@ -241,6 +241,19 @@ TEST(SessionHost, TellsALatchedFaultUntilTheOperatorResetsIt) {
   host.detach();
   const json reason = {"input_refused"};
   EXPECT_EQ(latched_by, (std::vector<json>{json::array(), reason, json::array()}));
+}
+
+TEST(SessionHost, SaysThatTheForceIsOnHold) {
+  Session session(wall_options("hand:"));
+  SessionHost host("1.2.3");
+  host.attach(session);
+  std::vector<json> on_hold;
+  session.run(0.3, [&](const ServoTick& tick) {
+    if (tick.number % 100 == 99) on_hold.push_back(json::parse(host.state())["on_hold"]);
+    if (tick.number == 100 || tick.number == 200) session.hold(tick.number == 100);
+  });
+  host.detach();
+  EXPECT_EQ(on_hold, (std::vector<json>{false, true, false}));
 }
 
 // A handle that rests away from the wall, with the figures of its mechanism.
@@ -260,7 +273,7 @@ class KnownDevice final : public Device {
 
 TEST(SessionHost, WarnsOfAStiffnessThatTheDeviceIsNotGoodFor) {
   SessionOptions options = wall_options("hand:");
-  options.device = std::make_unique<KnownDevice>();
+  options.open_devices[0] = std::make_unique<KnownDevice>();
   Session session(std::move(options));
   SessionHost host("1.2.3");
   host.attach(session);

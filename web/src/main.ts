@@ -248,6 +248,7 @@ function showTick(now: number): void {
   const flags = new Set([
     ...flagNames(tick?.flags ?? 0, introduced?.flags ?? []),
     ...flagNames(tick?.safety ?? 0, introduced?.safety_flags ?? []),
+    ...(state?.on_hold ? ["on_hold"] : []),
   ]);
   const { connected } = connection;
   const acting = flagNames(tick?.fixtures ?? 0, state?.fixtures ?? []);

@@ -452,6 +452,8 @@ export interface State {
   interventions: number[];
   /** names of the faults that latched: no force until the operator resets them; empty: none did */
   latched_by: string[];
+  /** the operator keeps the force off */
+  on_hold: boolean;
   /** how many ticks had each flag */
   flag_ticks: number[];
   pop_throughs: number;

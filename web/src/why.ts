@@ -80,6 +80,7 @@ function asked(facts: Parameters<Say>[0]): string {
 
 // Why no force is sent, in the order in which they decide. Empty: this does not say why.
 const NONE: readonly [flag: string, say: Say][] = [
+  ["on_hold", () => "the operator has put it on hold."],
   ["fault_latched", () => "faults came again and again, and the operator has to reset them."],
   ["output_refused", () => "the safety chain's own result broke its bounds."],
   ["input_refused", () => "the hand or the method gave a number that is not finite."],

@@ -334,7 +334,6 @@ class Session::Impl {
       if (needs_watchdog()) refuse_without_watchdog(hand->device().info(), settings.safety);
     }
     settings = for_cameras(std::move(settings));
-    validate(settings);
     if (settings.fixtures != settings_.fixtures) check_materials(settings.fixtures.get(), newest());
     const bool with_new_methods = settings.method != settings_.method;
     tell([&](SessionHand& hand,
@@ -346,13 +345,12 @@ class Session::Impl {
   }
 
   void place(std::size_t number, const Placement& placement) {
-    validate(placement);
     const std::lock_guard lock(control_);
     SessionHand& hand = *hands_.at(number);
-    hand.placement = placement;
-    if (number == 0) settings_.placement = placement;
     note(hand,
          hand.cycle().command([&](ServoCommands& told) { told.settings.placement = placement; }));
+    hand.placement = placement;
+    if (number == 0) settings_.placement = placement;
   }
 
   void hold(bool on) {

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 namespace palpate {
@@ -23,6 +24,27 @@ struct ParameterRow {
   double (*get)(const Owner&);
   void (*set)(Owner&, double);
 };
+
+/// The owner of the member that a pointer names.
+template <class Owner, class Member>
+Owner owner_of(Member Owner::*);
+
+/// The row of the member at the end of `path`, pointers to members of one another. Its default is
+/// what the member begins with.
+template <auto first, auto... path>
+constexpr auto row_of(std::string_view name, std::string_view symbol, std::string_view unit,
+                      double min, double max, std::string_view meaning,
+                      std::string_view source = "ours") {
+  using Owner = decltype(owner_of(first));
+  constexpr auto get = [](const Owner& owner) {
+    return static_cast<double>(((owner.*first).*....*path));
+  };
+  constexpr auto set = [](Owner& owner, double value) {
+    auto& member = ((owner.*first).*....*path);
+    member = static_cast<std::remove_reference_t<decltype(member)>>(value);
+  };
+  return ParameterRow<Owner>{name, symbol, unit, get(Owner{}), min, max, meaning, source, get, set};
+}
 
 /// A number as messages show it.
 std::string number_text(double value);

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "palpate/core/parameter_table.hpp"
+#include "palpate/core/parameters.hpp"
 
 namespace palpate {
 namespace {

@@ -17,7 +17,6 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/drivers/usb.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {

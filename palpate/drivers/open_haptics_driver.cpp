@@ -14,7 +14,6 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/drivers/usb.hpp"
 
 namespace palpate {
 namespace open_haptics {

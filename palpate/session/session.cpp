@@ -27,7 +27,7 @@
 #include "palpate/session/hand_paths.hpp"
 #include "palpate/session/played_source.hpp"
 #include "palpate/session/session_hand.hpp"
-#include "palpate/sources/posed_source.hpp"
+#include "palpate/sources/source.hpp"
 
 namespace palpate {
 namespace {

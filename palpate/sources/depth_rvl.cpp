@@ -5,7 +5,6 @@
 #include <cstring>
 
 #include "palpate/core/error.hpp"
-#include "palpate/sources/little_endian.hpp"
 
 namespace palpate {
 namespace {

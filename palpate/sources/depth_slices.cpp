@@ -6,7 +6,6 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/sources/depth_rvl.hpp"
-#include "palpate/sources/little_endian.hpp"
 
 namespace palpate {
 namespace {

@@ -10,7 +10,6 @@
 #include "palpate/sources/depth_recording.hpp"
 #include "palpate/sources/material_file.hpp"
 #include "palpate/sources/point_file_source.hpp"
-#include "palpate/sources/posed_source.hpp"
 #include "palpate/sources/source.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 

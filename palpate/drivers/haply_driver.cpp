@@ -300,7 +300,6 @@ class Inverse final : public ChannelHand {
                     .max_damping = 3.0};
     info_.reach = DeviceReach::ball(type == "minverse" ? 0.04 : 0.10);
     info_.serial = id_;
-    info_.firmware = tag.empty() ? "" : "service " + tag;
   }
 
   [[nodiscard]] std::string first_message() const {
@@ -343,7 +342,6 @@ class Inverse final : public ChannelHand {
     if (told == nullptr || !told->is_object()) return let_go(DeviceFault::disconnected);
     HandState& state = newest_.state;
     state.position = vector_of(*told, "cursor_position", state.position);
-    state.velocity = vector_of(*told, "cursor_velocity", state.velocity.value_or(Vec3::Zero()));
     read_grips(message, state);
     if (member(*device, "status") != nullptr) status_ = fault_of_status(*device);
     state.fault = status_;

@@ -260,7 +260,6 @@ class Hand final : public ChannelHand {
         if (turn.coeffs().allFinite() && turn.norm() > 0.5)
           newest_.state.orientation =
               Eigen::Quaterniond(wanted_.device_from_topic) * turn.normalized();
-        newest_.state.stamp = pose->header.stamp.seconds();
         any = place(pose->position) || any;
       }
     } else {

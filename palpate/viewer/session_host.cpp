@@ -2,6 +2,7 @@
 #include "palpate/viewer/session_host.hpp"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -28,11 +29,27 @@ json energy_of(const PortEnergy& port) {
   return {{"made", port.made}, {"generating", port.generating}};
 }
 
-json row_json(std::string_view name, std::string_view symbol, std::string_view unit,
-              double default_value, double min, double max, std::string_view meaning,
-              std::string_view source) {
-  return {{"name", name}, {"symbol", symbol}, {"unit", unit},       {"default", default_value},
-          {"min", min},   {"max", max},       {"meaning", meaning}, {"source", source}};
+template <class Owner>
+json rows_json(std::span<const ParameterRow<Owner>> table) {
+  json rows = json::array();
+  for (const auto& row : table)
+    rows.push_back({{"name", row.name},
+                    {"symbol", row.symbol},
+                    {"unit", row.unit},
+                    {"default", row.default_value},
+                    {"min", row.min},
+                    {"max", row.max},
+                    {"meaning", row.meaning},
+                    {"source", row.source}});
+  return rows;
+}
+
+// What the numbers of a table are now, by name.
+template <class Owner>
+json values_json(std::span<const ParameterRow<Owner>> table, const Owner& owner) {
+  json values;
+  for (const auto& row : table) values[std::string(row.name)] = row.get(owner);
+  return values;
 }
 
 std::string realtime_text(const RealtimeReport& report) {
@@ -130,23 +147,11 @@ void SessionHost::show_on(ViewerServer* server) {
 }
 
 std::string SessionHost::hello() {
-  json parameters = json::array();
-  json safety = json::array();
+  json safety = rows_json(safety_parameter_table());
+  for (json& row : safety) row["stricter"] = stricter_text(row["name"].get<std::string>());
   json methods = json::array();
   json flags = json::array();
   json safety_flags = json::array();
-  for (const ParameterInfo& row : parameter_table())
-    parameters.push_back(row_json(row.name, row.symbol, row.unit, row.default_value, row.min,
-                                  row.max, row.meaning, row.source));
-  for (const SafetyParameterInfo& row : safety_parameter_table()) {
-    safety.push_back(
-        row_json(row.name, "", row.unit, row.default_value, row.min, row.max, row.meaning, ""));
-    safety.back()["stricter"] = stricter_text(row.name);
-  }
-  json placement = json::array();
-  for (const PlacementInfo& row : placement_table())
-    placement.push_back(
-        row_json(row.name, "", row.unit, row.default_value, row.min, row.max, row.meaning, ""));
   for (const MethodInfo& row : session_->methods().entries())
     methods.push_back({{"name", row.name}, {"meaning", row.summary}});
   for (const TickFlagInfo& flag : tick_flag_table())
@@ -160,8 +165,8 @@ std::string SessionHost::hello() {
   const std::uint64_t most = rules_.files && rules_.open_scene ? rules_.files->limit() : 0;
   return json{{"file_limit", most},      {"scenes", scenes},
               {"notice", rules_.notice}, {"version", version_},
-              {"methods", methods},      {"parameters", parameters},
-              {"safety", safety},        {"placement", placement},
+              {"methods", methods},      {"parameters", rows_json(parameter_table())},
+              {"safety", safety},        {"placement", rows_json(placement_table())},
               {"flags", flags},          {"safety_flags", safety_flags}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
@@ -254,17 +259,8 @@ void SessionHost::look_at_points(const std::string& uri) {
 std::string SessionHost::state() {
   SessionState state = session_->state();
   look_at_points(state.cameras.front().uri);
-  json parameters;
-  json safety;
   json cameras = json::array();
-  for (const ParameterInfo& row : parameter_table())
-    parameters[std::string(row.name)] = row.get(state.settings.parameters);
-  for (const SafetyParameterInfo& row : safety_parameter_table())
-    safety[std::string(row.name)] = row.get(state.settings.safety);
   json playback;
-  json placement;
-  for (const PlacementInfo& row : placement_table())
-    placement[std::string(row.name)] = row.get(state.settings.placement);
   for (const CameraStatus& status : state.cameras) {
     cameras.push_back({{"uri", status.uri},
                        {"kind", status.kind},
@@ -333,9 +329,9 @@ std::string SessionHost::state() {
                          state.settings.placement.workspace_scale, state.rate);
   return json{
       {"method", state.settings.method},
-      {"parameters", parameters},
-      {"safety", safety},
-      {"placement", placement},
+      {"parameters", values_json(parameter_table(), state.settings.parameters)},
+      {"safety", values_json(safety_parameter_table(), state.settings.safety)},
+      {"placement", values_json(placement_table(), state.settings.placement)},
       {"cameras", cameras},
       {"playback", playback},
       {"points", points},

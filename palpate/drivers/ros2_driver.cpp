@@ -29,8 +29,10 @@ constexpr double idle_wait = 0.010;      // [s] between two zeros while no force
 constexpr double listening_wait = 0.02;  // [s] after which the end is heard
 constexpr int zeros_at_the_end = 3;      // for nodes that read as best effort, and lose some
 constexpr double last_wait = 0.05;       // [s] for reliable readers to have the last one
-constexpr double force_lifespan = 0.1;   // [s] an older force reaches no motor
-constexpr double force_deadline = 0.1;   // [s] more than idle_wait: a node may watch it
+constexpr dds::Quality force_quality{
+    .reliable = true,
+    .lifespan = 0.1,   // [s] an older force reaches no motor
+    .deadline = 0.1};  // [s] more than idle_wait: a node may watch it
 
 constexpr double needed_buffer = 4e6;   // [bytes] for depth and clouds without loss
 constexpr double listening_time = 0.5;  // [s] to hear of who publishes
@@ -118,76 +120,52 @@ HandOptions hand_options(const Uri& uri) {
   return wanted;
 }
 
-// Where forces go, whatever their type.
-class ForceWriter {
- public:
-  ForceWriter(dds::Participant& participant, const HandOptions& wanted)
-      : kind_(kind_of(wanted)), writer_(make(participant, wanted.force)) {}
+using Xyz = std::array<double, 3>;
 
-  // [N] in the topic's axes
-  void write(const Vec3& force, const std::string& frame) {
-    const std::array<double, 3> xyz{force.x(), force.y(), force.z()};
-    switch (kind_) {
-      case Kind::wrench_stamped:
-        writer_->write(ros::WrenchStamped{{ros::Time::now(), frame}, xyz, {}});
-        break;
-      case Kind::wrench:
-        writer_->write(ros::Wrench{xyz, {}});
-        break;
-      case Kind::vector:
-        writer_->write(ros::Vector3{xyz});
-        break;
-      case Kind::array:
-        writer_->write(ros::Float64MultiArray{"", {xyz[0], xyz[1], xyz[2]}});
-        break;
-      case Kind::omni:
-        writer_->write(ros::OmniFeedback{xyz, {}});
-        break;
-    }
-  }
-  [[nodiscard]] int readers() const { return writer_->readers(); }
-  void wait_for_readers(double seconds) { writer_->wait_for_readers(seconds); }
-
- private:
-  enum class Kind : std::uint8_t { wrench_stamped, wrench, vector, array, omni };
-
-  static Kind kind_of(const HandOptions& wanted) {
-    constexpr std::array<std::pair<std::string_view, Kind>, 5> kinds{
-        {{"WrenchStamped", Kind::wrench_stamped},
-         {"Wrench", Kind::wrench},
-         {"Vector3", Kind::vector},
-         {"Float64MultiArray", Kind::array},
-         {"OmniFeedback", Kind::omni}}};
-    std::string names;
-    for (const auto& [name, kind] : kinds) {
-      if (name == wanted.force_type) return kind;
-      add_to_list(names, name);
-    }
-    throw Error(wanted.uri, "force_type=" + wanted.force_type + " is not known",
-                "there are: " + names);
-  }
-
-  std::unique_ptr<dds::Writer> make(dds::Participant& participant, const std::string& topic) const {
-    const dds::Quality quality{
-        .reliable = true, .lifespan = force_lifespan, .deadline = force_deadline};
-    switch (kind_) {
-      case Kind::wrench:
-        return std::make_unique<dds::Writer>(participant, topic, ros::Wrench{}, quality);
-      case Kind::vector:
-        return std::make_unique<dds::Writer>(participant, topic, ros::Vector3{}, quality);
-      case Kind::array:
-        return std::make_unique<dds::Writer>(participant, topic, ros::Float64MultiArray{}, quality);
-      case Kind::omni:
-        return std::make_unique<dds::Writer>(participant, topic, ros::OmniFeedback{}, quality);
-      case Kind::wrench_stamped:
-        break;
-    }
-    return std::make_unique<dds::Writer>(participant, topic, ros::WrenchStamped{}, quality);
-  }
-
-  Kind kind_;
-  std::unique_ptr<dds::Writer> writer_;
+// A type of message in which a node takes forces.
+struct ForceKind {
+  std::string_view name;
+  std::unique_ptr<dds::Writer> (*make)(dds::Participant&, const std::string& topic,
+                                       const dds::Quality&);
+  void (*write)(dds::Writer&, const Xyz& force);
 };
+
+template <class MessageOf>
+constexpr ForceKind force_kind(std::string_view name, MessageOf /*a lambda without captures*/) {
+  return {name,
+          [](dds::Participant& participant, const std::string& topic, const dds::Quality& quality) {
+            return std::make_unique<dds::Writer>(participant, topic, MessageOf{}(Xyz{}), quality);
+          },
+          [](dds::Writer& writer, const Xyz& force) { writer.write(MessageOf{}(force)); }};
+}
+
+constexpr std::array force_kinds{
+    force_kind("WrenchStamped",
+               [](const Xyz& force) {
+                 return ros::WrenchStamped{{ros::Time::now(), ""}, force, {}};
+               }),
+    force_kind("Wrench",
+               [](const Xyz& force) {
+                 return ros::Wrench{force, {}};
+               }),
+    force_kind("Vector3", [](const Xyz& force) { return ros::Vector3{force}; }),
+    force_kind("Float64MultiArray",
+               [](const Xyz& force) {
+                 return ros::Float64MultiArray{"", {force.begin(), force.end()}};
+               }),
+    force_kind("OmniFeedback", [](const Xyz& force) {
+      return ros::OmniFeedback{force, {}};
+    })};
+
+const ForceKind& force_kind_of(const HandOptions& wanted) {
+  std::string names;
+  for (const ForceKind& kind : force_kinds) {
+    if (kind.name == wanted.force_type) return kind;
+    add_to_list(names, kind.name);
+  }
+  throw Error(wanted.uri, "force_type=" + wanted.force_type + " is not known",
+              "there are: " + names);
+}
 
 class Hand final : public ChannelHand {
  public:
@@ -195,7 +173,8 @@ class Hand final : public ChannelHand {
       : ChannelHand(wanted.silence),
         wanted_(std::move(wanted)),
         participant_(wanted_.uri),
-        forces_out_(participant_, wanted_) {
+        force_kind_(force_kind_of(wanted_)),
+        forces_out_(force_kind_.make(participant_, wanted_.force, force_quality)) {
     info_.uri = wanted_.uri;
     info_.kind = "ROS 2, " + wanted_.node;
     info_.limits.max_force = wanted_.max_force;
@@ -233,7 +212,7 @@ class Hand final : public ChannelHand {
       participant_.wait(0.01);
       hear();
       const bool is_told = newest_.time > 0.0;
-      const bool is_taken = forces_out_.readers() > 0;
+      const bool is_taken = forces_out_->readers() > 0;
       if (is_told && is_taken) return;
       if (monotonic_now() < end) continue;
       const std::string where = " in domain " + std::to_string(participant_.domain());
@@ -294,15 +273,17 @@ class Hand final : public ChannelHand {
       send(Vec3::Zero());
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    forces_out_.wait_for_readers(last_wait);
+    forces_out_->wait_for_readers(last_wait);
   }
   void send(const Vec3& force_in_device) {
-    forces_out_.write(wanted_.device_from_topic.transpose() * force_in_device, "");
+    const Vec3 force = wanted_.device_from_topic.transpose() * force_in_device;
+    force_kind_.write(*forces_out_, {force.x(), force.y(), force.z()});
   }
 
   const HandOptions wanted_;
   dds::Participant participant_;
-  ForceWriter forces_out_;
+  const ForceKind& force_kind_;
+  std::unique_ptr<dds::Writer> forces_out_;
   std::optional<dds::Reader> poses_, points_, buttons_;
   std::atomic<bool> silent_{false};
   Seen newest_;  // of the listener's thread

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string_view>
 
-#include "palpate/drivers/usb.hpp"
+#include "palpate/drivers/drivers.hpp"
 
 namespace palpate::app {
 namespace {

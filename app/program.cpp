@@ -13,8 +13,8 @@
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
-#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/parameters.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate::app {
 namespace {

@@ -23,9 +23,8 @@
 #include "palpate/core/sensor.hpp"
 #include "palpate/core/vectorise.hpp"
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/drivers/usb.hpp"
 #include "palpate/servo/periodic_thread.hpp"
-#include "palpate/viewer/page.hpp"
+#include "palpate/viewer/server.hpp"
 
 namespace palpate::app {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "palpate/devices/scripted_device.hpp"
+#include "palpate/devices/hip_path.hpp"
 #include "palpate/devices/simulated_hand.hpp"
 
 namespace palpate::lab {

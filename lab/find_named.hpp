@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate::lab {
 

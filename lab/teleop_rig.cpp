@@ -9,9 +9,7 @@
 #include "palpate/devices/simulated_hand.hpp"
 #include "palpate/servo/cycle.hpp"
 #include "palpate/teleop/approach_watch.hpp"
-#include "palpate/teleop/lead.hpp"
 #include "palpate/teleop/led_hand.hpp"
-#include "palpate/teleop/link_limits.hpp"
 #include "palpate/teleop/set_point.hpp"
 
 namespace palpate::lab {

@@ -12,7 +12,7 @@
 #include "lab/aim_table.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate::lab {
 namespace {

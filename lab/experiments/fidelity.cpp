@@ -17,7 +17,7 @@
 #include "lab/signal.hpp"
 #include "lab/sine_push.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate::lab {

@@ -10,7 +10,7 @@
 #include "lab/signal.hpp"
 #include "lab/table.hpp"
 #include "palpate/cloud/material_map.hpp"
-#include "palpate/devices/scripted_device.hpp"
+#include "palpate/devices/hip_path.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
 #include "palpate/sources/source.hpp"

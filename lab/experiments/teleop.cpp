@@ -13,7 +13,7 @@
 
 #include "lab/experiments/feel_scenes.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate::lab {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +17,23 @@
 // under the names of their definitions, units as ROS has them (REP 103). Each hands its fields, in
 // that order, to whatever writes them, reads them, or lays them out in memory (c_sample.hpp).
 namespace palpate::ros {
+
+/// The name of a type, as an argument of a template.
+template <std::size_t size>
+struct TypeName {
+  char text[size];
+  consteval TypeName(const char (&name)[size]) { std::copy_n(name, size, text); }
+  [[nodiscard]] constexpr std::string_view view() const { return {text, size - 1}; }
+};
+
+/// A message of one field.
+template <TypeName name, class Data>
+struct Single {
+  static constexpr std::string_view type = name.view();
+  Data data{};
+
+  static void walk(auto& way, auto& m) { way(m.data); }
+};
 
 /// builtin_interfaces/msg/Time. ROS counts from 1970 on the clock of the wall.
 struct Time {
@@ -187,32 +205,17 @@ struct Float64MultiArray {
   }
 };
 
-struct Float32 {
-  static constexpr std::string_view type = "std_msgs/msg/Float32";
-  float data = 0.0F;
-
-  static void walk(auto& way, auto& m) { way(m.data); }
-};
+using Float32 = Single<"std_msgs/msg/Float32", float>;
+using String = Single<"std_msgs/msg/String", std::string>;
+using Bool = Single<"std_msgs/msg/Bool", bool>;
+using UInt8 = Single<"std_msgs/msg/UInt8", std::uint8_t>;
+using UInt32 = Single<"std_msgs/msg/UInt32", std::uint32_t>;
 
 struct KeyValue {
   static constexpr std::string_view type = "diagnostic_msgs/msg/KeyValue";
   std::string key, value;
 
   static void walk(auto& way, auto& m) { way(m.key, m.value); }
-};
-
-struct String {
-  static constexpr std::string_view type = "std_msgs/msg/String";
-  std::string data;
-
-  static void walk(auto& way, auto& m) { way(m.data); }
-};
-
-struct Bool {
-  static constexpr std::string_view type = "std_msgs/msg/Bool";
-  bool data = false;
-
-  static void walk(auto& way, auto& m) { way(m.data); }
 };
 
 struct Point {

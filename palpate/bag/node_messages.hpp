@@ -24,20 +24,6 @@ struct Vector3Stamped {
   static void walk(auto& way, auto& m) { way(m.header, m.vector); }
 };
 
-struct UInt8 {
-  static constexpr std::string_view type = "std_msgs/msg/UInt8";
-  std::uint8_t data = 0;
-
-  static void walk(auto& way, auto& m) { way(m.data); }
-};
-
-struct UInt32 {
-  static constexpr std::string_view type = "std_msgs/msg/UInt32";
-  std::uint32_t data = 0;
-
-  static void walk(auto& way, auto& m) { way(m.data); }
-};
-
 struct DiagnosticStatus {
   enum Level : std::uint8_t { ok, warn, error, stale };
   std::uint8_t level = ok;
@@ -174,125 +160,76 @@ struct RequestHeader {
   static void walk(auto& way, auto& m) { way(m.client, m.sequence); }
 };
 
+template <TypeName name, class Content>
+struct ServiceMessage {
+  static constexpr std::string_view type = name.view();
+  RequestHeader header{};
+  Content content{};
+
+  static void walk(auto& way, auto& m) { way(m.header, m.content); }
+};
+
 struct SetParameters {
-  struct Request {
-    static constexpr std::string_view type = "rcl_interfaces/srv/SetParameters_Request";
-    RequestHeader header{};
-    std::vector<Parameter> parameters;
-
-    static void walk(auto& way, auto& m) { way(m.header, m.parameters); }
-  };
-  struct Reply {
-    static constexpr std::string_view type = "rcl_interfaces/srv/SetParameters_Response";
-    RequestHeader header{};
-    std::vector<SetParametersResult> results;
-
-    static void walk(auto& way, auto& m) { way(m.header, m.results); }
-  };
+  using Request =
+      ServiceMessage<"rcl_interfaces/srv/SetParameters_Request", std::vector<Parameter>>;
+  using Reply =
+      ServiceMessage<"rcl_interfaces/srv/SetParameters_Response", std::vector<SetParametersResult>>;
 };
 
 struct SetParametersAtomically {
-  struct Request {
-    static constexpr std::string_view type = "rcl_interfaces/srv/SetParametersAtomically_Request";
-    RequestHeader header{};
-    std::vector<Parameter> parameters;
-
-    static void walk(auto& way, auto& m) { way(m.header, m.parameters); }
-  };
-  struct Reply {
-    static constexpr std::string_view type = "rcl_interfaces/srv/SetParametersAtomically_Response";
-    RequestHeader header{};
-    SetParametersResult result;
-
-    static void walk(auto& way, auto& m) { way(m.header, m.result); }
-  };
+  using Request =
+      ServiceMessage<"rcl_interfaces/srv/SetParametersAtomically_Request", std::vector<Parameter>>;
+  using Reply =
+      ServiceMessage<"rcl_interfaces/srv/SetParametersAtomically_Response", SetParametersResult>;
 };
 
+/// Requests that name parameters.
+using ParameterNames = std::vector<std::string>;
+
 struct GetParameters {
-  struct Request {
-    static constexpr std::string_view type = "rcl_interfaces/srv/GetParameters_Request";
-    RequestHeader header{};
-    std::vector<std::string> names;
-
-    static void walk(auto& way, auto& m) { way(m.header, m.names); }
-  };
-  struct Reply {
-    static constexpr std::string_view type = "rcl_interfaces/srv/GetParameters_Response";
-    RequestHeader header{};
-    std::vector<ParameterValue> values;
-
-    static void walk(auto& way, auto& m) { way(m.header, m.values); }
-  };
+  using Request = ServiceMessage<"rcl_interfaces/srv/GetParameters_Request", ParameterNames>;
+  using Reply =
+      ServiceMessage<"rcl_interfaces/srv/GetParameters_Response", std::vector<ParameterValue>>;
 };
 
 struct GetParameterTypes {
-  struct Request {
-    static constexpr std::string_view type = "rcl_interfaces/srv/GetParameterTypes_Request";
-    RequestHeader header{};
-    std::vector<std::string> names;
-
-    static void walk(auto& way, auto& m) { way(m.header, m.names); }
-  };
-  struct Reply {
-    static constexpr std::string_view type = "rcl_interfaces/srv/GetParameterTypes_Response";
-    RequestHeader header{};
-    std::vector<std::uint8_t> types;
-
-    static void walk(auto& way, auto& m) { way(m.header, m.types); }
-  };
+  using Request = ServiceMessage<"rcl_interfaces/srv/GetParameterTypes_Request", ParameterNames>;
+  using Reply =
+      ServiceMessage<"rcl_interfaces/srv/GetParameterTypes_Response", std::vector<std::uint8_t>>;
 };
 
 struct DescribeParameters {
-  struct Request {
-    static constexpr std::string_view type = "rcl_interfaces/srv/DescribeParameters_Request";
-    RequestHeader header{};
-    std::vector<std::string> names;
-
-    static void walk(auto& way, auto& m) { way(m.header, m.names); }
-  };
-  struct Reply {
-    static constexpr std::string_view type = "rcl_interfaces/srv/DescribeParameters_Response";
-    RequestHeader header{};
-    std::vector<ParameterDescriptor> descriptors;
-
-    static void walk(auto& way, auto& m) { way(m.header, m.descriptors); }
-  };
+  using Request = ServiceMessage<"rcl_interfaces/srv/DescribeParameters_Request", ParameterNames>;
+  using Reply = ServiceMessage<"rcl_interfaces/srv/DescribeParameters_Response",
+                               std::vector<ParameterDescriptor>>;
 };
 
 struct ListParameters {
-  struct Request {
-    static constexpr std::string_view type = "rcl_interfaces/srv/ListParameters_Request";
-    RequestHeader header{};
+  struct Within {
     std::vector<std::string> prefixes;
     std::uint64_t depth = 0;  ///< 0: any
 
-    static void walk(auto& way, auto& m) { way(m.header, m.prefixes, m.depth); }
+    static void walk(auto& way, auto& m) { way(m.prefixes, m.depth); }
   };
-  struct Reply {
-    static constexpr std::string_view type = "rcl_interfaces/srv/ListParameters_Response";
-    RequestHeader header{};
+  struct Found {
     std::vector<std::string> names, prefixes;
 
-    static void walk(auto& way, auto& m) { way(m.header, m.names, m.prefixes); }
+    static void walk(auto& way, auto& m) { way(m.names, m.prefixes); }
   };
+  using Request = ServiceMessage<"rcl_interfaces/srv/ListParameters_Request", Within>;
+  using Reply = ServiceMessage<"rcl_interfaces/srv/ListParameters_Response", Found>;
 };
 
 struct Trigger {
-  struct Request {
-    static constexpr std::string_view type = "std_srvs/srv/Trigger_Request";
-    RequestHeader header{};
-    std::uint8_t empty = 0;  ///< IDL has no struct without a field; ROS sends this byte
-
-    static void walk(auto& way, auto& m) { way(m.header, m.empty); }
-  };
-  struct Reply {
-    static constexpr std::string_view type = "std_srvs/srv/Trigger_Response";
-    RequestHeader header{};
+  struct Outcome {
     bool success = false;
     std::string message;
 
-    static void walk(auto& way, auto& m) { way(m.header, m.success, m.message); }
+    static void walk(auto& way, auto& m) { way(m.success, m.message); }
   };
+  /// IDL has no struct without a field; ROS sends this byte.
+  using Request = ServiceMessage<"std_srvs/srv/Trigger_Request", std::uint8_t>;
+  using Reply = ServiceMessage<"std_srvs/srv/Trigger_Response", Outcome>;
 };
 
 // ---------------------------------------------------------------------------- nodes

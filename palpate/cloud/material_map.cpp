@@ -8,7 +8,7 @@
 
 #include "palpate/cloud/frame.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate {
 namespace {

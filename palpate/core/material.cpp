@@ -9,53 +9,10 @@ namespace {
 constexpr std::string_view material_noun = "property of a material";
 
 // A row that has unit, range, meaning and source of the session's parameter of the same name.
-template <double& (*member)(Material&)>
+template <auto... path>
 MaterialInfo as_parameter(std::string_view name) {
   const ParameterInfo& p = row_by_name(parameter_table(), name, material_noun);
-  return {p.name,
-          p.symbol,
-          p.unit,
-          p.default_value,
-          p.min,
-          p.max,
-          p.meaning,
-          p.source,
-          [](const Material& m) {
-            Material copy = m;
-            return member(copy);
-          },
-          [](Material& m, double v) { member(m) = v; }};
-}
-
-double& cushion_of(Material& m) {
-  return m.cushion;
-}
-double& friction_of(Material& m) {
-  return m.friction;
-}
-double& kinetic_share_of(Material& m) {
-  return m.kinetic_share;
-}
-double& viscosity_of(Material& m) {
-  return m.viscosity;
-}
-double& tap_of(Material& m) {
-  return m.tap.tap;
-}
-double& tap_frequency_of(Material& m) {
-  return m.tap.tap_frequency;
-}
-double& tap_decay_of(Material& m) {
-  return m.tap.tap_decay;
-}
-double& grain_of(Material& m) {
-  return m.texture.grain;
-}
-double& grain_length_of(Material& m) {
-  return m.texture.grain_length;
-}
-double& relief_of(Material& m) {
-  return m.texture.relief;
+  return row_of<path...>(p.name, p.symbol, p.unit, p.min, p.max, p.meaning, p.source);
 }
 
 }  // namespace
@@ -72,21 +29,21 @@ Material material_of(const Parameters& p) {
 }
 
 std::span<const MaterialInfo> material_table() {
+  using M = Material;
   static const std::array table{
-      MaterialInfo{"stiffness", "", "N/m", 1e5, 10.0, 1e5,
-                   "stiffness of the surface, limited to the session's stiffness", "ours (feel)",
-                   [](const Material& m) { return m.stiffness; },
-                   [](Material& m, double v) { m.stiffness = v; }},
-      as_parameter<cushion_of>("cushion"),
-      as_parameter<friction_of>("friction"),
-      as_parameter<kinetic_share_of>("kinetic_share"),
-      as_parameter<viscosity_of>("viscosity"),
-      as_parameter<tap_of>("tap"),
-      as_parameter<tap_frequency_of>("tap_frequency"),
-      as_parameter<tap_decay_of>("tap_decay"),
-      as_parameter<grain_of>("grain"),
-      as_parameter<grain_length_of>("grain_length"),
-      as_parameter<relief_of>("relief")};
+      row_of<&M::stiffness>("stiffness", "", "N/m", 10.0, 1e5,
+                            "stiffness of the surface, limited to the session's stiffness",
+                            "ours (feel)"),
+      as_parameter<&M::cushion>("cushion"),
+      as_parameter<&M::friction>("friction"),
+      as_parameter<&M::kinetic_share>("kinetic_share"),
+      as_parameter<&M::viscosity>("viscosity"),
+      as_parameter<&M::tap, &TapParameters::tap>("tap"),
+      as_parameter<&M::tap, &TapParameters::tap_frequency>("tap_frequency"),
+      as_parameter<&M::tap, &TapParameters::tap_decay>("tap_decay"),
+      as_parameter<&M::texture, &TextureParameters::grain>("grain"),
+      as_parameter<&M::texture, &TextureParameters::grain_length>("grain_length"),
+      as_parameter<&M::texture, &TextureParameters::relief>("relief")};
   return table;
 }
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/text.hpp"
 
 namespace palpate {

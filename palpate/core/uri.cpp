@@ -9,7 +9,6 @@
 #include <sstream>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/parameters.hpp"
 #include "palpate/core/text.hpp"
 

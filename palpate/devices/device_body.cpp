@@ -6,7 +6,7 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/parameter_table.hpp"
+#include "palpate/core/parameters.hpp"
 #include "palpate/core/pose.hpp"
 
 namespace palpate {

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
-#include <limits>
 #include <new>
 #include <string>
 #include <thread>
@@ -27,7 +26,6 @@ namespace {
 
 constexpr double opening_time = 30.0;   // [s] for the device to open, or to be enabled
 constexpr double guard_silence = 0.05;  // [s] without the guard's loop: the device is lost
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 // A value in shared memory that one process writes and the other reads, neither waiting: two slots,
 // of which the number of values written so far names the newer.
@@ -77,11 +75,9 @@ struct Force {
 };
 
 struct Hand {
-  std::array<double, 3> position;     // [m]
-  std::array<double, 3> velocity;     // [m/s] NaN: none
-  std::array<double, 4> orientation;  // x y z w; NaN: none
-  double stamp;                       // [s] NaN: none
-  std::int64_t buttons;               // -1: none
+  std::array<double, 3> position;                    // [m]
+  std::optional<std::array<double, 4>> orientation;  // x y z w
+  std::optional<std::uint32_t> buttons;
   bool present, clutched;
   DeviceFault fault;
 };
@@ -95,11 +91,12 @@ void put_text(Text& to, const std::string& from) {
 
 // DeviceInfo without what needs memory of its own.
 struct Info {
-  Text uri, kind, serial, firmware;
+  Text uri, kind, serial;
   DeviceLimits limits;
-  double mass, damping, friction, resolution, delay, rate, watchdog;  // NaN: empty
-  bool has_reach;
-  std::array<double, 7> reach;  // lowest, highest, radius
+  std::optional<double> damping, delay, rate;
+  double watchdog;
+  std::optional<std::array<double, 6>> reach;  // lowest, highest
+  std::optional<double> radius;                // of the reach
   bool simulated;
 };
 static_assert(std::is_trivially_copyable_v<DeviceLimits>);
@@ -124,32 +121,20 @@ struct Memory {
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
 static_assert(std::atomic<Phase>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-double or_nan(const std::optional<double>& value) {
-  return value.value_or(nothing);
-}
-
-std::optional<double> optional_of(double value) {
-  return std::isnan(value) ? std::nullopt : std::optional(value);
-}
-
 void put_info(const DeviceInfo& from, double beat_time, Info& to) {
   put_text(to.uri, from.uri);
   put_text(to.kind, from.kind + ", guarded");
   put_text(to.serial, from.serial);
-  put_text(to.firmware, from.firmware);
   to.limits = from.limits;
-  to.mass = or_nan(from.mass);
-  to.damping = or_nan(from.damping);
-  to.friction = or_nan(from.friction);
-  to.resolution = or_nan(from.resolution);
-  to.delay = or_nan(from.delay);
-  to.rate = or_nan(from.rate);
+  to.damping = from.damping;
+  to.delay = from.delay;
+  to.rate = from.rate;
   to.watchdog = std::min(from.watchdog.value_or(beat_time), beat_time);
-  to.has_reach = from.reach.has_value();
-  if (from.reach)
-    to.reach = {from.reach->lowest.x(),    from.reach->lowest.y(),  from.reach->lowest.z(),
-                from.reach->highest.x(),   from.reach->highest.y(), from.reach->highest.z(),
-                or_nan(from.reach->radius)};
+  if (const auto& reach = from.reach) {
+    const auto& [low, high, radius] = *reach;
+    to.reach = {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
+    to.radius = radius;
+  }
   to.simulated = from.simulated;
 }
 
@@ -158,36 +143,26 @@ DeviceInfo info_of(const Info& from) {
   info.uri = from.uri.data();
   info.kind = from.kind.data();
   info.limits = from.limits;
-  if (from.has_reach) {
-    const auto& r = from.reach;
-    info.reach = DeviceReach{Vec3(r[0], r[1], r[2]), Vec3(r[3], r[4], r[5]), optional_of(r[6])};
+  if (from.reach) {
+    const auto& r = *from.reach;
+    info.reach = DeviceReach{Vec3(r[0], r[1], r[2]), Vec3(r[3], r[4], r[5]), from.radius};
   }
-  info.mass = optional_of(from.mass);
-  info.damping = optional_of(from.damping);
-  info.friction = optional_of(from.friction);
-  info.resolution = optional_of(from.resolution);
-  info.delay = optional_of(from.delay);
-  info.rate = optional_of(from.rate);
+  info.damping = from.damping;
+  info.delay = from.delay;
+  info.rate = from.rate;
   info.watchdog = from.watchdog;
   info.simulated = from.simulated;
   info.serial = from.serial.data();
-  info.firmware = from.firmware.data();
   return info;
 }
 
 Hand hand_of(const HandState& from) {
   Hand hand{};
-  const Vec3 velocity = from.velocity.value_or(Vec3::Constant(nothing));
-  for (int i = 0; i < 3; ++i) {
-    hand.position[static_cast<std::size_t>(i)] = from.position[i];
-    hand.velocity[static_cast<std::size_t>(i)] = velocity[i];
-  }
-  hand.orientation.fill(nothing);
+  hand.position = {from.position.x(), from.position.y(), from.position.z()};
   if (from.orientation)
     hand.orientation = {from.orientation->x(), from.orientation->y(), from.orientation->z(),
                         from.orientation->w()};
-  hand.stamp = or_nan(from.stamp);
-  hand.buttons = from.buttons ? static_cast<std::int64_t>(*from.buttons) : -1;
+  hand.buttons = from.buttons;
   hand.present = from.present;
   hand.clutched = from.clutched;
   hand.fault = from.fault;
@@ -197,13 +172,11 @@ Hand hand_of(const HandState& from) {
 HandState state_of(const Hand& hand) {
   HandState state;
   state.position = Vec3(hand.position[0], hand.position[1], hand.position[2]);
-  if (!std::isnan(hand.velocity[0]))
-    state.velocity = Vec3(hand.velocity[0], hand.velocity[1], hand.velocity[2]);
-  if (!std::isnan(hand.orientation[0]))
-    state.orientation = Eigen::Quaterniond(hand.orientation[3], hand.orientation[0],
-                                           hand.orientation[1], hand.orientation[2]);
-  state.stamp = optional_of(hand.stamp);
-  if (hand.buttons >= 0) state.buttons = static_cast<std::uint32_t>(hand.buttons);
+  if (hand.orientation) {
+    const auto& [x, y, z, w] = *hand.orientation;
+    state.orientation = Eigen::Quaterniond(w, x, y, z);
+  }
+  state.buttons = hand.buttons;
   state.present = hand.present;
   state.clutched = hand.clutched;
   state.fault = hand.fault;

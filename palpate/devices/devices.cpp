@@ -5,8 +5,8 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/devices/hip_path.hpp"
 #include "palpate/devices/mouse_device.hpp"
-#include "palpate/devices/scripted_device.hpp"
 #include "palpate/devices/simulated_hand.hpp"
 
 namespace palpate {

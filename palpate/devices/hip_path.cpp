@@ -83,4 +83,17 @@ Vec3 HipPath::at(double t) const noexcept {
   return last->hip + (t - last->t) / (next->t - last->t) * (next->hip - last->hip);
 }
 
+ScriptedDevice::ScriptedDevice(HipPath path, bool repeat, std::string uri)
+    : info_{.uri = std::move(uri), .kind = "scripted path", .limits = no_motors, .simulated = true},
+      path_(std::move(path)),
+      repeat_(repeat) {}
+
+HandState ScriptedDevice::read(double t) noexcept {
+  if (!began_) began_ = t;
+  double along = t - *began_;
+  const double length = path_.last_time() - path_.first_time();
+  if (repeat_ && length > 0.0) along = std::fmod(along, length);
+  return {.position = path_.at(path_.first_time() + along)};
+}
+
 }  // namespace palpate

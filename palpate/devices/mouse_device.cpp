@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/parameter_table.hpp"
+#include "palpate/core/parameters.hpp"
 
 namespace palpate {
 namespace {

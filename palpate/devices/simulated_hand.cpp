@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "palpate/core/parameter_table.hpp"
+#include "palpate/core/parameters.hpp"
 
 namespace palpate {
 namespace {
@@ -41,10 +41,7 @@ SimulatedHand::SimulatedHand(HipPath target, const HandModel& model, std::string
   if (const auto& body = model_.body) {
     validate(*body);
     info_.kind = "simulated hand on a device";
-    info_.mass = body->mass;
     info_.damping = body->damping;
-    info_.friction = body->friction;
-    info_.resolution = body->resolution;
     info_.delay = body->delay;
     system_ = {model_.mass + body->mass, model_.damping + body->damping, model_.stiffness};
   }

@@ -54,6 +54,7 @@ class SimulatedHand final : public Device {
   SimulatedHand(HipPath target, const HandModel& model, std::string uri = "hand:");
 
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  [[nodiscard]] const HandModel& model() const { return model_; }
   /// Lets the time since the last read pass, at most 0.1 s of it. [servo]
   HandState read(double t) noexcept override;
   void write(const Vec3& force, double t) noexcept override;

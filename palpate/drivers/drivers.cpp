@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <fstream>
 #include <utility>
 
 namespace palpate {
@@ -46,6 +47,54 @@ std::function<DriverReport()> reporting(std::function<DriverReport()> look) {
       return report;
     }
   };
+}
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string usb_attribute(const fs::path& file) {
+  std::ifstream in(file);
+  std::string line;
+  std::getline(in, line);
+  return line;
+}
+
+}  // namespace
+
+std::vector<std::string> usb_ids(const fs::path& root) {
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (auto entry = fs::directory_iterator(root / "sys/bus/usb/devices", error);
+       !error && entry != fs::end(entry); entry.increment(error))
+    found.push_back(entry->path());
+  std::sort(found.begin(), found.end());
+  std::vector<std::string> ids;
+  for (const fs::path& entry : found) {
+    const std::string vendor = usb_attribute(entry / "idVendor");
+    if (!vendor.empty()) ids.push_back(vendor + ":" + usb_attribute(entry / "idProduct"));
+  }
+  return ids;
+}
+
+bool is_usb_of(const std::string& id, std::span<const std::string> known) {
+  return !id.empty() && std::any_of(known.begin(), known.end(),
+                                    [&](const std::string& one) { return id.starts_with(one); });
+}
+
+std::string usb_permission_remedy(const std::string& id) {
+  return "to allow it, put SUBSYSTEM==\"usb\", ATTRS{idVendor}==\"" + id.substr(0, 4) +
+         "\", MODE=\"0666\" into /etc/udev/rules.d/60-palpate.rules, run udevadm control --reload "
+         "and plug it in again; also close other programs that use it";
+}
+
+std::string unopened_by_usb(std::string_view scheme, std::span<const std::string> known,
+                            const std::string& why) {
+  for (const std::string& found : usb_ids()) {
+    if (is_usb_of(found, known))
+      return std::string(scheme) + " it is plugged in (USB " + found + ") but cannot be opened" +
+             (why.empty() ? "" : " (" + why + ")") + "; " + usb_permission_remedy(found);
+  }
+  return {};
 }
 
 }  // namespace palpate

@@ -17,7 +17,6 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/drivers/usb.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
@@ -109,8 +108,6 @@ struct Sdk {
   const char* (*error_get_last_str)() = library.find("dhdErrorGetLastStr");
   int (*get_position)(double* x, double* y, double* z,
                       char id) = library.find("dhdGetPosition");  // [m]
-  int (*get_linear_velocity)(double* x, double* y, double* z,
-                             char id) = library.find("dhdGetLinearVelocity");  // [m/s]
   int (*get_orientation_frame)(double rows[3][3], char id) = library.find("dhdGetOrientationFrame");
   int (*set_force)(double x, double y, double z, char id) = library.find("dhdSetForce");  // [N]
   int (*enable_force)(unsigned char on, char id) = library.find("dhdEnableForce");
@@ -211,8 +208,6 @@ class Arm final : public Device {
     // TimeGuard (1) repeats the place of a read that was less than a period ago: no error.
     bool good = sdk_->get_position(&x, &y, &z, id()) >= 0;
     if (good) state.position = from_arm(x, y, z);
-    good = good && sdk_->get_linear_velocity(&x, &y, &z, id()) >= 0;
-    if (good) state.velocity = from_arm(x, y, z);
     if (good && has_wrist_) good = read_orientation(state);
     if (good) state.buttons = sdk_->get_button_mask(id());
     if (good && ++ticks_ % ticks_a_status == 1) good = look_at_status(t);
@@ -339,15 +334,11 @@ class Arm final : public Device {
     info_.reach = DeviceReach::ball(model.radius);
     if (!model.body.empty()) {
       const DeviceBody& body = device_preset(model.body).body;
-      info_.mass = body.mass;
       info_.damping = body.damping;
-      info_.friction = body.friction;
-      info_.resolution = body.resolution;
       info_.delay = body.delay;
     }
     info_.serial = sdk_->serial(id());
     if (!info_.serial.empty()) wanted_.serial = std::stoi(info_.serial);  // when opened again
-    info_.firmware = "SDK " + sdk_->version();
     info_.watchdog = watchdog_unit * wanted_.watchdog;
     has_wrist_ = sdk_->has_wrist(id());
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -19,11 +18,9 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/text.hpp"
+#include "palpate/drivers/channel_hand.hpp"
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/web_socket.hpp"
-#include "palpate/servo/mailbox.hpp"
-#include "palpate/servo/realtime.hpp"
 
 namespace palpate {
 namespace haply {
@@ -36,7 +33,6 @@ constexpr double opening_time = 2.0;     // [s] for each step of opening
 constexpr double answer_time = 0.015;    // [s] for the answer to a message
 constexpr double silence_of_loss = 0.5;  // [s] without an answer: the service is asked anew
 constexpr double stale_time = 0.025;     // [s] a state that is older does not count
-constexpr double beat_time = 0.020;      // [s] without a force from the servo: none is sent
 constexpr double idle_wait = 0.005;      // [s] between two messages while no force comes
 constexpr double most_rise = 0.2;        // [N] from message to message
 constexpr double clear_force = 0.05;     // [N] that a device must show to have taken
@@ -162,9 +158,9 @@ void read_grips(const Json& message, HandState& state) {
   if (found) state.buttons = buttons;
 }
 
-class Inverse final : public Device {
+class Inverse final : public ChannelHand {
  public:
-  explicit Inverse(Wanted wanted) : wanted_(std::move(wanted)) {
+  explicit Inverse(Wanted wanted) : ChannelHand(stale_time), wanted_(std::move(wanted)) {
     std::promise<void> opened;
     std::future<void> result = opened.get_future();
     thread_ = std::thread(&Inverse::run, this, std::move(opened));
@@ -180,42 +176,14 @@ class Inverse final : public Device {
     end();
   }
 
-  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
-
-  HandState read(double /*t*/) noexcept override {
-    if (const Seen* seen = seen_.take()) last_ = *seen;
-    HandState state = last_.state;
-    if (monotonic_now() - last_.time > stale_time) state.fault = DeviceFault::disconnected;
-    state.present = state.fault == DeviceFault::none;
-    return state;
-  }
-
-  void write(const Vec3& force, double /*t*/) noexcept override {
-    const bool passes = enabled_.load(std::memory_order_acquire) && force.allFinite();
-    forces_.put(passes ? force : Vec3::Zero());
-    word_.call();
-  }
-
-  void enable() override { enabled_.store(true, std::memory_order_release); }
-  void disable() noexcept override {
-    enabled_.store(false, std::memory_order_release);
-    word_.call();
-  }
-
   [[nodiscard]] std::string fault_text() const override {
     const std::lock_guard lock(mutex_);
     return trouble_;
   }
 
  private:
-  struct Seen {
-    HandState state{.present = false, .fault = DeviceFault::disconnected};
-    double time = 0.0;  // [s]
-  };
-
   void end() {
-    ending_.store(true, std::memory_order_release);
-    word_.call();
+    begin_end();
     thread_.join();
   }
 
@@ -227,7 +195,7 @@ class Inverse final : public Device {
   // ---- All below: the channel's thread.
   void run(std::promise<void> opened) {
     std::promise<void>* waiting = &opened;
-    while (!ending_.load(std::memory_order_acquire)) {
+    while (!is_ending()) {
       try {
         try {
           converse(waiting);
@@ -274,13 +242,13 @@ class Inverse final : public Device {
     }
     channel.send(first_message());
     double heard = monotonic_now();
-    while (!ending_.load(std::memory_order_acquire)) {
+    while (!is_ending()) {
       const std::string answer = channel.receive(answer_time);
       const double now = monotonic_now();
       if (!answer.empty()) {
         heard = now;
         take(Json::parse(answer, nullptr, false), now);
-        wait_for_word();
+        word_.wait(idle_wait);
         channel.send(message_with(next_force()));
         continue;
       }
@@ -332,7 +300,6 @@ class Inverse final : public Device {
                     .max_damping = 3.0};
     info_.reach = DeviceReach::ball(type == "minverse" ? 0.04 : 0.10);
     info_.serial = id_;
-    info_.firmware = tag.empty() ? "" : "service " + tag;
   }
 
   [[nodiscard]] std::string first_message() const {
@@ -353,22 +320,11 @@ class Inverse final : public Device {
            std::string(text.data(), static_cast<std::size_t>(length));
   }
 
-  // Until the servo has written, or a little while.
-  void wait_for_word() { word_.wait(idle_wait); }
-
-  // What to send now. A servo that has not written for beat_time gets no force.
+  // What to send now.
   Vec3 next_force() {
-    const double now = monotonic_now();
-    if (forces_.take() != nullptr) written_ = now;
-    const bool passes = enabled_.load(std::memory_order_acquire) && now - written_ <= beat_time &&
-                        newest_.state.fault == DeviceFault::none;
-    const double before = asked_.norm();
-    asked_ = passes ? forces_.taken_last() : Vec3::Zero();
     // A channel that is late misses the beginning of a force: it must not begin with a step.
-    const double most = std::min(wanted_.max_force, before + most_rise);
-    const double size = asked_.norm();
-    if (size > most) asked_ *= most / size;
-    return asked_;
+    const Vec3 force = newest_force(std::min(wanted_.max_force, asked_.norm() + most_rise));
+    return asked_ = newest_.state.fault == DeviceFault::none ? force : Vec3::Zero();
   }
 
   static DeviceFault fault_of_status(const Json& device) {
@@ -386,7 +342,6 @@ class Inverse final : public Device {
     if (told == nullptr || !told->is_object()) return let_go(DeviceFault::disconnected);
     HandState& state = newest_.state;
     state.position = vector_of(*told, "cursor_position", state.position);
-    state.velocity = vector_of(*told, "cursor_velocity", state.velocity.value_or(Vec3::Zero()));
     read_grips(message, state);
     if (member(*device, "status") != nullptr) status_ = fault_of_status(*device);
     state.fault = status_;
@@ -425,21 +380,13 @@ class Inverse final : public Device {
   }
 
   Wanted wanted_;
-  DeviceInfo info_;  // set before the constructor returns
-  std::atomic<bool> enabled_{false}, ending_{false};
-  Mailbox<Vec3> forces_;  // [N] from the servo
-  Mailbox<Seen> seen_;    // to the servo
-  WakeUp word_;
   mutable std::mutex mutex_;  // of trouble_; the servo never takes it
   std::string trouble_;
-  // Of the servo's thread:
-  Seen last_;
   // Of the channel's thread:
   std::string id_;
   const char* key_ = "values";  // in which the service wants a force
   Seen newest_;
   Vec3 asked_ = Vec3::Zero();  // [N] in the message that was sent last
-  double written_ = 0.0;       // [s] when the servo last wrote
   DeviceFault status_ = DeviceFault::none;
   int doubts_ = 0;
   bool confirmed_ = false, changed_ = false;

@@ -14,7 +14,6 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/drivers/usb.hpp"
 
 namespace palpate {
 namespace open_haptics {
@@ -34,11 +33,9 @@ constexpr double cool_enough = 0.85;
 enum Name : unsigned {
   current_buttons = 0x2000,
   current_position = 0x2050,   // [mm]
-  current_velocity = 0x2051,   // [mm/s]
   current_transform = 0x2052,  // 4 x 4, column by column, [mm]
   device_model_type = 0x2501,
   device_serial_number = 0x2504,
-  device_firmware_version = 0x2505,
   usable_workspace_dimensions = 0x2551,  // [mm] lowest, highest
   calibration_style = 0x2555,
   nominal_max_force = 0x2603,             // [N]
@@ -241,7 +238,6 @@ class Pen final : public Device {
     in_frame_ = true;
     hd_->begin_frame(handle_);
     state.position = 1e-3 * from_device(hd_->numbers<3>(current_position).data());
-    state.velocity = 1e-3 * from_device(hd_->numbers<3>(current_velocity).data());
     const auto transform = hd_->numbers<16>(current_transform);
     Eigen::Matrix3d pen;
     for (int column = 0; column < 3; ++column)
@@ -363,10 +359,7 @@ class Pen final : public Device {
                     .max_stiffness = model.stiffness,
                     .max_damping = model.damping};
     if (model.force <= touch.force) {
-      info_.mass = preset.body.mass;
       info_.damping = preset.body.damping;
-      info_.friction = preset.body.friction;
-      info_.resolution = preset.body.resolution;
       info_.delay = preset.body.delay;
     }
     const auto reach = hd_->numbers<6>(usable_workspace_dimensions);
@@ -376,8 +369,6 @@ class Pen final : public Device {
       info_.reach = DeviceReach{a.cwiseMin(b), a.cwiseMax(b)};
     info_.rate = scheduler_rate;
     info_.serial = hd_->text(device_serial_number);
-    const double firmware = hd_->numbers<1>(device_firmware_version)[0];
-    if (firmware > 0.0) info_.firmware = std::to_string(firmware).substr(0, 4);
     hd_->take_errors();  // of what this model does not tell
   }
 

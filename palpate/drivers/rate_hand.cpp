@@ -54,7 +54,6 @@ HandState RateHand::read(double t) noexcept {
   }
   position_ += dt * velocity;
   return {.position = position_,
-          .velocity = velocity,
           .buttons = sticks.buttons,
           .present = sticks.plugged_in,
           .fault = sticks.plugged_in ? DeviceFault::none : DeviceFault::disconnected};

@@ -15,13 +15,13 @@
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/text.hpp"
-#include "palpate/drivers/clock_relation.hpp"
 #include "palpate/drivers/dds.hpp"
+#include "palpate/drivers/link_estimates.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/ros2.hpp"
 #include "palpate/drivers/ros2_publisher.hpp"
 #include "palpate/servo/realtime.hpp"
-#include "palpate/sources/depth_slices.hpp"
+#include "palpate/sources/depth_rvl.hpp"
 #include "palpate/sources/ros_frames.hpp"
 #include "palpate/sources/transforms.hpp"
 
@@ -32,7 +32,8 @@ namespace {
 constexpr double least_patience = 0.05;  // [s] between two looks at what is published
 // [s] for which a frame waits for a transform that covers it: /tf comes at 10 to 100 Hz
 constexpr double longest_wait_for_tf = 0.1;
-constexpr double time_to_settle = 2.0;  // [s] within which TF leads to a camera
+constexpr double kept_transforms = 5.0;  // [s] before the newest
+constexpr double time_to_settle = 2.0;   // [s] within which TF leads to a camera
 // [s] within which other nodes are heard of: one that publishes TF may be heard after the camera
 constexpr double time_to_be_heard = 1.0;
 constexpr double time_to_answer = 1.0;  // [s] of a camera's machine that is asked for its time
@@ -335,10 +336,15 @@ class Camera final : public LiveCamera {
 
   void take_transforms() {
     if (!tf_) return;
-    while (const auto message = static_tf_->take<ros::TFMessage>())
-      transforms_.add(*message, false, wanted_.uri + ": /tf_static");
-    while (const auto message = tf_->take<ros::TFMessage>())
-      transforms_.add(*message, true, wanted_.uri + ": /tf");
+    const auto take_all = [&](dds::Reader& reader, std::string_view topic) {
+      while (const auto message = reader.take<ros::TFMessage>()) {
+        for (const ros::TransformStamped& transform : message->transforms)
+          transforms_.add(transform, topic == transforms_topic,
+                          wanted_.uri + ": " + std::string(topic));
+      }
+    };
+    take_all(*static_tf_, static_transforms_topic);
+    take_all(*tf_, transforms_topic);
   }
 
   void take_lens() {
@@ -494,7 +500,7 @@ class Camera final : public LiveCamera {
   std::optional<SliceReader> slices_;
   std::optional<RemoteClock> clock_;
   std::string clock_note_;
-  LiveTransforms transforms_;
+  Transforms transforms_{kept_transforms};
   std::shared_ptr<const ViewingRays> rays_;
   std::optional<Pending> pending_;
   OrganisedClouds organised_;

@@ -12,11 +12,10 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
-#include "palpate/drivers/send_rate.hpp"
+#include "palpate/drivers/link_estimates.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/sources/depth_png.hpp"
 #include "palpate/sources/depth_rvl.hpp"
-#include "palpate/sources/depth_slices.hpp"
 #include "palpate/sources/ros_frames.hpp"
 #include "palpate/sources/transforms.hpp"
 

@@ -23,7 +23,7 @@ std::string report_topic(const std::string& camera);
 /// /NAME/depth/camera_info, and the camera's pose in `world` on /tf. Where a raw value is not a
 /// millimetre, as ROS takes for granted, the messages' format says so (compressed_depth).
 ///
-/// The same images are on /NAME/depth/image_raw/slices as slices (depth_slices.hpp), for links that
+/// The same images are on /NAME/depth/image_raw/slices as slices (depth_rvl.hpp), for links that
 /// lose packets: best effort, and no more images a second than the link carries. Only what
 /// somebody reads is packed. A thread of its own answers what the time is here, and hears how
 /// slices come.

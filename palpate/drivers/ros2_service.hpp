@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <deque>
 #include <functional>
 #include <string>
@@ -16,9 +18,20 @@ namespace palpate::dds {
 
 /// What a node's services and their clients have in common: ROS's quality of services, and the name
 /// by which a request's reader and its replies' writer are known to belong together.
-Quality service_quality(std::string_view identity);
+inline Quality service_quality(std::string_view identity) {
+  constexpr int requests_kept = 10;  // as ROS's own services
+  return {.reliable = true, .depth = requests_kept, .user_data = identity};
+}
 /// @param number  of the service among those of its participant
-std::string service_identity(const Guid& participant, unsigned number);
+inline std::string service_identity(const Guid& participant, unsigned number) {
+  std::string text = "serviceid=";
+  std::array<char, 8> piece{};
+  for (std::size_t i = 0; i < 12; ++i) {  // the rest is the same for all participants
+    std::snprintf(piece.data(), piece.size(), "%02x.", static_cast<unsigned>(participant[i]));
+    text += piece.data();
+  }
+  return text + std::to_string(number) + ";";
+}
 
 /// A service of a node, asked and answered as rmw_cyclonedds_cpp does: each message begins with who
 /// asked and the number of the request. (rmw_fastrtps_cpp says that outside of the message, where

@@ -145,7 +145,7 @@ class RosNode::Impl {
                   [this](const auto& request) { return describe(request); }),
         list_(participant_, name_ + "/list_parameters", 6,
               [this](const ros::ListParameters::Request& request) {
-                return parameters_.list(request.prefixes, request.depth);
+                return ros::ListParameters::Reply{{}, parameters_.list(request.content)};
               }),
         start_recording_(participant_, name_ + "/start_recording", 7,
                          [this](const auto&) { return start_recording(); }),
@@ -300,28 +300,22 @@ class RosNode::Impl {
     }
     for (const dds::Writer* writer : {&markers_, &diagnostics_, &events_})
       node.writers.push_back(identity<size>(writer->guid()));
-    const auto add = [&](const auto&... services) {
-      (node.readers.push_back(identity<size>(services.reader())), ...);
-      (node.writers.push_back(identity<size>(services.writer())), ...);
-    };
-    add(set_, set_all_, get_, types_, describe_, list_, start_recording_, stop_recording_, hold_,
-        release_, reset_);
+    for_services([&](const auto& service) {
+      node.readers.push_back(identity<size>(service.reader()));
+      node.writers.push_back(identity<size>(service.writer()));
+    });
     nodes_.emplace(participant_, "", info, latched);
     nodes_->write(info);
   }
 
   void serve(double now) {
-    set_.serve(now);
-    set_all_.serve(now);
-    get_.serve(now);
-    types_.serve(now);
-    describe_.serve(now);
-    list_.serve(now);
-    start_recording_.serve(now);
-    stop_recording_.serve(now);
-    hold_.serve(now);
-    release_.serve(now);
-    reset_.serve(now);
+    for_services([now](auto& service) { service.serve(now); });
+  }
+  template <class Visit>
+  void for_services(const Visit& visit) {
+    const auto all = [&](auto&... services) { (visit(services), ...); };
+    all(set_, set_all_, get_, types_, describe_, list_, start_recording_, stop_recording_, hold_,
+        release_, reset_);
   }
 
   // All of them or none.
@@ -338,16 +332,15 @@ class RosNode::Impl {
 
   ros::SetParameters::Reply set_each(const ros::SetParameters::Request& request) {
     ros::SetParameters::Reply reply;
-    for (const ros::Parameter& parameter : request.parameters)
-      reply.results.push_back(set({parameter}));
+    for (const ros::Parameter& parameter : request.content)
+      reply.content.push_back(set({parameter}));
     tell_changes();
     return reply;
   }
 
   ros::SetParametersAtomically::Reply set_together(
       const ros::SetParametersAtomically::Request& request) {
-    ros::SetParametersAtomically::Reply reply;
-    reply.result = set(request.parameters);
+    ros::SetParametersAtomically::Reply reply{{}, set(request.content)};
     tell_changes();
     return reply;
   }
@@ -355,22 +348,22 @@ class RosNode::Impl {
   ros::GetParameters::Reply get(const ros::GetParameters::Request& request) {
     ros::GetParameters::Reply reply;
     const ServoSettings settings = session_.settings();
-    for (const std::string& name : request.names)
-      reply.values.push_back(parameters_.get(settings, name));
+    for (const std::string& name : request.content)
+      reply.content.push_back(parameters_.get(settings, name));
     return reply;
   }
 
   ros::GetParameterTypes::Reply types(const ros::GetParameterTypes::Request& request) {
     ros::GetParameterTypes::Reply reply;
-    for (const std::string& name : request.names)
-      reply.types.push_back(parameters_.describe(name).type);
+    for (const std::string& name : request.content)
+      reply.content.push_back(parameters_.describe(name).type);
     return reply;
   }
 
   ros::DescribeParameters::Reply describe(const ros::DescribeParameters::Request& request) {
     ros::DescribeParameters::Reply reply;
-    for (const std::string& name : request.names)
-      reply.descriptors.push_back(parameters_.describe(name));
+    for (const std::string& name : request.content)
+      reply.content.push_back(parameters_.describe(name));
     return reply;
   }
 
@@ -390,13 +383,13 @@ class RosNode::Impl {
 
   ros::Trigger::Reply start_recording() {
     ros::Trigger::Reply reply = done([this] { recordings_.start(); }, "");
-    if (reply.success) reply.message = session_.state().recording.folder;
+    if (reply.content.success) reply.content.message = session_.state().recording.folder;
     return reply;
   }
 
   ros::Trigger::Reply stop_recording() {
     const RecordingState before = session_.state().recording;
-    if (!before.on) return {.success = false, .message = "no recording is on"};
+    if (!before.on) return {{}, {false, "no recording is on"}};
     return done([this] { recordings_.stop(); }, before.folder);
   }
 
@@ -404,9 +397,9 @@ class RosNode::Impl {
     try {
       what();
     } catch (const std::exception& error) {
-      return {.success = false, .message = error.what()};
+      return {{}, {false, error.what()}};
     }
-    return {.success = true, .message = message};
+    return {{}, {true, message}};
   }
 
   Session& session_;

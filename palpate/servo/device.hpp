@@ -42,18 +42,14 @@ struct DeviceInfo {
   std::string kind;  ///< e.g. "scripted path"
   DeviceLimits limits;
   std::optional<DeviceReach> reach = {};
-  std::optional<double> mass = {};        ///< [kg] apparent mass at the handle
-  std::optional<double> damping = {};     ///< [N s/m] of the mechanism
-  std::optional<double> friction = {};    ///< [N] Coulomb friction of the mechanism
-  std::optional<double> resolution = {};  ///< [m] of the position
-  std::optional<double> delay = {};       ///< [s] from a write to the motors' force
-  std::optional<double> rate = {};        ///< [Hz] at which the device is updated
+  std::optional<double> damping = {};  ///< [N s/m] of the mechanism
+  std::optional<double> delay = {};    ///< [s] from a write to the motors' force
+  std::optional<double> rate = {};     ///< [Hz] at which the device is updated
   /// [s] the hardware takes its force away when no command came for this long; empty: never. A
   /// session in real time refuses forces on a device with motors without one; see SessionOptions.
   std::optional<double> watchdog = {};
-  bool simulated = false;     ///< a simulated hand: it may be read on any clock
-  std::string serial = {};    ///< serial number, empty if unknown
-  std::string firmware = {};  ///< firmware and driver versions, empty if unknown
+  bool simulated = false;   ///< a simulated hand: it may be read on any clock
+  std::string serial = {};  ///< serial number, empty if unknown
 };
 
 /// Why a device gives no force; `none` if it does.
@@ -77,10 +73,8 @@ std::string_view describe(DeviceFault fault);
 /// The state of the device's handle at one read, in the device's own frame.
 struct HandState {
   Vec3 position = Vec3::Zero();                        ///< [m] device
-  std::optional<Vec3> velocity = {};                   ///< [m/s] device
   std::optional<Eigen::Quaterniond> orientation = {};  ///< device_from_handle, length 1
   std::optional<std::uint32_t> buttons = {};           ///< bit i: button i is pressed
-  std::optional<double> stamp = {};                    ///< [s] on the device's own clock
   bool present = true;    ///< false: nobody holds it, or it cannot be read; no force then
   bool clutched = false;  ///< true: the hand moves and the HIP stays; no force then
   DeviceFault fault = DeviceFault::none;  ///< other than `none`: no force

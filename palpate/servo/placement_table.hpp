@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "palpate/core/parameter_table.hpp"
+#include "palpate/core/parameters.hpp"
 #include "palpate/servo/workspace.hpp"
 
 namespace palpate {

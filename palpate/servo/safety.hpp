@@ -7,7 +7,7 @@
 #include <span>
 #include <string_view>
 
-#include "palpate/core/parameter_table.hpp"
+#include "palpate/core/parameters.hpp"
 #include "palpate/core/patch.hpp"
 #include "palpate/servo/correction_tank.hpp"
 #include "palpate/servo/device.hpp"

@@ -11,8 +11,8 @@
 
 #include "palpate/cloud/proposed_touch.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/pose.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/sources/toml_table.hpp"
 
 namespace palpate {

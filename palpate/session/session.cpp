@@ -28,7 +28,7 @@
 #include "palpate/session/played_source.hpp"
 #include "palpate/session/session_hand.hpp"
 #include "palpate/sources/fixture_file.hpp"
-#include "palpate/sources/posed_source.hpp"
+#include "palpate/sources/source.hpp"
 
 namespace palpate {
 namespace {

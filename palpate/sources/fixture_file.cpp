@@ -9,10 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/sources/files.hpp"
 #include "palpate/sources/point_file.hpp"
-#include "palpate/sources/stl.hpp"
 #include "palpate/sources/toml_table.hpp"
 
 namespace palpate {

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/parameters.hpp"
+#include "palpate/core/text.hpp"
 #include "palpate/sources/scene.hpp"
 
 namespace palpate {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include <lzf.h>
 
@@ -25,21 +28,39 @@ constexpr const char* write_anew = "write the file again";
 // The values of each line of the header, by keyword.
 using PcdHeader = std::map<std::string_view, std::vector<std::string_view>>;
 
+// What a column is read for.
+enum class Use : std::uint8_t { x, y, z, colour, none };
+
 struct Column {
   PointField field;
   Scalar type;
+  Use use = Use::none;
   [[nodiscard]] std::size_t bytes() const { return detail::size_of(type) * field.count; }
   [[nodiscard]] bool is_padding() const { return field.name == "_"; }
 };
 
-struct Layout {
-  std::vector<Column> columns;
-  std::array<std::size_t, 3> xyz{};     // which columns those are
-  std::optional<std::size_t> colour{};  // that of rgb or rgba
-};
-
 // What is read of each point.
 struct Values {
+  Values(const std::vector<Column>& columns, std::size_t size) : points(size) {
+    for (const Column& column : columns) {
+      if (column.use == Use::colour) rgb.resize(3 * size);
+    }
+  }
+  void set_colour(std::size_t point, std::uint32_t packed) {
+    for (std::size_t channel = 0; channel < 3; ++channel)
+      rgb[3 * point + channel] = static_cast<std::uint8_t>(packed >> (16 - 8 * channel));
+  }
+  // Takes a column whose values begin at `first`, each `stride` bytes behind the one before.
+  void take(const Column& column, const std::byte* first, std::size_t stride) {
+    if (column.use == Use::colour) {
+      for (std::size_t k = 0; k < points.size(); ++k)
+        set_colour(k, detail::load<std::uint32_t>(first + k * stride, std::endian::little));
+    } else if (column.use != Use::none) {
+      detail::load_column(first, stride, column.type, std::endian::little, points,
+                          static_cast<int>(column.use));
+    }
+  }
+
   std::vector<Vec3> points;
   std::vector<std::uint8_t> rgb;  // 3 of each point; empty without a colour
 };
@@ -131,7 +152,7 @@ Scalar type_of(const Cursor& file, std::string_view type, std::string_view size)
   return found->second;
 }
 
-Layout layout_of(const Cursor& file, const PcdHeader& header) {
+std::vector<Column> columns_of(const Cursor& file, const PcdHeader& header) {
   const auto fields = header.find("FIELDS");
   if (fields == header.end()) {
     file.fail("the header has no FIELDS line", not_pcd);
@@ -156,7 +177,7 @@ Layout layout_of(const Cursor& file, const PcdHeader& header) {
   const auto types = values("TYPE", "F");
   const auto counts = values("COUNT", "1");
 
-  Layout layout;
+  std::vector<Column> columns;
   for (std::size_t i = 0; i < size; ++i) {
     constexpr std::uint64_t largest_count = 1'000'000;  // keeps all products below in 64 bits
     const auto count = detail::to_count(counts[i]);
@@ -166,42 +187,29 @@ Layout layout_of(const Cursor& file, const PcdHeader& header) {
           correct_header);
     }
     const Scalar type = type_of(file, types[i], sizes[i]);
-    layout.columns.push_back(
+    columns.push_back(
         {{std::string(fields->second[i]), std::string(detail::name_of(type)), *count}, type});
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    const char name = "xyz"[axis];
+  for (const Use use : {Use::x, Use::y, Use::z}) {
+    const std::string name(1, "xyz"[static_cast<int>(use)]);
     std::size_t found = 0;
-    for (std::size_t i = 0; i < size; ++i) {
-      if (layout.columns[i].field.name == std::string(1, name)) {
-        layout.xyz[axis] = i;
-        ++found;
-      }
+    for (Column& column : columns) {
+      if (column.field.name != name) continue;
+      column.use = use;
+      found += column.field.count;
     }
-    if (found != 1 || layout.columns[layout.xyz[axis]].field.count != 1) {
-      file.fail("FIELDS must name " + std::string(1, name) + " once, with COUNT 1",
+    if (found != 1) {
+      file.fail("FIELDS must name " + name + " once, with COUNT 1",
                 "give a file whose points have the fields x, y and z");
     }
   }
   // PCL packs a colour into 4 bytes, 0xAARRGGBB, and declares them as a float or a whole number.
-  for (std::size_t i = 0; i < size; ++i) {
-    const Column& column = layout.columns[i];
-    const bool is_packed = column.field.count == 1 && detail::size_of(column.type) == 4;
-    if (is_packed && (column.field.name == "rgb" || column.field.name == "rgba") && !layout.colour)
-      layout.colour = i;
-  }
-  return layout;
-}
-
-void set_colour(std::vector<std::uint8_t>& rgb, std::size_t point, std::uint32_t packed) {
-  for (std::size_t channel = 0; channel < 3; ++channel)
-    rgb[3 * point + channel] = static_cast<std::uint8_t>(packed >> (16 - 8 * channel));
-}
-
-// Packed colours, the first at `first` and each `stride` bytes behind the one before.
-void load_colours(const std::byte* first, std::size_t stride, std::vector<std::uint8_t>& rgb) {
-  for (std::size_t k = 0; 3 * k < rgb.size(); ++k)
-    set_colour(rgb, k, detail::load<std::uint32_t>(first + k * stride, std::endian::little));
+  const auto colour = std::find_if(columns.begin(), columns.end(), [](const Column& column) {
+    return (column.field.name == "rgb" || column.field.name == "rgba") && column.field.count == 1 &&
+           detail::size_of(column.type) == 4;
+  });
+  if (colour != columns.end()) colour->use = Use::colour;
+  return columns;
 }
 
 // A packed colour written as text. Nothing depends on a colour: one that is no number is black.
@@ -251,26 +259,11 @@ std::optional<Vec3> viewpoint_of(const Cursor& file, const PcdHeader& header) {
   return Vec3(numbers[0], numbers[1], numbers[2]);
 }
 
-// Where x, y, z and the colour lie if each column takes up `size(column)`, and the size of all.
-struct Places {
-  std::array<std::size_t, 3> xyz{};
-  std::size_t colour = 0;
-  std::size_t all = 0;
-};
-
+// The size of a point, if each column takes up `size(column)`.
 template <class Size>
-Places places(const Layout& layout, const Size& size) {
-  Places result;
-  for (std::size_t i = 0; i < layout.columns.size(); ++i) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (layout.xyz[axis] == i) {
-        result.xyz[axis] = result.all;
-      }
-    }
-    if (layout.colour == i) result.colour = result.all;
-    result.all += size(layout.columns[i]);
-  }
-  return result;
+std::size_t size_of_point(const std::vector<Column>& columns, const Size& size) {
+  return std::accumulate(columns.begin(), columns.end(), std::size_t{0},
+                         [&](std::size_t sum, const Column& column) { return sum + size(column); });
 }
 
 [[noreturn]] void fail_promise(const Cursor& file, std::size_t points) {
@@ -279,42 +272,46 @@ Places places(const Layout& layout, const Size& size) {
             cut_short);
 }
 
-Values read_ascii(Cursor& file, const Layout& layout, std::size_t size) {
-  const Places values = places(layout, [](const Column& column) { return column.field.count; });
+Values read_ascii(Cursor& file, const std::vector<Column>& columns, std::size_t size) {
+  const std::size_t needed =
+      size_of_point(columns, [](const Column& column) { return column.field.count; });
   // A value and what separates it take two bytes at least; the last line may lack its end.
-  if (size > (file.left() + 1) / (2 * values.all)) {
+  if (size > (file.left() + 1) / (2 * needed)) {
     fail_promise(file, size);
   }
-  Values read{std::vector<Vec3>(size), {}};
-  if (layout.colour) read.rgb.resize(3 * size);
+  Values read(columns, size);
   for (std::size_t k = 0; k < size; ++k) {
     auto line = file.next_full_line();
     if (!line) {
       file.fail("ends after " + std::to_string(k) + " of " + counted(size, "point"), cut_short);
     }
-    for (std::size_t i = 0; i < values.all; ++i) {
+    std::size_t values = 0;
+    const auto next = [&] {
       const std::string_view token = detail::next_token(*line);
       if (token.empty()) {
         file.fail_in_line(
-            "has " + counted(i, "value") + " where the FIELDS need " + std::to_string(values.all),
+            "has " + counted(values, "value") + " where the FIELDS need " + std::to_string(needed),
             "complete the line, or correct the header");
       }
-      for (int axis = 0; axis < 3; ++axis) {
-        if (values.xyz[axis] == i) {
-          const auto number = detail::to_number(token);
-          if (!number) {
-            file.fail_in_line(
-                std::string(1, "xyz"[axis]) + " is " + detail::quoted(token) + ", not a number",
-                "correct the line; nan marks a hole");
-          }
-          read.points[k][axis] = *number;
+      ++values;
+      return token;
+    };
+    for (const Column& column : columns) {
+      const std::string_view token = next();
+      if (column.use == Use::colour) {
+        read.set_colour(k, packed_colour(token, column.type));
+      } else if (column.use != Use::none) {
+        const auto number = detail::to_number(token);
+        if (!number) {
+          file.fail_in_line(column.field.name + " is " + detail::quoted(token) + ", not a number",
+                            "correct the line; nan marks a hole");
         }
+        read.points[k][static_cast<int>(column.use)] = *number;
       }
-      if (layout.colour && values.colour == i)
-        set_colour(read.rgb, k, packed_colour(token, layout.columns[*layout.colour].type));
+      for (std::size_t i = 1; i < column.field.count; ++i) next();
     }
     if (!detail::next_token(*line).empty()) {
-      file.fail_in_line("has more than the " + counted(values.all, "value") + " of the FIELDS",
+      file.fail_in_line("has more than the " + counted(needed, "value") + " of the FIELDS",
                         "shorten the line, or correct the header");
     }
   }
@@ -322,20 +319,16 @@ Values read_ascii(Cursor& file, const Layout& layout, std::size_t size) {
 }
 
 // Point after point, little endian: PCL writes what is in memory.
-Values read_binary(Cursor& file, const Layout& layout, std::size_t size) {
-  const Places bytes = places(layout, [](const Column& column) { return column.bytes(); });
-  if (size > file.left() / bytes.all) {
+Values read_binary(Cursor& file, const std::vector<Column>& columns, std::size_t size) {
+  const std::size_t bytes = size_of_point(columns, std::mem_fn(&Column::bytes));
+  if (size > file.left() / bytes) {
     fail_promise(file, size);
   }
-  Values read{std::vector<Vec3>(size), {}};
-  const std::byte* const first = file.take(size * bytes.all);
-  for (int axis = 0; axis < 3; ++axis) {
-    detail::load_column(first + bytes.xyz[axis], bytes.all, layout.columns[layout.xyz[axis]].type,
-                        std::endian::little, read.points, axis);
-  }
-  if (layout.colour) {
-    read.rgb.resize(3 * size);
-    load_colours(first + bytes.colour, bytes.all, read.rgb);
+  Values read(columns, size);
+  const std::byte* first = file.take(size * bytes);
+  for (const Column& column : columns) {
+    read.take(column, first, bytes);
+    first += column.bytes();
   }
   return read;
 }
@@ -368,27 +361,21 @@ std::vector<std::byte> decompress(Cursor& file) {
 }
 
 // All of the first field, then all of the second, and so on. PCL leaves padding out, others don't.
-Values read_compressed(Cursor& file, const Layout& layout, std::size_t size) {
+Values read_compressed(Cursor& file, const std::vector<Column>& columns, std::size_t size) {
   const std::vector<std::byte> data = decompress(file);
   for (const bool has_padding : {true, false}) {
     const auto bytes_in_point = [&](const Column& column) {
       return column.is_padding() && !has_padding ? 0 : column.bytes();
     };
-    const std::size_t stride = places(layout, bytes_in_point).all;
+    const std::size_t stride = size_of_point(columns, bytes_in_point);
     if (data.size() % stride != 0 || data.size() / stride != size) {
       continue;
     }
-    const Places bytes =
-        places(layout, [&](const Column& column) { return bytes_in_point(column) * size; });
-    Values read{std::vector<Vec3>(size), {}};
-    for (int axis = 0; axis < 3; ++axis) {
-      const Column& column = layout.columns[layout.xyz[axis]];
-      detail::load_column(data.data() + bytes.xyz[axis], column.bytes(), column.type,
-                          std::endian::little, read.points, axis);
-    }
-    if (layout.colour) {
-      read.rgb.resize(3 * size);
-      load_colours(data.data() + bytes.colour, 4, read.rgb);
+    Values read(columns, size);
+    const std::byte* first = data.data();
+    for (const Column& column : columns) {
+      read.take(column, first, column.bytes());
+      first += size * bytes_in_point(column);
     }
     return read;
   }
@@ -408,27 +395,24 @@ PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name) {
     file.fail("PCD version " + detail::quoted(*version) + " is not known",
               "write the file as version 0.7");
   }
-  const Layout layout = layout_of(file, header);
+  const std::vector<Column> columns = columns_of(file, header);
 
   PointFile cloud;
-  for (const Column& column : layout.columns) {
+  for (const Column& column : columns) {
     cloud.fields.push_back(column.field);
   }
   read_extent(file, header, cloud);
   cloud.viewpoint = viewpoint_of(file, header);
   cloud.encoding = value_of(file, header, "DATA").value();
   const std::size_t size = cloud.width * cloud.height;
-  Values read;
-  if (cloud.encoding == "ascii") {
-    read = read_ascii(file, layout, size);
-  } else if (cloud.encoding == "binary") {
-    read = read_binary(file, layout, size);
-  } else if (cloud.encoding == "binary_compressed") {
-    read = read_compressed(file, layout, size);
-  } else {
+  const bool is_binary = cloud.encoding == "binary";
+  if (!is_binary && cloud.encoding != "ascii" && cloud.encoding != "binary_compressed") {
     file.fail("DATA " + detail::quoted(cloud.encoding) + " is not known",
               "it can be ascii, binary or binary_compressed");
   }
+  Values read = is_binary                   ? read_binary(file, columns, size)
+                : cloud.encoding == "ascii" ? read_ascii(file, columns, size)
+                                            : read_compressed(file, columns, size);
   cloud.points = std::move(read.points);
   cloud.colours = std::move(read.rgb);
   cloud.non_finite = detail::count_non_finite(cloud.points);

@@ -10,7 +10,7 @@
 #include "palpate/cloud/organised.hpp"
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
-#include "palpate/core/parameter_table.hpp"
+#include "palpate/core/parameters.hpp"
 #include "palpate/sources/files.hpp"
 
 namespace palpate {

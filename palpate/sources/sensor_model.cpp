@@ -9,6 +9,7 @@
 #include <string>
 
 #include "palpate/core/error.hpp"
+#include "palpate/core/parameters.hpp"
 #include "palpate/core/vectorise.hpp"
 
 namespace palpate {
@@ -190,57 +191,42 @@ std::vector<WindowNoise> d4xx_by_depth() {
   return rows;
 }
 
-void check(std::string_view name, double value, double min, double max) {
-  if (value >= min && value <= max) return;
-  throw Error("sensor: " + std::string(name), std::to_string(value) + " is out of range",
-              "give a value from " + std::to_string(min) + " to " + std::to_string(max));
-}
-
 }  // namespace
 
 SensorModel SensorModel::named(std::string_view name) {
-  SensorModel model;
-  if (name == "ideal") return model;
-  if (name == "d4xx") {
-    model.d4xx_noise = true;
-    model.quantisation = 1e-3;
-    model.flying = 0.3;
-    model.grazing = 80.0 * std::numbers::pi / 180.0;
-    return model;
-  }
-  if (name == "kinect") {
-    // Khoshelham and Elberink, Sensors 12 (2012), 1437: noise and step at 1 m.
-    model.noise = 1.425e-3;
-    model.noise_growth = 2;
-    model.disparity_step = 2.85e-3;
-    model.quantisation = 1e-3;
-    model.flying = 0.3;
-    model.grazing = 80.0 * std::numbers::pi / 180.0;
-    return model;
-  }
-  if (name == "tof") {
-    // Of a Kinect v2 1.5 mm and more have been measured (Corti and others, Robotics and Autonomous
-    // Systems 75 (2016), 584), growing with depth.
-    model.noise = 2.0e-3;
-    model.noise_growth = 1;
-    model.quantisation = 1e-3;
-    model.flying = 0.5;
-    model.grazing = 80.0 * std::numbers::pi / 180.0;
-    return model;
-  }
+  constexpr double grazing = 80.0 * std::numbers::pi / 180.0;
+  if (name == "ideal") return {};
+  if (name == "d4xx")
+    return {.d4xx_noise = true, .quantisation = 1e-3, .grazing = grazing, .flying = 0.3};
+  // Khoshelham and Elberink, Sensors 12 (2012), 1437: noise and step at 1 m.
+  if (name == "kinect")
+    return {.noise = 1.425e-3,
+            .noise_growth = 2,
+            .disparity_step = 2.85e-3,
+            .quantisation = 1e-3,
+            .grazing = grazing,
+            .flying = 0.3};
+  // Of a Kinect v2 1.5 mm and more have been measured (Corti and others, Robotics and Autonomous
+  // Systems 75 (2016), 584), growing with depth.
+  if (name == "tof")
+    return {.noise = 2.0e-3,
+            .noise_growth = 1,
+            .quantisation = 1e-3,
+            .grazing = grazing,
+            .flying = 0.5};
   throw Error("sensor '" + std::string(name) + "'", "there is no such sensor",
               "choose one of: ideal, d4xx, kinect, tof");
 }
 
 void validate(const SensorModel& model) {
-  check("noise", model.noise, 0.0, 1.0);
-  check("correlation_x", model.correlation_x, 0.0, 100.0);
-  check("correlation_y", model.correlation_y, 0.0, 100.0);
-  check("disparity_step", model.disparity_step, 0.0, 0.1);
-  check("quantisation", model.quantisation, 1e-6, 0.1);
-  check("dropouts", model.dropouts, 0.0, 1.0);
-  check("grazing", model.grazing, 0.0, 1.5707963267948967);
-  check("flying", model.flying, 0.0, 1.0);
+  check_range("sensor", "noise", "m", 0.0, 1.0, model.noise);
+  check_range("sensor", "correlation_x", "px", 0.0, 100.0, model.correlation_x);
+  check_range("sensor", "correlation_y", "px", 0.0, 100.0, model.correlation_y);
+  check_range("sensor", "disparity_step", "m", 0.0, 0.1, model.disparity_step);
+  check_range("sensor", "quantisation", "m", 1e-6, 0.1, model.quantisation);
+  check_range("sensor", "dropouts", "-", 0.0, 1.0, model.dropouts);
+  check_range("sensor", "grazing", "rad", 0.0, 1.5707963267948967, model.grazing);
+  check_range("sensor", "flying", "-", 0.0, 1.0, model.flying);
 }
 
 void fill_normal(std::uint64_t key, std::span<float> out) {

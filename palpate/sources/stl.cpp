@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/sources/stl.hpp"
-
-#include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <map>
+#include <optional>
 #include <string>
 #include <tuple>
 
 #include "palpate/core/error.hpp"
 #include "palpate/sources/files.hpp"
-#include "palpate/sources/little_endian.hpp"
+#include "palpate/sources/point_file.hpp"
+#include "palpate/sources/point_file_detail.hpp"
 
 namespace palpate {
 namespace {
@@ -41,15 +39,6 @@ class Welder {
   std::size_t corners_ = 0;
 };
 
-std::string_view next_word(std::string_view& text) {
-  constexpr std::string_view space = " \t\r\n";
-  const std::size_t begin = std::min(text.find_first_not_of(space), text.size());
-  const std::size_t end = std::min(text.find_first_of(space, begin), text.size());
-  const std::string_view word = text.substr(begin, end - begin);
-  text.remove_prefix(end);
-  return word;
-}
-
 }  // namespace
 
 PointFile parse_stl(std::span<const std::byte> bytes, std::string_view name) {
@@ -64,34 +53,37 @@ PointFile parse_stl(std::span<const std::byte> bytes, std::string_view name) {
     if (!at.allFinite()) fail("a corner is not finite");
     return at;
   };
-  if (bytes.size() >= header && little_endian(bytes, 80, 4) == (bytes.size() - header) / facet &&
+  if (bytes.size() >= header &&
+      detail::load<std::uint32_t>(&bytes[80], std::endian::little) ==
+          (bytes.size() - header) / facet &&
       (bytes.size() - header) % facet == 0) {
     file.encoding = "binary";
     for (std::size_t at = header; at < bytes.size(); at += facet) {
       for (std::size_t corner = 0; corner < 3; ++corner) {
         Vec3 place;
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          place[static_cast<Eigen::Index>(axis)] = static_cast<double>(
-              std::bit_cast<float>(little_endian(bytes, at + 12 + 12 * corner + 4 * axis, 4)));
+        for (int axis = 0; axis < 3; ++axis)
+          detail::load_column(&bytes[at + 12 + 12 * corner + 4 * static_cast<std::size_t>(axis)], 0,
+                              detail::Scalar::float32, std::endian::little, {&place, 1}, axis);
         welder.corner(finite(place));
       }
     }
   } else {
     file.encoding = "ascii";
     std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (next_word(text) != "solid")
+    if (detail::next_token(text) != "solid")
       fail(
           "it is no STL: its size does not fit its number of triangles, nor does it begin with "
           "'solid'");
-    for (std::string_view word = next_word(text); !word.empty(); word = next_word(text)) {
+    for (std::string_view word = detail::next_token(text); !word.empty();
+         word = detail::next_token(text)) {
       if (word != "vertex") continue;
       Vec3 place;
       for (int axis = 0; axis < 3; ++axis) {
-        const std::string_view number = next_word(text);
-        const auto [end, error] =
-            std::from_chars(number.data(), number.data() + number.size(), place[axis]);
-        if (error != std::errc() || end != number.data() + number.size())
-          fail("a corner has '" + std::string(number.substr(0, 20)) + "' for a coordinate");
+        const std::string_view token = detail::next_token(text);
+        const std::optional<double> number = detail::to_number(token);
+        if (!number)
+          fail("a corner has '" + std::string(token.substr(0, 20)) + "' for a coordinate");
+        place[axis] = *number;
       }
       welder.corner(finite(place));
     }

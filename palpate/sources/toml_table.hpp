@@ -25,8 +25,8 @@
 #include <toml++/toml.h>
 
 #include "palpate/core/error.hpp"
-#include "palpate/core/nearest_name.hpp"
 #include "palpate/core/pose.hpp"
+#include "palpate/core/text.hpp"
 
 namespace palpate {
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "palpate/core/error.hpp"
 
@@ -32,6 +33,13 @@ void for_each_transform(BagReader& bag, const Visit& visit) {
         visit(transform, topic == transforms_topic, name);
     }
   }
+}
+
+// Where in a line a sample of that time belongs.
+template <class Line>
+auto first_after(Line& line, double stamp) {
+  return std::upper_bound(line.begin(), line.end(), stamp,
+                          [](double t, const auto& one) { return t < one.stamp; });
 }
 
 }  // namespace
@@ -106,22 +114,23 @@ bool TransformLinks::holds(const ros::TransformStamped& transform, bool moves) c
          found->second.parent == plain_frame(transform.header.frame_id);
 }
 
-void LiveTransforms::add(const ros::TFMessage& message, bool moves, const std::string& name) {
-  for (const ros::TransformStamped& transform : message.transforms) {
-    const Trajectory::Sample sample = sample_of(transform, name);
-    const bool goes_on = links_.holds(transform, moves);
-    links_.add(transform, moves, name);
-    std::deque<Trajectory::Sample>& line = samples_[plain_frame(transform.child_frame_id)];
-    if (!goes_on || !moves) line.clear();
-    // A clock that was set back begins again; several nodes' transforms may overtake one another.
-    if (!line.empty() && sample.stamp < line.back().stamp - kept) line.clear();
-    if (!line.empty() && !(sample.stamp > line.back().stamp)) continue;
-    line.push_back(sample);
-    while (line.size() > most_samples || line.front().stamp < sample.stamp - kept) line.pop_front();
-  }
+void Transforms::add(const ros::TransformStamped& transform, bool moves, const std::string& name) {
+  const Trajectory::Sample sample = sample_of(transform, name);
+  const bool goes_on = links_.holds(transform, moves);
+  links_.add(transform, moves, name);
+  std::deque<Trajectory::Sample>& line = samples_[plain_frame(transform.child_frame_id)];
+  if (!goes_on || !moves) line.clear();
+  // A clock that was set back begins again; several nodes' transforms may overtake one another.
+  if (!line.empty() && sample.stamp < line.back().stamp - kept_) line.clear();
+  const auto after = first_after(line, sample.stamp);
+  if (after != line.begin() && (after - 1)->stamp == sample.stamp) return;
+  line.insert(after, sample);
+  while (line.front().stamp < line.back().stamp - kept_ ||
+         (std::isfinite(kept_) && line.size() > most_samples))
+    line.pop_front();
 }
 
-std::optional<Eigen::Isometry3d> LiveTransforms::at(const TransformWay& way, double stamp) const {
+std::optional<Eigen::Isometry3d> Transforms::at(const TransformWay& way, double stamp) const {
   Eigen::Isometry3d fixed_from_camera = Eigen::Isometry3d::Identity();
   for (const std::string& child : way.children) {
     const auto found = samples_.find(child);
@@ -131,8 +140,7 @@ std::optional<Eigen::Isometry3d> LiveTransforms::at(const TransformWay& way, dou
       fixed_from_camera = pose_of(line.back()) * fixed_from_camera;
       continue;
     }
-    const auto after = std::lower_bound(line.begin(), line.end(), stamp,
-                                        [](const auto& one, double t) { return one.stamp < t; });
+    const auto after = first_after(line, stamp);
     std::vector<Trajectory::Sample> around;
     if (after != line.begin()) around.push_back(*(after - 1));
     if (after != line.end()) around.push_back(*after);
@@ -144,7 +152,7 @@ std::optional<Eigen::Isometry3d> LiveTransforms::at(const TransformWay& way, dou
   return fixed_from_camera;
 }
 
-bool LiveTransforms::reach(const TransformWay& way, double stamp) const {
+bool Transforms::reach(const TransformWay& way, double stamp) const {
   return std::all_of(way.children.begin(), way.children.end(), [&](const std::string& child) {
     const auto found = samples_.find(child);
     return found != samples_.end() && !found->second.empty() &&
@@ -161,50 +169,15 @@ BagTransforms::BagTransforms(BagReader& bag, const std::string& frame, const std
   for_each_transform(bag, [&](const auto& transform, bool moves, const std::string& name) {
     links.add(transform, moves, name);
   });
-  const TransformWay way = links.way(frame, fixed, "the bag's TF");
-  root_ = way.root;
-  fixed_ = way.fixed;
-  if (fixed_.empty()) return;
-
-  std::map<std::string, std::vector<Trajectory::Sample>> samples;
-  for (const std::string& child : way.children) samples[child];
+  way_ = links.way(frame, fixed, "the bag's TF");
+  if (way_.fixed.empty()) return;
   for_each_transform(bag, [&](const auto& transform, bool moves, const std::string& name) {
-    const auto found = samples.find(plain_frame(transform.child_frame_id));
-    if (found == samples.end()) return;
-    if (!links.holds(transform, moves)) return;
-    if (!moves) found->second.clear();
-    found->second.push_back(sample_of(transform, name));
+    const auto& on_way = way_.children;
+    const std::string child = plain_frame(transform.child_frame_id);
+    if (std::find(on_way.begin(), on_way.end(), child) != on_way.end() &&
+        links.holds(transform, moves))
+      transforms_.add(transform, moves, name);
   });
-  for (const std::string& child : way.children) {
-    std::vector<Trajectory::Sample>& line = samples.at(child);
-    order_.push_back(links.moves(child));
-    if (!order_.back()) {
-      still_.push_back(pose_of(line.back()));
-      continue;
-    }
-    std::stable_sort(line.begin(), line.end(),
-                     [](const auto& a, const auto& b) { return a.stamp < b.stamp; });
-    line.erase(std::unique(line.begin(), line.end(),
-                           [](const auto& a, const auto& b) { return a.stamp == b.stamp; }),
-               line.end());
-    moving_.emplace_back(std::move(line), max_gap);
-  }
-}
-
-std::optional<Eigen::Isometry3d> BagTransforms::at(double stamp) const {
-  Eigen::Isometry3d fixed_from_camera = Eigen::Isometry3d::Identity();
-  auto moving = moving_.begin();
-  auto still = still_.begin();
-  for (const bool moves : order_) {
-    if (!moves) {
-      fixed_from_camera = *still++ * fixed_from_camera;
-      continue;
-    }
-    const std::optional<Eigen::Isometry3d> parent_from_child = (moving++)->at(stamp);
-    if (!parent_from_child) return std::nullopt;
-    fixed_from_camera = *parent_from_child * fixed_from_camera;
-  }
-  return fixed_from_camera;
 }
 
 }  // namespace palpate

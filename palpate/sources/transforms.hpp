@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -64,18 +65,19 @@ class TransformLinks {
   std::map<std::string, Link> links_;  // by the child's frame
 };
 
-/// The transforms of the last seconds, as they come from the network.
+/// Transforms over time, from the network or a bag.
 ///
-/// Between two of them it is interpolated as in BagTransforms.
-class LiveTransforms {
+/// Between two of them it is interpolated: linear in translation, spherical (slerp) in rotation.
+class Transforms {
  public:
-  /// [s] that are kept, before the newest
-  static constexpr double kept = 5.0;
   /// [s] Transforms farther apart are not interpolated.
   static constexpr double max_gap = 1.0;
 
-  /// @param moves  it came on /tf  @throws Error if one is not rigid, or there are too many frames.
-  void add(const ros::TFMessage& message, bool moves, const std::string& name);
+  /// @param kept  [s] before the newest, for which they are kept
+  explicit Transforms(double kept = std::numeric_limits<double>::infinity()) : kept_(kept) {}
+
+  /// @param moves  it came on /tf  @throws Error if it is not rigid, or there are too many frames.
+  void add(const ros::TransformStamped& transform, bool moves, const std::string& name);
 
   [[nodiscard]] const TransformLinks& links() const { return links_; }
   /// The pose of the way's first frame in its fixed one; none at a time that is not covered.
@@ -85,20 +87,15 @@ class LiveTransforms {
   [[nodiscard]] bool reach(const TransformWay& way, double stamp) const;
 
  private:
+  double kept_;
   TransformLinks links_;
   std::map<std::string, std::deque<Trajectory::Sample>> samples_;  // by the child; stamps increase
 };
 
 /// Where a camera was in a fixed frame, by the transforms (TF) that a bag has on /tf and
-/// /tf_static.
-///
-/// Between two transforms it is interpolated: linear in translation, spherical (slerp) in rotation.
-/// A frame of TF whose parent changes has the parent that it has last.
+/// /tf_static. A frame of TF whose parent changes has the parent that it has last.
 class BagTransforms {
  public:
-  /// [s] Transforms farther apart are not interpolated.
-  static constexpr double max_gap = 1.0;
-
   /// @param frame  of the camera's images or points, as their headers name it
   /// @param fixed  the fixed frame; empty: the first of map, odom and world that leads to `frame`
   /// @throws Error if `fixed` is named and does not lead there, or a transform is damaged.
@@ -108,19 +105,19 @@ class BagTransforms {
   static bool are_in(const BagReader& bag);
 
   /// Empty where none leads to the camera.
-  [[nodiscard]] const std::string& fixed_frame() const { return fixed_; }
+  [[nodiscard]] const std::string& fixed_frame() const { return way_.fixed; }
   /// The frame above all others on the way from the camera's.
-  [[nodiscard]] const std::string& root() const { return root_; }
+  [[nodiscard]] const std::string& root() const { return way_.root; }
   /// The camera's pose in the fixed frame; none at a time that the transforms do not cover.
   /// @param stamp  [s] since 1970
   /// @pre there is a fixed frame
-  [[nodiscard]] std::optional<Eigen::Isometry3d> at(double stamp) const;
+  [[nodiscard]] std::optional<Eigen::Isometry3d> at(double stamp) const {
+    return transforms_.at(way_, stamp);
+  }
 
  private:
-  std::string fixed_, root_;
-  std::vector<Trajectory> moving_;  // with `still_`, in the order of `order_`
-  std::vector<Eigen::Isometry3d> still_;
-  std::vector<bool> order_;  // from the camera to the fixed frame: does this one move?
+  TransformWay way_;
+  Transforms transforms_;  // of the way
 };
 
 }  // namespace palpate

@@ -17,8 +17,7 @@
 #include "palpate/sources/fixture_file.hpp"
 #include "palpate/telelink/topics.hpp"
 #include "palpate/telelink/touched_paint.hpp"
-#include "palpate/teleop/lead.hpp"
-#include "palpate/teleop/link_limits.hpp"
+#include "palpate/teleop/led_hand.hpp"
 
 namespace palpate {
 namespace {

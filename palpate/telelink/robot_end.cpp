@@ -23,7 +23,7 @@
 #include "palpate/telelink/topics.hpp"
 #include "palpate/telelink/touched_paint.hpp"
 #include "palpate/teleop/approach_watch.hpp"
-#include "palpate/teleop/force_zero.hpp"
+#include "palpate/teleop/set_point.hpp"
 #include "palpate/teleop/touched.hpp"
 
 namespace palpate {

@@ -9,19 +9,21 @@
 
 namespace palpate {
 
+Lead lead_of(const ServoTick& tick) noexcept {
+  constexpr std::uint32_t blind = frame_lost | fault_latched | output_refused;
+  constexpr std::uint32_t away = hand_clutched | hand_fault;
+  Lead lead{.place = tick.place, .press = -tick.force};
+  lead.leads = (tick.hand & hand_present) != 0 && (tick.hand & away) == 0 &&
+               (tick.safety & blind) == 0 && is_place(lead.place) && lead.press.allFinite();
+  return lead;
+}
+
 void validate(const LeadLimits& limits) {
-  const auto check = [](const char* name, double value, double least, double most,
-                        const char* unit) {
-    if (!(value >= least && value <= most))
-      throw Error(std::string("teleop, ") + name,
-                  number_text(value) + " " + unit + " is out of range",
-                  "give " + number_text(least) + " to " + number_text(most) + " " + unit);
-  };
-  check("max_speed", limits.max_speed, 1e-3, 5.0, "m/s");
-  check("contact_speed", limits.contact_speed, 1e-3, 5.0, "m/s");
-  check("near_time", limits.near_time, 0.01, 10.0, "s");
-  check("silence", limits.silence, 0.005, 0.5, "s");
-  check("resume_time", limits.resume_time, 0.0, 10.0, "s");
+  check_range("teleop", "max_speed", "m/s", 1e-3, 5.0, limits.max_speed);
+  check_range("teleop", "contact_speed", "m/s", 1e-3, 5.0, limits.contact_speed);
+  check_range("teleop", "near_time", "s", 0.01, 10.0, limits.near_time);
+  check_range("teleop", "silence", "s", 0.005, 0.5, limits.silence);
+  check_range("teleop", "resume_time", "s", 0.0, 10.0, limits.resume_time);
   if (limits.reach && (limits.reach->isEmpty() || !limits.reach->min().allFinite() ||
                        !limits.reach->max().allFinite()))
     throw Error("teleop, reach", "is no box",

@@ -1,17 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <optional>
 #include <string>
 
 #include <Eigen/Geometry>
 
+#include "palpate/core/patch.hpp"
+#include "palpate/servo/cycle.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/mailbox.hpp"
-#include "palpate/teleop/lead.hpp"
+#include "palpate/servo/safety.hpp"
 
 namespace palpate {
+
+/// Teleoperation command: all data that the operator's end sends.
+///
+/// The position is the operator's proxy (ServoTick::place), never the HIP: the robot is never
+/// commanded into surfaces and fixtures that stop the proxy at the operator's end.
+struct Lead {
+  Vec3 place = Vec3::Zero();  ///< [m] world: where the tool is to be
+  Vec3 press = Vec3::Zero();  ///< [N] world: with which the operator presses there
+  /// Is the command valid? Not while the device is released, clutched or faulty, or without frames.
+  bool leads = false;
+};
+
+/// Of a tick at the operator's end.
+Lead lead_of(const ServoTick& tick) noexcept;
 
 /// How a robot follows commands.
 struct LeadLimits {
@@ -85,5 +102,16 @@ class LedHand final : public Device {
   double led_for_ = 0.0;  // [s] since it was taken up
   bool began_ = false;
 };
+
+/// The safety chain's limits for frames from a network. The network latency alone does not fade the
+/// force: a frame fades once it is `fade_age` older than the typical age on arrival, and is lost
+/// 0.3 s later. @param latency [s] typical time from capture to arrival; at most 1 s counts
+inline SafetyParameters for_link(SafetyParameters safety, double latency) noexcept {
+  constexpr double longest = 1.0;    // [s] nobody leads a robot by older images
+  constexpr double fade_time = 0.3;  // [s]
+  if (latency > 0.0) safety.fade_age += std::min(latency, longest);
+  safety.lost_age = safety.fade_age + fade_time;
+  return safety;
+}
 
 }  // namespace palpate

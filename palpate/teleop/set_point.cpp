@@ -46,22 +46,15 @@ Vec3 without_part_against(const Vec3& unit, const Vec3& v) {
 }  // namespace
 
 void validate(const SetPointOptions& options) {
-  const auto check = [](const char* name, double value, double least, double most,
-                        const char* unit) {
-    if (!(value >= least && value <= most))
-      throw Error(std::string("teleop, ") + name,
-                  number_text(value) + " " + unit + " is out of range",
-                  "give " + number_text(least) + " to " + number_text(most) + " " + unit);
-  };
-  check("tool_radius", options.tool_radius, 1e-4, 0.05, "m");
-  check("margin", options.margin, 0.0, 0.05, "m");
-  check("lag", options.lag, 0.0, 1.0, "s");
-  if (options.stiffness) check("stiffness", *options.stiffness, 1.0, 1e6, "N/m");
-  check("max_force", options.max_force, 0.1, 1000.0, "N");
-  check("unwanted_force", options.unwanted_force, 0.1, 1000.0, "N");
-  check("press_share", options.press_share, 0.0, 1.0, "");
-  check("max_speed", options.max_speed, 1e-3, 5.0, "m/s");
-  check("contact_speed", options.contact_speed, 1e-3, 5.0, "m/s");
+  check_range("teleop", "tool_radius", "m", 1e-4, 0.05, options.tool_radius);
+  check_range("teleop", "margin", "m", 0.0, 0.05, options.margin);
+  check_range("teleop", "lag", "s", 0.0, 1.0, options.lag);
+  if (options.stiffness) check_range("teleop", "stiffness", "N/m", 1.0, 1e6, *options.stiffness);
+  check_range("teleop", "max_force", "N", 0.1, 1000.0, options.max_force);
+  check_range("teleop", "unwanted_force", "N", 0.1, 1000.0, options.unwanted_force);
+  check_range("teleop", "press_share", "-", 0.0, 1.0, options.press_share);
+  check_range("teleop", "max_speed", "m/s", 1e-3, 5.0, options.max_speed);
+  check_range("teleop", "contact_speed", "m/s", 1e-3, 5.0, options.contact_speed);
 }
 
 std::shared_ptr<const FixtureSet> robot_fixtures(const FixtureSet& fixtures) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/viewer/page.hpp"
-
 #include <array>
+
+#include "palpate/viewer/server.hpp"
 
 #ifdef PALPATE_WEB_DIST
 // The assembler puts a file between two labels; the compiler need not read it.

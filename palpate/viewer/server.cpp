@@ -26,8 +26,7 @@
 
 #include "palpate/core/error.hpp"
 #include "palpate/core/text.hpp"
-#include "palpate/viewer/admission.hpp"
-#include "palpate/viewer/page.hpp"
+#include "palpate/viewer/roles.hpp"
 
 namespace palpate {
 namespace {

@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 
 #include "palpate/viewer/protocol.hpp"
 #include "palpate/viewer/roles.hpp"
@@ -96,5 +98,15 @@ class ViewerServer {
 
 /// A random token of 128 bits.
 std::string make_token();
+
+/// A file of the page that the program carries inside itself.
+struct PageFile {
+  std::string_view path;  ///< as in a request, e.g. "/palpate.js"
+  std::string_view type;  ///< as in Content-Type
+  std::string_view content;
+};
+
+/// All of them; "/" is first. If the page was not built, there is only one that says so.
+std::span<const PageFile> page_files();
 
 }  // namespace palpate

@@ -2,6 +2,10 @@
 #include "palpate/viewer/session_host.hpp"
 
 #include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <span>
+#include <system_error>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -28,11 +32,27 @@ json energy_of(const PortEnergy& port) {
   return {{"made", port.made}, {"generating", port.generating}};
 }
 
-json row_json(std::string_view name, std::string_view symbol, std::string_view unit,
-              double default_value, double min, double max, std::string_view meaning,
-              std::string_view source) {
-  return {{"name", name}, {"symbol", symbol}, {"unit", unit},       {"default", default_value},
-          {"min", min},   {"max", max},       {"meaning", meaning}, {"source", source}};
+template <class Owner>
+json rows_json(std::span<const ParameterRow<Owner>> table) {
+  json rows = json::array();
+  for (const auto& row : table)
+    rows.push_back({{"name", row.name},
+                    {"symbol", row.symbol},
+                    {"unit", row.unit},
+                    {"default", row.default_value},
+                    {"min", row.min},
+                    {"max", row.max},
+                    {"meaning", row.meaning},
+                    {"source", row.source}});
+  return rows;
+}
+
+// What the numbers of a table are now, by name.
+template <class Owner>
+json values_json(std::span<const ParameterRow<Owner>> table, const Owner& owner) {
+  json values;
+  for (const auto& row : table) values[std::string(row.name)] = row.get(owner);
+  return values;
 }
 
 std::string realtime_text(const RealtimeReport& report) {
@@ -130,23 +150,11 @@ void SessionHost::show_on(ViewerServer* server) {
 }
 
 std::string SessionHost::hello() {
-  json parameters = json::array();
-  json safety = json::array();
+  json safety = rows_json(safety_parameter_table());
+  for (json& row : safety) row["stricter"] = stricter_text(row["name"].get<std::string>());
   json methods = json::array();
   json flags = json::array();
   json safety_flags = json::array();
-  for (const ParameterInfo& row : parameter_table())
-    parameters.push_back(row_json(row.name, row.symbol, row.unit, row.default_value, row.min,
-                                  row.max, row.meaning, row.source));
-  for (const SafetyParameterInfo& row : safety_parameter_table()) {
-    safety.push_back(
-        row_json(row.name, "", row.unit, row.default_value, row.min, row.max, row.meaning, ""));
-    safety.back()["stricter"] = stricter_text(row.name);
-  }
-  json placement = json::array();
-  for (const PlacementInfo& row : placement_table())
-    placement.push_back(
-        row_json(row.name, "", row.unit, row.default_value, row.min, row.max, row.meaning, ""));
   for (const MethodInfo& row : session_->methods().entries())
     methods.push_back({{"name", row.name}, {"meaning", row.summary}});
   for (const TickFlagInfo& flag : tick_flag_table())
@@ -160,8 +168,8 @@ std::string SessionHost::hello() {
   const std::uint64_t most = rules_.files && rules_.open_scene ? rules_.files->limit() : 0;
   return json{{"file_limit", most},      {"scenes", scenes},
               {"notice", rules_.notice}, {"version", version_},
-              {"methods", methods},      {"parameters", parameters},
-              {"safety", safety},        {"placement", placement},
+              {"methods", methods},      {"parameters", rows_json(parameter_table())},
+              {"safety", safety},        {"placement", rows_json(placement_table())},
               {"flags", flags},          {"safety_flags", safety_flags}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
@@ -254,18 +262,9 @@ void SessionHost::look_at_points(const std::string& uri) {
 std::string SessionHost::state() {
   SessionState state = session_->state();
   look_at_points(state.cameras.front().uri);
-  json parameters;
-  json safety;
   json cameras = json::array();
-  for (const ParameterInfo& row : parameter_table())
-    parameters[std::string(row.name)] = row.get(state.settings.parameters);
-  for (const SafetyParameterInfo& row : safety_parameter_table())
-    safety[std::string(row.name)] = row.get(state.settings.safety);
   const SessionHandState& first = state.hands.front();
   json playback;
-  json placement;
-  for (const PlacementInfo& row : placement_table())
-    placement[std::string(row.name)] = row.get(state.settings.placement);
   for (const CameraStatus& status : state.cameras) {
     cameras.push_back({{"uri", status.uri},
                        {"kind", status.kind},
@@ -334,9 +333,9 @@ std::string SessionHost::state() {
                          state.settings.placement.workspace_scale, state.rate);
   return json{
       {"method", state.settings.method},
-      {"parameters", parameters},
-      {"safety", safety},
-      {"placement", placement},
+      {"parameters", values_json(parameter_table(), state.settings.parameters)},
+      {"safety", values_json(safety_parameter_table(), state.settings.safety)},
+      {"placement", values_json(placement_table(), state.settings.placement)},
       {"cameras", cameras},
       {"playback", playback},
       {"points", points},
@@ -621,6 +620,66 @@ void SessionHost::describe(std::uint8_t camera, const ViewingRays& rays) {
   server_.load()->describe(camera,
                            rays_message(camera, static_cast<std::uint32_t>(k.width),
                                         static_cast<std::uint32_t>(k.height), std::move(xy)));
+}
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t keep_free = 100'000'000;  // [bytes] of the disk
+
+bool is_simple_name(const std::string& name) {
+  return !name.empty() && name.size() <= DroppedFiles::longest_name && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), [](unsigned char c) {
+           return std::isalnum(c) != 0 || c == '.' || c == '-' || c == '_';
+         });
+}
+
+std::string megabytes(std::uint64_t bytes) {
+  return std::to_string((bytes + 999'999) / 1'000'000) + " MB";
+}
+
+fs::path make_folder() {
+  std::string name = (fs::temp_directory_path() / DroppedFiles::folder_prefix).string() + "XXXXXX";
+  if (mkdtemp(name.data()) == nullptr)
+    throw Error(name, "cannot be made", "set TMPDIR to a folder that can be written");
+  return name;
+}
+
+}  // namespace
+
+DroppedFiles::~DroppedFiles() {
+  std::error_code unused;
+  if (!folder_.empty()) fs::remove_all(folder_, unused);
+}
+
+fs::path DroppedFiles::begin(const std::string& name, std::uint64_t size) {
+  if (!is_simple_name(name))
+    throw Error("file", "its name is too long, or has other characters than letters and digits",
+                "rename it");
+  static_cast<void>(uri_of_file(name));  // refuses other kinds
+  std::uint64_t sum = size;
+  for (const File& file : files_) sum += file.size;
+  if (size > limit_ || sum > limit_)
+    throw Error(
+        name,
+        "is of " + megabytes(size) + ", and the page may send " + megabytes(limit_) + " in all",
+        "start the program with --camera and the file's path");
+  if (folder_.empty()) folder_ = make_folder();
+  std::error_code error;
+  const fs::space_info space = fs::space(folder_, error);
+  if (!error && space.available < size + keep_free)
+    throw Error(folder_.string(), "has no room for " + megabytes(size), "free some, or set TMPDIR");
+  // A folder of its own: the name is what the person knows the file by.
+  const fs::path folder = folder_ / std::to_string(++count_);
+  fs::create_directory(folder, error);
+  if (error) throw Error(folder.string(), "cannot be made: " + error.message());
+  return files_.emplace_back(File{folder / name, size}).path;
+}
+
+void DroppedFiles::abandon(const fs::path& file) {
+  std::error_code unused;
+  fs::remove(file, unused);
+  std::erase_if(files_, [&](const File& other) { return other.path == file; });
 }
 
 }  // namespace palpate

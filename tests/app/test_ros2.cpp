@@ -113,15 +113,15 @@ TEST_F(Ros2Program, IsANodeThatTellsAndAnswers) {
   const auto answer = set.ask({{},
                                {{"stiffness", ros::ParameterValue::of(250.0)},
                                 {"stiffness", ros::ParameterValue::of(std::string("soft"))}}});
-  ASSERT_TRUE(answer && answer->results.size() == 2);
-  EXPECT_TRUE(answer->results[0].successful) << answer->results[0].reason;
-  EXPECT_NE(answer->results[1].reason.find("number"), std::string::npos);
+  ASSERT_TRUE(answer && answer->content.size() == 2);
+  EXPECT_TRUE(answer->content[0].successful) << answer->content[0].reason;
+  EXPECT_NE(answer->content[1].reason.find("number"), std::string::npos);
   test::RosClient<ros::Trigger> record(other, "/cell_3/feel/start_recording");
   const auto recording = record.ask({});
-  ASSERT_TRUE(recording && recording->success);
+  ASSERT_TRUE(recording && recording->content.success);
   EXPECT_EQ(node.end(), 0);
   // What was being recorded when it was told to end is whole, with the parameter that was set.
-  const Outcome replayed = run("info --json recording:" + recording->message);
+  const Outcome replayed = run("info --json recording:" + recording->content.message);
   EXPECT_EQ(replayed.code, 0) << replayed.err;
 }
 

@@ -268,7 +268,8 @@ TEST(SimulatedHand, TouchesAPlaneByADeviceInALightAndAFirmGrip) {
       ASSERT_EQ(record.safety & oscillation_cut, 0U) << uri;
     }
     // Hand and wall share 4 mm, but for friction: k_h (4 mm - d) = K d, within 0.4 N.
-    const double k = dynamic_cast<SimulatedHand&>(*device).info().friction.value_or(0.0);
+    const auto& body = dynamic_cast<SimulatedHand&>(*device).model().body;
+    const double k = body ? body->friction : 0.0;
     const double grip = std::string(uri).find("light") != std::string::npos ? 100.0 : 600.0;
     EXPECT_NEAR(record.force.z(), 0.004 * grip * 600.0 / (grip + 600.0), k + 0.05) << uri;
     EXPECT_LT(dynamic_cast<SimulatedHand&>(*device).statistics().shake, 50e-6) << uri;
@@ -282,15 +283,16 @@ TEST(OpenDevice, OpensHandsOnDevicesAndSaysWhatTheDeviceIs) {
   EXPECT_EQ(touch->info().kind, "simulated hand on a device: touch");
   EXPECT_EQ(touch->info().limits.continuous_force, 0.88);
   EXPECT_EQ(touch->info().limits.max_stiffness, 500.0);
-  EXPECT_EQ(touch->info().mass, 0.06);
-  EXPECT_EQ(touch->info().friction, 0.26);
-  EXPECT_EQ(touch->info().resolution, 0.055e-3);
+  const DeviceBody& body = *dynamic_cast<SimulatedHand&>(*touch).model().body;
+  EXPECT_EQ(body.mass, 0.06);
+  EXPECT_EQ(body.friction, 0.26);
+  EXPECT_EQ(body.resolution, 0.055e-3);
   EXPECT_EQ(touch->info().reach->radius, 0.075);
   const auto omega = open_device("hand:?device=omega&grip=firm&friction=0&delay=2ms", path);
   EXPECT_EQ(omega->info().limits.max_force, 12.0);
-  EXPECT_EQ(omega->info().friction, 0.0);
+  EXPECT_EQ(dynamic_cast<SimulatedHand&>(*omega).model().body->friction, 0.0);
   EXPECT_EQ(omega->info().delay, 2e-3);
-  EXPECT_FALSE(open_device("hand:?grip=light", path)->info().mass.has_value());
+  EXPECT_FALSE(open_device("hand:?grip=light", path)->info().damping.has_value());
 
   const auto opening = [&path](const char* uri) {
     return [uri, &path] { return open_device(uri, path) != nullptr; };

@@ -14,8 +14,8 @@
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/devices/devices.hpp"
+#include "palpate/devices/hip_path.hpp"
 #include "palpate/devices/mouse_device.hpp"
-#include "palpate/devices/scripted_device.hpp"
 #include "palpate/devices/simulated_hand.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A driver as a stranger adds one: this file, and nothing elsewhere.
-#include "palpate/devices/scripted_device.hpp"
+#include "palpate/devices/hip_path.hpp"
 #include "palpate/drivers/drivers.hpp"
 
 namespace palpate {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/drivers/clock_relation.hpp"
+#include "palpate/drivers/link_estimates.hpp"
 
 namespace palpate {
 namespace test_clock_relation {

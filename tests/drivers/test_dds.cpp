@@ -194,10 +194,10 @@ TEST_F(Dds, CarriesParametersAndServices) {
   whole.read_only = true;
   whole.integer_range = {{-5, 5, 1}};
   goes_through(ros::DescribeParameters::Reply{ask, {described, whole, {}}});
-  goes_through(ros::ListParameters::Request{ask, {"safety"}, 2});
-  goes_through(ros::ListParameters::Reply{ask, {"safety.a", "safety.b"}, {"safety"}});
+  goes_through(ros::ListParameters::Request{ask, {{"safety"}, 2}});
+  goes_through(ros::ListParameters::Reply{ask, {{"safety.a", "safety.b"}, {"safety"}}});
   goes_through(ros::Trigger::Request{ask});
-  goes_through(ros::Trigger::Reply{ask, true, "a folder"});
+  goes_through(ros::Trigger::Reply{ask, {true, "a folder"}});
   ros::ParticipantEntitiesInfo<16> info;
   info.participant = {1, 2, 3};
   info.nodes.resize(2);

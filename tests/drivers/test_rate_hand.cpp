@@ -57,10 +57,9 @@ TEST_F(RateHands, MoveAtASpeedThatGrowsWithTheSquareBeyondTheDeadZone) {
   bench.z = 0.09;   // within the dead zone
   settle();
   const HandState state = hand.read(1.01);
-  EXPECT_NEAR(state.velocity->x(), 0.2, 1e-12);
-  EXPECT_NEAR(state.velocity->y(), -0.05, 1e-12);
-  EXPECT_EQ(state.velocity->z(), 0.0);
-  EXPECT_NEAR(state.position.x(), 0.002, 1e-12);
+  EXPECT_NEAR(state.position.x(), 0.01 * 0.2, 1e-12);
+  EXPECT_NEAR(state.position.y(), 0.01 * -0.05, 1e-12);
+  EXPECT_EQ(state.position.z(), 0.1);
   EXPECT_EQ(state.buttons, 5U);
   EXPECT_NEAR(hand.read(9.0).position.x(), 0.012, 1e-12) << "50 ms at most, after a stall";
 }

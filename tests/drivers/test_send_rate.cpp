@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/drivers/send_rate.hpp"
+#include "palpate/drivers/link_estimates.hpp"
 
 namespace palpate {
 namespace test_send_rate {

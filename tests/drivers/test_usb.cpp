@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/drivers/usb.hpp"
+#include "palpate/drivers/drivers.hpp"
 
 #include "tests/support/temporary_folder.hpp"
 

@@ -138,11 +138,6 @@ EXPORT int dhdGetPosition(double* x, double* y, double* z, char id) {
   *z = arm->place[2];
   return guarded ? 1 : 0;
 }
-EXPORT int dhdGetLinearVelocity(double* x, double* y, double* z, char id) {
-  if (arm_of(id) == nullptr) return -1;
-  *x = *y = *z = 0.0;
-  return 1;  // TimeGuard
-}
 EXPORT int dhdGetOrientationFrame(double rows[3][3], char id) {
   if (arm_of(id) == nullptr) return -1;
   for (int i = 0; i < 9; ++i) rows[i / 3][i % 3] = i % 4 == 0 ? 1.0 : 0.0;

@@ -137,14 +137,8 @@ EXPORT void hdGetDoublev(unsigned name, double* values) {
       values[1] = 1e3 * up;
       values[2] = -1e3 * away;
       break;
-    case 0x2051:
-      values[0] = values[1] = values[2] = 0.0;
-      break;
     case 0x2052:
       for (int i = 0; i < 16; ++i) values[i] = i % 5 == 0 ? 1.0 : 0.0;
-      break;
-    case 0x2505:
-      values[0] = 1.25;
       break;
     case 0x2551: {
       const std::array<double, 6> box = {-210.0, -110.0, -85.0, 210.0, 205.0, 130.0};

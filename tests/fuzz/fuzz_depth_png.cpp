@@ -8,7 +8,6 @@
 #include "palpate/core/error.hpp"
 #include "palpate/sources/depth_png.hpp"
 #include "palpate/sources/depth_rvl.hpp"
-#include "palpate/sources/depth_slices.hpp"
 
 #include "tests/support/depth_pngs.hpp"
 

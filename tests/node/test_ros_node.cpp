@@ -71,11 +71,11 @@ class RosNodeTest : public ::testing::Test {
   }
 
   template <class Service>
-  typename Service::Reply ask(const std::string& name, typename Service::Request request = {}) {
+  auto ask(const std::string& name, typename Service::Request request = {}) {
     test::RosClient<Service> client(*other_, "/palpate/" + name);
     const auto reply = client.ask(std::move(request));
     EXPECT_TRUE(reply) << name << " was not answered";
-    return reply.value_or(typename Service::Reply{});
+    return reply.value_or(typename Service::Reply{}).content;
   }
 
   test::OwnNetwork network_;
@@ -148,31 +148,31 @@ TEST_F(RosNodeTest, SetsAndDescribesParameters) {
                                              {"stiffness", ParameterValue::of(-1.0)},
                                              {"safety.max_device_force", ParameterValue::of(9.0)},
                                              {"theta", ParameterValue::of(0.002)}}});
-  ASSERT_EQ(set.results.size(), 4U);
-  EXPECT_TRUE(set.results[0].successful) << set.results[0].reason;
-  EXPECT_FALSE(set.results[1].successful);
-  EXPECT_NE(set.results[1].reason.find("-1"), std::string::npos) << set.results[1].reason;
-  EXPECT_FALSE(set.results[2].successful);
-  EXPECT_TRUE(set.results[3].successful) << set.results[3].reason;
+  ASSERT_EQ(set.size(), 4U);
+  EXPECT_TRUE(set[0].successful) << set[0].reason;
+  EXPECT_FALSE(set[1].successful);
+  EXPECT_NE(set[1].reason.find("-1"), std::string::npos) << set[1].reason;
+  EXPECT_FALSE(set[2].successful);
+  EXPECT_TRUE(set[3].successful) << set[3].reason;
   EXPECT_EQ(session_->settings().parameters.coupling.stiffness, 321.0);
   EXPECT_EQ(session_->settings().parameters.proxy.theta, 0.002);
 
   const auto together = ask<ros::SetParametersAtomically>(
       "set_parameters_atomically",
       {{}, {{"stiffness", ParameterValue::of(111.0)}, {"r_1", ParameterValue::of(7.0)}}});
-  EXPECT_FALSE(together.result.successful);
+  EXPECT_FALSE(together.successful);
   EXPECT_EQ(session_->settings().parameters.coupling.stiffness, 321.0);
 
   const auto got = ask<ros::GetParameters>("get_parameters", {{}, {"stiffness", "no_such"}});
-  ASSERT_EQ(got.values.size(), 2U);
-  EXPECT_EQ(got.values[0], ParameterValue::of(321.0));
-  EXPECT_EQ(got.values[1], ParameterValue{});
+  ASSERT_EQ(got.size(), 2U);
+  EXPECT_EQ(got[0], ParameterValue::of(321.0));
+  EXPECT_EQ(got[1], ParameterValue{});
   const auto types = ask<ros::GetParameterTypes>("get_parameter_types", {{}, {"method", "xi"}});
-  EXPECT_EQ(types.types, (std::vector<std::uint8_t>{ParameterValue::text, ParameterValue::number}));
+  EXPECT_EQ(types, (std::vector<std::uint8_t>{ParameterValue::text, ParameterValue::number}));
   const auto described = ask<ros::DescribeParameters>("describe_parameters", {{}, {"stiffness"}});
-  ASSERT_EQ(described.descriptors.size(), 1U);
-  EXPECT_EQ(described.descriptors[0].floating_point_range.size(), 1U);
-  const auto listed = ask<ros::ListParameters>("list_parameters", {{}, {"placement"}, 0});
+  ASSERT_EQ(described.size(), 1U);
+  EXPECT_EQ(described[0].floating_point_range.size(), 1U);
+  const auto listed = ask<ros::ListParameters>("list_parameters", {{}, {{"placement"}, 0}});
   EXPECT_EQ(listed.prefixes, std::vector<std::string>{"placement"});
 }
 

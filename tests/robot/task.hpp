@@ -15,9 +15,7 @@
 #include "palpate/session/paint.hpp"
 #include "palpate/telelink/touched_paint.hpp"
 #include "palpate/teleop/approach_watch.hpp"
-#include "palpate/teleop/lead.hpp"
 #include "palpate/teleop/led_hand.hpp"
-#include "palpate/teleop/link_limits.hpp"
 #include "palpate/teleop/set_point.hpp"
 #include "palpate/teleop/touched.hpp"
 

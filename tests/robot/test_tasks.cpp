@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/devices/scripted_device.hpp"
+#include "palpate/devices/hip_path.hpp"
 
 #include "tests/robot/task.hpp"
 

@@ -8,7 +8,7 @@
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/session/played_source.hpp"
-#include "palpate/sources/posed_source.hpp"
+#include "palpate/sources/source.hpp"
 
 #include "tests/session/fakes.hpp"
 #include "tests/support/errors.hpp"

@@ -11,8 +11,8 @@
 
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/devices/hip_path.hpp"
 #include "palpate/devices/mouse_device.hpp"
-#include "palpate/devices/scripted_device.hpp"
 #include "palpate/record/replay.hpp"
 #include "palpate/session/session.hpp"
 

@@ -187,9 +187,7 @@ class FaultyHand final : public Device {
         state.fault = failure->fault == Fault::off ? DeviceFault::disconnected : DeviceFault::other;
       }
       if (failure->fault == Fault::garbage) {
-        state.velocity = Vec3::Constant(nan);
         state.orientation = Eigen::Quaterniond(nan, 0.0, nan, 1e300);
-        state.stamp = -nan;
         state.buttons = ~0U;
         state.position = Vec3::Constant(-nan);
       }

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/devices/scripted_device.hpp"
+#include "palpate/devices/hip_path.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
 #include "palpate/telelink/operator_end.hpp"
 #include "palpate/telelink/robot_end.hpp"

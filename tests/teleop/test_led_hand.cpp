@@ -8,9 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/methods/methods.hpp"
-#include "palpate/teleop/lead.hpp"
 #include "palpate/teleop/led_hand.hpp"
-#include "palpate/teleop/link_limits.hpp"
 
 #include "tests/support/errors.hpp"
 

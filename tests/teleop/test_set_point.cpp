@@ -12,7 +12,6 @@
 
 #include "palpate/sources/synthetic_camera.hpp"
 #include "palpate/teleop/approach_watch.hpp"
-#include "palpate/teleop/force_zero.hpp"
 #include "palpate/teleop/set_point.hpp"
 #include "palpate/teleop/simulated_tool.hpp"
 

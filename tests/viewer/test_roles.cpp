@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include "palpate/core/error.hpp"
-#include "palpate/viewer/admission.hpp"
 #include "palpate/viewer/roles.hpp"
 
 #include "tests/support/errors.hpp"

@@ -16,7 +16,6 @@
 #include <unistd.h>
 
 #include "palpate/core/error.hpp"
-#include "palpate/viewer/page.hpp"
 #include "palpate/viewer/server.hpp"
 
 #include "tests/support/errors.hpp"

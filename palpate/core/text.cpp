@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/core/nearest_name.hpp"
+#include "palpate/core/text.hpp"
 
 #include <algorithm>
 #include <vector>
-
-#include "palpate/core/text.hpp"
 
 namespace palpate {
 namespace {

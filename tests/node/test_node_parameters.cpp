@@ -74,19 +74,19 @@ TEST_F(NodeParametersTest, ListsByPrefixAndDepth) {
   const auto has = [](const std::vector<std::string>& names, const std::string& name) {
     return std::find(names.begin(), names.end(), name) != names.end();
   };
-  const auto all = parameters_.list({}, 0);
+  const auto all = parameters_.list({{}, 0});
   EXPECT_EQ(all.names.size(), parameters_.all(settings_).size());
   EXPECT_TRUE(std::is_sorted(all.names.begin(), all.names.end()));
   EXPECT_EQ(all.prefixes, (std::vector<std::string>{"placement", "safety"}));
-  const auto top = parameters_.list({}, 1);
+  const auto top = parameters_.list({{}, 1});
   EXPECT_TRUE(has(top.names, "method"));
   EXPECT_FALSE(has(top.names, "safety.max_speed"));
-  const auto safety = parameters_.list({"safety"}, 0);
+  const auto safety = parameters_.list({{"safety"}, 0});
   EXPECT_TRUE(has(safety.names, "safety.max_speed"));
   EXPECT_FALSE(has(safety.names, "method"));
-  EXPECT_EQ(parameters_.list({"safety"}, 1).names, safety.names);  // its direct children
-  EXPECT_EQ(parameters_.list({"method"}, 1).names, std::vector<std::string>{"method"});
-  EXPECT_TRUE(parameters_.list({"meth"}, 0).names.empty());
+  EXPECT_EQ(parameters_.list({{"safety"}, 1}).names, safety.names);  // its direct children
+  EXPECT_EQ(parameters_.list({{"method"}, 1}).names, std::vector<std::string>{"method"});
+  EXPECT_TRUE(parameters_.list({{"meth"}, 0}).names.empty());
 }
 
 }  // namespace test_node_parameters

@@ -131,8 +131,8 @@ TeleopEpisode teleop_episode(std::string_view fault, std::uint64_t seed) {
   episode.region.name = "wall";
   episode.region.shape = FixtureShape::half_space;
   const Vec3 outward(std::cos(turn), std::sin(turn), 0.0);
-  episode.region.world_from_fixture.linear() =
-      Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), outward).toRotationMatrix();
+  const Vec3 along = outward.unitOrthogonal();
+  episode.region.world_from_fixture.linear() << along, outward.cross(along), outward;
   episode.region.world_from_fixture.translation() = -chance.between(0.0, 0.03) * outward;
   episode.one.fixtures = std::make_shared<const FixtureSet>(std::vector{episode.region});
   return episode;

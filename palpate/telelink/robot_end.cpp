@@ -55,8 +55,8 @@ void add_walls(const Eigen::AlignedBox3d& reach, std::vector<Fixture>& fixtures)
       wall.shape = FixtureShape::half_space;
       Vec3 inward = Vec3::Zero();
       inward[axis] = -sign;
-      wall.world_from_fixture.linear() =
-          Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), inward).toRotationMatrix();
+      const Vec3 along = inward.unitOrthogonal();
+      wall.world_from_fixture.linear() << along, inward.cross(along), inward;
       Vec3 place = reach.center();
       place[axis] = sign < 0.0 ? reach.min()[axis] : reach.max()[axis];
       wall.world_from_fixture.translation() = place;

@@ -28,11 +28,10 @@ struct ExperimentOptions {
   Parameters parameters;  ///< Table 2 unless set
 
   // The benches `pop` and `field`.
-  std::optional<int> cases;  ///< how many of each family or class
-  std::vector<std::string>
-      families;  ///< of pop, methods; classes of field, scenes of fidelity; or all
-  std::vector<std::string> fixed;  ///< KEY=VALUE: not drawn at random
-  std::string case_text;           ///< one case, as a run printed it, and nothing else
+  std::optional<int> cases;           ///< how many of each family or class
+  std::vector<std::string> families;  ///< of pop; classes of field, scenes of fidelity; or all
+  std::vector<std::string> fixed;     ///< KEY=VALUE: not drawn at random
+  std::string case_text;              ///< one case, as a run printed it, and nothing else
   /// Methods besides those of the lab, of whoever calls; `pop`, `fidelity` and `real` know them.
   std::vector<OwnMethod> own_methods;
 };

@@ -58,6 +58,12 @@ class LabMethod : public Method {
   ObservedClouds clouds_;
 };
 
+/// What makes a method of class `M`.
+template <class M>
+std::unique_ptr<Method> made(const Parameters& parameters) {
+  return std::make_unique<M>(parameters);
+}
+
 /// A method that can fail in its ticks, which cannot throw: `play` asks after each.
 class FallibleMethod {
  public:

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "lab/aim_table.hpp"
+#include "lab/experiments/experiments.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -23,7 +24,6 @@
 namespace palpate::lab {
 namespace {
 
-constexpr double f_c = 30.0;     // [Hz]
 constexpr double press = 0.010;  // [m] the hand is that far below the true surface
 
 // How often a scene is repeated with other noise: --grid NxM, white and the camera's.
@@ -90,9 +90,6 @@ struct Watched {
   int lost = 0;
   int repeats = 0;
 };
-
-// Behind the true surface for longer than this [s] in one go, it is lost.
-constexpr double patience = 0.5;
 
 // Plays a scenario from free space into contact and watches the seconds from `from` on. A surface
 // is lost where the proxy's centre stays behind it; that ends the repeat, and what was seen of it
@@ -336,8 +333,7 @@ std::vector<Cell> fidelity_cells(const Experiment& experiment, const ExperimentO
     std::vector<std::string_view> scenes;
     for (const Measure& measure : measures) scenes.push_back(measure.scene);
     if (std::find(scenes.begin(), scenes.end(), name) == scenes.end())
-      throw Error("--families " + name, "fidelity has no such scene",
-                  "did you mean '" + std::string(nearest_name(name, scenes)) + "'?");
+      throw Error("--families " + name, "fidelity has no such scene", did_you_mean(name, scenes));
   }
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options)) {

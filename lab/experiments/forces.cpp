@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/forces.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -17,7 +16,6 @@
 namespace palpate::lab {
 namespace {
 
-constexpr double f_c = 30.0;  // [Hz] Table 2
 constexpr double pi = std::numbers::pi;
 
 constexpr std::array hold_levels = {0.0, 0.5, 1.0, 1.5, 2.5, 3.5, 5.0};  // [mm]
@@ -159,17 +157,17 @@ std::vector<Cell> force_cells(const Experiment& experiment, const ExperimentOpti
   return cells;
 }
 
-struct Felt {
+struct FeltForce {
   double error = 0.0;  // [N] rms against the ideal
   double step = 0.0;   // [N] largest in a millisecond
   double band = 0.0;   // [N] rms in 20 to 400 Hz
 };
 
-Felt felt(const Table& table, std::string_view method) {
+FeltForce felt(const Table& table, std::string_view method) {
   const auto rows = [&](std::size_t row) { return table.text(row, "method") == method; };
   const std::vector<double> force = table.numbers("force_n", rows);
   std::vector<double> error = table.numbers("ideal_n", rows);
-  Felt result;
+  FeltForce result;
   for (std::size_t i = 0; i < force.size(); ++i) {
     error[i] -= force[i];
     if (i > 0) result.step = std::max(result.step, std::abs(force[i] - force[i - 1]));
@@ -180,8 +178,8 @@ Felt felt(const Table& table, std::string_view method) {
 }
 
 std::vector<Claim> force_claims(const Table& table) {
-  const Felt corrected = felt(table, "paper");
-  const Felt printed = felt(table, "paper-as-printed");
+  const FeltForce corrected = felt(table, "paper");
+  const FeltForce printed = felt(table, "paper-as-printed");
   if (corrected.error == 0.0 || printed.error == 0.0) return {};
   return {
       {"4.6, (15)", "smoothens the force with moving point clouds", "no number",

@@ -22,7 +22,6 @@ namespace palpate::lab {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double f_c = 30.0;  // [Hz] of the lifts: Table 2
 using enum PopRange::Draw;
 
 // Even numbers in [0, 1), the same with every standard library.
@@ -619,8 +618,7 @@ std::span<const PopFamily> pop_families() {
 }
 
 const PopFamily& find_pop_family(std::string_view name) {
-  return find_named(families, name, "family", "there is no such family of cases",
-                    "the families are ");
+  return find_named(families, name, "family", "there is no such family of cases");
 }
 
 std::vector<const PopFamily*> find_pop_families(std::span<const std::string> names) {

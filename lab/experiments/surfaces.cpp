@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/surfaces.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -14,8 +13,6 @@
 
 namespace palpate::lab {
 namespace {
-
-constexpr double f_c = 30.0;  // [Hz] Table 2
 
 Truth flat_truth() {
   return [](const Vec3& p, double) { return TruePoint{p.z(), Vec3::UnitZ()}; };

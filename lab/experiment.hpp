@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -34,6 +35,12 @@ struct ExperimentOptions {
   std::string case_text;              ///< one case, as a run printed it, and nothing else
   /// Methods besides those of the lab, of whoever calls; `pop`, `fidelity` and `real` know them.
   std::vector<OwnMethod> own_methods;
+
+  /// Is a family, class or scene asked for?
+  [[nodiscard]] bool wants(std::string_view family) const {
+    return families.empty() ||
+           std::find(families.begin(), families.end(), family) != families.end();
+  }
 };
 
 /// A piece of an experiment that needs no other: its rows of the CSV, each ended by a newline.

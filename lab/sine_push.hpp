@@ -29,10 +29,7 @@ void push_by_sine(const std::string& name, const ExperimentOptions& options,
   GridCloud grid;
   grid.spacing = 0.3 * r_c;
   grid.half_x = grid.half_y = 12.0 * r_c;
-  const Truth truth = [&](const Vec3& p, double t) {
-    return TruePoint{p.z() - height(t), Vec3::UnitZ()};
-  };
-  const auto method = make_method(name, {parameters, truth}, options.own_methods);
+  const auto method = make_method(name, {parameters, flat_truth(height)}, options.own_methods);
   const Vec3 hip(0.1 * r_c, 0.1 * r_c, -0.005);
   method->seat(Vec3(hip.x(), hip.y(), 4.0 * r_c));
   play(*method,

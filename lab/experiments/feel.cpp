@@ -139,12 +139,8 @@ std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptio
   if (options.grid) std::tie(feel.repeats, feel.phases) = *options.grid;
 
   std::vector<Cell> cells;
-  const auto asked = [&options](std::string_view scene) {
-    return options.families.empty() || std::find(options.families.begin(), options.families.end(),
-                                                 scene) != options.families.end();
-  };
   const auto add = [&](std::string_view scene, auto play, auto... more) {
-    if (asked(scene))
+    if (options.wants(scene))
       cells.emplace_back([=] { return rows_of(scene, play(contestants, feel, more...)); });
   };
   add("slide-0.45m", play_slide, 0.45);

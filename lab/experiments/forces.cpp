@@ -39,10 +39,7 @@ std::vector<Cell> hold_cells(const Experiment& experiment, const ExperimentOptio
             grid.sigma = 1e-3 * hold_levels[static_cast<std::size_t>(level)];
             grid.noise = noise;
             grid.seed = seed * 7919 + static_cast<std::uint64_t>(level);
-            const Truth truth = [](const Vec3& p, double) {
-              return TruePoint{p.z(), Vec3::UnitZ()};
-            };
-            const auto method = make_method(name, {options.parameters, truth});
+            const auto method = make_method(name, {options.parameters, flat_truth()});
             const Vec3 above(0.1 * r_c, 0.1 * r_c, 4.0 * r_c);
             method->seat(above);
             int popped = 0;
@@ -53,8 +50,7 @@ std::vector<Cell> hold_cells(const Experiment& experiment, const ExperimentOptio
             double largest_step = 0.0;
             double settle_until = 0.5;
             play(*method,
-                 {.frame_rate = f_c,
-                  .duration = seconds,
+                 {.duration = seconds,
                   .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
                   .hip = [&](double) { return Vec3(0.1 * r_c, 0.1 * r_c, -6.0 * r_c); }},
                  [&](const Tick& tick) {
@@ -211,17 +207,15 @@ std::vector<Cell> damping_cells(const Experiment& experiment, const ExperimentOp
         constexpr double cycles = 5.0;
         GridCloud grid;
         grid.spacing = 0.3 * r_c;
-        const Truth truth = [](const Vec3& p, double) { return TruePoint{p.z(), Vec3::UnitZ()}; };
         Parameters parameters = options.parameters;
         parameters.coupling.damping = damping;
         parameters.coupling.max_force = 100.0;
-        const auto method = make_method(name, {parameters, truth});
+        const auto method = make_method(name, {parameters, flat_truth()});
         method->seat(Vec3(0.1 * r_c, 0.1 * r_c, 4.0 * r_c));
         double work = 0.0;  // [J] of the device on the hand
         std::optional<Tick> last;
         play(*method,
-             {.frame_rate = f_c,
-              .duration = 1.0 + cycles / rate,
+             {.duration = 1.0 + cycles / rate,
               .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
               .hip =
                   [&](double t) {

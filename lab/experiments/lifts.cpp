@@ -61,13 +61,10 @@ Lifted lift(std::string_view name, const ExperimentOptions& options, const Law& 
   grid.sigma = sigma;
   grid.noise = options.noise;
   grid.seed = seed;
-  const Truth truth = [&law](const Vec3& p, double t) {
-    return TruePoint{p.z() - law.height(t), Vec3::UnitZ()};
-  };
+  const Truth truth = flat_truth(law.height);
   const std::unique_ptr<Method> method = make_method(name, {options.parameters, truth});
   method->seat(Vec3::Zero());
   const Scenario scenario{
-      .frame_rate = f_c,
       .duration = law.duration,
       .cloud = [&](std::uint64_t frame, double t) { return grid.capture(frame, law.height(t)); },
       .hip = [&](double t) { return Vec3(0.0, 0.0, hand_height(law, r_c, t)); }};

@@ -37,10 +37,9 @@ PopStage on_grid(const PopCase& c, const Parameters& parameters, Noise noise,
   grid.noise = noise;
   grid.seed = c.seed;
   PopStage stage;
-  stage.truth = [law](const Vec3& p, double t) { return TruePoint{p.z() - law(t), Vec3::UnitZ()}; };
+  stage.truth = flat_truth(law);
   const auto shown = stage.shown;
-  stage.scenario = {.frame_rate = f_c,
-                    .duration = duration,
+  stage.scenario = {.duration = duration,
                     .cloud =
                         [=](std::uint64_t frame, double t) {
                           *shown = t;

@@ -14,10 +14,6 @@
 namespace palpate::lab {
 namespace {
 
-Truth flat_truth() {
-  return [](const Vec3& p, double) { return TruePoint{p.z(), Vec3::UnitZ()}; };
-}
-
 // 5.1: along x at 2 r_c/s, above the plane, from 1 s on below it, from 4 s on above it again. How
 // far is not printed: 2 r_c.
 std::vector<Cell> flat_cells(const Experiment& experiment, const ExperimentOptions& options) {
@@ -31,8 +27,7 @@ std::vector<Cell> flat_cells(const Experiment& experiment, const ExperimentOptio
       const auto method = make_method(name, {options.parameters, flat_truth()});
       std::string rows;
       play(*method,
-           {.frame_rate = f_c,
-            .duration = 5.0,
+           {.duration = 5.0,
             .cloud = [&](std::uint64_t frame, double) { return grid.capture(frame, 0.0); },
             .hip =
                 [&](double t) {
@@ -102,8 +97,7 @@ std::vector<Cell> jump_cells(const Experiment& experiment, const ExperimentOptio
         double rest = 0.0;
         bool there = false;
         play(*method,
-             {.frame_rate = f_c,
-              .duration = 2.0,
+             {.duration = 2.0,
               .cloud = [&](std::uint64_t frame, double) { return grid.capture(frame, 0.0); },
               .hip =
                   [&](double t) {

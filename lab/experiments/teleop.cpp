@@ -188,9 +188,7 @@ std::vector<Cell> teleop_cells(const Experiment& experiment, const ExperimentOpt
     if (known_way == known.end())
       throw Error("--methods " + way, "teleop has no such coupling", did_you_mean(way, known));
     for (const std::string_view scene : scenes) {
-      if (!options.families.empty() && std::find(options.families.begin(), options.families.end(),
-                                                 scene) == options.families.end())
-        continue;
+      if (!options.wants(scene)) continue;
       for (const std::string_view sensor : sensors) {
         // Those without a camera have no sensor.
         if (*known_way != "palpate" && sensor != sensors.front()) continue;

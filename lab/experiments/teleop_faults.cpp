@@ -163,9 +163,7 @@ std::vector<Cell> episode_cells(const Experiment& /*experiment*/,
   std::vector<Cell> cells;
   const int cases = options.cases.value_or(usual_cases);
   for (const std::string_view fault : faults) {
-    if (!options.families.empty() && std::find(options.families.begin(), options.families.end(),
-                                               fault) == options.families.end())
-      continue;
+    if (!options.wants(fault)) continue;
     for (int first = 0; first < cases; first += cases_a_cell) {
       cells.emplace_back([=, seed = options.seed, last = std::min(first + cases_a_cell, cases)] {
         std::string rows;

@@ -248,9 +248,7 @@ std::vector<Cell> zwidth_cells(const Experiment& experiment, const ExperimentOpt
   std::vector<Cell> cells;
   const std::vector<ZHolding> all = z_holdings();
   for (const std::string_view scene : scenes) {
-    if (!options.families.empty() && std::find(options.families.begin(), options.families.end(),
-                                               scene) == options.families.end())
-      continue;
+    if (!options.wants(scene)) continue;
     for (const std::string_view camera : cameras) {
       // A cell a device, with its hands.
       for (auto first = all.begin(); first != all.end();) {

@@ -178,6 +178,20 @@ function(palpate_test name)
     PROPERTIES TIMEOUT 300 ENVIRONMENT "PALPATE_DATA=${PALPATE_DATA}")
 endfunction()
 
+# palpate_long_run(NAME LINKS <libraries...>): long_run/NAME.cpp, a program for long runs by hand,
+# made by `ninja NAME`; with all else only by clang without a sanitizer, so that it goes on
+# compiling.
+function(palpate_long_run name)
+  cmake_parse_arguments(ARG "" "" "LINKS" ${ARGN})
+  add_executable(${name} long_run/${name}.cpp)
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${name} PRIVATE ${ARG_LINKS})
+  palpate_target_options(${name})
+  if(PALPATE_SANITIZE OR NOT CMAKE_CXX_COMPILER_ID MATCHES Clang)
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+  endif()
+endfunction()
+
 # palpate_fake_library(FILE SOURCE [DEFINITIONS ...] [LINKS ...]): a vendor's library as the tests
 # make it, to be loaded by name: FILE, such as libdrd.so.3 or old/libdrd.so.3, below the folder
 # ${PALPATE_FAKES}. DEFINITIONS make other versions of it from the same SOURCE.

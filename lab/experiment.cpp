@@ -3,21 +3,7 @@
 
 #include <algorithm>
 
-#include "lab/experiments/feel.hpp"
-#include "lab/experiments/fidelity.hpp"
-#include "lab/experiments/field.hpp"
-#include "lab/experiments/forces.hpp"
-#include "lab/experiments/lifts.hpp"
-#include "lab/experiments/materials.hpp"
-#include "lab/experiments/methods.hpp"
-#include "lab/experiments/pop.hpp"
-#include "lab/experiments/real.hpp"
-#include "lab/experiments/scan.hpp"
-#include "lab/experiments/surfaces.hpp"
-#include "lab/experiments/teleop.hpp"
-#include "lab/experiments/teleop_faults.hpp"
-#include "lab/experiments/tradeoff.hpp"
-#include "lab/experiments/zwidth.hpp"
+#include "lab/experiments/experiments.hpp"
 #include "lab/find_named.hpp"
 #include "lab/method.hpp"
 #include "lab/pipe_method.hpp"
@@ -33,14 +19,12 @@ const std::vector<Experiment>& known_experiments() {
       damping_experiment(),       corners_experiment(), scan_experiment(),
       fidelity_experiment(),      feel_experiment(),    zwidth_experiment(),
       materials_experiment(),     teleop_experiment(),  teleop_faults_experiment(),
-      pop_experiment(),           field_experiment(),   real_experiment(),
-      tradeoff_experiment(),      methods_experiment()};
+      pop_experiment(),           field_experiment(),   real_experiment()};
   return experiments;
 }
 
 const Experiment& find_experiment(std::string_view name) {
-  return find_named(known_experiments(), name, "experiment", "there is no such experiment",
-                    "the experiments are ", " and all");
+  return find_named(known_experiments(), name, "experiment", "there is no such experiment", "all");
 }
 
 std::vector<std::string> methods_of(const Experiment& experiment,

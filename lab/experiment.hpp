@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -28,13 +29,18 @@ struct ExperimentOptions {
   Parameters parameters;  ///< Table 2 unless set
 
   // The benches `pop` and `field`.
-  std::optional<int> cases;  ///< how many of each family or class
-  std::vector<std::string>
-      families;  ///< of pop, methods; classes of field, scenes of fidelity; or all
-  std::vector<std::string> fixed;  ///< KEY=VALUE: not drawn at random
-  std::string case_text;           ///< one case, as a run printed it, and nothing else
+  std::optional<int> cases;           ///< how many of each family or class
+  std::vector<std::string> families;  ///< of pop; classes of field, scenes of fidelity; or all
+  std::vector<std::string> fixed;     ///< KEY=VALUE: not drawn at random
+  std::string case_text;              ///< one case, as a run printed it, and nothing else
   /// Methods besides those of the lab, of whoever calls; `pop`, `fidelity` and `real` know them.
   std::vector<OwnMethod> own_methods;
+
+  /// Is a family, class or scene asked for?
+  [[nodiscard]] bool wants(std::string_view family) const {
+    return families.empty() ||
+           std::find(families.begin(), families.end(), family) != families.end();
+  }
 };
 
 /// A piece of an experiment that needs no other: its rows of the CSV, each ended by a newline.

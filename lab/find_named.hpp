@@ -11,25 +11,18 @@
 namespace palpate::lab {
 
 /// The entry of a list that has that `name`.
-/// @param noun   what an entry is, such as "experiment"
-/// @param what   what is wrong if there is none, such as "there is no such experiment"
-/// @param known  begins the list of all: "the experiments are "
+/// @param noun  what an entry is, such as "experiment"
+/// @param what  what is wrong if there is none, such as "there is no such experiment"
+/// @param also  another name that may stand there
 /// @throws Error for an unknown name, naming the nearest one and listing all.
 template <class Entries>
-const auto& find_named(const Entries& entries, std::string_view name, std::string_view noun,
-                       const std::string& what, const std::string& known,
-                       const std::string& also = {}) {
-  std::vector<std::string_view> names;
-  std::string list;
-  for (const auto& entry : entries) {
+const auto& find_named(const Entries& entries, std::string_view name, const std::string& noun,
+                       const std::string& what, std::string_view also = {}) {
+  for (const auto& entry : entries)
     if (entry.name == name) return entry;
-    names.push_back(entry.name);
-    list += (list.empty() ? "" : ", ") + std::string(entry.name);
-  }
-  const std::string_view near = nearest_name(name, names);
-  throw Error(
-      std::string(noun) + " '" + std::string(name) + "'", what,
-      (near.empty() ? "" : "did you mean '" + std::string(near) + "'? ") + known + list + also);
+  std::vector<std::string_view> known = names_of(entries);
+  if (!also.empty()) known.push_back(also);
+  throw Error(noun + " '" + std::string(name) + "'", what, did_you_mean(name, known));
 }
 
 }  // namespace palpate::lab

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "palpate/core/method.hpp"
@@ -26,6 +27,13 @@ using Truth = std::function<TruePoint(const Vec3& point, double t)>;
 
 /// The truth of an analytic scene.
 Truth truth_of(const std::shared_ptr<const Scene>& scene);
+
+/// The truth of a level plane. @param height  [m] at a time [s]; none: it is at 0
+inline Truth flat_truth(std::function<double(double t)> height = nullptr) {
+  return [height = std::move(height)](const Vec3& p, double t) {
+    return TruePoint{p.z() - (height ? height(t) : 0.0), Vec3::UnitZ()};
+  };
+}
 
 /// Base of the methods written to compare: their parameters, read as they are needed.
 ///
@@ -56,6 +64,12 @@ class LabMethod : public Method {
   Parameters parameters_;
   ObservedClouds clouds_;
 };
+
+/// What makes a method of class `M`.
+template <class M>
+std::unique_ptr<Method> made(const Parameters& parameters) {
+  return std::make_unique<M>(parameters);
+}
 
 /// A method that can fail in its ticks, which cannot throw: `play` asks after each.
 class FallibleMethod {

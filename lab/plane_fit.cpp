@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include <Eigen/Eigenvalues>
+#include "palpate/core/linear.hpp"
 
 namespace palpate::lab {
 
@@ -21,9 +21,7 @@ std::optional<Contact> fit_plane(const Patch& patch, double radius) {
   }
   if (patch.size() < 6 || !(total > 1e-12)) return std::nullopt;
   mean /= total;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(second / total -
-                                                            mean * mean.transpose());
-  Vec3 normal = axes.eigenvectors().col(0);
+  Vec3 normal = axes_of(second / total - mean * mean.transpose()).vectors.col(0);
   const Vec3 at = patch.ball().centre + mean;
   const auto& seen_from = patch.view(0).viewpoint;
   const Vec3 outward = seen_from ? Vec3(*seen_from - at) : Vec3(Vec3::UnitZ());

@@ -11,9 +11,14 @@
 
 namespace palpate::lab {
 
+inline constexpr double f_c = 30.0;  ///< [Hz] the camera's frame rate in Table 2
+
+/// [s] behind the true surface for longer than this in one go, a proxy is lost
+inline constexpr double patience = 0.5;
+
 /// What a method is put through: a camera and a hand, over time.
 struct Scenario {
-  double frame_rate = 30.0;   ///< [Hz] frame k is captured at k / frame_rate
+  double frame_rate = f_c;    ///< [Hz] frame k is captured at k / frame_rate
   double tick_rate = 1000.0;  ///< [Hz]
   double duration = 1.0;      ///< [s]
   std::function<std::shared_ptr<const Cloud>(std::uint64_t frame, double t)> cloud;

@@ -19,8 +19,7 @@ namespace palpate::lab {
 template <class OnTick>
 void push_by_sine(const std::string& name, const ExperimentOptions& options,
                   const OnTick& on_tick) {
-  constexpr double frame_rate = 30.0;  // [Hz] Table 2
-  constexpr double stroke = 0.020;     // [m]
+  constexpr double stroke = 0.020;  // [m]
   const double r_c = options.parameters.proxy.r_c();
   const auto height = [](double t) {
     return 0.5 * stroke * (1.0 - std::cos(2.0 * std::numbers::pi * t));
@@ -30,15 +29,11 @@ void push_by_sine(const std::string& name, const ExperimentOptions& options,
   GridCloud grid;
   grid.spacing = 0.3 * r_c;
   grid.half_x = grid.half_y = 12.0 * r_c;
-  const Truth truth = [&](const Vec3& p, double t) {
-    return TruePoint{p.z() - height(t), Vec3::UnitZ()};
-  };
-  const auto method = make_method(name, {parameters, truth}, options.own_methods);
+  const auto method = make_method(name, {parameters, flat_truth(height)}, options.own_methods);
   const Vec3 hip(0.1 * r_c, 0.1 * r_c, -0.005);
   method->seat(Vec3(hip.x(), hip.y(), 4.0 * r_c));
   play(*method,
-       {.frame_rate = frame_rate,
-        .duration = 4.0,
+       {.duration = 4.0,
         .cloud = [&](std::uint64_t f, double t) { return grid.capture(f, height(t)); },
         .hip = [&](double) { return hip; }},
        [&](const Tick& tick) {

@@ -8,9 +8,7 @@
 #include "palpate/core/error.hpp"
 #include "palpate/devices/simulated_hand.hpp"
 #include "palpate/servo/cycle.hpp"
-#include "palpate/teleop/approach_watch.hpp"
-#include "palpate/teleop/led_hand.hpp"
-#include "palpate/teleop/set_point.hpp"
+#include "palpate/teleop/robot_step.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -53,7 +51,7 @@ class Palpate final : public Coupling {
                ring),
         operator_ticks_(operator_.reader()),
         guard_ticks_(guard_.reader()),
-        set_point_(for_tool(one)) {}
+        step_(led_, for_tool(one)) {}
 
   void frame(const std::shared_ptr<const Cloud>& cloud, double stamp, double t) override {
     guard_.put_frame(cloud, stamp, t);
@@ -81,9 +79,8 @@ class Palpate final : public Coupling {
     std::shared_ptr<const Cloud> cloud;
     double stamp = 0.0;  // [s]
   };
-  static constexpr std::size_t ring = 4;      // read after each tick
-  static constexpr double own_stop = 0.1;     // [s] without an order: a robot stops
-  static constexpr double blind_after = 0.2;  // [s] without a frame
+  static constexpr std::size_t ring = 4;   // read after each tick
+  static constexpr double own_stop = 0.1;  // [s] without an order: a robot stops
 
   // As a watchdog does.
   void let_go(double t) {
@@ -106,19 +103,14 @@ class Palpate final : public Coupling {
     guard_.run({.t = t});
     ServoTick guarded;
     static_cast<void>(guard_ticks_.try_pop(guarded));
-    const bool lost = watch_.is_between(guarded.place, tool.place(), SimulatedTool::radius, t);
-    if (lost) guarded = with_proxy_at(tool.place(), guarded);
-    led_.sees(t - newest_.stamp <= blind_after && !lost);
-    const double ahead = (guarded.place - tool.place()).norm();
-    led_.clearance(guarded.tick.state == ContactState::free_motion
-                       ? watch_.clearance() - SimulatedTool::radius - ahead
-                       : 0.0);
-    led_.kept_out(guarded.place - guarded.tick.proxy);
-    out.led = led_.is_led() && !lost;
+    const Outlook seen =
+        outlook({&watch_, 1}, guarded.place, tool.place(), SimulatedTool::radius, t);
+    RobotState at{
+        .t = t, .position = tool.place(), .velocity = tool.velocity(), .force = tool.contact()};
+    const SetPoint::Order order = step_.next(guarded, seen, lead_.press, at, t);
+    out.led = step_.is_led();
     if (newest_.cloud)
       watch_.frame(std::exchange(newest_.cloud, nullptr), newest_.stamp, tool.place());
-    const SetPoint::Order order =
-        set_point_.next(guarded, lead_.press, out.led, watch_.newest(), tool.contact());
     return order.position;
   }
 
@@ -161,7 +153,7 @@ class Palpate final : public Coupling {
   Cycle operator_, guard_;
   TickRing<ServoTick>::Reader operator_ticks_, guard_ticks_;
   ApproachWatch watch_;
-  SetPoint set_point_;
+  RobotStep step_;
   Seen newest_;
 };
 

@@ -169,11 +169,11 @@ Verb add_eval(CLI::App& program) {
       ->allow_extra_args(false);
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
   command->add_option("--cases", options->cases,
-                      "pop, field: number of cases of each family or class (50, 5); tradeoff: "
-                      "repeats; feel: hands in free space");
+                      "pop, field: number of cases of each family or class (50, 5); "
+                      "feel: hands in free space");
   command
       ->add_option("--families", options->families,
-                   "pop, methods, field, fidelity, feel: which, separated by commas")
+                   "pop, field, fidelity, feel: which, separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("--fix", options->fixed, "pop, field: KEY=VALUE instead of a random value")

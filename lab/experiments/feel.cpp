@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/feel.hpp"
-
 #include <algorithm>
 #include <array>
 #include <optional>
@@ -10,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "lab/aim_table.hpp"
+#include "lab/experiments/experiments.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/text.hpp"
@@ -18,7 +17,7 @@ namespace palpate::lab {
 namespace {
 
 constexpr int usual_free_hands = 200;
-constexpr int block = 50;  // free hands a row
+constexpr int hands_a_row = 50;  // free hands a row
 
 // Measures, their scenes and loops, and their aims (upper bounds).
 struct Measure {
@@ -122,8 +121,7 @@ void check_scenes(const ExperimentOptions& options) {
   }
   for (const std::string& name : options.families) {
     if (std::find(scenes.begin(), scenes.end(), name) != scenes.end()) continue;
-    throw Error("--families " + name, "feel has no such scene",
-                "did you mean '" + std::string(nearest_name(name, scenes)) + "'?");
+    throw Error("--families " + name, "feel has no such scene", did_you_mean(name, scenes));
   }
 }
 
@@ -141,12 +139,8 @@ std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptio
   if (options.grid) std::tie(feel.repeats, feel.phases) = *options.grid;
 
   std::vector<Cell> cells;
-  const auto asked = [&options](std::string_view scene) {
-    return options.families.empty() || std::find(options.families.begin(), options.families.end(),
-                                                 scene) != options.families.end();
-  };
   const auto add = [&](std::string_view scene, auto play, auto... more) {
-    if (asked(scene))
+    if (options.wants(scene))
       cells.emplace_back([=] { return rows_of(scene, play(contestants, feel, more...)); });
   };
   add("slide-0.45m", play_slide, 0.45);
@@ -172,8 +166,8 @@ std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptio
   add("energy-0.7m", play_energy, 0.7);
   add("energy-0.95m", play_energy, 0.95);
   const int hands = options.cases.value_or(usual_free_hands);
-  for (int from = 0; from < hands; from += block)
-    add("free-hands", play_free_hands, from, std::min(block, hands - from));
+  for (int from = 0; from < hands; from += hands_a_row)
+    add("free-hands", play_free_hands, from, std::min(hands_a_row, hands - from));
   add("swing", play_swing);
   return cells;
 }

@@ -17,7 +17,6 @@
 namespace palpate::lab {
 namespace {
 
-constexpr double f_c = 30.0;       // [Hz]
 constexpr double press = 0.008;    // [m] the hand wants to be that far below the surface
 constexpr double settled = 1.6;    // [s] the chain's ramp is over
 constexpr double close_up = 0.45;  // [m] from the camera

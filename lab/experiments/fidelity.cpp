@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "lab/aim_table.hpp"
+#include "lab/experiments/experiments.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -23,7 +24,6 @@
 namespace palpate::lab {
 namespace {
 
-constexpr double f_c = 30.0;     // [Hz]
 constexpr double press = 0.010;  // [m] the hand is that far below the true surface
 
 // How often a scene is repeated with other noise: --grid NxM, white and the camera's.
@@ -91,9 +91,6 @@ struct Watched {
   int repeats = 0;
 };
 
-// Behind the true surface for longer than this [s] in one go, it is lost.
-constexpr double patience = 0.5;
-
 // Plays a scenario from free space into contact and watches the seconds from `from` on. A surface
 // is lost where the proxy's centre stays behind it; that ends the repeat, and what was seen of it
 // before it went behind counts.
@@ -144,10 +141,6 @@ std::vector<std::pair<std::string_view, double>> summary(const Watched& watched)
   return values;
 }
 
-Truth flat(const std::function<double(double)>& height) {
-  return [height](const Vec3& p, double t) { return TruePoint{p.z() - height(t), Vec3::UnitZ()}; };
-}
-
 // A resting plane of points under 1 mm of noise, watched for a second after 0.2 s.
 std::string rest_on_grid(const std::string& name, const ExperimentOptions& options,
                          std::string_view scene, Noise noise) {
@@ -160,13 +153,12 @@ std::string rest_on_grid(const std::string& name, const ExperimentOptions& optio
     grid.sigma = 1e-3;
     grid.noise = noise;
     grid.seed = options.seed * 1000 + static_cast<std::uint64_t>(k);
-    const Truth truth = flat([](double) { return 0.0; });
+    const Truth truth = flat_truth();
     const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
     const Vec3 hip(0.1 * r_c, 0.1 * r_c, -press);
     method->seat(Vec3(hip.x(), hip.y(), 4.0 * r_c));
     watch(*method,
-          {.frame_rate = f_c,
-           .duration = 1.2,
+          {.duration = 1.2,
            .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
            .hip = [&](double) { return hip; }},
           truth, r_c, 0.2, watched);
@@ -209,8 +201,7 @@ std::string rest_in_sight(const std::string& name, const ExperimentOptions& opti
         look_at(*scene, distance, options.seed * 1000 + static_cast<std::uint64_t>(k));
     const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
     watch(*method,
-          {.frame_rate = f_c,
-           .duration = contact_time + 2.0,
+          {.duration = contact_time + 2.0,
            .cloud = [&](std::uint64_t f, double t) { return camera.capture(t, f).cloud; },
            .hip = [&](double t) { return Vec3(0.0, 0.0, coming_down(t)); }},
           truth, r_c, contact_time + 1.0, watched);
@@ -242,8 +233,7 @@ std::string move_in_sight(const std::string& name, const ExperimentOptions& opti
     const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
     const std::size_t before = watched.error.size();
     watch(*method,
-          {.frame_rate = f_c,
-           .duration = duration,
+          {.duration = duration,
            .cloud = [&](std::uint64_t f, double t) { return camera.capture(t, f).cloud; },
            .hip = [&](double t) { return Vec3(0.0, 0.0, height(t) + coming_down(t)); }},
           truth, r_c, start, watched);
@@ -276,7 +266,7 @@ std::string slide_on_plane(const std::string& name, const ExperimentOptions& opt
   GridCloud grid;
   grid.spacing = 0.3 * r_c;
   grid.half_x = grid.half_y = 0.12;
-  const Truth truth = flat([](double) { return 0.0; });
+  const Truth truth = flat_truth();
   const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
   const auto hip = [&](double t) {
     const double x = 0.05 * (t - 1.0);
@@ -285,8 +275,7 @@ std::string slide_on_plane(const std::string& name, const ExperimentOptions& opt
   method->seat(hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
   Watched watched;
   watch(*method,
-        {.frame_rate = f_c,
-         .duration = 2.0,
+        {.duration = 2.0,
          .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
          .hip = hip},
         truth, r_c, 0.5, watched);
@@ -310,8 +299,7 @@ std::string slide_on_relief(const std::string& name, const ExperimentOptions& op
   method->seat(hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
   Watched watched;
   watch(*method,
-        {.frame_rate = f_c,
-         .duration = 3.0,
+        {.duration = 3.0,
          .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
          .hip = hip},
         truth, r_c, 0.5, watched);
@@ -336,15 +324,13 @@ std::vector<Cell> fidelity_cells(const Experiment& experiment, const ExperimentO
     std::vector<std::string_view> scenes;
     for (const Measure& measure : measures) scenes.push_back(measure.scene);
     if (std::find(scenes.begin(), scenes.end(), name) == scenes.end())
-      throw Error("--families " + name, "fidelity has no such scene",
-                  "did you mean '" + std::string(nearest_name(name, scenes)) + "'?");
+      throw Error("--families " + name, "fidelity has no such scene", did_you_mean(name, scenes));
   }
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options)) {
     // What plays a scene gets the method, the options, the scene's name and more.
     const auto add = [&](const char* scene, auto play, auto... more) {
-      if (options.families.empty() || std::find(options.families.begin(), options.families.end(),
-                                                scene) != options.families.end())
+      if (options.wants(scene))
         cells.emplace_back([=] { return play(name, options, scene, more...); });
     };
     const std::string plane = "synthetic:plane";

@@ -5,13 +5,7 @@
 #include <span>
 #include <string_view>
 
-#include "lab/experiment.hpp"
-
 namespace palpate::lab {
-
-/// How near the rendered contact and force are to the true ones, white noise and a real camera's,
-/// beside its aims. Takes some seconds a method.
-Experiment fidelity_experiment();
 
 /// A measure of a scene, and the most that it is to be.
 struct FidelityMeasure {

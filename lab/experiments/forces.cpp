@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/forces.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -17,7 +16,6 @@
 namespace palpate::lab {
 namespace {
 
-constexpr double f_c = 30.0;  // [Hz] Table 2
 constexpr double pi = std::numbers::pi;
 
 constexpr std::array hold_levels = {0.0, 0.5, 1.0, 1.5, 2.5, 3.5, 5.0};  // [mm]
@@ -41,10 +39,7 @@ std::vector<Cell> hold_cells(const Experiment& experiment, const ExperimentOptio
             grid.sigma = 1e-3 * hold_levels[static_cast<std::size_t>(level)];
             grid.noise = noise;
             grid.seed = seed * 7919 + static_cast<std::uint64_t>(level);
-            const Truth truth = [](const Vec3& p, double) {
-              return TruePoint{p.z(), Vec3::UnitZ()};
-            };
-            const auto method = make_method(name, {options.parameters, truth});
+            const auto method = make_method(name, {options.parameters, flat_truth()});
             const Vec3 above(0.1 * r_c, 0.1 * r_c, 4.0 * r_c);
             method->seat(above);
             int popped = 0;
@@ -55,8 +50,7 @@ std::vector<Cell> hold_cells(const Experiment& experiment, const ExperimentOptio
             double largest_step = 0.0;
             double settle_until = 0.5;
             play(*method,
-                 {.frame_rate = f_c,
-                  .duration = seconds,
+                 {.duration = seconds,
                   .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
                   .hip = [&](double) { return Vec3(0.1 * r_c, 0.1 * r_c, -6.0 * r_c); }},
                  [&](const Tick& tick) {
@@ -159,17 +153,17 @@ std::vector<Cell> force_cells(const Experiment& experiment, const ExperimentOpti
   return cells;
 }
 
-struct Felt {
+struct FeltForce {
   double error = 0.0;  // [N] rms against the ideal
   double step = 0.0;   // [N] largest in a millisecond
   double band = 0.0;   // [N] rms in 20 to 400 Hz
 };
 
-Felt felt(const Table& table, std::string_view method) {
+FeltForce felt(const Table& table, std::string_view method) {
   const auto rows = [&](std::size_t row) { return table.text(row, "method") == method; };
   const std::vector<double> force = table.numbers("force_n", rows);
   std::vector<double> error = table.numbers("ideal_n", rows);
-  Felt result;
+  FeltForce result;
   for (std::size_t i = 0; i < force.size(); ++i) {
     error[i] -= force[i];
     if (i > 0) result.step = std::max(result.step, std::abs(force[i] - force[i - 1]));
@@ -180,8 +174,8 @@ Felt felt(const Table& table, std::string_view method) {
 }
 
 std::vector<Claim> force_claims(const Table& table) {
-  const Felt corrected = felt(table, "paper");
-  const Felt printed = felt(table, "paper-as-printed");
+  const FeltForce corrected = felt(table, "paper");
+  const FeltForce printed = felt(table, "paper-as-printed");
   if (corrected.error == 0.0 || printed.error == 0.0) return {};
   return {
       {"4.6, (15)", "smoothens the force with moving point clouds", "no number",
@@ -213,17 +207,15 @@ std::vector<Cell> damping_cells(const Experiment& experiment, const ExperimentOp
         constexpr double cycles = 5.0;
         GridCloud grid;
         grid.spacing = 0.3 * r_c;
-        const Truth truth = [](const Vec3& p, double) { return TruePoint{p.z(), Vec3::UnitZ()}; };
         Parameters parameters = options.parameters;
         parameters.coupling.damping = damping;
         parameters.coupling.max_force = 100.0;
-        const auto method = make_method(name, {parameters, truth});
+        const auto method = make_method(name, {parameters, flat_truth()});
         method->seat(Vec3(0.1 * r_c, 0.1 * r_c, 4.0 * r_c));
         double work = 0.0;  // [J] of the device on the hand
         std::optional<Tick> last;
         play(*method,
-             {.frame_rate = f_c,
-              .duration = 1.0 + cycles / rate,
+             {.duration = 1.0 + cycles / rate,
               .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
               .hip =
                   [&](double t) {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/lifts.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,17 +6,16 @@
 #include <limits>
 #include <memory>
 
-#include <Eigen/Dense>
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
+#include "palpate/core/linear.hpp"
 
 namespace palpate::lab {
 namespace {
-
-constexpr double f_c = 30.0;  // [Hz] Table 2
 
 // The height of a surface over time, and for how long to watch.
 struct Law {
@@ -64,13 +61,10 @@ Lifted lift(std::string_view name, const ExperimentOptions& options, const Law& 
   grid.sigma = sigma;
   grid.noise = options.noise;
   grid.seed = seed;
-  const Truth truth = [&law](const Vec3& p, double t) {
-    return TruePoint{p.z() - law.height(t), Vec3::UnitZ()};
-  };
+  const Truth truth = flat_truth(law.height);
   const std::unique_ptr<Method> method = make_method(name, {options.parameters, truth});
   method->seat(Vec3::Zero());
   const Scenario scenario{
-      .frame_rate = f_c,
       .duration = law.duration,
       .cloud = [&](std::uint64_t frame, double t) { return grid.capture(frame, law.height(t)); },
       .hip = [&](double t) { return Vec3(0.0, 0.0, hand_height(law, r_c, t)); }};
@@ -350,8 +344,7 @@ Eigen::VectorXd polynomial_fit(const std::vector<double>& x, const std::vector<d
     for (int p = 0; p <= degree; ++p)
       a(i, p) = std::pow(x[static_cast<std::size_t>(i)] / scale, degree - p);
   }
-  Eigen::VectorXd fit =
-      a.colPivHouseholderQr().solve(Eigen::Map<const Eigen::VectorXd>(y.data(), n));
+  Eigen::VectorXd fit = least_squares(a, Eigen::Map<const Eigen::VectorXd>(y.data(), n));
   for (int p = 0; p <= degree; ++p) fit[p] /= std::pow(scale, degree - p);
   return fit;
 }

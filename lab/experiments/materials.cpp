@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/materials.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/signal.hpp"
 #include "lab/table.hpp"
 #include "palpate/cloud/material_map.hpp"

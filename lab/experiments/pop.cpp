@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -18,7 +19,6 @@ namespace {
 
 constexpr int usual_cases = 50;  // of each family
 constexpr int cases_a_row = 50;
-constexpr double patience = 0.5;  // [s] behind for longer than this is lost
 constexpr double noticed =
     0.3;  // [N] largest change of force by an occluder that counts as unnoticed
 
@@ -406,10 +406,6 @@ Judgement judge(const std::string& method, const PopCase& c, const ExperimentOpt
   const Outcome outcome =
       play_case(maker_of(method, options.own_methods), c, options.parameters, false);
   return {.held = !outcome.lost, .right = !outcome.lost && outcome.force.right()};
-}
-
-bool is_lost(const std::string& method, const PopCase& c, const Parameters& parameters) {
-  return play_case(maker_of(method, {}), c, parameters, false).lost;
 }
 
 Experiment pop_experiment() {

@@ -49,11 +49,4 @@ struct Judgement {
 /// Plays one case.
 Judgement judge(const std::string& method, const PopCase& c, const ExperimentOptions& options);
 
-/// Is the surface lost in a case? Nothing is shrunk: for tables of many methods.
-bool is_lost(const std::string& method, const PopCase& c, const Parameters& parameters);
-
-/// Does a method keep the proxy on the right side? Families of cases drawn at random, each failure
-/// shrunk to the simplest case that still fails. docs/pop.md has the rules.
-Experiment pop_experiment();
-
 }  // namespace palpate::lab

@@ -22,7 +22,6 @@ namespace palpate::lab {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double f_c = 30.0;  // [Hz] of the lifts: Table 2
 using enum PopRange::Draw;
 
 // Even numbers in [0, 1), the same with every standard library.
@@ -38,10 +37,9 @@ PopStage on_grid(const PopCase& c, const Parameters& parameters, Noise noise,
   grid.noise = noise;
   grid.seed = c.seed;
   PopStage stage;
-  stage.truth = [law](const Vec3& p, double t) { return TruePoint{p.z() - law(t), Vec3::UnitZ()}; };
+  stage.truth = flat_truth(law);
   const auto shown = stage.shown;
-  stage.scenario = {.frame_rate = f_c,
-                    .duration = duration,
+  stage.scenario = {.duration = duration,
                     .cloud =
                         [=](std::uint64_t frame, double t) {
                           *shown = t;
@@ -619,8 +617,7 @@ std::span<const PopFamily> pop_families() {
 }
 
 const PopFamily& find_pop_family(std::string_view name) {
-  return find_named(families, name, "family", "there is no such family of cases",
-                    "the families are ");
+  return find_named(families, name, "family", "there is no such family of cases");
 }
 
 std::vector<const PopFamily*> find_pop_families(std::span<const std::string> names) {

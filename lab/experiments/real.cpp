@@ -10,9 +10,9 @@
 #include <numbers>
 #include <optional>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/experiments/pop.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/method.hpp"
@@ -21,13 +21,13 @@
 #include "lab/signal.hpp"
 #include "palpate/cloud/audit.hpp"
 #include "palpate/core/error.hpp"
+#include "palpate/core/linear.hpp"
 #include "palpate/sources/source.hpp"
 
 namespace palpate::lab {
 namespace {
 
-constexpr double patience = 0.5;       // [s] behind for longer than this is lost
-constexpr double press = 0.008;        // [m] how far below the surface the hand goes
+constexpr double press_depth = 0.008;  // [m] how far below the surface the hand goes
 constexpr double contact_time = 0.4;   // [s]
 constexpr double flat_radius = 0.025;  // [m] a place is flat as far as that
 constexpr double patch_radius = 0.06;  // [m] of the patch that is cut out and moved
@@ -89,11 +89,11 @@ std::optional<Place> flat_place(const DepthImage& image, const Vec3& point) {
     points.col(static_cast<Eigen::Index>(i)) = Vec3(patch.x()[i], patch.y()[i], patch.z()[i]);
   const Vec3 mean = points.rowwise().mean();
   const Eigen::Matrix3Xd centred = points.colwise() - mean;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(centred * centred.transpose());
-  Vec3 normal = axes.eigenvectors().col(0);
+  const Axes axes = axes_of(centred * centred.transpose());
+  Vec3 normal = axes.vectors.col(0);
   if (normal.dot(point) > 0.0) normal = -normal;
   const double cosine = -normal.dot(point.normalized());
-  const double spread = std::sqrt(axes.eigenvalues()[0] / static_cast<double>(patch.size()));
+  const double spread = std::sqrt(axes.values[0] / static_cast<double>(patch.size()));
   const double pixels =
       std::numbers::pi * cosine * std::pow(flat_radius * image.intrinsics().fx / point.z(), 2);
   if (cosine < 0.5 || spread > 2.5e-3 || static_cast<double>(patch.size()) < 0.8 * pixels)
@@ -157,7 +157,7 @@ constexpr std::array action_names = {"hold", "slide", "moving", "sweep"};
 constexpr double onset = 0.9;  // [s] of what moves
 
 // How it moves; what `palpate eval real` plays unless it is drawn.
-struct Motion {
+struct PatchMotion {
   Action action = Action::hold;
   double stroke = 0.020;    // [m] of `moving`
   double frequency = 0.5;   // [Hz] of it
@@ -172,7 +172,7 @@ double duration_of(Action action) {
 
 // How far from the camera the place is, as a share of where it was recorded. Scaled about the
 // camera, every point stays on its line of sight.
-double scale_at(const Motion& motion, const Place& place, double t) {
+double scale_at(const PatchMotion& motion, const Place& place, double t) {
   if (motion.action != Action::moving || t < onset) return 1.0;
   const double phase = 2.0 * std::numbers::pi * motion.frequency * (t - onset);
   const double shift = 0.5 * motion.stroke * (1.0 - std::cos(phase));
@@ -181,7 +181,7 @@ double scale_at(const Motion& motion, const Place& place, double t) {
 
 // A recorded frame with the patch about the place moved, or with a copy of it that sweeps by.
 std::shared_ptr<const DepthImage> composed(const DepthImage& frame, const Place& place,
-                                           const Motion& motion, double t) {
+                                           const PatchMotion& motion, double t) {
   const Intrinsics& k = frame.intrinsics();
   std::vector<std::uint16_t> depth = frame.depth().copy();
   const double cu = k.fx * place.at.x() / place.at.z() + k.cx;
@@ -223,7 +223,7 @@ struct Outcome {
 };
 
 Outcome touch(const std::string& name, const ExperimentOptions& options, const Recording& recording,
-              const Place& place, const Motion& motion) {
+              const Place& place, const PatchMotion& motion) {
   const Action action = motion.action;
   const double r_c = options.parameters.proxy.r_c();
   // Where the camera moves, the place stays where the first frame had it in the world.
@@ -240,7 +240,7 @@ Outcome touch(const std::string& name, const ExperimentOptions& options, const R
   double shown = 0.0;
   std::shared_ptr<const DepthImage> image;
   const auto hip = [&](double t) {
-    const double above = std::max(0.15 * (contact_time - t), -press);
+    const double above = std::max(0.15 * (contact_time - t), -press_depth);
     const double along = action == Action::slide ? 0.02 * std::clamp(t - onset, 0.0, 1.0) : 0.0;
     return Vec3(eye + scale_at(motion, place, shown) * arm + above * normal + along * slide_along);
   };
@@ -408,12 +408,12 @@ RealCases draw_real_cases(const std::string& uri, const std::string& name, std::
     const auto at = static_cast<std::size_t>(
         std::floor(chance(0.0, static_cast<double>(recording->places.size()))));
     // Each action as often as the others.
-    const Motion motion{.action = static_cast<Action>(i % action_names.size()),
-                        .stroke = rounded(chance(0.010, 0.030)),
-                        .frequency = rounded(chance(0.5, 1.0)),
-                        .nearer = rounded(chance(0.6, 0.85)),
-                        .speed = rounded(chance(0.15, 0.4)),
-                        .first = static_cast<std::uint64_t>(chance(0.0, 1000.0))};
+    const PatchMotion motion{.action = static_cast<Action>(i % action_names.size()),
+                             .stroke = rounded(chance(0.010, 0.030)),
+                             .frequency = rounded(chance(0.5, 1.0)),
+                             .nearer = rounded(chance(0.6, 0.85)),
+                             .speed = rounded(chance(0.15, 0.4)),
+                             .first = static_cast<std::uint64_t>(chance(0.0, 1000.0))};
     result.cases.push_back(
         {fmt::format(
              "real:{}?action={}&place={}&stroke={}&frequency={}&nearer={}&speed={}&first={}", name,

@@ -12,10 +12,6 @@
 
 namespace palpate::lab {
 
-/// Pressing, holding and sliding on what a real camera measured, at rest and moved exactly: patches
-/// cut out of the recorded frames, with their noise, are moved along or across the lines of sight.
-Experiment real_experiment();
-
 /// One case on a recording: a place and a motion drawn at random.
 struct RealCase {
   std::string text;  ///< all that was drawn

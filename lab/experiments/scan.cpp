@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/scan.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/method.hpp"
 #include "palpate/cloud/audit.hpp"
 #include "palpate/cloud/depth_image.hpp"
@@ -21,7 +20,6 @@
 namespace palpate::lab {
 namespace {
 
-constexpr double f_c = 30.0;         // [Hz] Table 2
 constexpr double scan_speed = 0.05;  // [m/s]
 
 // What is scanned, and how to draw it as a profile.

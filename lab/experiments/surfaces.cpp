@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/surfaces.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
 
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -14,12 +13,6 @@
 
 namespace palpate::lab {
 namespace {
-
-constexpr double f_c = 30.0;  // [Hz] Table 2
-
-Truth flat_truth() {
-  return [](const Vec3& p, double) { return TruePoint{p.z(), Vec3::UnitZ()}; };
-}
 
 // 5.1: along x at 2 r_c/s, above the plane, from 1 s on below it, from 4 s on above it again. How
 // far is not printed: 2 r_c.
@@ -34,8 +27,7 @@ std::vector<Cell> flat_cells(const Experiment& experiment, const ExperimentOptio
       const auto method = make_method(name, {options.parameters, flat_truth()});
       std::string rows;
       play(*method,
-           {.frame_rate = f_c,
-            .duration = 5.0,
+           {.duration = 5.0,
             .cloud = [&](std::uint64_t frame, double) { return grid.capture(frame, 0.0); },
             .hip =
                 [&](double t) {
@@ -105,8 +97,7 @@ std::vector<Cell> jump_cells(const Experiment& experiment, const ExperimentOptio
         double rest = 0.0;
         bool there = false;
         play(*method,
-             {.frame_rate = f_c,
-              .duration = 2.0,
+             {.duration = 2.0,
               .cloud = [&](std::uint64_t frame, double) { return grid.capture(frame, 0.0); },
               .hip =
                   [&](double t) {

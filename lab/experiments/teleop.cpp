@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/text.hpp"
@@ -49,7 +50,7 @@ Motion motion_of(std::string_view name) {
     motion.speed = top_speed;
   } else if (name != "rest") {
     throw Error("--families " + std::string(name), "teleop has no such scene",
-                "did you mean '" + std::string(nearest_name(name, scenes)) + "'?");
+                did_you_mean(name, scenes));
   }
   return motion;
 }
@@ -185,12 +186,9 @@ std::vector<Cell> teleop_cells(const Experiment& experiment, const ExperimentOpt
     const auto& known = teleop_ways();
     const auto known_way = std::find(known.begin(), known.end(), way);
     if (known_way == known.end())
-      throw Error("--methods " + way, "teleop has no such coupling",
-                  "did you mean '" + std::string(nearest_name(way, known)) + "'?");
+      throw Error("--methods " + way, "teleop has no such coupling", did_you_mean(way, known));
     for (const std::string_view scene : scenes) {
-      if (!options.families.empty() && std::find(options.families.begin(), options.families.end(),
-                                                 scene) == options.families.end())
-        continue;
+      if (!options.wants(scene)) continue;
       for (const std::string_view sensor : sensors) {
         // Those without a camera have no sensor.
         if (*known_way != "palpate" && sensor != sensors.front()) continue;

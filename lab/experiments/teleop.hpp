@@ -5,14 +5,9 @@
 #include <string_view>
 #include <vector>
 
-#include "lab/experiment.hpp"
 #include "lab/teleop_rig.hpp"
 
 namespace palpate::lab {
-
-/// A hand that leads a robot over a link, by the ways of teleop_ways(): what the hand feels and
-/// what the robot does, by delay. docs/teleop.md says what is measured.
-Experiment teleop_experiment();
 
 /// The scenes of `teleop`: `rest`, a plane that is pressed three times; `bob`, one that moves by 60
 /// mm/s at most at 0.5 Hz under a hand at rest; `come`, one that begins to come at 60 mm/s.

@@ -5,12 +5,13 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <random>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/experiments/feel_scenes.hpp"
+#include "lab/experiments/pop_cases.hpp"
 #include "palpate/core/error.hpp"
 #include "palpate/core/text.hpp"
 #include "palpate/sources/synthetic_camera.hpp"
@@ -21,43 +22,31 @@ namespace {
 constexpr std::array<std::string_view, 5> faults = {"none", "link", "camera", "operator", "robot"};
 constexpr int usual_cases = 20;  // of each fault
 constexpr int cases_a_cell = 20;
-constexpr double begins = 2.0;    // [s] frames have come at any delay
-constexpr double duration = 7.0;  // [s]
-constexpr double across = 0.24;   // [m] that the camera sees
-constexpr double aside = 0.06;    // [m] to which the hand goes
-constexpr double fastest = 0.3;   // [m/s] of the hand
-constexpr double moving = 0.02;   // [m/s] of a tool that has to stop
-constexpr double at_rest = 0.01;  // [m/s] of a tool that has stopped, or nearly
-constexpr double after = 0.5;     // [s] after what failed is back
-
-class Chance {
- public:
-  explicit Chance(std::uint64_t seed) : random_(seed) {}
-  double between(double low, double high) {
-    return low + (high - low) * static_cast<double>(random_() >> 11U) * 0x1p-53;
-  }
-  bool one_in(int n) { return between(0.0, 1.0) * n < 1.0; }
-
- private:
-  std::mt19937_64 random_;
-};
+constexpr double begins = 2.0;            // [s] frames have come at any delay
+constexpr double episode_duration = 7.0;  // [s]
+constexpr double across = 0.24;           // [m] that the camera sees
+constexpr double aside = 0.06;            // [m] to which the hand goes
+constexpr double fastest = 0.3;           // [m/s] of the hand
+constexpr double moving = 0.02;           // [m/s] of a tool that has to stop
+constexpr double at_rest = 0.01;          // [m/s] of a tool that has stopped, or nearly
+constexpr double after = 0.5;             // [s] after what failed is back
 
 // A plane or a ball on it, tilted at random; one in two moves by up to 60 mm/s.
 std::vector<Part> parts_of(Chance& chance) {
-  const double slope = chance.between(0.0, 0.3);  // [rad]
+  const double slope = chance(0.0, 0.3);  // [rad]
   const Eigen::Isometry3d pose(
-      Eigen::AngleAxisd(chance.between(0.0, 2.0 * std::numbers::pi), Vec3::UnitZ()) *
+      Eigen::AngleAxisd(chance(0.0, 2.0 * std::numbers::pi), Vec3::UnitZ()) *
       Eigen::AngleAxisd(slope, Vec3::UnitY()));
   Motion motion;
-  if (chance.one_in(2)) {
+  if (chance() < 0.5) {
     motion.start = begins;
-    motion.frequency = chance.between(0.2, 0.6);
-    motion.stroke = chance.between(0.2, 1.0) * 0.06 / (std::numbers::pi * motion.frequency);
+    motion.frequency = chance(0.2, 0.6);
+    motion.stroke = chance(0.2, 1.0) * 0.06 / (std::numbers::pi * motion.frequency);
   }
   std::vector<Part> parts{{HalfSpace{}, pose, motion}};
-  if (chance.one_in(2)) {
-    const double radius = chance.between(0.02, 0.05);
-    const Vec3 place(chance.between(-0.03, 0.03), chance.between(-0.03, 0.03), -0.3 * radius);
+  if (chance() < 0.5) {
+    const double radius = chance(0.02, 0.05);
+    const Vec3 place(chance(-0.03, 0.03), chance(-0.03, 0.03), -0.3 * radius);
     parts.push_back({Sphere{radius}, Eigen::Isometry3d(Eigen::Translation3d(place)), motion});
   }
   return parts;
@@ -66,12 +55,11 @@ std::vector<Part> parts_of(Chance& chance) {
 HipPath wander(Chance& chance) {
   Vec3 place(0.0, 0.0, 0.07);
   std::vector<HipPath::Sample> path = {{0.0, place}, {begins, place}};
-  while (path.back().t < duration) {
-    const Vec3 to(chance.between(-aside, aside), chance.between(-aside, aside),
-                  chance.between(-0.02, 0.06));
-    const double speed = chance.between(0.03, fastest);
+  while (path.back().t < episode_duration) {
+    const Vec3 to(chance(-aside, aside), chance(-aside, aside), chance(-0.02, 0.06));
+    const double speed = chance(0.03, fastest);
     path.push_back({path.back().t + std::max((to - place).norm() / speed, 1e-3), to});
-    path.push_back({path.back().t + chance.between(0.05, 0.6), to});
+    path.push_back({path.back().t + chance(0.05, 0.6), to});
     place = to;
   }
   return HipPath(std::move(path));
@@ -82,13 +70,13 @@ HipPath wander(Chance& chance) {
 TeleopEpisode teleop_episode(std::string_view fault, std::uint64_t seed) {
   if (std::find(faults.begin(), faults.end(), fault) == faults.end())
     throw Error("--families " + std::string(fault), "teleop-faults has no such fault",
-                "did you mean '" + std::string(nearest_name(fault, faults)) + "'?");
+                did_you_mean(fault, faults));
   Chance chance(seed * 1000003U + 17U);
   std::vector<Part> parts = parts_of(chance);
   const bool moves = !parts.front().motion.rests();
   const auto scene = std::make_shared<const Scene>(std::move(parts));
-  const double distance = chance.between(0.45, 0.8);
-  const std::string_view sensor = chance.one_in(3) ? "ideal" : "d4xx";
+  const double distance = chance(0.45, 0.8);
+  const std::string_view sensor = 3.0 * chance() < 1.0 ? "ideal" : "d4xx";
   const auto plain = open_synthetic_camera(
       Uri("synthetic:plane?" + camera_options(distance, across, sensor, seed)));
   const auto camera =
@@ -99,16 +87,16 @@ TeleopEpisode teleop_episode(std::string_view fault, std::uint64_t seed) {
                 },
                 .truth = truth_of(scene),
                 .hand = wander(chance),
-                .duration = duration},
+                .duration = episode_duration},
       .one = {.way = "palpate", .seed = seed},
       .region = {},
       .moves = moves,
       .sensor = sensor};
 
-  LinkQuality link{.delay = chance.between(0.0, 0.25), .loss = chance.between(0.0, 0.2)};
-  link.jitter = std::min(chance.between(0.0, 0.03), link.delay);
-  const double at = chance.between(begins + 0.5, duration - 2.0);
-  const double until = at + chance.between(0.2, 1.5);
+  LinkQuality link{.delay = chance(0.0, 0.25), .loss = chance(0.0, 0.2)};
+  link.jitter = std::min(chance(0.0, 0.03), link.delay);
+  const double at = chance(begins + 0.5, episode_duration - 2.0);
+  const double until = at + chance(0.2, 1.5);
   if (fault == "link") {
     link.down_from = at;
     link.down_until = until;
@@ -127,13 +115,13 @@ TeleopEpisode teleop_episode(std::string_view fault, std::uint64_t seed) {
   episode.one.up = episode.one.down = link;
 
   // Beyond a wall that stands upright, on one side.
-  const double turn = chance.between(0.0, 2.0 * std::numbers::pi);
+  const double turn = chance(0.0, 2.0 * std::numbers::pi);
   episode.region.name = "wall";
   episode.region.shape = FixtureShape::half_space;
   const Vec3 outward(std::cos(turn), std::sin(turn), 0.0);
-  episode.region.world_from_fixture.linear() =
-      Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), outward).toRotationMatrix();
-  episode.region.world_from_fixture.translation() = -chance.between(0.0, 0.03) * outward;
+  const Vec3 along = outward.unitOrthogonal();
+  episode.region.world_from_fixture.linear() << along, outward.cross(along), outward;
+  episode.region.world_from_fixture.translation() = -chance(0.0, 0.03) * outward;
   episode.one.fixtures = std::make_shared<const FixtureSet>(std::vector{episode.region});
   return episode;
 }
@@ -175,9 +163,7 @@ std::vector<Cell> episode_cells(const Experiment& /*experiment*/,
   std::vector<Cell> cells;
   const int cases = options.cases.value_or(usual_cases);
   for (const std::string_view fault : faults) {
-    if (!options.families.empty() && std::find(options.families.begin(), options.families.end(),
-                                               fault) == options.families.end())
-      continue;
+    if (!options.wants(fault)) continue;
     for (int first = 0; first < cases; first += cases_a_cell) {
       cells.emplace_back([=, seed = options.seed, last = std::min(first + cases_a_cell, cases)] {
         std::string rows;

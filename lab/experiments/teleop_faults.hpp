@@ -5,14 +5,9 @@
 #include <optional>
 #include <string_view>
 
-#include "lab/experiment.hpp"
 #include "lab/teleop_rig.hpp"
 
 namespace palpate::lab {
-
-/// Hands that lead a robot at random, while the link, the camera or one of the two processes fails:
-/// does the robot break a fixture, press too hard or continue? docs/teleop.md.
-Experiment teleop_faults_experiment();
 
 /// An episode: a scene before a noisy or an exact camera, a hand, a link, and what fails.
 struct TeleopEpisode {

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "lab/experiments/experiments.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/table.hpp"
 #include "palpate/core/error.hpp"
@@ -43,7 +44,7 @@ constexpr double left = 0.5;
 
 // [m/s] A handle that moves slower is at rest: a D4xx's noise drives one that nobody holds in a
 // corner by up to 22 mm/s at any stiffness; one that swings does by 40 mm/s and more.
-constexpr double at_rest = 25e-3;
+constexpr double at_rest_below = 25e-3;
 // [N] in the mean. A hand that feels less was never engaged, or has lost the surface.
 constexpr double least_force = 0.01;
 constexpr double softest = 100.0;                            // [N/m]
@@ -77,7 +78,7 @@ std::vector<Part> parts_of(std::string_view name) {
     for (int i = 0; i < 3; ++i) add(i * 2.0 * std::numbers::pi / 3.0);
   } else {
     throw Error("--families " + std::string(name), "zwidth has no such scene",
-                "did you mean '" + std::string(nearest_name(name, scenes)) + "'?");
+                did_you_mean(name, scenes));
   }
   return walls;
 }
@@ -137,7 +138,7 @@ Vec3 ZScene::touched_at(double r_c) const {
 
 bool ZTrial::decays() const {
   // A swing that continues is there both times; a single kick, by a frame's noise, is not.
-  const bool rests = std::min(speed, speed_before) <= at_rest;
+  const bool rests = std::min(speed, speed_before) <= at_rest_below;
   return !cut && force >= least_force && (rests || speed <= left * speed_before);
 }
 
@@ -247,9 +248,7 @@ std::vector<Cell> zwidth_cells(const Experiment& experiment, const ExperimentOpt
   std::vector<Cell> cells;
   const std::vector<ZHolding> all = z_holdings();
   for (const std::string_view scene : scenes) {
-    if (!options.families.empty() && std::find(options.families.begin(), options.families.end(),
-                                               scene) == options.families.end())
-      continue;
+    if (!options.wants(scene)) continue;
     for (const std::string_view camera : cameras) {
       // A cell a device, with its hands.
       for (auto first = all.begin(); first != all.end();) {

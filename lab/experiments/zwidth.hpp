@@ -8,14 +8,8 @@
 #include <vector>
 
 #include "lab/closed_loop.hpp"
-#include "lab/experiment.hpp"
 
 namespace palpate::lab {
-
-/// How stiff a surface may be before the loop of device, hand and method swings: the largest
-/// stiffness that decays, by device, hand, scene, method, damping and way. docs/feel.md says what
-/// is measured, and how.
-Experiment zwidth_experiment();
 
 /// A device and what holds it. Hand `none` presses with a soft spring that has neither mass nor
 /// damping: the handle lies on the surface as if by its own weight.

@@ -903,8 +903,7 @@ std::span<const FieldClass> field_classes() {
 }
 
 const FieldClass& find_field_class(std::string_view name) {
-  return find_named(classes, name, "class", "there is no such class of the field set",
-                    "the classes are ");
+  return find_named(classes, name, "class", "there is no such class of the field set");
 }
 
 FieldCase draw_field_case(const FieldClass& of, std::uint64_t seed, std::uint64_t index) {

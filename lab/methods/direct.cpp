@@ -48,14 +48,10 @@ class Direct final : public LabMethod {
   std::int64_t frames_ = 0;
 };
 
-std::unique_ptr<Method> make(const Parameters& parameters) {
-  return std::make_unique<Direct>(parameters);
-}
-
 }  // namespace
 
 std::vector<MethodInfo> direct_methods() {
-  return {{"direct", "penalty force on a moving-least-squares surface (2.1, [7])", make}};
+  return {{"direct", "penalty force on a moving-least-squares surface (2.1, [7])", made<Direct>}};
 }
 
 }  // namespace palpate::lab

@@ -172,7 +172,7 @@ class Constrained final : public LabMethod {
 };
 
 template <bool sphere, bool lifted, bool shaded>
-std::unique_ptr<Method> make(const Parameters& parameters) {
+std::unique_ptr<Method> constrained(const Parameters& parameters) {
   return std::make_unique<Constrained>(parameters, Constrained::Kind{sphere, lifted, shaded});
 }
 
@@ -181,15 +181,15 @@ std::unique_ptr<Method> make(const Parameters& parameters) {
 std::vector<MethodInfo> god_object_methods() {
   return {
       {"god-object", "a point constrained by polygons ([3]; depth images tessellated: [10], [11])",
-       make<false, true, false>},
+       constrained<false, true, false>},
       {"god-object-kept", "the same, kept in world space when a frame arrives",
-       make<false, false, false>},
+       constrained<false, false, false>},
       {"sphere-proxy", "a sphere constrained by polygons ([4]; depth images tessellated)",
-       make<true, true, false>},
+       constrained<true, true, false>},
       {"sphere-proxy-kept", "the same, kept in world space when a frame arrives",
-       make<true, false, false>},
+       constrained<true, false, false>},
       {"force-shading", "god-object whose force has the normal interpolated between corners",
-       make<false, true, true>}};
+       constrained<false, true, true>}};
 }
 
 }  // namespace palpate::lab

@@ -10,11 +10,10 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Dense>
-
 #include "lab/method.hpp"
 #include "lab/ticks.hpp"
 #include "palpate/cloud/depth_image.hpp"
+#include "palpate/core/linear.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -55,7 +54,7 @@ class ImageFeatures final : public LabMethod {
       squares += row * row.transpose();
       sums += x.dot(away) * row;
     }
-    const Vec3 plane = squares.ldlt().solve(sums);
+    const Vec3 plane = solve_symmetric<3>(squares, sums);
     const Vec3 normal = (plane[1] / around * right + plane[2] / around * down - away).normalized();
     const Vec3 seen = hip + plane[0] * away + texture(hip) * normal;
     const double depth = normal.dot(seen - hip);
@@ -89,15 +88,11 @@ class ImageFeatures final : public LabMethod {
   std::int64_t frames_ = 0;
 };
 
-std::unique_ptr<Method> make(const Parameters& parameters) {
-  return std::make_unique<ImageFeatures>(parameters);
-}
-
 }  // namespace
 
 std::vector<MethodInfo> image_features_methods() {
-  return {
-      {"image-features", "height and texture of the image at the pixel of the HIP ([14])", make}};
+  return {{"image-features", "height and texture of the image at the pixel of the HIP ([14])",
+           made<ImageFeatures>}};
 }
 
 }  // namespace palpate::lab

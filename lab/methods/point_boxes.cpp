@@ -183,14 +183,11 @@ class PointBoxes final : public LabMethod {
   std::int64_t frames_ = 0;
 };
 
-std::unique_ptr<Method> make(const Parameters& parameters) {
-  return std::make_unique<PointBoxes>(parameters);
-}
-
 }  // namespace
 
 std::vector<MethodInfo> point_boxes_methods() {
-  return {{"point-boxes", "a box around every point, in a hash, and a god-object ([9])", make}};
+  return {{"point-boxes", "a box around every point, in a hash, and a god-object ([9])",
+           made<PointBoxes>}};
 }
 
 }  // namespace palpate::lab

@@ -171,14 +171,11 @@ class Tsdf final : public ImplicitMethod {
   std::vector<std::uint32_t> written_;
 };
 
-std::unique_ptr<Method> make(const Parameters& parameters) {
-  return std::make_unique<Tsdf>(parameters);
-}
-
 }  // namespace
 
 std::vector<MethodInfo> tsdf_methods() {
-  return {{"tsdf", "64^3 voxels of signed distance around the proxy, fused over frames", make}};
+  return {
+      {"tsdf", "64^3 voxels of signed distance around the proxy, fused over frames", made<Tsdf>}};
 }
 
 }  // namespace palpate::lab

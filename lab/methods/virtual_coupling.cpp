@@ -85,15 +85,12 @@ class VirtualCoupling final : public LabMethod {
   std::int64_t frames_ = 0;
 };
 
-std::unique_ptr<Method> make(const Parameters& parameters) {
-  return std::make_unique<VirtualCoupling>(parameters);
-}
-
 }  // namespace
 
 std::vector<MethodInfo> virtual_coupling_methods() {
   return {{"virtual-coupling",
-           "spring and damper to a virtual tool, within its passive limit ([2])", make}};
+           "spring and damper to a virtual tool, within its passive limit ([2])",
+           made<VirtualCoupling>}};
 }
 
 }  // namespace palpate::lab

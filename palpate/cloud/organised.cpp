@@ -7,9 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-#include <Eigen/QR>
+#include "palpate/core/linear.hpp"
 
 namespace palpate {
 namespace {
@@ -22,9 +20,10 @@ constexpr double largest_residual = 0.5;     // [px]
 constexpr double least_share = 0.999;        // of the points that must fit
 // [-] focal length over the image's width: fields of view from 3 to 127 degrees.
 constexpr double shortest_focus = 0.25, longest_focus = 20.0;
-constexpr double most_skew = 1e-3;         // [-] of the pixels, over the focal length
-constexpr double finest_unit = 1e-6;       // [m]
-constexpr double coarse_unit = 1e-3;       // [m] what depth cameras themselves have
+constexpr double most_skew = 1e-3;          // [-] of the pixels, over the focal length
+constexpr double least_determinant = 1e-9;  // [-] over the cube of the size: nothing projects
+constexpr double finest_unit = 1e-6;        // [m]
+constexpr double coarse_unit = 1e-3;        // [m] what depth cameras themselves have
 constexpr double share_of_depth = 1e-3;    // a unit of so much of the depth is finer than any noise
 constexpr double largest_reading = 65534;  // 65535 is a hole
 
@@ -87,6 +86,22 @@ std::optional<Intrinsics> fit_intrinsics(const std::vector<Sample>& samples,
   return k;
 }
 
+// Of a symmetric matrix that is not negative, the axis of the least eigenvalue: by inverse
+// iteration.
+Eigen::VectorXd least_axis(Eigen::MatrixXd squares) {
+  constexpr double shift = 1e-12;  // [-] of the largest: keeps the matrix regular
+  constexpr int most_steps = 200;
+  constexpr double settled = 1e-14;
+  squares.diagonal().array() += shift * squares.trace();
+  Eigen::VectorXd axis = Eigen::VectorXd::LinSpaced(squares.rows(), 1.0, 2.0).normalized();
+  for (int i = 0; i < most_steps; ++i) {
+    const Eigen::VectorXd before = axis;
+    axis = least_squares(squares, before).normalized();
+    if ((axis - before).norm() < settled) break;
+  }
+  return axis;
+}
+
 // The pose by direct linear transformation: a projection from space where `centre` is not known (a
 // plane alone does not tell it), else one of the directions from there.
 std::optional<Eigen::Isometry3d> fit_pose(const std::vector<Sample>& samples, int width,
@@ -111,27 +126,26 @@ std::optional<Eigen::Isometry3d> fit_pose(const std::vector<Sample>& samples, in
       squares += a * a.transpose();
     }
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(squares);
-  const Eigen::VectorXd best = solved.eigenvectors().col(0);
+  const Eigen::VectorXd best = least_axis(squares);
   Eigen::Matrix3d m;
   for (int row = 0; row < 3; ++row) m.row(row) = best.segment(row * columns, 3).transpose();
   if (m.determinant() < 0.0) m = -m;
-  const Eigen::FullPivLU<Eigen::Matrix3d> lu(m);
-  if (!lu.isInvertible()) return std::nullopt;
+  if (!(m.determinant() > least_determinant * std::pow(m.norm(), 3))) return std::nullopt;
+  const Eigen::Matrix3d inverse = m.inverse();
   Vec3 at = middle;
   if (!centre) {
     Vec3 last(best[3], best[7], best[11]);
     if (m.row(0).dot(best.segment<3>(0)) < 0.0) last = -last;
-    at -= size * lu.solve(last);
+    at -= size * (inverse * last);
   }
-  // m = K R: the inverse is R^T K^-1, which a QR decomposition takes apart.
-  const Eigen::HouseholderQR<Eigen::Matrix3d> qr(m.inverse());
-  Eigen::Matrix3d turn = qr.householderQ();
-  const Eigen::Matrix3d& upper = qr.matrixQR();
-  for (int i = 0; i < 3; ++i) {
-    if (upper(i, i) < 0.0) turn.col(i) = -turn.col(i);
-  }
-  if (std::abs(upper(0, 1)) > most_skew * std::abs(upper(1, 1)) || turn.determinant() < 0.0)
+  // m = K R: the inverse is R^T K^-1, which Gram and Schmidt take apart.
+  Eigen::Matrix3d turn;
+  turn.col(0) = inverse.col(0).normalized();
+  const double skew = turn.col(0).dot(inverse.col(1));
+  const Vec3 down = inverse.col(1) - skew * turn.col(0);
+  turn.col(1) = down.normalized();
+  turn.col(2) = turn.col(0).cross(turn.col(1));
+  if (std::abs(skew) > most_skew * down.norm() || turn.col(2).dot(inverse.col(2)) < 0.0)
     return std::nullopt;
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
   world_from_camera.linear() = turn;

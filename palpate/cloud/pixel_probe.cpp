@@ -6,9 +6,8 @@
 #include <cmath>
 #include <string>
 
-#include <Eigen/Eigenvalues>
-
 #include "palpate/core/error.hpp"
+#include "palpate/core/linear.hpp"
 
 namespace palpate {
 namespace {
@@ -52,11 +51,10 @@ std::optional<Vec3> normal_at(const PointAt& point_at, int u, int v, int radius,
   }
   if (count < fewest_points) return std::nullopt;
   const Vec3 mean = sum / count;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(squares / count -
-                                                            mean * mean.transpose());
-  const Eigen::Vector3d spread = axes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  const Axes axes = axes_of(squares / count - mean * mean.transpose());
+  const Eigen::Vector3d spread = axes.values.cwiseMax(0.0).cwiseSqrt();
   if (!(spread[1] > 0.0) || spread[0] > flatness * spread[1]) return std::nullopt;
-  const Vec3 normal = axes.eigenvectors().col(0);
+  const Vec3 normal = axes.vectors.col(0);
   return normal.dot(eye - centre) < 0.0 ? Vec3(-normal) : normal;
 }
 

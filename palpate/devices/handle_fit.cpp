@@ -6,7 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+
+#include "palpate/core/linear.hpp"
 
 namespace palpate {
 namespace {
@@ -237,7 +239,7 @@ Solution solve(const Equations& equations, const Eigen::VectorXd& forces, Eigen:
   a.col(0) = forces;
   const Eigen::VectorXd scale = a.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
   a = a * scale.asDiagonal();
-  const Eigen::VectorXd scaled = a.colPivHouseholderQr().solve(equations.left);
+  const Eigen::VectorXd scaled = least_squares(a, equations.left);
   Solution solution;
   solution.left = (equations.left - a * scaled).squaredNorm();
   solution.share = std::sqrt(solution.left / std::max(equations.left.squaredNorm(), 1e-300));

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/Cholesky>
+#include "palpate/core/linear.hpp"
 
 namespace palpate {
 namespace {
@@ -426,7 +426,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
     const auto fit_shape = [&](Eigen::Matrix<double, 5, 5> a, const Vec5& b) {
       a.diagonal().array() += 1e-9;
       a.diagonal().tail<3>().array() += prior;
-      shapes[j] = a.ldlt().solve(b);
+      shapes[j] = solve_symmetric<5>(a, b);
     };
     fit_shape(Shape::matrix(sums), Shape::right_side(sums));
     // One deviation more than elsewhere: each of four windows could be wrong in each frame.
@@ -651,7 +651,7 @@ double SurfaceEstimate::squared_structure(const Cells& frame,
     a.noalias() += means * means.transpose();
     b += residuals[k] * means;
   }
-  const Vec6 c = a.ldlt().solve(b);
+  const Vec6 c = solve_symmetric<6>(a, b);
   double sum = 0.0;
   double present = 0.0;
   for (std::size_t k = 0; k < cells; ++k) {

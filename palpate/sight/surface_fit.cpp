@@ -7,8 +7,7 @@
 #include <cstdint>
 #include <limits>
 
-#include <Eigen/Cholesky>
-
+#include "palpate/core/linear.hpp"
 #include "palpate/core/vectorise.hpp"
 
 namespace palpate {
@@ -312,7 +311,7 @@ Quadric fit_quadric(const Moments& moments, double curvature_prior) noexcept {
   for (int i = 0; i < 6; ++i) a(i, i) += 1e-9;
   a.diagonal().tail<3>().array() += curvature_prior;
   Quadric quadric;
-  quadric.c = a.ldlt().solve(moments.right_side());
+  quadric.c = solve_symmetric<6>(a, moments.right_side());
   quadric.c[0] *= Moments::unit;
   quadric.c.tail<3>() /= Moments::unit;
   return quadric;

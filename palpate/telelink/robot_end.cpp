@@ -22,8 +22,7 @@
 #include "palpate/sources/fixture_file.hpp"
 #include "palpate/telelink/topics.hpp"
 #include "palpate/telelink/touched_paint.hpp"
-#include "palpate/teleop/approach_watch.hpp"
-#include "palpate/teleop/set_point.hpp"
+#include "palpate/teleop/robot_step.hpp"
 #include "palpate/teleop/touched.hpp"
 
 namespace palpate {
@@ -32,7 +31,6 @@ namespace {
 constexpr double first_state = 5.0;       // [s] that a robot may take to say where it is
 constexpr double order_interval = 2e-3;   // [s]
 constexpr double report_interval = 0.01;  // [s]
-constexpr double blind_after = 0.2;       // [s] without a frame nothing is led
 
 // A device for a session, of a hand that the robot's end keeps.
 class Borrowed final : public Device {
@@ -55,8 +53,8 @@ void add_walls(const Eigen::AlignedBox3d& reach, std::vector<Fixture>& fixtures)
       wall.shape = FixtureShape::half_space;
       Vec3 inward = Vec3::Zero();
       inward[axis] = -sign;
-      wall.world_from_fixture.linear() =
-          Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), inward).toRotationMatrix();
+      const Vec3 along = inward.unitOrthogonal();
+      wall.world_from_fixture.linear() << along, inward.cross(along), inward;
       Vec3 place = reach.center();
       place[axis] = sign < 0.0 ? reach.min()[axis] : reach.max()[axis];
       wall.world_from_fixture.translation() = place;
@@ -112,8 +110,8 @@ class RobotEnd::Impl {
         state_(first_of(*robot_)),
         regions_(regions_of(robot_->info(), options.fixtures)),
         options_(options),
-        set_point_(set_point_of(robot_->info(), options, regions_)),
         hand_(std::make_shared<LedHand>(state_.position, limits_of(robot_->info()))),
+        step_(*hand_, set_point_of(robot_->info(), options, regions_)),
         topics_(options.name),
         publisher_(options.name, options.packing),
         participant_("teleop"),
@@ -220,34 +218,15 @@ class RobotEnd::Impl {
     ServoTick tick;
     while (ticks_->try_pop(tick)) any = true;
     if (!any) return;  // nothing guards the robot now
-    Approach comes;
     RobotState at;
-    double clearance = ApproachWatch::reach;
-    const double radius = robot_->info().tool_radius;
-    bool lost = !watches_.empty();  // so all cameras say
+    Outlook seen;
     {
       const std::lock_guard lock(mutex_);
       at = state_;
-      double noise = 0.0;
-      for (ApproachWatch& watch : watches_) {
-        if (watch.newest().speed > comes.speed) comes = watch.newest();
-        noise = std::max(noise, watch.newest().noise);
-        clearance = std::min(clearance, watch.clearance());
-        lost = lost && watch.is_between(tick.place, at.position, radius, now);
-      }
-      comes.noise = noise;
+      seen = outlook(watches_, tick.place, at.position, robot_->info().tool_radius, now);
     }
-    if (lost) tick = with_proxy_at(at.position, tick);
-    const bool in_the_open = tick.tick.state == ContactState::free_motion;
-    hand_->sees(tick.frame_age <= blind_after && !lost);
-    const double ahead = (tick.place - at.position).norm();
-    hand_->clearance(in_the_open ? clearance - radius - ahead : 0.0);
-    const bool alone = in_the_open && !lost && clearance - radius > ForceZero::clear;
-    at.force = force_zero_.next(now, at.force, alone);
+    const SetPoint::Order order = step_.next(tick, seen, lead_.press, at, now);
     contact_ = at.force;
-    hand_->kept_out(tick.place - tick.tick.proxy);
-    const SetPoint::Order order =
-        set_point_.next(tick, lead_.press, hand_->is_led() && !lost, comes, at.force);
     if (at.fault.empty()) robot_->command(order.position, order.velocity, now);
     if (const auto found =
             learner_.next(at.t, at.position, at.velocity, at.force, tick.tick.normal))
@@ -281,8 +260,8 @@ class RobotEnd::Impl {
   std::vector<ApproachWatch> watches_;  // one a camera
   const std::shared_ptr<const FixtureSet> regions_;
   const RobotEndOptions options_;
-  SetPoint set_point_;
   std::shared_ptr<LedHand> hand_;
+  RobotStep step_;  // of the leading thread
   const TeleopTopics topics_;
   Ros2CameraPublisher publisher_;
   dds::Participant participant_;
@@ -290,7 +269,6 @@ class RobotEnd::Impl {
   dds::Writer tools_, twists_, contacts_, links_, joints_, faults_, region_texts_, touched_;
   // Of the leading thread
   TouchLearner learner_;
-  ForceZero force_zero_;
   Vec3 contact_ = Vec3::Zero();  // [N] without what the sensor shows in free space
   Lead lead_;
   std::int64_t heard_ = 0;  // [ns] stamp of the newest place

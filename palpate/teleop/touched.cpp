@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
+#include "palpate/core/linear.hpp"
 #include "palpate/core/tick.hpp"
 
 namespace palpate {
@@ -105,7 +104,7 @@ std::optional<Touched> TouchLearner::taught() noexcept {
   const double n = std::max(touch.squares(0, 0), 1.0);
   const double mean = touch.with_force[0] / n;
   const double variance = touch.force_2 / n - mean * mean;
-  const Vec3 line = touch.squares.ldlt().solve(touch.with_force);  // force at no depth, K, B
+  const Vec3 line = solve_symmetric<3>(touch.squares, touch.with_force);  // force at no depth, K, B
   // Of what the line leaves, by its normal equations.
   const double left = std::max(touch.force_2 - line.dot(touch.with_force), 0.0) / n;
   if (touch.last_t - touch.began < least_time)

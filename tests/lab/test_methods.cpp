@@ -17,7 +17,6 @@
 #include "palpate/cloud/point_cloud.hpp"
 #include "palpate/sources/source.hpp"
 
-#include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -635,37 +634,6 @@ TEST(VirtualCoupling, IsPassiveWithinItsLimitAndNotBeyond) {
   // K = 500 N/m needs 0.25 N s/m; in series with the scene's spring it is 455 N/m.
   EXPECT_LT(energy_kept(500.0, 0.30), 1.0);
   EXPECT_GT(energy_kept(500.0, 0.15), 1.0);
-}
-
-TEST(MethodsTable, PutsTheRulerAboveAPublishedMethodAndCountsCosts) {
-  const Experiment& experiment = find_experiment("methods");
-  ExperimentOptions options;
-  options.methods = {"ideal", "surfels"};
-  options.cases = 1;
-  options.grid = {1, 1};
-  options.families = {"occluder", "lift-white"};
-  std::string csv = std::string(experiment.header) + "\n";
-  for (const Cell& cell : experiment.cells(experiment, options)) csv += cell();
-  const Table table("methods", csv);
-  const auto value = [&](std::string_view method, std::string_view measure) {
-    for (std::size_t i = 0; i < table.rows(); ++i) {
-      if (table.text(i, "method") == method && table.text(i, "measure") == measure)
-        return table.number(i, "value");
-    }
-    ADD_FAILURE() << "no " << measure << " of " << method;
-    return 0.0;
-  };
-  EXPECT_NEAR(value("ideal", "pop"), 100.0, 1e-9);
-  EXPECT_LT(value("surfels", "pop"), 100.0);
-  EXPECT_EQ(value("ideal", "first_contact"), 8.0) << "the fastest that is tried";
-  EXPECT_LT(value("ideal", "corners"), 0.01);
-  EXPECT_GT(value("surfels", "corners"), 0.1);
-  EXPECT_GT(value("surfels", "frame"), 10.0 * value("ideal", "frame"));
-  EXPECT_GT(value("surfels", "memory"), 0.01) << "MB: a patch and a tree";
-  expect_drawn(experiment.figure(table));
-  const Scores scores = experiment.scores(table);
-  ASSERT_EQ(scores.rows.size(), 2U);
-  for (const auto& row : scores.rows) EXPECT_EQ(row.size(), scores.columns.size());
 }
 
 }  // namespace test_methods

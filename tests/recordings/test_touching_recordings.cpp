@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include "palpate/cloud/depth_image.hpp"
 #include "palpate/cloud/point_cloud.hpp"
+#include "palpate/core/linear.hpp"
 #include "palpate/methods/methods.hpp"
 #include "palpate/sources/source.hpp"
 
@@ -48,8 +48,7 @@ std::optional<Place> smooth_place(const Cloud& cloud, const Vec3& point, const V
     points.col(static_cast<Eigen::Index>(i)) = Vec3(patch.x()[i], patch.y()[i], patch.z()[i]);
   const Vec3 mean = points.rowwise().mean();
   const Eigen::Matrix3Xd centred = points.colwise() - mean;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(centred * centred.transpose());
-  Vec3 normal = axes.eigenvectors().col(0);
+  Vec3 normal = axes_of(centred * centred.transpose()).vectors.col(0);
   const Vec3 sightline = (point - eye).normalized();
   if (normal.dot(sightline) > 0.0) normal = -normal;
   if (normal.dot(sightline) > -0.42) return std::nullopt;

@@ -12,7 +12,7 @@ namespace test_adversary {
 
 constexpr std::uint64_t ticks = test::sanitized ? 50'000 : 1'000'000;
 
-// The same for longer: adversarial_ticks, beside this program.
+// The same for longer: `ninja adversarial_ticks`.
 TEST(Adversary, GetsNoForceThatBreaksAPromise) {
   test::Adversary adversary(1);
   while (adversary.ticks() < ticks) {

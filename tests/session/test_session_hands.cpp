@@ -28,6 +28,7 @@
 #include "palpate/session/session.hpp"
 
 #include "tests/session/fakes.hpp"
+#include "tests/support/comes_true.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/sanitized.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -35,6 +36,7 @@
 namespace palpate {
 namespace test_session_hands {
 
+using test::comes_true;
 using test::fails_saying;
 using test::MadeSource;
 using test::wall;
@@ -382,13 +384,6 @@ SessionOptions live_with_two(const std::shared_ptr<LiveHand::Told>& one,
   options.safety.late_intervals = 100.0;
   options.safety.stall_time = 0.1;
   return options;
-}
-
-bool comes_true(const std::function<bool()>& condition) {
-  const double patience = monotonic_now() + 60.0;
-  while (!condition() && monotonic_now() < patience)
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  return condition();
 }
 
 TEST(LiveSessionHands, LetGoWhereOneOfThemHangsAndAllEndTogether) {

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -26,11 +25,13 @@
 
 #include "tests/session/fakes.hpp"
 #include "tests/session/slow_disk.hpp"
+#include "tests/support/comes_true.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
 namespace test_session_live_faults {
 
+using test::comes_true;
 using test::wall;
 using test::wall_depth;
 
@@ -137,13 +138,6 @@ class TappingDevice final : public Device {
  private:
   DeviceInfo info_{.uri = "tapping:", .kind = "tapping", .limits = no_motors};
 };
-
-bool comes_true(const std::function<bool()>& condition) {
-  const double patience = monotonic_now() + 60.0;
-  while (!condition() && monotonic_now() < patience)
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  return condition();
-}
 
 SessionOptions options_with(const std::vector<std::shared_ptr<CameraLog>>& logs) {
   SessionOptions options;

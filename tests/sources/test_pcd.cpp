@@ -19,7 +19,6 @@ namespace test_pcd {
 
 using test::bytes_of;
 using test::fails_saying;
-using test::Rejected;
 
 PointFile parse(std::string_view text) {
   return test::parse(parse_pcd, text);
@@ -335,120 +334,10 @@ TEST(Pcd, SaysInWhichLineOfTheDataItFailed) {
   EXPECT_TRUE(fails_saying([&] { return parse(head + "1 2 3\n        "); }, "after 1 of 2 points"));
 }
 
-TEST(Pcd, FailsCleanlyWhereverAFileIsCutShort) {
-  for (const std::string encoding : encodings) {
-    const std::string whole = valid_file(encoding);
-    // What is left of an ascii file may still be a number where its last one ends sooner.
-    const std::size_t last = encoding == "ascii" ? whole.rfind(' ') + 1 : whole.size() - 1;
-    test::expect_errors_when_cut_short(parse_pcd, whole, last);
-  }
-}
-
-TEST(Pcd, DoesSomethingDefinedWithDamagedFiles) {
-  for (const char* encoding : encodings) {
-    test::expect_defined_on_damage(parse_pcd, valid_file(encoding), 3000);
-  }
-}
-
-TEST(Pcd, SaysWhichFileCannotBeRead) {
-  const test::TemporaryFolder folder;
-  EXPECT_TRUE(fails_saying([&] { return read_pcd(folder.path() / "no.pcd"); }, "no.pcd: no such"));
-  EXPECT_TRUE(fails_saying([&] { return read_pcd(folder.path()); }, "not a file"));
-  EXPECT_TRUE(fails_saying([&] { return read_pcd(folder.write("empty.pcd", "")); }, "empty.pcd"));
-  EXPECT_EQ(read_pcd(folder.write("good.pcd", valid_file("binary"))).points[2], Vec3(7, 8, 9));
-}
-
-// What each file of the shared collection holds, as counted and averaged by an independent reader.
-struct Expected {
-  const char* file;
-  std::size_t width, height, non_finite;
-  Vec3 mean;
-};
-
-void expect(const std::filesystem::path& folder, const Expected& expected) {
-  SCOPED_TRACE(expected.file);
-  const PointFile cloud = read_pcd(folder / expected.file);
-  EXPECT_EQ(cloud.width, expected.width);
-  EXPECT_EQ(cloud.height, expected.height);
-  EXPECT_EQ(cloud.points.size(), expected.width * expected.height);
-  EXPECT_EQ(cloud.non_finite, expected.non_finite);
-  EXPECT_LT((test::mean_of(cloud) - expected.mean).norm(), 1e-6 * (1.0 + expected.mean.norm()));
-}
-
-TEST(Pcd, ReadsWhatOtherParsersReadAndRejectsWhatTheyReject) {
-  PALPATE_DATA_OR_SKIP(folder, "formats/pcd");
-  const std::array accepted{
-      Expected{
-          "data__object_template_0.pcd", 1397, 1, 0, {-0.106276255, 0.0947920007, 0.734193853}},
-      Expected{"nebula__ascii_xyz.pcd", 2, 1, 0, {-1.5, 1.4375, 4.875}},
-      Expected{"nebula__binary_xyz_pcl.pcd", 2, 1, 0, {-4.375, 11.25, 13.125}},
-      Expected{"pcd-rs__ascii.pcd", 213, 1, 0, {0.00906073761, 0.15169854, 0}},
-      Expected{"pcd-rs__binary.pcd", 1809, 16, 0, {3.70952449, 0.360627189, 0.128251944}},
-      Expected{"pcd-rs__empty_compressed.pcd", 0, 1, 0, {0, 0, 0}},
-      Expected{"pcd-rs__empty_compressed_debug.pcd", 0, 1, 0, {0, 0, 0}},
-      Expected{"pcd-rs__highly_compressed.pcd", 1000, 1, 0, {1, 1, 1}},
-      Expected{"pcd-rs__highly_uncompressed.pcd", 1000, 1, 0, {1, 1, 1}},
-      Expected{"pcd-rs__large_compressed.pcd", 10000, 1, 0, {55.5614372, 166.650409, 277.738968}},
-      Expected{"pcd-rs__output_binary.pcd", 3, 1, 0, {4, 5, 6}},
-      Expected{"pcd-rs__output_compressed.pcd", 3, 1, 0, {2, 3.16666667, 4.6}},
-      Expected{"pcd-rs__single_compressed.pcd", 1, 1, 0, {1, 2, 3}},
-      Expected{"pcd-rs__test_v05_ascii.pcd", 2, 1, 0, {2.5, 3.5, 4.5}},
-      Expected{"pcd-rs__test_v06_binary.pcd", 1, 1, 0, {1.5, 2.5, 3.5}},
-      Expected{"pcl__brisk_keypoints_gt.pcd", 1860, 1, 0, {288.0071, 291.858877, 0}},
-      Expected{"pcl__bunny.pcd", 397, 1, 0, {-0.0290809446, 0.102652652, 0.0273019573}},
-      Expected{"pcl__colored_cloud.pcd", 1, 1000, 0, {-0.21851276, -0.513777244, 1.21010301}},
-      Expected{"pcl__curve_close.pcd", 110, 1, 0, {0.468184734, 0.5, 0}},
-      Expected{"pcl__octants.pcd", 8, 1, 0, {-0.125, -6, -6}},
-  };
-  const std::array rejected{
-      Rejected{"pcd-rs__corrupt_compressed.pcd", "promises 100 bytes"},
-      Rejected{"pcd-rs__mixed_types_compressed.pcd", "FIELDS must name z"},
-      Rejected{"pcd-rs__test_unsupported_version.pcd", "version \".4\""},
-      Rejected{"pcd-rs__test_v05_no_viewpoint.pcd", "FIELDS must name y"},
-      Rejected{"pcd-rs__test_v06_mixed_types.pcd", "FIELDS must name x"},
-      Rejected{"pcd-rs__test_v5_compressed.pcd", "ends before the compressed data"},
-      Rejected{"pcd-rs__test_v6_compressed.pcd", "ends before the compressed data"},
-  };
-  for (const Expected& expected : accepted) {
-    expect(folder, expected);
-  }
-  for (const Rejected& bad : rejected) {
-    EXPECT_TRUE(fails_saying([&] { return read_pcd(folder / bad.file); }, bad.file, bad.says));
-  }
-  const auto files = std::distance(std::filesystem::directory_iterator(folder), {});
-  EXPECT_EQ(static_cast<std::size_t>(files), accepted.size() + rejected.size());
-}
-
-TEST(Pcd, ReadsRealScenesOfDepthCameras) {
-  PALPATE_DATA_OR_SKIP(folder, "single_pcl_kinect_scenes");
-  for (const Expected& expected : {
-           Expected{"capture0001.pcd", 640, 480, 57553, {-0.0255065098, 0.000946042403, 2.2441175}},
-           Expected{"capture0002.pcd", 640, 480, 57269, {-0.0158125988, 0.00291113684, 2.24211109}},
-           Expected{
-               "mOSD_learn0.pcd", 640, 480, 124908, {-0.0517441395, 0.0956667473, 0.850873603}},
-           Expected{
-               "mOSD_learn33.pcd", 640, 480, 128069, {-0.0585633874, 0.0747840867, 0.917053525}},
-           Expected{"milk.pcd", 13704, 1, 0, {-0.0562101657, -0.136754037, 0.774228645}},
-           Expected{"milk_cartoon_all_small_clorox.pcd",
-                    640,
-                    480,
-                    65793,
-                    {0.00906856657, -0.088555754, 0.90489248}},
-           Expected{"table_scene_mug_stereo_textured.pcd",
-                    640,
-                    480,
-                    97920,
-                    {0.0952321572, -0.0468975423, 1.26472742}},
-       }) {
-    expect(folder, expected);
-  }
-  PALPATE_DATA_OR_SKIP(grabber, "seq_pcl_grabber_3frames/pcd");
-  expect(grabber, {"frame_20121214T142255.814212.pcd",
-                   640,
-                   480,
-                   35625,
-                   {-0.0227141383, -0.0466103078, 0.99151716}});
-}
+using test::PointFiles;
+INSTANTIATE_TEST_SUITE_P(Pcd, PointFiles,
+                         testing::Values(test::PointFormat{"pcd", parse_pcd, read_pcd, encodings,
+                                                           valid_file, " "}));
 
 }  // namespace test_pcd
 }  // namespace palpate

@@ -14,7 +14,6 @@ namespace test_ply {
 
 using test::bytes_of;
 using test::fails_saying;
-using test::Rejected;
 
 PointFile parse(std::string_view text) {
   return test::parse(parse_ply, text);
@@ -420,89 +419,10 @@ TEST(Ply, SaysInWhichLineOfTheDataItFailed) {
       "promises -1 values"));
 }
 
-TEST(Ply, FailsCleanlyWhereverAFileIsCutShort) {
-  for (const std::string encoding : encodings) {
-    const std::string whole = valid_file(encoding);
-    // What is left of an ascii file may still be a number where its last one ends sooner.
-    const std::size_t last = encoding == "ascii" ? whole.rfind(" 1.0") + 1 : whole.size() - 1;
-    test::expect_errors_when_cut_short(parse_ply, whole, last);
-  }
-}
-
-TEST(Ply, DoesSomethingDefinedWithDamagedFiles) {
-  for (const char* encoding : encodings) {
-    test::expect_defined_on_damage(parse_ply, valid_file(encoding), 3000);
-  }
-}
-
-TEST(Ply, SaysWhichFileCannotBeRead) {
-  const test::TemporaryFolder folder;
-  EXPECT_TRUE(fails_saying([&] { return read_ply(folder.path() / "no.ply"); }, "no.ply: no such"));
-  EXPECT_TRUE(fails_saying([&] { return read_ply(folder.path()); }, "not a file"));
-  EXPECT_EQ(read_ply(folder.write("good.ply", valid_file("ascii"))).points[2], Vec3(7, 8, 9));
-}
-
-TEST(Ply, ReadsWhatOtherParsersReadAndRejectsWhatTheyReject) {
-  PALPATE_DATA_OR_SKIP(folder, "formats/ply");
-  // What each file holds, as counted and averaged by an independent reader.
-  struct Expected {
-    const char* file;
-    std::size_t points;
-    Vec3 mean;
-    std::size_t triangles = 0;
-    bool normals = false;
-  };
-  const std::array accepted{
-      Expected{"assimp__cube_binary.ply", 8, {0.5, 0.5, 0.5}, 12},
-      Expected{"assimp__cube_binary_header_with_RN_newline.ply", 8, {0.5, 0.5, 0.5}, 12},
-      Expected{"assimp__cube_binary_starts_with_nl.ply", 8, {6.46753407, 0.5, 0.5}, 12},
-      Expected{"assimp__float-color.ply", 3, {100, 66.6666667, 0}, 1},
-      Expected{"assimp__points.ply", 4, {0, 0.5, 0.5}, 0, true},
-      Expected{"happly__platonic_shelf.ply", 50, {1.81372228, -0.02773278, 0.00956212}, 80},
-      Expected{"happly__platonic_shelf_ascii.ply", 50, {1.81372228, -0.02773278, 0.00956212}, 80},
-      Expected{
-          "happly__platonic_shelf_big_endian.ply", 50, {1.81372228, -0.02773278, 0.00956212}, 80},
-      Expected{"pcl__cube.ply", 24, {0, 0, 0}, 12},
-      Expected{"pyntcloud__diamond.ply", 6, {0.5, 0.5, 0.5}, 8, true},
-      Expected{"pyntcloud__diamond_ascii.ply", 6, {0.5, 0.5, 0.5}, 8, true},
-      Expected{"pyntcloud__voxelgrid.ply", 6, {0.449999997, 0.449999997, 0.449999997}},
-      Expected{"tinyply__elephant.ply", 19753, {-0.00612780005, -3.40451721, 4.9738905}, 39290},
-      Expected{"tinyply__icosahedron.ply", 12, {0, 0, 0}, 20, true},
-      Expected{"tinyply__icosahedron_ascii.ply", 12, {0, 0, 0}, 20, true},
-      Expected{"trimesh__cube_blender_uv_meshlab.ply", 24, {0, 0, 0}, 12},
-      Expected{"trimesh__empty.ply", 0, {0, 0, 0}, 0, true},
-      Expected{"trimesh__metadata.ply", 4, {0, 0, 0}, 2},
-      Expected{"trimesh__multi.ply", 4, {0, 0, 0}, 2},
-      Expected{"trimesh__ply_empty_bin.ply", 0, {0, 0, 0}, 0, true},
-      Expected{"trimesh__ply_points_ascii.ply", 8, {0, 0, 0}},
-      Expected{"trimesh__ply_points_bin.ply", 8, {0, 0, 0}, 0, true},
-      Expected{"trimesh__points_ascii.ply", 5, {-0.0636, 0.03637442, 0.04180716}},
-      Expected{"trimesh__points_ascii_with_lists.ply", 5, {-0.0636, 0.03637442, 0.04180716}},
-      Expected{"trimesh__points_bin.ply", 5, {-0.0635999992, 0.0363744199, 0.0418071605}},
-      // Holds a thirteenth line; the header's twelve count, as for other readers.
-      Expected{"trimesh__points_emptyascii.ply", 12, {-0.0100495833, -0.0138001667, 0.0382333333}},
-      Expected{"trimesh__tet.ply", 4, {0, 0, 0}, 4},
-  };
-  const std::array rejected{
-      Rejected{"assimp__crash-30d6d0f7c529b3b66b4131700b7a4580cd7082df.ply", "line 7"},
-      Rejected{"pyntcloud__diamond_with_bool.ply", "\"bool\" is not a type"},
-      Rejected{"trimesh__ply_empty_header.ply", "one element vertex"},
-  };
-  for (const Expected& expected : accepted) {
-    SCOPED_TRACE(expected.file);
-    const PointFile cloud = read_ply(folder / expected.file);
-    EXPECT_EQ(cloud.points.size(), expected.points);
-    EXPECT_EQ(cloud.triangles.size(), expected.triangles);
-    EXPECT_EQ(cloud.normals.size(), expected.normals ? expected.points : 0U);
-    EXPECT_EQ(cloud.non_finite, 0u);
-    EXPECT_LT((test::mean_of(cloud) - expected.mean).norm(), 1e-6 * (1.0 + expected.mean.norm()));
-  }
-  for (const Rejected& bad : rejected) {
-    EXPECT_TRUE(fails_saying([&] { return read_ply(folder / bad.file); }, bad.file, bad.says));
-  }
-  const auto files = std::distance(std::filesystem::directory_iterator(folder), {});
-  EXPECT_EQ(static_cast<std::size_t>(files), accepted.size() + rejected.size());
-}
+using test::PointFiles;
+INSTANTIATE_TEST_SUITE_P(Ply, PointFiles,
+                         testing::Values(test::PointFormat{"ply", parse_ply, read_ply, encodings,
+                                                           valid_file, " 1.0"}));
 
 }  // namespace test_ply
 }  // namespace palpate

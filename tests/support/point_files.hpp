@@ -2,9 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <random>
 #include <span>
 #include <string>
@@ -64,25 +66,16 @@ inline void expect_defined_on_damage(Parse parser, const std::string& valid, int
   }
 }
 
-/// Checks that every beginning of a file of up to `last` bytes is an error, and that a longer one
-/// gives all of its points.
-inline void expect_errors_when_cut_short(Parse parser, std::string_view whole, std::size_t last) {
-  const std::size_t points = parse(parser, whole).points.size();
-  for (std::size_t size = 0; size < whole.size(); ++size) {
-    const std::string_view part = whole.substr(0, size);
-    if (size <= last) {
-      EXPECT_TRUE(fails_saying([&] { return parse(parser, part); }, "test file")) << size;
-    } else {
-      EXPECT_EQ(parse(parser, part).points.size(), points) << size;
-    }
-  }
-}
-
-/// A file that must be rejected, and what the message says.
-struct Rejected {
-  const char* file;
-  const char* says;
+/// A format of point files, as the tests that all of them must pass need it.
+struct PointFormat {
+  const char* name;
+  Parse parser;
+  PointFile (*read)(const std::filesystem::path&);
+  std::array<const char*, 3> encodings;  ///< ascii first
+  std::string (*valid_file)(const std::string& encoding);
+  const char* before_last;  ///< before the last number of the valid ascii file
 };
+class PointFiles : public testing::TestWithParam<PointFormat> {};
 
 /// The mean of a cloud's finite points.
 inline Vec3 mean_of(const PointFile& cloud) {

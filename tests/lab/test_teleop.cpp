@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lab/experiment.hpp"
 #include "lab/experiments/teleop.hpp"
 #include "lab/experiments/teleop_faults.hpp"
 

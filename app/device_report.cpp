@@ -12,10 +12,10 @@
 #include <unistd.h>
 
 #include "app/signals.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/devices/device_guard.hpp"
-#include "palpate/devices/device_probe.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/io/devices/device_guard.hpp"
+#include "palpate/io/devices/device_probe.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::app {
 namespace {

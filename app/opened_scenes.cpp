@@ -8,8 +8,8 @@
 #include <system_error>
 #include <utility>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/uri.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
 
 namespace palpate::app {
 namespace {

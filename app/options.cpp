@@ -4,10 +4,10 @@
 #include <charconv>
 
 #include "app/program.hpp"
-#include "palpate/cloud/proposed_touch.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/uri.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/cloud/proposed_touch.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 
 namespace palpate::app {
 

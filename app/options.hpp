@@ -8,7 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "palpate/core/method.hpp"
+#include "palpate/kernel/core/method.hpp"
 #include "palpate/session/config.hpp"
 
 namespace palpate::app {

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "palpate/cloud/proposed_touch.hpp"
-#include "palpate/sources/point_file_source.hpp"
+#include "palpate/io/sources/point_file_source.hpp"
+#include "palpate/kernel/cloud/proposed_touch.hpp"
 
 namespace palpate::app {
 

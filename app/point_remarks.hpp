@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "palpate/core/cloud.hpp"
+#include "palpate/kernel/core/cloud.hpp"
 
 namespace palpate::app {
 

@@ -13,8 +13,8 @@
 #include <CLI/CLI.hpp>
 #include <unistd.h>
 
-#include "palpate/core/parameters.hpp"
-#include "palpate/core/text.hpp"
+#include "palpate/kernel/core/parameters.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate::app {
 namespace {

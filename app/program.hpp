@@ -5,7 +5,7 @@
 #include <string>
 
 #include "app/verbs.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::app {
 

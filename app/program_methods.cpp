@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/program_methods.hpp"
 
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 
 namespace palpate::app {
 

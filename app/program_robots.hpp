@@ -5,9 +5,9 @@
 #include <memory>
 #include <string>
 
+#include "palpate/io/sources/source.hpp"
+#include "palpate/net/teleop/robot.hpp"
 #include "palpate/session/camera_feed.hpp"
-#include "palpate/sources/source.hpp"
-#include "palpate/teleop/robot.hpp"
 
 namespace palpate::app {
 

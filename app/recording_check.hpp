@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "palpate/bag/bag_reader.hpp"
+#include "palpate/io/bag/bag_reader.hpp"
 
 namespace palpate::app {
 

@@ -9,10 +9,10 @@
 
 #include "app/program_methods.hpp"
 #include "app/summary_text.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/uri.hpp"
-#include "palpate/devices/device_guard.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/io/devices/device_guard.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
 #include "palpate/servo/stiffness.hpp"
 
 namespace palpate::app {

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "app/session_arguments.hpp"
-#include "palpate/core/method.hpp"
+#include "palpate/kernel/core/method.hpp"
+#include "palpate/net/viewer/session_host.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/session/config.hpp"
 #include "palpate/session/session.hpp"
-#include "palpate/viewer/session_host.hpp"
 
 namespace palpate::app {
 

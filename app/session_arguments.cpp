@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/pose.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/pose.hpp"
 
 namespace palpate::app {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <utility>
 
-#include "palpate/core/error.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
-#include "palpate/telelink/robots.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/net/telelink/robots.hpp"
 
 namespace palpate::app {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::app {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "palpate/core/tick.hpp"
+#include "palpate/kernel/core/tick.hpp"
 
 namespace palpate::app {
 

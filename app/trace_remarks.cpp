@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 
 #include "app/point_remarks.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/session/summary.hpp"
 
 namespace palpate::app {

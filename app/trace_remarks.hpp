@@ -12,8 +12,8 @@
 
 #include <Eigen/Geometry>
 
-#include "palpate/core/cloud.hpp"
-#include "palpate/core/tick.hpp"
+#include "palpate/kernel/core/cloud.hpp"
+#include "palpate/kernel/core/tick.hpp"
 #include "palpate/session/frame_sequence.hpp"
 
 namespace palpate::app {

@@ -14,16 +14,16 @@
 
 #include "app/session_arguments.hpp"
 #include "app/verbs.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/pose.hpp"
-#include "palpate/core/uri.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/pose.hpp"
+#include "palpate/kernel/core/uri.hpp"
 #include "palpate/session/camera_registration.hpp"
 #include "palpate/session/point_capture.hpp"
 #include "palpate/session/press.hpp"
 #include "palpate/session/registration.hpp"
-#include "palpate/sources/source.hpp"
 
 namespace palpate::app {
 namespace {

@@ -19,12 +19,12 @@
 #include "app/device_report.hpp"
 #include "app/machine.hpp"
 #include "app/verbs.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/sensor.hpp"
-#include "palpate/core/vectorise.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/sensor.hpp"
+#include "palpate/kernel/core/vectorise.hpp"
+#include "palpate/net/viewer/server.hpp"
 #include "palpate/servo/periodic_thread.hpp"
-#include "palpate/viewer/server.hpp"
 
 namespace palpate::app {
 namespace {

@@ -17,14 +17,14 @@
 #include "app/point_remarks.hpp"
 #include "app/recording_check.hpp"
 #include "app/verbs.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/pixel_probe.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/cloud/proposed_touch.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/uri.hpp"
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/pixel_probe.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/cloud/proposed_touch.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
 
 namespace palpate::app {
 namespace {

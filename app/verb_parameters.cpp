@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 
 #include "app/verbs.hpp"
-#include "palpate/cloud/material_map.hpp"
-#include "palpate/core/parameters.hpp"
+#include "palpate/kernel/cloud/material_map.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 #include "palpate/servo/safety.hpp"
 
 namespace palpate::app {

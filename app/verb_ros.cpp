@@ -10,7 +10,7 @@
 #include "app/running_session.hpp"
 #include "app/signals.hpp"
 #include "app/verbs.hpp"
-#include "palpate/node/ros_node.hpp"
+#include "palpate/net/node/ros_node.hpp"
 
 namespace palpate::app {
 namespace {

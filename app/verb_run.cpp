@@ -21,10 +21,10 @@
 #include "app/running_session.hpp"
 #include "app/signals.hpp"
 #include "app/verbs.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/uri.hpp"
-#include "palpate/sources/scene.hpp"
-#include "palpate/viewer/session_host.hpp"
+#include "palpate/io/sources/scene.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
+#include "palpate/net/viewer/session_host.hpp"
 
 namespace palpate::app {
 namespace {

@@ -12,9 +12,9 @@
 
 #include "app/signals.hpp"
 #include "app/verbs.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/core/error.hpp"
 #include "palpate/drivers/ros2_publisher.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 #include "palpate/session/camera_feed.hpp"
 

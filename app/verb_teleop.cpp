@@ -16,11 +16,11 @@
 #include "app/program_robots.hpp"
 #include "app/running_session.hpp"
 #include "app/verbs.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/sources/fixture_file.hpp"
-#include "palpate/telelink/operator_end.hpp"
-#include "palpate/telelink/robot_end.hpp"
-#include "palpate/telelink/robots.hpp"
+#include "palpate/io/sources/fixture_file.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/net/telelink/operator_end.hpp"
+#include "palpate/net/telelink/robot_end.hpp"
+#include "palpate/net/telelink/robots.hpp"
 
 namespace palpate::app {
 namespace {

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <functional>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/methods/methods.hpp"
-#include "palpate/paper/proxy.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/methods/methods.hpp"
+#include "palpate/kernel/paper/proxy.hpp"
 
 #include "bench/limit.hpp"
 #include "bench/pcl_searches.hpp"

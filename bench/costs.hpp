@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "palpate/core/parameters.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 
 #include "bench/subject.hpp"
 #include "bench/timing.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/limit.hpp"
 
-#include "palpate/core/vectorise.hpp"
+#include "palpate/kernel/core/vectorise.hpp"
 
 namespace palpate::bench {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate::bench {
 

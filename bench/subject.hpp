@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "palpate/core/cloud.hpp"
+#include "palpate/kernel/core/cloud.hpp"
 
 namespace palpate::bench {
 

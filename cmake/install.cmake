@@ -10,6 +10,13 @@ set_target_properties(palpate_all PROPERTIES EXPORT_NAME palpate)
 target_link_libraries(palpate_all INTERFACE ${rooms})
 install(TARGETS palpate_all EXPORT palpate_targets COMPONENT dev)
 
+# The kernel alone, from observations and a hand to a force.
+add_library(palpate_kernel INTERFACE)
+add_library(palpate::kernel ALIAS palpate_kernel)
+set_target_properties(palpate_kernel PROPERTIES EXPORT_NAME kernel)
+target_link_libraries(palpate_kernel INTERFACE palpate::methods palpate::cloud palpate::fixtures)
+install(TARGETS palpate_kernel EXPORT palpate_targets COMPONENT dev)
+
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/palpate)
 install(EXPORT palpate_targets NAMESPACE palpate:: COMPONENT dev DESTINATION ${package_folder})
 configure_package_config_file(cmake/palpateConfig.cmake.in palpateConfig.cmake

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include <palpate/cloud/depth_image.hpp>
+#include <palpate/kernel/cloud/depth_image.hpp>
 #include <palpate/session/session.hpp>
 
 // Sees a wall that moves 10 mm to and fro, like a chest that breathes.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 
-#include <palpate/cloud/depth_image.hpp>
-#include <palpate/methods/methods.hpp>
+#include <palpate/kernel/cloud/depth_image.hpp>
+#include <palpate/kernel/methods/methods.hpp>
 
 int main() {
   // A camera that looks at a wall one metre away: every pixel reads 1000 mm.

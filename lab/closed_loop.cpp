@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include "palpate/devices/hip_path.hpp"
-#include "palpate/devices/simulated_hand.hpp"
+#include "palpate/io/devices/hip_path.hpp"
+#include "palpate/io/devices/simulated_hand.hpp"
 
 namespace palpate::lab {
 namespace {

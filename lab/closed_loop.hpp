@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "lab/play.hpp"
-#include "palpate/devices/device_body.hpp"
-#include "palpate/devices/hip_path.hpp"
+#include "palpate/io/devices/device_body.hpp"
+#include "palpate/io/devices/hip_path.hpp"
 #include "palpate/servo/cycle.hpp"
 
 namespace palpate::lab {

@@ -25,8 +25,8 @@
 #include "lab/pipe_method.hpp"
 #include "lab/sha256.hpp"
 #include "lab/table.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/uri.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
 
 namespace palpate::lab {
 namespace {

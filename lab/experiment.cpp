@@ -7,7 +7,7 @@
 #include "lab/find_named.hpp"
 #include "lab/method.hpp"
 #include "lab/pipe_method.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
 

@@ -13,7 +13,7 @@
 #include "lab/method.hpp"
 #include "lab/plot.hpp"
 #include "lab/table.hpp"
-#include "palpate/core/parameters.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 
 namespace palpate::lab {
 

@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate::lab {
 

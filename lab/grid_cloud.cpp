@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/sources/sensor_model.hpp"
+#include "palpate/io/sources/sensor_model.hpp"
 
 namespace palpate::lab {
 namespace {

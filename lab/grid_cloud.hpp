@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "lab/experiment.hpp"
-#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 
 namespace palpate::lab {
 

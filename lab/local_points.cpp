@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 
 namespace palpate::lab {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "palpate/core/cloud.hpp"
+#include "palpate/kernel/core/cloud.hpp"
 
 #include "search/kd_tree.hpp"
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "lab/pipe_method.hpp"
-#include "palpate/methods/methods.hpp"
-#include "palpate/sources/scene.hpp"
+#include "palpate/io/sources/scene.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 
 namespace palpate::lab {
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/core/method.hpp"
+#include "palpate/kernel/core/method.hpp"
 
 namespace palpate {
 class Scene;

@@ -21,9 +21,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 extern char** environ;
 

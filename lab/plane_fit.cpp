@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "palpate/core/linear.hpp"
+#include "palpate/kernel/core/linear.hpp"
 
 namespace palpate::lab {
 

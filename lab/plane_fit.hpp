@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "lab/ticks.hpp"
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate::lab {
 

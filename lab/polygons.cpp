@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "lab/local_points.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
 namespace {

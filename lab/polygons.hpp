@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 #include <unsupported/Eigen/BVH>
 
-#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 
 namespace palpate::lab {
 

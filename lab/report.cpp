@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
 namespace {

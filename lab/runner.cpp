@@ -15,7 +15,7 @@
 #include <thread>
 #include <vector>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #ifdef PALPATE_MPI
 // The C++ bindings that some MPIs still have don't compile without warnings.

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
 namespace {

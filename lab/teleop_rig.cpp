@@ -5,10 +5,10 @@
 #include <cmath>
 #include <utility>
 
-#include "palpate/core/error.hpp"
-#include "palpate/devices/simulated_hand.hpp"
+#include "palpate/io/devices/simulated_hand.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/net/teleop/robot_step.hpp"
 #include "palpate/servo/cycle.hpp"
-#include "palpate/teleop/robot_step.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -13,12 +13,12 @@
 #include <vector>
 
 #include "lab/method.hpp"
-#include "palpate/core/cloud.hpp"
-#include "palpate/core/parameters.hpp"
-#include "palpate/devices/device_body.hpp"
-#include "palpate/devices/hip_path.hpp"
-#include "palpate/teleop/set_point.hpp"
-#include "palpate/teleop/simulated_tool.hpp"
+#include "palpate/io/devices/device_body.hpp"
+#include "palpate/io/devices/hip_path.hpp"
+#include "palpate/kernel/core/cloud.hpp"
+#include "palpate/kernel/core/parameters.hpp"
+#include "palpate/net/teleop/set_point.hpp"
+#include "palpate/net/teleop/simulated_tool.hpp"
 
 namespace palpate::lab {
 

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "palpate/core/parameters.hpp"
-#include "palpate/core/tick.hpp"
+#include "palpate/kernel/core/parameters.hpp"
+#include "palpate/kernel/core/tick.hpp"
 
 namespace palpate::lab {
 

@@ -14,8 +14,8 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include "palpate/core/parameters.hpp"
-#include "palpate/core/tick.hpp"
+#include "palpate/kernel/core/parameters.hpp"
+#include "palpate/kernel/core/tick.hpp"
 #include "palpate/servo/cycle.hpp"
 
 namespace palpate::python {

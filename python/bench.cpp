@@ -14,7 +14,7 @@
 #include "lab/entry.hpp"
 #include "lab/experiment.hpp"
 #include "lab/runner.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "python/arrays.hpp"
 #include "python/python_method.hpp"

@@ -6,12 +6,12 @@
 #include <utility>
 #include <variant>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/io/sources/material_file.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/servo/safety.hpp"
-#include "palpate/sources/material_file.hpp"
 
 #include "python/arrays.hpp"
 #include "python/materials.hpp"

@@ -4,8 +4,8 @@
 #include <memory>
 #include <optional>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/material_map.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/material_map.hpp"
 
 #include "python/arrays.hpp"
 

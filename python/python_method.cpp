@@ -3,8 +3,8 @@
 
 #include <utility>
 
-#include "palpate/core/error.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 
 namespace palpate::python {
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <optional>
 
-#include "palpate/core/method.hpp"
+#include "palpate/kernel/core/method.hpp"
 
 #include "python/arrays.hpp"
 

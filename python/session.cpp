@@ -9,9 +9,9 @@
 #include <thread>
 #include <utility>
 
-#include "palpate/cloud/proposed_touch.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/sources/fixture_file.hpp"
+#include "palpate/io/sources/fixture_file.hpp"
+#include "palpate/kernel/cloud/proposed_touch.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "python/arrays.hpp"
 #include "python/materials.hpp"

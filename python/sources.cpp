@@ -4,14 +4,14 @@
 #include <string>
 #include <utility>
 
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/sensor.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/sensor.hpp"
 #include "palpate/record/session_reader.hpp"
 #include "palpate/session/frame_sequence.hpp"
 #include "palpate/session/press.hpp"
-#include "palpate/sources/source.hpp"
 
 #include "python/arrays.hpp"
 #include "python/python_method.hpp"

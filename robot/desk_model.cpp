@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/core/pose.hpp"
+#include "palpate/kernel/core/pose.hpp"
 
 #include "robot/models.hpp"
 

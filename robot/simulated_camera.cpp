@@ -7,7 +7,7 @@
 #include <limits>
 #include <variant>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::robot {

@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "palpate/sources/sensor_model.hpp"
-#include "palpate/sources/source.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
-#include "palpate/teleop/behind_arm.hpp"
+#include "palpate/io/sources/sensor_model.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/net/teleop/behind_arm.hpp"
 
 #include "robot/simulation.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "robot/simulated_camera.hpp"
 

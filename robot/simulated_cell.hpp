@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <memory>
 
-#include "palpate/core/uri.hpp"
-#include "palpate/sources/source.hpp"
-#include "palpate/teleop/robot.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/core/uri.hpp"
+#include "palpate/net/teleop/robot.hpp"
 
 #include "robot/simulation.hpp"
 

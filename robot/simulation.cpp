@@ -12,8 +12,8 @@
 #include <Eigen/Eigenvalues>
 #include <mujoco/mujoco.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/pose.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/pose.hpp"
 #include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/periodic_thread.hpp"
 #include "palpate/servo/realtime.hpp"

@@ -10,8 +10,8 @@
 
 #include <Eigen/Geometry>
 
-#include "palpate/sources/shapes.hpp"
-#include "palpate/teleop/robot.hpp"
+#include "palpate/io/sources/shapes.hpp"
+#include "palpate/net/teleop/robot.hpp"
 
 namespace palpate::robot {
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate {
 

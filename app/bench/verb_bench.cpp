@@ -15,10 +15,10 @@
 #include "app/options.hpp"
 #include "app/progress.hpp"
 #include "app/verbs.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/vectorise.hpp"
-#include "palpate/methods/methods.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/vectorise.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 
 #include "bench/costs.hpp"
 

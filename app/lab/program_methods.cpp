@@ -2,7 +2,7 @@
 #include "app/program_methods.hpp"
 
 #include "lab/method.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
 
 namespace palpate::app {
 

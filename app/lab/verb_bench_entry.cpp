@@ -18,7 +18,7 @@
 #include "app/verbs.hpp"
 #include "lab/entry.hpp"
 #include "lab/runner.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::app {
 namespace {

@@ -16,7 +16,7 @@
 #include "lab/method.hpp"
 #include "lab/report.hpp"
 #include "lab/runner.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::app {
 namespace {

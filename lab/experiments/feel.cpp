@@ -10,8 +10,8 @@
 #include "lab/aim_table.hpp"
 #include "lab/experiments/experiments.hpp"
 #include "lab/experiments/feel_scenes.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate::lab {
 namespace {

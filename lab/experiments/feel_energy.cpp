@@ -10,8 +10,8 @@
 
 #include "lab/closed_loop.hpp"
 #include "lab/experiments/feel_scenes.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/servo/passivity_observer.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
 
 namespace palpate::lab {
 namespace {

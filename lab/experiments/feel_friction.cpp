@@ -7,7 +7,7 @@
 
 #include "lab/closed_loop.hpp"
 #include "lab/experiments/feel_scenes.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
 
 namespace palpate::lab {
 namespace {

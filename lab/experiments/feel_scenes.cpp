@@ -12,7 +12,7 @@
 
 #include "lab/closed_loop.hpp"
 #include "lab/signal.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
 
 namespace palpate::lab {
 namespace {

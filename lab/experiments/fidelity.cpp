@@ -17,9 +17,9 @@
 #include "lab/play.hpp"
 #include "lab/signal.hpp"
 #include "lab/sine_push.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -11,7 +11,7 @@
 #include "lab/field/field_cases.hpp"
 #include "lab/field/field_judge.hpp"
 #include "lab/method.hpp"
-#include "palpate/core/sensor.hpp"
+#include "palpate/kernel/core/sensor.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -12,7 +12,7 @@
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
-#include "palpate/core/linear.hpp"
+#include "palpate/kernel/core/linear.hpp"
 
 namespace palpate::lab {
 namespace {

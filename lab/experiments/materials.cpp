@@ -8,11 +8,11 @@
 #include "lab/experiments/experiments.hpp"
 #include "lab/signal.hpp"
 #include "lab/table.hpp"
-#include "palpate/cloud/material_map.hpp"
-#include "palpate/devices/hip_path.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/io/devices/hip_path.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/material_map.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
-#include "palpate/sources/source.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "lab/experiment.hpp"
-#include "palpate/core/tick.hpp"
+#include "palpate/kernel/core/tick.hpp"
 
 namespace palpate::lab {
 

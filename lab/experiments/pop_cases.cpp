@@ -14,9 +14,9 @@
 
 #include "lab/find_named.hpp"
 #include "lab/grid_cloud.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/uri.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -19,10 +19,10 @@
 #include "lab/play.hpp"
 #include "lab/sha256.hpp"
 #include "lab/signal.hpp"
-#include "palpate/cloud/audit.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/linear.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/audit.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/linear.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -10,12 +10,12 @@
 
 #include "lab/experiments/experiments.hpp"
 #include "lab/method.hpp"
-#include "palpate/cloud/audit.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/paper/paper.hpp"
-#include "palpate/sources/source.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/cloud/audit.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/paper/paper.hpp"
 
 namespace palpate::lab {
 namespace {

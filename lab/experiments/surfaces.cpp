@@ -9,7 +9,7 @@
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
-#include "palpate/sources/scene.hpp"
+#include "palpate/io/sources/scene.hpp"
 
 namespace palpate::lab {
 namespace {

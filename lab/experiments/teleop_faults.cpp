@@ -12,9 +12,9 @@
 #include "lab/experiments/experiments.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/experiments/pop_cases.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -11,8 +11,8 @@
 #include <fmt/format.h>
 
 #include "lab/find_named.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/uri.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
 
 namespace palpate::lab::field {
 namespace {

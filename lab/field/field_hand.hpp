@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate::lab::field {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "lab/field/field_cases.hpp"
-#include "palpate/core/method.hpp"
+#include "palpate/kernel/core/method.hpp"
 
 namespace palpate::lab::field {
 

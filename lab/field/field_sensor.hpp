@@ -7,7 +7,7 @@
 
 #include "lab/field/chance.hpp"
 #include "lab/field/field_scene.hpp"
-#include "palpate/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 
 namespace palpate::lab::field {
 

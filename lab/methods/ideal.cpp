@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "lab/method.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/hand_velocity.hpp"
-#include "palpate/paper/coupling.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/hand_velocity.hpp"
+#include "palpate/kernel/paper/coupling.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -12,8 +12,8 @@
 
 #include "lab/method.hpp"
 #include "lab/ticks.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/core/linear.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/core/linear.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -9,10 +9,10 @@
 #include <tuple>
 #include <utility>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
 #include "palpate/drivers/cyclone_api.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::dds {

@@ -12,9 +12,9 @@
 #include <string_view>
 #include <vector>
 
-#include "palpate/bag/c_sample.hpp"
-#include "palpate/bag/messages.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/io/bag/c_sample.hpp"
+#include "palpate/io/bag/messages.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 // ROS 2's topics without ROS: by Eclipse Cyclone DDS's library, which is loaded when it is asked
 // for. Topics and types have the names that ROS gives them: /camera/depth/image_raw,

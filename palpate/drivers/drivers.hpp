@@ -10,10 +10,10 @@
 #include <string_view>
 #include <vector>
 
-#include "palpate/core/registry.hpp"
-#include "palpate/core/uri.hpp"
-#include "palpate/devices/devices.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/devices/devices.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/core/registry.hpp"
+#include "palpate/kernel/core/uri.hpp"
 
 namespace palpate {
 

@@ -11,12 +11,12 @@
 
 #include <sys/utsname.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
-#include "palpate/devices/device_body.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/io/devices/device_body.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {

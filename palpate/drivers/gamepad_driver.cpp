@@ -7,11 +7,11 @@
 #include <thread>
 #include <utility>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/rate_hand.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
 namespace gamepad {

@@ -16,11 +16,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
 #include "palpate/drivers/channel_hand.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/web_socket.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
 namespace haply {

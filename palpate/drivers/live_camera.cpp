@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {

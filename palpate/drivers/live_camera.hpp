@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
 
 namespace palpate {
 

@@ -9,11 +9,11 @@
 #include <string_view>
 #include <utility>
 
-#include "palpate/core/error.hpp"
-#include "palpate/devices/device_body.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/reopener.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/io/devices/device_body.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace open_haptics {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <thread>
 
-#include "palpate/core/uri.hpp"
+#include "palpate/kernel/core/uri.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/mailbox.hpp"
 

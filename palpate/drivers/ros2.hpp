@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "palpate/core/uri.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/core/uri.hpp"
 #include "palpate/servo/device.hpp"
-#include "palpate/sources/source.hpp"
 
 namespace palpate {
 

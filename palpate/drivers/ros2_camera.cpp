@@ -10,20 +10,20 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/organised.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/link_estimates.hpp"
 #include "palpate/drivers/live_camera.hpp"
 #include "palpate/drivers/ros2.hpp"
 #include "palpate/drivers/ros2_publisher.hpp"
+#include "palpate/io/sources/depth_rvl.hpp"
+#include "palpate/io/sources/ros_frames.hpp"
+#include "palpate/io/sources/transforms.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/organised.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 #include "palpate/servo/realtime.hpp"
-#include "palpate/sources/depth_rvl.hpp"
-#include "palpate/sources/ros_frames.hpp"
-#include "palpate/sources/transforms.hpp"
 
 namespace palpate {
 namespace ros2 {

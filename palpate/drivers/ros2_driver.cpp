@@ -12,14 +12,14 @@
 #include <thread>
 #include <utility>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
 #include "palpate/drivers/channel_hand.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/ros2.hpp"
+#include "palpate/io/sources/ros_frames.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 #include "palpate/servo/realtime.hpp"
-#include "palpate/sources/ros_frames.hpp"
 
 namespace palpate {
 namespace ros2 {

@@ -10,14 +10,14 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/core/error.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/link_estimates.hpp"
+#include "palpate/io/sources/depth_png.hpp"
+#include "palpate/io/sources/depth_rvl.hpp"
+#include "palpate/io/sources/ros_frames.hpp"
+#include "palpate/io/sources/transforms.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
-#include "palpate/sources/depth_png.hpp"
-#include "palpate/sources/depth_rvl.hpp"
-#include "palpate/sources/ros_frames.hpp"
-#include "palpate/sources/transforms.hpp"
 
 namespace palpate {
 namespace {

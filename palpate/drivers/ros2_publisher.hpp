@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/sources/ros_frames.hpp"
+#include "palpate/io/sources/ros_frames.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 
 namespace palpate {
 

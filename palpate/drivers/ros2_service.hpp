@@ -11,8 +11,8 @@
 #include <string_view>
 #include <utility>
 
-#include "palpate/bag/node_messages.hpp"
 #include "palpate/drivers/dds.hpp"
+#include "palpate/io/bag/node_messages.hpp"
 
 namespace palpate::dds {
 

@@ -7,8 +7,8 @@
 #include <dlfcn.h>
 #include <link.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/text.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
 namespace {

@@ -5,10 +5,10 @@
 
 #include <poll.h>
 
-#include "palpate/core/error.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/rate_hand.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace spacenav {

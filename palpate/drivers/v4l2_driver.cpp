@@ -19,11 +19,11 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/core/error.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"
-#include "palpate/sources/intrinsics_file.hpp"
+#include "palpate/io/sources/intrinsics_file.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::v4l2 {
 namespace {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate {
 

@@ -6,7 +6,7 @@
 #include <exception>
 #include <utility>
 
-#include "palpate/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/free_side.hpp"
 
 namespace palpate {

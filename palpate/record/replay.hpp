@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/record/session_reader.hpp"
 
 namespace palpate {

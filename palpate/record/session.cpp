@@ -8,8 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "palpate/core/error.hpp"
-#include "palpate/sources/fixture_file.hpp"
+#include "palpate/io/sources/fixture_file.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <string>
 
-#include "palpate/bag/messages.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/io/bag/messages.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/bag/bag_reader.hpp"
+#include "palpate/io/bag/bag_reader.hpp"
+#include "palpate/io/sources/bag_camera.hpp"
 #include "palpate/record/session.hpp"
-#include "palpate/sources/bag_camera.hpp"
 
 namespace palpate {
 

@@ -5,15 +5,15 @@
 #include <cmath>
 #include <cstring>
 
-#include "palpate/bag/messages.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/io/bag/messages.hpp"
+#include "palpate/io/sources/bag_camera.hpp"
+#include "palpate/io/sources/depth_png.hpp"
+#include "palpate/io/sources/depth_rvl.hpp"
+#include "palpate/io/sources/material_file.hpp"
+#include "palpate/io/sources/ros_frames.hpp"
+#include "palpate/io/sources/transforms.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
-#include "palpate/sources/bag_camera.hpp"
-#include "palpate/sources/depth_png.hpp"
-#include "palpate/sources/depth_rvl.hpp"
-#include "palpate/sources/material_file.hpp"
-#include "palpate/sources/ros_frames.hpp"
-#include "palpate/sources/transforms.hpp"
 
 namespace palpate {
 namespace {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "palpate/bag/bag_writer.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/io/bag/bag_writer.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/record/session.hpp"
 
 namespace palpate {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/free_side.hpp"
 
 namespace palpate {

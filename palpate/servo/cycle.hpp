@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "palpate/core/method.hpp"
-#include "palpate/fixtures/fixture_stage.hpp"
+#include "palpate/kernel/core/method.hpp"
+#include "palpate/kernel/fixtures/fixture_stage.hpp"
 #include "palpate/servo/cycle_state.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/freshness.hpp"

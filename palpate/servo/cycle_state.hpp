@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/patch.hpp"
 #include "palpate/servo/freshness.hpp"
 
 namespace palpate {

@@ -9,7 +9,7 @@
 
 #include <Eigen/Geometry>
 
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 
 #include <array>
 
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/servo/force_watchdog.hpp"
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 

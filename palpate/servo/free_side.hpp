@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "palpate/core/cloud.hpp"
+#include "palpate/kernel/core/cloud.hpp"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "palpate/core/tick.hpp"
+#include "palpate/kernel/core/tick.hpp"
 
 namespace palpate {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "palpate/core/parameters.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 #include "palpate/servo/workspace.hpp"
 
 namespace palpate {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {

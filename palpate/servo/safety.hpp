@@ -7,8 +7,8 @@
 #include <span>
 #include <string_view>
 
-#include "palpate/core/parameters.hpp"
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/parameters.hpp"
+#include "palpate/kernel/core/patch.hpp"
 #include "palpate/servo/correction_tank.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/energy_monitor.hpp"

@@ -11,7 +11,7 @@
 
 #include <pthread.h>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {

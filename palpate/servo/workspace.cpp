@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/pose.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/pose.hpp"
 
 namespace palpate {
 

@@ -10,8 +10,8 @@
 #include <limits>
 #include <utility>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {

@@ -12,8 +12,8 @@
 #include <thread>
 
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/io/sources/source.hpp"
 #include "palpate/session/stamp_placer.hpp"
-#include "palpate/sources/source.hpp"
 
 namespace palpate {
 

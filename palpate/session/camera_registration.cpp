@@ -12,7 +12,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 
-#include "palpate/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 
 namespace palpate {
 

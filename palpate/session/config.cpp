@@ -9,11 +9,11 @@
 #include <span>
 #include <sstream>
 
-#include "palpate/cloud/proposed_touch.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/pose.hpp"
-#include "palpate/core/text.hpp"
-#include "palpate/sources/toml_table.hpp"
+#include "palpate/io/sources/toml_table.hpp"
+#include "palpate/kernel/cloud/proposed_touch.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/pose.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "palpate/core/error.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/session/camera_feed.hpp"
 
 namespace palpate {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "palpate/core/method.hpp"
-#include "palpate/devices/hip_path.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/devices/hip_path.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/core/method.hpp"
 
 namespace palpate {
 

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/session/press.hpp"
 
 namespace palpate {

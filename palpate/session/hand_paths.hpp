@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/devices/hip_path.hpp"
+#include "palpate/io/devices/hip_path.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 
 namespace palpate {
 

@@ -8,7 +8,7 @@
 #include <ctime>
 #include <utility>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/tick.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/tick.hpp"
 
 namespace palpate {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "palpate/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 
 namespace palpate {
 

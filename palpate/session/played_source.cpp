@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {

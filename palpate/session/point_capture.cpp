@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "palpate/cloud/proposed_touch.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/pose.hpp"
+#include "palpate/kernel/cloud/proposed_touch.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/pose.hpp"
 
 namespace palpate {
 namespace {

@@ -10,9 +10,9 @@
 
 #include <Eigen/Core>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/proposed_view.hpp"
-#include "palpate/core/tick.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/proposed_view.hpp"
+#include "palpate/kernel/core/tick.hpp"
 #include "palpate/session/frame_sequence.hpp"
 
 namespace palpate {

@@ -9,9 +9,9 @@
 
 #include <Eigen/SVD>
 
-#include "palpate/core/csv.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/pose.hpp"
+#include "palpate/kernel/core/csv.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/pose.hpp"
 
 namespace palpate {
 namespace {

@@ -16,19 +16,19 @@
 #include <thread>
 #include <utility>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/cloud/proposed_touch.hpp"
-#include "palpate/cloud/proposed_view.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/core/sensor.hpp"
-#include "palpate/core/uri.hpp"
-#include "palpate/devices/mouse_device.hpp"
+#include "palpate/io/devices/mouse_device.hpp"
+#include "palpate/io/sources/fixture_file.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/cloud/proposed_touch.hpp"
+#include "palpate/kernel/cloud/proposed_view.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/sensor.hpp"
+#include "palpate/kernel/core/uri.hpp"
 #include "palpate/session/hand_paths.hpp"
 #include "palpate/session/played_source.hpp"
 #include "palpate/session/session_hand.hpp"
-#include "palpate/sources/fixture_file.hpp"
-#include "palpate/sources/source.hpp"
 
 namespace palpate {
 namespace {

@@ -9,16 +9,16 @@
 #include <string>
 #include <vector>
 
-#include "palpate/cloud/depth_image.hpp"
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/record/recorder.hpp"
 #include "palpate/servo/servo_loop.hpp"
 #include "palpate/session/camera_feed.hpp"
 #include "palpate/session/paint.hpp"
 #include "palpate/session/session_spec.hpp"
 #include "palpate/session/summary.hpp"
-#include "palpate/sources/source.hpp"
 
 namespace palpate {
 

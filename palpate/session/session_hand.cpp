@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/devices/mouse_device.hpp"
+#include "palpate/io/devices/mouse_device.hpp"
 #include "palpate/servo/linked_device.hpp"
 
 namespace palpate {

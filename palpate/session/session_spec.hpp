@@ -7,7 +7,7 @@
 
 #include <Eigen/Geometry>
 
-#include "palpate/core/parameters.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 #include "palpate/servo/safety.hpp"
 #include "palpate/servo/workspace.hpp"
 

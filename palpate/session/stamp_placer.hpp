@@ -7,7 +7,7 @@
 #include <deque>
 #include <string_view>
 
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "palpate/cloud/audit.hpp"
+#include "palpate/kernel/cloud/audit.hpp"
 
 namespace palpate {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "palpate/core/cloud.hpp"
+#include "palpate/kernel/core/cloud.hpp"
 #include "palpate/servo/cycle.hpp"
 
 namespace palpate {

@@ -47,6 +47,9 @@ KNOWS["app/lab"] = KNOWS["app"] | {"app", "lab"}
 KNOWS["app/robot"] = KNOWS["app"] | {"app", "robot"}
 KNOWS["app/bench"] = KNOWS["app"] | {"app", "bench"}
 
+# Folders of palpate/ that hold rooms.
+GROUPS = {"kernel", "io", "net"}
+
 # Methods are pure: neither threads nor clocks nor files, and no library but Eigen.
 PURE = {"core", "paper", "sight", "feel", "methods", "fixtures"}
 CORE_ALLOWS = re.compile(r"Eigen/|[a-z_]+$")
@@ -59,7 +62,7 @@ CORE_FORBIDS = {
 # The field set judges what was made with the lab's own scenes and sensors, so it must not reach
 # their code, not even by a header of another room (docs/field.md).
 FIELD = re.compile(r"^lab/(field/.*|experiments/field)\.[ch]pp$")
-NOT_FIELD = re.compile(r"^(palpate/sources/|lab/experiments/(?!experiments\.)|lab/grid_cloud\.)")
+NOT_FIELD = re.compile(r"^(palpate/io/sources/|lab/experiments/(?!experiments\.)|lab/grid_cloud\.)")
 
 IGNORED = re.compile(r"\.git$|\.cache$|build|out$|node_modules$|__pycache__$|dist$")
 CODE = re.compile(r"\.(cpp|hpp|py|ts|js|cmake|in|sh)$|CMakeLists\.txt$"
@@ -110,7 +113,9 @@ def room_of(path):
         return "/".join(parts[:2])
     if len(parts) > 1 and parts[0] in ("search", "lab", "bench", "robot", "app", "python"):
         return parts[0]
-    return parts[1] if len(parts) > 2 and parts[0] == "palpate" else None
+    if parts[0] != "palpate" or len(parts) < 3:
+        return None
+    return parts[2] if parts[1] in GROUPS and len(parts) > 3 else parts[1]
 
 
 def check_rooms(root):

@@ -31,58 +31,60 @@ class Tree(unittest.TestCase):
 
 class Rooms(Tree):
     def test_an_arrow_down_is_fine(self):
-        self.include("palpate/cloud/a.hpp", '"palpate/core/patch.hpp"')
-        self.include("palpate/sources/a.cpp", "<palpate/core/patch.hpp>")
-        self.include("palpate/sources/b.cpp", '"palpate/sources/b.hpp"')
-        self.include("app/main.cpp", '"palpate/viewer/server.hpp"')
-        self.write("palpate/cloud/CMakeLists.txt", "palpate_room(cloud LINKS palpate::core)\n")
+        self.include("palpate/kernel/cloud/a.hpp", '"palpate/kernel/core/patch.hpp"')
+        self.include("palpate/io/sources/a.cpp", "<palpate/kernel/core/patch.hpp>")
+        self.include("palpate/io/sources/b.cpp", '"palpate/io/sources/b.hpp"')
+        self.include("app/main.cpp", '"palpate/net/viewer/server.hpp"')
+        self.write("palpate/kernel/cloud/CMakeLists.txt",
+                   "palpate_room(cloud LINKS palpate::core)\n")
         self.assertEqual(check.check_rooms(self.root), [])
 
     def test_an_arrow_up_is_found(self):
-        self.include("palpate/core/a.cpp", '"palpate/cloud/depth_image.hpp"')
+        self.include("palpate/kernel/core/a.cpp", '"palpate/kernel/cloud/depth_image.hpp"')
         self.assertEqual(check.check_rooms(self.root),
-                         ["palpate/core/a.cpp:2: core must not know cloud"])
+                         ["palpate/kernel/core/a.cpp:2: core must not know cloud"])
 
     def test_an_arrow_sideways_is_found(self):
-        self.include("palpate/servo/a.hpp", "<palpate/cloud/frame.hpp>")
+        self.include("palpate/servo/a.hpp", "<palpate/kernel/cloud/frame.hpp>")
         self.assertEqual(check.check_rooms(self.root),
                          ["palpate/servo/a.hpp:2: servo must not know cloud"])
 
     def test_the_library_does_not_know_the_program(self):
-        self.include("palpate/sources/a.cpp", '"app/options.hpp"')
-        self.include("palpate/cloud/a.cpp", '"lab/metrics.hpp"')
+        self.include("palpate/io/sources/a.cpp", '"app/options.hpp"')
+        self.include("palpate/kernel/cloud/a.cpp", '"lab/metrics.hpp"')
         self.assertEqual(check.check_rooms(self.root),
-                         ["palpate/cloud/a.cpp:2: cloud must not know lab",
-                          "palpate/sources/a.cpp:2: sources must not know app"])
+                         ["palpate/io/sources/a.cpp:2: sources must not know app",
+                          "palpate/kernel/cloud/a.cpp:2: cloud must not know lab"])
 
     def test_a_link_up_is_found(self):
-        self.write("palpate/core/CMakeLists.txt", "palpate_room(core LINKS palpate::sources)\n")
+        self.write("palpate/kernel/core/CMakeLists.txt",
+                   "palpate_room(core LINKS palpate::sources)\n")
         self.assertEqual(check.check_rooms(self.root),
-                         ["palpate/core/CMakeLists.txt:1: core must not know sources"])
+                         ["palpate/kernel/core/CMakeLists.txt:1: core must not know sources"])
 
     def test_core_is_pure(self):
-        self.include("palpate/core/a.cpp", "<Eigen/Core>")
-        self.include("palpate/core/b.cpp", "<cmath>")
-        self.include("palpate/core/c.cpp", "<thread>")
-        self.include("palpate/core/d.cpp", "<nlohmann/json.hpp>")
+        self.include("palpate/kernel/core/a.cpp", "<Eigen/Core>")
+        self.include("palpate/kernel/core/b.cpp", "<cmath>")
+        self.include("palpate/kernel/core/c.cpp", "<thread>")
+        self.include("palpate/kernel/core/d.cpp", "<nlohmann/json.hpp>")
         self.assertEqual([fault.split(",")[0] for fault in check.check_rooms(self.root)],
-                         ["palpate/core/c.cpp:2: core includes thread",
-                          "palpate/core/d.cpp:2: core includes nlohmann/json.hpp"])
+                         ["palpate/kernel/core/c.cpp:2: core includes thread",
+                          "palpate/kernel/core/d.cpp:2: core includes nlohmann/json.hpp"])
 
     def test_the_field_set_stays_apart_from_what_it_judges(self):
-        self.include("lab/field/a.cpp", '"palpate/cloud/frame.hpp"')
-        self.include("lab/field/b.cpp", '"palpate/sources/shapes.hpp"')
+        self.include("lab/field/a.cpp", '"palpate/kernel/cloud/frame.hpp"')
+        self.include("lab/field/b.cpp", '"palpate/io/sources/shapes.hpp"')
         self.include("lab/field/c.cpp", '"lab/method.hpp"')
-        self.include("lab/method.hpp", '"palpate/sources/scene.hpp"')
+        self.include("lab/method.hpp", '"palpate/io/sources/scene.hpp"')
         self.include("lab/experiments/field.cpp", '"lab/experiments/pop_cases.hpp"')
-        self.include("lab/experiments/pop.cpp", '"palpate/sources/scene.hpp"')
+        self.include("lab/experiments/pop.cpp", '"palpate/io/sources/scene.hpp"')
         self.assertEqual(check.check_rooms(self.root),
                          ["lab/experiments/field.cpp:2: the field set must not reach"
                           " lab/experiments/pop_cases.hpp",
                           "lab/field/b.cpp:2: the field set must not reach"
-                          " palpate/sources/shapes.hpp",
+                          " palpate/io/sources/shapes.hpp",
                           "lab/field/c.cpp:2: the field set must not reach"
-                          " palpate/sources/scene.hpp"])
+                          " palpate/io/sources/scene.hpp"])
 
     def test_a_room_nobody_planned_is_found(self):
         self.include("palpate/kitchen/a.cpp", "<cmath>")
@@ -101,7 +103,7 @@ class Text(Tree):
                           "docs/a.md:1: 'lets\ngo': write 'releases'"])
 
     def test_a_clean_tree_is_fine(self):
-        self.write("palpate/core/a.cpp", SPDX + "x" * check.COLUMNS + "\n")
+        self.write("palpate/kernel/core/a.cpp", SPDX + "x" * check.COLUMNS + "\n")
         self.write("docs/a.md", "# Some `title` here\n[b](b.md#part-2-more) [c](#some-title-here)"
                                 " [d](https://example.org)\n```\n[no](link.md)\n```\n")
         self.write("docs/b.md", "## Part 2: more\n")

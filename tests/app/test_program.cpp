@@ -21,9 +21,9 @@
 
 #include "app/opened_scenes.hpp"
 #include "app/reach.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/core/pose.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/core/pose.hpp"
 
 #include "tests/app/program.hpp"
 #include "tests/support/depth_pngs.hpp"

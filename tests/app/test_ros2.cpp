@@ -11,8 +11,8 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
-#include "palpate/bag/node_messages.hpp"
 #include "palpate/drivers/dds.hpp"
+#include "palpate/io/bag/node_messages.hpp"
 #include "palpate/servo/realtime.hpp"
 
 #include "tests/app/program.hpp"

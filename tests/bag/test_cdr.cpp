@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/bag/cdr.hpp"
-#include "palpate/bag/messages.hpp"
+#include "palpate/io/bag/cdr.hpp"
+#include "palpate/io/bag/messages.hpp"
 
 #include "tests/support/errors.hpp"
 

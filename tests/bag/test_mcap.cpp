@@ -9,9 +9,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "palpate/bag/bag_reader.hpp"
-#include "palpate/bag/compression.hpp"
-#include "palpate/bag/messages.hpp"
+#include "palpate/io/bag/bag_reader.hpp"
+#include "palpate/io/bag/compression.hpp"
+#include "palpate/io/bag/messages.hpp"
 
 #include "tests/support/bag_contents.hpp"
 #include "tests/support/data.hpp"

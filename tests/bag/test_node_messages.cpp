@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/bag/node_messages.hpp"
+#include "palpate/io/bag/node_messages.hpp"
 
 namespace palpate::ros {
 namespace test_node_messages {

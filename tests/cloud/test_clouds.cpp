@@ -12,10 +12,10 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/paper/paper.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/paper/paper.hpp"
 
 #include "tests/support/sanitized.hpp"
 

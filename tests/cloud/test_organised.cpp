@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/organised.hpp"
+#include "palpate/kernel/cloud/organised.hpp"
 namespace palpate {
 namespace test_organised {
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/pixel_probe.hpp"
+#include "palpate/kernel/cloud/pixel_probe.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/proposed_touch.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/proposed_touch.hpp"
 
 namespace palpate {
 namespace test_proposed_touch {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/pose.hpp"
+#include "palpate/kernel/core/pose.hpp"
 
 #include "tests/support/errors.hpp"
 

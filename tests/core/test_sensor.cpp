@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/sensor.hpp"
+#include "palpate/kernel/core/sensor.hpp"
 
 namespace palpate {
 namespace test_sensor {

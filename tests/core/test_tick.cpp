@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/registry.hpp"
-#include "palpate/core/tick.hpp"
+#include "palpate/kernel/core/registry.hpp"
+#include "palpate/kernel/core/tick.hpp"
 
 #include "tests/support/errors.hpp"
 

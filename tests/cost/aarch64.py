@@ -11,9 +11,10 @@ import subprocess
 import sys
 
 # What a tick runs through.
-SOURCES = ["palpate/core/patch_loops.cpp", "palpate/core/patch.cpp", "palpate/paper/proxy.cpp",
-           "palpate/paper/paper.cpp", "palpate/cloud/depth_image.cpp",
-           "palpate/cloud/point_cloud.cpp"]
+SOURCES = ["palpate/kernel/core/patch_loops.cpp", "palpate/kernel/core/patch.cpp",
+           "palpate/kernel/paper/proxy.cpp", "palpate/kernel/paper/paper.cpp",
+           "palpate/kernel/cloud/depth_image.cpp",
+           "palpate/kernel/cloud/point_cloud.cpp"]
 COMPILER = "aarch64-linux-gnu-g++"
 FLAGS = ["-std=c++20", "-O3", "-fopenmp-simd", "-fno-math-errno", "-fno-trapping-math", "-Wall",
          "-Wextra", "-Wno-restrict", "-Werror"]

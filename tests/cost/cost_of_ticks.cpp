@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "palpate/paper/paper.hpp"
+#include "palpate/kernel/paper/paper.hpp"
 
 #include "bench/subject.hpp"
 

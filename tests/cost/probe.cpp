@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/paper/proxy.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/paper/proxy.hpp"
 
 namespace palpate {
 

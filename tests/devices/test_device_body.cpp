@@ -11,10 +11,10 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/devices/devices.hpp"
-#include "palpate/devices/simulated_hand.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/io/devices/devices.hpp"
+#include "palpate/io/devices/simulated_hand.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
 
 #include "tests/support/errors.hpp"

@@ -12,8 +12,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/devices/device_guard.hpp"
+#include "palpate/io/devices/device_guard.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/devices/device_probe.hpp"
-#include "palpate/devices/devices.hpp"
-#include "palpate/devices/sampled_wall.hpp"
+#include "palpate/io/devices/device_probe.hpp"
+#include "palpate/io/devices/devices.hpp"
+#include "palpate/io/devices/sampled_wall.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -12,12 +12,12 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/devices/devices.hpp"
-#include "palpate/devices/hip_path.hpp"
-#include "palpate/devices/mouse_device.hpp"
-#include "palpate/devices/simulated_hand.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/io/devices/devices.hpp"
+#include "palpate/io/devices/hip_path.hpp"
+#include "palpate/io/devices/mouse_device.hpp"
+#include "palpate/io/devices/simulated_hand.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
 
 #include "tests/support/errors.hpp"

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/devices/hip_path.hpp"
+#include "palpate/io/devices/hip_path.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace test_hip_path {

@@ -7,9 +7,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/shared_library.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 
 #include "tests/support/environment.hpp"
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "palpate/bag/node_messages.hpp"
 #include "palpate/drivers/dds.hpp"
+#include "palpate/io/bag/node_messages.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::test {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A driver as a stranger adds one: this file, and nothing elsewhere.
-#include "palpate/devices/hip_path.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/io/devices/hip_path.hpp"
 
 namespace palpate {
 

@@ -8,9 +8,9 @@
 #include <dds/ddsrt/log.h>
 #include <gtest/gtest.h>
 
-#include "palpate/bag/node_messages.hpp"
 #include "palpate/drivers/cyclone_api.hpp"
 #include "palpate/drivers/dds.hpp"
+#include "palpate/io/bag/node_messages.hpp"
 
 #include "tests/drivers/dds_test.hpp"
 #include "tests/support/errors.hpp"

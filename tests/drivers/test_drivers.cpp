@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
 #include "palpate/drivers/drivers.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/support/environment.hpp"
 #include "tests/support/errors.hpp"

@@ -10,14 +10,14 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/ros2.hpp"
 #include "palpate/drivers/ros2_publisher.hpp"
+#include "palpate/io/sources/depth_png.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/servo/realtime.hpp"
-#include "palpate/sources/depth_png.hpp"
 
 #include "tests/drivers/dds_test.hpp"
 #include "tests/support/errors.hpp"

@@ -14,11 +14,11 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/devices/device_guard.hpp"
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/ros2.hpp"
+#include "palpate/io/devices/device_guard.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 
 #include "tests/drivers/dds_test.hpp"

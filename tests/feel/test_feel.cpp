@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/feel/feel.hpp"
-#include "palpate/methods/methods.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/feel/feel.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 
 #include "tests/support/allocations.hpp"
 

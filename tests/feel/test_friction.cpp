@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/feel/friction.hpp"
+#include "palpate/kernel/feel/friction.hpp"
 
 namespace palpate {
 namespace test_friction {

@@ -11,11 +11,11 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/material_map.hpp"
-#include "palpate/feel/feel.hpp"
-#include "palpate/methods/methods.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/material_map.hpp"
+#include "palpate/kernel/feel/feel.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 
 namespace palpate {
 namespace test_materials {

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::test {
 

@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "palpate/bag/bag_reader.hpp"
+#include "palpate/io/bag/bag_reader.hpp"
 
 #include "tests/fuzz/expect.hpp"
 #include "tests/fuzz/memory_folder.hpp"

@@ -5,9 +5,9 @@
 #include <string>
 #include <string_view>
 
-#include "palpate/core/error.hpp"
-#include "palpate/sources/depth_png.hpp"
-#include "palpate/sources/depth_rvl.hpp"
+#include "palpate/io/sources/depth_png.hpp"
+#include "palpate/io/sources/depth_rvl.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/support/depth_pngs.hpp"
 

@@ -3,7 +3,7 @@
 #include <sstream>
 #include <string>
 
-#include "palpate/devices/hip_path.hpp"
+#include "palpate/io/devices/hip_path.hpp"
 
 #include "tests/fuzz/expect.hpp"
 

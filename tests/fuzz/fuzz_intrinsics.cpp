@@ -3,8 +3,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "palpate/core/error.hpp"
-#include "palpate/sources/intrinsics_file.hpp"
+#include "palpate/io/sources/intrinsics_file.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 // Stops unless the text gives an Error of one line, or a camera that makes sense.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -2,8 +2,8 @@
 #include <span>
 #include <vector>
 
-#include "palpate/bag/messages.hpp"
-#include "palpate/bag/node_messages.hpp"
+#include "palpate/io/bag/messages.hpp"
+#include "palpate/io/bag/node_messages.hpp"
 
 #include "tests/fuzz/expect.hpp"
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <string_view>
 
-#include "palpate/core/error.hpp"
-#include "palpate/sources/point_file.hpp"
+#include "palpate/io/sources/point_file.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/support/point_file_rules.hpp"
 

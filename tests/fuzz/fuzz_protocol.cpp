@@ -3,7 +3,7 @@
 #include <span>
 #include <variant>
 
-#include "palpate/viewer/protocol.hpp"
+#include "palpate/net/viewer/protocol.hpp"
 
 #include "tests/fuzz/expect.hpp"
 

@@ -5,10 +5,10 @@
 #include <fstream>
 #include <string>
 
-#include "palpate/bag/bag_writer.hpp"
-#include "palpate/bag/messages.hpp"
+#include "palpate/io/bag/bag_writer.hpp"
+#include "palpate/io/bag/messages.hpp"
+#include "palpate/io/sources/source.hpp"
 #include "palpate/record/replay.hpp"
-#include "palpate/sources/source.hpp"
 
 #include "tests/fuzz/expect.hpp"
 #include "tests/fuzz/memory_folder.hpp"

@@ -3,8 +3,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "palpate/core/error.hpp"
-#include "palpate/sources/trajectory.hpp"
+#include "palpate/io/sources/trajectory.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace {
 

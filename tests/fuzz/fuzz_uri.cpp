@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include "palpate/core/uri.hpp"
+#include "palpate/kernel/core/uri.hpp"
 
 #include "tests/fuzz/expect.hpp"
 

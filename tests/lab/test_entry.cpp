@@ -17,8 +17,8 @@
 #include "lab/interval.hpp"
 #include "lab/pipe_method.hpp"
 #include "lab/sha256.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"

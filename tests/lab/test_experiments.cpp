@@ -14,8 +14,8 @@
 #include "lab/method.hpp"
 #include "lab/report.hpp"
 #include "lab/runner.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/lab/drawn.hpp"
 #include "tests/support/data.hpp"

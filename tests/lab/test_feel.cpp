@@ -16,9 +16,9 @@
 #include "lab/method.hpp"
 #include "lab/runner.hpp"
 #include "lab/signal.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/feel/feel.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/feel/feel.hpp"
 
 #include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"

@@ -16,7 +16,7 @@
 #include "lab/field/field_judge.hpp"
 #include "lab/method.hpp"
 #include "lab/runner.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"

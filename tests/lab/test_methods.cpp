@@ -14,8 +14,8 @@
 #include "lab/experiment.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"

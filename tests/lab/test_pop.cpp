@@ -10,7 +10,7 @@
 #include "lab/experiments/pop.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/runner.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/lab/drawn.hpp"
 #include "tests/support/temporary_folder.hpp"

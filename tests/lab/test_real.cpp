@@ -6,7 +6,7 @@
 
 #include "lab/experiment.hpp"
 #include "lab/runner.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/lab/drawn.hpp"
 #include "tests/support/data.hpp"

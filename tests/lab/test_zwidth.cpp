@@ -8,7 +8,7 @@
 
 #include "lab/experiments/zwidth.hpp"
 #include "lab/runner.hpp"
-#include "palpate/devices/sampled_wall.hpp"
+#include "palpate/io/devices/sampled_wall.hpp"
 
 #include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"

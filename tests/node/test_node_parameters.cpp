@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/parameters.hpp"
-#include "palpate/node/node_parameters.hpp"
+#include "palpate/kernel/core/parameters.hpp"
+#include "palpate/net/node/node_parameters.hpp"
 
 #include "tests/support/errors.hpp"
 

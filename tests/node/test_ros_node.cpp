@@ -14,9 +14,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/bag/node_messages.hpp"
 #include "palpate/drivers/dds.hpp"
-#include "palpate/node/ros_node.hpp"
+#include "palpate/io/bag/node_messages.hpp"
+#include "palpate/net/node/ros_node.hpp"
 #include "palpate/servo/realtime.hpp"
 
 #include "tests/drivers/dds_test.hpp"

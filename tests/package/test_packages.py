@@ -19,7 +19,7 @@ VERSION = re.search(r"project\(palpate VERSION (\S+)", (SOURCES / "CMakeLists.tx
 EXPECTED = {
     "palpate": ["usr/bin/palpate", "usr/bin/palpate-lab", "usr/share/man/man1/palpate.1.gz",
                 "usr/share/bash-completion/completions/palpate"],
-    "libpalpate-dev": ["usr/include/palpate/core/method.hpp", "libpalpate_core.a",
+    "libpalpate-dev": ["usr/include/palpate/kernel/core/method.hpp", "libpalpate_core.a",
                        "cmake/palpate/palpateConfig.cmake", "pkgconfig/palpate.pc"],
     "python3-palpate": ["usr/lib/python3/dist-packages/palpate/__init__.py", "palpate/py.typed"],
 }

@@ -11,7 +11,7 @@
 #include <span>
 #include <string>
 
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/record/recorder.hpp"
 
 #include "tests/record/sessions.hpp"

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/record/replay.hpp"
 #include "palpate/record/session_reader.hpp"
 #include "palpate/record/session_writer.hpp"

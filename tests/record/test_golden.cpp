@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/vectorise.hpp"
+#include "palpate/kernel/core/vectorise.hpp"
 #include "palpate/record/replay.hpp"
 
 #include "tests/record/loop_session.hpp"

@@ -13,10 +13,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "palpate/methods/methods.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/record/recorder.hpp"
 #include "palpate/record/replay.hpp"
-#include "palpate/sources/source.hpp"
 
 #include "tests/record/loop_session.hpp"
 #include "tests/record/sessions.hpp"

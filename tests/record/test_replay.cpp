@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/bag/messages.hpp"
+#include "palpate/io/bag/messages.hpp"
 #include "palpate/record/replay.hpp"
 
 #include "tests/record/sessions.hpp"

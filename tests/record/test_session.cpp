@@ -11,9 +11,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "palpate/io/sources/source.hpp"
 #include "palpate/record/recorded_hand.hpp"
 #include "palpate/record/replay.hpp"
-#include "palpate/sources/source.hpp"
 
 #include "tests/record/sessions.hpp"
 #include "tests/support/errors.hpp"

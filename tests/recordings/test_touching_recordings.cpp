@@ -10,11 +10,11 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/linear.hpp"
-#include "palpate/methods/methods.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/linear.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 
 #include "tests/support/data.hpp"
 

@@ -10,14 +10,14 @@
 #include <string_view>
 #include <utility>
 
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/methods/methods.hpp"
+#include "palpate/net/telelink/touched_paint.hpp"
+#include "palpate/net/teleop/approach_watch.hpp"
+#include "palpate/net/teleop/led_hand.hpp"
+#include "palpate/net/teleop/set_point.hpp"
+#include "palpate/net/teleop/touched.hpp"
 #include "palpate/servo/cycle.hpp"
 #include "palpate/session/paint.hpp"
-#include "palpate/telelink/touched_paint.hpp"
-#include "palpate/teleop/approach_watch.hpp"
-#include "palpate/teleop/led_hand.hpp"
-#include "palpate/teleop/set_point.hpp"
-#include "palpate/teleop/touched.hpp"
 
 #include "robot/simulated_cell.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"
 
 #include "robot/simulated_camera.hpp"

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "robot/models.hpp"
 #include "robot/simulation.hpp"

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/devices/hip_path.hpp"
+#include "palpate/io/devices/hip_path.hpp"
 
 #include "tests/robot/task.hpp"
 

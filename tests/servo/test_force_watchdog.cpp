@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/force_watchdog.hpp"
 
 namespace palpate {

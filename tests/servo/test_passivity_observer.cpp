@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/servo/cycle.hpp"
 #include "palpate/servo/passivity_observer.hpp"
 

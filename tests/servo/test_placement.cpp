@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
 #include "palpate/servo/placement_table.hpp"
 #include "palpate/servo/stiffness.hpp"

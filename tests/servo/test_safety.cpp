@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/safety.hpp"
 
 #include "tests/support/errors.hpp"

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
 #include "palpate/servo/weight_support.hpp"
 

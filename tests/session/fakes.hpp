@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 
 namespace palpate::test {
 

@@ -14,8 +14,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/session/camera_feed.hpp"
 
 #include "tests/session/fakes.hpp"

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/session/camera_registration.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/sanitized.hpp"

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/session/config.hpp"
 
 #include "tests/support/errors.hpp"

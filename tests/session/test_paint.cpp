@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
+#include "palpate/io/sources/material_file.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/session/paint.hpp"
-#include "palpate/sources/material_file.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -6,9 +6,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/point_cloud.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/session/played_source.hpp"
-#include "palpate/sources/source.hpp"
 
 #include "tests/session/fakes.hpp"
 #include "tests/support/errors.hpp"

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/devices/hip_path.hpp"
+#include "palpate/io/devices/hip_path.hpp"
 #include "palpate/session/point_capture.hpp"
 
 #include "tests/servo/fake_device.hpp"

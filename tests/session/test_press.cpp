@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/session/press.hpp"
 
 #include "tests/support/errors.hpp"

@@ -9,10 +9,10 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/core/error.hpp"
-#include "palpate/devices/hip_path.hpp"
-#include "palpate/devices/mouse_device.hpp"
+#include "palpate/io/devices/hip_path.hpp"
+#include "palpate/io/devices/mouse_device.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/record/replay.hpp"
 #include "palpate/session/session.hpp"
 

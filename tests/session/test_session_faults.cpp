@@ -22,9 +22,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/devices/mouse_device.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/io/devices/mouse_device.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/session/session.hpp"
 
 #include "tests/session/fakes.hpp"

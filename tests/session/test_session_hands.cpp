@@ -19,9 +19,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/devices/hip_path.hpp"
-#include "palpate/devices/mouse_device.hpp"
+#include "palpate/io/devices/hip_path.hpp"
+#include "palpate/io/devices/mouse_device.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/record/replay.hpp"
 #include "palpate/record/session_reader.hpp"
 #include "palpate/servo/linked_device.hpp"

@@ -16,8 +16,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/session/session.hpp"
 
 #include "tests/session/fakes.hpp"

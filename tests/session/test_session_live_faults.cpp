@@ -19,7 +19,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/record/session_reader.hpp"
 #include "palpate/session/session.hpp"
 

@@ -9,12 +9,12 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/sight/monitor.hpp"
-#include "palpate/sight/sight.hpp"
-#include "palpate/sight/tracker.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/sight/monitor.hpp"
+#include "palpate/kernel/sight/sight.hpp"
+#include "palpate/kernel/sight/tracker.hpp"
 
 #include "tests/support/grids.hpp"
 

@@ -12,9 +12,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/sight/sight.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/sight/sight.hpp"
 
 namespace palpate {
 namespace test_several_cameras {

@@ -12,11 +12,11 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/methods/methods.hpp"
-#include "palpate/sight/sight.hpp"
-#include "palpate/sight/tracker.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/methods/methods.hpp"
+#include "palpate/kernel/sight/sight.hpp"
+#include "palpate/kernel/sight/tracker.hpp"
 
 #include "tests/support/grids.hpp"
 

@@ -10,9 +10,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/sight/sight.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/sight/sight.hpp"
 
 #include "tests/support/allocations.hpp"
 #include "tests/support/grids.hpp"

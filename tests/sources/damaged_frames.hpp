@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::test {
 

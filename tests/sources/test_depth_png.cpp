@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/sources/depth_png.hpp"
+#include "palpate/io/sources/depth_png.hpp"
 
 #include "tests/support/depth_pngs.hpp"
 #include "tests/support/errors.hpp"

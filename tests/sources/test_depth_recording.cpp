@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/sources/depth_png.hpp"
-#include "palpate/sources/depth_recording.hpp"
+#include "palpate/io/sources/depth_png.hpp"
+#include "palpate/io/sources/depth_recording.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 
 #include "tests/support/depth_pngs.hpp"
 #include "tests/support/errors.hpp"

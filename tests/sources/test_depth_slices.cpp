@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/sources/depth_rvl.hpp"
+#include "palpate/io/sources/depth_rvl.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -8,7 +8,7 @@
 
 #include <lzf.h>
 
-#include "palpate/sources/point_file.hpp"
+#include "palpate/io/sources/point_file.hpp"
 
 #include "tests/support/data.hpp"
 #include "tests/support/errors.hpp"

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <type_traits>
 
-#include "palpate/sources/point_file.hpp"
+#include "palpate/io/sources/point_file.hpp"
 
 #include "tests/support/data.hpp"
 #include "tests/support/errors.hpp"

@@ -6,12 +6,12 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/sources/files.hpp"
-#include "palpate/sources/point_file.hpp"
-#include "palpate/sources/point_file_source.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/files.hpp"
+#include "palpate/io/sources/point_file.hpp"
+#include "palpate/io/sources/point_file_source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 
 #include "tests/support/data.hpp"
 #include "tests/support/errors.hpp"

@@ -6,7 +6,7 @@
 #include <sstream>
 #include <string>
 
-#include "palpate/sources/point_file.hpp"
+#include "palpate/io/sources/point_file.hpp"
 
 #include "tests/support/data.hpp"
 #include "tests/support/errors.hpp"

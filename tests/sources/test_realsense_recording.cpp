@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/sources/realsense_lens.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/realsense_lens.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 
 #include "tests/sources/damaged_frames.hpp"
 #include "tests/support/data.hpp"

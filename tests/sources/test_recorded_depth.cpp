@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 
 #include "tests/support/data.hpp"
 

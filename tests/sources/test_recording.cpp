@@ -17,13 +17,13 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/bag/bag_reader.hpp"
-#include "palpate/bag/bag_writer.hpp"
-#include "palpate/bag/messages.hpp"
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/cloud/point_cloud.hpp"
-#include "palpate/sources/depth_png.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/bag/bag_reader.hpp"
+#include "palpate/io/bag/bag_writer.hpp"
+#include "palpate/io/bag/messages.hpp"
+#include "palpate/io/sources/depth_png.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 
 #include "tests/sources/damaged_frames.hpp"
 #include "tests/support/data.hpp"

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/sources/scene.hpp"
+#include "palpate/io/sources/scene.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/sources/sensor_model.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/sensor_model.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/sources/shapes.hpp"
+#include "palpate/io/sources/shapes.hpp"
 
 namespace palpate {
 namespace test_shapes {

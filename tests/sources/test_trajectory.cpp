@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/sources/trajectory.hpp"
+#include "palpate/io/sources/trajectory.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -4,9 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/core/uri.hpp"
-#include "palpate/sources/source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "palpate/bag/bag_reader.hpp"
+#include "palpate/io/bag/bag_reader.hpp"
 
 namespace palpate::test {
 

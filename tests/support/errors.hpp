@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 namespace palpate::test {
 

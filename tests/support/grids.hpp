@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "palpate/core/patch.hpp"
+#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate::test {
 

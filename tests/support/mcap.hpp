@@ -15,7 +15,7 @@
 #include <zlib.h>
 #include <zstd.h>
 
-#include "palpate/bag/bag_reader.hpp"
+#include "palpate/io/bag/bag_reader.hpp"
 
 namespace palpate::test {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "palpate/sources/point_file.hpp"
+#include "palpate/io/sources/point_file.hpp"
 
 namespace palpate::test {
 

@@ -14,8 +14,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/sources/point_file.hpp"
+#include "palpate/io/sources/point_file.hpp"
+#include "palpate/kernel/core/error.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/point_file_rules.hpp"

@@ -10,8 +10,8 @@
 
 #include <zstd.h>
 
-#include "palpate/bag/database.hpp"
-#include "palpate/bag/messages.hpp"
+#include "palpate/io/bag/database.hpp"
+#include "palpate/io/bag/messages.hpp"
 
 namespace palpate::test {
 

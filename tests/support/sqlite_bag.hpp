@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "palpate/bag/checksum.hpp"
-#include "palpate/bag/database.hpp"
+#include "palpate/io/bag/checksum.hpp"
+#include "palpate/io/bag/database.hpp"
 
 namespace palpate::test {
 

@@ -10,11 +10,11 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/devices/hip_path.hpp"
-#include "palpate/sources/synthetic_camera.hpp"
-#include "palpate/telelink/operator_end.hpp"
-#include "palpate/telelink/robot_end.hpp"
-#include "palpate/telelink/robots.hpp"
+#include "palpate/io/devices/hip_path.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/net/telelink/operator_end.hpp"
+#include "palpate/net/telelink/robot_end.hpp"
+#include "palpate/net/telelink/robots.hpp"
 
 #include "tests/drivers/dds_test.hpp"
 #include "tests/support/comes_true.hpp"

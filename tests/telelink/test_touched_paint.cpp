@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/telelink/touched_paint.hpp"
+#include "palpate/net/telelink/touched_paint.hpp"
 
 namespace palpate {
 namespace test_touched_paint {

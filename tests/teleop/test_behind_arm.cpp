@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/teleop/behind_arm.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/net/teleop/behind_arm.hpp"
 
 namespace palpate {
 namespace test_behind_arm {

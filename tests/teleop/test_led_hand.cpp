@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/methods/methods.hpp"
-#include "palpate/teleop/led_hand.hpp"
+#include "palpate/kernel/methods/methods.hpp"
+#include "palpate/net/teleop/led_hand.hpp"
 
 #include "tests/support/errors.hpp"
 

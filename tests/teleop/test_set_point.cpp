@@ -10,10 +10,10 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/sources/synthetic_camera.hpp"
-#include "palpate/teleop/approach_watch.hpp"
-#include "palpate/teleop/set_point.hpp"
-#include "palpate/teleop/simulated_tool.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/net/teleop/approach_watch.hpp"
+#include "palpate/net/teleop/set_point.hpp"
+#include "palpate/net/teleop/simulated_tool.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/teleop/touched.hpp"
+#include "palpate/net/teleop/touched.hpp"
 
 namespace palpate {
 namespace test_touched {

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/viewer/protocol.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/net/viewer/protocol.hpp"
 
 namespace palpate {
 namespace test_protocol {

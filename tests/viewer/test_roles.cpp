@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/viewer/roles.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/net/viewer/roles.hpp"
 
 #include "tests/support/errors.hpp"
 

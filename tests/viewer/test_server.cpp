@@ -15,8 +15,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "palpate/core/error.hpp"
-#include "palpate/viewer/server.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/net/viewer/server.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"

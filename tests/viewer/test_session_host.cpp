@@ -13,8 +13,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "palpate/devices/mouse_device.hpp"
-#include "palpate/viewer/session_host.hpp"
+#include "palpate/io/devices/mouse_device.hpp"
+#include "palpate/net/viewer/session_host.hpp"
 
 #include "tests/session/fakes.hpp"
 #include "tests/support/errors.hpp"

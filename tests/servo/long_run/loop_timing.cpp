@@ -14,8 +14,8 @@
 #include <thread>
 #include <vector>
 
-#include "palpate/cloud/depth_image.hpp"
-#include "palpate/methods/methods.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/methods/methods.hpp"
 #include "palpate/servo/servo_loop.hpp"
 
 namespace palpate {

@@ -1,0 +1,438 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/io/devices/device_guard.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <new>
+#include <string>
+#include <thread>
+#include <type_traits>
+
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/servo/realtime.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double opening_time = 30.0;   // [s] for the device to open, or to be enabled
+constexpr double guard_silence = 0.05;  // [s] without the guard's loop: the device is lost
+
+// A value in shared memory that one process writes and the other reads, neither waiting: two slots,
+// of which the number of values written so far names the newer.
+template <class Value>
+class Newest {
+  static_assert(std::is_trivially_copyable_v<Value>);
+
+ public:
+  void write(const Value& value) noexcept {
+    const std::uint64_t next = count_.load(std::memory_order_relaxed) + 1;
+    Slot& slot = slots_[next % slots_.size()];
+    slot.count.store(0, std::memory_order_relaxed);
+    std::atomic_thread_fence(std::memory_order_release);
+    std::memcpy(&slot.value, &value, sizeof value);
+    slot.count.store(next, std::memory_order_release);
+    count_.store(next, std::memory_order_release);
+  }
+  // The newest value; false if there is none, or writers were faster than the copy eight times.
+  bool read(Value& value) const noexcept {
+    for (int attempt = 0; attempt < 8; ++attempt) {
+      const std::uint64_t count = count_.load(std::memory_order_acquire);
+      if (count == 0) return false;
+      const Slot& slot = slots_[count % slots_.size()];
+      if (slot.count.load(std::memory_order_acquire) != count) continue;
+      std::memcpy(&value, &slot.value, sizeof value);
+      std::atomic_thread_fence(std::memory_order_acquire);
+      if (slot.count.load(std::memory_order_relaxed) == count) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] std::uint64_t count() const noexcept {
+    return count_.load(std::memory_order_acquire);
+  }
+
+ private:
+  struct Slot {
+    std::atomic<std::uint64_t> count{0};
+    Value value{};
+  };
+  std::atomic<std::uint64_t> count_{0};
+  std::array<Slot, 4> slots_{};
+};
+
+struct Force {
+  double x, y, z;  // [N] device
+  std::uint64_t beats;
+};
+
+struct Hand {
+  std::array<double, 3> position;                    // [m]
+  std::optional<std::array<double, 4>> orientation;  // x y z w
+  std::optional<std::uint32_t> buttons;
+  bool present, clutched;
+  DeviceFault fault;
+};
+
+using Text = std::array<char, 256>;
+
+void put_text(Text& to, const std::string& from) {
+  to.fill('\0');
+  std::copy_n(from.begin(), std::min(from.size(), to.size() - 1), to.begin());
+}
+
+// DeviceInfo without what needs memory of its own.
+struct Info {
+  Text uri, kind, serial;
+  DeviceLimits limits;
+  std::optional<double> damping, delay, rate;
+  double watchdog;
+  std::optional<std::array<double, 6>> reach;  // lowest, highest
+  std::optional<double> radius;                // of the reach
+  bool simulated;
+};
+static_assert(std::is_trivially_copyable_v<DeviceLimits>);
+
+enum class Phase : int { opening, open, refused };
+enum class Wish : int { disabled, enabled, ended };
+
+struct Memory {
+  std::atomic<Phase> phase{Phase::opening};
+  Text refusal{};  // written before `phase`
+  Info info{};     // likewise
+  Newest<Force> force;
+  Newest<Hand> hand;
+  Newest<Text> fault_text;
+  std::atomic<std::uint64_t> turns{0};   // of the guard's loop
+  std::atomic<std::uint64_t> wishes{0};  // raised with each new wish
+  std::atomic<Wish> wish{Wish::disabled};
+  std::atomic<std::uint64_t> granted{0};  // the number of the wish that was done
+  std::atomic<bool> enable_failed{false};
+  Text enable_refusal{};  // written before `granted`
+};
+static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
+static_assert(std::atomic<Phase>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+
+void put_info(const DeviceInfo& from, double beat_time, Info& to) {
+  put_text(to.uri, from.uri);
+  put_text(to.kind, from.kind + ", guarded");
+  put_text(to.serial, from.serial);
+  to.limits = from.limits;
+  to.damping = from.damping;
+  to.delay = from.delay;
+  to.rate = from.rate;
+  to.watchdog = std::min(from.watchdog.value_or(beat_time), beat_time);
+  if (const auto& reach = from.reach) {
+    const auto& [low, high, radius] = *reach;
+    to.reach = {low.x(), low.y(), low.z(), high.x(), high.y(), high.z()};
+    to.radius = radius;
+  }
+  to.simulated = from.simulated;
+}
+
+DeviceInfo info_of(const Info& from) {
+  DeviceInfo info;
+  info.uri = from.uri.data();
+  info.kind = from.kind.data();
+  info.limits = from.limits;
+  if (from.reach) {
+    const auto& r = *from.reach;
+    info.reach = DeviceReach{Vec3(r[0], r[1], r[2]), Vec3(r[3], r[4], r[5]), from.radius};
+  }
+  info.damping = from.damping;
+  info.delay = from.delay;
+  info.rate = from.rate;
+  info.watchdog = from.watchdog;
+  info.simulated = from.simulated;
+  info.serial = from.serial.data();
+  return info;
+}
+
+Hand hand_of(const HandState& from) {
+  Hand hand{};
+  hand.position = {from.position.x(), from.position.y(), from.position.z()};
+  if (from.orientation)
+    hand.orientation = {from.orientation->x(), from.orientation->y(), from.orientation->z(),
+                        from.orientation->w()};
+  hand.buttons = from.buttons;
+  hand.present = from.present;
+  hand.clutched = from.clutched;
+  hand.fault = from.fault;
+  return hand;
+}
+
+HandState state_of(const Hand& hand) {
+  HandState state;
+  state.position = Vec3(hand.position[0], hand.position[1], hand.position[2]);
+  if (hand.orientation) {
+    const auto& [x, y, z, w] = *hand.orientation;
+    state.orientation = Eigen::Quaterniond(w, x, y, z);
+  }
+  state.buttons = hand.buttons;
+  state.present = hand.present;
+  state.clutched = hand.clutched;
+  state.fault = hand.fault;
+  return state;
+}
+
+// Does what the session wished for last, if it is new.
+void grant(Memory& memory, Device& device) {
+  const std::uint64_t wished = memory.wishes.load(std::memory_order_acquire);
+  if (wished == memory.granted.load(std::memory_order_relaxed)) return;
+  memory.enable_failed = false;
+  if (memory.wish.load(std::memory_order_acquire) == Wish::enabled) {
+    try {
+      device.enable();
+    } catch (const std::exception& error) {
+      put_text(memory.enable_refusal, error.what());
+      memory.enable_failed = true;
+    }
+  } else {
+    device.disable();
+  }
+  memory.granted.store(wished, std::memory_order_release);
+}
+
+// One tick of the guard: reads the device and writes what the session wrote last.
+class GuardTick {
+ public:
+  GuardTick(Memory& memory, Device& device, double beat_time)
+      : memory_(memory), device_(device), gate_(beat_time) {}
+
+  void run() noexcept {
+    HandState state = device_.read(monotonic_now());
+    if (Force force{}; memory_.force.read(force)) {
+      wanted_ = Vec3(force.x, force.y, force.z);
+      beats_ = force.beats;
+    }
+    const double now = monotonic_now();
+    device_.write(gate_.pass(now, beats_, wanted_), now);
+    if (gate_.closed()) {
+      state.present = false;  // so that the session's safety chain releases, and engages again
+      if (state.fault == DeviceFault::none && beats_ > 0) state.fault = DeviceFault::other;
+    }
+    memory_.hand.write(hand_of(state));
+    memory_.turns.fetch_add(1, std::memory_order_release);
+  }
+
+ private:
+  Memory& memory_;
+  Device& device_;
+  GuardGate gate_;
+  Vec3 wanted_ = Vec3::Zero();  // [N] device
+  std::uint64_t beats_ = 0;
+};
+
+bool goes_on(const Memory& memory, pid_t session) {
+  return getppid() == session && memory.wish.load(std::memory_order_acquire) != Wish::ended;
+}
+
+// What the device says of its fault, for the session.
+void tell_fault(Memory& memory, const Device& device, std::string& told) {
+  const std::string text = device.fault_text();
+  if (text == told) return;
+  told = text;
+  Text words{};
+  put_text(words, text);
+  memory.fault_text.write(words);
+}
+
+// The guard's process: until the session wishes for the end, or has ended.
+void hold_polled(Memory& memory, Device& device, const GuardLimits& limits, pid_t session) {
+  constexpr int ticks_a_text = 50;
+  RealtimeRequest request;
+  request.pin = false;  // the servo has the core that it would get
+  const RealtimeThread realtime(request);
+  GuardTick tick(memory, device, limits.beat_time);
+  std::string told;
+  double next = monotonic_now();
+  for (int number = 0; goes_on(memory, session); ++number) {
+    grant(memory, device);
+    tick.run();
+    if (number % ticks_a_text == 0) tell_fault(memory, device, told);
+    next = std::max(next + limits.period, monotonic_now());
+    sleep_until(static_cast<std::uint64_t>(1e9 * next));
+  }
+  device.write(Vec3::Zero(), monotonic_now());
+  device.disable();
+}
+
+// The same with a device whose driver calls.
+void hold_driven(Memory& memory, Device& device, const GuardLimits& limits, pid_t session) {
+  constexpr auto look_interval = std::chrono::milliseconds(5);
+  constexpr int looks_of_end = 10;  // for the last write
+  GuardTick tick(memory, device, limits.beat_time);
+  std::atomic<bool> ending{false};
+  std::atomic<bool> zero_sent{false};
+  device.start([&] {
+    if (!ending.load(std::memory_order_acquire)) return tick.run();
+    static_cast<void>(device.read(monotonic_now()));
+    device.write(Vec3::Zero(), monotonic_now());
+    zero_sent.store(true, std::memory_order_release);
+  });
+  std::string told;
+  while (goes_on(memory, session)) {
+    grant(memory, device);
+    tell_fault(memory, device, told);
+    std::this_thread::sleep_for(look_interval);
+  }
+  ending.store(true, std::memory_order_release);
+  for (int i = 0; i < looks_of_end && !zero_sent.load(std::memory_order_acquire); ++i)
+    std::this_thread::sleep_for(look_interval);
+  device.disable();
+  device.stop();
+}
+
+[[noreturn]] void run_guard(Memory& memory, const std::function<std::unique_ptr<Device>()>& open,
+                            const GuardLimits& limits, pid_t session) {
+  // What ends a session reaches its whole group; the guard outlives it.
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTOU, SIGTTIN})
+    std::signal(number, SIG_IGN);  // NOLINT(cert-err33-c): these can all be ignored
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+  int status = 0;
+  try {
+    const std::unique_ptr<Device> device = open();
+    put_info(device->info(), limits.beat_time, memory.info);
+    memory.phase.store(Phase::open, std::memory_order_release);
+    const auto hold = device->drives() ? hold_driven : hold_polled;
+    hold(memory, *device, limits, session);
+  } catch (const std::exception& error) {
+    put_text(memory.refusal, error.what());
+    memory.phase.store(Phase::refused, std::memory_order_release);
+    status = 1;
+  }
+  _exit(status);  // nothing that the session's process has registered runs here
+}
+
+// The session's side.
+class GuardedDevice final : public Device {
+ public:
+  GuardedDevice(Memory* memory, pid_t guard)
+      : memory_(memory), guard_(guard), info_(info_of(memory->info)) {}
+  ~GuardedDevice() override {
+    memory_->wish.store(Wish::ended, std::memory_order_release);
+    waitpid(guard_, nullptr, 0);
+    munmap(memory_, sizeof(Memory));
+  }
+
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+
+  HandState read(double t) noexcept override {
+    Hand hand{};
+    if (memory_->hand.read(hand)) last_ = state_of(hand);
+    const std::uint64_t turns = memory_->turns.load(std::memory_order_acquire);
+    if (turns != turns_) {
+      turns_ = turns;
+      heard_ = t;
+    }
+    HandState state = last_;
+    if (t - heard_ > guard_silence || turns == 0) {
+      state.present = false;
+      state.fault = DeviceFault::disconnected;
+    }
+    return state;
+  }
+
+  void write(const Vec3& force, double /*t*/) noexcept override {
+    const bool passes = enabled_.load(std::memory_order_acquire);
+    memory_->force.write(passes ? Force{force.x(), force.y(), force.z(), ++beats_}
+                                : Force{0.0, 0.0, 0.0, ++beats_});
+  }
+
+  void enable() override {
+    const std::uint64_t number = wish(Wish::enabled);
+    const double end = monotonic_now() + opening_time;
+    while (memory_->granted.load(std::memory_order_acquire) < number) {
+      if (monotonic_now() > end || waitpid(guard_, nullptr, WNOHANG) != 0)
+        throw Error(info_.uri, "its guard does not answer", "start the session again");
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    if (memory_->enable_failed) throw Error(info_.uri, memory_->enable_refusal.data());
+    enabled_.store(true, std::memory_order_release);
+  }
+
+  void disable() noexcept override {
+    enabled_.store(false, std::memory_order_release);
+    wish(Wish::disabled);
+  }
+
+  [[nodiscard]] std::string fault_text() const override {
+    Text text{};
+    return memory_->fault_text.read(text) ? text.data() : "";
+  }
+
+ private:
+  std::uint64_t wish(Wish wish) noexcept {
+    memory_->wish.store(wish, std::memory_order_release);
+    return memory_->wishes.fetch_add(1, std::memory_order_acq_rel) + 1;
+  }
+
+  Memory* memory_;
+  pid_t guard_;
+  DeviceInfo info_;
+  std::atomic<bool> enabled_{false};
+  // Of the thread that reads and writes:
+  HandState last_;
+  std::uint64_t beats_ = 0;
+  std::uint64_t turns_ = 0;
+  double heard_ = 0.0;  // [s]
+};
+
+}  // namespace
+
+Vec3 GuardGate::pass(double now, std::uint64_t beats, const Vec3& force) {
+  if (beats != beats_) {
+    beats_ = beats;
+    last_beat_ = now;
+    if (force.isZero(0.0)) closed_ = false;
+  }
+  if (now - last_beat_ > beat_time_ || !force.allFinite()) closed_ = true;
+  return closed_ ? Vec3::Zero() : force;
+}
+
+std::unique_ptr<Device> open_guarded(const std::function<std::unique_ptr<Device>()>& open,
+                                     const GuardLimits& limits) {
+  if (!(limits.beat_time >= 0.005 && limits.beat_time <= 0.05))
+    throw Error("beat_time of the guard", "it is out of range", "give 0.005 to 0.05 s");
+  if (!(limits.period >= 1e-4 && limits.period <= 0.01))
+    throw Error("period of the guard", "it is out of range", "give 1e-4 to 0.01 s");
+  void* shared =
+      mmap(nullptr, sizeof(Memory), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (shared == MAP_FAILED) throw Error("guard", std::strerror(errno));
+  auto* memory = new (shared) Memory;
+  const pid_t session = getpid();
+  const pid_t guard = fork();
+  if (guard < 0) {
+    munmap(shared, sizeof(Memory));
+    throw Error("guard", std::strerror(errno), "end other processes");
+  }
+  if (guard == 0) run_guard(*memory, open, limits, session);
+  const double end = monotonic_now() + opening_time;
+  int status = 0;
+  std::string trouble;
+  while (memory->phase.load(std::memory_order_acquire) == Phase::opening && trouble.empty()) {
+    if (waitpid(guard, &status, WNOHANG) == guard) trouble = "guard: its process has ended";
+    if (monotonic_now() > end) trouble = "guard: the device did not open in 30 s";
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  if (memory->phase == Phase::refused) trouble = memory->refusal.data();
+  if (!trouble.empty()) {
+    kill(guard, SIGKILL);
+    waitpid(guard, &status, 0);
+    munmap(shared, sizeof(Memory));
+    throw Error(trouble, "the device could not be opened in its guard process");
+  }
+  return std::make_unique<GuardedDevice>(memory, guard);
+}
+
+}  // namespace palpate

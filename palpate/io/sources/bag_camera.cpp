@@ -1,0 +1,456 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/io/sources/bag_camera.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "palpate/io/sources/depth_png.hpp"
+#include "palpate/io/sources/material_file.hpp"
+#include "palpate/io/sources/realsense_lens.hpp"
+#include "palpate/io/sources/ros_frames.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double least_unit = 1e-6, largest_unit = 0.1;  // [m] of a RealSense's depth
+
+std::string parent(const std::string& topic) {
+  return topic.substr(0, topic.rfind('/'));
+}
+
+// Of librealsense, whose models have names of their own.
+RealSenseLens realsense_lens(const ros::CameraInfo& info) {
+  RealSenseLens lens{.width = static_cast<int>(std::min(info.width, largest_side + 1)),
+                     .height = static_cast<int>(std::min(info.height, largest_side + 1)),
+                     .ppx = info.k[2],
+                     .ppy = info.k[5],
+                     .fx = info.k[0],
+                     .fy = info.k[4],
+                     .model = info.distortion_model,
+                     .coeffs = {}};
+  std::copy_n(info.d.begin(), std::min(info.d.size(), lens.coeffs.size()), lens.coeffs.begin());
+  return lens;
+}
+
+class Recording final : public Source {
+ public:
+  Recording(const Uri& uri, const BagCamera::Options& options, SourceInfo info)
+      : bag_(uri.path()),
+        camera_(bag_, choose(uri.text_option("topic", ""), info), options),
+        info_(std::move(info)) {
+    if (camera_.frames() == 0)
+      throw Error(info_.uri, "holds no frames on " + camera_.topic(),
+                  "name another topic with ?topic=");
+    info_.kind = camera_.is_ours()        ? "recording of palpate's"
+                 : camera_.is_realsense() ? "RealSense recording"
+                                          : std::string(bag_.kind());
+    info_.sensor = sensor_option(uri, camera_.sensor());
+    info_.frames = camera_.frames();
+    info_.frame_rate = camera_.frame_rate();
+    if (std::string note = camera_.pose_note(); !note.empty())
+      info_.notes.push_back(std::move(note));
+    if (!camera_.colour_note().empty()) info_.notes.push_back(camera_.colour_note());
+    std::optional<Frame> first;
+    while (!(first = camera_.frame(next_)) && next_ + 1 < camera_.frames()) ++next_;
+    if (!first)
+      throw Error(info_.uri, "its TF has no transform for the time of any frame",
+                  "ignore TF with ?fixed_frame=none");
+    first_ = first->stamp;
+    info_.start_time = first_;
+  }
+
+  std::optional<Frame> next(double /*timeout*/) override {
+    while (next_ < camera_.frames()) {
+      std::optional<Frame> frame = camera_.frame(next_++);
+      if (!frame) continue;
+      frame->stamp -= first_;
+      info_.details = camera_.details();
+      return frame;
+    }
+    return std::nullopt;
+  }
+
+  std::size_t skip(std::size_t count) override {
+    const std::size_t skipped = std::min(count, camera_.frames() - next_);
+    next_ += skipped;
+    return skipped;
+  }
+
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+ private:
+  std::string choose(const std::string& wanted, SourceInfo& info) const {
+    const std::vector<std::string> topics = BagCamera::topics_of(bag_);
+    if (!wanted.empty()) return wanted;
+    if (topics.empty())
+      throw Error(info.uri, "has no topic of depth images or points",
+                  "record one, or name it with ?topic=");
+    std::string others;
+    for (std::size_t i = 1; i < topics.size(); ++i) others += " " + topics[i];
+    if (!others.empty())
+      info.notes.push_back(topics.front() + " is read; also there, by ?topic=:" + others);
+    return topics.front();
+  }
+
+  BagReader bag_;
+  BagCamera camera_;
+  SourceInfo info_;
+  double first_ = 0.0;
+  std::size_t next_ = 0;
+};
+
+}  // namespace
+
+CameraTopics::CameraTopics(std::size_t number) {
+  const std::string camera = "camera_" + std::to_string(number);
+  depth = "/" + camera + "/depth/image_raw/compressedDepth";
+  camera_info = "/" + camera + "/depth/camera_info";
+  points = "/" + camera + "/depth/points";
+  exact = "/" + camera + "/depth/exact";
+  materials = "/" + camera + "/material/image/compressed";
+  material_table = "/" + camera + "/material/table";
+  optical_frame = camera + "_optical_frame";
+}
+
+std::vector<std::string> BagCamera::topics_of(const BagReader& bag) {
+  std::vector<std::string> topics;
+  for (const BagReader::Topic& topic : bag.topics()) {
+    if (is_topic_of_depth(topic.name, topic.type)) topics.push_back(topic.name);
+  }
+  return topics;
+}
+
+BagCamera::BagCamera(BagReader& bag, const std::string& topic, const Options& options)
+    : bag_(bag), topic_(topic), options_(options) {
+  const BagReader::Topic* found = bag.find(topic);
+  if (found == nullptr) {
+    std::string known;
+    for (const std::string& name : topics_of(bag)) add_to_list(known, name);
+    throw Error("topic " + topic, "is not in the bag",
+                known.empty() ? "it has no depth images or points" : "give one of " + known);
+  }
+  type_ = found->type;
+  if (type_ != ros::Image::type && type_ != ros::CompressedImage::type &&
+      type_ != ros::PointCloud2::type)
+    throw Error("topic " + topic, "is of " + type_ + ", not of a camera",
+                "name one of Image, CompressedImage or PointCloud2");
+  places_ = bag.places(topic);
+  const std::string camera = camera_of_topic(topic, type_);
+  exact_topic_ = camera + "/exact";
+  if (const BagReader::Topic* exact = bag.find(exact_topic_);
+      exact != nullptr && exact->type == ros::Float64MultiArray::type)
+    exact_places_ = bag.places(exact_topic_);
+  if (type_ != ros::PointCloud2::type) find_lens(camera);
+  follow_transforms();
+  if (type_ != ros::PointCloud2::type && !is_ours() && !places_.empty()) find_colour();
+}
+
+void BagCamera::find_colour() {
+  const std::string topic = BagColour::topic_beside(bag_, topic_);
+  if (topic.empty()) return;
+  try {
+    colour_.emplace(bag_, topic, topic_, first_header().frame_id,
+                    transforms_ ? &*transforms_ : nullptr);
+  } catch (const Error& error) {
+    colour_note_ = std::string("colour is skipped: ") + error.what();
+  }
+}
+
+ros::Header BagCamera::first_header() const {
+  const std::vector<std::byte> first = bag_.read(places_.front());
+  return type_ == ros::PointCloud2::type ? ros::decode<ros::PointCloud2>(first, name(0)).header
+         : type_ == ros::Image::type     ? ros::decode<ros::Image>(first, name(0)).header
+                                         : ros::decode<ros::CompressedImage>(first, name(0)).header;
+}
+
+void BagCamera::find_lens(const std::string& camera) {
+  const std::string in_ros1 = camera + "/info/camera_info";  // librealsense's bags of ROS 1
+  is_realsense_ = bag_.find(in_ros1) != nullptr;
+  info_topic_ = is_realsense_ ? in_ros1 : camera + "/camera_info";
+  info_places_ = bag_.places(info_topic_);
+  if (info_places_.empty())
+    throw Error("topic " + topic_, "has no CameraInfo on " + info_topic_, "record that topic too");
+  is_realsense_ = is_realsense_ || bag_.find(info_topic_)->type == ros::String::type;
+  if (!is_realsense_) return;
+  const char* name = info_topic_ == in_ros1 ? "Depth Units" : "Depth_Units";
+  units_topic_ = parent(camera) + "/option/" + name + "/value";
+  units_places_ = bag_.places(units_topic_);
+  if (units_places_.empty() && !options_.units)
+    throw Error("topic " + topic_, "has no depth unit on " + units_topic_,
+                "give the raw values per metre, such as ?units=1000");
+}
+
+void BagCamera::follow_transforms() {
+  if (is_ours() || is_realsense_ || places_.empty() || options_.fixed_frame == "none") return;
+  if (!BagTransforms::are_in(bag_)) {
+    if (options_.fixed_frame.empty()) return;
+    throw Error("fixed frame " + options_.fixed_frame, "is not in the bag: it has no TF",
+                "leave it out");
+  }
+  transforms_.emplace(bag_, first_header().frame_id, options_.fixed_frame);
+}
+
+std::string BagCamera::pose_note() const {
+  if (is_ours() || is_realsense_) return {};
+  if (!transforms_)
+    return std::string(options_.fixed_frame == "none" ? "TF is not used"
+                                                      : "the bag has no TF (/tf, /tf_static)") +
+           ": points are in the camera frame";
+  if (transforms_->fixed_frame().empty())
+    return "TF connects none of map, odom and world with the camera: points are in the camera "
+           "frame; ?fixed_frame=" +
+           transforms_->root() + " transforms them to the topmost TF frame";
+  return "points are in " + transforms_->fixed_frame() +
+         ", by TF; frames without a transform at their time are dropped";
+}
+
+// The identity where TF does not lead to the camera; none where it does, but not at that time.
+std::optional<Eigen::Isometry3d> BagCamera::pose_at(double stamp) const {
+  if (!transforms_ || transforms_->fixed_frame().empty()) return Eigen::Isometry3d::Identity();
+  return transforms_->at(stamp);
+}
+
+std::string BagCamera::text(const BagReader::Place& place, const std::string& topic) const {
+  return ros::decode<ros::String>(bag_.read(place), bag_.name(topic, place)).data;
+}
+
+SensorKind BagCamera::sensor() const {
+  if (!is_realsense_) return SensorKind::unknown;
+  const std::string device_topic = topic_.substr(0, topic_.find('/', 1)) + "/info";
+  const BagReader::Topic* topic = bag_.find(device_topic);
+  if (topic == nullptr) return realsense_sensor("");
+  std::string product;
+  for (const BagReader::Place& place : bag_.places(device_topic)) {
+    if (topic->type == ros::KeyValue::type) {
+      const auto pair =
+          ros::decode<ros::KeyValue>(bag_.read(place), bag_.name(device_topic, place));
+      if (pair.key == "Name") product += pair.value;
+    } else if (topic->type == ros::String::type) {
+      product += text(place, device_topic);
+    }
+  }
+  return realsense_sensor(product);
+}
+
+// Raw values per metre at a frame.
+double BagCamera::realsense_units(std::size_t number) const {
+  BagReader::Place newest = units_places_.front();
+  for (const BagReader::Place& place : units_places_) {
+    if (place.nanoseconds <= places_[number].nanoseconds) newest = place;
+  }
+  const std::string name = bag_.name(units_topic_, newest);
+  std::string metres;
+  if (bag_.find(units_topic_)->type == ros::Float32::type) {
+    std::array<char, 32> digits{};  // 0.001, not what is nearest to it in a double
+    const float value = ros::decode<ros::Float32>(bag_.read(newest), name).data;
+    metres.assign(digits.data(), std::to_chars(digits.begin(), digits.end(), value).ptr);
+  } else {
+    metres = text(newest, units_topic_);
+  }
+  double unit = 0.0;
+  const auto [end, error] = std::from_chars(metres.data(), metres.data() + metres.size(), unit);
+  if (error != std::errc() || !(unit >= least_unit && unit <= largest_unit))
+    throw Error(name, "says '" + metres + "' metres for a unit of depth",
+                "give the raw values per metre, such as ?units=1000");
+  return 1.0 / unit;
+}
+
+std::string BagCamera::name(std::size_t number) const {
+  return bag_.name(topic_, places_[number]);
+}
+
+std::optional<double> BagCamera::frame_rate() const {
+  std::vector<std::int64_t> intervals;
+  for (std::size_t i = 1; i < places_.size(); ++i)
+    intervals.push_back(places_[i].nanoseconds - places_[i - 1].nanoseconds);
+  if (intervals.empty()) return std::nullopt;
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  if (*middle <= 0) return std::nullopt;
+  return 1e9 / static_cast<double>(*middle);
+}
+
+double BagCamera::stamp(std::size_t number, const ros::Header& header) const {
+  const std::int64_t stamped = header.stamp.nanoseconds();
+  return 1e-9 * static_cast<double>(stamped != 0 ? stamped : places_[number].nanoseconds);
+}
+
+// The numbers recorded with each frame of palpate's own bags (CameraTopics::exact).
+std::vector<double> BagCamera::exact(std::size_t number, std::size_t size) {
+  if (number >= exact_places_.size())
+    throw Error(name(number), "has no message on " + exact_topic_, "the bag may be damaged");
+  const BagReader::Place& place = exact_places_[number];
+  const std::string name = bag_.name(exact_topic_, place);
+  auto numbers = ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data;
+  const bool has_materials = numbers.size() == size + 2 && type_ != ros::PointCloud2::type;
+  if (numbers.size() != size && !has_materials)
+    throw Error(
+        name,
+        "has " + std::to_string(numbers.size()) + " numbers instead of " + std::to_string(size),
+        "it may be damaged, or of another version of palpate");
+  return numbers;
+}
+
+const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
+                                                          const ros::Image& image) {
+  // In other bags the intrinsics are taken to be constant: those of the first CameraInfo.
+  const std::size_t which = is_ours() ? number : 0;
+  if (which >= info_places_.size())
+    throw Error(name(number), "has no message on " + info_topic_, "the bag may be damaged");
+  if (!rays_ || is_ours()) {
+    const std::string info_name = bag_.name(info_topic_, info_places_[which]);
+    const bool is_rectified = !is_ours() && topic_.find("rect") != std::string::npos;
+    Intrinsics k;
+    if (bag_.find(info_topic_)->type == ros::String::type) {
+      const std::string described = text(info_places_[which], info_topic_);
+      k = intrinsics_of(parse_realsense_lens(described, info_name), info_name);
+    } else {
+      const auto info = ros::decode<ros::CameraInfo>(bag_.read(info_places_[which]), info_name);
+      k = is_realsense_ ? intrinsics_of(realsense_lens(info), info_name)
+                        : intrinsics_of(info, is_rectified, info_name);
+    }
+    if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
+  }
+  const Intrinsics& k = rays_->intrinsics();
+  if (k.width != static_cast<int>(image.width) || k.height != static_cast<int>(image.height))
+    throw Error(name(number),
+                "is an image of " + std::to_string(image.width) + "x" +
+                    std::to_string(image.height) + " pixels, but its CameraInfo has " +
+                    std::to_string(k.width) + "x" + std::to_string(k.height),
+                "it may be damaged, or belong to another topic");
+  return rays_;
+}
+
+std::optional<Frame> BagCamera::read_depth(std::size_t number, ros::Image image) {
+  const double units = options_.units  ? *options_.units
+                       : is_realsense_ ? realsense_units(number)
+                                       : depth_units(details_, name(number));
+  std::vector<std::uint16_t> depth = raw_depth(image, units, name(number));
+  const std::shared_ptr<const ViewingRays>& seen = rays(number, image);
+  if (!is_ours()) {
+    const double taken = stamp(number, image.header);
+    const std::optional<Eigen::Isometry3d> pose = pose_at(taken);
+    if (!pose) return std::nullopt;
+    return Frame{
+        .stamp = taken,
+        .cloud = std::make_shared<DepthImage>(seen, std::move(depth), units, *pose),
+        .colour = colour_ ? colour_->at(places_[number].nanoseconds, taken, *pose) : nullptr};
+  }
+  const std::vector<double> numbers = exact(number, 14);
+  Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column)
+      world_from_camera(row, column) = numbers[static_cast<std::size_t>(2 + 4 * row + column)];
+  }
+  auto cloud = std::make_shared<DepthImage>(seen, std::move(depth), numbers[1], world_from_camera);
+  if (numbers.size() > 14) cloud->set_materials(materials(number, numbers[14], numbers[15]));
+  return Frame{numbers[0], std::move(cloud)};
+}
+
+// What was recorded of a frame's materials. The messages are counted from 1.
+std::shared_ptr<const MaterialMap> BagCamera::materials(std::size_t number, double image,
+                                                        double table) {
+  if (image == material_image_ && table == material_table_) return materials_;
+  const std::string camera = topic_.substr(0, topic_.find('/', 1));
+  const auto message = [&](const std::string& topic, double count) {
+    std::vector<BagReader::Place>& places = material_places_[topic];
+    if (places.empty() && bag_.find(topic) != nullptr) places = bag_.places(topic);
+    if (!(count >= 1.0 && count <= static_cast<double>(places.size())))
+      throw Error(name(number), "has no message on " + topic, "the bag may be damaged");
+    return places[static_cast<std::size_t>(count) - 1];
+  };
+  auto names = std::make_shared<MaterialTable>();
+  if (table != 0.0) {
+    const std::string topic = camera + "/material/table";
+    const BagReader::Place place = message(topic, table);
+    *names = materials_from_json(text(place, topic), bag_.name(topic, place));
+  }
+  const std::string topic = camera + "/material/image/compressed";
+  const BagReader::Place place = message(topic, image);
+  const std::string where = bag_.name(topic, place);
+  const auto packed = ros::decode<ros::CompressedImage>(bag_.read(place), where);
+  const DepthPng png = parse_depth_png(packed.data, where);
+  const bool bright = packed.format == material_format_with_brightness;
+  std::vector<std::uint8_t> labels;
+  std::vector<std::uint8_t> brightness;
+  for (const std::uint16_t pixel : png.depth) {
+    labels.push_back(static_cast<std::uint8_t>(pixel & 0xffU));
+    if (bright) brightness.push_back(static_cast<std::uint8_t>(pixel >> 8U));
+  }
+  const Intrinsics& k = rays_->intrinsics();
+  if (png.width != k.width || png.height != k.height)
+    throw Error(where,
+                "is an image of " + std::to_string(png.width) + "x" + std::to_string(png.height) +
+                    " pixels, but its camera has " + std::to_string(k.width) + "x" +
+                    std::to_string(k.height),
+                "it may be damaged");
+  materials_ =
+      std::make_shared<LabelImage>(std::move(names), std::move(labels), std::move(brightness));
+  material_image_ = image;
+  material_table_ = table;
+  return materials_;
+}
+
+std::optional<Frame> BagCamera::read_points(std::size_t number, const ros::PointCloud2& message) {
+  std::vector<Vec3> points = points_of(message, name(number));
+  if (!is_ours()) {
+    const double taken = stamp(number, message.header);
+    const std::optional<Eigen::Isometry3d> pose = pose_at(taken);
+    if (!pose) return std::nullopt;
+    std::shared_ptr<ColourImage> colour;
+    if (std::vector<std::uint8_t> rgb = rgb_of(message); !rgb.empty()) {
+      colour = std::make_shared<ColourImage>();
+      colour->width = static_cast<int>(message.width);
+      colour->height = static_cast<int>(message.height);
+      colour->rgb = std::move(rgb);
+    }
+    if (auto image = organised_.image(points, message.width, message.height, std::nullopt, *pose))
+      return Frame{taken, std::move(image), std::move(colour)};
+    for (Vec3& point : points) point = *pose * point;
+    if (!colour) return Frame{taken, std::make_shared<PointCloud>(points)};
+    Surface surface{.points = std::move(points)};
+    return Frame{taken, std::make_shared<PointCloud>(std::move(surface)), std::move(colour)};
+  }
+  const std::vector<double> numbers = exact(number, 6);
+  std::optional<Vec3> viewpoint;
+  if (numbers[2] != 0.0) viewpoint = Vec3(numbers[3], numbers[4], numbers[5]);
+  return Frame{numbers[0], std::make_shared<PointCloud>(points, viewpoint)};
+}
+
+std::optional<Frame> BagCamera::frame(std::size_t number) {
+  const std::vector<std::byte> bytes = bag_.read(places_[number]);
+  const std::string message = name(number);
+  if (type_ == ros::PointCloud2::type) {
+    details_ = "PointCloud2";
+    return read_points(number, ros::decode<ros::PointCloud2>(bytes, message));
+  }
+  if (type_ == ros::Image::type) {
+    auto image = ros::decode<ros::Image>(bytes, message);
+    details_ = image.encoding;
+    return read_depth(number, std::move(image));
+  }
+  auto packed = ros::decode<ros::CompressedImage>(bytes, message);
+  details_ = packed.format;
+  const double units = options_.units ? *options_.units : depth_units(details_, message);
+  return read_depth(number, unpacked(std::move(packed), units, message));
+}
+
+std::unique_ptr<Source> open_recording(const Uri& uri) {
+  constexpr std::array<std::string_view, 4> known{"topic", "units", "fixed_frame", "sensor"};
+  uri.allow_only(known);
+  BagCamera::Options options;
+  if (uri.has("units")) options.units = uri.number_option("units", 1000.0, 1e-3, 1e7, "px");
+  options.fixed_frame = uri.text_option("fixed_frame", "");
+  return std::make_unique<Recording>(uri, options, SourceInfo{.uri = uri.text(), .kind = {}});
+}
+
+}  // namespace palpate

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "palpate/kernel/core/patch.hpp"
+
+namespace palpate {
+
+/// One column of a point file, as its header declares it.
+struct PointField {
+  std::string name;       ///< e.g. "x", "rgba"; PCD's padding is called "_"
+  std::string type;       ///< "int8" .. "uint64", "float32", "float64"; "list of TYPE" in a PLY
+  std::size_t count = 1;  ///< how many values of that type a point has; 1 for a list
+};
+
+/// The content of a PCD or PLY file, in its own coordinates and unit (usually metres).
+struct PointFile {
+  /// Every point in the order of the file; holes of an organised cloud stay, as NaN, so that the
+  /// point of pixel (u, v) is points[v * width + u].
+  std::vector<Vec3> points;
+  std::size_t width = 0;   ///< [points] in a row of an organised cloud; else their number
+  std::size_t height = 1;  ///< [points] rows of an organised cloud; else 1
+  /// A PLY's nx, ny, nz of each point as stored: of any length, perhaps not finite. Empty without.
+  std::vector<Vec3> normals;
+  /// A PLY's faces: indices of points, in the order of the file. Polygons are fanned, strips cut.
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  /// Red, green and blue of each point in its order, 3 values each: a PCD's rgb or rgba, a PLY's
+  /// red, green and blue, of bytes or of floats from 0 to 1. Empty without.
+  std::vector<std::uint8_t> colours;
+  /// Position of the camera in the frame of the points: the translation of PCD's
+  /// VIEWPOINT, or view_px view_py view_pz of the `camera` element that PCL writes into a PLY.
+  ///
+  /// PCL keeps points as they are stored and takes the viewpoint to be in the same frame (its
+  /// normals are turned towards it), though its viewer moves the points by it. Here too
+  /// nothing is transformed, and the orientation is not used.
+  std::optional<Vec3> viewpoint;
+  std::string encoding;            ///< as in the header, e.g. "binary_compressed"
+  std::vector<PointField> fields;  ///< of a point, in the order of the file
+  std::size_t non_finite = 0;      ///< how many points have a coordinate that is NaN or infinite
+  /// Bytes after the data that the header declares, not counting white space. They are not read:
+  /// PCL pads binary files to a whole page.
+  std::size_t bytes_unread = 0;
+};
+
+/// Reads a PCD file, versions 0.5 to 0.7: ascii, binary (little endian) or binary_compressed;
+/// fields of any order, type, size and count, as long as x, y and z are among them.
+///
+/// Allocates in proportion to the size of the file, whatever its header declares.
+/// @throws Error naming the file, the line or offset, and what was wrong.
+PointFile read_pcd(const std::filesystem::path& path);
+/// The same for bytes in memory; `name` is what an error calls them.
+PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name);
+
+/// Reads a PLY file, version 1.0: ascii, little or big endian. Of element `vertex` x, y, z and
+/// nx, ny, nz and red, green, blue; of `face` and `tristrips` vertex_indices or vertex_index; of
+/// `camera` its position. Other elements, lists and properties are checked and passed over.
+///
+/// Allocates in proportion to the size of the file, whatever its header declares.
+/// @throws Error naming the file, the line or offset, and what was wrong.
+PointFile read_ply(const std::filesystem::path& path);
+/// The same for bytes in memory; `name` is what an error calls them.
+PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name);
+
+/// Reads an STL file, binary or ascii, into `points` and `triangles`. Corners at the same place are
+/// one point. Normals and attributes are passed over.
+///
+/// Allocates in proportion to the size of the file, whatever its header declares.
+/// @throws Error naming the file and what was wrong
+PointFile read_stl(const std::filesystem::path& path);
+/// The same for bytes in memory; `name` is what an error calls them.
+PointFile parse_stl(std::span<const std::byte> bytes, std::string_view name);
+
+}  // namespace palpate

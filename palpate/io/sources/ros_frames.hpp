@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/io/bag/messages.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+
+// What ROS 2's messages of cameras hold, the same from a bag and from the network. `name` is the
+// message's, for errors.
+namespace palpate {
+
+constexpr std::uint32_t largest_side = 16384;  ///< [px] of an image
+constexpr double units_of_16uc1 = 1000.0;      ///< [1/m] REP 118
+constexpr double units_of_32fc1 = 5000.0;      ///< [1/m] 0.2 mm, up to 13 m
+
+/// Is it a topic that can be touched? Colour images have the types of depth: of images only topics
+/// with "depth" in their name count.
+bool is_topic_of_depth(const std::string& topic, const std::string& type);
+
+/// The names in front of a topic of depth: .../depth/image_raw/compressedDepth and
+/// .../depth/image_raw have .../depth/camera_info, and librealsense's .../Depth_0/image/data has
+/// .../Depth_0/camera_info.
+std::string camera_of_topic(const std::string& topic, const std::string& type);
+
+/// Raw values per metre of a depth image: what its format says (see compressed_depth), or ROS's own
+/// unit of its encoding. @param format  an Image's encoding, or a CompressedImage's format
+/// @throws Error if the format says what cannot be.
+double depth_units(const std::string& format, const std::string& name);
+
+/// The raw depth of an image of 16UC1, mono16 or 32FC1, row by row; floats in units of 1/`units`
+/// metres. @throws Error if it is of another encoding, or damaged.
+std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
+                                     const std::string& name);
+
+/// The colours of an image of rgb8, bgr8, rgba8 or bgra8, row by row: red, green, blue.
+/// @throws Error if it is of another encoding, or damaged.
+std::vector<std::uint8_t> rgb_of(const ros::Image& image, const std::string& name);
+
+/// The image in a message of compressed_depth_image_transport. Floats, which are stored as rounded
+/// inverse depth, are returned as 16UC1 in `units`. @throws Error if it is none, or damaged.
+ros::Image unpacked(ros::CompressedImage message, double units, const std::string& name);
+
+/// @param is_rectified  the images are: the projection counts, not the lens
+/// @throws Error if its distortion is neither zero nor Brown and Conrady's.
+Intrinsics intrinsics_of(const ros::CameraInfo& info, bool is_rectified, const std::string& name);
+
+/// The other way round.
+ros::CameraInfo camera_info_of(const ros::Header& header, const Intrinsics& k);
+
+/// How a message holds compressed depth; both are lossless.
+enum class DepthPacking : std::uint8_t {
+  png,  ///< every reader knows it
+  rvl   ///< many times as fast (depth_rvl.hpp); ROS's own readers know it since Noetic
+};
+
+/// A message of compressed_depth_image_transport. A raw value is a millimetre to ROS; where it is
+/// something else the format ends in "; units_per_metre=10000", which ROS's own readers pass over.
+/// @param packed           16-bit depth, as encode_depth_png or encode_depth_rvl give it
+/// @param units_per_metre  raw values per metre
+ros::CompressedImage compressed_depth(const ros::Header& header, std::span<const std::byte> packed,
+                                      double units_per_metre, DepthPacking packing);
+
+/// A message of a slice of depth. Its format says the unit as that of compressed_depth does.
+/// @param slice  of encode_depth_slices
+ros::CompressedImage depth_slice(const ros::Header& header, std::span<const std::byte> slice,
+                                 double units_per_metre);
+/// Is it one?
+bool is_depth_slice(const ros::CompressedImage& message);
+
+/// The colours of all points, row by row: red, green, blue; empty without `rgb` or `rgba`.
+/// @pre points_of took the message
+std::vector<std::uint8_t> rgb_of(const ros::PointCloud2& message);
+
+/// All points, row by row, in the frame of the message; what was not measured is not a number.
+/// @throws Error without x, y and z, or if it is damaged.
+std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name);
+
+}  // namespace palpate

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/kernel/sight/monitor.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
+#include "palpate/kernel/sight/surface_fit.hpp"
+
+namespace palpate {
+namespace {
+
+// A camera that measures fewer points than this in a footprint says nothing about it: with fewer a
+// median is no better than a single pixel.
+constexpr std::size_t least_points = 8;
+// [m] What lies along a line of sight is looked for this far from a place: as far as the tracker
+// looks for a surface.
+constexpr double look_reach = 0.3;
+// [-] Share of the points that may lie before a hand in free space: flying pixels and other strays.
+// More would let go of a hand at an edge that only grazes its lines of sight.
+constexpr double strays = 0.05;
+// [-] r_c: radius of the hand's footprint. A sphere of r_c that touches the outline of a body has a
+// fifth of such a footprint within the outline: four times the strays.
+constexpr double hand_radius = 2.0;
+// [-] pixels: radius of the narrowest footprint. It holds some ten.
+constexpr double narrowest = 1.8;
+// [-] Where holes leave too few points, a footprint is widened by this, up to twice.
+constexpr double widening = 3.0;
+constexpr double least_margin = 1e-3;  // [m] rounding of depth, in common cameras
+// [1/m] No estimate of the noise counts beyond this times the squared distance: 5 mm at 1 m, what a
+// stereo camera's is. So a wrong estimate cannot blind the monitor.
+constexpr double most_noise = 5e-3;
+double most_margin(double confidence, double distance) {
+  return confidence * most_noise * distance * distance;
+}
+// [-] footprint's radius: a look without an edge has 80 % of its points within this along the line
+// of sight, and the margin for noise. A plane at 70 degrees from facing the camera spans 4.4.
+constexpr double one_layer = 4.0;
+// [-] r_c: a nearer layer that begins beyond such a step, after the proxy has moved sideways by
+// `sideways`, is another body, behind which the proxy went round an edge. What a surface that leans
+// by 70 degrees rises on the way, `steepest_rise` times that, is no step.
+constexpr double edge_step = 2.0;
+constexpr double steepest_rise = 2.75;  // [-] tan 70 degrees
+constexpr double sideways = 2e-3;       // [m]
+// [m] What moves nearer by more than this from frame to frame came between camera and surface: a
+// surface at rest struck with 90 m/s^2 moves 50 mm in an interval at 30 Hz.
+constexpr double farthest_strike = 65e-3;
+// [-] Cosine: a force that points away from the camera, within 73 degrees of its line of sight.
+constexpr double away = -0.3;
+// [m] A look serves as long as its place moves less than this: a fifth of r_c.
+constexpr double look_serves = 1e-3;
+
+}  // namespace
+
+void Monitor::set(const SightParameters& parameters) noexcept {
+  parameters_ = parameters;
+}
+
+void Monitor::forget() noexcept {
+  hand_ = proxy_ = last_front_ = {};
+  side_ = Side::unknown;
+  frame_judged_ = false;
+  frames_behind_ = frames_past_edge_ = 0;
+}
+
+// What each camera measures on its lines of sight within `radius` of `place`. A camera that sees
+// the place free, or in front of a surface, is right whatever others see.
+void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& result) noexcept {
+  result = {};
+  result.fresh = true;
+  result.place = place;
+  result.radius = radius;
+  gather(cloud, Beam{place, radius, look_reach, Vec3::UnitZ()}, look_points, patch_);
+  std::array<float, look_points> heights;
+  for (std::size_t v = 0; v < patch_.view_count(); ++v) {
+    const Patch::View& view = patch_.view(v);
+    const std::size_t end = patch_.view_end(v);
+    if (!view.viewpoint) continue;
+    const Vec3 line = (*view.viewpoint - place).normalized();
+    const Eigen::Vector3f towards = line.cast<float>();
+    std::size_t size = 0;
+    for (std::size_t i = view.begin; i < end && size < look_points; ++i) {
+      const float height =
+          patch_.x()[i] * towards.x() + patch_.y()[i] * towards.y() + patch_.z()[i] * towards.z();
+      if (std::isfinite(height)) heights[size++] = height;
+    }
+    if (size < least_points) continue;
+    const std::span<const float> all(heights.data(), size);
+    const auto strayed = static_cast<std::size_t>(strays * static_cast<double>(size));
+    const double clear = -kth_smallest(all, size - 1 - strayed);
+    const double behind = kth_smallest(all, size / 2);
+    if (!result.seen || behind < result.behind) {
+      result.behind = behind;
+      result.line = line;
+      result.distance = (*view.viewpoint - place).norm();
+      result.low = kth_smallest(all, size / 10);
+      result.high = kth_smallest(all, size - 1 - size / 10);
+    }
+    result.clear = result.seen ? std::max(result.clear, clear) : clear;
+    result.seen = true;
+  }
+}
+
+// The look at `place`, taken anew only if the last one does not serve any more.
+const Monitor::Look& Monitor::look_at(const Cloud& cloud, const Vec3& place, double radius,
+                                      Look& last) noexcept {
+  if (last.fresh && (place - last.place).squaredNorm() < look_serves * look_serves) return last;
+  radius = std::max(radius, narrowest * cloud.spacing(place));
+  for (int i = 0; i < 3; ++i, radius *= widening) {
+    look(cloud, place, radius, last);
+    if (last.seen) break;
+  }
+  return last;
+}
+
+// Keeps account of the side of what the camera sees on which the proxy is. Does the look show a
+// proxy that belongs in front behind?
+bool Monitor::is_behind(double margin, double deepest, double r_c) noexcept {
+  if (!proxy_.seen) return false;
+  const bool in_front = proxy_.behind < -margin - r_c;
+  if (side_ == Side::unknown) side_ = proxy_.behind < 0.0 ? Side::front : Side::behind;
+  if (side_ == Side::behind && in_front) side_ = Side::front;
+  if (side_ != Side::front) return false;
+  const auto count_past_edge = [this](bool past) {
+    if (!frame_judged_) frames_past_edge_ = past ? frames_past_edge_ + 1 : 0;
+  };
+  if (proxy_.behind <= margin) {
+    if (proxy_.behind <= 0.0) last_front_ = proxy_;
+    count_past_edge(false);
+    return false;
+  }
+  // At an edge the median is of one body or the other.
+  if (proxy_.high - proxy_.low > one_layer * proxy_.radius + margin) return false;
+  if (last_front_.seen) {
+    const Vec3 way = proxy_.place - last_front_.place;
+    const Vec3& line = proxy_.line;
+    const double nearer = way.dot(line) + proxy_.behind - last_front_.behind;
+    const double aside = (way - way.dot(line) * line).norm();
+    // Noise of the two looks must not end the watch over the front, however small it is estimated.
+    const double noise = most_margin(parameters_.confidence, proxy_.distance);
+    const bool past_edge =
+        nearer > edge_step * r_c + noise + steepest_rise * aside && aside > sideways;
+    count_past_edge(past_edge);
+    if (past_edge) {
+      if (frames_past_edge_ >= parameters_.evidence_frames) side_ = Side::behind;
+      return false;
+    }
+    if (nearer > farthest_strike + margin) return false;
+  }
+  return proxy_.behind <= deepest + margin;
+}
+
+Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noexcept {
+  Verdict verdict;
+  const double r_c = contact.r_c;
+  const auto margin_at = [&](double distance) {
+    return std::max(least_margin, std::min(parameters_.confidence * contact.noise,
+                                           most_margin(parameters_.confidence, distance)));
+  };
+  // The frame shows the surface where it was when the frame was captured.
+  const Look& proxy = look_at(cloud, contact.proxy - contact.carried, r_c, proxy_);
+  const double margin = margin_at(proxy.distance);
+  verdict.behind = is_behind(margin, contact.deepest, r_c);
+  verdict.hidden = proxy.seen && proxy.low > edge_step * r_c + margin;
+  if (!frame_judged_) {
+    frame_judged_ = true;
+    frames_behind_ = verdict.behind ? frames_behind_ + 1 : 0;
+  } else if (!verdict.behind) {
+    frames_behind_ = 0;
+  }
+
+  if (contact.touching) {
+    const Look& hand = look_at(cloud, contact.hip - contact.carried, hand_radius * r_c, hand_);
+    const bool free = hand.seen && hand.clear > r_c + margin_at(hand.distance);
+    if (side_ == Side::behind) {
+      if (free && (contact.hip - contact.proxy).norm() > contact.deepest + margin)
+        verdict.action = Action::let_go;
+    } else {
+      const bool pulls = proxy.seen && std::abs(proxy.behind) < 2.0 * r_c + margin &&
+                         contact.normal.dot(proxy.line) < away;
+      if (free || pulls) verdict.action = Action::release;
+    }
+    if (verdict.action != Action::none) return verdict;
+  }
+  if (verdict.behind && frames_behind_ >= parameters_.evidence_frames && !contact.held) {
+    verdict.action = Action::return_to_front;
+    verdict.normal = proxy.line;
+    verdict.front = contact.proxy + (proxy.behind + r_c) * proxy.line;
+    frames_behind_ = 0;
+    proxy_.fresh = false;
+  }
+  return verdict;
+}
+
+}  // namespace palpate

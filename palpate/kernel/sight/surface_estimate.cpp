@@ -1,0 +1,798 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/kernel/sight/surface_estimate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "palpate/kernel/core/linear.hpp"
+
+namespace palpate {
+namespace {
+
+using Vec5 = Eigen::Matrix<double, 5, 1>;
+
+constexpr double widest_gate = 60e-3;  // [m]
+constexpr std::size_t inner_points = 768;
+constexpr std::size_t outer_points = 1280;
+constexpr std::size_t inner_rungs = 2;
+constexpr std::size_t median_points = 192;
+constexpr double narrowest_cell = 4.5e-3;  // [m]
+// A disc's radius in multiples of what lies between points: pi 3^2 = 28 points are enough for a
+// quadric and for an outlier test, and half of them still are at an edge.
+constexpr double least_radius = 3.0;
+// Discs of coarse images grow at least by this from rung to rung; fine ones' by 1.57 to 1.7.
+constexpr double least_growth = 1.25;
+// Residuals this small are no structure, whatever the noise [m].
+constexpr double structure_floor = 50e-6;
+// Noise may grow by this much at once, however little there was [m].
+constexpr double unnoticed_noise = 50e-6;
+// Upper 99 % confidence bounds of a variance estimated from 1 to 5 samples, in multiples of it.
+constexpr std::array upper_bounds = {6000.0, 400.0, 120.0, 50.0, 28.0};
+// [m] Places of a fit that differ by less are the same.
+constexpr double same_centre = 1e-6;
+// [-] standard deviations. A disc in use needs so much stronger evidence against it: a change is
+// felt.
+constexpr double hysteresis = 0.5;
+
+constexpr double squared(double x) {
+  return x * x;
+}
+
+// How many standard deviations, themselves estimated with so many degrees of freedom, are exceeded
+// as rarely as `z` known ones: Student's quantile, by Fisher's expansion.
+double t_quantile(double z, double freedom) {
+  return z + z * (z * z + 1.0) / (4.0 * freedom);
+}
+
+// Variance of heights that do not move [m^2], all but the newest; 0 if there are too few.
+double variance_at_rest(std::span<const HeightSample> newest_first, std::size_t frames) {
+  constexpr std::size_t enough = 8;
+  if (frames <= enough) return 0.0;
+  const double base = newest_first[1].height;
+  double count = 0.0;
+  double sum = 0.0;
+  double squares = 0.0;
+  for (std::size_t i = 1; i < frames; ++i) {
+    const double height = newest_first[i].height - base;
+    const double weight = 1.0 / newest_first[i].doubt;
+    count += weight;
+    sum += weight * height;
+    squares += weight * height * height;
+  }
+  return std::max(squares - sum * sum / count, 0.0) / static_cast<double>(frames - 2);
+}
+
+// Normal equations of the shape over the newest 2, 4, 8, ... frames: matrix * shape = right_side,
+// in centimetres.
+constexpr std::size_t slope_windows = 4;
+struct SlopeWindow {
+  Eigen::Matrix<double, 5, 5> matrix;
+  Vec5 right_side;
+};
+
+// Keeps the slopes of a shape that was summed over all frames within `confidence` standard
+// deviations of what each window of the newest ones gives, the longest first: a surface that turns
+// is never farther off than their noise, and a false alarm costs no more than a little of the
+// averaging.
+// @param point_variance  [cm^2] what one point weighs
+void confine_slopes(Vec5& shape, std::span<const SlopeWindow> windows, double point_variance,
+                    double confidence) {
+  for (std::size_t i = windows.size(); i-- > 0;) {
+    const Eigen::Matrix2d matrix = windows[i].matrix.topLeftCorner<2, 2>();
+    const double determinant = matrix.determinant();
+    if (!(determinant > 1e-6 * squared(matrix.trace()))) continue;
+    const Vec5 off = windows[i].right_side - windows[i].matrix * shape;
+    const Eigen::Matrix2d inverse = matrix.inverse();
+    const Vec2 change = inverse * off.head<2>();
+    for (int axis = 0; axis < 2; ++axis) {
+      const double slack = confidence * std::sqrt(point_variance * inverse(axis, axis));
+      shape[axis] += change[axis] - std::clamp(change[axis], -slack, slack);
+    }
+  }
+}
+
+}  // namespace
+
+void SurfaceEstimate::set(const SightParameters& parameters) noexcept {
+  parameters_ = parameters;
+  if (parameters_.usual_noise == 0.0) parameters_.usual_noise = SightParameters::unknown_noise;
+  if (parameters_.noise_growth == 0) parameters_.noise_growth = SightParameters::unknown_growth;
+}
+
+double SurfaceEstimate::height_sd() const noexcept {
+  return std::sqrt(variance(mover_));
+}
+
+double SurfaceEstimate::beam_sd() const noexcept {
+  double most = 0.0;
+  for (std::size_t i = 0; i < is_known_.size(); ++i)
+    if (is_known_[i]) most = std::max(most, variance(0, i));
+  return std::sqrt(most > 0.0 ? most : variance(0, camera_));
+}
+
+double SurfaceEstimate::variance(std::size_t rung) const noexcept {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < is_known_.size(); ++i)
+    if (is_known_[i]) least = std::min(least, variance(rung, i));
+  return std::isfinite(least) ? least : variance(rung, camera_);
+}
+
+// Variance of one frame's height in a disc [m^2]: the usual one of a depth camera, until enough
+// frames have been measured; then the measured one, with a margin for how few they were.
+double SurfaceEstimate::variance(std::size_t rung, std::size_t camera) const noexcept {
+  const std::array<Scatter, rungs>& scatters = scatter_[camera];
+  const Scatter& scatter = scatters[rung];
+  // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
+  const double most = 4.0 * spread_ + 0.5e-3;
+  const double grown =
+      parameters_.noise_growth == 1 ? distances_[camera] : squared(distances_[camera]);
+  const double usual =
+      squared(std::min(parameters_.usual_noise * grown, most)) + 0.03 * squared(spread_) + 1e-12;
+  // Noise falls with the area it is averaged over: a wider disc's is the least of this one's.
+  double wider = 0.0;
+  for (std::size_t j = rung + 1; j < rungs; ++j) wider = std::max(wider, scatters[j].variance);
+  if (scatter.samples < 1.0) return std::max(usual, wider);
+  const double measured = std::max({scatter.variance * (1.0 + 4.0 / scatter.samples), scatter.least,
+                                    std::min(scatter.at_rest, 4.0 * scatter.variance)}) +
+                          1e-12;
+  if (scatter.samples > static_cast<double>(upper_bounds.size())) return measured;
+  const double largest =
+      upper_bounds[static_cast<std::size_t>(scatter.samples) - 1] * (scatter.variance + 1e-12);
+  return std::max({std::min(usual, largest), measured, wider});
+}
+
+void SurfaceEstimate::set_spacing(double spacing) noexcept {
+  double least = least_radius * spacing;
+  for (std::size_t j = 0; j < rungs; ++j, least *= least_growth) {
+    radii_[j] = std::max(narrowest_discs[j], least);
+  }
+  cell_size_ = narrowest_cell * coarseness();
+}
+
+std::size_t SurfaceEstimate::most_rungs() const noexcept {
+  std::size_t most = inner_rungs;
+  while (most < rungs && narrowest_discs[most] <= parameters_.widest_disc) ++most;
+  return most;
+}
+
+bool SurfaceEstimate::misfits(double spacing) const noexcept {
+  constexpr double tolerated = 1.4;
+  const double ratio = std::max(narrowest_discs[0], least_radius * spacing) / radii_[0];
+  return spacing > 0.0 && (ratio > tolerated || ratio < 1.0 / tolerated);
+}
+
+double SurfaceEstimate::gate(double narrowest) const noexcept {
+  // The beam is as wide as the narrowest disc, whose height is the noisiest.
+  return std::clamp(std::max(4.0 * spread_, 6.0 * beam_sd()), narrowest, widest_gate);
+}
+
+double SurfaceEstimate::displacement(double t) const noexcept {
+  if (velocity_ == 0.0) return 0.0;
+  // Beyond one and a half intervals the velocity fades over another, and the surface stays there.
+  const double elapsed = std::max(t - stamp_, 0.0) / interval_;
+  const double late = std::clamp(elapsed - 1.5, 0.0, 1.0);
+  return velocity_ * interval_ * (std::min(elapsed, 1.5) + late - 0.5 * late * late);
+}
+
+SurfaceContact SurfaceEstimate::contact(const Vec3& point, double t, double reach) const noexcept {
+  Vec3 local = frame_.local_from_world(point);
+  const double moved = displacement(t);
+  local.z() -= moved;
+  Vec3 from = local;
+  if (const double bulge = surface_.strongest_fall(); bulge > 0.0) {
+    // From near the centre of curvature all places around are equally near. The one above counts.
+    constexpr double deepest = 0.6;  // [-] of the bulge's radius
+    from.z() = std::max(from.z(), surface_.height(from.head<2>()) - deepest / bulge);
+  }
+  const Vec2 at = surface_.nearest(from, from.head<2>(), centre_, reach);
+  const Vec3 foot(at.x(), at.y(), surface_.height(at));
+  const Vec3 normal = surface_.normal(at);
+  return {frame_.world_from_local(foot + Vec3(0, 0, moved)), frame_.direction_in_world(normal),
+          (local - foot).dot(normal), (at - centre_).norm() > 0.999 * reach,
+          surface_.strongest_rise()};
+}
+
+void SurfaceEstimate::start_frame(std::size_t camera, double stamp, double interval) noexcept {
+  const bool follows = stamp > stamp_ || (stamp == stamp_ && camera != camera_);
+  camera_ = camera;
+  if (!(follows && stamp - stamp_ <= longest_gap)) {
+    stop();
+    settled_ = 0;
+  }
+  stamp_ = stamp;
+  interval_ = interval;
+}
+
+bool SurfaceEstimate::start(const Cloud& cloud, const Vec3& foot, const Vec3& up) noexcept {
+  frame_ = LocalFrame::about(foot, up);
+  surface_ = {};
+  count_ = 0;
+  for (Cells& past : cells_) past.full = false;
+  stop();
+  jumped_ = false;
+  smooth_ = false;
+  // Wide enough for the narrowest disc on a surface that leans by 60 degrees
+  const double gate = narrowest_gate * coarseness() + 4.0 * spread_;
+  return measure(cloud, Vec2::Zero(), Look{gate}, true);
+}
+
+SurfaceEstimate::Shape SurfaceEstimate::Shape::of(const Moments& disc) noexcept {
+  const Eigen::Matrix<double, 6, 6> a = disc.normal_matrix();
+  const Vec6 b = disc.right_side();
+  const double weight = std::max(a(0, 0), 1e-9);
+  const Vec5 column = a.block<5, 1>(1, 0);
+  const Eigen::Matrix<double, 5, 5> matrix =
+      a.bottomRightCorner<5, 5>() - column * column.transpose() / weight;
+  Shape shape{.sums = {}, .means = column / weight, .height = b[0] / weight, .points = a(0, 0)};
+  for (Eigen::Index i = 0, k = 0; i < 5; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) shape.sums[k++] = matrix(i, j);
+  }
+  shape.sums.tail<5>() = b.tail<5>() - column * (b[0] / weight);
+  return shape;
+}
+
+Eigen::Matrix<double, 5, 5> SurfaceEstimate::Shape::matrix(const Sums& sums) noexcept {
+  Eigen::Matrix<double, 5, 5> result;
+  for (Eigen::Index i = 0, k = 0; i < 5; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) result(i, j) = result(j, i) = sums[k++];
+  }
+  return result;
+}
+
+// The residuals of a patch's points within `radius` of `foot`: their median, and how they spread
+// about it. Looks at an even part of them: a median of so many is good enough to judge what belongs
+// to a surface.
+std::optional<SurfaceEstimate::Residuals> SurfaceEstimate::residuals(const Vec2& foot,
+                                                                     double radius,
+                                                                     double wide) const noexcept {
+  std::array<float, median_points + 1> values;
+  std::size_t size = 0;
+  const FloatQuadric surface(surface_);
+  const auto foot_x = static_cast<float>(foot.x());
+  const auto foot_y = static_cast<float>(foot.y());
+  const auto radius_squared = static_cast<float>(squared(radius));
+  const auto most = static_cast<float>(wide);
+  const std::size_t stride = 1 + points_.size / (median_points + 1);
+  for (std::size_t i = 0; i < points_.size && size < median_points; i += stride) {
+    const float dx = points_.x[i] - foot_x;
+    const float dy = points_.y[i] - foot_y;
+    const float r = points_.z[i] - surface.height(points_.x[i], points_.y[i]);
+    values[size] = r;
+    const bool counts = (dx * dx + dy * dy <= radius_squared) & (std::abs(r) <= most);
+    size += counts ? 1 : 0;
+  }
+  if (size < least_points) return std::nullopt;
+  const std::span found(values.data(), size);
+  const float centre = kth_smallest(found, size / 2);
+  for (float& each : found) each = std::abs(each - centre);
+  // Of quantised depth half may well be equal.
+  return Residuals{centre, std::max(1.4826 * kth_smallest(found, size / 2),
+                                    0.965 * kth_smallest(found, size * 7 / 10))};
+}
+
+// Shifts the expected surface by the median residual near `foot`, and sets `cut` [m], the residual
+// beyond which a point is an outlier.
+bool SurfaceEstimate::recentre(const Vec2& foot, double wide, double& cut) noexcept {
+  const std::optional<Residuals> near = residuals(foot, radii_[0], wide);
+  if (!near) return false;
+  surface_.c[0] += near->median;
+  // Smoothed, since quantised depth makes single deviations jump between its steps.
+  spread_ = count_ == 0 ? near->deviation : spread_ + 0.2 * (near->deviation - spread_);
+  cut = std::clamp(6.0 * std::max(near->deviation, spread_), 0.5e-3, wide);
+  return true;
+}
+
+// Measures the surface around `foot` in the newest frame, and estimates anew from all frames.
+bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& look,
+                              bool new_frame) noexcept {
+  const double wide = look.gate;
+  const Vec3 place = frame_.world_from_local(Vec3(foot.x(), foot.y(), surface_.height(foot)));
+  const double deep = wide + 2.0 * radii_[1];
+  gather(cloud, Beam{place, radii_[1] * 1.2, deep, frame_.up}, inner_points, patch_);
+  points_.take(patch_, frame_);
+  const Quadric before = surface_;
+  double cut = 0.0;
+  const bool first = count_ == 0;
+  // Without an estimate to start from, the shape is found by iterating the fit.
+  for (int i = 0; i < (first ? 3 : 1); ++i) {
+    if (!recentre(foot, wide, cut)) {
+      surface_ = before;
+      return false;
+    }
+    if (!first) break;
+    Moments moments =
+        disc_moments(patch_, frame_, surface_, Disc{foot, 0.0, radii_[1], std::max(cut, 2e-3)});
+    if (moments.xy[0] < 6.0) {
+      surface_ = before;
+      return false;
+    }
+    const Quadric correction = fit_quadric(moments, 0.1 * moments.xy[0]);
+    surface_.c += correction.c;
+  }
+
+  if (new_frame || count_ == 0) {
+    // Heights from before a jump belong to another surface, unless the next frame's jump says that
+    // it was a motion.
+    const bool goes_on = look.jumped && jumped_;
+    jumped_ = look.jumped;
+    if (count_ == 0 || (look.jumped && !goes_on)) settled_ = 0;
+    if (settled_ == 0) rested_ = 0;
+    settled_ += goes_on && settled_ == 1 ? 2 : 1;
+    newest_ = (newest_ + 1) % history;
+    count_ = std::min(count_ + 1, most_frames());
+    evidence(0).camera = camera_;
+    is_known_.fill(false);
+    for (std::size_t i = 0; i < count_; ++i) is_known_[evidence(i).camera] = true;
+    cameras_ = static_cast<std::size_t>(std::count(is_known_.begin(), is_known_.end(), true));
+  }
+  Evidence& now = evidence(0);
+  now.stamp = stamp_;
+  now.centre = foot;
+  now.whole = !look.partial;
+  now.lost = 0;
+  const auto add_ring = [&](std::size_t j) {
+    Moments moments = disc_moments(patch_, frame_, surface_,
+                                   Disc{foot, j == 0 ? 0.0 : radii_[j - 1], radii_[j], cut});
+    now.extent[j] = moments.xy[0] / patch_.share() + (j > 0 ? now.extent[j - 1] : 0.0);
+    moments.raise(surface_);
+    if (j > 0) moments.add(now.disc[j - 1]);
+    now.disc[j] = moments;
+  };
+  for (std::size_t j = 0; j < inner_rungs; ++j) add_ring(j);
+  now.rungs = inner_rungs;
+
+  look_at_cells(foot, look, new_frame);
+
+  // Where there is noise to average away, look farther.
+  const Scatter& inner = scatter_[now.camera][1];
+  const bool noisy = inner.samples >= 1.0 ? inner.variance > squared(20e-6) : spread_ > 0.1e-3;
+  const std::size_t most = most_rungs();
+  if (noisy && most > inner_rungs) {
+    const double widest = radii_[most - 1];
+    gather(cloud, Beam{place, widest * 1.1, wide + widest, frame_.up}, outer_points, patch_);
+    points_.take(patch_, frame_);
+    // Noise that is common to the inner disc is not common to the wide ones: their outliers are
+    // judged by their own median and deviation.
+    if (const std::optional<Residuals> far = residuals(foot, widest, wide)) {
+      surface_.c[0] += far->median;
+      cut = std::clamp(6.0 * far->deviation, cut, wide);
+    }
+    for (std::size_t j = inner_rungs; j < most; ++j) add_ring(j);
+    now.rungs = most;
+  }
+  for (std::size_t j = 0; j < now.rungs; ++j) now.shape[j] = Shape::of(now.disc[j]);
+  if (first && !spans_area(now.shape[0])) {
+    surface_ = before;
+    count_ = 0;
+    return false;
+  }
+  estimate(foot, new_frame);
+  if (!look.partial) judge(foot);
+  now.smooth = smooth_;
+  // What one camera sees whole another may see cut off by a shadow, in turn.
+  std::array<bool, Patch::max_views> is_judged{};
+  for (std::size_t i = 0; i < count_ && cameras_ > 1 && !look.partial; ++i) {
+    const Evidence& e = evidence(i);
+    if (std::exchange(is_judged[e.camera], true) || stamp_ - e.stamp > longest_gap) continue;
+    smooth_ = smooth_ || (e.smooth && (e.centre - foot).squaredNorm() < squared(same_centre));
+  }
+  centre_ = foot;
+  if (foot.norm() > 4e-3 * coarseness()) move_origin(foot);
+  return true;
+}
+
+void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
+  Evidence& now = evidence(0);
+  const Vec2 at = foot / Moments::unit;
+  Vec5 basis;
+  basis << at.x(), at.y(), at.x() * at.x(), at.x() * at.y(), at.y() * at.y();
+  const double cm2 = squared(Moments::unit);
+
+  std::array<Vec5, rungs> shapes;
+  std::array<std::array<HeightSample, history>, rungs> heights;
+  std::array<std::size_t, rungs> frames{};
+  std::size_t chosen = 0;
+  const std::size_t averaged =
+      std::min(count_, cameras_ * static_cast<std::size_t>(parameters_.averaged_frames));
+  for (std::size_t j = 0; j < now.rungs; ++j) {
+    std::array<double, Patch::max_views> doubts{};
+    for (std::size_t c = 0; c < doubts.size(); ++c)
+      if (is_known_[c]) doubts[c] = doubt(j, c);
+    // Evidence from frames whose disc overlaps this one's well.
+    const double farthest = squared(overlap(j));
+    Shape::Sums sums = Shape::Sums::Zero();
+    std::array<SlopeWindow, slope_windows> windows;
+    std::size_t filled = 0;
+    std::size_t whole = 0;
+    std::size_t n = 0;
+    for (; n < averaged; ++n) {
+      const Evidence& e = evidence(n);
+      if (j < e.lost || e.rungs <= j || (e.centre - foot).squaredNorm() > farthest) break;
+      // A partly hidden disc determines the height, but hardly the slope.
+      if (!e.whole && n > 0) continue;
+      sums += 1.0 / doubts[e.camera] * e.shape[j].sums;
+      if (++whole == std::size_t{2} << filled && filled < slope_windows) {
+        windows[filled++] = {Shape::matrix(sums), Shape::right_side(sums)};
+      }
+    }
+    frames[j] = n;
+    const double points = std::max(now.shape[j].points, 1.0);
+    Scatter& scatter = scatter_[now.camera][j];
+    // Weight of the curvature prior in points, with correlated noise counted by its effect.
+    const double prior =
+        variance(j) * points / cm2 / squared(parameters_.curvature_sd * Moments::unit);
+    const auto fit_shape = [&](Eigen::Matrix<double, 5, 5> a, const Vec5& b) {
+      a.diagonal().array() += 1e-9;
+      a.diagonal().tail<3>().array() += prior;
+      shapes[j] = solve_symmetric<5>(a, b);
+    };
+    fit_shape(Shape::matrix(sums), Shape::right_side(sums));
+    // One deviation more than elsewhere: each of four windows could be wrong in each frame.
+    confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / cm2,
+                   parameters_.confidence + 1.0);
+    const double above = shapes[j].dot(basis);
+    std::array<double, Patch::max_views> own_frames{};
+    for (std::size_t i = 0; i < n; ++i) ++own_frames[evidence(i).camera];
+    std::array<double, Patch::max_views> usual_extent{};
+    std::array<HeightSample, 5> h;  // of this camera, without what it is worth beside others
+    std::size_t own = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Evidence& e = evidence(i);
+      heights[j][i] = {
+          e.stamp, (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * Moments::unit};
+      usual_extent[e.camera] += e.extent[j] / own_frames[e.camera];
+    }
+    // A disc that an occluder begins to hide has fewer points and more noise.
+    for (std::size_t i = 0; i < n; ++i) {
+      const Evidence& e = evidence(i);
+      HeightSample& height = heights[j][i];
+      const double share = e.extent[j] / usual_extent[e.camera];
+      if (share < 0.8) height.doubt = 1.0 / squared(std::max(share, 0.1));
+      if (e.camera == now.camera && own < h.size()) h[own++] = height;
+      height.doubt *= doubts[e.camera];
+    }
+    if (cameras_ > 1) align_cameras(std::span(heights[j].data(), n));
+    if (new_frame && own == h.size() && now.whole) {
+      // Fourth differences do not see a smooth motion; their variance is 70 times a height's.
+      const double fourth =
+          h[0].height - 4.0 * h[1].height + 6.0 * h[2].height - 4.0 * h[3].height + h[4].height;
+      double change =
+          fourth * fourth /
+          (h[0].doubt + 16.0 * (h[1].doubt + h[3].doubt) + 36.0 * h[2].doubt + h[4].doubt);
+      // A single jump is not noise.
+      if (scatter.samples >= 4.0) {
+        change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise));
+      }
+      scatter.samples = std::min(scatter.samples + 1.0, 40.0);
+      scatter.variance += (change - scatter.variance) / scatter.samples;
+    }
+    if (new_frame)
+      scatter.at_rest = doubts[now.camera] * variance_at_rest(heights[j], std::min(n, rested_));
+  }
+  // Lepski's rule: the widest disc that agrees with all narrower ones determines the height. The
+  // differences between discs are taken frame by frame, so that motion cancels and their scatter is
+  // the noise. A disc may differ from the narrower ones, because the surface is not a quadric over
+  // its width, and yet move with them: then it determines the motion only.
+  const double negligible =
+      2e-6 + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
+  // Until a disc's noise has been measured over time, what its points scatter counts at most: the
+  // usual noise of a camera would let a wide disc agree that reaches beyond a body.
+  constexpr double unmeasured = 0.5;  // [-] of the spread
+  const auto measured = [&](std::size_t j) {
+    return scatter_[now.camera][j].samples > static_cast<double>(upper_bounds.size());
+  };
+  const auto expected = [&](std::size_t j) {
+    return measured(j) ? variance(j) : std::min(variance(j), squared(unmeasured * spread_));
+  };
+  // [-] A disc that is emptier than this, beside the narrowest, reaches beyond the body: at a
+  // straight edge half of it is empty.
+  constexpr double least_filled = 0.45;
+  std::size_t mover = 0;
+  bool agree = true;
+  for (std::size_t j = 1; j < now.rungs; ++j) {
+    if (now.extent[j] < least_filled * now.extent[0] * squared(radii_[j] / radii_[0])) break;
+    bool moves_along = frames[j] >= std::min<std::size_t>(frames[0], 2);
+    for (std::size_t i = 0; i < j && moves_along; ++i) {
+      const std::size_t n = std::min(frames[i], frames[j]);
+      double sum = 0.0;
+      double squares = 0.0;
+#pragma omp simd reduction(+ : sum, squares)
+      for (std::size_t k = 0; k < n; ++k) {
+        const double d = heights[j][k].height - heights[i][k].height;
+        sum += d;
+        squares += d * d;
+      }
+      const auto count = static_cast<double>(n);
+      const double mean = sum / count;
+      const double about_mean = std::max(squares - count * mean * mean, 0.0);
+      // Noise falls at most with the area it is averaged over, so the difference from the next
+      // narrower disc is a lower bound of a disc's noise.
+      if (i + 1 == j && n >= 4) {
+        scatter_[now.camera][j].least =
+            (1.0 + 2.0 / count) * about_mean / count / (squared(radii_[j] / radii_[i]) - 1.0);
+      }
+      // Few differences may happen to be alike: what the heights' noise lets expect counts as
+      // `prior` more. Without it a contact that slides falls back on narrow discs in single frames.
+      constexpr double prior = 4.0;
+      const double freedom = count - 1.0 + prior;
+      const double scattered = (about_mean + prior * (expected(i) + expected(j))) / freedom;
+      // What is not measured yet is bounded, not estimated.
+      const double sds = parameters_.confidence + (j <= rung_ ? hysteresis : 0.0);
+      const double confidence = measured(i) && measured(j) ? t_quantile(sds, freedom) : sds;
+      agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
+      const double newest = heights[j][0].height - heights[i][0].height;
+      moves_along =
+          agree || (n >= 4 && std::abs(newest - mean) <=
+                                  parameters_.confidence * std::sqrt(scattered) + negligible);
+    }
+    if (!moves_along) break;
+    if (agree && variance(j) <= variance(chosen)) chosen = j;
+    if (variance(j) <= variance(mover)) mover = j;
+  }
+  rung_ = chosen;
+  mover_ = mover;
+  std::array<HeightSample, history>& past = heights[mover];
+  const std::size_t known = std::min(frames[chosen], frames[mover]);
+  if (mover != chosen) {
+    double difference = 0.0;
+    for (std::size_t k = 0; k < known; ++k) {
+      difference += (heights[chosen][k].height - past[k].height) / static_cast<double>(known);
+    }
+    for (std::size_t k = 0; k < frames[mover]; ++k) past[k].height += difference;
+  }
+  const std::span<const HeightSample> since(past.data(),
+                                            std::clamp<std::size_t>(settled_, 1, frames[mover]));
+  const double sd = height_sd();
+  const HeightTrack track = track_height(since, sd, interval_, parameters_);
+  if (new_frame) {
+    velocity_ = track.velocity;
+    rested_ = velocity_ == 0.0 ? std::min(rested_ + 1, history) : 0;
+  }
+  const double height = track.height;
+  surface_.c.tail<5>() = shapes[chosen];
+  surface_.c.tail<3>() /= Moments::unit;
+  above_mean_ = since.front().height - height;
+  surface_.c[0] = height - shapes[chosen].dot(basis) * Moments::unit;
+}
+
+// Where cameras' poses are not quite right, their heights differ by what is no motion: takes from
+// each camera's how far they lie above those of the others, interpolated in time, so that the mean
+// stays. Of the newest frames.
+void SurfaceEstimate::align_cameras(std::span<HeightSample> heights) noexcept {
+  const std::size_t n = heights.size();
+  constexpr std::size_t none = history;
+  std::array<std::size_t, history> newer;  // frame of another camera; the next older one likewise
+  std::array<std::size_t, history> older;
+  const auto camera = [this](std::size_t i) { return evidence(i).camera; };
+  for (std::size_t i = 0; i < n; ++i)
+    newer[i] = i == 0 ? none : camera(i - 1) != camera(i) ? i - 1 : newer[i - 1];
+  for (std::size_t i = n; i-- > 0;)
+    older[i] = i + 1 == n ? none : camera(i + 1) != camera(i) ? i + 1 : older[i + 1];
+  struct Sums {
+    double difference = 0.0, count = 0.0, weight = 0.0;
+  };
+  std::array<Sums, Patch::max_views> sums{};
+  double weight = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    Sums& own = sums[camera(i)];
+    own.weight += 1.0 / heights[i].doubt;
+    weight += 1.0 / heights[i].doubt;
+    if (newer[i] == none || older[i] == none) continue;
+    const HeightSample& after = heights[newer[i]];
+    const HeightSample& before = heights[older[i]];
+    const double time = after.stamp - before.stamp;
+    const double share = time > 0.0 ? (heights[i].stamp - before.stamp) / time : 0.5;
+    own.difference += heights[i].height - before.height - share * (after.height - before.height);
+    ++own.count;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const Sums& own = sums[camera(i)];
+    if (own.count > 0.0)
+      heights[i].height -= own.difference / own.count * (1.0 - own.weight / weight);
+  }
+}
+
+// Means of the inner patch's points in cells of a square about `foot`. Structure stays from frame
+// to frame, noise does not.
+void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept {
+  if (new_frame) newest_cells_ = (newest_cells_ + 1) % cell_frames;
+  Cells& now = cells_[newest_cells_];
+  const Vec2 corner = foot / cell_size_ - Vec2::Constant(0.5 * cells_per_side);
+  now.first = corner.array().round().cast<int>();
+  now.heights.fill(0.0);
+  now.means.fill(Vec6::Zero());
+  const FloatQuadric surface(surface_);
+  const auto first_u = static_cast<float>(now.first.x());
+  const auto first_v = static_cast<float>(now.first.y());
+  const auto per_cell = static_cast<float>(1.0 / cell_size_);
+  const auto gate = static_cast<float>(look.gate);
+  for (std::size_t i = 0; i < points_.size; ++i) {
+    const float x = points_.x[i];
+    const float y = points_.y[i];
+    const float z = points_.z[i];
+    const float u = x * per_cell - first_u;
+    const float v = y * per_cell - first_v;
+    if (!(u >= 0.0F && v >= 0.0F && u < cells_per_side && v < cells_per_side)) continue;
+    if (!(std::abs(z - surface.height(x, y)) <= gate)) continue;
+    const auto k =
+        static_cast<std::size_t>(static_cast<int>(v) * cells_per_side + static_cast<int>(u));
+    now.heights[k] += double{z};
+    now.means[k] += quadric_basis(Vec2(x, y));
+  }
+  // Noise leaves single cells empty, an edge leaves a whole row.
+  constexpr int most_empty = 2;
+  int empty = 0;
+  for (std::size_t k = 0; k < cells; ++k) {
+    const double count = now.means[k][0];
+    if (!(count > 0.0)) {
+      ++empty;
+      continue;
+    }
+    now.heights[k] /= count;
+    now.means[k] /= count;
+  }
+  now.full = !look.partial && empty <= most_empty;
+}
+
+// Mean square of the cells' residuals about their own best quadric [m^2]: errors of the fit, which
+// grow towards the corners, do not count as structure.
+double SurfaceEstimate::squared_structure(const Cells& frame,
+                                          const std::array<double, cells>& residuals) noexcept {
+  Eigen::Matrix<double, 6, 6> a = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
+  Vec6 b = Vec6::Zero();
+  std::array<Vec6, cells> basis;
+  for (std::size_t k = 0; k < cells; ++k) {
+    Vec6& means = basis[k];
+    means = frame.means[k];
+    means.segment<2>(1) *= 1.0 / Moments::unit;
+    means.tail<3>() *= 1.0 / squared(Moments::unit);
+    a.noalias() += means * means.transpose();
+    b += residuals[k] * means;
+  }
+  const Vec6 c = solve_symmetric<6>(a, b);
+  double sum = 0.0;
+  double present = 0.0;
+  for (std::size_t k = 0; k < cells; ++k) {
+    sum += squared(residuals[k] - c.dot(basis[k]));
+    present += frame.means[k][0];
+  }
+  return sum / (present - 6.0);
+}
+
+// Do the points span an area, so that they determine a slope? Those of a border seen from its side
+// lie in a line.
+bool SurfaceEstimate::spans_area(const Shape& inner) const noexcept {
+  const double xx = inner.means[2] - squared(inner.means[0]);
+  const double xy = inner.means[3] - inner.means[0] * inner.means[1];
+  const double yy = inner.means[4] - squared(inner.means[1]);
+  const double least = 0.5 * (xx + yy) - std::hypot(0.5 * (xx - yy), xy);
+  return least > 0.05 * full_disc();
+}
+
+// Does the fit describe the surface, up to noise?
+void SurfaceEstimate::judge(const Vec2& foot) noexcept {
+  const Evidence& now = evidence(0);
+  // At an edge the points lie to one side of the disc, at a gap around an empty middle.
+  const Shape& inner = now.shape[0];
+  const Vec2 middle(inner.means[0], inner.means[1]);
+  const Vec2 spread = Vec2(inner.means[2], inner.means[4]) - Vec2(middle.cwiseAbs2());
+  // Hysteresis, so that the way to rest does not change from frame to frame.
+  const double slack = smooth_ ? 0.5 : 0.35;
+  const bool whole = (middle * Moments::unit - foot).norm() < 0.85 * slack * radii_[0] &&
+                     spread.minCoeff() > (1.0 - slack) * full_disc() &&
+                     spread.maxCoeff() < (1.0 + slack) * full_disc();
+  if (!whole) {
+    smooth_ = false;
+    return;
+  }
+  const Cells& newest = cells_[newest_cells_];
+  if (!newest.full) {
+    smooth_ = false;
+    return;
+  }
+  // Residuals over the surface as it is known now, less what all cells share; 0 of empty ones.
+  const auto residuals_of = [this](const Cells& frame) {
+    std::array<double, cells> residuals;
+    double sum = 0.0;
+    double present = 0.0;
+    for (std::size_t k = 0; k < cells; ++k) {
+      residuals[k] = frame.heights[k] - surface_.c.dot(frame.means[k]);
+      sum += residuals[k];
+      present += frame.means[k][0];
+    }
+    for (std::size_t k = 0; k < cells; ++k) residuals[k] -= frame.means[k][0] * sum / present;
+    return residuals;
+  };
+  const std::array<double, cells> residuals = residuals_of(newest);
+  std::array<double, cells> sums = residuals;
+  std::size_t frames = 1;
+  for (; frames < cell_frames; ++frames) {
+    const Cells& past = cells_[(newest_cells_ + cell_frames - frames) % cell_frames];
+    if (!past.full) break;
+    const std::array<double, cells> older = residuals_of(past);
+    if (frames == 1) learn_cell_noise(newest, residuals, past, older);
+    if (past.first != newest.first) break;
+    for (std::size_t k = 0; k < cells; ++k) sums[k] += older[k];
+  }
+  const auto n = static_cast<double>(frames);
+  const double structure = squared_structure(newest, sums) / squared(n);
+  // Structure below the noise of one frame is ignored: over points the proxy would not rest better.
+  const double times = std::max((smooth_ ? 6.0 : 3.0) / n, smooth_ ? 2.0 : 1.0);
+  smooth_ = structure <= squared(structure_floor) + times * cell_scatter_.variance;
+}
+
+// Noise of a cell, from the differences of two frames in the cells that both measured, less their
+// common part.
+void SurfaceEstimate::learn_cell_noise(const Cells& newest,
+                                       const std::array<double, cells>& residuals,
+                                       const Cells& past,
+                                       const std::array<double, cells>& older) noexcept {
+  const Eigen::Vector2i offset = newest.first - past.first;
+  double sum = 0.0;
+  double squares = 0.0;
+  double shared = 0.0;
+  for (int v = 0; v < cells_per_side; ++v) {
+    for (int u = 0; u < cells_per_side; ++u) {
+      const int past_u = u + offset.x();
+      const int past_v = v + offset.y();
+      if (past_u < 0 || past_v < 0 || past_u >= cells_per_side || past_v >= cells_per_side)
+        continue;
+      const auto k = static_cast<std::size_t>(v * cells_per_side + u);
+      const auto past_k = static_cast<std::size_t>(past_v * cells_per_side + past_u);
+      if (newest.means[k][0] == 0.0 || past.means[past_k][0] == 0.0) continue;
+      const double change = residuals[k] - older[past_k];
+      sum += change;
+      squares += squared(change);
+      shared += 1.0;
+    }
+  }
+  constexpr double enough = 6.0;
+  if (shared < enough) return;
+  const double change = std::max(squares - sum * sum / shared, 0.0) / (2.0 * (shared - 1.0));
+  cell_scatter_.samples = std::min(cell_scatter_.samples + 1.0, 30.0);
+  cell_scatter_.variance += (change - cell_scatter_.variance) / cell_scatter_.samples;
+}
+
+// Keeps the local origin near the contact: sums of fourth powers lose digits far from it.
+void SurfaceEstimate::move_origin(const Vec2& foot) noexcept {
+  const Eigen::Vector2i step = (foot / cell_size_).array().round().cast<int>();
+  const Vec2 to = cell_size_ * step.cast<double>();
+  const Vec3 shift(to.x(), to.y(), surface_.height(to));
+  const Vec2 gradient = surface_.gradient(to);
+  frame_.origin = frame_.world_from_local(shift);
+  surface_.c[0] = 0.0;
+  surface_.c[1] = gradient.x();
+  surface_.c[2] = gradient.y();
+  centre_ -= to;
+  for (Cells& past : cells_) {
+    past.first -= step;
+    for (std::size_t k = 0; k < cells; ++k) {
+      Vec6& m = past.means[k];
+      if (m[0] == 0.0) continue;  // empty
+      past.heights[k] -= shift.z();
+      m[3] += to.x() * (to.x() - 2.0 * m[1]);
+      m[4] += to.x() * to.y() - to.x() * m[2] - to.y() * m[1];
+      m[5] += to.y() * (to.y() - 2.0 * m[2]);
+      m.segment<2>(1) -= to;
+    }
+  }
+  // A disc that lies twice as far as discs may overlap from a newer frame's is never reached again,
+  // nor is what is older. The newest frame's may still be moved.
+  const Vec2 newer = count_ > 1 ? evidence(1).centre : foot;
+  std::size_t lost = 0;
+  for (std::size_t age = 0; age < count_; ++age) {
+    Evidence& e = evidence(age);
+    const double away = (e.centre - newer).norm();
+    while (age > 1 && lost < rungs && away > 2.0 * overlap(lost)) ++lost;
+    e.lost = std::max(e.lost, lost);
+    e.centre -= to;
+    for (std::size_t j = e.lost; j < e.rungs; ++j) {
+      e.disc[j] = e.disc[j].moved(shift);
+      e.shape[j] = Shape::of(e.disc[j]);
+    }
+  }
+}
+
+}  // namespace palpate

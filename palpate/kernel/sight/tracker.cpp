@@ -1,0 +1,452 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/kernel/sight/tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate {
+namespace {
+
+// Along a line of sight a surface is looked for this far from where it is expected [m].
+constexpr double reach = 0.3;
+// Occluders are looked for this far in front of the surface [m]: an arm may be held high.
+constexpr double occluder_reach = 1.2;
+constexpr double most_support = 0.7;      // beyond this share nothing else is checked
+constexpr double gate_after_hold = 5e-3;  // [m]
+// Layers along a line of sight are separated by a gap of at least this [m], and by what a surface
+// that leans by 70 degrees falls from point to point: tan 70 degrees by a third of the resolution.
+constexpr double narrowest_layer_gap = 20e-3;
+constexpr double steepest = 0.92;  // [-]
+double layer_gap(const SurfaceEstimate& surface) {
+  return std::max(narrowest_layer_gap, steepest * surface.resolution());
+}
+constexpr std::size_t beam_points = 256;
+// Radius within which an occluder is looked for: that of the cells of SurfaceEstimate::judge [m].
+constexpr double shadow_radius = 15e-3;
+constexpr std::size_t wide_beam_points = 512;
+// A fit is used for contacts within this of its centre [m].
+constexpr double serves = 1.5e-3;
+// While the surface is hidden it cannot be fitted anew: the last fit is used this far from its
+// centre [m].
+constexpr double serves_while_held = 15e-3;
+// Radii of the rings of the map of heights beside the contact [m].
+constexpr double beside_inner = 12e-3;
+constexpr std::array<double, 5> beside_bands = {40e-3, 80e-3, 140e-3, 220e-3, 320e-3};
+constexpr std::size_t beside_points = 640;
+// From so many frames on, a jump is compared with `hardest_strike`.
+constexpr std::size_t well_known = 4;
+constexpr float nothing = -1e3F;
+// [-] cosine: a camera sees a surface that faces it within 70 degrees.
+constexpr double faces_at = 0.35;
+
+// The viewpoint of the view that contributed most of the patch's points; none if it has none.
+std::optional<Vec3> main_viewpoint(const Patch& patch) {
+  std::size_t most = 0;
+  std::optional<Vec3> viewpoint;
+  for (std::size_t i = 0; i < patch.view_count(); ++i) {
+    const std::size_t points = patch.view_end(i) - patch.view(i).begin;
+    if (points <= most) continue;
+    most = points;
+    viewpoint = patch.view(i).viewpoint;
+  }
+  return viewpoint;
+}
+
+// Heights of a patch's points above its centre along `up`. Returns how many were written.
+std::size_t heights_along(const Patch& patch, const Vec3& up, std::span<float> heights) {
+  const Eigen::Vector3f u = up.cast<float>();
+  const std::size_t most = std::min(patch.size(), heights.size());
+  std::size_t size = 0;
+  for (std::size_t i = 0; i < most; ++i) {
+    const float height = patch.x()[i] * u.x() + patch.y()[i] * u.y() + patch.z()[i] * u.z();
+    if (std::isfinite(height)) heights[size++] = height;
+  }
+  return size;
+}
+
+}  // namespace
+
+std::optional<Layer> first_layer(std::span<float> heights, double gap,
+                                 double least_share) noexcept {
+  if (heights.size() < SurfaceEstimate::least_points) return std::nullopt;
+  std::sort(heights.begin(), heights.end(), std::greater<>());
+  const auto total = static_cast<double>(heights.size());
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= heights.size(); ++i) {
+    if (i < heights.size() && heights[i - 1] - heights[i] < gap) continue;
+    const double share = static_cast<double>(i - begin) / total;
+    if (share >= least_share) return Layer{heights[begin + (i - begin) / 2], share};
+    begin = i;
+  }
+  return std::nullopt;
+}
+
+void SightTracker::set(const SightParameters& parameters) noexcept {
+  least_share_ = parameters.least_share;
+  surface_.set(parameters);
+}
+
+SurfaceContact SightTracker::contact(const Vec3& point, double t) const noexcept {
+  return surface_.contact(point, t, holding_ ? serves_while_held : serves);
+}
+
+// The surface was not measured: it is kept as it was at `since` [s].
+SightTracker::Event SightTracker::hold(double since) noexcept {
+  if (!holding_) held_since_ = since;
+  holding_ = true;
+  surface_.stop();
+  return Event::hidden;
+}
+
+SightTracker::Ring SightTracker::nothing_beside() noexcept {
+  Ring ring;
+  ring.fill(nothing);
+  return ring;
+}
+
+// The camera that measures most on its lines of sight through a place.
+std::size_t SightTracker::best_camera(const ObservedClouds& clouds, const Vec3& place) noexcept {
+  std::size_t best = 0;
+  std::size_t most = 0;
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    const Cloud* cloud = clouds.of(i);
+    if (cloud == nullptr) continue;
+    if (clouds.parts().size() == 1) return i;
+    gather(*cloud, Beam{place, surface_.resolution(), reach, surface_.frame().up}, beam_points,
+           patch_);
+    if (patch_.size() > most || clouds.of(best) == nullptr) best = i;
+    most = std::max(most, patch_.size());
+  }
+  return best;
+}
+
+// Does the newest frame of another camera that faces the surface show it at `place`?
+bool SightTracker::others_show(const ObservedClouds& clouds, std::size_t camera, const Vec3& place,
+                               const Vec3& normal, double gate) noexcept {
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    const double since = views_[camera].stamp - views_[i].stamp;
+    if (i == camera || clouds.of(i) == nullptr || !(since <= SurfaceEstimate::longest_gap))
+      continue;
+    const std::optional<Seen> shown = look_at(*clouds.of(i), place, surface_.resolution());
+    if (shown && shown->line.dot(normal) > faces_at &&
+        std::abs(shown->above * shown->line.dot(normal)) <= gate)
+      return true;
+  }
+  return false;
+}
+
+SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_t camera,
+                                        double stamp, double interval, const Vec3& proxy,
+                                        double hardest_strike) noexcept {
+  const Cloud& cloud = *clouds.of(camera);
+  View& view = views_[camera];
+  view.stamp = stamp;
+  view.interval = interval;
+  if (!tracking_) {
+    surface_.start_frame(camera, stamp, interval);
+    watch(clouds, proxy);
+    return tracking_ ? Event::followed : Event::none;
+  }
+  const bool alone = clouds.parts().size() == 1;
+  const double elapsed = alone ? interval : stamp - surface_.stamp();
+  // What was captured before the newest evidence says nothing about now.
+  if (!alone && elapsed < 0.0 && elapsed >= -SurfaceEstimate::longest_gap) return Event::none;
+  // Where the surface is expected: below the proxy, moved by its velocity.
+  const LocalFrame& axes = surface_.frame();
+  const double expected = surface_.velocity() * std::min(elapsed, SurfaceEstimate::longest_gap);
+  const Vec3 hand = axes.local_from_world(proxy);
+  Vec2 foot = surface_.surface().nearest(hand, hand.head<2>(), surface_.centre(),
+                                         holding_ ? serves_while_held : 2.0 * serves);
+  // An unchanged centre lets frames be compared cell by cell.
+  if ((foot - surface_.centre()).norm() < serves) foot = surface_.centre();
+  Quadric moved = surface_.surface();
+  moved.c[0] += expected;
+  const Vec3 place = axes.world_from_local(Vec3(foot.x(), foot.y(), moved.height(foot)));
+
+  gather(cloud, Beam{place, shadow_radius * surface_.coarseness(), occluder_reach, axes.up},
+         wide_beam_points, patch_);
+  const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
+  if (viewpoint) surface_.set_distance(camera, (*viewpoint - place).norm());
+  const Vec3 line = viewpoint ? Vec3((*viewpoint - place).normalized()) : axes.up;
+  const bool from_behind = line.dot(axes.up) < 0.0;
+  std::array<float, wide_beam_points> heights;
+  std::size_t seen = 0;
+  std::size_t near = 0;
+  std::size_t before = 0;  // points between the viewpoint and the surface
+  // After a hold the gate is narrow: the surface is where it was, and what remains of an occluder
+  // may be close to it.
+  const double wide = holding_ ? surface_.gate(gate_after_hold) : surface_.gate();
+  const SightCone inner({place, surface_.resolution(), occluder_reach, axes.up}, viewpoint);
+  const Eigen::Vector3f axis = inner.axis().cast<float>();
+  const auto radius = static_cast<float>(inner.radius_at(0.0));
+  const auto widening = static_cast<float>(inner.radius_at(1.0) - inner.radius_at(0.0));
+  const Eigen::Vector3f towards = line.cast<float>();
+  const FloatQuadric expected_surface(moved);
+  const std::size_t size = std::min(patch_.size(), wide_beam_points);
+  const double share = patch_.share();
+  points_.take(patch_, axes);
+  std::array<float, wide_beam_points> above_surface;
+  std::array<float, wide_beam_points> off_axis;  // [m^2] squared distance, less the cone's radius
+  std::array<float, wide_beam_points> height;
+  for (std::size_t i = 0; i < size; ++i) {
+    const float x = patch_.x()[i];
+    const float y = patch_.y()[i];
+    const float z = patch_.z()[i];
+    const float along = x * axis.x() + y * axis.y() + z * axis.z();
+    const float r = std::max(radius + widening * along, 0.0F);
+    off_axis[i] = x * x + y * y + z * z - along * along - r * r;
+    height[i] = x * towards.x() + y * towards.y() + z * towards.z();
+    above_surface[i] = points_.z[i] - expected_surface.height(points_.x[i], points_.y[i]);
+  }
+  std::array<float, wide_beam_points + 1> near_above;
+  const auto gate = static_cast<float>(wide);
+  for (std::size_t i = 0; i < size; ++i) {
+    const float above = above_surface[i];
+    before += above > gate ? 1 : 0;
+    const bool counts = (off_axis[i] <= 0.0F) & (above <= static_cast<float>(occluder_reach)) &
+                        (above >= static_cast<float>(-reach));
+    const bool is_near = counts & (std::abs(above) <= gate);
+    near_above[near] = above;
+    near += is_near ? 1 : 0;
+    heights[seen] = height[i];
+    seen += counts ? 1 : 0;
+  }
+
+  bool there = near >= SurfaceEstimate::least_points &&
+               static_cast<double>(near) >= least_share_ * static_cast<double>(seen);
+  // Of a surface that moved beyond the gate, the tail of the noise is still inside.
+  if (there && static_cast<double>(near) < most_support * static_cast<double>(seen)) {
+    const float middle = kth_smallest(std::span(near_above.data(), near), near / 2);
+    there = std::abs(middle) <= 0.5F * gate;
+  }
+  if (!alone) {
+    const Vec3 normal = axes.direction_in_world(moved.normal(foot));
+    const bool is_faced = viewpoint && line.dot(normal) > faces_at;
+    if (!(there && is_faced) && others_show(clouds, camera, place, normal, wide))
+      return Event::none;
+  }
+  const double previous_stamp = surface_.stamp();
+  surface_.start_frame(camera, stamp, interval);
+  Event event = Event::followed;
+  double jump = 0.0;  // [m] along up, from where it was expected
+  if (!there) {
+    const std::optional<Layer> layer =
+        first_layer(std::span(heights.data(), seen),
+                    std::max(layer_gap(surface_), surface_.spread()), least_share_);
+    if (from_behind && layer) {
+      // A surface touched from behind has left the gate: the proxy goes on over the points.
+      forget();
+      return Event::none;
+    }
+    if (!layer) return hold(previous_stamp);
+    jump = layer->height / std::max(line.dot(axes.up), 0.2);
+    const bool nearer = jump > 0.0;
+    if (nearer && (holding_ || is_occluder(view.beside, look_beside(cloud, place), jump + expected,
+                                           jump, hardest_strike))) {
+      return hold(previous_stamp);
+    }
+    event = Event::jumped;
+  }
+  const bool resumed = holding_;
+  surface_.shift(expected + jump);
+  if (resumed && event == Event::jumped) surface_.forget_frames();
+  // An occluder that moves in front of a resting contact first hides a part of the disc. The border
+  // of the rest is not an edge of the surface. Points that vanish without an occluder in front of
+  // them lie in a stereo camera's shadow beside one.
+  const bool stays = foot == surface_.centre();
+  const double all_near = static_cast<double>(near) / share;
+  if (!stays || all_near > view.near_usual) view.near_usual = all_near;
+  const bool covered = before >= 3 || all_near < 0.75 * view.near_usual;
+  view.shadowed = covered && stays && (view.shadowed || resumed || !view.covered);
+  view.covered = covered;
+  if (!surface_.add(cloud, foot, {wide, event == Event::jumped, view.shadowed})) {
+    surface_.shift(-expected - jump);
+    // What is seen behind it is not hidden by anything: the surface ends here, as over a hole.
+    if (jump < 0.0) {
+      forget();
+      return Event::none;
+    }
+    return hold(previous_stamp);
+  }
+  holding_ = false;
+  view.beside = look_beside(cloud, surface_.place());
+  return event;
+}
+
+void SightTracker::watch(const ObservedClouds& clouds, const Vec3& proxy) noexcept {
+  if (tracking_) {
+    if (holding_) return;
+    const Vec2 below = surface_.frame().local_from_world(proxy).head<2>();
+    if ((below - surface_.centre()).norm() < 5e-3) return;
+  }
+  tracking_ = false;
+  const std::size_t camera = best_camera(clouds, proxy);
+  const Cloud& cloud = *clouds.of(camera);
+  surface_.set_spacing(cloud.spacing(proxy));
+  gather(cloud, Beam{proxy, surface_.resolution(), reach, surface_.frame().up}, beam_points,
+         patch_);
+  const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
+  if (!viewpoint) return;  // no line of sight to follow
+  const Vec3 line = (*viewpoint - proxy).normalized();
+  surface_.set_distance(camera, (*viewpoint - proxy).norm());
+  std::array<float, beam_points> heights;
+  const std::size_t seen = heights_along(patch_, line, heights);
+  const std::optional<Layer> layer =
+      first_layer(std::span(heights.data(), seen), layer_gap(surface_), least_share_);
+  if (!layer || layer->height > 0.0) return;  // nothing, or the proxy is hidden behind it
+  const Vec3 place = proxy + layer->height * line;
+  surface_.set_spacing(cloud.spacing(place));
+  start(clouds, camera, place, line);
+}
+
+void SightTracker::touch(const ObservedClouds& clouds, const Vec3& foot,
+                         const Vec3& normal) noexcept {
+  if (holding_) return;
+  if (tracking_) {
+    const Vec3 local = surface_.frame().local_from_world(foot);
+    const Vec2 at = local.head<2>();
+    const double off = local.z() - surface_.surface().height(at);
+    const double away = (at - surface_.centre()).norm();
+    if (faces(normal) && away < 12e-3 &&
+        std::abs(off) < 3e-3 + 4.0 * (surface_.spread() + surface_.height_sd())) {
+      if (away < serves) return;
+      const std::size_t measured_by = surface_.camera();
+      if (surface_.move_to(*clouds.of(measured_by), at,
+                           {surface_.gate(), false, views_[measured_by].shadowed}))
+        return;
+    }
+  }
+  const std::size_t camera = best_camera(clouds, foot);
+  const Cloud& cloud = *clouds.of(camera);
+  // Where the camera sees the surface well behind this place, the contact from behind is with a
+  // stray point.
+  const std::optional<Seen> seen = look_at(cloud, foot, surface_.resolution());
+  if (seen && seen->line.dot(normal) < 0.0 && seen->above < -SurfaceEstimate::narrowest_gate)
+    return;
+  surface_.set_spacing(cloud.spacing(foot));
+  gather(cloud, Beam{foot, surface_.resolution(), SurfaceEstimate::narrowest_gate, normal},
+         beam_points, patch_);
+  const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
+  Vec3 up = normal;
+  if (viewpoint) {
+    const Vec3 line = (*viewpoint - foot).normalized();
+    surface_.set_distance(camera, (*viewpoint - foot).norm());
+    if (std::abs(line.dot(normal)) > 0.5) up = line.dot(normal) > 0.0 ? line : Vec3(-line);
+  }
+  start(clouds, camera, foot, up);
+}
+
+bool SightTracker::slide(const ObservedClouds& clouds, const Vec3& foot) noexcept {
+  if (!tracking_ || holding_) return false;
+  const std::size_t camera = surface_.camera();
+  const Cloud& cloud = *clouds.of(camera);
+  if (const double spacing = cloud.spacing(foot); surface_.misfits(spacing)) {
+    surface_.set_spacing(spacing);
+    start(clouds, camera, foot, surface_.frame().up);
+    return tracking_;
+  }
+  const Vec2 at = surface_.frame().local_from_world(foot).head<2>();
+  return surface_.move_to(cloud, at, {surface_.gate(), false, views_[camera].shadowed});
+}
+
+// Begins to follow the surface at `foot`, in a camera's newest frame.
+void SightTracker::start(const ObservedClouds& clouds, std::size_t camera, const Vec3& foot,
+                         const Vec3& up) noexcept {
+  const Cloud& cloud = *clouds.of(camera);
+  holding_ = false;
+  for (View& view : views_) {
+    view.shadowed = view.covered = false;
+    if (&view != &views_[camera]) view.beside = nothing_beside();
+  }
+  if (clouds.parts().size() > 1)
+    surface_.start_frame(camera, views_[camera].stamp, views_[camera].interval);
+  tracking_ = surface_.start(cloud, foot, up);
+  if (tracking_) views_[camera].beside = look_beside(cloud, surface_.place());
+}
+
+std::optional<SightTracker::Seen> SightTracker::look_at(const Cloud& cloud, const Vec3& place,
+                                                        double radius) noexcept {
+  gather(cloud, Beam{place, radius, reach, surface_.frame().up}, beam_points, patch_);
+  const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
+  if (!viewpoint) return std::nullopt;
+  const Vec3 line = (*viewpoint - place).normalized();
+  std::array<float, beam_points> heights;
+  const std::size_t seen = heights_along(patch_, line, heights);
+  if (seen < SurfaceEstimate::least_points) return std::nullopt;
+  return Seen{kth_smallest(std::span(heights.data(), seen), seen / 2), line};
+}
+
+std::optional<Vec3> SightTracker::in_front(const ObservedClouds& clouds, const Vec3& before,
+                                           const Vec3& after, double radius) noexcept {
+  // A proxy that goes round an edge has the surface beside or behind it all the way, or comes from
+  // farther away.
+  const double farthest = 4.0 * radius;
+  const double way = (after - before).norm();
+  if (!tracking_ || holding_ || views_[surface_.camera()].covered || way < 0.5 * radius ||
+      way > farthest)
+    return std::nullopt;
+  const Cloud& cloud = *clouds.of(best_camera(clouds, after));
+  const std::optional<Seen> now = look_at(cloud, after, radius);
+  if (!now || now->above < 0.0 || now->above > farthest) return std::nullopt;
+  const std::optional<Seen> then = look_at(cloud, before, radius);
+  if (!then || then->above > 0.0 || then->above < -farthest) return std::nullopt;
+  return after + (now->above + radius) * now->line;
+}
+
+// For each sector and ring beside the contact, the height of the point nearest to the camera.
+SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& place) noexcept {
+  Ring ring = nothing_beside();
+  const LocalFrame& axes = surface_.frame();
+  gather(cloud, Beam{place, beside_bands.back(), reach, axes.up}, beside_points, patch_);
+  points_.take(patch_, axes);
+  const Eigen::Vector3f at = axes.local_from_world(place).cast<float>();
+  // Beside the contact the surface is continued as its tangent plane.
+  Quadric plane;
+  plane.c.segment<2>(1) = surface_.surface().gradient(surface_.centre());
+  plane.c[0] = surface_.surface().height(surface_.centre()) - plane.height(surface_.centre());
+  const FloatQuadric tangent(plane);
+  const auto squared_band = [](double r) { return static_cast<float>(r * r); };
+  for (std::size_t i = 0; i < points_.size; ++i) {
+    const float dx = points_.x[i] - at.x();
+    const float dy = points_.y[i] - at.y();
+    const float away = dx * dx + dy * dy;
+    if (!(away >= squared_band(beside_inner) && away < squared_band(beside_bands.back()))) continue;
+    std::size_t band = 0;
+    for (const double end : beside_bands) band += away >= squared_band(end) ? 1 : 0;
+    const std::size_t sector =
+        (dx > 0.0F ? 4 : 0) + (dy > 0.0F ? 2 : 0) + (std::abs(dx) > std::abs(dy) ? 1 : 0);
+    float& cell = ring[band * sectors + sector];
+    cell = std::max(cell, points_.z[i] - tangent.height(points_.x[i], points_.y[i]));
+  }
+  return ring;
+}
+
+// Is the nearer layer an occluder, or the surface itself? It is an occluder if it was visible
+// beside the contact in the frame before, if the surface is still visible there, or if the surface
+// would need a larger acceleration than `hardest_strike`.
+// @param height  [m] of what is seen now, above where the surface was
+// @param jump    [m] above where it was expected
+bool SightTracker::is_occluder(const Ring& ring_before, const Ring& now, double height, double jump,
+                               double hardest_strike) const noexcept {
+  const double interval = surface_.interval();
+  const double strike = 0.5 * hardest_strike * (interval * interval);
+  const double times = surface_.jumped() ? 4.0 : surface_.velocity() != 0.0 ? 2.0 : 1.0;
+  const double noise = std::max(surface_.spread(), surface_.height_sd());
+  if (surface_.settled() >= well_known && jump > times * strike + 15e-3 + 4.0 * noise) return true;
+  const double tolerance = std::max(15e-3, 4.0 * noise);
+  // A cell keeps its nearest point, which is the extreme of the noise.
+  const double nearer = std::max(15e-3, 6.0 * noise);
+  std::size_t same_before = 0;
+  std::size_t unchanged = 0;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    const double before = ring_before[i];
+    if (before > nearer && std::abs(before - height) < std::min(30e-3, 0.6 * height)) return true;
+    if (std::abs(before) < tolerance) {
+      ++same_before;
+      if (std::abs(now[i] - before) < std::min(tolerance, 0.3 * height)) ++unchanged;
+    }
+  }
+  return unchanged >= 3 && 4 * unchanged >= same_before;
+}
+
+}  // namespace palpate

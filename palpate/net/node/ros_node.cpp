@@ -1,0 +1,451 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/net/node/ros_node.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cctype>
+#include <cmath>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "palpate/drivers/dds.hpp"
+#include "palpate/drivers/ros2_service.hpp"
+#include "palpate/io/bag/node_messages.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/net/node/node_parameters.hpp"
+#include "palpate/net/node/node_reports.hpp"
+#include "palpate/servo/realtime.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr double marker_interval = 1.0 / 30.0;  // [s]
+constexpr double report_interval = 1.0;         // [s]
+constexpr double nodes_interval = 0.2;          // [s] between two looks at who else is there
+constexpr double longest_wait = 0.05;           // [s] until the end of the session is noticed
+constexpr dds::Quality reliable{.reliable = true, .depth = 10};
+constexpr dds::Quality newest_alone{.reliable = true};
+constexpr dds::Quality latched{.reliable = true, .keeps_for_late = true};
+constexpr dds::Quality events{.reliable = true, .depth = 1000};  // as ROS's own
+
+struct NodeName {
+  std::string space, name;  // "/cell_3", "palpate"
+  [[nodiscard]] std::string full() const { return (space == "/" ? "" : space) + "/" + name; }
+};
+
+// @throws Error if it is none by ROS's rules.
+NodeName checked_name(const std::string& text) {
+  const std::string path = text.substr(text.starts_with('/') ? 1 : 0);
+  bool is_good = !path.empty() && path.back() != '/';
+  char before = '/';
+  for (const char c : path) {
+    const auto letter = static_cast<unsigned char>(c);
+    is_good = is_good && (std::isalnum(letter) != 0 || c == '_' || c == '/') &&
+              !(before == '/' && (c == '/' || std::isdigit(letter) != 0));
+    before = c;
+  }
+  if (!is_good)
+    throw Error("--name", "'" + text + "' is not a valid node name",
+                "write letters, digits and _, such as palpate or cell_3/palpate");
+  const std::size_t slash = path.rfind('/');
+  if (slash == std::string::npos) return {"/", path};
+  return {"/" + path.substr(0, slash), path.substr(slash + 1)};
+}
+
+double checked_rate(double rate) {
+  if (!(rate >= 1.0 && rate <= 1000.0))
+    throw Error("--publish-rate", number_text(rate) + " Hz is too low or too high",
+                "give 1 to 1000");
+  return rate;
+}
+
+template <std::size_t size>
+std::array<std::uint8_t, size> identity(const dds::Guid& guid) {
+  std::array<std::uint8_t, size> bytes{};
+  std::copy(guid.begin(), guid.end(), bytes.begin());
+  return bytes;
+}
+
+// The topics of a hand, and what has been read of it.
+struct HandTopics {
+  HandTopics(dds::Participant& participant, const std::string& name,
+             const TickRing<ServoTick>::Reader& reader)
+      : ticks(reader),
+        proxy(participant, name + "/proxy", ros::PoseStamped{}, reliable),
+        hip(participant, name + "/hip", ros::PoseStamped{}, reliable),
+        force(participant, name + "/force", ros::WrenchStamped{}, reliable),
+        normal(participant, name + "/normal", ros::Vector3Stamped{}, reliable),
+        contact(participant, name + "/contact", ros::UInt8{}, reliable),
+        flags(participant, name + "/flags", ros::UInt32{}, reliable),
+        safety(participant, name + "/safety_flags", ros::UInt32{}, reliable) {}
+
+  void read() {
+    TickReport since;
+    fresh = false;
+    for (ServoTick record{}; ticks.try_pop(record); fresh = true) {
+      since.add(record);
+      second.add(record);
+    }
+    if (fresh) report = since;
+  }
+
+  void publish(const ros::Header& now) {
+    const Tick& tick = report.newest.tick;
+    proxy.write(ros::PoseStamped{now, components(tick.proxy)});
+    hip.write(ros::PoseStamped{now, components(tick.hip)});
+    force.write(ros::WrenchStamped{now, components(report.newest.force)});
+    normal.write(ros::Vector3Stamped{now, components(tick.normal)});
+    contact.write(ros::UInt8{static_cast<std::uint8_t>(tick.state)});
+    flags.write(ros::UInt32{report.flags});
+    safety.write(ros::UInt32{report.safety});
+  }
+
+  [[nodiscard]] std::array<const dds::Writer*, 7> writers() const {
+    return {&proxy, &hip, &force, &normal, &contact, &flags, &safety};
+  }
+
+  TickRing<ServoTick>::Reader ticks;
+  dds::Writer proxy, hip, force, normal, contact, flags, safety;
+  TickReport report;   // since the last message
+  TickReport second;   // since the last report
+  bool fresh = false;  // a tick came since the last message
+};
+
+}  // namespace
+
+class RosNode::Impl {
+ public:
+  Impl(Session& session, const RosNodeOptions& options)
+      : session_(session),
+        node_(checked_name(options.name)),
+        name_(node_.full()),
+        frame_(options.frame),
+        interval_(1.0 / checked_rate(options.rate)),
+        parameters_(session.methods()),
+        participant_("ros", "enclave=/;"),
+        hands_(topics_of(participant_, name_, session)),
+        markers_(participant_, name_ + "/markers", ros::MarkerArray{}, newest_alone),
+        diagnostics_(participant_, "/diagnostics", ros::DiagnosticArray{}, reliable),
+        events_(participant_, "/parameter_events", ros::ParameterEvent{}, events),
+        set_(participant_, name_ + "/set_parameters", 1,
+             [this](const auto& request) { return set_each(request); }),
+        set_all_(participant_, name_ + "/set_parameters_atomically", 2,
+                 [this](const auto& request) { return set_together(request); }),
+        get_(participant_, name_ + "/get_parameters", 3,
+             [this](const auto& request) { return get(request); }),
+        types_(participant_, name_ + "/get_parameter_types", 4,
+               [this](const auto& request) { return types(request); }),
+        describe_(participant_, name_ + "/describe_parameters", 5,
+                  [this](const auto& request) { return describe(request); }),
+        list_(participant_, name_ + "/list_parameters", 6,
+              [this](const ros::ListParameters::Request& request) {
+                return ros::ListParameters::Reply{{}, parameters_.list(request.content)};
+              }),
+        start_recording_(participant_, name_ + "/start_recording", 7,
+                         [this](const auto&) { return start_recording(); }),
+        stop_recording_(participant_, name_ + "/stop_recording", 8,
+                        [this](const auto&) { return stop_recording(); }),
+        hold_(participant_, name_ + "/hold", 9,
+              [this](const auto&) {
+                return done([this] { session_.hold(true); }, "no force from now on");
+              }),
+        release_(participant_, name_ + "/release", 10,
+                 [this](const auto&) {
+                   return done([this] { session_.hold(false); },
+                               "the device engages in free space");
+                 }),
+        reset_(participant_, name_ + "/reset_faults", 11,
+               [this](const auto&) {
+                 return done([this] { session_.reset_faults(); }, "latched faults have ended");
+               }),
+        recordings_(session, options.recordings),
+        known_(parameters_.all(session.settings())),
+        thread_([this] { run(); }) {}
+
+  ~Impl() {
+    ends_ = true;
+    thread_.join();
+  }
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
+  [[nodiscard]] std::string recording_ended() const { return recordings_.ended(); }
+  [[nodiscard]] std::string trouble() const {
+    const std::lock_guard lock(trouble_mutex_);
+    return trouble_;
+  }
+
+ private:
+  // The first hand's are the node's own; another one's have its name between.
+  static std::vector<std::unique_ptr<HandTopics>> topics_of(dds::Participant& participant,
+                                                            const std::string& node,
+                                                            const Session& session) {
+    std::vector<std::unique_ptr<HandTopics>> hands;
+    for (std::size_t i = 0; i < session.hands(); ++i)
+      hands.push_back(std::make_unique<HandTopics>(
+          participant, i == 0 ? node : node + "/" + session.hand_name(i), session.ticks(i)));
+    return hands;
+  }
+
+  // When each of its works is due next [s].
+  struct Due {
+    double ticks, markers, report, nodes;
+  };
+
+  void run() {
+    const double begin = monotonic_now();
+    Due due{begin, begin, begin + report_interval, begin};
+    counted_at_ = begin;
+    while (!ends_) {
+      try {
+        participant_.wait(std::clamp(due.ticks - monotonic_now(), 0.0, longest_wait));
+        work(due);
+      } catch (const std::exception& error) {  // the session continues without what failed
+        const std::lock_guard lock(trouble_mutex_);
+        trouble_ = error.what();
+      }
+    }
+  }
+
+  void work(Due& due) {
+    const double now = monotonic_now();
+    serve(now);
+    if (now < due.ticks) return;
+    due.ticks = std::max(due.ticks + interval_, now);  // what was missed is not made up for
+    bool fresh = false;
+    for (const auto& hand : hands_) {
+      hand->read();
+      if (hand->fresh) hand->publish({dds::stamp_of(hand->report.newest.tick.t), frame_});
+      fresh = fresh || hand->fresh;
+    }
+    if (fresh && now >= due.markers) {
+      due.markers = now + marker_interval;
+      write_markers();
+    }
+    if (now >= due.nodes) {
+      due.nodes = now + nodes_interval;
+      announce();
+    }
+    if (now >= due.report) {
+      due.report = now + report_interval;
+      report(now);
+    }
+  }
+
+  // Of all hands in one message, by the hand's number.
+  void write_markers() {
+    const double radius = session_.settings().parameters.proxy.r_c();
+    ros::MarkerArray all;
+    for (std::size_t i = 0; i < hands_.size(); ++i) {
+      const ServoTick& newest = hands_[i]->report.newest;
+      ros::MarkerArray markers = markers_of(newest, radius, {dds::stamp_of(newest.tick.t), frame_});
+      for (auto& marker : markers.markers) {
+        marker.id = static_cast<std::int32_t>(i);
+        all.markers.push_back(std::move(marker));
+      }
+    }
+    markers_.write(all);
+  }
+
+  void report(double now) {
+    SessionReport report;
+    report.state = session_.state();
+    report.ticks = hands_.front()->second;
+    report.now = now;
+    const std::uint64_t ticks = session_.statistics().ticks.load();
+    report.tick_rate =
+        static_cast<double>(ticks - counted_ticks_) / std::max(now - counted_at_, 1e-3);
+    report.late_ticks = report.state.hands[0].summary.late_ticks - counted_late_;
+    counted_at_ = now;
+    counted_ticks_ = ticks;
+    counted_late_ = report.state.hands[0].summary.late_ticks;
+    for (std::size_t i = 1; i < hands_.size(); ++i)
+      report.more_hands.push_back({hands_[i]->second, session_.device(i).info()});
+    for (const auto& hand : hands_) hand->second.flags = hand->second.safety = 0;
+    diagnostics_.write(
+        diagnostics_of(report, session_.device().info(), {dds::stamp_of(now), frame_}));
+    tell_changes();
+  }
+
+  // ROS's nodes tell each other their names and whose each reader and writer is; the message has
+  // another form from Iron on, and is an error to those of the other form. So it waits until one
+  // is there, and takes its form.
+  void announce() {
+    const dds::Generation generation = participant_.generation();
+    if (generation == announced_ || generation == dds::Generation::unknown) return;
+    nodes_.reset();
+    if (generation == dds::Generation::from_iron)
+      announce_as<16>();
+    else
+      announce_as<24>();
+    announced_ = generation;
+  }
+
+  template <std::size_t size>
+  void announce_as() {
+    ros::ParticipantEntitiesInfo<size> info;
+    info.participant = identity<size>(participant_.guid());
+    auto& node = info.nodes.emplace_back();
+    node.node_namespace = node_.space;
+    node.node_name = node_.name;
+    for (const auto& hand : hands_) {
+      for (const dds::Writer* writer : hand->writers())
+        node.writers.push_back(identity<size>(writer->guid()));
+    }
+    for (const dds::Writer* writer : {&markers_, &diagnostics_, &events_})
+      node.writers.push_back(identity<size>(writer->guid()));
+    for_services([&](const auto& service) {
+      node.readers.push_back(identity<size>(service.reader()));
+      node.writers.push_back(identity<size>(service.writer()));
+    });
+    nodes_.emplace(participant_, "", info, latched);
+    nodes_->write(info);
+  }
+
+  void serve(double now) {
+    for_services([now](auto& service) { service.serve(now); });
+  }
+  template <class Visit>
+  void for_services(const Visit& visit) {
+    const auto all = [&](auto&... services) { (visit(services), ...); };
+    all(set_, set_all_, get_, types_, describe_, list_, start_recording_, stop_recording_, hold_,
+        release_, reset_);
+  }
+
+  // All of them or none.
+  ros::SetParametersResult set(const std::vector<ros::Parameter>& parameters) {
+    try {
+      session_.change([&](ServoSettings& settings) {
+        for (const ros::Parameter& parameter : parameters) parameters_.set(settings, parameter);
+      });
+    } catch (const std::exception& error) {
+      return {false, error.what()};
+    }
+    return {true, ""};
+  }
+
+  ros::SetParameters::Reply set_each(const ros::SetParameters::Request& request) {
+    ros::SetParameters::Reply reply;
+    for (const ros::Parameter& parameter : request.content)
+      reply.content.push_back(set({parameter}));
+    tell_changes();
+    return reply;
+  }
+
+  ros::SetParametersAtomically::Reply set_together(
+      const ros::SetParametersAtomically::Request& request) {
+    ros::SetParametersAtomically::Reply reply{{}, set(request.content)};
+    tell_changes();
+    return reply;
+  }
+
+  ros::GetParameters::Reply get(const ros::GetParameters::Request& request) {
+    ros::GetParameters::Reply reply;
+    const ServoSettings settings = session_.settings();
+    for (const std::string& name : request.content)
+      reply.content.push_back(parameters_.get(settings, name));
+    return reply;
+  }
+
+  ros::GetParameterTypes::Reply types(const ros::GetParameterTypes::Request& request) {
+    ros::GetParameterTypes::Reply reply;
+    for (const std::string& name : request.content)
+      reply.content.push_back(parameters_.describe(name).type);
+    return reply;
+  }
+
+  ros::DescribeParameters::Reply describe(const ros::DescribeParameters::Request& request) {
+    ros::DescribeParameters::Reply reply;
+    for (const std::string& name : request.content)
+      reply.content.push_back(parameters_.describe(name));
+    return reply;
+  }
+
+  // Whoever changed them: one that is set may change others, as r_c does.
+  void tell_changes() {
+    std::vector<ros::Parameter> all = parameters_.all(session_.settings());
+    ros::ParameterEvent event;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (all[i].value != known_[i].value) event.changed.push_back(all[i]);
+    }
+    known_ = std::move(all);
+    if (event.changed.empty()) return;
+    event.stamp = dds::stamp_of(monotonic_now());
+    event.node = name_;
+    events_.write(event);
+  }
+
+  ros::Trigger::Reply start_recording() {
+    ros::Trigger::Reply reply = done([this] { recordings_.start(); }, "");
+    if (reply.content.success) reply.content.message = session_.state().recording.folder;
+    return reply;
+  }
+
+  ros::Trigger::Reply stop_recording() {
+    const RecordingState before = session_.state().recording;
+    if (!before.on) return {{}, {false, "no recording is on"}};
+    return done([this] { recordings_.stop(); }, before.folder);
+  }
+
+  static ros::Trigger::Reply done(const std::function<void()>& what, const std::string& message) {
+    try {
+      what();
+    } catch (const std::exception& error) {
+      return {{}, {false, error.what()}};
+    }
+    return {{}, {true, message}};
+  }
+
+  Session& session_;
+  const NodeName node_;
+  const std::string name_, frame_;
+  const double interval_;  // [s]
+  const NodeParameters parameters_;
+
+  dds::Participant participant_;
+  std::vector<std::unique_ptr<HandTopics>> hands_;
+  dds::Writer markers_, diagnostics_, events_;
+  dds::Service<ros::SetParameters> set_;
+  dds::Service<ros::SetParametersAtomically> set_all_;
+  dds::Service<ros::GetParameters> get_;
+  dds::Service<ros::GetParameterTypes> types_;
+  dds::Service<ros::DescribeParameters> describe_;
+  dds::Service<ros::ListParameters> list_;
+  dds::Service<ros::Trigger> start_recording_, stop_recording_, hold_, release_, reset_;
+  std::optional<dds::Writer> nodes_;
+  dds::Generation announced_ = dds::Generation::unknown;
+
+  ObserverRecordings recordings_;
+  std::vector<ros::Parameter> known_;  // as others were told
+  double counted_at_ = 0.0;            // [s]
+  std::uint64_t counted_ticks_ = 0, counted_late_ = 0;
+  mutable std::mutex trouble_mutex_;
+  std::string trouble_;  // guarded by it
+  std::atomic<bool> ends_{false};
+  std::thread thread_;
+};
+
+RosNode::RosNode(Session& session, const RosNodeOptions& options)
+    : impl_(std::make_unique<Impl>(session, options)) {}
+RosNode::~RosNode() = default;
+
+const std::string& RosNode::name() const {
+  return impl_->name();
+}
+std::uint32_t RosNode::domain() const {
+  return impl_->domain();
+}
+std::string RosNode::trouble() const {
+  return impl_->trouble();
+}
+std::string RosNode::recording_ended() const {
+  return impl_->recording_ended();
+}
+
+}  // namespace palpate

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "palpate/net/teleop/robot.hpp"
+#include "palpate/net/teleop/touched.hpp"
+#include "palpate/session/session.hpp"
+
+namespace palpate {
+
+/// Options of the operator's end.
+struct OperatorEndOptions {
+  std::string name = "robot";  ///< of the robot's topics
+  /// The scene is shifted at the start, so that the device starts at the tool.
+  bool index = true;
+  /// Stiffness and friction measured by the robot become the material of the surface there; see
+  /// paint_touched.
+  bool learn = false;
+};
+
+/// The robot's state at the operator's end.
+struct RobotView {
+  std::optional<RobotState> state;  ///< last received; its time is that of arrival
+  double age = 0.0;                 ///< [s] since then
+  bool heard = false;               ///< lately
+  bool led = false;                 ///< commands are being sent
+  double latency = 0.0;             ///< [s] of the rendered frame, capture to arrival
+  std::optional<Touched> touched;   ///< its last contact measurement, accepted or not
+  std::string ignored;              ///< why the measurement was ignored; empty: it was used
+};
+
+/// The operator's end: sends the proxy position of a session to the robot, and adds the robot's
+/// limits to the session as fixtures. The session's first camera is the robot's,
+/// `ros2:/NAME/depth/image_raw/slices`.
+///
+/// Nothing is sent without a valid command (lead_of), so that a robot stops with its operator in
+/// any failure. The network latency alone does not fade the force: the age limits follow it
+/// (for_link), unless the user sets them.
+class OperatorEnd {
+ public:
+  /// @param session  must outlive this
+  /// @throws Error if the name is not valid, or DDS is missing.
+  OperatorEnd(Session& session, const OperatorEndOptions& options);
+  ~OperatorEnd();
+
+  [[nodiscard]] RobotView robot() const;
+  [[nodiscard]] std::uint32_t domain() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "palpate/kernel/core/patch.hpp"
+
+namespace palpate {
+
+/// Properties of a teleoperated robot.
+struct RobotInfo {
+  std::string uri;   ///< as it was opened
+  std::string kind;  ///< e.g. "simulated arm"
+  /// [m] world: the box in which the tool may be; empty: not known
+  std::optional<Eigen::AlignedBox3d> reach = {};
+  double max_speed = 0.5;  ///< [m/s] of the tool that it can follow
+  /// [s] lag of the tool behind a command at constant speed: 2 / w for a loop with the poles -w, -w
+  double lag = 0.08;
+  /// [N/m] stiffness of the tool against displacement; empty: unknown
+  std::optional<double> stiffness = {};
+  double max_force = 5.0;      ///< [N] with which the tool may press
+  double tool_radius = 0.005;  ///< [m] of the ball at the tool's tip that touches
+  std::vector<std::string> joint_names = {};
+};
+
+/// State that a robot reports.
+struct RobotState {
+  double t = 0.0;                   ///< [s] time of this state, on the servo loop's clock
+  Vec3 position = Vec3::Zero();     ///< [m] world: the centre of the ball at the tool's tip
+  Vec3 velocity = Vec3::Zero();     ///< [m/s] world
+  Vec3 force = Vec3::Zero();        ///< [N] world: contact force on the tool
+  std::vector<double> joints = {};  ///< [rad], as RobotInfo::joint_names
+  std::vector<Vec3> links = {};     ///< [m] world: the arm as a line from base to tip; may be empty
+  std::string fault = {};           ///< why it does not move, with the remedy; empty: it moves
+};
+
+/// A robot that follows positions of its tool tip: an arm, simulated or real.
+///
+/// Functions may be called by one thread at a time.
+class Robot {
+ public:
+  Robot() = default;
+  virtual ~Robot() = default;  ///< leaves it at rest
+  Robot(const Robot&) = delete;
+  Robot& operator=(const Robot&) = delete;
+
+  [[nodiscard]] virtual const RobotInfo& info() const = 0;
+  /// Commanded position of the tool tip. Called several hundred times a second. A robot must stop
+  /// by itself after 100 ms without a command.
+  /// @param position  [m] world, finite
+  /// @param velocity [m/s] world, of that position: for feed-forward
+  virtual void command(const Vec3& position, const Vec3& velocity, double t) noexcept = 0;
+  /// The newest state. Empty before the robot has reported one.
+  [[nodiscard]] virtual std::optional<RobotState> state() = 0;
+};
+
+}  // namespace palpate

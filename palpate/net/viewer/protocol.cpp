@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/net/viewer/protocol.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "palpate/kernel/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+static_assert(std::endian::native == std::endian::little,
+              "depths and points are sent as they lie in memory");
+
+enum Kind : std::uint8_t { frame = 1, ticks = 2, rays = 3, path = 4, hand = 16, shown = 17 };
+// What a hand message says of the hand.
+enum Grip : std::uint8_t { let_go = 0, held = 1, let_go_towards = 2 };
+enum Format : std::uint8_t { depth = 0, depth_with_rays = 1, points = 2 };
+// Whose pixels colours are: nobody's, those of the depth or the points, another camera's.
+enum class Colours : std::uint8_t { none = 0, registered = 1, own_camera = 2 };
+
+constexpr std::size_t frame_header_size = 96;
+constexpr std::size_t colour_header_size = 72;
+constexpr std::size_t ticks_header_size = 112;
+constexpr std::size_t sample_size = 28;
+constexpr std::size_t hand_size = 32;
+constexpr std::size_t shown_size = 8;
+
+// Writes numbers one after the other, each aligned as docs/protocol.md says.
+class Writer {
+ public:
+  explicit Writer(std::vector<std::byte>& out) : out_(out) {}
+
+  template <class Number>
+  Writer& put(Number value) {
+    const std::size_t at = out_.size();
+    out_.resize(at + sizeof(Number));
+    std::memcpy(out_.data() + at, &value, sizeof(Number));
+    return *this;
+  }
+  Writer& put_float(double value) { return put(static_cast<float>(value)); }
+  Writer& put_vec3(const Vec3& v) { return put_float(v.x()).put_float(v.y()).put_float(v.z()); }
+
+ private:
+  std::vector<std::byte>& out_;
+};
+
+template <class Number>
+Number read(std::span<const std::byte> message, std::size_t at) {
+  Number value;
+  std::memcpy(&value, message.data() + at, sizeof(Number));
+  return value;
+}
+
+Writer& put_pose(Writer& writer, const Eigen::Isometry3d& pose) {
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) writer.put_float(pose(row, column));
+  }
+  return writer;
+}
+
+ViewerMessage frame_message(const FrameHeader& header, Format format,
+                            std::span<const std::byte> payload, std::shared_ptr<const void> owner,
+                            std::uint32_t triangles = 0) {
+  ViewerMessage message;
+  message.head.reserve(frame_header_size + colour_header_size);
+  Writer writer(message.head);
+  const ColourImage* colour = header.colour.get();
+  const Colours colours = colour == nullptr ? Colours::none
+                          : colour->camera  ? Colours::own_camera
+                                            : Colours::registered;
+  if (colour != nullptr) {
+    const auto count =
+        static_cast<std::size_t>(colour->width) * static_cast<std::size_t>(colour->height);
+    if (colour->rgb.size() != 3 * count ||
+        (!colour->camera && count != std::size_t{header.width} * header.height))
+      throw Error("colour for the viewer", "its size is not that of its image");
+  }
+  writer.put(Kind::frame).put(header.camera).put(format).put(colours);
+  writer.put(header.number).put(header.stamp).put(header.width).put(header.height);
+  writer.put_float(header.fx).put_float(header.fy).put_float(header.cx).put_float(header.cy);
+  writer.put_float(header.metres_per_unit);
+  put_pose(writer, header.world_from_camera).put(triangles);
+  if (colours == Colours::own_camera) {
+    const Intrinsics& k = colour->camera->intrinsics;
+    writer.put(static_cast<std::uint32_t>(colour->width));
+    writer.put(static_cast<std::uint32_t>(colour->height));
+    writer.put_float(k.fx).put_float(k.fy).put_float(k.cx).put_float(k.cy);
+    put_pose(writer, colour->camera->world_from_camera.inverse());
+  }
+  message.colour = header.colour;
+  message.payload = payload;
+  message.owner = std::move(owner);
+  return message;
+}
+
+// The float arrays' bytes, owned by the message.
+std::pair<std::span<const std::byte>, std::shared_ptr<const void>> shared_bytes(
+    std::vector<float> values) {
+  const auto owner = std::make_shared<const std::vector<float>>(std::move(values));
+  return {std::as_bytes(std::span<const float>(*owner)), owner};
+}
+
+}  // namespace
+
+ViewerMessage depth_message(const FrameHeader& header, std::span<const std::uint16_t> depth,
+                            std::shared_ptr<const void> owner) {
+  if (depth.size() != std::size_t{header.width} * header.height)
+    throw Error("depth image for the viewer", "its size is not width x height");
+  return frame_message(header, header.has_rays ? Format::depth_with_rays : Format::depth,
+                       std::as_bytes(depth), std::move(owner));
+}
+
+ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz,
+                             std::span<const std::uint32_t> triangles) {
+  const std::size_t count = std::size_t{header.width} * header.height;
+  if (xyz.size() != 3 * count)
+    throw Error("points for the viewer", "there are not three numbers for each");
+  if (triangles.size() % 3 != 0 ||
+      std::any_of(triangles.begin(), triangles.end(), [&](auto corner) { return corner >= count; }))
+    throw Error("triangles for the viewer", "they are not of the points");
+  // Behind the points, in the same payload.
+  for (const std::uint32_t corner : triangles) xyz.push_back(std::bit_cast<float>(corner));
+  auto [bytes, owner] = shared_bytes(std::move(xyz));
+  return frame_message(header, Format::points, bytes, std::move(owner),
+                       static_cast<std::uint32_t>(triangles.size() / 3));
+}
+
+ViewerMessage path_message(std::uint8_t camera, std::vector<float> txyz) {
+  if (txyz.size() % 4 != 0)
+    throw Error("path for the viewer", "there are not four numbers for each place");
+  ViewerMessage message;
+  Writer(message.head)
+      .put(Kind::path)
+      .put(camera)
+      .put(std::uint16_t{0})
+      .put(static_cast<std::uint32_t>(txyz.size() / 4));
+  std::tie(message.payload, message.owner) = shared_bytes(std::move(txyz));
+  return message;
+}
+
+ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32_t height,
+                           std::vector<float> rays) {
+  if (rays.size() != 2 * std::size_t{width} * height)
+    throw Error("rays for the viewer", "there are not two numbers for each pixel");
+  ViewerMessage message;
+  Writer(message.head).put(Kind::rays).put(camera).put(std::uint16_t{0}).put(width).put(height);
+  std::tie(message.payload, message.owner) = shared_bytes(std::move(rays));
+  return message;
+}
+
+ViewerMessage ticks_message(const TickBatch& batch) {
+  const std::size_t count = std::min(batch.samples.size(), TickBatch::max_samples);
+  ViewerMessage message;
+  message.head.reserve(ticks_header_size + count * sample_size);
+  Writer writer(message.head);
+  writer.put(Kind::ticks).put(batch.state).put(static_cast<std::uint16_t>(count));
+  writer.put(batch.flags).put(batch.t).put(batch.safety).put(batch.steps);
+  writer.put_vec3(batch.hip).put_vec3(batch.proxy).put_vec3(batch.normal).put_vec3(batch.force);
+  writer.put_float(batch.surface_velocity).put(batch.frame);
+  writer.put_float(batch.gain).put_float(batch.asked_force).put_vec3(batch.place);
+  writer.put_float(batch.region).put_float(batch.guidance).put(batch.fixtures);
+  const std::span<const TickSample> samples(batch.samples);
+  for (const TickSample& sample : samples.last(count)) {
+    writer.put_float(batch.t - sample.t).put(sample.force).put(sample.penetration);
+    writer.put(sample.steps).put(sample.tick_time);
+    writer.put(sample.relative).put(sample.absolute);
+  }
+  return message;
+}
+
+ViewerMessage text_message(const std::string& text) {
+  ViewerMessage message;
+  message.text = true;
+  const auto bytes = std::as_bytes(std::span(text));
+  message.head.assign(bytes.begin(), bytes.end());
+  return message;
+}
+
+std::optional<std::variant<HandMessage, ShownMessage>> parse_binary(
+    std::span<const std::byte> message) {
+  if (message.empty()) return std::nullopt;
+  const auto kind = read<std::uint8_t>(message, 0);
+  if (kind == Kind::hand && message.size() == hand_size) {
+    const auto grip = read<std::uint8_t>(message, 1);
+    if (grip > Grip::let_go_towards) return std::nullopt;
+    if (grip == Grip::let_go) return HandMessage{};
+    const Vec3 target(read<double>(message, 8), read<double>(message, 16),
+                      read<double>(message, 24));
+    // Also false for what is not a number.
+    if (!(target.cwiseAbs().maxCoeff() <= max_hand_distance) || !target.allFinite())
+      return std::nullopt;
+    return HandMessage{grip == Grip::held, target};
+  }
+  if (kind == Kind::shown && message.size() == shown_size) {
+    const auto camera = read<std::uint8_t>(message, 1);
+    if (camera >= Patch::max_views) return std::nullopt;
+    return ShownMessage{camera, read<std::uint32_t>(message, 4)};
+  }
+  return std::nullopt;
+}
+
+std::optional<Command> parse_command(std::string_view message) {
+  if (message.size() > max_page_message) return std::nullopt;
+  const auto json = nlohmann::json::parse(message, nullptr, false);
+  if (!json.is_object() || json.size() != 1) return std::nullopt;
+  const std::string& verb = json.begin().key();
+  const nlohmann::json& what = json.begin().value();
+  if (verb == "set" || verb == "set_safety" || verb == "place") {
+    if (!what.is_object() || what.size() != 2) return std::nullopt;
+    const auto name = what.find("name");
+    const auto value = what.find("value");
+    if (name == what.end() || value == what.end() || !name->is_string() || !value->is_number())
+      return std::nullopt;
+    if (verb == "set") return SetParameter{name->get<std::string>(), value->get<double>()};
+    if (verb == "place") return SetPlacement{name->get<std::string>(), value->get<double>()};
+    return SetSafetyParameter{name->get<std::string>(), value->get<double>()};
+  }
+  if (verb == "method" && what.is_string()) return SetMethod{what.get<std::string>()};
+  if (verb == "record" && what.is_boolean()) return SetRecording{what.get<bool>()};
+  if (verb == "open" && what.is_string()) return OpenScene{what.get<std::string>()};
+  if (verb == "seek" && what.is_number()) return Seek{what.get<double>()};
+  if (verb == "play") {
+    if (!what.is_object() || what.size() != 3) return std::nullopt;
+    const auto paused = what.find("paused");
+    const auto loop = what.find("loop");
+    const auto speed = what.find("speed");
+    if (paused == what.end() || loop == what.end() || speed == what.end()) return std::nullopt;
+    if (!paused->is_boolean() || !loop->is_boolean() || !speed->is_number()) return std::nullopt;
+    return SetPlayback{paused->get<bool>(), loop->get<bool>(), speed->get<double>()};
+  }
+  if (verb == "brush") {
+    if (what.is_null()) return DropBrush{};
+    if (!what.is_object() || what.size() != 2) return std::nullopt;
+    const auto material = what.find("material");
+    const auto radius = what.find("radius");
+    if (material == what.end() || radius == what.end() || !material->is_string() ||
+        !radius->is_number())
+      return std::nullopt;
+    return SetBrush{material->get<std::string>(), radius->get<double>()};
+  }
+  if (verb == "clear_paint" && what == true) return ClearPaint{};
+  if (verb == "forbid") {
+    if (!what.is_object() || what.size() != 2) return std::nullopt;
+    const auto size = what.find("size");
+    const auto margin = what.find("margin");
+    if (size == what.end() || margin == what.end() || !size->is_number() || !margin->is_number())
+      return std::nullopt;
+    return Forbid{size->get<double>(), margin->get<double>()};
+  }
+  if (verb == "guide") {
+    if (!what.is_object() || what.size() != 1) return std::nullopt;
+    const auto slack = what.find("slack");
+    if (slack == what.end() || !slack->is_number()) return std::nullopt;
+    return Guide{slack->get<double>()};
+  }
+  if (verb == "remove_fixture" && what.is_string()) return RemoveFixture{what.get<std::string>()};
+  if (verb == "reset" && what == true) return ResetHand{};
+  if (verb == "reset_faults" && what == true) return ResetFaults{};
+  return std::nullopt;
+}
+
+}  // namespace palpate

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "palpate/kernel/cloud/frame.hpp"
+#include "palpate/kernel/core/patch.hpp"
+
+namespace palpate {
+
+/// The messages between program and page, as docs/protocol.md lays them out.
+
+/// A message on its way to the pages: a head of its own, then what is shared, not copied.
+struct ViewerMessage {
+  bool text = false;
+  std::vector<std::byte> head;
+  std::span<const std::byte> payload;
+  std::shared_ptr<const void> owner;          ///< keeps the payload alive
+  std::shared_ptr<const ColourImage> colour;  ///< behind the payload; null: nothing is
+};
+
+/// What a page needs to know of a frame besides its depths or points.
+struct FrameHeader {
+  std::uint8_t camera = 0;
+  std::uint32_t number = 0;               ///< of this camera's frames, from 0
+  double stamp = 0.0;                     ///< [s]
+  std::uint32_t width = 0;                ///< [px]; how many, of points
+  std::uint32_t height = 1;               ///< [px]
+  double fx = 1, fy = 1, cx = 0, cy = 0;  ///< [px]
+  double metres_per_unit = 1.0;
+  Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
+  bool has_rays = false;  ///< the lens is distorted: a rays message tells where pixels look
+  std::shared_ptr<const ColourImage> colour = {};  ///< null: none
+};
+
+/// A depth image as it was captured; holes are 0 and 65535.
+/// @param owner  keeps `depth` alive and unchanged
+/// @throws Error if the size is not width * height, or that of the colour is another.
+ViewerMessage depth_message(const FrameHeader& header, std::span<const std::uint16_t> depth,
+                            std::shared_ptr<const void> owner);
+
+/// Points without an image [m, camera], x y z after one another.
+/// @param triangles  of a mesh whose corners they are, three indices each; empty: none
+/// @throws Error if there are not three numbers for each, an index is beyond the points, or the
+///         colours are not one for each.
+ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz,
+                             std::span<const std::uint32_t> triangles = {});
+
+/// Where a distorted lens's pixels look: x and y of the ray (x, y, 1), NaN for none.
+ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32_t height,
+                           std::vector<float> rays);
+
+/// The path of the hand that was recorded with a camera's frames: t [s from the recording's first
+/// frame], x, y, z [m, world] after one another.
+ViewerMessage path_message(std::uint8_t camera, std::vector<float> txyz);
+
+/// A few ticks in one: what the plots show of them.
+struct TickSample {
+  double t = 0.0;            ///< [s] of the last
+  float force = 0.0F;        ///< [N] largest
+  float penetration = 0.0F;  ///< [m] largest depth of the HIP below the surface; 0: above it
+  float steps = 0.0F;        ///< most
+  float tick_time = 0.0F;    ///< [s] longest, of the thread's own time
+  float relative = 0.0F;     ///< [J] given to the hand in this contact, relative to the surface
+  float absolute = 0.0F;     ///< [J] the same with the surface's own motion
+};
+
+/// The newest tick, and what happened since the message before.
+struct TickBatch {
+  double t = 0.0;  ///< [s]
+  std::uint8_t state = 0;
+  std::uint32_t flags = 0;   ///< TickFlag bits of any tick
+  std::uint32_t safety = 0;  ///< SafetyFlag bits of any tick
+  std::uint32_t steps = 0;
+  std::int32_t frame = -1;
+  Vec3 hip = Vec3::Zero(), proxy = Vec3::Zero(), normal = Vec3::Zero(), force = Vec3::Zero();
+  double surface_velocity = 0.0;  ///< [m/s]
+  double gain = 0.0;              ///< [-] of the safety chain: 0 disengaged, 1 nothing faded
+  double asked_force = 0.0;       ///< [N] length of all that is asked for: surface and fixtures
+  /// [m] world: where the hand is kept by the surface and by forbidden regions; ServoTick::place
+  Vec3 place = Vec3::Zero();
+  double region = 0.0;              ///< [N] length of what forbidden regions ask for
+  double guidance = 0.0;            ///< [N] of what guides and viscous regions ask for
+  std::uint32_t fixtures = 0;       ///< bit i: the session's fixture i gives a force
+  std::vector<TickSample> samples;  ///< oldest first; at most `max_samples` are sent, the newest
+  static constexpr std::size_t max_samples = 1024;
+};
+ViewerMessage ticks_message(const TickBatch& batch);
+
+ViewerMessage text_message(const std::string& text);
+
+/// The page's hand: where it is to be, or that it was let go.
+struct HandMessage {
+  bool held = false;
+  /// [m] world: where to. None, never of a held hand: it stays where it is.
+  std::optional<Vec3> target = {};
+};
+/// The page has drawn a frame and can take another.
+struct ShownMessage {
+  std::uint8_t camera;
+  std::uint32_t number;
+};
+
+/// The page asks for a change in words. Values are not checked yet.
+struct SetParameter {
+  std::string name;
+  double value;
+};
+struct SetSafetyParameter {
+  std::string name;
+  double value;
+};
+struct SetPlacement {
+  std::string name;
+  double value;
+};
+struct SetMethod {
+  std::string name;
+};
+struct SetRecording {
+  bool on;
+};
+/// How recordings are played; see Playback.
+struct SetPlayback {
+  bool paused;
+  bool loop;
+  double speed;
+};
+/// Recordings continue from another place: 0 is the first frame, 1 the last.
+struct Seek {
+  double share;
+};
+/// Another scene is to be touched, one of those that *hello* lists.
+struct OpenScene {
+  std::string uri;
+};
+/// From now on what is touched is painted with a material; "" erases.
+struct SetBrush {
+  std::string material;
+  double radius;  ///< [m]
+};
+/// What is touched is no longer painted.
+struct DropBrush {};
+struct ClearPaint {};
+/// What is seen about the place that was touched last becomes a forbidden region.
+struct Forbid {
+  double size;    ///< [m] edge of the box about that place
+  double margin;  ///< [m]
+};
+/// The stroke of the hand's last contact becomes a guide: a path, or a point if it hardly moved.
+struct Guide {
+  double slack;  ///< [m] from it within which the hand is free
+};
+struct RemoveFixture {
+  std::string name;
+};
+struct ResetHand {};
+/// Ends a latched fault of the safety chain; see Session::reset_faults.
+struct ResetFaults {};
+using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod,
+                             SetRecording, SetPlayback, Seek, OpenScene, SetBrush, DropBrush,
+                             ClearPaint, Forbid, Guide, RemoveFixture, ResetHand, ResetFaults>;
+
+/// The longest message a page may send [bytes].
+constexpr std::size_t max_page_message = 1024;
+/// The farthest place a hand can be sent to [m].
+constexpr double max_hand_distance = 1000.0;
+
+/// A binary message from a page, or none if it is not one of the protocol's, to the byte.
+std::optional<std::variant<HandMessage, ShownMessage>> parse_binary(
+    std::span<const std::byte> message);
+
+/// A text message from a page, or none if it is not one of the protocol's.
+std::optional<Command> parse_command(std::string_view message);
+
+}  // namespace palpate

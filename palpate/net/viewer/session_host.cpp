@@ -1,0 +1,685 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/net/viewer/session_host.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <span>
+#include <system_error>
+#include <utility>
+
+#include <nlohmann/json.hpp>
+
+#include "palpate/io/devices/mouse_device.hpp"
+#include "palpate/io/sources/point_file_source.hpp"
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
+#include "palpate/record/recorded_hand.hpp"
+#include "palpate/servo/placement_table.hpp"
+#include "palpate/servo/stiffness.hpp"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+constexpr double samples_per_second = 200.0;  // of the page's plots
+
+json energy_of(const PortEnergy& port) {
+  return {{"made", port.made}, {"generating", port.generating}};
+}
+
+template <class Owner>
+json rows_json(std::span<const ParameterRow<Owner>> table) {
+  json rows = json::array();
+  for (const auto& row : table)
+    rows.push_back({{"name", row.name},
+                    {"symbol", row.symbol},
+                    {"unit", row.unit},
+                    {"default", row.default_value},
+                    {"min", row.min},
+                    {"max", row.max},
+                    {"meaning", row.meaning},
+                    {"source", row.source}});
+  return rows;
+}
+
+// What the numbers of a table are now, by name.
+template <class Owner>
+json values_json(std::span<const ParameterRow<Owner>> table, const Owner& owner) {
+  json values;
+  for (const auto& row : table) values[std::string(row.name)] = row.get(owner);
+  return values;
+}
+
+std::string realtime_text(const RealtimeReport& report) {
+  std::string text = report.fifo ? "real-time, priority " + std::to_string(report.priority)
+                                 : "not real-time; see palpate doctor";
+  if (report.core >= 0) text += ", core " + std::to_string(report.core);
+  return text;
+}
+
+// t [s from its first frame], x, y, z [m] of the hand in a recording; empty if it has none.
+std::vector<float> path_of(const std::string& uri) {
+  constexpr std::size_t most_places = 4000;
+  std::vector<float> path;
+  if (Uri(uri).scheme() != "recording") return path;
+  try {
+    const double first = open_source(uri)->info().start_time;
+    for (const RecordedHand& hand : recorded_hand(Uri(uri).path(), most_places)) {
+      path.push_back(static_cast<float>(hand.t - first));
+      for (int axis = 0; axis < 3; ++axis) path.push_back(static_cast<float>(hand.hip[axis]));
+    }
+  } catch (const Error&) {  // a bag without a hand, or a damaged one: its frames may still do
+    path.clear();
+  }
+  return path;
+}
+
+std::string_view stricter_text(std::string_view limit) {
+  switch (stricter_direction(limit)) {
+    case Stricter::lower:
+      return "lower";
+    case Stricter::higher:
+      return "higher";
+    case Stricter::neither:
+      break;
+  }
+  return "";
+}
+
+// What the page draws of a fixture.
+nlohmann::json fixture_to_draw(const Fixture& fixture) {
+  const auto numbers = [](const Vec3& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
+  nlohmann::json pose = nlohmann::json::array();
+  for (int i = 0; i < 12; ++i) pose.push_back(fixture.world_from_fixture(i / 4, i % 4));
+  Vec3 size = fixture.size;
+  nlohmann::json points = nlohmann::json::array();
+  if (fixture.shape == FixtureShape::mesh) {  // its box
+    Vec3 low = fixture.points.front();
+    Vec3 high = low;
+    for (const Vec3& point : fixture.points) {
+      low = low.cwiseMin(point);
+      high = high.cwiseMax(point);
+    }
+    size = high - low;
+    const Vec3 middle = fixture.world_from_fixture * Vec3(0.5 * (low + high));
+    for (int axis = 0; axis < 3; ++axis)
+      pose[static_cast<std::size_t>(4 * axis + 3)] = middle[axis];
+  } else {
+    for (const Vec3& point : fixture.points) points.push_back(numbers(point));
+  }
+  return {{"name", fixture.name},
+          {"kind", fixture_kind_names()[static_cast<std::size_t>(fixture.kind)]},
+          {"shape", fixture_shape_names()[static_cast<std::size_t>(fixture.shape)]},
+          {"pose", pose},
+          {"size", numbers(size)},
+          {"radius", fixture.radius},
+          {"length", fixture.length},
+          {"points", points}};
+}
+
+}  // namespace
+
+void SessionHost::attach(Session& session) {
+  bounds_.emplace(session.settings().safety, rules_.operator_limits);
+  recordings_ = std::make_unique<ObserverRecordings>(session, rules_.recordings);
+  session_ = &session;
+  mouse_ = session.mouse();
+  if (mouse_ != nullptr) target_ = start_ = mouse_->start_position();
+  reader_.emplace(session.ticks());
+  for (std::size_t hand = 1; hand < session.hands(); ++hand)
+    others_.push_back({.reader = session.ticks(hand)});
+  const double rate = session.state().rate;
+  batcher_.emplace(static_cast<unsigned>(std::max(1.0, rate / samples_per_second)));
+}
+
+void SessionHost::show_on(ViewerServer* server) {
+  server_.store(server, std::memory_order_release);
+  if (server == nullptr) return;
+  const std::vector<CameraStatus> cameras = session_->state().cameras;
+  for (std::size_t i = 0; i < cameras.size() && i < Patch::max_views; ++i) {
+    std::vector<float> path = path_of(cameras[i].uri);
+    if (!path.empty())
+      server->show_path(static_cast<std::uint8_t>(i),
+                        path_message(static_cast<std::uint8_t>(i), std::move(path)));
+  }
+}
+
+std::string SessionHost::hello() {
+  json safety = rows_json(safety_parameter_table());
+  for (json& row : safety) row["stricter"] = stricter_text(row["name"].get<std::string>());
+  json methods = json::array();
+  json flags = json::array();
+  json safety_flags = json::array();
+  for (const MethodInfo& row : session_->methods().entries())
+    methods.push_back({{"name", row.name}, {"meaning", row.summary}});
+  for (const TickFlagInfo& flag : tick_flag_table())
+    flags.push_back({{"name", flag.name}, {"meaning", flag.meaning}});
+  for (std::size_t i = 0; i < safety_flag_count; ++i)
+    safety_flags.push_back(
+        {{"name", safety_flag_names()[i]}, {"meaning", safety_flag_meanings()[i]}});
+  json scenes = json::array();
+  for (const SceneChoice& scene : rules_.scenes)
+    scenes.push_back({{"uri", scene.uri}, {"meaning", scene.meaning}, {"group", scene.group}});
+  const std::uint64_t most = rules_.files && rules_.open_scene ? rules_.files->limit() : 0;
+  return json{{"file_limit", most},      {"scenes", scenes},
+              {"notice", rules_.notice}, {"version", version_},
+              {"methods", methods},      {"parameters", rows_json(parameter_table())},
+              {"safety", safety},        {"placement", rows_json(placement_table())},
+              {"flags", flags},          {"safety_flags", safety_flags}}
+      .dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+void SessionHost::forbid(const Forbid& wanted) {
+  if (!touched_)
+    throw Error("fixture", "nothing has been touched yet",
+                "touch the object that is to be forbidden");
+  Fixture region{.name = {},
+                 .kind = FixtureKind::forbidden,
+                 .shape = FixtureShape::seen,
+                 .size = Vec3::Constant(wanted.size)};
+  region.world_from_fixture.translation() = *touched_;
+  region.numbers.margin = wanted.margin;
+  add_fixture(std::move(region), "keep off");
+}
+
+void SessionHost::guide(const Guide& wanted) {
+  constexpr double shortest = 0.01;  // [m] from end to end of a path; else it is a place
+  if (stroke_.empty())
+    throw Error("fixture", "there was no contact yet", "slide along the path of the guide first");
+  double length = 0.0;
+  for (std::size_t i = 1; i < stroke_.size(); ++i) length += (stroke_[i] - stroke_[i - 1]).norm();
+  Fixture line{.name = {}, .kind = FixtureKind::guide, .shape = FixtureShape::point};
+  if (length >= shortest) {
+    line.shape = FixtureShape::path;
+    line.points = stroke_;
+  } else {
+    line.world_from_fixture.translation() = stroke_.back();
+  }
+  set_parameter(line.numbers, "slack", wanted.slack);
+  add_fixture(std::move(line), length >= shortest ? "stroke" : "place");
+}
+
+void SessionHost::add_fixture(Fixture fixture, const std::string& name) {
+  session_->change([&](ServoSettings& settings) {
+    std::vector<Fixture> all =
+        settings.fixtures ? settings.fixtures->fixtures() : std::vector<Fixture>{};
+    const auto is_taken = [&] {
+      return std::any_of(all.begin(), all.end(),
+                         [&](const Fixture& other) { return other.name == fixture.name; });
+    };
+    for (int number = 1; fixture.name.empty() || is_taken(); ++number)
+      fixture.name = name + " " + std::to_string(number);
+    all.push_back(std::move(fixture));
+    settings.fixtures = std::make_shared<const FixtureSet>(all);
+  });
+}
+
+void SessionHost::remove_fixture(const std::string& name) {
+  session_->change([&](ServoSettings& settings) {
+    std::vector<Fixture> all =
+        settings.fixtures ? settings.fixtures->fixtures() : std::vector<Fixture>{};
+    if (std::erase_if(all, [&](const Fixture& fixture) { return fixture.name == name; }) == 0)
+      throw Error("fixture '" + name + "'", "there is no fixture of that name",
+                  "see the list on the page");
+    settings.fixtures = all.empty() ? nullptr : std::make_shared<const FixtureSet>(all);
+  });
+}
+
+// The names of what the first camera's surfaces can be painted with.
+std::vector<std::string> SessionHost::paintable() const {
+  const auto clouds = session_->newest_clouds();
+  return clouds.empty() || !clouds.front() ? std::vector<std::string>{}
+                                           : Paint::names(*clouds.front());
+}
+
+// The recording that was made last, to be touched; empty while there is none that is whole.
+std::string SessionHost::recorded_scene(const RecordingState& recording) const {
+  if (!rules_.open_scene || recording.on || recording.closing || recording.failed ||
+      recording.folder.empty())
+    return {};
+  const bool has_mark = recording.folder.find('?') != std::string::npos;  // of options, in a URI
+  return "recording:" + recording.folder + (has_mark ? "?" : "");
+}
+
+// A scale that somebody chose is asked about no more.
+void SessionHost::look_at_points(const std::string& uri) {
+  if (proposed_) return;
+  const auto clouds = session_->newest_clouds();
+  const auto* points =
+      clouds.empty() ? nullptr : dynamic_cast<const PointCloud*>(clouds.front().get());
+  if (points == nullptr) return;
+  proposed_ = proposed_touch(*points);
+  const bool may_open = rules_.open_scene && !rules_.scenes.empty() && clouds.size() == 1;
+  if (may_open && proposed_->scale != 1.0 && !Uri(uri).has("scale"))
+    rescaled_uri_ = rescaled(uri, proposed_->scale);
+}
+
+std::string SessionHost::state() {
+  SessionState state = session_->state();
+  look_at_points(state.cameras.front().uri);
+  json cameras = json::array();
+  const SessionHandState& first = state.hands.front();
+  json playback;
+  for (const CameraStatus& status : state.cameras) {
+    cameras.push_back({{"uri", status.uri},
+                       {"kind", status.kind},
+                       {"sensor", name_of(status.sensor)},
+                       {"rate", status.rate},
+                       {"state", status.text},
+                       {"stays_valid", status.stays_valid},
+                       {"dropped", status.dropped},
+                       {"frames", status.recorded},
+                       {"place", status.place},
+                       {"time", status.recorded_time}});
+    if (status.recorded > 1 && playback.is_null())
+      playback = {{"paused", status.playback.paused},
+                  {"loop", status.playback.loop},
+                  {"speed", status.playback.speed}};
+  }
+  json points;
+  if (proposed_)
+    points = {{"extent", proposed_->extent},
+              {"spacing", proposed_->spacing},
+              {"scale", proposed_->scale},
+              {"rescaled", rescaled_uri_}};
+  json latched_by = json::array();
+  for (std::size_t i = 0; i < safety_flag_count; ++i) {
+    if ((first.latched_by >> i & 1U) != 0) latched_by.push_back(safety_flag_names()[i]);
+  }
+  const CycleStatistics& cycles = session_->statistics();
+  json servo = {{"rate", state.rate},
+                {"ticks", cycles.ticks.load()},
+                {"late_ticks", first.summary.late_ticks},
+                {"frames_adopted", cycles.frames_adopted.load()},
+                {"frames_dropped", cycles.frames_dropped.load()}};
+  if (const Timing* timing = session_->timing()) {
+    servo["realtime"] = realtime_text(*session_->realtime());
+    servo["compute_p99"] = 1e-9 * static_cast<double>(timing->compute.quantile(0.99));
+    servo["wake_up_p99"] = 1e-9 * static_cast<double>(timing->wake_up.quantile(0.99));
+  }
+  json recording = {{"possible", true},
+                    {"path", nullptr},
+                    {"message", state.recording.message},
+                    {"ended", recording_ended()},
+                    {"seconds", state.recording.seconds},
+                    {"bytes", state.recording.bytes},
+                    {"room", nullptr},
+                    {"open", nullptr}};
+  if (state.recording.on) recording["path"] = state.recording.folder;
+  if (const auto room = recordings_ ? recordings_->room() : std::nullopt) recording["room"] = *room;
+  if (const std::string uri = recorded_scene(state.recording); !uri.empty())
+    recording["open"] = uri;
+  json dabs = json::array();
+  for (const Dab& dab : session_->paint().dabs())
+    dabs.push_back({{"place", {dab.place.x(), dab.place.y(), dab.place.z()}},
+                    {"normal", {dab.normal.x(), dab.normal.y(), dab.normal.z()}},
+                    {"radius", dab.radius},
+                    {"material", dab.material}});
+  json fixtures = json::array();
+  if (state.settings.fixtures) {
+    for (const FixtureSet::Item& item : state.settings.fixtures->items())
+      fixtures.push_back(fixture_to_draw(item.fixture));
+  }
+  json brush;
+  if (brush_) brush = {{"material", brush_->material}, {"radius", brush_->radius}};
+  const DeviceInfo& device = session_->device().info();
+  const std::vector<std::string> warnings =
+      stiffness_warnings(device, state.settings.parameters.coupling.stiffness,
+                         state.settings.placement.workspace_scale, state.rate);
+  return json{
+      {"method", state.settings.method},
+      {"parameters", values_json(parameter_table(), state.settings.parameters)},
+      {"safety", values_json(safety_parameter_table(), state.settings.safety)},
+      {"placement", values_json(placement_table(), state.settings.placement)},
+      {"cameras", cameras},
+      {"playback", playback},
+      {"points", points},
+      {"device",
+       {{"uri", device.uri},
+        {"kind", device.kind},
+        {"takes_hand", mouse_ != nullptr},
+        {"fault", first.device.text},
+        {"warnings", warnings}}},
+      {"servo", servo},
+      {"interventions", first.interventions},
+      {"latched_by", latched_by},
+      {"on_hold", state.held},
+      {"flag_ticks", first.summary.flag_ticks},
+      {"pop_throughs", first.summary.pop_throughs},
+      {"energy",
+       {{"contacts", first.summary.energy.contacts},
+        {"relative", energy_of(first.summary.energy.relative)},
+        {"absolute", energy_of(first.summary.energy.absolute)}}},
+      {"fixtures", fixtures},
+      {"paint",
+       {{"brush", brush}, {"dabs", dabs}, {"materials", paintable()}, {"trouble", brush_trouble_}}},
+      {"recording", recording}}
+      .dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string SessionHost::robot() {
+  const std::optional<RobotPicture> robot = rules_.robot ? rules_.robot() : std::nullopt;
+  if (!robot) return {};
+  const auto place = [](const Vec3& at) { return json{at.x(), at.y(), at.z()}; };
+  json links = json::array();
+  for (const Vec3& link : robot->links) links.push_back(place(link));
+  json tool;
+  if (robot->tool) tool = place(*robot->tool);
+  return json{{"name", robot->name},
+              {"tool", tool},
+              {"links", links},
+              {"force", place(robot->force)},
+              {"radius", robot->radius},
+              {"age", robot->age},
+              {"latency", robot->latency},
+              {"led", robot->led},
+              {"trouble", robot->trouble}}
+      .dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string SessionHost::more_hands() {
+  if (others_.empty()) return {};
+  json hands = json::array();
+  for (std::size_t i = 0; i < others_.size(); ++i) {
+    Other& other = others_[i];
+    while (other.reader.try_pop(other.newest)) {
+    }
+    const Tick& tick = other.newest.tick;
+    const auto numbers = [](const Vec3& v) { return json{v.x(), v.y(), v.z()}; };
+    hands.push_back({{"name", session_->hand_name(i + 1)},
+                     {"hip", numbers(tick.hip)},
+                     {"proxy", numbers(tick.proxy)},
+                     {"force", numbers(other.newest.force)},
+                     {"touches", tick.state != ContactState::free_motion},
+                     {"present", (other.newest.hand & hand_present) != 0},
+                     {"trouble", palpate::describe(fault_of(other.newest.hand))}});
+  }
+  return hands.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::optional<TickBatch> SessionHost::ticks() {
+  const double contact_radius = session_->settings().parameters.proxy.r_c();
+  std::optional<ServoTick> newest;
+  for (ServoTick record{}; reader_->try_pop(record);) {
+    batcher_->add(record, contact_radius);
+    newest = record;
+  }
+  if (newest) paint(*newest, contact_radius);
+  return batcher_->take();
+}
+
+// Along a stroke, a dab in each third of the brush's radius.
+// Keeps the stroke in as few places as a guide may have, however long it becomes.
+void SessionHost::follow(const Tick& tick, const Vec3& foot) {
+  constexpr double finest = 0.002;   // [m]
+  constexpr std::size_t most = 128;  // places
+  if (tick.force.isZero()) {
+    stroke_is_over_ = true;
+    return;
+  }
+  if (std::exchange(stroke_is_over_, false)) {
+    stroke_.clear();
+    stroke_spacing_ = finest;
+  }
+  if (!stroke_.empty() && (foot - stroke_.back()).norm() < stroke_spacing_) return;
+  stroke_.push_back(foot);
+  if (stroke_.size() < most) return;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < stroke_.size(); i += 2) stroke_[kept++] = stroke_[i];
+  stroke_.resize(kept);
+  stroke_spacing_ *= 2.0;
+}
+
+void SessionHost::paint(const ServoTick& newest, double contact_radius) {
+  const Tick& tick = newest.tick;
+  follow(tick, tick.proxy - contact_radius * tick.normal);
+  if (!tick.force.isZero()) touched_ = tick.proxy - contact_radius * tick.normal;
+  if (!brush_ || tick.force.isZero()) {
+    dabbed_.reset();
+    return;
+  }
+  const Vec3 foot = tick.proxy - contact_radius * tick.normal;
+  if (dabbed_ && (foot - *dabbed_).norm() < brush_->radius / 3.0) return;
+  dabbed_ = foot;
+  try {
+    if (brush_->material.empty())
+      session_->paint().erase(foot, brush_->radius);
+    else
+      session_->paint().add({.place = foot,
+                             .radius = brush_->radius,
+                             .normal = tick.normal,
+                             .material = brush_->material});
+    brush_trouble_.clear();
+  } catch (const Error& error) {  // full
+    brush_trouble_ = error.what();
+  }
+}
+
+void SessionHost::hand(const HandMessage& hand) {
+  if (mouse_ == nullptr) return;
+  if (hand.target) {
+    const Placement placement = session_->settings().placement;
+    const Vec3 place =
+        placement.world_from_device.inverse() * *hand.target / placement.workspace_scale;
+    if (is_place(place)) target_ = place;
+  }
+  mouse_->aim({.position = target_, .present = hand.held});
+}
+
+void SessionHost::command(const Command& command, Role role) {
+  if (const auto* set = std::get_if<SetParameter>(&command)) {
+    session_->change([&](ServoSettings& settings) {
+      set_parameter(settings.parameters, set->name, set->value);
+    });
+  } else if (const auto* limit = std::get_if<SetSafetyParameter>(&command)) {
+    bounds_->check(limit->name, limit->value, role);
+    session_->change([&](ServoSettings& settings) {
+      set_parameter(settings.safety, limit->name, limit->value);
+    });
+    if (role == Role::operating) bounds_->set_by_operator(limit->name, limit->value);
+  } else if (const auto* place = std::get_if<SetPlacement>(&command)) {
+    session_->change([&](ServoSettings& settings) {
+      set_placement(settings.placement, place->name, place->value);
+    });
+  } else if (const auto* method = std::get_if<SetMethod>(&command)) {
+    session_->change([&](ServoSettings& settings) { settings.method = method->name; });
+  } else if (const auto* record = std::get_if<SetRecording>(&command)) {
+    record->on ? recordings_->start() : recordings_->stop();
+  } else if (const auto* play = std::get_if<SetPlayback>(&command)) {
+    session_->set_playback({.paused = play->paused, .loop = play->loop, .speed = play->speed});
+  } else if (const auto* scene = std::get_if<OpenScene>(&command)) {
+    const bool is_offered =
+        std::any_of(rules_.scenes.begin(), rules_.scenes.end(),
+                    [&](const SceneChoice& choice) { return choice.uri == scene->uri; });
+    const bool is_recorded =
+        !scene->uri.empty() && scene->uri == recorded_scene(session_->state().recording);
+    const bool is_proposed = !scene->uri.empty() && scene->uri == rescaled_uri_;
+    if (!(is_offered || is_recorded || is_proposed) || !rules_.open_scene)
+      throw Error("scene", "'" + scene->uri + "' is not among those of this session",
+                  "choose one of the list, or restart the program with --camera");
+    rules_.open_scene(scene->uri);
+  } else if (const auto* seek = std::get_if<Seek>(&command)) {
+    session_->seek(seek->share);
+  } else if (const auto* brush = std::get_if<SetBrush>(&command)) {
+    if (!(brush->radius >= Paint::smallest && brush->radius <= Paint::largest))
+      throw Error("brush", "its radius is out of range", "give 0.001 to 0.1 m");
+    const std::vector<std::string> names = paintable();
+    if (!brush->material.empty() &&
+        std::find(names.begin(), names.end(), brush->material) == names.end())
+      static_cast<void>(standard_material(brush->material));  // throws, naming the nearest
+    brush_ = *brush;
+    dabbed_.reset();
+  } else if (std::holds_alternative<DropBrush>(command)) {
+    brush_.reset();
+  } else if (std::holds_alternative<ClearPaint>(command)) {
+    session_->paint().clear();
+    dabbed_.reset();
+  } else if (const auto* wanted = std::get_if<Forbid>(&command)) {
+    forbid(*wanted);
+  } else if (const auto* along = std::get_if<Guide>(&command)) {
+    guide(*along);
+  } else if (const auto* fixture = std::get_if<RemoveFixture>(&command)) {
+    remove_fixture(fixture->name);
+  } else if (std::holds_alternative<ResetFaults>(command)) {
+    session_->reset_faults();
+  } else if (mouse_ != nullptr) {
+    mouse_->aim({.position = target_ = start_, .present = false});
+  }
+}
+
+std::filesystem::path SessionHost::begin_file(const std::string& name, std::uint64_t size) {
+  if (!rules_.files || !rules_.open_scene) return ViewerHost::begin_file(name, size);
+  return rules_.files->begin(name, size);
+}
+
+void SessionHost::end_file(const std::filesystem::path& file, bool whole) {
+  if (whole)
+    rules_.open_scene(uri_of_file(file));
+  else
+    rules_.files->abandon(file);
+}
+
+void SessionHost::show(std::size_t number, const FedFrame& fed) {
+  ViewerServer* server = server_.load(std::memory_order_acquire);
+  const auto camera = static_cast<std::uint8_t>(number);
+  // A still image came first before there was a server: what is shown again then is new to it.
+  if (server == nullptr || (!fed.is_new && numbers_[camera] > 0)) return;
+  const Frame& frame = fed.frame;
+  FrameHeader header;
+  header.camera = camera;
+  header.number = numbers_[camera]++;
+  header.stamp = frame.stamp;
+  if (const auto* image = frame.cloud->image()) {
+    const Intrinsics& k = image->intrinsics();
+    header.width = static_cast<std::uint32_t>(k.width);
+    header.height = static_cast<std::uint32_t>(k.height);
+    header.fx = k.fx;
+    header.fy = k.fy;
+    header.cx = k.cx;
+    header.cy = k.cy;
+    header.metres_per_unit = 1.0 / image->units_per_metre();
+    header.world_from_camera = image->world_from_camera();
+    header.has_rays = k.distorted();
+    if (header.has_rays && header.number == 0) describe(camera, image->rays());
+    header.colour = frame.colour;
+    server->show(camera, depth_message(header, image->depth(), frame.cloud));
+  } else if (const auto* points = frame.cloud->point_cloud()) {
+    std::vector<float> xyz;
+    std::vector<std::uint32_t> triangles;
+    const auto put = [&](const Vec3& point) {
+      for (int axis = 0; axis < 3; ++axis) xyz.push_back(static_cast<float>(point[axis]));
+    };
+    if (const Surface* given = points->surface()) {
+      const std::vector<Vec3>& all = given->points;
+      const bool has_colour = frame.colour && frame.colour->rgb.size() == 3 * all.size();
+      auto colour = has_colour ? std::make_shared<ColourImage>() : nullptr;
+      std::vector<std::uint32_t> place(all.size(), 0);  // among those that are finite
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        place[i] = static_cast<std::uint32_t>(xyz.size() / 3);
+        if (!all[i].allFinite()) continue;
+        put(all[i]);
+        if (!colour) continue;
+        for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) colour->rgb.push_back(frame.colour->rgb[k]);
+      }
+      for (const auto& corners : given->triangles) {
+        if (!std::all_of(corners.begin(), corners.end(),
+                         [&](std::uint32_t i) { return all[i].allFinite(); }))
+          continue;
+        for (const std::uint32_t i : corners) triangles.push_back(place[i]);
+      }
+      if (colour) {
+        colour->width = static_cast<int>(xyz.size() / 3);
+        colour->height = 1;
+        header.colour = std::move(colour);
+      }
+    } else {
+      xyz.reserve(3 * points->size());
+      for (std::size_t i = 0; i < points->size(); ++i) put(points->point(i));
+    }
+    header.width = static_cast<std::uint32_t>(xyz.size() / 3);
+    server->show(camera, points_message(header, std::move(xyz), triangles));
+  }
+}
+
+void SessionHost::describe(std::uint8_t camera, const ViewingRays& rays) {
+  const Intrinsics& k = rays.intrinsics();
+  std::vector<float> xy;
+  xy.reserve(2 * static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height));
+  for (int v = 0; v < k.height; ++v) {
+    for (int u = 0; u < k.width; ++u) {
+      const Eigen::Vector2d ray = rays.ray(u, v);
+      xy.push_back(static_cast<float>(ray.x()));
+      xy.push_back(static_cast<float>(ray.y()));
+    }
+  }
+  server_.load()->describe(camera,
+                           rays_message(camera, static_cast<std::uint32_t>(k.width),
+                                        static_cast<std::uint32_t>(k.height), std::move(xy)));
+}
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t keep_free = 100'000'000;  // [bytes] of the disk
+
+bool is_simple_name(const std::string& name) {
+  return !name.empty() && name.size() <= DroppedFiles::longest_name && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), [](unsigned char c) {
+           return std::isalnum(c) != 0 || c == '.' || c == '-' || c == '_';
+         });
+}
+
+std::string megabytes(std::uint64_t bytes) {
+  return std::to_string((bytes + 999'999) / 1'000'000) + " MB";
+}
+
+fs::path make_folder() {
+  std::string name = (fs::temp_directory_path() / DroppedFiles::folder_prefix).string() + "XXXXXX";
+  if (mkdtemp(name.data()) == nullptr)
+    throw Error(name, "cannot be made", "set TMPDIR to a folder that can be written");
+  return name;
+}
+
+}  // namespace
+
+DroppedFiles::~DroppedFiles() {
+  std::error_code unused;
+  if (!folder_.empty()) fs::remove_all(folder_, unused);
+}
+
+fs::path DroppedFiles::begin(const std::string& name, std::uint64_t size) {
+  if (!is_simple_name(name))
+    throw Error("file", "its name is too long, or has other characters than letters and digits",
+                "rename it");
+  static_cast<void>(uri_of_file(name));  // refuses other kinds
+  std::uint64_t sum = size;
+  for (const File& file : files_) sum += file.size;
+  if (size > limit_ || sum > limit_)
+    throw Error(
+        name,
+        "is of " + megabytes(size) + ", and the page may send " + megabytes(limit_) + " in all",
+        "start the program with --camera and the file's path");
+  if (folder_.empty()) folder_ = make_folder();
+  std::error_code error;
+  const fs::space_info space = fs::space(folder_, error);
+  if (!error && space.available < size + keep_free)
+    throw Error(folder_.string(), "has no room for " + megabytes(size), "free some, or set TMPDIR");
+  // A folder of its own: the name is what the person knows the file by.
+  const fs::path folder = folder_ / std::to_string(++count_);
+  fs::create_directory(folder, error);
+  if (error) throw Error(folder.string(), "cannot be made: " + error.message());
+  return files_.emplace_back(File{folder / name, size}).path;
+}
+
+void DroppedFiles::abandon(const fs::path& file) {
+  std::error_code unused;
+  fs::remove(file, unused);
+  std::erase_if(files_, [&](const File& other) { return other.path == file; });
+}
+
+}  // namespace palpate

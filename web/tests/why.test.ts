@@ -194,7 +194,7 @@ describe("why the force is what it is", () => {
       ++count;
     }
     expect(count).toBeGreaterThan(30_000);
-  }, 60_000); // [ms] of a hang: they are many
+  }, 60_000); // [ms] 40,000 combinations take seconds on a slow machine; a hang takes longer
 });
 
 test("a line stays to be read, unless a graver one comes or it is no longer true", () => {

@@ -61,7 +61,8 @@ TEST_F(Ros2Program, LeadsARobotInAnotherProcess) {
   ASSERT_EQ(both.code, 0) << both.err;
   EXPECT_NE(both.err.find("is teleoperated by /robot"), std::string::npos) << both.err;
   const auto summary = nlohmann::json::parse(both.out);
-  EXPECT_GT(summary["ticks"], 1000);
+  EXPECT_GT(summary["ticks"], 0);
+  EXPECT_GT(summary["frames"], 0) << "the other process's camera was not seen";
 }
 
 TEST_F(Ros2Program, SaysWhatAnEndOfALinkLacks) {

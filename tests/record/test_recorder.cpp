@@ -122,8 +122,16 @@ TEST_P(RecorderOf, ASessionInItsMidstIsReplayedBitForBit) {
   ASSERT_GE(reader.ticks(), 200U);
   const ServoTick first = reader.tick(0);
   EXPECT_NE(first.hand & method_switched, 0U);
-  EXPECT_NE(reader.tick(10).tick.state, ContactState::free_motion);  // in the midst of a touch
-  EXPECT_GT(reader.tick(100).tick.force.norm(), 1.0);
+  // It began in the midst of a touch, at whichever of its ticks the writing thread came first; the
+  // hand lets go for ten ticks of each 120.
+  int touching = 0;
+  double largest = 0.0;
+  for (std::size_t i = 0; i < 100; ++i) {
+    if (reader.tick(i).tick.state != ContactState::free_motion) ++touching;
+    largest = std::max(largest, reader.tick(i).tick.force.norm());
+  }
+  EXPECT_GT(touching, 50);
+  EXPECT_GT(largest, 1.0);
   const ReplayReport report = replay(reader);
   EXPECT_TRUE(report.identical()) << test::text_of(report);
   EXPECT_EQ(report.sent_unchecked, "");

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/io/devices/device_body.hpp"
 #include "palpate/io/devices/device_probe.hpp"
 #include "palpate/io/devices/devices.hpp"
 #include "palpate/io/devices/sampled_wall.hpp"
@@ -57,26 +58,34 @@ class Wrapped final : public Device {
 };
 
 TEST(MeasureDevice, FindsWhatSimulatedDevicesAreMadeOf) {
-  for (const std::string options :
-       {"device=touch&grip=none", "device=touch&grip=none&friction=0.05", "device=omega&grip=none",
-        "device=touch&grip=none&friction=0.1&device_mass=0.12&delay=4ms"}) {
+  struct Case {
+    std::string options;
+    DeviceBody truth;
+  };
+  const DeviceBody touch = device_preset("touch").body;
+  DeviceBody smooth = touch;
+  smooth.friction = 0.05;
+  DeviceBody slow = touch;
+  slow.mass = 0.12, slow.friction = 0.1, slow.delay = 4e-3;
+  for (const auto& [options, truth] :
+       {Case{"device=touch&grip=none", touch}, Case{"device=touch&grip=none&friction=0.05", smooth},
+        Case{"device=omega&grip=none", device_preset("omega").body},
+        Case{"device=touch&grip=none&friction=0.1&device_mass=0.12&delay=4ms", slow}}) {
     const auto device = opened(options);
-    const DeviceInfo& truth = device->info();
     const DeviceMeasurement found = measure_device(*device);
     EXPECT_EQ(found.ended, "") << options;
     EXPECT_TRUE(found.doubts.empty()) << options << ": " << found.doubts.front();
     ASSERT_TRUE(found.fit.delay) << options;
-    EXPECT_NEAR(found.fit.delay->value, *truth.delay, 0.15e-3) << options;
-    EXPECT_NEAR(*found.resolution, *truth.resolution, 1e-9) << options;
+    EXPECT_NEAR(found.fit.delay->value, truth.delay, 0.15e-3) << options;
+    EXPECT_NEAR(*found.resolution, truth.resolution, 1e-9) << options;
     EXPECT_NEAR(found.tick_rate, 1000.0, 1.0);
     EXPECT_LE(found.largest_force, 0.45 + 1e-12) << options;
     EXPECT_LE(found.farthest, 0.03) << options;
     for (const auto& along : found.fit.axes) {
       ASSERT_TRUE(along) << options;
-      EXPECT_NEAR(along->mass.value, *truth.mass, 0.15 * *truth.mass) << options;
-      EXPECT_NEAR(along->damping.value, *truth.damping, 0.15 * *truth.damping) << options;
-      EXPECT_NEAR(along->friction.value, *truth.friction, 0.15 * *truth.friction + 0.002)
-          << options;
+      EXPECT_NEAR(along->mass.value, truth.mass, 0.15 * truth.mass) << options;
+      EXPECT_NEAR(along->damping.value, truth.damping, 0.15 * truth.damping) << options;
+      EXPECT_NEAR(along->friction.value, truth.friction, 0.15 * truth.friction + 0.002) << options;
       EXPECT_NEAR(along->load.value, 0.0, 0.01) << options;
     }
   }

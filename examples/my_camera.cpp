@@ -51,7 +51,7 @@ int main() {
   palpate::Session session(std::move(options));
   session.run(6.0);
   const palpate::SessionState state = session.state();
-  std::printf("%s: %zu frames, felt %.1f N, pop-throughs: %zu\n",
-              state.cameras.front().kind.c_str(), state.summary.frames, state.summary.largest_sent,
-              state.summary.pop_throughs);
+  const palpate::Summary& felt = state.hands[0].summary;
+  std::printf("%s: %zu frames, felt %.1f N, pop-throughs: %zu\n", state.cameras[0].kind.c_str(),
+              felt.frames, felt.largest_sent, felt.pop_throughs);
 }

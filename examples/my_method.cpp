@@ -66,5 +66,5 @@ int main() {
     deepest = std::max(deepest, (record.tick.proxy - record.tick.hip).norm());
   });
   std::printf("method %s: pressed in by %.1f mm, felt %.1f N\n", session.settings().method.c_str(),
-              1e3 * deepest, session.state().summary.largest_sent);
+              1e3 * deepest, session.state().hands[0].summary.largest_sent);
 }

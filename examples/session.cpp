@@ -12,7 +12,7 @@ int main() {
   options.stroke_time = 6.0;
   palpate::Session session(std::move(options));
   session.run(6.0);
-  const palpate::Summary summary = session.state().summary;
+  const palpate::Summary summary = session.state().hands[0].summary;
   std::printf("%zu ticks, %zu in contact; asked for %.1f N at most, sent %.1f N\n", summary.ticks,
               summary.contact_ticks, summary.largest_asked, summary.largest_sent);
 }

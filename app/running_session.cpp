@@ -97,7 +97,7 @@ SessionOptions options_of(const RunOptions& options, const SessionConfig& config
                 "give 0.1 to 86400 s");
   validate(config);
   SessionOptions session;
-  static_cast<SessionSpec&>(session) = config;
+  static_cast<SessionSpec&>(session) = static_cast<const SessionSpec&>(config);
   session.methods = std::move(methods);
   std::string& device = session.hands.front().device;
   if (device.empty()) device = options.headless ? "hand:" : "mouse:";

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -71,7 +72,8 @@ class LoopSession {
         cycle_->set_settings(settings_);
         if (recorder_) recorder_->commands(cycle_->commands(), now());
       }
-      device_.hand.position = Vec3(0.03 + 1e-5 * tick_, -0.05, -0.02 - 1e-4 * std::min(tick_, 300));
+      device_.hand.position =
+          Vec3(0.03 + 1e-5 * tick_, -0.05, -0.02 - 1e-4 * std::min(tick_.load(), 300));
       // It swings with 14 Hz, as a hand on a surface that oscillates does.
       if (tick_ > 100)
         device_.hand.position.z() += 2e-3 * std::sin(2e-3 * std::acos(-1.0) * 14 * tick_);
@@ -124,7 +126,7 @@ class LoopSession {
     double stamp = 0.0;
     std::uint64_t number = 0;
   } second_;
-  int tick_ = 0;
+  std::atomic<int> tick_{0};  // begin_anew() runs on the recorder's thread
   bool handing_ = true;
   std::unique_ptr<Recorder> recorder_;  // before the cycle, which it reads
 };

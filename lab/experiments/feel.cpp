@@ -42,17 +42,17 @@ std::vector<Measure> all_measures() {
                                  std::pair{"slide-0.7m", std::array{15.0, 0.08, 10.0}},
                                  std::pair{"slide-0.95m", std::array{25.0, 0.12, 20.0}}};
   for (const auto& [scene, aims] : slides) {
-    add(scene, "felt", "mN", aims[0], {"path", "light", "firm"}, {"chain", "tank"});
-    add(scene, "step", "N", aims[1], {"path", "light", "firm"}, {"chain", "tank"});
-    add(scene, "error", "%", aims[2], {"path"}, {"light", "firm", "chain", "tank"});
+    add(scene, "felt", "mN", aims[0], {"path", "light", "firm"}, {"chain"});
+    add(scene, "step", "N", aims[1], {"path", "light", "firm"}, {"chain"});
+    add(scene, "error", "%", aims[2], {"path"}, {"light", "firm", "chain"});
   }
-  add("onset", "overshoot", "times", 1.3, {"path", "light"}, {"chain", "tank"});
-  add("onset", "swing", "N", 0.3, {"path", "light"}, {"chain", "tank"});
-  add("onset", "swing-median", "N", none, {}, {"path", "light", "chain", "tank"});
+  add("onset", "overshoot", "times", 1.3, {"path", "light"}, {"chain"});
+  add("onset", "swing", "N", 0.3, {"path", "light"}, {"chain"});
+  add("onset", "swing-median", "N", none, {}, {"path", "light", "chain"});
   for (const std::string_view scene : {"return-covered", "return-stopped", "return-dropped"})
     add(scene, "kick", "mm/s", 40.0, {"free", "light"}, {"chain"});
   for (const std::string_view scene : {"rest-0.45m", "rest-0.7m", "rest-0.95m"}) {
-    add(scene, "felt", "mN", 10.0, {"path"}, {"light", "firm", "chain", "tank"});
+    add(scene, "felt", "mN", 10.0, {"path"}, {"light", "firm", "chain"});
     add(scene, "undamped", "mN", none, {}, {"path"});
   }
   for (const std::string_view scene :
@@ -67,9 +67,8 @@ std::vector<Measure> all_measures() {
   add("stick", "drift", "mm", 0.1, {"light"}, {});
   add("stick-bob", "drift", "mm", 0.1, {"light"}, {});
   for (const std::string_view scene : {"energy-0.45m", "energy-0.7m", "energy-0.95m"}) {
-    const std::vector<std::string_view> loops = {"light", "firm", "omega",
-                                                 "chain", "tank", "tank-0"};
-    add(scene, "above", "mJ", 0.1, {"light", "firm", "omega"}, {"chain", "tank", "tank-0"});
+    const std::vector<std::string_view> loops = {"light", "firm", "omega", "chain"};
+    add(scene, "above", "mJ", 0.1, {"light", "firm", "omega"}, {"chain"});
     add(scene, "above-99%", "mJ", none, {}, loops);
     add(scene, "above-median", "mJ", none, {}, loops);
     add(scene, "over-0.1mJ", "%", none, {}, loops);

@@ -25,13 +25,11 @@ struct Holding {
   std::string_view loop;
   std::string_view device;
   std::string_view grip;
-  std::optional<double> frame_work;  // [J] through the chain; none: without it
+  bool by_chain;  // through the safety chain
 };
-constexpr double no_limit = 1.0;  // [J]
 constexpr std::array holdings = {
-    Holding{"light", "touch", "light", {}},  Holding{"firm", "touch", "firm", {}},
-    Holding{"omega", "omega", "light", {}},  Holding{"chain", "touch", "light", no_limit},
-    Holding{"tank", "touch", "light", 1e-4}, Holding{"tank-0", "touch", "light", 0.0}};
+    Holding{"light", "touch", "light", false}, Holding{"firm", "touch", "firm", false},
+    Holding{"omega", "omega", "light", false}, Holding{"chain", "touch", "light", true}};
 
 // A hand's way, and when each of its contacts is over.
 struct Presses {
@@ -117,10 +115,8 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
         };
         // The ruler first: an exact surface in the same hand, by the same way.
         const auto add = [&](std::unique_ptr<Method> method) {
-          SafetyParameters safety;
-          safety.frame_work = holding.frame_work.value_or(no_limit);
-          loops.push_back(holding.frame_work
-                              ? safe_loop(std::move(method), held(), options.parameters, safety)
+          loops.push_back(holding.by_chain
+                              ? safe_loop(std::move(method), held(), options.parameters)
                               : straight_loop(std::move(method), held()));
           meters.emplace_back(hand.ends);
         };

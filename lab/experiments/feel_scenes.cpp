@@ -27,9 +27,7 @@ constexpr std::string_view path = "path";    // a given path: the open loop
 constexpr std::string_view light = "light";  // a light grip on a Touch
 constexpr std::string_view firm = "firm";    // a firm grip on a Touch
 constexpr std::string_view free_handle = "free";
-constexpr std::string_view chain =
-    "chain";                               // the light grip, or the free handle, through the chain
-constexpr std::string_view tank = "tank";  // the light grip through the chain, with frame_work
+constexpr std::string_view chain = "chain";  // the light grip, or the free handle, by the chain
 
 const DevicePreset& touch() {
   return device_preset("touch");
@@ -74,11 +72,8 @@ class Loops {
     rulers_.push_back(ruler);
     for (const Contestant& contestant : contestants_) {
       auto method = contestant.make({parameters_, truth_});
-      SafetyParameters safety;
-      if (name == tank) safety.frame_work = 1e-4;
-      loops.push_back(name == chain || name == tank
-                          ? safe_loop(std::move(method), held(), parameters_, safety)
-                          : straight_loop(std::move(method), held()));
+      loops.push_back(name == chain ? safe_loop(std::move(method), held(), parameters_)
+                                    : straight_loop(std::move(method), held()));
       names.emplace_back(contestant.name, name);
       rulers_.push_back(ruler);
     }
@@ -90,7 +85,6 @@ class Loops {
     add(light, [&] { return in_hand(hand, grip_preset(light), touch(), seed); });
     if (firmly) add(firm, [&] { return in_hand(hand, grip_preset(firm), touch(), seed); });
     add(chain, [&] { return in_hand(hand, grip_preset(light), touch(), seed); });
-    add(tank, [&] { return in_hand(hand, grip_preset(light), touch(), seed); });
   }
 
   /// [N] what a spring on the true surface would give where the hand is.
@@ -247,7 +241,7 @@ FeelFigures play_slide(const std::vector<Contestant>& contestants, const FeelOpt
     Loops loops(contestants, options.parameters, stage.scene);
     loops.add_usual(hand, seed, true);
     for (const auto& [i, signal] : signals(loops, stage.scenario(3.0), [&](std::string_view loop) {
-           return loop == chain || loop == tank ? settled : from;
+           return loop == chain ? settled : from;
          })) {
       repeats.add(loops.names[i], "felt", 1e3 * felt_rms_of_all(signal.error));
       repeats.add(loops.names[i], "step", signal.largest_step());

@@ -311,8 +311,6 @@ void Cycle::run(const Wake& wake) noexcept {
        .frame_intervals = age.intervals,
        .surface_velocity = tick.surface_velocity,
        .surface_motion = tick.surface_motion,
-       .stiffness = tick.hardness * parameters_.coupling.stiffness,
-       .new_frame = new_frame,
        .held = support,
        .transient = tick.transient,
        .vibration = tick.vibration,

@@ -35,10 +35,10 @@ constexpr double least_lever = 1e-3;
 constexpr double least_directed_force = 0.05;
 
 constexpr std::array<std::string_view, safety_flag_count> flag_names{
-    "input_refused",   "pull_removed",   "force_cut",     "continuous_cut",    "slew_cut",
-    "oscillation_cut", "disengaged",     "ramping",       "frame_late",        "frame_fading",
-    "frame_lost",      "hand_too_fast",  "stalled",       "direction_refused", "fault_latched",
-    "energy_cut",      "output_refused", "correction_cut"};
+    "input_refused",   "pull_removed",  "force_cut", "continuous_cut",    "slew_cut",
+    "oscillation_cut", "disengaged",    "ramping",   "frame_late",        "frame_fading",
+    "frame_lost",      "hand_too_fast", "stalled",   "direction_refused", "fault_latched",
+    "energy_cut",      "output_refused"};
 
 constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the device or the method gave a number that is not finite, or time ran backwards",
@@ -58,9 +58,7 @@ constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the method's surface normal contradicts the direction from the HIP to the proxy",
     "no force: repeated faults; an operator has to reset the safety chain",
     "the surface is softened because it kept up an oscillation",
-    "no force: the result of the safety chain violated its limits; please report it",
-    "the force is reduced: a correction would have transferred more energy to the hand than "
-    "frame_work"};
+    "no force: the result of the safety chain violated its limits; please report it"};
 
 using P = SafetyParameters;
 template <double P::*member>
@@ -103,9 +101,6 @@ constexpr std::array table{
     row<&P::cut_memory>("cut_memory", "s", 30.0, 1.0, 600.0,
                         "time constant with which the stiffness recovers after it was reduced for "
                         "generated energy"),
-    row<&P::frame_work>("frame_work", "J", 1.0, 0.0, 1.0,
-                        "energy that the corrections of one frame may transfer to the hand, in "
-                        "addition to the energy that the contact has dissipated; 1: no limit"),
     row<&P::engage_force>("engage_force", "N", 0.2, 0.0, 3.0,
                           "the device engages while the requested force is below this"),
     row<&P::engage_ticks>("engage_ticks", "ticks", 10.0, 1.0, 1e5,
@@ -413,27 +408,6 @@ double SafetyChain::ceiling(const SafetyInput& input, double demand,
   return ceiling;
 }
 
-// The share of the force that corrections of the surface may put into the hand's contact.
-double SafetyChain::within_the_tank(const SafetyInput& input, const Vec3& force, double since_last,
-                                    std::uint32_t& flags) noexcept {
-  constexpr double no_limit = 1.0;  // [J]
-  if (!has(correction_cut) || !(parameters_.frame_work < no_limit)) {
-    tank_.restart();
-    return 1.0;
-  }
-  if (since_last > parameters_.stall_time) tank_.restart();
-  const double share = tank_.run({.dt = since_last,
-                                  .hip = input.hip,
-                                  .surface = input.surface_motion,
-                                  .force = force,
-                                  .last = last_force_,
-                                  .stiffness = input.stiffness,
-                                  .new_frame = input.new_frame,
-                                  .frame_work = parameters_.frame_work});
-  if (share < 1.0) flags |= correction_cut;
-  return share;
-}
-
 // Shrinks along the last force at fall_rate and changes otherwise at rise_rate.
 Vec3 SafetyChain::slewed(const Vec3& force, double rise, double fall) const noexcept {
   const double last = last_force_.norm();
@@ -521,13 +495,11 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     gain_ = has(ramping) ? std::min(most, gain_ + dt / parameters_.ramp_time) : most;
     if (gain_ < most) flags |= ramping;
     force *= gain_;
-    force *= within_the_tank(input, force, since_last, flags);
   } else {
     gain_ = 0.0;
     engaged_ = false;
     quiet_ticks_ = 0.0;
     energy_.restart();
-    tank_.restart();
     if (latched_by_ != 0) flags |= fault_latched;
   }
 

@@ -9,7 +9,6 @@
 
 #include "palpate/kernel/core/parameters.hpp"
 #include "palpate/kernel/core/patch.hpp"
-#include "palpate/servo/correction_tank.hpp"
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/energy_monitor.hpp"
 #include "palpate/servo/transient_budget.hpp"
@@ -60,11 +59,8 @@ enum SafetyFlag : std::uint32_t {
   energy_cut = 1u << 15,
   /// What the chain computed broke its own bounds: no force. Never seen; please report it.
   output_refused = 1u << 16,
-  /// A frame, a parameter or another method would have done more work on the hand than frame_work
-  /// and what the contact has dissipated: the surface comes more slowly. Only with frame_work.
-  correction_cut = 1u << 17,
 };
-constexpr std::size_t safety_flag_count = 18;
+constexpr std::size_t safety_flag_count = 17;
 /// A short name for each bit, in their order, e.g. "force_cut".
 std::span<const std::string_view> safety_flag_names();
 /// For each bit, in their order, a sentence for people: why the force is what it is.
@@ -84,7 +80,6 @@ struct SafetyParameters {
   double cycle_distance = 1e-3;    ///< [m] a smaller swing of the hand is no cycle
   double cycle_count = 6.0;        ///< [-] cycles in a row that generate energy: an oscillation
   double cut_memory = 30.0;        ///< [s] time constant with which a cut of energy is forgotten
-  double frame_work = 1.0;         ///< [J] that a frame's corrections may do; 1: no limit
   double engage_force = 0.2;       ///< [N] the hand engages while less than this is asked for
   double engage_ticks = 10.0;      ///< [ticks] in a row below engage_force
   double ramp_time = 1.5;          ///< [s] from no force to all of it
@@ -121,9 +116,7 @@ struct SafetyInput {
   double frame_age;         ///< [s] of the oldest camera's newest fresh frame; inf: none
   double frame_intervals;   ///< [intervals] the most overdue camera is without one; Freshness::Age
   double surface_velocity;  ///< [m/s] of the surface along the normal, as the method tracks it
-  Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world: the same as a vector, extrapolated
-  double stiffness = 0.0;              ///< [N/m] of the surface; 0: not known
-  bool new_frame = false;              ///< the first tick with a frame
+  Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world: the same as a vector; only its soundness
   /// [N] magnitude of the force that the motors apply in addition to `force` to support the
   /// handle's weight. It reduces the available force and counts in the thermal model.
   double held = 0.0;
@@ -212,7 +205,6 @@ class SafetyChain {
     way("calm", self.calm_);
     EnergyMonitor::walk(way, self.energy_);
     way("energy_ceiling", self.energy_ceiling_);
-    CorrectionTank::walk(way, self.tank_);
     TransientBudget::walk(way, self.transients_);
     way("last_sent", self.last_sent_);
     way("engaged", self.engaged_);
@@ -244,8 +236,6 @@ class SafetyChain {
   double ceiling(const SafetyInput& input, double demand, std::uint32_t& flags) noexcept;
   double oscillation_ceiling(double t, double dt) noexcept;
   double energy_ceiling(const SafetyInput& input, double since_last) noexcept;
-  [[nodiscard]] double within_the_tank(const SafetyInput& input, const Vec3& force,
-                                       double since_last, std::uint32_t& flags) noexcept;
   [[nodiscard]] Vec3 slewed(const Vec3& force, double rise, double fall) const noexcept;
   [[nodiscard]] Vec3 bounded(Vec3 force, double rise, std::uint32_t& flags) noexcept;
   [[nodiscard]] Vec3 with_transient(const SafetyInput& input, const Vec3& force,
@@ -281,7 +271,6 @@ class SafetyChain {
   double calm_ = 1.0;      // [-] what the oscillation detector allows
   EnergyMonitor energy_;
   double energy_ceiling_ = 1.0;  // [-] what the energy link allows
-  CorrectionTank tank_;
   TransientBudget transients_;
   bool engaged_ = false;
   double quiet_ticks_ = 0.0;

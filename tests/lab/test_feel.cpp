@@ -267,13 +267,12 @@ TEST(Feel, CountsTheEnergyThatAMethodGivesBeyondAnExactSurface) {
     return figure_of(figures, loop, measure, method);
   };
   EXPECT_EQ(figure("plane", "light", "contacts"), 8.0);
-  for (const char* loop : {"light", "firm", "omega", "chain", "tank", "tank-0"}) {
+  for (const char* loop : {"light", "firm", "omega", "chain"}) {
     EXPECT_LT(std::abs(figure("plane", loop, "above")), 0.02) << loop;
     EXPECT_GT(figure("pushing", loop, "above"), figure("plane", loop, "above")) << loop;
   }
   EXPECT_GT(figure("pushing", "light", "above-median"), 0.5) << "0.6 N over some millimetres";
   EXPECT_EQ(figure("pushing", "light", "over-0.1mJ"), 100.0);
-  EXPECT_LT(figure("pushing", "tank-0", "above"), 0.1) << "what is not pressed in is not given";
 }
 
 TEST(Feel, JudgesTheScenesThatAreAskedFor) {

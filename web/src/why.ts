@@ -121,10 +121,6 @@ const LESS: readonly [flag: string, say: Say][] = [
     "pull_removed",
     ({ tick }) => (changes(tick) ? "Less, as what pulled into the surface is removed." : ""),
   ],
-  [
-    "correction_cut",
-    ({ tick }) => (changes(tick) ? "Coming slowly, as the surface was corrected under it." : ""),
-  ],
   ["slew_cut", ({ tick }) => (changes(tick) ? "Changing as fast as it may." : "")],
 ];
 

@@ -26,6 +26,7 @@ import { handAt, Timeline, trailAt } from "./timeline";
 import { flagNames, SteadyWhy, why } from "./why";
 
 const DISENGAGED = 1 << 6; // SafetyFlag
+const PLOT_SHARE = 12; // drawings of the scene for one of the plots, where drawing is slow
 const NUMBERS = 100; // [ms] between changes of what is written: faster, nobody reads it
 
 const plots = new Plots(get("plots"));
@@ -289,7 +290,7 @@ function loop(now: number): void {
   view.draw(now);
   senses.give(performance.now());
   showTick(now);
-  plots.draw(now, 3000 * (view.thinning.frameTime ?? 0));
+  plots.draw(now, PLOT_SHARE * 1000 * (view.thinning.frameTime ?? 0));
   requestAnimationFrame(loop);
 }
 

@@ -209,8 +209,8 @@ std::optional<Command> parse_command(std::string_view message) {
   if (message.size() > max_page_message) return std::nullopt;
   const auto json = nlohmann::json::parse(message, nullptr, false);
   if (!json.is_object() || json.size() != 1) return std::nullopt;
-  const std::string& verb = json.begin().key();
-  const nlohmann::json& what = json.begin().value();
+  const std::string verb = json.begin().key();
+  const nlohmann::json& what = json.front();
   if (verb == "set" || verb == "set_safety" || verb == "place") {
     if (!what.is_object() || what.size() != 2) return std::nullopt;
     const auto name = what.find("name");

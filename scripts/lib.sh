@@ -37,6 +37,20 @@ progress() {
   done
 }
 
+# has_room FOLDER...: whether some megabytes can be written in each. Says what to do where not.
+has_room() {
+  local folder file
+  for folder in "$@"; do
+    if ! { file=$(mktemp -p "$folder") && head -c 4M /dev/zero >"$file"; } 2>/dev/null; then
+      rm -f "$file"
+      say "nothing can be written in $folder: it is full, or another user's; make room, use a" \
+        "clone of your own, or set TMPDIR to another folder for temporary files"
+      return 1
+    fi
+    rm -f "$file"
+  done
+}
+
 # build_in FOLDER -DNAME=VALUE... [-- TARGETS...]: configures and builds. With every argument in
 # CMake's cache it leaves it to ninja to see whether anything has changed: sources, their headers,
 # CMake's files, and the folders' contents. Writes to stderr alone: stdout is the program's.
@@ -44,6 +58,7 @@ progress() {
 build_in() {
   local folder=$1 said sources=$PWD arguments=() targets=()
   shift
+  has_room "$PWD" "${TMPDIR:-/tmp}" || return 1
   while (($#)) && [[ $1 != -- ]]; do
     if [[ $1 == -S ]]; then sources=$PWD/$2; fi
     arguments+=("$1")

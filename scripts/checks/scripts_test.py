@@ -52,6 +52,12 @@ class Build(unittest.TestCase):
         self.assertEqual(done.returncode, 0)
         self.assertTrue((self.folder / "built").exists())
 
+    def test_says_which_folder_is_full(self):
+        done = subprocess.run(["bash", "-c", BUILD], cwd=self.folder, stderr=subprocess.PIPE,
+                              env={**os.environ, "TMPDIR": "/dev/full"}, check=False)
+        self.assertIn("nothing can be written in /dev/full", done.stderr.decode())
+        self.assertEqual(done.returncode, 1)
+
 
 class PoorLink(unittest.TestCase):
     def test_undoes_what_was_begun_where_a_later_step_fails(self):

@@ -72,7 +72,11 @@ build_in() {
   if (($#)); then targets=("${@:2}"); fi
   if command -v ccache >/dev/null; then arguments+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
   if ! in_cache "$folder" "${arguments[@]}"; then
-    [[ -e $folder/build.ninja ]] || say "configuring $folder"
+    if [[ ! -e $folder/build.ninja ]]; then
+      say "configuring $folder"
+      # What an attempt that failed found out about the compiler is wrong.
+      rm -rf "$folder/CMakeCache.txt" "$folder/CMakeFiles"
+    fi
     said=$(cmake -B "$folder" -G Ninja "${arguments[@]}" 2>&1) || {
       echo "$said" >&2
       return 1

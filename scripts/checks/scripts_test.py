@@ -52,6 +52,11 @@ class Build(unittest.TestCase):
         self.assertEqual(done.returncode, 0)
         self.assertTrue((self.folder / "built").exists())
 
+    def test_believes_nothing_of_an_attempt_to_configure_that_failed(self):
+        (self.folder / "build" / "build.ninja").unlink()
+        self.assertEqual(self.build("", subprocess.PIPE).returncode, 0)
+        self.assertFalse((self.folder / "build" / "CMakeCache.txt").exists())
+
     def test_says_which_folder_is_full(self):
         done = subprocess.run(["bash", "-c", BUILD], cwd=self.folder, stderr=subprocess.PIPE,
                               env={**os.environ, "TMPDIR": "/dev/full"}, check=False)

@@ -116,12 +116,8 @@ TeleopEpisode teleop_episode(std::string_view fault, std::uint64_t seed) {
 
   // Beyond a wall that stands upright, on one side.
   const double turn = chance(0.0, 2.0 * std::numbers::pi);
-  episode.region.name = "wall";
-  episode.region.shape = FixtureShape::half_space;
   const Vec3 outward(std::cos(turn), std::sin(turn), 0.0);
-  const Vec3 along = outward.unitOrthogonal();
-  episode.region.world_from_fixture.linear() << along, outward.cross(along), outward;
-  episode.region.world_from_fixture.translation() = -chance(0.0, 0.03) * outward;
+  episode.region = half_space("wall", outward, -chance(0.0, 0.03) * outward);
   episode.one.fixtures = std::make_shared<const FixtureSet>(std::vector{episode.region});
   return episode;
 }

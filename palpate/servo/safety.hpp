@@ -116,7 +116,7 @@ struct SafetyInput {
   double frame_age;         ///< [s] of the oldest camera's newest fresh frame; inf: none
   double frame_intervals;   ///< [intervals] the most overdue camera is without one; Freshness::Age
   double surface_velocity;  ///< [m/s] of the surface along the normal, as the method tracks it
-  Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world: the same as a vector; only its soundness
+  Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world: the same as a vector; refused if not finite
   /// [N] magnitude of the force that the motors apply in addition to `force` to support the
   /// handle's weight. It reduces the available force and counts in the thermal model.
   double held = 0.0;

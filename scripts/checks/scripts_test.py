@@ -13,6 +13,7 @@ import unittest.mock
 SCRIPTS = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(SCRIPTS))
 import poor_link  # noqa: E402
+import variants  # noqa: E402
 
 BUILD = f"set -euo pipefail; source {SCRIPTS}/lib.sh; build_in build"
 
@@ -82,6 +83,15 @@ class PoorLink(unittest.TestCase):
         self.assertIn(f"ip netns add {first}", done)
         self.assertIn(f"ip netns del {first}", done)
         self.assertEqual(set(os.listdir("/proc/self/fd")), opened)
+
+
+class Variants(unittest.TestCase):
+    def test_of_both_lists_are_of_what_is_in_the_sources(self):
+        for file in ("tests/servo/mutants.txt", "lab/ablation.txt"):
+            listed = variants.read_list(variants.ROOT / file)
+            batches = variants.batches(listed)  # exits, naming what is not there
+            self.assertEqual(sum(len(piece.variants) for batch in batches for piece in batch),
+                             len(listed))
 
 
 if __name__ == "__main__":

@@ -747,7 +747,11 @@ test("a recording is paused, touched and gone through; jumps take the force away
       .toBe(true);
     // A frame that was on its way may still come.
     let place = -1;
-    const isStill = async () => place === (place = (await cameraState()).place);
+    const isStill = async () => {
+      const before = place;
+      place = (await cameraState()).place;
+      return place === before;
+    };
     await expect.poll(isStill, { interval: 1000 }).toBe(true);
     const ghost = () =>
       page.evaluate(() => (window as any).palpate.view.ghostAt as number[] | null);

@@ -5,7 +5,8 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
-#include <vector>
+
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
 
@@ -69,12 +70,10 @@ void check_ranges(std::span<const ParameterRow<Owner>> table, const Owner& owner
 template <class Owner>
 const ParameterRow<Owner>& row_by_name(std::span<const ParameterRow<Owner>> table,
                                        std::string_view name, std::string_view noun) {
-  std::vector<std::string_view> names;
   for (const auto& row : table) {
     if (row.name == name) return row;
-    names.push_back(row.name);
   }
-  refuse_name(noun, name, names);
+  refuse_name(noun, name, names_of(table));
 }
 
 /// Sets one number by name. @throws Error for an unknown name or a value out of its range.

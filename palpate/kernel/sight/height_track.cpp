@@ -181,8 +181,9 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
     bank.likelihood[i] -= plain_bonus;
     before[i] -= plain_bonus;
   }
-  double rest = parameters.rest_odds + resting_odds.with;
-  if (parameters.rest_odds + resting_odds.without > *std::max_element(before.begin(), before.end()))
+  const double odds = parameters.rest_odds;
+  double rest = odds + resting_odds.with;
+  if (odds + resting_odds.without > *std::max_element(before.begin(), before.end()))
     rest += single_proof;
   double most = rest;
   for (const double l : bank.likelihood) most = std::max(most, l);

@@ -48,17 +48,12 @@ class Borrowed final : public Device {
 void add_walls(const Eigen::AlignedBox3d& reach, std::vector<Fixture>& fixtures) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const double sign : {-1.0, 1.0}) {
-      Fixture wall;
-      wall.name = std::string("reach ") + (sign < 0.0 ? "-" : "+") + "xyz"[axis];
-      wall.shape = FixtureShape::half_space;
       Vec3 inward = Vec3::Zero();
       inward[axis] = -sign;
-      const Vec3 along = inward.unitOrthogonal();
-      wall.world_from_fixture.linear() << along, inward.cross(along), inward;
       Vec3 place = reach.center();
       place[axis] = sign < 0.0 ? reach.min()[axis] : reach.max()[axis];
-      wall.world_from_fixture.translation() = place;
-      fixtures.push_back(std::move(wall));
+      fixtures.push_back(half_space(std::string("reach ") + (sign < 0.0 ? "-" : "+") + "xyz"[axis],
+                                    inward, place));
     }
   }
 }

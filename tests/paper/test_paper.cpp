@@ -275,6 +275,29 @@ TEST(Paper, KeepsTheForceOnWhileSlidingOverASurfaceAtRest) {
   }
 }
 
+// A normal is a mean. A HIP outside of it may yet be behind one of the points that it is the mean
+// of, which must not hold the proxy while the HIP goes on.
+TEST(Paper, GoesRoundAPointThatStandsInItsWay) {
+  constexpr double deviation = 1e-3;  // [m] a Kinect's at 0.8 m
+  constexpr double slide = 0.04;      // [m], at 1 m/s
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0.0, deviation);
+    const BruteForceCloud rough(grid(spacing, 40, [&](double, double) { return noise(random); }));
+    Paper paper;
+    paper.seat({-0.5 * slide, 0, 0.02});
+    paper.observe({rough, 0.0});
+    Tick tick = settle(paper, {-0.5 * slide, 0, 0});
+    double farthest = 0.0;
+    for (double way = 0.0; way < slide; way += 1e-3) {
+      // It leaves along the surface, and is soon higher than the proxy was.
+      tick = paper.tick({-0.5 * slide + way, 0, 0.25 * way}, 0.1 + way);
+      farthest = std::max(farthest, (tick.proxy - Vec3(way - 0.5 * slide, 0, 0.25 * way)).norm());
+    }
+    EXPECT_LT(farthest, 2.5 * r_c) << "seed " << seed;
+  }
+}
+
 TEST(Paper, RefusesRadiiThatDoNotIncrease) {
   Parameters parameters;
   parameters.proxy.r_2 = parameters.proxy.r_1;

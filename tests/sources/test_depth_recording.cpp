@@ -90,6 +90,15 @@ TEST(TumRecording, KeepsToTheCamerasFrameAndTheFilesClockOnRequest) {
   EXPECT_TRUE(image_of(frame).world_from_camera().matrix().isIdentity());
 }
 
+TEST(TumRecording, CorrectsTheClockOfItsPosesOnRequest) {
+  const TumFolder folder;
+  const auto source = folder.open("pose_delay=-50ms&start=1");
+  EXPECT_NEAR(image_of(source->next()).world_from_camera().translation().x(), 0.55, 1e-9);
+  EXPECT_TRUE(fails_saying([&] { return folder.open("poses=none&pose_delay=1ms"); },
+                           "'pose_delay' has no trajectory", "poses=FILE"));
+  EXPECT_TRUE(fails_saying([&] { return folder.open("pose_delay=2s"); }, "'pose_delay'"));
+}
+
 TEST(TumRecording, StartsLateAndEndsEarlyOnRequest) {
   const TumFolder folder;
   const auto source = folder.open("start=1&frames=1");

@@ -157,6 +157,35 @@ test("a new visitor who opens, points and holds is in contact at once", async ()
   console.log(`in contact after ${count} drawings, ${paint.toFixed(1)} s from first paint`);
 });
 
+test("a pointer held where nothing is seen presses what comes there", async () => {
+  const page = await open(["--camera", "synthetic:moving?size=320x240"]);
+  const at = await placeWhere(page, "surface");
+  const see = (nothing: boolean) =>
+    page.evaluate((nothing) => {
+      const { view } = (window as any).palpate;
+      if (nothing) view.surfaceNear = () => null;
+      else delete view.surfaceNear;
+    }, nothing);
+  await see(true);
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  expect(await page.locator("#view").getAttribute("data-gesture")).toBe("turn");
+  await see(false);
+  await until(page, (seen) => seen.state !== 0);
+  expect(await page.locator("#view").getAttribute("data-gesture")).toBe("press");
+  await page.mouse.up();
+  // One that has moved turns the view until it is up.
+  await see(true);
+  await page.mouse.down();
+  await page.mouse.move(at.x + 20, at.y);
+  await see(false);
+  await page.mouse.move(at.x, at.y);
+  const { frame } = await glimpse(page);
+  await until(page, (seen) => seen.frame > frame + 5);
+  expect(await page.locator("#view").getAttribute("data-gesture")).toBe("turn");
+  await page.mouse.up();
+});
+
 test("whatever ends a press lets the hand go", async () => {
   const page = await open(PLANE);
   const at = await placeWhere(page, "surface");

@@ -16,7 +16,7 @@ import { Pointers, type Place } from "./pointers";
 import { outOf, Press, type Felt } from "./press";
 import { Grip, type Vec3 } from "./protocol";
 import type { SceneView } from "./scene";
-import { onPlane } from "./surface";
+import { onPlane, type Spot } from "./surface";
 
 const TURN = 0.005; // [rad] a pixel
 const WHEEL = 0.00005; // [-] of the hand's distance, a pixel of wheel
@@ -29,6 +29,7 @@ const FINE = 0.2; // [-] with Alt
 const STEP = 16; // [ms]
 const DEEPEST = 0.05; // [m] of the hand in what is touched: a mouse feels no wall
 const REPEAT = 100; // [ms] a held hand is said again: after 0.5 s of silence it is let go
+const STILL = 4; // [px] that a pointer may move and still waits for a surface
 const FARTHEST_SLIDE = 0.1; // [m] over a hole, in the plane of what was pressed last
 
 export interface HandHost {
@@ -47,6 +48,9 @@ export class HandInput {
   private target: Vec3 = [0, 0, 0];
   private readonly pointers = new Pointers();
   private press: Press | null = null;
+  // A pointer that went down where nothing was seen, and the frames until then: where the camera
+  // moves, a surface may come.
+  private waits: { id: number; at: Place; frames: number } | null = null;
   // Where the pointer was last, and where a surface was seen for it, in how many frames.
   private pressed: { pointer: Place; at: Place; frames: number } | null = null;
   private readonly keys = new Set<string>();
@@ -77,6 +81,7 @@ export class HandInput {
   /** The hand, and all fingers and keys, are off: the connection is lost, or the page left. */
   letGo(): void {
     this.keys.clear();
+    this.waits = null;
     this.pointers.clear();
     this.byKeys = false;
     this.release();
@@ -143,14 +148,26 @@ export class HandInput {
       // It is up again already: the next that is heard of it says so.
     }
     const at = { x: event.clientX, y: event.clientY };
-    const near = this.host.takesHand() ? this.view.surfaceNear(at) : null;
+    const near = this.pressable(at);
     const turns = event.shiftKey || event.ctrlKey;
     const pressed = this.pointers.pressing !== null;
-    const may = { press: near !== null && this.host.newest() !== null };
+    const may = { press: near !== null };
     const gesture = this.pointers.down(event.pointerId, at, event.button, turns, may);
     if (pressed && this.pointers.pressing === null) this.release();
     this.canvas.dataset.gesture = gesture;
-    if (gesture !== "press" || !near || !this.take()) return;
+    const { frames } = this.view;
+    const mayWait = event.button === 0 && !turns && this.pointers.count === 1;
+    this.waits = !near && mayWait ? { id: event.pointerId, at, frames } : null;
+    if (this.waits) this.start();
+    if (gesture === "press" && near) this.beginPress(at, near);
+  }
+
+  private pressable(at: Place): { at: Place; spot: Spot } | null {
+    return this.host.takesHand() && this.host.newest() ? this.view.surfaceNear(at) : null;
+  }
+
+  private beginPress(at: Place, near: { at: Place; spot: Spot }): void {
+    if (!this.take()) return;
     this.byKeys = false;
     const ahead = (place: Vec3) => this.view.ahead(place);
     this.press = new Press(this.target, near.spot, this.host.touch(), ahead);
@@ -158,14 +175,28 @@ export class HandInput {
     this.start();
   }
 
+  private waitStep(): void {
+    const { waits } = this;
+    if (!waits || waits.frames === this.view.frames) return;
+    waits.frames = this.view.frames;
+    const near = this.pressable(waits.at);
+    if (!near) return;
+    this.waits = null;
+    this.pointers.press(waits.id);
+    this.canvas.dataset.gesture = "press";
+    this.beginPress(waits.at, near);
+  }
+
   private move(event: PointerEvent): void {
     const at = { x: event.clientX, y: event.clientY };
+    const from = this.waits?.at;
+    if (from && Math.hypot(at.x - from.x, at.y - from.y) > STILL) this.waits = null;
     const pressed = this.pointers.pressing !== null;
     const motion = this.pointers.move(event.pointerId, at, event.buttons);
     const left = at.x < 0 || at.y < 0 || at.x >= innerWidth || at.y >= innerHeight;
     if (pressed && (left || this.pointers.pressing === null)) return this.up(event.pointerId);
     if (!motion) {
-      if (!this.pointers.any) this.over = at;
+      if (this.pointers.count === 0) this.over = at;
     } else if (motion.gesture === "turn") {
       const orbit = zoomed(this.view.orbit, motion.zoom);
       this.view.setOrbit(turned(orbit, -motion.x * TURN, motion.y * TURN));
@@ -176,9 +207,10 @@ export class HandInput {
 
   private up(id: number): void {
     const pressed = this.pointers.pressing !== null;
+    this.waits = null;
     this.pointers.up(id);
     if (pressed && this.pointers.pressing === null) this.release();
-    if (!this.pointers.any) delete this.canvas.dataset.gesture;
+    if (this.pointers.count === 0) delete this.canvas.dataset.gesture;
   }
 
   private shift(x: number, y: number): void {
@@ -230,8 +262,9 @@ export class HandInput {
       const seconds = (now - last) / 1000;
       last = now;
       if (this.keys.size > 0) this.keyStep(seconds);
+      this.waitStep();
       if (this.press) this.pressStep(this.press, seconds);
-      if (this.keys.size > 0 || this.press) return;
+      if (this.keys.size > 0 || this.press || this.waits) return;
       clearInterval(this.timer);
       this.timer = 0;
     }, STEP);
@@ -255,7 +288,10 @@ export class HandInput {
   // What is pressed now that the pointer moved, or a frame came.
   private aimAnew(press: Press, pointer: Place, moved: boolean): Place {
     const at = moved ? pointer : this.pressed!.at;
-    const spot = this.view.spotUnder(at.x, at.y);
+    // What is touched is followed along the camera's sightline: along the eye's, which may graze
+    // the surface, noise would lead the hand away over it.
+    const touched = moved || press.inAir ? null : this.view.spotAt(press.aimedAt.at);
+    const spot = touched ?? this.view.spotUnder(at.x, at.y);
     const near = spot ? { at, spot } : press.inAir ? this.view.surfaceNear(pointer) : null;
     if (!near && moved) this.slideOverHole(press, pointer);
     else if (near && moved) press.aim(near.spot);

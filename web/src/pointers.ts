@@ -90,6 +90,12 @@ export class Pointers {
     return motion;
   }
 
+  /** A pointer that turned presses from now on. */
+  press(id: number): void {
+    const pointer = this.pointers.get(id);
+    if (pointer) pointer.gesture = "press";
+  }
+
   up(id: number): void {
     this.pointers.delete(id);
   }
@@ -104,7 +110,7 @@ export class Pointers {
     return null;
   }
 
-  get any(): boolean {
-    return this.pointers.size > 0;
+  get count(): number {
+    return this.pointers.size;
   }
 }

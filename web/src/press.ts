@@ -29,6 +29,8 @@ const WAIT = -0.001; // [m] depth at which a hand waits to be engaged: it is ask
 const SLACK = 0.02; // [m] by which the hand may be ahead of its proxy, besides the depth
 const CLEAR = 0.015; // [m] before all that is seen, on a flight
 const SETTLE = 0.2; // of what a new frame says of the spot of a hand that touches
+const BEHIND = 0.01; // [m] behind what is seen, where the surface should have been met
+const PATIENCE = 0.25; // [s] there without a contact, after which the hand begins again
 const LONGEST_STEP = 0.05; // [s] a page that was busy makes no larger step
 
 /** What the newest tick says. */
@@ -62,26 +64,31 @@ export function above(spot: Spot): Vec3 {
 
 /**
  * A way through seen free space: straight if nothing is in between, else lifted towards the camera
- * over what is. What a camera sees past is free.
+ * over what is, at each end by what is needed there. What a camera sees past is free.
  */
 export function flight(from: Vec3, to: Vec3, ahead: Ahead): Vec3[] {
   const samples = 24;
-  let lift = 0; // [m]
+  const rounds = 12;
   const towards = ahead(to)?.towards ?? ahead(from)?.towards ?? null;
   if (!towards) return [to];
-  const lifted = (place: Vec3): Vec3 => add(place, scale(towards, lift));
-  // Sightlines are not parallel: what is lifted once may need a little more.
-  for (let round = 0; round < 3; ++round) {
-    let missing = 0;
+  const ends: [Vec3, Vec3] = [from, to];
+  let isLifted = false;
+  for (let round = 0; round < rounds; ++round) {
+    let [missing, share] = [0, 0]; // [m] where the way comes nearest to what is seen
     for (let i = 0; i <= samples; ++i) {
-      const share = i / samples;
-      const seen = ahead(lifted(add(scale(from, 1 - share), scale(to, share))));
-      if (seen) missing = Math.max(missing, CLEAR - seen.distance);
+      const t = i / samples;
+      const seen = ahead(add(scale(ends[0], 1 - t), scale(ends[1], t)));
+      if (seen && CLEAR - seen.distance > missing) [missing, share] = [CLEAR - seen.distance, t];
     }
     if (missing < 1e-6) break;
-    lift += missing;
+    isLifted = true;
+    // The end that is nearer to that place rises most: a way that is planned anew with each frame,
+    // to what hides behind something, must not climb at its beginning each time.
+    const shares = [1 - share, share] as const;
+    const part = missing / (shares[0] ** 4 + shares[1] ** 4);
+    shares.forEach((of, end) => (ends[end] = add(ends[end]!, scale(towards, part * of ** 3))));
   }
-  return lift > 0 ? [lifted(from), lifted(to), to] : [to];
+  return isLifted ? [...ends, to] : [to];
 }
 
 export class Press {
@@ -91,6 +98,8 @@ export class Press {
   private wanted: number; // [m] depth below the surface that is felt; negative: above it
   private touching = false;
   private chased = 0; // [m] that frames have led the hand since the pointer moved
+  private missed = 0; // [s] behind what is seen, without a contact
+  private readonly isSeen: boolean; // some camera has an image of where it presses
 
   /**
    * @param start  [m] where the hand is
@@ -105,6 +114,7 @@ export class Press {
   ) {
     this.place = start;
     this.way = flight(start, above(spot), ahead);
+    this.isSeen = ahead(spot.at) !== null;
     this.wanted = clamp(PRESS_FORCE / Math.max(hand.stiffness, 1), ...DEPTHS);
   }
 
@@ -130,9 +140,13 @@ export class Press {
   private go(spot: Spot): void {
     const away = length(sub(spot.at, this.spot.at));
     this.spot = spot;
-    if (!this.travelling && away < JUMP) return;
+    if (this.travelling || away >= JUMP) this.beginAgain();
+  }
+
+  private beginAgain(): void {
+    this.missed = 0;
     this.depth = -HOVER;
-    this.way = flight(this.place, above(spot), this.ahead);
+    this.way = flight(this.place, above(this.spot), this.ahead);
   }
 
   /** The pointer rests, and a new frame says where its spot is: follows, in contact calmly. */
@@ -158,6 +172,9 @@ export class Press {
   step(seconds: number, felt: Felt | null): Vec3 {
     const dt = clamp(seconds, 0, LONGEST_STEP);
     this.touching = felt?.touching ?? false;
+    const isBehind = (this.ahead(this.place)?.distance ?? 0) < -BEHIND;
+    this.missed = isBehind && this.inAir ? this.missed + dt : 0;
+    if (this.missed > PATIENCE && !this.travelling) this.beginAgain();
     if (this.travelling) {
       let left = TRAVEL * dt;
       while (left > 0 && this.way.length > 0) {
@@ -200,8 +217,10 @@ export class Press {
       const wanted = felt.engaged ? this.wanted : Math.min(this.wanted, WAIT);
       return clamp(GAIN * (wanted - feltDepth), -PULL, PUSH);
     }
-    const rate = clamp(AIR_GAIN * (this.wanted - this.depth), -PULL, DESCENT);
-    return this.wanted > 0 ? Math.max(rate, SEEK) : rate;
+    // Out of the image, or in a hole of it, the hand waits: what comes there must meet it outside.
+    const wanted = this.isSeen && !this.ahead(this.spot.at) ? -HOVER : this.wanted;
+    const rate = clamp(AIR_GAIN * (wanted - this.depth), -PULL, DESCENT);
+    return wanted > 0 ? Math.max(rate, SEEK) : rate;
   }
 }
 

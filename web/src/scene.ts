@@ -611,6 +611,20 @@ export class SceneView {
     return best;
   }
 
+  /** The surface on a camera's sightline through a place, whether that is before it or behind. */
+  spotAt(place: Vec3): Spot | null {
+    const seen = this.ahead(place);
+    if (!seen) return null;
+    let best: Spot | null = null;
+    for (const cloud of this.clouds.values()) {
+      // From before the surface.
+      const before = add(place, scale(seen.towards, Math.max(0, 0.02 - seen.distance)));
+      const spot = cloud.seen?.meet(before, scale(seen.towards, -1))?.spot;
+      if (spot && (!best || length(sub(spot.at, place)) < length(sub(best.at, place)))) best = spot;
+    }
+    return best;
+  }
+
   depthRange(): [number, number] | null {
     const first = this.clouds.values().next();
     return first.done ? null : first.value.range;
@@ -709,19 +723,8 @@ export class SceneView {
 
   // The surface that the hand is over, and how high it is above it [m].
   private underHand(): { spot: Spot; height: number } | null {
-    if (!this.tick) return null;
-    const { proxy } = this.tick;
-    const seen = this.ahead(proxy);
-    if (!seen) return null;
-    let best: Spot | null = null;
-    for (const cloud of this.clouds.values()) {
-      // From before the surface, whether the proxy is before it or a little behind.
-      const before = add(proxy, scale(seen.towards, Math.max(0, 0.02 - seen.distance)));
-      const met = cloud.seen?.meet(before, scale(seen.towards, -1));
-      if (met && (!best || length(sub(met.spot.at, proxy)) < length(sub(best.at, proxy))))
-        best = met.spot;
-    }
-    return best && { spot: best, height: dot(sub(proxy, best.at), best.normal) };
+    const spot = this.tick && this.spotAt(this.tick.proxy);
+    return spot && { spot, height: dot(sub(this.tick!.proxy, spot.at), spot.normal) };
   }
 
   // Once: from what is seen at first. A moving camera's frustum moves with it.

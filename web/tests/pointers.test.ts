@@ -31,7 +31,7 @@ test("a second finger ends the press, and one that stays turns the view", () => 
   expect(pointers.pressing).toBeNull();
   expect(pointers.move(1, at(8, 4), 1)).toEqual({ gesture: "turn", x: 8, y: 4, zoom: 1 });
   pointers.up(1);
-  expect(pointers.any).toBe(false);
+  expect(pointers.count).toBe(0);
 });
 
 test("a pointer without a button that is down has gone, though nobody said so", () => {
@@ -39,7 +39,17 @@ test("a pointer without a button that is down has gone, though nobody said so", 
   pointers.down(1, at(0), 0, false, SURFACE);
   expect(pointers.move(1, at(1), 0)).toBeNull();
   expect(pointers.pressing).toBeNull();
-  expect(pointers.any).toBe(false);
+  expect(pointers.count).toBe(0);
+});
+
+test("a pointer that turned the view may press from then on", () => {
+  const pointers = new Pointers();
+  pointers.down(1, at(3), 0, false, { press: false });
+  expect(pointers.pressing).toBeNull();
+  pointers.press(1);
+  expect(pointers.pressing).toEqual(at(3));
+  pointers.press(2);
+  expect(pointers.count).toBe(1);
 });
 
 test("a press is where its pointer is", () => {

@@ -254,7 +254,8 @@ describe("a hand in the air", () => {
 
   test("goes after what the pixel sees, however far that has gone", () => {
     const world = new World([...overFirst], () => -0.2);
-    const press = new Press([...overFirst], floor(0), hand, overFloor);
+    const ahead: Ahead = ([, , z]) => ({ distance: z - world.surface, towards: up });
+    const press = new Press([...overFirst], floor(0), hand, ahead);
     world.run(press, 0.2);
     // A camera that moves, or another frame of a recording: 0.2 m deeper, 0.15 m aside.
     press.follow({ at: [0.15, 0, -0.2], normal: up });
@@ -276,6 +277,30 @@ describe("a hand in the air", () => {
       expect(world.feel().hip[2]).toBeGreaterThan(world.surface - 0.012);
     }
     expect(world.force).toBeCloseTo(2, 1);
+  });
+
+  test("waits outside while its place is out of the image, and presses what comes back", () => {
+    let isSeen = true;
+    const world = new World([0, 0, 0.05], () => (isSeen ? 0 : -1));
+    const press = new Press([0, 0, 0.05], floor(0), hand, (at) => (isSeen ? overFloor(at) : null));
+    world.run(press, 2);
+    expect(world.force).toBeCloseTo(2, 1);
+    isSeen = false;
+    world.run(press, 3);
+    expect(world.feel().hip[2]).toBeCloseTo(HOVER, 3);
+    isSeen = true;
+    world.run(press, 2);
+    expect(world.force).toBeCloseTo(2, 1);
+  });
+
+  test("that is behind what is seen, and feels nothing, comes out and tries again", () => {
+    const world = new World([0, 0, 0.05], () => -1); // the proxy is behind it, too
+    const press = new Press([0, 0, 0.05], floor(0), hand, overFloor);
+    world.run(press, 2);
+    const heights = world.path.map(([, , z]) => z);
+    const behind = heights.findIndex((z) => z < -0.01);
+    expect(Math.max(...heights.slice(behind, behind + 1 / STEP))).toBeCloseTo(HOVER, 3);
+    expect(Math.min(...heights)).toBeGreaterThan(-0.02);
   });
 
   test("does not chase a pixel without end that flickers between two surfaces", () => {
@@ -343,6 +368,17 @@ describe("a flight", () => {
         expect(inside).toBe(false);
       }
     }
+  });
+
+  test("that is planned anew with each frame does not climb", () => {
+    const place: Vec3 = [-0.2, 0, 0.03];
+    const hidden = floor(0.053); // in the box's shadow
+    const press = new Press(place, hidden, { r_c, stiffness }, ahead);
+    const heights = Array.from({ length: 300 }, () => {
+      press.follow(hidden);
+      return press.step(STEP, null)[2];
+    });
+    expect(Math.max(...heights)).toBeLessThan(2.5 * high);
   });
 
   test("is straight where no camera sees", () => {

@@ -165,11 +165,13 @@ void select(const Uri& uri, std::vector<RecordedImage>& images) {
 }
 
 // Gives each image the pose at its stamp; those without one are left out, which a note says.
-void place(const Uri& uri, const Trajectory& trajectory, const std::string& trajectory_name,
+void place(const Uri& uri, const fs::path& file, const std::string& trajectory_name,
            std::vector<RecordedImage>& images, SourceInfo& info) {
+  const Trajectory trajectory = parse_trajectory(read_text(file), file.string());
+  const double delay = uri.number_option("pose_delay", 0.0, -1.0, 1.0, "s");
   const std::size_t all = images.size();
   std::erase_if(images, [&](RecordedImage& image) {
-    const auto pose = trajectory.at(image.stamp);
+    const auto pose = trajectory.at(image.stamp + delay);
     if (pose) image.world_from_camera = *pose;
     return !pose;
   });
@@ -209,6 +211,13 @@ void associate(const fs::path& list, const std::string& what, fs::path RecordedI
   }
 }
 
+// Poses that belong to images by their numbers, or none at all, have no stamps to correct.
+void refuse_delay(const Uri& uri) {
+  if (!uri.has("pose_delay")) return;
+  throw Error(uri.text(), "option 'pose_delay' has no trajectory to apply to",
+              "give poses=FILE with timestamps, or leave pose_delay out");
+}
+
 // Counts stamps from the first image.
 void start_clock(std::vector<RecordedImage>& images, SourceInfo& info) {
   info.start_time = images.front().stamp;
@@ -232,7 +241,7 @@ bool is_json(const fs::path& path) {
 }  // namespace
 
 std::unique_ptr<Source> open_tum(const Uri& uri) {
-  allow_only(uri, {"poses", "stamps", "brightness", "colour", "labels"});
+  allow_only(uri, {"poses", "pose_delay", "stamps", "brightness", "colour", "labels"});
   const fs::path folder = uri.path();
   std::error_code error;
   if (uri.path().empty())
@@ -270,7 +279,9 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
     if (!fs::exists(file, error)) {
       throw Error(uri.text(), "has no " + poses, "use poses=none for the camera frame");
     }
-    place(uri, parse_trajectory(read_text(file), file.string()), poses, images, info);
+    place(uri, file, poses, images, info);
+  } else {
+    refuse_delay(uri);
   }
   for (const auto& [what, member] :
        {std::pair("brightness", &RecordedImage::brightness),
@@ -299,7 +310,7 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
 }
 
 std::unique_ptr<Source> open_depth(const Uri& uri) {
-  allow_only(uri, {"fps", "poses", "labels", "colour"});
+  allow_only(uri, {"fps", "poses", "pose_delay", "labels", "colour"});
   const fs::path path = uri.path();
   std::error_code error;
   const bool is_folder = fs::is_directory(path, error);
@@ -370,9 +381,10 @@ std::unique_ptr<Source> open_depth(const Uri& uri) {
     }
   }
   select(uri, images);
-  if (poses != "none" && !matrices) {
-    place(uri, parse_trajectory(read_text(poses_file), poses_file.string()), poses, images, info);
-  }
+  if (poses != "none" && !matrices)
+    place(uri, poses_file, poses, images, info);
+  else
+    refuse_delay(uri);
   start_clock(images, info);
   info.frames = images.size();
   if (is_folder) info.frame_rate = fps;

@@ -25,13 +25,15 @@ namespace palpate {
 /// Stamps count from the first frame given; SourceInfo::start_time is the time of that frame on the
 /// recording's clock. `stamps=absolute` gives the recording's own stamps.
 /// `poses=FILE` reads another trajectory, named relative to DIR; `poses=none` gives points in the
-/// camera's own frame. Frames at whose stamp the trajectory has no pose are left out, and
-/// SourceInfo::notes says how many. `colour=rgb.txt` reads that list of images in visible light,
-/// registered to the depth and of its size, and gives each frame the one nearest to it within 20
-/// ms, if any, as Frame::colour; so it is without the option, too, where that list is there, and
-/// frames have no colour from the first image on that cannot be read; `colour=none` reads none.
-/// `brightness=rgb.txt` gives the same in grey, as DepthImage::brightness;
-/// `labels=FILE` the same of 8-bit images whose values are labels of materials, as Frame::labels.
+/// camera's own frame. `pose_delay` [s] is by how much later than images the trajectory's clock
+/// stamps poses: the image of stamp t gets the pose of stamp t + pose_delay. Frames at whose stamp
+/// the trajectory has no pose are left out, and SourceInfo::notes says how many. `colour=rgb.txt`
+/// reads that list of images in visible light, registered to the depth and of its size, and gives
+/// each frame the one nearest to it within 20 ms, if any, as Frame::colour; so it is without the
+/// option, too, where that list is there, and frames have no colour from the first image on that
+/// cannot be read; `colour=none` reads none. `brightness=rgb.txt` gives the same in grey, as
+/// DepthImage::brightness; `labels=FILE` the same of 8-bit images whose values are labels of
+/// materials, as Frame::labels.
 /// @throws Error if the lists, poses or intrinsics cannot be used, or no frame is left.
 std::unique_ptr<Source> open_tum(const Uri& uri);
 

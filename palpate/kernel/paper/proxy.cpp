@@ -156,19 +156,26 @@ MovementEnd move(const Patch& patch, const Vec3& hip, const ProxyParameters& par
     }
 
     // Steps 3 to 6.
-    Vec3 step;
-    if (fixed_step) {
-      step = fixed_proxy_step(now.state, normal, u, proxy);
-    } else if (now.state == ContactState::contact && inside > 0.0) {
+    const auto slide = [&] {
       const Vec3 u_p = u + inside / squared_length * normal;  // u - (u . n) n
       const double squared = u_p.squaredNorm();
       const double scale = squared <= square(at_hip) ? 0.0
                            : squared < square(proxy.r_1)
                                ? gamma_schedule(proxy.gamma, now.contact_steps)  // Eq. (11)
                                : proxy.xi * proxy.r_1 / std::sqrt(squared);      // Eq. (12)
-      step = scale * u_p;                                                        // Eq. (6)
+      return Vec3(scale * u_p);                                                  // Eq. (6)
+    };
+    Vec3 step;
+    if (fixed_step) {
+      step = fixed_proxy_step(now.state, normal, u, proxy);
+    } else if (now.state == ContactState::contact && inside > 0.0) {
+      step = slide();
     } else {
       step = searched_step(patch, now.at, now.state, normal, u, proxy);
+      // The HIP is outside of n, but a point that stands out of the noise is in the way: the proxy
+      // goes round it. docs/method.md, "Blocked in contact".
+      if (now.state == ContactState::contact && known && step.squaredNorm() <= square(no_step))
+        step = slide();
     }
     const double squared_step = step.squaredNorm();
     if (squared_step <= square(no_step) || !is_number(squared_step)) {

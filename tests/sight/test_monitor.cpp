@@ -353,7 +353,7 @@ TEST(SightTracker, CountsTheTimeOfAHoldFromItsBeginning) {
   ObservedClouds clouds;
   const auto frame = [&](const PointCloud& cloud, int k) {
     clouds.take(0, cloud);
-    tracker.frame(clouds, 0, k * interval, interval, Vec3(0, 0, r_c), 90.0);
+    tracker.frame(clouds, 0, k * interval, interval, Vec3::Zero(), Vec3(0, 0, r_c), 90.0);
   };
   for (int k = 0; k < 10; ++k) frame(plane, k);
   ASSERT_TRUE(tracker.tracking());

@@ -638,6 +638,62 @@ TEST(Sight, FeelsASmallBoxFromItsFirstFramesOn) {
   }
 }
 
+// A stereo camera's noise is the same over its window. With much of it the height comes from a disc
+// as wide as the dome, of two seconds.
+TEST(Sight, IsLiftedByADomeThatSlidesInUnderAHandAtRest) {
+  constexpr double cap = 12e-3;                                     // [m] high
+  constexpr double base = 35e-3;                                    // [m] its radius
+  constexpr double window = 12e-3;                                  // [m]
+  constexpr double ball = (base * base + cap * cap) / (2.0 * cap);  // [m] of which it is a part
+  constexpr int resting = 60;                                       // [frames]
+  constexpr int arriving = 10;
+  std::mt19937 random(7);
+  std::normal_distribution<double> noise(0.0, 3e-3);
+  const Overhead camera;
+  Sight sight = seated({0, 0, 0.02});
+  std::vector<std::unique_ptr<DepthImage>> images;
+  double z = 0.0;
+  for (int i = 0; i < resting + arriving + 15; ++i) {
+    const double middle = 0.1 * std::max(0.0, 1.0 - std::max(i - resting, 0) / double{arriving});
+    std::array<std::array<double, 40>, 40> blotches;
+    for (auto& row : blotches)
+      for (double& each : row) each = noise(random);
+    const auto height = [&](double x, double y) {
+      const auto cell = [](double at) {
+        return static_cast<std::size_t>(std::clamp(at / window + 20.0, 0.0, 39.0));
+      };
+      const double away = std::hypot(x - middle, y);
+      const double dome = away < base ? std::sqrt(ball * ball - away * away) - (ball - cap) : 0.0;
+      return dome + blotches[cell(x)][cell(y)];
+    };
+    images.push_back(std::make_unique<DepthImage>(camera.shoot(height, 0.0, random)));
+    const HipPath rests = [](double) { return Vec3(0, 0, -6e-3); };
+    z = live_through(sight, *images.back(), i * interval, rests).proxy.z();
+    EXPECT_LT(z, cap + 2.0 * r_c);
+  }
+  EXPECT_NEAR(z, cap + r_c, 2e-3);
+}
+
+TEST(Sight, StopsAtARiserThatTheCameraDoesNotSee) {
+  constexpr double rise = 26e-3;      // [m]
+  constexpr double slow = 1.0 / 6.0;  // [s] between frames, in which the hand slides 10 mm
+  constexpr double speed = 0.06;      // [m/s]
+  std::mt19937 random(1);
+  const Overhead camera;
+  Sight sight = seated({-0.05, 0, 0.02});
+  const DepthImage stairs =
+      camera.shoot([](double x, double) { return x < 0.0 ? 0.0 : rise; }, 0.0, random);
+  Tick tick;
+  for (int i = 0; i < 8; ++i) {
+    sight.observe({stairs, i * slow});
+    for (double t = i * slow; t < (i + 1) * slow; t += 1e-3) {
+      tick = sight.tick({-0.05 + speed * t, 0, t < slow ? 0.02 : -5e-3}, t);
+      EXPECT_LT(tick.proxy.x(), 0.0);
+    }
+  }
+  EXPECT_LT(tick.force.x(), -1.0);
+}
+
 TEST(Sight, ComesBackSlowlyWhateverTheFirstFramesCorrect) {
   // Two seconds without a frame; then the plane is 4 mm higher, and the frames are noisy.
   const Overhead camera;

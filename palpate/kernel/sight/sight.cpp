@@ -83,8 +83,8 @@ void Sight::observe(const Observation& seen) noexcept {
   constexpr double infinite = std::numeric_limits<double>::infinity();
   using Event = SightTracker::Event;
   const Event event =
-      tracker_.frame(*frame_.cloud(), seen.camera, frame_.camera_stamp(), interval(), *proxy_.at,
-                     proxy_.touching ? parameters_.sight.hardest_strike : infinite);
+      tracker_.frame(*frame_.cloud(), seen.camera, frame_.camera_stamp(), interval(), last_hip_,
+                     *proxy_.at, proxy_.touching ? parameters_.sight.hardest_strike : infinite);
   if (event != Event::followed && event != Event::jumped) return;
   // Side repair: the proxy was on the surface's free side and must be there still. If it will move
   // over points, it must be in front of this frame's points, not only of their average.

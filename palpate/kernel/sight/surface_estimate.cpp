@@ -64,6 +64,29 @@ double variance_at_rest(std::span<const HeightSample> newest_first, std::size_t 
   return std::max(squares - sum * sum / count, 0.0) / static_cast<double>(frames - 2);
 }
 
+// How many of the newest readings, 2, 4 or 8, differ from those before; 0: none. Noise of depth
+// cameras correlates from frame to frame by up to 0.85: so much of a single one's deviation is left
+// in a mean.
+// @param reading  [m] of a frame, by its age
+// @param most     [m] that a single one may deviate
+template <class Reading>
+std::size_t changed_since(std::size_t frames, double most, const Reading& reading) {
+  constexpr std::array<double, 3> left = {0.96, 0.91, 0.80};  // [-]
+  double all = 0.0;
+  for (std::size_t i = 0; i < frames; ++i) all += reading(i);
+  double newest = 0.0;
+  std::size_t added = 0;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    const std::size_t window = std::size_t{2} << i;
+    if (frames < 2 * window) return 0;
+    for (; added < window; ++added) newest += reading(added);
+    const double change = newest / static_cast<double>(window) -
+                          (all - newest) / static_cast<double>(frames - window);
+    if (std::abs(change) > left[i] * most) return window;
+  }
+  return 0;
+}
+
 // Normal equations of the shape over the newest 2, 4, 8, ... frames: matrix * shape = right_side,
 // in centimetres.
 constexpr std::size_t slope_windows = 4;
@@ -368,7 +391,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
     count_ = 0;
     return false;
   }
-  estimate(foot, new_frame);
+  estimate(foot, new_frame, new_frame);
   if (!look.partial) judge(foot);
   now.smooth = smooth_;
   // What one camera sees whole another may see cut off by a shadow, in turn.
@@ -383,7 +406,8 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   return true;
 }
 
-void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
+// @param learns  new_frame, and nothing was learned from it yet
+void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) noexcept {
   Evidence& now = evidence(0);
   const Vec2 at = foot / Moments::unit;
   Vec5 basis;
@@ -454,7 +478,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       height.doubt *= doubts[e.camera];
     }
     if (cameras_ > 1) align_cameras(std::span(heights[j].data(), n));
-    if (new_frame && own == h.size() && now.whole) {
+    if (learns && own == h.size() && now.whole) {
       // Fourth differences do not see a smooth motion; their variance is 70 times a height's.
       const double fourth =
           h[0].height - 4.0 * h[1].height + 6.0 * h[2].height - 4.0 * h[3].height + h[4].height;
@@ -468,7 +492,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       scatter.samples = std::min(scatter.samples + 1.0, 40.0);
       scatter.variance += (change - scatter.variance) / scatter.samples;
     }
-    if (new_frame)
+    if (learns)
       scatter.at_rest = doubts[now.camera] * variance_at_rest(heights[j], std::min(n, rested_));
   }
   // Lepski's rule: the widest disc that agrees with all narrower ones determines the height. The
@@ -490,6 +514,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
   // straight edge half of it is empty.
   constexpr double least_filled = 0.45;
   std::size_t mover = 0;
+  std::size_t changed = 0;  // frames since
   bool agree = true;
   for (std::size_t j = 1; j < now.rungs; ++j) {
     if (now.extent[j] < least_filled * now.extent[0] * squared(radii_[j] / radii_[0])) break;
@@ -522,14 +547,33 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame) noexcept {
       const double sds = parameters_.confidence + (j <= rung_ ? hysteresis : 0.0);
       const double confidence = measured(i) && measured(j) ? t_quantile(sds, freedom) : sds;
       agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
+      // What slides in under a contact at rest changes the newest frames alone: of the mean over
+      // all it is a small part, and it scatters. Only noise that was measured before shows it.
+      const auto most = [&](double variance) { return sds * std::sqrt(variance) + negligible; };
+      const bool differs = measured(i) && measured(j) &&
+                           changed_since(n, most(variance(i) + variance(j)), [&](std::size_t k) {
+                             return heights[j][k].height - heights[i][k].height;
+                           }) > 0;
+      // Where the narrower one has changed itself, it is another surface that is touched.
+      if (differs && learns && changed == 0)
+        changed = changed_since(n, most(variance(i)),
+                                [&](std::size_t k) { return heights[i][k].height; });
+      agree = agree && !differs;
       const double newest = heights[j][0].height - heights[i][0].height;
-      moves_along =
-          agree || (n >= 4 && std::abs(newest - mean) <=
+      moves_along = agree || (n >= 4 && !differs &&
+                              std::abs(newest - mean) <=
                                   parameters_.confidence * std::sqrt(scattered) + negligible);
     }
     if (!moves_along) break;
     if (agree && variance(j) <= variance(chosen)) chosen = j;
     if (variance(j) <= variance(mover)) mover = j;
+  }
+  if (changed > 0) {
+    count_ = changed;
+    settled_ = std::min(settled_, changed);
+    rested_ = 0;
+    estimate(foot, new_frame, false);
+    return;
   }
   rung_ = chosen;
   mover_ = mover;

@@ -186,7 +186,7 @@ class SurfaceEstimate {
   [[nodiscard]] std::optional<Residuals> residuals(const Vec2& foot, double radius,
                                                    double gate) const noexcept;
   bool recentre(const Vec2& foot, double gate, double& cut) noexcept;
-  void estimate(const Vec2& foot, bool new_frame) noexcept;
+  void estimate(const Vec2& foot, bool new_frame, bool learns) noexcept;
   void look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept;
   static double squared_structure(const Cells& frame,
                                   const std::array<double, cells>& residuals) noexcept;

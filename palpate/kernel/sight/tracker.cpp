@@ -136,8 +136,8 @@ bool SightTracker::others_show(const ObservedClouds& clouds, std::size_t camera,
 }
 
 SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_t camera,
-                                        double stamp, double interval, const Vec3& proxy,
-                                        double hardest_strike) noexcept {
+                                        double stamp, double interval, const Vec3& hip,
+                                        const Vec3& proxy, double hardest_strike) noexcept {
   const Cloud& cloud = *clouds.of(camera);
   View& view = views_[camera];
   view.stamp = stamp;
@@ -253,7 +253,12 @@ SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_
   // An occluder that moves in front of a resting contact first hides a part of the disc. The border
   // of the rest is not an edge of the surface. Points that vanish without an occluder in front of
   // them lie in a stereo camera's shadow beside one.
-  const bool stays = foot == surface_.centre();
+  // A hand that slid there itself has come beside what stood there before.
+  const Vec3 slid = hip - view.hip;
+  const double still = 0.5 * surface_.resolution();
+  const bool slides = (slid - slid.dot(axes.up) * axes.up).squaredNorm() > still * still;
+  if (slides) view.hip = hip;
+  const bool stays = foot == surface_.centre() && !slides;
   const double all_near = static_cast<double>(near) / share;
   if (!stays || all_near > view.near_usual) view.near_usual = all_near;
   const bool covered = before >= 3 || all_near < 0.75 * view.near_usual;

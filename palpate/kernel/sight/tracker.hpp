@@ -44,11 +44,11 @@ class SightTracker {
   /// @param clouds     what each camera saw last, this frame included
   /// @param stamp     [s] of the frame
   /// @param interval  [s] after that camera's one before
-  /// @param proxy     [m] world
+  /// @param hip, proxy  [m] world
   /// @param hardest_strike  [m/s^2] a layer that would need a larger acceleration is an occluder;
   ///                        infinite for a surface that is not touched yet
   Event frame(const ObservedClouds& clouds, std::size_t camera, double stamp, double interval,
-              const Vec3& proxy, double hardest_strike) noexcept;
+              const Vec3& hip, const Vec3& proxy, double hardest_strike) noexcept;
   /// Looks for a surface to follow behind a proxy in free space, unless one is followed there.
   void watch(const ObservedClouds& clouds, const Vec3& proxy) noexcept;
   /// Follows the surface at a contact that was made with its points.
@@ -98,6 +98,7 @@ class SightTracker {
     double interval = 1.0 / 30.0;  // [s]
     bool covered = false;          // an occluder hides a part of the disc
     bool shadowed = false;         // and arrived while the contact stayed in place
+    Vec3 hip = Vec3::Zero();       // [m] world: where the hand rests
     double near_usual = 0.0;       // points of the surface in the beam without an occluder
     Ring beside = nothing_beside();
   };

@@ -34,11 +34,9 @@ std::string replay_text(const ReplayDifferences& differences, std::uint64_t tick
 }
 
 std::string replay_text(const ReplayReport& report) {
-  std::string text =
-      fmt::format("{} ticks and {} frames replayed\nasked: {}\nsent:  {}\n", report.ticks,
-                  report.frames, replay_text(report.asked, report.ticks),
-                  report.sent_unchecked.empty() ? replay_text(report.sent, report.ticks)
-                                                : "not checked: " + report.sent_unchecked);
+  std::string text = fmt::format(
+      "{} ticks and {} frames replayed\nasked: {}\nsent:  {}\n", report.ticks, report.frames,
+      replay_text(report.asked, report.ticks), replay_text(report.sent, report.ticks));
   if (!report.broken_off.empty()) text += "the replay stopped: " + report.broken_off + "\n";
   return text + app::text_of(report.check) + "\n";
 }
@@ -60,12 +58,8 @@ nlohmann::ordered_json replay_json(const ReplayReport& report) {
   nlohmann::ordered_json object = {{"identical", report.identical()},
                                    {"ticks", report.ticks},
                                    {"frames", report.frames},
-                                   {"asked", replay_json(report.asked)}};
-  if (report.sent_unchecked.empty()) {
-    object["sent"] = replay_json(report.sent);
-  } else {
-    object["sent"] = {{"not_checked", report.sent_unchecked}};
-  }
+                                   {"asked", replay_json(report.asked)},
+                                   {"sent", replay_json(report.sent)}};
   if (!report.broken_off.empty()) object["broken_off"] = report.broken_off;
   object["checksums"] = app::text_of(report.check);
   if (!report.check.damage.empty()) object["damage"] = report.check.damage;

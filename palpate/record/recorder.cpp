@@ -174,9 +174,7 @@ void Recorder::begin(const ServoTick& first) {
   while (!found && cycle_.states.try_pop(state))
     found = state.numbers[0] == static_cast<double>(first.number);
   const std::lock_guard lock(mutex_);
-  seat_ = proxy_;
-  seated_at_ = first.tick.t;
-  if (found) state_ = state;
+  if (found) state_.emplace(state, first.tick.t);
 }
 
 void Recorder::collect_ticks() {
@@ -190,7 +188,6 @@ void Recorder::collect_ticks() {
       if (!more) break;
       if (!begun_) {
         if ((tick.hand & method_switched) == 0) {
-          proxy_ = tick.tick.proxy;
           tick_before_ = tick.number;
           // Only now, so that the tick before the first is known.
           if (renew_) std::exchange(renew_, nullptr)();
@@ -340,14 +337,11 @@ bool Recorder::write_ticks() {
   constexpr std::size_t most_at_once = 4096;
   std::vector<ServoTick> ticks;
   std::deque<AdoptedFrame> adopted;
-  std::optional<double> seated_at;
-  std::optional<CycleState> state;
+  std::optional<std::pair<CycleState, double>> state;
   {
     const std::lock_guard lock(mutex_);
     adopted.swap(adopted_);
     state = std::exchange(state_, std::nullopt);
-    seated_at = std::exchange(seated_at_, std::nullopt);
-    if (seated_at) info_.seat = seat_;
     while (!collected_.empty() && ticks.size() < most_at_once) {
       const ServoTick& tick = collected_.front();
       if (tick.frame_number > frame_written_ || !commands_written_ ||
@@ -357,8 +351,7 @@ bool Recorder::write_ticks() {
       collected_.pop_front();
     }
   }
-  if (seated_at) writer_->info(info_, *seated_at);
-  if (state) writer_->state(*state, seated_at.value_or(0.0));
+  if (state) writer_->state(state->first, state->second);
   for (const AdoptedFrame& frame : adopted) writer_->adopted(frame);
   for (const ServoTick& tick : ticks) writer_->tick(tick);
   const std::lock_guard lock(mutex_);

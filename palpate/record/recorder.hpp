@@ -124,8 +124,7 @@ class Recorder {
   CycleReader cycle_;
   std::function<void()> renew_;
   bool begun_ = false;
-  std::optional<Vec3> proxy_;                 // [m] in the tick before the first recorded one
-  std::optional<std::uint64_t> tick_before_;  // its number
+  std::optional<std::uint64_t> tick_before_;  // number of the tick before the first recorded one
   std::vector<AdoptedFrame> frames_taken_;    // not handed on yet: the last before it, and later
   std::uint64_t overflowed_ = 0;              // ticks that found no room in collected_
 
@@ -145,9 +144,7 @@ class Recorder {
   std::deque<AdoptedFrame> adopted_;               // to be written before them
   std::map<std::size_t, std::shared_ptr<const Cloud>> newest_;  // of each camera, as handed over
   std::uint64_t entries_handed_ = 0;
-  std::optional<double> seated_at_;  // [s] when the seat in info_ has to be written again
-  std::optional<Vec3> seat_;
-  std::optional<CycleState> state_;  // at seated_at_
+  std::optional<std::pair<CycleState, double>> state_;  // before the first tick; when that was [s]
   Status status_;
   bool stopping_ = false, collecting_ = true, failed_ = false;
   std::uint64_t flushes_asked_ = 0, flushes_collected_ = 0, flushes_done_ = 0, flush_entries_ = 0;

@@ -10,75 +10,63 @@
 #include <utility>
 
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/servo/free_side.hpp"
 
 namespace palpate {
 namespace {
 
-// The columns of a tick that follow from what went into the cycle. A recording that begins in
-// mid-session counts its frames and settings differently.
-constexpr std::array<std::string_view, 6> sent_columns{"force",     "gain",   "frame_stamp",
-                                                       "frame_age", "safety", "hand"};
-constexpr std::array<std::string_view, 8> asked_columns{
-    "hip", "proxy", "normal", "rendered_force", "state", "steps", "surface_velocity", "flags"};
-
-// Those of the energy: of the method, and of the cycle.
-constexpr std::array<std::string_view, 1> asked_energy{"surface_motion"};
+// What went into a cycle, or only counts: not compared, as a replay is given it, and a recording
+// that begins in mid-session counts differently.
+constexpr std::array<std::string_view, 9> given_columns{"t",
+                                                        "frame",
+                                                        "position",
+                                                        "handle",
+                                                        "number",
+                                                        "frame_number",
+                                                        "settings_number",
+                                                        "wake_up_ns",
+                                                        "previous_compute_ns"};
+// What the method made of it; all others are the cycle's.
+constexpr std::array<std::string_view, 12> asked_columns{"hip",
+                                                         "proxy",
+                                                         "normal",
+                                                         "rendered_force",
+                                                         "state",
+                                                         "steps",
+                                                         "flags",
+                                                         "surface_velocity",
+                                                         "surface_motion",
+                                                         "orientation",
+                                                         "proxy_orientation",
+                                                         "rendered_torque"};
 
 // Does `columns` name the column, or the vector that it is an axis of?
 bool names(std::span<const std::string_view> columns, std::string_view column) {
-  if (column.ends_with("_x") || column.ends_with("_y") || column.ends_with("_z"))
-    column.remove_suffix(2);
+  if (column.size() > 2 && column[column.size() - 2] == '_') column.remove_suffix(2);
   return std::find(columns.begin(), columns.end(), column) != columns.end();
 }
 
 // Which of two groups of numbers a column belongs to.
 enum class Group { asked, sent };
 
-bool is_of(Group group, const std::string& column, bool energy) {
-  if (energy) return names(asked_energy, column) == (group == Group::asked);
-  return group == Group::asked ? names(asked_columns, column) : names(sent_columns, column);
-}
-
-// Which columns a recording has beside those of every version.
-struct LaterColumns {
-  bool energy = false;
-  bool fixtures = false;
-};
-
-// Compares the columns of a group, the later ones if they were recorded.
-void compare(const ServoTick& recorded, const ServoTick& again, Group group, LaterColumns later,
+// Compares the columns of a group that were recorded.
+void compare(const ServoTick& recorded, const ServoTick& again, Group group, const TickRows& rows,
              const Vec3& force_difference, ReplayDifferences& differences) {
+  const std::vector<double> a = row_of(recorded);
+  const std::vector<double> b = row_of(again);
   bool different = false;
-  const auto compare_rows = [&](const std::vector<double>& a, const std::vector<double>& b,
-                                const std::vector<std::string>& columns, bool energy) {
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      if (std::bit_cast<std::uint64_t>(a[i]) == std::bit_cast<std::uint64_t>(b[i]) ||
-          !is_of(group, columns[i], energy))
-        continue;
-      different = true;
-      if (!differences.first)
-        differences.first = ReplayDifference{recorded.number, columns[i], a[i], b[i]};
-    }
-  };
-  compare_rows(row_of(recorded), row_of(again), tick_columns(), false);
-  if (later.energy)
-    compare_rows(energy_row_of(recorded), energy_row_of(again), energy_columns(), true);
-  if (later.fixtures)
-    compare_rows(fixture_row_of(recorded), fixture_row_of(again), fixture_columns(), true);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const std::string& column = tick_columns()[i];
+    if (std::bit_cast<std::uint64_t>(a[i]) == std::bit_cast<std::uint64_t>(b[i]) || !rows.has(i) ||
+        names(given_columns, column) || names(asked_columns, column) != (group == Group::asked))
+      continue;
+    different = true;
+    if (!differences.first)
+      differences.first = ReplayDifference{recorded.number, column, a[i], b[i]};
+  }
   if (!different) return;
   ++differences.ticks;
   differences.largest_force = std::max(differences.largest_force, force_difference.norm());
 }
-
-// A session's ticks made again.
-class Rerun {
- public:
-  virtual ~Rerun() = default;
-  // The next tick. @throws Error if the recording lacks what it needs
-  virtual ServoTick tick(const ServoTick& recorded) = 0;
-  [[nodiscard]] virtual std::uint64_t frames() const = 0;
-};
 
 // The device of a replay: its hand is where it was then.
 class ReplayDevice final : public Device {
@@ -92,6 +80,7 @@ class ReplayDevice final : public Device {
 
   void set_hand(const ServoTick& recorded) {
     hand_ = {.position = recorded.position,
+             .orientation = Eigen::Quaterniond(recorded.handle),
              .present = (recorded.hand & hand_present) != 0,
              .clutched = (recorded.hand & hand_clutched) != 0,
              .fault = fault_of(recorded.hand)};
@@ -103,16 +92,20 @@ class ReplayDevice final : public Device {
 };
 
 // The very cycle of a live session, with all that went into it then.
-class CycleRerun final : public Rerun {
+class Rerun {
  public:
-  CycleRerun(SessionReader& session, const ServoTick& first, const MethodRegistry& methods)
+  Rerun(SessionReader& session, const ServoTick& first, const MethodRegistry& methods)
       : session_(session),
         methods_(methods),
-        device_(session.info().limits.value()),
+        device_(session.info().limits),
         commands_(session.commands(first.settings_number)),
         cycle_(made_method(), device_, commands_),
         ticks_(cycle_.reader()) {
-    if (!session.state()) return;
+    if (!session.state()) {
+      if (first.number == 0) return;
+      throw Error("the recording", "begins in mid-session, with the state of another version",
+                  "replay it with the version that made it");
+    }
     // What was in use before, of each camera.
     std::vector<FrameInUse> in_use;
     const auto use = [&](std::uint64_t number) {
@@ -130,7 +123,8 @@ class CycleRerun final : public Rerun {
     cycle_.restore(*session.state(), in_use);
   }
 
-  ServoTick tick(const ServoTick& recorded) override {
+  // The next tick. @throws Error if the recording lacks what it needs
+  ServoTick tick(const ServoTick& recorded) {
     const bool switched = (recorded.hand & method_switched) != 0;
     if (switched || recorded.settings_number != commands_.number) {
       commands_ = session_.commands(recorded.settings_number);
@@ -148,7 +142,7 @@ class CycleRerun final : public Rerun {
     return again;
   }
 
-  [[nodiscard]] std::uint64_t frames() const override { return frames_; }
+  [[nodiscard]] std::uint64_t frames() const { return frames_; }
 
  private:
   [[nodiscard]] std::shared_ptr<Method> made_method() const {
@@ -187,107 +181,6 @@ class CycleRerun final : public Rerun {
   std::uint64_t frames_ = 0;
 };
 
-// The method of a session alone, given again what it was given then: for recordings that lack what
-// the rest of the cycle needs.
-class MethodRerun final : public Rerun {
- public:
-  MethodRerun(SessionReader& session, const ServoTick& first, const MethodRegistry& methods)
-      : session_(session),
-        methods_(methods),
-        settings_number_(first.settings_number),
-        settings_(session.commands(settings_number_).settings),
-        method_(make_method(settings_.method, settings_.parameters, methods_)) {
-    if (!session.info().seat) return;
-    last_proxy_ = *session.info().seat;
-    method_->seat(last_proxy_);
-  }
-
-  ServoTick tick(const ServoTick& recorded) override {
-    bool switched = (recorded.hand & method_switched) != 0 && ticks_ > 0;
-    if (recorded.settings_number != settings_number_) {
-      const std::string before = settings_.method;
-      settings_number_ = recorded.settings_number;
-      settings_ = session_.commands(settings_number_).settings;
-      switched = switched || settings_.method != before;
-      if (!switched) method_->set_parameters(settings_.parameters);
-    }
-    if (switched) {
-      method_ = make_method(settings_.method, settings_.parameters, methods_);
-      method_->seat(last_proxy_);
-      last_normal_ = Vec3::Zero();
-      if (recorded.frame_number == frame_number_) {
-        for (const FrameInUse& frame : in_use_)
-          if (frame.cloud) method_->observe({*frame.cloud, frame.stamp, frame.camera});
-      }
-    }
-    ++ticks_;
-    adopt(recorded.frame_number);
-    if ((recorded.hand & proxy_reseated) != 0 && !seen_.parts().empty()) {
-      method_->seat(
-          free_side(seen_, last_proxy_, last_normal_, settings_.parameters.proxy.r_c(), patch_));
-    }
-    ServoTick again = recorded;
-    again.tick = method_->tick(recorded.tick.hip, recorded.tick.t);
-    last_proxy_ = again.tick.proxy;
-    last_normal_ = again.tick.normal;
-    return again;
-  }
-
-  [[nodiscard]] std::uint64_t frames() const override { return frames_; }
-
- private:
-  void adopt(std::uint64_t number) {
-    if (number == frame_number_) return;
-    const auto& put = session_.frames();
-    const auto last = put.find(number);
-    if (last == put.end() || number < frame_number_)
-      throw Error("recording", "lacks frame " + std::to_string(number),
-                  "the disk was too slow, or the recording is damaged");
-    auto frame = last;
-    if (session_.info().kind == SessionInfo::Kind::headless) frame = put.upper_bound(frame_number_);
-    for (; frame != std::next(last); ++frame) {
-      for (FrameInUse& seen : session_.seen(frame->first)) {
-        method_->observe({*seen.cloud, seen.stamp, seen.camera});
-        seen_.take(seen.camera, *seen.cloud);
-        in_use_[seen.camera] = std::move(seen);  // only now may the one before go
-      }
-      ++frames_;
-    }
-    frame_number_ = number;
-  }
-
-  SessionReader& session_;
-  const MethodRegistry& methods_;
-  std::uint64_t settings_number_;
-  ServoSettings settings_;
-  std::unique_ptr<Method> method_;
-  std::uint64_t ticks_ = 0;
-  std::uint64_t frame_number_ = 0;
-  std::array<FrameInUse, Freshness::max_cameras> in_use_;  // by camera
-  ObservedClouds seen_;                                    // these
-  Patch patch_;
-  Vec3 last_proxy_ = Vec3::Zero();
-  Vec3 last_normal_ = Vec3::Zero();
-  std::uint64_t frames_ = 0;
-};
-
-// Why the cycle cannot be run again; empty if it can.
-std::string lacks_for_cycle(const SessionReader& session, const ServoTick& first) {
-  if (!session.info().limits)
-    return "the recording has no device limits: it is older than these, or of a session "
-           "without a safety chain";
-  if (first.number > 0 && !session.state())
-    return "the recording begins in mid-session, without a state of this version's safety chain";
-  return {};
-}
-
-std::unique_ptr<Rerun> open_rerun(SessionReader& session, const ServoTick& first,
-                                  const MethodRegistry& methods, ReplayReport& report) {
-  report.sent_unchecked = lacks_for_cycle(session, first);
-  if (report.sent_unchecked.empty()) return std::make_unique<CycleRerun>(session, first, methods);
-  return std::make_unique<MethodRerun>(session, first, methods);
-}
-
 }  // namespace
 
 ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress,
@@ -301,22 +194,20 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
   }
   std::optional<ServoTick> last;
   std::unique_ptr<Rerun> rerun;
-  LaterColumns later;
   for (std::size_t i = 0; i < session.ticks(); ++i) {
     try {
-      if (i == 0) later = {session.has_energy(), session.has_fixtures()};
       const ServoTick recorded = session.tick(i);
       if (last && recorded.number != last->number + 1) {
         report.broken_off = "ticks " + std::to_string(last->number + 1) + " to " +
                             std::to_string(recorded.number - 1) + " are missing";
         break;
       }
-      if (!rerun) rerun = open_rerun(session, recorded, methods, report);
+      if (!rerun) rerun = std::make_unique<Rerun>(session, recorded, methods);
       const ServoTick again = rerun->tick(recorded);
-      compare(recorded, again, Group::asked, later, again.tick.force - recorded.tick.force,
+      compare(recorded, again, Group::asked, session.rows(), again.tick.force - recorded.tick.force,
               report.asked);
-      if (report.sent_unchecked.empty())
-        compare(recorded, again, Group::sent, later, again.force - recorded.force, report.sent);
+      compare(recorded, again, Group::sent, session.rows(), again.force - recorded.force,
+              report.sent);
       last = recorded;
     } catch (const Error& error) {
       report.broken_off = last ? "after tick " + std::to_string(last->number) + ": " : "";

@@ -29,14 +29,12 @@ struct ReplayDifferences {
 struct ReplayReport {
   std::uint64_t ticks = 0;   ///< replayed
   std::uint64_t frames = 0;  ///< adopted
-  /// What the method made: HIP, proxy, normal, the force that it asked for, state, steps, surface
-  /// velocity, flags.
+  /// What the method made: HIP, proxy, normal, the wrench that it asked for, state, steps, the
+  /// surface's velocity and motion, flags.
   ReplayDifferences asked{};
-  /// What the cycle made of it: the force that was sent, gain, safety flags, the frame's age and
-  /// stamp, flags of the hand.
+  /// What the cycle made of it: the wrench that was sent, gain, safety flags, the frame's age and
+  /// stamp, flags of the hand, energy, the forces of fixtures.
   ReplayDifferences sent{};
-  /// Why `sent` could not be compared, such as a recording that is too old; empty if it was.
-  std::string sent_unchecked;
   /// Why it could not continue to the end, such as ticks that the recorder lost; empty if it could.
   std::string broken_off;
   /// What the checksums say of all messages, also of those that a replay does not need.
@@ -51,8 +49,8 @@ struct ReplayReport {
 /// Runs the loop's cycle again, method and safety chain, on what went into it: a session's frames,
 /// hands, settings and wake-up times. Compares each tick with the recorded one, bit for bit.
 ///
-/// Of recordings that lack what the chain needs, the method alone is run and compared. Where a
-/// recording is damaged or names a method that is not there, the replay ends, as the report says.
+/// Columns that a recording of another version lacks are not compared. Where it is damaged or names
+/// a method that is not there, the replay ends, as the report says.
 /// @param progress  called now and then with the number of ticks done; may be empty
 /// @param methods   those that the session may name
 ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress = {},

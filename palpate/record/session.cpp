@@ -42,12 +42,7 @@ void walk(Way& way, T& record) {
   way("wake_up_ns", record.wake_up_ns);
   way("previous_compute_ns", record.previous_compute_ns);
   way("hand", record.hand);
-}
-
-// The same of what came later, behind these in a row.
-template <class Way, class T>
-void walk_energy(Way& way, T& record) {
-  way("surface_motion", record.tick.surface_motion);
+  way("surface_motion", tick.surface_motion);
   const auto walk_port = [&way](const std::string& name, auto& port) {
     way(name + "_excess", port.excess);
     way(name + "_most", port.most);
@@ -57,65 +52,84 @@ void walk_energy(Way& way, T& record) {
   walk_port("relative", record.energy.relative);
   walk_port("absolute", record.energy.absolute);
   way("contacts", record.energy.contacts);
-}
-
-// And of what came after that.
-template <class Way, class T>
-void walk_fixtures(Way& way, T& record) {
   way("region", record.region);
   way("guidance", record.guidance);
   way("fixtures", record.fixtures);
+  way("handle", record.handle);
+  way("orientation", tick.orientation);
+  way("proxy_orientation", tick.proxy_orientation);
+  way("rendered_torque", tick.torque);
+  way("torque", record.torque);
 }
+
+// The axes of a field's numbers; a single number has no axis.
+template <class T>
+constexpr std::string_view axes_of = "";
+template <>
+constexpr std::string_view axes_of<Vec3> = "xyz";
+template <>
+constexpr std::string_view axes_of<Rotation> = "xyzw";  // as a rotation's coeffs()
 
 class Names {
  public:
   template <class T>
   void operator()(std::string_view name, const T& /*value*/) {
-    if constexpr (std::is_same_v<T, Vec3>) {
-      for (const char* axis : {"_x", "_y", "_z"}) names.push_back(std::string(name) + axis);
-    } else {
-      names.emplace_back(name);
-    }
+    if constexpr (axes_of<T>.empty()) names.emplace_back(name);
+    for (const char axis : axes_of<T>) names.push_back(std::string(name) + "_" + axis);
   }
   std::vector<std::string> names;
 };
 
 class Put {
  public:
+  void operator()(std::string_view /*name*/, const Vec3& v) {
+    row.insert(row.end(), v.begin(), v.end());
+  }
+  void operator()(std::string_view /*name*/, const Rotation& q) {
+    row.insert(row.end(), q.coeffs().begin(), q.coeffs().end());
+  }
   template <class T>
   void operator()(std::string_view /*name*/, const T& value) {
-    if constexpr (std::is_same_v<T, Vec3>) {
-      row.insert(row.end(), {value.x(), value.y(), value.z()});
-    } else {
-      row.push_back(static_cast<double>(value));  // whole numbers are far below 2^53
-    }
+    row.push_back(static_cast<double>(value));  // whole numbers are far below 2^53
   }
   std::vector<double> row;
 };
 
 class Get {
  public:
-  Get(std::span<const double> row, const std::string& name) : row_(row), name_(name) {}
+  Get(std::span<const double> row, std::span<const std::optional<std::size_t>> places,
+      const std::string& name)
+      : row_(row), places_(places), name_(name) {}
 
+  void operator()(std::string_view /*field*/, double& value) { value = next().value_or(value); }
+  void operator()(std::string_view /*field*/, Vec3& v) {
+    for (double& value : v) value = next().value_or(value);
+  }
+  void operator()(std::string_view /*field*/, Rotation& q) {
+    for (double& value : q.coeffs()) value = next().value_or(value);
+  }
   template <class T>
   void operator()(std::string_view field, T& value) {
-    if constexpr (std::is_same_v<T, Vec3>) {
-      for (int axis = 0; axis < 3; ++axis) value[axis] = row_[at_++];
-    } else if constexpr (std::is_same_v<T, double>) {
-      value = row_[at_++];
-    } else if constexpr (std::is_enum_v<T>) {
-      value = static_cast<T>(static_cast<int>(whole(field, 0.0, 2.0)));
+    const std::optional<double> number = next();
+    if (!number) return;
+    if constexpr (std::is_enum_v<T>) {
+      value = static_cast<T>(static_cast<int>(whole(field, *number, 0.0, 2.0)));
     } else {
       constexpr double most = 9007199254740992.0;  // 2^53
       using Limits = std::numeric_limits<T>;
-      value = static_cast<T>(whole(field, std::max(static_cast<double>(Limits::min()), -most),
-                                   std::min(static_cast<double>(Limits::max()), most)));
+      value =
+          static_cast<T>(whole(field, *number, std::max(static_cast<double>(Limits::min()), -most),
+                               std::min(static_cast<double>(Limits::max()), most)));
     }
   }
 
  private:
-  double whole(std::string_view field, double least, double most) {
-    const double value = row_[at_++];
+  std::optional<double> next() {
+    const std::optional<std::size_t> place = places_[at_++];
+    return place ? std::optional(row_[*place]) : std::nullopt;
+  }
+  [[nodiscard]] double whole(std::string_view field, double value, double least,
+                             double most) const {
     if (!(value >= least && value <= most && value == std::floor(value)))
       throw Error(name_, "has a " + std::string(field) + " of " + std::to_string(value),
                   "it may be damaged");
@@ -123,17 +137,10 @@ class Get {
   }
 
   std::span<const double> row_;
+  std::span<const std::optional<std::size_t>> places_;
   const std::string& name_;
   std::size_t at_ = 0;
 };
-
-json numbers(const Vec3& v) {
-  return json::array({v.x(), v.y(), v.z()});
-}
-
-Vec3 vec3_of(const json& array) {
-  return {array.at(0).get<double>(), array.at(1).get<double>(), array.at(2).get<double>()};
-}
 
 // A whole number that a T can hold; JSON's own may have fractions or be of any size.
 template <class T>
@@ -145,14 +152,6 @@ T whole_of(const json& number, const std::string& name) {
     throw Error(name, "has a number that is not whole or too large",
                 "it may be damaged, or of another version of palpate");
   return number.get<T>();
-}
-
-// The names of what `walk_over` walks over.
-template <class Walk>
-std::vector<std::string> columns_of(const Walk& walk_over) {
-  Names names;
-  walk_over(names, ServoTick{});
-  return names.names;
 }
 
 // Calls `read` with the JSON in `text`; whatever does not fit is an Error about `name`.
@@ -168,20 +167,12 @@ auto parsed(const std::string& text, const std::string& name, const Read& read) 
 }  // namespace
 
 const std::vector<std::string>& tick_columns() {
-  static const std::vector<std::string> columns =
-      columns_of([](auto& way, const ServoTick& tick) { walk(way, tick); });
-  return columns;
-}
-
-const std::vector<std::string>& energy_columns() {
-  static const std::vector<std::string> columns =
-      columns_of([](auto& way, const ServoTick& tick) { walk_energy(way, tick); });
-  return columns;
-}
-
-const std::vector<std::string>& fixture_columns() {
-  static const std::vector<std::string> columns =
-      columns_of([](auto& way, const ServoTick& tick) { walk_fixtures(way, tick); });
+  static const std::vector<std::string> columns = [] {
+    Names names;
+    const ServoTick tick;
+    walk(names, tick);
+    return std::move(names.names);
+  }();
   return columns;
 }
 
@@ -192,41 +183,22 @@ std::vector<double> row_of(const ServoTick& tick) {
   return std::move(put.row);
 }
 
-std::vector<double> energy_row_of(const ServoTick& tick) {
-  Put put;
-  put.row.reserve(energy_columns().size());
-  walk_energy(put, tick);
-  return std::move(put.row);
+TickRows::TickRows(std::span<const std::string> columns) : width_(columns.size()) {
+  for (const std::string& name : tick_columns()) {
+    const auto found = std::find(columns.begin(), columns.end(), name);
+    places_.push_back(found == columns.end() ? std::nullopt
+                                             : std::optional<std::size_t>(found - columns.begin()));
+  }
 }
 
-std::vector<double> fixture_row_of(const ServoTick& tick) {
-  Put put;
-  put.row.reserve(fixture_columns().size());
-  walk_fixtures(put, tick);
-  return std::move(put.row);
-}
-
-std::vector<double> whole_row_of(const ServoTick& tick) {
-  Put put;
-  put.row.reserve(tick_columns().size() + energy_columns().size() + fixture_columns().size());
-  walk(put, tick);
-  walk_energy(put, tick);
-  walk_fixtures(put, tick);
-  return std::move(put.row);
-}
-
-ServoTick tick_of(std::span<const double> row, const std::string& name) {
-  const std::size_t with_energy = tick_columns().size() + energy_columns().size();
-  const std::size_t whole = with_energy + fixture_columns().size();
-  if (row.size() != tick_columns().size() && row.size() != with_energy && row.size() != whole)
+ServoTick TickRows::read(std::span<const double> row, const std::string& name) const {
+  if (row.size() != width_)
     throw Error(
-        name, "has " + std::to_string(row.size()) + " numbers instead of " + std::to_string(whole),
-        "it may be damaged, or of another version of palpate");
-  ServoTick tick{};
-  Get get(row, name);
+        name, "has " + std::to_string(row.size()) + " numbers instead of " + std::to_string(width_),
+        "it may be damaged");
+  ServoTick tick;
+  Get get(row, places_, name);
   walk(get, tick);
-  if (row.size() >= with_energy) walk_energy(get, tick);
-  if (row.size() == whole) walk_fixtures(get, tick);
   return tick;
 }
 
@@ -260,19 +232,14 @@ std::filesystem::path hand_folder(const std::filesystem::path& first, const std:
 }
 
 std::string to_json(const SessionInfo& info) {
-  std::vector<std::string> columns = tick_columns();
-  columns.insert(columns.end(), energy_columns().begin(), energy_columns().end());
-  columns.insert(columns.end(), fixture_columns().begin(), fixture_columns().end());
-  json object = {{"palpate", info.version},
-                 {"kind", info.kind == SessionInfo::Kind::live ? "live" : "headless"},
-                 {"cameras", info.cameras},
-                 {"device", info.device},
-                 {"epoch_ns", info.epoch},
-                 {"tick_columns", columns}};
-  if (info.seat) object["seat"] = numbers(*info.seat);
-  if (info.limits)
-    object["device_limits"] = {{"max_force", info.limits->max_force},
-                               {"continuous_force", info.limits->continuous_force}};
+  json object = {
+      {"palpate", info.version},
+      {"cameras", info.cameras},
+      {"device", info.device},
+      {"device_limits",
+       {{"max_force", info.limits.max_force}, {"continuous_force", info.limits.continuous_force}}},
+      {"epoch_ns", info.epoch},
+      {"tick_columns", tick_columns()}};
   if (!info.hand.empty()) object["hand"] = info.hand;
   if (!info.more_hands.empty()) object["more_hands"] = info.more_hands;
   if (info.frames_in_parent) object["frames_in_parent"] = true;
@@ -282,18 +249,14 @@ std::string to_json(const SessionInfo& info) {
 SessionInfo session_from_json(const std::string& text, const std::string& name) {
   return parsed(text, name, [&](const json& object) {
     SessionInfo info;
-    info.kind = object.at("kind").get<std::string>() == "live" ? SessionInfo::Kind::live
-                                                               : SessionInfo::Kind::headless;
     info.version = object.at("palpate").get<std::string>();
     info.cameras = object.at("cameras").get<std::vector<std::string>>();
     info.device = object.at("device").get<std::string>();
     info.epoch = whole_of<std::int64_t>(object.at("epoch_ns"), name);
-    if (object.contains("seat")) info.seat = vec3_of(object.at("seat"));
-    if (object.contains("device_limits")) {
-      const json& limits = object.at("device_limits");
-      info.limits = DeviceLimits{.max_force = limits.at("max_force").get<double>(),
-                                 .continuous_force = limits.at("continuous_force").get<double>()};
-    }
+    const json& limits = object.at("device_limits");
+    info.limits = {.max_force = limits.at("max_force").get<double>(),
+                   .continuous_force = limits.at("continuous_force").get<double>()};
+    info.tick_columns = object.at("tick_columns").get<std::vector<std::string>>();
     info.hand = object.value("hand", std::string());
     info.more_hands = object.value("more_hands", std::vector<std::string>());
     for (const std::string& hand : info.more_hands) {

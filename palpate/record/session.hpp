@@ -16,23 +16,17 @@ namespace palpate {
 
 /// What a recording says of its session as a whole.
 struct SessionInfo {
-  /// Who called the renderer: in a live loop a tick adopts the newest frame alone; a run as fast as
-  /// the machine can adopts each, in order.
-  enum class Kind { live, headless };
-
-  Kind kind = Kind::headless;
   std::string version{};               ///< of palpate
   std::vector<std::string> cameras{};  ///< URIs
   std::string device{};                ///< URI
   std::int64_t epoch = 0;              ///< [ns] since 1970: when the session's clock was 0
-  std::optional<Vec3> seat{};          ///< [m] where the proxy was put before the first tick
-  /// Of the device; none in recordings of which a replay cannot run the safety chain.
-  std::optional<DeviceLimits> limits{};
+  DeviceLimits limits{};               ///< of the device
   /// The hand's name, in a session of several; the recording of the first one names the others,
   /// which lie in its hand_folder().
   std::string hand{};
   std::vector<std::string> more_hands{};
   bool frames_in_parent = false;  ///< of a hand after the first: its frames are in the first one's
+  std::vector<std::string> tick_columns{};  ///< read: of its ticks; written: those of palpate now
 };
 
 /// Where the recording of a hand after the first lies within that of the first.
@@ -54,19 +48,27 @@ constexpr std::string_view transforms = "/tf";              ///< the cameras' pl
 
 constexpr std::string_view world_frame = "world";
 
-/// The numbers of /palpate/tick, in their order: a ServoTick to the bit. Those of energy_columns()
-/// and of fixture_columns() follow; recordings that are older lack them.
+/// The names of the numbers of /palpate/tick as they are written, in their order: a ServoTick to
+/// the bit.
 const std::vector<std::string>& tick_columns();
-const std::vector<std::string>& energy_columns();
-const std::vector<std::string>& fixture_columns();
-std::vector<double> row_of(const ServoTick& tick);          ///< those of tick_columns()
-std::vector<double> energy_row_of(const ServoTick& tick);   ///< those of energy_columns()
-std::vector<double> fixture_row_of(const ServoTick& tick);  ///< those of fixture_columns()
-std::vector<double> whole_row_of(const ServoTick& tick);    ///< all, as they are written
-/// What has no columns is zero.
-/// @throws Error naming `name` if the numbers are not as many as tick_columns(), or those and
-///         energy_columns(), or those and fixture_columns().
-ServoTick tick_of(std::span<const double> row, const std::string& name);
+std::vector<double> row_of(const ServoTick& tick);
+
+/// Reads the ticks of a recording, whose columns may be those of another version.
+class TickRows {
+ public:
+  /// @param columns  the names of its numbers; those that this version does not know are left out
+  explicit TickRows(std::span<const std::string> columns = tick_columns());
+
+  /// What has no column is as in a ServoTick that nothing was written to.
+  /// @throws Error naming `name` if the row has another length, or a number that cannot be.
+  [[nodiscard]] ServoTick read(std::span<const double> row, const std::string& name) const;
+  /// Is there a column for number i of tick_columns()?
+  [[nodiscard]] bool has(std::size_t i) const { return places_[i].has_value(); }
+
+ private:
+  std::size_t width_;
+  std::vector<std::optional<std::size_t>> places_;  // in a row, of each of tick_columns()
+};
 
 /// number, stamp, put_at, for each camera its number and when its frame was captured, and the tick.
 std::vector<double> row_of(const AdoptedFrame& frame);

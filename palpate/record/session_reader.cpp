@@ -59,6 +59,7 @@ SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
   read_all<ros::String>(session_topic::session, [&](const auto& message, const auto& name) {
     info_ = session_from_json(message.data, name);
   });
+  rows_ = TickRows(info_.tick_columns);
   if (info_.frames_in_parent) parent_ = parent_of(path);
   read_all<ros::String>(session_topic::settings, [&](const auto& message, const auto& name) {
     ServoCommands commands = commands_from_json(message.data, name);
@@ -112,22 +113,7 @@ void SessionReader::read_frames() {
 ServoTick SessionReader::tick(std::size_t index) {
   const BagReader::Place& place = ticks_.at(index);
   const std::string name = bag_.name(session_topic::tick, place);
-  return tick_of(ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data, name);
-}
-
-std::size_t SessionReader::numbers_of_a_tick() {
-  if (ticks_.empty()) return 0;
-  const BagReader::Place& place = ticks_.front();
-  const std::string name = bag_.name(session_topic::tick, place);
-  return ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data.size();
-}
-
-bool SessionReader::has_energy() {
-  return numbers_of_a_tick() > tick_columns().size();
-}
-
-bool SessionReader::has_fixtures() {
-  return numbers_of_a_tick() > tick_columns().size() + energy_columns().size();
+  return rows_.read(ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data, name);
 }
 
 const ServoCommands& SessionReader::commands(std::uint64_t number) const {

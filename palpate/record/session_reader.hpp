@@ -29,10 +29,8 @@ class SessionReader {
   [[nodiscard]] std::size_t ticks() const { return ticks_.size(); }
   /// @param index  from 0, in the order of the session  @throws Error if it is damaged.
   [[nodiscard]] ServoTick tick(std::size_t index);
-  /// Do its ticks have energy_columns()? As of its first one; those of old recordings do not.
-  [[nodiscard]] bool has_energy();
-  /// Do its ticks have fixture_columns()?
-  [[nodiscard]] bool has_fixtures();
+  /// Which columns its ticks have.
+  [[nodiscard]] const TickRows& rows() const { return rows_; }
   /// @throws Error if they are not in the recording.
   [[nodiscard]] const ServoCommands& commands(std::uint64_t number) const;
 
@@ -49,8 +47,8 @@ class SessionReader {
   }
   /// How frames were taken into use, by their number; none in old recordings.
   [[nodiscard]] const std::map<std::uint64_t, AdoptedFrame>& adopted() const { return adopted_; }
-  /// What the cycle remembered before the first tick; none of a session from its start, of an old
-  /// recording, or of another version's state.
+  /// What the cycle remembered before the first tick; none of a session from its start, or of
+  /// another version's state.
   [[nodiscard]] const std::optional<CycleState>& state() const { return state_; }
   /// The numbers of the frames that a tick took into use.
   /// @param before  the highest taken before it
@@ -60,7 +58,6 @@ class SessionReader {
   [[nodiscard]] std::vector<FrameInUse> seen(std::uint64_t number);
 
  private:
-  [[nodiscard]] std::size_t numbers_of_a_tick();
   struct Camera {
     std::optional<BagCamera> camera;
     std::size_t number = 0;  // of `cloud`
@@ -75,6 +72,7 @@ class SessionReader {
 
   BagReader bag_;
   SessionInfo info_;
+  TickRows rows_;
   std::unique_ptr<SessionReader> parent_;  // of the first hand, if it has the frames
   std::vector<BagReader::Place> ticks_;
   std::map<std::uint64_t, ServoCommands> commands_;

@@ -53,12 +53,8 @@ PackedImage packed_image(const Cloud& image) {
 SessionWriter::SessionWriter(const std::filesystem::path& folder, const SessionInfo& info, double t,
                              double commit_interval)
     : epoch_(info.epoch), bag_(folder), commit_interval_(commit_interval) {
-  this->info(info, t);
-  commit();
-}
-
-void SessionWriter::info(const SessionInfo& info, double t) {
   write(session_topic::session, nanoseconds(t), ros::String{to_json(info)}, true);
+  commit();
 }
 
 template <class Message>
@@ -200,10 +196,14 @@ void SessionWriter::state(const CycleState& state, double t) {
 void SessionWriter::tick(const ServoTick& tick) {
   const std::int64_t at = nanoseconds(tick.tick.t);
   const ros::Header header{ros::Time::at(at), std::string(world_frame)};
-  write(session_topic::tick, at, ros::Float64MultiArray{"tick", whole_row_of(tick)});
-  write(session_topic::hip, at, ros::PoseStamped{header, array_of(tick.tick.hip)});
-  write(session_topic::proxy, at, ros::PoseStamped{header, array_of(tick.tick.proxy)});
-  write(session_topic::force, at, ros::WrenchStamped{header, array_of(tick.force), {}});
+  write(session_topic::tick, at, ros::Float64MultiArray{"tick", row_of(tick)});
+  const auto pose = [&](const Vec3& p, const Rotation& q) {
+    return ros::PoseStamped{header, array_of(p), {q.x(), q.y(), q.z(), q.w()}};
+  };
+  write(session_topic::hip, at, pose(tick.tick.hip, tick.tick.orientation));
+  write(session_topic::proxy, at, pose(tick.tick.proxy, tick.tick.proxy_orientation));
+  write(session_topic::force, at,
+        ros::WrenchStamped{header, array_of(tick.force), array_of(tick.torque)});
   ++ticks_;
 }
 

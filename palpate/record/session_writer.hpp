@@ -41,9 +41,6 @@ class SessionWriter {
 
   // Each throws Error if the disk is full or fails; what was committed before stays.
 
-  /// Says again what the session is: the last time counts. Its epoch stays.
-  /// @param t  [s] when it was that
-  void info(const SessionInfo& info, double t);
   /// Settings, before the first tick that uses them.
   /// @param t  [s] when they were set
   void commands(const ServoCommands& commands, double t);

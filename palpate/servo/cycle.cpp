@@ -278,7 +278,8 @@ void Cycle::run(const Wake& wake) noexcept {
     reseated = true;
     method_->seat(free_side(seen_, last_proxy_, last_normal_, parameters_.proxy.r_c(), patch_));
   }
-  const Tick tick = method_->tick(hip, t);
+  const Tick tick = method_->tick(
+      HandPose{.position = hip, .orientation = workspace_.orientation_in_world(hand)}, t);
   last_proxy_ = tick.proxy;
   last_normal_ = tick.normal;
   const bool holds = hand.present && !hand.clutched && !is_faulty(hand) && !jumped && !on_hold_;
@@ -323,7 +324,7 @@ void Cycle::run(const Wake& wake) noexcept {
   // A surface's force that has yet to shrink is not added to: together they keep the limit.
   support = std::max(std::min(support, most_force - safe.force.norm()), 0.0);
   const Vec3 sent = workspace_.force_in_device(safe.force) - support * workspace_.placement().down;
-  device_.write(sent, t);
+  device_.write(Wrench{.force = sent}, t);
   const Placement& placement = workspace_.placement();
   const ServoEnergy& energy =
       passivity_.run({.t = t,
@@ -342,6 +343,7 @@ void Cycle::run(const Wake& wake) noexcept {
                          .place = hip + kept_out,
                          .force = safe.force,
                          .position = hand.position,
+                         .handle = hand.orientation.value_or(Eigen::Quaterniond::Identity()),
                          .gain = safe.gain,
                          .energy = energy,
                          .frame_stamp = last_stamp_,

@@ -84,8 +84,12 @@ struct ServoTick {
   /// [m] world: the proxy position, additionally displaced out of the forbidden regions. This
   /// position is sent to a robot.
   Vec3 place = Vec3::Zero();
-  Vec3 force = Vec3::Zero();          ///< [N] world: the force sent to the device
-  Vec3 position = Vec3::Zero();       ///< [m] of the hand, device frame
+  Vec3 force = Vec3::Zero();  ///< [N] world: the force sent to the device
+  /// [N m] world: the torque sent. Zero: no stage of the safety chain bounds a torque yet.
+  Vec3 torque = Vec3::Zero();
+  Vec3 position = Vec3::Zero();  ///< [m] of the hand, device frame
+  /// device_from_handle; of a device that tells none the identity
+  Rotation handle = Rotation::Identity();
   double gain = 0.0;                  ///< [-] of the safety chain
   ServoEnergy energy;                 ///< that the forces sent before have given to the hand
   double frame_stamp = 0.0;           ///< [s] of the frame taken last; 0 before the first

@@ -9,7 +9,7 @@
 
 #include <Eigen/Geometry>
 
-#include "palpate/kernel/core/patch.hpp"
+#include "palpate/kernel/core/hand.hpp"
 
 namespace palpate {
 
@@ -103,6 +103,9 @@ class Device {
   virtual HandState read(double t) noexcept = 0;
   /// [servo] @param force  [N] device frame, on the hand  @param t  as for `read`
   virtual void write(const Vec3& force, double t) noexcept = 0;
+  /// [servo] The same with a torque, which a device of three motors leaves out. The cycle calls
+  /// this one.
+  virtual void write(const Wrench& wrench, double t) noexcept { write(wrench.force, t); }
 
   /// Switches the motors on, with zero force. Any thread but the servo's; may wait.
   /// A device with motors overrides this and `disable`; the default is for one without.

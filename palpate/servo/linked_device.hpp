@@ -42,6 +42,7 @@ class LinkedDevice final : public Device {
   [[nodiscard]] const DeviceInfo& info() const override { return device_->info(); }
   HandState read(double t) noexcept override;
   void write(const Vec3& force, double t) noexcept override { device_->write(force, t); }
+  void write(const Wrench& wrench, double t) noexcept override { device_->write(wrench, t); }
   void enable() override { device_->enable(); }
   void disable() noexcept override { device_->disable(); }
   [[nodiscard]] std::string fault_text() const override { return device_->fault_text(); }

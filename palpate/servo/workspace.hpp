@@ -80,6 +80,15 @@ class Workspace {
     return placement_.world_from_device * Vec3(placement_.workspace_scale * held_);
   }
 
+  /// world_from_handle. A handle whose device tells no orientation is aligned with the device;
+  /// clutch and bubble do not change it.
+  [[nodiscard]] Rotation orientation_in_world(const HandState& hand) const noexcept {
+    const Rotation world_from_device(placement_.world_from_device.linear());
+    const Rotation turned(world_from_device *
+                          Rotation(hand.orientation.value_or(Eigen::Quaterniond::Identity())));
+    return turned.coeffs().allFinite() ? turned : Rotation(Rotation::Identity());
+  }
+
   /// Is the hand clutched, by the device or by the placement's button?
   [[nodiscard]] bool is_clutched(const HandState& hand) const noexcept {
     const auto& button = placement_.clutch_button;

@@ -689,7 +689,7 @@ class Session::Impl {
   [[nodiscard]] SessionInfo info_of(const SessionHand& hand) const {
     using std::chrono::nanoseconds;
     using std::chrono::system_clock;
-    SessionInfo info{.kind = SessionInfo::Kind::live, .version = options_.version};
+    SessionInfo info{.version = options_.version};
     for (const CameraSpec& camera : options_.cameras) info.cameras.push_back(camera.uri);
     info.device = hand.device().info().uri;
     info.limits = hand.device().info().limits;

@@ -25,18 +25,26 @@ constexpr double beat_time = 0.020;  // [s]
 TEST(GuardGate, PassesForcesWhileTheyComeAndAfterALapseOnlyFromZeroOn) {
   GuardGate gate(beat_time);
   const Vec3 force(0.0, 0.0, 1.0);
-  EXPECT_EQ(gate.pass(0.000, 1, force), Vec3::Zero()) << "not before the first zero force";
-  EXPECT_EQ(gate.pass(0.001, 2, Vec3::Zero()), Vec3::Zero());
-  EXPECT_EQ(gate.pass(0.002, 3, force), force);
-  EXPECT_EQ(gate.pass(0.021, 3, force), force);
-  EXPECT_EQ(gate.pass(0.023, 3, force), Vec3::Zero());
+  const auto pass = [&](double now, std::uint64_t beats, const Vec3& wanted) {
+    const Wrench passed = gate.pass(now, beats, {wanted, 0.01 * wanted});
+    EXPECT_TRUE(passed.torque == 0.01 * passed.force);
+    return passed.force;
+  };
+  EXPECT_EQ(pass(0.000, 1, force), Vec3::Zero()) << "not before the first zero force";
+  EXPECT_EQ(pass(0.001, 2, Vec3::Zero()), Vec3::Zero());
+  EXPECT_EQ(pass(0.002, 3, force), force);
+  EXPECT_EQ(pass(0.021, 3, force), force);
+  EXPECT_EQ(pass(0.023, 3, force), Vec3::Zero());
   EXPECT_TRUE(gate.closed());
-  EXPECT_EQ(gate.pass(0.024, 4, force), Vec3::Zero()) << "a process that goes on in mid-tick";
-  EXPECT_EQ(gate.pass(0.025, 5, Vec3::Zero()), Vec3::Zero());
-  EXPECT_EQ(gate.pass(0.026, 6, force), force);
-  EXPECT_EQ(gate.pass(0.027, 7, Vec3::Constant(std::numeric_limits<double>::quiet_NaN())),
-            Vec3::Zero());
-  EXPECT_EQ(gate.pass(0.028, 8, force), Vec3::Zero());
+  EXPECT_EQ(pass(0.024, 4, force), Vec3::Zero()) << "a process that goes on in mid-tick";
+  EXPECT_EQ(pass(0.025, 5, Vec3::Zero()), Vec3::Zero());
+  EXPECT_EQ(pass(0.026, 6, force), force);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(pass(0.027, 7, Vec3::Constant(nan)), Vec3::Zero());
+  EXPECT_EQ(pass(0.028, 8, force), Vec3::Zero());
+  EXPECT_EQ(pass(0.029, 9, Vec3::Zero()), Vec3::Zero());
+  EXPECT_EQ(gate.pass(0.030, 10, {force, Vec3(0.0, nan, 0.0)}).force, Vec3::Zero());
+  EXPECT_TRUE(gate.closed());
 }
 
 // What the device in the guard saw, in memory that test, session and guard share.

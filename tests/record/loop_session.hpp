@@ -16,7 +16,6 @@
 #include "palpate/record/recorder.hpp"
 
 #include "tests/record/sessions.hpp"
-#include "tests/servo/fake_device.hpp"
 
 namespace palpate::test {
 
@@ -44,9 +43,8 @@ class LoopSession {
   void record(const std::filesystem::path& folder, const RecorderOptions& options = {}) {
     const bool is_on = tick_ > 0;
     recorder_ = std::make_unique<Recorder>(
-        folder,
-        SessionInfo{.kind = SessionInfo::Kind::live, .version = "test", .limits = DeviceLimits{}},
-        cycle_->full_reader(), is_on ? [this] { begin_anew(); } : std::function<void()>{}, options);
+        folder, SessionInfo{.version = "test"}, cycle_->full_reader(),
+        is_on ? [this] { begin_anew(); } : std::function<void()>{}, options);
     recorder_->commands(cycle_->commands(), now());
     if (frame_ > 0) recorder_->frame(frame_, stamp_, 0, cloud_);
     if (second_.number > 0)

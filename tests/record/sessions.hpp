@@ -15,6 +15,8 @@
 #include "palpate/record/session_reader.hpp"
 #include "palpate/record/session_writer.hpp"
 
+#include "tests/servo/fake_device.hpp"
+
 namespace palpate::test {
 
 /// A small camera that looks down on a wavy floor which rises from frame to frame, with doubles
@@ -44,26 +46,24 @@ inline std::vector<ServoTick> record_press(SessionWriter& writer, const Paramete
                                            int ticks, bool close = true,
                                            const std::string& method = "sight") {
   const auto place = [](int i) { return Vec3(0.03 + 1e-5 * i, -0.05, -0.01 - 4e-4 * i); };
-  const auto touch = make_method(method, parameters);
-  touch->seat(place(0));
-  writer.commands({.settings = {method, parameters, {}, {}}}, 0.0);
+  FakeDevice device;
+  Cycle cycle(make_method(method, parameters), device, {method, parameters, {}, {}});
+  CycleReader reader = cycle.full_reader();
+  writer.commands(cycle.commands(), 0.0);
   std::vector<ServoTick> recorded;
-  std::shared_ptr<const Cloud> cloud;
   for (int i = 0; i < ticks; ++i) {
+    const double t = i * 1e-3;
     if (i % 33 == 0) {
-      const double stamp = i * 1e-3 - 1e-4 / 3.0;
-      const auto fresh = wavy_floor(i / 33);
-      touch->observe({*fresh, stamp});
-      cloud = fresh;
-      writer.frame(static_cast<std::uint64_t>(i / 33 + 1), stamp, 0, cloud);
+      const auto cloud = wavy_floor(i / 33);
+      const double stamp = t - 1e-4 / 3.0;
+      writer.frame(cycle.put_frame(cloud, stamp, t), stamp, 0, cloud);
     }
-    ServoTick record{};
-    record.tick = touch->tick(place(i), i * 1e-3);
-    record.force = 0.5 * record.tick.force;
-    record.number = static_cast<std::uint64_t>(i);
-    record.frame_number = static_cast<std::uint64_t>(i / 33 + 1);
-    writer.tick(record);
-    recorded.push_back(record);
+    device.hand.position = place(i);
+    device.hand.orientation = Eigen::Quaterniond(1.0, 0.1 / 3.0, 1e-3 * i, -0.2).normalized();
+    cycle.run({.t = t});
+    for (AdoptedFrame frame; reader.frames.try_pop(frame);) writer.adopted(frame);
+    reader.ticks.try_pop(recorded.emplace_back());
+    writer.tick(recorded.back());
   }
   if (close) writer.close();
   return recorded;
@@ -71,7 +71,7 @@ inline std::vector<ServoTick> record_press(SessionWriter& writer, const Paramete
 
 /// What a replay found, for messages.
 inline std::string text_of(const ReplayReport& report) {
-  std::string text = report.broken_off + report.sent_unchecked + report.check.damage;
+  std::string text = report.broken_off + report.check.damage;
   for (const ReplayDifferences* each : {&report.asked, &report.sent}) {
     if (each->first)
       text += " tick " + std::to_string(each->first->tick) + " " + each->first->field + " was " +
@@ -85,8 +85,7 @@ inline SessionInfo press_info() {
   return {.version = "test",
           .cameras = {"synthetic:floor"},
           .device = "script:",
-          .epoch = 1'700'000'000'000'000'000,
-          .seat = Vec3(0.03, -0.05, -0.01)};
+          .epoch = 1'700'000'000'000'000'000};
 }
 
 }  // namespace palpate::test

@@ -47,10 +47,8 @@ TEST(RecordedFixtures, AreReplayedBitForBit) {
     session.recorder().stop();
     EXPECT_EQ(session.recorder().status().trouble, "");
     SessionReader reader(folder.path() / "bag");
-    ASSERT_TRUE(reader.has_fixtures());
     const ReplayReport report = replay(reader);
     EXPECT_TRUE(report.identical()) << test::text_of(report);
-    EXPECT_EQ(report.sent_unchecked, "");
     std::uint32_t acting = 0;
     for (std::size_t i = 0; i < reader.ticks(); ++i) acting |= reader.tick(i).fixtures;
     EXPECT_EQ(acting & 0b1101U, 0b1101U);  // what is replayed did something

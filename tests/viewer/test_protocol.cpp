@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -123,12 +124,15 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   batch.force = Vec3(0.0, 0.0, 2.5);
   batch.gain = 0.25;
   batch.asked_force = 10.0;
+  batch.orientation = {0.5, 0.25, -0.25, 0.125};
+  batch.proxy_orientation = {1.0, 2.0, 3.0, 4.0};
+  batch.torque = {0.0, 0.0, 0.75};
   for (std::size_t i = 0; i < TickBatch::max_samples + 10; ++i)
     batch.samples.push_back(
         {100.0 - 0.001 * static_cast<double>(i), 1.0F, 0.5F, 2.0F, 3e-6F, 4e-4F, -5e-4F});
   const ViewerMessage message = ticks_message(batch);
   EXPECT_EQ(at<std::uint16_t>(message.head, 2), TickBatch::max_samples);
-  ASSERT_EQ(message.head.size(), 112 + 28 * TickBatch::max_samples);
+  ASSERT_EQ(message.head.size(), 156 + 28 * TickBatch::max_samples);
   EXPECT_EQ(at<std::uint32_t>(message.head, 4), 5u);
   EXPECT_EQ(at<double>(message.head, 8), 100.0);
   EXPECT_EQ(at<std::uint32_t>(message.head, 16), 1u << 12);
@@ -136,10 +140,14 @@ TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   EXPECT_EQ(at<std::int32_t>(message.head, 76), -1);
   EXPECT_EQ(at<float>(message.head, 80), 0.25F);
   EXPECT_EQ(at<float>(message.head, 84), 10.0F);
-  EXPECT_NEAR(at<float>(message.head, 112), 0.010, 1e-6) << "the first ten are the oldest";
-  EXPECT_EQ(at<float>(message.head, 112 + 16), 3e-6F);
-  EXPECT_EQ(at<float>(message.head, 112 + 20), 4e-4F);
-  EXPECT_EQ(at<float>(message.head, 112 + 24), -5e-4F);
+  EXPECT_EQ(at<float>(message.head, 112), 0.25F) << "x first";
+  EXPECT_EQ(at<float>(message.head, 124), 0.5F) << "w last";
+  EXPECT_EQ(at<float>(message.head, 140), 1.0F);
+  EXPECT_EQ(at<float>(message.head, 152), 0.75F);
+  EXPECT_NEAR(at<float>(message.head, 156), 0.010, 1e-6) << "the first ten are the oldest";
+  EXPECT_EQ(at<float>(message.head, 156 + 16), 3e-6F);
+  EXPECT_EQ(at<float>(message.head, 156 + 20), 4e-4F);
+  EXPECT_EQ(at<float>(message.head, 156 + 24), -5e-4F);
 }
 
 TEST(Protocol, UnderstandsAHandThatIsHeldOrLetGo) {
@@ -155,6 +163,23 @@ TEST(Protocol, UnderstandsAHandThatIsHeldOrLetGo) {
   ASSERT_TRUE(retreats && std::holds_alternative<HandMessage>(*retreats));
   EXPECT_FALSE(std::get<HandMessage>(*retreats).held);
   EXPECT_EQ(std::get<HandMessage>(*retreats).target, Vec3(0.1, -0.2, 0.3));
+}
+
+TEST(Protocol, UnderstandsAHandThatIsTurned) {
+  std::vector<std::byte> bytes = hand_bytes(1, {0.1, -0.2, 0.3});
+  bytes.resize(64);
+  const auto turned = [&](const std::array<double, 4>& xyzw) {
+    std::memcpy(bytes.data() + 32, xyzw.data(), 32);
+    return parse_binary(bytes);
+  };
+  const auto hand = turned({0.6, 0.0, 0.0, 0.8});
+  ASSERT_TRUE(hand && std::holds_alternative<HandMessage>(*hand));
+  EXPECT_EQ(std::get<HandMessage>(*hand).target, Vec3(0.1, -0.2, 0.3));
+  ASSERT_TRUE(std::get<HandMessage>(*hand).orientation);
+  EXPECT_NEAR(std::get<HandMessage>(*hand).orientation->x(), 0.6, 1e-12);
+  EXPECT_NEAR(std::get<HandMessage>(*hand).orientation->w(), 0.8, 1e-12);
+  EXPECT_FALSE(turned({0.6, 0.0, 0.0, 0.9})) << "not of length 1";
+  EXPECT_FALSE(turned({std::nan(""), 0.0, 0.0, 1.0}));
 }
 
 TEST(Protocol, RefusesAHandThatIsNowhere) {

@@ -9,7 +9,7 @@ const Colours = { none: 0, registered: 1, ownCamera: 2 } as const;
 
 const FRAME_HEADER = 96;
 const COLOUR_HEADER = 72;
-const TICKS_HEADER = 112;
+const TICKS_HEADER = 156; // from 112 on orientations and torque, which no tool shows yet
 const SAMPLE_FLOATS = 7;
 const RAYS_HEADER = 12;
 const PATH_HEADER = 8;

@@ -34,7 +34,7 @@ function frameMessage(
 }
 
 function ticksMessage(samples: number[][]): ArrayBuffer {
-  const buffer = new ArrayBuffer(112 + 28 * samples.length);
+  const buffer = new ArrayBuffer(156 + 28 * samples.length);
   const view = new DataView(buffer);
   view.setUint8(0, 2);
   view.setUint8(1, 1);
@@ -50,7 +50,7 @@ function ticksMessage(samples: number[][]): ArrayBuffer {
   view.setFloat32(84, 12, true);
   [13, 14, 15, 2, 0.5].forEach((value, i) => view.setFloat32(88 + 4 * i, value, true));
   view.setUint32(108, 5, true);
-  samples.flat().forEach((value, i) => view.setFloat32(112 + 4 * i, value, true));
+  samples.flat().forEach((value, i) => view.setFloat32(156 + 4 * i, value, true));
   return buffer;
 }
 
@@ -151,7 +151,7 @@ describe("ticks", () => {
   });
 
   test("are refused when they are cut short", () => {
-    expect(() => decode(ticksMessage([[1, 2, 3, 4, 5, 6, 7]]).slice(0, 120))).toThrow("cut short");
+    expect(() => decode(ticksMessage([[1, 2, 3, 4, 5, 6, 7]]).slice(0, 164))).toThrow("cut short");
   });
 });
 

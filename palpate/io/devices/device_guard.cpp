@@ -69,8 +69,8 @@ class Newest {
   std::array<Slot, 4> slots_{};
 };
 
-struct Force {
-  double x, y, z;  // [N] device
+struct Command {
+  std::array<double, 6> wrench;  // [N], [N m] device
   std::uint64_t beats;
 };
 
@@ -108,7 +108,7 @@ struct Memory {
   std::atomic<Phase> phase{Phase::opening};
   Text refusal{};  // written before `phase`
   Info info{};     // likewise
-  Newest<Force> force;
+  Newest<Command> command;
   Newest<Hand> hand;
   Newest<Text> fault_text;
   std::atomic<std::uint64_t> turns{0};   // of the guard's loop
@@ -209,9 +209,10 @@ class GuardTick {
 
   void run() noexcept {
     HandState state = device_.read(monotonic_now());
-    if (Force force{}; memory_.force.read(force)) {
-      wanted_ = Vec3(force.x, force.y, force.z);
-      beats_ = force.beats;
+    if (Command command{}; memory_.command.read(command)) {
+      const auto& w = command.wrench;
+      wanted_ = {Vec3(w[0], w[1], w[2]), Vec3(w[3], w[4], w[5])};
+      beats_ = command.beats;
     }
     const double now = monotonic_now();
     device_.write(gate_.pass(now, beats_, wanted_), now);
@@ -227,7 +228,7 @@ class GuardTick {
   Memory& memory_;
   Device& device_;
   GuardGate gate_;
-  Vec3 wanted_ = Vec3::Zero();  // [N] device
+  Wrench wanted_;  // device
   std::uint64_t beats_ = 0;
 };
 
@@ -343,10 +344,14 @@ class GuardedDevice final : public Device {
     return state;
   }
 
-  void write(const Vec3& force, double /*t*/) noexcept override {
-    const bool passes = enabled_.load(std::memory_order_acquire);
-    memory_->force.write(passes ? Force{force.x(), force.y(), force.z(), ++beats_}
-                                : Force{0.0, 0.0, 0.0, ++beats_});
+  void write(const Vec3& force, double t) noexcept override { write(Wrench{force}, t); }
+  void write(const Wrench& wrench, double /*t*/) noexcept override {
+    Command command{.wrench = {}, .beats = ++beats_};
+    if (enabled_.load(std::memory_order_acquire)) {
+      const auto& [f, m] = wrench;
+      command.wrench = {f.x(), f.y(), f.z(), m.x(), m.y(), m.z()};
+    }
+    memory_->command.write(command);
   }
 
   void enable() override {
@@ -390,14 +395,15 @@ class GuardedDevice final : public Device {
 
 }  // namespace
 
-Vec3 GuardGate::pass(double now, std::uint64_t beats, const Vec3& force) {
+Wrench GuardGate::pass(double now, std::uint64_t beats, const Wrench& wrench) {
   if (beats != beats_) {
     beats_ = beats;
     last_beat_ = now;
-    if (force.isZero(0.0)) closed_ = false;
+    if (wrench.force.isZero(0.0) && wrench.torque.isZero(0.0)) closed_ = false;
   }
-  if (now - last_beat_ > beat_time_ || !force.allFinite()) closed_ = true;
-  return closed_ ? Vec3::Zero() : force;
+  if (now - last_beat_ > beat_time_ || !wrench.force.allFinite() || !wrench.torque.allFinite())
+    closed_ = true;
+  return closed_ ? Wrench{} : wrench;
 }
 
 std::unique_ptr<Device> open_guarded(const std::function<std::unique_ptr<Device>()>& open,

@@ -21,11 +21,11 @@ class GuardGate {
   explicit GuardGate(double beat_time) : beat_time_(beat_time) {}
 
   /// @param now    [s]
-  /// @param beats  how many forces the session has written so far
-  /// @param force  [N] device frame: the newest of them
-  /// @return [N] zero if none came for beat_time, and from then on until the session has written a
-  ///         zero force: a process that was stopped may continue in the middle of a tick.
-  Vec3 pass(double now, std::uint64_t beats, const Vec3& force);
+  /// @param beats   how many wrenches the session has written so far
+  /// @param wrench  device frame: the newest of them
+  /// @return zero if none came for beat_time, and from then on until the session has written zero:
+  ///         a process that was stopped may continue in the middle of a tick.
+  Wrench pass(double now, std::uint64_t beats, const Wrench& wrench);
 
   /// Is the session's force kept from the device?
   [[nodiscard]] bool closed() const { return closed_; }

@@ -63,7 +63,10 @@ HandState MouseDevice::read(double t) noexcept {
   const double length = move.norm();
   if (length > max_speed_ * dt) move *= max_speed_ * dt / length;
   position_ += move;
-  return {.position = position_, .present = target_.present, .clutched = target_.clutched};
+  return {.position = position_,
+          .orientation = target_.orientation,
+          .present = target_.present,
+          .clutched = target_.clutched};
 }
 
 }  // namespace palpate

@@ -13,8 +13,10 @@ namespace palpate {
 /// Where a person at a screen wants the hand.
 struct MouseTarget {
   Vec3 position = Vec3::Zero();  ///< [m] device frame
-  bool present = true;           ///< false releases: no force until it is back
-  bool clutched = false;         ///< true: the hand moves and the HIP stays
+  /// device_from_handle, taken as it is, not made smooth
+  std::optional<Eigen::Quaterniond> orientation = {};
+  bool present = true;    ///< false releases: no force until it is back
+  bool clutched = false;  ///< true: the hand moves and the HIP stays
 };
 
 /// A hand led by few, coarse places a second (a mouse, a touch screen), made smooth.

@@ -40,6 +40,13 @@ class Method {
   /// @param hip  [m] world
   /// @param t    [s] now, on the clock of the frames' stamps
   virtual Tick tick(const Vec3& hip, double t) noexcept = 0;
+  /// The same of a hand that is turned. For a ball this is all that there is to do; a method of
+  /// tools with another shape overrides this.
+  virtual Tick tick(const HandPose& hand, double t) noexcept {
+    Tick tick = this->tick(hand.position, t);
+    tick.orientation = tick.proxy_orientation = hand.orientation;
+    return tick;
+  }
 
   /// Changes parameters between two ticks; the proxy and its contact stay.
   ///

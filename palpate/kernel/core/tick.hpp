@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-#include "palpate/kernel/core/patch.hpp"
+#include "palpate/kernel/core/hand.hpp"
 
 namespace palpate {
 
@@ -77,9 +77,12 @@ struct Tick {
   Vec3 proxy = Vec3::Zero();   ///< [m] world, centre of the sphere after the tick's steps
   Vec3 normal = Vec3::Zero();  ///< [-] unit, away from the surface; zero: nothing within r_3
   Vec3 force = Vec3::Zero();   ///< [N] world, on the hand; finite, at most max_force long
-  ContactState state = ContactState::free_motion;  ///< after the tick's steps
-  int steps = 0;                                   ///< proxy steps taken
-  double surface_velocity = 0.0;                   ///< [m/s] v of (13), towards the proxy
+  Vec3 torque = Vec3::Zero();  ///< [N m] world, on the hand about the HIP; of a ball always zero
+  Rotation orientation = Rotation::Identity();        ///< world_from_handle, as given
+  Rotation proxy_orientation = Rotation::Identity();  ///< of a ball that of the hand
+  ContactState state = ContactState::free_motion;     ///< after the tick's steps
+  int steps = 0;                                      ///< proxy steps taken
+  double surface_velocity = 0.0;                      ///< [m/s] v of (13), towards the proxy
   /// [m/s] world: of the surface at the proxy since the tick before, as tracked; corrections of the
   /// estimate by a frame are no motion
   Vec3 surface_motion = Vec3::Zero();

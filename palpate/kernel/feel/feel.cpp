@@ -135,7 +135,11 @@ Feel::Texture Feel::texture(const Vec3& push, const Movement& movement) noexcept
 }
 
 Tick Feel::tick(const Vec3& hip, double t) noexcept {
-  Tick tick = method_->tick(hip, t);
+  return tick(HandPose{.position = hip}, t);
+}
+
+Tick Feel::tick(const HandPose& hand, double t) noexcept {
+  Tick tick = method_->tick(hand, t);
   if (!feels_ || (tick.flags & non_finite_input) != 0) return tick;
   const Movement movement = move(tick);
   if ((tick.flags & (free_space_released | proxy_let_go)) != 0) forget_contact();

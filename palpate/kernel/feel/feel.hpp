@@ -29,6 +29,7 @@ class Feel final : public Method {
   void seat(const Vec3& proxy) noexcept override;
   void observe(const Observation& seen) noexcept override;
   Tick tick(const Vec3& hip, double t) noexcept override;
+  Tick tick(const HandPose& hand, double t) noexcept override;
   void set_parameters(const Parameters& parameters) noexcept override;
   [[nodiscard]] const Patch* patch() const noexcept override { return method_->patch(); }
   void check(const Cloud& cloud) const override { method_->check(cloud); }

@@ -97,9 +97,13 @@ struct HandTopics {
 
   void publish(const ros::Header& now) {
     const Tick& tick = report.newest.tick;
-    proxy.write(ros::PoseStamped{now, components(tick.proxy)});
-    hip.write(ros::PoseStamped{now, components(tick.hip)});
-    force.write(ros::WrenchStamped{now, components(report.newest.force)});
+    const auto pose = [&](const Vec3& p, const Rotation& q) {
+      return ros::PoseStamped{now, components(p), {q.x(), q.y(), q.z(), q.w()}};
+    };
+    proxy.write(pose(tick.proxy, tick.proxy_orientation));
+    hip.write(pose(tick.hip, tick.orientation));
+    force.write(
+        ros::WrenchStamped{now, components(report.newest.force), components(report.newest.torque)});
     normal.write(ros::Vector3Stamped{now, components(tick.normal)});
     contact.write(ros::UInt8{static_cast<std::uint8_t>(tick.state)});
     flags.write(ros::UInt32{report.flags});

@@ -26,9 +26,10 @@ enum class Colours : std::uint8_t { none = 0, registered = 1, own_camera = 2 };
 
 constexpr std::size_t frame_header_size = 96;
 constexpr std::size_t colour_header_size = 72;
-constexpr std::size_t ticks_header_size = 112;
+constexpr std::size_t ticks_header_size = 156;
 constexpr std::size_t sample_size = 28;
 constexpr std::size_t hand_size = 32;
+constexpr std::size_t turned_hand_size = 64;  // with an orientation
 constexpr std::size_t shown_size = 8;
 
 // Writes numbers one after the other, each aligned as docs/protocol.md says.
@@ -45,6 +46,7 @@ class Writer {
   }
   Writer& put_float(double value) { return put(static_cast<float>(value)); }
   Writer& put_vec3(const Vec3& v) { return put_float(v.x()).put_float(v.y()).put_float(v.z()); }
+  Writer& put_rotation(const Rotation& q) { return put_vec3(q.vec()).put_float(q.w()); }
 
  private:
   std::vector<std::byte>& out_;
@@ -165,6 +167,8 @@ ViewerMessage ticks_message(const TickBatch& batch) {
   writer.put_float(batch.surface_velocity).put(batch.frame);
   writer.put_float(batch.gain).put_float(batch.asked_force).put_vec3(batch.place);
   writer.put_float(batch.region).put_float(batch.guidance).put(batch.fixtures);
+  writer.put_rotation(batch.orientation).put_rotation(batch.proxy_orientation);
+  writer.put_vec3(batch.torque);
   const std::span<const TickSample> samples(batch.samples);
   for (const TickSample& sample : samples.last(count)) {
     writer.put_float(batch.t - sample.t).put(sample.force).put(sample.penetration);
@@ -186,7 +190,7 @@ std::optional<std::variant<HandMessage, ShownMessage>> parse_binary(
     std::span<const std::byte> message) {
   if (message.empty()) return std::nullopt;
   const auto kind = read<std::uint8_t>(message, 0);
-  if (kind == Kind::hand && message.size() == hand_size) {
+  if (kind == Kind::hand && (message.size() == hand_size || message.size() == turned_hand_size)) {
     const auto grip = read<std::uint8_t>(message, 1);
     if (grip > Grip::let_go_towards) return std::nullopt;
     if (grip == Grip::let_go) return HandMessage{};
@@ -195,7 +199,11 @@ std::optional<std::variant<HandMessage, ShownMessage>> parse_binary(
     // Also false for what is not a number.
     if (!(target.cwiseAbs().maxCoeff() <= max_hand_distance) || !target.allFinite())
       return std::nullopt;
-    return HandMessage{grip == Grip::held, target};
+    if (message.size() == hand_size) return HandMessage{grip == Grip::held, target};
+    const Rotation turned(read<double>(message, 56), read<double>(message, 32),
+                          read<double>(message, 40), read<double>(message, 48));
+    if (!(std::abs(turned.norm() - 1.0) <= 0.01)) return std::nullopt;
+    return HandMessage{grip == Grip::held, target, turned.normalized()};
   }
   if (kind == Kind::shown && message.size() == shown_size) {
     const auto camera = read<std::uint8_t>(message, 1);

@@ -14,6 +14,7 @@
 #include <Eigen/Geometry>
 
 #include "palpate/kernel/cloud/frame.hpp"
+#include "palpate/kernel/core/hand.hpp"
 #include "palpate/kernel/core/patch.hpp"
 
 namespace palpate {
@@ -89,9 +90,12 @@ struct TickBatch {
   double asked_force = 0.0;       ///< [N] length of all that is asked for: surface and fixtures
   /// [m] world: where the hand is kept by the surface and by forbidden regions; ServoTick::place
   Vec3 place = Vec3::Zero();
-  double region = 0.0;              ///< [N] length of what forbidden regions ask for
-  double guidance = 0.0;            ///< [N] of what guides and viscous regions ask for
-  std::uint32_t fixtures = 0;       ///< bit i: the session's fixture i gives a force
+  double region = 0.0;                          ///< [N] length of what forbidden regions ask for
+  double guidance = 0.0;                        ///< [N] of what guides and viscous regions ask for
+  std::uint32_t fixtures = 0;                   ///< bit i: the session's fixture i gives a force
+  Rotation orientation = Rotation::Identity();  ///< world_from_handle
+  Rotation proxy_orientation = Rotation::Identity();  ///< of a ball that of the hand
+  Vec3 torque = Vec3::Zero();                         ///< [N m] sent
   std::vector<TickSample> samples;  ///< oldest first; at most `max_samples` are sent, the newest
   static constexpr std::size_t max_samples = 1024;
 };
@@ -104,6 +108,8 @@ struct HandMessage {
   bool held = false;
   /// [m] world: where to. None, never of a held hand: it stays where it is.
   std::optional<Vec3> target = {};
+  /// world_from_handle; none: as the device.
+  std::optional<Rotation> orientation = {};
 };
 /// The page has drawn a frame and can take another.
 struct ShownMessage {

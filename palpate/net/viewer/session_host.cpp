@@ -404,16 +404,13 @@ std::string SessionHost::more_hands() {
 
 std::optional<TickBatch> SessionHost::ticks() {
   const double contact_radius = session_->settings().parameters.proxy.r_c();
-  std::optional<ServoTick> newest;
   for (ServoTick record{}; reader_->try_pop(record);) {
     batcher_->add(record, contact_radius);
-    newest = record;
+    paint(record, contact_radius);  // each, so that a stroke is the same however often it is drawn
   }
-  if (newest) paint(*newest, contact_radius);
   return batcher_->take();
 }
 
-// Along a stroke, a dab in each third of the brush's radius.
 // Keeps the stroke in as few places as a guide may have, however long it becomes.
 void SessionHost::follow(const Tick& tick, const Vec3& foot) {
   constexpr double finest = 0.002;   // [m]
@@ -435,15 +432,16 @@ void SessionHost::follow(const Tick& tick, const Vec3& foot) {
   stroke_spacing_ *= 2.0;
 }
 
-void SessionHost::paint(const ServoTick& newest, double contact_radius) {
-  const Tick& tick = newest.tick;
-  follow(tick, tick.proxy - contact_radius * tick.normal);
-  if (!tick.force.isZero()) touched_ = tick.proxy - contact_radius * tick.normal;
+// Along a stroke, a dab in each third of the brush's radius.
+void SessionHost::paint(const ServoTick& record, double contact_radius) {
+  const Tick& tick = record.tick;
+  const Vec3 foot = tick.proxy - contact_radius * tick.normal;
+  follow(tick, foot);
+  if (!tick.force.isZero()) touched_ = foot;
   if (!brush_ || tick.force.isZero()) {
     dabbed_.reset();
     return;
   }
-  const Vec3 foot = tick.proxy - contact_radius * tick.normal;
   if (dabbed_ && (foot - *dabbed_).norm() < brush_->radius / 3.0) return;
   dabbed_ = foot;
   try {
@@ -462,13 +460,17 @@ void SessionHost::paint(const ServoTick& newest, double contact_radius) {
 
 void SessionHost::hand(const HandMessage& hand) {
   if (mouse_ == nullptr) return;
+  std::optional<Eigen::Quaterniond> orientation;
   if (hand.target) {
     const Placement placement = session_->settings().placement;
+    if (hand.orientation)
+      orientation = Eigen::Quaterniond(placement.world_from_device.linear().transpose() *
+                                       hand.orientation->toRotationMatrix());
     const Vec3 place =
         placement.world_from_device.inverse() * *hand.target / placement.workspace_scale;
     if (is_place(place)) target_ = place;
   }
-  mouse_->aim({.position = target_, .present = hand.held});
+  mouse_->aim({.position = target_, .orientation = orientation, .present = hand.held});
 }
 
 void SessionHost::command(const Command& command, Role role) {

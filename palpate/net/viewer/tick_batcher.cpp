@@ -38,6 +38,9 @@ void TickBatcher::add(const ServoTick& record, double contact_radius) {
   batch_.region = record.region.norm();
   batch_.guidance = record.guidance.norm();
   batch_.fixtures = record.fixtures;
+  batch_.orientation = tick.orientation;
+  batch_.proxy_orientation = tick.proxy_orientation;
+  batch_.torque = record.torque;
   any_ = true;
 
   const double penetration = penetration_of(tick, contact_radius);

@@ -18,7 +18,7 @@ std::string radius_remark(const Cloud& cloud, double r_c) {
   if (points == nullptr || r_c <= usual) return {};
   return fmt::format(
       "its points are {} apart, so the proxy has r_c = {} and cannot fall between them; "
-      "--set r_c={:.3g} has the usual one",
+      "--set r_c={:.3g} sets the default",
       length_text(proposed_touch(*points).spacing), length_text(r_c), usual);
 }
 
@@ -27,7 +27,8 @@ std::string sparse_remark(const Cloud& cloud, const std::string& uri, double r_c
   if (points == nullptr) return {};
   const ProposedTouch proposed = proposed_touch(*points);
   if (proposed.spacing == 0.0)
-    return fmt::format("{} points make no surface; give a file with more", points->size());
+    return fmt::format("{} points are too few for a surface; use a file with more points",
+                       points->size());
   if (proposed.scale == 1.0 && proposed.radius <= r_c) return {};
   const bool has_proxy = proposed.scale == 1.0;
   const std::string what = fmt::format(

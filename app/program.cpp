@@ -82,10 +82,9 @@ int run_verb(int argc, char** argv, std::span<const AddVerb> own_verbs) {
   program.allow_extras();
   program.require_subcommand(0, 1);  // a verb's name behind a verb is no verb: `eval methods`
 
-  std::vector<AddVerb> adders = {add_run,          add_trace,      add_replay,    add_info,
-                                 add_methods,      add_parameters, add_calibrate, add_doctor,
-                                 add_serve_camera, add_ros,        add_teleop};
-  adders.insert(adders.begin() + 3, own_verbs.begin(), own_verbs.end());
+  std::vector<AddVerb> adders = listed_verbs();
+  adders.insert(adders.begin(), own_verbs.begin(), own_verbs.end());
+  std::stable_partition(adders.begin(), adders.end(), [](AddVerb add) { return add == &add_run; });
   std::vector<Verb> verbs;
   std::vector<std::string> words;
   for (const AddVerb add : adders) {

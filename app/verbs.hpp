@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -20,16 +21,11 @@ struct Verb {
 };
 using AddVerb = Verb (*)(CLI::App& program);
 
+/// The programs' common verbs: what verb_NAME.cpp gives by `Verb
+/// palpate::app::add_NAME(CLI::App&)`.
+std::vector<AddVerb> listed_verbs();
+
+/// The verb that a newcomer needs first.
 Verb add_run(CLI::App& program);
-Verb add_trace(CLI::App& program);
-Verb add_info(CLI::App& program);
-Verb add_replay(CLI::App& program);
-Verb add_doctor(CLI::App& program);
-Verb add_methods(CLI::App& program);
-Verb add_parameters(CLI::App& program);
-Verb add_calibrate(CLI::App& program);
-Verb add_serve_camera(CLI::App& program);
-Verb add_ros(CLI::App& program);
-Verb add_teleop(CLI::App& program);
 
 }  // namespace palpate::app

@@ -137,22 +137,43 @@ function(palpate_room name)
   endif()
 endfunction()
 
-# palpate_list_drivers(TARGET FUNCTION): adds to TARGET the function
-# std::vector<Driver> palpate::FUNCTION(), what the current folder's files NAME_driver.cpp give by
-# their functions Driver palpate::NAME_driver(). So a new driver is one file.
-function(palpate_list_drivers target function)
-  file(GLOB files CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} *_driver.cpp)
-  list(TRANSFORM files REPLACE "\\.cpp$" "()")
-  list(JOIN files ", " called)
+# palpate_list(TARGET FUNCTION TYPE HEADER DECLARE ITEM FILES [ROOM]): adds to TARGET the function
+# std::vector<TYPE> palpate::ROOM::FUNCTION(), with an entry for each file *FILES*.cpp of the
+# current folder and of PALPATE_EXTENSIONS, which become part of TARGET: what is added is one file.
+# In DECLARE and ITEM @ stands for the file's name without FILES.
+set(PALPATE_EXTENSIONS "" CACHE STRING
+    "Folders with files NAME_driver.cpp, NAME_method.cpp and verb_NAME.cpp of one's own")
+function(palpate_list target function type header declare item files)
+  set(namespace palpate ${ARGN})
+  list(JOIN namespace "::" namespace)
+  set(patterns *${files}*.cpp)
+  set(declared "")
+  set(items "")
+  foreach(folder ${PALPATE_EXTENSIONS})
+    if(NOT IS_DIRECTORY ${folder})
+      message(FATAL_ERROR "PALPATE_EXTENSIONS: there is no folder ${folder}; name it absolutely")
+    endif()
+    file(GLOB added CONFIGURE_DEPENDS ${folder}/*${files}*.cpp)
+    target_sources(${target} PRIVATE ${added})
+    list(APPEND patterns ${folder}/*${files}*.cpp)
+  endforeach()
+  file(GLOB found CONFIGURE_DEPENDS ${patterns})
+  foreach(file ${found})
+    get_filename_component(name ${file} NAME_WE)
+    string(REPLACE "${files}" "" name ${name})
+    string(REPLACE "@" "${name}" one "${declare}")
+    string(APPEND declared "${one};  // NOLINT(readability-redundant-declaration)\n")
+    string(REPLACE "@" "${name}" one "${item}")
+    string(APPEND items "${one}, ")
+  endforeach()
   set(list ${CMAKE_CURRENT_BINARY_DIR}/${function}.cpp)
   file(CONFIGURE OUTPUT ${list} @ONLY CONTENT [[
-#include "palpate/drivers/drivers.hpp"
-namespace palpate {
-Driver @called@;  // NOLINT(readability-redundant-declaration): all of the folder as one file
-std::vector<Driver> @function@() {
-  return {@called@};
+#include "@header@"
+namespace @namespace@ {
+@declared@std::vector<@type@> @function@() {
+  return {@items@};
 }
-}  // namespace palpate
+}  // namespace @namespace@
 ]])
   target_sources(${target} PRIVATE ${list})
 endfunction()

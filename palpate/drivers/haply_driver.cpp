@@ -57,7 +57,7 @@ Wanted usual_place() {
   int port = 0;
   const auto end = std::from_chars(text.data() + colon + 1, text.data() + text.size(), port).ptr;
   if (end != text.data() + text.size() || port < 1 || port > 65535)
-    throw Error("PALPATE_HAPLY", "'" + text + "' is no place of a service",
+    throw Error("PALPATE_HAPLY", "'" + text + "' is not the address of a service",
                 "write HOST:PORT, such as localhost:10001");
   wanted.port = port;
   return wanted;
@@ -448,7 +448,7 @@ DriverReport look() {
 Driver haply_driver() {
   return {.name = "haply",
           .summary = "Haply's Inverse3, Inverse3x and Minverse, by their Inverse Service",
-          .tried = "an emulator of the service alone",
+          .tried = "only an emulator of the service",
           .open_device = haply::open_inverse,
           .look = reporting(haply::look),
           .needs_guard = true};

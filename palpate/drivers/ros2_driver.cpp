@@ -216,11 +216,11 @@ class Hand final : public ChannelHand {
       if (is_told && is_taken) return;
       if (monotonic_now() < end) continue;
       const std::string where = " in domain " + std::to_string(participant_.domain());
-      throw Error(
-          wanted_.uri,
-          is_told ? "nobody takes forces as " + wanted_.force_type + " on " + wanted_.force + where
-                  : "no pose comes as " + wanted_.pose_type + " on " + wanted_.pose + where,
-          "start the haptic node, or name its topics with ?pose= and ?force=");
+      throw Error(wanted_.uri,
+                  is_told ? "no node subscribes to forces of type " + wanted_.force_type + " on " +
+                                wanted_.force + where
+                          : "no pose comes as " + wanted_.pose_type + " on " + wanted_.pose + where,
+                  "start the haptic node, or name its topics with ?pose= and ?force=");
     }
   }
 
@@ -341,7 +341,7 @@ Driver ros2_driver() {
           .summary =
               "ros2:/TOPIC of a camera's depth or points, ros2:fd and others as haptic devices, "
               "on the network of ROS 2",
-          .tried = "Cyclone DDS's own writers; no ROS 2 beside it",
+          .tried = "only simulated Cyclone DDS nodes, without ROS 2",
           .open_camera = open_ros2_camera,
           .open_device = open_ros2_device,
           .look = reporting(ros2::look),

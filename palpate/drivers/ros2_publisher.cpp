@@ -36,7 +36,7 @@ std::string checked_name(const std::string& name) {
                   [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '/'; }) &&
       name.front() != '/' && name.back() != '/' && name.find("//") == std::string::npos;
   if (!is_good)
-    throw Error("name", "'" + name + "' is none for a topic",
+    throw Error("name", "'" + name + "' is not a valid topic name",
                 "write letters, digits and _, such as robot/camera");
   return name;
 }

@@ -29,7 +29,7 @@ std::string report_topic(const std::string& camera);
 /// slices come.
 class Ros2CameraPublisher {
  public:
-  /// @throws Error if `name` is none for a topic, or DDS is missing.
+  /// @throws Error if `name` is not a valid topic name, or DDS is missing.
   explicit Ros2CameraPublisher(const std::string& name, DepthPacking packing = DepthPacking::rvl);
   ~Ros2CameraPublisher();
 

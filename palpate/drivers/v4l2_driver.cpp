@@ -138,7 +138,7 @@ class Camera final : public LiveCamera {
         rays_(std::make_shared<const ViewingRays>(lens_.intrinsics)) {
     if (!node_.is_open()) fail("it cannot be opened");
     if (!node_.captures())
-      throw Error(info_.uri, "it is no video node that captures", "palpate doctor lists those");
+      throw Error(info_.uri, "it is not a video capture device", "palpate doctor lists those");
     info_.kind = node_.name();
     info_.sensor = lens_.sensor;
     choose_format();
@@ -289,7 +289,7 @@ namespace palpate {
 Driver v4l2_driver() {
   return {.name = "v4l2",
           .summary = "v4l2:/dev/videoN?intrinsics=FILE.json, depth as Z16 by the kernel",
-          .tried = "a fake of the kernel's calls alone",
+          .tried = "only mocked kernel calls",
           .usb = {},
           .open_camera = [](const Uri& uri) -> std::unique_ptr<Source> {
             return std::make_unique<v4l2::Camera>(uri);

@@ -105,10 +105,10 @@ WebSocketClient::WebSocketClient(const std::string& host, int port, double timeo
     std::size_t head = std::string::npos;
     while ((head = bytes_.find("\r\n\r\n")) == std::string::npos) {
       if (bytes_.size() > largest_head || !read_some(end - monotonic_now()))
-        throw Error(place_, "what is there does not answer as a WebSocket does");
+        throw Error(place_, "the server does not answer as a WebSocket");
     }
     if (bytes_.find(" 101 ") > bytes_.find("\r\n"))
-      throw Error(place_, "what is there speaks no WebSocket (" +
+      throw Error(place_, "the server does not support WebSocket (" +
                               bytes_.substr(0, std::min<std::size_t>(bytes_.find("\r\n"), 60)) +
                               ")");
     bytes_.erase(0, head + 4);

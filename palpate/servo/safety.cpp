@@ -54,7 +54,7 @@ constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "the force fades: a camera's newest frame is old",
     "no force: a camera has sent no frame that can be used for too long",
     "no force: the hand was faster than max_speed",
-    "the force starts again from nothing: the loop missed its deadlines",
+    "the force restarts from zero: the loop missed its deadlines",
     "no force: the method's surface normal contradicts the direction from the HIP to the proxy",
     "no force: repeated faults; an operator has to reset the safety chain",
     "the surface is softened because it kept up an oscillation",

@@ -112,7 +112,7 @@ void check_name(const std::string& name, std::span<const std::unique_ptr<Session
   constexpr std::size_t longest = 40;
   const bool begins = !name.empty() && name.front() >= 'a' && name.front() <= 'z';
   if (!begins || name.size() > longest || !std::all_of(name.begin(), name.end(), fits))
-    throw Error("hand '" + name + "'", "that is no name for a hand",
+    throw Error("hand '" + name + "'", "the name is not valid",
                 "use small letters, digits and _, beginning with a letter, at most 40 in all");
   for (const auto& hand : before) {
     if (hand->name() == name)
@@ -200,7 +200,7 @@ class Session::Impl {
     refuse_if_stopped();
     if (started_) return;
     if (!is_live())
-      throw Error("session", "a free-running session has no time of its own to start in",
+      throw Error("session", "a free-running session cannot be started in real time",
                   "call run, or choose real time");
     try {
       for (const auto& hand : hands_) hand->loop()->start();
@@ -564,7 +564,7 @@ class Session::Impl {
         cloud = std::move(made);
       }
     } catch (const std::exception& error) {
-      trouble = std::string("what it is made of is not known: ") + error.what();
+      trouble = std::string("its materials could not be assigned: ") + error.what();
     }
     const std::lock_guard lock(frames_mutex_);
     materials_trouble_[camera] = std::move(trouble);

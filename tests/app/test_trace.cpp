@@ -166,7 +166,7 @@ TEST_F(Trace, TouchesSparsePointsByALargerProxyUnlessOneIsChosen) {
   ASSERT_EQ(felt.code, 0) << felt.err;
   EXPECT_GT(nlohmann::json::parse(felt.out)["max_force_asked"].get<double>(), 2.0);
   EXPECT_TRUE(says(felt.err, "the proxy has r_c = 10")) << felt.err;
-  EXPECT_TRUE(says(felt.err, "--set r_c=0.005 has the usual one")) << felt.err;
+  EXPECT_TRUE(says(felt.err, "--set r_c=0.005 sets the default")) << felt.err;
   const Outcome usual = run(press + " --set r_c=0.005");
   EXPECT_FALSE(says(usual.err, "the proxy has r_c")) << usual.err;
 }

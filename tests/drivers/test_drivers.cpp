@@ -11,8 +11,6 @@
 
 namespace palpate {
 
-std::vector<Driver> strangers_drivers();  // of this folder's files *_driver.cpp
-
 namespace test_drivers {
 
 TEST(Drivers, AreKindsOfSourceAndDeviceLikeAnyOther) {
@@ -38,13 +36,6 @@ TEST(Drivers, AreKindsOfSourceAndDeviceLikeAnyOther) {
   EXPECT_EQ(all_sources(drivers).try_find("my-arm"), nullptr);
   EXPECT_NE(all_devices().try_find("hand"), nullptr);
   EXPECT_NE(all_sources().try_find("synthetic"), nullptr);
-}
-
-TEST(Drivers, AreListedByTheirFilesAlone) {
-  const Registry<Driver> drivers("driver", ":", strangers_drivers());
-  ASSERT_EQ(drivers.entries().size(), 1U);
-  const auto arm = open_device("stranger:", std::nullopt, all_devices(drivers));
-  EXPECT_EQ(arm->read(0.0).position, Vec3(1.0, 2.0, 3.0));
 }
 
 TEST(Drivers, ReportWhatTheirLookMeets) {

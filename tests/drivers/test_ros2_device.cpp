@@ -239,7 +239,7 @@ TEST_F(Ros2Device, SaysWhatIsMissingOrWrong) {
   Node node(plain);
   EXPECT_TRUE(
       test::fails_saying([] { return open("ros2:?pose=/hand/pose&force=/hand/push&wait=1s"); },
-                         "nobody takes forces as WrenchStamped on /hand/push"));
+                         "no node subscribes to forces of type WrenchStamped on /hand/push"));
 }
 
 // What the test below starts as a process of its own: a session that pushes.

@@ -644,7 +644,7 @@ test("the hand leads a tool at the other end of a link, and sees where it is", a
   await page.mouse.move(at.x, at.y);
   await page.mouse.down();
   await until(page, (seen) => seen.state !== 0 && seen.force > 0.3);
-  await expect.poll(() => page.locator("#robot").textContent()).toContain("robot is led");
+  await expect.poll(() => page.locator("#robot").textContent()).toContain("robot follows commands");
   // The tool comes to the proxy, and stays on the surface as that does.
   await expect
     .poll(async () => distance((await tool())!, (await glimpse(page)).proxy))
@@ -739,7 +739,7 @@ test("a wrong or missing token is said on the page", async () => {
   program = await Program.start(DESK);
   const page = await browser.newPage();
   await page.goto(new URL("?token=of-an-earlier-session", program.viewersUrl).href);
-  await expect.poll(() => toast(page)).toContain("this page looks on");
+  await expect.poll(() => toast(page)).toContain("is for viewing only");
 });
 
 test("help opens at its beginning", async () => {

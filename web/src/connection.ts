@@ -20,8 +20,8 @@ export interface Presence {
 
 /** What a page says whose token opens nothing, though none is needed. */
 export const unknownToken =
-  "The token in this page's address is wrong or of an earlier session: this page looks on. " +
-  "To operate the session, open the link that the program printed.";
+  "The token in this page's address is wrong or of an earlier session: this page is for viewing " +
+  "only. To operate the session, open the link that the program printed.";
 
 /** Why the program lets no session begin; null: that is not why. @param status  of HTTP */
 export function refusalText(status: number, hasToken: boolean): string | null {

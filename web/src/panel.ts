@@ -8,7 +8,7 @@ import type { Hello, ParameterRow, Role, State } from "./protocol";
 export const roleNames: Record<Role, { name: string; may: string }> = {
   looking: {
     name: "looking on",
-    may: "This page looks on. Take the hand to move it and to set the method's parameters.",
+    may: "For viewing only. Take control of the HIP to move it and to set the method's parameters.",
   },
   holding: {
     name: "hand holder",
@@ -450,7 +450,7 @@ export class Panel {
           (how === "live" ? `, ${rate.toFixed(1)} Hz` : ` · ${how}`),
       ]),
       ...(inOwnFrame && state.cameras[0]?.frames !== 1
-        ? [["World", "the camera's own frame, no pose being known: the hand goes with it"] as Fact]
+        ? [["World", "the camera frame, as no pose is known: the HIP moves with it"] as Fact]
         : []),
       [
         "Hand",

@@ -88,13 +88,13 @@ const NONE: readonly [flag: string, say: Say][] = [
   ["non_finite_input", () => "the hand's place is not finite."],
   ["no_frame", () => "there is no frame to touch yet."],
   ["frame_lost", () => "a camera has sent no usable frame for too long."],
-  ["hand_too_fast", () => "the hand was faster than it may be."],
+  ["hand_too_fast", () => "the hand moved faster than max_speed."],
   [
     "disengaged",
     (facts) => (touches(facts.tick) && !isLeft(facts) ? "pull back, then push in again." : ""),
   ],
   ["free_space_released", () => "the camera sees free space around the hand."],
-  ["proxy_let_go", () => "the proxy was too far from the hand and starts anew there."],
+  ["proxy_let_go", () => "the proxy was too far from the hand and was reset to it."],
 ];
 
 // What changes a force that is asked for, likewise.
@@ -119,7 +119,8 @@ const LESS: readonly [flag: string, say: Say][] = [
   ["force_saturated", ({ tick }) => (touches(tick) ? "Limited by the method's max force." : "")],
   [
     "pull_removed",
-    ({ tick }) => (changes(tick) ? "Less, as what pulled into the surface is removed." : ""),
+    ({ tick }) =>
+      changes(tick) ? "Reduced: the part that pulled into the surface was removed." : "",
   ],
   ["slew_cut", ({ tick }) => (changes(tick) ? "Changing as fast as it may." : "")],
 ];

@@ -23,7 +23,7 @@ namespace {
 constexpr std::size_t footer_content = 20;           // [bytes]
 constexpr std::uint64_t largest_record = 1U << 28U;  // [bytes] in memory, when decompressed, too
 constexpr std::size_t most_mcap_messages = std::size_t{1} << 25U;
-constexpr const char* mcap_remedy = "copy it again, or keep what is whole with mcap recover";
+constexpr const char* mcap_remedy = "copy it again, or save the undamaged part with mcap recover";
 
 class McapFile final : public BagFile {
  public:
@@ -208,7 +208,7 @@ class McapFile final : public BagFile {
     static_cast<void>(fields.number<std::uint64_t>());  // when it was published
     if (!channels_.contains(channel))
       at(record).fail("has a message of channel " + std::to_string(channel) +
-                      ", which is none of the file's");
+                      ", which is not declared in the file");
     return {logged, record, offset, channel};
   }
 
@@ -295,7 +295,7 @@ class McapFile final : public BagFile {
           walked.data_end = place;
           walked.data_crc = RecordFields(content, at(place)).number<std::uint32_t>();
           if (closed_ && record->end() != summary_)
-            at(place).fail("ends its data at another place than where its summary begins");
+            at(place).fail("has a gap between its data and its summary");
           expect_all(walked);
           return;
         }

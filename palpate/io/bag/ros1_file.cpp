@@ -27,7 +27,7 @@ constexpr std::uint64_t largest_ros1_record = 1U << 28U;  // [bytes] in memory, 
 constexpr std::size_t most_ros1_messages = std::size_t{1} << 25U;
 constexpr std::size_t most_ros1_connections = 100'000;
 constexpr std::size_t ros1_index_entry = 12;  // [bytes] time and offset
-constexpr const char* ros1_remedy = "copy it again, or keep what is whole with rosbag reindex";
+constexpr const char* ros1_remedy = "copy it again, or save the undamaged part with rosbag reindex";
 
 enum class Ros1Kind : std::uint8_t {
   message = 2,
@@ -251,7 +251,7 @@ class Ros1File final : public BagFile {
   void expect_connection(std::uint32_t connection, std::uint64_t place) const {
     if (!connections_.contains(connection))
       at(place).fail("has a message of connection " + std::to_string(connection) +
-                     ", which is none of the file's");
+                     ", which is not declared in the file");
   }
 
   void add(const Entry& entry) {

@@ -335,10 +335,11 @@ std::unique_ptr<Source> open_depth(const Uri& uri) {
   if (!camera) {
     for (const char* key : {"fx", "fy", "cx", "cy", "units"}) {
       if (uri.has(key)) continue;
-      throw Error(uri.text(),
-                  "has no intrinsics.json beside its images or one folder above, nor an option '" +
-                      std::string(key) + "'",
-                  "give fx, fy, cx, cy [px] and units (raw values per metre)");
+      throw Error(
+          uri.text(),
+          "has no intrinsics.json in the image folder or one folder above, and no option '" +
+              std::string(key) + "'",
+          "give fx, fy, cx, cy [px] and units (raw values per metre)");
     }
     const DepthPng first = read_depth_png(files.front());
     camera.emplace().intrinsics = {.width = first.width, .height = first.height};

@@ -332,7 +332,7 @@ void read_binary_row(Cursor& file, const Element& element, std::endian order, st
         faces.corners.push_back(integer(property.type, list + k * size));
       }
       add_triangles(element, faces, [&](const std::string& reason) {
-        file.fail_at_offset(reason, "write the file anew, or leave its faces out");
+        file.fail_at_offset(reason, "write the file again, or remove its faces");
       });
     } else if (property.into != nullptr) {
       detail::load_column(value, 0, property.type, order, {&(*property.into)[row], 1},

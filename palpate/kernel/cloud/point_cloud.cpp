@@ -263,8 +263,7 @@ void BruteForceCloud::gather(const Beam& beam, std::size_t /*max_points*/,
 
 CloudSet::CloudSet(std::vector<std::shared_ptr<const Cloud>> clouds) : clouds_(std::move(clouds)) {
   if (clouds_.size() > Patch::max_views) {
-    throw Error("set of clouds",
-                std::to_string(clouds_.size()) + " are more than can be touched at once",
+    throw Error("set of clouds", std::to_string(clouds_.size()) + " clouds are too many",
                 "give at most " + std::to_string(Patch::max_views));
   }
   for (std::size_t i = 0; i < clouds_.size(); ++i) {

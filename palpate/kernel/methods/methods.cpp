@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/kernel/methods/methods.hpp"
 
+#include <vector>
+
 #include "palpate/kernel/feel/feel.hpp"
 #include "palpate/kernel/paper/paper.hpp"
 #include "palpate/kernel/sight/sight.hpp"
 
 namespace palpate {
+
+std::vector<MethodInfo> listed_methods();  // made by CMake of files *_method.cpp
+
 namespace {
 
 template <Paper::Variant variant>
@@ -13,18 +18,25 @@ std::unique_ptr<Method> make_paper(const Parameters& parameters) {
   return std::make_unique<Paper>(parameters, variant);
 }
 
+MethodRegistry with_listed(MethodRegistry methods) {
+  for (const MethodInfo& method : listed_methods()) methods.add(method);
+  return methods;
+}
+
 }  // namespace
 
 const MethodRegistry& standard_methods() {
-  static const MethodRegistry methods(
-      "method", "",
-      {{"paper", "Rydén and Chizeck 2013, errata corrected", make_paper<Paper::Variant::corrected>},
-       {"paper-as-printed", "Rydén and Chizeck 2013, to the letter",
-        make_paper<Paper::Variant::as_printed>},
-       {"fixed-step", "Rydén 2011 [1]: steps of 0.1 r_1, no velocity",
-        make_paper<Paper::Variant::fixed_step>},
-       {"sight", "tracks the surface along the camera's lines of sight (docs/sight.md)",
-        [](const Parameters& parameters) { return std::make_unique<Sight>(parameters); }}});
+  static const MethodRegistry methods = with_listed(
+      {"method",
+       "",
+       {{"paper", "Rydén and Chizeck 2013, errata corrected",
+         make_paper<Paper::Variant::corrected>},
+        {"paper-as-printed", "Rydén and Chizeck 2013, to the letter",
+         make_paper<Paper::Variant::as_printed>},
+        {"fixed-step", "Rydén 2011 [1]: steps of 0.1 r_1, no velocity",
+         make_paper<Paper::Variant::fixed_step>},
+        {"sight", "tracks the surface along the camera's lines of sight (docs/sight.md)",
+         [](const Parameters& parameters) { return std::make_unique<Sight>(parameters); }}}});
   return methods;
 }
 

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string_view>
+#include <vector>
 
 #include "palpate/kernel/core/method.hpp"
 
@@ -11,7 +12,8 @@ namespace palpate {
 /// The default method of library and programs.
 inline constexpr std::string_view default_method = "sight";
 
-/// The library's methods, in the order in which they are shown. Copy it to add methods.
+/// The library's methods, in the order in which they are shown, and those of PALPATE_EXTENSIONS: of
+/// files NAME_method.cpp with a function `MethodInfo NAME_method()`. A program adds to a copy.
 const MethodRegistry& standard_methods();
 
 /// A method by its name, with what surfaces feel like around it (`Feel`).

@@ -134,8 +134,7 @@ ViewerMessage points_message(const FrameHeader& header, std::vector<float> xyz,
 }
 
 ViewerMessage path_message(std::uint8_t camera, std::vector<float> txyz) {
-  if (txyz.size() % 4 != 0)
-    throw Error("path for the viewer", "there are not four numbers for each place");
+  if (txyz.size() % 4 != 0) throw Error("path for the viewer", "each point needs four numbers");
   ViewerMessage message;
   Writer(message.head)
       .put(Kind::path)

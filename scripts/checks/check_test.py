@@ -71,6 +71,13 @@ class Rooms(Tree):
                          ["palpate/kernel/core/c.cpp:2: core includes thread",
                           "palpate/kernel/core/d.cpp:2: core includes nlohmann/json.hpp"])
 
+    def test_forces_are_the_same_on_every_machine(self):
+        self.write("palpate/kernel/sight/a.cpp", SPDX + "double a = std::exp(1.0);\n")
+        self.write("palpate/kernel/sight/b.cpp", SPDX + "double a = std::sqrt(math::exp(1.0));\n")
+        self.write("palpate/io/sources/c.cpp", SPDX + "double a = std::exp(1.0);\n")
+        self.assertEqual([fault.split(";")[0] for fault in check.check_rooms(self.root)],
+                         ["palpate/kernel/sight/a.cpp:2: calls the mathematical library"])
+
     def test_the_field_set_stays_apart_from_what_it_judges(self):
         self.include("lab/field/a.cpp", '"palpate/kernel/cloud/frame.hpp"')
         self.include("lab/field/b.cpp", '"palpate/io/sources/shapes.hpp"')

@@ -9,9 +9,11 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <numbers>
 #include <span>
 #include <string>
 
+#include "palpate/kernel/core/mathematics.hpp"
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/record/recorder.hpp"
 
@@ -74,7 +76,7 @@ class LoopSession {
           Vec3(0.03 + 1e-5 * tick_, -0.05, -0.02 - 1e-4 * std::min(tick_.load(), 300));
       // It swings with 14 Hz, as a hand on a surface that oscillates does.
       if (tick_ > 100)
-        device_.hand.position.z() += 2e-3 * std::sin(2e-3 * std::acos(-1.0) * 14 * tick_);
+        device_.hand.position.z() += 2e-3 * math::sin(2e-3 * std::numbers::pi * 14 * tick_);
       // Now and then the device's clutch, nobody at it, a fault, and its reset.
       device_.hand.clutched = tick_ % 120 >= 110;
       device_.hand.present = tick_ % 170 < 165;

@@ -4,12 +4,14 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/mathematics.hpp"
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/record/replay.hpp"
 #include "palpate/record/session_reader.hpp"
@@ -29,14 +31,15 @@ inline std::shared_ptr<const DepthImage> wavy_floor(int frame, bool distorted = 
   std::mt19937 random(static_cast<unsigned>(frame));
   std::vector<std::uint16_t> depth;
   for (int i = 0; i < k.width * k.height; ++i) {
-    const double wave = 20.0 * std::sin(0.3 * (i % k.width));
+    const double wave = 20.0 * math::sin(0.3 * (i % k.width));
     const auto noise = static_cast<double>(random() % 5);
     depth.push_back(static_cast<std::uint16_t>(1000.0 + wave + noise - 3.0 * frame));
   }
   depth[5] = 0;
   depth[6] = 65535;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.rotate(Eigen::AngleAxisd(std::acos(-1.0) - 0.1 / 3.0, Vec3::UnitX()));
+  const double tilt = 0.5 * (std::numbers::pi - 0.1 / 3.0);
+  pose.rotate(Eigen::Quaterniond(math::cos(tilt), math::sin(tilt), 0.0, 0.0));
   pose.translation() = Vec3(0.1, -0.2, 1.0) / 3.0;
   return std::make_shared<DepthImage>(rays, std::move(depth), 3000.0 / 1.1, pose);
 }

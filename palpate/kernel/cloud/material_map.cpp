@@ -8,6 +8,7 @@
 
 #include "palpate/kernel/cloud/frame.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/mathematics.hpp"
 #include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
@@ -16,9 +17,11 @@ namespace {
 // sRGB to CIELAB, white D65.
 Vec3 lab(double red, double green, double blue) {
   const auto linear = [](double c) {
-    return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+    return c <= 0.04045 ? c / 12.92 : math::pow((c + 0.055) / 1.055, 2.4);
   };
-  const auto root = [](double t) { return t > 0.008856 ? std::cbrt(t) : 7.787 * t + 16.0 / 116.0; };
+  const auto root = [](double t) {
+    return t > 0.008856 ? math::pow(t, 1.0 / 3.0) : 7.787 * t + 16.0 / 116.0;
+  };
   const double r = linear(red / 255.0);
   const double g = linear(green / 255.0);
   const double b = linear(blue / 255.0);

@@ -130,7 +130,7 @@ std::optional<Eigen::Isometry3d> fit_pose(const std::vector<Sample>& samples, in
   Eigen::Matrix3d m;
   for (int row = 0; row < 3; ++row) m.row(row) = best.segment(row * columns, 3).transpose();
   if (m.determinant() < 0.0) m = -m;
-  if (!(m.determinant() > least_determinant * std::pow(m.norm(), 3))) return std::nullopt;
+  if (!(m.determinant() > least_determinant * m.norm() * m.squaredNorm())) return std::nullopt;
   const Eigen::Matrix3d inverse = m.inverse();
   Vec3 at = middle;
   if (!centre) {

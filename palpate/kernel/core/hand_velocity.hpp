@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cmath>
 #include <optional>
 
+#include "palpate/kernel/core/mathematics.hpp"
 #include "palpate/kernel/core/patch.hpp"
 
 namespace palpate {
@@ -17,7 +17,7 @@ class HandVelocity {
   void update(const Vec3& hip, double t) noexcept {
     const double dt = t - t_;
     if (hip_ && dt > 0.0 && dt < longest_gap) {
-      velocity_ += (1.0 - std::exp(-dt / time_constant)) * ((hip - *hip_) / dt - velocity_);
+      velocity_ += -math::expm1(-dt / time_constant) * ((hip - *hip_) / dt - velocity_);
     } else if (!hip_ || dt != 0.0) {
       velocity_ = Vec3::Zero();
     }

@@ -5,9 +5,8 @@
 
 #include "palpate/kernel/core/vectorise.hpp"
 
-// Plain loops that the compiler turns into vector code. This file is compiled with leave to add in
-// any order and to take every number for finite (CMakeLists.txt): that is what makes a sum or a
-// minimum a vector operation, down to its last few lanes.
+// Plain loops that the compiler turns into vector code. This file is compiled with leave to take
+// every number for finite (CMakeLists.txt): that is what makes a minimum a vector operation.
 
 namespace palpate {
 namespace {

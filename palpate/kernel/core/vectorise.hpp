@@ -3,10 +3,11 @@
 
 #include <string_view>
 
-// PALPATE_VECTORISED on a function with a `#pragma omp simd` loop: compiled once per instruction
-// set, the best one picked when the program starts. Sanitizers can't run inside that choice, so
-// their builds have the portable code only, as do other processors and systems. The sets can give
-// other last bits; CMake's PALPATE_VECTOR_SET leaves some out, to make those of another processor.
+// PALPATE_VECTORISED on a function with a vector loop: compiled once per instruction set, the best
+// one picked when the program starts. Sanitizers can't run inside that choice, so their builds have
+// the portable code only, as do other processors and systems. All sets give the same bits, as sums
+// go through core/lanes.hpp; CMake's PALPATE_VECTOR_SET leaves some out, to measure the time of the
+// others.
 #if !defined(__x86_64__) || !defined(__linux__) || defined(PALPATE_SANITIZED) || \
     defined(PALPATE_VECTOR_SET_DEFAULT)
 #define PALPATE_VECTORISED

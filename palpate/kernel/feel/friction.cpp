@@ -2,8 +2,9 @@
 #include "palpate/kernel/feel/friction.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
+
+#include "palpate/kernel/core/mathematics.hpp"
 
 namespace palpate {
 namespace {
@@ -22,7 +23,7 @@ double sliding_share(double bend, bool back) {
   if (back || bend <= elastic) return 0.0;
   if (bend >= 1.0) return 1.0;
   const double x = (bend - elastic) / (1.0 - elastic);
-  return 0.5 - 0.5 * std::cos(std::numbers::pi * x);
+  return 0.5 - 0.5 * math::cos(std::numbers::pi * x);
 }
 
 }  // namespace
@@ -36,7 +37,7 @@ Vec3 Friction::update(const Vec3& push, const Vec3& moved, const Vec3& velocity,
                       double dt) noexcept {
   const double normal_force = push.norm();
   const FrictionParameters& p = parameters_;
-  pressed_ = std::max(normal_force, pressed_ * std::exp(-std::max(dt, 0.0) / memory));
+  pressed_ = std::max(normal_force, pressed_ * math::exp(-std::max(dt, 0.0) / memory));
   if (!(pressed_ > least_push)) {
     reset();
     return Vec3::Zero();
@@ -58,7 +59,7 @@ Vec3 Friction::update(const Vec3& push, const Vec3& moved, const Vec3& velocity,
     // hand's speed would let a hand that sticks and trembles slip.
     const double faster = sliding_ * speed / p.stribeck_speed;
     const double coefficient =
-        p.friction * (p.kinetic_share + (1.0 - p.kinetic_share) * std::exp(-faster * faster));
+        p.friction * (p.kinetic_share + (1.0 - p.kinetic_share) * math::exp(-faster * faster));
     const double steady = coefficient * pressed_ / p.bristle_stiffness;  // [m]
     const double bend = bristle_.norm() / steady;
     sliding_ = sliding_share(bend, bristle_.dot(step) < 0.0);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "palpate/kernel/core/mathematics.hpp"
+
 namespace palpate {
 namespace {
 
@@ -39,9 +41,9 @@ double Grain::update(double length, double speed, double dt) noexcept {
   const double turn = 2.0 * std::numbers::pi * std::min(wanted, top) * dt;
   if (std::abs(turn - turn_) > same_turn * turn_) {
     turn_ = turn;
-    const double decay = std::exp(-half_width * turn);
-    pole_real_ = decay * std::cos(turn);
-    pole_imaginary_ = decay * std::sin(turn);
+    const double decay = math::exp(-half_width * turn);
+    pole_real_ = decay * math::cos(turn);
+    pole_imaginary_ = decay * math::sin(turn);
     kick_ = std::sqrt(1.0 - decay * decay);
   }
   const double real = real_;

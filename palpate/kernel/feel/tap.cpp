@@ -2,8 +2,9 @@
 #include "palpate/kernel/feel/tap.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
+
+#include "palpate/kernel/core/mathematics.hpp"
 
 namespace palpate {
 namespace {
@@ -26,8 +27,8 @@ Vec3 Tap::update(double pressed, const Vec3& normal, double approach, const TapP
   const double since = t - struck_at_;
   if (!(since >= 0.0 && since < longest)) return Vec3::Zero();
   const double left = std::min((longest - since) / ending, 1.0);
-  const double ringing = size_ * left * std::exp(-material_.tap_decay * since) *
-                         std::cos(2.0 * std::numbers::pi * material_.tap_frequency * since);
+  const double ringing = size_ * left * math::exp(-material_.tap_decay * since) *
+                         math::cos(2.0 * std::numbers::pi * material_.tap_frequency * since);
   return ringing * normal;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/kernel/core/mathematics.hpp"
 #include "palpate/kernel/paper/proxy.hpp"
 
 namespace palpate {
@@ -21,7 +22,7 @@ constexpr double side_jump = 2.0;
 
 void PointMover::set(const Options& options) noexcept {
   options_ = options;
-  cos_theta_ = std::cos(options.proxy.theta);
+  cos_theta_ = math::cos(options.proxy.theta);
   stale_ = true;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "palpate/kernel/core/lanes.hpp"
 #include "palpate/kernel/core/vectorise.hpp"
 
 // Compiled as patch_loops.cpp is, so that (1) becomes vector code in the middle of the movement: a
@@ -44,33 +45,35 @@ struct DirectionSums {
 // Eq. (1) with the weights of (2): `inverse_width` is 1 / (r_3 - r_1), `reach` r_3 of these.
 PALPATE_INLINED DirectionSums sum_directions(const PointArrays& points, Float3 at, float reach,
                                              float inverse_width) noexcept {
-  const auto [x, y, z, size] = points;
-  const auto [px, py, pz] = at;
-  float sum_x = 0.0F;
-  float sum_y = 0.0F;
-  float sum_z = 0.0F;
-  float nearest = std::numeric_limits<float>::max();
-  const std::size_t end = whole_blocks(size);
-  for (std::size_t i = 0; i < end; ++i) {
-    const float dx = px - x[i];
-    const float dy = py - y[i];
-    const float dz = pz - z[i];
-    constexpr float smallest = 1e-18F;  // a nanometre, squared: keeps 1 / r finite
-    const float squared = dx * dx + (dy * dy + (dz * dz + smallest));
-    const float r = std::sqrt(squared);
-    // Eq. (2) with s = (r_3 - r) / (r_3 - r_1) kept in 0..1, hence 1 within r_1 and 0 beyond r_3.
-    float s = reach - r * inverse_width;
-    s = s < 0.0F ? 0.0F : s;
-    s = s > 1.0F ? 1.0F : s;
-    const float s_2 = s * s;
-    const float psi = s_2 * s_2 * (5.0F - 4.0F * s);
-    const float scale = psi / r;
-    sum_x += dx * scale;  // Eq. (1)
-    sum_y += dy * scale;
-    sum_z += dz * scale;
-    nearest = squared < nearest ? squared : nearest;
+  FloatLanes sum_x{};
+  FloatLanes sum_y{};
+  FloatLanes sum_z{};
+  FloatLanes nearest;
+  nearest.fill(std::numeric_limits<float>::max());
+  const std::size_t end = whole_blocks(points.size);
+  for (std::size_t block = 0; block < end; block += sum_lanes) {
+#pragma omp simd
+    for (std::size_t lane = 0; lane < sum_lanes; ++lane) {
+      const float dx = at.x - points.x[block + lane];
+      const float dy = at.y - points.y[block + lane];
+      const float dz = at.z - points.z[block + lane];
+      constexpr float smallest = 1e-18F;  // a nanometre, squared: keeps 1 / r finite
+      const float squared = dx * dx + (dy * dy + (dz * dz + smallest));
+      const float r = std::sqrt(squared);
+      // Eq. (2) with s = (r_3 - r) / (r_3 - r_1) kept in 0..1, hence 1 within r_1 and 0 beyond r_3.
+      float s = reach - r * inverse_width;
+      s = s < 0.0F ? 0.0F : s;
+      s = s > 1.0F ? 1.0F : s;
+      const float s_2 = s * s;
+      const float psi = s_2 * s_2 * (5.0F - 4.0F * s);
+      const float scale = psi / r;
+      sum_x[lane] += dx * scale;  // Eq. (1)
+      sum_y[lane] += dy * scale;
+      sum_z[lane] += dz * scale;
+      nearest[lane] = squared < nearest[lane] ? squared : nearest[lane];
+    }
   }
-  return {{sum_x, sum_y, sum_z}, nearest};
+  return {{sum_of_lanes(sum_x), sum_of_lanes(sum_y), sum_of_lanes(sum_z)}, least_of_lanes(nearest)};
 }
 
 // The steps whose size takes another search of the patch: out of entrenchment, and to the HIP.

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "palpate/kernel/core/mathematics.hpp"
+
 namespace palpate {
 namespace {
 
@@ -93,7 +95,7 @@ struct Bank {
       xv[i] -= kx * xv[i];
       xx[i] -= kx * xx[i];
       likelihood[i] =
-          memory * likelihood[i] - 0.5 * (miss * miss * inverse + std::log(expected / variance));
+          memory * likelihood[i] - 0.5 * (miss * miss * inverse + math::log(expected / variance));
     }
   }
 };
@@ -118,7 +120,7 @@ Rest likelihood_of_rest(std::span<const HeightSample> samples, std::size_t frame
       const double miss = height - sum / n;
       const double spread = 1.0 + weight / n;
       likelihood = memory * likelihood -
-                   0.5 * (weight * miss * miss / (variance * spread) + std::log(spread));
+                   0.5 * (weight * miss * miss / (variance * spread) + math::log(spread));
     }
     sum += weight * height;
     n += weight;
@@ -187,12 +189,12 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
     rest += single_proof;
   double most = rest;
   for (const double l : bank.likelihood) most = std::max(most, l);
-  const double rest_share = std::exp(rest - most);
+  const double rest_share = math::exp(rest - most);
   double shares = rest_share;
   double height = rest_share * (resting - base);
   double next = height;
   for (std::size_t i = 0; i < filters; ++i) {
-    const double share = std::exp(bank.likelihood[i] - most);
+    const double share = math::exp(bank.likelihood[i] - most);
     shares += share;
     height += share * bank.x[i];
     next += share * (bank.x[i] + interval * (bank.v[i] + 0.5 * interval * bank.a[i]));

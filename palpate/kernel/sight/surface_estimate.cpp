@@ -6,7 +6,9 @@
 #include <limits>
 #include <utility>
 
+#include "palpate/kernel/core/lanes.hpp"
 #include "palpate/kernel/core/linear.hpp"
+#include "palpate/kernel/core/mathematics.hpp"
 
 namespace palpate {
 namespace {
@@ -521,14 +523,10 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
     bool moves_along = frames[j] >= std::min<std::size_t>(frames[0], 2);
     for (std::size_t i = 0; i < j && moves_along; ++i) {
       const std::size_t n = std::min(frames[i], frames[j]);
-      double sum = 0.0;
-      double squares = 0.0;
-#pragma omp simd reduction(+ : sum, squares)
-      for (std::size_t k = 0; k < n; ++k) {
+      const auto [sum, squares] = sums_over<2>(n, [&](std::size_t k) {
         const double d = heights[j][k].height - heights[i][k].height;
-        sum += d;
-        squares += d * d;
-      }
+        return std::array{d, d * d};
+      });
       const auto count = static_cast<double>(n);
       const double mean = sum / count;
       const double about_mean = std::max(squares - count * mean * mean, 0.0);
@@ -711,7 +709,7 @@ bool SurfaceEstimate::spans_area(const Shape& inner) const noexcept {
   const double xx = inner.means[2] - squared(inner.means[0]);
   const double xy = inner.means[3] - inner.means[0] * inner.means[1];
   const double yy = inner.means[4] - squared(inner.means[1]);
-  const double least = 0.5 * (xx + yy) - std::hypot(0.5 * (xx - yy), xy);
+  const double least = 0.5 * (xx + yy) - math::hypot(0.5 * (xx - yy), xy);
   return least > 0.05 * full_disc();
 }
 

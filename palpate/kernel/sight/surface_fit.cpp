@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "palpate/kernel/core/lanes.hpp"
 #include "palpate/kernel/core/linear.hpp"
 #include "palpate/kernel/core/vectorise.hpp"
 
@@ -38,9 +39,9 @@ constexpr std::size_t index_of(int x, int y) {
   return static_cast<std::size_t>(degree * (degree + 1) / 2 + y);
 }
 
-struct FloatMoments {
-  float s[15], z[6];
-};
+// The sums of Moments: 15 of xy, then 6 of z.
+constexpr std::size_t moment_count = 21;
+using FloatMoments = std::array<float, moment_count>;
 
 struct Rows {
   float x[3], y[3], z[3], offset[3];
@@ -48,63 +49,66 @@ struct Rows {
 
 PALPATE_VECTORISED
 FloatMoments sum_moments(const float* px, const float* py, const float* pz, std::size_t size,
-                         const Rows rows, const float* c, float centre_x, float centre_y,
+                         const Rows rows, const float* coefficients, float centre_x, float centre_y,
                          float inner_squared, float outer_squared, float inverse_cut) {
-  float s0 = 0.0F, s1 = 0.0F, s2 = 0.0F, s3 = 0.0F, s4 = 0.0F, s5 = 0.0F, s6 = 0.0F, s7 = 0.0F,
-        s8 = 0.0F, s9 = 0.0F, s10 = 0.0F, s11 = 0.0F, s12 = 0.0F, s13 = 0.0F, s14 = 0.0F;
-  float z0 = 0.0F, z1 = 0.0F, z2 = 0.0F, z3 = 0.0F, z4 = 0.0F, z5 = 0.0F;
-#pragma omp simd reduction(+ : s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, \
-                               s14, z0, z1, z2, z3, z4, z5)
-  for (std::size_t i = 0; i < size / Patch::block * Patch::block; ++i) {
-    float x = rows.x[0] * px[i] + rows.x[1] * py[i] + rows.x[2] * pz[i] + rows.offset[0];
-    float y = rows.y[0] * px[i] + rows.y[1] * py[i] + rows.y[2] * pz[i] + rows.offset[1];
-    float z = rows.z[0] * px[i] + rows.z[1] * py[i] + rows.z[2] * pz[i] + rows.offset[2];
-    // A weight of 0 does not make a point harmless that is no number.
-    const bool sound = std::abs(x) + std::abs(y) + std::abs(z) < 1e6F;
-    x = sound ? x : 1e6F;
-    y = sound ? y : 0.0F;
-    z = sound ? z : 0.0F;
-    const float xx = x * x;
-    const float xy = x * y;
-    const float yy = y * y;
-    const float r = z - (c[0] + c[1] * x + c[2] * y + c[3] * xx + c[4] * xy + c[5] * yy);
-    const float dx = x - centre_x;
-    const float dy = y - centre_y;
-    const float away = dx * dx + dy * dy;
-    const float in_disc = ((away >= inner_squared) & (away < outer_squared)) ? 1.0F : 0.0F;
-    float t = r * inverse_cut;
-    t = t * t;
-    t = t < 1.0F ? 1.0F - t : 0.0F;
-    const float w = in_disc * t * t;  // Tukey's biweight
-    const float wx = w * x;
-    const float wy = w * y;
-    const float wxx = w * xx;
-    const float wxy = w * xy;
-    const float wyy = w * yy;
-    s0 += w;
-    s1 += wx;
-    s2 += wy;
-    s3 += wxx;
-    s4 += wxy;
-    s5 += wyy;
-    s6 += wxx * x;
-    s7 += wxx * y;
-    s8 += wyy * x;
-    s9 += wyy * y;
-    s10 += wxx * xx;
-    s11 += wxx * xy;
-    s12 += wxx * yy;
-    s13 += wxy * yy;
-    s14 += wyy * yy;
-    z0 += w * r;
-    z1 += wx * r;
-    z2 += wy * r;
-    z3 += wxx * r;
-    z4 += wxy * r;
-    z5 += wyy * r;
+  std::array<FloatLanes, moment_count> sums{};
+  const std::array<float, 6> c{coefficients[0], coefficients[1], coefficients[2],
+                               coefficients[3], coefficients[4], coefficients[5]};
+  for (std::size_t block = 0; block < size / Patch::block * Patch::block; block += sum_lanes) {
+#pragma omp simd
+    for (std::size_t lane = 0; lane < sum_lanes; ++lane) {
+      const std::size_t i = block + lane;
+      float x = rows.x[0] * px[i] + rows.x[1] * py[i] + rows.x[2] * pz[i] + rows.offset[0];
+      float y = rows.y[0] * px[i] + rows.y[1] * py[i] + rows.y[2] * pz[i] + rows.offset[1];
+      float z = rows.z[0] * px[i] + rows.z[1] * py[i] + rows.z[2] * pz[i] + rows.offset[2];
+      // A weight of 0 does not make a point harmless that is no number.
+      const bool sound = std::abs(x) + std::abs(y) + std::abs(z) < 1e6F;
+      x = sound ? x : 1e6F;
+      y = sound ? y : 0.0F;
+      z = sound ? z : 0.0F;
+      const float xx = x * x;
+      const float xy = x * y;
+      const float yy = y * y;
+      const float r = z - (c[0] + c[1] * x + c[2] * y + c[3] * xx + c[4] * xy + c[5] * yy);
+      const float dx = x - centre_x;
+      const float dy = y - centre_y;
+      const float away = dx * dx + dy * dy;
+      const float in_disc = ((away >= inner_squared) & (away < outer_squared)) ? 1.0F : 0.0F;
+      float t = r * inverse_cut;
+      t = t * t;
+      t = t < 1.0F ? 1.0F - t : 0.0F;
+      const float w = in_disc * t * t;  // Tukey's biweight
+      const float wx = w * x;
+      const float wy = w * y;
+      const float wxx = w * xx;
+      const float wxy = w * xy;
+      const float wyy = w * yy;
+      sums[0][lane] += w;
+      sums[1][lane] += wx;
+      sums[2][lane] += wy;
+      sums[3][lane] += wxx;
+      sums[4][lane] += wxy;
+      sums[5][lane] += wyy;
+      sums[6][lane] += wxx * x;
+      sums[7][lane] += wxx * y;
+      sums[8][lane] += wyy * x;
+      sums[9][lane] += wyy * y;
+      sums[10][lane] += wxx * xx;
+      sums[11][lane] += wxx * xy;
+      sums[12][lane] += wxx * yy;
+      sums[13][lane] += wxy * yy;
+      sums[14][lane] += wyy * yy;
+      sums[15][lane] += w * r;
+      sums[16][lane] += wx * r;
+      sums[17][lane] += wy * r;
+      sums[18][lane] += wxx * r;
+      sums[19][lane] += wxy * r;
+      sums[20][lane] += wyy * r;
+    }
   }
-  return {{s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11, s12, s13, s14},
-          {z0, z1, z2, z3, z4, z5}};
+  FloatMoments moments;
+  for (std::size_t k = 0; k < moment_count; ++k) moments[k] = sum_of_lanes(sums[k]);
+  return moments;
 }
 
 // The frame's axes in `unit`s [m]: local = rows * p + offset, for points relative to `centre`.
@@ -300,8 +304,9 @@ Moments disc_moments(const Patch& patch, const LocalFrame& frame, const Quadric&
                   static_cast<float>(disc.centre.y() * per_metre), squared(disc.inner),
                   squared(disc.outer), static_cast<float>(Moments::unit / disc.cut));
   Moments moments;
-  std::copy(std::begin(sums.s), std::end(sums.s), moments.xy.begin());
-  std::copy(std::begin(sums.z), std::end(sums.z), moments.z.begin());
+  const auto z = sums.begin() + static_cast<std::ptrdiff_t>(moments.xy.size());
+  std::copy(sums.begin(), z, moments.xy.begin());
+  std::copy(z, sums.end(), moments.z.begin());
   return moments;
 }
 

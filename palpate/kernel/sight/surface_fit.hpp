@@ -2,13 +2,13 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <optional>
 #include <span>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "palpate/kernel/core/mathematics.hpp"
 #include "palpate/kernel/core/patch.hpp"
 
 namespace palpate {
@@ -60,11 +60,11 @@ struct Quadric {
   }
   /// The largest second derivative in any direction [1/m]: how it curves up towards what is above.
   [[nodiscard]] double strongest_rise() const noexcept {
-    return c[3] + c[5] + std::hypot(c[3] - c[5], c[4]);
+    return c[3] + c[5] + math::hypot(c[3] - c[5], c[4]);
   }
   /// The same downwards: how it bulges.
   [[nodiscard]] double strongest_fall() const noexcept {
-    return std::hypot(c[3] - c[5], c[4]) - c[3] - c[5];
+    return math::hypot(c[3] - c[5], c[4]) - c[3] - c[5];
   }
   /// Where the surface is nearest to `point` [m, local], by Newton's method from `start`, no
   /// farther than `reach` [m] from `centre`.

@@ -75,7 +75,7 @@ TEST_F(Ros2Program, SaysWhatAnEndOfALinkLacks) {
   refuses("--robot pint: --camera synthetic:plane", "unknown type of robot");
   refuses("--device mouse:", "the haptic device is at the operator's end");
   refuses("--margin -1", "margin");
-  refuses("--name 'a b'", "none for a topic");
+  refuses("--name 'a b'", "not a valid topic name");
 }
 
 TEST_F(Ros2Program, ServesACameraToAnother) {

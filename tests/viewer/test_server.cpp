@@ -299,7 +299,7 @@ TEST_F(ViewerServerTest, IntroducesItselfAndTellsOfTicks) {
   EXPECT_EQ(presence["viewers"], 1);
   const std::string first = page.until_kind(2);
   const std::string second = page.until_kind(2);
-  ASSERT_EQ(first.size(), 112u);
+  ASSERT_EQ(first.size(), 156u);
   EXPECT_NE(first, second);
 }
 

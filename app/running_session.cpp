@@ -69,6 +69,21 @@ MethodRegistry session_methods() {
   return methods;
 }
 
+void RunOptions::add_to(CLI::App& command, const char* headless_help) {
+  session.add_to(command);
+  const std::string end = headless_help == nullptr ? "" : "; headless 10";
+  command.add_option("--duration", duration, "seconds of the session (until Ctrl-C" + end + ")");
+  if (headless_help != nullptr) command.add_flag("--headless", headless, headless_help);
+  command.add_flag("--json", json, "print the summary as a JSON object");
+  command.add_flag("--print-config", print_config,
+                   "print the session of these options as a TOML file, and exit");
+}
+
+bool prints_config(const RunOptions& options, const SessionConfig& config) {
+  if (options.print_config) std::fputs(to_toml(config).c_str(), stdout);
+  return options.print_config;
+}
+
 void introduce(const Session& session, const SessionConfig& config) {
   for (std::size_t hand = 0; hand < session.hands(); ++hand) {
     const DeviceInfo& device = session.device(hand).info();

@@ -29,6 +29,10 @@ struct Beside {
 };
 
 struct RunOptions {
+  /// Adds the options of the session and of how it runs.
+  /// @param headless_help  the help of --headless; null: there is no such option
+  void add_to(CLI::App& command, const char* headless_help);
+
   SessionArguments session;
   std::optional<double> duration;
   bool headless = false;
@@ -46,6 +50,9 @@ constexpr double headless_duration = 10.0;  ///< [s]
 
 /// All that a session can run: `ideal`, the lab's ruler, needs the truth.
 MethodRegistry session_methods();
+
+/// Prints the session as a TOML file where --print-config asks for it. @return does it?
+bool prints_config(const RunOptions& options, const SessionConfig& config);
 
 /// @throws Error for a duration out of range.
 SessionOptions options_of(const RunOptions& options, const SessionConfig& config,

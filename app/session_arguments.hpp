@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,20 +24,12 @@ class SessionArguments {
   [[nodiscard]] SessionConfig config(const MethodRegistry& methods) const;
 
  private:
+  const CLI::App* command_ = nullptr;  // whose options they are
+  SessionConfig given_;                // where it puts the values of keys
   std::vector<std::string> cameras_, devices_, limits_, operator_limits_;
-  std::optional<std::string> material_, fixtures_, device_pose_, record_, record_folder_;
-  std::optional<std::string> listen_, token_, operator_token_;
-  std::optional<double> rate_, scale_, bubble_, handle_weight_, record_limit_;
-  std::optional<int> clutch_button_;
-  std::optional<int> port_;
-  bool no_browser_ = false, without_watchdog_ = false;
+  std::optional<std::string> material_, device_pose_;
+  bool no_browser_ = false;
   MethodOptions method_;
 };
-
-/// The options --device-pose, --scale and --clutch-button on a placement.
-/// @param pose  "x,y,z,qx,qy,qz,qw" or the TOML file of a session, for its world_from_device
-/// @throws Error if one cannot be used.
-void apply_placement(const std::optional<std::string>& pose, const std::optional<double>& scale,
-                     const std::optional<int>& clutch_button, Placement& placement);
 
 }  // namespace palpate::app

@@ -22,10 +22,7 @@ struct RosOptions {
 
 int run_node(const RosOptions& options) {
   const SessionConfig config = options.run.session.config(session_methods());
-  if (options.run.print_config) {
-    std::fputs(to_toml(config).c_str(), stdout);
-    return 0;
-  }
+  if (prints_config(options.run, config)) return 0;
   // While there is one thread, and before there is DDS: a guard is another process.
   GuardedDevices guarded = guarded_devices(config);
   Running running;
@@ -60,16 +57,12 @@ Verb add_ros(CLI::App& program) {
   CLI::App* command = program.add_subcommand("ros", "run a session as a ROS 2 node");
   const auto options = std::make_shared<RosOptions>();
   options->run.headless = options->run.in_real_time = true;
-  options->run.session.add_to(*command);
+  options->run.add_to(*command, nullptr);
   command->add_option("--name", options->node.name,
                       "name of the node (palpate), with its namespace: cell_3/palpate");
   command->add_option("--frame", options->node.frame, "frame_id of the published messages (world)");
   command->add_option("--publish-rate", options->node.rate,
                       "rate [Hz] of poses, force, contact and flags (100), 1 to 1000");
-  command->add_option("--duration", options->run.duration, "seconds of the session (until Ctrl-C)");
-  command->add_flag("--json", options->run.json, "print the summary as a JSON object");
-  command->add_flag("--print-config", options->run.print_config,
-                    "print the session of these options as a TOML file, and exit");
   return {command, [options] { return run_node(*options); }};
 }
 

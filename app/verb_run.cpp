@@ -60,7 +60,7 @@ void show_in_browser(const std::string& url) {
 std::unique_ptr<ViewerServer> open_server(const ServerConfig& config, std::uint16_t usual_port,
                                           ViewerHost& host) {
   ViewerOptions viewer{.listen = config.listen,
-                       .port = config.port.value_or(usual_port),
+                       .port = static_cast<std::uint16_t>(config.port.value_or(usual_port)),
                        .token = config.token,
                        .operator_token = config.operator_token};
   try {
@@ -270,15 +270,6 @@ int run_pages(const RunOptions& options, SessionConfig config, GuardedDevices gu
   }
 }
 
-int run(const RunOptions& options) {
-  const SessionConfig config = options.session.config(session_methods());
-  if (options.print_config) {
-    std::fputs(to_toml(config).c_str(), stdout);
-    return 0;
-  }
-  return run_session(options, config);
-}
-
 }  // namespace
 
 int run_session(const RunOptions& options, const SessionConfig& config) {
@@ -294,15 +285,11 @@ Verb add_run(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "run", "run a session with the page: touch cameras, recordings or simulated scenes");
   const auto options = std::make_shared<RunOptions>();
-  options->session.add_to(*command);
-  command->add_option("--duration", options->duration,
-                      "seconds of the session (until Ctrl-C; headless 10)");
-  command->add_flag("--headless", options->headless,
-                    "no page; recordings and simulations run as fast as the computer can");
-  command->add_flag("--json", options->json, "print the summary as a JSON object");
-  command->add_flag("--print-config", options->print_config,
-                    "print the session of these options as a TOML file, and exit");
-  return {command, [options] { return run(*options); }};
+  options->add_to(*command, "no page; recordings and simulations run as fast as the computer can");
+  return {command, [options] {
+            const SessionConfig config = options->session.config(session_methods());
+            return prints_config(*options, config) ? 0 : run_session(*options, config);
+          }};
 }
 
 }  // namespace palpate::app

@@ -59,10 +59,7 @@ int operate(const OperatorOptions& options) {
     if (options.robot_starts) uri += std::string(options.whole_images ? "&" : "?") + patience;
     config.cameras = {{.uri = uri}};
   }
-  if (run.print_config) {
-    std::fputs(to_toml(config).c_str(), stdout);
-    return 0;
-  }
+  if (prints_config(run, config)) return 0;
   std::shared_ptr<OperatorEnd> end;
   run.beside.attach = [&](Session& session) -> std::shared_ptr<void> {
     // A mouse and a simulated hand are where they want to be.
@@ -101,10 +98,7 @@ int operate(const OperatorOptions& options) {
 int guard(const RobotOptions& options) {
   RunOptions run = options.run;
   SessionConfig config = run.session.config(session_methods());
-  if (run.print_config) {
-    std::fputs(to_toml(config).c_str(), stdout);
-    return 0;
-  }
+  if (prints_config(run, config)) return 0;
   if (!config.hands.front().device.empty())
     throw Error("--device", "the haptic device is at the operator's end",
                 "remove this option, and start palpate teleop operator --device there");
@@ -197,15 +191,7 @@ int lead_here(const OperatorOptions& operating, const RobotOptions& robot) {
   return operate(operating);
 }
 
-void add_running(CLI::App& command, RunOptions& run) {
-  run.session.add_to(command);
-  command.add_option("--duration", run.duration,
-                     "seconds of the session (until Ctrl-C; headless 10)");
-  command.add_flag("--headless", run.headless, "no page");
-  command.add_flag("--json", run.json, "print the summary as a JSON object");
-  command.add_flag("--print-config", run.print_config,
-                   "print the session of these options as a TOML file, and exit");
-}
+constexpr const char* headless_help = "no page";
 
 void add_learn(CLI::App& command, OperatorOptions& options) {
   command.add_flag(
@@ -222,7 +208,7 @@ Verb add_teleop(CLI::App& program) {
   const auto operating = std::make_shared<OperatorOptions>();
   CLI::App* hand =
       command->add_subcommand("operator", "the operator's end, with the haptic device");
-  add_running(*hand, operating->run);
+  operating->run.add_to(*hand, headless_help);
   hand->add_option("--name", operating->name,
                    "name of the robot in its topics (robot): /NAME/teleop/...");
   hand->add_flag("--whole-images", operating->whole_images,
@@ -235,7 +221,7 @@ Verb add_teleop(CLI::App& program) {
 
   const auto robot = std::make_shared<RobotOptions>();
   CLI::App* arm = command->add_subcommand("robot", "the robot's end: its camera and its arm");
-  add_running(*arm, robot->run);
+  robot->run.add_to(*arm, headless_help);
   arm->add_option("--robot", robot->robot, robots_help());
   arm->add_option("--name", robot->end.name,
                   "name of the robot in its topics (robot): /NAME/teleop/...");
@@ -246,7 +232,7 @@ Verb add_teleop(CLI::App& program) {
                   "fraction of the operator's force with which the tool presses, 0 (default) to 1");
   const auto both = std::make_shared<OperatorOptions>();
   both->run.in_real_time = both->robot_starts = true;
-  add_running(*command, both->run);
+  both->run.add_to(*command, headless_help);
   add_learn(*command, *both);
   command->add_option("--robot", robot->robot, "both ends on this computer: as for teleop robot");
   command->add_option("--name", both->name, "of the robot's topics (robot)");

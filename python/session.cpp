@@ -2,12 +2,16 @@
 // A whole session: cameras, device, method, safety chain, recorder.
 #include "palpate/session/session.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "palpate/io/sources/fixture_file.hpp"
 #include "palpate/kernel/cloud/proposed_touch.hpp"
@@ -37,30 +41,31 @@ std::shared_ptr<const FixtureSet> fixtures_of(const std::optional<std::string>& 
                                                 : read_fixtures(*what));
 }
 
-// Hands after the first: each a device's URI, or a dict with it.
-void add_hands(const py::iterable& hands, std::vector<HandSpec>& all) {
-  for (const py::handle& each : hands) {
-    HandSpec hand;
-    if (py::isinstance<py::str>(each)) {
-      hand.device = py::cast<std::string>(each);
-    } else {
-      for (const auto& [key, value] : py::cast<py::dict>(each)) {
-        const auto name = py::cast<std::string>(key);
-        if (name == "device")
-          hand.device = py::cast<std::string>(value);
-        else if (name == "name")
-          hand.name = py::cast<std::string>(value);
-        else if (name == "scale")
-          hand.placement.workspace_scale = py::cast<double>(value);
-        else if (name == "world_from_device")
-          hand.placement.world_from_device = pose_of(py::cast<Numbers>(value), "world_from_device");
-        else
-          throw Error("hands", "a hand has no '" + name + "'",
-                      "give device, name, world_from_device and scale");
-      }
-    }
-    all.push_back(std::move(hand));
+// A further hand: the URI of its device, or a dict with keys of [[hand]].
+HandSpec hand_of(const py::handle& what) {
+  HandSpec hand;
+  if (py::isinstance<py::str>(what)) {
+    hand.device = py::cast<std::string>(what);
+    return hand;
   }
+  const auto values = py::cast<py::dict>(what);
+  std::vector<std::string_view> known;
+  HandSpec::walk_keys(hand, [&](const Key& key, auto& value) {
+    using Value = std::remove_reference_t<decltype(value)>;
+    known.push_back(key.name);
+    if (!values.contains(key.name)) return;
+    const py::object given = values[py::str(key.name)];
+    if constexpr (std::is_same_v<Value, Eigen::Isometry3d>)
+      value = pose_of(py::cast<Numbers>(given), "world_from_device");
+    else
+      value = py::cast<Value>(given);
+  });
+  for (const auto& [key, value] : values) {
+    const auto name = py::cast<std::string>(key);
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      throw Error("hands", "a hand has no '" + name + "'", did_you_mean(name, known));
+  }
+  return hand;
 }
 
 // Asks a Python function, on a camera's thread, which of the materials each pixel is.
@@ -118,7 +123,7 @@ class PythonSession {
     options.stroke_time = stroke_time;
     options.record = record;
     options.version = PALPATE_VERSION;
-    add_hands(hands, options.hands);
+    for (const py::handle& hand : hands) options.hands.push_back(hand_of(hand));
     if (materials.has_value() != labels.has_value())
       throw Error("materials, labels", "one is of no use without the other",
                   "give materials=palpate.Materials(...) and labels=FUNCTION");
@@ -309,8 +314,8 @@ void define_session(py::module_& m) {
            "camera: a URI or a list of them. device: a URI. free_running: as fast as the machine\n"
            "can, with the same forces each time. limits: of the safety chain\n"
            "(palpate.limits()). fixtures: a TOML file of virtual fixtures, or its text.\n"
-           "hands: further hands, each a device's URI or a dict with device, name, scale and\n"
-           "world_from_device; while one of the hands is in trouble, none has a force. labels: a\n"
+           "hands: further hands, each a device's URI or a dict with keys of [[hand]]\n"
+           "(docs/session.md); while one of the hands is in trouble, none has a force. labels: a\n"
            "function that is called with a camera's number and depth for each of its frames, and\n"
            "returns uint8 (height, width), 0 for none and i for the i-th of `materials`. Further\n"
            "keywords are parameters (palpate.parameters()).")

@@ -403,7 +403,7 @@ Wanted wanted_by(const Uri& uri) {
   wanted.uri = uri.text();
   wanted.id = uri.path();
   wanted.host = uri.text_option("host", wanted.host);
-  wanted.port = static_cast<int>(uri.number_option("port", wanted.port, 1, 65535));
+  wanted.port = static_cast<int>(uri.number_option("port", wanted.port, 1, 65535, "-"));
   wanted.max_force = uri.number_option("max_force", wanted.max_force, 0.1, 10.0, "N");
   return wanted;
 }

@@ -459,7 +459,7 @@ class Camera final : public LiveCamera {
       set("preset", option_preset, static_cast<float>(first_preset + (preset - presets.begin())));
     }
     if (uri.has("laser")) {
-      const auto power = static_cast<float>(uri.number_option("laser", 0.0, 0.0, 1000.0));  // [mW]
+      const auto power = static_cast<float>(uri.number_option("laser", 0.0, 0.0, 1000.0, "mW"));
       set("laser", option_emitter, power > 0.0F ? 1.0F : 0.0F);
       if (power > 0.0F) set("laser", option_laser, power);
     }

@@ -3,51 +3,18 @@
 
 #include <algorithm>
 #include <limits>
-#include <optional>
 #include <utility>
 
 #include <Eigen/Geometry>
 
 #include "palpate/servo/device.hpp"
+#include "palpate/servo/placement.hpp"
 
 namespace palpate {
-
-/// How a device's workspace lies in the scene.
-struct Placement {
-  Eigen::Isometry3d world_from_device = Eigen::Isometry3d::Identity();
-  /// [-] scene metres per device metre. Forces are not scaled, so the hand feels the coupling's
-  /// stiffness times this: scale up and the limit of stability comes nearer.
-  double workspace_scale = 1.0;
-  /// Button of the device that clutches while it is pressed, 0 to 31; none: only the device's own
-  /// clutch does.
-  std::optional<int> clutch_button = {};
-  /// [m, device] radius of the rate-control bubble around the workspace centre. Inside: position
-  /// control. Outside: in addition a velocity of the HIP in the direction of the handle (rate
-  /// control). 0: off.
-  double bubble_radius = 0.0;
-  /// [m/s, scene] largest velocity of rate control, from `bubble_rim` beyond the radius on.
-  double bubble_speed = 0.1;
-  /// [kg] handle mass that the motors compensate, 0 to 0.1; 0: off. In addition to the surface
-  /// force and within the same limits (WeightSupport).
-  double handle_weight = 0.0;
-  Vec3 down = -Vec3::UnitZ();  ///< [-] device: which way that weight pulls, of length 1
-
-  bool operator==(const Placement& other) const {
-    return world_from_device.matrix() == other.world_from_device.matrix() &&
-           workspace_scale == other.workspace_scale && clutch_button == other.clutch_button &&
-           bubble_radius == other.bubble_radius && bubble_speed == other.bubble_speed &&
-           handle_weight == other.handle_weight && down == other.down;
-  }
-};
 
 /// [m, device] Beyond a bubble's radius the speed grows with the square of the distance over this
 /// length: a fifth to a quarter of what a Touch or an omega reaches.
 constexpr double bubble_rim = 0.02;
-
-/// @throws Error if the pose is not rigid and finite, the scale is not in 0.001 to 1000, the button
-///         not in 0 to 31, the bubble's radius not in 0 to 1 m, its speed not in 0.001 to 1 m/s,
-///         the weight not in 0 to 0.1 kg or `down` not of length 1.
-void validate(const Placement& placement);
 
 /// Brings hands into the world and forces back, and remembers what clutch and bubble have shifted.
 ///

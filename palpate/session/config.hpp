@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -15,11 +14,34 @@ namespace palpate {
 
 /// The page's server.
 struct ServerConfig {
-  std::string listen = "127.0.0.1";        ///< address; this default lets in this machine alone
-  std::optional<std::uint16_t> port = {};  ///< none: 8642, or any free one; 0: any free one
-  std::string token = {};                  ///< what a page must know; empty: none is asked for
-  std::string operator_token = {};         ///< the operator's page's; empty: one is made
-  bool browser = true;                     ///< open one at the start, where there is a desktop
+  std::string listen = "127.0.0.1";  ///< address
+  std::optional<int> port = {};      ///< none: 8642, or any free one; 0: any free one
+  std::string token = {};            ///< what a page must know; empty: none is asked for
+  std::string operator_token = {};   ///< the operator's page's; empty: one is made
+  bool browser = true;               ///< open one at the start, where there is a desktop
+
+  /// See Key.
+  template <class Self, class Way>
+  static void walk_keys(Self& self, const Way& way) {
+    way(Key{"listen", "--listen",
+            "address on which the page is served (127.0.0.1: only for this computer). Tokens "
+            "are sent unencrypted over the network: a tunnel from the other computer is safer, "
+            "ssh -L 8642:localhost:8642 THIS_COMPUTER"},
+        self.listen);
+    way(key_of("port", "--port", "-", 0.0, 65535.0,
+               "port of the page (8642, or any if that is in use); 0: any"),
+        self.port);
+    way(Key{"token", "--token",
+            "access token for viewing and for controlling the HIP; empty: generated if other "
+            "computers are allowed"},
+        self.token);
+    way(Key{"operator_token", "--operator-token",
+            "access token of the operator: only a page with this token can change method, "
+            "placement and limits, and record; empty: generated and printed. Other users of "
+            "this computer can read the command line; use the environment variable instead"},
+        self.operator_token);
+    way(Key{"browser", "", "open a browser at the start, if there is a desktop"}, self.browser);
+  }
 };
 
 /// A session of the program as one TOML file describes it. docs/session.md lists the keys.
@@ -32,6 +54,32 @@ struct SessionConfig : SessionSpec {
   /// end of its range.
   std::map<std::string, double> operator_limits = {};
   ServerConfig server;
+
+  /// The keys outside tables; see Key.
+  template <class Self, class Way>
+  static void walk_keys(Self& self, const Way& way) {
+    way(Key{"method", "", "how forces are computed"}, self.method);
+    way(Key{"device", "", "URI of the haptic device; empty: the default"},
+        self.hands.front().device);
+    way(Key{"without_watchdog", "--without-watchdog",
+            "allow forces above engage_force on a device that has motors but no watchdog of at "
+            "most 0.5 s. Danger: if this program is killed, the device keeps the last force"},
+        self.without_watchdog);
+    way(key_of("rate", "--rate", "Hz", 100.0, 1e5, "ticks of the servo loop"), self.rate);
+    way(Key{"fixtures", "--fixtures",
+            "TOML file of virtual fixtures: forbidden regions, guides, viscous regions"},
+        self.fixtures);
+    way(Key{"record", "--record",
+            "record the session into this folder as a ROS 2 bag; check it with palpate replay"},
+        self.record);
+    way(Key{"record_folder", "--record-folder",
+            "folder for recordings started on the page; empty: the current folder"},
+        self.record_folder);
+    way(key_of("record_limit", "--record-limit", "GB", 1e-3, 1e6,
+               "total size of the recordings started on the page; recording ends there, or when "
+               "less than 1 GB is free"),
+        self.record_limit);
+  }
 };
 
 /// Throws Error if there is no method of that name; for what the file names.

@@ -8,8 +8,8 @@
 #include <Eigen/Geometry>
 
 #include "palpate/kernel/core/parameters.hpp"
+#include "palpate/servo/placement.hpp"
 #include "palpate/servo/safety.hpp"
-#include "palpate/servo/workspace.hpp"
 
 namespace palpate {
 
@@ -19,6 +19,15 @@ struct CameraSpec {
   /// Pose of the optical frame; none: the source's own.
   std::optional<Eigen::Isometry3d> world_from_camera = {};
   std::string name = {};  ///< for messages and the page; empty: the URI
+
+  /// See Key.
+  template <class Self, class Way>
+  static void walk_keys(Self& self, const Way& way) {
+    way(Key{"uri", "", "source of the frames"}, self.uri);
+    way(Key{"name", "", "name in messages; empty: the URI"}, self.name);
+    way(Key{"world_from_camera", "", "pose of the optical frame; default: the source's own"},
+        self.world_from_camera);
+  }
 };
 
 /// A hand of a session: a haptic device, and where it lies in the scene.
@@ -28,6 +37,15 @@ struct HandSpec {
   /// Empty: hand_1, hand_2, ..., or no name if it is the only hand.
   std::string name = {};
   Placement placement = {};
+
+  /// See Key.
+  template <class Self, class Way>
+  static void walk_keys(Self& self, const Way& way) {
+    way(Key{"device", "", "URI of a further haptic device"}, self.device);
+    way(Key{"name", "", "name in messages, topics and on the page; empty: hand_2, hand_3, ..."},
+        self.name);
+    Placement::walk_keys(self.placement, way);
+  }
 };
 
 /// A session as files, command lines, Python and C++ describe it.

@@ -140,7 +140,7 @@ TEST_F(Program, PrintsASessionThatReadsBackTheSame) {
   expect_refusal("run --device-pose 1,2,3", {"--device-pose", "x,y,z,qx,qy,qz,qw"});
   expect_refusal("run --device-pose nowhere.toml", {"nowhere.toml", "no such file"});
   expect_refusal("run --scale 0", {"scale"});
-  expect_refusal("run --clutch-button 40", {"clutch_button", "0 to 31"});
+  expect_refusal("run --clutch-button 40", {"--clutch-button", "0 to 31"});
   expect_refusal("run --config " + write("k.toml", "\n[safety]\nswig = 1\n"),
                  {"k.toml:3", "did you mean 'swing'"});
 }
@@ -739,7 +739,7 @@ TEST_F(Program, RefusesBadInputInOneLineThatNamesIt) {
   expect_refusal("run --operator-limit fall_rate=1", {"--operator-limit", "fall_rate"});
   expect_refusal("run --operator-limit max_device_farce=1",
                  {"max_device_farce", "max_device_force"});
-  expect_refusal("run --record-limit 0", {"record_limit", "0.001"});
+  expect_refusal("run --record-limit 0", {"--record-limit", "0.001"});
   expect_refusal("run --device mouze:", {"mouze", "mouse"});
   expect_refusal("run --device omega", {"'omega'", "did you mean 'force-dimension:'"});
   expect_refusal("run --port 99999", {"--port", "99999", "65535"});

@@ -109,6 +109,7 @@ TEST_F(RealSense, RefusesOptionsInOneLine) {
                            "leave width, height and fps out"));
   EXPECT_TRUE(fails_saying(opening("realsense:?fps=999"), "Couldn't resolve"));
   EXPECT_TRUE(fails_saying(opening("realsense:?laser=500"), "laser is refused", "out of range"));
+  EXPECT_TRUE(fails_saying(opening("realsense:?laser=5mm"), "does not fit", "plain number"));
   EXPECT_TRUE(fails_saying(opening("realsense:?preset=best"), "no preset 'best'", "hand"));
   EXPECT_TRUE(fails_saying(opening("realsense:?widht=4"), "widht", "width"));
   EXPECT_TRUE(fails_saying(opening("realsense:?exposure=5"), "exposure"));

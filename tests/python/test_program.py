@@ -173,7 +173,8 @@ class Session(unittest.TestCase):
     def test_has_several_hands(self):
         with tempfile.TemporaryDirectory() as folder:
             bag = os.path.join(folder, "session")
-            hands = ["hand:", {"device": "hand:", "name": "left", "scale": 0.5}]
+            hands = ["hand:", {"device": "hand:", "name": "left", "scale": 0.5,
+                               "bubble_radius": 0.05}]
             with palpate.Session(CAMERA, free_running=True, stroke_time=1.0, hands=hands,
                                  record=bag) as session:
                 session.run(1.0)

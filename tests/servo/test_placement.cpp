@@ -7,7 +7,7 @@
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/servo/cycle.hpp"
-#include "palpate/servo/placement_table.hpp"
+#include "palpate/servo/placement.hpp"
 #include "palpate/servo/stiffness.hpp"
 
 #include "tests/servo/fake_device.hpp"

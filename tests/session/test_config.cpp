@@ -152,6 +152,7 @@ TEST(SessionConfig, TakesACameraInShort) {
   EXPECT_EQ(parse_session_config("camera = \"tum:a\"", "s").cameras.front().uri, "tum:a");
   EXPECT_EQ(parse_session_config("camera = [\"tum:a\", \"tum:b\"]", "s").cameras.back().uri,
             "tum:b");
+  EXPECT_EQ(parse_session_config("hand = \"hand:\"", "s").hands[1].device, "hand:");
   const SessionConfig config = parse_session_config(
       "[[camera]]\nuri = \"tum:a\"\nworld_from_camera = \"1,2,3,0,0,0,1\"", "s");
   EXPECT_EQ(config.cameras.front().world_from_camera->translation(), Eigen::Vector3d(1, 2, 3));

@@ -38,14 +38,9 @@ std::optional<Intrinsics> lens_of(BagReader& bag, const std::string& camera) {
     const std::string name = bag.name(camera + last, places.front());
     const std::vector<std::byte> bytes = bag.read(places.front());
     if (bag.find(camera + last)->type == ros::String::type) {
-      const RealSenseLens lens =
-          parse_realsense_lens(ros::decode<ros::String>(bytes, name).data, name);
-      return Intrinsics{.width = lens.width,
-                        .height = lens.height,
-                        .fx = lens.fx,
-                        .fy = lens.fy,
-                        .cx = lens.ppx,
-                        .cy = lens.ppy};
+      RealSenseLens lens = parse_realsense_lens(ros::decode<ros::String>(bytes, name).data, name);
+      lens.coeffs = {};
+      return intrinsics_of(lens, name);
     }
     auto info = ros::decode<ros::CameraInfo>(bytes, name);
     info.d.clear();

@@ -116,11 +116,6 @@ class DepthRecording final : public Source {
   bool colour_is_asked_for_;
 };
 
-std::string read_text(const fs::path& path) {
-  const std::vector<std::byte> bytes = read_file(path, largest_text);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 void allow_only(const Uri& uri, std::initializer_list<std::string_view> own) {
   std::vector<std::string_view> known(own);
   known.insert(known.end(), {"fx", "fy", "cx", "cy", "units", "sensor", "start", "frames"});
@@ -167,7 +162,7 @@ void select(const Uri& uri, std::vector<RecordedImage>& images) {
 // Gives each image the pose at its stamp; those without one are left out, which a note says.
 void place(const Uri& uri, const fs::path& file, const std::string& trajectory_name,
            std::vector<RecordedImage>& images, SourceInfo& info) {
-  const Trajectory trajectory = parse_trajectory(read_text(file), file.string());
+  const Trajectory trajectory = parse_trajectory(read_text(file, largest_text), file.string());
   const double delay = uri.number_option("pose_delay", 0.0, -1.0, 1.0, "s");
   const std::size_t all = images.size();
   std::erase_if(images, [&](RecordedImage& image) {
@@ -192,7 +187,8 @@ void place(const Uri& uri, const fs::path& file, const std::string& trajectory_n
 void associate(const fs::path& list, const std::string& what, fs::path RecordedImage::*member,
                std::vector<RecordedImage>& images, SourceInfo& info) {
   constexpr double apart = 0.02;  // [s] at most, as the benchmark's own scripts have it
-  const std::vector<StampedFile> listed = parse_image_list(read_text(list), list.string());
+  const std::vector<StampedFile> listed =
+      parse_image_list(read_text(list, largest_text), list.string());
   std::size_t without = 0;
   for (RecordedImage& image : images) {
     const auto off = [&](const StampedFile& file) { return std::abs(file.stamp - image.stamp); };
@@ -269,7 +265,7 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
 
   SourceInfo info{.uri = uri.text(), .kind = "TUM RGB-D recording"};
   std::vector<RecordedImage> images;
-  for (const StampedFile& listed : parse_image_list(read_text(list), list.string())) {
+  for (const StampedFile& listed : parse_image_list(read_text(list, largest_text), list.string())) {
     images.push_back({.file = folder / listed.file, .stamp = listed.stamp});
   }
   select(uri, images);
@@ -370,7 +366,8 @@ std::unique_ptr<Source> open_depth(const Uri& uri) {
   const fs::path poses_file = (is_folder ? path : folder) / poses;
   const bool matrices = poses != "none" && is_json(poses_file);
   if (matrices) {
-    const auto world_from_camera = parse_pose_matrices(read_text(poses_file), poses_file.string());
+    const auto world_from_camera =
+        parse_pose_matrices(read_text(poses_file, largest_text), poses_file.string());
     if (world_from_camera.size() != images.size()) {
       throw Error(poses_file.string(),
                   "has " + std::to_string(world_from_camera.size()) + " poses for " +

@@ -58,6 +58,11 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::uintmax
   return bytes;
 }
 
+std::string read_text(const std::filesystem::path& path, std::uintmax_t max_bytes) {
+  const std::vector<std::byte> bytes = read_file(path, max_bytes);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
 std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder,
                                             std::string_view extension) {
   std::vector<std::filesystem::path> files;

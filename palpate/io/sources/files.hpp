@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -13,6 +14,9 @@ namespace palpate {
 /// @param max_bytes  files larger than this are refused before anything is allocated
 /// @throws Error if it is no regular file, cannot be read to its end, or is too large.
 std::vector<std::byte> read_file(const std::filesystem::path& path, std::uintmax_t max_bytes);
+
+/// The same as a text.
+std::string read_text(const std::filesystem::path& path, std::uintmax_t max_bytes);
 
 /// The files in a folder, not below it, whose extension is `extension` (".pcd"; upper and lower
 /// case are the same), in natural order of their names.

@@ -87,8 +87,8 @@ Fixture read_fixture(const TomlTable& root, const toml::node& node, const fs::pa
   read_choice(table, "shape", fixture_shape_names(), fixture.shape);
   if (const auto pose = table.pose("pose")) fixture.world_from_fixture = *pose;
   if (const toml::node* size = table.find("size")) fixture.size = read_triple(table, *size, "size");
-  table.read("radius", fixture.radius, 0.0, longest, "m");
-  table.read("length", fixture.length, 0.0, longest, "m");
+  table.read(key_of("radius", "", "m", 0.0, longest, ""), fixture.radius);
+  table.read(key_of("length", "", "m", 0.0, longest, ""), fixture.length);
   if (const toml::node* points = table.find("points")) {
     if (!points->is_array())
       table.fail(*points, "'points' is not a list", "write [[x, y, z], [x, y, z]] in metres");
@@ -101,11 +101,7 @@ Fixture read_fixture(const TomlTable& root, const toml::node& node, const fs::pa
   table.read("consent", fixture.consent);
   table.read("on_surface", fixture.on_surface);
   set_rows(table, fixture_table(), fixture.numbers);
-  try {
-    validate(fixture);
-  } catch (const Error& error) {
-    throw Error(at_line(root.file(), node.source().begin.line), error.what());
-  }
+  root.at(node, [&] { validate(fixture); });
   return fixture;
 }
 
@@ -136,9 +132,7 @@ FixtureSet parse_fixtures(std::string_view text, const std::string& name, const 
 }
 
 FixtureSet read_fixtures(const fs::path& file) {
-  const std::vector<std::byte> bytes = read_file(file, largest_fixture_file);
-  return parse_fixtures({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, file.string(),
-                        file.parent_path());
+  return parse_fixtures(read_text(file, largest_fixture_file), file.string(), file.parent_path());
 }
 
 std::string fixtures_json(const FixtureSet& set) {

@@ -137,9 +137,7 @@ RecordedCamera parse_intrinsics(std::string_view text, const std::string& name) 
 }
 
 RecordedCamera read_intrinsics(const std::filesystem::path& path) {
-  const std::vector<std::byte> bytes = read_file(path, largest_intrinsics);
-  return parse_intrinsics({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
-                          path.string());
+  return parse_intrinsics(read_text(path, largest_intrinsics), path.string());
 }
 
 }  // namespace palpate

@@ -61,11 +61,8 @@ NamedMaterial read_material(const TomlTable& root, const toml::node& node,
   if (!like.empty()) {
     const auto known = std::find_if(above.materials.begin(), above.materials.end(),
                                     [&](const NamedMaterial& m) { return m.name == like; });
-    try {
-      material = known != above.materials.end() ? *known : standard_material(like);
-    } catch (const Error& error) {
-      throw Error(at_line(root.file(), table.find("like")->source().begin.line), error.what());
-    }
+    table.at(*table.find("like"),
+             [&] { material = known != above.materials.end() ? *known : standard_material(like); });
     material.colour.reset();
   }
   material.name = name;
@@ -76,7 +73,7 @@ NamedMaterial read_material(const TomlTable& root, const toml::node& node,
       table.fail(*table.find("colour"), "'colour' is '" + colour + "'",
                  "write it as \"#rrggbb\", such as \"#a0522d\"");
   }
-  table.read("tolerance", material.tolerance, 1.0, 100.0, "of CIELAB");
+  table.read(key_of("tolerance", "", "of CIELAB", 1.0, 100.0, ""), material.tolerance);
   set_rows(table, material_table(), material.material);
   return material;
 }
@@ -154,9 +151,7 @@ MaterialTable parse_materials(std::string_view text, const std::string& name) {
 }
 
 MaterialTable read_materials(const fs::path& file) {
-  const std::vector<std::byte> bytes = read_file(file, largest_material_file);
-  return parse_materials({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
-                         file.string());
+  return parse_materials(read_text(file, largest_material_file), file.string());
 }
 
 Materials materials_of(const std::string& name_or_file) {

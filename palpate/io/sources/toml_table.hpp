@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #define TOML_ENABLE_FORMATTERS 0
@@ -25,6 +26,7 @@
 #include <toml++/toml.h>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/parameters.hpp"
 #include "palpate/kernel/core/pose.hpp"
 #include "palpate/kernel/core/text.hpp"
 
@@ -72,18 +74,32 @@ class TomlTable {
     value = **node->as_boolean();
   }
 
-  // Whole numbers only if `whole`.
-  void read(std::string_view key, double& value, double min, double max, std::string_view unit,
-            bool whole = false) const {
-    const toml::node* node = find(key);
+  /// Reads the value of a key, if the table has it.
+  template <class Value>
+  void read(const Key& key, Value& value) const {
+    constexpr bool whole = std::is_same_v<Value, std::optional<int>>;
+    const toml::node* node = find(key.name);
     if (node == nullptr) return;
-    const double number = number_of(*node, quoted(key));
-    if (!(number >= min && number <= max) || (whole && std::floor(number) != number)) {
-      fail(*node, quoted(key) + ": " + shortest(number) + " is out of range",
-           std::string("give a ") + (whole ? "whole number" : "value") + " from " + shortest(min) +
-               " to " + shortest(max) + (unit.empty() ? "" : " " + std::string(unit)));
+    if constexpr (whole || std::is_same_v<Value, double>) {
+      const double number = number_of(*node, quoted(key.name));
+      at(*node,
+         [&] { check_range("setting", key.name, key.unit, key.min, key.max, number, whole); });
+      value = static_cast<std::conditional_t<whole, int, double>>(number);
+    } else if constexpr (std::is_assignable_v<Value&, Eigen::Isometry3d>) {
+      value = *pose(key.name);
+    } else {
+      read(key.name, value);
     }
-    value = number;
+  }
+
+  /// Does something, and adds the line of `node` to its error.
+  template <class Action>
+  void at(const toml::node& node, const Action& action) const {
+    try {
+      action();
+    } catch (const Error& error) {
+      throw Error(at_line(file_, node.source().begin.line), error.what());
+    }
   }
 
   [[nodiscard]] double number_of(const toml::node& node, const std::string& what) const {
@@ -126,6 +142,16 @@ class TomlTable {
   std::string file_, title_;
 };
 
+/// Reads the keys of `owner` that a table has. @param more  further names that it may have
+template <class Owner>
+TomlTable read_keys(const toml::table& table, const std::string& file, const std::string& title,
+                    Owner& owner, std::vector<std::string_view> more = {}) {
+  Owner::walk_keys(owner, [&](const Key& key, const auto&) { more.push_back(key.name); });
+  TomlTable checked(table, file, title, more);
+  Owner::walk_keys(owner, [&](const Key& key, auto& value) { checked.read(key, value); });
+  return checked;
+}
+
 /// Sets what a table has of the rows of `rows`, in their order, in which a derived parameter comes
 /// before what it is derived from.
 template <class Rows, class Values>
@@ -134,11 +160,7 @@ void set_rows(const TomlTable& table, const Rows& rows, Values& values) {
     const toml::node* node = table.find(row.name);
     if (node == nullptr) continue;
     const double number = table.number_of(*node, TomlTable::quoted(row.name));
-    try {
-      set_parameter(values, row.name, number);
-    } catch (const Error& error) {
-      throw Error(at_line(table.file(), node->source().begin.line), error.what());
-    }
+    table.at(*node, [&] { set_parameter(values, row.name, number); });
   }
 }
 

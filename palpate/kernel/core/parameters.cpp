@@ -19,12 +19,15 @@ std::string number_text(double value) {
 }
 
 void check_range(std::string_view noun, std::string_view name, std::string_view unit, double min,
-                 double max, double value) {
-  if (std::isfinite(value) && value >= min && value <= max) return;
+                 double max, double value, bool whole) {
+  if (std::isfinite(value) && value >= min && value <= max &&
+      (!whole || std::floor(value) == value))
+    return;
   const std::string shown = unit == "-" ? "" : " " + std::string(unit);
   throw Error(std::string(noun) + " '" + std::string(name) + "'",
               number_text(value) + shown + " is out of range",
-              "give a value from " + number_text(min) + " to " + number_text(max) + shown);
+              std::string("give a ") + (whole ? "whole number" : "value") + " from " +
+                  number_text(min) + " to " + number_text(max) + shown);
 }
 
 void refuse_name(std::string_view noun, std::string_view name,

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "palpate/kernel/core/pose.hpp"
 #include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
@@ -50,10 +51,11 @@ constexpr auto row_of(std::string_view name, std::string_view symbol, std::strin
 /// A number as messages show it.
 std::string number_text(double value);
 
-/// @param noun  what a row is, such as "parameter"
+/// @param noun   what a row is, such as "parameter"
+/// @param whole  only whole numbers are allowed
 /// @throws Error if the value is not finite or not in [min, max].
 void check_range(std::string_view noun, std::string_view name, std::string_view unit, double min,
-                 double max, double value);
+                 double max, double value, bool whole = false);
 /// @throws Error naming the nearest of the known names.
 [[noreturn]] void refuse_name(std::string_view noun, std::string_view name,
                               std::span<const std::string_view> known);
@@ -83,6 +85,51 @@ void set_by_name(std::span<const ParameterRow<Owner>> table, Owner& owner, std::
   const ParameterRow<Owner>& row = row_by_name(table, name, noun);
   check_range(noun, row.name, row.unit, row.min, row.max, value);
   row.set(owner, value);
+}
+
+/// A key of a session: what its file, the command line and the page say of one value. A struct with
+/// keys has a function `walk_keys(self, way)`, which calls way(key, member) for each of them, in
+/// the order in which they are printed.
+struct Key {
+  std::string_view name;    ///< in a file
+  std::string_view option;  ///< of the command line; empty: none
+  std::string_view meaning;
+  std::string_view unit = "-";  ///< of a number; "-" where it has none
+  double min = 0.0;             ///< smallest number allowed
+  double max = 0.0;             ///< largest number allowed
+};
+
+/// The key of a number.
+constexpr Key key_of(std::string_view name, std::string_view option, std::string_view unit,
+                     double min, double max, std::string_view meaning) {
+  return {name, option, meaning, unit, min, max};
+}
+
+/// "Hz, 100 to 100000" of the key or row of a number.
+template <class Row>
+std::string range_text(const Row& row) {
+  const std::string unit = row.unit == "-" ? "" : std::string(row.unit) + ", ";
+  return unit + number_text(row.min) + " to " + number_text(row.max);
+}
+
+/// @param noun, name  what messages call the key
+/// @throws Error if a number is out of its range or a pose is not rigid.
+template <class Value>
+void check(const Key& key, const Value& value, std::string_view noun, std::string_view name) {
+  if constexpr (std::is_same_v<Value, double> || std::is_same_v<Value, int>) {
+    check_range(noun, name, key.unit, key.min, key.max, value, std::is_same_v<Value, int>);
+  } else if constexpr (std::is_same_v<Value, Eigen::Isometry3d>) {
+    check_rigid(value, std::string(name));
+  } else if constexpr (requires { value.has_value(); }) {
+    if (value) check(key, *value, noun, name);
+  }
+}
+
+/// The same for all keys of `owner`.
+template <class Owner>
+void check_keys(const Owner& owner) {
+  Owner::walk_keys(
+      owner, [](const Key& key, const auto& value) { check(key, value, "setting", key.name); });
 }
 
 /// The proxy's regions and the constants of its movement. Section 4.1, 4.3, 4.4; Table 2.

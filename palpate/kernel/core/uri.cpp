@@ -114,7 +114,7 @@ double Uri::number_option(std::string_view key, double fallback, double min, dou
   if (number < min || number > max) {
     std::ostringstream range;
     range << "give a value from " << min << " to " << max;
-    if (!si_unit.empty() && si_unit != "1") {
+    if (!si_unit.empty() && si_unit != "1" && si_unit != "-") {
       range << ' ' << si_unit;
     }
     throw Error(subject, "'" + value + "' is out of range", range.str());

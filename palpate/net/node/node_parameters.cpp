@@ -7,7 +7,7 @@
 
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/parameters.hpp"
-#include "palpate/servo/placement_table.hpp"
+#include "palpate/servo/placement.hpp"
 #include "palpate/servo/safety.hpp"
 
 namespace palpate {

@@ -18,7 +18,7 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/uri.hpp"
 #include "palpate/record/recorded_hand.hpp"
-#include "palpate/servo/placement_table.hpp"
+#include "palpate/servo/placement.hpp"
 #include "palpate/servo/stiffness.hpp"
 
 namespace palpate {

@@ -172,8 +172,8 @@ Compiling for Release with tests, one core's seconds by folder: {folders}. The l
 ## Guaranteed by tests
 
 `tests/cost`: the versions of each loop for SSE2, AVX2 and AVX-512 are disassembled and must be
-vector code of that width; all three give the same points, single lengths to 5 nm and sums of
-unit vectors to 2e-5; the steps and gathers of a slide are bounded, and so are the instructions of a
+vector code of that width, and all three give the same points, lengths and sums, bit for bit; the
+steps and gathers of a slide are bounded, and so are the instructions of a
 tick, counted by valgrind (6408 when the bound was set, with 8.3 steps over 90 points on AVX2); the
 core compiles for aarch64 if there is a cross compiler.
 """

@@ -45,7 +45,7 @@ std::optional<Press> press_of(const TraceOptions& options, const FrameSequence& 
   if (options.press.empty()) return std::nullopt;
   PressOptions pressing = options.pressing;
   if (!options.slide_to.empty()) pressing.slide_to = parse_pixel(options.slide_to, "--slide-to");
-  return Press(*playback.upcoming(0), parse_pixel(options.press, "--press"), pressing);
+  return Press(*playback.upcoming(0)->cloud, parse_pixel(options.press, "--press"), pressing);
 }
 
 int trace(TraceOptions options) {
@@ -75,7 +75,8 @@ int trace(TraceOptions options) {
   const std::string& name = config.method;
   Parameters parameters = for_sensors(config.parameters, playback.sensors());
   std::vector<const Cloud*> seen;
-  for (std::size_t i = 0; i < playback.cameras(); ++i) seen.push_back(playback.upcoming(i));
+  for (std::size_t i = 0; i < playback.cameras(); ++i)
+    seen.push_back(playback.upcoming(i)->cloud.get());
   if (!config.radii_chosen) parameters = for_points(parameters, seen);
   const double r_c = parameters.proxy.r_c();
   if (const std::string remark = radius_remark(*seen.front(), r_c);

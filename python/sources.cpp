@@ -109,7 +109,7 @@ HipPath path_of(const py::object& path) {
 Press press_of(const FrameSequence& frames, std::pair<int, int> at,
                const std::optional<std::pair<int, int>>& slide_to, PressOptions options) {
   if (slide_to) options.slide_to = Pixel{slide_to->first, slide_to->second};
-  return {*frames.upcoming(0), {at.first, at.second}, options};
+  return {*frames.upcoming(0)->cloud, {at.first, at.second}, options};
 }
 
 py::array trace(const py::object& camera, const py::object& path, const py::object& method,

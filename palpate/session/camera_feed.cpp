@@ -2,7 +2,9 @@
 #include "palpate/session/camera_feed.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -28,6 +30,19 @@ constexpr std::size_t pixels_a_look = 97;  // every so many of a frame; prime to
 constexpr std::size_t fewest_points = 50;  // of a look, below which it says nothing
 constexpr double most_elsewhere = 0.3;     // [-] share of points that may lie out of range
 
+// Of each CameraState.
+constexpr std::array<const char*, 6> state_words{
+    "waiting: no frame for ", "live",  "frozen: it sends the same image repeatedly",
+    "looking for it again",   "ended", "stopped"};
+// Of each StampProblem.
+constexpr std::array<const char*, stamp_problem_count> problem_words{
+    "",
+    "its clock jumped",
+    "its clock drifted away",
+    "its timestamps are in the future; arrival times are used",
+    "its frames arrive old",
+    "its timestamps do not increase"};
+
 class MachineClock final : public FeedClock {
  public:
   [[nodiscard]] double now() const override { return monotonic_now(); }
@@ -42,16 +57,10 @@ class MachineClock final : public FeedClock {
   }
 };
 
-// In hundredths of a metre
-std::string metres(double length) {
-  const auto count = std::lround(100.0 * length);
-  const std::string rest = std::to_string(100 + count % 100).substr(1);
-  return std::to_string(count / 100) + "." + rest;
-}
-
-std::string tenths(double seconds) {
-  const auto count = static_cast<long long>(std::lround(10.0 * seconds));
-  return std::to_string(count / 10) + "." + std::to_string(count % 10) + " s";
+std::string fixed(double value, int digits) {
+  std::array<char, 32> text{};
+  const auto format = std::chars_format::fixed;
+  return {text.data(), std::to_chars(text.begin(), text.end(), value, format, digits).ptr};
 }
 
 // Are two captures the same to the bit? Points of clouds are not compared.
@@ -77,27 +86,8 @@ std::string doubt_of(const Cloud& cloud, const DepthRange& range) {
   const double share = static_cast<double>(elsewhere) / static_cast<double>(measured + 1);
   if (measured < fewest_points || share <= most_elsewhere) return {};
   return std::to_string(std::lround(100.0 * share)) +
-         " % of its points are outside the camera's measuring range (" + metres(range.nearest) +
-         " to " + metres(range.farthest) + " m): check the unit of its depth values";
-}
-
-// Which sentence tells a person of a problem with stamps.
-std::string_view remark_of(StampProblem problem) {
-  switch (problem) {
-    case StampProblem::jumped:
-      return "its clock jumped";
-    case StampProblem::drifted:
-      return "its clock drifted away";
-    case StampProblem::from_the_future:
-      return "its timestamps are in the future; arrival times are used";
-    case StampProblem::too_old:
-      return "its frames arrive old";
-    case StampProblem::not_increasing:
-      return "its timestamps do not increase";
-    case StampProblem::none:
-      break;
-  }
-  return "";
+         " % of its points are outside the camera's measuring range (" + fixed(range.nearest, 2) +
+         " to " + fixed(range.farthest, 2) + " m): check the unit of its depth values";
 }
 
 }  // namespace
@@ -113,26 +103,17 @@ class CameraFeed::Worker {
   Worker(std::unique_ptr<Source> source, FeedOptions options, Open open)
       : options_(std::move(options)),
         open_(std::move(open)),
-        placer_(source->info().clock, options_.stamps),
-        source_(std::move(source)) {
-    const SourceInfo& info = source_->info();
-    is_live_ = info.live;
-    status_.uri = info.uri;
-    status_.kind = info.kind;
-    status_.sensor = info.sensor;
-    status_.rate = info.frame_rate.value_or(0.0);
-    status_.recorded = is_live_ ? 0 : info.frames.value_or(0);
-    last_heard_ = now();
-  }
+        source_(std::move(source)),
+        is_live_(source_->info().live),
+        player_(source_, open_, Playing::in_real_time),
+        placer_(source_->info().clock, options_.stamps),
+        status_(player_.status()) {}
 
   // Before the thread.
   std::optional<Frame> first_frame(double timeout) {
-    if (first_) return first_->frame;
-    first_ = read(timeout);
-    if (!first_ && !is_live_)
-      throw Error(status_.uri, "it has no frames", "give a source with at least one");
-    if (!first_) return std::nullopt;
-    return first_->frame;
+    if (!is_live_) return player_.first_frame();
+    if (!first_) first_ = read(timeout);
+    return first_;
   }
   void connect(Sink sink) {
     sink_ = std::move(sink);
@@ -141,19 +122,16 @@ class CameraFeed::Worker {
 
   // The thread.
   void run() {
-    {
-      const std::lock_guard lock(mutex_);
-      last_heard_ = now();
-    }
+    last_heard_ = now();
     while (!is_stopping()) {
-      if (!source_ && !open_again(true)) continue;
+      if (!source_ && !open_again()) continue;
       if (is_live_) {
         run_live();
       } else if (!run_recording()) {
         break;
       }
     }
-    set_source(nullptr);
+    close();
     const std::lock_guard lock(mutex_);
     is_finished_ = true;
     changed_.notify_all();
@@ -178,26 +156,30 @@ class CameraFeed::Worker {
     return changed_.wait_for(lock, bound, [this] { return is_finished_; });
   }
   void set_playback(const Playback& playback) {
-    {
-      const std::lock_guard lock(mutex_);
-      status_.playback = playback;
-    }
+    const std::lock_guard lock(mutex_);
+    wanted_ = status_.playback = playback;
     changed_.notify_all();
   }
   void seek(double share) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (!is_live_) sought_ = share;
-    }
+    const std::lock_guard lock(mutex_);
+    if (!is_live_) sought_ = share;
     changed_.notify_all();
   }
   [[nodiscard]] CameraStatus status() const;
 
  private:
-  struct Read {
-    Frame frame;
-    double arrival;  // [s]
-    double took;     // [s] of reading it
+  // While it lives, the source is read: `status` says so where that hangs.
+  struct Watch {
+    Watch(Worker& of, double timeout) : worker(of) {
+      const std::lock_guard lock(worker.mutex_);
+      worker.publish();
+      worker.read_until_ = worker.now() + std::min(timeout, hang_margin);
+    }
+    ~Watch() {
+      const std::lock_guard lock(worker.mutex_);
+      worker.read_until_.reset();
+    }
+    Worker& worker;
   };
 
   [[nodiscard]] double now() const { return options_.clock->now(); }
@@ -205,57 +187,46 @@ class CameraFeed::Worker {
     const std::lock_guard lock(mutex_);
     return is_stopping_;
   }
-  bool wait_until(double t);
-  std::optional<Read> read(double timeout);
+  void publish();
+  void wait_until(double t);
   void set_source(std::shared_ptr<Source> source);
+  void close();
   void look_again(const std::string& trouble);
-  bool open_again(bool was_gone);
-  void run_live();
+  bool open_again();
   bool run_recording();
-  bool go_to(double share, std::size_t& at);
-  bool wait_to_show(double stamp, double& offset, bool at_once);
-  std::optional<double> take_sought() {
-    const std::lock_guard lock(mutex_);
-    return std::exchange(sought_, std::nullopt);
-  }
-  bool stay_at_end();
-  void show_again();
-  void show_still(const Read& only, double last);
-  void take_live(Read read);
-  void deliver(FedFrame fed);
-  void drop(std::uint64_t count);
-  void count(StampProblem problem);
-  void set_trouble(const std::string& trouble);
-  void set_state(CameraState state);
+  bool read_ahead(int& errors);
+  void run_live();
+  std::optional<Frame> read(double timeout);
+  void take_live(Frame frame);
+  void deliver(const FedFrame& fed);
 
   const FeedOptions options_;
   const Open open_;
 
+  std::shared_ptr<Source> source_;  // the thread alone changes it, with mutex_ held
+  std::atomic<bool> is_live_;
+  std::atomic<double> last_heard_{now()};  // [s] when the last frame came
+
   // The thread's own.
+  Player player_;  // has the status of a live camera, too
   StampPlacer placer_;
-  std::optional<Read> first_;
+  std::optional<Frame> first_;                                   // of a live camera
   std::shared_ptr<const Cloud> newest_;                          // of a live camera
   int same_pictures_ = 0;                                        // in a row
   int frames_seen_ = 0;                                          // since it was opened
   double took_ = 0.0;                                            // [s] to decode the frame before
   double pause_ = 0.0;                                           // [s] before it is opened again
   double last_time_ = -std::numeric_limits<double>::infinity();  // [s] stamp handed over last
-  FedFrame shown_;            // of a recording: the frame handed over last
-  double first_stamp_ = 0.0;  // [s] of a recording's first frame, by its own clock
-  bool has_jumped_ = false;   // in time, before the frame to come
-  double speed_ = 1.0;        // of the recording, which the offset of its stamps is for
-  std::atomic<bool> is_live_{false};
+  bool is_starting_ = true;                                      // no frame since it was opened
 
   mutable std::mutex mutex_;  // for all below
   std::condition_variable changed_;
-  std::shared_ptr<Source> source_;
   bool is_stopping_ = false, is_finished_ = false;
-  CameraStatus status_;
-  double last_heard_ = 0.0;           // [s] when the last frame came
-  bool is_starting_ = true;           // no frame since it was opened
+  CameraStatus status_;               // as published
   std::optional<double> read_until_;  // [s] when the read that continues must have ended
   StampProblem last_problem_ = StampProblem::none;
   double last_problem_time_ = 0.0;  // [s]
+  std::optional<Playback> wanted_;  // asked for, and not yet the player's
   std::optional<double> sought_;    // place in the recording that was asked for, 0 to 1
 
   // Held while the sink is called. Recursive: a sink may stop its own camera.
@@ -264,97 +235,117 @@ class CameraFeed::Worker {
   bool is_connected_ = false;
 };
 
-// False if the camera is to stop.
-bool CameraFeed::Worker::wait_until(double t) {
-  std::unique_lock lock(mutex_);
-  while (!is_stopping_ && now() < t) options_.clock->wait(lock, changed_, t);
-  return !is_stopping_;
+// With mutex_ held: what others see from now on.
+void CameraFeed::Worker::publish() {
+  const CameraStatus& status = player_.status();
+  for (std::size_t i = 0; i < stamp_problem_count; ++i) {
+    if (status.stamp_problems[i] == status_.stamp_problems[i]) continue;
+    last_problem_ = static_cast<StampProblem>(i);
+    last_problem_time_ = now();
+  }
+  status_ = status;
+  if (wanted_) status_.playback = *wanted_;
 }
 
-// The source's next frame. @throws what it throws
-std::optional<CameraFeed::Worker::Read> CameraFeed::Worker::read(double timeout) {
-  const double begin = now();
-  {
-    const std::lock_guard lock(mutex_);
-    read_until_ = begin + std::min(timeout, hang_margin);
-  }
-  struct Done {
-    Worker& worker;
-    ~Done() {
-      const std::lock_guard lock(worker.mutex_);
-      worker.read_until_.reset();
-    }
-  } const done{*this};
-  std::optional<Frame> frame = source_->next(timeout);
-  const double end = now();
-  if (!frame || !frame->cloud) return std::nullopt;
-  const double arrival = std::min(frame->arrival.value_or(end), end);
-  return Read{std::move(*frame), arrival, end - begin};
+// Unless the camera is to stop.
+void CameraFeed::Worker::wait_until(double t) {
+  std::unique_lock lock(mutex_);
+  publish();
+  while (!is_stopping_ && now() < t) options_.clock->wait(lock, changed_, t);
 }
 
 // The one before is destroyed here, on the camera's thread: closing it may take its time.
 void CameraFeed::Worker::set_source(std::shared_ptr<Source> source) {
   {
     const std::lock_guard lock(mutex_);
+    publish();
     std::swap(source_, source);
     if (source_ && is_stopping_) source_->cancel();
   }
   source.reset();
 }
 
-void CameraFeed::Worker::set_state(CameraState state) {
-  const std::lock_guard lock(mutex_);
-  status_.state = state;
-}
-
-void CameraFeed::Worker::set_trouble(const std::string& trouble) {
-  const std::lock_guard lock(mutex_);
-  status_.trouble = trouble;
-}
-
-void CameraFeed::Worker::drop(std::uint64_t count) {
-  const std::lock_guard lock(mutex_);
-  status_.dropped += count;
-}
-
-void CameraFeed::Worker::count(StampProblem problem) {
-  if (problem == StampProblem::none) return;
-  const std::lock_guard lock(mutex_);
-  ++status_.stamp_problems[static_cast<std::size_t>(problem)];
-  last_problem_ = problem;
-  last_problem_time_ = now();
+void CameraFeed::Worker::close() {
+  player_.close();
+  set_source(nullptr);
 }
 
 // Closes the source, or keeps one that cannot be opened again, and waits before the next attempt.
 void CameraFeed::Worker::look_again(const std::string& trouble) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (is_stopping_) return;
-    status_.trouble = trouble;
-    status_.state = CameraState::searching;
-  }
-  if (open_) set_source(nullptr);
+  player_.status().trouble = trouble;
+  player_.status().state = CameraState::searching;
+  if (open_) close();
   pause_ = pause_ > 0.0 ? std::min(2.0 * pause_, options_.longest_pause) : options_.first_pause;
   wait_until(now() + pause_);
 }
 
-bool CameraFeed::Worker::open_again(bool was_gone) {
+bool CameraFeed::Worker::open_again() {
   try {
-    std::unique_ptr<Source> source = open_();
-    if (!source) throw Error(status_.uri, "nothing was opened");
+    std::shared_ptr<Source> source = open_();
+    if (!source) throw Error(player_.status().uri, "nothing was opened");
     is_live_ = source->info().live;
     placer_.restart(source->info().clock);
-    same_pictures_ = 0;
-    frames_seen_ = 0;
+    same_pictures_ = frames_seen_ = 0;
     newest_.reset();
     set_source(std::move(source));
-    const std::lock_guard lock(mutex_);
-    status_.opened_again += was_gone ? 1 : 0;
-    if (was_gone) status_.state = CameraState::waiting;
+    player_.begin(source_);
+    CameraStatus& status = player_.status();
+    if (status.state == CameraState::searching) {
+      ++status.opened_again;
+      status.state = CameraState::waiting;
+    }
     last_heard_ = now();
     is_starting_ = true;
     return true;
   } catch (const std::exception& error) {
+    look_again(error.what());
+    return false;
+  }
+}
+
+// A recording, until it is to stop or has to be opened again. False: it is over.
+bool CameraFeed::Worker::run_recording() {
+  for (int errors = 0;;) {
+    {
+      std::unique_lock lock(mutex_);
+      if (is_stopping_) return true;
+      if (const auto wanted = std::exchange(wanted_, std::nullopt))
+        player_.set_playback(*wanted, now());
+      if (const auto share = std::exchange(sought_, std::nullopt)) player_.seek(*share);
+      publish();
+      const double due = player_.due(now());
+      if (!open_ && due == std::numeric_limits<double>::infinity()) return false;
+      if (now() < due) {
+        options_.clock->wait(lock, changed_, due);
+        continue;
+      }
+    }
+    if (player_.needs_source()) {
+      close();
+      return true;
+    }
+    if (player_.needs_frame()) {
+      if (!read_ahead(errors)) return true;
+    } else if (const auto fed = player_.next_until(now())) {
+      if (fed->is_new) last_heard_ = now();
+      pause_ = 0.0;
+      deliver(*fed);
+    }
+  }
+}
+
+// Reads a recording's next frame. False: it has been closed, or kept for a while, for its faults.
+bool CameraFeed::Worker::read_ahead(int& errors) {
+  const double begin = now();
+  try {
+    const Watch watch(*this, Source::no_timeout);
+    player_.read(begin, took_);
+    took_ = now() - begin;
+    errors = 0;
+    return true;
+  } catch (const std::exception& error) {
+    player_.status().trouble = error.what();
+    if (++errors < most_recording_errors && !player_.needs_source()) return true;
     look_again(error.what());
     return false;
   }
@@ -365,12 +356,12 @@ void CameraFeed::Worker::run_live() {
   if (first_) take_live(*std::exchange(first_, std::nullopt));
   for (int errors = 0; !is_stopping();) {
     const double begin = now();
-    std::optional<Read> frame;
+    std::optional<Frame> frame;
     try {
       frame = read(options_.waiting);
     } catch (const std::exception& error) {
-      set_trouble(error.what());
-      drop(1);
+      player_.status().trouble = error.what();
+      ++player_.status().dropped;
       if (++errors < most_live_errors) continue;
       look_again(error.what());
       return;
@@ -382,17 +373,10 @@ void CameraFeed::Worker::run_live() {
       continue;
     }
     if (is_stopping()) return;
-    double silent = 0.0;
-    double bound = options_.silence;
-    {
-      const std::lock_guard lock(mutex_);
-      silent = end - last_heard_;
-      if (silent >= options_.waiting) status_.state = CameraState::waiting;
-      if (is_starting_) bound = options_.start_up;
-    }
-    if (silent >= bound) {
-      look_again("it has delivered nothing for " + tenths(silent));
-      const std::lock_guard lock(mutex_);
+    const double silent = end - last_heard_;
+    if (silent >= options_.waiting) player_.status().state = CameraState::waiting;
+    if (silent >= (is_starting_ ? options_.start_up : options_.silence)) {
+      look_again("it has delivered nothing for " + fixed(silent, 1) + " s");
       last_heard_ = now();  // a source that cannot be opened again gets its time once more
       return;
     }
@@ -400,261 +384,59 @@ void CameraFeed::Worker::run_live() {
   }
 }
 
-void CameraFeed::Worker::take_live(Read read) {
-  {
-    const std::lock_guard lock(mutex_);
-    last_heard_ = std::max(read.arrival, last_heard_);
-    is_starting_ = false;
-    status_.trouble.clear();
-  }
+// A live camera's next frame, with its arrival. @throws what its source throws
+std::optional<Frame> CameraFeed::Worker::read(double timeout) {
+  const Watch watch(*this, timeout);
+  std::optional<Frame> frame = source_->next(timeout);
+  const double end = now();
+  if (!frame || !frame->cloud) return std::nullopt;
+  frame->arrival = std::min(frame->arrival.value_or(end), end);
+  return frame;
+}
+
+void CameraFeed::Worker::take_live(Frame frame) {
+  CameraStatus& status = player_.status();
+  const double arrival = frame.arrival.value_or(now());
+  last_heard_ = std::max(arrival, last_heard_.load());
+  is_starting_ = false;
+  status.trouble.clear();
   pause_ = 0.0;
   const double known = options_.clock->now() - options_.clock->system_now();
   const StampClock clock = source_->info().clock;
-  const double stamp = read.frame.stamp;
+  const double stamp = frame.stamp;
   const PlacedStamp placed =
-      placer_.place(stamp, read.arrival, clock == StampClock::system ? known : 0.0);
-  count(placed.problem);
-  same_pictures_ = is_same_picture(newest_.get(), read.frame.cloud.get()) ? same_pictures_ + 1 : 1;
-  newest_ = read.frame.cloud;
-  if (const auto& range = source_->info().range; range && frames_seen_++ % frames_a_look == 0) {
-    const std::string doubt = doubt_of(*newest_, *range);
-    const std::lock_guard lock(mutex_);
-    status_.doubt = doubt;
-  }
+      placer_.place(stamp, arrival, clock == StampClock::system ? known : 0.0);
+  if (placed.problem != StampProblem::none)
+    ++status.stamp_problems[static_cast<std::size_t>(placed.problem)];
+  same_pictures_ = is_same_picture(newest_.get(), frame.cloud.get()) ? same_pictures_ + 1 : 1;
+  newest_ = frame.cloud;
+  if (const auto& range = source_->info().range; range && frames_seen_++ % frames_a_look == 0)
+    status.doubt = doubt_of(*newest_, *range);
   const bool is_frozen = same_pictures_ >= options_.frozen_frames;
-  {
-    const std::lock_guard lock(mutex_);
-    status_.latency = placer_.latency();
-    status_.state = is_frozen ? CameraState::frozen : CameraState::live;
-  }
+  status.latency = placer_.latency();
+  status.state = is_frozen ? CameraState::frozen : CameraState::live;
   if (is_frozen || !placed.usable || !(placed.time > last_time_)) {
-    drop(1);
+    ++status.dropped;
     return;
   }
-  read.frame.stamp = placed.time;
-  deliver({std::move(read.frame), stamp, true});
+  ++status.frames;
+  status.last_frame = frame.stamp = placed.time;
+  status.stays_valid = false;
+  deliver({std::move(frame), stamp});
 }
 
-// Goes to another place of the recording, which is at frame `at`. False: it has to be opened again.
-bool CameraFeed::Worker::go_to(double share, std::size_t& at) {
-  const std::size_t count = source_->info().frames.value_or(0);
-  if (count < 2) return true;
-  const auto wanted = static_cast<std::size_t>(std::lround(share * static_cast<double>(count - 1)));
-  if (wanted < at) {
-    if (!open_) return true;
-    set_source(nullptr);
-    if (!open_again(false)) return false;
-    at = 0;
-  }
-  while (at < wanted) {
-    const std::size_t skipped = source_->skip(wanted - at);
-    at += skipped > 0 ? skipped : 1;
-    if (skipped == 0 && !read(Source::no_timeout)) break;
-  }
-  has_jumped_ = true;
-  return true;
-}
-
-// The frame that was shown last, once more.
-void CameraFeed::Worker::show_again() {
-  FedFrame again = shown_;
-  again.frame.stamp = std::max(last_time_ + options_.still_interval, now());
-  again.is_new = false;
-  again.after_jump = false;
-  deliver(std::move(again));
-}
-
-// Waits until a frame is due, at `stamp / speed_ + offset`, and while the recording is paused,
-// unless it is the first of a place. False: not to be shown, as the camera is to stop or goes
-// elsewhere.
-bool CameraFeed::Worker::wait_to_show(double stamp, double& offset, bool is_first) {
-  for (bool was_paused = false;;) {
-    {
-      std::unique_lock lock(mutex_);
-      if (is_stopping_ || sought_) return false;
-      const Playback& playback = status_.playback;
-      const bool is_paused = playback.paused && !is_first;
-      if (playback.speed != speed_ || (was_paused && !is_paused)) {
-        // On from the frame that was shown last.
-        speed_ = playback.speed;
-        const double after = std::max(stamp - shown_.source_stamp, 0.0) / speed_;
-        offset = std::max(now(), last_time_) + after - stamp / speed_;
-      }
-      was_paused = is_paused;
-      const double wake =
-          is_paused ? last_time_ + options_.still_interval : stamp / speed_ + offset;
-      if (now() < wake) {
-        options_.clock->wait(lock, changed_, wake);
-        continue;
-      }
-      if (!is_paused) return true;
-    }
-    show_again();
-  }
-}
-
-// After the last frame: pauses there, unless the recording begins again. False: the camera is to
-// stop.
-bool CameraFeed::Worker::stay_at_end() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (status_.playback.loop) return !is_stopping_;
-    status_.playback.paused = true;
-  }
-  for (;;) {
-    {
-      std::unique_lock lock(mutex_);
-      const double wake = last_time_ + options_.still_interval;
-      if (is_stopping_) return false;
-      if (sought_ || !status_.playback.paused) return true;
-      if (now() < wake) {
-        options_.clock->wait(lock, changed_, wake);
-        continue;
-      }
-    }
-    show_again();
-  }
-}
-
-// One pass of a recording. False if it is over for good.
-bool CameraFeed::Worker::run_recording() {
-  std::optional<Read> next = std::exchange(first_, std::nullopt);
-  std::optional<Read> only;  // the first frame while it is the only one
-  std::size_t frames = 0;    // of this pass, left-out ones included
-  double offset = 0.0;       // [s] from the recording's clock to the loop's
-  double last_stamp = 0.0;   // [s] by the recording's clock
-  int errors = 0;
-  const double period =
-      source_->info().frame_rate.value_or(0.0) > 0.0 ? 1.0 / *source_->info().frame_rate : 0.0;
-  for (;;) {
-    if (is_stopping()) return true;
-    if (const std::optional<double> share = take_sought()) {
-      next.reset();
-      only.reset();
-      if (!go_to(*share, frames)) return true;
-    }
-    if (!next) {
-      // Decoding is too slow: leave out the frames that would be late.
-      if (frames > 0 && period > 0.0 && !has_jumped_) {
-        const double behind = now() + took_ - ((last_stamp + period) / speed_ + offset);
-        if (behind > period / speed_) {
-          const auto late = static_cast<std::size_t>(behind * speed_ / period);
-          const std::size_t skipped = source_->skip(late);
-          frames += skipped;
-          drop(skipped);
-        }
-      }
-      try {
-        next = read(Source::no_timeout);
-      } catch (const std::exception& error) {
-        set_trouble(error.what());
-        drop(1);
-        ++frames;
-        if (++errors < most_recording_errors) continue;
-        look_again(error.what());
-        return true;
-      }
-    }
-    if (!next) break;
-    errors = 0;
-    took_ = frames > 0 ? next->took : 0.0;  // the first frame takes longer than others
-    const double stamp = next->frame.stamp;
-    if (!std::isfinite(stamp) || (frames > 0 && !has_jumped_ && stamp <= last_stamp &&
-                                  last_stamp - stamp < stamp_step_back)) {
-      count(StampProblem::not_increasing);
-      drop(1);
-      ++frames;
-      next.reset();
-      continue;
-    }
-    const double earliest = std::max(now(), last_time_ + options_.still_interval);
-    const bool was_sought = has_jumped_ && frames > 0;
-    const bool has_jumped = frames > 0 && !was_sought &&
-                            (stamp < last_stamp || stamp - last_stamp > options_.longest_gap);
-    const bool is_behind =
-        frames > 0 && !was_sought && now() - (stamp / speed_ + offset) > options_.longest_lag;
-    if (frames == 0 || was_sought || has_jumped || is_behind) offset = earliest - stamp / speed_;
-    if (has_jumped) count(StampProblem::jumped);
-    if (has_jumped) has_jumped_ = true;
-    if (frames == 0) first_stamp_ = stamp;
-    if (is_behind && !has_jumped) {
-      const std::lock_guard lock(mutex_);
-      ++status_.slowed;
-    }
-    last_stamp = stamp;
-    if (++frames == 1) only = *next;
-    if (frames == 2) only.reset();
-    if (!wait_to_show(stamp, offset, frames == 1 || has_jumped_)) continue;
-    const double due = stamp / speed_ + offset;
-    pause_ = 0.0;
-    {
-      const std::lock_guard lock(mutex_);
-      last_heard_ = now();
-      status_.state = CameraState::live;
-      status_.place = frames - 1;
-      status_.recorded_time = stamp - first_stamp_;
-    }
-    Frame frame = std::move(next->frame);
-    next.reset();
-    frame.stamp = due;
-    if (due > last_time_) {
-      shown_ = {std::move(frame), stamp, true, std::exchange(has_jumped_, false)};
-      deliver(shown_);
-    } else {
-      count(StampProblem::not_increasing);
-      drop(1);
-    }
-  }
-  if (is_stopping()) return true;
-  if (frames == 0 && open_) {
-    look_again("it has no frames");
-    return true;
-  }
-  if (only && frames == 1) {
-    {
-      const std::lock_guard lock(mutex_);
-      status_.kind += ", one frame";
-    }
-    show_still(*only, last_time_);
-    return true;
-  }
-  if (!open_) {
-    set_state(CameraState::ended);
-    while (frames > 0 && wait_until(last_time_ + options_.still_interval)) show_again();
-    return false;
-  }
-  if (!stay_at_end()) return true;
-  has_jumped_ = true;
-  set_source(nullptr);
-  open_again(false);
-  return true;
-}
-
-// The only frame of a recording, again and again until the camera is to stop.
-void CameraFeed::Worker::show_still(const Read& only, double last) {
-  while (wait_until(last + options_.still_interval)) {
-    last = std::max(last + options_.still_interval, now());
-    Frame frame = only.frame;
-    frame.stamp = last;
-    deliver({std::move(frame), only.frame.stamp, false});
-  }
-}
-
-void CameraFeed::Worker::deliver(FedFrame fed) {
+void CameraFeed::Worker::deliver(const FedFrame& fed) {
   const double interval = fed.frame.stamp - last_time_;
   last_time_ = fed.frame.stamp;
+  if (double& rate = player_.status().rate;
+      fed.is_new && std::isfinite(interval) && interval > 0.0) {
+    // The mean of intervals: two frames that come at once would rule a mean of rates.
+    const double mean = rate > 0.0 ? 1.0 / rate : interval;
+    rate = 1.0 / (mean + rate_weight * (interval - mean));
+  }
   {
     const std::lock_guard lock(mutex_);
-    if (fed.is_new) {
-      ++status_.frames;
-      if (std::isfinite(interval) && interval > 0.0) {
-        // The mean of intervals: two frames that come at once would rule a mean of rates.
-        const double mean = status_.rate > 0.0 ? 1.0 / status_.rate : interval;
-        status_.rate = 1.0 / (mean + rate_weight * (interval - mean));
-      }
-    }
-    status_.last_frame = fed.frame.stamp;
-    status_.stays_valid = !fed.is_new;
+    publish();
   }
   const std::lock_guard lock(sink_mutex_);
   if (is_connected_) sink_(fed);
@@ -664,36 +446,22 @@ CameraStatus CameraFeed::Worker::status() const {
   const std::lock_guard lock(mutex_);
   const double time = now();
   CameraStatus status = status_;
-  const double silent = time - last_heard_;
+  if (status.recorded == 1) status.kind += ", one frame";
+  const std::string silent = fixed(time - last_heard_, 1) + " s";
   const bool hangs = read_until_ && time > *read_until_ + hang_margin;
   if (is_stopping_) status.state = CameraState::stopped;
-  const std::string because = status.trouble.empty() ? "" : ": " + status.trouble;
-  switch (status.state) {
-    case CameraState::waiting:
-      status.text = "waiting: no frame for " + tenths(silent) + because;
-      break;
-    case CameraState::live:
-      status.text = "live";
-      break;
-    case CameraState::frozen:
-      status.text = "frozen: it sends the same image repeatedly";
-      break;
-    case CameraState::searching:
-      status.text = "looking for it again" + because;
-      break;
-    case CameraState::ended:
-      status.text = status.stays_valid ? "ended, its last frame stays" : "ended";
-      break;
-    case CameraState::stopped:
-      status.text = "stopped";
-      break;
-  }
+  status.text = state_words[static_cast<std::size_t>(status.state)];
+  if (status.state == CameraState::waiting) status.text += silent;
+  if (status.state == CameraState::ended && status.stays_valid)
+    status.text += ", its last frame stays";
+  if (status.state == CameraState::waiting || status.state == CameraState::searching)
+    status.text += status.trouble.empty() ? "" : ": " + status.trouble;
   if (hangs && !is_stopping_) {
     status.state = CameraState::waiting;
-    status.text = "it hangs: no frame for " + tenths(silent);
+    status.text = "it hangs: no frame for " + silent;
   } else if (status.state == CameraState::live && last_problem_ != StampProblem::none &&
              time - last_problem_time_ < remark_time) {
-    status.text += "; " + std::string(remark_of(last_problem_));
+    status.text += "; " + std::string(problem_words[static_cast<std::size_t>(last_problem_)]);
   } else if (status.state == CameraState::live && !status.doubt.empty()) {
     status.text += "; " + status.doubt;
   }

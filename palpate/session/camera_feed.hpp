@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <condition_variable>
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -13,6 +11,7 @@
 
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/io/sources/source.hpp"
+#include "palpate/session/player.hpp"
 #include "palpate/session/stamp_placer.hpp"
 
 namespace palpate {
@@ -33,94 +32,26 @@ class FeedClock {
 /// This machine's clocks.
 std::shared_ptr<FeedClock> machine_clock();
 
-/// [s] at which an image that stays valid is shown again: 30 Hz, as a camera would.
-inline constexpr double still_interval = 1.0 / 30.0;
-/// [s] of a recording that begins again at its end; a shorter one stays on its last frame.
-inline constexpr double shortest_loop = 2.0;
-
-/// When a camera is given up, looked for again and shown. Times in seconds.
+/// When a camera is given up and looked for again. Times in seconds.
 struct FeedOptions {
   double silence = 2.0;        ///< [s] without a frame after which a live camera is opened again
   double start_up = 5.0;       ///< [s] the same, for its first frame after it was opened
   double first_pause = 0.1;    ///< [s] before it is opened again; doubles with each failure
   double longest_pause = 5.0;  ///< [s] at most
   double waiting = 0.25;       ///< [s] without a frame after which its state says so
-  double still_interval = palpate::still_interval;  ///< [s] at which a still image is shown again
-  double longest_gap = 10.0;  ///< [s] between frames of a recording beyond which it is cut short
-  double longest_lag = 1.0;   ///< [s] behind its stamps, beyond which a recording is slowed down
-  int frozen_frames = 10;     ///< identical depth images in a row that make a live camera frozen
+  int frozen_frames = 10;      ///< identical depth images in a row that make a live camera frozen
   StampPlacerOptions stamps{};
   Registry<SourceScheme> schemes = all_sources();  ///< opens the URI, also again
   std::shared_ptr<FeedClock> clock = machine_clock();
-};
-
-/// A recording whose stamps go back by this much [s] begins again there.
-inline constexpr double stamp_step_back = 1.0;
-
-/// Playback of a recording. A live camera ignores it.
-struct Playback {
-  bool paused = false;  ///< the last frame is repeated at 30 Hz
-  bool loop = true;     ///< a recording that ends starts again; false: it pauses on its last frame
-  double speed = 1.0;   ///< of its stamps
-  static constexpr double slowest = 0.1, fastest = 4.0;
-};
-
-/// A frame as it is delivered to the servo loop.
-struct FedFrame {
-  Frame frame;                ///< its stamp is on the servo loop's clock [s, CLOCK_MONOTONIC]
-  double source_stamp = 0.0;  ///< [s] the timestamp from the source
-  /// False for a repeated frame of a recording; its timestamp is the time of the repetition.
-  bool is_new = true;
-  /// Time has jumped before this frame: the recording restarted, or was moved to another time.
-  bool after_jump = false;
-};
-
-enum class CameraState : std::uint8_t {
-  waiting,    ///< open, but without recent frames
-  live,       ///< frames come
-  frozen,     ///< a live camera sends the same image repeatedly
-  searching,  ///< it is disconnected; the driver tries to reconnect
-  ended,      ///< a recording that cannot be opened again has ended, and stays on its last frame
-  stopped,    ///< by request_stop
-};
-
-/// Status of a camera.
-struct CameraStatus {
-  std::string uri, kind;
-  SensorKind sensor = SensorKind::unknown;
-  CameraState state = CameraState::waiting;
-  std::string text;          ///< the state in words, with what is wrong; "live"
-  double rate = 0.0;         ///< [Hz] of the frames lately
-  std::uint64_t frames = 0;  ///< handed over, each once
-  /// Dropped: to keep up with a recording, frozen, unreadable, or with a timestamp that is not
-  /// later than the last.
-  std::uint64_t dropped = 0;
-  std::uint64_t opened_again = 0;  ///< how often after it was gone
-  std::uint64_t slowed = 0;        ///< how often a recording was slowed down, see longest_lag
-  /// How often each StampProblem was seen; [0] is not used.
-  std::array<std::uint64_t, stamp_problem_count> stamp_problems{};
-  double latency = 0.0;                ///< [s] usual time from capture to arrival (live cameras)
-  std::optional<double> last_frame{};  ///< [s, CLOCK_MONOTONIC] stamp of the newest frame
-  std::string trouble;                 ///< the error met last; a live camera's next frame clears it
-  /// The last frame is declared valid until another one replaces it: a static image, or a recording
-  /// that is paused or has ended. Never true for a live camera that stopped.
-  bool stays_valid = false;
-  std::string doubt;         ///< why its depth unit may be wrong; empty: no sign of it
-  Playback playback;         ///< of a recording
-  std::size_t recorded = 0;  ///< frames of a recording; 0: not known, or no recording
-  std::size_t place = 0;     ///< of a recording: number of the frame shown last, from 0
-  /// [s] of a recording: stamp of that frame, from the recording's first
-  double recorded_time = 0.0;
 };
 
 /// One camera in its own thread.
 ///
 /// Frames reach the sink with their capture timestamps, shifted to the servo loop's clock by one
 /// constant offset, so that the intervals stay as the camera measured them:
-/// - A recording plays at the pace of its stamps; each pass has its offset. Where decoding is too
-///   slow, frames come late or are left out (`dropped`); the stamps stay. What ends begins again. A
-///   frame that stays, as it is the only one, or the recording is paused or has ended, is shown
-///   again at 30 Hz with new stamps (FedFrame::is_new is false; CameraStatus::stays_valid).
+/// - A recording plays at the pace of its stamps, as Player says. Where decoding is too slow,
+/// frames
+///   come late or are left out (`dropped`); the stamps stay.
 /// - A live camera's clock is followed as StampPlacer says; stamps that cannot be true are replaced
 ///   by the time of arrival, and counted.
 ///
@@ -140,7 +71,7 @@ class CameraFeed {
  public:
   /// Called on the camera's thread for each frame. Must be quick and must not throw.
   using Sink = std::function<void(const FedFrame&)>;
-  using Open = std::function<std::unique_ptr<Source>()>;
+  using Open = Player::Open;
 
   /// Opens the source. @throws Error as open_source.
   explicit CameraFeed(const std::string& uri, FeedOptions options = {});

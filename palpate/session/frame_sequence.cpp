@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/session/frame_sequence.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/session/camera_feed.hpp"
 
 namespace palpate {
 
@@ -30,61 +28,48 @@ FrameSequence::FrameSequence(std::vector<std::unique_ptr<Source>> sources) {
   if (sources.empty())
     throw Error("--camera", "no camera is given", "give one, such as --camera synthetic:desk");
   for (std::unique_ptr<Source>& source : sources) {
-    Camera camera;
-    camera.source = std::move(source);
-    camera.next = camera.source->next();
-    if (!camera.next)
-      throw Error(camera.source->info().uri, "it has no frames", "give a source with at least one");
-    camera.first_stamp = camera.next->stamp;
-    cameras_.push_back(std::move(camera));
+    players_.emplace_back(std::move(source), Player::Open(), Playing::by_its_stamps);
+    shown_.push_back({.first = players_.back().first_frame().stamp});
   }
-  newest_.resize(cameras_.size());
+  newest_.resize(players_.size());
 }
 
 void FrameSequence::adopt_until(double t, const std::function<void(const Observation&)>& adopt) {
   for (;;) {
-    Camera* due = nullptr;
-    for (Camera& camera : cameras_) {
-      if (!camera.next || camera.next->stamp > t) continue;
-      if (due == nullptr || camera.next->stamp < due->next->stamp) due = &camera;
+    Player* due = nullptr;
+    for (Player& player : players_) {
+      const Frame* next = player.look_ahead();
+      if (next == nullptr || next->stamp > t) continue;
+      if (due == nullptr || next->stamp < due->upcoming()->stamp) due = &player;
     }
-    if (due == nullptr) break;
-    due->newest = std::move(*due->next);
-    due->next = due->source->next();
-    const auto number = static_cast<std::size_t>(due - cameras_.data());
-    adopt({*due->newest.cloud, due->newest.stamp, number});
-    newest_[number] = due->newest.cloud;  // only now may the frame before go
-    ++due->adopted;
+    const std::optional<FedFrame> fed = due == nullptr ? std::nullopt : due->next_until(t);
+    if (!fed) break;
+    const auto number = static_cast<std::size_t>(due - players_.data());
+    adopt({*fed->frame.cloud, fed->frame.stamp, number});
+    newest_[number] = fed->frame.cloud;  // only now may the frame before go
+    shown_[number].last = last_ = fed->frame.stamp;
+    ++shown_[number].count;
     ++adopted_;
-    shown_ = due->newest.stamp;
   }
-  // A live camera that ends has failed: what it saw last stays as old as it is.
-  const bool is_valid = std::all_of(cameras_.begin(), cameras_.end(), [](const Camera& camera) {
-    return !camera.next && !camera.source->info().live;
-  });
-  if (!is_valid || adopted_ < 2 || shown_ + still_interval > t) return;
-  shown_ += still_interval * std::floor((t - shown_) / still_interval);
-  for (std::size_t i = 0; i < cameras_.size(); ++i) adopt({*newest_[i], shown_, i});
-}
-
-std::vector<ShownFrames> FrameSequence::shown() const {
-  std::vector<ShownFrames> all;
-  for (const Camera& camera : cameras_)
-    all.push_back({.count = camera.adopted,
-                   .first = camera.first_stamp,
-                   .last = camera.newest.stamp,
-                   .ended = !camera.next});
-  return all;
+  bool is_valid = true;
+  for (std::size_t i = 0; i < players_.size(); ++i) {
+    shown_[i].ended = players_[i].has_ended();
+    // A live camera that ends has failed: what it saw last stays as old as it is.
+    is_valid = is_valid && shown_[i].ended && !players_[i].source().info().live;
+  }
+  if (!is_valid || adopted_ < 2 || last_ + still_interval > t) return;
+  last_ += still_interval * std::floor((t - last_) / still_interval);
+  for (std::size_t i = 0; i < players_.size(); ++i) adopt({*newest_[i], last_, i});
 }
 
 std::vector<SensorKind> FrameSequence::sensors() const {
   std::vector<SensorKind> all;
-  for (const Camera& camera : cameras_) all.push_back(camera.source->info().sensor);
+  for (const Player& player : players_) all.push_back(player.status().sensor);
   return all;
 }
 
 void FrameSequence::check(const Method& method) const {
-  for (const Camera& camera : cameras_) method.check(*camera.next->cloud);
+  for (const Player& player : players_) method.check(*player.upcoming()->cloud);
 }
 
 namespace {

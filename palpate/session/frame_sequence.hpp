@@ -12,6 +12,7 @@
 #include "palpate/io/devices/hip_path.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/core/method.hpp"
+#include "palpate/session/player.hpp"
 
 namespace palpate {
 
@@ -45,34 +46,24 @@ class FrameSequence {
   /// Frames handed over so far, each once.
   [[nodiscard]] std::size_t adopted() const { return adopted_; }
   /// The same of each camera.
-  [[nodiscard]] std::vector<ShownFrames> shown() const;
-  [[nodiscard]] std::size_t cameras() const { return cameras_.size(); }
-  [[nodiscard]] const Source& source(std::size_t camera) const { return *cameras_[camera].source; }
+  [[nodiscard]] const std::vector<ShownFrames>& shown() const { return shown_; }
+  [[nodiscard]] std::size_t cameras() const { return players_.size(); }
+  [[nodiscard]] const Source& source(std::size_t camera) const { return players_[camera].source(); }
   /// How each camera measures, for `for_sensors`.
   [[nodiscard]] std::vector<SensorKind> sensors() const;
   /// What a camera will show next; null after its last frame.
-  [[nodiscard]] const Cloud* upcoming(std::size_t camera) const {
-    return cameras_[camera].next ? cameras_[camera].next->cloud.get() : nullptr;
-  }
-  /// [s] When it was captured; 0 after the last frame.
-  [[nodiscard]] double upcoming_stamp(std::size_t camera) const {
-    return cameras_[camera].next ? cameras_[camera].next->stamp : 0.0;
+  [[nodiscard]] const Frame* upcoming(std::size_t camera) const {
+    return players_[camera].upcoming();
   }
   /// What each camera saw last; null before its first frame.
   [[nodiscard]] std::span<const std::shared_ptr<const Cloud>> newest() const { return newest_; }
 
  private:
-  struct Camera {
-    std::unique_ptr<Source> source;
-    std::optional<Frame> next;
-    Frame newest;
-    std::size_t adopted = 0;
-    double first_stamp = 0.0;  // [s]
-  };
-  std::vector<Camera> cameras_;
+  std::vector<Player> players_;  // of each camera
+  std::vector<ShownFrames> shown_;
   std::vector<std::shared_ptr<const Cloud>> newest_;
   std::size_t adopted_ = 0;
-  double shown_ = 0.0;  // [s] stamp handed over last
+  double last_ = 0.0;  // [s] stamp handed over last
 };
 
 /// Moves a hand through what the cameras saw, tick by tick, from `first` on, where the proxy

@@ -337,7 +337,7 @@ void touch_along(FrameSequence& frames, Method& method, Press& press, double rat
   std::shared_ptr<const Cloud> seen;
   std::optional<Tick> last;
   touch(
-      frames, method, {frames.upcoming_stamp(0), press.hip()}, rate,
+      frames, method, {frames.upcoming(0)->stamp, press.hip()}, rate,
       [&](double t) -> std::optional<Vec3> {
         if (press.done()) return std::nullopt;
         if (frames.newest().front() != seen) {

@@ -27,7 +27,7 @@
 #include "palpate/kernel/core/sensor.hpp"
 #include "palpate/kernel/core/uri.hpp"
 #include "palpate/session/hand_paths.hpp"
-#include "palpate/session/played_source.hpp"
+#include "palpate/session/player.hpp"
 #include "palpate/session/session_hand.hpp"
 
 namespace palpate {
@@ -285,7 +285,7 @@ class Session::Impl {
     drain();
     SessionState state;
     for (const auto& feed : feeds_) state.cameras.push_back(feed->status());
-    for (const auto& played : played_) state.cameras.push_back(played->status());
+    for (const Player& played : played_) state.cameras.push_back(played.status());
     for (const auto& hand : hands_) state.hands.push_back(report(*hand));
     const ServoLoop* loop = hands_.front()->loop();
     state.rate = loop != nullptr ? loop->rate() : options_.rate;
@@ -480,8 +480,8 @@ class Session::Impl {
     // A hand that strokes is out of the surface before the recording begins again.
     if (length >= shortest_loop) options_.stroke_time = std::min(options_.stroke_time, length);
     if (!is_live()) {
-      played_.push_back(std::make_unique<PlayedSource>(std::move(source), std::move(open)));
-      return played_.back()->first_frame().cloud;
+      played_.emplace_back(std::move(source), std::move(open));
+      return played_.back().first_frame().cloud;
     }
     feeds_.push_back(std::make_unique<CameraFeed>(
         std::move(source), FeedOptions{.schemes = options_.sources}, std::move(open)));
@@ -599,7 +599,7 @@ class Session::Impl {
       const double t = static_cast<double>(i) / options_.rate;
       free_t_ = t;
       for (std::size_t camera = 0; camera < played_.size(); ++camera) {
-        while (const auto frame = played_[camera]->next_until(t)) take(camera, *frame);
+        while (const auto frame = played_[camera].next_until(t)) take(camera, *frame);
       }
       for (const auto& hand : hands_) hand->run_at(t);
       if (ServoTick record{}; on_tick && reader.try_pop(record)) on_tick(record);
@@ -762,9 +762,9 @@ class Session::Impl {
 
   SessionOptions options_;
   Paint paint_;
-  std::vector<SensorKind> sensors_;                    // of the cameras
-  std::vector<std::unique_ptr<CameraFeed>> feeds_;     // in real time
-  std::vector<std::unique_ptr<PlayedSource>> played_;  // free-running
+  std::vector<SensorKind> sensors_;                 // of the cameras
+  std::vector<std::unique_ptr<CameraFeed>> feeds_;  // in real time
+  std::vector<Player> played_;                      // free-running
   // As many from the first thread on. Recorders are set and reset with control_ and frames_mutex_
   // held, and used with either.
   std::vector<std::unique_ptr<SessionHand>> hands_;

@@ -8,13 +8,14 @@
 
 #include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
-#include "palpate/session/played_source.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/session/player.hpp"
 
 #include "tests/session/fakes.hpp"
 #include "tests/support/errors.hpp"
 
 namespace palpate {
-namespace test_played_source {
+namespace test_player {
 
 using test::fails_saying;
 using test::MadeSource;
@@ -28,7 +29,7 @@ std::unique_ptr<Source> stamped(std::vector<double> stamps) {
 }
 
 // What comes until `end` [s] of a clock of 1 kHz.
-std::vector<FedFrame> played(PlayedSource& source, double end) {
+std::vector<FedFrame> played(Player& source, double end) {
   std::vector<FedFrame> frames;
   for (int i = 0; 1e-3 * i <= end; ++i) {
     while (auto frame = source.next_until(1e-3 * i)) frames.push_back(*frame);
@@ -38,8 +39,8 @@ std::vector<FedFrame> played(PlayedSource& source, double end) {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-TEST(PlayedSource, GivesEachFrameWhenItIsDueWithOneOffset) {
-  PlayedSource source(stamped({7.0, 7.1, 7.15, 7.4}), [] { return stamped({7.0, 7.1}); });
+TEST(Player, GivesEachFrameWhenItIsDueWithOneOffset) {
+  Player source(stamped({7.0, 7.1, 7.15, 7.4}), [] { return stamped({7.0, 7.1}); });
   EXPECT_EQ(source.first_frame().stamp, 7.0);
   const std::vector<FedFrame> frames = played(source, 0.41);
   ASSERT_EQ(frames.size(), 4U);
@@ -55,8 +56,8 @@ std::vector<double> slow(double first) {
   return {first, first + 0.5, first + 1.0, first + 1.5, first + 2.0, first + 2.5};
 }
 
-TEST(PlayedSource, BeginsAgainAnIntervalAfterTheLastFrameAndSaysThatTimeJumps) {
-  PlayedSource source(stamped(slow(0.0)), [] { return stamped(slow(50.0)); });
+TEST(Player, BeginsAgainAnIntervalAfterTheLastFrameAndSaysThatTimeJumps) {
+  Player source(stamped(slow(0.0)), [] { return stamped(slow(50.0)); });
   const std::vector<FedFrame> frames = played(source, 6.2);
   ASSERT_EQ(frames.size(), 13U);
   for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -67,11 +68,11 @@ TEST(PlayedSource, BeginsAgainAnIntervalAfterTheLastFrameAndSaysThatTimeJumps) {
   EXPECT_FALSE(source.status().stays_valid);
 }
 
-TEST(PlayedSource, StaysOnItsLastFrameWhereItIsShortOrCannotBeginAgain) {
+TEST(Player, StaysOnItsLastFrameWhereItIsShortOrCannotBeginAgain) {
   const auto open = [] { return stamped({}); };
-  PlayedSource brief(stamped({4.0, 4.1, 4.2}), open);
-  PlayedSource given(stamped(slow(4.0)), {});
-  for (auto& [source, last] : {std::pair<PlayedSource&, double>(brief, 0.2), {given, 2.5}}) {
+  Player brief(stamped({4.0, 4.1, 4.2}), open);
+  Player given(stamped(slow(4.0)), {});
+  for (auto& [source, last] : {std::pair<Player&, double>(brief, 0.2), {given, 2.5}}) {
     EXPECT_FALSE(source.first_frame().cloud == nullptr);
     const std::vector<FedFrame> frames = played(source, last + 0.11);
     const auto count = static_cast<std::ptrdiff_t>(frames.size());
@@ -88,8 +89,8 @@ TEST(PlayedSource, StaysOnItsLastFrameWhereItIsShortOrCannotBeginAgain) {
   }
 }
 
-TEST(PlayedSource, ShowsASingleFrameAgainAtThirtyHertz) {
-  PlayedSource source(stamped({3.0}), [] { return stamped({}); });
+TEST(Player, ShowsASingleFrameAgainAtThirtyHertz) {
+  Player source(stamped({3.0}), [] { return stamped({}); });
   const std::vector<FedFrame> frames = played(source, 1.001);
   ASSERT_EQ(frames.size(), 31U);
   EXPECT_TRUE(frames[0].is_new);
@@ -101,8 +102,8 @@ TEST(PlayedSource, ShowsASingleFrameAgainAtThirtyHertz) {
   EXPECT_TRUE(source.status().stays_valid);
 }
 
-TEST(PlayedSource, LeavesOutFramesWhoseStampsCannotBeTrue) {
-  PlayedSource source(stamped({nan, 0.0, 0.1, 0.1, 0.05, nan, 0.2}), [] { return stamped({0.0}); });
+TEST(Player, LeavesOutFramesWhoseStampsCannotBeTrue) {
+  Player source(stamped({nan, 0.0, 0.1, 0.1, 0.05, nan, 0.2}), [] { return stamped({0.0}); });
   const std::vector<FedFrame> frames = played(source, 0.22);
   ASSERT_EQ(frames.size(), 3U);
   for (std::size_t k = 0; k < frames.size(); ++k)
@@ -110,9 +111,9 @@ TEST(PlayedSource, LeavesOutFramesWhoseStampsCannotBeTrue) {
   EXPECT_EQ(source.status().dropped, 4U);
 }
 
-TEST(PlayedSource, GoesOnWhenItsClockIsSet) {
-  PlayedSource source(stamped({100.0, 100.1, 20.0, 20.1, 1e12, 1e12 + 0.1}),
-                      [] { return stamped({0.0}); });
+TEST(Player, GoesOnWhenItsClockIsSet) {
+  Player source(stamped({100.0, 100.1, 20.0, 20.1, 1e12, 1e12 + 0.1}),
+                [] { return stamped({0.0}); });
   const std::vector<FedFrame> frames = played(source, 0.51);
   ASSERT_EQ(frames.size(), 6U);
   for (std::size_t k = 0; k < frames.size(); ++k)
@@ -121,16 +122,16 @@ TEST(PlayedSource, GoesOnWhenItsClockIsSet) {
     EXPECT_EQ(frames[k].after_jump, k == 2 || k == 4) << k;
 }
 
-TEST(PlayedSource, EndsEachLookAtASourceThatRepeatsOneStampForEver) {
-  PlayedSource source(std::make_unique<MadeSource>([](int) {
-                        return Frame{1.0, wall()};
-                      }),
-                      [] { return stamped({0.0}); });
+TEST(Player, EndsEachLookAtASourceThatRepeatsOneStampForEver) {
+  Player source(std::make_unique<MadeSource>([](int) {
+                  return Frame{1.0, wall()};
+                }),
+                [] { return stamped({0.0}); });
   EXPECT_EQ(played(source, 0.02).size(), 1U);
   EXPECT_GT(source.status().dropped, 0U);
 }
 
-TEST(PlayedSource, RefusesLiveCamerasAndEmptyRecordings) {
+TEST(Player, RefusesLiveCamerasAndEmptyRecordings) {
   const auto open = [] { return stamped({}); };
   const auto live = [] {
     return std::make_unique<MadeSource>(
@@ -139,16 +140,63 @@ TEST(PlayedSource, RefusesLiveCamerasAndEmptyRecordings) {
         },
         SourceInfo{.uri = "camera:", .kind = "camera", .live = true});
   };
-  EXPECT_TRUE(fails_saying([&] { PlayedSource(live(), open); }, "camera:", "real time"));
-  EXPECT_TRUE(
-      fails_saying([&] { return PlayedSource(stamped({}), open).first_frame().stamp; }, "made:"));
+  EXPECT_TRUE(fails_saying([&] { Player(live(), open); }, "camera:", "real time"));
+  EXPECT_TRUE(fails_saying([&] { return Player(stamped({}), open).first_frame().stamp; }, "made:"));
   EXPECT_TRUE(fails_saying(
       [&] {
-        return PlayedSource(stamped({nan, nan}), open).first_frame().stamp;
+        return Player(stamped({nan, nan}), open).first_frame().stamp;
       },
       "made:"));
-  PlayedSource gone(stamped(slow(0.0)), open);
+  Player gone(stamped(slow(0.0)), open);
   EXPECT_TRUE(fails_saying([&] { return played(gone, 4.0).size(); }, "no frames any more"));
+}
+
+TEST(Player, GoesToAPlaceBeyondFramesThatCannotBeRead) {
+  const auto made = [] {
+    return std::make_unique<MadeSource>(
+        [read = 0](int) mutable -> std::optional<Frame> {
+          const int k = read++;
+          if (k == 3) throw Error("made:", "frame 3 is damaged", "leave it out");
+          return k < 10 ? std::optional(Frame{0.1 * k, wall()}) : std::nullopt;
+        },
+        SourceInfo{.uri = "made:", .kind = "made", .frames = 10});
+  };
+  Player player(made(), made);
+  ASSERT_TRUE(player.next_until(0.0));
+  double t = 0.0;
+  for (const auto& [share, stamp] : {std::pair(1.0, 0.9), {5.0 / 9.0, 0.5}}) {
+    player.seek(share);
+    EXPECT_TRUE(fails_saying([&] { return player.next_until(t += 1.0).has_value(); }, "damaged"));
+    const std::optional<FedFrame> fed = player.next_until(t);
+    ASSERT_TRUE(fed);
+    EXPECT_NEAR(fed->source_stamp, stamp, 1e-12);
+    EXPECT_TRUE(fed->after_jump);
+  }
+  EXPECT_EQ(player.status().place, 5U);
+  EXPECT_NEAR(player.status().recorded_time, 0.5, 1e-12);
+  EXPECT_EQ(player.status().dropped, 2U);
+}
+
+TEST(Player, SaysThatTimeJumpsWhereItIsClosedAndBeginsAgain) {
+  Player player(stamped(slow(0.0)), [] { return stamped(slow(0.0)); });
+  EXPECT_FALSE(player.next_until(0.0)->after_jump);
+  player.close();
+  EXPECT_FALSE(player.next_until(0.01)) << "an interval after the frame before";
+  EXPECT_TRUE(player.next_until(0.04)->after_jump);
+}
+
+TEST(Player, KeepsTheStampsOfTheSourceWhereItsFramesAreTakenByThem) {
+  Player player(stamped({5.0, 5.1, 5.1, nan, 5.05, 2.0, 2.1, 30.0}), {}, Playing::by_its_stamps);
+  EXPECT_EQ(player.first_frame().stamp, 5.0);
+  EXPECT_FALSE(player.next_until(4.9));
+  for (const double stamp : {5.0, 5.1, 2.0, 2.1, 30.0}) {
+    const std::optional<FedFrame> fed = player.next_until(stamp);
+    ASSERT_TRUE(fed) << stamp;
+    EXPECT_EQ(fed->frame.stamp, stamp);
+  }
+  EXPECT_FALSE(player.next_until(100.0)) << "nothing is repeated";
+  EXPECT_TRUE(player.has_ended());
+  EXPECT_EQ(player.status().dropped, 3U);
 }
 
 TEST(PosedSource, PutsDepthImagesAndPointsWhereTheCameraStands) {
@@ -210,5 +258,5 @@ TEST(PosedSource, RefusesACloudOfAnotherKind) {
   EXPECT_TRUE(fails_saying([&] { return source->next()->stamp; }, "made:", "pose"));
 }
 
-}  // namespace test_played_source
+}  // namespace test_player
 }  // namespace palpate

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstring>
 
 #include "palpate/kernel/core/vectorise.hpp"
 
@@ -26,11 +27,35 @@ PALPATE_INLINED Number sum_of_lanes(std::array<Number, sum_lanes> lanes) noexcep
   return lanes[0];
 }
 
+namespace detail {
+// Four floats as every processor has them: compilers make scalar code of a tree over an array.
+using Four = float __attribute__((vector_size(16)));
+PALPATE_INLINED Four four_of(const FloatLanes& lanes, std::size_t first) noexcept {
+  Four four;
+  std::memcpy(&four, lanes.data() + first, sizeof four);
+  return four;
+}
+}  // namespace detail
+
+/// The same for floats, in a few instructions.
+template <>
+PALPATE_INLINED float sum_of_lanes(FloatLanes lanes) noexcept {
+  using detail::four_of;
+  const detail::Four sum =
+      (four_of(lanes, 0) + four_of(lanes, 8)) + (four_of(lanes, 4) + four_of(lanes, 12));
+  return (sum[0] + sum[2]) + (sum[1] + sum[3]);
+}
+
 /// The least number in any lane.
 PALPATE_INLINED float least_of_lanes(const FloatLanes& lanes) noexcept {
-  float least = lanes[0];
-  for (const float lane : lanes) least = lane < least ? lane : least;
-  return least;
+  detail::Four least = detail::four_of(lanes, 0);
+  for (std::size_t first = 4; first < sum_lanes; first += 4) {
+    const detail::Four other = detail::four_of(lanes, first);
+    least = other < least ? other : least;
+  }
+  const float a = least[0] < least[2] ? least[0] : least[2];
+  const float b = least[1] < least[3] ? least[1] : least[3];
+  return a < b ? a : b;
 }
 
 /// Sums of what `terms(i)` gives for i from 0 to below `size`: an array of as many terms as sums.

@@ -23,7 +23,7 @@ namespace test_materials {
 constexpr double pi = std::numbers::pi;
 
 // A plane at z = 0 without any camera: the coupling's spring alone.
-class Flat final : public Method {
+class Flat : public Method {
  public:
   explicit Flat(const Parameters& parameters) : parameters_(parameters) {}
   void seat(const Vec3& /*proxy*/) noexcept override {}
@@ -275,6 +275,32 @@ TEST(Tap, RingsFromTheFirstTickInProportionToTheSpeed) {
       for (std::size_t i = 60; i < rings.size(); ++i) EXPECT_EQ(rings[i], 0.0);
     }
   }
+}
+
+// The same with rounding errors of 1e-8 N along the plane.
+class Rounded final : public Flat {
+ public:
+  using Flat::Flat;
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    Tick tick = Flat::tick(hip, t);
+    if (!tick.force.isZero(0.0)) tick.force.x() += 1e-8;
+    return tick;
+  }
+};
+
+TEST(Tap, RingsAlongTheNormalWhereTheForceIsOfRoundingErrors) {
+  Parameters parameters;
+  parameters.tap = {.tap = 2.0, .tap_frequency = 100.0, .tap_decay = 80.0};
+  Feel feel(std::make_unique<Rounded>(parameters), parameters);
+  double largest = 0.0;  // [N]
+  for (int i = 0; i < 200; ++i) {
+    // At 0.1 m/s to the plane, and 0.01 nm into it.
+    const double depth = std::min(1e-4 * i - 0.01, 1e-11);
+    const Vec3 ringing = feel.tick(pressed(depth), 1e-3 * i).transient;
+    EXPECT_LE(ringing.head<2>().norm(), 1e-9) << i;
+    largest = std::max(largest, ringing.norm());
+  }
+  EXPECT_GT(largest, 0.1);
 }
 
 TEST(Tap, IsOneForEachImpactBeforeANoisyCamera) {

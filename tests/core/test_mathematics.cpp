@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -28,6 +29,8 @@ double worst(const Ours& ours, const Exact& exact, double low, double high) {
 }
 
 TEST(Mathematics, IsExactToTheLastPlaces) {
+  if (std::getenv("PALPATE_MEMCHECK") != nullptr)
+    GTEST_SKIP() << "valgrind computes long doubles with 64 bits";
   const auto exp = [](double x) { return math::exp(x); };
   const auto exact_exp = [](long double x) { return std::exp(x); };
   EXPECT_LE(worst(exp, exact_exp, -1.0, 1.0), 2.0);

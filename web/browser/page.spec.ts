@@ -652,7 +652,7 @@ test("the hand leads a tool at the other end of a link, and sees where it is", a
   if (process.env.PALPATE_PICTURES)
     await page.screenshot({ path: join(process.env.PALPATE_PICTURES, "teleop.png") });
   await page.mouse.up();
-  await expect.poll(() => page.locator("#robot").textContent()).toContain("no operator commands it");
+  await expect.poll(() => page.locator("#robot").textContent()).toContain("no operator commands");
 });
 
 test("without the operator's link a page is greyed out and may hold the hand", async () => {

@@ -23,7 +23,7 @@ const led: RobotState = {
 it("says what a robot does, and what is wrong before anything else", () => {
   expect(robotText(led)).toBe("robot follows commands · the rendered image is 120 ms old");
   expect(robotText({ ...led, force: [0, 0, 2] })).toContain("2.0 N");
-  expect(robotText({ ...led, led: false })).toContain("no operator commands it");
+  expect(robotText({ ...led, led: false })).toContain("no operator commands");
   expect(robotText({ ...led, age: 2 })).toContain("2.0 s ago");
   expect(robotText({ ...led, tool: null })).toContain("not been heard");
   expect(robotText({ ...led, age: 2, trouble: "its emergency stop is open" })).toBe(

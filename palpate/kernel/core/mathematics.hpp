@@ -85,7 +85,7 @@ inline double log(double x) noexcept {
   }
   const auto bits = std::bit_cast<std::uint64_t>(x);
   // x = 2^exponent m with m from sqrt(1/2) to sqrt(2).
-  double m = std::bit_cast<double>((bits & 0xfffffffffffffU) | 0x3ff0000000000000U);
+  auto m = std::bit_cast<double>((bits & 0xfffffffffffffU) | 0x3ff0000000000000U);
   exponent += static_cast<double>(static_cast<std::int64_t>(bits >> 52U) - 1023);
   if (m > std::numbers::sqrt2) {
     m *= 0.5;

@@ -15,6 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       test::expect(hand->target || !hand->held);
       test::expect(!hand->target ||
                    (hand->target->allFinite() && hand->target->norm() <= 2.0 * max_hand_distance));
+      test::expect(!hand->orientation || std::abs(hand->orientation->norm() - 1.0) < 1e-9);
     }
   }
   if (const auto command = parse_command(test::text_of(data, size))) {

@@ -64,7 +64,7 @@ void walk(Way& way, T& record) {
 
 // The axes of a field's numbers; a single number has no axis.
 template <class T>
-constexpr std::string_view axes_of = "";
+constexpr std::string_view axes_of{};
 template <>
 constexpr std::string_view axes_of<Vec3> = "xyz";
 template <>

@@ -6,7 +6,7 @@ namespace palpate {
 namespace {
 
 // A spring to a plane half a metre before the camera, whatever that sees.
-class Cushion final : public Method {
+class Spring final : public Method {
  public:
   void seat(const Vec3& /*proxy*/) noexcept override {}
   void observe(const Observation& /*seen*/) noexcept override { ++frames_; }
@@ -28,9 +28,9 @@ class Cushion final : public Method {
 
 }  // namespace
 
-MethodInfo cushion_method() {
-  return {.name = "cushion", .summary = "a spring to a plane", .make = [](const Parameters&) {
-            return std::make_unique<Cushion>();
+MethodInfo spring_method() {
+  return {.name = "spring", .summary = "a spring to a plane", .make = [](const Parameters&) {
+            return std::make_unique<Spring>();
           }};
 }
 

@@ -45,27 +45,30 @@ bool names(std::span<const std::string_view> columns, std::string_view column) {
   return std::find(columns.begin(), columns.end(), column) != columns.end();
 }
 
-// Which of two groups of numbers a column belongs to.
-enum class Group { asked, sent };
-
-// Compares the columns of a group that were recorded.
-void compare(const ServoTick& recorded, const ServoTick& again, Group group, const TickRows& rows,
-             const Vec3& force_difference, ReplayDifferences& differences) {
+// Compares the columns that were recorded, and counts the tick in each of the two groups in which
+// it differs.
+void compare(const ServoTick& recorded, const ServoTick& again, const TickRows& rows,
+             ReplayReport& report) {
   const std::vector<double> a = row_of(recorded);
   const std::vector<double> b = row_of(again);
-  bool different = false;
+  bool asked = false;
+  bool sent = false;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const std::string& column = tick_columns()[i];
     if (std::bit_cast<std::uint64_t>(a[i]) == std::bit_cast<std::uint64_t>(b[i]) || !rows.has(i) ||
-        names(given_columns, column) || names(asked_columns, column) != (group == Group::asked))
+        names(given_columns, column))
       continue;
-    different = true;
-    if (!differences.first)
-      differences.first = ReplayDifference{recorded.number, column, a[i], b[i]};
+    const bool is_asked = names(asked_columns, column);
+    (is_asked ? asked : sent) = true;
+    auto& first = (is_asked ? report.asked : report.sent).first;
+    if (!first) first = ReplayDifference{recorded.number, column, a[i], b[i]};
   }
-  if (!different) return;
-  ++differences.ticks;
-  differences.largest_force = std::max(differences.largest_force, force_difference.norm());
+  const auto count = [](ReplayDifferences& differences, const Vec3& force) {
+    ++differences.ticks;
+    differences.largest_force = std::max(differences.largest_force, force.norm());
+  };
+  if (asked) count(report.asked, again.tick.force - recorded.tick.force);
+  if (sent) count(report.sent, again.force - recorded.force);
 }
 
 // The device of a replay: its hand is where it was then.
@@ -204,10 +207,7 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
       }
       if (!rerun) rerun = std::make_unique<Rerun>(session, recorded, methods);
       const ServoTick again = rerun->tick(recorded);
-      compare(recorded, again, Group::asked, session.rows(), again.tick.force - recorded.tick.force,
-              report.asked);
-      compare(recorded, again, Group::sent, session.rows(), again.force - recorded.force,
-              report.sent);
+      compare(recorded, again, session.rows(), report);
       last = recorded;
     } catch (const Error& error) {
       report.broken_off = last ? "after tick " + std::to_string(last->number) + ": " : "";

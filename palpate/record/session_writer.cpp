@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "palpate/io/bag/messages.hpp"
+#include "palpate/io/bag/geometry.hpp"
 #include "palpate/io/sources/bag_camera.hpp"
 #include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/depth_rvl.hpp"
@@ -16,13 +16,6 @@
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
-namespace {
-
-std::array<double, 3> array_of(const Vec3& v) {
-  return {v.x(), v.y(), v.z()};
-}
-
-}  // namespace
 
 PackedImage packed_image(const Cloud& image) {
   const DepthImage* depth = image.image();
@@ -169,7 +162,7 @@ void SessionWriter::points(std::size_t camera, double stamp, const PointCloud& c
                            .row_step = static_cast<std::uint32_t>(cloud.size()) * point_step,
                            .data = std::vector<std::byte>(cloud.size() * point_step)};
   for (std::size_t i = 0; i < cloud.size(); ++i) {
-    const std::array<double, 3> point = array_of(cloud.point(i));
+    const std::array<double, 3> point = components(cloud.point(i));
     std::memcpy(message.data.data() + i * point_step, point.data(), point_step);
   }
   const Vec3 viewpoint = cloud.viewpoint().value_or(Vec3::Zero());
@@ -197,13 +190,10 @@ void SessionWriter::tick(const ServoTick& tick) {
   const std::int64_t at = nanoseconds(tick.tick.t);
   const ros::Header header{ros::Time::at(at), std::string(world_frame)};
   write(session_topic::tick, at, ros::Float64MultiArray{"tick", row_of(tick)});
-  const auto pose = [&](const Vec3& p, const Rotation& q) {
-    return ros::PoseStamped{header, array_of(p), {q.x(), q.y(), q.z(), q.w()}};
-  };
-  write(session_topic::hip, at, pose(tick.tick.hip, tick.tick.orientation));
-  write(session_topic::proxy, at, pose(tick.tick.proxy, tick.tick.proxy_orientation));
+  write(session_topic::hip, at, pose_of(header, tick.tick.hip, tick.tick.orientation));
+  write(session_topic::proxy, at, pose_of(header, tick.tick.proxy, tick.tick.proxy_orientation));
   write(session_topic::force, at,
-        ros::WrenchStamped{header, array_of(tick.force), array_of(tick.torque)});
+        ros::WrenchStamped{header, components(tick.force), components(tick.torque)});
   ++ticks_;
 }
 

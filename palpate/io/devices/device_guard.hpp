@@ -20,7 +20,7 @@ class GuardGate {
  public:
   explicit GuardGate(double beat_time) : beat_time_(beat_time) {}
 
-  /// @param now    [s]
+  /// @param now     [s]
   /// @param beats   how many wrenches the session has written so far
   /// @param wrench  device frame: the newest of them
   /// @return zero if none came for beat_time, and from then on until the session has written zero:

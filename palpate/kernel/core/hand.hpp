@@ -23,4 +23,7 @@ struct Wrench {
   Vec3 torque = Vec3::Zero();  ///< [N m] about the HIP
 };
 
+/// [N] Up to here the direction of a force is that of rounding errors.
+inline constexpr double undirected_force = 1e-6;
+
 }  // namespace palpate

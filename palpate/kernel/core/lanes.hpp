@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstring>
 
+#include "palpate/kernel/core/patch_loops.hpp"
 #include "palpate/kernel/core/vectorise.hpp"
 
 namespace palpate {
@@ -15,6 +16,7 @@ namespace palpate {
 // not matter.
 
 inline constexpr std::size_t sum_lanes = 16;
+static_assert(patch_block % sum_lanes == 0);  // loops over a patch have no remainder
 
 using FloatLanes = std::array<float, sum_lanes>;
 

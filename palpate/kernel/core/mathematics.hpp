@@ -34,7 +34,7 @@ inline double power_of_two(std::int64_t n) noexcept {
 inline constexpr double ln2_high = 0x1.62e42fee00000p-1;
 inline constexpr double ln2_low = 0x1.a39ef35793c76p-33;
 
-// e^x - 1 for |x| <= ln 2 / 2: 16 terms of its series.
+// e^x - 1 for |x| <= ln 2 / 2: 14 terms of its series.
 inline double exp_less_1(double x) noexcept {
   constexpr double c[] = {1.0,
                           1.0 / 2,
@@ -66,7 +66,7 @@ inline double exp(double x) noexcept {
          detail::power_of_two(whole - half);
 }
 
-/// e^x - 1, also of small x.
+/// e^x - 1, also of small x. Within 4 units of the last place.
 inline double expm1(double x) noexcept {
   return std::abs(x) < 0.34 ? detail::exp_less_1(x) : exp(x) - 1.0;
 }
@@ -158,7 +158,7 @@ inline double acos(double c) noexcept {
   return is_steep ? std::numbers::pi - angle : angle;
 }
 
-/// x^p of x >= 0. Within some 10 units of the last place.
+/// x^p of x >= 0. Within 16 units of the last place for p of 2.4 and x from 0.01 to 1.
 inline double pow(double x, double p) noexcept {
   return x == 0.0 ? 0.0 : exp(p * log(x));
 }

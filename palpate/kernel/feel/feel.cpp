@@ -8,8 +8,6 @@
 namespace palpate {
 namespace {
 
-// [N] Up to here the direction of a force is that of rounding errors: the method's normal is taken.
-constexpr double rounding = 1e-6;
 // [m] that the foot moves before it is looked up again what is there: 1/30 of what is averaged.
 constexpr double same_place = 1e-4;
 // [s] over which an impact's speed is averaged: an encoder's counts of 0.055 mm at 1 kHz are then
@@ -148,7 +146,7 @@ Tick Feel::tick(const HandPose& hand, double t) noexcept {
 
   const double pressed = tick.force.norm();
   if (pressed > 0.0) look_at_surface(tick);
-  const bool has_direction = pressed > rounding || (pressed > 0.0 && tick.normal.isZero());
+  const bool has_direction = pressed > undirected_force || (pressed > 0.0 && tick.normal.isZero());
   const Vec3 normal = has_direction ? Vec3(tick.force / pressed) : tick.normal;
   // As hard as the material: its spring, and its cushion.
   const double wanted = std::min(here_.stiffness / std::max(stiffness_, 1e-9), 1.0);

@@ -277,8 +277,7 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
     // The force goes on as it would have without the frame, then turns to what the frame says.
     Vec3 carried = last_force_;
     const double push = last_force_.norm();
-    constexpr double rounding = 1e-6;  // [N] up to here its direction is that of rounding errors
-    if (push > rounding) {
+    if (push > undirected_force) {
       const Vec3 outwards = last_force_ / push;
       const double deeper =
           carried_rate_ * (t - last_blend_t_) * tracker_.surface().frame().up.dot(outwards) -

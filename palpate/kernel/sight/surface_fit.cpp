@@ -54,7 +54,8 @@ FloatMoments sum_moments(const float* px, const float* py, const float* pz, std:
   std::array<FloatLanes, moment_count> sums{};
   const std::array<float, 6> c{coefficients[0], coefficients[1], coefficients[2],
                                coefficients[3], coefficients[4], coefficients[5]};
-  for (std::size_t block = 0; block < size / Patch::block * Patch::block; block += sum_lanes) {
+  const std::size_t end = whole_blocks(size);
+  for (std::size_t block = 0; block < end; block += sum_lanes) {
 #pragma omp simd
     for (std::size_t lane = 0; lane < sum_lanes; ++lane) {
       const std::size_t i = block + lane;

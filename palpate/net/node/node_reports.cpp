@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/io/bag/geometry.hpp"
+
 namespace palpate {
 namespace {
 
@@ -187,10 +189,6 @@ DiagnosticStatus recording_status(const RecordingState& recording) {
 }
 
 }  // namespace
-
-std::array<double, 3> components(const Vec3& v) {
-  return {v.x(), v.y(), v.z()};
-}
 
 ros::MarkerArray markers_of(const ServoTick& record, double contact_radius,
                             const ros::Header& header) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -23,9 +22,6 @@ struct TickReport {
     safety |= record.safety;
   }
 };
-
-/// As messages have a vector.
-std::array<double, 3> components(const Vec3& v);
 
 /// Proxy, HIP, the line between them, force and normal, as RViz and Foxglove draw them.
 /// @param contact_radius  [m] of the proxy

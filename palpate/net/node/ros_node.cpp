@@ -16,6 +16,7 @@
 
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/ros2_service.hpp"
+#include "palpate/io/bag/geometry.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/net/node/node_parameters.hpp"
@@ -97,11 +98,8 @@ struct HandTopics {
 
   void publish(const ros::Header& now) {
     const Tick& tick = report.newest.tick;
-    const auto pose = [&](const Vec3& p, const Rotation& q) {
-      return ros::PoseStamped{now, components(p), {q.x(), q.y(), q.z(), q.w()}};
-    };
-    proxy.write(pose(tick.proxy, tick.proxy_orientation));
-    hip.write(pose(tick.hip, tick.orientation));
+    proxy.write(pose_of(now, tick.proxy, tick.proxy_orientation));
+    hip.write(pose_of(now, tick.hip, tick.orientation));
     force.write(
         ros::WrenchStamped{now, components(report.newest.force), components(report.newest.torque)});
     normal.write(ros::Vector3Stamped{now, components(tick.normal)});

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "palpate/drivers/dds.hpp"
+#include "palpate/io/bag/geometry.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
 #include "palpate/kernel/core/error.hpp"

@@ -15,6 +15,7 @@
 
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/ros2_publisher.hpp"
+#include "palpate/io/bag/geometry.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <string>
 
 #include "palpate/drivers/dds.hpp"
-#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate {
 
@@ -31,9 +29,5 @@ struct TeleopTopics {
 inline constexpr dds::Quality newest_alone{};
 inline constexpr dds::Quality each_one{.reliable = true};
 inline constexpr dds::Quality kept_for_late{.reliable = true, .keeps_for_late = true};
-
-inline std::array<double, 3> components(const Vec3& v) {
-  return {v.x(), v.y(), v.z()};
-}
 
 }  // namespace palpate

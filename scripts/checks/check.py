@@ -16,7 +16,7 @@ import sys
 KNOWS = {
     "core": set(),
     "paper": {"core"},
-    "sight": {"core", "paper"},
+    "sight": {"core", "paper", "cloud"},
     "feel": {"core"},
     "methods": {"core", "paper", "sight", "feel"},
     "cloud": {"core"},

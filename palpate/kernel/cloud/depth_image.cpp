@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "palpate/kernel/cloud/implied_points.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/pose.hpp"
 #include "palpate/kernel/core/vectorise.hpp"
@@ -14,8 +15,6 @@ namespace palpate {
 namespace {
 
 constexpr int largest_image = 16384;
-// [-] depth over width of a surface between neighbouring pixels: a slope of 70 degrees.
-constexpr double steepest_surface = 2.75;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 // Rational Brown-Conrady: where the ray (x, y) appears in normalised image coordinates.
@@ -226,18 +225,6 @@ void gather_strip(const Strip& strip, const Reference& reference, const Cone* co
   flush();
 }
 
-// Too many pixels: take every stride-th of every stride-th row, on a grid fixed in the image.
-int stride_of(const ViewingRays::Window& window, std::size_t most) noexcept {
-  int stride = 1;
-  const auto in_steps = [&stride](int length) {
-    return static_cast<std::size_t>((length + stride - 1) / stride);
-  };
-  while (in_steps(window.u_end - window.u_begin) * in_steps(window.v_end - window.v_begin) >
-         std::max<std::size_t>(most, 1))
-    ++stride;
-  return stride;
-}
-
 }  // namespace
 
 void validate(const Intrinsics& k) {
@@ -321,6 +308,16 @@ Eigen::Vector2d ViewingRays::ray(int u, int v) const noexcept {
   return {x_[i], y_[i]};
 }
 
+int ViewingRays::Window::stride(std::size_t most) const noexcept {
+  int stride = 1;
+  const auto in_steps = [&stride](int length) {
+    return static_cast<std::size_t>((length + stride - 1) / stride);
+  };
+  while (in_steps(u_end - u_begin) * in_steps(v_end - v_begin) > std::max<std::size_t>(most, 1))
+    ++stride;
+  return stride;
+}
+
 ViewingRays::Window ViewingRays::window(const Vec3& centre, double radius) const noexcept {
   if (!(centre.z() > -radius)) return {};  // wholly behind the camera
   // The ball reaches the plane of the pupil, where slopes have no bound.
@@ -387,7 +384,7 @@ void DepthImage::gather(const Ball& ball, const SightCone* sight, std::size_t ma
   const ViewingRays::Window window = rays_->window(centre, ball.radius);
   if (window.empty()) return;
 
-  const int stride = stride_of(window, max_points);
+  const int stride = window.stride(max_points);
   const auto in_steps = [stride](int length) { return (length + stride - 1) / stride; };
   if (stride > 1) patch.mark_thinned(1.0 / (stride * stride));
 
@@ -442,65 +439,10 @@ void DepthImage::gather(const Ball& ball, const SightCone* sight, std::size_t ma
   }
 }
 
-std::optional<double> DepthImage::seen_past(int u, int v, double z, double jump,
-                                            int stride) const noexcept {
-  // Largest hole that an edge search crosses: stereo cameras leave a shadow beside near objects.
-  constexpr int widest_hole = 16;   // [px]
-  constexpr double steepest = 2.0;  // [-] depth over width of a surface that continues past a hole
-  const Intrinsics& k = intrinsics();
-  const auto beside = [&](int du, int dv) {
-    const double pitch = z * (du != 0 ? 1.0 / k.fx : 1.0 / k.fy) * stride;
-    for (int i = 1; i <= widest_hole; ++i) {
-      const int x = u + i * du * stride;
-      const int y = v + i * dv * stride;
-      if (x < 0 || y < 0 || x >= k.width || y >= k.height) return z;
-      const std::uint16_t raw =
-          depth_[static_cast<std::size_t>(y) * static_cast<std::size_t>(k.width) +
-                 static_cast<std::size_t>(x)];
-      if (!is_measured(raw)) continue;
-      const double there = raw * metres_per_unit_;
-      return there > z + jump + steepest * pitch * (i - 1) ? there : z;
-    }
-    return std::numeric_limits<double>::infinity();
-  };
-  const double end = std::max({beside(1, 0), beside(-1, 0), beside(0, 1), beside(0, -1)});
-  return end > z ? std::optional(end) : std::nullopt;
-}
-
 void DepthImage::gather_sides(const Ball& ball, const Sides& sides, std::size_t max_points,
                               Patch& patch) const noexcept {
-  const Eigen::Matrix3d rotation = world_from_camera_.linear();
-  const Vec3 centre = rotation.transpose() * (ball.centre - world_from_camera_.translation());
-  if (!(centre.z() > ball.radius)) return;
-  const ViewingRays::Window window = rays_->window(centre, ball.radius);
-  if (window.empty()) return;
-  const Intrinsics& k = intrinsics();
-  const int stride = stride_of(window, max_points);
-  const auto on_grid = [stride](int first) { return (first + stride - 1) / stride * stride; };
-  const double nearest = centre.z() - ball.radius;
-  const double farthest = centre.z() + ball.radius;
-  for (int v = on_grid(window.v_begin); v < window.v_end; v += stride) {
-    const std::uint16_t* row =
-        depth_.data() + static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width);
-    for (int u = on_grid(window.u_begin); u < window.u_end; u += stride) {
-      const double z = row[u] * metres_per_unit_;
-      if (!is_measured(row[u]) || z > farthest || z + sides.depth < nearest) continue;
-      const double pitch = z / k.fx * stride;
-      const std::optional<double> past =
-          seen_past(u, v, z, std::max(sides.jump, steepest_surface * pitch), stride);
-      if (!past) continue;
-      const Eigen::Vector2d ray = rays_->ray(u, v);
-      if (!ray.allFinite()) continue;
-      const double end = std::min({*past, z + sides.depth, farthest});
-      for (int i = std::max(1, static_cast<int>((nearest - z) / pitch)); z + i * pitch < end; ++i) {
-        const double at = z + i * pitch;
-        const Vec3 p = Vec3(at * ray.x(), at * ray.y(), at) - centre;
-        if (p.squaredNorm() > ball.radius * ball.radius) continue;
-        const Vec3 q = rotation * p;
-        patch.push(static_cast<float>(q.x()), static_cast<float>(q.y()), static_cast<float>(q.z()));
-      }
-    }
-  }
+  palpate::gather_sides(
+      *this, [this](int u, int v) { return depth_at(u, v); }, ball, sides, max_points, patch);
 }
 
 void DepthImage::gather_of(std::string_view material, const Ball& ball, std::size_t max_points,
@@ -512,7 +454,7 @@ void DepthImage::gather_of(std::string_view material, const Ball& ball, std::siz
   const Vec3 centre = rotation.transpose() * (ball.centre - world_from_camera_.translation());
   const ViewingRays::Window window = rays_->window(centre, ball.radius);
   if (window.empty()) return;
-  const int stride = stride_of(window, max_points);
+  const int stride = window.stride(max_points);
   if (stride > 1) patch.mark_thinned(1.0 / (stride * stride));
   const auto on_grid = [stride](int first) { return (first + stride - 1) / stride * stride; };
   const auto width = static_cast<std::size_t>(intrinsics().width);
@@ -531,85 +473,10 @@ void DepthImage::gather_of(std::string_view material, const Ball& ball, std::siz
   }
 }
 
-// Each pixel is a tile, which reaches half way to its neighbours: bilinear between those that are
-// of the same surface, and going on as it is where they are not.
 void DepthImage::gather_sheet(const Ball& ball, const Sheet& sheet, std::size_t max_points,
                               Patch& patch) const noexcept {
-  constexpr int most_parts = 12;  // of a tile, along either side
-  const Eigen::Matrix3d rotation = world_from_camera_.linear();
-  const Vec3 centre = rotation.transpose() * (ball.centre - world_from_camera_.translation());
-  const Intrinsics& k = intrinsics();
-  const double pitch = centre.z() / std::min(k.fx, k.fy);
-  if (!(pitch > sheet.spacing) || !(centre.z() > ball.radius + pitch)) return;
-  ViewingRays::Window window = rays_->window(centre, ball.radius + pitch);
-  if (window.empty() || stride_of(window, max_points) > 1) return;
-  const double jump = std::max(sheet.jump, steepest_surface * pitch);
-
-  // What a pixel saw, in the camera's axes relative to the ball's centre; none of another surface.
-  struct Seen {
-    Vec3 p;
-    double z;
-    bool same;
-  };
-  const auto look = [&](int u, int v, double z_here) -> Seen {
-    if (u < 0 || v < 0 || u >= k.width || v >= k.height) return {Vec3::Zero(), 0.0, false};
-    const std::uint16_t raw =
-        depth_[static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width) +
-               static_cast<std::size_t>(u)];
-    const double z = raw * metres_per_unit_;
-    const Eigen::Vector2d ray = rays_->ray(u, v);
-    return {Vec3(z * ray.x(), z * ray.y(), z) - centre, z,
-            is_measured(raw) && ray.allFinite() && std::abs(z - z_here) <= jump};
-  };
-  const double squared_radius = ball.radius * ball.radius;
-  for (int v = window.v_begin; v < window.v_end; ++v) {
-    for (int u = window.u_begin; u < window.u_end; ++u) {
-      const double z = depth_[static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width) +
-                              static_cast<std::size_t>(u)] *
-                       metres_per_unit_;
-      const Seen here = look(u, v, z);
-      if (!here.same || std::abs(z - centre.z()) > ball.radius + jump) continue;
-      std::array<Seen, 9> around;  // by rows
-      for (int i = 0; i < 9; ++i) {
-        around[static_cast<std::size_t>(i)] = look(u + i % 3 - 1, v + i / 3 - 1, z);
-      }
-      // From the pixel to its four neighbours. Towards another surface it continues as on the other
-      // side; without either, across the line of sight.
-      const auto step = [&](std::size_t to, std::size_t from, const Vec3& across) -> Vec3 {
-        if (around[to].same) return around[to].p - here.p;
-        return around[from].same ? Vec3(here.p - around[from].p) : across;
-      };
-      const Vec3 right = step(5, 3, Vec3(z / k.fx, 0.0, 0.0));
-      const Vec3 left = step(3, 5, Vec3(-z / k.fx, 0.0, 0.0));
-      const Vec3 down = step(7, 1, Vec3(0.0, z / k.fy, 0.0));
-      const Vec3 up = step(1, 7, Vec3(0.0, -z / k.fy, 0.0));
-      const auto parts = [&](const Vec3& a, const Vec3& b) {
-        const double length = 0.5 * (a.norm() + b.norm());
-        return std::clamp(static_cast<int>(std::ceil(length / sheet.spacing)), 1, most_parts);
-      };
-      const int columns = parts(left, right);
-      const int rows = parts(up, down);
-      for (int j = 0; j < rows; ++j) {
-        const double b = (j + 0.5) / rows - 0.5;
-        for (int i = 0; i < columns; ++i) {
-          const double a = (i + 0.5) / columns - 0.5;
-          if (a == 0.0 && b == 0.0) continue;  // the pixel itself
-          const Vec3& along = a < 0.0 ? left : right;
-          const Vec3& across = b < 0.0 ? up : down;
-          const Seen& corner =
-              around[static_cast<std::size_t>((b < 0.0 ? 0 : 6) + (a < 0.0 ? 0 : 2))];
-          const double s = std::abs(a);
-          const double t = std::abs(b);
-          Vec3 p = here.p + s * along + t * across;
-          if (corner.same) p += s * t * (corner.p - here.p - along - across);
-          if (p.squaredNorm() > squared_radius) continue;
-          const Vec3 q = rotation * p;
-          patch.push(static_cast<float>(q.x()), static_cast<float>(q.y()),
-                     static_cast<float>(q.z()));
-        }
-      }
-    }
-  }
+  palpate::gather_sheet(
+      *this, [this](int u, int v) { return depth_at(u, v); }, ball, sheet, max_points, patch);
 }
 
 double DepthImage::spacing(const Vec3& place) const noexcept {
@@ -641,7 +508,7 @@ void DepthImage::sample(const Vec3& place, const Vec3& normal, double radius,
   const double reach = std::max(radius, fewest_pixels * centre.z() / std::min(k.fx, k.fy));
   const ViewingRays::Window window = rays_->window(centre, reach);
   if (window.empty()) return;
-  const int stride = stride_of(window, most_pixels);
+  const int stride = window.stride(most_pixels);
   const Vec3 along = up.unitOrthogonal();
   const Vec3 across = up.cross(along);
   const bool by_map = materials_ && materials_->has_brightness();
@@ -689,12 +556,9 @@ void DepthImage::sample(const Vec3& place, const Vec3& normal, double radius,
 std::optional<Vec3> DepthImage::deproject(int u, int v) const noexcept {
   const Intrinsics& k = rays_->intrinsics();
   if (u < 0 || v < 0 || u >= k.width || v >= k.height) return std::nullopt;
-  const std::uint16_t raw = depth_[static_cast<std::size_t>(v) * static_cast<std::size_t>(k.width) +
-                                   static_cast<std::size_t>(u)];
-  if (!is_measured(raw)) return std::nullopt;
+  const double z = depth_at(u, v);
   const Eigen::Vector2d ray = rays_->ray(u, v);
-  if (!ray.allFinite()) return std::nullopt;
-  const double z = raw * metres_per_unit_;
+  if (!(z > 0.0 && ray.allFinite())) return std::nullopt;
   return world_from_camera_ * Vec3(z * ray.x(), z * ray.y(), z);
 }
 

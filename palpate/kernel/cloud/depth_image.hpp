@@ -51,6 +51,9 @@ class ViewingRays {
   struct Window {
     int u_begin = 0, u_end = 0, v_begin = 0, v_end = 0;
     [[nodiscard]] bool empty() const noexcept { return u_begin >= u_end || v_begin >= v_end; }
+    /// So that no more than `most` are left: every how many pixels and rows to take, on a grid
+    /// fixed in the image. 1: all.
+    [[nodiscard]] int stride(std::size_t most) const noexcept;
   };
 
   /// The pixels whose rays can meet a ball at `centre` [m, optical frame]; the whole image where
@@ -100,6 +103,11 @@ class DepthReadings {
   std::span<const std::uint16_t> readings_;
   std::shared_ptr<const void> owner_;
 };
+
+/// Is this depth reading a measurement? 0 is "none", 65535 "saturated".
+constexpr bool is_measured(std::uint16_t raw) noexcept {
+  return raw != 0 && raw != 65535;
+}
 
 /// One capture of a depth camera: 16-bit depth as it came, touched in place.
 ///
@@ -159,6 +167,8 @@ class DepthImage final : public Cloud {
     return world_from_camera_;
   }
 
+  /// [m] along the optical axis at pixel (u, v), which must be in the image; 0 for a hole.
+  [[nodiscard]] double depth_at(int u, int v) const noexcept;
   /// The point that pixel (u, v) measured [m, world]; none for a hole or outside the image.
   [[nodiscard]] std::optional<Vec3> deproject(int u, int v) const noexcept;
   /// All measured points [m, world], row by row.
@@ -167,11 +177,6 @@ class DepthImage final : public Cloud {
  private:
   void gather(const Ball& ball, const SightCone* sight, std::size_t max_points,
               Patch& patch) const noexcept;
-  /// Depth [m] of the background beside pixel (u, v), if it is farther than the pixel's own z by
-  /// more than a side's `jump`.
-  [[nodiscard]] std::optional<double> seen_past(int u, int v, double z, double jump,
-                                                int stride) const noexcept;
-
   std::shared_ptr<const ViewingRays> rays_;
   DepthReadings depth_;
   double units_per_metre_;
@@ -181,9 +186,11 @@ class DepthImage final : public Cloud {
   std::shared_ptr<const MaterialMap> materials_;
 };
 
-/// Is this depth reading a measurement? 0 is "none", 65535 "saturated".
-constexpr bool is_measured(std::uint16_t raw) noexcept {
-  return raw != 0 && raw != 65535;
+inline double DepthImage::depth_at(int u, int v) const noexcept {
+  const std::uint16_t raw =
+      depth_[static_cast<std::size_t>(v) * static_cast<std::size_t>(rays_->intrinsics().width) +
+             static_cast<std::size_t>(u)];
+  return is_measured(raw) ? raw * metres_per_unit_ : 0.0;
 }
 
 }  // namespace palpate

@@ -130,6 +130,13 @@ Rest likelihood_of_rest(std::span<const HeightSample> samples, std::size_t frame
 
 }  // namespace
 
+double moved_since(double velocity, double elapsed, double interval) noexcept {
+  if (velocity == 0.0) return 0.0;
+  const double intervals = std::max(elapsed, 0.0) / interval;
+  const double late = std::clamp(intervals - 1.5, 0.0, 1.0);
+  return velocity * interval * (std::min(intervals, 1.5) + late - 0.5 * late * late);
+}
+
 double agreed_height(std::span<const HeightSample> samples, double sd, double confidence) noexcept {
   const std::size_t size = std::min(samples.size(), most_heights);
   const double base = samples.front().height;

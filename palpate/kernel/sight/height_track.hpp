@@ -21,6 +21,10 @@ struct HeightTrack {
   double velocity;  ///< [m/s] leads to where it will be one frame later; 0 while it rests
 };
 
+/// How far a surface has moved [m] `elapsed` [s] after its frame, with `velocity` [m/s]: beyond one
+/// and a half intervals [s] the velocity fades over another, and it stays there.
+double moved_since(double velocity, double elapsed, double interval) noexcept;
+
 /// The most heights that are looked at; older ones are left out.
 inline constexpr std::size_t most_heights = 128;
 

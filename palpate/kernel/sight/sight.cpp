@@ -39,6 +39,7 @@ void Sight::seat(const Vec3& proxy) noexcept {
   hand_velocity_.reset();
   mover_.seat();
   tracker_.forget();
+  for (FusedImage& each : fused_) each.forget();
   monitor_.forget();
   last_proxy_.reset();
   returning_ = false;
@@ -54,11 +55,58 @@ double Sight::interval() const noexcept {
   return frame_.in_order() ? frame_.camera_interval() : 1.0 / parameters_.motion.frame_rate;
 }
 
-// [m/s] of the surface along its frame's axis, as it is rendered at time t [s].
-double Sight::surface_speed(double t) const noexcept {
+// The averaged points that the proxy rests on; null if it rests on a fit, or none are.
+const FusedImage* Sight::fused() const noexcept {
+  const std::size_t camera = tracker_.surface().camera();
+  if (on_fit_ || !tracker_.tracking() || camera >= most_fused) return nullptr;
+  return fused_[camera].active() ? &fused_[camera] : nullptr;
+}
+
+// What each camera saw last, averaged where it is.
+ObservedClouds Sight::points() const noexcept {
+  ObservedClouds points = *frame_.cloud();
+  for (std::size_t i = 0; i < most_fused; ++i)
+    if (fused_[i].active()) points.take(i, fused_[i]);
+  return points;
+}
+
+// How far what the proxy rests on has moved at time t [s] since its frame [m, world].
+Vec3 Sight::displacement(double t) const noexcept {
+  if (const FusedImage* points = fused()) return points->displacement(t);
+  return tracker_.tracking() ? tracker_.displacement(t) : Vec3(Vec3::Zero());
+}
+
+// [m/s, world] of that, as it is rendered at time t [s].
+Vec3 Sight::surface_velocity(double t) const noexcept {
   constexpr double dt = 1e-3;  // [s]
-  if (!tracker_.tracking()) return 0.0;
-  return (tracker_.surface().displacement(t) - tracker_.surface().displacement(t - dt)) / dt;
+  return (displacement(t) - displacement(t - dt)) / dt;
+}
+
+// [frames] A fit may describe what is none by chance: after so many on it points are forgotten.
+constexpr int most_frames_on_fit = 8;
+
+// Averages the newest frame's points into those of its camera while the proxy rests on them, or
+// would where it is about to touch.
+void Sight::fuse(const Observation& seen, SightTracker::Event event) noexcept {
+  if (seen.camera >= most_fused) return;
+  FusedImage& fused = fused_[seen.camera];
+  const DepthImage* image = seen.cloud.image();
+  const SurfaceEstimate& surface = tracker_.surface();
+  const bool touches = proxy_.touching && proxy_.normal;
+  frames_on_fit_ = on_fit_ || (!touches && surface.smooth()) ? frames_on_fit_ + 1 : 0;
+  if (image == nullptr || event != SightTracker::Event::followed ||
+      frames_on_fit_ > most_frames_on_fit) {
+    fused.forget();
+    return;
+  }
+  fused.observe(*image,
+                {.place = touches ? Vec3(*proxy_.at - parameters_.proxy.r_c() * *proxy_.normal)
+                                  : surface.place(),
+                 .radius = surface.resolution(),
+                 .stamp = frame_.camera_stamp(),
+                 .interval = interval(),
+                 .sd = surface.beam_sd()},
+                parameters_.sight);
 }
 
 // A frame seen along the lines of sight: docs/sight.md, 3.
@@ -70,10 +118,13 @@ void Sight::observe(const Observation& seen) noexcept {
   mover_.invalidate();
   blend_due_ = true;
   // The surface's own velocity, by which the force would go on changing without this frame.
-  carried_rate_ = surface_speed(hand_velocity_.t());
+  carried_velocity_ = surface_velocity(hand_velocity_.t());
   monitor_.start_frame(seen.camera);
-  points_moved_ = Vec3::Zero();
-  if (!proxy_.at) return;
+  const Vec3 points_moved = std::exchange(points_moved_, Vec3::Zero());
+  if (!proxy_.at) {
+    fuse(seen, SightTracker::Event::none);
+    return;
+  }
   // A hidden surface is kept only while the proxy is near it.
   constexpr double leaves = 20e-3;  // [m]
   if (tracker_.holding() && !(proxy_.touching && on_fit_) &&
@@ -85,9 +136,14 @@ void Sight::observe(const Observation& seen) noexcept {
   const Event event =
       tracker_.frame(*frame_.cloud(), seen.camera, frame_.camera_stamp(), interval(), last_hip_,
                      *proxy_.at, proxy_.touching ? parameters_.sight.hardest_strike : infinite);
+  fuse(seen, event);
   if (event != Event::followed && event != Event::jumped) return;
   // Side repair: the proxy was on the surface's free side and must be there still. If it will move
   // over points, it must be in front of this frame's points, not only of their average.
+  if (const FusedImage* points = proxy_.touching ? fused() : nullptr) {
+    *proxy_.at += points->correction() - points_moved;
+    if (points->is_in_front(*proxy_.at)) return;
+  }
   const SurfaceContact contact = tracker_.contact(*proxy_.at, frame_.stamp());
   const double r_c = parameters_.proxy.r_c();
   const double least =
@@ -114,12 +170,12 @@ Movement Sight::move(const Vec3& hip, double t) noexcept {
       if (contact.curvature * r_c > deepest || !tracker_.faces(contact.normal)) return false;
       if (contact.at_limit && !tracker_.holding()) {
         if (slides == most_slides) movement.flags |= step_budget_hit;
-        const double rate = surface_speed(hand_velocity_.t());
+        const Vec3 velocity = surface_velocity(hand_velocity_.t());
         if (slides++ < most_slides && tracker_.slide(*frame_.cloud(), contact.foot)) {
           // The force goes on smoothly from one fit to the next, as from frame to frame.
           if (on_fit_ && proxy_.touching && !blend_due_) {
             blend_due_ = true;
-            carried_rate_ = rate;
+            carried_velocity_ = velocity;
           }
           continue;
         }
@@ -156,11 +212,11 @@ Movement Sight::move(const Vec3& hip, double t) noexcept {
   const int steps = movement.steps + slides;
   // Between frames the points move with the surface that was fitted to them, and so does a proxy
   // that touches them.
-  const Vec3 moved = tracker_.tracking() && tracker_.surface().smooth() ? tracker_.displacement(t)
-                                                                        : Vec3(Vec3::Zero());
+  const bool moves = fused() != nullptr || (tracker_.tracking() && tracker_.surface().smooth());
+  const Vec3 moved = moves ? displacement(t) : Vec3(Vec3::Zero());
   *proxy_.at -= points_moved_;
   const Vec3 before = *proxy_.at;
-  movement = mover_.move(proxy_, *frame_.cloud(), hip - moved);
+  movement = mover_.move(proxy_, points(), hip - moved);
   movement.steps += steps;
   // Scattered points can let the proxy through; the line of sight through it shows that.
   if (const std::optional<Vec3> front =
@@ -211,17 +267,16 @@ void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
   const double deepest =
       r_c + std::min(coupling.max_force / std::max(coupling.stiffness, 1e-9), deepest_return);
   const Monitor::Verdict verdict = monitor_.judge(
-      *frame_.cloud(),
-      {.hip = hip,
-       .proxy = *proxy_.at,
-       .normal = proxy_.normal.value_or(Vec3::Zero()),
-       .touching = proxy_.touching || !last_force_.isZero(),
-       .held =
-           tracker_.holding() && t - tracker_.held_since() < sight.hidden_hold + sight.hidden_fade,
-       .carried = tracker_.tracking() ? tracker_.displacement(t) : Vec3(Vec3::Zero()),
-       .noise = tracker_.surface().beam_sd(),
-       .r_c = r_c,
-       .deepest = deepest});
+      *frame_.cloud(), {.hip = hip,
+                        .proxy = *proxy_.at,
+                        .normal = proxy_.normal.value_or(Vec3::Zero()),
+                        .touching = proxy_.touching || !last_force_.isZero(),
+                        .held = tracker_.holding() &&
+                                t - tracker_.held_since() < sight.hidden_hold + sight.hidden_fade,
+                        .carried = displacement(t),
+                        .noise = tracker_.surface().beam_sd(),
+                        .r_c = r_c,
+                        .deepest = deepest});
   if (verdict.behind) movement.flags |= pop_through_suspected;
   mover_.set_hidden(verdict.hidden);
   switch (verdict.action) {
@@ -255,8 +310,8 @@ Vec3 Sight::render_force(const Vec3& hip, double t, std::uint32_t& flags) noexce
   if (!proxy_.touching) return Vec3::Zero();
   Vec3 u = hip - *proxy_.at;
   // A proxy that rests on points is moved with the surface for the force.
-  if (tracker_.tracking()) u -= tracker_.displacement(t) - points_moved_;
-  const Vec3 relative = hand_velocity_.value() - surface_speed(t) * tracker_.surface().frame().up;
+  if (tracker_.tracking()) u -= displacement(t) - points_moved_;
+  const Vec3 relative = hand_velocity_.value() - surface_velocity(t);
   const double distance = u.norm();
   const double rate = distance > 0.0 ? relative.dot(u) / distance : 0.0;
   const CouplingForce result =
@@ -280,8 +335,7 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
     if (push > undirected_force) {
       const Vec3 outwards = last_force_ / push;
       const double deeper =
-          carried_rate_ * (t - last_blend_t_) * tracker_.surface().frame().up.dot(outwards) -
-          (hip - last_hip_).dot(outwards);
+          (carried_velocity_ * (t - last_blend_t_) - (hip - last_hip_)).dot(outwards);
       carried += parameters_.coupling.stiffness * deeper * outwards;
     }
     blend_offset_ = carried - force;
@@ -349,7 +403,7 @@ Tick Sight::tick(const Vec3& hip, double t) noexcept {
   if (tracker_.holding()) tick.flags |= surface_hidden;
   tick.force = blend_force(render_force(hip, t, tick.flags), hip, t);
   tick.surface_velocity = tracker_.tracking() ? tracker_.surface().normal_velocity() : 0.0;
-  if (tracker_.tracking()) tick.surface_motion = surface_speed(t) * tracker_.surface().frame().up;
+  tick.surface_motion = surface_velocity(t);
   return tick;
 }
 

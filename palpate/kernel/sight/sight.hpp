@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "palpate/kernel/core/hand_velocity.hpp"
@@ -9,6 +10,7 @@
 #include "palpate/kernel/paper/coupling.hpp"
 #include "palpate/kernel/paper/point_mover.hpp"
 #include "palpate/kernel/sight/frame_timing.hpp"
+#include "palpate/kernel/sight/fused_image.hpp"
 #include "palpate/kernel/sight/monitor.hpp"
 #include "palpate/kernel/sight/tracker.hpp"
 
@@ -37,7 +39,11 @@ class Sight final : public Method {
   Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;
   Vec3 blend_force(const Vec3& force, const Vec3& hip, double t) noexcept;
   [[nodiscard]] double interval() const noexcept;
-  [[nodiscard]] double surface_speed(double t) const noexcept;
+  void fuse(const Observation& seen, SightTracker::Event event) noexcept;
+  [[nodiscard]] const FusedImage* fused() const noexcept;
+  [[nodiscard]] ObservedClouds points() const noexcept;
+  [[nodiscard]] Vec3 displacement(double t) const noexcept;
+  [[nodiscard]] Vec3 surface_velocity(double t) const noexcept;
 
   Parameters parameters_;
   PointMover mover_;
@@ -48,6 +54,9 @@ class Sight final : public Method {
   bool on_fit_ = false;  // the proxy rests on the fitted surface, not on points
   // [m] displacement of the points since their frame, with the surface, at the last tick
   Vec3 points_moved_ = Vec3::Zero();
+  static constexpr std::size_t most_fused = 4;  // cameras; those of further ones are not averaged
+  std::array<FusedImage, most_fused> fused_;    // by camera: points that the proxy rests on
+  int frames_on_fit_ = 0;                       // in a row; a few do not end an average
   Monitor monitor_;
   std::optional<Vec3> last_proxy_;  // [m] of the last tick
   bool returning_ = false;          // the surface was hidden or lost and comes back
@@ -61,7 +70,7 @@ class Sight final : public Method {
   Vec3 left_at_ = Vec3::Zero();     // [m] the hand in the last tick in which it pressed
   Vec3 left_along_ = Vec3::Zero();  // [-] the last normal there was
   double last_blend_t_ = 0.0;
-  double carried_rate_ = 0.0;  // [m/s] of the surface, before the newest frame
+  Vec3 carried_velocity_ = Vec3::Zero();  // [m/s] of the surface, before the newest frame
   Vec3 blend_offset_ = Vec3::Zero();
   double blend_start_ = 0.0;
 

@@ -194,11 +194,7 @@ double SurfaceEstimate::gate(double narrowest) const noexcept {
 }
 
 double SurfaceEstimate::displacement(double t) const noexcept {
-  if (velocity_ == 0.0) return 0.0;
-  // Beyond one and a half intervals the velocity fades over another, and the surface stays there.
-  const double elapsed = std::max(t - stamp_, 0.0) / interval_;
-  const double late = std::clamp(elapsed - 1.5, 0.0, 1.0);
-  return velocity_ * interval_ * (std::min(elapsed, 1.5) + late - 0.5 * late * late);
+  return moved_since(velocity_, t - stamp_, interval_);
 }
 
 SurfaceContact SurfaceEstimate::contact(const Vec3& point, double t, double reach) const noexcept {

@@ -382,7 +382,7 @@ TEST(FieldRules, LeaveOutWhatCannotBeKnown) {
 
 TEST(FieldCase, IsDrawnFromSeedClassAndNumberAndReadsBack) {
   std::set<std::string> texts;
-  for (const FieldClass& of : field_classes()) {
+  for (const FieldClass& of : field_set().classes) {
     const FieldCase c = draw_field_case(of, 1, 0);
     texts.insert(c.text());
     texts.insert(draw_field_case(of, 1, 1).text());
@@ -395,11 +395,11 @@ TEST(FieldCase, IsDrawnFromSeedClassAndNumberAndReadsBack) {
     EXPECT_EQ(again.values, stage.values);
     EXPECT_NEAR(again.duration, stage.duration, 0.05) << c.text();
   }
-  EXPECT_EQ(texts.size(), 3 * field_classes().size());
+  EXPECT_EQ(texts.size(), 3 * field_set().classes.size());
 }
 
 TEST(FieldCase, HasANameOfItsOwnForEachValue) {
-  for (const FieldClass& of : field_classes()) {
+  for (const FieldClass& of : field_set().classes) {
     for (int sensor = 0; sensor < sensor_kinds; ++sensor) {
       FieldCase c = draw_field_case(of, 3, 0);
       c.fixed = "sensor=" + std::to_string(sensor);
@@ -437,7 +437,7 @@ class Field : public ::testing::Test {
 
 TEST_F(Field, TheRulerIsRightInEveryCaseOfEveryClassAndHasAForceWhereverTheHandIsInABody) {
   const Parameters parameters;
-  for (const FieldClass& of : field_classes()) {
+  for (const FieldClass& of : field_set().classes) {
     FieldCase c = draw_field_case(of, 1, 0);
     c.fixed = "rate=15";  // for the sake of time
     Stage stage = make_stage(c);

@@ -169,7 +169,7 @@ Verb add_eval(CLI::App& program) {
       ->allow_extra_args(false);
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
   command->add_option("--cases", options->cases,
-                      "pop, field, visits: number of cases of each family or class (50, 5, 3); "
+                      "pop, field, visits: number of cases of each family or class (50, 5, 4); "
                       "feel: hands in free space");
   command
       ->add_option("--families", options->families,

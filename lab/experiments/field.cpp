@@ -311,7 +311,7 @@ Experiment field_experiment() {
 Experiment visits_experiment() {
   return {
       "visits",     "the visits set: what comes, goes and moves around a hand that rests or works",
-      header,       {"direct", "sight"},
+      header,       {"sight", "direct", "paper"},
       false,        visits_cells,
       field_figure, no_claims,
       visits_scores};

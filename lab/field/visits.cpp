@@ -22,9 +22,9 @@ double latency_of(Draw& draw) {
   return draw.even("latency", 0.0, 0.12);
 }
 
-// [m/s] of what comes against the hand: not farther than `most` while a frame is on its way.
+// [m/s] of what comes against the hand, which goes so far while a frame is on its way.
 double pushing(Draw& draw) {
-  constexpr double most = 0.012;  // [m]
+  const double most = draw.by_factor("push_in_lag", 0.005, 0.03);  // [m]
   return std::min(draw.by_factor("push", 0.03, 0.4),
                   most / (1.0 / rate_of(draw) + latency_of(draw)));
 }
@@ -159,7 +159,7 @@ void box_against(Draw& draw, Setting& setting, double start) {
   Script path(front(-0.2));
   path.wait(hand.now())
       .reach(front(-0.03), 0.4)
-      .reach(front(draw.even("beyond", 0.0, 0.018)), pushing(draw))
+      .reach(front(draw.even("beyond", 0.0, 0.03)), pushing(draw))
       .wait(draw.even("there", 1.2, 2.0));
   if (draw.whole("leaves", 2) == 1)
     path.reach(front(-0.2), draw.by_factor("leaving", 0.1, 0.5)).wait(1.2);
@@ -483,7 +483,7 @@ void door_push(Draw& draw, Setting& setting, double start) {
       .reach(Vec3(draw.even("open", 0.1, 0.5), 0.0, 0.0), 3.0 * turn)
       .wait(draw.even("there", 0.1, 0.6))
       .reach(Vec3::Zero(), turn)
-      .reach(Vec3(-draw.even("beyond", 0.0, 0.015) / door.arm, 0.0, 0.0), turn)
+      .reach(Vec3(-draw.even("beyond", 0.0, 0.02) / door.arm, 0.0, 0.0), turn)
       .wait(1.2)
       .reach(Vec3::Zero(), turn)
       .wait(1.2);
@@ -708,7 +708,7 @@ CameraPlan visits_camera(Draw& draw) {
 }  // namespace
 
 const CaseSet& visits_set() {
-  static constexpr CaseSet set{"visits", 0x766973697473ULL, visits, 3, visits_camera};
+  static constexpr CaseSet set{"visits", 0x766973697473ULL, visits, 4, visits_camera};
   return set;
 }
 

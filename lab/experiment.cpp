@@ -19,7 +19,8 @@ const std::vector<Experiment>& known_experiments() {
       damping_experiment(),       corners_experiment(), scan_experiment(),
       fidelity_experiment(),      feel_experiment(),    zwidth_experiment(),
       materials_experiment(),     teleop_experiment(),  teleop_faults_experiment(),
-      pop_experiment(),           field_experiment(),   real_experiment()};
+      pop_experiment(),           field_experiment(),   visits_experiment(),
+      real_experiment()};
   return experiments;
 }
 

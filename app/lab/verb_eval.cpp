@@ -169,17 +169,19 @@ Verb add_eval(CLI::App& program) {
       ->allow_extra_args(false);
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
   command->add_option("--cases", options->cases,
-                      "pop, field: number of cases of each family or class (50, 5); "
+                      "pop, field, visits: number of cases of each family or class (50, 5, 4); "
                       "feel: hands in free space");
   command
       ->add_option("--families", options->families,
-                   "pop, field, fidelity, feel: which, separated by commas")
+                   "pop, field, visits, fidelity, feel: which, separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--fix", options->fixed, "pop, field: KEY=VALUE instead of a random value")
+  command
+      ->add_option("--fix", options->fixed,
+                   "pop, field, visits: KEY=VALUE instead of a random value")
       ->allow_extra_args(false);
   command->add_option("--case", options->case_text,
-                      "pop, field: one case as a run printed it, pop:... or field:...");
+                      "pop, field, visits: one case as a run printed it, such as field:...");
   command->add_option("--noise", options->noise, "white (default) or correlated");
   command->add_option(
       "--recording", options->recording,

@@ -54,6 +54,9 @@ Experiment pop_experiment();
 /// The field set: scenes, sensors and hands that share no code with the generator that methods were
 /// made with. docs/field.md has the rules.
 Experiment field_experiment();
+/// The visits set: things, people and surfaces that come, go and move around a hand that rests or
+/// works, drawn and judged as those of the field set. docs/field.md has the classes.
+Experiment visits_experiment();
 /// Pressing, holding and sliding on what a real camera measured, at rest and moved exactly: patches
 /// cut out of the recorded frames, with their noise, are moved along or across the lines of sight.
 Experiment real_experiment();

@@ -16,8 +16,6 @@
 namespace palpate::lab {
 namespace {
 
-constexpr int usual_cases = 5;  // of each class
-
 // What a camera says of itself.
 SensorKind declared(field::SensorKind kind) {
   switch (kind) {
@@ -63,6 +61,7 @@ std::string rows_of(const std::vector<std::string>& names, const field::FieldCas
                 .add(verdict.numb)
                 .add(verdict.wrong_side)
                 .add(verdict.worst_step)
+                .add(verdict.shake < 0.0 ? "-" : fmt::format("{:.4g}", 1e3 * verdict.shake))
                 .add(verdict.time)
                 .add(verdict.time_behind)
                 .add(verdict.alarmed)
@@ -76,7 +75,8 @@ std::string rows_of(const std::vector<std::string>& names, const field::FieldCas
   return rows;
 }
 
-std::vector<Cell> field_cells(const Experiment& experiment, const ExperimentOptions& options) {
+std::vector<Cell> cells_of(const field::CaseSet& set, const Experiment& experiment,
+                           const ExperimentOptions& options) {
   const std::vector<std::string> names = methods_of(experiment, options);
   std::vector<Cell> cells;
   const auto add = [&](field::FieldCase c, int number) {
@@ -85,17 +85,26 @@ std::vector<Cell> field_cells(const Experiment& experiment, const ExperimentOpti
         [=, parameters = options.parameters] { return rows_of(names, c, number, parameters); });
   };
   if (!options.case_text.empty()) {
-    add(field::parse_field_case(options.case_text), 0);
+    add(field::parse_field_case(options.case_text, set), 0);
     return cells;
   }
   std::vector<field::FieldClass> classes;
-  for (const std::string& name : options.families) classes.push_back(field::find_field_class(name));
-  if (classes.empty()) classes.assign(field::field_classes().begin(), field::field_classes().end());
+  for (const std::string& name : options.families)
+    classes.push_back(field::find_field_class(name, set));
+  if (classes.empty()) classes.assign(set.classes.begin(), set.classes.end());
   for (const field::FieldClass& of : classes) {
-    for (int i = 0; i < options.cases.value_or(usual_cases); ++i)
-      add(field::draw_field_case(of, options.seed, static_cast<std::uint64_t>(i)), i);
+    for (int i = 0; i < options.cases.value_or(set.usual_cases); ++i)
+      add(field::draw_field_case(of, options.seed, static_cast<std::uint64_t>(i), set), i);
   }
   return cells;
+}
+
+std::vector<Cell> field_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  return cells_of(field::field_set(), experiment, options);
+}
+
+std::vector<Cell> visits_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  return cells_of(field::visits_set(), experiment, options);
 }
 
 struct Sum {
@@ -107,7 +116,8 @@ struct Sum {
   int numb = 0;
   int wrong = 0;
   double worst_ghost = 0.0;
-  std::vector<double> steps;  // [N] of the cases that were held
+  std::vector<double> steps;   // [N] of the cases that were held
+  std::vector<double> shakes;  // [mm] of those in which hand and surface rest
   std::string first_not_right;
 };
 
@@ -118,6 +128,23 @@ std::string percent(double share) {
 
 std::string median_text(const std::vector<double>& values) {
   return values.empty() ? "-" : fmt::format("{:.2g}", median(values));
+}
+
+// What a set shows of each method beside the shares of held and right cases.
+struct Extra {
+  std::vector<std::string> columns;
+  std::vector<std::string> (*values)(const Sum&);
+  std::string_view note;
+};
+
+std::vector<std::string> step_values(const Sum& sum) {
+  return {median_text(sum.steps)};
+}
+
+std::vector<std::string> rest_values(const Sum& sum) {
+  const auto worst = std::max_element(sum.shakes.begin(), sum.shakes.end());
+  return {sum.known == 0 ? "-" : percent(static_cast<double>(sum.numb) / sum.known),
+          median_text(sum.shakes), worst == sum.shakes.end() ? "-" : fmt::format("{:.2g}", *worst)};
 }
 
 // In the order of the table: what appears first comes first.
@@ -145,11 +172,13 @@ void add_row(const Table& table, std::size_t row, Sum& sum) {
   sum.wrong += table.number(row, "wrong_side") != 0.0 ? 1 : 0;
   sum.worst_ghost = std::max(sum.worst_ghost, table.number(row, "ghost_n"));
   if (!lost) sum.steps.push_back(table.number(row, "worst_step_n"));
+  if (!lost && table.text(row, "shake_mm") != "-")
+    sum.shakes.push_back(table.number(row, "shake_mm"));
   if (!right && sum.first_not_right.empty()) sum.first_not_right = table.text(row, "text");
 }
 
 std::vector<std::string> line_of(const std::string& name, std::map<std::string, Sum>& sums,
-                                 const std::vector<std::string>& methods) {
+                                 const std::vector<std::string>& methods, const Extra& extra) {
   const Sum& any = sums[methods.front()];
   std::vector<std::string> line = {name, std::to_string(any.known), std::to_string(any.unknown)};
   for (const std::string& method : methods) {
@@ -157,7 +186,7 @@ std::vector<std::string> line_of(const std::string& name, std::map<std::string, 
     const double known = sum.known;
     line.push_back(sum.known == 0 ? "-" : percent(sum.held / known));
     line.push_back(sum.known == 0 ? "-" : percent(sum.right / known));
-    line.push_back(median_text(sum.steps));
+    for (std::string& value : extra.values(sum)) line.push_back(std::move(value));
   }
   return line;
 }
@@ -181,7 +210,7 @@ std::string alarm_text(const Table& table, const std::string& method) {
       sum("times_behind"));
 }
 
-Scores field_scores(const Table& table) {
+Scores scores_of(const Table& table, const Extra& extra) {
   const std::vector<std::string> methods = methods_in(table);
   Sums classes;
   Sums sensors;
@@ -197,15 +226,13 @@ Scores field_scores(const Table& table) {
   for (const std::string& method : methods) {
     scores.columns.push_back(method + " held [%]");
     scores.columns.push_back("right [%]");
-    scores.columns.push_back("step [N]");
+    scores.columns.insert(scores.columns.end(), extra.columns.begin(), extra.columns.end());
   }
-  for (auto& [name, sums] : classes) scores.rows.push_back(line_of(name, sums, methods));
+  for (auto& [name, sums] : classes) scores.rows.push_back(line_of(name, sums, methods, extra));
   for (auto& [name, sums] : sensors)
-    scores.rows.push_back(line_of("all before " + name, sums, methods));
-  scores.note =
-      "The score is the mean over the classes of the shares, of the observable cases; step is the "
-      "median over the cases of the largest change of force in a tick. docs/field.md has the "
-      "rules.";
+    scores.rows.push_back(line_of("all before " + name, sums, methods, extra));
+  scores.note = "The score is the mean over the classes of the shares, of the observable cases; " +
+                std::string(extra.note) + " docs/field.md has the rules.";
   std::vector<std::string> last = {"score", "", ""};
   for (const std::string& method : methods) {
     double held = 0.0;
@@ -220,18 +247,33 @@ Scores field_scores(const Table& table) {
       if (sum.right == sum.known) continue;
       scores.note += fmt::format(
           "\n{}, {}: {} cases: {} popped through, {} with a force in free space (up to {:.2f} N), "
-          "{} with a missing force, {} with a force in the opposite direction; palpate eval field "
+          "{} with a missing force, {} with a force in the opposite direction; palpate eval {} "
           "--methods {} --case '{}'",
           method, name, sum.known, sum.known - sum.held, sum.ghost, sum.worst_ghost, sum.numb,
-          sum.wrong, method, sum.first_not_right);
+          sum.wrong, sum.first_not_right.substr(0, sum.first_not_right.find(':')), method,
+          sum.first_not_right);
     }
     last.push_back(count == 0 ? "-" : percent(held / count));
     last.push_back(count == 0 ? "-" : percent(right / count));
-    last.emplace_back("");
+    last.resize(last.size() + extra.columns.size());
   }
   scores.rows.push_back(std::move(last));
   for (const std::string& method : methods) scores.note += "\n" + alarm_text(table, method);
   return scores;
+}
+
+Scores field_scores(const Table& table) {
+  return scores_of(table, {{"step [N]"},
+                           step_values,
+                           "step is the median over the cases of the largest change of force in a "
+                           "tick."});
+}
+
+Scores visits_scores(const Table& table) {
+  return scores_of(table, {{"numb [%]", "shake [mm]", "worst"},
+                           rest_values,
+                           "shake is how far the proxy moves while hand and surface rest, the "
+                           "median and the worst over the held cases."});
 }
 
 Figure field_figure(const Table& table) {
@@ -247,21 +289,32 @@ Figure field_figure(const Table& table) {
       {by_group(table, known_class, share, {.label = "right [%]", .low = -2.0, .high = 102.0})}};
 }
 
+constexpr std::string_view header =
+    "method,class,sensor,number,unknown,lost,right,behind_s,ghost_n,numb,wrong_side,worst_step_n,"
+    "shake_mm,time_s,time_behind_s,alarmed_s,false_alarm_s,times_behind,quick_returns,text,values";
+
 }  // namespace
 
 Experiment field_experiment() {
   return {"field",
           "the field set: independent scenes, sensors and HIP paths, which share no code with "
           "those of pop and feel",
-          "method,class,sensor,number,unknown,lost,right,behind_s,ghost_n,numb,wrong_side,"
-          "worst_step_n,time_s,time_behind_s,alarmed_s,false_alarm_s,times_behind,quick_returns,"
-          "text,values",
+          header,
           {"paper", "sight"},
           false,
           field_cells,
           field_figure,
           no_claims,
           field_scores};
+}
+
+Experiment visits_experiment() {
+  return {
+      "visits",     "the visits set: what comes, goes and moves around a hand that rests or works",
+      header,       {"sight", "direct", "paper"},
+      false,        visits_cells,
+      field_figure, no_claims,
+      visits_scores};
 }
 
 }  // namespace palpate::lab

@@ -4,130 +4,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
-#include <numbers>
 #include <utility>
 
-#include <fmt/format.h>
-
-#include "lab/find_named.hpp"
-#include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/uri.hpp"
+#include "lab/field/field_setting.hpp"
 
 namespace palpate::lab::field {
 namespace {
 
-constexpr double pi = std::numbers::pi;
 constexpr double edge_feature = 0.010;  // [m] the sphere on an edge: two r_c
 
-std::uint64_t hash_of(std::string_view text, std::uint64_t hash) {
-  for (const char letter : text) hash = Chance(hash ^ static_cast<unsigned char>(letter)).bits();
-  return hash;
-}
-
-// The values of a case, by name.
-class Draw {
- public:
-  explicit Draw(const FieldCase& c) : uri_(c.text()), seed_(c.seed) {}
-
-  double even(std::string_view key, double low, double high) {
-    return given(key, low + (high - low) * chance_of(key), std::min(11.0 * low, 0.0),
-                 high + 10.0 * std::abs(high));
-  }
-  double by_factor(std::string_view key, double low, double high) {
-    return given(key, low * std::pow(high / low, chance_of(key)), 0.01 * low, 10.0 * high);
-  }
-  /// One of 0 to count - 1.
-  int whole(std::string_view key, int count) {
-    return static_cast<int>(
-        given(key, std::floor(chance_of(key) * count), 0.0, static_cast<double>(count - 1)));
-  }
-  /// Random numbers for what has no name of its own.
-  [[nodiscard]] std::uint64_t seed_of(std::string_view what) const { return hash_of(what, seed_); }
-
-  /// @throws Error if a value was set that is none of them
-  void check() const {
-    std::vector<std::string_view> keys = {"seed"};
-    for (const auto& [key, value] : values_) keys.push_back(key);
-    uri_.allow_only(keys);
-  }
-  /// All values, sorted by name.
-  [[nodiscard]] std::string text() const {
-    std::string text;
-    for (const auto& [key, value] : values_)
-      text += fmt::format("{}{}={:.4g}", text.empty() ? "" : "&", key, value.value);
-    return text;
-  }
-
- private:
-  [[nodiscard]] double chance_of(std::string_view key) const {
-    return Chance(hash_of(key, seed_)).even();
-  }
-  struct Value {
-    double value;
-    double low, high;  // that it may have
-  };
-
-  double given(std::string_view key, double drawn, double low, double high) {
-    const Value value{uri_.number_option(key, drawn, low, high), low, high};
-    const auto [found, is_new] = values_.emplace(key, value);
-    if (!is_new && (found->second.low != low || found->second.high != high))
-      throw Error("field: " + std::string(key), "two values have this name",
-                  "use different names for the values of a class and its sensors");
-    return value.value;
-  }
-
-  Uri uri_;
-  std::uint64_t seed_;
-  std::map<std::string_view, Value> values_;
-};
-
-Eigen::Isometry3d at(const Vec3& place) {
-  return Eigen::Isometry3d(Eigen::Translation3d(place));
-}
-Eigen::Isometry3d at(double x, double y, double z) {
-  return at(Vec3(x, y, z));
-}
-Eigen::Isometry3d turned(double angle, const Vec3& axis) {
-  return Eigen::Isometry3d(Eigen::AngleAxisd(angle, axis));
-}
-Body still(ShapePtr shape, const Eigen::Isometry3d& place = Eigen::Isometry3d::Identity()) {
-  return {std::move(shape), place, nullptr};
-}
-Body moving(ShapePtr shape, std::function<Eigen::Isometry3d(double)> motion) {
-  return {std::move(shape), Eigen::Isometry3d::Identity(), std::move(motion)};
-}
-Vec3 toward(double heading) {
-  return {std::cos(heading), std::sin(heading), 0.0};
-}
-
-// A class fills this in; the camera is put before it afterwards.
-struct Setting {
-  FieldScene scene;
-  std::function<Vec3(double t)> hip;
-  double duration = 0.0;      // [s]
-  double least_tilt = 0.0;    // [rad] of the camera, off straight above
-  double most_tilt = 1.22;    // [rad] 70 degrees
-  double azimuth = 0.0;       // [rad] to which side it may be tilted
-  double azimuth_range = pi;  // [rad] to both sides of it
-  double feature = std::numeric_limits<double>::infinity();
-};
-
 // ---- Hands. ----
-
-struct Place {
-  Vec3 point;   // [m] on the surface
-  Vec3 normal;  // [-]
-};
-
-// The first surface below a place, at a time.
-Place below(const FieldScene& scene, double x, double y, double t = 0.0, double from = 0.5) {
-  const Snapshot snapshot(scene, t);
-  const Vec3 high(x, y, from);
-  const double gone = snapshot.cast(high, -Vec3::UnitZ(), 2.0).value_or(from);
-  const Vec3 point = high - gone * Vec3::UnitZ();
-  return {point, snapshot.nearest(point + 1e-4 * Vec3::UnitZ()).normal};
-}
 
 // Along the surface from (x, y): `depth` under it along its own normals.
 std::vector<Vec3> under_surface(const FieldScene& scene, double x, double y, double heading,
@@ -140,11 +26,6 @@ std::vector<Vec3> under_surface(const FieldScene& scene, double x, double y, dou
     places.emplace_back(place.point - depth * place.normal);
   }
   return places;
-}
-
-// [s] of a way [m, rad] with the least jerk, whose highest speed is `fastest`.
-double seconds_for(double way, double fastest) {
-  return 1.875 * way / fastest;
 }
 
 // How a hand presses, by the values of a case.
@@ -208,11 +89,6 @@ Script stroke_and_lift(const std::vector<Vec3>& places, const Vec3& out, const P
   return script;
 }
 
-void play_script(Setting& setting, const Script& script) {
-  setting.duration = script.duration();
-  setting.hip = [script](double t) { return script.at(t); };
-}
-
 // ---- Things that come. ----
 
 // From one place to another with the least jerk, between two times.
@@ -222,23 +98,6 @@ std::function<Eigen::Isometry3d(double)> from_to(
   return [=](double t) {
     return Eigen::Isometry3d(at(from + ease((t - begin) / seconds) * (to - from)) * turn);
   };
-}
-
-// An arm with a hand, its fingertips at the origin and the arm towards -x.
-std::vector<std::pair<ShapePtr, Eigen::Isometry3d>> arm_parts() {
-  std::vector<std::pair<ShapePtr, Eigen::Isometry3d>> parts = {
-      {capsule(0.16, 0.038), at(-0.38, 0.0, 0.0)},
-      {capsule(0.035, 0.027), at(-0.135, 0.015, 0.0)},
-      {capsule(0.035, 0.027), at(-0.135, -0.015, 0.0)}};
-  for (const double y : {-0.024, -0.008, 0.008, 0.024})  // closed fingers
-    parts.emplace_back(capsule(0.045, 0.0085), at(-0.055, y, 0.0));
-  return parts;
-}
-
-void add_arm(FieldScene& scene, const std::function<Eigen::Isometry3d(double)>& pose) {
-  for (const auto& [shape, place] : arm_parts())
-    scene.push_back(moving(
-        shape, [pose, at_rest = place](double t) { return Eigen::Isometry3d(pose(t) * at_rest); }));
 }
 
 // In from outside, there for a while, and out again unless it stays.
@@ -645,15 +504,6 @@ void wedge_under(Draw& draw, Setting& setting, double start) {
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
-// Turned by an angle about z with the least jerk.
-std::function<Eigen::Isometry3d(double)> turning(const Vec3& axis_at, double angle, double begin,
-                                                 double seconds, const Eigen::Isometry3d& on_it) {
-  return [=](double t) {
-    return Eigen::Isometry3d(at(axis_at) *
-                             turned(angle * ease((t - begin) / seconds), Vec3::UnitZ()) * on_it);
-  };
-}
-
 // A hand rests on a turntable; a dome on it passes under the hand, or stops there.
 void table_dome(Draw& draw, Setting& setting, double start) {
   const double out = draw.even("out", 0.06, 0.09);  // [m] of the hand and the dome from the axis
@@ -791,54 +641,45 @@ void lift_off(Draw& draw, Setting& setting, double start) {
   play_script(setting, script);
 }
 
-struct Maker {
-  FieldClass of;
-  void (*make)(Draw&, Setting&, double start);
-};
-
-constexpr std::array makers = {
-    Maker{{"plane-press", "a plane seen at 0 to 70 degrees, pressed and left"}, plane_press},
-    Maker{{"plane-slide", "the same, strokes of up to 0.5 m/s"}, plane_slide},
-    Maker{{"plane-tap", "the same, quick taps and a press"}, plane_tap},
-    Maker{{"bowl-press", "the inside of a cup or a bowl"}, bowl_press},
-    Maker{{"bowl-slide", "along the inside of a bowl, up its wall"}, bowl_slide},
-    Maker{{"corner-slide", "three planes that meet: from the floor to the walls"}, corner_slide},
-    Maker{{"stairs", "up into a riser, or down on the next tread"}, stairs},
-    Maker{{"torus-press", "on a ring"}, torus_press},
-    Maker{{"torus-slide", "along a ring"}, torus_slide},
-    Maker{{"rod-press", "a rod or a cable of 6 to 10 mm over a table"}, rod_press},
-    Maker{{"sheet-press", "the front of a wall 3 mm thick"}, sheet_press},
-    Maker{{"cloth-rest", "a cloth that undulates under a resting hand"}, cloth_rest},
-    Maker{{"cloth-slide", "a stroke over such a cloth"}, cloth_slide},
-    Maker{{"torso-rest", "a resting hand on a torso that breathes"}, torso_rest},
-    Maker{{"torso-palpate", "taps and strokes on it"}, torso_palpate},
-    Maker{{"terrain-slide", "a stroke over bumps and hollows"}, terrain_slide},
-    Maker{{"belt-under", "a box arrives sideways under the hand, which then presses on it"},
-          belt_under},
-    Maker{{"belt-beside", "a box arrives beside the pressing hand and stays"}, belt_beside},
-    Maker{{"belt-ride", "a long box moves on under the hand that rests on it"}, belt_ride},
-    Maker{{"wedge-under", "an inclined board is pushed under the HIP at rest and stays"},
-          wedge_under},
-    Maker{{"table-dome", "a dome on a turntable passes under the resting hand, or stops there"},
-          table_dome},
-    Maker{{"table-follow", "the HIP moves in a circle with an object on a turntable"},
-          table_follow},
-    Maker{{"arm-over", "an arm reaches in over the pressing hand, and leaves or stays"}, arm_over},
-    Maker{{"arm-under", "a visitor's hand is laid under the waiting hand, which presses on it"},
-          arm_under},
-    Maker{{"hover", "a hand in free space, an arm beside it"}, hover},
-    Maker{{"lift-off", "pressed, slid, and away at 0.5 m/s"}, lift_off}};
-
-constexpr auto classes = [] {
-  std::array<FieldClass, makers.size()> all{};
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = makers[i].of;
-  return all;
-}();
+constexpr std::array classes = {
+    FieldClass{"plane-press", "a plane seen at 0 to 70 degrees, pressed and left", plane_press},
+    FieldClass{"plane-slide", "the same, strokes of up to 0.5 m/s", plane_slide},
+    FieldClass{"plane-tap", "the same, quick taps and a press", plane_tap},
+    FieldClass{"bowl-press", "the inside of a cup or a bowl", bowl_press},
+    FieldClass{"bowl-slide", "along the inside of a bowl, up its wall", bowl_slide},
+    FieldClass{"corner-slide", "three planes that meet: from the floor to the walls", corner_slide},
+    FieldClass{"stairs", "up into a riser, or down on the next tread", stairs},
+    FieldClass{"torus-press", "on a ring", torus_press},
+    FieldClass{"torus-slide", "along a ring", torus_slide},
+    FieldClass{"rod-press", "a rod or a cable of 6 to 10 mm over a table", rod_press},
+    FieldClass{"sheet-press", "the front of a wall 3 mm thick", sheet_press},
+    FieldClass{"cloth-rest", "a cloth that undulates under a resting hand", cloth_rest},
+    FieldClass{"cloth-slide", "a stroke over such a cloth", cloth_slide},
+    FieldClass{"torso-rest", "a resting hand on a torso that breathes", torso_rest},
+    FieldClass{"torso-palpate", "taps and strokes on it", torso_palpate},
+    FieldClass{"terrain-slide", "a stroke over bumps and hollows", terrain_slide},
+    FieldClass{"belt-under", "a box arrives sideways under the hand, which then presses on it",
+               belt_under},
+    FieldClass{"belt-beside", "a box arrives beside the pressing hand and stays", belt_beside},
+    FieldClass{"belt-ride", "a long box moves on under the hand that rests on it", belt_ride},
+    FieldClass{"wedge-under", "an inclined board is pushed under the HIP at rest and stays",
+               wedge_under},
+    FieldClass{"table-dome", "a dome on a turntable passes under the resting hand, or stops there",
+               table_dome},
+    FieldClass{"table-follow", "the HIP moves in a circle with an object on a turntable",
+               table_follow},
+    FieldClass{"arm-over", "an arm reaches in over the pressing hand, and leaves or stays",
+               arm_over},
+    FieldClass{"arm-under", "a visitor's hand is laid under the waiting hand, which presses on it",
+               arm_under},
+    FieldClass{"hover", "a hand in free space, an arm beside it", hover},
+    FieldClass{"lift-off", "pressed, slid, and away at 0.5 m/s", lift_off}};
 
 // ---- Cameras. ----
 
-SensorSetup sensor_of(Draw& draw, double& distance) {
-  SensorSetup setup;
+CameraPlan camera_of(Draw& draw) {
+  CameraPlan plan;
+  SensorSetup& setup = plan.setup;
   setup.kind = static_cast<SensorKind>(draw.whole("sensor", sensor_kinds));
   setup.seed = draw.seed_of("noise");
   double least = 0.4;  // [m]
@@ -880,107 +721,23 @@ SensorSetup sensor_of(Draw& draw, double& distance) {
       setup.units = 10000.0;
       break;
   }
-  distance = draw.even("distance", least, most);
-  if (setup.kind != SensorKind::coarse) {
-    // So much about the place that is touched is taken; near it a camera runs at a lower
-    // resolution.
-    constexpr double wide = 0.28;  // [m]
-    constexpr int most_pixels = 168;
-    setup.focal = std::min(setup.focal, most_pixels * distance / wide);
-    setup.width = setup.height = std::max(static_cast<int>(wide * setup.focal / distance), 64);
-  }
-  return setup;
+  plan.distance = draw.even("distance", least, most);
+  constexpr double wide = 0.28;  // [m]
+  constexpr int most_pixels = 168;
+  if (setup.kind != SensorKind::coarse) crop(setup, plan.distance, wide, most_pixels);
+  plan.rate = draw.by_factor("rate", 5.0, 90.0);
+  plan.latency = draw.even("latency", 0.0, 0.15);
+  plan.dropped = draw.even("dropped", 0.0, 0.1);
+  plan.jitter = std::min(draw.even("jitter", 0.0, 0.003), 0.2 / plan.rate);
+  return plan;
 }
 
 }  // namespace
 
-std::string FieldCase::text() const {
-  return fmt::format("field:{}?seed={}{}{}", name, seed, fixed.empty() ? "" : "&", fixed);
-}
-
-std::span<const FieldClass> field_classes() {
-  return classes;
-}
-
-const FieldClass& find_field_class(std::string_view name) {
-  return find_named(classes, name, "class", "there is no such class of the field set");
-}
-
-FieldCase draw_field_case(const FieldClass& of, std::uint64_t seed, std::uint64_t index) {
+const CaseSet& field_set() {
   // Another stream than every other experiment's, also for the same seed.
-  Chance chance(hash_of(of.name, Chance(seed ^ 0x6669656c64736574ULL).bits()) ^
-                Chance(index).bits());
-  return {of.name, chance.bits() >> 33U, {}};
-}
-
-FieldCase parse_field_case(const std::string& text) {
-  const Uri uri(text);
-  if (uri.scheme() != "field")
-    throw Error("--case " + text, "it does not begin with 'field:'",
-                "give one as `palpate eval field` prints it");
-  FieldCase c;
-  c.name = find_field_class(uri.path()).name;
-  c.seed = static_cast<std::uint64_t>(uri.number_option("seed", 0.0, 0.0, 0x1p31));
-  // All but the seed, as it was written.
-  std::string rest =
-      text.substr(text.find('?') == std::string::npos ? text.size() : text.find('?') + 1);
-  while (!rest.empty()) {
-    const std::size_t end = std::min(rest.find('&'), rest.size());
-    const std::string assignment = rest.substr(0, end);
-    if (assignment.rfind("seed=", 0) != 0) c.fixed += (c.fixed.empty() ? "" : "&") + assignment;
-    rest.erase(0, end + 1);
-  }
-  return c;
-}
-
-Stage make_stage(const FieldCase& c) {
-  Draw draw(c);
-  double distance = 0.0;
-  const SensorSetup setup = sensor_of(draw, distance);
-
-  const double rate = draw.by_factor("rate", 5.0, 90.0);
-  const double latency = draw.even("latency", 0.0, 0.15);
-  const double dropped = draw.even("dropped", 0.0, 0.1);
-  const double jitter = std::min(draw.even("jitter", 0.0, 0.003), 0.2 / rate);
-  // The hand waits until the camera has shown the scene at least three times.
-  const double start = 0.1 + latency + 4.0 / rate;
-
-  Setting setting;
-  const auto* const maker = std::find_if(makers.begin(), makers.end(),
-                                         [&](const Maker& one) { return one.of.name == c.name; });
-  maker->make(draw, setting, start);
-
-  const double tilt = draw.even("tilt", setting.least_tilt, setting.most_tilt);
-  const double azimuth = draw.even("azimuth", setting.azimuth - setting.azimuth_range,
-                                   setting.azimuth + setting.azimuth_range);
-  Stage stage;
-  stage.sensor = std::make_shared<Sensor>(
-      setup, camera_pose(Vec3::Zero(), distance, tilt, azimuth, draw.even("roll", -pi, pi)));
-  stage.scene = std::move(setting.scene);
-  stage.hip = std::move(setting.hip);
-  stage.duration = setting.duration;
-  stage.feature = setting.feature;
-  stage.interval = 1.0 / rate;
-
-  Chance chance(draw.seed_of("shots"));
-  for (int i = 0; i / rate <= stage.duration; ++i) {
-    Shot shot;
-    shot.captured = i / rate;
-    const double off = jitter * chance.normal();
-    shot.arrives = shot.captured + latency + std::abs(off);
-    shot.stamp = shot.captured + off;
-    const bool lost = chance.even() < dropped;
-    if (lost && i >= 3) continue;  // the hand waits for the first three
-    if (!stage.shots.empty()) {
-      shot.arrives = std::max(shot.arrives, stage.shots.back().arrives);
-      shot.stamp = std::max(shot.stamp, stage.shots.back().stamp + 1e-3);
-    }
-    shot.stamp = std::min(shot.stamp, shot.arrives);
-    stage.shots.push_back(shot);
-  }
-  draw.check();
-  stage.values = draw.text();
-  return stage;
+  static constexpr CaseSet set{"field", 0x6669656c64736574ULL, classes, 5, camera_of};
+  return set;
 }
 
 }  // namespace palpate::lab::field

@@ -2,6 +2,7 @@
 #include "lab/field/field_judge.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -20,6 +21,9 @@ constexpr double least_share = 0.25;   // [-] of it
 constexpr double has_side = 0.5;       // [N] a ruler's force that has a side
 constexpr double opposite = -0.5;      // [-] cosine
 constexpr double jump = 0.015;         // [m] that may lie between what is and the visible surface
+constexpr double settling = 0.5;       // [s] that hand and surface rest before shake counts,
+constexpr double long_rest = 0.5;      // [s] and that they rest on for it to count
+constexpr double moves = 1e-7;         // [m] in a tick: what moves by less rests
 constexpr double just_before = 0.002;  // [m] from the sphere: what is met there is what it touches
 
 bool inside(const Snapshot& scene, const Vec3& place) {
@@ -80,6 +84,14 @@ void Judge::add(const Tick& tick, const Ruling& ruling, bool behind) {
     verdict_.worst_ghost = std::max(verdict_.worst_ghost, force);
 
   const bool touching = now > 0.0 && seen > 0.0;
+  const double rested =
+      lasted(resting_for_, touching && ruling.rests && ruling.known && !behind) - settling;
+  if (rested > 0.0) {
+    rested_in_.extend(tick.proxy);
+    if (rested > long_rest) verdict_.shake = std::max(verdict_.shake, rested_in_.diagonal().norm());
+  } else {
+    rested_in_.setEmpty();
+  }
   if (touching && touched_)
     verdict_.worst_step = std::max(verdict_.worst_step, (tick.force - last_force_).norm());
   touched_ = touching;
@@ -116,6 +128,7 @@ Outcome play_field(Stage& stage, const std::vector<Method*>& methods, const Para
   std::size_t next = 0;
   double last_known = 0.0;
   Vec3 ruler_proxy = seat;
+  std::array<Vec3, 3> before{seat, seat, seat};
   bool contact = false;
   int touching = 0;
   int in_sight = 0;
@@ -136,6 +149,10 @@ Outcome play_field(Stage& stage, const std::vector<Method*>& methods, const Para
     Ruling ruling;
     ruling.now = ruler_now->tick(hip, t);
     ruling.seen = ruler_seen->tick(hip, t);
+    const std::array places{hip, ruling.now.proxy, ruling.seen.proxy};
+    ruling.rests = std::equal(places.begin(), places.end(), before.begin(),
+                              [](const Vec3& a, const Vec3& b) { return (a - b).norm() < moves; });
+    before = places;
     ruler_proxy = ruling.seen.proxy;
     contact = ruling.seen.force.norm() > 0.0;
     const bool sees = sensor.sees(shown, ruler_proxy, r_c + just_before);

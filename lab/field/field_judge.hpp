@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "lab/field/field_cases.hpp"
 #include "palpate/kernel/core/method.hpp"
 
@@ -17,6 +19,9 @@ struct Verdict {
   double behind = 0.0;       ///< [s] the longest in one go
   double worst_ghost = 0.0;  ///< [N] in free space that is seen to be free
   double worst_step = 0.0;   ///< [N] largest change of the force from tick to tick in contact
+  /// [m] The longest way between two corners of the box that holds the proxy while hand and surface
+  /// rest; negative: they never rest for long enough.
+  double shake = -1.0;
 
   // How well it knows itself that it is behind: the tick's flag `pop_through_suspected`.
   double time = 0.0;         ///< [s] in all
@@ -37,6 +42,7 @@ struct Ruling {
   /// Within the last half second what is touched has been in sight and the rulers agreed.
   bool known = true;
   bool free_in_sight = false;  ///< the hand is seen to be in free space
+  bool rests = false;          ///< hand and rulers' proxies have not moved since the tick before
 };
 
 /// Judges a method, tick by tick.
@@ -56,6 +62,8 @@ class Judge {
   int numb_for_ = 0;
   int wrong_for_ = 0;
   double back_for_ = 0.0;  // [s] that being behind has lasted
+  int resting_for_ = 0;
+  Eigen::AlignedBox3d rested_in_;
   bool touched_ = false;
   Vec3 last_force_ = Vec3::Zero();
 };

@@ -285,8 +285,10 @@ class Cloth final : public Relief {
       const double ky = k * std::sin(wave.heading);
       const double angle =
           kx * x + ky * y - 2.0 * std::numbers::pi * wave.frequency * t + wave.phase;
-      const double slope = wave.height * std::cos(angle);
-      sum.z += wave.height * std::sin(angle);
+      const double tall =
+          wave.height * ease((t - wave.begin) / swell) * (1.0 - ease((t - wave.end) / swell));
+      const double slope = tall * std::cos(angle);
+      sum.z += tall * std::sin(angle);
       sum.along_x += kx * slope;
       sum.along_y += ky * slope;
     }

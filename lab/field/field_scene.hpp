@@ -57,12 +57,15 @@ ShapePtr terrain(std::vector<Bump> bumps);
 
 /// One wave of a cloth, which travels: height sin(2 pi ((x cos + y sin) / length - frequency t)).
 struct Wave {
-  double height;     ///< [m] amplitude
-  double length;     ///< [m]
-  double frequency;  ///< [Hz]
-  double heading;    ///< [rad]
-  double phase;      ///< [rad]
+  double height;                                            ///< [m] amplitude
+  double length;                                            ///< [m]
+  double frequency;                                         ///< [Hz]
+  double heading;                                           ///< [rad]
+  double phase;                                             ///< [rad]
+  double begin = -std::numeric_limits<double>::infinity();  ///< [s] from which on it grows
+  double end = std::numeric_limits<double>::infinity();     ///< [s] from which on it ebbs away
 };
+constexpr double swell = 1.0;  ///< [s] that a wave takes to grow, and to ebb away
 ShapePtr cloth(std::vector<Wave> waves);
 
 /// An ellipsoid whose half axes grow from `rest` by `breath` and shrink again, at `frequency`.

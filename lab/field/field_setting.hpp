@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <string>
+#include <string_view>
+
+#include "lab/field/field_cases.hpp"
+#include "palpate/kernel/core/uri.hpp"
+
+namespace palpate::lab::field {
+
+// What the sets of cases make their scenes and hands of.
+
+constexpr double pi = std::numbers::pi;
+
+std::uint64_t hash_of(std::string_view text, std::uint64_t hash);
+
+/// The values of a case, by name.
+class Draw {
+ public:
+  explicit Draw(const FieldCase& c) : uri_(c.text()), seed_(c.seed) {}
+
+  double even(std::string_view key, double low, double high);
+  double by_factor(std::string_view key, double low, double high);
+  /// One of 0 to count - 1.
+  int whole(std::string_view key, int count);
+  /// Random numbers for what has no name of its own.
+  [[nodiscard]] std::uint64_t seed_of(std::string_view what) const { return hash_of(what, seed_); }
+
+  /// @throws Error if a value was set that is none of them
+  void check() const;
+  /// All values, sorted by name.
+  [[nodiscard]] std::string text() const;
+
+ private:
+  struct Value {
+    double value;
+    double low, high;  // that it may have
+  };
+  [[nodiscard]] double chance_of(std::string_view key) const {
+    return Chance(hash_of(key, seed_)).even();
+  }
+  double given(std::string_view key, double drawn, double low, double high);
+
+  Uri uri_;
+  std::uint64_t seed_;
+  std::map<std::string_view, Value> values_;
+};
+
+Eigen::Isometry3d at(const Vec3& place);
+Eigen::Isometry3d at(double x, double y, double z);
+Eigen::Isometry3d turned(double angle, const Vec3& axis);
+Body still(ShapePtr shape, const Eigen::Isometry3d& place = Eigen::Isometry3d::Identity());
+Body moving(ShapePtr shape, std::function<Eigen::Isometry3d(double)> motion);
+Vec3 toward(double heading);
+
+/// A class fills this in; the camera is put before it afterwards.
+struct Setting {
+  FieldScene scene;
+  std::function<Vec3(double t)> hip;
+  double duration = 0.0;      ///< [s]
+  double least_tilt = 0.0;    ///< [rad] of the camera, off straight above
+  double most_tilt = 1.22;    ///< [rad] 70 degrees
+  double azimuth = 0.0;       ///< [rad] to which side it may be tilted
+  double azimuth_range = pi;  ///< [rad] to both sides of it
+  double feature = std::numeric_limits<double>::infinity();
+  /// Adds what depends on where the camera is [m]; may be none.
+  std::function<void(FieldScene&, const Vec3& eye)> before_camera{};
+};
+
+struct Place {
+  Vec3 point;   ///< [m] on the surface
+  Vec3 normal;  ///< [-]
+};
+
+/// The first surface below a place, at a time.
+Place below(const FieldScene& scene, double x, double y, double t = 0.0, double from = 0.5);
+
+/// [s] of a way [m, rad] with the least jerk, whose highest speed is `fastest`.
+double seconds_for(double way, double fastest);
+
+void play_script(Setting& setting, const Script& script);
+
+/// Turned by an angle about z with the least jerk.
+std::function<Eigen::Isometry3d(double)> turning(const Vec3& axis_at, double angle, double begin,
+                                                 double seconds, const Eigen::Isometry3d& on_it);
+
+/// An arm with a hand, its fingertips at the origin of `pose` and the arm towards its -x.
+void add_arm(FieldScene& scene, const std::function<Eigen::Isometry3d(double)>& pose);
+
+/// Of an image `wide` [m] about the place that is touched is taken, with at most `most_pixels` a
+/// side: near it a camera runs at a lower resolution.
+void crop(SensorSetup& setup, double distance, double wide, int most_pixels);
+
+}  // namespace palpate::lab::field

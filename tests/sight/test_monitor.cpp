@@ -92,6 +92,11 @@ TEST(Monitor, TakesOffAForceThatPointsAwayFromTheCameraUnlessTheSurfaceWasMetFro
   Monitor in_front;
   meet(in_front, 1.0);
   EXPECT_EQ(in_front.judge(plane, pulled).action, Monitor::Action::release);
+  // A hand inside is not set free there.
+  pulled.hip.z() = -0.006;
+  const Monitor::Verdict inside = in_front.judge(plane, pulled);
+  EXPECT_EQ(inside.action, Monitor::Action::return_to_front);
+  EXPECT_NEAR(inside.front.z(), r_c, 1e-4);
   Monitor behind;
   meet(behind, -1.0);
   pulled.hip.z() = 0.02;
@@ -170,6 +175,24 @@ TEST(Monitor, TakesWhatComesFarBeforeTheContactForSomethingElse) {
     EXPECT_EQ(verdict.action, Monitor::Action::none);
     EXPECT_FALSE(verdict.behind);
   }
+}
+
+TEST(Monitor, TakesNoVisitorForAnEdgeThatAMovingHandHasPassed) {
+  Monitor monitor;
+  meet(monitor, 1.0);
+  const PointCloud plane = plane_at(0.0);
+  const PointCloud visitor = plane_at(0.2);
+  const auto judge = [&](const PointCloud& seen, double x) {
+    monitor.start_frame();
+    Monitor::Contact moving = pressed(-0.004, -0.004);
+    moving.hip.x() = moving.proxy.x() = x;
+    moving.touching = false;
+    return monitor.judge(seen, moving);
+  };
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(judge(visitor, 0.003 * i).action, Monitor::Action::none);
+  // The hand is still one that belongs in front.
+  EXPECT_EQ(judge(plane, 0.02).action, Monitor::Action::none);
+  EXPECT_EQ(judge(plane, 0.02).action, Monitor::Action::return_to_front);
 }
 
 TEST(Monitor, LetsAHandGoRoundAnEdgeBehindABody) {

@@ -389,6 +389,39 @@ TEST(Sight, HoldsTheContactWhenSomethingCoversAllThatIsSeenWithinAFrame) {
   }
 }
 
+// Before a slow camera a visitor is there in one frame, everywhere, and gone in another. The hand,
+// pressed in, moves on meanwhile: it must be neither numb afterwards nor held when it lifts.
+TEST(Sight, KnowsASlowCamerasVisitorFromTheSurface) {
+  constexpr double slow = 0.3;  // [s] between frames: too far apart to tell a motion
+  const Overhead camera;
+  for (const int visit : {1, 3}) {  // [frames]
+    std::mt19937 random(2);
+    const auto shoot = [&](double height) {
+      return camera.shoot([=](double, double) { return height; }, 2e-3, random);
+    };
+    Sight sight = seated({0, 0, 0.03});
+    Tick tick;
+    double pressed = 0.0;
+    double last = 0.0;
+    for (int i = 0; i < 20; ++i) {
+      const DepthImage image = shoot(i >= 6 && i < 6 + visit ? 0.35 : 0.0);
+      sight.observe({image, i * slow});
+      for (int k = 0; k < 300; ++k) {
+        const double t = i * slow + k * 1e-3;
+        const double lifted = std::max(0.0, 0.1 * (t - 17 * slow));  // [m]
+        tick =
+            sight.tick({0.02 * std::sin(3.0 * t), 0, std::max(0.03 - 0.1 * t, -6e-3) + lifted}, t);
+        EXPECT_GT(tick.force.z(), -0.05) << t;
+        if (i == 5) pressed = tick.force.z();
+        if (i == 16) last = tick.force.z();
+      }
+    }
+    EXPECT_GT(pressed, 2.0);
+    EXPECT_NEAR(last, pressed, 0.4) << visit;
+    EXPECT_EQ(tick.force.norm(), 0.0);
+  }
+}
+
 TEST(Sight, LetsAHandOutOfTheShadowOfWhatCameBesideIt) {
   // A tall box slides up to a pressing hand off the camera's axis and hides it: its shadow reaches
   // 5 to 10 mm beyond the hand. As the hand lifts, it comes out of the shadow beside the box.

@@ -43,9 +43,6 @@ constexpr double one_layer = 4.0;
 constexpr double edge_step = 2.0;
 constexpr double steepest_rise = 2.75;  // [-] tan 70 degrees
 constexpr double sideways = 2e-3;       // [m]
-// [m] What moves nearer by more than this from frame to frame came between camera and surface: a
-// surface at rest struck with 90 m/s^2 moves 50 mm in an interval at 30 Hz.
-constexpr double farthest_strike = 65e-3;
 // [-] Cosine: a force that points away from the camera, within 73 degrees of its line of sight.
 constexpr double away = -0.3;
 // [m] A look serves as long as its place moves less than this: a fifth of r_c.
@@ -114,9 +111,16 @@ const Monitor::Look& Monitor::look_at(const Cloud& cloud, const Vec3& place, dou
   return last;
 }
 
+// Does the newest frame show the surface where the proxy was last in front of it?
+bool Monitor::still_shown(const Cloud& cloud, double margin) noexcept {
+  Look there;
+  look(cloud, last_front_.place, last_front_.radius, there);
+  return there.seen && std::abs(there.behind - last_front_.behind) <= margin;
+}
+
 // Keeps account of the side of what the camera sees on which the proxy is. Does the look show a
 // proxy that belongs in front behind?
-bool Monitor::is_behind(double margin, double deepest, double r_c) noexcept {
+bool Monitor::is_behind(const Cloud& cloud, double margin, double deepest, double r_c) noexcept {
   if (!proxy_.seen) return false;
   const bool in_front = proxy_.behind < -margin - r_c;
   if (side_ == Side::unknown) side_ = proxy_.behind < 0.0 ? Side::front : Side::behind;
@@ -139,8 +143,10 @@ bool Monitor::is_behind(double margin, double deepest, double r_c) noexcept {
     const double aside = (way - way.dot(line) * line).norm();
     // Noise of the two looks must not end the watch over the front, however small it is estimated.
     const double noise = most_margin(parameters_.confidence, proxy_.distance);
+    // What came before the surface, while the proxy moved, is no edge that it passed.
     const bool past_edge =
-        nearer > edge_step * r_c + noise + steepest_rise * aside && aside > sideways;
+        nearer > edge_step * r_c + noise + steepest_rise * aside && aside > sideways &&
+        (frame_judged_ ? frames_past_edge_ > 0 : still_shown(cloud, margin + noise));
     count_past_edge(past_edge);
     if (past_edge) {
       if (frames_past_edge_ >= parameters_.evidence_frames) side_ = Side::behind;
@@ -161,7 +167,7 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
   // The frame shows the surface where it was when the frame was captured.
   const Look& proxy = look_at(cloud, contact.proxy - contact.carried, r_c, proxy_);
   const double margin = margin_at(proxy.distance);
-  verdict.behind = is_behind(margin, contact.deepest, r_c);
+  verdict.behind = is_behind(cloud, margin, contact.deepest, r_c);
   verdict.hidden = proxy.seen && proxy.low > edge_step * r_c + margin;
   if (!frame_judged_) {
     frame_judged_ = true;
@@ -179,12 +185,16 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
     } else {
       const bool pulls = proxy.seen && std::abs(proxy.behind) < 2.0 * r_c + margin &&
                          contact.normal.dot(proxy.line) < away;
-      if (free || pulls) verdict.action = Action::release;
+      // A hand that belongs in front and is held from behind was inside when the surface came back.
+      const bool inside = side_ == Side::front && proxy.behind > 0.0 && hand.behind > 0.0;
+      if (free || pulls)
+        verdict.action = !free && inside ? Action::return_to_front : Action::release;
     }
-    if (verdict.action != Action::none) return verdict;
+    if (verdict.action == Action::release || verdict.action == Action::let_go) return verdict;
   }
-  if (verdict.behind && frames_behind_ >= parameters_.evidence_frames && !contact.held) {
+  if (verdict.behind && frames_behind_ >= parameters_.evidence_frames && !contact.held)
     verdict.action = Action::return_to_front;
+  if (verdict.action == Action::return_to_front) {
     verdict.normal = proxy.line;
     verdict.front = contact.proxy + (proxy.behind + r_c) * proxy.line;
     frames_behind_ = 0;

@@ -9,6 +9,11 @@
 
 namespace palpate {
 
+/// [m] What comes nearer by more than this from frame to frame, whatever their interval, is no
+/// surface that a hand rests on, but came between it and the camera: a surface at rest struck with
+/// 90 m/s^2 moves 50 mm in an interval at 30 Hz. Nor is a proxy brought back that lies deeper.
+inline constexpr double farthest_strike = 65e-3;
+
 /// The last word on a contact: checks hand and proxy against what the newest frame itself measures
 /// on their lines of sight. It estimates nothing and trusts no fit. docs/sight.md, 7.
 ///
@@ -80,7 +85,8 @@ class Monitor {
 
   const Look& look_at(const Cloud& cloud, const Vec3& place, double radius, Look& look) noexcept;
   void look(const Cloud& cloud, const Vec3& place, double radius, Look& look) noexcept;
-  bool is_behind(double margin, double deepest, double r_c) noexcept;
+  bool is_behind(const Cloud& cloud, double margin, double deepest, double r_c) noexcept;
+  bool still_shown(const Cloud& cloud, double margin) noexcept;
 
   SightParameters parameters_;
   Patch patch_;

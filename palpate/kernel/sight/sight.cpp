@@ -253,19 +253,15 @@ void Sight::release(const Vec3& hip, Movement& movement) noexcept {
 void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
   // A frame's correction moves a proxy no farther than a surface is looked for [m].
   constexpr double farthest_move = 0.3;
-  // A proxy deeper than this behind the surface is not brought back: nothing moves so far between
-  // frames that the tracker could have followed [m].
-  constexpr double deepest_return = 65e-3;
   const double r_c = parameters_.proxy.r_c();
   if (last_proxy_ && (*proxy_.at - hip).norm() > (*last_proxy_ - hip).norm() + farthest_move) {
     release(hip, movement);
-    monitor_.forget();
     movement.flags |= proxy_let_go;
   }
   const SightParameters& sight = parameters_.sight;
   const Coupling& coupling = parameters_.coupling;
   const double deepest =
-      r_c + std::min(coupling.max_force / std::max(coupling.stiffness, 1e-9), deepest_return);
+      r_c + std::min(coupling.max_force / std::max(coupling.stiffness, 1e-9), farthest_strike);
   const Monitor::Verdict verdict = monitor_.judge(
       *frame_.cloud(), {.hip = hip,
                         .proxy = *proxy_.at,

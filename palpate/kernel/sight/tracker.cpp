@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "palpate/kernel/sight/monitor.hpp"
+
 namespace palpate {
 namespace {
 
@@ -434,10 +436,14 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
 bool SightTracker::is_occluder(const Ring& ring_before, const Ring& now, double height, double jump,
                                double hardest_strike) const noexcept {
   const double interval = surface_.interval();
-  const double strike = 0.5 * hardest_strike * (interval * interval);
   const double times = surface_.jumped() ? 4.0 : surface_.velocity() != 0.0 ? 2.0 : 1.0;
   const double noise = std::max(surface_.spread(), surface_.height_sd());
-  if (surface_.settled() >= well_known && jump > times * strike + 15e-3 + 4.0 * noise) return true;
+  const double struck = 0.5 * hardest_strike * (interval * interval);
+  const double most = std::isfinite(struck) ? times * (surface_.settled() >= well_known
+                                                           ? std::min(struck, farthest_strike)
+                                                           : farthest_strike)
+                                            : struck;
+  if (jump > most + 15e-3 + 4.0 * noise) return true;
   const double tolerance = std::max(15e-3, 4.0 * noise);
   // A cell keeps its nearest point, which is the extreme of the noise.
   const double nearer = std::max(15e-3, 6.0 * noise);

@@ -357,9 +357,10 @@ Vec3 Sight::blend_force(const Vec3& force, const Vec3& hip, double t) noexcept {
   double known = 1.0;
   if (tracker_.holding())
     known = ease((t - tracker_.held_since() - sight.hidden_hold) / sight.hidden_fade);
-  // A single frame is a scan, not a stream that stopped. One lost frame is no reason to fade.
+  // A single frame is a scan, not a stream that stopped. One lost frame is no reason to fade, nor
+  // is one before it that was late by half an interval.
   const double fade = std::max(parameters_.motion.max_extrapolation, 1e-3);
-  const double late = std::max(fade, 2.0 * timing_.interval());
+  const double late = std::max(fade, 2.5 * timing_.interval());
   if (frame_.count() > 1) known *= ease((timing_.age(t) - late) / fade);
   if (std::exchange(returns_, false)) known = 0.0;
   // The force falls at once with the confidence in the surface. It rises as if the surface came

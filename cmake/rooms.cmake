@@ -13,7 +13,7 @@ endmacro()
 # palpate_target_options(TARGET): warnings and sanitizers. Never leaves the build.
 function(palpate_target_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
-                         -Wno-sign-conversion -Wnon-virtual-dtor)
+                         -Wno-sign-conversion $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor>)
   # A product is rounded before it is added to, whatever the processor could do at once: then the
   # same session has the same forces on all of them.
   target_compile_options(${target} PRIVATE -ffp-contract=off)
@@ -33,7 +33,8 @@ function(palpate_target_options target)
     set_target_properties(${target} PROPERTIES UNITY_BUILD_BATCH_SIZE 0)
     target_compile_options(${target} PRIVATE -Wno-shadow)
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-      target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+      target_compile_options(${target} PRIVATE
+                             $<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>)
     endif()
   endif()
   if(PALPATE_WERROR)
@@ -116,8 +117,8 @@ endfunction()
 # headers are included by their path from the repository root, which is also where they install.
 function(palpate_room name)
   cmake_parse_arguments(ARG "" "" "LINKS;PRIVATE" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS *.cpp)
-  file(GLOB headers CONFIGURE_DEPENDS *.hpp)
+  file(GLOB sources CONFIGURE_DEPENDS *.cpp *.c)
+  file(GLOB headers CONFIGURE_DEPENDS *.hpp *.h)
   add_library(palpate_${name} ${sources} ${headers})
   add_library(palpate::${name} ALIAS palpate_${name})
   set_target_properties(palpate_${name} PROPERTIES EXPORT_NAME ${name} VERSION ${PROJECT_VERSION}

@@ -34,6 +34,8 @@ std::uint32_t hand_bits(const HandState& hand) noexcept {
 }
 
 constexpr double gravity = 9.80665;  // [m/s^2]
+// [s] for which a tick may add to the force, as the safety chain's longest_credit.
+constexpr double longest_tick = 1e-3;
 // What also ends the support of a handle's weight at once.
 constexpr std::uint32_t no_support =
     input_refused | hand_too_fast | stalled | fault_latched | output_refused;
@@ -153,6 +155,7 @@ void Cycle::walk(Way& way, Self& self) {
   PassivityObserver::walk(way, self.passivity_);
   FixtureStage::walk(way, self.fixtures_);
   WeightSupport::walk(way, self.support_);
+  LastGate::walk(way, self.gate_);
 }
 
 std::vector<std::string> cycle_state_names() {
@@ -166,6 +169,7 @@ std::vector<std::string> cycle_state_names() {
     PassivityObserver passivity_{};
     FixtureStage fixtures_{};
     WeightSupport support_{};
+    LastGate gate_{};
   } memory;
   NameState name;
   Cycle::walk(name, memory);
@@ -295,9 +299,9 @@ void Cycle::run(const Wake& wake) noexcept {
   const bool held = hand.present && !is_faulty(hand) && hand.position.allFinite();
   const DeviceLimits& limits = device_.info().limits;
   const double most_force = std::min(safety_.parameters().max_force, limits.max_force);
+  const bool may_hold = held && !jumped && !on_hold_ && safety_.latched_by() == 0;
   double support = support_.run(t, gravity * workspace_.placement().handle_weight,
-                                std::min(most_force, limits.continuous_force),
-                                held && !jumped && !on_hold_ && safety_.latched_by() == 0);
+                                std::min(most_force, limits.continuous_force), may_hold);
 
   const Freshness::Age age = freshness_.at(t);
   const SafetyOutput safe = safety_.run(
@@ -323,9 +327,38 @@ void Cycle::run(const Wake& wake) noexcept {
   }
   // A surface's force that has yet to shrink is not added to: together they keep the limit.
   support = std::max(std::min(support, most_force - safe.force.norm()), 0.0);
-  const Vec3 sent = workspace_.force_in_device(safe.force) - support * workspace_.placement().down;
-  device_.write(Wrench{.force = sent}, t);
   const Placement& placement = workspace_.placement();
+  const SafetyParameters& allowed = safety_.parameters();
+  const Vec3 wanted = workspace_.force_in_device(safe.force);
+  const double torque_share = limits.max_torque / limits.max_force;  // [m]
+  const LastGate::Sent sent =
+      gate_.write(device_,
+                  {.t = t,
+                   .force = gate_vector(wanted),
+                   .torque = {},
+                   .held = gate_vector(-support * placement.down),
+                   .ring = safe.ring,
+                   .frame_age = age.age,
+                   .lost_age = allowed.lost_age,
+                   .frame_intervals = age.intervals,
+                   .late_intervals = allowed.late_intervals,
+                   .force_bounds = {most_force, allowed.rise_rate, allowed.fall_rate},
+                   .torque_bounds = {limits.max_torque, torque_share * allowed.rise_rate,
+                                     torque_share * allowed.fall_rate},
+                   .ramp_time = allowed.ramp_time,
+                   .longest_gap = allowed.stall_time,
+                   .longest_time = longest_tick,
+                   .engaged = (safe.flags & disengaged) == 0,
+                   .hand = holds,
+                   .latched = safety_.latched_by() != 0,
+                   .may_hold = may_hold},
+                  t);
+  // In the world as it was asked for, to the bit, where the gate did nothing.
+  const Vec3 force =
+      sent.force == wanted ? safe.force : Vec3(placement.world_from_device.linear() * sent.force);
+  std::uint32_t flags = safe.flags;
+  if ((sent.verdict & palpate_gate_refused) != 0) flags |= output_refused;
+  if (force != safe.force) add(statistics_.gate_cuts, 1);
   const ServoEnergy& energy =
       passivity_.run({.t = t,
                       .handle = placement.world_from_device.linear() * hand.position,
@@ -333,7 +366,7 @@ void Cycle::run(const Wake& wake) noexcept {
                       .scale = placement.workspace_scale,
                       .surface = tick.surface_motion,
                       .jumped = jumped,
-                      .sent = safe.force});
+                      .sent = force});
 
   Vec3 kept_out = fixtures.displacement;
   join(tick.proxy - hip, kept_out);
@@ -341,7 +374,7 @@ void Cycle::run(const Wake& wake) noexcept {
                          .region = fixtures.region,
                          .guidance = fixtures.guidance,
                          .place = hip + kept_out,
-                         .force = safe.force,
+                         .force = force,
                          .position = hand.position,
                          .handle = hand.orientation.value_or(Eigen::Quaterniond::Identity()),
                          .gain = safe.gain,
@@ -351,7 +384,7 @@ void Cycle::run(const Wake& wake) noexcept {
                          .number = number_++,
                          .frame_number = frame_number_,
                          .settings_number = changes_.taken_last().commands.number,
-                         .safety = safe.flags,
+                         .safety = flags,
                          .wake_up_ns = wake.wake_up_ns,
                          .previous_compute_ns = wake.previous_compute_ns,
                          .fixtures = fixtures.acting,
@@ -359,7 +392,7 @@ void Cycle::run(const Wake& wake) noexcept {
                                  (switched ? method_switched : 0U) | (reset ? faults_reset : 0U) |
                                  (on_hold_ ? force_on_hold : 0U)};
   ring_.push(record);
-  keep_statistics(record, sent.norm());
+  keep_statistics(record, sent.wrench.force.norm());
 }
 
 void Cycle::keep_statistics(const ServoTick& record, double sent) noexcept {

@@ -17,6 +17,7 @@
 #include "palpate/servo/device.hpp"
 #include "palpate/servo/freshness.hpp"
 #include "palpate/servo/histogram.hpp"
+#include "palpate/servo/last_gate.hpp"
 #include "palpate/servo/mailbox.hpp"
 #include "palpate/servo/passivity_observer.hpp"
 #include "palpate/servo/periodic_thread.hpp"
@@ -120,6 +121,7 @@ struct CycleStatistics {
   std::array<std::atomic<std::uint64_t>, safety_flag_count> interventions{};
   std::atomic<bool> force_out{false};        ///< the last tick sent a force other than zero
   std::atomic<std::uint32_t> latched_by{0};  ///< SafetyFlag bits, as SafetyChain::latched_by
+  std::atomic<std::uint64_t> gate_cuts{0};   ///< ticks in which the LastGate sent less than asked
   std::atomic<double> heat{0.0};             ///< [-] of the motors, as SafetyChain::heat
 };
 
@@ -246,6 +248,7 @@ class Cycle {
   SafetyChain safety_;
   Workspace workspace_;
   WeightSupport support_;
+  LastGate gate_;
   Parameters parameters_;  // in use
   Patch patch_;            // for seating the proxy again
 

@@ -11,6 +11,8 @@
 
 #include "palpate/kernel/core/hand.hpp"
 
+struct palpate_gate_wish;  // last_gate.h
+
 namespace palpate {
 
 /// What a device's motors and its closed loop are good for. Defaults: a Touch-class desktop arm.
@@ -20,6 +22,7 @@ struct DeviceLimits {
   std::optional<double> max_stiffness = {};  ///< [N/m] nominal: a stiffer wall may oscillate
   std::optional<double> max_damping = {};    ///< [N s/m] nominal
   bool motors = true;                        ///< false: no force that is sent reaches a hand
+  double max_torque = 0.0;                   ///< [N m] peak; 0: none is sent
 };
 
 /// Limits of a hand without motors: the peak force of a Touch, continuously.
@@ -106,6 +109,10 @@ class Device {
   /// [servo] The same with a torque, which a device of three motors leaves out. The cycle calls
   /// this one.
   virtual void write(const Wrench& wrench, double t) noexcept { write(wrench.force, t); }
+
+  /// [servo] What the `write` that follows was judged by: a device in another process judges it
+  /// there once more (see open_guarded). Others need not know.
+  virtual void announce(const palpate_gate_wish& /*wish*/) noexcept {}
 
   /// Switches the motors on, with zero force. Any thread but the servo's; may wait.
   /// A device with motors overrides this and `disable`; the default is for one without.

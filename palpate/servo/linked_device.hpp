@@ -43,6 +43,7 @@ class LinkedDevice final : public Device {
   HandState read(double t) noexcept override;
   void write(const Vec3& force, double t) noexcept override { device_->write(force, t); }
   void write(const Wrench& wrench, double t) noexcept override { device_->write(wrench, t); }
+  void announce(const palpate_gate_wish& wish) noexcept override { device_->announce(wish); }
   void enable() override { device_->enable(); }
   void disable() noexcept override { device_->disable(); }
   [[nodiscard]] std::string fault_text() const override { return device_->fault_text(); }

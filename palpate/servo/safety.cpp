@@ -511,7 +511,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     if (((flags & ~last_flags_) >> i & 1u) != 0) ++interventions_[i];
   }
   last_flags_ = flags;
-  return {last_sent_, flags, gain_};
+  return {last_sent_, flags, (last_sent_ - force).norm(), gain_};
 }
 
 }  // namespace palpate

@@ -136,6 +136,7 @@ struct SafetyInput {
 struct SafetyOutput {
   Vec3 force;           ///< [N] world; finite, within all limits
   std::uint32_t flags;  ///< SafetyFlag bits
+  double ring;          ///< [N] length of the part of it that is an impact's
   double gain;          ///< [-] 0 disengaged, 1 engaged and nothing faded
 };
 

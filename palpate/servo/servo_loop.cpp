@@ -79,7 +79,7 @@ void ServoLoop::start() {
           beat(wake.t);
           cycle_.run(wake);
         },
-        [this] { device_.write(Vec3::Zero(), monotonic_now()); });
+        [this] { LastGate::write_zero(device_, monotonic_now()); });
   }
   started_ = true;
   watch_ = std::thread(&ServoLoop::watch, this);
@@ -117,7 +117,7 @@ void ServoLoop::driven_tick() noexcept {
   beat(now);
   if (stopping_.load(std::memory_order_acquire)) {
     if (zero_sent_.load(std::memory_order_relaxed)) return;
-    device_.write(Vec3::Zero(), now);
+    LastGate::write_zero(device_, now);
     zero_sent_.store(true, std::memory_order_release);
     return;
   }
@@ -211,7 +211,7 @@ void ServoLoop::finish() {
     thread_->stop();
   } else {
     device_.stop();
-    if (!zero_sent_) device_.write(Vec3::Zero(), monotonic_now());
+    if (!zero_sent_) LastGate::write_zero(device_, monotonic_now());
   }
   ended_.store(true, std::memory_order_release);
 }

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/servo/last_gate.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
@@ -51,7 +52,7 @@ std::vector<Vec3> capture_points(Device& device, std::size_t count, double timeo
   HandState last;
   const auto read = [&](double t) {
     const HandState hand = device.read(t);
-    device.write(Vec3::Zero(), t);
+    LastGate::write_zero(device, t);
     const std::lock_guard lock(mutex);
     last = hand;
     if (points.size() >= count) return;

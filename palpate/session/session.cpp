@@ -250,7 +250,7 @@ class Session::Impl {
   void stop_loops() noexcept {
     for (const auto& hand : hands_) {
       if (hand->loop() != nullptr) hand->loop()->request_stop();
-      if (!is_live() && started_) hand->device().write(Vec3::Zero(), free_t_);
+      if (!is_live() && started_) LastGate::write_zero(hand->device(), free_t_);
     }
     for (const auto& hand : hands_) {
       if (hand->loop() != nullptr) hand->loop()->stop();

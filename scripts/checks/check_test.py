@@ -93,6 +93,18 @@ class Rooms(Tree):
                           "lab/field/c.cpp:2: the field set must not reach"
                           " palpate/io/sources/scene.hpp"])
 
+    def test_only_the_gate_writes_to_a_device(self):
+        self.write("palpate/servo/last_gate.hpp", SPDX + "device.write(sent, t);\n")
+        self.write("palpate/servo/wrapper.hpp", SPDX + "  void write(const Vec3& force, double t) "
+                   "noexcept override { device_->write(force, t); }\n")
+        self.write("palpate/servo/a.cpp", SPDX + "device_.write(force, t);\n")
+        self.write("app/b.cpp", SPDX + "hand->device().write(Vec3::Zero(), t);\n"
+                   "file.write(text);\n")
+        self.assertEqual(check.check_rooms(self.root),
+                         ["app/b.cpp:2: writes to a device past palpate/servo/last_gate.hpp",
+                          "palpate/servo/a.cpp:2: writes to a device past "
+                          "palpate/servo/last_gate.hpp"])
+
     def test_a_room_nobody_planned_is_found(self):
         self.include("palpate/kitchen/a.cpp", "<cmath>")
         self.assertEqual(len(check.check_rooms(self.root)), 1)

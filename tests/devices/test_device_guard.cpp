@@ -57,6 +57,21 @@ struct Seen {
   std::atomic<int> session{0}, beats{0};  // process that writes; how often it did
 };
 
+// Asks for a force along z as a safety chain does that allows to push at once.
+void push(Device& device, double newtons, double t) {
+  palpate_gate_wish wish{};
+  wish.t = t;
+  wish.force.z = newtons;
+  wish.lost_age = wish.late_intervals = 1.0;  // [s], [intervals]
+  wish.force_bounds = {3.3, 1e6, 1e6};
+  wish.ramp_time = 1e-3;
+  wish.longest_gap = 0.1;
+  wish.longest_time = 1e-3;
+  wish.engaged = wish.hand = 1;
+  device.announce(wish);
+  device.write(Vec3::Zero(), t);
+}
+
 // Forces count up in the last digits, so that the device sees whether one is new.
 class WitnessDevice final : public Device {
  public:
@@ -128,7 +143,7 @@ class DeviceGuard : public ::testing::Test {
       for (int i = 0; i < 1'000'000; ++i) {
         const HandState hand = device->read(i * 1e-3);
         const bool pushes = hand.present && i > 0;  // as the safety chain: else zero
-        device->write(pushes ? Vec3(0.0, 0.0, 1.0 + 1e-9 * i) : Vec3::Zero(), i * 1e-3);
+        push(*device, pushes ? 1.0 + 1e-9 * i : 0.0, i * 1e-3);
         ++seen.beats;
         std::this_thread::sleep_for(std::chrono::microseconds(500));
       }
@@ -189,24 +204,25 @@ TEST_F(DeviceGuard, ShowsTheDeviceAsItIsAndStatesAWatchdog) {
 
 TEST_F(DeviceGuard, PassesNoForceOfADisabledDevice) {
   const std::unique_ptr<Device> device = open();
-  const auto push = [&](int turns) {
+  double t = 0.0;
+  const auto push_for = [&](int turns) {
     const int end = seen.writes + turns;
     seen.largest = 0.0;
     int calls = 0;
     wait_for([&] {
-      device->write(Vec3(0.0, 0.0, ++calls % 8 < 4 ? 0.0 : 1.0), 0.0);
+      push(*device, ++calls % 8 < 4 ? 0.0 : 1.0, t += 1e-3);
       return seen.writes >= end && calls > turns;
     });
     return seen.largest.load();
   };
-  EXPECT_EQ(push(50), 0.0);
+  EXPECT_EQ(push_for(50), 0.0);
   device->enable();
   EXPECT_TRUE(seen.enabled);
-  EXPECT_EQ(push(50), 1.0);
+  EXPECT_EQ(push_for(50), 1.0);
   device->disable();
   EXPECT_TRUE(wait_for([&] { return !seen.enabled; }));
-  push(2);
-  EXPECT_EQ(push(50), 0.0);
+  push_for(2);
+  EXPECT_EQ(push_for(50), 0.0);
 }
 
 TEST_F(DeviceGuard, SaysWhyADeviceDidNotOpen) {

@@ -283,7 +283,8 @@ class Adversary {
     if (!force.allFinite()) broken = "a force that is not finite";
     if (length > 3.3 + 1e-9) broken = "a force above the limit";
     const double change = (force - last_).norm();
-    if (length - last_.norm() > rise || change > rise + fall) {
+    // A stop is at once: the last gate makes one where the clock stands or jumps.
+    if (length - last_.norm() > rise || (change > rise + fall && length > 0.0)) {
       // An impact rings: by up to 1 N to both sides, for up to 60 ms of any 100 ms.
       if (!ringing_.empty() && !(t >= ringing_.back().t)) ringing_.clear();
       ringing_.push_back({t, std::clamp(elapsed, 0.0, 5e-3)});

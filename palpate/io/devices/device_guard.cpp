@@ -13,12 +13,14 @@
 #include <string>
 #include <thread>
 #include <type_traits>
+#include <utility>
 
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/servo/last_gate.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
@@ -70,7 +72,7 @@ class Newest {
 };
 
 struct Command {
-  std::array<double, 6> wrench;  // [N], [N m] device
+  palpate_gate_wish wish;
   std::uint64_t beats;
 };
 
@@ -109,7 +111,7 @@ struct Memory {
   Text refusal{};  // written before `phase`
   Info info{};     // likewise
   Newest<Command> command;
-  Newest<Hand> hand;
+  Newest<Hand> seen;
   Newest<Text> fault_text;
   std::atomic<std::uint64_t> turns{0};   // of the guard's loop
   std::atomic<std::uint64_t> wishes{0};  // raised with each new wish
@@ -205,31 +207,51 @@ void grant(Memory& memory, Device& device) {
 class GuardTick {
  public:
   GuardTick(Memory& memory, Device& device, double beat_time)
-      : memory_(memory), device_(device), gate_(beat_time) {}
+      : memory_(memory), device_(device), beat_time_(beat_time), gate_(beat_time) {}
 
   void run() noexcept {
     HandState state = device_.read(monotonic_now());
-    if (Command command{}; memory_.command.read(command)) {
-      const auto& w = command.wrench;
-      wanted_ = {Vec3(w[0], w[1], w[2]), Vec3(w[3], w[4], w[5])};
-      beats_ = command.beats;
-    }
+    memory_.command.read(command_);
     const double now = monotonic_now();
-    device_.write(gate_.pass(now, beats_, wanted_), now);
+    const auto& [wish, beats] = command_;
+    gate_.pass(now, beats, {vector_of(wish.force) + vector_of(wish.held), vector_of(wish.torque)});
+    // A command that came already leaves the force as it is.
+    if (gate_.closed()) {
+      last_gate_.release(device_, now);
+    } else if (beats != judged_) {
+      last_gate_.write(device_, judged_here(wish), now);
+    } else {
+      last_gate_.write_again(device_, now);
+    }
+    judged_ = beats;
     if (gate_.closed()) {
       state.present = false;  // so that the session's safety chain releases, and engages again
-      if (state.fault == DeviceFault::none && beats_ > 0) state.fault = DeviceFault::other;
+      if (state.fault == DeviceFault::none && beats > 0) state.fault = DeviceFault::other;
     }
-    memory_.hand.write(hand_of(state));
+    memory_.seen.write(hand_of(state));
     memory_.turns.fetch_add(1, std::memory_order_release);
   }
 
  private:
+  // By what the device states here, whatever the session says of it; and by the guard's own pace,
+  // which misses some of the session's ticks.
+  [[nodiscard]] palpate_gate_wish judged_here(palpate_gate_wish wish) const noexcept {
+    constexpr double longest_time = 5e-3;  // [s] between two commands that the guard sees
+    const DeviceLimits& limits = device_.info().limits;
+    wish.force_bounds.limit = std::min(wish.force_bounds.limit, limits.max_force);
+    wish.torque_bounds.limit = std::min(wish.torque_bounds.limit, limits.max_torque);
+    wish.longest_gap = beat_time_;
+    wish.longest_time = longest_time;
+    return wish;
+  }
+
   Memory& memory_;
   Device& device_;
+  double beat_time_;  // [s]
   GuardGate gate_;
-  Wrench wanted_;  // device
-  std::uint64_t beats_ = 0;
+  LastGate last_gate_;
+  Command command_{};
+  std::uint64_t judged_ = 0;  // beats of the last command
 };
 
 bool goes_on(const Memory& memory, pid_t session) {
@@ -262,7 +284,7 @@ void hold_polled(Memory& memory, Device& device, const GuardLimits& limits, pid_
     next = std::max(next + limits.period, monotonic_now());
     sleep_until(static_cast<std::uint64_t>(1e9 * next));
   }
-  device.write(Vec3::Zero(), monotonic_now());
+  LastGate::write_zero(device, monotonic_now());
   device.disable();
 }
 
@@ -276,7 +298,7 @@ void hold_driven(Memory& memory, Device& device, const GuardLimits& limits, pid_
   device.start([&] {
     if (!ending.load(std::memory_order_acquire)) return tick.run();
     static_cast<void>(device.read(monotonic_now()));
-    device.write(Vec3::Zero(), monotonic_now());
+    LastGate::write_zero(device, monotonic_now());
     zero_sent.store(true, std::memory_order_release);
   });
   std::string told;
@@ -330,7 +352,7 @@ class GuardedDevice final : public Device {
 
   HandState read(double t) noexcept override {
     Hand hand{};
-    if (memory_->hand.read(hand)) last_ = state_of(hand);
+    if (memory_->seen.read(hand)) last_ = state_of(hand);
     const std::uint64_t turns = memory_->turns.load(std::memory_order_acquire);
     if (turns != turns_) {
       turns_ = turns;
@@ -344,14 +366,13 @@ class GuardedDevice final : public Device {
     return state;
   }
 
-  void write(const Vec3& force, double t) noexcept override { write(Wrench{force}, t); }
-  void write(const Wrench& wrench, double /*t*/) noexcept override {
-    Command command{.wrench = {}, .beats = ++beats_};
-    if (enabled_.load(std::memory_order_acquire)) {
-      const auto& [f, m] = wrench;
-      command.wrench = {f.x(), f.y(), f.z(), m.x(), m.y(), m.z()};
-    }
-    memory_->command.write(command);
+  void announce(const palpate_gate_wish& wish) noexcept override { announced_ = wish; }
+  // The guard judges what was announced; nothing was: zero.
+  void write(const Vec3& /*force*/, double t) noexcept override {
+    palpate_gate_wish wish = std::exchange(announced_, {});
+    wish.t = t;
+    if (!enabled_.load(std::memory_order_acquire)) wish.force = wish.torque = wish.held = {};
+    memory_->command.write({.wish = wish, .beats = ++beats_});
   }
 
   void enable() override {
@@ -387,6 +408,7 @@ class GuardedDevice final : public Device {
   DeviceInfo info_;
   std::atomic<bool> enabled_{false};
   // Of the thread that reads and writes:
+  palpate_gate_wish announced_{};
   HandState last_;
   std::uint64_t beats_ = 0;
   std::uint64_t turns_ = 0;

@@ -278,7 +278,7 @@ void run_simulated(Device& device, const ProbeOptions& options,
     if (reader.try_pop(tick) && !watcher.add(tick)) break;
     if (!watcher.allowed() && t > ready_time) never_ready(device);
   }
-  device.write(Vec3::Zero(), 0.0);
+  LastGate::write_zero(device, 0.0);
   device.disable();
 }
 

@@ -117,7 +117,7 @@ static Vector scaled(double k, Vector v) {
 /*@ requires good_bounds(b) && good_tick(t);
     assigns \nothing; ensures 0 <= \result == fall_step(b, t); */
 static double step_of(Bounds b, Tick t) {
-  return greater(0.0, greater(b.fall, b.limit * CLOSE_RATE) * t.fall_time);
+  return greater(greater(b.fall, b.limit * CLOSE_RATE) * t.fall_time, 0.0);
 }
 
 /*@ requires good_channel(c) && good_bounds(b) && good_tick(t);
@@ -267,6 +267,12 @@ static Vector held_within(double share, Vector wish) {
   return is_within(less, widen(most)) ? less : nothing;
 }
 
+/*@ assigns \nothing; ensures \result <==> in_time(g, w); */
+static int is_in_time(struct palpate_gate g, Wish w) {
+  return g.started && between(w.t, -LARGEST_TIME, LARGEST_TIME) &&
+         between(w.t - g.t, SHORTEST, w.longest_gap);
+}
+
 /*@ requires b > 0; assigns \nothing; ensures \result == a / b; */
 static double ratio(double a, double b) {
   return a / b;
@@ -275,7 +281,7 @@ static double ratio(double a, double b) {
 /*@ requires 0 <= share <= 1 && 0 <= more; assigns \nothing;
     ensures 0 <= \result <= 1 && \result <= share + more; */
 static double raised(double share, double more) {
-  return lesser(1.0, greater(0.0, share + more));
+  return lesser(1.0, greater(share + more, 0.0));
 }
 
 /*@ requires good_gate(g) && good_wish(w) && in_time(g, w);
@@ -315,8 +321,7 @@ static struct palpate_gate stepped(struct palpate_gate g, Wish w) {
                               0.0,
                               0.0,
                               timed || g.started};
-  if (!g.started || !timed || !between(w.t - g.t, SHORTEST, w.longest_gap) || !is_good_wish(w))
-    return next;
+  if (!is_in_time(g, w) || !is_good_wish(w)) return next;
 
   Tick tick = tick_of(g, w);
   next.share = tick.share;

@@ -14,6 +14,7 @@
 
 #include "palpate/io/devices/device_guard.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/servo/last_gate.h"
 
 #include "tests/support/errors.hpp"
 

@@ -300,6 +300,12 @@ class Adversary {
     if ((last_safety_ & frame_late) != 0 && length > last_.norm())
       broken = "a force that grows while a frame is late";
     if ((last_safety_ & output_refused) != 0) broken = "a chain that had to refuse its own result";
+    // The step of a closed gate in tests/gate/stop.pml: a tenth of the limit at least, or zero.
+    if ((last_safety_ & (disengaged | fault_latched | frame_lost)) != 0) {
+      const double step = 330.0 * std::clamp(elapsed, 1e-4, 1e-3);
+      if (length > std::max(last_.norm() - step, 0.0) + 1e-5)
+        broken = "a closed gate that takes off too little";
+    }
     // 3.3 N are gone in two milliseconds of time; ticks without time take none off.
     idle_time_ = allowed ? 0.0 : idle_time_ + std::max(credit, 0.0);
     if (!allowed && idle_time_ > 3e-3 && length > 0.0)

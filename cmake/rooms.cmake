@@ -17,6 +17,9 @@ function(palpate_target_options target)
   # A product is rounded before it is added to, whatever the processor could do at once: then the
   # same session has the same forces on all of them.
   target_compile_options(${target} PRIVATE -ffp-contract=off)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
+    target_compile_options(${target} PRIVATE -U__ARM_FEATURE_FMA)  # by which Eigen would fuse them
+  endif()
   if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
     # Clang vectorises a least or greatest float only where NaN is promised away; then `omp simd`
     # remains a wish, and the loop is as right as before.

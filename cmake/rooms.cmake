@@ -121,6 +121,9 @@ function(palpate_room name)
   cmake_parse_arguments(ARG "" "" "LINKS;PRIVATE" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS *.cpp)
   file(GLOB headers CONFIGURE_DEPENDS *.hpp)
+  if(PALPATE_LEFT_OUT)  # of another project, which has other files in their place
+    list(FILTER sources EXCLUDE REGEX ${PALPATE_LEFT_OUT})
+  endif()
   add_library(palpate_${name} ${sources} ${headers})
   add_library(palpate::${name} ALIAS palpate_${name})
   set_target_properties(palpate_${name} PROPERTIES EXPORT_NAME ${name} VERSION ${PROJECT_VERSION}

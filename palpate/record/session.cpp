@@ -61,7 +61,8 @@ AdoptedFrame adopted_of(std::span<const double> row, const std::string& name) {
   AdoptedFrame frame{.number = whole(row[0]), .stamp = row[1], .put_at = row[2]};
   if (row.size() % 2 != fixed % 2) frame.tick = whole(row.back());
   for (std::size_t i = fixed; i + 1 < row.size(); i += 2)
-    frame.cameras[frame.camera_count++] = {.camera = whole(row[i]), .stamp = row[i + 1]};
+    frame.cameras[frame.camera_count++] = {.camera = static_cast<std::size_t>(whole(row[i])),
+                                           .stamp = row[i + 1]};
   return frame;
 }
 

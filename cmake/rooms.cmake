@@ -17,6 +17,9 @@ function(palpate_target_options target)
   # A product is rounded before it is added to, whatever the processor could do at once: then the
   # same session has the same forces on all of them.
   target_compile_options(${target} PRIVATE -ffp-contract=off)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(aarch64|arm64)$")
+    target_compile_options(${target} PRIVATE -U__ARM_FEATURE_FMA)  # by which Eigen would fuse them
+  endif()
   if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
     # Clang vectorises a least or greatest float only where NaN is promised away; then `omp simd`
     # remains a wish, and the loop is as right as before.
@@ -119,6 +122,9 @@ function(palpate_room name)
   cmake_parse_arguments(ARG "" "" "LINKS;PRIVATE" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS *.cpp *.c)
   file(GLOB headers CONFIGURE_DEPENDS *.hpp *.h)
+  if(PALPATE_LEFT_OUT)  # of another project, which has other files in their place
+    list(FILTER sources EXCLUDE REGEX ${PALPATE_LEFT_OUT})
+  endif()
   add_library(palpate_${name} ${sources} ${headers})
   add_library(palpate::${name} ALIAS palpate_${name})
   set_target_properties(palpate_${name} PROPERTIES EXPORT_NAME ${name} VERSION ${PROJECT_VERSION}

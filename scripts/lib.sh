@@ -99,15 +99,21 @@ npm_quietly() {
   }
 }
 
-# build_page: the viewer's page, web/dist, which becomes part of the program; only if something has
-# changed.
-build_page() {
-  local lock=web/node_modules/.package-lock.json page=web/dist/index.html
+# get_npm_packages: those of the page.
+lock=web/node_modules/.package-lock.json
+get_npm_packages() {
   if [[ ! -e $lock || web/package-lock.json -nt $lock ]]; then
     say "getting the page's packages with npm"
     npm_quietly ci --no-audit --no-fund || return 1
     touch "$lock"
   fi
+}
+
+# build_page: the viewer's page, web/dist, which becomes part of the program; only if something has
+# changed.
+build_page() {
+  local page=web/dist/index.html
+  get_npm_packages || return 1
   if [[ -e $page ]]; then
     [[ $(find web/src web/index.html web/*.ts "$lock" -newer "$page" -print -quit) ]] || return 0
   fi

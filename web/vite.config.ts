@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 import { defineConfig } from "vitest/config";
 
-// Three files with fixed names: the program carries them inside itself.
-export default defineConfig({
+// Three files with fixed names: the program carries them inside itself. In mode `site` they are a
+// page without a server, which differs in one module.
+export default defineConfig(({ mode }) => ({
+  base: mode === "site" ? "./" : "/",
+  resolve: {
+    alias: mode === "site" ? [{ find: "./connection", replacement: "./worker_connection" }] : [],
+  },
   build: {
     target: "es2022",
     chunkSizeWarningLimit: 1024,
@@ -16,4 +21,4 @@ export default defineConfig({
     },
   },
   test: { include: ["tests/*.test.ts"] },
-});
+}));

@@ -42,6 +42,7 @@ constexpr auto stop_poll_interval = std::chrono::milliseconds(5);
 constexpr double longest_watchdog = 0.5;             // [s] in which a hand reacts
 constexpr double camera_join_time = 0.5;             // [s] for a camera's thread to end
 constexpr std::int64_t ticks_between_flushes = 500;  // of a free-running session's recording
+constexpr double longest_catch_up = 0.1;             // [s] of ticks that are late, in `advance`
 
 std::string seconds_text(double seconds) {
   return std::to_string(static_cast<int>(seconds)) + " s";
@@ -276,6 +277,16 @@ class Session::Impl {
     }
   }
 
+  void advance(double t) {
+    refuse_if_stopped();
+    if (!started_) begin_free();
+    const auto due = static_cast<std::int64_t>(t * options_.rate);
+    const auto most = static_cast<std::int64_t>(longest_catch_up * options_.rate);
+    for (next_tick_ = std::max(next_tick_, due - most); next_tick_ <= due; ++next_tick_)
+      run_tick(next_tick_);
+    drain();
+  }
+
   [[nodiscard]] std::vector<std::shared_ptr<const Cloud>> newest() const {
     const std::lock_guard lock(frames_mutex_);
     return newest_;
@@ -362,10 +373,12 @@ class Session::Impl {
 
   void set_playback(const Playback& playback) {
     for (const auto& feed : feeds_) feed->set_playback(playback);
+    for (Player& played : played_) played.set_playback(playback, now());
   }
 
   void seek(double share) {
     for (const auto& feed : feeds_) feed->seek(share);
+    for (Player& played : played_) played.seek(share);
   }
 
   void start_recording(const std::string& folder) {
@@ -591,21 +604,29 @@ class Session::Impl {
   void run_free(std::optional<double> duration,
                 const std::function<void(const ServoTick&)>& on_tick,
                 const std::atomic<bool>& stop_requested) {
-    for (const auto& hand : hands_) hand->device().enable();
-    started_ = true;
+    begin_free();
     const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.rate);
     TickRing<ServoTick>::Reader reader = hands_.front()->cycle().reader();
     for (std::int64_t i = 0; i < ticks && !stop_requested.load(std::memory_order_relaxed); ++i) {
-      const double t = static_cast<double>(i) / options_.rate;
-      free_t_ = t;
-      for (std::size_t camera = 0; camera < played_.size(); ++camera) {
-        while (const auto frame = played_[camera].next_until(t)) take(camera, *frame);
-      }
-      for (const auto& hand : hands_) hand->run_at(t);
+      run_tick(i);
       if (ServoTick record{}; on_tick && reader.try_pop(record)) on_tick(record);
       drain();
       if (i % ticks_between_flushes == 0) wait_for_recorder();
     }
+  }
+
+  void begin_free() {
+    for (const auto& hand : hands_) hand->device().enable();
+    started_ = true;
+  }
+
+  void run_tick(std::int64_t number) {
+    const double t = static_cast<double>(number) / options_.rate;
+    free_t_ = t;
+    for (std::size_t camera = 0; camera < played_.size(); ++camera) {
+      while (const auto frame = played_[camera].next_until(t)) take(camera, *frame);
+    }
+    for (const auto& hand : hands_) hand->run_at(t);
   }
 
   // The clock waits for the disk here, as it runs faster than time.
@@ -769,6 +790,7 @@ class Session::Impl {
   // held, and used with either.
   std::vector<std::unique_ptr<SessionHand>> hands_;
   std::atomic<double> free_t_{0.0};  // [s]
+  std::int64_t next_tick_ = 0;       // of `advance`
   std::atomic<bool> started_{false};
   std::atomic<bool> stopped_{false};
 
@@ -810,6 +832,10 @@ void Session::stop() noexcept {
 void Session::run(std::optional<double> duration,
                   const std::function<void(const ServoTick&)>& on_tick) {
   impl_->run(duration, on_tick, stop_requested_);
+}
+
+void Session::advance(double t) {
+  impl_->advance(t);
 }
 
 std::size_t Session::hands() const {

@@ -140,6 +140,12 @@ class Session {
   ///         session is stopped then, too.
   void run(std::optional<double> duration,
            const std::function<void(const ServoTick&)>& on_tick = {});
+  /// Free-running, in place of `run`: runs the ticks that are due up to a time, on this thread. For
+  /// a caller that has a clock and no threads, such as a page.
+  /// @param t  [s] since the session's begin. Where it is more than 0.1 s beyond the last tick, the
+  ///           ticks between are left out.
+  /// @throws Error as `run`, where a source's frame cannot be read.
+  void advance(double t);
   /// Makes `run` return soon. Any thread, and a signal handler.
   void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
 
@@ -169,7 +175,7 @@ class Session {
   /// @throws Error, leaving everything as it was, if the placement is out of range.
   void place(std::size_t hand, const Placement& placement);
   /// How its recordings are played. The force goes to zero and ramps up again wherever time jumps.
-  /// Real time. @throws Error as CameraFeed::set_playback and seek.
+  /// Free-running: on the thread of `advance`. @throws Error as CameraFeed::set_playback and seek.
   void set_playback(const Playback& playback);
   void seek(double share);
   /// Takes the force away, as fast as the safety chain's `fall_rate` says, and keeps it away while

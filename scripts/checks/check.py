@@ -34,13 +34,15 @@ KNOWS = {
     "telelink": {"core", "bag", "cloud", "drivers", "fixtures", "servo", "session", "sources",
                  "teleop"},
     "viewer": {"core", "methods", "cloud", "servo", "sources", "devices", "record", "session"},
+    "site": {"core", "methods", "cloud", "servo", "bag", "sources", "devices", "drivers", "session",
+             "viewer"},
     "search": {"core"},
     "lab": {"core", "paper", "methods", "cloud", "fixtures", "servo", "teleop", "sources",
             "devices", "search"},
     "robot": {"core", "cloud", "sources", "servo", "teleop"},
     "bench": {"core", "paper", "methods", "cloud", "search"},
 }
-KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench", "robot"}
+KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench", "robot", "site"}
 KNOWS["python"] = KNOWS["app"] - {"node", "viewer"} | {"lab"}
 # The programs that are built when they are first asked for.
 KNOWS["app/lab"] = KNOWS["app"] | {"app", "lab"}
@@ -122,7 +124,7 @@ def room_of(path):
     parts = path.split("/")
     if "/".join(parts[:2]) in ("app/lab", "app/bench", "app/robot"):
         return "/".join(parts[:2])
-    if len(parts) > 1 and parts[0] in ("search", "lab", "bench", "robot", "app", "python"):
+    if len(parts) > 1 and parts[0] in ("search", "lab", "bench", "robot", "app", "python", "site"):
         return parts[0]
     if parts[0] != "palpate" or len(parts) < 3:
         return None
@@ -132,7 +134,7 @@ def room_of(path):
 def check_rooms(root):
     """Includes and CMake links that point up or sideways."""
     faults = []
-    of_a_room = re.compile(r"^(palpate|search|lab|bench|robot|app|python)/.*"
+    of_a_room = re.compile(r"^(palpate|site|search|lab|bench|robot|app|python)/.*"
                            r"(\.[ch]pp|CMakeLists\.txt)$")
     for path in files(root, of_a_room):
         room = room_of(path)

@@ -174,8 +174,9 @@ Compiling for Release with tests, one core's seconds by folder: {folders}. The l
 `tests/cost`: the versions of each loop for SSE2, AVX2 and AVX-512 are disassembled and must be
 vector code of that width, and all three give the same points, lengths and sums, bit for bit; the
 steps and gathers of a slide are bounded, and so are the instructions of a
-tick, counted by valgrind (6408 when the bound was set, with 8.3 steps over 90 points on AVX2); the
-core compiles for aarch64 if there is a cross compiler.
+tick, counted by valgrind (6408 when the bound was set, with 8.3 steps over 90 points on AVX2);
+kernel and servo, built for aarch64 and run by qemu, and as WebAssembly run by Node.js, give the
+golden hashes, where g++-aarch64-linux-gnu and qemu-user, or emscripten, are installed.
 """
 
 

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <bit>
+#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -19,31 +17,19 @@
 namespace palpate {
 namespace test_golden {
 
-// FNV-1a over the bits of a tick's numbers, from its time to the flags of the hand.
-void add(std::uint64_t& hash, const ServoTick& tick) {
-  static const auto count =
-      std::find(tick_columns().begin(), tick_columns().end(), "hand") - tick_columns().begin() + 1;
-  const std::vector<double> row = row_of(tick);
-  for (const double number : std::span(row).first(static_cast<std::size_t>(count))) {
-    const auto bits = std::bit_cast<std::uint64_t>(number);
-    for (int byte = 0; byte < 8; ++byte)
-      hash = (hash ^ (bits >> 8 * byte & 0xffU)) * 0x100000001b3U;
-  }
-}
-
 // Of a recorded session that was replayed.
 std::string hash_of(const std::string& method) {
   const test::TemporaryFolder folder;
   test::LoopSession session(method);
   session.record(folder.path() / "bag");
-  session.run(600);
+  session.run(test::golden_ticks);
   session.recorder().stop();
   SessionReader reader(folder.path() / "bag");
   const ReplayReport report = replay(reader);
   EXPECT_TRUE(report.identical()) << test::text_of(report);
-  EXPECT_EQ(report.ticks, 600U);
-  std::uint64_t hash = 0xcbf29ce484222325U;
-  for (std::size_t i = 0; i < reader.ticks(); ++i) add(hash, reader.tick(i));
+  EXPECT_EQ(report.ticks, static_cast<std::uint64_t>(test::golden_ticks));
+  std::uint64_t hash = test::empty_hash;
+  for (std::size_t i = 0; i < reader.ticks(); ++i) test::add_to_hash(hash, reader.tick(i));
   std::array<char, 17> text{};
   std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(hash));
   return text.data();

@@ -174,6 +174,27 @@ TEST(Session, AsksWhatFramesAreMadeOfAndKeepsAHandOffOneMaterial) {
   EXPECT_TRUE(fails_saying([&] { validate(box); }, "'box'", "remove material"));
 }
 
+TEST(Session, RunsTheTicksThatAreDueByACallersClock) {
+  const Outcome all = play(on_the_wall(), 1.5);
+  Session session(on_the_wall());
+  TickRing<ServoTick>::Reader reader = session.ticks();
+  for (const double t : {0.0, 0.004, 0.0041, 0.1}) session.advance(t);
+  std::vector<ServoTick> ticks;
+  for (ServoTick tick{}; reader.try_pop(tick);) ticks.push_back(tick);
+  ASSERT_EQ(ticks.size(), 101U);  // each once, from 0 s on
+  for (double t = 0.13; t < 1.5; t += 0.03) session.advance(t);
+  for (ServoTick tick{}; reader.try_pop(tick);) ticks.push_back(tick);
+  for (std::size_t i = 0; i < ticks.size(); ++i)
+    ASSERT_EQ(ticks[i].force, all.ticks[i].force) << "tick " << i;
+  EXPECT_GT(ticks.back().force.norm(), 0.5);
+  session.advance(9.0);  // the caller was away: ticks are left out but for 0.1 s
+  std::size_t late = 0;
+  for (ServoTick tick{}; reader.try_pop(tick); ++late) EXPECT_GE(tick.tick.t, 8.899);
+  EXPECT_EQ(late, 101U);
+  session.set_playback({.paused = true});
+  EXPECT_TRUE(session.state().cameras.front().playback.paused);
+}
+
 TEST(Session, TakesTheNoiseThatIsUsualForTheCamerasKindUnlessItIsSet) {
   const auto on_a = [](SensorKind sensor) {
     SessionOptions options = on_the_wall();

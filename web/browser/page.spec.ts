@@ -16,6 +16,7 @@ import {
   placeWhere,
   Program,
   spotUnder,
+  wallPly,
 } from "./session";
 
 const DESK = ["--camera", "synthetic:desk?size=320x240"];
@@ -252,28 +253,6 @@ test("a contact is heard and felt where that is asked for, and only then", async
   await switchBoth();
   await expect.poll(async () => (await given()).sounds).toEqual(["closed"]);
 });
-
-/** A sheet of 121 x 121 corners, 2 mm apart, with its faces. */
-function wallPly(): string {
-  const side = 121;
-  const corners: string[] = [];
-  const faces: string[] = [];
-  for (let v = 0; v < side; ++v)
-    for (let u = 0; u < side; ++u) {
-      corners.push(`${(0.002 * (u - 60)).toFixed(3)} ${(0.002 * (v - 60)).toFixed(3)} 0`);
-      const at = side * v + u;
-      if (u < side - 1 && v < side - 1)
-        faces.push(`4 ${at} ${at + 1} ${at + side + 1} ${at + side}`);
-    }
-  const axes = ["x", "y", "z"].map((axis) => `property float ${axis}`);
-  return [
-    ...["ply", "format ascii 1.0", `element vertex ${corners.length}`, ...axes],
-    ...[`element face ${faces.length}`, "property list uchar int vertex_indices", "end_header"],
-    ...corners,
-    ...faces,
-    "",
-  ].join("\n");
-}
 
 /** Two faces of four corners, 24 cm wide. */
 const SHEET_PLY = [

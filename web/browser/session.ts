@@ -165,3 +165,25 @@ export function difference(page: Page, one: Buffer, other: Buffer): Promise<numb
     [one.toString("base64"), other.toString("base64")],
   );
 }
+
+/** A sheet of 121 x 121 corners, 2 mm apart, with its faces. */
+export function wallPly(): string {
+  const side = 121;
+  const corners: string[] = [];
+  const faces: string[] = [];
+  for (let v = 0; v < side; ++v)
+    for (let u = 0; u < side; ++u) {
+      corners.push(`${(0.002 * (u - 60)).toFixed(3)} ${(0.002 * (v - 60)).toFixed(3)} 0`);
+      const at = side * v + u;
+      if (u < side - 1 && v < side - 1)
+        faces.push(`4 ${at} ${at + 1} ${at + side + 1} ${at + side}`);
+    }
+  const axes = ["x", "y", "z"].map((axis) => `property float ${axis}`);
+  return [
+    ...["ply", "format ascii 1.0", `element vertex ${corners.length}`, ...axes],
+    ...[`element face ${faces.length}`, "property list uchar int vertex_indices", "end_header"],
+    ...corners,
+    ...faces,
+    "",
+  ].join("\n");
+}

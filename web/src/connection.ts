@@ -1,22 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-import {
-  decode,
-  type Command,
-  type Hello,
-  type Message,
-  type OtherHand,
-  type RobotState,
-  type State,
-} from "./protocol";
+import { dispatch, type Handlers, type Toast } from "./dispatch";
+import type { Command, Hello } from "./protocol";
 
 const SILENCE = 2500; // [ms] the program speaks thirty times a second
 const FIRST_PAUSE = 250; // [ms] before trying again
 const LONGEST_PAUSE = 2000;
-
-export interface Presence {
-  hand: "you" | "other" | "free";
-  viewers: number;
-}
 
 /** What a page says whose token opens nothing, though none is needed. */
 export const unknownToken =
@@ -42,25 +30,13 @@ export function refusalText(status: number, hasToken: boolean): string | null {
   }
 }
 
-export interface Handlers {
-  opened(): void;
-  /** @param refusal  why the program lets no session begin; null: it is lost */
-  lost(refusal: string | null): void;
-  hello(hello: Hello): void;
-  state(state: State): void;
-  presence(presence: Presence): void;
-  robot(robot: RobotState): void;
-  moreHands(hands: OtherHand[]): void;
-  refused(reason: string): void;
-  message(message: Message): void;
-}
-
 /** The line to the program: opens, notices when it is dead, and opens again. */
 export class Connection {
   private socket: WebSocket | null = null;
   private pause = FIRST_PAUSE;
   private heard = 0;
   private opened = false;
+  private sending: XMLHttpRequest | null = null;
   private token = new URLSearchParams(location.search).get("token");
 
   constructor(private readonly handlers: Handlers) {
@@ -82,9 +58,19 @@ export class Connection {
     if (this.connected) this.socket!.send(JSON.stringify(command));
   }
 
-  /** Where a file goes that is to be touched. */
-  fileTarget(name: string): string {
-    return `/file?token=${encodeURIComponent(this.token ?? "")}&name=${name}`;
+  /** Sends a file that is to be touched. @param name  of letters, digits, '.', '-' and '_' */
+  sendFile(file: File, name: string, toast: Toast): void {
+    this.sending?.abort();
+    const request = (this.sending = new XMLHttpRequest());
+    request.open("PUT", `/file?token=${encodeURIComponent(this.token ?? "")}&name=${name}`);
+    request.upload.onprogress = ({ loaded, total }) =>
+      toast(`Sending ${file.name}, ${Math.floor((100 * loaded) / total)} %`, 0);
+    request.onload = () => {
+      if (request.status === 200) toast(`${file.name} has arrived.`);
+      else toast(request.responseText || `The program refuses ${file.name}.`, 15_000);
+    };
+    request.onerror = () => toast(`${file.name} could not be sent.`, 15_000);
+    request.send(file);
   }
 
   private open(): void {
@@ -103,19 +89,8 @@ export class Connection {
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
       if (socket !== this.socket) return;
       this.heard = performance.now();
-      if (typeof event.data === "string") this.take(event.data);
-      else this.handlers.message(decode(event.data));
+      dispatch(event.data, { ...this.handlers, hello: (hello) => this.greet(hello) });
     };
-  }
-
-  private take(text: string): void {
-    const [[verb, what]] = Object.entries(JSON.parse(text)) as [[string, unknown]];
-    if (verb === "hello") this.greet(what as Hello);
-    if (verb === "state") this.handlers.state(what as State);
-    if (verb === "presence") this.handlers.presence(what as Presence);
-    if (verb === "robot") this.handlers.robot(what as RobotState);
-    if (verb === "more_hands") this.handlers.moreHands(what as OtherHand[]);
-    if (verb === "error") this.handlers.refused(what as string);
   }
 
   private greet(hello: Hello): void {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Files that are dropped onto the page, or chosen, to be touched.
 
+import type { Toast } from "./dispatch";
 import { get } from "./dom";
 import { mayOperate } from "./panel";
 import type { Hello, State } from "./protocol";
@@ -33,16 +34,14 @@ export function whyNotSent(
 }
 
 export interface FileActions {
-  /** the address to send a file of that name to */
-  target(name: string): string;
-  toast(text: string, lasts?: number): void;
+  /** @param name  under which it is sent */
+  send(file: File, name: string): void;
+  toast: Toast;
   hello(): Hello | null;
   state(): State | null;
 }
 
 export class Files {
-  private sending: XMLHttpRequest | null = null;
-
   constructor(private readonly actions: FileActions) {
     const input = get<HTMLInputElement>("file");
     get("open-file").addEventListener("click", () => input.click());
@@ -73,16 +72,6 @@ export class Files {
     const refusal = whyNotSent(files, this.actions.hello(), this.actions.state());
     if (refusal) return this.actions.toast(refusal);
     const file = files[0]!;
-    this.sending?.abort();
-    const request = (this.sending = new XMLHttpRequest());
-    request.open("PUT", this.actions.target(plainName(file.name)));
-    request.upload.onprogress = ({ loaded, total }) =>
-      this.actions.toast(`Sending ${file.name}, ${Math.floor((100 * loaded) / total)} %`, 0);
-    request.onload = () => {
-      if (request.status === 200) this.actions.toast(`${file.name} has arrived.`);
-      else this.actions.toast(request.responseText || `The program refuses ${file.name}.`, 15_000);
-    };
-    request.onerror = () => this.actions.toast(`${file.name} could not be sent.`, 15_000);
-    request.send(file);
+    this.actions.send(file, plainName(file.name));
   }
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 import "./style.css";
 import { Brush, dabColour } from "./brush";
-import { Connection, unknownToken, type Presence } from "./connection";
+import { Connection, unknownToken } from "./connection";
+import type { Presence } from "./dispatch";
 import { get, write as writeIn } from "./dom";
 import { Files } from "./files";
 import { fixtureLines, Fixtures } from "./fixtures";
@@ -209,7 +210,7 @@ const connection = new Connection({
 });
 
 new Files({
-  target: (name) => connection.fileTarget(name),
+  send: (file, name) => connection.sendFile(file, name, toast),
   toast,
   hello: () => introduced,
   state: () => state,

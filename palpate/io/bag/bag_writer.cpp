@@ -48,7 +48,7 @@ void put_block(Buffer& to, std::span<const std::byte> bytes) {
 }
 
 void put_text(Buffer& to, std::string_view text) {
-  put_block(to, std::as_bytes(std::span(text)));
+  put_block(to, std::as_bytes(std::span(text.data(), text.size())));
 }
 
 void put_record(Buffer& to, RecordKind kind, std::span<const std::byte> content) {

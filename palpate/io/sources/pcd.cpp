@@ -187,8 +187,9 @@ std::vector<Column> columns_of(const Cursor& file, const PcdHeader& header) {
           correct_header);
     }
     const Scalar type = type_of(file, types[i], sizes[i]);
-    columns.push_back(
-        {{std::string(fields->second[i]), std::string(detail::name_of(type)), *count}, type});
+    columns.push_back({{std::string(fields->second[i]), std::string(detail::name_of(type)),
+                        static_cast<std::size_t>(*count)},
+                       type});
   }
   for (const Use use : {Use::x, Use::y, Use::z}) {
     const std::string name(1, "xyz"[static_cast<int>(use)]);

@@ -126,7 +126,8 @@ nlohmann::json fixture_to_draw(const Fixture& fixture) {
 
 void SessionHost::attach(Session& session) {
   bounds_.emplace(session.settings().safety, rules_.operator_limits);
-  recordings_ = std::make_unique<ObserverRecordings>(session, rules_.recordings);
+  if (rules_.records)
+    recordings_ = std::make_unique<ObserverRecordings>(session, rules_.recordings);
   session_ = &session;
   mouse_ = session.mouse();
   if (mouse_ != nullptr) target_ = start_ = mouse_->start_position();
@@ -302,7 +303,7 @@ std::string SessionHost::state() {
     servo["compute_p99"] = 1e-9 * static_cast<double>(timing->compute.quantile(0.99));
     servo["wake_up_p99"] = 1e-9 * static_cast<double>(timing->wake_up.quantile(0.99));
   }
-  json recording = {{"possible", true},
+  json recording = {{"possible", rules_.records},
                     {"path", nullptr},
                     {"message", state.recording.message},
                     {"ended", recording_ended()},
@@ -491,6 +492,8 @@ void SessionHost::command(const Command& command, Role role) {
   } else if (const auto* method = std::get_if<SetMethod>(&command)) {
     session_->change([&](ServoSettings& settings) { settings.method = method->name; });
   } else if (const auto* record = std::get_if<SetRecording>(&command)) {
+    if (!rules_.records)
+      throw Error("recording", "this session does not record", "run the program palpate");
     record->on ? recordings_->start() : recordings_->stop();
   } else if (const auto* play = std::get_if<SetPlayback>(&command)) {
     session_->set_playback({.paused = play->paused, .loop = play->loop, .speed = play->speed});

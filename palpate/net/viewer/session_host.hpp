@@ -92,6 +92,7 @@ struct PageRules {
   /// The robot that the hand leads; empty: there is none. The server's thread.
   std::function<std::optional<RobotPicture>()> robot = {};
   std::string notice = {};  ///< what pages are told when they join; empty: nothing
+  bool records = true;      ///< the operator's page can record
 };
 
 /// A session as pages see it: an observer that reads its ticks and frames and sends settings back.

@@ -1,0 +1,310 @@
+// SPDX-License-Identifier: Apache-2.0
+// A session in a page's Worker: what the program's server is to its pages, for one page, without
+// threads. worker.js calls what is exported here and posts what comes out of it.
+#include "site/page.hpp"
+
+#include <algorithm>
+#include <array>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include <emscripten.h>
+#include <nlohmann/json.hpp>
+
+#include "palpate/io/sources/scene.hpp"
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/net/viewer/session_host.hpp"
+#include "palpate/session/session.hpp"
+
+// clang-format off
+EM_JS(void, post_text, (const char* text), { palpatePost(UTF8ToString(text)); })
+EM_JS(void, post_bytes, (const void* head, std::size_t head_size, const void* payload,
+                         std::size_t payload_size, const void* colour, std::size_t colour_size), {
+  const bytes = new Uint8Array(head_size + payload_size + colour_size);
+  bytes.set(HEAPU8.subarray(head, head + head_size), 0);
+  bytes.set(HEAPU8.subarray(payload, payload + payload_size), head_size);
+  bytes.set(HEAPU8.subarray(colour, colour + colour_size), head_size + payload_size);
+  palpatePost(bytes.buffer);
+})
+// What fits into `to`; 0 if it is damaged or more than that.
+EM_JS(std::size_t, unpack_zstd_into, (const void* from, std::size_t size, void* to,
+                                      std::size_t room), {
+  try {
+    const bytes = fzstd.decompress(HEAPU8.slice(from, from + size));
+    if (bytes.length > room) return 0;
+    HEAPU8.set(bytes, to);
+    return bytes.length;
+  } catch (error) {
+    return 0;
+  }
+})
+// clang-format on
+
+namespace palpate {
+namespace {
+
+constexpr double pages_interval = 0.033;  // [s] between messages of ticks, as the server's
+constexpr int ticks_per_state = 6;        // of these messages for one of the state
+constexpr double hand_timeout = 2.0;      // [s] pages repeat a held hand several times a second
+constexpr std::uint32_t max_ahead = 2;    // frames sent that the page has not drawn yet
+// [bytes] of all files that are opened in one page: they lie in its memory
+constexpr std::uint64_t most_file_bytes = 500'000'000;
+
+void post(const ViewerMessage& message) {
+  if (message.text) {
+    const auto* text = reinterpret_cast<const char*>(message.head.data());
+    post_text(std::string(text, message.head.size()).c_str());
+    return;
+  }
+  const auto colour =
+      message.colour ? std::as_bytes(std::span(message.colour->rgb)) : std::span<const std::byte>();
+  post_bytes(message.head.data(), message.head.size(), message.payload.data(),
+             message.payload.size(), colour.data(), colour.size());
+}
+
+void post(std::string_view verb, const std::string& what) {
+  post_text(("{\"" + std::string(verb) + "\":" + what + "}").c_str());
+}
+
+void refuse(const std::string& why) {
+  post("error", nlohmann::json(why).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+// A JSON object with the one role that there is here.
+std::string with_role(const std::string& object) {
+  return "{\"role\":\"" + std::string(to_string(Role::operating)) + "\"," + object.substr(1);
+}
+
+// Frames wait here until the page has drawn those before.
+struct Camera {
+  std::optional<ViewerMessage> frame;
+  std::uint32_t sent = 0, shown = 0;  // frames
+
+  void offer() {
+    if (!frame || sent - shown >= max_ahead) return;
+    post(*std::exchange(frame, std::nullopt));
+    ++sent;
+  }
+};
+
+// Of the scene that is touched; there is one page and one thread.
+std::array<Camera, Patch::max_views>& cameras() {
+  static std::array<Camera, Patch::max_views> all;
+  return all;
+}
+
+}  // namespace
+
+class ViewerServer::Impl {};
+
+ViewerServer::ViewerServer(const ViewerOptions& /*options*/, ViewerHost& /*host*/) {
+  cameras() = {};
+}
+
+ViewerServer::~ViewerServer() = default;
+
+void ViewerServer::show(std::uint8_t camera, ViewerMessage frame) {
+  cameras()[camera].frame = std::move(frame);
+  cameras()[camera].offer();
+}
+
+void ViewerServer::describe(std::uint8_t /*camera*/, ViewerMessage rays) {
+  post(rays);
+}
+
+void ViewerServer::show_path(std::uint8_t /*camera*/, ViewerMessage path) {
+  post(path);
+}
+
+std::filesystem::path ViewerHost::begin_file(const std::string& name, std::uint64_t /*size*/) {
+  throw Error(name, "this session opens no files", "open the page without ?file=");
+}
+
+void ViewerHost::end_file(const std::filesystem::path& /*file*/, bool /*whole*/) {}
+
+namespace site {
+namespace {
+
+// A scene that is touched, from its opening to the next one's.
+class Scene {
+ public:
+  Scene(const std::string& uri, std::function<void(const std::string&)> open,
+        std::shared_ptr<DroppedFiles> files)
+      : host_(PALPATE_VERSION, rules_of(uri, std::move(open), std::move(files))),
+        session_(options_of(uri)),
+        server_({}, host_) {
+    host_.attach(session_);
+    post("hello", with_role(host_.hello()));
+    tell_presence();
+    host_.show_on(&server_);
+  }
+  ~Scene() { host_.show_on(nullptr); }
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
+
+  void advance(double t) {
+    t_ = t;
+    session_.advance(t);
+    if (t - beaten_ < pages_interval) return;
+    beaten_ = t;
+    if (holds_ && t - heard_ > hand_timeout) release({});
+    if (const auto batch = host_.ticks()) post(ticks_message(*batch));
+    if (++beats_ % ticks_per_state == 0) tell_state();
+  }
+
+  void take(std::span<const std::byte> bytes) {
+    const auto message = parse_binary(bytes);
+    if (!message) return;
+    if (const auto* shown = std::get_if<ShownMessage>(&*message)) {
+      if (shown->camera >= Patch::max_views) return;
+      Camera& camera = cameras()[shown->camera];
+      camera.shown = camera.sent;
+      camera.offer();
+    } else if (const auto& hand = std::get<HandMessage>(*message); hand.held) {
+      heard_ = t_;
+      host_.hand(hand);
+      if (!std::exchange(holds_, true)) tell_presence();
+    } else if (holds_) {
+      release(hand);
+    }
+  }
+
+  void command(std::string_view text) {
+    const std::optional<Command> command = parse_command(text);
+    if (!command) return;
+    host_.command(*command, Role::operating);
+    tell_state();
+  }
+
+ private:
+  static PageRules rules_of(const std::string& uri, std::function<void(const std::string&)> open,
+                            std::shared_ptr<DroppedFiles> files) {
+    PageRules rules{.open_scene = std::move(open),
+                    .files = std::move(files),
+                    .notice =
+                        "This page runs palpate by itself, in your browser. For cameras, haptic "
+                        "devices, robots and ROS 2, run the program: scripts/run."};
+    rules.records = false;
+    rules.scenes.push_back({uri, "what is touched now"});
+    for (const SceneInfo& scene : known_scenes())
+      rules.scenes.push_back(
+          {"synthetic:" + std::string(scene.name), std::string(scene.summary), "Built-in scenes"});
+    return rules;
+  }
+
+  SessionOptions options_of(const std::string& uri) {
+    SessionOptions options;
+    options.cameras = {{.uri = uri}};
+    options.hands = {{.device = "mouse:"}};
+    options.pace = Pace::free_running;
+    options.on_frame = [this](std::size_t camera, const FedFrame& frame) {
+      host_.show(camera, frame);
+    };
+    return options;
+  }
+
+  void release(const HandMessage& farewell) {
+    holds_ = false;
+    host_.hand(farewell);
+    tell_presence();
+  }
+  void tell_presence() {
+    post("presence", holds_ ? R"({"hand":"you","viewers":1})" : R"({"hand":"free","viewers":1})");
+    tell_state();
+  }
+  void tell_state() { post("state", with_role(host_.state())); }
+
+  SessionHost host_;
+  Session session_;
+  ViewerServer server_;
+  double t_ = 0.0, beaten_ = 0.0, heard_ = 0.0;  // [s] since the scene was opened
+  bool holds_ = false;
+  int beats_ = 0;
+};
+
+// All that the Worker has.
+struct Page {
+  std::shared_ptr<DroppedFiles> files = std::make_shared<DroppedFiles>(most_file_bytes);
+  std::unique_ptr<Scene> scene;
+  std::string wanted;   // scene that is to be opened; empty: none
+  double opened = 0.0;  // [s] on the Worker's clock
+};
+
+Page& page() {
+  static Page one;
+  return one;
+}
+
+// What throws becomes a message of the page.
+template <class Do>
+bool tried(const Do& act) {
+  try {
+    act();
+    return true;
+  } catch (const std::exception& error) {
+    refuse(error.what());
+    return false;
+  }
+}
+
+}  // namespace
+
+std::vector<std::byte> unpack_zstd(std::span<const std::byte> packed, std::size_t max_bytes) {
+  std::vector<std::byte> bytes(max_bytes);
+  bytes.resize(unpack_zstd_into(packed.data(), packed.size(), bytes.data(), max_bytes));
+  return bytes;
+}
+
+}  // namespace site
+}  // namespace palpate
+
+using palpate::site::page;
+using palpate::site::tried;
+
+extern "C" {
+
+/// Opens a scene in place of the one before, which stays where this one cannot be opened.
+/// @return whether it is open
+EMSCRIPTEN_KEEPALIVE bool palpate_open(const char* uri, double now) {
+  return tried([&] {
+    page().scene = std::make_unique<palpate::site::Scene>(
+        palpate::source_uri(uri), [](const std::string& wanted) { page().wanted = wanted; },
+        page().files);
+    page().opened = now;
+  });
+}
+
+/// @param now  [s] on the Worker's clock
+EMSCRIPTEN_KEEPALIVE void palpate_advance(double now) {
+  if (page().scene) tried([&] { page().scene->advance(now - page().opened); });
+  if (const std::string uri = std::exchange(page().wanted, {}); !uri.empty())
+    palpate_open(uri.c_str(), now);
+}
+
+EMSCRIPTEN_KEEPALIVE void palpate_take(const std::byte* bytes, std::size_t size) {
+  if (page().scene) tried([&] { page().scene->take({bytes, size}); });
+}
+
+EMSCRIPTEN_KEEPALIVE void palpate_command(const char* text) {
+  if (page().scene) tried([&] { page().scene->command(text); });
+}
+
+/// @return where the file goes; empty: it is refused
+EMSCRIPTEN_KEEPALIVE const char* palpate_begin_file(const char* name, double size) {
+  static std::string path;
+  path.clear();
+  tried([&] { path = page().files->begin(name, static_cast<std::uint64_t>(size)).string(); });
+  return path.c_str();
+}
+
+/// It is there: it is opened by the next `palpate_advance`.
+EMSCRIPTEN_KEEPALIVE void palpate_end_file(const char* path) {
+  tried([&] { page().wanted = palpate::uri_of_file(path); });
+}
+
+}  // extern "C"

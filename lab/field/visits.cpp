@@ -550,16 +550,23 @@ void arm_visits(Draw& draw, Setting& setting, double start) {
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const double speed = carrying(draw);
   const double there = draw.even("there", 0.0, 1.2);
-  const Vec3 in = 0.46 * toward(heading);
+  const double over = draw.even("over", 0.11, 0.15);
+  const Vec3 inside = 0.06 * toward(heading);
+  const Vec3 outside = -0.40 * toward(heading);
   Hand hand = hand_over(draw, start);
   hand.press(up(0.0));
-  Script arm(up(draw.even("over", 0.11, 0.15)) + 0.06 * toward(heading) - in);
+  Script arm(outside);
   arm.wait(hand.now() + 0.3);
   const int visits = 1 + draw.whole("again", 2);
   for (int i = 0; i < visits; ++i)
-    arm.reach(arm.end() + in, speed).wait(there).reach(arm.end(), speed).wait(0.4);
+    arm.reach(inside, speed).wait(there).reach(outside, speed).wait(0.4);
   setting.scene = {still(ground())};
-  add_arm(setting.scene, along(arm, turned(heading, Vec3::UnitZ())));
+  setting.before_camera = [=](FieldScene& scene, const Vec3& eye) {
+    const Vec3 between = over / eye.z() * eye;
+    add_arm(scene, [=](double t) {
+      return Eigen::Isometry3d(at(between + arm.at(t)) * turned(heading, Vec3::UnitZ()));
+    });
+  };
   setting.most_tilt = 0.6;
   work_until(draw, setting, hand, arm.duration(), 1.2 + visits * there);
 }

@@ -16,6 +16,7 @@ PLACES = {
     "aarch64": {
         "needs": {"aarch64-linux-gnu-g++": "g++-aarch64-linux-gnu", "qemu-aarch64": "qemu-user"},
         "options": ["-DCMAKE_SYSTEM_NAME=Linux", "-DCMAKE_SYSTEM_PROCESSOR=aarch64",
+                    "-DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc",
                     "-DCMAKE_CXX_COMPILER=aarch64-linux-gnu-g++", "-DCMAKE_CXX_FLAGS=-O1",
                     "-DCMAKE_EXE_LINKER_FLAGS=-static"],
         "run": ["qemu-aarch64", "golden_ticks"],

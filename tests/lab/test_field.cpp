@@ -444,6 +444,24 @@ TEST(FieldCase, HasANameOfItsOwnForEachValue) {
   }
 }
 
+TEST(FieldCase, HasVisitorsThatHideTheHandAndLeave) {
+  const Vec3 hand(0.0, 0.0, 0.005);
+  for (const std::string_view name : {"arm-visits", "person-passes"}) {
+    for (std::uint64_t i = 0; i < 4; ++i) {
+      const FieldCase c = draw_field_case(find_field_class(name, visits_set()), 1, i, visits_set());
+      const Stage stage = make_stage(c);
+      double hidden = 0.0;
+      constexpr double step = 0.02;
+      for (double t = 0.0; t < stage.duration; t += step)
+        hidden += stage.sensor->sees(Snapshot(stage.scene, t), hand, 0.0) ? 0.0 : step;
+      EXPECT_GT(hidden, 0.05) << c.text();
+      EXPECT_LT(hidden, 0.6 * stage.duration) << c.text();
+      for (const double t : {0.0, stage.duration})
+        EXPECT_TRUE(stage.sensor->sees(Snapshot(stage.scene, t), hand, 0.0)) << c.text();
+    }
+  }
+}
+
 TEST(FieldCase, SettingAValueChangesNoOther) {
   const Stage drawn = make_stage(parse_field_case("field:terrain-slide?seed=9&sensor=4&rate=30"));
   const Stage set = make_stage(parse_field_case("field:terrain-slide?seed=9&sensor=4&rate=60"));

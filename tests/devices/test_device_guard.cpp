@@ -17,6 +17,7 @@
 #include "palpate/servo/last_gate.h"
 
 #include "tests/support/errors.hpp"
+#include "tests/support/push.hpp"
 
 namespace palpate {
 namespace test_device_guard {
@@ -57,21 +58,6 @@ struct Seen {
   std::atomic<bool> enabled{false}, closed{false};
   std::atomic<int> session{0}, beats{0};  // process that writes; how often it did
 };
-
-// Asks for a force along z as a safety chain does that allows to push at once.
-void push(Device& device, double newtons, double t) {
-  palpate_gate_wish wish{};
-  wish.t = t;
-  wish.force.z = newtons;
-  wish.lost_age = wish.late_intervals = 1.0;  // [s], [intervals]
-  wish.force_bounds = {3.3, 1e6, 1e6};
-  wish.ramp_time = 1e-3;
-  wish.longest_gap = 0.1;
-  wish.longest_time = 1e-3;
-  wish.engaged = wish.hand = 1;
-  device.announce(wish);
-  device.write(Vec3::Zero(), t);
-}
 
 // Forces count up in the last digits, so that the device sees whether one is new.
 class WitnessDevice final : public Device {
@@ -144,7 +130,7 @@ class DeviceGuard : public ::testing::Test {
       for (int i = 0; i < 1'000'000; ++i) {
         const HandState hand = device->read(i * 1e-3);
         const bool pushes = hand.present && i > 0;  // as the safety chain: else zero
-        push(*device, pushes ? 1.0 + 1e-9 * i : 0.0, i * 1e-3);
+        test::push(*device, pushes ? 1.0 + 1e-9 * i : 0.0, i * 1e-3);
         ++seen.beats;
         std::this_thread::sleep_for(std::chrono::microseconds(500));
       }
@@ -211,7 +197,7 @@ TEST_F(DeviceGuard, PassesNoForceOfADisabledDevice) {
     seen.largest = 0.0;
     int calls = 0;
     wait_for([&] {
-      push(*device, ++calls % 8 < 4 ? 0.0 : 1.0, t += 1e-3);
+      test::push(*device, ++calls % 8 < 4 ? 0.0 : 1.0, t += 1e-3);
       return seen.writes >= end && calls > turns;
     });
     return seen.largest.load();

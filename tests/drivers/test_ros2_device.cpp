@@ -23,6 +23,7 @@
 
 #include "tests/drivers/dds_test.hpp"
 #include "tests/support/errors.hpp"
+#include "tests/support/push.hpp"
 
 namespace palpate {
 namespace test_ros2_device {
@@ -250,7 +251,7 @@ TEST(Ros2Session, DISABLED_PushesUntilItIsKilled) {
   device->enable();
   for (;;) {
     const bool pushes = device->read(monotonic_now()).present;
-    device->write(Vec3(0.0, 0.0, pushes ? 2.0 : 0.0), monotonic_now());
+    test::push(*device, pushes ? 2.0 : 0.0, monotonic_now());
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 }

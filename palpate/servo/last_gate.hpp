@@ -34,13 +34,12 @@ class LastGate {
     passed.torque = gate_.torque.last;
     passed.held = gate_.held;
     device.announce(passed);
-    const Sent sent{
-        {vector_of(gate_.sum), vector_of(passed.torque)}, vector_of(passed.force), verdict};
+    Sent sent{{vector_of(gate_.sum), vector_of(passed.torque)}, vector_of(passed.force), verdict};
     device.write(sent.wrench, t);
     return sent;
   }
   /// Writes once more what it wrote last.
-  void write_again(Device& device, double t) noexcept {
+  void write_again(Device& device, double t) const noexcept {
     device.write(Wrench{vector_of(gate_.sum), vector_of(gate_.torque.last)}, t);
   }
   /// Writes a zero force and starts again: whatever follows has to pass the ramp.

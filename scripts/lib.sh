@@ -70,7 +70,9 @@ build_in() {
     rm -rf "$folder"
   fi
   if (($#)); then targets=("${@:2}"); fi
-  if command -v ccache >/dev/null; then arguments+=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache); fi
+  if command -v ccache >/dev/null; then
+    arguments+=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
+  fi
   if ! in_cache "$folder" "${arguments[@]}"; then
     if [[ ! -e $folder/build.ninja ]]; then
       say "configuring $folder"

@@ -126,6 +126,15 @@ struct Visitor {
     thing.reach(thing.end() + by, speed);
     alone(by, speed);
   }
+  /// Both come from `away` [m], and the arm goes back there.
+  void bring(const Vec3& away, double speed) {
+    carry(-away, speed);
+    alone(away, speed);
+  }
+  void fetch(const Vec3& away, double speed) {
+    alone(-away, speed);
+    carry(away, speed);
+  }
   void enter(FieldScene& scene, const ShapePtr& shape, double heading) const {
     constexpr double pitch = 0.8;  // [rad] the elbow is higher than the hand
     const Eigen::Isometry3d turn = turned(heading, Vec3::UnitZ());
@@ -225,12 +234,10 @@ void put_under(Draw& draw, Setting& setting, double start) {
   const Vec3 middle = up(-0.5 * tall) + away;
   Visitor visitor(middle, middle - thing.reach * toward(heading));
   visitor.until(start);
-  visitor.carry(-away, speed);
-  visitor.alone(away, speed);
+  visitor.bring(away, speed);
   hand.until(visitor.now() + draw.even("pause", 0.0, 0.4)).press(up(0.0)).rest(1.0).lift();
   visitor.until(hand.now());
-  visitor.alone(-away, speed);
-  visitor.carry(away, speed);
+  visitor.fetch(away, speed);
   visitor.enter(setting.scene, thing.shape, heading);
   setting.scene.push_back(still(ground(), at(up(-tall))));
   hand.until(visitor.now()).press(up(-tall)).rest(1.0);
@@ -251,12 +258,8 @@ void put_beside(Draw& draw, Setting& setting, double start) {
       up(0.5 * tall) + away - (draw.even("beside", 0.012, 0.04) + thing.reach) * toward(heading);
   Visitor visitor(middle, middle - thing.reach * toward(heading));
   visitor.until(hand.now());
-  visitor.carry(-away, speed);
-  visitor.alone(away, speed);
-  if (draw.whole("leaves", 2) == 1) {
-    visitor.alone(-away, speed);
-    visitor.carry(away, speed);
-  }
+  visitor.bring(away, speed);
+  if (draw.whole("leaves", 2) == 1) visitor.fetch(away, speed);
   visitor.enter(setting.scene, thing.shape, heading);
   setting.scene.push_back(still(ground()));
   setting.azimuth = heading;  // the hand is on the camera's side of the thing

@@ -29,8 +29,6 @@ constexpr float spread_weight = 0.2F;    // of the newest frame in the spread
 constexpr int most_across = 16;          // pixels that are looked at, along either axis
 constexpr double nearest_camera = 1e-3;  // [m] from it to a place, along its axis
 constexpr double farthest_pixel = 1e6;   // [px] beyond any image
-constexpr float half_spread = 1.4826F;   // [-] standard deviation over the median deviation
-constexpr float wider_spread = 0.965F;   // [-] the same over the deviation of 70 %
 
 // A place in a camera's axes.
 Vec3 seen_from(const DepthImage& image, const Vec3& place) {
@@ -101,11 +99,9 @@ bool FusedImage::find_level(int u, int v, double radius) noexcept {
   newest_ = kth_smallest(near, near.size() / 2);
   const std::span<float> wide = look(spread_region * radius);
   if (wide.size() < least_pixels) return false;
-  for (float& each : wide) each = std::abs(each - newest_);
-  // Of quantised depth half may well be equal, and no spread is less than half its step.
-  const float deviation = std::max({half_spread * kth_smallest(wide, wide.size() / 2),
-                                    wider_spread * kth_smallest(wide, wide.size() * 7 / 10),
-                                    static_cast<float>(0.5 / image_->units_per_metre())});
+  // No spread is less than half a step of the depth.
+  const float deviation = std::max(deviation_about<float>(newest_, wide),
+                                   static_cast<float>(0.5 / image_->units_per_metre()));
   spread_ = spread_ == 0.0F
                 ? deviation
                 : std::min(spread_ + spread_weight * (deviation - spread_), most_growth * spread_);

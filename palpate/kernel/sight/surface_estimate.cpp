@@ -287,10 +287,7 @@ std::optional<SurfaceEstimate::Residuals> SurfaceEstimate::residuals(const Vec2&
   if (size < least_points) return std::nullopt;
   const std::span found(values.data(), size);
   const float centre = kth_smallest(found, size / 2);
-  for (float& each : found) each = std::abs(each - centre);
-  // Of quantised depth half may well be equal.
-  return Residuals{centre, std::max(1.4826 * kth_smallest(found, size / 2),
-                                    0.965 * kth_smallest(found, size * 7 / 10))};
+  return Residuals{centre, deviation_about<double>(centre, found)};
 }
 
 // Shifts the expected surface by the median residual near `foot`, and sets `cut` [m], the residual

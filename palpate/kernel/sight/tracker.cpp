@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "palpate/kernel/sight/monitor.hpp"
 
@@ -438,11 +439,12 @@ bool SightTracker::is_occluder(const Ring& ring_before, const Ring& now, double 
   const double interval = surface_.interval();
   const double times = surface_.jumped() ? 4.0 : surface_.velocity() != 0.0 ? 2.0 : 1.0;
   const double noise = std::max(surface_.spread(), surface_.height_sd());
-  const double struck = 0.5 * hardest_strike * (interval * interval);
-  const double most = std::isfinite(struck) ? times * (surface_.settled() >= well_known
-                                                           ? std::min(struck, farthest_strike)
-                                                           : farthest_strike)
-                                            : struck;
+  // A surface that is not touched may come from anywhere.
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  const double struck =
+      surface_.settled() >= well_known ? 0.5 * hardest_strike * (interval * interval) : infinite;
+  const double most =
+      std::isfinite(hardest_strike) ? times * std::min(struck, farthest_strike) : infinite;
   if (jump > most + 15e-3 + 4.0 * noise) return true;
   const double tolerance = std::max(15e-3, 4.0 * noise);
   // A cell keeps its nearest point, which is the extreme of the noise.

@@ -5,7 +5,15 @@
 #include <array>
 #include <charconv>
 #include <fstream>
+#include <sstream>
 #include <string_view>
+
+#include <linux/ethtool.h>
+#include <linux/sockios.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "palpate/drivers/drivers.hpp"
 
@@ -46,6 +54,14 @@ std::string first_line(const fs::path& file) {
   return line;
 }
 
+// The number that a file consists of; 0 where there is none.
+double number_in(const fs::path& file) {
+  const std::string text = first_line(file);
+  double value = 0.0;
+  std::from_chars(text.data(), text.data() + text.size(), value);
+  return value;
+}
+
 std::vector<fs::path> entries(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code error;
@@ -72,8 +88,17 @@ void look_at_processor(const fs::path& root, Machine& machine) {
     const auto known = std::find(machine.governors.begin(), machine.governors.end(), governor);
     if (!governor.empty() && known == machine.governors.end())
       machine.governors.push_back(governor);
+    for (const char* cause : {"core", "package"})
+      machine.throttled += static_cast<std::uint64_t>(
+          number_in(core / "thermal_throttle" / (std::string(cause) + "_throttle_count")));
+    for (const fs::path& state : entries(core / "cpuidle")) {
+      if (first_line(state / "disable") != "1")
+        machine.deepest_sleep =
+            std::max(machine.deepest_sleep, 1e-6 * number_in(state / "latency"));
+    }
   }
   machine.isolated_cores = first_line(root / "sys/devices/system/cpu/isolated");
+  machine.threads_share_cores = first_line(root / "sys/devices/system/cpu/smt/active") == "1";
 }
 
 void look_at_kernel(const fs::path& root, Machine& machine) {
@@ -83,14 +108,8 @@ void look_at_kernel(const fs::path& root, Machine& machine) {
     if (!machine.preemption.empty() || version.find(kind) == std::string::npos) continue;
     machine.preemption = kind;
   }
-  const auto number = [&](const char* name) {
-    const std::string text = first_line(root / "proc/sys/kernel" / name);
-    double value = 0.0;
-    std::from_chars(text.data(), text.data() + text.size(), value);
-    return value;
-  };
-  const double runtime = number("sched_rt_runtime_us");
-  const double period = number("sched_rt_period_us");
+  const double runtime = number_in(root / "proc/sys/kernel/sched_rt_runtime_us");
+  const double period = number_in(root / "proc/sys/kernel/sched_rt_period_us");
   if (runtime >= 0.0 && period > 0.0) machine.fifo_share = std::min(runtime / period, 1.0);
 }
 
@@ -110,13 +129,64 @@ void look_at_devices(const fs::path& root, Machine& machine) {
   }
 }
 
+// [us] that a network interface of this machine may hold packets back; none: it does not say.
+std::optional<unsigned> coalescing_of(const std::string& name) {
+  ethtool_coalesce asked{};
+  asked.cmd = ETHTOOL_GCOALESCE;
+  ifreq request{};
+  if (name.size() >= sizeof request.ifr_name) return std::nullopt;
+  std::copy(name.begin(), name.end(), request.ifr_name);
+  request.ifr_data = reinterpret_cast<char*>(&asked);
+  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (socket < 0) return std::nullopt;
+  const bool answered = ::ioctl(socket, SIOCETHTOOL, &request) == 0;
+  ::close(socket);
+  return answered ? std::optional<unsigned>(asked.rx_coalesce_usecs) : std::nullopt;
+}
+
+void look_at_network(const fs::path& root, Machine& machine) {
+  for (const fs::path& card : entries(root / "sys/class/net")) {
+    std::error_code error;
+    const fs::path driver = fs::read_symlink(card / "device/driver", error);
+    const std::string name = card.filename().string();
+    if (!error) machine.network.push_back({name, driver.filename().string(), coalescing_of(name)});
+  }
+}
+
 }  // namespace
+
+std::map<std::string, std::uint64_t> interrupts_on(int core, const fs::path& root) {
+  std::map<std::string, std::uint64_t> counts;
+  std::ifstream in(root / "proc/interrupts");
+  std::string line;
+  std::getline(in, line);
+  std::istringstream header(line);
+  std::size_t columns = 0;
+  std::size_t wanted = 0;  // from 1; 0: the core has none
+  for (std::string cpu; header >> cpu;)
+    if (++columns; cpu == "CPU" + std::to_string(core)) wanted = columns;
+  while (wanted > 0 && std::getline(in, line)) {
+    std::istringstream words(line);
+    std::string number;
+    std::uint64_t count = 0;
+    words >> number;
+    std::uint64_t on_core = 0;
+    for (std::size_t i = 1; i <= columns && words >> count; ++i)
+      if (i == wanted) on_core = count;
+    std::string name;
+    for (std::string word; words >> word;) name = word;  // the last one says whose it is
+    if (on_core > 0 && number.size() > 1 && number[0] >= '0' && number[0] <= '9')
+      counts[number + " " + name] += on_core;
+  }
+  return counts;
+}
 
 Machine look_at_machine(const fs::path& root) {
   Machine machine;
   look_at_processor(root, machine);
   look_at_kernel(root, machine);
   look_at_devices(root, machine);
+  look_at_network(root, machine);
   return machine;
 }
 

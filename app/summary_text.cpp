@@ -96,9 +96,26 @@ std::string text_of(std::span<const SessionHandState> hands,
   return text;
 }
 
+nlohmann::ordered_json json_of(const Timing& timing) {
+  nlohmann::ordered_json object = {{"ticks", timing.wake_up.count()},
+                                   {"late_ticks", timing.late_ticks.load()},
+                                   {"late_by_compute", timing.late_by_compute.load()},
+                                   {"late_by_interruption", timing.late_by_interruption.load()}};
+  for (const auto& [name, histogram] :
+       {std::pair{"wake_up", &timing.wake_up}, std::pair{"compute", &timing.compute}}) {
+    for (const auto& [suffix, share] :
+         {std::pair{"_p50_s", 0.5}, {"_p99_s", 0.99}, {"_p999_s", 0.999}, {"_max_s", 1.0}})
+      object[std::string(name) + suffix] = 1e-9 * static_cast<double>(histogram->quantile(share));
+  }
+  return object;
+}
+
 std::string json_of(std::span<const SessionHandState> hands, const std::string& recording,
                     std::span<const CameraStatus> cameras, const Timing* timing,
                     const Histogram* hand_over) {
+  const auto seconds = [&](double share) {
+    return 1e-9 * static_cast<double>(hand_over->quantile(share));
+  };
   nlohmann::ordered_json object = object_of(hands.front().summary);
   for (const SessionHandState& hand : hands.subspan(1)) {
     nlohmann::ordered_json other = {{"name", hand.name}};
@@ -116,17 +133,9 @@ std::string json_of(std::span<const SessionHandState> hands, const std::string& 
                                  {"opened_again", camera.opened_again},
                                  {"doubt", camera.doubt},
                                  {"trouble", camera.trouble}});
-  const auto seconds = [](const Histogram& histogram, double share) {
-    return 1e-9 * static_cast<double>(histogram.quantile(share));
-  };
-  if (timing != nullptr)
-    object["servo"] = {{"wake_up_p50_s", seconds(timing->wake_up, 0.5)},
-                       {"wake_up_p99_s", seconds(timing->wake_up, 0.99)},
-                       {"wake_up_p999_s", seconds(timing->wake_up, 0.999)},
-                       {"wake_up_max_s", 1e-9 * static_cast<double>(timing->wake_up.max())}};
+  if (timing != nullptr) object["servo"] = json_of(*timing);
   if (timing != nullptr && hand_over != nullptr)
-    object["servo"].update({{"hand_over_p50_s", seconds(*hand_over, 0.5)},
-                            {"hand_over_p99_s", seconds(*hand_over, 0.99)}});
+    object["servo"].update({{"hand_over_p50_s", seconds(0.5)}, {"hand_over_p99_s", seconds(0.99)}});
   if (!recording.empty()) object["recording"] = recording;
   return object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

@@ -4,6 +4,8 @@
 #include <span>
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "palpate/servo/periodic_thread.hpp"
 #include "palpate/session/camera_feed.hpp"
 #include "palpate/session/session.hpp"
@@ -21,5 +23,8 @@ std::string text_of(std::span<const SessionHandState> hands,
 std::string json_of(std::span<const SessionHandState> hands, const std::string& recording = {},
                     std::span<const CameraStatus> cameras = {}, const Timing* timing = nullptr,
                     const Histogram* hand_over = nullptr);
+
+/// How a loop kept its deadlines, SI units: ticks, late ticks and their causes, percentiles.
+nlohmann::ordered_json json_of(const Timing& timing);
 
 }  // namespace palpate::app

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <string>
 #include <thread>
@@ -18,6 +19,7 @@
 
 #include "app/device_report.hpp"
 #include "app/machine.hpp"
+#include "app/summary_text.hpp"
 #include "app/verbs.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -25,6 +27,8 @@
 #include "palpate/kernel/core/vectorise.hpp"
 #include "palpate/net/viewer/server.hpp"
 #include "palpate/servo/periodic_thread.hpp"
+#include "palpate/servo/stiffness.hpp"
+#include "palpate/session/session.hpp"
 
 namespace palpate::app {
 namespace {
@@ -42,39 +46,103 @@ struct DoctorOptions {
 constexpr double most_late = 0.5e-3;        // [s] 99.9 % of the wake-ups
 constexpr double most_late_ticks = 1.0e-3;  // [-] share of ticks that are not done when due
 
-// A loop that does nothing: its late ticks are due to the machine.
-Json look_at_time(const DoctorOptions& options, std::vector<std::string>& advice) {
-  PeriodicThread thread(options.rate, RealtimeRequest{}, [](const Wake&) {});
-  std::this_thread::sleep_for(std::chrono::duration<double>(options.seconds));
-  thread.stop();
-  const Histogram& wake_up = thread.timing().wake_up;
-  const RealtimeReport& granted = thread.realtime();
-  const auto late = thread.timing().late_ticks.load();
-  const auto seconds = [&](double share) {
-    return 1e-9 * static_cast<double>(wake_up.quantile(share));
-  };
-  const double late_share =
-      static_cast<double>(late) / static_cast<double>(std::max<std::uint64_t>(wake_up.count(), 1));
-  const bool fit = seconds(0.999) <= most_late && late_share <= most_late_ticks;
-  if (!fit)
+bool is_fit(const Json& loop) {
+  const double ticks = std::max(loop["ticks"].get<double>(), 1.0);
+  return loop["wake_up_p999_s"] <= most_late &&
+         loop["late_ticks"].get<double>() / ticks <= most_late_ticks;
+}
+
+// What may stand in the way of a loop that was late, each with its remedy.
+// @param interrupts  on its core, during the measurement
+void name_obstacles(const Machine& machine, const RealtimeReport& granted, double seconds,
+                    const std::map<std::string, std::uint64_t>& interrupts,
+                    std::vector<std::string>& advice) {
+  constexpr double many_interrupts = 50.0;  // [1/s]
+  for (const auto& [name, count] : interrupts) {
+    if (static_cast<double>(count) < many_interrupts * seconds) continue;
+    const std::string number = name.substr(0, name.find(':'));
     advice.push_back(
-        fmt::format("servo ticks are late (wake-up latency {:.0f} us at 99.9 %, {} of {} deadlines "
-                    "missed): close other programs, grant the real-time permissions listed here, "
-                    "or install a PREEMPT_RT kernel",
-                    1e6 * seconds(0.999), late, wake_up.count()));
+        fmt::format("core {}, which runs the servo loop, serves {:.0f} interrupts/s of '{}': stop "
+                    "irqbalance and write another core to /proc/irq/{}/smp_affinity_list",
+                    granted.core, static_cast<double>(count) / seconds, name, number));
+  }
+  if (!granted.awake && machine.deepest_sleep > most_late / 10.0)
+    advice.push_back(
+        fmt::format("cores sleep so deeply that they take {:.0f} us to wake: grant access to "
+                    "/dev/cpu_dma_latency, or boot with processor.max_cstate=1",
+                    1e6 * machine.deepest_sleep));
+  if (machine.threads_share_cores)
+    advice.emplace_back(
+        "two hardware threads share each core (SMT), and the other one slows the servo loop down: "
+        "echo off > /sys/devices/system/cpu/smt/control");
+}
+
+// Network devices and arms answer as fast as the card hands packets on.
+void name_slow_cards(const Machine& machine, std::vector<std::string>& advice) {
+  constexpr unsigned most_held_back = 50;  // [us]
+  for (const NetworkCard& card : machine.network) {
+    if (card.driver.rfind("r81", 0) == 0)
+      advice.push_back(card.name + " is a Realtek network card (" + card.driver +
+                       "), known for delays of some ms: use another card for a device or an arm "
+                       "on the network");
+    if (card.coalescing.value_or(0) > most_held_back)
+      advice.push_back(
+          fmt::format("{0} holds packets back for up to {1} us: for a device or an "
+                      "arm on it, ethtool -C {0} rx-usecs 0",
+                      card.name, *card.coalescing));
+  }
+}
+
+// A loop that does nothing, whose late ticks are due to the machine; and after it a session: a
+// simulated hand presses and strokes a simulated scene.
+Json look_at_time(const DoctorOptions& options, const Machine& machine,
+                  std::vector<std::string>& advice) {
+  const auto half = std::chrono::duration<double>(0.5 * options.seconds);
+  PeriodicThread thread(options.rate, RealtimeRequest{}, [](const Wake&) {});
+  const RealtimeReport& granted = thread.realtime();
+  auto interrupts = interrupts_on(granted.core);
+  std::this_thread::sleep_for(half);
+  thread.stop();
+  for (auto& [name, count] : interrupts_on(granted.core))
+    interrupts[name] = count - interrupts[name];
+
+  SessionOptions wanted;
+  wanted.cameras = {{.uri = "synthetic:desk"}};
+  wanted.hands[0].device = "script:";
+  wanted.rate = options.rate;
+  wanted.stroke_time = 0.5 * options.seconds;
+  Session session(std::move(wanted));
+  session.run(half.count());
+
+  Json loop = json_of(thread.timing());
+  Json felt = json_of(*session.timing());
+  const bool fit = is_fit(loop) && is_fit(felt);
+  if (!fit) {
+    advice.push_back(fmt::format(
+        "servo ticks are late ({} of {} in an empty loop, {} of {} in a session): close other "
+        "programs, grant the real-time permissions listed here, or install a PREEMPT_RT kernel",
+        loop["late_ticks"].get<int>(), loop["ticks"].get<int>(), felt["late_ticks"].get<int>(),
+        felt["ticks"].get<int>()));
+    name_obstacles(machine, granted, half.count(), interrupts, advice);
+  }
+  if (const auto throttled = look_at_machine().throttled; throttled > machine.throttled)
+    advice.push_back(
+        fmt::format("the processor was slowed down by its heat {} times meanwhile: "
+                    "improve its cooling",
+                    throttled - machine.throttled));
   advice.insert(advice.begin(), granted.advice.begin(), granted.advice.end());
-  return {{"fit", fit},
-          {"rate_hz", options.rate},
-          {"ticks", wake_up.count()},
-          {"late_ticks", late},
-          {"wake_up_p50_s", seconds(0.5)},
-          {"wake_up_p99_s", seconds(0.99)},
-          {"wake_up_p999_s", seconds(0.999)},
-          {"wake_up_max_s", 1e-9 * static_cast<double>(wake_up.max())},
-          {"fifo_priority", granted.priority},
-          {"memory_locked", granted.locked},
-          {"core", granted.core},
-          {"kept_awake", granted.awake}};
+  const double delay = felt["wake_up_p999_s"].get<double>() + felt["compute_p999_s"].get<double>();
+  Json report = {{"fit", fit},
+                 {"rate_hz", options.rate},
+                 {"delay_s", delay},
+                 {"stiffness_per_damping_1_s", largest_stiffness(1.0, 1.0 / options.rate, delay)}};
+  report.update(loop);
+  report.update({{"session", std::move(felt)},
+                 {"fifo_priority", granted.priority},
+                 {"memory_locked", granted.locked},
+                 {"core", granted.core},
+                 {"kept_awake", granted.awake}});
+  return report;
 }
 
 Json look_at_processor(const Machine& machine, std::vector<std::string>& advice) {
@@ -89,11 +157,18 @@ Json look_at_processor(const Machine& machine, std::vector<std::string>& advice)
     advice.emplace_back(
         "this is a virtual machine; its host can delay any servo tick: use a physical computer "
         "when a person holds the device");
+  name_slow_cards(machine, advice);
+  Json network = Json::array();
+  for (const NetworkCard& card : machine.network)
+    network.push_back(card.name + " (" + card.driver + ")");
   return {{"processor", machine.processor},
           {"cores", std::thread::hardware_concurrency()},
           {"vector_set", vector_set_in_use()},
           {"governors", machine.governors},
           {"isolated_cores", machine.isolated_cores},
+          {"deepest_sleep_s", machine.deepest_sleep},
+          {"threads_share_cores", machine.threads_share_cores},
+          {"network", network},
           {"virtual", machine.is_virtual},
           {"kernel", machine.kernel},
           {"preemption", machine.preemption},
@@ -215,17 +290,38 @@ std::string drivers_text(const Json& drivers) {
   return text;
 }
 
+std::string loop_text(const char* name, const Json& loop) {
+  std::string text = fmt::format("{}, {} ticks\n", name, loop["ticks"].get<std::uint64_t>());
+  for (const auto& [what, key] :
+       {std::pair{"wake-up latency", "wake_up"}, {"compute", "compute"}}) {
+    const auto microseconds = [&, name = std::string(key)](const char* share) {
+      return 1e6 * loop[name + share].get<double>();
+    };
+    text +=
+        fmt::format("  {}: {:.0f} us median, {:.0f} at 99 %, {:.0f} at 99.9 %, {:.0f} maximum\n",
+                    what, microseconds("_p50_s"), microseconds("_p99_s"), microseconds("_p999_s"),
+                    microseconds("_max_s"));
+  }
+  const auto number = [&](const char* key) { return loop[key].get<std::int64_t>(); };
+  const auto late = number("late_ticks");
+  const auto computed = number("late_by_compute");
+  const auto interrupted = number("late_by_interruption");
+  return text + fmt::format(
+                    "  missed deadlines: {} ({} woken late, {} interrupted, {} by the tick's own "
+                    "work)\n",
+                    late, late - computed - interrupted, interrupted, computed);
+}
+
 std::string doctor_text(const Json& report) {
   const Json& time = report["realtime"];
-  const auto microseconds = [&](const char* key) { return 1e6 * time[key].get<double>(); };
   std::string text = fmt::format(
-      "{} for haptics at {} Hz\n\nEmpty servo loop, {} ticks\n  wake-up latency: {:.0f} us median, "
-      "{:.0f} at 99 %, {:.0f} at 99.9 %, {:.0f} maximum; {} deadlines missed\n  real-time "
-      "scheduling: {}; memory: {}; core: {}; cores: {}\n",
+      "{} for haptics at {} Hz: with its delay of {:.2f} ms a device may have walls of up to "
+      "{:.0f} "
+      "N/m for each N s/m of its damping\n\n{}{}  real-time scheduling: {}; memory: {}; core: {}; "
+      "cores: {}\n",
       report["fit"].get<bool>() ? "Fit" : "Not fit", time["rate_hz"].get<double>(),
-      time["ticks"].get<std::uint64_t>(), microseconds("wake_up_p50_s"),
-      microseconds("wake_up_p99_s"), microseconds("wake_up_p999_s"), microseconds("wake_up_max_s"),
-      time["late_ticks"].get<std::uint64_t>(),
+      1e3 * time["delay_s"].get<double>(), time["stiffness_per_damping_1_s"].get<double>(),
+      loop_text("Empty servo loop", time), loop_text("Session", time["session"]),
       time["fifo_priority"] == 0 ? "refused"
                                  : "priority " + std::to_string(time["fifo_priority"].get<int>()),
       time["memory_locked"].get<bool>() ? "locked" : "not locked",
@@ -268,7 +364,7 @@ int run(const DoctorOptions& options) {
   const Registry<Driver> drivers = standard_drivers();
   std::vector<std::string> advice;
   Json report;
-  report["realtime"] = look_at_time(options, advice);
+  report["realtime"] = look_at_time(options, machine, advice);
   report["fit"] = report["realtime"]["fit"];
   report["machine"] = look_at_processor(machine, advice);
   report["devices"] = look_at_devices(machine, drivers, advice);
@@ -289,7 +385,9 @@ Verb add_doctor(CLI::App& program) {
       "doctor",
       "check this computer for haptics, list connected cameras and devices, and recommend actions");
   const auto options = std::make_shared<DoctorOptions>();
-  command->add_option("--seconds", options->seconds, "duration of the measurement [s] (3)");
+  command->add_option(
+      "--seconds", options->seconds,
+      "duration of the measurement [s] (3): half of it an empty loop, half a session");
   command->add_option("--rate", options->rate, "ticks per second (1000)");
   command->add_flag("--json", options->json, "print a JSON object");
   command->add_option("--device", options->device.uri,

@@ -61,6 +61,12 @@ bool PeriodicThread::try_stop(double timeout) {
   return ended_.wait_for(std::chrono::duration<double>(timeout)) == std::future_status::ready;
 }
 
+void Timing::add_late(bool began_late, std::uint64_t cpu, std::uint64_t whole) noexcept {
+  const auto count = [](auto& number) { number.fetch_add(1, std::memory_order_relaxed); };
+  count(late_ticks);
+  if (!began_late) count(2 * cpu > whole ? late_by_compute : late_by_interruption);
+}
+
 void PeriodicThread::run(std::uint64_t period, const RealtimeRequest& request,
                          std::promise<RealtimeReport> started) {
   const RealtimeThread realtime(request);
@@ -78,10 +84,8 @@ void PeriodicThread::run(std::uint64_t period, const RealtimeRequest& request,
     deadline += period;
     const std::uint64_t done = nanoseconds(CLOCK_MONOTONIC);
     if (done > deadline) {
-      const std::uint64_t passed = (done - deadline) / period + 1;
-      deadline += passed * period;
-      timing_.late_ticks.fetch_add(1, std::memory_order_relaxed);
-      timing_.skipped_deadlines.fetch_add(passed, std::memory_order_relaxed);
+      timing_.add_late(awake + period - deadline > done - awake, compute, done - awake);
+      deadline += ((done - deadline) / period + 1) * period;
     }
   }
   if (last_) last_();

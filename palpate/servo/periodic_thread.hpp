@@ -17,7 +17,14 @@ struct Timing {
   Histogram wake_up;                         ///< [ns] from a deadline until the thread ran
   Histogram compute;                         ///< [ns] of a cycle, by the thread's own CPU clock
   std::atomic<std::uint64_t> late_ticks{0};  ///< not done when the next was due
-  std::atomic<std::uint64_t> skipped_deadlines{0};  ///< passed altogether: no tick was made up
+  std::atomic<std::uint64_t> late_by_compute{0};       ///< of them: the cycle's own work
+  std::atomic<std::uint64_t> late_by_interruption{0};  ///< of them: other work on the core
+  // The rest of them were woken late, or called late by the device.
+
+  /// Counts a late tick by its cause. [servo]
+  /// @param began_late  it was late before its cycle began
+  /// @param cpu, whole  [ns] of the cycle: of the thread's CPU time, and as time passed
+  void add_late(bool began_late, std::uint64_t cpu, std::uint64_t whole) noexcept;
 };
 
 /// When a cycle runs, and how the last ones kept their time.

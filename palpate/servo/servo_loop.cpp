@@ -133,11 +133,9 @@ void ServoLoop::driven_tick() noexcept {
   } else {
     late = std::clamp(now - previous_tick_ - period, 0.0, 4.0);
     driven_timing_.wake_up.add(static_cast<std::uint64_t>(1e9 * late));
-    if (late > 0.5 * period) {
-      driven_timing_.late_ticks.fetch_add(1, std::memory_order_relaxed);
-      driven_timing_.skipped_deadlines.fetch_add(
-          static_cast<std::uint64_t>(std::llround(late / period)), std::memory_order_relaxed);
-    }
+    if (late > 0.5 * period)
+      driven_timing_.add_late(previous_whole_ < period, previous_compute_,
+                              static_cast<std::uint64_t>(1e9 * previous_whole_));
   }
   previous_tick_ = now;
   const std::uint64_t cpu = thread_cpu_time();
@@ -146,6 +144,7 @@ void ServoLoop::driven_tick() noexcept {
   driven_timing_.compute.add(compute);
   previous_compute_ = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(compute, std::numeric_limits<std::uint32_t>::max()));
+  previous_whole_ = monotonic_now() - now;
 }
 
 void ServoLoop::beat(double now) noexcept {

@@ -131,6 +131,7 @@ class ServoLoop {
   std::atomic<bool> in_callback_{false};
   double previous_tick_ = 0.0;          // [s]
   std::uint32_t previous_compute_ = 0;  // [ns]
+  double previous_whole_ = 0.0;         // [s] of the cycle before, as time passed
 
   ForceWatchdog watchdog_;
   std::thread watch_;

@@ -20,7 +20,7 @@ std::vector<std::string> stiffness_warnings(const DeviceInfo& device, double sti
   if (device.limits.max_stiffness)
     warn(*device.limits.max_stiffness, "the rated stiffness of the device");
   if (device.damping)
-    warn(2.0 * *device.damping / (1.0 / rate + 2.0 * device.delay.value_or(0.0)),
+    warn(largest_stiffness(*device.damping, 1.0 / rate, device.delay.value_or(0.0)),
          "above which a released handle may oscillate (2b/(T + 2 t_d))");
   return warnings;
 }

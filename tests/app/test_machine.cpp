@@ -20,7 +20,13 @@ class FakeSystem {
     std::filesystem::create_directories(path.parent_path());
     std::ofstream(path) << text;
   }
+  void link(const std::string& file, const std::string& target) const {
+    std::filesystem::create_symlink(target, folder_.path() / file);
+  }
   [[nodiscard]] Machine look() const { return look_at_machine(folder_.path()); }
+  [[nodiscard]] std::map<std::string, std::uint64_t> interrupts_on(int core) const {
+    return app::interrupts_on(core, folder_.path());
+  }
 
  private:
   test::TemporaryFolder folder_;
@@ -46,6 +52,42 @@ TEST(Machine, IsDescribedByWhatItsSystemSays) {
   EXPECT_DOUBLE_EQ(machine.fifo_share, 0.95);
   EXPECT_EQ(machine.governors, std::vector<std::string>{"powersave"});
   EXPECT_EQ(machine.isolated_cores, "1");
+}
+
+TEST(Machine, SaysWhatDelaysALoop) {
+  const FakeSystem system;
+  const std::string cpu = "sys/devices/system/cpu/";
+  system.write(cpu + "cpu0/cpuidle/state1/latency", "2\n");
+  system.write(cpu + "cpu0/cpuidle/state2/latency", "133\n");
+  system.write(cpu + "cpu0/cpuidle/state3/latency", "900\n");
+  system.write(cpu + "cpu0/cpuidle/state3/disable", "1\n");
+  system.write(cpu + "cpu0/thermal_throttle/core_throttle_count", "3\n");
+  system.write(cpu + "cpu1/thermal_throttle/package_throttle_count", "4\n");
+  system.write(cpu + "smt/active", "1\n");
+  system.write("sys/bus/pci/drivers/r8169/bind", "");
+  system.write("sys/class/net/lo/mtu", "65536\n");
+  system.write("sys/class/net/enp3s0/device/vendor", "0x10ec\n");
+  system.link("sys/class/net/enp3s0/device/driver", "../../../../bus/pci/drivers/r8169");
+  const Machine machine = system.look();
+  EXPECT_DOUBLE_EQ(machine.deepest_sleep, 133e-6);
+  EXPECT_EQ(machine.throttled, 7U);
+  EXPECT_TRUE(machine.threads_share_cores);
+  ASSERT_EQ(machine.network.size(), 1U);
+  EXPECT_EQ(machine.network[0].name, "enp3s0");
+  EXPECT_EQ(machine.network[0].driver, "r8169");
+}
+
+TEST(Machine, CountsTheInterruptsOfACore) {
+  const FakeSystem system;
+  system.write("proc/interrupts",
+               "           CPU0       CPU2\n"
+               " 28:          5         70  PCI-MSI 524288-edge      enp3s0\n"
+               " 29:          9          0  PCI-MSI 524289-edge      nvme0q1\n"
+               "LOC:     123456     654321   Local timer interrupts\n");
+  using Counts = std::map<std::string, std::uint64_t>;
+  EXPECT_EQ(system.interrupts_on(2), (Counts{{"28: enp3s0", 70}}));
+  EXPECT_EQ(system.interrupts_on(0), (Counts{{"28: enp3s0", 5}, {"29: nvme0q1", 9}}));
+  EXPECT_EQ(system.interrupts_on(1), Counts{});
 }
 
 TEST(Machine, ShowsItsCamerasAndHapticDevicesAndNothingElse) {

@@ -870,6 +870,12 @@ TEST_F(Program, LooksAtTheMachineAndSaysWhatToDo) {
   EXPECT_GT(report["realtime"]["ticks"], 0);
   EXPECT_GE(report["realtime"]["wake_up_max_s"], report["realtime"]["wake_up_p50_s"]);
   EXPECT_TRUE(report["fit"].is_boolean());
+  const auto& session = report["realtime"]["session"];
+  EXPECT_GT(session["ticks"], 0);
+  EXPECT_GE(session["late_ticks"].get<int>(),
+            session["late_by_compute"].get<int>() + session["late_by_interruption"].get<int>());
+  const double delay = report["realtime"]["delay_s"].get<double>();
+  EXPECT_NEAR(report["realtime"]["stiffness_per_damping_1_s"], 2.0 / (1e-3 + 2.0 * delay), 1e-6);
   EXPECT_TRUE(report["devices"].is_array());
   EXPECT_TRUE(report["drivers"].is_array());
   EXPECT_GE(report["machine"]["cores"], 1);
@@ -879,8 +885,8 @@ TEST_F(Program, LooksAtTheMachineAndSaysWhatToDo) {
     EXPECT_TRUE(report["realtime"][right].get<bool>() || !report["advice"].empty()) << right;
   }
   const std::string text = run("doctor --seconds 0.2").out;
-  for (const char* part :
-       {"for haptics at 1000 Hz", "wake-up latency", "Cameras and haptic", "Versions"})
+  for (const char* part : {"for haptics at 1000 Hz", "N/m for each N s/m", "Session, ",
+                           "wake-up latency", "Cameras and haptic", "Versions"})
     EXPECT_NE(text.find(part), std::string::npos) << part << " is not in\n" << text;
   expect_refusal("doctor --seconds 0", {"--seconds"});
 }

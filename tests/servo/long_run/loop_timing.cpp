@@ -36,11 +36,11 @@ class Circling final : public Device {
 };
 
 void print(const char* name, const RealtimeReport& granted, const Timing& timing) {
-  std::printf("%s: fifo %d, locked %d, core %d, awake %d; %llu ticks, %llu late, %llu skipped\n",
+  std::printf("%s: fifo %d, locked %d, core %d, awake %d; %llu ticks, %llu late, %llu by compute\n",
               name, granted.priority, granted.locked, granted.core, granted.awake,
               static_cast<unsigned long long>(timing.wake_up.count()),
               static_cast<unsigned long long>(timing.late_ticks.load()),
-              static_cast<unsigned long long>(timing.skipped_deadlines.load()));
+              static_cast<unsigned long long>(timing.late_by_compute.load()));
   for (const auto* histogram : {&timing.wake_up, &timing.compute}) {
     std::printf("  %s [us]: p50 %.1f  p99 %.1f  p99.9 %.1f  p99.99 %.1f  max %.1f\n",
                 histogram == &timing.wake_up ? "wake-up" : "compute",

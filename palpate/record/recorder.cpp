@@ -255,6 +255,7 @@ bool Recorder::flush_is_due() const {
   return flushes_collected_ > flushes_done_ && entries_written_ >= flush_entries_;
 }
 
+// Hazard: hanging-disk, killed-recording
 void Recorder::write() {
   guarded([this] {
     for (bool last = false; !last;) {

@@ -33,6 +33,7 @@ constexpr double regular = 1.4;
 
 }  // namespace
 
+// Hazard: slow-oscillation
 bool EnergyMonitor::run(double dt, const Vec3& sent, const Vec3& hip, const Vec3& normal,
                         double velocity, const Limits& limits) noexcept {
   if (!normal.isZero()) normal_ = normal.normalized();

@@ -5,6 +5,7 @@
 
 namespace palpate {
 
+// Hazard: hang
 void ForceWatchdog::look(double now) {
   const bool force_out = force_out_.load(std::memory_order_relaxed);
   const bool stalled = silence(now) > (force_out ? limits_.force_time : limits_.watch_time);

@@ -6,6 +6,7 @@
 
 namespace palpate {
 
+// Hazard: late-loop
 Vec3 free_side(const Cloud& cloud, const Vec3& proxy, const Vec3& normal, double r_c,
                Patch& patch) noexcept {
   constexpr double reach = 0.05;  // [m] 1.5 m/s for one frame at 30 Hz

@@ -50,6 +50,7 @@ void Freshness::adopt(std::span<const CameraFrame> frames, double arrived,
   }
 }
 
+// Hazard: lost-camera
 Freshness::Age Freshness::at(double t) const noexcept {
   constexpr double inf = std::numeric_limits<double>::infinity();
   Age worst{0.0, 0.0};

@@ -301,6 +301,7 @@ static Tick tick_of(struct palpate_gate g, Wish w) {
   return tick;
 }
 
+// Hazard: chain-wrong, torque
 /*@ requires good_gate(g);
     assigns \nothing;
     ensures good_gate(\result) && sound(\result.sum);

@@ -18,6 +18,7 @@ bool is_in_trouble(const CycleStatistics& hand, double t, double silence) noexce
          t - hand.last_t.load(std::memory_order_relaxed) > silence;
 }
 
+// Hazard: another-hand
 HandState LinkedDevice::read(double t) noexcept {
   HandState hand = device_->read(t);
   if (hand.fault == DeviceFault::none &&

@@ -119,6 +119,7 @@ double share_of(double dt, double time_constant) {
   return -math::expm1(-dt / time_constant);
 }
 
+// Hazard: not-a-number
 bool is_sound(const Vec3& v) {
   return v.allFinite() && v.cwiseAbs().maxCoeff() <= largest;
 }
@@ -138,6 +139,7 @@ void remove_pull(const Vec3& outwards, Vec3& force) {
 }
 
 // Both the normal that the method gives and the direction that its proxy shows have to agree.
+// Hazard: pull
 void only_push(const SafetyInput& input, Vec3& force) {
   const Vec3 lever = input.proxy - input.hip;
   if (input.normal.isZero() && lever.isZero()) force.setZero();  // no telling which way it acts
@@ -201,6 +203,7 @@ SafetyChain::SafetyChain(const DeviceLimits& device, const SafetyParameters& par
   heat_ = parameters_.initial_heat * device_.continuous_force * device_.continuous_force;
 }
 
+// Hazard: late-loop
 bool SafetyChain::stalls_at(double t) const noexcept {
   return has(stalled) && last_t_ && t - *last_t_ > parameters_.stall_time;
 }
@@ -216,6 +219,7 @@ void SafetyChain::reset() noexcept {
 
 // Does the method's normal point away from where its proxy is? A force of any weight then acts
 // through the surface or sideways. A proxy next to the HIP shows no direction.
+// Hazard: wrong-direction
 bool SafetyChain::is_contradictory(const SafetyInput& input) const noexcept {
   const Vec3 lever = input.proxy - input.hip;
   return has(direction_refused) && input.normal.dot(lever) < 0.0 && lever.norm() > least_lever &&
@@ -223,6 +227,7 @@ bool SafetyChain::is_contradictory(const SafetyInput& input) const noexcept {
 }
 
 // A fault is counted when it begins and not for each tick that it lasts.
+// Hazard: repeated-fault
 void SafetyChain::note_faults(std::uint32_t flags) noexcept {
   const std::uint32_t begun =
       flags & ~last_flags_ & (std::uint32_t{input_refused} | std::uint32_t{direction_refused});
@@ -242,6 +247,7 @@ void SafetyChain::note_faults(std::uint32_t flags) noexcept {
 
 // After a gap the last force counts as held all through, but cooling only as of a tick that is just
 // not stalled: whether the motors were off is not known.
+// Hazard: hot-motors
 void SafetyChain::warm_up(double since_last) noexcept {
   const double given = last_sent_.norm() + held_;
   const double change = given * given - heat_;
@@ -264,6 +270,7 @@ double SafetyChain::peak_as_warm() const noexcept {
 
 // Pushes only, magnitude, continuous force; and frames that are late. `share` is what the links
 // that soften leave.
+// Hazard: too-much-force
 Vec3 SafetyChain::limited(const SafetyInput& input, double share,
                           std::uint32_t& flags) const noexcept {
   Vec3 force = share * (input.force - input.transient);
@@ -309,6 +316,7 @@ Vec3 vibration_in(const SafetyInput& input, const Vec3& sent) noexcept {
 }  // namespace
 
 // Halves what is allowed at each train of fast, large swings, and gives it back when they stop.
+// Hazard: fast-oscillation
 double SafetyChain::oscillation_ceiling(double t, double dt) noexcept {
   const Vec3 steady = last_force_ - last_vibration_;
   for (int axis = 0; axis < 3; ++axis) {
@@ -330,6 +338,7 @@ double SafetyChain::oscillation_ceiling(double t, double dt) noexcept {
 
 // Halves what is allowed at each oscillation that the surface keeps up, and gives it back over so
 // long a time that the next one is not felt as one more burst of a vibration.
+// Hazard: slow-oscillation
 double SafetyChain::energy_ceiling(const SafetyInput& input, double since_last) noexcept {
   if (since_last > parameters_.stall_time) energy_.restart();
   // Across the boundary that gives the larger force.
@@ -358,6 +367,7 @@ double SafetyChain::softened(const SafetyInput& input, double since_last, double
 }
 
 // What the links from the engage gate on let through, 0 to 1.
+// Hazard: engaging-inside, late-frame, fast-hand, nobody-holds
 double SafetyChain::ceiling(const SafetyInput& input, double demand,
                             std::uint32_t& flags) noexcept {
   double ceiling = 1.0;
@@ -397,6 +407,7 @@ double SafetyChain::ceiling(const SafetyInput& input, double demand,
 }
 
 // Shrinks along the last force at fall_rate and changes otherwise at rise_rate.
+// Hazard: force-step
 Vec3 SafetyChain::slewed(const Vec3& force, double rise, double fall) const noexcept {
   const double last = last_force_.norm();
   const Vec3 along = last > 0.0 ? Vec3(last_force_ / last) : Vec3::Zero();
@@ -411,6 +422,7 @@ Vec3 SafetyChain::slewed(const Vec3& force, double rise, double fall) const noex
 // The last word. A force that turns while it shrinks slowly may be longer than before and than the
 // limit: here it is not. Then the promises are checked on the result itself, and what breaks one, a
 // NaN included, is no force.
+// Hazard: too-much-force
 Vec3 SafetyChain::bounded(Vec3 force, double rise, std::uint32_t& flags) noexcept {
   const double last = last_force_.norm();
   const double most = (flags & frame_late) != 0 ? last : std::max(last, peak());
@@ -446,6 +458,7 @@ Vec3 SafetyChain::with_transient(const SafetyInput& input, const Vec3& force,
   return sent.allFinite() ? sent : force;
 }
 
+// Hazard: not-a-number
 SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   std::uint32_t flags = 0;
   const bool in_order = std::isfinite(input.t) && (!last_t_ || input.t >= *last_t_);

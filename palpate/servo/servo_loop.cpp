@@ -180,6 +180,7 @@ void ServoLoop::request_stop() noexcept {
   if (thread_) thread_->request_stop();
 }
 
+// Hazard: session-stops, hanging-driver
 bool ServoLoop::stop() {
   if (!started_) return true;
   if (stopped_.exchange(true)) {

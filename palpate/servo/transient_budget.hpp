@@ -22,6 +22,7 @@ class TransientBudget {
   /// @param hip      [m] world
   /// @param wanted   [N] world: finite
   /// @return [N] world: what may be sent beside the force that the limit on its rise has passed
+  // Hazard: impact, material-force
   Vec3 run(double t, const Vec3& hip, const Vec3& wanted) noexcept {
     done_ += std::max(last_.dot(hip - hip_), 0.0);
     hip_ = hip;

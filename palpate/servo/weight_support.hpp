@@ -18,6 +18,7 @@ class WeightSupport {
   /// @param limit   [N] that the motors may give at most
   /// @param may     a hand is there, and nothing is wrong
   /// @return [N] 0 to `weight`, no more than `most` and `limit`
+  // Hazard: handle-weight
   double run(double t, double weight, double limit, bool may) noexcept {
     constexpr double longest_credit = 1e-3;  // [s] of ramp that a tick earns, however late it is
     const double since = t - last_t_;

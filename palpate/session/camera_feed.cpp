@@ -412,6 +412,7 @@ void CameraFeed::Worker::take_live(Frame frame) {
   newest_ = frame.cloud;
   if (const auto& range = source_->info().range; range && frames_seen_++ % frames_a_look == 0)
     status.doubt = doubt_of(*newest_, *range);
+  // Hazard: frozen-image
   const bool is_frozen = same_pictures_ >= options_.frozen_frames;
   status.latency = placer_.latency();
   status.state = is_frozen ? CameraState::frozen : CameraState::live;

@@ -123,6 +123,7 @@ void check_name(const std::string& name, std::span<const std::unique_ptr<Session
 
 // A device with motors that nothing watches keeps its last force when this process is killed: no
 // more than what a hand engages at, whatever the settings call that.
+// Hazard: unwatched-motors
 void refuse_without_watchdog(const DeviceInfo& device, const SafetyParameters& safety) {
   const bool watched =
       device.watchdog && *device.watchdog > 0.0 && *device.watchdog <= longest_watchdog;

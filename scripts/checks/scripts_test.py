@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scripts where what they call is slow or fails."""
 
+import importlib.machinery
+import importlib.util
 import os
 import pathlib
 import subprocess
@@ -15,7 +17,25 @@ sys.path.insert(0, str(SCRIPTS))
 import poor_link  # noqa: E402
 import variants  # noqa: E402
 
+LOADER = importlib.machinery.SourceFileLoader("safety_case", str(SCRIPTS / "safety_case"))
+safety_case = importlib.util.module_from_spec(
+    importlib.util.spec_from_loader("safety_case", LOADER))
+LOADER.exec_module(safety_case)
+
 BUILD = f"set -euo pipefail; source {SCRIPTS}/lib.sh; build_in build"
+
+
+class SafetyCase(unittest.TestCase):
+    def test_has_code_and_tests_for_every_hazard(self):
+        case, elements, tests = safety_case.read_case()
+        for hazard in case["hazard"]:
+            with self.subTest(hazard["id"]):
+                self.assertTrue(elements[hazard["id"]])
+                self.assertTrue(tests[hazard["id"]])
+
+    def test_is_current_in_the_docs(self):
+        self.assertEqual(safety_case.table(), safety_case.TABLE.read_text(),
+                         "run scripts/safety_case --table")
 
 
 class Build(unittest.TestCase):

@@ -153,6 +153,7 @@ TEST_F(ForceDimensionHands, GiveNoSuddenForceToAHandThatBeginsWithinTheSurface) 
   EXPECT_LE(bench.largest, limit + 1e-9);
 }
 
+// Hazard: dead-process
 TEST_F(ForceDimensionHands, LetGoWhenTheProgramIsKilled) {
   start("force-dimension:");
   ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
@@ -162,6 +163,7 @@ TEST_F(ForceDimensionHands, LetGoWhenTheProgramIsKilled) {
   EXPECT_EQ(bench.motor_force(bench.commanded + reaction), 0.0);
 }
 
+// Hazard: dead-process
 TEST_F(ForceDimensionHands, LetGoWhenTheProgramIsStoppedAndBeginAnewAfter) {
   start("force-dimension:");
   ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
@@ -247,6 +249,7 @@ TEST_F(TouchHands, TouchASlopeInTheDriversOwnCallback) {
   EXPECT_LE(bench.largest, limit + 1e-9);
 }
 
+// Hazard: dead-process
 TEST_F(TouchHands, LetGoWhenTheProgramIsStoppedOrKilled) {
   start("touch:");
   ASSERT_TRUE(reaches([&] { return motor_force() > 0.95 * limit; }));
@@ -377,6 +380,7 @@ TEST_F(HaplyHands, FindTheFormOfTheCommandThatTheServiceTakes) {
   EXPECT_LE(at(largest_first), 0.25);
 }
 
+// Hazard: dead-process
 TEST_F(HaplyHands, LetGoWhenTheProgramIsStoppedOrKilled) {
   at(version) = 3.5;
   start(uri());

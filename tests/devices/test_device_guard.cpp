@@ -24,6 +24,7 @@ namespace test_device_guard {
 
 constexpr double beat_time = 0.020;  // [s]
 
+// Hazard: dead-process
 TEST(GuardGate, PassesForcesWhileTheyComeAndAfterALapseOnlyFromZeroOn) {
   GuardGate gate(beat_time);
   const Vec3 force(0.0, 0.0, 1.0);
@@ -143,6 +144,7 @@ class DeviceGuard : public ::testing::Test {
   pid_t child_ = -1;
 };
 
+// Hazard: dead-process
 TEST_F(DeviceGuard, TakesTheForceOffWhenItsSessionIsKilled) {
   start_session();
   kill(child_, SIGKILL);
@@ -154,6 +156,7 @@ TEST_F(DeviceGuard, TakesTheForceOffWhenItsSessionIsKilled) {
   EXPECT_EQ(seen.late_forces, 0);
 }
 
+// Hazard: dead-process
 TEST_F(DeviceGuard, TakesTheForceOffWhileItsSessionIsStopped) {
   start_session();
   kill(child_, SIGSTOP);
@@ -166,6 +169,7 @@ TEST_F(DeviceGuard, TakesTheForceOffWhileItsSessionIsStopped) {
   EXPECT_EQ(seen.late_forces, 0);
 }
 
+// Hazard: dead-process
 TEST_F(DeviceGuard, ShowsTheDeviceAsItIsAndStatesAWatchdog) {
   const std::unique_ptr<Device> device = open();
   EXPECT_EQ(device->info().uri, "witness:");
@@ -189,6 +193,7 @@ TEST_F(DeviceGuard, ShowsTheDeviceAsItIsAndStatesAWatchdog) {
   EXPECT_EQ(state.fault, DeviceFault::none);
 }
 
+// Hazard: dead-process
 TEST_F(DeviceGuard, PassesNoForceOfADisabledDevice) {
   const std::unique_ptr<Device> device = open();
   double t = 0.0;
@@ -212,6 +217,7 @@ TEST_F(DeviceGuard, PassesNoForceOfADisabledDevice) {
   EXPECT_EQ(push_for(50), 0.0);
 }
 
+// Hazard: dead-process
 TEST_F(DeviceGuard, SaysWhyADeviceDidNotOpen) {
   const auto failing = [] {
     return open_guarded([]() -> std::unique_ptr<Device> {

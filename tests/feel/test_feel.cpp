@@ -97,6 +97,7 @@ TEST(Feel, AddsFrictionToEachMethodsForce) {
   }
 }
 
+// Hazard: material-force
 TEST(Feel, KeepsWithinTheLimitOfTheForce) {
   Plane plane("ideal");
   Parameters parameters = with_friction(2.0);

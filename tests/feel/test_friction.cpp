@@ -102,6 +102,7 @@ TEST(Friction, HoldsAHandForEverInNoise) {
   EXPECT_NEAR(x + force.x() / p.bristle_stiffness, 0.0, 1e-9);
 }
 
+// Hazard: material-energy
 TEST(Friction, MakesNoEnergyGoingToAndFro) {
   for (const double stroke : {0.2e-3, 1e-3, 10e-3}) {
     FrictionParameters p = rubber();

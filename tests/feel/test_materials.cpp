@@ -191,6 +191,7 @@ Sweep sweep(double friction, double speed) {
   return sweep;
 }
 
+// Hazard: material-energy
 TEST(Materials, GiveBackNoMoreThanTheyTookOverABorder) {
   for (const double speed : {0.02, 0.1, 0.3}) {
     for (const double friction : {0.0, 0.3}) {
@@ -205,6 +206,7 @@ TEST(Materials, GiveBackNoMoreThanTheyTookOverABorder) {
   }
 }
 
+// Hazard: material-energy
 TEST(Hardness, WaitsUnderAHandAtRestAndChangesWhenItComesOff) {
   Hardness hardness;
   const Vec3 push(0, 0, 2.0);
@@ -219,6 +221,7 @@ TEST(Hardness, WaitsUnderAHandAtRestAndChangesWhenItComesOff) {
   EXPECT_EQ(rest(1.0, push), 1.0);
 }
 
+// Hazard: material-energy
 TEST(Hardness, NeverMakesEnergyWhateverTheMapAndTheHandDo) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> share(0.05, 1.0);
@@ -303,6 +306,7 @@ TEST(Tap, RingsAlongTheNormalWhereTheForceIsOfRoundingErrors) {
   EXPECT_GT(largest, 0.1);
 }
 
+// Hazard: material-force
 TEST(Tap, IsOneForEachImpactBeforeANoisyCamera) {
   Parameters parameters;
   parameters.tap = {.tap = 5.0, .tap_frequency = 150.0, .tap_decay = 80.0};
@@ -383,6 +387,7 @@ TEST(Grain, HasTheSpectrumOfItsSpeedWhateverTheRate) {
   }
 }
 
+// Hazard: material-force
 TEST(Grain, IsSilentAtRest) {
   Parameters parameters;
   parameters.texture.grain = 0.2;
@@ -426,6 +431,7 @@ TEST(Relief, LeansAgainstWhatGetsBrighter) {
   }
 }
 
+// Hazard: material-force
 TEST(Materials, AreFeltWithinTheLimitWhateverTheHandDoes) {
   MaterialTable table;
   for (const NamedMaterial& m : standard_materials().materials) table.materials.push_back(m);

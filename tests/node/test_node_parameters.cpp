@@ -55,6 +55,7 @@ TEST_F(NodeParametersTest, SetsNumbersWholeOnesAndTheMethod) {
   EXPECT_EQ(settings_.method, "paper");
 }
 
+// Hazard: ros-node
 TEST_F(NodeParametersTest, SaysWhyItRefuses) {
   const auto refuses = [&](const std::string& name, const ParameterValue& value,
                            const std::string& why, const std::string& remedy) {

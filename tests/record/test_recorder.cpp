@@ -335,6 +335,7 @@ std::shared_ptr<const DepthImage> noisy_floor(unsigned seed) {
   }
 }
 
+// Hazard: killed-recording
 TEST(Recorder, KilledAtAnyTimeLeavesASessionThatReplaysToItsLastCommit) {
   constexpr int rounds = 8;
   std::mt19937 random(5);

@@ -13,6 +13,7 @@ namespace test_adversary {
 constexpr std::uint64_t ticks = test::sanitized ? 50'000 : 1'000'000;
 
 // The same for longer: `ninja adversarial_ticks`.
+// Hazard: too-much-force
 TEST(Adversary, GetsNoForceThatBreaksAPromise) {
   test::Adversary adversary(1);
   while (adversary.ticks() < ticks) {

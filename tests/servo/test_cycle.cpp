@@ -153,6 +153,7 @@ TEST(Cycle, ForgetsAHandThatWasNoNumberOnceItIsOneAgain) {
   EXPECT_EQ(session.run().tick.hip, Vec3(0, 0, 0.02));
 }
 
+// Hazard: lost-camera
 TEST(Cycle, TakesTheForceOffWhenTheCameraRepeatsItselfOrStandsStill) {
   const auto force_after = [](double seconds, auto feed) {
     Session session;
@@ -206,6 +207,7 @@ struct TwoCameras : Session {
   ServoTick record{};
 };
 
+// Hazard: lost-camera
 TEST(Cycle, TakesTheForceOffWhenOneOfTwoCamerasDies) {
   TwoCameras session;
   session.cloud = nullptr;
@@ -262,6 +264,7 @@ TEST(Cycle, AdoptsTheToleranceOfFutureStampsWithTheSettings) {
   EXPECT_GT(force_with(0.21), 0.5);
 }
 
+// Hazard: repeated-fault
 TEST(Cycle, LatchesRepeatedFaultsUntilTheyAreReset) {
   Session session;
   session.run_for(2.0);
@@ -287,6 +290,7 @@ TEST(Cycle, SaysHowWarmTheMotorsAre) {
 
 // What real methods do may never be taken for a fault: a plane that moves by up to 20 mm at 1 Hz,
 // with noise of its own in each frame, under a hand that presses, slides and lifts.
+// Hazard: wrong-direction
 TEST(Cycle, FindsNoFaultInTheDirectionsOfHonestContacts) {
   constexpr int runs = test::sanitized ? 4 : 24;
   int forceful = 0;

@@ -71,6 +71,7 @@ void wait_until(const std::function<bool()>& done) {
   while (!done()) std::this_thread::yield();
 }
 
+// Hazard: session-stops
 TEST(DrivenLoop, RunsItsCyclesOnTheDevicesThreadAndKeepsTheirTiming) {
   DrivingDevice device;
   ServoLoop loop(make_method("paper"), device);
@@ -91,6 +92,7 @@ TEST(DrivenLoop, RunsItsCyclesOnTheDevicesThreadAndKeepsTheirTiming) {
   EXPECT_EQ(device.writes, static_cast<int>(ticks) + 1);
 }
 
+// Hazard: hang, session-stops
 TEST(DrivenLoop, DisablesADeviceWhoseCallbacksStopAndEnablesItWhenTheyComeAgain) {
   DrivingDevice device;
   ServoLoop loop(make_method("paper"), device);
@@ -110,6 +112,7 @@ TEST(DrivenLoop, DisablesADeviceWhoseCallbacksStopAndEnablesItWhenTheyComeAgain)
   EXPECT_FALSE(device.enabled);
 }
 
+// Hazard: session-stops
 TEST(DrivenLoop, SendsZeroByItselfWhereTheCallbacksHaveEnded) {
   DrivingDevice device;
   ServoLoop loop(make_method("paper"), device);
@@ -123,6 +126,7 @@ TEST(DrivenLoop, SendsZeroByItselfWhereTheCallbacksHaveEnded) {
   EXPECT_FALSE(device.enabled);
 }
 
+// Hazard: session-stops
 TEST(DrivenLoop, RefusesADeviceThatCannotBeEnabledOrNeverCalls) {
   DrivingDevice device;
   device.refuses = true;
@@ -174,6 +178,7 @@ class HangingMethod final : public Method {
   int ticks_ = 0;
 };
 
+// Hazard: hang, session-stops
 TEST(ServoLoop, DisablesThePolledDeviceOfAMethodThatHangs) {
   Hang hang;
   FakeDevice device;
@@ -191,6 +196,7 @@ TEST(ServoLoop, DisablesThePolledDeviceOfAMethodThatHangs) {
   EXPECT_TRUE(device.force.isZero());
 }
 
+// Hazard: session-stops
 TEST(ServoLoop, DisablesADeviceWithAForceLongBeforeTheWatchTime) {
   Hang hang;
   FakeDevice device;
@@ -219,6 +225,7 @@ TEST(ServoLoop, DisablesADeviceWithAForceLongBeforeTheWatchTime) {
   EXPECT_TRUE(in_time);
 }
 
+// Hazard: session-stops, hanging-driver
 TEST(ServoLoop, StopsAlthoughAMethodHangsAndEndsItsThreadWhenThatReturns) {
   Hang hang;
   FakeDevice device;
@@ -243,6 +250,7 @@ TEST(ServoLoop, StopsAlthoughAMethodHangsAndEndsItsThreadWhenThatReturns) {
   EXPECT_EQ(device.enables, enables) << "never again";
 }
 
+// Hazard: session-stops
 TEST(ServoLoop, DisablesTheDeviceAtOnceByASecondStopWhileTheFirstWaits) {
   Hang hang;
   FakeDevice device;
@@ -261,6 +269,7 @@ TEST(ServoLoop, DisablesTheDeviceAtOnceByASecondStopWhileTheFirstWaits) {
   hang.end();
 }
 
+// Hazard: session-stops, hanging-driver
 TEST(DrivenLoop, StopsAlthoughACallbackHangsAndEndsItWhenThatReturns) {
   Hang hang;
   DrivingDevice device;
@@ -304,6 +313,7 @@ struct SlowlyEnabledDevice final : Device {
   DeviceInfo info_{.uri = "slow:", .kind = "slow", .limits = {}};
 };
 
+// Hazard: session-stops, hanging-driver
 TEST(ServoLoop, StopsAlthoughTheDeviceHangsWhileItIsEnabledAndLeavesItDisabled) {
   Hang hang;
   SlowlyEnabledDevice device;
@@ -325,6 +335,7 @@ TEST(ServoLoop, StopsAlthoughTheDeviceHangsWhileItIsEnabledAndLeavesItDisabled) 
   EXPECT_FALSE(device.enabled);
 }
 
+// Hazard: session-stops
 TEST(ServoLoop, RefusesAWatchTimeOutOfRange) {
   FakeDevice device;
   EXPECT_THROW(ServoLoop(make_method("paper"), device, {}, {.watch_time = 0.0}), Error);
@@ -358,6 +369,7 @@ struct Pressing {
   int ticks = 0;
 };
 
+// Hazard: nobody-holds
 TEST(DeviceFault, TakesTheForceAwayInTwoTicksAndIsInTheRecord) {
   Pressing session;
   ASSERT_GT(session.run().force.norm(), 1.0);
@@ -378,6 +390,7 @@ TEST(DeviceFault, TakesTheForceAwayInTwoTicksAndIsInTheRecord) {
   }
 }
 
+// Hazard: nobody-holds
 TEST(DeviceFault, IsSaidInWordsByTheLoop) {
   FakeDevice device;
   ServoLoop loop(make_method("paper"), device);
@@ -392,6 +405,7 @@ TEST(DeviceFault, IsSaidInWordsByTheLoop) {
   EXPECT_EQ(loop.device_status().text, device.text) << "the device knows better";
 }
 
+// Hazard: nobody-holds
 TEST(DeviceFault, HasANameAndASentenceEach) {
   EXPECT_EQ(to_string(DeviceFault::none), "none");
   EXPECT_EQ(describe(DeviceFault::none), "");

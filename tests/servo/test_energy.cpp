@@ -34,6 +34,7 @@ HapticLoop touch_without_a_hand() {
   return loop;
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyLink, StopsAFreeHandleThatSwingsBelow20Hz) {
   HapticLoop loop = touch_without_a_hand();
   const HapticLoop::Result with = loop.run(8.0, 0.005);
@@ -44,6 +45,7 @@ TEST(EnergyLink, StopsAFreeHandleThatSwingsBelow20Hz) {
   EXPECT_GT(largest_after(loop.run(8.0, 0.005), 4.0), 6e-3) << "the fault is gone by itself";
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyLink, StopsEveryFreeHandleOfAPopulation) {
   std::uint64_t swung = 0;
   for (std::uint64_t seed = first_seed; seed < first_seed + free_swings; ++seed) {
@@ -59,12 +61,14 @@ TEST(EnergyLink, StopsEveryFreeHandleOfAPopulation) {
   EXPECT_GT(swung, free_swings / 2) << "nothing was at stake";
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyLink, LetsHonestContactsBe) {
   for (std::uint64_t seed = first_seed; seed < first_seed + honest_contacts; ++seed) {
     EXPECT_LT(test::honest_contact(seed).run(4.0, 0.012).first_cut, 0.0) << "seed " << seed;
   }
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyLink, StopsASlowOscillationOfAMethodThatLags) {
   HapticLoop loop;
   loop.mass = 0.1;
@@ -79,6 +83,7 @@ TEST(EnergyLink, StopsASlowOscillationOfAMethodThatLags) {
   EXPECT_GT(largest_after(loop.run(8.0, 0.003), 4.0), 5e-3);
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyLink, LeavesTheSameHandleAloneInAHand) {
   HapticLoop held = touch_without_a_hand();
   held.hand_mass = 0.1;
@@ -127,6 +132,7 @@ struct Shaken {
                     .surface_velocity = 0.0};
 };
 
+// Hazard: slow-oscillation
 TEST(EnergyLink, HalvesTheStiffnessAndGivesItBackOverItsMemory) {
   Shaken session;
   EXPECT_TRUE(session.shake(9).flags & energy_cut);
@@ -137,12 +143,14 @@ TEST(EnergyLink, HalvesTheStiffnessAndGivesItBackOverItsMemory) {
   EXPECT_EQ(later.flags, 0U);
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyLink, LeavesAHandAllTheForceThatIsAllowed) {
   Shaken session;
   session.shake(9);
   EXPECT_NEAR(session.hold(0.1, 8.0).force.z(), 3.3, 1e-9) << "softer, not weaker";
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyLink, ForgetsCyclesBeforeAGapOrAFault) {
   const auto found_after = [](auto disturb) {
     // With a ramp so short that the force is there again in the same cycle.
@@ -193,6 +201,7 @@ int found_in_cycle(double hertz, int lag, double amplitude, double decay, double
   return 0;
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyMonitor, FindsAnOscillationInItsEighthCycleOrSooner) {
   for (const double hertz : {9.0, 14.0, 25.0, 40.0}) {
     const int cycle = found_in_cycle(hertz, 1, 4e-3, 0.0, 0.0);
@@ -200,6 +209,7 @@ TEST(EnergyMonitor, FindsAnOscillationInItsEighthCycleOrSooner) {
   }
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyMonitor, FindsASlowOneThatGeneratesMuch) {
   EXPECT_EQ(found_in_cycle(4.0, 1, 4e-3, 0.0, 0.0), 0) << "someone taps";
   const int cycle = found_in_cycle(4.0, 20, 4e-3, 0.0, 0.0);
@@ -207,23 +217,28 @@ TEST(EnergyMonitor, FindsASlowOneThatGeneratesMuch) {
   EXPECT_EQ(found_in_cycle(1.0, 20, 4e-3, 0.0, 0.0), 0) << "someone has time to let go";
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyMonitor, FindsItOnAMovingSurface) {
   EXPECT_GT(found_in_cycle(14.0, 1, 4e-3, 0.0, 0.0, 10e-3), 0);
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyMonitor, FindsItWhereTheSurfaceIsNeverLeft) {
   EXPECT_GT(found_in_cycle(14.0, 2, 2e-3, 0.0, 0.0, 0.0, 1000.0, {.depth = 8e-3}), 0);
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyMonitor, FindsItInAHandThatMovesUnevenly) {
   EXPECT_GT(found_in_cycle(9.0, 2, 2e-3, 0.0, 0.0, 0.0, 1000.0, {.ripple = 0.4e-3}), 0);
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyMonitor, FindsItAtEveryRate) {
   EXPECT_GT(found_in_cycle(14.0, 1, 4e-3, 0.0, 0.0, 0.0, 500.0), 0);
   EXPECT_GT(found_in_cycle(25.0, 1, 4e-3, 0.0, 0.0, 0.0, 4000.0), 0);
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyMonitor, IgnoresWhatIsSmallDiesAwayOrGoesElsewhere) {
   EXPECT_EQ(found_in_cycle(14.0, 1, 0.45e-3, 0.0, 0.0), 0) << "less than a millimetre";
   EXPECT_EQ(found_in_cycle(14.0, 1, 20e-3, 4.0, 0.0), 0) << "25 % less each cycle";
@@ -231,6 +246,7 @@ TEST(EnergyMonitor, IgnoresWhatIsSmallDiesAwayOrGoesElsewhere) {
   EXPECT_GT(found_in_cycle(14.0, 1, 4e-3, 0.0, 0.05), 0) << "3.6 mm aside each cycle";
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyMonitor, IgnoresTremorOnASurfaceThatAnswersATickLate) {
   for (const double hertz : {9.0, 12.0}) {
     EXPECT_EQ(found_in_cycle(hertz, 1, 1.5e-3, 0.0, 0.0, 0.0, 1000.0, {.depth = 8e-3}), 0) << hertz;
@@ -240,6 +256,7 @@ TEST(EnergyMonitor, IgnoresTremorOnASurfaceThatAnswersATickLate) {
       << "no tremor";
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyMonitor, IgnoresTremorOfAHandThatComesOutOfTheSurface) {
   // What the surface gives back was stored when the hand went in.
   for (const int lag : {0, 1}) {
@@ -248,6 +265,7 @@ TEST(EnergyMonitor, IgnoresTremorOfAHandThatComesOutOfTheSurface) {
   }
 }
 
+// Hazard: slow-oscillation
 TEST(EnergyMonitor, IgnoresASurfaceThatTakesEnergy) {
   // The force leads the hand: it is that of the next tick's place.
   EnergyMonitor monitor;

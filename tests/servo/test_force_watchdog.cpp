@@ -26,6 +26,7 @@ struct SwitchedDevice final : Device {
   DeviceInfo info_{.uri = "switched:", .kind = "switched", .limits = {}};
 };
 
+// Hazard: hang
 TEST(ForceWatchdog, TakesAForceOffAfter10msWithoutATick) {
   SwitchedDevice device;
   ForceWatchdog watchdog(device);
@@ -40,6 +41,7 @@ TEST(ForceWatchdog, TakesAForceOffAfter10msWithoutATick) {
   EXPECT_NEAR(watchdog.silence(5.02), 0.02, 1e-12);
 }
 
+// Hazard: hang
 TEST(ForceWatchdog, GivesALoopWithoutAForce25ms) {
   SwitchedDevice device;
   ForceWatchdog watchdog(device);
@@ -50,6 +52,7 @@ TEST(ForceWatchdog, GivesALoopWithoutAForce25ms) {
   EXPECT_FALSE(device.enabled);
 }
 
+// Hazard: hang
 TEST(ForceWatchdog, JudgesByTheForceOfTheLastTickAlone) {
   SwitchedDevice device;
   ForceWatchdog watchdog(device);
@@ -59,6 +62,7 @@ TEST(ForceWatchdog, JudgesByTheForceOfTheLastTickAlone) {
   EXPECT_TRUE(device.enabled);
 }
 
+// Hazard: hang
 TEST(ForceWatchdog, EnablesTheDeviceWhenTicksComeAgainAndNotBefore) {
   SwitchedDevice device;
   ForceWatchdog watchdog(device);
@@ -71,6 +75,7 @@ TEST(ForceWatchdog, EnablesTheDeviceWhenTicksComeAgainAndNotBefore) {
   EXPECT_TRUE(device.enabled);
 }
 
+// Hazard: hang
 TEST(ForceWatchdog, AsksADeviceThatRefusesOnceASecondAndSaysWhy) {
   SwitchedDevice device;
   ForceWatchdog watchdog(device);

@@ -31,6 +31,7 @@ double feed(Freshness& freshness, double interval, int frames, double delay = 0.
   return t;
 }
 
+// Hazard: lost-camera
 TEST(Freshness, IsInfinitelyOldBeforeTheFirstFrame) {
   EXPECT_EQ(Freshness().at(5.0).age, inf);
   EXPECT_EQ(Freshness().at(5.0).intervals, inf);
@@ -39,6 +40,7 @@ TEST(Freshness, IsInfinitelyOldBeforeTheFirstFrame) {
   EXPECT_EQ(freshness.at(5.0).age, inf);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, CountsAgeFromCaptureAndIntervalsFromArrival) {
   Freshness freshness;
   const double last = feed(freshness, 0.01, 20, 0.04);
@@ -46,6 +48,7 @@ TEST(Freshness, CountsAgeFromCaptureAndIntervalsFromArrival) {
   EXPECT_NEAR(freshness.at(last + 0.005).intervals, 0.5, 1e-9);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, TakesACameraFor30HzUntilTwoFramesCame) {
   Freshness freshness;
   adopt(freshness, 10.0, 10.0);
@@ -54,6 +57,7 @@ TEST(Freshness, TakesACameraFor30HzUntilTwoFramesCame) {
   EXPECT_NEAR(freshness.at(10.3).intervals, 0.5, 1e-9);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, KnowsACamerasIntervalDespiteSkippedFramesAndBursts) {
   Freshness freshness;
   double stamp = 10.0;
@@ -65,6 +69,7 @@ TEST(Freshness, KnowsACamerasIntervalDespiteSkippedFramesAndBursts) {
   }
 }
 
+// Hazard: lost-camera
 TEST(Freshness, LearnsNoIntervalFromAStampThatJumpedBack) {
   Freshness freshness;
   double t = feed(freshness, 0.01, 20);
@@ -76,6 +81,7 @@ TEST(Freshness, LearnsNoIntervalFromAStampThatJumpedBack) {
   EXPECT_NEAR(freshness.at(t + 0.02).intervals, 2.0, 1e-9);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, IsThatOfTheWorstOfTwoCamerasWhicheverThatIs) {
   for (const std::size_t dead : {0U, 1U}) {
     Freshness freshness;
@@ -93,6 +99,7 @@ TEST(Freshness, IsThatOfTheWorstOfTwoCamerasWhicheverThatIs) {
   }
 }
 
+// Hazard: lost-camera
 TEST(Freshness, IsNoneAtATimeThatIsNone) {
   Freshness freshness;
   feed(freshness, 0.01, 20);
@@ -100,6 +107,7 @@ TEST(Freshness, IsNoneAtATimeThatIsNone) {
   EXPECT_FALSE(freshness.at(nan).intervals <= 1e9);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, TakesNoCameraForFasterThanAKilohertz) {
   Freshness freshness;
   double stamp = 10.0;
@@ -110,6 +118,7 @@ TEST(Freshness, TakesNoCameraForFasterThanAKilohertz) {
   EXPECT_NEAR(freshness.at(stamp + 0.002).intervals, 2.0, 1e-6);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, GoesOnAfterAnInfiniteStamp) {
   Freshness freshness;
   const double last = feed(freshness, 0.01, 20);
@@ -118,6 +127,7 @@ TEST(Freshness, GoesOnAfterAnInfiniteStamp) {
   EXPECT_NEAR(freshness.at(last + 0.025).age, 0.005, 1e-12);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, AdaptsToACameraThatChangesItsRate) {
   Freshness freshness;
   double stamp = feed(freshness, 1.0 / 90.0, 50);
@@ -125,12 +135,14 @@ TEST(Freshness, AdaptsToACameraThatChangesItsRate) {
   EXPECT_NEAR(freshness.at(stamp + 0.2).intervals, 1.0, 1e-9);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, TakesNoPauseOfMoreThanASecondForARate) {
   Freshness freshness;
   for (const double stamp : {10.0, 15.0, 20.0, 25.0}) adopt(freshness, stamp, stamp);
   EXPECT_NEAR(freshness.at(25.1).intervals, 3.0, 1e-9);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, IsNotFooledByStampsThatRepeatRunBackwardsOrAreFromTheFuture) {
   const auto age_after = [](auto stamp_at) {
     Freshness freshness;
@@ -148,6 +160,7 @@ TEST(Freshness, IsNotFooledByStampsThatRepeatRunBackwardsOrAreFromTheFuture) {
   EXPECT_NEAR(age_after([](double, double t) { return t + 0.049; }), 0.0, 1e-9);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, IsNeverYoungerThanItsArrival) {
   Freshness freshness;
   adopt(freshness, 10.04, 10.0);
@@ -155,6 +168,7 @@ TEST(Freshness, IsNeverYoungerThanItsArrival) {
   EXPECT_NEAR(freshness.at(10.08).age, 0.08, 1e-9);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, RecoversAfterACameraStartedItsClockAnew) {
   Freshness freshness;
   const double last = feed(freshness, 0.033, 10);
@@ -185,12 +199,14 @@ struct Cameras {
   double worst_intervals = 0.0;
 };
 
+// Hazard: lost-camera
 TEST(Freshness, ChargesNoCameraWithTheRateOfAllTogether) {
   Cameras cameras(8);
   cameras.run(1.0, 8);
   EXPECT_LT(cameras.worst_intervals, 1.01);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, DoesNotLetALivingCameraHideADeadOne) {
   Cameras cameras(2);
   cameras.run(1.0, 2);
@@ -202,6 +218,7 @@ TEST(Freshness, DoesNotLetALivingCameraHideADeadOne) {
   EXPECT_LT(cameras.freshness.at(cameras.t).age, 0.04) << "it is no longer waited for";
 }
 
+// Hazard: lost-camera
 TEST(Freshness, WaitsForTheFirstFrameOfEachCamera) {
   Cameras cameras(3);
   cameras.run(1.0, 2);
@@ -210,6 +227,7 @@ TEST(Freshness, WaitsForTheFirstFrameOfEachCamera) {
   EXPECT_LT(cameras.freshness.at(cameras.t).age, 0.04);
 }
 
+// Hazard: lost-camera
 TEST(Freshness, JudgesACameraThatComesBackAnew) {
   Cameras cameras(2);
   cameras.run(1.0, 2);

@@ -46,6 +46,7 @@ struct Gated {
   LastGate::Sent last{};
 };
 
+// Hazard: chain-wrong
 TEST(LastGate, SendsToTheBitWhatKeepsTheBounds) {
   Gated session;
   session.open();
@@ -60,6 +61,7 @@ TEST(LastGate, SendsToTheBitWhatKeepsTheBounds) {
   }
 }
 
+// Hazard: chain-wrong
 TEST(LastGate, CutsToTheLimitAndKeepsTheDirection) {
   Gated session;
   for (int i = 0; i < 2000; ++i) session.run(Vec3(0.0, 30.0, 40.0));
@@ -69,6 +71,7 @@ TEST(LastGate, CutsToTheLimitAndKeepsTheDirection) {
   EXPECT_EQ(session.last.verdict, palpate_gate_cut);
 }
 
+// Hazard: chain-wrong
 TEST(LastGate, AddsInATickOnlyWhatTheRateAllows) {
   Gated session;
   session.open(Vec3(0, 0, 1));
@@ -80,6 +83,7 @@ TEST(LastGate, AddsInATickOnlyWhatTheRateAllows) {
   EXPECT_NEAR(session.run(Vec3(3, 0, 0)).x(), 0.5, 1e-9) << "sideways, too";
 }
 
+// Hazard: chain-wrong
 TEST(LastGate, TakesAForceOffAtOnce) {
   Gated session;
   session.open(Vec3(0, 0, 0));
@@ -89,6 +93,7 @@ TEST(LastGate, TakesAForceOffAtOnce) {
   EXPECT_EQ(session.last.verdict, 0);
 }
 
+// Hazard: chain-wrong
 TEST(LastGate, AddsForAnImpactWhatItsRingingMayBe) {
   Gated session;
   session.open(Vec3(0, 0, 1));
@@ -102,6 +107,7 @@ TEST(LastGate, AddsForAnImpactWhatItsRingingMayBe) {
   EXPECT_NEAR(session.run(Vec3(0, 0, -2)).z(), -1.5, 1e-9) << "no number: none, but the last's";
 }
 
+// Hazard: chain-wrong
 TEST(LastGate, NeverSendsMoreWhileAFrameIsLate) {
   Gated session;
   session.open(Vec3(0, 0, 1));
@@ -126,6 +132,7 @@ struct Closing {
 
 class LastGateCloses : public ::testing::TestWithParam<Closing> {};
 
+// Hazard: chain-wrong
 TEST_P(LastGateCloses, WithinTenMillisecondsAndOpensOnlyByTheRamp) {
   Gated session;
   session.wish.force_bounds.fall = 1.0;  // the user's rate is slow; the gate's is not
@@ -170,6 +177,7 @@ struct Shutting {
 
 class LastGateShuts : public ::testing::TestWithParam<Shutting> {};
 
+// Hazard: chain-wrong
 TEST_P(LastGateShuts, AtOnceAndOpensOnlyByTheRamp) {
   Gated session;
   session.open(Vec3(0, 0, 2));
@@ -216,12 +224,14 @@ INSTANTIATE_TEST_SUITE_P(
         Shutting{"longest_time", [](auto& w) { w.t += ms, w.longest_time = 0.2; }}),
     [](const auto& shutting) { return std::string(shutting.param.name); });
 
+// Hazard: chain-wrong
 TEST(LastGate, SendsNothingInItsFirstTick) {
   Gated session;
   EXPECT_EQ(session.run(Vec3(0, 0, 1)), Vec3::Zero());
   EXPECT_EQ(session.last.verdict, palpate_gate_shut);
 }
 
+// Hazard: chain-wrong, torque
 TEST(LastGate, BoundsATorqueAsAForce) {
   Gated session;
   for (int i = 0; i < 1600; ++i) session.run(Vec3::Zero());
@@ -242,6 +252,7 @@ TEST(LastGate, BoundsATorqueAsAForce) {
   EXPECT_EQ(session.last.wrench.torque, Vec3::Zero());
 }
 
+// Hazard: chain-wrong
 TEST(LastGate, ReachesALoweredLimitAtTheRateOfTheUser) {
   Gated session;
   session.wish.force_bounds.fall = 400.0;
@@ -254,6 +265,7 @@ TEST(LastGate, ReachesALoweredLimitAtTheRateOfTheUser) {
   EXPECT_NEAR(session.device.force.z(), 1.0, 1e-5);
 }
 
+// Hazard: chain-wrong
 TEST(LastGate, HoldsAHandlesWeightBesideTheForceWithinOneNewtonAndTheLimit) {
   Gated session;
   session.wish.engaged = 0;

@@ -80,6 +80,7 @@ TEST(SafetyChain, PassesAModestForceOnceEngaged) {
   EXPECT_EQ(output.gain, 1.0);
 }
 
+// Hazard: not-a-number
 TEST(SafetyChain, AnswersWhatIsNotFiniteWithNoForce) {
   const auto worst = [](std::uint32_t links, auto spoil) {
     Session session = engaged_without(links);
@@ -110,6 +111,7 @@ TEST(SafetyChain, AnswersWhatIsNotFiniteWithNoForce) {
   EXPECT_EQ(worst(0, [](SafetyInput& input) { input.t = inf; }), 0.0);
 }
 
+// Hazard: not-a-number
 TEST(SafetyChain, TakesTheForceOffWhenTimeRunsBackwards) {
   Session session = engaged_without(0);
   session.run_for(0.1, 0.8);
@@ -126,6 +128,7 @@ TEST(SafetyChain, TakesTwoTicksAtTheSameTimeForNoFault) {
   EXPECT_NEAR(again.force.z(), 0.8, 1e-12);
 }
 
+// Hazard: not-a-number
 TEST(SafetyChain, GoesOnAfterATimeThatWasNone) {
   Session session = engaged_without(0);
   const double t = session.input.t;
@@ -136,6 +139,7 @@ TEST(SafetyChain, GoesOnAfterATimeThatWasNone) {
   EXPECT_NEAR(session.engage().run_for(0.1, 0.8).force.norm(), 0.8, 1e-9);
 }
 
+// Hazard: pull
 TEST(SafetyChain, OnlyPushesAndLeavesWhatIsAlongTheSurface) {
   const auto pulled = [](std::uint32_t links) {
     Session session = engaged_without(links);
@@ -161,6 +165,7 @@ TEST(SafetyChain, TellsAPushFromAPullByTheProxyWhereThereIsNoNormal) {
   EXPECT_EQ(session.run_for(0.02, 0.5).force.z(), 0.0) << "neither is known: no force";
 }
 
+// Hazard: pull
 TEST(SafetyChain, OnlyPushesWhereTheProxyIsNextToTheHand) {
   Session session = engaged_without(0);
   session.input.proxy = session.input.hip + Vec3(0, 0, 0.5e-3);
@@ -171,6 +176,7 @@ TEST(SafetyChain, OnlyPushesWhereTheProxyIsNextToTheHand) {
   EXPECT_NEAR(session.run_for(0.02, -0.5).force.z(), 0.0, 1e-12) << "by the proxy alone";
 }
 
+// Hazard: pull
 TEST(SafetyChain, LetsNoForceActAwayFromTheProxyWhateverTheNormalSays) {
   // The normal leans by 80 degrees from the direction to the proxy, and the force pulls along it.
   Session session = engaged_without(0);
@@ -186,6 +192,7 @@ TEST(SafetyChain, LetsNoForceActAwayFromTheProxyWhateverTheNormalSays) {
   EXPECT_TRUE(output.flags & pull_removed);
 }
 
+// Hazard: wrong-direction
 TEST(SafetyChain, RefusesANormalThatContradictsTheDirectionToTheProxy) {
   const auto flipped = [](std::uint32_t links, double newtons, double lever) {
     Session session = engaged_without(links | fault_latched);
@@ -216,6 +223,7 @@ TEST(SafetyChain, RefusesANormalThatContradictsTheDirectionToTheProxy) {
   EXPECT_EQ(session.run_for(1.0, 0.8).force.norm(), 0.0) << "and the hand has to engage anew";
 }
 
+// Hazard: not-a-number
 TEST(SafetyChain, EngagesAnewAfterAFault) {
   Session session = engaged_without(0, never_hot);
   session.run_for(0.1, 2.0);
@@ -249,6 +257,7 @@ void stumble(Session& session, int times, double period) {
   }
 }
 
+// Hazard: repeated-fault
 TEST(SafetyChain, LatchesRepeatedFaultsUntilAnOperatorResetsIt) {
   Session session = engaged_without(0, never_hot);
   stumble(session, 2, 0.5);
@@ -301,6 +310,7 @@ TEST(SafetyChain, LatchesForEveryKindOfFaultAndNotForRareOrLongOnes) {
   EXPECT_EQ(without.chain.latched_by(), 0U);
 }
 
+// Hazard: too-much-force
 TEST(SafetyChain, CutsTheForceToTheLowerOfTheDevicesAndTheUsersLimit) {
   EXPECT_NEAR(engaged_without(0, never_hot).run_for(0.1, 10.0).force.norm(), 3.3, 1e-9);
   EXPECT_NEAR(engaged_without(force_cut, never_hot).run_for(0.1, 10.0).force.norm(), 10.0, 1e-9);
@@ -315,6 +325,7 @@ TEST(SafetyChain, CutsTheForceToTheLowerOfTheDevicesAndTheUsersLimit) {
   EXPECT_FALSE(device.run_for(0.1, 1.9).flags & force_cut);
 }
 
+// Hazard: hot-motors
 TEST(SafetyChain, ComesDownToTheContinuousForceBeforeTheMotorsAreHot) {
   const auto press = [](std::uint32_t links) {
     Session session = engaged_without(links);
@@ -337,6 +348,7 @@ TEST(SafetyChain, ComesDownToTheContinuousForceBeforeTheMotorsAreHot) {
   EXPECT_NEAR(press(continuous_cut).first, 3.3, 1e-9);
 }
 
+// Hazard: hot-motors
 TEST(SafetyChain, TakesTheMotorsForWarmAtTheStartUnlessToldOtherwise) {
   const auto pressed_after = [](double seconds, const SafetyParameters& parameters) {
     Session session(all, {}, parameters);
@@ -389,6 +401,7 @@ TEST(SafetyChain, ComesDownToALimitThatIsLoweredMeanwhileAtItsFallRate) {
   EXPECT_NEAR(session.run(3.3).force.norm(), 0.5, 1e-9);
 }
 
+// Hazard: force-step
 TEST(SafetyChain, RisesNoFasterThanItsSlewLimitAndFallsFaster) {
   const auto steps = [](std::uint32_t links) {
     Session session = engaged_without(links, never_hot);
@@ -433,6 +446,7 @@ double swing_left(std::uint32_t links, double hertz) {
   return high - low;
 }
 
+// Hazard: fast-oscillation
 TEST(SafetyChain, SeesAnOscillationAlongEachAxis) {
   for (int axis = 0; axis < 3; ++axis) {
     Session session = engaged_without(pull_removed, never_hot);
@@ -446,6 +460,7 @@ TEST(SafetyChain, SeesAnOscillationAlongEachAxis) {
   }
 }
 
+// Hazard: fast-oscillation
 TEST(SafetyChain, WeakensAFastOscillationAndNotASlowOne) {
   EXPECT_LE(swing_left(0, 50.0), 0.7);  // what is no oscillation, and a little while it recovers
   EXPECT_NEAR(swing_left(oscillation_cut, 50.0), 2.5, 1e-6);
@@ -514,6 +529,7 @@ TEST(SafetyChain, GivesTheForceBackWhenAnOscillationHasStopped) {
   EXPECT_NEAR(session.run_for(1.0, 2.0).force.z(), 2.0, 1e-9);
 }
 
+// Hazard: engaging-inside
 TEST(SafetyChain, EngagesOnlyAfterTheHandFeltNextToNothing) {
   const auto force_after_a_second = [](std::uint32_t links) {
     Session session(all & ~links, never_hot);
@@ -547,6 +563,7 @@ TEST(SafetyChain, RampsMoreSlowlyWhereTicksAreFewer) {
   EXPECT_NEAR(output.force.z(), 2.0 * 0.3 / 1.5, 0.01) << "as 300 ticks of a millisecond";
 }
 
+// Hazard: engaging-inside
 TEST(SafetyChain, RampsTheForceUpAfterEngaging) {
   const auto force_at = [](std::uint32_t links, double seconds) {
     Session session(all & ~links, never_hot);
@@ -558,6 +575,7 @@ TEST(SafetyChain, RampsTheForceUpAfterEngaging) {
   EXPECT_NEAR(force_at(ramping, 0.01), 2.0, 1e-9);
 }
 
+// Hazard: nobody-holds
 TEST(SafetyChain, LetsGoOfAHandThatIsGoneAndEngagesAnewWhenItIsBack) {
   Session session = engaged_without(0, never_hot);
   session.run_for(0.1, 2.0);
@@ -593,6 +611,7 @@ TEST(SafetyChain, CallsAFrameLateAfterThreeIntervalsAndNotBefore) {
 }
 
 // Whatever is asked, from whatever force and in the midst of a ramp: the cap is what was sent.
+// Hazard: late-frame
 TEST(SafetyChain, NeverSendsMoreThanTheTickBeforeWhileAFrameIsLate) {
   std::mt19937_64 random(5);
   const auto uniform = [&](double low, double high) {
@@ -664,6 +683,7 @@ TEST(SafetyChain, GivesNoForceBeforeTheFirstFrameOrForAnAgeThatIsNone) {
   }
 }
 
+// Hazard: fast-hand
 TEST(SafetyChain, TakesTheForceOffAHandThatIsTooFast) {
   const auto moving_at = [](std::uint32_t links, double speed, double dt = ms) {
     Session session = engaged_without(links, never_hot);
@@ -682,6 +702,7 @@ TEST(SafetyChain, TakesTheForceOffAHandThatIsTooFast) {
   EXPECT_NEAR(moving_at(hand_too_fast, 2.0), 2.0, 1e-9);
 }
 
+// Hazard: fast-hand
 TEST(SafetyChain, TakesAJumpOfTheHandForTooFast) {
   Session session = engaged_without(0, never_hot);
   session.run_for(0.1, 2.0);
@@ -721,6 +742,7 @@ TEST(SafetyChain, MeasuresTheHandsSpeedOnTheDeviceAndNotInTheScene) {
   EXPECT_TRUE(flags_of(&SafetyInput::position) & hand_too_fast);
 }
 
+// Hazard: late-loop
 TEST(SafetyChain, RampsFromNothingAfterAStalledTick) {
   const auto after_stall = [](std::uint32_t links) {
     Session session = engaged_without(links, never_hot);
@@ -744,6 +766,7 @@ TEST(SafetyChain, CountsHowOftenEachLinkStepsIn) {
   EXPECT_EQ(session.chain.interventions()[0], 0U);
 }
 
+// Hazard: too-much-force
 TEST(SafetyChain, KeepsItsPromisesForAnyInput) {
   std::mt19937_64 random(11);
   const auto uniform = [&](double low, double high) {
@@ -797,6 +820,7 @@ TEST(SafetyChain, KeepsItsPromisesForAnyInput) {
   EXPECT_GT(strongest, 3.0) << "the chain was hardly ever engaged";
 }
 
+// Hazard: too-much-force
 TEST(SafetyChain, StaysWithinItsLimitsWithWhateverParametersAreAllowed) {
   // A force that turns while it may shrink only slowly is neither the old nor the new one.
   Session session(all & ~pull_removed, never_hot,
@@ -810,6 +834,7 @@ TEST(SafetyChain, StaysWithinItsLimitsWithWhateverParametersAreAllowed) {
 }
 
 // Every combination of states of the chain, extreme parameters and special inputs, one tick each.
+// Hazard: not-a-number
 TEST(SafetyChain, KeepsItsBoundsFromEveryStateForEverySpecialInput) {
   constexpr double tiny = std::numeric_limits<double>::denorm_min();
   const std::array forces{Vec3(0, 0, 0),       Vec3(0, 0, 3.0),   Vec3(2.0, -2.0, 0.1),

@@ -94,6 +94,7 @@ TEST(Timing, CountsLateTicksByTheirCause) {
   EXPECT_EQ(timing.late_by_interruption, 2U);
 }
 
+// Hazard: session-stops
 TEST(ServoLoop, TicksWhileACameraFloodsItAndViewersComeAndGo) {
   FakeDevice device;
   device.hand.position = {0, 0, 0.01};
@@ -145,6 +146,7 @@ TEST(ServoLoop, TicksWhileACameraFloodsItAndViewersComeAndGo) {
   EXPECT_TRUE(device.force.isZero());
 }
 
+// Hazard: session-stops
 TEST(ServoLoop, CanBeDestroyedBeforeItStartedAndStoppedTwice) {
   FakeDevice device;
   { const ServoLoop never_started(make_method("paper"), device); }

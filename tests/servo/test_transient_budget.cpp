@@ -12,6 +12,7 @@ namespace test_transient_budget {
 constexpr double dt = 1e-3;
 constexpr double up = 1.0;
 
+// Hazard: impact
 TEST(TransientBudget, LetsAnImpactRingAtOnceAndBriefly) {
   TransientBudget budget;
   const Vec3 hip = Vec3::Zero();
@@ -27,6 +28,7 @@ TEST(TransientBudget, LetsAnImpactRingAtOnceAndBriefly) {
   EXPECT_EQ(budget.run(0.11, hip, Vec3(0, 0, up)), Vec3(0, 0, up)) << "the next impact";
 }
 
+// Hazard: impact
 TEST(TransientBudget, CutsWhatIsTooStrongOrDoesTooMuchWork) {
   TransientBudget budget;
   EXPECT_NEAR(budget.run(0.0, Vec3::Zero(), Vec3(3, 0, 4)).norm(), 1.0, 1e-12);
@@ -68,6 +70,7 @@ struct Touching {
   SafetyInput input{};
 };
 
+// Hazard: impact
 TEST(TransientBudget, IsBesideTheLimitOfTheRise) {
   Touching hand;
   EXPECT_NEAR(hand.run(1.0, 0.9).force.z(), 1.9, 1e-9);
@@ -76,6 +79,7 @@ TEST(TransientBudget, IsBesideTheLimitOfTheRise) {
   EXPECT_NEAR(hand.run(1.0, 0.0).force.z(), 0.7, 0.31) << "the lasting force rises as ever";
 }
 
+// Hazard: impact, material-force
 TEST(TransientBudget, KeepsTheLimitsOfTheForce) {
   Touching hand;
   for (int i = 0; i < 50; ++i) hand.run(3.2, 0.0);
@@ -84,6 +88,7 @@ TEST(TransientBudget, KeepsTheLimitsOfTheForce) {
   EXPECT_TRUE(output.flags & force_cut);
 }
 
+// Hazard: impact
 TEST(TransientBudget, IsNothingWhileSomethingIsAmiss) {
   const auto rings = [](const auto& amiss) {
     Touching hand;

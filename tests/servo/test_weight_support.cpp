@@ -66,6 +66,7 @@ class Held {
       std::make_shared<PointCloud>(test::flat_grid(), Vec3(0, 0, 1));
 };
 
+// Hazard: handle-weight
 TEST(WeightSupport, RisesSlowlyAgainstTheWeight) {
   Held held;
   EXPECT_EQ(held.run(1, 0.02).norm(), 0.0);
@@ -78,6 +79,7 @@ TEST(WeightSupport, RisesSlowlyAgainstTheWeight) {
   EXPECT_TRUE(held.cycle->statistics().force_out) << "the watchdog has to know";
 }
 
+// Hazard: handle-weight
 TEST(WeightSupport, IsGoneAtOnceWithoutAHandAndComesBackSlowly) {
   for (int why = 0; why < 4; ++why) {
     Held held;
@@ -94,6 +96,7 @@ TEST(WeightSupport, IsGoneAtOnceWithoutAHandAndComesBackSlowly) {
   }
 }
 
+// Hazard: handle-weight
 TEST(WeightSupport, IsGoneWhileAnotherPlacementBegins) {
   Held held;
   held.run(2000, 0.02);
@@ -103,6 +106,7 @@ TEST(WeightSupport, IsGoneWhileAnotherPlacementBegins) {
   EXPECT_NEAR(held.run(2000, 0.02).norm(), 1.5 * newtons, 1e-12);
 }
 
+// Hazard: handle-weight
 TEST(WeightSupport, SharesTheLimitOfTheForceWithTheSurface) {
   Held held(1.0);
   held.run(3000, 0.02);
@@ -120,6 +124,7 @@ TEST(WeightSupport, SharesTheLimitOfTheForceWithTheSurface) {
   EXPECT_LE(held.device.force.norm(), 0.3 + 1e-12);
 }
 
+// Hazard: handle-weight
 TEST(WeightSupport, WarmsTheMotors) {
   const auto heat_after = [](double mass) {
     Held held;
@@ -134,6 +139,7 @@ TEST(WeightSupport, WarmsTheMotors) {
   EXPECT_NEAR(heat_after(weight), share * share * (1.0 - std::exp(-1.0)), 0.04 * share * share);
 }
 
+// Hazard: handle-weight
 TEST(WeightSupport, NeverGivesMoreThanANewtonOrTheLimit) {
   WeightSupport support;
   double t = 0.0;

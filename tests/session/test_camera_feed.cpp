@@ -480,6 +480,7 @@ TEST(CameraFeed, OpensACameraAgainThatDeliversNothing) {
   EXPECT_GT(hesitating.given.size(), 40U);
 }
 
+// Hazard: frozen-image
 TEST(CameraFeed, GivesNoFreshnessToAPictureThatStaysTheSame) {
   Playing run;
   std::vector<Step> steps = frames(300, 0.0);

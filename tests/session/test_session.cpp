@@ -277,6 +277,7 @@ TEST(Session, ChangesParametersFromTheNextTickOn) {
   EXPECT_NEAR(forces[3999], 1.5, 0.05);
 }
 
+// Hazard: ros-node
 TEST(Session, HoldsTheForceBackUntilTheHandEngagesAnew) {
   const double hover = wall_depth - 0.05;
   const double pressed = wall_depth + 0.005;

@@ -470,6 +470,7 @@ std::string name_of_cell(const testing::TestParamInfo<Cell>& info) {
 
 class SessionFaults : public testing::TestWithParam<Cell> {};
 
+// Hazard: lost-camera, nobody-holds, not-a-number
 TEST_P(SessionFaults, TakeTheForceOffAndGiveItBack) {
   const Scenario scenario{std::get<2>(GetParam()),
                           {{.fault = std::get<0>(GetParam()), .place = std::get<1>(GetParam())}}};
@@ -522,6 +523,7 @@ class FaultyPage final : public Device {
   MouseDevice mouse_{{0.0, 0.0, wall_depth - 0.05}};
 };
 
+// Hazard: silent-page
 TEST(SessionFaults, TakeTheForceOfAPageAwayThatFallsSilent) {
   constexpr double silence = 0.5;  // [s] as docs/devices.md has it
   for (const Fault fault : {Fault::off, Fault::garbage, Fault::slow, Fault::intermittent}) {
@@ -586,6 +588,7 @@ TEST(SessionFaultsByChance, ShrinkToTheSmallestThatFails) {
   EXPECT_EQ(text_of(smallest), "Contact, Device Off from 3.1 to 3.2 s");
 }
 
+// Hazard: lost-camera, nobody-holds, not-a-number
 TEST(SessionFaultsByChance, TwoAtATimeBreakNoPromise) {
   std::mt19937 random(2026);
   const auto draw = [&](std::size_t n) {

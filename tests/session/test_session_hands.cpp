@@ -133,6 +133,7 @@ TEST(SessionHands, EachFeelsWhatItWouldFeelAlone) {
   EXPECT_GT(both.state.hands[1].summary.largest_sent, 2.0);
 }
 
+// Hazard: another-hand
 TEST(SessionHands, LoseTheirForceTogetherAndEngageAnew) {
   struct Case {
     const char* name;
@@ -293,6 +294,7 @@ TEST(SessionHands, OfAGripperPushEachOtherApart) {
   EXPECT_NEAR(other.z(), 2.4, 0.1);
 }
 
+// Hazard: another-hand
 TEST(LinkedDevice, CallsTicksThatStayAwayTroubleOnlyWhereAClockDrivesThem) {
   CycleStatistics hand;
   const double never = std::numeric_limits<double>::infinity();
@@ -385,6 +387,7 @@ SessionOptions live_with_two(const std::shared_ptr<LiveHand::Told>& one,
   return options;
 }
 
+// Hazard: another-hand
 TEST(LiveSessionHands, LetGoWhereOneOfThemHangsAndAllEndTogether) {
   const auto one = std::make_shared<LiveHand::Told>();
   const auto other = std::make_shared<LiveHand::Told>();

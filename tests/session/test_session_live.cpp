@@ -218,6 +218,7 @@ std::size_t threads_of_this_process() {
   return static_cast<std::size_t>(std::distance(begin(tasks), end(tasks)));
 }
 
+// Hazard: session-stops
 TEST(LiveSession, TakesTheForceOffBeforeAnyCameraIsWaitedFor) {
   const auto log = std::make_shared<Log>();
   const auto gate = std::make_shared<Gate>();
@@ -263,6 +264,7 @@ TEST(LiveSession, TakesTheForceOffBeforeAnyCameraIsWaitedFor) {
   camera_ended.wait();
 }
 
+// Hazard: hang, session-stops
 TEST(LiveSession, TakesTheForceOfAMethodThatHangsAwayAndLeavesItsThreadBehind) {
   const auto log = std::make_shared<Log>();
   const auto gate = std::make_shared<Gate>();
@@ -301,6 +303,7 @@ TEST(LiveSession, TakesTheForceOfAMethodThatHangsAwayAndLeavesItsThreadBehind) {
       << "nothing is written or enabled afterwards";
 }
 
+// Hazard: session-stops
 TEST(LiveSession, EndsWithoutEverHavingBegun) {
   const auto log = std::make_shared<Log>();
   { const Session session(patient(log)); }
@@ -310,6 +313,7 @@ TEST(LiveSession, EndsWithoutEverHavingBegun) {
   EXPECT_GT(std::count(events.begin(), events.end(), "disable"), 0);
 }
 
+// Hazard: session-stops
 TEST(LiveSession, LeavesNoThreadBehindWhereTheDeviceRefuses) {
   const auto log = std::make_shared<Log>();
   SessionOptions options = patient(log);
@@ -323,6 +327,7 @@ TEST(LiveSession, LeavesNoThreadBehindWhereTheDeviceRefuses) {
   session.stop();
 }
 
+// Hazard: session-stops, unwatched-motors
 TEST(LiveSession, RefusesForcesOnMotorsThatNothingWatches) {
   const DeviceInfo arm{.uri = "arm:", .kind = "an arm", .limits = {.max_force = 2.0}};
   const auto with_limit = [](double newtons) {
@@ -371,6 +376,7 @@ TEST(LiveSession, RefusesForcesOnMotorsThatNothingWatches) {
   EXPECT_EQ(gentle->settings().safety.max_force, 0.1);
 }
 
+// Hazard: session-stops
 TEST(LiveSession, EndsARunWhenItIsAskedTo) {
   Session session(patient(std::make_shared<Log>()));
   std::thread other([&] {
@@ -385,6 +391,7 @@ TEST(LiveSession, EndsARunWhenItIsAskedTo) {
   ASSERT_NE(session.timing(), nullptr);
 }
 
+// Hazard: session-stops
 TEST(LiveSession, LetsGoOfTheHandWhereTimeJumpsInARecording) {
   SessionOptions options = patient(std::make_shared<Log>());
   options.open_cameras[0] = std::make_unique<test::MadeSource>(
@@ -414,6 +421,7 @@ TEST(LiveSession, LetsGoOfTheHandWhereTimeJumpsInARecording) {
 
 // A source that has one frame says that it is valid for as long as nothing replaces it; of a camera
 // that stops nobody knows what it would see by now.
+// Hazard: session-stops
 TEST(LiveSession, GoesOnFeelingAStillPictureAndNotWhatAStoppedCameraSaw) {
   constexpr double lost_age = 0.3;  // [s]
   constexpr double slack = 0.05;    // [s]
@@ -453,6 +461,7 @@ TEST(LiveSession, GoesOnFeelingAStillPictureAndNotWhatAStoppedCameraSaw) {
   }
 }
 
+// Hazard: session-stops
 TEST(LiveSession, IsChangedAndWatchedFromSeveralThreads) {
   Session session(patient(std::make_shared<Log>()));
   session.start();

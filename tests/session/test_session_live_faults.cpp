@@ -160,6 +160,7 @@ struct Cell {
 
 class LiveSessionFaults : public testing::TestWithParam<std::tuple<Cell, std::size_t>> {};
 
+// Hazard: frozen-image, lost-camera, hang
 TEST_P(LiveSessionFaults, TakeTheForceOffAndGiveItBack) {
   const Cell& cell = std::get<0>(GetParam());
   const std::size_t which = std::get<1>(GetParam());
@@ -251,6 +252,7 @@ INSTANTIATE_TEST_SUITE_P(
              (std::get<1>(cell.param) == 0 ? "FirstCamera" : "SecondCamera");
     });
 
+// Hazard: session-stops
 TEST(LiveSession, GoesOnAndSaysSoWhereTheDiskOfARecordingFails) {
   const test::TemporaryFolder folder;
   const auto log = std::make_shared<CameraLog>();
@@ -271,6 +273,7 @@ TEST(LiveSession, GoesOnAndSaysSoWhereTheDiskOfARecordingFails) {
   EXPECT_GT(session.statistics().ticks, ticks);
 }
 
+// Hazard: session-stops, hanging-disk
 TEST(LiveSession, StopsAndSaysWhatIsNotWrittenWhereTheDiskOfARecordingHangs) {
   const test::TemporaryFolder folder;
   const std::filesystem::path bag = folder.path() / "bag";

@@ -128,6 +128,7 @@ class Telelink : public ::testing::Test {
   std::unique_ptr<OperatorEnd> operator_end_;
 };
 
+// Hazard: robot-collides
 TEST_F(Telelink, LeadsTheRobotToTheHandAndNotThroughWhatIsSeen) {
   // 10 mm below the plane: the tool stays on it.
   operate({0.05, 0.0, -0.01});
@@ -154,6 +155,7 @@ TEST_F(Telelink, LeadsTheRobotToTheHandAndNotThroughWhatIsSeen) {
   EXPECT_EQ(view.ignored, "ignored: it is not softer than the rendered stiffness");
 }
 
+// Hazard: robot-runaway
 TEST_F(Telelink, StopsTheRobotWithItsOperator) {
   operate({0.15, 0.0, 0.1});
   ASSERT_TRUE(comes_true([&] { return tool().x() > 0.02; }));
@@ -197,6 +199,7 @@ TEST(Robots, SayWhatTheyNeed) {
                          "ros2:", "no PoseStamped messages", "pose="));
 }
 
+// Hazard: robot-runaway
 TEST(Robots, APointFollowsAndStopsByItself) {
   const auto robot = open_robot("point:?x=0.1");
   ASSERT_TRUE(robot->state());

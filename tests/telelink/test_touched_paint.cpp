@@ -41,6 +41,7 @@ TEST(PaintTouched, LeavesWhatAPersonPainted) {
   EXPECT_EQ(painted(paint), std::vector<std::string>{"foam"});
 }
 
+// Hazard: robot-lies
 TEST(PaintTouched, IgnoresWhatCannotBeSaying) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   Paint paint;

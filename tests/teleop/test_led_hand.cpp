@@ -49,6 +49,7 @@ TEST(Lead, IsTheProxyWhileAHandIsThereAndSees) {
 }
 
 // A hand that is pressed into a forbidden region leads to the region's border.
+// Hazard: robot-collides
 TEST(Lead, StaysOutOfForbiddenRegions) {
   Fixture wall;
   wall.name = "wall";
@@ -90,6 +91,7 @@ class LedHandTest : public ::testing::Test {
   std::optional<Vec3> tool_;  // where it is said to be; none: at the hand
 };
 
+// Hazard: robot-runaway
 TEST_F(LedHandTest, FollowsAtALimitedSpeedAndSlowlyAtFirst) {
   LedHand hand(Vec3::Zero(), {.max_speed = 0.2, .contact_speed = 0.05, .resume_time = 0.5});
   const Vec3 far(1.0, 0.0, 0.0);
@@ -107,6 +109,7 @@ TEST_F(LedHandTest, FollowsAtALimitedSpeedAndSlowlyAtFirst) {
   EXPECT_TRUE(hand.is_led());
 }
 
+// Hazard: robot-runaway
 TEST_F(LedHandTest, RestsWhereTheToolIsWithoutALead) {
   LedHand hand(Vec3::Zero(), {.max_speed = 0.2, .silence = 0.05, .resume_time = 0.1});
   go(hand, 1.0, Vec3(1.0, 0.0, 0.0));
@@ -123,6 +126,7 @@ TEST_F(LedHandTest, RestsWhereTheToolIsWithoutALead) {
   EXPECT_EQ(at_, rests);
 }
 
+// Hazard: robot-runaway
 TEST_F(LedHandTest, IsNotLedWhileNothingIsSeenOrByWhatIsNoPlace) {
   LedHand hand(Vec3::Zero(), {});
   const Vec3 to(0.1, 0.0, 0.0);
@@ -167,6 +171,7 @@ TEST_F(LedHandTest, GoesWhereRegionsKeepTheProxy) {
   EXPECT_EQ(at_, in);
 }
 
+// Hazard: robot-collides
 TEST_F(LedHandTest, StaysWithinItsReach) {
   LeadLimits limits;
   limits.reach.emplace(Vec3(-0.1, -0.1, 0.0), Vec3(0.1, 0.1, 0.2));
@@ -186,6 +191,7 @@ TEST_F(LedHandTest, RefusesWhatCannotBe) {
       test::fails_saying([&] { LedHand(Vec3::Zero(), turned); }, "reach", "no box", "corner"));
 }
 
+// Hazard: robot-runaway
 TEST(LinkLimits, FadeWhenFramesAreOlderThanTheLinkMakesThem) {
   const SafetyParameters usual;
   const SafetyParameters near = for_link(usual, 0.0);

@@ -56,6 +56,7 @@ TEST_F(SetPointTest, IsTheProxyWhereNothingElseIs) {
   EXPECT_EQ(order.velocity, Vec3::Zero());
 }
 
+// Hazard: robot-struck
 TEST_F(SetPointTest, GoesAheadOfASurfaceThatComesAndNotAfterOneThatGoes) {
   SetPoint point({.lag = 0.08});
   ServoTick record = at(Vec3::Zero(), true, t_);
@@ -66,6 +67,7 @@ TEST_F(SetPointTest, GoesAheadOfASurfaceThatComesAndNotAfterOneThatGoes) {
   EXPECT_LE(run(point, record, 0.5).position.z(), 0.05 * (0.08 + 0.2));
 }
 
+// Hazard: robot-struck
 TEST_F(SetPointTest, IsOutOfTheWayBeforeWhatComesTouches) {
   SetPoint point({.tool_radius = 5e-3, .margin = 1e-3, .lag = 0.08});
   const ServoTick record = at(Vec3::Zero(), false, t_);
@@ -81,6 +83,7 @@ TEST_F(SetPointTest, IsOutOfTheWayBeforeWhatComesTouches) {
   EXPECT_NEAR(run(point, record, 0.01, comes).position.z(), 0.0, 1e-9);
 }
 
+// Hazard: robot-presses
 TEST_F(SetPointTest, PressesByAShareOfTheForceIfTheRobotsStiffnessIsKnown) {
   const ServoTick record = at(Vec3::Zero(), true, t_);
   const Vec3 press(0.0, 0.0, -2.0);
@@ -96,6 +99,7 @@ TEST_F(SetPointTest, PressesByAShareOfTheForceIfTheRobotsStiffnessIsKnown) {
   EXPECT_EQ(run(unknown, record, 2.0, {}, Vec3::Zero(), press).position, Vec3::Zero());
 }
 
+// Hazard: robot-presses
 TEST_F(SetPointTest, GivesWayToWhatPushesTooHard) {
   SetPoint point({.max_force = 5.0});
   const ServoTick record = at(Vec3::Zero(), false, t_);
@@ -105,6 +109,7 @@ TEST_F(SetPointTest, GivesWayToWhatPushesTooHard) {
   EXPECT_LT(run(point, record, 5.0).position.x(), 1e-3);
 }
 
+// Hazard: robot-presses
 TEST_F(SetPointTest, GivesWayToWhatNobodyWantedToPress) {
   const Vec3 push(0.0, 0.0, 3.0);
   SetPoint unwanted({.stiffness = 1000.0, .press_share = 1.0});
@@ -114,6 +119,7 @@ TEST_F(SetPointTest, GivesWayToWhatNobodyWantedToPress) {
   EXPECT_NEAR(run(wanted, record, 1.0, {}, push, -push).position.z(), -3e-3, 1e-6);
 }
 
+// Hazard: robot-collides
 TEST_F(SetPointTest, StaysFartherFromWhatIsSeenWithNoiseAndFromWhatMovedLately) {
   ServoTick record = at(Vec3::Zero(), true, t_);
   SetPoint noisy;
@@ -186,6 +192,7 @@ TEST_F(SetPointTest, GoesOutOfTheWayOfNothingIntoWhatIsTouched) {
   EXPECT_GT(run(point, record, 0.02).position.z(), out.position.z() - 0.002);
 }
 
+// Hazard: robot-collides
 TEST_F(SetPointTest, NeverGoesIntoAForbiddenRegion) {
   Fixture wall;
   wall.name = "wall";
@@ -202,6 +209,7 @@ TEST_F(SetPointTest, NeverGoesIntoAForbiddenRegion) {
   EXPECT_LE(highest.z(), 1e-6);
 }
 
+// Hazard: robot-collides
 TEST_F(SetPointTest, TheRegionsOfARobotDoNotGiveWay) {
   Fixture box;
   box.name = "box";
@@ -258,6 +266,7 @@ std::vector<Approach> watched(const char* motion, double seconds, const Vec3& to
   return all;
 }
 
+// Hazard: robot-struck
 TEST(ApproachWatchTest, SeesWhatComesWithinSevenFrames) {
   const std::vector<Approach> seen = watched("&speed=0.06&start=2", 2.5, {0.0, 0.0, 0.03});
   int late = 0;
@@ -273,6 +282,7 @@ TEST(ApproachWatchTest, SeesWhatComesWithinSevenFrames) {
   EXPECT_LE(late, 1);
 }
 
+// Hazard: robot-struck
 TEST(ApproachWatchTest, IsSeldomWrongAboutWhatRests) {
   const std::vector<Approach> seen = watched("", 20.0, {0.0, 0.0, 0.03});
   const auto wrong =
@@ -280,6 +290,7 @@ TEST(ApproachWatchTest, IsSeldomWrongAboutWhatRests) {
   EXPECT_LE(wrong, 30);  // of 600
 }
 
+// Hazard: robot-struck
 TEST(ApproachWatchTest, BeginsAnewWhereTimeDoesAndSaysNothingOfNothing) {
   const auto camera = open_synthetic_camera(Uri("synthetic:plane?size=64x48&noise=1mm"));
   ApproachWatch watch;
@@ -289,6 +300,7 @@ TEST(ApproachWatchTest, BeginsAnewWhereTimeDoesAndSaysNothingOfNothing) {
 }
 
 // A ball of 60 mm whose top is the origin, 40 mm above a floor.
+// Hazard: robot-struck
 TEST(ApproachWatchTest, SeesWhatIsBetweenAToolAndItsProxy) {
   constexpr double radius = 0.005;  // [m]
   const auto camera =

@@ -55,6 +55,7 @@ TEST_F(Touching, TellsTheStiffnessOfASpringWithADamper) {
   }
 }
 
+// Hazard: robot-lies
 TEST_F(Touching, TakesNoPushedThingForASpring) {
   // It slides with 1.5 N and stays where it was pushed to.
   double farthest = 0.0;
@@ -79,6 +80,7 @@ TEST_F(Touching, TellsFrictionOfWhatItSlidesOn) {
   EXPECT_NEAR(found->friction.value_or(0.0), 0.4, 0.01);
 }
 
+// Hazard: robot-lies
 TEST_F(Touching, LearnsNothingFromShortWeakOrWrongForces) {
   const auto told = [&](const std::function<Vec3(const Vec3&, const Vec3&)>& force) {
     return press(in_and_out, force).has_value() ? std::string_view("something")
@@ -102,6 +104,7 @@ TEST_F(Touching, LearnsNothingFromShortWeakOrWrongForces) {
             "the robot reported a force or a position that is not finite or out of range");
 }
 
+// Hazard: robot-lies
 TEST(Disbelief, SaysWhatCannotBe) {
   const auto why = [](const Vec3& place, const Vec3& normal, std::optional<double> stiffness,
                       std::optional<double> friction) {

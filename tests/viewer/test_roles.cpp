@@ -18,6 +18,7 @@ auto asking(const Command& command, Role role) {
   return [command, role] { check_allowed(command, role); };
 }
 
+// Hazard: strangers-limits
 TEST(Roles, AllowALookingPageNothing) {
   for (const Command& command :
        {Command(SetParameter{"stiffness", 1.0}), Command(SetSafetyParameter{"max_speed", 0.1}),
@@ -32,6 +33,7 @@ TEST(Roles, AllowALookingPageNothing) {
   }
 }
 
+// Hazard: strangers-limits
 TEST(Roles, LeaveMethodPlacementAndRecordingToTheOperator) {
   EXPECT_TRUE(fails_saying(asking(SetMethod{"paper"}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(SetPlacement{"scale", 2.0}, Role::holding), "operator"));
@@ -50,6 +52,7 @@ TEST(Roles, LeaveMethodPlacementAndRecordingToTheOperator) {
   EXPECT_NO_THROW(check_allowed(SetBrush{"ice", 0.01}, Role::holding));
 }
 
+// Hazard: strangers-limits
 TEST(LimitBounds, LetWhoHoldsTheHandMakeEveryLimitStricterAndNoneLooser) {
   const SafetyParameters start;
   const LimitBounds bounds(start);
@@ -74,6 +77,7 @@ TEST(LimitBounds, LetWhoHoldsTheHandMakeEveryLimitStricterAndNoneLooser) {
   }
 }
 
+// Hazard: strangers-limits
 TEST(LimitBounds, FollowTheOperatorBothWays) {
   LimitBounds bounds{SafetyParameters{}};
   const auto force = [&](double newtons) {
@@ -86,6 +90,7 @@ TEST(LimitBounds, FollowTheOperatorBothWays) {
   EXPECT_NO_THROW(force(4.5)());
 }
 
+// Hazard: strangers-limits
 TEST(LimitBounds, EndWhereTheSessionsOptionsEndThem) {
   const LimitBounds bounds(SafetyParameters{}, {{"max_device_force", 4.0}, {"ramp_time", 1.0}});
   EXPECT_NO_THROW(bounds.check("max_device_force", 4.0, Role::operating));

@@ -386,6 +386,7 @@ TEST_F(ViewerServerTest, SendsAHandThatIsLetGoToWhereItsPageSays) {
   EXPECT_EQ(host.hand_number(3), Vec3(0.4, 0.5, 0.6));
 }
 
+// Hazard: silent-page
 TEST_F(ViewerServerTest, LetsTheHandGoWhenItsPageIsLost) {
   {
     Page page(server.port());
@@ -395,6 +396,7 @@ TEST_F(ViewerServerTest, LetsTheHandGoWhenItsPageIsLost) {
   EXPECT_FALSE(host.hand_number(2));
 }
 
+// Hazard: silent-page
 TEST_F(ViewerServerTest, LetsTheHandGoWhenItsPageFallsSilent) {
   Page page(server.port());
   page.move_hand(true, 0.1, 0.2, 0.3);
@@ -499,6 +501,7 @@ TEST_F(ViewerServerTest, AnswersNewcomersWhileManyConnectionsSayNothing) {
   EXPECT_TRUE(Page(server.port()).accepted());
 }
 
+// Hazard: strangers-limits
 TEST_F(ViewerServerTest, LetsALookingPageChangeNothing) {
   Page page(server.port());
   for (const char* text : {R"({"set": {"name": "stiffness", "value": 1}})",

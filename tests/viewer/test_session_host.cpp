@@ -73,6 +73,7 @@ TEST(SessionHost, ShowsTheRobotThatTheHandLeads) {
   EXPECT_EQ(shown["trouble"], "its brakes are on");
 }
 
+// Hazard: strangers-limits
 TEST(SessionHost, HoldsLimitsToWhatTheSessionWasStartedWith) {
   Hosted hosted;
   const auto force = [](double newtons) { return SetSafetyParameter{"max_device_force", newtons}; };
@@ -227,6 +228,7 @@ class StumblingDevice final : public Device {
   DeviceInfo info_{.uri = "stumbling:", .kind = "stumbling", .limits = no_motors};
 };
 
+// Hazard: repeated-fault
 TEST(SessionHost, TellsALatchedFaultUntilTheOperatorResetsIt) {
   SessionOptions options = wall_options("hand:");
   options.open_devices[0] = std::make_unique<StumblingDevice>();

@@ -209,6 +209,7 @@ class GuardTick {
   GuardTick(Memory& memory, Device& device, double beat_time)
       : memory_(memory), device_(device), beat_time_(beat_time), gate_(beat_time) {}
 
+  // Hazard: dead-process
   void run() noexcept {
     HandState state = device_.read(monotonic_now());
     memory_.command.read(command_);

@@ -39,6 +39,7 @@ void MouseDevice::aim(const MouseTarget& target) {
   targets_.put(target);
 }
 
+// Hazard: silent-page
 HandState MouseDevice::read(double t) noexcept {
   if (const MouseTarget* target = targets_.take()) {
     target_ = *target;

@@ -138,6 +138,7 @@ Tick Feel::tick(const Vec3& hip, double t) noexcept {
   return tick(HandPose{.position = hip}, t);
 }
 
+// Hazard: material-force
 Tick Feel::tick(const HandPose& hand, double t) noexcept {
   Tick tick = method_->tick(hand, t);
   if (!feels_ || (tick.flags & non_finite_input) != 0) return tick;

@@ -33,6 +33,7 @@ void Friction::reset() noexcept {
   pressed_ = sliding_ = 0.0;
 }
 
+// Hazard: material-energy
 Vec3 Friction::update(const Vec3& push, const Vec3& moved, const Vec3& velocity,
                       double dt) noexcept {
   const double normal_force = push.norm();

@@ -21,6 +21,7 @@ constexpr double braked_speed = 5e-3;
 
 }  // namespace
 
+// Hazard: material-energy
 Hardness::Felt Hardness::update(double wanted, const Vec3& push, double stiffness, double taken,
                                 const Vec3& moved, const Vec3& velocity) noexcept {
   const double force = push.norm();

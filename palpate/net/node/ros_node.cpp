@@ -153,6 +153,7 @@ class RosNode::Impl {
                          [this](const auto&) { return start_recording(); }),
         stop_recording_(participant_, name_ + "/stop_recording", 8,
                         [this](const auto&) { return stop_recording(); }),
+        // Hazard: ros-node
         hold_(participant_, name_ + "/hold", 9,
               [this](const auto&) {
                 return done([this] { session_.hold(true); }, "no force from now on");

@@ -9,6 +9,7 @@
 
 namespace palpate {
 
+// Hazard: robot-runaway, robot-collides
 Lead lead_of(const ServoTick& tick) noexcept {
   constexpr std::uint32_t blind = frame_lost | fault_latched | output_refused;
   constexpr std::uint32_t away = hand_clutched | hand_fault;
@@ -53,6 +54,7 @@ void LedHand::kept_out(const Vec3& way) {
   if (is_place(way)) ways_.put(way);
 }
 
+// Hazard: robot-runaway
 HandState LedHand::read(double t) noexcept {
   constexpr double longest_step = 0.005;  // [s] after a stall
   constexpr double keep_time = 0.01;      // [s] in which it goes where regions keep it

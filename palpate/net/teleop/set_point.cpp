@@ -107,6 +107,7 @@ Vec3 SetPoint::followed(const Vec3& held, bool touches, const Vec3& force, doubl
   return held_ + outward + no_longer_than(way - outward, speed_ * dt);
 }
 
+// Hazard: robot-collides, robot-presses, robot-struck
 SetPoint::Order SetPoint::next(const ServoTick& record, const Vec3& press, bool led,
                                const Approach& comes, const Vec3& force) noexcept {
   const Tick& tick = record.tick;

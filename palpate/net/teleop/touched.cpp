@@ -26,6 +26,7 @@ constexpr double largest_scatter = 0.5;  // [-] of the drag, to its mean
 
 }  // namespace
 
+// Hazard: robot-lies
 std::string_view disbelief(const Touched& touched) noexcept {
   const auto within = [](const std::optional<double>& value, double least, double most) {
     return !value || (*value >= least && *value <= most);  // no number is not

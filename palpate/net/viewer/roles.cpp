@@ -44,6 +44,7 @@ std::string_view to_string(Role role) {
   return names[static_cast<std::size_t>(role)];
 }
 
+// Hazard: strangers-limits
 void check_allowed(const Command& command, Role role) {
   if (role == Role::operating) return;
   if (std::holds_alternative<SetMethod>(command))
@@ -92,6 +93,7 @@ LimitBounds::LimitBounds(const SafetyParameters& start,
   }
 }
 
+// Hazard: strangers-limits
 void LimitBounds::check(std::string_view name, double value, Role role) const {
   const SafetyParameterInfo& row = safety_parameter(name);
   const Stricter stricter = stricter_direction(name);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <string>
@@ -15,6 +16,7 @@
 
 #include "palpate/kernel/core/parameters.hpp"
 #include "palpate/kernel/core/text.hpp"
+#include "palpate/kernel/core/vectorise.hpp"
 
 namespace palpate::app {
 namespace {
@@ -141,6 +143,7 @@ int run_program(int argc, char** argv, std::span<const AddVerb> own_verbs) {
   if (argc > 1 && argv[1] == std::string_view("teleop") && own_path().filename() == "palpate")
     become("palpate-robot", argv);
   try {
+    if (const char* name = std::getenv("PALPATE_VECTOR")) use_vector_set(name);
     return run_verb(argc, argv, own_verbs);
   } catch (const UnknownMethod& error) {
     std::string what = error.what();

@@ -15,7 +15,6 @@
 #include <nlohmann/json.hpp>
 
 #include "app/point_remarks.hpp"
-#include "app/recording_check.hpp"
 #include "app/verbs.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/io/sources/source.hpp"
@@ -25,6 +24,7 @@
 #include "palpate/kernel/cloud/proposed_touch.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/uri.hpp"
+#include "palpate/record/replay.hpp"
 
 namespace palpate::app {
 namespace {
@@ -173,7 +173,7 @@ int info(InfoOptions options) {
   if (about.start_time != 0.0) json["start_time_s"] = about.start_time;
   // Before a damaged frame ends it.
   if (const Uri uri(options.uri); uri.scheme() == "recording") {
-    json["checksums"] = app::text_of(BagReader(uri.path()).check());
+    json["checksums"] = text_of(BagReader(uri.path()).check());
     if (!options.json) fmt::print("checksums: {}\n", json["checksums"].get<std::string>());
   }
   const auto frame = source->next(first_frame_timeout);

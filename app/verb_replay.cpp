@@ -12,8 +12,8 @@
 
 #include "app/program_methods.hpp"
 #include "app/progress.hpp"
-#include "app/recording_check.hpp"
 #include "app/verbs.hpp"
+#include "palpate/kernel/core/vectorise.hpp"
 #include "palpate/record/replay.hpp"
 
 namespace palpate::app {
@@ -23,23 +23,6 @@ struct ReplayOptions {
   std::string path;
   bool json = false;
 };
-
-std::string replay_text(const ReplayDifferences& differences, std::uint64_t ticks) {
-  if (!differences.first) return "identical, bit for bit";
-  const ReplayDifference& first = *differences.first;
-  return fmt::format(
-      "{} of {} ticks differ, forces by up to {:.3g} N; first tick {}: {} was {}, and is {} now",
-      differences.ticks, ticks, differences.largest_force, first.tick, first.field, first.recorded,
-      first.replayed);
-}
-
-std::string replay_text(const ReplayReport& report) {
-  std::string text = fmt::format(
-      "{} ticks and {} frames replayed\nasked: {}\nsent:  {}\n", report.ticks, report.frames,
-      replay_text(report.asked, report.ticks), replay_text(report.sent, report.ticks));
-  if (!report.broken_off.empty()) text += "the replay stopped: " + report.broken_off + "\n";
-  return text + app::text_of(report.check) + "\n";
-}
 
 nlohmann::ordered_json replay_json(const ReplayDifferences& differences) {
   nlohmann::ordered_json object = {{"identical", !differences.first},
@@ -55,13 +38,13 @@ nlohmann::ordered_json replay_json(const ReplayDifferences& differences) {
 }
 
 nlohmann::ordered_json replay_json(const ReplayReport& report) {
-  nlohmann::ordered_json object = {{"identical", report.identical()},
-                                   {"ticks", report.ticks},
-                                   {"frames", report.frames},
-                                   {"asked", replay_json(report.asked)},
-                                   {"sent", replay_json(report.sent)}};
+  nlohmann::ordered_json object = {
+      {"identical", report.identical()},   {"ticks", report.ticks},
+      {"frames", report.frames},           {"hash", fmt::format("{:016x}", report.hash)},
+      {"vector_set", vector_set_in_use()}, {"asked", replay_json(report.asked)},
+      {"sent", replay_json(report.sent)}};
   if (!report.broken_off.empty()) object["broken_off"] = report.broken_off;
-  object["checksums"] = app::text_of(report.check);
+  object["checksums"] = text_of(report.check);
   if (!report.check.damage.empty()) object["damage"] = report.check.damage;
   return object;
 }
@@ -93,7 +76,7 @@ int run(const ReplayOptions& options) {
     fmt::print("{}\n", object.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
   } else {
     for (const HandReplay& hand : hands)
-      fmt::print("{}{}", hands.size() == 1 ? "" : hand.name + ":\n", replay_text(hand.report));
+      fmt::print("{}{}", hands.size() == 1 ? "" : hand.name + ":\n", text_of(hand.report));
   }
   const bool identical = std::all_of(hands.begin(), hands.end(),
                                      [](const auto& hand) { return hand.report.identical(); });

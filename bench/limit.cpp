@@ -34,12 +34,12 @@ std::uint16_t add_pixels(const std::uint16_t* depth, std::size_t columns, std::s
 }  // namespace
 
 float load_and_add(const Patch& patch) {
-  return add_points(patch.x(), patch.y(), patch.z(), patch.padded_size());
+  return vectorised<add_points>(patch.x(), patch.y(), patch.z(), patch.padded_size());
 }
 
 std::uint16_t load_and_add(const std::uint16_t* depth, std::size_t columns, std::size_t rows,
                            std::size_t row_length) {
-  return add_pixels(depth, columns, rows, row_length);
+  return vectorised<add_pixels>(depth, columns, rows, row_length);
 }
 
 }  // namespace palpate::bench

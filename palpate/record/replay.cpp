@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cinttypes>
+#include <cstdio>
 #include <memory>
 #include <span>
 #include <string_view>
 #include <utility>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/pose.hpp"
 
 namespace palpate {
 namespace {
@@ -184,7 +187,44 @@ class Rerun {
   std::uint64_t frames_ = 0;
 };
 
+std::string text_of(const ReplayDifferences& differences, std::uint64_t ticks) {
+  if (!differences.first) return "identical, bit for bit";
+  const ReplayDifference& first = *differences.first;
+  return std::to_string(differences.ticks) + " of " + std::to_string(ticks) +
+         " ticks differ, forces by up to " + shortest(differences.largest_force) +
+         " N; first tick " + std::to_string(first.tick) + ": " + first.field + " was " +
+         shortest(first.recorded) + ", and is " + shortest(first.replayed) + " now";
+}
+
 }  // namespace
+
+std::string text_of(const BagCheck& check) {
+  if (!check.damage.empty()) return "the recording is damaged: " + check.damage;
+  std::string text =
+      "the recording has no checksums (it is older, or written by another program): damage may not "
+      "be detected";
+  if (check.has_checksums) {
+    text = "checksums of all " + std::to_string(check.messages - check.unchecked) +
+           " messages are right";
+    if (check.unchecked > 0) text += "; " + std::to_string(check.unchecked) + " others have none";
+  }
+  if (!check.closed)
+    text +=
+        "; it was not closed (its program was probably killed), and contains only the completely "
+        "written messages";
+  return text;
+}
+
+std::string text_of(const ReplayReport& report) {
+  std::array<char, 17> hash{};
+  std::snprintf(hash.data(), hash.size(), "%016" PRIx64, report.hash);
+  std::string text = std::to_string(report.ticks) + " ticks and " + std::to_string(report.frames) +
+                     " frames replayed, hash " + hash.data() +
+                     "\nasked: " + text_of(report.asked, report.ticks) +
+                     "\nsent:  " + text_of(report.sent, report.ticks) + "\n";
+  if (!report.broken_off.empty()) text += "the replay stopped: " + report.broken_off + "\n";
+  return text + text_of(report.check) + "\n";
+}
 
 ReplayReport replay(SessionReader& session, const std::function<void(std::size_t)>& progress,
                     const MethodRegistry& methods) {
@@ -208,6 +248,7 @@ ReplayReport replay(SessionReader& session, const std::function<void(std::size_t
       if (!rerun) rerun = std::make_unique<Rerun>(session, recorded, methods);
       const ServoTick again = rerun->tick(recorded);
       compare(recorded, again, session.rows(), report);
+      add_to_hash(report.hash, again);
       last = recorded;
     } catch (const Error& error) {
       report.broken_off = last ? "after tick " + std::to_string(last->number) + ": " : "";

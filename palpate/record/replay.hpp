@@ -27,8 +27,9 @@ struct ReplayDifferences {
 
 /// What a replay found.
 struct ReplayReport {
-  std::uint64_t ticks = 0;   ///< replayed
-  std::uint64_t frames = 0;  ///< adopted
+  std::uint64_t ticks = 0;          ///< replayed
+  std::uint64_t frames = 0;         ///< adopted
+  std::uint64_t hash = empty_hash;  ///< of the ticks as they are now
   /// What the method made: HIP, proxy, normal, the wrench that it asked for, state, steps, the
   /// surface's velocity and motion, flags.
   ReplayDifferences asked{};
@@ -45,6 +46,11 @@ struct ReplayReport {
     return asked.ticks == 0 && sent.ticks == 0 && broken_off.empty() && check.damage.empty();
   }
 };
+
+/// What the checksums of a recording say, in a line without its end.
+std::string text_of(const BagCheck& check);
+/// The same of a replay, in lines.
+std::string text_of(const ReplayReport& report);
 
 /// Runs the loop's cycle again, method and safety chain, on what went into it: a session's frames,
 /// hands, settings and wake-up times. Compares each tick with the recorded one, bit for bit.

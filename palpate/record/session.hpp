@@ -53,6 +53,12 @@ constexpr std::string_view world_frame = "world";
 const std::vector<std::string>& tick_columns();
 std::vector<double> row_of(const ServoTick& tick);
 
+/// A hash of ticks before the first one is added.
+inline constexpr std::uint64_t empty_hash = 0xcbf29ce484222325U;
+/// Adds the bits of a tick's numbers, from its time to the flags of the hand, by FNV-1a: equal
+/// inputs and settings give equal hashes on every machine.
+void add_to_hash(std::uint64_t& hash, const ServoTick& tick);
+
 /// Reads the ticks of a recording, whose columns may be those of another version.
 class TickRows {
  public:

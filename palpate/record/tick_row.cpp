@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <type_traits>
 #include <utility>
 
@@ -154,6 +156,17 @@ std::vector<double> row_of(const ServoTick& tick) {
   put.row.reserve(tick_columns().size());
   walk(put, tick);
   return std::move(put.row);
+}
+
+void add_to_hash(std::uint64_t& hash, const ServoTick& tick) {
+  static const auto count = static_cast<std::size_t>(
+      std::find(tick_columns().begin(), tick_columns().end(), "hand") - tick_columns().begin() + 1);
+  const std::vector<double> row = row_of(tick);
+  for (const double number : std::span(row).first(count)) {
+    const auto bits = std::bit_cast<std::uint64_t>(number);
+    for (int byte = 0; byte < 8; ++byte)
+      hash = (hash ^ (bits >> 8 * byte & 0xffU)) * 0x100000001b3U;
+  }
 }
 
 TickRows::TickRows(std::span<const std::string> columns) : width_(columns.size()) {

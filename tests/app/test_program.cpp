@@ -24,6 +24,7 @@
 #include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/pose.hpp"
+#include "palpate/kernel/core/vectorise.hpp"
 
 #include "tests/app/program.hpp"
 #include "tests/support/depth_pngs.hpp"
@@ -884,6 +885,11 @@ TEST_F(Program, LooksAtTheMachineAndSaysWhatToDo) {
   for (const char* right : {"memory_locked", "kept_awake"}) {
     EXPECT_TRUE(report["realtime"][right].get<bool>() || !report["advice"].empty()) << right;
   }
+  EXPECT_EQ(report["machine"]["vector_set"], vector_set_in_use());
+  const std::string first(vector_sets().front());
+  const Outcome chosen = run("doctor --json --seconds 0.2", "PALPATE_VECTOR=" + first + " ");
+  EXPECT_EQ(nlohmann::json::parse(chosen.out)["machine"]["vector_set"], first);
+  expect_refusal("methods", {"'mmx'", first}, "PALPATE_VECTOR=mmx ");
   const std::string text = run("doctor --seconds 0.2").out;
   for (const char* part : {"for haptics at 1000 Hz", "N/m for each N s/m", "Session, ",
                            "wake-up latency", "Cameras and haptic", "Versions"})

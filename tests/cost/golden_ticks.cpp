@@ -12,8 +12,8 @@ int main() {
     test::PressedFloor session(method.name);
     auto ticks = session.ticks();
     session.run(test::golden_ticks);
-    std::uint64_t hash = test::empty_hash;
-    for (ServoTick tick{}; ticks.try_pop(tick);) test::add_to_hash(hash, tick);
+    std::uint64_t hash = empty_hash;
+    for (ServoTick tick{}; ticks.try_pop(tick);) add_to_hash(hash, tick);
     std::printf("%s %016" PRIx64 "\n", method.name.c_str(), hash);
   }
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Are the kernel's loops vector code, in each clone? `vector_code.py LIBRARY...`; 77: unknown."""
+"""Are the kernel's loops vector code, for each set? `vector_code.py LIBRARY...`; 77: unknown."""
 import platform
 import re
 import shutil
@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 LOOPS = {"move": "sqrtps", "travel": "sqrtps", "escape": "sqrtps", "deproject_pixels": "cvtdq2ps"}
-REGISTERS = {"default": "xmm", "avx2": "ymm", "avx512f": "zmm"}
+REGISTERS = {"any": "xmm", "avx2": "ymm", "avx512": "zmm"}
 LEAST = 12  # packed operations on the widest registers in a loop
 
 
@@ -21,23 +21,23 @@ def main(libraries):
         text = subprocess.run(["objdump", "-d", "--no-show-raw-insn", library], check=True,
                               capture_output=True, text=True).stdout
         for match in re.finditer(r"^[0-9a-f]+ <(\S+)>:\n((?:.+\n)+)", text, re.M):
-            name = re.fullmatch(r"_ZN7palpate12_GLOBAL__N_1\d+([a-z_]+?)E.*?"
-                                r"\.(default|avx2|avx512f)(?:\.\d+)?", match.group(1))
+            name = re.search(r"Vectorised.*_GLOBAL__N_1\d+([a-z_]+)E.*\don_([a-z0-9]+)E",
+                             match.group(1))
             if name:
                 bodies[name.groups()] = match.group(2)
     faults = []
     for loop, needed in LOOPS.items():
-        for clone, register in REGISTERS.items():
-            body = bodies.get((loop, clone))
+        for vector_set, register in REGISTERS.items():
+            body = bodies.get((loop, vector_set))
             if body is None:
-                faults.append(f"{loop}: there is no {clone} clone of it")
+                faults.append(f"{loop}: there is no code of it for {vector_set}")
                 continue
             packed = len(re.findall(rf"\sv?\w+ps\s.*%{register}", body))
-            print(f"{loop}, {clone}: {packed} packed operations on {register}")
+            print(f"{loop}, {vector_set}: {packed} packed operations on {register}")
             if packed < LEAST:
-                faults.append(f"{loop}: its {clone} clone is not vector code")
+                faults.append(f"{loop}: its code for {vector_set} is not vector code")
             if not re.search(rf"\bv?{needed}\s.*%{register}", body):
-                faults.append(f"{loop}: its {clone} clone has no {needed} on {register}")
+                faults.append(f"{loop}: its code for {vector_set} has no {needed} on {register}")
     print("\n".join(faults))
     return 1 if faults else 0
 

@@ -145,18 +145,6 @@ class PressedFloor {
   std::atomic<int> tick_{0};  // a recorder's thread reads it
 };
 
-// FNV-1a over the bits of a tick's numbers, from its time to the flags of the hand.
-inline void add_to_hash(std::uint64_t& hash, const ServoTick& tick) {
-  static const auto count =
-      std::find(tick_columns().begin(), tick_columns().end(), "hand") - tick_columns().begin() + 1;
-  const std::vector<double> row = row_of(tick);
-  for (const double number : std::span(row).first(static_cast<std::size_t>(count))) {
-    const auto bits = std::bit_cast<std::uint64_t>(number);
-    for (int byte = 0; byte < 8; ++byte)
-      hash = (hash ^ (bits >> 8 * byte & 0xffU)) * 0x100000001b3U;
-  }
-}
-inline constexpr std::uint64_t empty_hash = 0xcbf29ce484222325U;
 inline constexpr int golden_ticks = 600;
 
 }  // namespace palpate::test

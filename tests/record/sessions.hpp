@@ -43,18 +43,6 @@ inline std::vector<ServoTick> record_press(SessionWriter& writer, const Paramete
   return recorded;
 }
 
-/// What a replay found, for messages.
-inline std::string text_of(const ReplayReport& report) {
-  std::string text = report.broken_off + report.check.damage;
-  for (const ReplayDifferences* each : {&report.asked, &report.sent}) {
-    if (each->first)
-      text += " tick " + std::to_string(each->first->tick) + " " + each->first->field + " was " +
-              std::to_string(each->first->recorded) + ", is " +
-              std::to_string(each->first->replayed);
-  }
-  return text;
-}
-
 inline SessionInfo press_info() {
   return {.version = "test",
           .cameras = {"synthetic:floor"},

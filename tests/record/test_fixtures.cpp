@@ -48,7 +48,7 @@ TEST(RecordedFixtures, AreReplayedBitForBit) {
     EXPECT_EQ(session.recorder().status().trouble, "");
     SessionReader reader(folder.path() / "bag");
     const ReplayReport report = replay(reader);
-    EXPECT_TRUE(report.identical()) << test::text_of(report);
+    EXPECT_TRUE(report.identical()) << text_of(report);
     std::uint32_t acting = 0;
     for (std::size_t i = 0; i < reader.ticks(); ++i) acting |= reader.tick(i).fixtures;
     EXPECT_EQ(acting & 0b1101U, 0b1101U);  // what is replayed did something

@@ -44,7 +44,7 @@ TEST_P(RecorderOf, ASessionFromItsStartIsReplayedBitForBit) {
   EXPECT_EQ(session.recorder().status().ticks, 400U);
   SessionReader reader(folder.path() / "bag");
   const ReplayReport report = replay(reader);
-  EXPECT_TRUE(report.identical()) << test::text_of(report);
+  EXPECT_TRUE(report.identical()) << text_of(report);
   EXPECT_EQ(report.ticks, 400U);
   double largest = 0.0;
   double sent = 0.0;
@@ -93,7 +93,7 @@ TEST_P(RecorderOf, ASessionOnMaterialsIsReplayedBitForBit) {
     EXPECT_EQ(session.recorder().status().trouble, "");
     SessionReader reader(folder.path() / "bag");
     const ReplayReport report = replay(reader);
-    EXPECT_TRUE(report.identical()) << test::text_of(report);
+    EXPECT_TRUE(report.identical()) << text_of(report);
     ASSERT_GE(report.ticks, 350U);
     // As it was, and not as without materials.
     const auto camera = open_source("recording:" + (folder.path() / "bag").string());
@@ -132,7 +132,7 @@ TEST_P(RecorderOf, ASessionInItsMidstIsReplayedBitForBit) {
   EXPECT_GT(touching, 50);
   EXPECT_GT(largest, 1.0);
   const ReplayReport report = replay(reader);
-  EXPECT_TRUE(report.identical()) << test::text_of(report);
+  EXPECT_TRUE(report.identical()) << text_of(report);
 }
 
 TEST_P(RecorderOf, ASessionOfTwoCamerasIsReplayedBitForBit) {
@@ -147,7 +147,7 @@ TEST_P(RecorderOf, ASessionOfTwoCamerasIsReplayedBitForBit) {
     EXPECT_EQ(session.recorder().status().trouble, "");
     SessionReader reader(folder.path() / "bag");
     const ReplayReport report = replay(reader);
-    EXPECT_TRUE(report.identical()) << test::text_of(report);
+    EXPECT_TRUE(report.identical()) << text_of(report);
     ASSERT_GE(report.ticks, 350U);
     EXPECT_GE(report.frames, 27U);  // each camera's
   }
@@ -186,7 +186,7 @@ ReplayReport replay_changed(const std::function<void(ServoTick&)>& change) {
 
 TEST(ReplayOfACycle, IsIdenticalWhereNothingWasChanged) {
   const ReplayReport report = replay_changed([](ServoTick& /*tick*/) {});
-  EXPECT_TRUE(report.identical()) << test::text_of(report);
+  EXPECT_TRUE(report.identical()) << text_of(report);
 }
 
 TEST(ReplayOfACycle, FindsForcesThatWereNotTheOnesSent) {
@@ -357,7 +357,7 @@ TEST(Recorder, KilledAtAnyTimeLeavesASessionThatReplaysToItsLastCommit) {
     SessionReader reader(folder.path() / "bag");
     EXPECT_GE(reader.ticks(), committed);
     const ReplayReport report = replay(reader);
-    EXPECT_TRUE(report.identical()) << test::text_of(report);
+    EXPECT_TRUE(report.identical()) << text_of(report);
     EXPECT_EQ(report.ticks, reader.ticks());
   }
 }

@@ -36,7 +36,7 @@ TEST_P(Replay, GivesTheSameForcesBitForBit) {
   ASSERT_GT(largest, 0.5);  // it touched
   SessionReader reader(folder.path() / "bag");
   const ReplayReport report = replay(reader);
-  EXPECT_TRUE(report.identical()) << test::text_of(report);
+  EXPECT_TRUE(report.identical()) << text_of(report);
   EXPECT_EQ(report.ticks, 150U);
   EXPECT_EQ(report.frames, 5U);
 }

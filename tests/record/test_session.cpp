@@ -258,7 +258,7 @@ TEST(Session, IsThereUpToTheLastCommitWhenItsProgramIsKilled) {
   SessionReader reader(bag);
   EXPECT_EQ(reader.ticks(), 100U);
   const ReplayReport report = replay(reader);
-  EXPECT_TRUE(report.identical()) << test::text_of(report);
+  EXPECT_TRUE(report.identical()) << text_of(report);
   EXPECT_EQ(report.ticks, 100U);
 }
 

@@ -230,7 +230,7 @@ void validate(const SensorModel& model) {
 }
 
 void fill_normal(std::uint64_t key, std::span<float> out) {
-  fill_middle(key, out.data(), out.size());
+  vectorised<fill_middle>(key, out.data(), out.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
     if (std::abs(out[i]) < middle_ends) continue;
     out[i] = static_cast<float>(normal_quantile(share(bits_of_value(key, i))));
@@ -272,7 +272,7 @@ void Sensor::add_gaussian_noise(std::uint64_t frame) {
     for (int v = 0; v < high; ++v) {
       const float* in = field_.data() + static_cast<std::ptrdiff_t>(v) * wide;
       float* out = rows_.data() + static_cast<std::ptrdiff_t>(v) * width;
-      for (int i = 0; i < taps_x; ++i) add_scaled(kernel_x_[i], in + i, out, width);
+      for (int i = 0; i < taps_x; ++i) vectorised<add_scaled>(kernel_x_[i], in + i, out, width);
     }
     smooth = rows_.data();
   }
@@ -281,8 +281,8 @@ void Sensor::add_gaussian_noise(std::uint64_t frame) {
   for (int v = 0; v < height; ++v) {
     std::fill(row.begin(), row.end(), 0.0F);
     for (int i = 0; i < taps_y; ++i) {
-      add_scaled(kernel_y_[i], smooth + static_cast<std::ptrdiff_t>(v + i) * width, row.data(),
-                 width);
+      vectorised<add_scaled>(kernel_y_[i], smooth + static_cast<std::ptrdiff_t>(v + i) * width,
+                             row.data(), width);
     }
     float* depth = depth_.data() + static_cast<std::ptrdiff_t>(v) * width;
     if (model_.noise_growth == 2) {
@@ -290,7 +290,7 @@ void Sensor::add_gaussian_noise(std::uint64_t frame) {
     } else if (model_.noise_growth == 1) {
       for (int u = 0; u < width; ++u) depth[u] += sigma * depth[u] * row[u];
     } else {
-      add_scaled(sigma, row.data(), depth, width);
+      vectorised<add_scaled>(sigma, row.data(), depth, width);
     }
   }
 }
@@ -364,8 +364,8 @@ void Sensor::blank_grazing(std::span<const float> truth,
                            std::vector<std::uint16_t>& readings) const {
   for (int v = 1; v + 1 < camera_.height; ++v) {
     const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(v) * camera_.width;
-    blank_grazing_row(camera_, std::cos(model_.grazing), v, truth.data() + row,
-                      readings.data() + row);
+    vectorised<blank_grazing_row>(camera_, std::cos(model_.grazing), v, truth.data() + row,
+                                  readings.data() + row);
   }
 }
 

@@ -99,7 +99,7 @@ struct Reference {
 
 PALPATE_VECTORISED
 void deproject_pixels(const Pixels& pixels, std::size_t size, const Reference& reference,
-                      Points& points) noexcept {
+                      Points& points) {
   const std::int32_t raw_0 = reference.raw;
   const float z_0 = reference.z;
   const float metres = reference.metres_per_unit;
@@ -134,7 +134,7 @@ struct Cone {
 };
 
 PALPATE_VECTORISED
-void keep_inside(const Cone& cone, std::size_t size, Points& points) noexcept {
+void keep_inside(const Cone& cone, std::size_t size, Points& points) {
   const Eigen::Vector3f axis = cone.axis;
   const float reach = cone.reach;
   const float radius = cone.radius;
@@ -177,8 +177,7 @@ void read_slopes(const double* rays, const Strip& strip, double reference, float
 }
 
 PALPATE_VECTORISED
-void gather_strip(const Strip& strip, const Reference& reference, const Cone* cone,
-                  Patch& patch) noexcept {
+void gather_strip(const Strip& strip, const Reference& reference, const Cone* cone, Patch& patch) {
   Pixels pixels;
   Points points;
   std::size_t size = 0;
@@ -188,8 +187,8 @@ void gather_strip(const Strip& strip, const Reference& reference, const Cone* co
       pixels.raw[i] = 0;
       pixels.slope_x[i] = pixels.slope_y[i] = 0.0F;
     }
-    deproject_pixels(pixels, size, reference, points);
-    if (cone != nullptr) keep_inside(*cone, size, points);
+    vectorised<deproject_pixels>(pixels, size, reference, points);
+    if (cone != nullptr) vectorised<keep_inside>(*cone, size, points);
     patch.append(points.x.data(), points.y.data(), points.z.data(), points.inside.data(),
                  whole_blocks(size));
     size = 0;
@@ -425,7 +424,7 @@ void DepthImage::gather(const Ball& ball, const SightCone* sight, std::size_t ma
     const auto column = static_cast<std::size_t>(u);
     const auto row = static_cast<std::size_t>(first_v);
     const std::size_t pixel = row * width + column;
-    gather_strip(
+    vectorised<gather_strip>(
         {.depth = depth_.data() + pixel,
          .readable = depth_.size() - pixel,
          .row_length = width,

@@ -65,16 +65,14 @@ float escape(const PointArrays& points, const Float3& at, const Float3& directio
 
 }  // namespace
 
-// The choice between the clones has to be local to a file: compilers disagree on its symbols.
-
 float smallest_travel(const PointArrays& points, Float3 at, Float3 direction, float squared_r_c,
                       float unlimited) noexcept {
-  return travel(points, at, direction, squared_r_c, unlimited);
+  return vectorised<travel>(points, at, direction, squared_r_c, unlimited);
 }
 
 float largest_escape(const PointArrays& points, Float3 at, Float3 direction, float squared_r_1,
                      float squared_r_c) noexcept {
-  return escape(points, at, direction, squared_r_1, squared_r_c);
+  return vectorised<escape>(points, at, direction, squared_r_1, squared_r_c);
 }
 
 }  // namespace palpate

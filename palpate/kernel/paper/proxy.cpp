@@ -204,7 +204,7 @@ double gamma_schedule(double gamma, int contact_steps) noexcept {
 
 MovementEnd move_proxy(const Patch& patch, const Vec3& hip, const ProxyParameters& proxy,
                        double cos_theta, bool fixed_step, ProxyMovement& movement) noexcept {
-  return move(patch, hip, proxy, cos_theta, fixed_step, movement);
+  return vectorised<move>(patch, hip, proxy, cos_theta, fixed_step, movement);
 }
 
 }  // namespace palpate

@@ -180,8 +180,8 @@ Vec6 in_units(const Vec6& metres) {
 
 void LocalPoints::take(const Patch& patch, const LocalFrame& frame) noexcept {
   size = std::min(patch.size(), capacity);
-  transform(patch.x(), patch.y(), patch.z(), size, rows_of(frame, patch.ball().centre, 1.0),
-            x.data(), y.data(), z.data());
+  vectorised<transform>(patch.x(), patch.y(), patch.z(), size,
+                        rows_of(frame, patch.ball().centre, 1.0), x.data(), y.data(), z.data());
 }
 
 float kth_smallest(std::span<const float> values, std::size_t k) noexcept {
@@ -189,7 +189,7 @@ float kth_smallest(std::span<const float> values, std::size_t k) noexcept {
   std::array<std::int32_t, most> keys;
   const std::size_t size = std::min(values.size(), most);
   for (std::size_t i = 0; i < size; ++i) keys[i] = ordered(std::bit_cast<std::int32_t>(values[i]));
-  return std::bit_cast<float>(ordered(kth_key(keys.data(), size, k)));
+  return std::bit_cast<float>(ordered(vectorised<kth_key>(keys.data(), size, k)));
 }
 
 LocalFrame LocalFrame::about(const Vec3& origin, const Vec3& up) noexcept {
@@ -300,10 +300,10 @@ Moments disc_moments(const Patch& patch, const LocalFrame& frame, const Quadric&
   const Eigen::Matrix<float, 6, 1> c = in_cm.cast<float>();
   const auto squared = [](double r) { return static_cast<float>(r * r * per_metre * per_metre); };
   const FloatMoments sums =
-      sum_moments(patch.x(), patch.y(), patch.z(), patch.padded_size(), rows, c.data(),
-                  static_cast<float>(disc.centre.x() * per_metre),
-                  static_cast<float>(disc.centre.y() * per_metre), squared(disc.inner),
-                  squared(disc.outer), static_cast<float>(Moments::unit / disc.cut));
+      vectorised<sum_moments>(patch.x(), patch.y(), patch.z(), patch.padded_size(), rows, c.data(),
+                              static_cast<float>(disc.centre.x() * per_metre),
+                              static_cast<float>(disc.centre.y() * per_metre), squared(disc.inner),
+                              squared(disc.outer), static_cast<float>(Moments::unit / disc.cut));
   Moments moments;
   const auto z = sums.begin() + static_cast<std::ptrdiff_t>(moments.xy.size());
   std::copy(sums.begin(), z, moments.xy.begin());

@@ -12,6 +12,7 @@
 #include "palpate/kernel/sight/frame_timing.hpp"
 #include "palpate/kernel/sight/fused_image.hpp"
 #include "palpate/kernel/sight/monitor.hpp"
+#include "palpate/kernel/sight/render.hpp"
 #include "palpate/kernel/sight/tracker.hpp"
 
 namespace palpate {
@@ -30,14 +31,37 @@ class Sight final : public Method {
   Tick tick(const Vec3& hip, double t) noexcept override;
   void set_parameters(const Parameters& parameters) noexcept override;
 
-  [[nodiscard]] const Patch* patch() const noexcept override { return &mover_.patch(); }
+  [[nodiscard]] const Patch* patch() const noexcept override { return &contact_.mover.patch(); }
+  [[nodiscard]] ContactMode mode() const noexcept { return contact_.tracker.mode(); }
 
  private:
+  static constexpr std::size_t most_fused = 4;  // cameras; those of further ones are not averaged
+
+  /// All that is remembered of one contact: a value.
+  struct Contact {
+    explicit Contact(const PointMover::Options& options) : mover(options) {}
+
+    Proxy proxy;
+    PointMover mover;
+    SightTracker tracker;  // with the contact's mode
+    Monitor monitor;
+    ForceRenderer renderer;
+    std::array<FusedImage, most_fused> fused;  // by camera: points that the proxy rests on
+    int frames_on_fit = 0;                     // in a row; a few do not end an average
+    // [m] displacement of the points since their frame, with the surface, at the last tick
+    Vec3 points_moved = Vec3::Zero();
+    std::optional<Vec3> last_proxy;  // [m] of the last tick
+  };
+
   Movement move(const Vec3& hip, double t) noexcept;
+  [[nodiscard]] bool is_near_fit(const Vec3& place, double t) const noexcept;
+  bool rest_on_fit(const Vec3& hip, double t, Movement& movement) noexcept;
+  void move_over_points(const Vec3& hip, double t, Movement& movement) noexcept;
   void supervise(const Vec3& hip, double t, Movement& movement) noexcept;
   void release(const Vec3& hip, Movement& movement) noexcept;
+  void repair_side(const Vec3& points_moved) noexcept;
   Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;
-  Vec3 blend_force(const Vec3& force, const Vec3& hip, double t) noexcept;
+  [[nodiscard]] double knowledge(double t, std::uint32_t flags) const noexcept;
   [[nodiscard]] double interval() const noexcept;
   void fuse(const Observation& seen, SightTracker::Event event) noexcept;
   [[nodiscard]] const FusedImage* fused() const noexcept;
@@ -46,35 +70,10 @@ class Sight final : public Method {
   [[nodiscard]] Vec3 surface_velocity(double t) const noexcept;
 
   Parameters parameters_;
-  PointMover mover_;
   NewestFrame frame_;
   FrameTiming timing_;
-  Proxy proxy_;
-  SightTracker tracker_;
-  bool on_fit_ = false;  // the proxy rests on the fitted surface, not on points
-  // [m] displacement of the points since their frame, with the surface, at the last tick
-  Vec3 points_moved_ = Vec3::Zero();
-  static constexpr std::size_t most_fused = 4;  // cameras; those of further ones are not averaged
-  std::array<FusedImage, most_fused> fused_;    // by camera: points that the proxy rests on
-  int frames_on_fit_ = 0;                       // in a row; a few do not end an average
-  Monitor monitor_;
-  std::optional<Vec3> last_proxy_;  // [m] of the last tick
-  bool returning_ = false;          // the surface was hidden or lost and comes back
-  double most_felt_ = 0.0;          // [m] inside it that the hand may be felt, then
-  bool returns_ = false;            // it begins to come back in this tick
-
-  // From which the force goes on when a frame arrives.
-  bool blend_due_ = false;  // a frame came since the last force
-  Vec3 last_force_ = Vec3::Zero();
-  Vec3 last_hip_ = Vec3::Zero();
-  Vec3 left_at_ = Vec3::Zero();     // [m] the hand in the last tick in which it pressed
-  Vec3 left_along_ = Vec3::Zero();  // [-] the last normal there was
-  double last_blend_t_ = 0.0;
-  Vec3 carried_velocity_ = Vec3::Zero();  // [m/s] of the surface, before the newest frame
-  Vec3 blend_offset_ = Vec3::Zero();
-  double blend_start_ = 0.0;
-
   HandVelocity hand_velocity_;
+  Contact contact_;
 };
 
 }  // namespace palpate

@@ -90,13 +90,13 @@ void SightTracker::set(const SightParameters& parameters) noexcept {
 }
 
 SurfaceContact SightTracker::contact(const Vec3& point, double t) const noexcept {
-  return surface_.contact(point, t, holding_ ? serves_while_held : serves);
+  return surface_.contact(point, t, holding() ? serves_while_held : serves);
 }
 
 // The surface was not measured: it is kept as it was at `since` [s].
 SightTracker::Event SightTracker::hold(double since) noexcept {
-  if (!holding_) held_since_ = since;
-  holding_ = true;
+  if (!holding()) held_since_ = since;
+  note(Evidence::hidden);
   surface_.stop();
   return Event::hidden;
 }
@@ -145,10 +145,10 @@ SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_
   View& view = views_[camera];
   view.stamp = stamp;
   view.interval = interval;
-  if (!tracking_) {
+  if (!tracking()) {
     surface_.start_frame(camera, stamp, interval);
     watch(clouds, proxy);
-    return tracking_ ? Event::followed : Event::none;
+    return tracking() ? Event::followed : Event::none;
   }
   const bool alone = clouds.parts().size() == 1;
   const double elapsed = alone ? interval : stamp - surface_.stamp();
@@ -159,7 +159,7 @@ SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_
   const double expected = surface_.velocity() * std::min(elapsed, SurfaceEstimate::longest_gap);
   const Vec3 hand = axes.local_from_world(proxy);
   Vec2 foot = surface_.surface().nearest(hand, hand.head<2>(), surface_.centre(),
-                                         holding_ ? serves_while_held : 2.0 * serves);
+                                         holding() ? serves_while_held : 2.0 * serves);
   // An unchanged centre lets frames be compared cell by cell.
   if ((foot - surface_.centre()).norm() < serves) foot = surface_.centre();
   Quadric moved = surface_.surface();
@@ -178,7 +178,7 @@ SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_
   std::size_t before = 0;  // points between the viewpoint and the surface
   // After a hold the gate is narrow: the surface is where it was, and what remains of an occluder
   // may be close to it.
-  const double wide = holding_ ? surface_.gate(gate_after_hold) : surface_.gate();
+  const double wide = holding() ? surface_.gate(gate_after_hold) : surface_.gate();
   const SightCone inner({place, surface_.resolution(), occluder_reach, axes.up}, viewpoint);
   const Eigen::Vector3f axis = inner.axis().cast<float>();
   const auto radius = static_cast<float>(inner.radius_at(0.0));
@@ -238,19 +238,19 @@ SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_
                     std::max(layer_gap(surface_), surface_.spread()), least_share_);
     if (from_behind && layer) {
       // A surface touched from behind has left the gate: the proxy goes on over the points.
-      forget();
+      note(Evidence::lost);
       return Event::none;
     }
     if (!layer) return hold(previous_stamp);
     jump = layer->height / std::max(line.dot(axes.up), 0.2);
     const bool nearer = jump > 0.0;
-    if (nearer && (holding_ || is_occluder(view.beside, look_beside(cloud, place), jump + expected,
-                                           jump, hardest_strike))) {
+    if (nearer && (holding() || is_occluder(view.beside, look_beside(cloud, place), jump + expected,
+                                            jump, hardest_strike))) {
       return hold(previous_stamp);
     }
     event = Event::jumped;
   }
-  const bool resumed = holding_;
+  const bool resumed = holding();
   surface_.shift(expected + jump);
   if (resumed && event == Event::jumped) surface_.forget_frames();
   // An occluder that moves in front of a resting contact first hides a part of the disc. The border
@@ -265,29 +265,30 @@ SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_
   const double all_near = static_cast<double>(near) / share;
   if (!stays || all_near > view.near_usual) view.near_usual = all_near;
   const bool covered = before >= 3 || all_near < 0.75 * view.near_usual;
-  view.shadowed = covered && stays && (view.shadowed || resumed || !view.covered);
-  view.covered = covered;
-  if (!surface_.add(cloud, foot, {wide, event == Event::jumped, view.shadowed})) {
+  const bool arrived = stays && (resumed || view.outline != Outline::cut);
+  view.outline = !covered ? Outline::whole : arrived ? Outline::shadowed : Outline::cut;
+  const bool shadowed = view.outline == Outline::shadowed;
+  if (!surface_.add(cloud, foot, {wide, event == Event::jumped, shadowed})) {
     surface_.shift(-expected - jump);
     // What is seen behind it is not hidden by anything: the surface ends here, as over a hole.
     if (jump < 0.0) {
-      forget();
+      note(Evidence::lost);
       return Event::none;
     }
     return hold(previous_stamp);
   }
-  holding_ = false;
+  note(Evidence::seen);
   view.beside = look_beside(cloud, surface_.place());
   return event;
 }
 
 void SightTracker::watch(const ObservedClouds& clouds, const Vec3& proxy) noexcept {
-  if (tracking_) {
-    if (holding_) return;
+  if (tracking()) {
+    if (holding()) return;
     const Vec2 below = surface_.frame().local_from_world(proxy).head<2>();
     if ((below - surface_.centre()).norm() < 5e-3) return;
   }
-  tracking_ = false;
+  note(Evidence::lost);
   const std::size_t camera = best_camera(clouds, proxy);
   const Cloud& cloud = *clouds.of(camera);
   surface_.set_spacing(cloud.spacing(proxy));
@@ -309,8 +310,8 @@ void SightTracker::watch(const ObservedClouds& clouds, const Vec3& proxy) noexce
 
 void SightTracker::touch(const ObservedClouds& clouds, const Vec3& foot,
                          const Vec3& normal) noexcept {
-  if (holding_) return;
-  if (tracking_) {
+  if (holding()) return;
+  if (tracking()) {
     const Vec3 local = surface_.frame().local_from_world(foot);
     const Vec2 at = local.head<2>();
     const double off = local.z() - surface_.surface().height(at);
@@ -320,7 +321,7 @@ void SightTracker::touch(const ObservedClouds& clouds, const Vec3& foot,
       if (away < serves) return;
       const std::size_t measured_by = surface_.camera();
       if (surface_.move_to(*clouds.of(measured_by), at,
-                           {surface_.gate(), false, views_[measured_by].shadowed}))
+                           {surface_.gate(), false, is_shadowed(measured_by)}))
         return;
     }
   }
@@ -345,31 +346,30 @@ void SightTracker::touch(const ObservedClouds& clouds, const Vec3& foot,
 }
 
 bool SightTracker::slide(const ObservedClouds& clouds, const Vec3& foot) noexcept {
-  if (!tracking_ || holding_) return false;
+  if (!tracking() || holding()) return false;
   const std::size_t camera = surface_.camera();
   const Cloud& cloud = *clouds.of(camera);
   if (const double spacing = cloud.spacing(foot); surface_.misfits(spacing)) {
     surface_.set_spacing(spacing);
     start(clouds, camera, foot, surface_.frame().up);
-    return tracking_;
+    return tracking();
   }
   const Vec2 at = surface_.frame().local_from_world(foot).head<2>();
-  return surface_.move_to(cloud, at, {surface_.gate(), false, views_[camera].shadowed});
+  return surface_.move_to(cloud, at, {surface_.gate(), false, is_shadowed(camera)});
 }
 
 // Begins to follow the surface at `foot`, in a camera's newest frame.
 void SightTracker::start(const ObservedClouds& clouds, std::size_t camera, const Vec3& foot,
                          const Vec3& up) noexcept {
   const Cloud& cloud = *clouds.of(camera);
-  holding_ = false;
   for (View& view : views_) {
-    view.shadowed = view.covered = false;
+    view.outline = Outline::whole;
     if (&view != &views_[camera]) view.beside = nothing_beside();
   }
   if (clouds.parts().size() > 1)
     surface_.start_frame(camera, views_[camera].stamp, views_[camera].interval);
-  tracking_ = surface_.start(cloud, foot, up);
-  if (tracking_) views_[camera].beside = look_beside(cloud, surface_.place());
+  note(surface_.start(cloud, foot, up) ? Evidence::seen : Evidence::lost);
+  if (tracking()) views_[camera].beside = look_beside(cloud, surface_.place());
 }
 
 std::optional<SightTracker::Seen> SightTracker::look_at(const Cloud& cloud, const Vec3& place,
@@ -390,8 +390,8 @@ std::optional<Vec3> SightTracker::in_front(const ObservedClouds& clouds, const V
   // farther away.
   const double farthest = 4.0 * radius;
   const double way = (after - before).norm();
-  if (!tracking_ || holding_ || views_[surface_.camera()].covered || way < 0.5 * radius ||
-      way > farthest)
+  if (!tracking() || holding() || views_[surface_.camera()].outline != Outline::whole ||
+      way < 0.5 * radius || way > farthest)
     return std::nullopt;
   const Cloud& cloud = *clouds.of(best_camera(clouds, after));
   const std::optional<Seen> now = look_at(cloud, after, radius);

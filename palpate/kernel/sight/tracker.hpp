@@ -7,6 +7,7 @@
 #include <span>
 
 #include "palpate/kernel/core/observed_clouds.hpp"
+#include "palpate/kernel/sight/contact_mode.hpp"
 #include "palpate/kernel/sight/surface_estimate.hpp"
 
 namespace palpate {
@@ -37,7 +38,8 @@ class SightTracker {
   };
 
   void set(const SightParameters& parameters) noexcept;
-  void forget() noexcept { tracking_ = holding_ = false; }
+  /// Notes what a tick shows. What frames show the tracker notes itself.
+  void note(Evidence evidence) noexcept { mode_ = next_mode(mode_, evidence); }
 
   /// Takes a camera's new frame into use: it alone says what is new, and where it does not show the
   /// surface the others' newest ones may.
@@ -65,12 +67,13 @@ class SightTracker {
   [[nodiscard]] std::optional<Vec3> in_front(const ObservedClouds& clouds, const Vec3& before,
                                              const Vec3& after, double radius) noexcept;
 
-  [[nodiscard]] bool tracking() const noexcept { return tracking_; }
+  [[nodiscard]] ContactMode mode() const noexcept { return mode_; }
+  [[nodiscard]] bool tracking() const noexcept { return is_followed(mode_); }
   /// Is the surface so well described by its fit that the proxy can rest on that?
   [[nodiscard]] bool smooth() const noexcept {
-    return tracking_ && (surface_.smooth() || holding_ || views_[surface_.camera()].shadowed);
+    return tracking() && (surface_.smooth() || holding() || is_shadowed(surface_.camera()));
   }
-  [[nodiscard]] bool holding() const noexcept { return holding_; }
+  [[nodiscard]] bool holding() const noexcept { return is_hidden(mode_); }
   [[nodiscard]] double held_since() const noexcept { return held_since_; }  ///< [s]
 
   /// The surface nearest to `point` [m, world] at time t [s]; only while `tracking`.
@@ -92,14 +95,19 @@ class SightTracker {
   static constexpr std::size_t bands = 5;
   using Ring = std::array<float, sectors * bands>;
 
+  /// How much of the disc a camera sees.
+  enum class Outline : std::uint8_t {
+    whole,
+    cut,      ///< something hides a part of it
+    shadowed  ///< the same, and it arrived while the contact stayed in place
+  };
   // How a camera sees the surface and what is beside it.
   struct View {
     double stamp = 0.0;            // [s] of its newest frame
     double interval = 1.0 / 30.0;  // [s]
-    bool covered = false;          // an occluder hides a part of the disc
-    bool shadowed = false;         // and arrived while the contact stayed in place
-    Vec3 hip = Vec3::Zero();       // [m] world: where the hand rests
-    double near_usual = 0.0;       // points of the surface in the beam without an occluder
+    Outline outline = Outline::whole;
+    Vec3 hip = Vec3::Zero();  // [m] world: where the hand rests
+    double near_usual = 0.0;  // points of the surface in the beam without an occluder
     Ring beside = nothing_beside();
   };
   static Ring nothing_beside() noexcept;
@@ -110,6 +118,9 @@ class SightTracker {
   [[nodiscard]] bool others_show(const ObservedClouds& clouds, std::size_t camera,
                                  const Vec3& place, const Vec3& normal, double gate) noexcept;
   Event hold(double since) noexcept;
+  [[nodiscard]] bool is_shadowed(std::size_t camera) const noexcept {
+    return views_[camera].outline == Outline::shadowed;
+  }
   /// The median of what is measured within `radius` [m] of the line of sight through `place`.
   struct Seen {
     double above;  // [m] `place`, towards the viewpoint
@@ -125,8 +136,7 @@ class SightTracker {
   LocalPoints points_;  // of the patch
   SurfaceEstimate surface_;
   double least_share_ = SightParameters().least_share;
-  bool tracking_ = false;
-  bool holding_ = false;
+  ContactMode mode_ = ContactMode::free;
   double held_since_ = 0.0;
   std::array<View, Patch::max_views> views_;  // by camera
 };

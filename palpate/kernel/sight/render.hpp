@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+
+#include "palpate/kernel/core/parameters.hpp"
+
+namespace palpate {
+
+/// [-] From 1 at x = 0 to 0 at 1, with slopes of 0.
+inline double ease(double x) noexcept {
+  x = std::clamp(x, 0.0, 1.0);
+  return 1.0 - x * x * (3.0 - 2.0 * x);
+}
+
+/// The force that a hand feels, from what the coupling says: spreads what frames correct, takes
+/// what is left of an old force from a hand that leaves, and lets a force fade and come back with
+/// the knowledge of the surface. docs/sight.md, 6.
+///
+/// [servo] Nothing here allocates, locks or throws.
+class ForceRenderer {
+ public:
+  struct Input {
+    Vec3 hip;                    ///< [m] world
+    double t;                    ///< [s]
+    Vec3 force;                  ///< [N] world: the coupling's, from the newest estimate
+    std::optional<Vec3> normal;  ///< [-] unit, world: of the surface that is touched
+    double blend;                ///< [s] over which a correction is spread
+    double known;                ///< [-] 0 to 1: how well the surface is known
+    double return_speed;         ///< [m/s] at which it comes back once it is known again
+    double r_c;                  ///< [m] and so much beyond itself
+  };
+
+  /// The next force will be a corrected one: until then the surface moved at `velocity` [m/s].
+  void correct(const Vec3& velocity) noexcept {
+    if (!due_) due_ = velocity;
+  }
+  /// As `correct`, for a frame: what it says is newer than what was corrected before.
+  void start_frame(const Vec3& velocity) noexcept { due_ = velocity; }
+  /// The force may end at once.
+  void release() noexcept {
+    due_.reset();
+    offset_ = Vec3::Zero();
+  }
+  void forget() noexcept {
+    release();
+    force_ = Vec3::Zero();
+    felt_ = fully;
+  }
+  Vec3 render(const Input& input, const Coupling& coupling) noexcept;
+
+  /// [N] world: of the last tick, before it faded.
+  [[nodiscard]] const Vec3& last() const noexcept { return force_; }
+  /// [m] world: the last hand.
+  [[nodiscard]] const Vec3& hip() const noexcept { return hip_; }
+
+ private:
+  static constexpr double fully = std::numeric_limits<double>::infinity();
+
+  [[nodiscard]] Vec3 blend(const Input& input, const Coupling& coupling) noexcept;
+  [[nodiscard]] Vec3 left_behind(Vec3 force, const Input& input, double stiffness) noexcept;
+  [[nodiscard]] Vec3 come_back(Vec3 force, const Input& input, double stiffness) noexcept;
+
+  std::optional<Vec3> due_;         // [m/s] a correction came since the last force
+  Vec3 offset_ = Vec3::Zero();      // [N] that it leaves to blend out
+  double start_ = 0.0;              // [s] of that
+  Vec3 force_ = Vec3::Zero();       // [N] the last one
+  Vec3 hip_ = Vec3::Zero();         // [m] then
+  double t_ = 0.0;                  // [s] then
+  Vec3 left_at_ = Vec3::Zero();     // [m] the hand in the last tick in which it pressed
+  Vec3 left_along_ = Vec3::Zero();  // [-] the last normal there was
+  double felt_ = fully;             // [m] inside the surface that the hand is felt at most
+};
+
+}  // namespace palpate

@@ -9,10 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/linear.hpp"
 
 namespace palpate {
 namespace {
@@ -105,11 +103,10 @@ class Planes {
     for (const Vec3& point : points) mean += point / static_cast<double>(points.size());
     Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
     for (const Vec3& point : points) spread += (point - mean) * (point - mean).transpose();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
-    if (solver.eigenvalues()[0] > 0.1 * solver.eigenvalues()[1]) return {};  // no plane
+    const Axes axes = axes_of(spread);
+    if (axes.values[0] > 0.1 * axes.values[1]) return {};  // no plane
     const auto n = static_cast<double>(points.size());
-    return Plane{mean, solver.eigenvectors().col(0),
-                 solver.eigenvalues()[0] / (n - 3.0) / solver.eigenvalues()[1]};
+    return Plane{mean, axes.vectors.col(0), axes.values[0] / (n - 3.0) / axes.values[1]};
   }
 
   const DepthImage& image_;
@@ -199,11 +196,11 @@ double needed_information(const Equations& sum) {
 // The step that brings the surfaces together, without the motions that are left open: along these
 // the start stays.
 Vec6 step_of(const Equations& sum) {
-  const Eigen::SelfAdjointEigenSolver<Mat6> solver(sum.information / sum.weights);
+  const Axes6 axes = axes_of_six(sum.information / sum.weights);
   Vec6 step = Vec6::Zero();
   for (int i = 0; i < 6; ++i) {
-    const Vec6 motion = solver.eigenvectors().col(i);
-    const double information = solver.eigenvalues()[i];
+    const Vec6 motion = axes.vectors.col(i);
+    const double information = axes.values[i];
     if (information > needed_information(sum))
       step -= motion.dot(sum.gradient) / (sum.weights * information) * motion;
   }
@@ -212,9 +209,9 @@ Vec6 step_of(const Equations& sum) {
 
 // @throws Error if the geometry leaves a motion open.
 void check_information(const Equations& sum) {
-  const Eigen::SelfAdjointEigenSolver<Mat6> solver(sum.information / sum.weights);
-  if (solver.eigenvalues()[0] > needed_information(sum)) return;
-  const Vec6 weakest = solver.eigenvectors().col(0);
+  const Axes6 axes = axes_of_six(sum.information / sum.weights);
+  if (axes.values[0] > needed_information(sum)) return;
+  const Vec6 weakest = axes.vectors.col(0);
   const bool turns = weakest.head<3>().norm() > weakest.tail<3>().norm();
   const Vec3 axis = (turns ? weakest.head<3>() : weakest.tail<3>()).normalized();
   throw Error(
@@ -228,13 +225,11 @@ void check_information(const Equations& sum) {
 }  // namespace
 
 double CameraFit::turn_deviation() const {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance.topLeftCorner<3, 3>());
-  return std::sqrt(solver.eigenvalues()[2]);
+  return std::sqrt(axes_of(Eigen::Matrix3d(covariance.topLeftCorner<3, 3>())).values[2]);
 }
 
 double CameraFit::shift_deviation() const {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance.bottomRightCorner<3, 3>());
-  return std::sqrt(solver.eigenvalues()[2]);
+  return std::sqrt(axes_of(Eigen::Matrix3d(covariance.bottomRightCorner<3, 3>())).values[2]);
 }
 
 CameraFit register_cameras(const DepthImage& first, const DepthImage& second,
@@ -287,11 +282,14 @@ CameraFit register_cameras(const DepthImage& first, const DepthImage& second,
                     " % agree, to " + std::to_string(std::lround(1e3 * sum.deviation)) + " mm",
                 "use an initial estimate accurate to 10 cm and 10 degrees, keep the scene at rest, "
                 "and check the depth units");
-  Mat6 unscaled = sum.information;
-  unscaled.topRows<3>() *= sum.radius;
-  unscaled.leftCols<3>() *= sum.radius;
   const double variance = sum.squares / std::max(sum.weights - 6.0, 1.0);
-  fit.covariance = variance * unscaled.ldlt().solve(Mat6::Identity());
+  const Axes6 axes = axes_of_six(sum.information);
+  fit.covariance.setZero();
+  for (int i = 0; i < 6; ++i) {
+    Vec6 motion = axes.vectors.col(i);
+    motion.head<3>() /= sum.radius;
+    fit.covariance += variance / axes.values[i] * motion * motion.transpose();
+  }
   fit.centre = sum.centre;
   fit.rms = std::sqrt(sum.squares / sum.weights);
   fit.overlap = static_cast<double>(pairs.size()) / static_cast<double>(points.size());

@@ -17,7 +17,6 @@
 #include "tests/support/bag_contents.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/errors.hpp"
-#include "tests/support/sqlite_bag.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate {
@@ -214,97 +213,6 @@ TEST(Bag, OfRosbag2IsRead) {
   }
 }
 
-// Ten commits of some messages on two topics. @return its one file
-std::filesystem::path write_commits(const std::filesystem::path& folder) {
-  std::mt19937 random(3);
-  const std::filesystem::path file = folder.string() + ".db3";
-  test::SqliteBagWriter writer(file);
-  const std::size_t a = writer.topic("/a", ros::String::type);
-  const std::size_t b = writer.topic("/b", ros::Float64MultiArray::type);
-  for (int i = 0; i < 100; ++i) {
-    writer.write(a, 1000 * i, ros::encode(ros::String{std::string(random() % 60, 'x')}));
-    writer.write(b, 1000 * i, ros::encode(ros::Float64MultiArray{"b", {1.0 / 3.0, 1.0 * i}}));
-    if (i % 10 == 9) writer.commit();
-  }
-  writer.commit(true);
-  return file;
-}
-
-TEST(BagChecksums, OfAWholeBagAreRight) {
-  const TemporaryFolder folder;
-  const BagCheck check = BagReader(write_commits(folder.path() / "bag")).check();
-  EXPECT_TRUE(check.has_checksums);
-  EXPECT_TRUE(check.closed);
-  EXPECT_EQ(check.messages, 200U);
-  EXPECT_EQ(check.unchecked, 0U);
-  EXPECT_EQ(check.damage, "");
-}
-
-TEST(BagChecksums, NoticeEachFlippedBitThatChangesWhatIsRead) {
-  const TemporaryFolder folder;
-  const std::filesystem::path file = write_commits(folder.path() / "bag");
-  const std::vector<std::string> original = bag_contents(file);
-  const std::string whole = text_of(file);
-  std::mt19937 random(7);
-  int noticed = 0;
-  constexpr int flips = 400;
-  for (int i = 0; i < flips; ++i) {
-    std::string changed = whole;
-    const std::size_t bit = random() % (8 * whole.size());
-    changed[bit / 8] = static_cast<char>(changed[bit / 8] ^ (1 << bit % 8));
-    const std::filesystem::path flipped = folder.write("flipped.db3", changed);
-    std::vector<std::string> read;
-    BagCheck check;
-    bool thrown = false;
-    try {
-      check = BagReader(flipped).check();
-      read = bag_contents(flipped);
-    } catch (const Error&) {
-      thrown = true;
-    }
-    noticed += thrown || !check.damage.empty() ? 1 : 0;
-    if (!thrown && check.has_checksums && check.damage.empty()) {
-      ASSERT_EQ(read, original) << "bit " << bit;
-    }
-  }
-  EXPECT_GT(noticed, flips / 8);  // the others were in empty pages
-}
-
-TEST(BagChecksums, NameTheFirstMessageThatIsDamagedOrMissing) {
-  const TemporaryFolder folder;
-  const std::filesystem::path file = write_commits(folder.path() / "bag");
-  const std::string whole = text_of(file);
-  const auto damage_by = [&](const std::string& sql) {
-    const std::filesystem::path changed = folder.write("changed.db3", whole);
-    Database::create(changed).run(sql);
-    return BagReader(changed).check().damage;
-  };
-  const auto says = [&](const std::string& sql, const std::string& what) {
-    const std::string damage = damage_by(sql);
-    EXPECT_NE(damage.find(what), std::string::npos) << sql << ": " << damage;
-  };
-  says("UPDATE messages SET data = zeroblob(60) WHERE id IN (42, 77)", "message 42 of /b");
-  says("UPDATE messages SET timestamp = timestamp + 1 WHERE id = 42", "message 42 of /b");
-  says("UPDATE messages SET topic_id = 1 WHERE id = 42", "message 42 of /a");
-  says("UPDATE messages SET topic_id = 9 WHERE id = 42", "message 42 is of no topic");
-  says("DELETE FROM messages WHERE id = 42", "message 42 is missing");
-  says("DELETE FROM messages WHERE id > 150", "message 151 is missing");
-  says("UPDATE topics SET type = 'x/msg/Y' WHERE name = '/b'", "message 2 of /b");
-  says("DELETE FROM palpate_checksums WHERE id = 5", "block 5");
-  says("UPDATE palpate_checksums SET first = first + 1 WHERE id = 5", "block 5");
-  EXPECT_EQ(damage_by("SELECT 1"), "");
-}
-
-TEST(BagChecksums, LetNoDamagedMessageBeRead) {
-  const TemporaryFolder folder;
-  const std::filesystem::path file = write_commits(folder.path() / "bag");
-  Database::create(file).run("UPDATE messages SET timestamp = timestamp + 1 WHERE id = 42");
-  BagReader reader(file);
-  const auto places = reader.places("/b");
-  EXPECT_TRUE(fails_saying([&] { return reader.read(places[20]); }, "message 42", "checksum"));
-  EXPECT_FALSE(reader.read(places[19]).empty());
-}
-
 TEST(BagChecksums, TellABagThatWasNotClosedFromADamagedOne) {
   const TemporaryFolder folder;
   // What a reader finds is what a program that dies now would leave.
@@ -320,15 +228,21 @@ TEST(BagChecksums, TellABagThatWasNotClosedFromADamagedOne) {
   EXPECT_EQ(check.damage, "");
 }
 
-TEST(BagChecksums, AreMissingInBagsOfOthersWhichAreReadAllTheSame) {
+TEST(BagChecksums, AreMissingInSqliteWhichIsReadAllTheSame) {
   const TemporaryFolder folder;
-  const std::filesystem::path file = write_commits(folder.path() / "bag");
-  Database::create(file).run("DROP TABLE palpate_checksums");
+  const std::filesystem::path file = folder.path() / "bag.db3";
+  Database::create(file).run(
+      "CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL);"
+      "CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,"
+      "timestamp INTEGER NOT NULL,data BLOB NOT NULL);"
+      "INSERT INTO topics VALUES(1,'/a','std_msgs/msg/String');"
+      "INSERT INTO messages(topic_id,timestamp,data) VALUES(1,0,x'00010000'),(1,9,x'00010000')");
   const BagCheck check = BagReader(file).check();
   EXPECT_FALSE(check.has_checksums);
-  EXPECT_EQ(check.unchecked, 200U);
+  EXPECT_EQ(check.messages, 2U);
+  EXPECT_EQ(check.unchecked, 2U);
   EXPECT_EQ(check.damage, "");
-  EXPECT_EQ(bag_contents(file).size(), 200U);
+  EXPECT_EQ(bag_contents(file).size(), 2U);
 }
 
 }  // namespace test_bag

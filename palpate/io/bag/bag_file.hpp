@@ -14,7 +14,7 @@ namespace palpate {
 
 /// What the checksums of a bag say of its messages.
 struct BagCheck {
-  bool has_checksums = false;   ///< false: others' bags, and palpate's up to version 0.1
+  bool has_checksums = false;   ///< false: bags in SQLite or of ROS 1
   bool closed = true;           ///< false: its program was killed; it ends with what was whole
   std::uint64_t messages = 0;   ///< that are there
   std::uint64_t unchecked = 0;  ///< of these, without a checksum

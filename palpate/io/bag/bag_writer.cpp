@@ -13,7 +13,6 @@
 #include <unistd.h>
 #include <zstd.h>
 
-#include "palpate/io/bag/checksum.hpp"
 #include "palpate/io/bag/mcap_format.hpp"
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -307,13 +306,12 @@ std::string BagWriter::metadata() const {
                      "\nstarting_time:\n  nanoseconds_since_epoch: " + start +
                      "\nmessage_count: " + count + "\ntopics_with_message_count:\n";
   if (topics_.empty()) yaml += "  []\n";
-  for (const Topic& topic : topics_) {
+  for (const Topic& topic : topics_)
     yaml +=
         "  - topic_metadata:\n      name: " + quoted(topic.name) + "\n      type: " + topic.type +
         "\n      serialization_format: cdr\n      offered_qos_profiles: " + quoted(topic.profile) +
         "\n      type_description_hash: \"\"\n    message_count: " +
         std::to_string(topic.messages) + "\n";
-  }
   return yaml + "compression_format: \"\"\ncompression_mode: \"\"\nrelative_file_paths:\n  - " +
          quoted(name_) + "\nfiles:\n  - path: " + quoted(name_) +
          "\n    starting_time:\n      nanoseconds_since_epoch: " + start +

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -10,48 +9,29 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/io/bag/bag_file.hpp"
-#include "palpate/io/bag/checksum.hpp"
+#include "palpate/io/bag/chunked_bag.hpp"
 #include "palpate/io/bag/compression.hpp"
 #include "palpate/io/bag/mcap_format.hpp"
-#include "palpate/io/bag/random_access.hpp"
-#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {
 
-constexpr std::size_t footer_content = 20;           // [bytes]
-constexpr std::uint64_t largest_record = 1U << 28U;  // [bytes] in memory, when decompressed, too
-constexpr std::size_t most_mcap_messages = std::size_t{1} << 25U;
+constexpr std::size_t footer_content = 20;  // [bytes]
 constexpr const char* mcap_remedy = "copy it again, or save the undamaged part with mcap recover";
 
-class McapFile final : public BagFile {
+class McapFile final : public ChunkedBag {
  public:
-  explicit McapFile(const std::filesystem::path& path) : BagFile(path), file_(path) {
+  explicit McapFile(const std::filesystem::path& path)
+      : ChunkedBag(path, mcap_remedy, "ros2 bag convert") {
     if (file_.size() < mcap_magic.size() || !is_magic(0))
       throw Error(path.string(), "is not an MCAP file", "name a bag of ROS 2");
     find_footer();
     if (read_index()) return;
     entries_.clear();
-    channels_.clear();
+    topics_.clear();
     schemas_.clear();
     Walked walked;
     walk(walked, false, [this](const Entry& entry) { add(entry); });
-  }
-
-  [[nodiscard]] std::vector<BagTopic> topics() const override {
-    std::vector<BagTopic> topics;
-    for (const auto& [number, topic] : channels_) topics.push_back(topic);
-    return topics;
-  }
-
-  [[nodiscard]] std::vector<Message> messages(std::string_view topic) override {
-    std::vector<Message> messages;
-    for (std::size_t i = 0; i < entries_.size(); ++i) {
-      if (channels_.at(entries_[i].channel).name == topic)
-        messages.push_back({static_cast<std::int64_t>(i + 1), entries_[i].nanoseconds});
-    }
-    return messages;
   }
 
   [[nodiscard]] Content read(std::int64_t id) override {
@@ -75,11 +55,9 @@ class McapFile final : public BagFile {
       content = inner.content;
     }
     if (kind != RecordKind::message) place.fail("has no message where its index names one");
-    const Entry found = entry_of(content, entry.record, entry.offset);
-    if (found.channel != entry.channel || found.nanoseconds != entry.nanoseconds)
-      place.fail("has another message than its index says");
+    entry_of(content, entry.record, entry.offset).expect(entry, place);
     content = content.subspan(message_head);
-    return {channels_.at(entry.channel).name, {content.begin(), content.end()}};
+    return {topics_.at(entry.topic).name, {content.begin(), content.end()}};
   }
 
   void check(BagCheck& check) override {
@@ -114,13 +92,6 @@ class McapFile final : public BagFile {
     RecordKind kind;
     std::span<const std::byte> content;
   };
-  static constexpr std::uint32_t in_no_chunk = std::numeric_limits<std::uint32_t>::max();
-  struct Entry {
-    std::int64_t nanoseconds;
-    std::uint64_t record;  // where in the file the message's record begins, or that of its chunk
-    std::uint32_t offset;  // of the message's record in its chunk, or `in_no_chunk`
-    std::uint16_t channel;
-  };
   struct Walked {
     std::uint64_t messages = 0;
     std::uint64_t covered = 0;  // of these, in chunks with a checksum
@@ -133,8 +104,6 @@ class McapFile final : public BagFile {
   struct ChunkIndex {
     std::uint64_t begin, indexes, indexes_size;
   };
-
-  [[nodiscard]] BytePlace at(std::uint64_t byte) const { return {path(), byte, mcap_remedy}; }
 
   [[nodiscard]] bool is_magic(std::uint64_t place) const {
     std::array<char, mcap_magic.size()> bytes{};
@@ -172,13 +141,6 @@ class McapFile final : public BagFile {
     return Record{kind, place, place + record_head, size};
   }
 
-  [[nodiscard]] std::vector<std::byte> content_of(const Record& record) const {
-    if (record.size > largest_record)
-      at(record.place)
-          .fail("has a record of " + std::to_string(record.size) + " bytes, more than can be read");
-    return file_.bytes(record.begin, record.size);
-  }
-
   static Inner inner_at(std::span<const std::byte> records, std::size_t offset,
                         const BytePlace& place) {
     RecordFields fields(records.subspan(offset), place);
@@ -196,7 +158,7 @@ class McapFile final : public BagFile {
     const auto schema = schemas_.find(fields.number<std::uint16_t>());
     BagTopic topic{.name = fields.text(), .type = {}};
     if (schema != schemas_.end()) topic.type = schema->second;
-    channels_.emplace(number, std::move(topic));
+    topics_.emplace(number, std::move(topic));
   }
 
   [[nodiscard]] Entry entry_of(std::span<const std::byte> message, std::uint64_t record,
@@ -206,18 +168,10 @@ class McapFile final : public BagFile {
     static_cast<void>(fields.number<std::uint32_t>());  // sequence
     const auto logged = static_cast<std::int64_t>(fields.number<std::uint64_t>());
     static_cast<void>(fields.number<std::uint64_t>());  // when it was published
-    if (!channels_.contains(channel))
+    if (!topics_.contains(channel))
       at(record).fail("has a message of channel " + std::to_string(channel) +
                       ", which is not declared in the file");
     return {logged, record, offset, channel};
-  }
-
-  void add(const Entry& entry) {
-    if (entries_.size() == most_mcap_messages)
-      throw Error(path().string(),
-                  "has more than " + std::to_string(most_mcap_messages) + " messages",
-                  "split it with ros2 bag convert");
-    entries_.push_back(entry);
   }
 
   // The records of the chunk that begins there, decompressed and checked; they live until those of
@@ -235,8 +189,7 @@ class McapFile final : public BagFile {
     const auto crc = fields.number<std::uint32_t>();
     const std::string compression = fields.text();
     const std::span<const std::byte> records = fields.take(fields.number<std::uint64_t>());
-    if (size > largest_record)
-      at(place).fail("has a chunk of " + std::to_string(size) + " bytes, more than can be read");
+    expect_size("chunk", size, place);
     if (compression.empty())
       chunk_.assign(records.begin(), records.end());
     else if (compression == "zstd")
@@ -420,18 +373,16 @@ class McapFile final : public BagFile {
       while (!places.left().empty()) {
         const auto logged = static_cast<std::int64_t>(places.number<std::uint64_t>());
         const auto where = places.number<std::uint64_t>();
-        if (where >= in_no_chunk || !channels_.contains(channel) ||
+        if (where >= in_no_chunk || !topics_.contains(channel) ||
             entries_.size() == statistics_->messages)
           return false;
         add({logged, chunk.begin, static_cast<std::uint32_t>(where), channel});
       }
     }
-    std::sort(entries_.begin() + static_cast<std::ptrdiff_t>(first), entries_.end(),
-              [](const Entry& a, const Entry& b) { return a.offset < b.offset; });
+    sort_chunk(first);
     return true;
   }
 
-  RandomAccess file_;
   bool closed_ = false;
   std::uint64_t end_ = 0;          // of the records: where the footer begins, or the file ends
   std::uint64_t summary_ = 0;      // where it begins; `end_` without one
@@ -439,12 +390,7 @@ class McapFile final : public BagFile {
   std::string summary_damage_;
   std::optional<Statistics> statistics_;
   std::map<std::uint16_t, std::string> schemas_;
-  std::map<std::uint16_t, BagTopic> channels_;
-  std::vector<Entry> entries_;
-  // The chunk that was read last
-  std::uint64_t chunk_place_ = 0;  // 0: none
-  bool chunk_has_crc_ = false;
-  std::vector<std::byte> chunk_;
+  bool chunk_has_crc_ = false;  // of the chunk that was read last
 };
 
 }  // namespace

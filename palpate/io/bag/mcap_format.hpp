@@ -4,7 +4,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string_view>
+
+#include <zlib.h>
 
 namespace palpate {
 
@@ -26,5 +29,14 @@ enum class RecordKind : std::uint8_t {
   statistics = 11,
   data_end = 15,
 };
+
+/// The CRC-32 (IEEE 802.3) of bytes that come in several parts: it notices every single flipped bit
+/// and every run of up to 32.
+/// @param before  of the parts before, 0 for the first
+inline std::uint32_t crc32_on(std::uint32_t before, std::span<const std::byte> bytes) {
+  if (bytes.empty()) return before;  // for which zlib would begin anew where there is no pointer
+  return static_cast<std::uint32_t>(
+      crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
+}
 
 }  // namespace palpate

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/io/bag/messages.hpp"
 
-#include <algorithm>
-#include <array>
 #include <chrono>
 #include <utility>
-#include <vector>
 
 #include "palpate/kernel/core/error.hpp"
 

@@ -8,7 +8,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "palpate/io/bag/checksum.hpp"
+#include "palpate/io/bag/mcap_format.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate {

@@ -12,19 +12,15 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/io/bag/bag_file.hpp"
+#include "palpate/io/bag/chunked_bag.hpp"
 #include "palpate/io/bag/compression.hpp"
 #include "palpate/io/bag/messages.hpp"
-#include "palpate/io/bag/random_access.hpp"
-#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 namespace {
 
 constexpr std::string_view ros1_magic = "#ROSBAG V2.0\n";
-constexpr std::uint64_t largest_ros1_head = 1U << 20U;    // [bytes] of a record's fields
-constexpr std::uint64_t largest_ros1_record = 1U << 28U;  // [bytes] in memory, when decompressed
-constexpr std::size_t most_ros1_messages = std::size_t{1} << 25U;
+constexpr std::uint64_t largest_ros1_head = 1U << 20U;  // [bytes] of a record's fields
 constexpr std::size_t most_ros1_connections = 100'000;
 constexpr std::size_t ros1_index_entry = 12;  // [bytes] time and offset
 constexpr const char* ros1_remedy = "copy it again, or save the undamaged part with rosbag reindex";
@@ -93,9 +89,10 @@ std::string ros2_type(std::string_view type) {
   return std::string(type.substr(0, slash)) + "/msg" + std::string(type.substr(slash));
 }
 
-class Ros1File final : public BagFile {
+class Ros1File final : public ChunkedBag {
  public:
-  explicit Ros1File(const std::filesystem::path& path) : BagFile(path), file_(path) {
+  explicit Ros1File(const std::filesystem::path& path)
+      : ChunkedBag(path, ros1_remedy, "rosbag filter") {
     expect_magic();
     const std::optional<Record> first = record_at(ros1_magic.size());
     if (!first) at(ros1_magic.size()).fail("ends before what is in it");
@@ -116,33 +113,16 @@ class Ros1File final : public BagFile {
 
   [[nodiscard]] std::string_view kind() const override { return "ROS 1 bag"; }
 
-  [[nodiscard]] std::vector<BagTopic> topics() const override {
-    std::vector<BagTopic> topics;
-    for (const auto& [number, topic] : connections_) topics.push_back(topic);
-    return topics;
-  }
-
-  [[nodiscard]] std::vector<Message> messages(std::string_view topic) override {
-    std::vector<Message> messages;
-    for (std::size_t i = 0; i < entries_.size(); ++i) {
-      if (connections_.at(entries_[i].connection).name == topic)
-        messages.push_back({static_cast<std::int64_t>(i + 1), entries_[i].nanoseconds});
-    }
-    return messages;
-  }
-
   [[nodiscard]] Content read(std::int64_t id) override {
     const Entry& entry = entries_.at(static_cast<std::size_t>(id - 1));
-    const BytePlace place = at(entry.chunk);
-    const std::span<const std::byte> records = chunk_at(entry.chunk);
+    const BytePlace place = at(entry.record);
+    const std::span<const std::byte> records = chunk_at(entry.record);
     if (entry.offset > records.size()) place.fail("has a chunk that ends before its index says");
     const Inner inner = inner_at(records, entry.offset, place);
     const Ros1Head head(inner.head, place);
     if (head.kind() != Ros1Kind::message) place.fail("has no message where its index names one");
-    const Entry found = entry_of(head, entry.chunk, entry.offset);
-    if (found.connection != entry.connection || found.nanoseconds != entry.nanoseconds)
-      place.fail("has another message than its index says");
-    const BagTopic& topic = connections_.at(entry.connection);
+    entry_of(head, entry.record, entry.offset).expect(entry, place);
+    const BagTopic& topic = topics_.at(entry.topic);
     return {topic.name, ros::from_ros1(topic.type, inner.content, name(topic.name, id))};
   }
 
@@ -173,14 +153,6 @@ class Ros1File final : public BagFile {
     std::span<const std::byte> head, content;
     std::size_t end;  // in the chunk
   };
-  struct Entry {
-    std::int64_t nanoseconds;
-    std::uint64_t chunk;  // where in the file its record begins
-    std::uint32_t offset, connection;
-  };
-
-  [[nodiscard]] BytePlace at(std::uint64_t byte) const { return {path(), byte, ros1_remedy}; }
-
   void expect_magic() const {
     std::array<char, ros1_magic.size()> bytes{};
     const std::string_view begin(bytes.data(), bytes.size());
@@ -213,13 +185,6 @@ class Ros1File final : public BagFile {
     return record;
   }
 
-  [[nodiscard]] std::vector<std::byte> content_of(const Record& record) const {
-    if (record.size > largest_ros1_record)
-      at(record.place)
-          .fail("has a record of " + std::to_string(record.size) + " bytes, more than can be read");
-    return file_.bytes(record.begin, record.size);
-  }
-
   static Inner inner_at(std::span<const std::byte> records, std::size_t offset,
                         const BytePlace& place) {
     RecordFields fields(records.subspan(offset), place);
@@ -233,11 +198,11 @@ class Ros1File final : public BagFile {
   void take_connection(const Ros1Head& head, std::span<const std::byte> content,
                        std::uint64_t place) {
     const auto number = head.number<std::uint32_t>("conn");
-    if (connections_.contains(number)) return;
-    if (connections_.size() == most_ros1_connections) at(place).fail("has too many connections");
+    if (topics_.contains(number)) return;
+    if (topics_.size() == most_ros1_connections) at(place).fail("has too many connections");
     const Ros1Head inner(content, at(place));
-    connections_.emplace(number,
-                         BagTopic{std::string(head.text("topic")), ros2_type(inner.text("type"))});
+    topics_.emplace(number,
+                    BagTopic{std::string(head.text("topic")), ros2_type(inner.text("type"))});
   }
 
   [[nodiscard]] Entry entry_of(const Ros1Head& head, std::uint64_t chunk,
@@ -249,17 +214,9 @@ class Ros1File final : public BagFile {
   }
 
   void expect_connection(std::uint32_t connection, std::uint64_t place) const {
-    if (!connections_.contains(connection))
+    if (!topics_.contains(connection))
       at(place).fail("has a message of connection " + std::to_string(connection) +
                      ", which is not declared in the file");
-  }
-
-  void add(const Entry& entry) {
-    if (entries_.size() == most_ros1_messages)
-      throw Error(path().string(),
-                  "has more than " + std::to_string(most_ros1_messages) + " messages",
-                  "split it with rosbag filter");
-    entries_.push_back(entry);
   }
 
   // The records of the chunk that begins there, decompressed; they live until those of another
@@ -272,8 +229,7 @@ class Ros1File final : public BagFile {
     const Ros1Head head(record->head, at(place));
     const auto size = head.number<std::uint32_t>("size");
     const std::string_view compression = head.text("compression");
-    if (size > largest_ros1_record)
-      at(place).fail("has a chunk of " + std::to_string(size) + " bytes, more than can be read");
+    expect_size("chunk", size, place);
     std::vector<std::byte> content = content_of(*record);
     if (compression == "none")
       chunk_ = std::move(content);
@@ -348,7 +304,7 @@ class Ros1File final : public BagFile {
         }
         place = record->end();
       }
-      if (connections_.size() != connections || infos != chunks) return false;
+      if (topics_.size() != connections || infos != chunks) return false;
       read_chunk_indexes();
       return entries_.size() == messages;
     } catch (const Error& error) {
@@ -361,14 +317,10 @@ class Ros1File final : public BagFile {
   void read_chunk_indexes() {
     std::uint64_t chunk = 0;
     std::size_t first = 0;  // of the chunk's entries
-    const auto sort_chunk = [&] {
-      std::sort(entries_.begin() + static_cast<std::ptrdiff_t>(first), entries_.end(),
-                [](const Entry& a, const Entry& b) { return a.offset < b.offset; });
-      first = entries_.size();
-    };
     for_each_record([&](const Record& record, const Ros1Head& head) {
       if (head.kind() == Ros1Kind::chunk) {
-        sort_chunk();
+        sort_chunk(first);
+        first = entries_.size();
         chunk = record.place;
       }
       if (head.kind() != Ros1Kind::index) return;
@@ -383,18 +335,12 @@ class Ros1File final : public BagFile {
         add({nanoseconds, chunk, fields.number<std::uint32_t>(), connection});
       }
     });
-    sort_chunk();
+    sort_chunk(first);
   }
 
-  RandomAccess file_;
   bool closed_ = false;
   std::uint64_t begin_ = 0, end_ = 0;  // of the chunks; behind them is the index, if it was closed
   std::string index_damage_;
-  std::map<std::uint32_t, BagTopic> connections_;
-  std::vector<Entry> entries_;
-  // The chunk that was read last
-  std::uint64_t chunk_place_ = 0;  // 0: none
-  std::vector<std::byte> chunk_;
 };
 
 }  // namespace

@@ -2,7 +2,6 @@
 #include <algorithm>
 
 #include "palpate/io/bag/bag_file.hpp"
-#include "palpate/io/bag/checksum.hpp"
 #include "palpate/io/bag/database.hpp"
 #include "palpate/kernel/core/error.hpp"
 
@@ -31,7 +30,6 @@ class SqliteFile final : public BagFile {
       if (topics_.size() > most_sqlite_topics)
         throw Error(file.string(), "has too many topics", "it may be damaged");
     }
-    checksums_ = read_checksums(database_);
   }
 
   [[nodiscard]] std::vector<BagTopic> topics() const override {
@@ -53,7 +51,7 @@ class SqliteFile final : public BagFile {
   }
 
   [[nodiscard]] Content read(std::int64_t id) override {
-    Statement select(database_, "SELECT data, topic_id, timestamp FROM messages WHERE id = ?");
+    Statement select(database_, "SELECT data, topic_id FROM messages WHERE id = ?");
     select.bind(0, id);
     if (!select.step())
       throw Error(path().string(), "message " + std::to_string(id) + " is gone",
@@ -62,53 +60,20 @@ class SqliteFile final : public BagFile {
     const BagTopic* topic = find(select.integer(1));
     const std::string_view topic_name =
         topic == nullptr ? std::string_view("an unknown topic") : std::string_view(topic->name);
-    if (const std::uint32_t* expected = checksums_.find(id);
-        expected != nullptr &&
-        (topic == nullptr ||
-         checksum_of(topic->name, topic->type, select.integer(2), bytes) != *expected))
-      throw Error(name(topic_name, id), "is not what its checksum says",
-                  "it is damaged; what was recorded before it can be used");
     return {topic_name, {bytes.begin(), bytes.end()}};
   }
 
+  // Others write no checksums: only what SQLite itself cannot read is damage.
   void check(BagCheck& check) override {
-    const auto damaged = [&](const std::string& what) {
-      if (check.damage.empty()) check.damage = path().string() + ": " + what;
-    };
-    std::int64_t expected = 1;  // the next message's id
-    std::int64_t covered = 0;   // the last id that has a checksum
-    bool closed = !checksums_.there;
-    if (!checksums_.blocks.empty()) {
-      const ChecksumBlock& last = checksums_.blocks.back();
-      covered = last.first + static_cast<std::int64_t>(last.messages.size()) - 1;
-      closed = last.closed;
-    }
-    check.has_checksums = check.has_checksums || checksums_.there;
-    check.closed = check.closed && closed;
     try {
-      Statement list(database_, "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id");
+      Statement list(database_, "SELECT data FROM messages ORDER BY id");
       while (list.step()) {
         ++check.messages;
-        const std::int64_t id = list.integer(0);
-        const std::uint32_t* checksum = checksums_.find(id);
-        if (checksum == nullptr) {
-          ++check.unchecked;
-          continue;
-        }
-        if (id != expected) damaged("message " + std::to_string(expected) + " is missing");
-        expected = id + 1;
-        const BagTopic* topic = find(list.integer(1));
-        if (topic == nullptr)
-          damaged("message " + std::to_string(id) + " is of no topic");
-        else if (checksum_of(topic->name, topic->type, list.integer(2), list.bytes(3)) != *checksum)
-          damaged("message " + std::to_string(id) + " of " + topic->name +
-                  " is not what its checksum says");
+        ++check.unchecked;
       }
-      if (expected <= covered) damaged("message " + std::to_string(expected) + " is missing");
     } catch (const Error& error) {
       if (check.damage.empty()) check.damage = error.what();
     }
-    if (!checksums_.damage.empty()) damaged(checksums_.damage);
   }
 
  private:
@@ -121,7 +86,6 @@ class SqliteFile final : public BagFile {
   Database database_;
   // With a topic's number in this file; not the same in all files of a bag.
   std::vector<std::pair<BagTopic, std::int64_t>> topics_;
-  Checksums checksums_;
 };
 
 }  // namespace

@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <charconv>
-#include <cmath>
 #include <cstring>
 #include <utility>
 
@@ -13,7 +11,6 @@
 #include "palpate/io/sources/material_file.hpp"
 #include "palpate/io/sources/realsense_lens.hpp"
 #include "palpate/io/sources/ros_frames.hpp"
-#include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"

@@ -2,15 +2,11 @@
 #include "palpate/io/sources/bag_colour.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
-#include <string_view>
-#include <utility>
 
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/io/sources/realsense_lens.hpp"
 #include "palpate/io/sources/ros_frames.hpp"
-#include "palpate/io/sources/transforms.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
 

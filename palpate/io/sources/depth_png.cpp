@@ -7,7 +7,6 @@
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
-#include <memory>
 #include <new>
 #include <string_view>
 #include <system_error>
@@ -196,9 +195,8 @@ template <class Value, std::size_t channels = 1, class SetUp>
 std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& name,
                           const char* needed, int& width, int& height, const SetUp& set_up) {
   const auto* signature = reinterpret_cast<png_const_bytep>(bytes.data());
-  if (bytes.size() < signature_size || png_sig_cmp(signature, 0, signature_size) != 0) {
+  if (bytes.size() < signature_size || png_sig_cmp(signature, 0, signature_size) != 0)
     throw Error(name, bytes.empty() ? "is empty" : "is not a PNG image", needed);
-  }
   PngReader reader(bytes);
   PngReader::Header header;
   const auto damaged = [&] {
@@ -207,26 +205,23 @@ std::vector<Value> decode(std::span<const std::byte> bytes, const std::string& n
   };
   if (!reader.read_header(header) || !set_up(reader, header)) throw damaged();
   const std::string size = std::to_string(header.width) + "x" + std::to_string(header.height);
-  if (header.width > largest_png_side || header.height > largest_png_side) {
+  if (header.width > largest_png_side || header.height > largest_png_side)
     throw Error(name, "is an image of " + size + " pixels",
                 "images up to 16384x16384 can be read; it may be damaged");
-  }
   // Deflate compresses by 1032 at most: a header that declares more pixels is wrong.
   constexpr std::size_t best_ratio = 1032;
   const std::size_t pixels = std::size_t{header.width} * header.height;
-  if (pixels * static_cast<std::size_t>(header.bits) / 8 / best_ratio > bytes.size()) {
+  if (pixels * static_cast<std::size_t>(header.bits) / 8 / best_ratio > bytes.size())
     throw Error(name,
                 "promises " + size + " pixels, more than its " + std::to_string(bytes.size()) +
                     " bytes can hold",
                 "copy or record it again, it may have been cut short");
-  }
   width = static_cast<int>(header.width);
   height = static_cast<int>(header.height);
   std::vector<Value> values(channels * pixels);
   std::vector<png_bytep> rows(header.height);
-  for (std::size_t v = 0; v < rows.size(); ++v) {
+  for (std::size_t v = 0; v < rows.size(); ++v)
     rows[v] = reinterpret_cast<png_bytep>(values.data() + v * channels * header.width);
-  }
   if (!reader.read_rows(rows.data())) throw damaged();
   return values;
 }
@@ -239,12 +234,11 @@ DepthPng parse_depth_png(std::span<const std::byte> bytes, const std::string& na
   image.depth =
       decode<std::uint16_t>(bytes, name, needed, image.width, image.height,
                             [&](PngReader& /*reader*/, const PngReader::Header& header) {
-                              if (header.bits != 16 || header.colour != PNG_COLOR_TYPE_GRAY) {
+                              if (header.bits != 16 || header.colour != PNG_COLOR_TYPE_GRAY)
                                 throw Error(name,
                                             "is a PNG of " + std::to_string(header.bits) + "-bit " +
                                                 colour_name(header.colour) + ", not of depth",
                                             needed);
-                              }
                               return true;
                             });
   return image;
@@ -284,10 +278,9 @@ void write_depth_png(const std::filesystem::path& path, int width, int height,
   const bool written =
       file != nullptr && std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
   const bool closed = file != nullptr && std::fclose(file) == 0;
-  if (!written || !closed) {
+  if (!written || !closed)
     throw Error(path.string(), "cannot be written: " + std::generic_category().message(errno),
                 "check the folder, its permissions and the space on the disk");
-  }
 }
 
 }  // namespace palpate

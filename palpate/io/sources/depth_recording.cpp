@@ -62,9 +62,8 @@ class DepthRecording final : public Source {
       check_size(image.brightness, grey.width, grey.height);
     }
     for (const std::uint16_t no_value : {camera_.invalid_value, camera_.saturated_value}) {
-      if (is_measured(no_value)) {
+      if (is_measured(no_value))
         std::replace(png.depth.begin(), png.depth.end(), no_value, std::uint16_t{0});
-      }
     }
     Frame frame{image.stamp,
                 std::make_shared<DepthImage>(rays_, std::move(png.depth), camera_.units_per_metre,
@@ -129,19 +128,17 @@ void override_camera(const Uri& uri, RecordedCamera& camera) {
   k.fy = uri.number_option("fy", k.fy, 1e-3, 1e7, "px");
   k.cx = uri.number_option("cx", k.cx, -1e7, 1e7, "px");
   k.cy = uri.number_option("cy", k.cy, -1e7, 1e7, "px");
-  for (std::size_t i = 0; i < k.distortion.size(); ++i) {
+  for (std::size_t i = 0; i < k.distortion.size(); ++i)
     k.distortion[i] = uri.number_option(distortion_options[i], k.distortion[i], -1e6, 1e6, "px");
-  }
   camera.units_per_metre = uri.number_option("units", camera.units_per_metre, 1e-3, 1e7, "px");
   camera.sensor = sensor_option(uri, camera.sensor);
 }
 
 std::size_t count_option(const Uri& uri, std::string_view key, double fallback, double min) {
   const double count = uri.number_option(key, fallback, min, 1e9, "px");
-  if (count != std::floor(count)) {
+  if (count != std::floor(count))
     throw Error(uri.text(), "option '" + std::string(key) + "' is not a whole number",
                 "give a number of frames");
-  }
   return static_cast<std::size_t>(count);
 }
 
@@ -149,12 +146,11 @@ std::size_t count_option(const Uri& uri, std::string_view key, double fallback, 
 void select(const Uri& uri, std::vector<RecordedImage>& images) {
   const std::size_t start = count_option(uri, "start", 0.0, 0.0);
   const std::size_t frames = count_option(uri, "frames", 1e9, 1.0);
-  if (start >= images.size()) {
+  if (start >= images.size())
     throw Error(uri.text(),
                 "has " + std::to_string(images.size()) +
                     " frames, none remains after start=" + std::to_string(start),
                 "start earlier");
-  }
   images.erase(images.begin(), images.begin() + static_cast<std::ptrdiff_t>(start));
   images.resize(std::min(images.size(), frames));
 }
@@ -171,15 +167,13 @@ void place(const Uri& uri, const fs::path& file, const std::string& trajectory_n
     return !pose;
   });
   const std::size_t lost = all - images.size();
-  if (images.empty()) {
+  if (images.empty())
     throw Error(uri.text(), "no frame has a pose in " + trajectory_name + " at its timestamp",
                 "check that both use the same clock, or give poses=none");
-  }
-  if (lost > 0) {
+  if (lost > 0)
     info.notes.push_back(std::to_string(lost) + " of " + std::to_string(all) +
                          " frames are dropped: " + trajectory_name +
                          " has no pose at their timestamps");
-  }
 }
 
 // Gives each depth image the visible one that was taken nearest to it in time; a note says how many
@@ -200,11 +194,10 @@ void associate(const fs::path& list, const std::string& what, fs::path RecordedI
     else
       ++without;
   }
-  if (without > 0) {
+  if (without > 0)
     info.notes.push_back(std::to_string(without) + " of " + std::to_string(images.size()) +
                          " frames have no " + what + ": " + list.filename().string() +
                          " has no image within 20 ms");
-  }
 }
 
 // Poses that belong to images by their numbers, or none at all, have no stamps to correct.
@@ -222,9 +215,8 @@ void start_clock(std::vector<RecordedImage>& images, SourceInfo& info) {
 
 double median_rate(const std::vector<RecordedImage>& images) {
   std::vector<double> intervals;
-  for (std::size_t i = 1; i < images.size(); ++i) {
+  for (std::size_t i = 1; i < images.size(); ++i)
     intervals.push_back(images[i].stamp - images[i - 1].stamp);
-  }
   const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
   std::nth_element(intervals.begin(), middle, intervals.end());
   return 1.0 / *middle;
@@ -242,19 +234,16 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
   std::error_code error;
   if (uri.path().empty())
     throw Error("'" + uri.text() + "'", "names no folder", "write tum:FOLDER, which has depth.txt");
-  if (!fs::is_directory(folder, error)) {
+  if (!fs::is_directory(folder, error))
     throw Error(uri.text(), "is not a folder", "name the folder that holds depth.txt");
-  }
   const fs::path list = folder / "depth.txt";
-  if (!fs::exists(list, error)) {
+  if (!fs::exists(list, error))
     throw Error(
         uri.text(), "has no depth.txt",
         "name a recording of the TUM RGB-D layout, or write depth:DIR for a folder of PNGs");
-  }
   const std::string stamps = uri.text_option("stamps", "relative");
-  if (stamps != "relative" && stamps != "absolute") {
+  if (stamps != "relative" && stamps != "absolute")
     throw Error(uri.text(), "option 'stamps' is '" + stamps + "'", "give relative or absolute");
-  }
 
   RecordedCamera camera{
       .intrinsics = {.width = 640, .height = 480, .fx = 525, .fy = 525, .cx = 319.5, .cy = 239.5},
@@ -265,16 +254,14 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
 
   SourceInfo info{.uri = uri.text(), .kind = "TUM RGB-D recording"};
   std::vector<RecordedImage> images;
-  for (const StampedFile& listed : parse_image_list(read_text(list, largest_text), list.string())) {
+  for (const StampedFile& listed : parse_image_list(read_text(list, largest_text), list.string()))
     images.push_back({.file = folder / listed.file, .stamp = listed.stamp});
-  }
   select(uri, images);
   const std::string poses = uri.text_option("poses", "groundtruth.txt");
   if (poses != "none") {
     const fs::path file = folder / poses;
-    if (!fs::exists(file, error)) {
+    if (!fs::exists(file, error))
       throw Error(uri.text(), "has no " + poses, "use poses=none for the camera frame");
-    }
     place(uri, file, poses, images, info);
   } else {
     refuse_delay(uri);
@@ -287,10 +274,9 @@ std::unique_ptr<Source> open_tum(const Uri& uri) {
     const std::string named = uri.text_option(what, is_usual ? "rgb.txt" : "none");
     if (named == "none") continue;
     const fs::path file = folder / named;
-    if (!fs::is_regular_file(file, error)) {
+    if (!fs::is_regular_file(file, error))
       throw Error(uri.text(), "has no list of images " + file.filename().string(),
                   "name one as depth.txt is, such as " + std::string(what) + "=rgb.txt");
-    }
     try {
       associate(file, what, member, images, info);
     } catch (const Error& damaged) {
@@ -310,17 +296,15 @@ std::unique_ptr<Source> open_depth(const Uri& uri) {
   const fs::path path = uri.path();
   std::error_code error;
   const bool is_folder = fs::is_directory(path, error);
-  if (!is_folder && !fs::exists(path, error)) {
+  if (!is_folder && !fs::exists(path, error))
     throw Error(uri.text(), "no such file or folder", "check the path");
-  }
   fs::path folder = is_folder ? path : path.parent_path();
   std::vector<fs::path> files{path};
   if (is_folder) {
     if (fs::is_directory(folder / "depth", error)) folder /= "depth";
     files = files_in(folder, ".png");
-    if (files.empty()) {
+    if (files.empty())
       throw Error(folder.string(), "holds no PNG", "name a folder of 16-bit PNGs, or one file");
-    }
   }
 
   std::optional<RecordedCamera> camera;
@@ -345,9 +329,8 @@ std::unique_ptr<Source> open_depth(const Uri& uri) {
 
   SourceInfo info{.uri = uri.text(), .kind = is_folder ? "folder of depth images" : "depth image"};
   std::vector<RecordedImage> images;
-  for (std::size_t k = 0; k < files.size(); ++k) {
+  for (std::size_t k = 0; k < files.size(); ++k)
     images.push_back({.file = files[k], .stamp = static_cast<double>(k) / fps});
-  }
   for (const auto& [what, member] :
        {std::pair("colour", &RecordedImage::colour), std::pair("labels", &RecordedImage::labels)}) {
     if (!uri.has(what)) continue;
@@ -368,15 +351,13 @@ std::unique_ptr<Source> open_depth(const Uri& uri) {
   if (matrices) {
     const auto world_from_camera =
         parse_pose_matrices(read_text(poses_file, largest_text), poses_file.string());
-    if (world_from_camera.size() != images.size()) {
+    if (world_from_camera.size() != images.size())
       throw Error(poses_file.string(),
                   "has " + std::to_string(world_from_camera.size()) + " poses for " +
                       std::to_string(images.size()) + " images",
                   "give one for each image");
-    }
-    for (std::size_t k = 0; k < images.size(); ++k) {
+    for (std::size_t k = 0; k < images.size(); ++k)
       images[k].world_from_camera = world_from_camera[k];
-    }
   }
   select(uri, images);
   if (poses != "none" && !matrices)

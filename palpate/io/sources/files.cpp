@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
-#include <string>
 #include <system_error>
 
 #include "palpate/kernel/core/error.hpp"
@@ -28,33 +27,27 @@ std::string_view take_number(std::string_view& rest) noexcept {
 std::vector<std::byte> read_file(const std::filesystem::path& path, std::uintmax_t max_bytes) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
+  if (!std::filesystem::exists(status))
     throw Error(path.string(), "no such file", "check the path");
-  }
   // Opening a folder would succeed, and reading a pipe may never end: both are refused.
-  if (!std::filesystem::is_regular_file(status)) {
+  if (!std::filesystem::is_regular_file(status))
     throw Error(path.string(), "is not a file", "name a file");
-  }
   const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (error) {
+  if (error)
     throw Error(path.string(), "cannot be read: " + error.message(), "check its permissions");
-  }
-  if (size > max_bytes) {
+  if (size > max_bytes)
     throw Error(path.string(),
                 "is " + std::to_string(size) + " bytes long, more than the " +
                     std::to_string(max_bytes) + " that are read of such a file",
                 "check that it is the right file");
-  }
   std::ifstream file(path, std::ios::binary);
-  if (!file) {
+  if (!file)
     throw Error(path.string(), "cannot be opened: " + std::generic_category().message(errno),
                 "check its permissions");
-  }
   std::vector<std::byte> bytes(size);
   file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-  if (static_cast<std::uintmax_t>(file.gcount()) != size) {
+  if (static_cast<std::uintmax_t>(file.gcount()) != size)
     throw Error(path.string(), "cannot be read to its end", "check the disk and try again");
-  }
   return bytes;
 }
 
@@ -89,9 +82,7 @@ bool natural_less(std::string_view a, std::string_view b) noexcept {
     const bool y_number = digits.find(y.front()) != std::string_view::npos;
     if (x_number && y_number) {
       const std::string_view m = take_number(x), n = take_number(y);
-      if (m != n) {
-        return m.size() != n.size() ? m.size() < n.size() : m < n;
-      }
+      if (m != n) return m.size() != n.size() ? m.size() < n.size() : m < n;
     } else if (x.front() != y.front()) {
       return x.substr(0, 1) < y.substr(0, 1);
     } else {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -68,17 +67,15 @@ std::array<double, 8> parse_distortion(const json& distortion, const Object& out
   for (const auto& [found, value] : distortion.items()) {
     const bool centre = found == "codx" || found == "cody";  // of the lens, 0 on any Azure Kinect
     if (centre && value.is_number() && value.get<double>() == 0.0) continue;
-    if (std::find(coefficients.begin(), coefficients.end(), found) == coefficients.end()) {
+    if (std::find(coefficients.begin(), coefficients.end(), found) == coefficients.end())
       outer.fail(key, "has " + json(found).dump() + ", which is not understood",
                  "k1 to k6, p1 and p2, with codx and cody 0 if they are there");
-    }
   }
   const Object inner(distortion, name + ": " + key);
   std::array<double, 8> result{};
   for (std::size_t i = 0; i < coefficients.size(); ++i) {
-    if (inner.has(coefficients[i])) {
+    if (inner.has(coefficients[i]))
       result[i] = inner.number(coefficients[i], -1e6, 1e6, "a finite coefficient");
-    }
   }
   return result;
 }
@@ -87,10 +84,9 @@ std::array<double, 8> parse_distortion(const json& distortion, const Object& out
 
 RecordedCamera parse_intrinsics(std::string_view text, const std::string& name) {
   const json root = json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (!root.is_object()) {
+  if (!root.is_object())
     throw Error(name, root.is_discarded() ? "is not valid JSON" : "is not a JSON object",
                 "write an object of width, height, fx, fy, cx, cy and depth_units_per_metre");
-  }
   const Object object(root, name);
   constexpr int largest = 16384;
   constexpr const char* pixels = "a whole number of pixels from 1 to 16384";
@@ -114,16 +110,14 @@ RecordedCamera parse_intrinsics(std::string_view text, const std::string& name) 
   camera.units_per_metre = object.number("depth_units_per_metre", 1e-3, 1e7,
                                          "1000 for millimetres, 5000 for the TUM benchmark");
   const auto optional_raw = [&](const char* key, std::uint16_t& value) {
-    if (object.has(key)) {
+    if (object.has(key))
       value = static_cast<std::uint16_t>(object.whole_number(key, 0, 65535, raw_value));
-    }
   };
   optional_raw("invalid_value", camera.invalid_value);
   optional_raw("saturated_value", camera.saturated_value);
-  if (object.has("fps_nominal")) {
+  if (object.has("fps_nominal"))
     camera.frame_rate =
         object.number("fps_nominal", 1e-3, 1e6, "null or the frames per second, more than 0");
-  }
   if (object.has("sensor_kind")) {
     const json& value = root.at("sensor_kind");
     const std::optional<SensorKind> kind =

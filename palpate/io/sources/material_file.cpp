@@ -156,10 +156,9 @@ MaterialTable read_materials(const fs::path& file) {
 
 Materials materials_of(const std::string& name_or_file) {
   std::error_code error;
-  if (fs::is_regular_file(name_or_file, error)) {
+  if (fs::is_regular_file(name_or_file, error))
     return {.table = std::make_shared<MaterialTable>(read_materials(name_or_file)),
             .everywhere = false};
-  }
   if (name_or_file.find_first_of("/.") != std::string::npos)
     throw Error(name_or_file, "there is no such file of materials", "check the path");
   return {.table = std::make_shared<MaterialTable>(

@@ -100,10 +100,9 @@ std::vector<Part> thin_plate(const Uri& uri) {
 std::vector<Part> wedge(const Uri& uri) {
   const double opening = angle(uri, "angle", pi / 2.0, 0.1, pi - 0.01);
   const std::string edge = uri.text_option("edge", "convex");
-  if (edge != "convex" && edge != "concave") {
+  if (edge != "convex" && edge != "concave")
     throw Error(uri.text() + ": option 'edge'", "'" + edge + "' is not a type of edge",
                 "give convex or concave");
-  }
   const double rise = std::cos(0.5 * opening) * (edge == "convex" ? -1.0 : 1.0) * 2.0;
   const double run = std::sin(0.5 * opening) * 2.0;
   return {moving(uri, ground_profile({Vec2(run, rise), Vec2(0.0, 0.0), Vec2(-run, rise)}))};
@@ -114,10 +113,9 @@ std::vector<Part> triangle_wave(const Uri& uri) {
   const double extent = length(uri, "extent", 0.450);
   const double height = length(uri, "height", 0.030, 0.0);
   const double corners = std::floor(extent / (0.5 * period));
-  if (corners < 2.0 || corners > 10000.0) {
+  if (corners < 2.0 || corners > 10000.0)
     throw Error(uri.text() + ": option 'period'", "the wave would have no or too many corners",
                 "give a period from extent/5000 to extent");
-  }
   const int count = static_cast<int>(corners);
   std::vector<Vec2> surface{Vec2(far_away, 0.0)};
   for (int i = count; i >= 0; --i) {
@@ -277,9 +275,8 @@ const Row& find_row(std::string_view name) {
 
 Scene make_scene(const Uri& uri) {
   std::vector<Part> parts = find_row(uri.path()).build(uri);
-  if (uri.has("floor")) {
+  if (uri.has("floor"))
     parts.push_back(resting(HalfSpace{}, place(0.0, 0.0, -length(uri, "floor", 0.0))));
-  }
   return Scene(std::move(parts));
 }
 

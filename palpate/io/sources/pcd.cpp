@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -77,26 +76,18 @@ PcdHeader read_pcd_header(Cursor& file) {
   while (const auto line = file.next_full_line()) {
     std::string_view rest = *line;
     std::string_view keyword = detail::next_token(rest);
-    if (keyword.starts_with('#')) {
-      continue;
-    }
+    if (keyword.starts_with('#')) continue;
     if (keyword == "COLUMNS") {
       keyword = "FIELDS";  // its name before version 0.5
     }
-    if (std::find(keywords.begin(), keywords.end(), keyword) == keywords.end()) {
+    if (std::find(keywords.begin(), keywords.end(), keyword) == keywords.end())
       file.fail_in_line(detail::quoted(keyword) + " does not begin a line of a PCD header",
                         not_pcd);
-    }
     const auto [entry, is_new] = header.try_emplace(keyword);
-    if (!is_new) {
-      file.fail_in_line(std::string(keyword) + " is given twice", "remove one of them");
-    }
-    for (auto value = detail::next_token(rest); !value.empty(); value = detail::next_token(rest)) {
+    if (!is_new) file.fail_in_line(std::string(keyword) + " is given twice", "remove one of them");
+    for (auto value = detail::next_token(rest); !value.empty(); value = detail::next_token(rest))
       entry->second.push_back(value);
-    }
-    if (keyword == "DATA") {
-      return header;
-    }
+    if (keyword == "DATA") return header;
   }
   file.fail("the header has no DATA line", not_pcd);
 }
@@ -105,28 +96,22 @@ PcdHeader read_pcd_header(Cursor& file) {
 std::optional<std::string_view> value_of(const Cursor& file, const PcdHeader& header,
                                          std::string_view keyword) {
   const auto entry = header.find(keyword);
-  if (entry == header.end()) {
-    return std::nullopt;
-  }
-  if (entry->second.size() != 1) {
+  if (entry == header.end()) return std::nullopt;
+  if (entry->second.size() != 1)
     file.fail(std::string(keyword) + " has " + counted(entry->second.size(), "value") +
                   " where one belongs",
               correct_header);
-  }
   return entry->second.front();
 }
 
 std::optional<std::uint64_t> count_of(const Cursor& file, const PcdHeader& header,
                                       std::string_view keyword) {
   const auto value = value_of(file, header, keyword);
-  if (!value) {
-    return std::nullopt;
-  }
+  if (!value) return std::nullopt;
   const auto count = detail::to_count(*value);
-  if (!count) {
+  if (!count)
     file.fail(std::string(keyword) + " is " + detail::quoted(*value) + ", not a whole number",
               correct_header);
-  }
   return count;
 }
 
@@ -144,35 +129,28 @@ Scalar type_of(const Cursor& file, std::string_view type, std::string_view size)
   const std::string wanted = std::string(type) + std::string(size);
   const auto* const found = std::find_if(types.begin(), types.end(),
                                          [&](const auto& known) { return known.first == wanted; });
-  if (found == types.end()) {
+  if (found == types.end())
     file.fail(
         "no field can have TYPE " + detail::quoted(type) + " and SIZE " + detail::quoted(size),
         "types are I and U of 1, 2, 4, 8 bytes, and F of 4, 8");
-  }
   return found->second;
 }
 
 std::vector<Column> columns_of(const Cursor& file, const PcdHeader& header) {
   const auto fields = header.find("FIELDS");
-  if (fields == header.end()) {
-    file.fail("the header has no FIELDS line", not_pcd);
-  }
+  if (fields == header.end()) file.fail("the header has no FIELDS line", not_pcd);
   const std::size_t size = fields->second.size();
   const auto values = [&](std::string_view keyword, std::string_view otherwise) {
     const auto entry = header.find(keyword);
-    if (entry == header.end()) {
-      return std::vector<std::string_view>(size, otherwise);
-    }
-    if (entry->second.size() != size) {
+    if (entry == header.end()) return std::vector<std::string_view>(size, otherwise);
+    if (entry->second.size() != size)
       file.fail(std::string(keyword) + " has " + counted(entry->second.size(), "value") + " for " +
                     counted(size, "field"),
                 correct_header);
-    }
     return entry->second;
   };
-  if (header.contains("SIZE") != header.contains("TYPE")) {
+  if (header.contains("SIZE") != header.contains("TYPE"))
     file.fail("the header has one of SIZE and TYPE without the other", correct_header);
-  }
   const auto sizes = values("SIZE", "4");  // the oldest files have floats only
   const auto types = values("TYPE", "F");
   const auto counts = values("COUNT", "1");
@@ -181,11 +159,10 @@ std::vector<Column> columns_of(const Cursor& file, const PcdHeader& header) {
   for (std::size_t i = 0; i < size; ++i) {
     constexpr std::uint64_t largest_count = 1'000'000;  // keeps all products below in 64 bits
     const auto count = detail::to_count(counts[i]);
-    if (!count || *count == 0 || *count > largest_count) {
+    if (!count || *count == 0 || *count > largest_count)
       file.fail(
           "COUNT " + detail::quoted(counts[i]) + " is not in 1.." + std::to_string(largest_count),
           correct_header);
-    }
     const Scalar type = type_of(file, types[i], sizes[i]);
     columns.push_back({{std::string(fields->second[i]), std::string(detail::name_of(type)),
                         static_cast<std::size_t>(*count)},
@@ -199,10 +176,9 @@ std::vector<Column> columns_of(const Cursor& file, const PcdHeader& header) {
       column.use = use;
       found += column.field.count;
     }
-    if (found != 1) {
+    if (found != 1)
       file.fail("FIELDS must name " + name + " once, with COUNT 1",
                 "give a file whose points have the fields x, y and z");
-    }
   }
   // PCL packs a colour into 4 bytes, 0xAARRGGBB, and declares them as a float or a whole number.
   const auto colour = std::find_if(columns.begin(), columns.end(), [](const Column& column) {
@@ -228,30 +204,24 @@ void read_extent(const Cursor& file, const PcdHeader& header, PointFile& cloud) 
   const auto points = count_of(file, header, "POINTS");
   const auto width = count_of(file, header, "WIDTH");
   const auto height = count_of(file, header, "HEIGHT");
-  if (!width && (!points || height.value_or(1) != 1)) {
+  if (!width && (!points || height.value_or(1) != 1))
     file.fail("the header has no WIDTH line", not_pcd);
-  }
   cloud.width = width ? *width : *points;
   cloud.height = height.value_or(1);
-  if (cloud.height != 0 && cloud.width > std::numeric_limits<std::size_t>::max() / cloud.height) {
+  if (cloud.height != 0 && cloud.width > std::numeric_limits<std::size_t>::max() / cloud.height)
     file.fail("WIDTH times HEIGHT is beyond all bounds", correct_header);
-  }
-  if (points && *points != cloud.width * cloud.height) {
+  if (points && *points != cloud.width * cloud.height)
     file.fail("WIDTH " + std::to_string(cloud.width) + " times HEIGHT " +
                   std::to_string(cloud.height) + " is not POINTS " + std::to_string(*points),
               correct_header);
-  }
 }
 
 std::optional<Vec3> viewpoint_of(const Cursor& file, const PcdHeader& header) {
   const auto entry = header.find("VIEWPOINT");
-  if (entry == header.end()) {
-    return std::nullopt;
-  }
+  if (entry == header.end()) return std::nullopt;
   std::vector<double> numbers;
-  for (const std::string_view value : entry->second) {
+  for (const std::string_view value : entry->second)
     numbers.push_back(detail::to_number(value).value_or(std::numeric_limits<double>::quiet_NaN()));
-  }
   if (numbers.size() != 7 || !std::all_of(numbers.begin(), numbers.end(),
                                           [](double value) { return std::isfinite(value); })) {
     file.fail("VIEWPOINT is not seven numbers",
@@ -277,23 +247,19 @@ Values read_ascii(Cursor& file, const std::vector<Column>& columns, std::size_t 
   const std::size_t needed =
       size_of_point(columns, [](const Column& column) { return column.field.count; });
   // A value and what separates it take two bytes at least; the last line may lack its end.
-  if (size > (file.left() + 1) / (2 * needed)) {
-    fail_promise(file, size);
-  }
+  if (size > (file.left() + 1) / (2 * needed)) fail_promise(file, size);
   Values read(columns, size);
   for (std::size_t k = 0; k < size; ++k) {
     auto line = file.next_full_line();
-    if (!line) {
+    if (!line)
       file.fail("ends after " + std::to_string(k) + " of " + counted(size, "point"), cut_short);
-    }
     std::size_t values = 0;
     const auto next = [&] {
       const std::string_view token = detail::next_token(*line);
-      if (token.empty()) {
+      if (token.empty())
         file.fail_in_line(
             "has " + counted(values, "value") + " where the FIELDS need " + std::to_string(needed),
             "complete the line, or correct the header");
-      }
       ++values;
       return token;
     };
@@ -303,18 +269,16 @@ Values read_ascii(Cursor& file, const std::vector<Column>& columns, std::size_t 
         read.set_colour(k, packed_colour(token, column.type));
       } else if (column.use != Use::none) {
         const auto number = detail::to_number(token);
-        if (!number) {
+        if (!number)
           file.fail_in_line(column.field.name + " is " + detail::quoted(token) + ", not a number",
                             "correct the line; nan marks a hole");
-        }
         read.points[k][static_cast<int>(column.use)] = *number;
       }
       for (std::size_t i = 1; i < column.field.count; ++i) next();
     }
-    if (!detail::next_token(*line).empty()) {
+    if (!detail::next_token(*line).empty())
       file.fail_in_line("has more than the " + counted(needed, "value") + " of the FIELDS",
                         "shorten the line, or correct the header");
-    }
   }
   return read;
 }
@@ -322,9 +286,7 @@ Values read_ascii(Cursor& file, const std::vector<Column>& columns, std::size_t 
 // Point after point, little endian: PCL writes what is in memory.
 Values read_binary(Cursor& file, const std::vector<Column>& columns, std::size_t size) {
   const std::size_t bytes = size_of_point(columns, std::mem_fn(&Column::bytes));
-  if (size > file.left() / bytes) {
-    fail_promise(file, size);
-  }
+  if (size > file.left() / bytes) fail_promise(file, size);
   Values read(columns, size);
   const std::byte* first = file.take(size * bytes);
   for (const Column& column : columns) {
@@ -336,22 +298,18 @@ Values read_binary(Cursor& file, const std::vector<Column>& columns, std::size_t
 
 // Two 32-bit sizes, then LZF.
 std::vector<std::byte> decompress(Cursor& file) {
-  if (file.left() < 8) {
-    file.fail_at_offset("ends before the compressed data", cut_short);
-  }
+  if (file.left() < 8) file.fail_at_offset("ends before the compressed data", cut_short);
   const auto compressed = detail::load<std::uint32_t>(file.take(4), std::endian::little);
   const auto size = detail::load<std::uint32_t>(file.take(4), std::endian::little);
-  if (compressed > file.left()) {
+  if (compressed > file.left())
     file.fail_at_offset("promises " + counted(compressed, "byte") + " of compressed data, but " +
                             std::to_string(file.left()) + " are left",
                         cut_short);
-  }
   constexpr std::uint64_t best_ratio = 88;  // LZF: three bytes repeat at most 264
-  if (size > compressed * best_ratio) {
+  if (size > compressed * best_ratio)
     file.fail_at_offset(
         counted(compressed, "byte") + " of compressed data cannot hold " + std::to_string(size),
         write_anew);
-  }
   std::vector<std::byte> data(size);
   // lzf_decompress() would read a byte even where there is none.
   if (compressed != 0 &&
@@ -369,9 +327,7 @@ Values read_compressed(Cursor& file, const std::vector<Column>& columns, std::si
       return column.is_padding() && !has_padding ? 0 : column.bytes();
     };
     const std::size_t stride = size_of_point(columns, bytes_in_point);
-    if (data.size() % stride != 0 || data.size() / stride != size) {
-      continue;
-    }
+    if (data.size() % stride != 0 || data.size() / stride != size) continue;
     Values read(columns, size);
     const std::byte* first = data.data();
     for (const Column& column : columns) {
@@ -392,25 +348,21 @@ PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name) {
   const PcdHeader header = read_pcd_header(file);
   const auto version = value_of(file, header, "VERSION");
   constexpr std::array<std::string_view, 6> versions{".5", "0.5", ".6", "0.6", ".7", "0.7"};
-  if (version && std::find(versions.begin(), versions.end(), *version) == versions.end()) {
+  if (version && std::find(versions.begin(), versions.end(), *version) == versions.end())
     file.fail("PCD version " + detail::quoted(*version) + " is not known",
               "write the file as version 0.7");
-  }
   const std::vector<Column> columns = columns_of(file, header);
 
   PointFile cloud;
-  for (const Column& column : columns) {
-    cloud.fields.push_back(column.field);
-  }
+  for (const Column& column : columns) cloud.fields.push_back(column.field);
   read_extent(file, header, cloud);
   cloud.viewpoint = viewpoint_of(file, header);
   cloud.encoding = value_of(file, header, "DATA").value();
   const std::size_t size = cloud.width * cloud.height;
   const bool is_binary = cloud.encoding == "binary";
-  if (!is_binary && cloud.encoding != "ascii" && cloud.encoding != "binary_compressed") {
+  if (!is_binary && cloud.encoding != "ascii" && cloud.encoding != "binary_compressed")
     file.fail("DATA " + detail::quoted(cloud.encoding) + " is not known",
               "it can be ascii, binary or binary_compressed");
-  }
   Values read = is_binary                   ? read_binary(file, columns, size)
                 : cloud.encoding == "ascii" ? read_ascii(file, columns, size)
                                             : read_compressed(file, columns, size);

@@ -70,10 +70,9 @@ Scalar type_of(const Cursor& file, std::string_view name) {
        {"float64", Scalar::float64}}};
   const auto* const found = std::find_if(types.begin(), types.end(),
                                          [&](const auto& known) { return known.first == name; });
-  if (found == types.end()) {
+  if (found == types.end())
     file.fail_in_line(detail::quoted(name) + " is not a type of PLY",
                       "types are char, uchar, short, ushort, int, uint, float and double");
-  }
   return found->second;
 }
 
@@ -82,25 +81,21 @@ Property read_property(const Cursor& file, std::string_view rest) {
   std::string_view type = detail::next_token(rest);
   if (type == "list") {
     property.length = type_of(file, detail::next_token(rest));
-    if (*property.length == Scalar::float32 || *property.length == Scalar::float64) {
+    if (*property.length == Scalar::float32 || *property.length == Scalar::float64)
       file.fail_in_line("a list's length cannot be a float", correct_line);
-    }
     type = detail::next_token(rest);
   }
   property.type = type_of(file, type);
   property.name = detail::next_token(rest);
-  if (property.name.empty() || !detail::next_token(rest).empty()) {
+  if (property.name.empty() || !detail::next_token(rest).empty())
     file.fail_in_line("a property is `property TYPE NAME` or `property list TYPE TYPE NAME`",
                       correct_line);
-  }
   return property;
 }
 
 PlyHeader read_ply_header(Cursor& file) {
   const std::string_view magic = file.next_line().value_or("");
-  if (magic != "ply") {
-    file.fail("does not begin with `ply`", not_ply);
-  }
+  if (magic != "ply") file.fail("does not begin with `ply`", not_ply);
   PlyHeader header;
   while (const auto line = file.next_full_line()) {
     std::string_view rest = *line;
@@ -113,28 +108,22 @@ PlyHeader read_ply_header(Cursor& file) {
         file.fail_in_line("format " + detail::quoted(header.encoding) + " is not known",
                           "it can be ascii, binary_little_endian or binary_big_endian");
       }
-      if (version != "1.0") {
+      if (version != "1.0")
         file.fail_in_line("PLY version " + detail::quoted(version) + " is not known",
                           "write the file as version 1.0");
-      }
     } else if (keyword == "element") {
       Element element;
       element.name = detail::next_token(rest);
       const auto rows = detail::to_count(detail::next_token(rest));
-      if (!rows || !detail::next_token(rest).empty()) {
+      if (!rows || !detail::next_token(rest).empty())
         file.fail_in_line("an element is `element NAME COUNT`", correct_line);
-      }
       element.rows = *rows;
       header.elements.push_back(element);
     } else if (keyword == "property") {
-      if (header.elements.empty()) {
-        file.fail_in_line("a property before any element", correct_line);
-      }
+      if (header.elements.empty()) file.fail_in_line("a property before any element", correct_line);
       header.elements.back().properties.push_back(read_property(file, rest));
     } else if (keyword == "end_header") {
-      if (header.encoding.empty()) {
-        file.fail("the header has no format line", not_ply);
-      }
+      if (header.encoding.empty()) file.fail("the header has no format line", not_ply);
       return header;
     } else if (keyword != "comment" && keyword != "obj_info") {
       file.fail_in_line(detail::quoted(keyword) + " does not begin a line of a PLY header",
@@ -203,11 +192,10 @@ void load_colour(const Property& property, std::size_t row, const std::byte* val
 void ask_for_corners(const Cursor& file, Element& element) {
   for (Property& property : element.properties) {
     if (property.name != "vertex_indices" && property.name != "vertex_index") continue;
-    if (!property.length || property.type == Scalar::float32 || property.type == Scalar::float64) {
+    if (!property.length || property.type == Scalar::float32 || property.type == Scalar::float64)
       file.fail(
           element.text() + ": " + std::string(property.name) + " is not a list of whole numbers",
           "write it as `property list uchar int vertex_indices`");
-    }
     property.corners = true;
     return;
   }
@@ -219,10 +207,9 @@ void add_triangles(const Element& element, Faces& faces, const Fail& fail) {
   const std::vector<std::int64_t>& corners = faces.corners;
   for (const std::int64_t corner : corners) {
     if (faces.strips && corner == -1) continue;
-    if (corner < 0 || static_cast<std::uint64_t>(corner) >= faces.vertices) {
+    if (corner < 0 || static_cast<std::uint64_t>(corner) >= faces.vertices)
       fail(element.text() + " names vertex " + std::to_string(corner) + ", but there are " +
            std::to_string(faces.vertices) + ", counted from 0");
-    }
   }
   const auto add = [&](std::size_t a, std::size_t b, std::size_t c) {
     faces.triangles.push_back({static_cast<std::uint32_t>(corners[a]),
@@ -252,56 +239,47 @@ void add_triangles(const Element& element, Faces& faces, const Fail& fail) {
 
 void read_ascii_row(Cursor& file, const Element& element, std::size_t row, Faces& faces) {
   auto line = file.next_full_line();
-  if (!line) {
-    file.fail("ends within " + element.text(), cut_short);
-  }
+  if (!line) file.fail("ends within " + element.text(), cut_short);
   const auto next = [&] {
     const std::string_view token = detail::next_token(*line);
-    if (token.empty()) {
+    if (token.empty())
       file.fail_in_line("has too few values for " + element.text(),
                         "complete the line, or correct the header");
-    }
     return token;
   };
   for (const Property& property : element.properties) {
     const std::string_view token = next();
     if (property.length) {
       const auto length = detail::to_count(token);
-      if (!length) {
-        file.fail_in_line("a list's length is " + detail::quoted(token), correct_line);
-      }
+      if (!length) file.fail_in_line("a list's length is " + detail::quoted(token), correct_line);
       faces.corners.clear();
       for (std::uint64_t k = 0; k < *length; ++k) {
         const std::string_view value = next();
         if (!property.corners) continue;
         const auto corner = detail::to_index(value);
-        if (!corner) {
+        if (!corner)
           file.fail_in_line("a vertex of " + element.text() + " is " + detail::quoted(value) +
                                 ", not a whole number",
                             correct_line);
-        }
         faces.corners.push_back(*corner);
       }
-      if (property.corners) {
+      if (property.corners)
         add_triangles(element, faces,
                       [&](const std::string& reason) { file.fail_in_line(reason, correct_line); });
-      }
     } else if (property.into != nullptr) {
       const auto number = detail::to_number(token);
-      if (!number) {
+      if (!number)
         file.fail_in_line(
             std::string(property.name) + " is " + detail::quoted(token) + ", not a number",
             correct_line);
-      }
       (*property.into)[row][property.axis] = *number;
     } else if (property.colours != nullptr) {
       set_colour(property, row, detail::to_number(token).value_or(0.0));
     }
   }
-  if (!detail::next_token(*line).empty()) {
+  if (!detail::next_token(*line).empty())
     file.fail_in_line("has too many values for " + element.text(),
                       "shorten the line, or correct the header");
-  }
 }
 
 void read_binary_row(Cursor& file, const Element& element, std::endian order, std::size_t row,
@@ -312,25 +290,22 @@ void read_binary_row(Cursor& file, const Element& element, std::endian order, st
     });
   };
   for (const Property& property : element.properties) {
-    if (file.left() < property.least_bytes()) {
+    if (file.left() < property.least_bytes())
       file.fail_at_offset("ends within " + element.text(), cut_short);
-    }
     const std::byte* const value = file.take(property.least_bytes());
     if (property.length) {
       const std::int64_t length = integer(*property.length, value);
       const std::size_t size = detail::size_of(property.type);
-      if (length < 0 || static_cast<std::uint64_t>(length) > file.left() / size) {
+      if (length < 0 || static_cast<std::uint64_t>(length) > file.left() / size)
         file.fail_at_offset("a list of " + element.text() + " promises " + std::to_string(length) +
                                 " values, but " + std::to_string(file.left()) + " bytes are left",
                             cut_short);
-      }
       const auto count = static_cast<std::size_t>(length);
       const std::byte* const list = file.take(count * size);
       if (!property.corners) continue;
       faces.corners.clear();
-      for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t k = 0; k < count; ++k)
         faces.corners.push_back(integer(property.type, list + k * size));
-      }
       add_triangles(element, faces, [&](const std::string& reason) {
         file.fail_at_offset(reason, "write the file again, or remove its faces");
       });
@@ -359,9 +334,7 @@ void read_element(Cursor& file, const Element& element, std::string_view encodin
     has_lists |= property.length.has_value();
   }
   // The last line of an ascii file may lack its end.
-  if (element.rows > (file.left() + (ascii ? 1 : 0)) / least_bytes) {
-    fail_promise(file, element);
-  }
+  if (element.rows > (file.left() + (ascii ? 1 : 0)) / least_bytes) fail_promise(file, element);
   for (const Property& property : properties) {
     if (property.into != nullptr) property.into->resize(element.rows);
     if (property.colours != nullptr) property.colours->resize(3 * element.rows);
@@ -369,10 +342,9 @@ void read_element(Cursor& file, const Element& element, std::string_view encodin
   if (!ascii && !has_lists) {
     const std::byte* column = file.take(element.rows * least_bytes);
     for (const Property& property : properties) {
-      if (property.into != nullptr) {
+      if (property.into != nullptr)
         detail::load_column(column, least_bytes, property.type, order, *property.into,
                             property.axis);
-      }
       if (property.colours != nullptr) {
         for (std::size_t row = 0; row < element.rows; ++row)
           load_colour(property, row, column + row * least_bytes, order);
@@ -397,9 +369,8 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
   PlyHeader header = read_ply_header(file);
   const auto is_vertex = [](const Element& element) { return element.name == "vertex"; };
   const auto vertex = std::find_if(header.elements.begin(), header.elements.end(), is_vertex);
-  if (std::count_if(header.elements.begin(), header.elements.end(), is_vertex) != 1) {
+  if (std::count_if(header.elements.begin(), header.elements.end(), is_vertex) != 1)
     file.fail("the header does not declare one element vertex", "give a file that holds points");
-  }
 
   PointFile cloud;
   cloud.encoding = header.encoding;
@@ -407,17 +378,15 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
   std::vector<Vec3> viewpoints;
   for (Element& element : header.elements) {
     if (is_vertex(element)) {
-      if (!ask_for({"x", "y", "z"}, element, cloud.points)) {
+      if (!ask_for({"x", "y", "z"}, element, cloud.points))
         file.fail("element vertex does not have one x, one y and one z that are no lists",
                   "give a file that holds points");
-      }
       ask_for({"nx", "ny", "nz"}, element, cloud.normals);
       ask_for_colours(element, cloud.colours);
-      for (const Property& property : element.properties) {
+      for (const Property& property : element.properties)
         cloud.fields.push_back(
             {std::string(property.name),
              (property.length ? "list of " : "") + std::string(name_of(property.type))});
-      }
     } else if (element.name == "face" || element.name == "tristrips") {
       ask_for_corners(file, element);
       faces.strips = element.name == "tristrips";
@@ -427,12 +396,9 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
     read_element(file, element, header.encoding, faces);
   }
   cloud.triangles = std::move(faces.triangles);
-  if (!viewpoints.empty()) {
-    cloud.viewpoint = viewpoints.front();
-  }
-  if (cloud.viewpoint && !cloud.viewpoint->allFinite()) {
+  if (!viewpoints.empty()) cloud.viewpoint = viewpoints.front();
+  if (cloud.viewpoint && !cloud.viewpoint->allFinite())
     file.fail("the camera's view_px, view_py, view_pz are not finite", "correct them");
-  }
   cloud.width = cloud.points.size();
   cloud.non_finite = detail::count_non_finite(cloud.points);
   cloud.bytes_unread = file.left_after_blanks();

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "palpate/io/sources/files.hpp"
-#include "palpate/kernel/cloud/organised.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/parameters.hpp"
@@ -24,16 +23,11 @@ std::string details_of(const PointFile& file) {
       std::to_string(file.width) + "x" + std::to_string(file.height) + " points, " + file.encoding;
   for (const PointField& field : file.fields) {
     text += ", " + field.name + " " + field.type;
-    if (field.count != 1) {
-      text += " x " + std::to_string(field.count);
-    }
+    if (field.count != 1) text += " x " + std::to_string(field.count);
   }
-  if (!file.triangles.empty()) {
-    text += "; " + std::to_string(file.triangles.size()) + " triangles";
-  }
-  if (file.bytes_unread != 0) {
+  if (!file.triangles.empty()) text += "; " + std::to_string(file.triangles.size()) + " triangles";
+  if (file.bytes_unread != 0)
     text += "; " + std::to_string(file.bytes_unread) + " bytes after them not read";
-  }
   return text;
 }
 
@@ -49,19 +43,13 @@ PointFileSource::PointFileSource(std::vector<fs::path> files, Reader reader, con
     : files_(std::move(files)), reader_(reader), options_(options), info_(std::move(info)) {}
 
 std::optional<Frame> PointFileSource::next(double /*timeout*/) {
-  if (next_ == files_.size()) {
-    return std::nullopt;
-  }
+  if (next_ == files_.size()) return std::nullopt;
   const std::size_t k = next_++;  // before anything can throw: the next call takes the file after
   info_.details.clear();
   PointFile file = reader_(files_[k]);
   info_.details = details_of(file);
-  for (Vec3& point : file.points) {
-    point *= options_.scale;
-  }
-  if (file.viewpoint) {
-    *file.viewpoint *= options_.scale;
-  }
+  for (Vec3& point : file.points) point *= options_.scale;
+  if (file.viewpoint) *file.viewpoint *= options_.scale;
   const double stamp = static_cast<double>(k) / options_.fps;
   const bool is_image = file.width > 1 && file.height > 1;
   if (!is_image && file.normals.empty() && file.triangles.empty() && file.colours.empty())
@@ -108,19 +96,17 @@ std::unique_ptr<Source> open_point_files(const Uri& uri) {
   const bool is_pcd = uri.scheme() == "pcd";
   const std::string kind = is_pcd ? "PCD" : "PLY";
 
-  if (uri.path().empty()) {
+  if (uri.path().empty())
     throw Error(uri.text(), "names no file or folder",
                 "write " + uri.scheme() + ":FILE or " + uri.scheme() + ":DIR");
-  }
   const fs::path path = uri.path();
   std::error_code error;
   std::vector<fs::path> files{path};
   if (fs::is_directory(path, error)) {
     files = files_in(path, "." + uri.scheme());
-    if (files.empty()) {
+    if (files.empty())
       throw Error(path.string(), "holds no ." + uri.scheme() + " file",
                   "name a folder of " + kind + " files, or one file");
-    }
   } else if (!fs::exists(path, error)) {
     throw Error(path.string(), "no such file or folder", "check the path");
   }

@@ -22,9 +22,8 @@ Eigen::Isometry3d Motion::at(double t) const {
   const double phase = 2.0 * std::numbers::pi * frequency * elapsed;
   const double shift =
       elapsed * (speed + 0.5 * acceleration * elapsed) + 0.5 * stroke * (1.0 - std::cos(phase));
-  if (swing != 0.0) {
+  if (swing != 0.0)
     pose.linear() = Eigen::AngleAxisd(swing * std::sin(phase), axis).toRotationMatrix();
-  }
   pose.translation() = pivot - pose.linear() * pivot + shift * direction;
   return pose;
 }
@@ -61,10 +60,9 @@ SurfacePoint Scene::nearest(const Vec3& point, double t) const {
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const Eigen::Isometry3d world_from_part = parts_[i].pose(t);
     const Nearest local = palpate::nearest(parts_[i].shape, world_from_part.inverse() * point);
-    if (local.distance < best.distance) {
+    if (local.distance < best.distance)
       best = {local.distance, world_from_part * local.point,
               world_from_part.linear() * local.normal, Vec3::Zero(), i};
-    }
   }
   best.velocity = parts_[best.part].motion.velocity(best.point, t);
   return best;

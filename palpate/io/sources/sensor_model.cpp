@@ -241,9 +241,8 @@ void add_point_noise(std::span<Vec3> points, double sigma, std::uint64_t seed,
                      std::uint64_t frame) {
   const std::uint64_t key = key_of(seed, frame, Salt::point);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    for (int axis = 0; axis < 3; ++axis) {
+    for (int axis = 0; axis < 3; ++axis)
       points[i][axis] += sigma * normal(bits(key, 3 * i + static_cast<std::uint64_t>(axis)));
-    }
   }
 }
 
@@ -280,10 +279,9 @@ void Sensor::add_gaussian_noise(std::uint64_t frame) {
   std::vector<float> row(width);
   for (int v = 0; v < height; ++v) {
     std::fill(row.begin(), row.end(), 0.0F);
-    for (int i = 0; i < taps_y; ++i) {
+    for (int i = 0; i < taps_y; ++i)
       vectorised<add_scaled>(kernel_y_[i], smooth + static_cast<std::ptrdiff_t>(v + i) * width,
                              row.data(), width);
-    }
     float* depth = depth_.data() + static_cast<std::ptrdiff_t>(v) * width;
     if (model_.noise_growth == 2) {
       for (int u = 0; u < width; ++u) depth[u] += sigma * depth[u] * depth[u] * row[u];
@@ -371,10 +369,9 @@ void Sensor::blank_grazing(std::span<const float> truth,
 
 std::vector<std::uint16_t> Sensor::measure(std::span<const float> depth, std::uint64_t frame) {
   const std::size_t pixels = static_cast<std::size_t>(camera_.width) * camera_.height;
-  if (depth.size() != pixels) {
+  if (depth.size() != pixels)
     throw Error("depth",
                 std::to_string(depth.size()) + " values for " + std::to_string(pixels) + " pixels");
-  }
   depth_.assign(depth.begin(), depth.end());
   if (model_.flying > 0.0) let_edges_fly(depth, frame);
   if (model_.noise > 0.0) add_gaussian_noise(frame);

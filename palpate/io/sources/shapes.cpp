@@ -87,10 +87,9 @@ Nearest2 nearest_on_outline(const std::vector<Vec2>& outline, const Vec2& p) {
 Nearest stretched(const Nearest2& flat, const Vec3& p, double half_length) {
   const double beyond = std::abs(p.y()) - half_length;
   const Vec3 end_normal(0.0, std::copysign(1.0, p.y()), 0.0);
-  if (beyond <= 0.0 && (flat.distance > 0.0 || flat.distance >= beyond)) {
+  if (beyond <= 0.0 && (flat.distance > 0.0 || flat.distance >= beyond))
     return {flat.distance, Vec3(flat.point.x(), p.y(), flat.point.y()),
             Vec3(flat.normal.x(), 0.0, flat.normal.y())};
-  }
   const double y = std::copysign(half_length, p.y());
   if (flat.distance <= 0.0) return {beyond, Vec3(p.x(), y, p.z()), end_normal};
   const Vec3 point(flat.point.x(), y, flat.point.y());
@@ -305,9 +304,8 @@ void cast(const Shape& shape, const Vec3& origin, std::span<const Vec3> directio
           std::span<double> along) {
   std::visit(
       [&](const auto& body) {
-        for (std::size_t i = 0; i < directions.size(); ++i) {
+        for (std::size_t i = 0; i < directions.size(); ++i)
           along[i] = std::min(along[i], cast_on(body, origin, directions[i]));
-        }
       },
       shape);
 }

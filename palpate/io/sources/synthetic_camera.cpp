@@ -54,10 +54,9 @@ std::uint64_t whole_option(const Uri& uri, std::string_view key, std::uint64_t f
                            double min) {
   constexpr double largest = 9007199254740992.0;  // 2^53: every whole number below is exact
   const double value = uri.number_option(key, static_cast<double>(fallback), min, largest, "px");
-  if (value != std::floor(value)) {
+  if (value != std::floor(value))
     throw Error(uri.text() + ": option '" + std::string(key) + "'",
                 "'" + uri.text_option(key, "") + "' is not a whole number", "give a whole number");
-  }
   return static_cast<std::uint64_t>(value);
 }
 
@@ -90,9 +89,8 @@ SyntheticCamera::SyntheticCamera(Scene scene, const CameraSetup& setup, const Se
       rays_(std::make_shared<const ViewingRays>(setup.intrinsics)),
       directions_(setup.intrinsics.width),
       along_(setup.intrinsics.width) {
-  if (!(setup.frame_rate > 0.0 && std::isfinite(setup.frame_rate))) {
+  if (!(setup.frame_rate > 0.0 && std::isfinite(setup.frame_rate)))
     throw Error("synthetic camera: frame_rate", "it is not positive", "give a rate in Hz");
-  }
   info_.frames = setup.frames;
   info_.frame_rate = setup.frame_rate;
   if (info_.kind.empty()) info_.kind = "synthetic depth camera";
@@ -178,9 +176,8 @@ void SyntheticCamera::draw(const Part& part, double t, std::vector<float>& depth
   const Eigen::Matrix3d turn = part_from_camera.linear();
   const double radius = bounding_radius(part.shape);
   ViewingRays::Window window{0, image.width, 0, image.height};
-  if (std::isfinite(radius)) {
+  if (std::isfinite(radius))
     window = rays_->window(part_from_camera.inverse().translation(), radius);
-  }
   if (window.empty()) return;
   const std::size_t count = window.u_end - window.u_begin;
   for (int v = window.v_begin; v < window.v_end; ++v) {
@@ -198,10 +195,9 @@ void SyntheticCamera::draw(const Part& part, double t, std::vector<float>& depth
 CameraSetup camera_setup(const Uri& uri) {
   CameraSetup setup;
   const Pair size = pair_option(uri, "size", {640, 480}, 1, 16384, false);
-  if (size.first != std::floor(size.first) || size.second != std::floor(size.second)) {
+  if (size.first != std::floor(size.first) || size.second != std::floor(size.second))
     throw Error(uri.text() + ": option 'size'", "a number of pixels must be whole",
                 "write such as size=640x480");
-  }
   setup.intrinsics = pinhole(static_cast<int>(size.first), static_cast<int>(size.second),
                              uri.number_option("fov", 57.0 * deg, deg, 170.0 * deg, "rad"));
   setup.world_from_camera = looking_at_origin(

@@ -43,19 +43,17 @@ void for_each_stamped_line(std::string_view text, const std::string& name, std::
     if (fields.empty()) continue;
     const std::string where = name + ":" + std::to_string(number);
     const std::string remedy = std::string("a line is '") + form + "'";
-    if (fields.size() != count) {
+    if (fields.size() != count)
       throw Error(
           where,
           "fields: " + std::to_string(fields.size()) + " instead of " + std::to_string(count),
           remedy);
-    }
     const std::optional<double> stamp = to_finite(fields[0]);
     if (!stamp) throw Error(where, "the timestamp is not a finite number", remedy);
-    if (before && *stamp <= *before) {
+    if (before && *stamp <= *before)
       throw Error(where,
                   *stamp < *before ? "the timestamp goes backwards" : "the timestamp repeats",
                   "timestamps must increase from line to line");
-    }
     before = stamp;
     visit(where, *stamp, fields);
   }
@@ -76,10 +74,9 @@ Eigen::Isometry3d parse_matrix(const json& rows, const std::string& where) {
     numbers = of_four(rows[i]);
     for (std::size_t j = 0; numbers && j < 4; ++j) {
       numbers = rows[i][j].is_number();
-      if (numbers) {
+      if (numbers)
         matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
             rows[i][j].get<double>();
-      }
     }
   }
   if (!numbers) throw Error(where, "is not a matrix of 4x4 numbers", remedy);
@@ -115,17 +112,15 @@ Trajectory parse_trajectory(std::string_view text, const std::string& name) {
         std::array<double, 7> numbers{};
         for (std::size_t i = 0; i < numbers.size(); ++i) {
           const std::optional<double> number = to_finite(fields[i + 1]);
-          if (!number) {
+          if (!number)
             throw Error(where, "field " + std::to_string(i + 2) + " is not a finite number",
                         std::string("a line is '") + form + "'");
-          }
           numbers[i] = *number;
         }
         const auto [tx, ty, tz, qx, qy, qz, qw] = numbers;
         const Eigen::Quaterniond rotation(qw, qx, qy, qz);
-        if (!(std::abs(rotation.norm() - 1.0) < 0.01)) {
+        if (!(std::abs(rotation.norm() - 1.0) < 0.01))
           throw Error(where, "the quaternion is not of length 1", "give qx qy qz qw of a rotation");
-        }
         samples.push_back({stamp, {tx, ty, tz}, rotation.normalized()});
       });
   if (samples.empty()) throw Error(name, "has no poses", std::string("a line is '") + form + "'");
@@ -135,9 +130,8 @@ Trajectory parse_trajectory(std::string_view text, const std::string& name) {
 std::vector<Eigen::Isometry3d> parse_pose_matrices(std::string_view text, const std::string& name) {
   constexpr const char* remedy = "give {\"world_from_camera\": [4x4 matrices]}";
   const json root = json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (!root.is_object()) {
+  if (!root.is_object())
     throw Error(name, root.is_discarded() ? "is not valid JSON" : "is not a JSON object", remedy);
-  }
   std::vector<Eigen::Isometry3d> poses;
   bool found = false;
   for (const auto& [key, matrices] : root.items()) {

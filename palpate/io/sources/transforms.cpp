@@ -2,12 +2,8 @@
 #include "palpate/io/sources/transforms.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "palpate/kernel/core/error.hpp"
 

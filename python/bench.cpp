@@ -22,6 +22,8 @@
 namespace palpate::python {
 namespace {
 
+using namespace py::literals;
+
 // How long a wait lasts before Python is asked for signals.
 constexpr std::chrono::milliseconds bench_pause{50};
 
@@ -104,12 +106,8 @@ py::dict bench(const std::string& name, const std::vector<std::string>& methods,
     return lab::run_experiment(experiment, options, runner, file);
   });
   const lab::Scores scores = experiment.scores(lab::Table(name, csv));
-  py::dict result;
-  result["columns"] = scores.columns;
-  result["rows"] = scores.rows;
-  result["note"] = scores.note;
-  result["csv"] = csv;
-  return result;
+  return py::dict("columns"_a = scores.columns, "rows"_a = scores.rows, "note"_a = scores.note,
+                  "csv"_a = csv);
 }
 
 /// Makes an entry of the bench and gives its text.
@@ -138,14 +136,9 @@ py::dict check(const std::string& file, const Own& own, std::size_t sample, std:
   const lab::EntryCheck check = on_a_thread(jobs, trouble, [&](const lab::RunnerOptions& runner) {
     return lab::check_entry(file, sample, chance, recordings, methods, runner);
   });
-  py::dict result;
-  result["holds"] = check.holds;
-  result["played"] = check.played;
-  result["entered"] = check.entered;
-  result["differences"] = check.differences;
-  result["faults"] = check.faults;
-  result["left_out"] = check.left_out;
-  return result;
+  return py::dict("holds"_a = check.holds, "played"_a = check.played, "entered"_a = check.entered,
+                  "differences"_a = check.differences, "faults"_a = check.faults,
+                  "left_out"_a = check.left_out);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 #include <utility>
-#include <variant>
 
 #include "palpate/io/sources/material_file.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
@@ -57,7 +56,7 @@ std::shared_ptr<const MaterialMap> make_map(const Intrinsics& k,
 
 namespace {
 
-using SharedCloud = std::shared_ptr<const Cloud>;
+using namespace py::literals;
 using SharedRays = std::shared_ptr<const ViewingRays>;
 
 /// A pinhole camera, whose viewing rays are computed once for all of its frames.
@@ -214,22 +213,14 @@ py::dict values_of(const Parameters& parameters) {
   return values;
 }
 
-template <class Row>
-py::dict row_dict(const Row& row) {
-  py::dict entry;
-  entry["unit"] = std::string(row.unit);
-  entry["default"] = row.default_value;
-  entry["min"] = row.min;
-  entry["max"] = row.max;
-  entry["meaning"] = std::string(row.meaning);
-  entry["source"] = std::string(row.source);
-  return entry;
-}
-
 template <class Table>
 py::dict table_dict(const Table& table) {
   py::dict all;
-  for (const auto& row : table) all[py::str(std::string(row.name))] = row_dict(row);
+  for (const auto& row : table)
+    all[py::str(std::string(row.name))] =
+        py::dict("unit"_a = std::string(row.unit), "default"_a = row.default_value,
+                 "min"_a = row.min, "max"_a = row.max, "meaning"_a = std::string(row.meaning),
+                 "source"_a = std::string(row.source));
   return all;
 }
 

@@ -23,6 +23,8 @@
 namespace palpate::python {
 namespace {
 
+using namespace py::literals;
+
 // How long a wait lasts before Python is asked for signals.
 constexpr std::chrono::milliseconds session_pause{50};
 // Ticks of a free-running session between two looks at signals.
@@ -215,58 +217,36 @@ class PythonSession {
       const py::gil_scoped_release released;
       return session_->state();
     }();
-    py::dict state;
-    state["running"] = now.running;
-    state["rate"] = now.rate;
-    state["method"] = now.settings.method;
     py::list cameras;
-    for (const CameraStatus& camera : now.cameras) {
-      py::dict each;
-      each["uri"] = camera.uri;
-      each["kind"] = camera.kind;
-      each["state"] = camera.text;
-      each["rate"] = camera.rate;
-      each["frames"] = camera.frames;
-      each["dropped"] = camera.dropped;
-      each["latency"] = camera.latency;
-      each["trouble"] = camera.trouble;
-      each["doubt"] = camera.doubt;
-      cameras.append(each);
-    }
-    state["cameras"] = cameras;
-    py::dict recording;
-    recording["on"] = now.recording.on;
-    recording["folder"] = now.recording.folder;
-    recording["message"] = now.recording.message;
-    recording["failed"] = now.recording.failed;
-    recording["closing"] = now.recording.closing;
-    state["recording"] = recording;
-    state["ticks"] = now.hands[0].summary.ticks;
-    state["late_ticks"] = now.hands[0].summary.late_ticks;
-    state["contact_ticks"] = now.hands[0].summary.contact_ticks;
-    state["largest_force"] = now.hands[0].summary.largest_sent;
-    state["pop_throughs"] = now.hands[0].summary.pop_throughs;
+    for (const CameraStatus& camera : now.cameras)
+      cameras.append(py::dict("uri"_a = camera.uri, "kind"_a = camera.kind, "state"_a = camera.text,
+                              "rate"_a = camera.rate, "frames"_a = camera.frames,
+                              "dropped"_a = camera.dropped, "latency"_a = camera.latency,
+                              "trouble"_a = camera.trouble, "doubt"_a = camera.doubt));
+    const RecordingState& recording = now.recording;
+    const Summary& summary = now.hands[0].summary;
     py::dict interventions;
     const auto names = safety_flag_names();
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (now.hands[0].interventions[i] > 0)
         interventions[py::str(std::string(names[i]))] = now.hands[0].interventions[i];
     }
-    state["interventions"] = interventions;
-    state["latched_by"] = now.hands[0].latched_by;
     py::list hands;
-    for (const SessionHandState& hand : std::span(now.hands).subspan(1)) {
-      py::dict each;
-      each["name"] = hand.name;
-      each["ticks"] = hand.summary.ticks;
-      each["contact_ticks"] = hand.summary.contact_ticks;
-      each["largest_force"] = hand.summary.largest_sent;
-      each["latched_by"] = hand.latched_by;
-      each["trouble"] = hand.device.text;
-      hands.append(each);
-    }
-    state["more_hands"] = hands;
-    return state;
+    for (const SessionHandState& hand : std::span(now.hands).subspan(1))
+      hands.append(py::dict("name"_a = hand.name, "ticks"_a = hand.summary.ticks,
+                            "contact_ticks"_a = hand.summary.contact_ticks,
+                            "largest_force"_a = hand.summary.largest_sent,
+                            "latched_by"_a = hand.latched_by, "trouble"_a = hand.device.text));
+    return py::dict(
+        "running"_a = now.running, "rate"_a = now.rate, "method"_a = now.settings.method,
+        "cameras"_a = cameras,
+        "recording"_a = py::dict("on"_a = recording.on, "folder"_a = recording.folder,
+                                 "message"_a = recording.message, "failed"_a = recording.failed,
+                                 "closing"_a = recording.closing),
+        "ticks"_a = summary.ticks, "late_ticks"_a = summary.late_ticks,
+        "contact_ticks"_a = summary.contact_ticks, "largest_force"_a = summary.largest_sent,
+        "pop_throughs"_a = summary.pop_throughs, "interventions"_a = interventions,
+        "latched_by"_a = now.hands[0].latched_by, "more_hands"_a = hands);
   }
 
   py::list clouds() {

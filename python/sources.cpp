@@ -19,6 +19,8 @@
 namespace palpate::python {
 namespace {
 
+using namespace py::literals;
+
 // How long a wait lasts before Python is asked for signals [s].
 constexpr double between_signals = 0.1;
 // Ticks between two looks at signals: some milliseconds.
@@ -55,18 +57,11 @@ class FrameSource {
 
   [[nodiscard]] py::dict info() const {
     const SourceInfo& info = source_->info();
-    py::dict about;
-    about["uri"] = info.uri;
-    about["kind"] = info.kind;
-    about["frames"] = info.frames;
-    about["frame_rate"] = info.frame_rate;
-    about["start_time"] = info.start_time;
-    about["live"] = info.live;
-    about["clock"] = std::string(name_of(info.clock));
-    about["sensor"] = std::string(name_of(info.sensor));
-    about["notes"] = info.notes;
-    about["details"] = info.details;
-    return about;
+    return py::dict("uri"_a = info.uri, "kind"_a = info.kind, "frames"_a = info.frames,
+                    "frame_rate"_a = info.frame_rate, "start_time"_a = info.start_time,
+                    "live"_a = info.live, "clock"_a = std::string(name_of(info.clock)),
+                    "sensor"_a = std::string(name_of(info.sensor)), "notes"_a = info.notes,
+                    "details"_a = info.details);
   }
 
  private:

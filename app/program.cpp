@@ -7,7 +7,6 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
-#include <string>
 #include <string_view>
 #include <vector>
 

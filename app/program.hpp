@@ -2,7 +2,6 @@
 #pragma once
 
 #include <span>
-#include <string>
 
 #include "app/verbs.hpp"
 #include "palpate/kernel/core/error.hpp"

@@ -231,11 +231,10 @@ int calibrate(const CalibrateOptions& options) {
         {"residuals_m", fit.residuals}};
     fmt::print("{}\n", json.dump(2));
   } else {
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
+    for (std::size_t i = 0; i < pairs.size(); ++i)
       fmt::print("point {}  device {}  scene {}  residual {:.2f} mm\n", i + 1,
                  text_of_point(pairs[i].device), text_of_point(pairs[i].world),
                  1e3 * fit.residuals[i]);
-    }
     fmt::print("world_from_device = [{}]\nscale = {}\nrms = {:.2f} mm\n",
                pose_text(fit.placement.world_from_device), shortest(fit.placement.workspace_scale),
                1e3 * fit.rms);

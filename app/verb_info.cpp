@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <iterator>
 #include <limits>
 #include <memory>
 #include <string>
-#include <system_error>
-#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -25,6 +22,7 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/uri.hpp"
 #include "palpate/record/replay.hpp"
+#include "palpate/session/press.hpp"
 
 namespace palpate::app {
 namespace {
@@ -116,22 +114,6 @@ Json describe(const PointCloud& cloud) {
   return json;
 }
 
-// "320,240"
-std::pair<int, int> pixel_of(const std::string& text) {
-  std::pair<int, int> pixel;
-  const char* const end = text.data() + text.size();
-  const auto [comma, error] = std::from_chars(text.data(), end, pixel.first);
-  bool good = error == std::errc{} && comma != end && *comma == ',';
-  if (good) {
-    const auto [rest, second] = std::from_chars(comma + 1, end, pixel.second);
-    good = second == std::errc{} && rest == end;
-  }
-  if (!good)
-    throw Error("--at", "'" + text + "' is not a pixel",
-                "give column and row as whole numbers, such as --at 320,240");
-  return pixel;
-}
-
 Json describe(const PixelProbe& probe, int u, int v) {
   Json json = {{"pixel", Json::array({u, v})}, {"hole", !probe.in_world}};
   if (probe.depth) json["depth_m"] = rounded(*probe.depth);
@@ -147,7 +129,7 @@ Json describe(const PixelProbe& probe, int u, int v) {
 }
 
 Json describe_pixel(const Cloud& cloud, const std::string& text, const std::string& uri) {
-  const auto [u, v] = pixel_of(text);
+  const auto [u, v] = parse_pixel(text, "--at");
   if (const DepthImage* image = cloud.image()) return describe(probe_pixel(*image, u, v), u, v);
   if (const PointCloud* points = cloud.point_cloud();
       points != nullptr && points->surface() != nullptr && points->surface()->columns > 0)

@@ -21,10 +21,9 @@ int print_parameters() {
                row.unit, row.default_value, row.min, row.max, row.meaning, row.source);
   }
   fmt::print("\nlimits of the safety chain (--limit):\n");
-  for (const SafetyParameterInfo& row : safety_parameter_table()) {
+  for (const SafetyParameterInfo& row : safety_parameter_table())
     fmt::print("{:<18} {:<4} {:<11} {:>12.6g} {:>9g} {:>9g}  {}\n", row.name, "", row.unit,
                row.default_value, row.min, row.max, row.meaning);
-  }
   fmt::print("\nmaterials (--material), with the values that differ from the default surface:\n");
   for (const NamedMaterial& named : standard_materials().materials) {
     std::string numbers;

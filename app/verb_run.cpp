@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <atomic>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -17,7 +15,6 @@
 
 #include "app/opened_scenes.hpp"
 #include "app/point_remarks.hpp"
-#include "app/reach.hpp"
 #include "app/running_session.hpp"
 #include "app/signals.hpp"
 #include "app/verbs.hpp"

@@ -13,7 +13,6 @@
 #include "app/progress.hpp"
 #include "app/signals.hpp"
 #include "app/summary_text.hpp"
-#include "app/trace_csv.hpp"
 #include "app/trace_remarks.hpp"
 #include "app/verbs.hpp"
 #include "palpate/drivers/drivers.hpp"

@@ -127,7 +127,7 @@ std::vector<Row> measure_all(const BenchOptions& options, const bench::MethodCho
            [=, w = width, h = height] { return bench::noisy_plane(w, h, focal, distance); }});
     }
   }
-  if (options.camera) {
+  if (options.camera)
     scenes.push_back({*options.camera, [&options] {
                         const auto frame = open_source(*options.camera)->next();
                         if (!frame)
@@ -135,7 +135,6 @@ std::vector<Row> measure_all(const BenchOptions& options, const bench::MethodCho
                                       "give a source with at least one");
                         return bench::recorded(*options.camera, frame->cloud);
                       }});
-  }
   if (options.quick) scenes.erase(scenes.begin() + 3, scenes.begin() + 8);
 
   Progress progress("bench", scenes.size());
@@ -217,11 +216,10 @@ int report(const BenchOptions& options) {
   fmt::print("\n{:<20}{:<14}{:>14}{:>12}{:>10}{:>8}\n", "the search", "method", "build a frame",
              "query", "p99", "found");
   for (const Row& row : rows) {
-    for (const SearchCosts& costs : row.search) {
+    for (const SearchCosts& costs : row.search)
       fmt::print("{:<20}{:<14}{:>14}{:>12.3f}{:>10.3f}{:>8}\n", row.name, costs.name,
                  costs.build ? fmt::format("{:.0f}", costs.build->median) : "-", costs.query.median,
                  costs.query.p99, costs.found);
-    }
   }
   const KernelCosts& k = one_metre.kernel;
   fmt::print(

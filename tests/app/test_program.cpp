@@ -20,7 +20,6 @@
 #include <unistd.h>
 
 #include "app/opened_scenes.hpp"
-#include "app/reach.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/pose.hpp"

@@ -75,9 +75,8 @@ Subject noisy_points(std::size_t points, double spacing) {
 
 Subject recorded(const std::string& name, std::shared_ptr<const Cloud> frame) {
   const std::vector<Vec3> points = points_of(*frame);
-  if (points.empty()) {
+  if (points.empty())
     throw Error(name, "its first frame has no measurement", "give a source that sees a surface");
-  }
   Vec3 eye = Vec3::Zero();
   Vec3 surface = points[points.size() / 2];
   if (const DepthImage* image = frame->image()) {

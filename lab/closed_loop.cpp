@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "palpate/io/devices/hip_path.hpp"
 #include "palpate/io/devices/simulated_hand.hpp"
 
 namespace palpate::lab {

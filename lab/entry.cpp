@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <ctime>
 #include <fstream>
 #include <map>
 #include <numeric>
@@ -21,9 +20,9 @@
 #include "lab/experiments/pop.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/experiments/real.hpp"
-#include "lab/interval.hpp"
 #include "lab/pipe_method.hpp"
 #include "lab/sha256.hpp"
+#include "lab/statistics.hpp"
 #include "lab/table.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/uri.hpp"
@@ -136,11 +135,10 @@ void plan_real(const EntryOptions& options, Plan& plan) {
     const std::size_t share = cases / count + (i < cases % count ? 1 : 0);
     plan.recordings.emplace_back(name,
                                  draw_real_cases(options.recordings[i], name, options.seed, share));
-    for (const RealCase& c : plan.recordings.back().second.cases) {
+    for (const RealCase& c : plan.recordings.back().second.cases)
       plan.items.push_back(
           {"real", name, c.text,
            [=] { return outcome_text(c.play(options.method, experiment_options(options))); }});
-    }
   }
 }
 

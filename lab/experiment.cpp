@@ -1,26 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/experiment.hpp"
 
-#include <algorithm>
+#include <utility>
 
-#include "lab/experiments/experiments.hpp"
-#include "lab/find_named.hpp"
+#include <fmt/format.h>
+
 #include "lab/method.hpp"
 #include "lab/pipe_method.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
 
+// The experiments, in the order of the report: a file of lab/experiments defines `Experiment
+// NAME_experiment()`. Adding an experiment: that, and its name here.
+// clang-format off
+#define PALPATE_EXPERIMENTS(name)                                                            \
+  name(flat) name(jump) name(single_lift) name(lift) name(bound) name(speed)                 \
+  name(first_contact) name(hold) name(force) name(damping) name(corners) name(scan)          \
+  name(fidelity) name(feel) name(zwidth) name(materials) name(teleop) name(teleop_faults)    \
+  name(pop) name(field) name(visits) name(real)
+// clang-format on
+
+#define PALPATE_DECLARE(name) Experiment name##_experiment();
+PALPATE_EXPERIMENTS(PALPATE_DECLARE)
+#undef PALPATE_DECLARE
+
 const std::vector<Experiment>& known_experiments() {
-  static const std::vector<Experiment> experiments = {
-      flat_experiment(),          jump_experiment(),    single_lift_experiment(),
-      lift_experiment(),          bound_experiment(),   speed_experiment(),
-      first_contact_experiment(), hold_experiment(),    force_experiment(),
-      damping_experiment(),       corners_experiment(), scan_experiment(),
-      fidelity_experiment(),      feel_experiment(),    zwidth_experiment(),
-      materials_experiment(),     teleop_experiment(),  teleop_faults_experiment(),
-      pop_experiment(),           field_experiment(),   visits_experiment(),
-      real_experiment()};
+#define PALPATE_MAKE(name) name##_experiment(),
+  static const std::vector<Experiment> experiments = {PALPATE_EXPERIMENTS(PALPATE_MAKE)};
+#undef PALPATE_MAKE
   return experiments;
 }
 
@@ -46,6 +54,56 @@ std::vector<std::string> methods_of(const Experiment& experiment,
     if (!is_own) static_cast<void>(methods().find(name));
   }
   return options.methods;
+}
+
+AimTable::AimTable(std::vector<std::string> labels, std::vector<std::string> methods)
+    : methods_(std::move(methods)), met_(methods_.size(), 0) {
+  scores_.columns = std::move(labels);
+  scores_.columns.emplace_back("aim");
+  scores_.columns.insert(scores_.columns.end(), methods_.begin(), methods_.end());
+}
+
+void AimTable::add(std::vector<std::string> labels, std::optional<double> aim,
+                   const std::vector<std::optional<double>>& values) {
+  std::vector<std::string> line = std::move(labels);
+  line.push_back(aim ? fmt::format("<= {:g}", *aim) : "-");
+  aims_ += aim ? 1 : 0;
+  for (std::size_t m = 0; m < methods_.size(); ++m) {
+    const bool missed = aim && !(values[m] && *values[m] <= *aim);
+    met_[m] += aim && !missed ? 1 : 0;
+    line.push_back((values[m] ? fmt::format("{:.3g}", *values[m]) : "-") + (missed ? " *" : ""));
+  }
+  scores_.rows.push_back(std::move(line));
+}
+
+Scores AimTable::scores(std::string note) const {
+  Scores scores = scores_;
+  std::vector<std::string> line(scores.columns.size() - methods_.size() - 1);
+  line.front() = "aims met";
+  line.push_back(fmt::format("{}", aims_));
+  for (const int count : met_) line.push_back(fmt::format("{}", count));
+  scores.rows.push_back(std::move(line));
+  scores.note = std::move(note);
+  return scores;
+}
+
+std::string measure_text(std::string_view name, std::string_view unit) {
+  return unit.empty() ? std::string(name) : fmt::format("{} [{}]", name, unit);
+}
+
+Figure figure_of_aims(const Table& table, const std::function<bool(std::size_t)>& keep) {
+  const auto measure = [&](std::size_t row) {
+    return table.text(row, "aim") != "-" && keep(row)
+               ? table.text(row, "scene") + " " + table.text(row, "measure")
+               : std::string();
+  };
+  const auto ratio = [&](const std::vector<std::size_t>& rows) {
+    return table.number(rows.back(), "value") / table.number(rows.back(), "aim");
+  };
+  Panel panel = by_group(table, measure, ratio,
+                         {.label = "measured / aim", .log = true, .low = 1e-3, .high = 1e3});
+  panel.series.push_back({"", {{1.0, -anything}, {1.0, anything}}, Line::solid, Mark::none, grey});
+  return {{panel}};
 }
 
 }  // namespace palpate::lab

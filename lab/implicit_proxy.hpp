@@ -4,8 +4,8 @@
 #include <functional>
 #include <optional>
 
+#include "lab/contact.hpp"
 #include "lab/method.hpp"
-#include "lab/ticks.hpp"
 
 namespace palpate::lab {
 

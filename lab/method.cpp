@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/method.hpp"
 
-#include <utility>
-#include <vector>
-
 #include "lab/pipe_method.hpp"
 #include "palpate/io/sources/scene.hpp"
 #include "palpate/kernel/methods/methods.hpp"

@@ -12,7 +12,6 @@
 #include <limits>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -15,6 +16,13 @@ inline constexpr double f_c = 30.0;  ///< [Hz] the camera's frame rate in Table 
 
 /// [s] behind the true surface for longer than this in one go, a proxy is lost
 inline constexpr double patience = 0.5;
+
+/// Of `count` frames that are played forth and back, the one that is shown as number `k`.
+inline std::size_t forth_and_back(std::uint64_t k, std::size_t count) {
+  const std::size_t turn = std::max<std::size_t>(2 * count - 2, 1);
+  const std::size_t at = k % turn;
+  return at < count ? at : turn - at;
+}
 
 /// What a method is put through: a camera and a hand, over time.
 struct Scenario {

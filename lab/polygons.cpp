@@ -7,7 +7,6 @@
 
 #include "lab/local_points.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
-#include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {

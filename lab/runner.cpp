@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/runner.hpp"
 
-#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
@@ -13,7 +12,6 @@
 #include <mutex>
 #include <sstream>
 #include <thread>
-#include <vector>
 
 #include "palpate/kernel/core/error.hpp"
 

@@ -24,11 +24,10 @@ constexpr std::array<std::uint32_t, 64> round_constants = {
 
 void Sha256::take_block(const unsigned char* block) {
   std::array<std::uint32_t, 64> w{};
-  for (std::size_t i = 0; i < 16; ++i) {
+  for (std::size_t i = 0; i < 16; ++i)
     w[i] = static_cast<std::uint32_t>(block[4 * i]) << 24U |
            static_cast<std::uint32_t>(block[4 * i + 1]) << 16U |
            static_cast<std::uint32_t>(block[4 * i + 2]) << 8U | block[4 * i + 3];
-  }
   for (std::size_t i = 16; i < 64; ++i) {
     const std::uint32_t s0 = std::rotr(w[i - 15], 7) ^ std::rotr(w[i - 15], 18) ^ (w[i - 15] >> 3U);
     const std::uint32_t s1 = std::rotr(w[i - 2], 17) ^ std::rotr(w[i - 2], 19) ^ (w[i - 2] >> 10U);

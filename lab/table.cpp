@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <cstddef>
 #include <limits>
 
 #include "palpate/kernel/core/error.hpp"
@@ -85,20 +84,9 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-Row& Row::add(std::string_view text) {
-  if (!line_.empty()) line_ += ',';
-  line_ += text;
-  return *this;
-}
-
-Row& Row::add(double number) {
+std::string csv_field(double number) {
   std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), number).ptr;
-  return add(std::string_view(text.data(), static_cast<std::size_t>(end - text.data())));
-}
-
-Row& Row::add(long long number) {
-  return add(std::string_view(std::to_string(number)));
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), number).ptr};
 }
 
 }  // namespace palpate::lab

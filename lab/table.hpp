@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <concepts>
 #include <cstddef>
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -45,21 +45,23 @@ std::vector<std::string> methods_in(const Table& table);
 /// The upper one of the two in the middle of an even number; NaN of none.
 double median(std::vector<double> values);
 
-/// One CSV row from its fields: numbers in the shortest form that reads back to the same value.
-class Row {
- public:
-  Row& add(std::string_view text);
-  Row& add(const char* text) { return add(std::string_view(text)); }
-  Row& add(double number);
-  Row& add(long long number);
-  Row& add(int number) { return add(static_cast<long long>(number)); }
-  Row& add(std::uint64_t number) { return add(static_cast<long long>(number)); }
-  Row& add(bool yes) { return add(static_cast<long long>(yes)); }
-  /// The row with its newline.
-  [[nodiscard]] std::string done() const { return line_ + "\n"; }
+/// A field of a CSV: numbers in the shortest form that reads back to the same value.
+std::string csv_field(double number);
+inline std::string csv_field(std::string_view text) {
+  return std::string(text);
+}
+template <std::integral Whole>
+std::string csv_field(Whole number) {
+  return std::to_string(static_cast<long long>(number));
+}
 
- private:
-  std::string line_;
-};
+/// One row of a CSV with its newline.
+template <class... Fields>
+std::string csv_row(const Fields&... fields) {
+  std::string line;
+  ((line += csv_field(fields) + ','), ...);
+  line.back() = '\n';
+  return line;
+}
 
 }  // namespace palpate::lab

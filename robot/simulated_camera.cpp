@@ -41,16 +41,13 @@ SimulatedCamera::SimulatedCamera(std::shared_ptr<Simulation> simulation,
       rays_(std::make_shared<const ViewingRays>(setup.camera.intrinsics)),
       directions_(setup.camera.intrinsics.width),
       along_(setup.camera.intrinsics.width) {
-  if (!(setup.camera.frame_rate >= 0.1 && setup.camera.frame_rate <= 1000.0)) {
+  if (!(setup.camera.frame_rate >= 0.1 && setup.camera.frame_rate <= 1000.0))
     throw Error("simulated camera: frame rate", "it is not between 0.1 and 1000 Hz",
                 "give such as 30 Hz");
-  }
-  if (!(setup.latency >= 0.0 && setup.latency <= 0.4)) {
+  if (!(setup.latency >= 0.0 && setup.latency <= 0.4))
     throw Error("simulated camera: latency", "it is not between 0 and 0.4 s", "give such as 30 ms");
-  }
-  if (!(setup.margin >= 0.0 && setup.margin <= 0.1)) {
+  if (!(setup.margin >= 0.0 && setup.margin <= 0.1))
     throw Error("simulated camera: margin", "it is not between 0 and 0.1 m", "give such as 3 mm");
-  }
   for (const VisibleGeom& geom : simulation_->geoms())
     thick_.push_back(thickened(geom.shape, geom.of_arm ? setup.margin : 0.0));
   if (setup.arm == ArmView::remembered)

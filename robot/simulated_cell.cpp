@@ -42,10 +42,9 @@ std::unique_ptr<Source> make_camera(const Uri& uri, const std::shared_ptr<Simula
   setup.camera = camera_setup(uri);
   setup.sensor = camera_sensor(uri);
   const std::string arm = uri.text_option("arm", "hidden");
-  if (arm != "hidden" && arm != "remembered" && arm != "seen") {
+  if (arm != "hidden" && arm != "remembered" && arm != "seen")
     throw Error(uri.text() + ": option 'arm'", "there is no '" + arm + "'",
                 "write arm=hidden, arm=remembered or arm=seen");
-  }
   setup.arm = arm == "seen"         ? ArmView::seen
               : arm == "remembered" ? ArmView::remembered
                                     : ArmView::hidden;

@@ -106,21 +106,19 @@ std::unique_ptr<mjModel, ModelDeleter> compile(std::string_view mjcf) {
 
 int find(const mjModel& model, int type, const char* name) {
   const int id = mj_name2id(&model, type, name);
-  if (id < 0) {
+  if (id < 0)
     throw Error("robot's model", "it has no " + std::string(mju_type2Str(type)) + " '" + name + "'",
                 "give it one, as robot/models/desk.xml does");
-  }
   return id;
 }
 
 std::vector<double> numbers(const mjModel& model, const char* name, int count) {
   const int id = find(model, mjOBJ_NUMERIC, name);
   const double* const first = model.numeric_data + model.numeric_adr[id];
-  if (model.numeric_size[id] != count) {
+  if (model.numeric_size[id] != count)
     throw Error("robot's model: numeric '" + std::string(name) + "'",
                 "it has " + std::to_string(model.numeric_size[id]) + " numbers",
                 "give it " + std::to_string(count));
-  }
   return {first, first + count};
 }
 
@@ -175,10 +173,9 @@ Vec3 limited(const Vec3& v, double most) {
 
 void check_range(double value, double least, double most, const std::string& what,
                  const std::string& unit) {
-  if (!(value >= least && value <= most)) {
+  if (!(value >= least && value <= most))
     throw Error(what, shortest(value) + " " + unit + " is out of range",
                 "give " + shortest(least) + " to " + shortest(most) + " " + unit);
-  }
 }
 
 double checked_hole(const SimulationSetup& setup) {
@@ -211,15 +208,13 @@ class Simulation::Implementation {
 
   void find_parts() {
     const mjModel& m = *model_;
-    if (m.nu != arm_joints || m.njnt < arm_joints + 1 || m.nv < arm_joints + 1) {
+    if (m.nu != arm_joints || m.njnt < arm_joints + 1 || m.nv < arm_joints + 1)
       throw Error("robot's model", "it has not six motors and more than six joints",
                   "drive the arm by six motors, as robot/models/desk.xml does");
-    }
     for (int i = 0; i < arm_joints; ++i) {
-      if (m.jnt_type[i] != mjJNT_HINGE || m.actuator_trnid[2 * i] != i) {
+      if (m.jnt_type[i] != mjJNT_HINGE || m.actuator_trnid[2 * i] != i)
         throw Error("robot's model", "its first six joints are not hinges with a motor each",
                     "put the arm first, as robot/models/desk.xml does");
-      }
       info_.joint_names.emplace_back(mj_id2name(&m, mjOBJ_JOINT, i));
       const int body = m.jnt_bodyid[i];
       // Joints that share a place make no link.
@@ -230,9 +225,8 @@ class Simulation::Implementation {
     base_site_ = find(m, mjOBJ_SITE, "base");
     tip_geom_ = find(m, mjOBJ_GEOM, "tip");
     plate_joint_ = find(m, mjOBJ_JOINT, "plate");
-    if (m.jnt_type[plate_joint_] != mjJNT_SLIDE) {
+    if (m.jnt_type[plate_joint_] != mjJNT_SLIDE)
       throw Error("robot's model: joint 'plate'", "it does not slide", "make it a slide joint");
-    }
     if (setup_.plate_stiffness) soften_plate(*setup_.plate_stiffness);
     plate_dof_ = m.jnt_dofadr[plate_joint_];
     plate_mass_ = m.body_subtreemass[m.jnt_bodyid[plate_joint_]];
@@ -240,10 +234,9 @@ class Simulation::Implementation {
     std::copy(home.begin(), home.end(), data_->qpos);
     const std::vector<double> reach = numbers(m, "reach", 6);
     reach_ = Eigen::AlignedBox3d(vector(reach.data()), vector(reach.data() + 3));
-    if (reach_.isEmpty()) {
+    if (reach_.isEmpty())
       throw Error("robot's model: numeric 'reach'", "a least number is above its largest",
                   "give least x, y, z and then largest x, y, z");
-    }
     info_.kind = "simulated arm";
     info_.reach = reach_;
     info_.max_speed = setup_.max_speed;
@@ -486,10 +479,9 @@ class Simulation::Implementation {
   void place(std::string_view name, const Eigen::Isometry3d& world_from_body) {
     check_rigid(world_from_body, "pose of '" + std::string(name) + "'");
     const int joint = model_->body_jntadr[body(name)];
-    if (joint < 0 || model_->jnt_type[joint] != mjJNT_FREE) {
+    if (joint < 0 || model_->jnt_type[joint] != mjJNT_FREE)
       throw Error("robot's model: body '" + std::string(name) + "'", "it is not free to move",
                   "place a body that is, such as 'box' or 'ball'");
-    }
     mjtNum* const q = data_->qpos + model_->jnt_qposadr[joint];
     const Eigen::Quaterniond turn(world_from_body.linear());
     Eigen::Map<Vec3>{q} = world_from_body.translation();

@@ -7,8 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "lab/aim_table.hpp"
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
@@ -101,14 +100,10 @@ std::string rows_of(std::string_view scene, const FeelFigures& figures) {
   for (const FeelFigure& figure : figures) {
     // What the table does not show stands in the CSV.
     const Measure* measure = find_measure(scene, figure.measure, figure.loop);
-    Row row;
-    row.add(figure.method).add(scene).add(figure.loop).add(figure.measure);
-    row.add(measure != nullptr ? measure->unit : "");
-    if (measure != nullptr && measure->aim)
-      row.add(*measure->aim);
-    else
-      row.add("-");
-    rows += row.add(figure.value).add(figure.case_text).done();
+    const std::optional<double> aim = measure != nullptr ? measure->aim : std::nullopt;
+    rows += csv_row(figure.method, scene, figure.loop, figure.measure,
+                    measure != nullptr ? measure->unit : "", aim ? csv_field(*aim) : "-",
+                    figure.value, figure.case_text);
   }
   return rows;
 }
@@ -128,10 +123,9 @@ void check_scenes(const ExperimentOptions& options) {
 std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptions& options) {
   check_scenes(options);
   std::vector<Contestant> contestants;
-  for (const std::string& name : methods_of(experiment, options)) {
+  for (const std::string& name : methods_of(experiment, options))
     contestants.push_back(
         {name, [name](const MethodSetup& setup) { return make_method(name, setup); }});
-  }
   FeelOptions feel;
   feel.parameters = options.parameters;
   feel.seed = options.seed;

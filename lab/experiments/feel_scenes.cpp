@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 
 #include "lab/closed_loop.hpp"
-#include "lab/signal.hpp"
+#include "lab/statistics.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 
 namespace palpate::lab {
@@ -37,11 +37,8 @@ const DevicePreset& touch() {
 struct Stage {
   explicit Stage(const std::string& uri)
       : camera(open_synthetic_camera(Uri(uri))), scene(std::make_shared<Scene>(camera->scene())) {}
-  Stage(const std::shared_ptr<const Scene>& its_scene, const std::string& uri) : scene(its_scene) {
-    const auto plain = open_synthetic_camera(Uri(uri));
-    SensorModel sensor = plain->sensor().model();
-    camera = std::make_unique<SyntheticCamera>(*scene, plain->setup(), sensor);
-  }
+  Stage(const std::shared_ptr<const Scene>& its_scene, const std::string& options)
+      : camera(camera_before(*its_scene, options)), scene(its_scene) {}
 
   [[nodiscard]] Scenario scenario(double duration) const {
     return {
@@ -51,7 +48,7 @@ struct Stage {
         .hip = nullptr};
   }
 
-  std::unique_ptr<SyntheticCamera> camera;
+  std::shared_ptr<SyntheticCamera> camera;
   std::shared_ptr<const Scene> scene;
 };
 
@@ -225,6 +222,11 @@ std::string camera_options(double distance, double across, std::string_view sens
                      2.0 * std::atan(0.5 * pixels / focal), distance, sensor, seed);
 }
 
+std::shared_ptr<SyntheticCamera> camera_before(const Scene& scene, const std::string& options) {
+  const auto plain = open_synthetic_camera(Uri("synthetic:plane?" + options));
+  return std::make_shared<SyntheticCamera>(scene, plain->setup(), plain->sensor().model());
+}
+
 FeelFigures play_slide(const std::vector<Contestant>& contestants, const FeelOptions& options,
                        double distance) {
   constexpr double from = 1.2;
@@ -322,9 +324,9 @@ FeelFigures play_return(const std::vector<Contestant>& contestants, const FeelOp
   Repeats repeats;
   for (int k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
-    const std::string camera = "synthetic:plane?" + camera_options(middle, 0.3, "d4xx", seed);
-    const Stage stage =
-        why == Unseen::covered ? Stage(covered_plane(gone, back), camera) : Stage(camera);
+    const std::string camera = camera_options(middle, 0.3, "d4xx", seed);
+    const Stage stage = why == Unseen::covered ? Stage(covered_plane(gone, back), camera)
+                                               : Stage("synthetic:plane?" + camera);
     Scenario scenario = stage.scenario(back + 2.0);
     if (why != Unseen::covered) {
       scenario.delay = [=](std::uint64_t frame) -> std::optional<double> {

@@ -10,6 +10,10 @@
 #include "lab/experiment.hpp"
 #include "lab/method.hpp"
 
+namespace palpate {
+class SyntheticCamera;
+}
+
 namespace palpate::lab {
 
 /// A method that takes part, and how to make it for a scene.
@@ -41,6 +45,8 @@ struct FeelOptions {
 /// @param distance  [m]
 std::string camera_options(double distance, double across, std::string_view sensor,
                            std::uint64_t seed);
+/// A synthetic camera with such options before a scene.
+std::shared_ptr<SyntheticCamera> camera_before(const Scene& scene, const std::string& options);
 
 /// Along a resting plane at 0.1 m/s before a D4xx. @param distance  [m] from the camera
 FeelFigures play_slide(const std::vector<Contestant>& contestants, const FeelOptions& options,

@@ -6,17 +6,14 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <optional>
 
 #include <fmt/format.h>
 
-#include "lab/aim_table.hpp"
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
-#include "lab/signal.hpp"
-#include "lab/sine_push.hpp"
+#include "lab/statistics.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
@@ -70,13 +67,8 @@ std::string rows_of(std::string_view method, std::string_view scene,
     if (measure.scene != scene) continue;
     for (const auto& [name, value] : values) {
       if (name != measure.name) continue;
-      Row row;
-      row.add(method).add(scene).add(measure.name).add(measure.unit);
-      if (measure.aim)
-        row.add(*measure.aim);
-      else
-        row.add("-");
-      rows += row.add(value).done();
+      rows += csv_row(method, scene, measure.name, measure.unit,
+                      measure.aim ? csv_field(*measure.aim) : "-", value);
     }
   }
   return rows;
@@ -148,8 +140,7 @@ std::string rest_on_grid(const std::string& name, const ExperimentOptions& optio
   const double r_c = options.parameters.proxy.r_c();
   Watched watched;
   for (int k = 0; k < repeats; ++k) {
-    GridCloud grid;
-    grid.spacing = 0.3 * r_c;
+    GridCloud grid = level_grid(r_c, 0.06);
     grid.sigma = 1e-3;
     grid.noise = noise;
     grid.seed = options.seed * 1000 + static_cast<std::uint64_t>(k);
@@ -263,9 +254,7 @@ std::string move_in_sight(const std::string& name, const ExperimentOptions& opti
 std::string slide_on_plane(const std::string& name, const ExperimentOptions& options,
                            std::string_view scene) {
   const double r_c = options.parameters.proxy.r_c();
-  GridCloud grid;
-  grid.spacing = 0.3 * r_c;
-  grid.half_x = grid.half_y = 0.12;
+  GridCloud grid = level_grid(r_c, 0.12);
   const Truth truth = flat_truth();
   const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
   const auto hip = [&](double t) {
@@ -290,9 +279,7 @@ std::string slide_on_relief(const std::string& name, const ExperimentOptions& op
   const double r_c = options.parameters.proxy.r_c();
   const auto scene = std::make_shared<const Scene>(make_scene(Uri("synthetic:relief")));
   const Truth truth = truth_of(scene);
-  GridCloud grid;
-  grid.spacing = 0.3 * r_c;
-  grid.half_x = grid.half_y = 0.08;
+  GridCloud grid = level_grid(r_c, 0.08);
   grid.height = [](double x, double) { return 1.5e-3 * std::sin(200.0 * std::numbers::pi * x); };
   const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
   const auto hip = [&](double t) { return Vec3(0.02 * (t - 1.5), 0.1 * r_c, -press); };

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/field/field_cases.hpp"
 #include "lab/field/field_judge.hpp"
 #include "lab/method.hpp"
@@ -48,29 +48,13 @@ std::string rows_of(const std::vector<std::string>& names, const field::FieldCas
   for (std::size_t m = 0; m < names.size(); ++m) {
     const field::Verdict verdict =
         outcome.verdicts.empty() ? field::Verdict{} : outcome.verdicts[m];
-    rows += Row()
-                .add(names[m])
-                .add(c.name)
-                .add(field::to_string(stage.sensor->setup().kind))
-                .add(number)
-                .add(outcome.unknown.empty() ? "-" : outcome.unknown)
-                .add(verdict.lost)
-                .add(verdict.right())
-                .add(verdict.behind)
-                .add(verdict.worst_ghost)
-                .add(verdict.numb)
-                .add(verdict.wrong_side)
-                .add(verdict.worst_step)
-                .add(verdict.shake < 0.0 ? "-" : fmt::format("{:.4g}", 1e3 * verdict.shake))
-                .add(verdict.time)
-                .add(verdict.time_behind)
-                .add(verdict.alarmed)
-                .add(verdict.false_alarm)
-                .add(verdict.times_behind)
-                .add(verdict.quick_returns)
-                .add(c.text())
-                .add(stage.values)
-                .done();
+    rows += csv_row(names[m], c.name, field::to_string(stage.sensor->setup().kind), number,
+                    outcome.unknown.empty() ? "-" : outcome.unknown, verdict.lost, verdict.right(),
+                    verdict.behind, verdict.worst_ghost, verdict.numb, verdict.wrong_side,
+                    verdict.worst_step,
+                    verdict.shake < 0.0 ? "-" : fmt::format("{:.4g}", 1e3 * verdict.shake),
+                    verdict.time, verdict.time_behind, verdict.alarmed, verdict.false_alarm,
+                    verdict.times_behind, verdict.quick_returns, c.text(), stage.values);
   }
   return rows;
 }
@@ -203,7 +187,8 @@ std::string alarm_text(const Table& table, const std::string& method) {
   };
   const double behind = sum("time_behind_s");
   return fmt::format(
-      "{}: behind for {:.1f} s of {:.0f} s, {:.1f} % of that flagged; false positives in {:.2f} % "
+      "{}: behind for {:.1f} s of {:.0f} s, {:.1f} % of that flagged; false positives in {:.2f} "
+      "% "
       "of the rest; {:.0f} of {:.0f} times in front again within 0.2 s",
       method, behind, sum("time_s"), behind > 0.0 ? 100.0 * sum("alarmed_s") / behind : 100.0,
       100.0 * sum("false_alarm_s") / std::max(sum("time_s") - behind, 1e-3), sum("quick_returns"),
@@ -246,7 +231,8 @@ Scores scores_of(const Table& table, const Extra& extra) {
       ++count;
       if (sum.right == sum.known) continue;
       scores.note += fmt::format(
-          "\n{}, {}: {} cases: {} popped through, {} with a force in free space (up to {:.2f} N), "
+          "\n{}, {}: {} cases: {} popped through, {} with a force in free space (up to {:.2f} "
+          "N), "
           "{} with a missing force, {} with a force in the opposite direction; palpate eval {} "
           "--methods {} --case '{}'",
           method, name, sum.known, sum.known - sum.held, sum.ghost, sum.worst_ghost, sum.numb,
@@ -291,7 +277,8 @@ Figure field_figure(const Table& table) {
 
 constexpr std::string_view header =
     "method,class,sensor,number,unknown,lost,right,behind_s,ghost_n,numb,wrong_side,worst_step_n,"
-    "shake_mm,time_s,time_behind_s,alarmed_s,false_alarm_s,times_behind,quick_returns,text,values";
+    "shake_mm,time_s,time_behind_s,alarmed_s,false_alarm_s,times_behind,quick_returns,text,"
+    "values";
 
 }  // namespace
 

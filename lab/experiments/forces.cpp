@@ -6,12 +6,11 @@
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
-#include "lab/signal.hpp"
-#include "lab/sine_push.hpp"
+#include "lab/statistics.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -33,9 +32,7 @@ std::vector<Cell> hold_cells(const Experiment& experiment, const ExperimentOptio
           cells.emplace_back([=] {
             const double r_c = options.parameters.proxy.r_c();
             const std::uint64_t seed = options.seed * 1000 + static_cast<std::uint64_t>(k);
-            GridCloud grid;
-            grid.spacing = 0.3 * r_c;
-            grid.half_x = grid.half_y = 12.0 * r_c;
+            GridCloud grid = level_grid(r_c, 12.0 * r_c);
             grid.sigma = 1e-3 * hold_levels[static_cast<std::size_t>(level)];
             grid.noise = noise;
             grid.seed = seed * 7919 + static_cast<std::uint64_t>(level);
@@ -77,18 +74,9 @@ std::vector<Cell> hold_cells(const Experiment& experiment, const ExperimentOptio
             double mean = 0.0;
             for (const double h : heights) mean += h / static_cast<double>(heights.size());
             for (double& h : heights) h -= mean;
-            return Row()
-                .add(name)
-                .add(noise == Noise::white ? "white" : "correlated")
-                .add(1e3 * grid.sigma)
-                .add(seed)
-                .add(seconds)
-                .add(popped)
-                .add(1e3 * mean)
-                .add(1e3 * rms(heights))
-                .add(largest_step)
-                .add(felt_rms(forces))
-                .done();
+            return csv_row(name, noise == Noise::white ? "white" : "correlated", 1e3 * grid.sigma,
+                           seed, seconds, popped, 1e3 * mean, 1e3 * rms(heights), largest_step,
+                           felt_rms(forces));
           });
         }
       }
@@ -133,23 +121,15 @@ Figure hold_figure(const Table& table) {
 
 std::vector<Cell> force_cells(const Experiment& experiment, const ExperimentOptions& options) {
   std::vector<Cell> cells;
-  for (const std::string& name : methods_of(experiment, options)) {
+  for (const std::string& name : methods_of(experiment, options))
     cells.emplace_back([=] {
       const double r_c = options.parameters.proxy.r_c();
       std::string rows;
       push_by_sine(name, options, [&](const Tick& tick, double height, double ideal) {
-        rows += Row()
-                    .add(name)
-                    .add(tick.t)
-                    .add(tick.force.z())
-                    .add(ideal)
-                    .add(tick.proxy.z() - r_c)
-                    .add(height)
-                    .done();
+        rows += csv_row(name, tick.t, tick.force.z(), ideal, tick.proxy.z() - r_c, height);
       });
       return rows;
     });
-  }
   return cells;
 }
 
@@ -205,8 +185,7 @@ std::vector<Cell> damping_cells(const Experiment& experiment, const ExperimentOp
         const double r_c = options.parameters.proxy.r_c();
         constexpr double rate = 5.0;  // [Hz]
         constexpr double cycles = 5.0;
-        GridCloud grid;
-        grid.spacing = 0.3 * r_c;
+        GridCloud grid = level_grid(r_c, 0.06);
         Parameters parameters = options.parameters;
         parameters.coupling.damping = damping;
         parameters.coupling.max_force = 100.0;
@@ -227,7 +206,7 @@ std::vector<Cell> damping_cells(const Experiment& experiment, const ExperimentOp
                if (tick.t >= 1.0 - 1e-9) last = tick;
                return true;
              });
-        return Row().add(name).add(damping).add(1e3 * work / cycles).done();
+        return csv_row(name, damping, 1e3 * work / cycles);
       });
     }
   }

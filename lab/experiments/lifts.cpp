@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -55,9 +55,7 @@ using BeforeFrame = std::function<void(const Tick& last, double shown)>;
 Lifted lift(std::string_view name, const ExperimentOptions& options, const Law& law, double sigma,
             std::uint64_t seed, const BeforeFrame& before_frame = {}) {
   const double r_c = options.parameters.proxy.r_c();
-  GridCloud grid;
-  grid.spacing = 0.3 * r_c;
-  grid.half_x = grid.half_y = 12.0 * r_c;
+  GridCloud grid = level_grid(r_c, 12.0 * r_c);
   grid.sigma = sigma;
   grid.noise = options.noise;
   grid.seed = seed;
@@ -111,25 +109,17 @@ std::vector<Cell> single_lift_cells(const Experiment& experiment,
                                     const ExperimentOptions& options) {
   const double r_c = options.parameters.proxy.r_c();
   std::vector<Cell> cells;
-  for (const std::string& name : methods_of(experiment, options)) {
+  for (const std::string& name : methods_of(experiment, options))
     cells.emplace_back([=] {
       const Law law = lift_law(r_c, single_acceleration * r_c);
       std::string rows;
       lift(name, options, law, single_noise * r_c, options.seed,
            [&](const Tick& last, double shown) {
-             rows += Row()
-                         .add(name)
-                         .add(last.t)
-                         .add(law.height(last.t))
-                         .add(shown)
-                         .add(last.hip.z())
-                         .add(last.proxy.z())
-                         .add(last.state != ContactState::free_motion)
-                         .done();
+             rows += csv_row(name, last.t, law.height(last.t), shown, last.hip.z(), last.proxy.z(),
+                             last.state != ContactState::free_motion);
            });
       return rows;
     });
-  }
   return cells;
 }
 
@@ -190,13 +180,7 @@ std::vector<Cell> lift_cells(const Experiment& experiment, const ExperimentOptio
         cells.emplace_back([=] {
           const Lifted result =
               lift(name, options, lift_law(r_c, acceleration * r_c), noise * r_c, seed);
-          return Row()
-              .add(name)
-              .add(acceleration)
-              .add(noise)
-              .add(options.seed)
-              .add(result.popped)
-              .done();
+          return csv_row(name, acceleration, noise, options.seed, result.popped);
         });
       }
     }
@@ -317,16 +301,8 @@ std::vector<Cell> bound_cells(const Experiment& experiment, const ExperimentOpti
           normal_error += result.normal_error / repeats;
           popped += result.popped ? 1 : 0;
         }
-        return Row()
-            .add(name)
-            .add(noise)
-            .add(options.seed)
-            .add(thickness)
-            .add(normal_error)
-            .add(printed_h(noise * r_c))
-            .add(printed_e(noise * r_c))
-            .add(popped)
-            .done();
+        return csv_row(name, noise, options.seed, thickness, normal_error, printed_h(noise * r_c),
+                       printed_e(noise * r_c), popped);
       });
     }
   }
@@ -463,13 +439,8 @@ std::vector<Cell> speed_cells(const Experiment& experiment, const ExperimentOpti
             const Law law{[=](double t) { return whole.height(t - delay); },
                           whole.duration + delay};
             const Lifted result = lift(name, options, law, 0.0, options.seed);
-            return Row()
-                .add(name)
-                .add(sudden ? "sudden" : "gradual")
-                .add(speed)
-                .add(options.seed + static_cast<std::uint64_t>(k))
-                .add(result.popped)
-                .done();
+            return csv_row(name, sudden ? "sudden" : "gradual", speed,
+                           options.seed + static_cast<std::uint64_t>(k), result.popped);
           });
         }
       }
@@ -538,12 +509,7 @@ std::vector<Cell> first_contact_cells(const Experiment& experiment,
           const Law law{[=](double t) { return -away + speed * t; }, away / speed + 5.0 / f_c};
           const Lifted result = lift(name, options, law, 0.1 * r_c,
                                      cell_seed(options.seed, k, static_cast<int>(1e3 * speed)));
-          return Row()
-              .add(name)
-              .add(speed)
-              .add(options.seed + static_cast<std::uint64_t>(k))
-              .add(result.popped)
-              .done();
+          return csv_row(name, speed, options.seed + static_cast<std::uint64_t>(k), result.popped);
         });
       }
     }

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <memory>
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
-#include "lab/signal.hpp"
+#include "lab/experiment.hpp"
+#include "lab/statistics.hpp"
 #include "lab/table.hpp"
 #include "palpate/io/devices/hip_path.hpp"
 #include "palpate/io/sources/source.hpp"
@@ -67,14 +66,8 @@ std::string rows_of(const std::string& material, const Parameters& parameters) {
     cycle.run({.t = t});
     ServoTick felt;
     if (!ticks.try_pop(felt) || t < engaged) continue;
-    rows += Row()
-                .add(material)
-                .add(t)
-                .add(-1e3 * felt.tick.hip.z())
-                .add(1e3 * felt.tick.hip.x())
-                .add(felt.force.z())
-                .add(-felt.force.x())
-                .done();
+    rows += csv_row(material, t, -1e3 * felt.tick.hip.z(), 1e3 * felt.tick.hip.x(), felt.force.z(),
+                    -felt.force.x());
   }
   return rows;
 }

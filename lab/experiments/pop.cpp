@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -196,26 +196,8 @@ std::string row_of(const std::string& method, const PopFamily& family, int from,
       noticeable += outcome.caused > noticed ? 1 : 0;
     }
   }
-  return Row()
-      .add(method)
-      .add(family.name)
-      .add(from)
-      .add(count)
-      .add(lost)
-      .add(dipped)
-      .add(step)
-      .add(change)
-      .add(caused)
-      .add(noticeable)
-      .add(first)
-      .add(simplest)
-      .add(ghosts)
-      .add(numb)
-      .add(wrong)
-      .add(right)
-      .add(worst_ghost)
-      .add(first_not_right)
-      .done();
+  return csv_row(method, family.name, from, count, lost, dipped, step, change, caused, noticeable,
+                 first, simplest, ghosts, numb, wrong, right, worst_ghost, first_not_right);
 }
 
 std::vector<const PopFamily*> families_of(const ExperimentOptions& options) {
@@ -237,19 +219,18 @@ std::vector<Cell> pop_cells(const Experiment& experiment, const ExperimentOption
   std::vector<Cell> cells;
   if (!options.case_text.empty()) {
     const PopCase c = parse_pop_case(options.case_text);
-    for (const std::string& name : methods_of(experiment, options)) {
+    for (const std::string& name : methods_of(experiment, options))
       cells.emplace_back([=] {
         return row_of(
             name, find_pop_family(c.family), 0, 1, [c](int) { return c; }, options);
       });
-    }
     return cells;
   }
   const int cases = options.cases.value_or(usual_cases);
   const std::vector<const PopFamily*> families = families_of(options);
   for (const std::string& name : methods_of(experiment, options)) {
     for (const PopFamily* family : families) {
-      for (int from = 0; from < cases; from += cases_a_row) {
+      for (int from = 0; from < cases; from += cases_a_row)
         cells.emplace_back([=] {
           return row_of(
               name, *family, from, std::min(cases_a_row, cases - from),
@@ -260,7 +241,6 @@ std::vector<Cell> pop_cells(const Experiment& experiment, const ExperimentOption
               },
               options);
         });
-      }
     }
   }
   return cells;
@@ -271,20 +251,23 @@ std::string percent_held(double held, double cases) {
   return fmt::format("{:.2f}", std::floor(1e4 * held / cases) / 100.0);
 }
 
+// What a method's rows of a family come to, by column.
 struct Sum {
-  double cases = 0.0;
-  double lost = 0.0;
-  double dipped = 0.0;
-  double change = 0.0;
-  double caused = 0.0;
-  double noticeable = 0.0;
-  double ghost = 0.0;
-  double numb = 0.0;
-  double wrong = 0.0;
-  double right = 0.0;
-  double worst_ghost = 0.0;
-  std::string simplest;
-  std::string not_right;
+  void add(const Table& table, std::size_t row) {
+    for (const std::string_view column :
+         {"cases", "lost", "dipped", "noticeable", "ghost", "numb", "wrong", "right"})
+      numbers[column] += table.number(row, column);
+    for (const std::string_view column : {"worst_change_n", "worst_caused_n", "worst_ghost_n"})
+      numbers[column] = std::max(numbers[column], table.number(row, column));
+    for (const std::string_view column : {"simplest", "first_not_right"}) {
+      if (first[column].empty() && table.text(row, column) != "-")
+        first[column] = table.text(row, column);
+    }
+  }
+  double operator[](std::string_view column) { return numbers[column]; }
+
+  std::map<std::string_view, double> numbers;
+  std::map<std::string_view, std::string> first;
 };
 
 Scores pop_scores(const Table& table) {
@@ -296,22 +279,7 @@ Scores pop_scores(const Table& table) {
     const std::string& family = table.text(row, "family");
     if (std::find(families.begin(), families.end(), family) == families.end())
       families.push_back(family);
-    Sum& sum = sums[{method, family}];
-    sum.cases += table.number(row, "cases");
-    sum.lost += table.number(row, "lost");
-    sum.dipped += table.number(row, "dipped");
-    sum.change = std::max(sum.change, table.number(row, "worst_change_n"));
-    sum.caused = std::max(sum.caused, table.number(row, "worst_caused_n"));
-    sum.noticeable += table.number(row, "noticeable");
-    sum.ghost += table.number(row, "ghost");
-    sum.numb += table.number(row, "numb");
-    sum.wrong += table.number(row, "wrong");
-    sum.right += table.number(row, "right");
-    sum.worst_ghost = std::max(sum.worst_ghost, table.number(row, "worst_ghost_n"));
-    if (sum.not_right.empty() && table.text(row, "first_not_right") != "-")
-      sum.not_right = table.text(row, "first_not_right");
-    if (sum.simplest.empty() && table.text(row, "simplest") != "-")
-      sum.simplest = table.text(row, "simplest");
+    sums[{method, family}].add(table, row);
   }
   Scores scores;
   scores.columns = {"family", "cases"};
@@ -329,30 +297,33 @@ Scores pop_scores(const Table& table) {
   for (const std::string& family : families) {
     std::vector<std::string> line = {family};
     for (std::size_t m = 0; m < methods.size(); ++m) {
-      const Sum& sum = sums[{methods[m], family}];
-      if (m == 0) line.push_back(fmt::format("{:g}", sum.cases));
-      line.push_back(percent_held(sum.cases - sum.lost, sum.cases));
-      line.push_back(fmt::format("{:.1f}", 100.0 * sum.dipped / sum.cases));
-      line.push_back(percent_held(sum.right, sum.cases));
-      held[m] += (sum.cases - sum.lost) / sum.cases;
-      right[m] += sum.right / sum.cases;
-      if (sum.ghost + sum.numb + sum.wrong > 0.0)
+      Sum& sum = sums[{methods[m], family}];
+      const double cases = sum["cases"];
+      if (m == 0) line.push_back(fmt::format("{:g}", cases));
+      line.push_back(percent_held(cases - sum["lost"], cases));
+      line.push_back(fmt::format("{:.1f}", 100.0 * sum["dipped"] / cases));
+      line.push_back(percent_held(sum["right"], cases));
+      held[m] += (cases - sum["lost"]) / cases;
+      right[m] += sum["right"] / cases;
+      if (sum["ghost"] + sum["numb"] + sum["wrong"] > 0.0)
         scores.note += fmt::format(
             "\n{}, {}: {:g} cases: {:g} with a force in free space (up to {:.2f} N), {:g} with a "
             "missing force, {:g} with a force in the opposite direction",
-            methods[m], family, sum.cases, sum.ghost, sum.worst_ghost, sum.numb, sum.wrong);
+            methods[m], family, cases, sum["ghost"], sum["worst_ghost_n"], sum["numb"],
+            sum["wrong"]);
       // None where all of them are lost, too: the next line plays one of those.
-      if (!sum.not_right.empty())
-        scores.note +=
-            fmt::format("; palpate eval pop --methods {} --case '{}'", methods[m], sum.not_right);
-      if (!sum.simplest.empty())
-        scores.note +=
-            fmt::format("\npalpate eval pop --methods {} --case '{}'", methods[m], sum.simplest);
-      if (sum.change > 0.0)
+      for (const auto& [column, begin] :
+           {std::pair("first_not_right", "; "), std::pair("simplest", "\n")}) {
+        if (!sum.first[column].empty())
+          scores.note += fmt::format("{}palpate eval pop --methods {} --case '{}'", begin,
+                                     methods[m], sum.first[column]);
+      }
+      if (sum["worst_change_n"] > 0.0)
         scores.note += fmt::format(
             "\n{}, {}: in cases without pop-through the force changed by up to {:.3f} N; the "
             "change caused by the occluder was at most {:.3f} N, and above {:g} N in {:g} of {:g}",
-            methods[m], family, sum.change, sum.caused, noticed, sum.noticeable, sum.cases);
+            methods[m], family, sum["worst_change_n"], sum["worst_caused_n"], noticed,
+            sum["noticeable"], cases);
     }
     scores.rows.push_back(std::move(line));
   }

@@ -7,13 +7,12 @@
 #include <cstdlib>
 #include <limits>
 #include <numbers>
-#include <random>
-#include <vector>
+#include <tuple>
 
 #include <fmt/format.h>
 
-#include "lab/find_named.hpp"
 #include "lab/grid_cloud.hpp"
+#include "lab/method.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/uri.hpp"
@@ -24,15 +23,12 @@ namespace {
 constexpr double pi = std::numbers::pi;
 using enum PopRange::Draw;
 
-// Even numbers in [0, 1), the same with every standard library.
 // ---- Clouds of points on a grid, as in section 5. ----
 
 PopStage on_grid(const PopCase& c, const Parameters& parameters, Noise noise,
                  std::function<double(double)> law, double duration) {
   const double r_c = parameters.proxy.r_c();
-  GridCloud grid;
-  grid.spacing = 0.3 * r_c;
-  grid.half_x = grid.half_y = 12.0 * r_c;
+  GridCloud grid = level_grid(r_c, 12.0 * r_c);
   grid.sigma = c["noise"];
   grid.noise = noise;
   grid.seed = c.seed;
@@ -100,9 +96,7 @@ PopStage lift_sphere(const PopCase& c, const Parameters& parameters) {
     return TruePoint{distance - radius,
                      distance > 0.0 ? Vec3(offset / distance) : Vec3(Vec3::UnitZ())};
   };
-  GridCloud grid;
-  grid.spacing = 0.3 * r_c;
-  grid.half_x = grid.half_y = 12.0 * r_c;
+  GridCloud grid = level_grid(r_c, 12.0 * r_c);
   grid.sigma = c["noise"];
   grid.seed = c.seed;
   grid.height = [radius](double x, double y) {
@@ -152,6 +146,13 @@ constexpr PopRange distance_range{"distance", 0.7, 0.45, 0.95, even, 5.0};
 constexpr PopRange fps_range{"fps", 30.0, 15.0, 90.0, by_factor, 1000.0};
 constexpr PopRange stroke_range{"stroke", 0.0, 0.0, 0.06, even, 1.0};
 constexpr PopRange frequency_range{"frequency", 0.5, 0.25, 1.5, by_factor, 50.0};
+
+template <std::size_t Count, class... More>
+constexpr auto joined(const std::array<PopRange, Count>& first, const More&... more) {
+  return std::apply([&](const auto&... ranges) { return std::array{ranges..., more...}; }, first);
+}
+constexpr std::array view_ranges = {sensor_range, tilt_range, distance_range, fps_range};
+constexpr std::array moved_ranges = joined(view_ranges, stroke_range, frequency_range);
 
 // How a hand touches: from 60 mm above at 0.15 m/s, then `press` below what the newest frame truly
 // showed at (x + along t, y), following it at up to 1 m/s.
@@ -259,24 +260,17 @@ PopStage hold_real(const PopCase& c, const Parameters& /*parameters*/) {
   return in_sight(c, "synthetic:plane", {}, contact_time + c["seconds"]);
 }
 
-constexpr std::array sine_ranges = {sensor_range,
-                                    tilt_range,
-                                    distance_range,
-                                    fps_range,
-                                    PopRange{"stroke", 0.0, 0.005, 0.1, even, 1.0},
-                                    PopRange{"frequency", 0.5, 0.25, 3.0, by_factor, 50.0}};
+constexpr std::array sine_ranges =
+    joined(view_ranges, PopRange{"stroke", 0.0, 0.005, 0.1, even, 1.0},
+           PopRange{"frequency", 0.5, 0.25, 3.0, by_factor, 50.0});
 PopStage sine(const PopCase& c, const Parameters& /*parameters*/) {
   return in_sight(c, "synthetic:plane?" + motion_of(c), {});
 }
 
-constexpr std::array turn_ranges = {sensor_range,
-                                    tilt_range,
-                                    distance_range,
-                                    fps_range,
-                                    PopRange{"slope", 0.0, -0.5, 0.5, even, 1.2},
-                                    PopRange{"swing", 0.0, 0.05, 0.4, even, 1.5},
-                                    PopRange{"x", 0.0, -0.03, 0.03, even, 0.2},
-                                    frequency_range};
+constexpr std::array turn_ranges =
+    joined(view_ranges, PopRange{"slope", 0.0, -0.5, 0.5, even, 1.2},
+           PopRange{"swing", 0.0, 0.05, 0.4, even, 1.5}, PopRange{"x", 0.0, -0.03, 0.03, even, 0.2},
+           frequency_range);
 PopStage turn(const PopCase& c, const Parameters& /*parameters*/) {
   return in_sight(c,
                   fmt::format("synthetic:tilt?slope={}&swing={}&frequency={}&start=0.5", c["slope"],
@@ -284,29 +278,18 @@ PopStage turn(const PopCase& c, const Parameters& /*parameters*/) {
                   {.x = c["x"]});
 }
 
-constexpr std::array sphere_ranges = {sensor_range,
-                                      tilt_range,
-                                      distance_range,
-                                      fps_range,
-                                      stroke_range,
-                                      frequency_range,
-                                      PopRange{"radius", 0.08, 0.02, 0.1, even, 1.0},
-                                      PopRange{"x", 0.0, -0.3, 0.3, even, 0.9},
-                                      PopRange{"y", 0.0, -0.3, 0.3, even, 0.9}};
+constexpr std::array sphere_ranges =
+    joined(moved_ranges, PopRange{"radius", 0.08, 0.02, 0.1, even, 1.0},
+           PopRange{"x", 0.0, -0.3, 0.3, even, 0.9}, PopRange{"y", 0.0, -0.3, 0.3, even, 0.9});
 PopStage sphere(const PopCase& c, const Parameters& /*parameters*/) {
   const double radius = c["radius"];
   return in_sight(c, fmt::format("synthetic:sphere?radius={}&floor=0.25&{}", radius, motion_of(c)),
                   {.x = c["x"] * radius, .y = c["y"] * radius});
 }
 
-constexpr std::array cylinder_ranges = {sensor_range,
-                                        tilt_range,
-                                        distance_range,
-                                        fps_range,
-                                        stroke_range,
-                                        frequency_range,
-                                        PopRange{"radius", 0.05, 0.015, 0.06, even, 1.0},
-                                        PopRange{"x", 0.0, -0.3, 0.3, even, 0.9}};
+constexpr std::array cylinder_ranges =
+    joined(moved_ranges, PopRange{"radius", 0.05, 0.015, 0.06, even, 1.0},
+           PopRange{"x", 0.0, -0.3, 0.3, even, 0.9});
 PopStage cylinder(const PopCase& c, const Parameters& /*parameters*/) {
   const double radius = c["radius"];
   return in_sight(c,
@@ -314,16 +297,10 @@ PopStage cylinder(const PopCase& c, const Parameters& /*parameters*/) {
                   {.x = c["x"] * radius});
 }
 
-constexpr std::array edge_ranges = {sensor_range,
-                                    tilt_range,
-                                    distance_range,
-                                    fps_range,
-                                    stroke_range,
-                                    frequency_range,
-                                    PopRange{"angle", 2.0, 1.0, 2.6, even, 3.1},
-                                    PopRange{"concave", 0.0, 0.0, 1.0, whole},
-                                    PopRange{"x", 0.0, -0.010, 0.010, even, 0.1},
-                                    PopRange{"along", 0.0, -0.03, 0.03, even, 1.0}};
+constexpr std::array edge_ranges =
+    joined(moved_ranges, PopRange{"angle", 2.0, 1.0, 2.6, even, 3.1},
+           PopRange{"concave", 0.0, 0.0, 1.0, whole}, PopRange{"x", 0.0, -0.010, 0.010, even, 0.1},
+           PopRange{"along", 0.0, -0.03, 0.03, even, 1.0});
 PopStage edge(const PopCase& c, const Parameters& /*parameters*/) {
   return in_sight(c,
                   fmt::format("synthetic:wedge?angle={}&edge={}&{}", c["angle"],
@@ -331,13 +308,8 @@ PopStage edge(const PopCase& c, const Parameters& /*parameters*/) {
                   {.x = c["x"], .along = c["along"]});
 }
 
-constexpr std::array finger_ranges = {sensor_range,
-                                      tilt_range,
-                                      distance_range,
-                                      fps_range,
-                                      stroke_range,
-                                      frequency_range,
-                                      PopRange{"radius", 0.014, 0.008, 0.014, even, 0.1}};
+constexpr std::array finger_ranges =
+    joined(moved_ranges, PopRange{"radius", 0.014, 0.008, 0.014, even, 0.1});
 PopStage finger(const PopCase& c, const Parameters& /*parameters*/) {
   return in_sight(
       c, fmt::format("synthetic:finger?radius={}&floor=0.15&{}", c["radius"], motion_of(c)), {});
@@ -366,13 +338,9 @@ PopStage occluder(const PopCase& c, const Parameters& /*parameters*/) {
 
 // Narrower than the sphere, with room for a pixel: it may not fall in. Whoever reaches through a
 // wider hole may touch the plate from beneath, and how thick it is nobody has seen.
-constexpr std::array hole_ranges = {sensor_range,
-                                    tilt_range,
-                                    distance_range,
-                                    fps_range,
-                                    PopRange{"width", 0.003, 0.003, 0.008, even, 0.009},
-                                    PopRange{"along", 0.05, 0.02, 0.08, even, 1.0},
-                                    PopRange{"y", 0.0, -0.01, 0.01, even, 0.1}};
+constexpr std::array hole_ranges = joined(
+    view_ranges, PopRange{"width", 0.003, 0.003, 0.008, even, 0.009},
+    PopRange{"along", 0.05, 0.02, 0.08, even, 1.0}, PopRange{"y", 0.0, -0.01, 0.01, even, 0.1});
 PopStage hole(const PopCase& c, const Parameters& /*parameters*/) {
   const double along = c["along"];
   return in_sight(c, fmt::format("synthetic:hole?width={}&thickness=0.06&floor=0.2", c["width"]),
@@ -381,14 +349,10 @@ PopStage hole(const PopCase& c, const Parameters& /*parameters*/) {
 
 // A terrace over a plane moves up and down; the hand presses on it or beside it. Nothing moves
 // sideways over the hand: from above, a body that pushes and one that passes look the same.
-constexpr std::array layers_ranges = {sensor_range,
-                                      tilt_range,
-                                      distance_range,
-                                      fps_range,
-                                      PopRange{"stroke", 0.0, 0.0, 0.04, even, 1.0},
-                                      frequency_range,
-                                      PopRange{"separation", 0.04, 0.008, 0.04, even, 0.2},
-                                      PopRange{"x", -0.03, -0.03, 0.03, even, 0.1}};
+constexpr std::array layers_ranges =
+    joined(view_ranges, PopRange{"stroke", 0.0, 0.0, 0.04, even, 1.0}, frequency_range,
+           PopRange{"separation", 0.04, 0.008, 0.04, even, 0.2},
+           PopRange{"x", -0.03, -0.03, 0.03, even, 0.1});
 PopStage layers(const PopCase& c, const Parameters& /*parameters*/) {
   Motion motion;
   motion.start = 0.5;
@@ -405,14 +369,9 @@ PopStage layers(const PopCase& c, const Parameters& /*parameters*/) {
 }
 
 // Frames are dropped at random and come late by a time drawn afresh for each.
-constexpr std::array stream_ranges = {sensor_range,
-                                      tilt_range,
-                                      distance_range,
-                                      fps_range,
-                                      PopRange{"stroke", 0.0, 0.0, 0.04, even, 1.0},
-                                      frequency_range,
-                                      PopRange{"dropped", 0.0, 0.0, 0.5, even, 0.99},
-                                      PopRange{"late", 0.0, 0.0, 0.06, even, 1.0}};
+constexpr std::array stream_ranges = joined(
+    view_ranges, PopRange{"stroke", 0.0, 0.0, 0.04, even, 1.0}, frequency_range,
+    PopRange{"dropped", 0.0, 0.0, 0.5, even, 0.99}, PopRange{"late", 0.0, 0.0, 0.06, even, 1.0});
 PopStage stream(const PopCase& c, const Parameters& /*parameters*/) {
   PopStage stage = in_sight(c, "synthetic:plane?" + motion_of(c), {});
   const double dropped = c["dropped"];
@@ -427,17 +386,11 @@ PopStage stream(const PopCase& c, const Parameters& /*parameters*/) {
 
 // Bodies of any kind and size on a floor go up and down; the first lies under the hand. Either it
 // swings too, or the hand slides; both together may bring it over the hand from the side.
-constexpr std::array random_ranges = {sensor_range,
-                                      tilt_range,
-                                      distance_range,
-                                      fps_range,
-                                      PopRange{"parts", 1.0, 1.0, 4.0, whole},
-                                      PopRange{"stroke", 0.0, 0.0, 0.05, even, 1.0},
-                                      PopRange{"slides", 0.0, 0.0, 1.0, whole},
-                                      PopRange{"swing", 0.0, 0.0, 0.4, even, 1.5},
-                                      PopRange{"along", 0.0, -0.05, 0.05, even, 1.0},
-                                      PopRange{"x", 0.0, -0.3, 0.3, even, 0.9},
-                                      PopRange{"y", 0.0, -0.3, 0.3, even, 0.9}};
+constexpr std::array random_ranges = joined(
+    view_ranges, PopRange{"parts", 1.0, 1.0, 4.0, whole},
+    PopRange{"stroke", 0.0, 0.0, 0.05, even, 1.0}, PopRange{"slides", 0.0, 0.0, 1.0, whole},
+    PopRange{"swing", 0.0, 0.0, 0.4, even, 1.5}, PopRange{"along", 0.0, -0.05, 0.05, even, 1.0},
+    PopRange{"x", 0.0, -0.3, 0.3, even, 0.9}, PopRange{"y", 0.0, -0.3, 0.3, even, 0.9});
 PopStage random_scene(const PopCase& c, const Parameters& /*parameters*/) {
   Chance chance(c.seed);
   const bool slides = c["slides"] != 0.0;

@@ -5,20 +5,18 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
-#include "lab/experiments/pop.hpp"
+#include "lab/experiment.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 #include "lab/sha256.hpp"
-#include "lab/signal.hpp"
+#include "lab/statistics.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/cloud/audit.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -50,9 +48,7 @@ struct Recording {
 
   // Forth and back.
   [[nodiscard]] const DepthImage& frame(std::uint64_t k) const {
-    const std::size_t turn = std::max<std::size_t>(2 * frames.size() - 2, 1);
-    const std::size_t at = k % turn;
-    return *frames[at < frames.size() ? at : turn - at];
+    return *frames[forth_and_back(k, frames.size())];
   }
 };
 
@@ -304,24 +300,14 @@ std::vector<Cell> real_cells(const Experiment& experiment, const ExperimentOptio
     for (const Action action : {Action::hold, Action::slide, Action::moving, Action::sweep}) {
       const bool moves = action == Action::moving || action == Action::sweep;
       if (moves && !recording->at_rest) continue;  // then nobody knows what would be exact
-      for (std::size_t i = 0; i < recording->places.size(); ++i) {
+      for (std::size_t i = 0; i < recording->places.size(); ++i)
         cells.emplace_back([=] {
           const Place& place = recording->places[i];
           const Outcome outcome = touch(name, options, *recording, place, {action});
-          return Row()
-              .add(name)
-              .add(action_names[static_cast<std::size_t>(action)])
-              .add(static_cast<long long>(i))
-              .add(place.at.z())
-              .add(outcome.lost)
-              .add(outcome.suspected)
-              .add(1e3 * outcome.error)
-              .add(outcome.felt)
-              .add(outcome.step)
-              .add(outcome.change)
-              .done();
+          return csv_row(name, action_names[static_cast<std::size_t>(action)],
+                         static_cast<long long>(i), place.at.z(), outcome.lost, outcome.suspected,
+                         1e3 * outcome.error, outcome.felt, outcome.step, outcome.change);
         });
-      }
     }
   }
   return cells;

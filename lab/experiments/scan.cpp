@@ -8,8 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/method.hpp"
+#include "lab/play.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/cloud/audit.hpp"
@@ -181,13 +182,11 @@ Subject recorded(const std::string& recording) {
   const auto hip = std::make_shared<const std::vector<Vec3>>(stroke_along(*first, recording));
   const Eigen::Isometry3d camera_from_world = first->world_from_camera().inverse();
   const double rate = source->info().frame_rate.value_or(f_c);
-  const std::size_t turn = std::max<std::size_t>(2 * frames.size() - 2, 1);
   return {.frame_rate = rate,
           .duration = static_cast<double>(hip->size() - 1) * 1e-3,
           .frame =
-              [frames = std::move(frames), rate, turn](std::uint64_t k) {
-                const std::size_t at = k % turn;
-                Frame frame = frames[at < frames.size() ? at : turn - at];
+              [frames = std::move(frames), rate](std::uint64_t k) {
+                Frame frame = frames[forth_and_back(k, frames.size())];
                 frame.stamp = static_cast<double>(k) / rate;
                 return frame;
               },
@@ -228,18 +227,8 @@ std::string scan(const std::string& name, const ExperimentOptions& options) {
     if (i % 4 != 0 || i <= 100) continue;
     const auto [hip_y, hip_z] = subject.profile(hip);
     const auto [proxy_y, proxy_z] = subject.profile(tick.proxy);
-    rows += Row()
-                .add(name)
-                .add(t)
-                .add(hip_y)
-                .add(hip_z)
-                .add(proxy_y)
-                .add(proxy_z)
-                .add(subject.surface(tick.proxy, in_use))
-                .add(tick.force.norm())
-                .add(tick.steps)
-                .add(tick.state != ContactState::free_motion)
-                .done();
+    rows += csv_row(name, t, hip_y, hip_z, proxy_y, proxy_z, subject.surface(tick.proxy, in_use),
+                    tick.force.norm(), tick.steps, tick.state != ContactState::free_motion);
   }
   return rows;
 }

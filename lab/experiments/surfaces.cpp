@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -21,9 +21,7 @@ std::vector<Cell> flat_cells(const Experiment& experiment, const ExperimentOptio
   for (const std::string& name : methods_of(experiment, options)) {
     cells.emplace_back([=] {
       const double r_c = options.parameters.proxy.r_c();
-      GridCloud grid;
-      grid.spacing = 0.3 * r_c;
-      grid.half_x = grid.half_y = 15.0 * r_c;  // 100 x 100 points
+      GridCloud grid = level_grid(r_c, 15.0 * r_c);  // 100 x 100 points
       const auto method = make_method(name, {options.parameters, flat_truth()});
       std::string rows;
       play(*method,
@@ -37,17 +35,8 @@ std::vector<Cell> flat_cells(const Experiment& experiment, const ExperimentOptio
                   return Vec3(x, 0.1 * x, below ? -2.0 * r_c : 2.0 * r_c);
                 }},
            [&](const Tick& tick) {
-             rows += Row()
-                         .add(name)
-                         .add(tick.t)
-                         .add(tick.hip.x())
-                         .add(tick.hip.z())
-                         .add(tick.proxy.x())
-                         .add(tick.proxy.z())
-                         .add(tick.proxy.z() - r_c)
-                         .add(tick.force.norm())
-                         .add(tick.steps)
-                         .done();
+             rows += csv_row(name, tick.t, tick.hip.x(), tick.hip.z(), tick.proxy.x(),
+                             tick.proxy.z(), tick.proxy.z() - r_c, tick.force.norm(), tick.steps);
              return true;
            });
       return rows;
@@ -86,11 +75,10 @@ Figure flat_figure(const Table& table) {
 std::vector<Cell> jump_cells(const Experiment& experiment, const ExperimentOptions& options) {
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options)) {
-    for (const int depth : {1, 2, 4, 6, 10, 20}) {
+    for (const int depth : {1, 2, 4, 6, 10, 20})
       cells.emplace_back([=] {
         const double r_c = options.parameters.proxy.r_c();
-        GridCloud grid;
-        grid.spacing = 0.3 * r_c;
+        GridCloud grid = level_grid(r_c, 0.06);
         const auto method = make_method(name, {options.parameters, flat_truth()});
         int ticks = 0;
         int steps = 0;
@@ -111,9 +99,8 @@ std::vector<Cell> jump_cells(const Experiment& experiment, const ExperimentOptio
                there = std::abs(rest) < 0.03 * r_c;
                return true;
              });
-        return Row().add(name).add(depth).add(there ? ticks : -1).add(steps).add(rest).done();
+        return csv_row(name, depth, there ? ticks : -1, steps, rest);
       });
-    }
   }
   return cells;
 }
@@ -172,16 +159,8 @@ std::vector<Cell> corners_cells(const Experiment& experiment, const ExperimentOp
         const SurfacePoint under = scene->nearest(tick.proxy, 0.0);
         const Vec3 contact = tick.proxy - r_c * under.normal;
         if (i % 5 == 0 && i > 50)
-          rows += Row()
-                      .add(name)
-                      .add(tick.hip.x())
-                      .add(tick.proxy.x())
-                      .add(tick.proxy.z())
-                      .add(contact.x())
-                      .add(contact.z())
-                      .add(height(contact.x(), 0.0))
-                      .add(under.distance - r_c)
-                      .done();
+          rows += csv_row(name, tick.hip.x(), tick.proxy.x(), tick.proxy.z(), contact.x(),
+                          contact.z(), height(contact.x(), 0.0), under.distance - r_c);
       }
       return rows;
     });

@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numbers>
 #include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -91,10 +90,7 @@ LinkQuality link_of(double round_trip, bool poor) {
 TeleopScene teleop_scene(std::string_view name, std::string_view sensor, std::uint64_t seed) {
   const auto scene = std::make_shared<const Scene>(
       std::vector<Part>{{HalfSpace{}, Eigen::Isometry3d::Identity(), motion_of(name)}});
-  const auto plain = open_synthetic_camera(
-      Uri("synthetic:plane?" + camera_options(distance, across, sensor, seed)));
-  const auto camera =
-      std::make_shared<SyntheticCamera>(*scene, plain->setup(), plain->sensor().model());
+  const auto camera = camera_before(*scene, camera_options(distance, across, sensor, seed));
   TeleopScene played{
       .cloud = [camera](std::uint64_t frame, double t) -> std::shared_ptr<const Cloud> {
         return camera->capture(t, frame).cloud;
@@ -157,20 +153,9 @@ std::string rows_of(std::string_view name, std::string_view sensor, std::string_
                            .parameters = options.parameters,
                            .seed = options.seed};
       const TeleopFigures figures = play_teleop_case(teleop_scene(name, sensor, options.seed), one);
-      rows += Row()
-                  .add(way)
-                  .add(name)
-                  .add(sensor)
-                  .add(1e3 * round_trip)
-                  .add(poor ? "poor" : "even")
-                  .add(figures.force)
-                  .add(figures.most_force)
-                  .add(1e3 * figures.shake)
-                  .add(1e3 * figures.energy)
-                  .add(1e3 * figures.depth)
-                  .add(figures.contact)
-                  .add(1e3 * figures.swing)
-                  .done();
+      rows += csv_row(way, name, sensor, 1e3 * round_trip, poor ? "poor" : "even", figures.force,
+                      figures.most_force, 1e3 * figures.shake, 1e3 * figures.energy,
+                      1e3 * figures.depth, figures.contact, 1e3 * figures.swing);
     }
   }
   return rows;

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <memory>
 #include <string_view>
-#include <vector>
 
 #include "lab/teleop_rig.hpp"
 

@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
@@ -77,10 +77,7 @@ TeleopEpisode teleop_episode(std::string_view fault, std::uint64_t seed) {
   const auto scene = std::make_shared<const Scene>(std::move(parts));
   const double distance = chance(0.45, 0.8);
   const std::string_view sensor = 3.0 * chance() < 1.0 ? "ideal" : "d4xx";
-  const auto plain = open_synthetic_camera(
-      Uri("synthetic:plane?" + camera_options(distance, across, sensor, seed)));
-  const auto camera =
-      std::make_shared<SyntheticCamera>(*scene, plain->setup(), plain->sensor().model());
+  const auto camera = camera_before(*scene, camera_options(distance, across, sensor, seed));
   TeleopEpisode episode{
       .scene = {.cloud = [camera](std::uint64_t frame, double t) -> std::shared_ptr<const Cloud> {
                   return camera->capture(t, frame).cloud;
@@ -160,29 +157,19 @@ std::vector<Cell> episode_cells(const Experiment& /*experiment*/,
   const int cases = options.cases.value_or(usual_cases);
   for (const std::string_view fault : faults) {
     if (!options.wants(fault)) continue;
-    for (int first = 0; first < cases; first += cases_a_cell) {
+    for (int first = 0; first < cases; first += cases_a_cell)
       cells.emplace_back([=, seed = options.seed, last = std::min(first + cases_a_cell, cases)] {
         std::string rows;
         for (int i = first; i < last; ++i) {
           const std::uint64_t number = seed * 1000000 + static_cast<std::uint64_t>(i);
           const TeleopEpisode episode = teleop_episode(fault, number);
           const EpisodeFigures figures = play_episode(episode);
-          rows += Row()
-                      .add(fault)
-                      .add(episode.moves ? "moves" : "rests")
-                      .add(episode.sensor)
-                      .add(number)
-                      .add(1e3 * figures.breach)
-                      .add(figures.contact)
-                      .add(figures.unseen)
-                      .add(figures.rise)
-                      .add(figures.force)
-                      .add(1e3 * figures.stop.value_or(0.0))
-                      .done();
+          rows += csv_row(fault, episode.moves ? "moves" : "rests", episode.sensor, number,
+                          1e3 * figures.breach, figures.contact, figures.unseen, figures.rise,
+                          figures.force, 1e3 * figures.stop.value_or(0.0));
         }
         return rows;
       });
-    }
   }
   return cells;
 }

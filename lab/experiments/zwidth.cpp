@@ -5,12 +5,11 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "lab/experiments/experiments.hpp"
+#include "lab/experiment.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/table.hpp"
 #include "palpate/io/devices/sampled_wall.hpp"
@@ -120,12 +119,10 @@ std::vector<ZHolding> z_holdings() {
 ZScene::ZScene(std::string_view name, std::string_view sensor, std::uint64_t seed) {
   const auto scene = std::make_shared<const Scene>(parts_of(name));
   truth_ = truth_of(scene);
-  const auto plain = open_synthetic_camera(
-      Uri("synthetic:plane?" + camera_options(distance, across, sensor, seed)));
-  SyntheticCamera camera(*scene, plain->setup(), plain->sensor().model());
+  const auto camera = camera_before(*scene, camera_options(distance, across, sensor, seed));
   constexpr std::uint64_t frames = 60;  // then from the first again: nothing moves
   for (std::uint64_t k = 0; k < frames; ++k)
-    frames_.push_back(camera.capture(static_cast<double>(k) / frame_rate, k).cloud);
+    frames_.push_back(camera->capture(static_cast<double>(k) / frame_rate, k).cloud);
 }
 
 Vec3 ZScene::touched_at(double r_c) const {
@@ -223,18 +220,10 @@ std::string rows_of(std::string_view scene_name, std::string_view camera,
         if (method == "ideal" && camera != cameras.front()) continue;
         for (const bool chain : {false, true}) {
           const ZLoop loop{&scene, &holding, method, damping, chain};
-          rows += Row()
-                      .add(holding.name)
-                      .add(holding.hand.name)
-                      .add(scene_name)
-                      .add(camera)
-                      .add(method)
-                      .add(chain ? "chain" : "straight")
-                      .add(damping)
-                      .add(largest_stiffness(loop, options.parameters))
-                      .add(delayed_stiffness(wall))
-                      .add(linear)
-                      .done();
+          rows +=
+              csv_row(holding.name, holding.hand.name, scene_name, camera, method,
+                      chain ? "chain" : "straight", damping,
+                      largest_stiffness(loop, options.parameters), delayed_stiffness(wall), linear);
         }
       }
     }

@@ -179,12 +179,11 @@ void plane_tap(Draw& draw, Setting& setting, double start) {
   Script script(place.point + p.hover * p.out);
   script.wait(start);
   const int taps = 2 + draw.whole("taps", 3);
-  for (int i = 0; i < taps; ++i) {
+  for (int i = 0; i < taps; ++i)
     script.reach(place.point - p.depth * p.out, speed)
         .wait(dwell)
         .reach(place.point + 0.03 * p.out, speed)
         .wait(dwell);
-  }
   script.reach(place.point - p.depth * p.out, speed)
       .wait(p.hold)
       .reach(place.point + p.height * p.out, p.speed)

@@ -10,7 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "lab/field/field_hand.hpp"
 #include "lab/field/field_scene.hpp"
 #include "lab/field/field_sensor.hpp"
 

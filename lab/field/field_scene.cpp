@@ -2,10 +2,8 @@
 #include "lab/field/field_scene.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 namespace palpate::lab::field {
 namespace {

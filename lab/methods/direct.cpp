@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "lab/contact.hpp"
 #include "lab/method.hpp"
-#include "lab/plane_fit.hpp"
-#include "lab/ticks.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -14,12 +14,11 @@
 //
 // `force-shading` turns the god-object's force to the normal interpolated between the corners.
 #include <array>
-#include <cmath>
 #include <optional>
 
+#include "lab/contact.hpp"
 #include "lab/method.hpp"
 #include "lab/polygons.hpp"
-#include "lab/ticks.hpp"
 
 namespace palpate::lab {
 namespace {

@@ -6,12 +6,10 @@
 // Left open by the publication: how many neighbours. A plane through those within 4 mm of the HIP's
 // line of sight favours it over single pixels. Half a millimetre of height is white against black,
 // where a frame came with its brightness.
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
+#include "lab/contact.hpp"
 #include "lab/method.hpp"
-#include "lab/ticks.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/linear.hpp"
 

@@ -12,9 +12,9 @@
 #include <limits>
 #include <unordered_map>
 
+#include "lab/contact.hpp"
 #include "lab/local_points.hpp"
 #include "lab/method.hpp"
-#include "lab/ticks.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -125,7 +125,7 @@ class PointBoxes final : public LabMethod {
   [[nodiscard]] Hit first_face(const Vec3& from, const Vec3& way) const {
     Hit hit{std::numeric_limits<double>::infinity(), 0, 0.0};
     const int cells = std::min(static_cast<int>(way.norm() / (2.0 * half_)) + 1, 1000);
-    for (int i = 0; i <= cells && !(hit.travel * cells < i - 1); ++i) {
+    for (int i = 0; i <= cells && !(hit.travel * cells < i - 1); ++i)
       for_points_near(from + way * (double(i) / cells), [&](const Vec3& point) {
         double enter = -std::numeric_limits<double>::infinity();
         double leave = std::numeric_limits<double>::infinity();
@@ -148,7 +148,6 @@ class PointBoxes final : public LabMethod {
         const double side = way[axis] > 0.0 ? -(half_ + off) : half_ + off;
         hit = {enter, axis, point[axis] + side};
       });
-    }
     return hit;
   }
 

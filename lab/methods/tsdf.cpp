@@ -8,8 +8,6 @@
 // over eight frames and lags behind what moves. The volume moves along with the proxy by whole
 // voxels.
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <vector>
 
 #include "lab/implicit_proxy.hpp"

@@ -13,9 +13,8 @@
 
 #include <Eigen/LU>
 
-#include "lab/coupling_limit.hpp"
+#include "lab/contact.hpp"
 #include "lab/method.hpp"
-#include "lab/plane_fit.hpp"
 
 namespace palpate::lab {
 namespace {

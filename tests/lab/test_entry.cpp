@@ -14,9 +14,9 @@
 #include "lab/experiments/pop.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/experiments/real.hpp"
-#include "lab/interval.hpp"
 #include "lab/pipe_method.hpp"
 #include "lab/sha256.hpp"
+#include "lab/statistics.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 

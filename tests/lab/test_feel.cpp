@@ -15,7 +15,7 @@
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/method.hpp"
 #include "lab/runner.hpp"
-#include "lab/signal.hpp"
+#include "lab/statistics.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/feel/feel.hpp"

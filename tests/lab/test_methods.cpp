@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lab/coupling_limit.hpp"
+#include "lab/contact.hpp"
 #include "lab/experiment.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"

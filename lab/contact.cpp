@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/plane_fit.hpp"
+#include "lab/contact.hpp"
 
 #include <algorithm>
 

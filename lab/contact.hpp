@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 
 #include "palpate/kernel/core/parameters.hpp"
+#include "palpate/kernel/core/patch.hpp"
 #include "palpate/kernel/core/tick.hpp"
 
 namespace palpate::lab {
@@ -26,6 +28,18 @@ inline Tick contact_tick(const Parameters& parameters, const Vec3& hip, const Co
   const double most = parameters.coupling.max_force;
   if (tick.force.norm() > most) tick.force *= most / tick.force.norm();
   return tick;
+}
+
+/// The moving-least-squares plane at the middle of a patch [7]: a = sum w x / sum w, and as normal
+/// the eigenvector of the weighted covariance with the smallest eigenvalue, towards where the
+/// points were seen from (else up). None for less than six points.
+/// @param radius  [m] w is Wendland's function down to 0 there
+std::optional<Contact> fit_plane(const Patch& patch, double radius);
+
+/// The stiffest spring [N/m] with which a sampled wall stays passive [2]: a device with damping b
+/// [N s/m] against a spring K and a damper B held for a period T [s] needs b > K T / 2 + B.
+constexpr double passive_stiffness(double device_damping, double damping, double period) {
+  return std::max(0.0, 2.0 * (device_damping - damping) / period);
 }
 
 }  // namespace palpate::lab

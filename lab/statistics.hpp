@@ -3,8 +3,19 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 namespace palpate::lab {
+
+/// Root of the mean of the squares; 0 of nothing.
+double rms(const std::vector<double>& values);
+
+/// The part of a signal sampled at 1 kHz that lies in 20 to 400 Hz, rms: what a finger is most
+/// sensitive to. Over whole seconds; a remainder is left out.
+double felt_rms(const std::vector<double>& signal);
+
+/// The same over all samples, however many.
+double felt_rms_of_all(const std::vector<double>& signal);
 
 /// An estimate and the interval that holds what it estimates with 95 % confidence.
 struct Interval {

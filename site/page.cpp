@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,7 +19,9 @@
 
 #include "palpate/io/sources/scene.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/uri.hpp"
 #include "palpate/net/viewer/session_host.hpp"
+#include "palpate/record/replay.hpp"
 #include "palpate/session/session.hpp"
 
 // clang-format off
@@ -31,11 +34,12 @@ EM_JS(void, post_bytes, (const void* head, std::size_t head_size, const void* pa
   bytes.set(HEAPU8.subarray(colour, colour + colour_size), head_size + payload_size);
   palpatePost(bytes.buffer);
 })
-// What fits into `to`; 0 if it is damaged or more than that.
-EM_JS(std::size_t, unpack_zstd_into, (const void* from, std::size_t size, void* to,
-                                      std::size_t room), {
+EM_JS(void, post_file, (const char* path), { palpatePostFile(UTF8ToString(path)); })
+// What a function of worker.js makes of bytes, if it fits into `to`; 0 if not.
+EM_JS(std::size_t, convert, (const char* by, const void* from, std::size_t size, void* to,
+                             std::size_t room), {
   try {
-    const bytes = fzstd.decompress(HEAPU8.slice(from, from + size));
+    const bytes = palpateConvert[UTF8ToString(by)](HEAPU8.slice(from, from + size), room);
     if (bytes.length > room) return 0;
     HEAPU8.set(bytes, to);
     return bytes.length;
@@ -157,6 +161,22 @@ class Scene {
     if (++beats_ % ticks_per_state == 0) tell_state();
   }
 
+  [[nodiscard]] const ServoTick& tick() {
+    while (ticks_.try_pop(tick_)) {
+    }
+    return tick_;
+  }
+
+  void lead(const HandMessage& hand) {
+    if (!hand.held) {
+      if (holds_) release(hand);
+      return;
+    }
+    heard_ = t_;
+    host_.hand(hand);
+    if (!std::exchange(holds_, true)) tell_presence();
+  }
+
   void take(std::span<const std::byte> bytes) {
     const auto message = parse_binary(bytes);
     if (!message) return;
@@ -165,16 +185,13 @@ class Scene {
       Camera& camera = cameras()[shown->camera];
       camera.shown = camera.sent;
       camera.offer();
-    } else if (const auto& hand = std::get<HandMessage>(*message); hand.held) {
-      heard_ = t_;
-      host_.hand(hand);
-      if (!std::exchange(holds_, true)) tell_presence();
-    } else if (holds_) {
-      release(hand);
+    } else {
+      lead(std::get<HandMessage>(*message));
     }
   }
 
   void command(std::string_view text) {
+    if (text == R"({"replay":true})") return replay_recording();
     const std::optional<Command> command = parse_command(text);
     if (!command) return;
     host_.command(*command, Role::operating);
@@ -184,12 +201,14 @@ class Scene {
  private:
   static PageRules rules_of(const std::string& uri, std::function<void(const std::string&)> open,
                             std::shared_ptr<DroppedFiles> files) {
-    PageRules rules{.open_scene = std::move(open),
-                    .files = std::move(files),
-                    .notice =
-                        "This page runs palpate by itself, in your browser. For cameras, haptic "
-                        "devices, robots and ROS 2, run the program: scripts/run."};
-    rules.records = false;
+    PageRules rules{
+        .open_scene = std::move(open),
+        .files = std::move(files),
+        .notice =
+            "This page runs palpate by itself, in your browser. For cameras, other haptic "
+            "devices, robots and ROS 2, run the program: scripts/run."};
+    rules.recordings = {
+        .folder = "/recordings", .limit = most_file_bytes, .keep_free = 0.0, .own_thread = false};
     rules.scenes.push_back({uri, "what is touched now"});
     for (const SceneInfo& scene : known_scenes())
       rules.scenes.push_back(
@@ -208,6 +227,14 @@ class Scene {
     return options;
   }
 
+  // What `palpate replay` says, of the recording that is touched.
+  void replay_recording() {
+    const std::string uri = session_.state().cameras.front().uri;
+    SessionReader reader(Uri(uri).path());
+    const ReplayReport report = replay(reader);
+    post("notice", nlohmann::json(text_of(report)).dump());
+  }
+
   void release(const HandMessage& farewell) {
     holds_ = false;
     host_.hand(farewell);
@@ -217,14 +244,25 @@ class Scene {
     post("presence", holds_ ? R"({"hand":"you","viewers":1})" : R"({"hand":"free","viewers":1})");
     tell_state();
   }
-  void tell_state() { post("state", with_role(host_.state())); }
+  void tell_state() {
+    host_.look_at_recordings();
+    post("state", with_role(host_.state()));
+    const RecordingState recording = session_.state().recording;
+    if (recording.on || recording.failed || recording.folder == offered_) return;
+    offered_ = recording.folder;
+    for (const auto& file : std::filesystem::directory_iterator(offered_))
+      if (file.path().extension() == ".mcap") post_file(file.path().c_str());
+  }
 
   SessionHost host_;
   Session session_;
   ViewerServer server_;
+  TickRing<ServoTick>::Reader ticks_ = session_.ticks();
+  ServoTick tick_{};
   double t_ = 0.0, beaten_ = 0.0, heard_ = 0.0;  // [s] since the scene was opened
   bool holds_ = false;
   int beats_ = 0;
+  std::string offered_;  // the recording that the page was given last
 };
 
 // All that the Worker has.
@@ -254,10 +292,25 @@ bool tried(const Do& act) {
 
 }  // namespace
 
-std::vector<std::byte> unpack_zstd(std::span<const std::byte> packed, std::size_t max_bytes) {
+namespace {
+std::vector<std::byte> converted(const char* by, std::span<const std::byte> from,
+                                 std::size_t max_bytes) {
   std::vector<std::byte> bytes(max_bytes);
-  bytes.resize(unpack_zstd_into(packed.data(), packed.size(), bytes.data(), max_bytes));
+  bytes.resize(convert(by, from.data(), from.size(), bytes.data(), max_bytes));
   return bytes;
+}
+}  // namespace
+
+std::vector<std::byte> unpack_zstd(std::span<const std::byte> packed, std::size_t max_bytes) {
+  return converted("unzstd", packed, max_bytes);
+}
+
+std::vector<std::byte> unpack_zlib(std::span<const std::byte> packed, std::size_t max_bytes) {
+  return converted("unzlib", packed, max_bytes);
+}
+
+std::vector<std::byte> pack_zlib(std::span<const std::byte> bytes) {
+  return converted("zlib", bytes, bytes.size() + bytes.size() / 1000 + 64);
 }
 
 }  // namespace site
@@ -294,17 +347,48 @@ EMSCRIPTEN_KEEPALIVE void palpate_command(const char* text) {
   if (page().scene) tried([&] { page().scene->command(text); });
 }
 
-/// @return where the file goes; empty: it is refused
+/// Where a hand is to be [m, world], or that it was let go.
+EMSCRIPTEN_KEEPALIVE void palpate_hand(bool held, double x, double y, double z) {
+  if (!page().scene) return;
+  palpate::HandMessage hand{.held = held};
+  if (held) hand.target = palpate::Vec3(x, y, z);
+  tried([&] { page().scene->lead(hand); });
+}
+
+/// The newest tick: HIP, proxy, normal and force in world axes, the state, and the time.
+EMSCRIPTEN_KEEPALIVE const double* palpate_tick() {
+  static std::array<double, 14> numbers;
+  if (!page().scene) return numbers.data();
+  const palpate::ServoTick& tick = page().scene->tick();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<int>(i);
+    numbers[i] = tick.tick.hip[axis];
+    numbers[3 + i] = tick.tick.proxy[axis];
+    numbers[6 + i] = tick.tick.normal[axis];
+    numbers[9 + i] = tick.force[axis];
+  }
+  numbers[12] = static_cast<double>(tick.tick.state);
+  numbers[13] = tick.tick.t;
+  return numbers.data();
+}
+
+/// @return where the file goes, or the content of a .zip; empty: it is refused
 EMSCRIPTEN_KEEPALIVE const char* palpate_begin_file(const char* name, double size) {
   static std::string path;
+  static int zips = 0;
   path.clear();
-  tried([&] { path = page().files->begin(name, static_cast<std::uint64_t>(size)).string(); });
+  tried([&] {
+    const std::filesystem::path wanted(name);
+    path = wanted.extension() == ".zip"
+               ? "/zips/" + std::to_string(++zips) + "/" + wanted.stem().string()
+               : page().files->begin(name, static_cast<std::uint64_t>(size)).string();
+  });
   return path.c_str();
 }
 
 /// It is there: it is opened by the next `palpate_advance`.
 EMSCRIPTEN_KEEPALIVE void palpate_end_file(const char* path) {
-  tried([&] { page().wanted = palpate::uri_of_file(path); });
+  tried([&] { page().wanted = palpate::source_uri(path); });
 }
 
 }  // extern "C"

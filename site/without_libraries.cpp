@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// In place of the files that need SQLite, zstd, lz4, bzip2 and libpng: what they read is refused in
+// In place of the files that need SQLite, zstd, lz4 and bzip2: what they read is refused in
 // one sentence, but for zstd, which the page's JavaScript decodes. There are no drivers, either.
 #include <cstring>
 #include <memory>
@@ -10,7 +10,6 @@
 #include "palpate/io/bag/bag_writer.hpp"
 #include "palpate/io/bag/compression.hpp"
 #include "palpate/io/bag/database.hpp"
-#include "palpate/io/sources/depth_png.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 #include "site/page.hpp"
@@ -83,27 +82,6 @@ std::string Statement::text(int /*column*/) const {
 }
 std::span<const std::byte> Statement::bytes(int /*column*/) const {
   return {};
-}
-
-DepthPng parse_depth_png(std::span<const std::byte> /*bytes*/, const std::string& name) {
-  refuse(name, "it is a PNG");
-}
-DepthPng read_depth_png(const std::filesystem::path& path) {
-  refuse(path.string(), "it is a PNG");
-}
-GreyPng read_grey_png(const std::filesystem::path& path) {
-  refuse(path.string(), "it is a PNG");
-}
-ColourPng read_colour_png(const std::filesystem::path& path) {
-  refuse(path.string(), "it is a PNG");
-}
-std::vector<std::byte> encode_depth_png(int /*width*/, int /*height*/,
-                                        std::span<const std::uint16_t> /*depth*/) {
-  refuse("image", "it is to be a PNG");
-}
-void write_depth_png(const std::filesystem::path& path, int /*width*/, int /*height*/,
-                     std::span<const std::uint16_t> /*depth*/) {
-  refuse(path.string(), "it is to be a PNG");
 }
 
 }  // namespace palpate

@@ -23,6 +23,7 @@ Recorder::Recorder(const std::filesystem::path& folder, const SessionInfo& info,
   info_.frames_in_parent = !options_.with_frames;
   writer_.emplace(folder, info_, monotonic_now(), options.commit_interval);
   status_.folder = writer_->folder();
+  if (!options_.own_threads) return;
   threads_.emplace_back([this] { collect(); });
   threads_.emplace_back([this] { write(); });
   threads_.emplace_back([this] { pack(); });
@@ -34,14 +35,17 @@ Recorder::~Recorder() {
 }
 
 void Recorder::request_stop() {
-  const std::lock_guard lock(mutex_);
-  if (stopping_) return;
-  stopping_ = true;
-  status_.closing = !status_.done;
-  wake_collector_.notify_all();
-  wake_packer_.notify_all();
-  wake_writer_.notify_all();
-  progress_.notify_all();
+  {
+    const std::lock_guard lock(mutex_);
+    if (stopping_) return;
+    stopping_ = true;
+    status_.closing = !status_.done;
+    wake_collector_.notify_all();
+    wake_packer_.notify_all();
+    wake_writer_.notify_all();
+    progress_.notify_all();
+  }
+  if (!options_.own_threads) work();
 }
 
 bool Recorder::done() const {
@@ -92,7 +96,7 @@ void Recorder::frame(std::uint64_t number, double stamp, std::size_t camera,
   } else if (options_.with_frames) {
     frame->cloud = std::move(cloud);
     const bool is_known = std::exchange(newest_[camera], frame->cloud) == frame->cloud;
-    frame->ready = is_known || frame->cloud->image() == nullptr;
+    frame->ready = is_known || frame->cloud->image() == nullptr || !options_.own_threads;
   }
   if (!frame->ready) {
     to_pack_.push_back(frame);
@@ -112,6 +116,7 @@ void Recorder::commands(const ServoCommands& commands, double t) {
 }
 
 void Recorder::flush() {
+  if (!options_.own_threads) return work();
   std::unique_lock lock(mutex_);
   const std::uint64_t mine = ++flushes_asked_;
   flush_entries_ = entries_handed_;
@@ -141,6 +146,29 @@ void Recorder::guarded(const Work& work) {
   } catch (const std::exception& error) {
     fail(error.what());
   }
+}
+
+void Recorder::work() {
+  if (!writer_) return;
+  guarded([this] {
+    collect_ticks();
+    while (has_ready_entry()) {
+      write_entries();
+      writer_->commit_if_due();
+    }
+    while (write_ticks()) {
+    }
+    writer_->commit_if_due();
+    if (stopping_) writer_->close();
+    const std::lock_guard lock(mutex_);
+    status_.committed_ticks = writer_->ticks();
+    status_.bytes = writer_->bytes();
+  });
+  const std::lock_guard lock(mutex_);
+  if (!stopping_) return;
+  writer_.reset();
+  collecting_ = status_.closing = false;
+  status_.done = true;
 }
 
 void Recorder::collect() {

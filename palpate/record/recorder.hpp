@@ -27,6 +27,8 @@ struct RecorderOptions {
   std::size_t most_ticks = 60'000;  ///< waiting; the next are lost, and counted. 20 MB
   /// False: another recording of the session has the frames; see SessionInfo::frames_in_parent.
   bool with_frames = true;
+  /// False: it has none, and everything happens in `flush` and `request_stop`, on their thread.
+  bool own_threads = true;
 };
 
 /// Records a live session on threads of its own: ticks from the servo's ring, frames and settings
@@ -105,6 +107,7 @@ class Recorder {
   };
   using Entry = std::variant<std::shared_ptr<PutFrame>, Told>;
 
+  void work();     // all of it, where there is no thread
   void collect();  // the thread that empties the ring
   void pack();     // the thread that packs images
   void write();    // the thread that writes the bag

@@ -42,7 +42,9 @@ double size_of(const std::filesystem::path& folder) {
 }  // namespace
 
 ObserverRecordings::ObserverRecordings(Session& session, RecordingRules rules)
-    : session_(session), rules_(std::move(rules)), thread_([this] { watch(); }) {}
+    : session_(session), rules_(std::move(rules)) {
+  if (rules_.own_thread) thread_ = std::thread([this] { watch(); });
+}
 
 ObserverRecordings::~ObserverRecordings() {
   {
@@ -50,7 +52,7 @@ ObserverRecordings::~ObserverRecordings() {
     ends_ = true;
   }
   wakes_.notify_all();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 void ObserverRecordings::start() {
@@ -89,6 +91,19 @@ std::string ObserverRecordings::ended() const {
   return ended_;
 }
 
+void ObserverRecordings::look() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!watching_) return;
+  }
+  const std::string reason = reason_to_end();
+  if (reason.empty()) return;
+  session_.stop_recording();
+  const std::lock_guard lock(mutex_);
+  ended_ = "the recording was ended: " + reason;
+  watching_ = false;
+}
+
 void ObserverRecordings::watch() {
   const std::chrono::duration<double> interval(rules_.interval);
   std::unique_lock lock(mutex_);
@@ -98,13 +113,8 @@ void ObserverRecordings::watch() {
       continue;
     }
     lock.unlock();
-    const std::string reason = reason_to_end();
-    if (!reason.empty()) session_.stop_recording();
+    look();
     lock.lock();
-    if (!reason.empty()) {
-      ended_ = "the recording was ended: " + reason;
-      watching_ = false;
-    }
     wakes_.wait_for(lock, interval, [this] { return ends_; });
   }
 }

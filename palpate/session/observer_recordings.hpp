@@ -19,6 +19,7 @@ struct RecordingRules {
   double limit = 20e9;                ///< [bytes] of all that they record in a session
   double keep_free = 1e9;             ///< [bytes] left free on the disk
   double interval = 0.5;              ///< [s] between two looks at the sizes
+  bool own_thread = true;             ///< false: `look` is called now and then
 };
 
 /// The recordings that observers start, a page or a node of ROS 2: in one folder, under names made
@@ -37,6 +38,8 @@ class ObserverRecordings {
   /// nearly full or the folder cannot be made.
   void start();
   void stop();
+  /// Ends a recording that has reached a limit.
+  void look();
   /// Why the last one was ended by its limits; empty if it was not. Any thread.
   [[nodiscard]] std::string ended() const;
   /// [bytes] until a limit ends one, as of the last look; none before the first. Any thread.

@@ -286,6 +286,7 @@ class Session::Impl {
     for (next_tick_ = std::max(next_tick_, due - most); next_tick_ <= due; ++next_tick_)
       run_tick(next_tick_);
     drain();
+    wait_for_recorder();
   }
 
   [[nodiscard]] std::vector<std::shared_ptr<const Cloud>> newest() const {
@@ -630,7 +631,7 @@ class Session::Impl {
     for (const auto& hand : hands_) hand->run_at(t);
   }
 
-  // The clock waits for the disk here, as it runs faster than time.
+  // The clock waits for the disk here, as it runs faster than time: recorders have no threads then.
   void wait_for_recorder() {
     const std::lock_guard lock(control_);
     for (const auto& hand : hands_) {
@@ -682,7 +683,7 @@ class Session::Impl {
         opened[i].recorder = std::make_unique<Recorder>(
             i == 0 ? folder : hand_folder(folder, hand.name()).string(), info_of(hand),
             hand.cycle().full_reader(), std::move(begin_anew),
-            RecorderOptions{.with_frames = i == 0});
+            RecorderOptions{.with_frames = i == 0, .own_threads = is_live()});
       } catch (...) {
         for (Opened& each : opened) each.promise->set_value(nullptr);
         throw;

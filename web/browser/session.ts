@@ -2,9 +2,11 @@
 // A session of the program and a browser that looks at it, for tests and pictures.
 
 import { spawn, type ChildProcess } from "node:child_process";
-import { mkdtempSync, rmSync } from "node:fs";
+import { createReadStream, existsSync, mkdtempSync, rmSync } from "node:fs";
+import { createServer, type Server } from "node:http";
+import type { AddressInfo } from "node:net";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { extname, join } from "node:path";
 import { chromium, type Browser, type Page } from "playwright-core";
 
 /** The program with its page, until stopped. */
@@ -56,6 +58,27 @@ export class Program {
       this.child.kill(signal);
     });
   }
+}
+
+const types: Record<string, string> = {
+  ".html": "text/html",
+  ".js": "text/javascript",
+  ".css": "text/css",
+  ".wasm": "application/wasm",
+};
+
+/** A folder behind what any static host does; each `.ply` is a wall. */
+export async function hosted(folder: string): Promise<{ host: Server; address: string }> {
+  const host = createServer((request, answer) => {
+    const { pathname } = new URL(request.url!, "http://host");
+    const file = join(folder, pathname === "/" ? "index.html" : pathname);
+    if (file.endsWith(".ply")) return answer.end(wallPly());
+    if (!existsSync(file)) return answer.writeHead(404).end();
+    answer.writeHead(200, { "Content-Type": types[extname(file)] ?? "text/plain" });
+    createReadStream(file).pipe(answer);
+  });
+  await new Promise<void>((resolve) => host.listen(0, "127.0.0.1", resolve));
+  return { host, address: `http://127.0.0.1:${(host.address() as AddressInfo).port}` };
 }
 
 export function launch(): Promise<Browser> {

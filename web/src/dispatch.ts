@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a session says, whatever way it comes: docs/protocol.md.
+import type { Orbit } from "./camera_math";
 import {
   decode,
   type Hello,
@@ -24,6 +25,10 @@ export interface Handlers {
   robot(robot: RobotState): void;
   moreHands(hands: OtherHand[]): void;
   refused(reason: string): void;
+  /** what the person is told */
+  notice(text: string): void;
+  /** from where the scene is looked at */
+  orbit(): Orbit;
   message(message: Message): void;
 }
 
@@ -38,5 +43,6 @@ export function dispatch(data: string | ArrayBuffer, handlers: Handlers): void {
   if (verb === "presence") handlers.presence(what as Presence);
   if (verb === "robot") handlers.robot(what as RobotState);
   if (verb === "more_hands") handlers.moreHands(what as OtherHand[]);
+  if (verb === "notice") handlers.notice(what as string);
   if (verb === "error") handlers.refused(what as string);
 }

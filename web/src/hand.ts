@@ -12,6 +12,7 @@ import {
   within,
   zoomed,
 } from "./camera_math";
+import type { Stick } from "./gamepad";
 import { Pointers, type Place } from "./pointers";
 import { outOf, Press, type Felt } from "./press";
 import { Grip, type Vec3 } from "./protocol";
@@ -309,8 +310,8 @@ export class HandInput {
   private keyStep(seconds: number): void {
     const pressed = (more: string, less: string) =>
       Number(this.keys.has(more)) - Number(this.keys.has(less));
-    const x = pressed("ArrowRight", "ArrowLeft");
-    const y = pressed("ArrowDown", "ArrowUp");
+    let x = pressed("ArrowRight", "ArrowLeft");
+    let y = pressed("ArrowDown", "ArrowUp");
     const into = pressed("KeyE", "KeyQ");
     const nearer = pressed("Equal", "Minus") + pressed("NumpadAdd", "NumpadSubtract");
     const fine = this.altHeld ? FINE : 1;
@@ -319,9 +320,15 @@ export class HandInput {
       orbit = turned(orbit, x * KEY_TURN * seconds, -y * KEY_TURN * seconds);
     if (nearer !== 0) orbit = zoomed(orbit, Math.exp(-nearer * seconds));
     if (orbit !== this.view.orbit) this.view.setOrbit(orbit);
-    if (this.press) return this.press.refine(into * KEY_PRESS * fine * seconds);
-    if (this.shiftHeld || (x === 0 && y === 0 && into === 0) || !this.takeByKeys()) return;
-    const metres = KEY_SPEED * fine * seconds;
+    if (this.shiftHeld) [x, y] = [0, 0];
+    this.steer({ x, y, into }, fine * seconds);
+  }
+
+  /** Moves the hand in the picture and into it, as keys or a gamepad's sticks ask. */
+  steer({ x, y, into }: Stick, seconds: number): void {
+    if (this.press) return this.press.refine(into * KEY_PRESS * seconds);
+    if ((x === 0 && y === 0 && into === 0) || !this.takeByKeys()) return;
+    const metres = KEY_SPEED * seconds;
     const depth = depthOf(this.view.orbit, this.target);
     const pixels = (metres * depth) / metresPerPixel(depth, this.view.height);
     this.moveTarget({ x: x * pixels, y: y * pixels }, into * metres * depth);

@@ -6,6 +6,7 @@ import type { Presence } from "./dispatch";
 import { get, write as writeIn } from "./dom";
 import { Files } from "./files";
 import { fixtureLines, Fixtures } from "./fixtures";
+import { stickOf } from "./gamepad";
 import { HandInput, isForForm } from "./hand";
 import { length } from "./camera_math";
 import { handsLines, handsText } from "./more_hands";
@@ -23,11 +24,13 @@ import {
 import { robotLines, robotText } from "./robot";
 import { GHOST_TRAIL, SceneView, type Palette } from "./scene";
 import { Senses } from "./senses";
-import { handAt, Timeline, trailAt } from "./timeline";
+import { linked, linkTo } from "./share";
+import { handAt, longest, Timeline, trailAt } from "./timeline";
 import { flagNames, SteadyWhy, why } from "./why";
 
 const DISENGAGED = 1 << 6; // SafetyFlag
 const PLOT_SHARE = 12; // drawings of the scene for one of the plots, where drawing is slow
+const LONGEST_STEP = 50; // [ms] of a gamepad's stick, where drawing is slow
 const NUMBERS = 100; // [ms] between changes of what is written: faster, nobody reads it
 
 const plots = new Plots(get("plots"));
@@ -147,6 +150,7 @@ const connection = new Connection({
       })),
     );
     timeline.show(newest, performance.now());
+    goToMoment(newest);
     const { r_c, r_1, r_3 } = newest.parameters;
     view.setRadii({ r_c: r_c ?? 0.005, r_1: r_1 ?? 0.005, r_3: r_3 ?? 0.01 });
     write("camera", cameraText(newest));
@@ -162,7 +166,7 @@ const connection = new Connection({
     get("latched").hidden = !latched;
     get("reset-faults").hidden = !mayOperate(newest);
     const record = get<HTMLButtonElement>("record");
-    record.disabled = !newest.recording.possible || !mayOperate(newest);
+    record.disabled = !mayOperate(newest);
     const { path, message } = newest.recording;
     const about = path ? `Recording ${path}; press to end (R)` : message || "Record (R)";
     record.title = mayOperate(newest)
@@ -195,6 +199,8 @@ const connection = new Connection({
     toast(reason);
     panel.refused();
   },
+  notice: (text) => toast(text, 30_000),
+  orbit: () => view.orbit,
   message(message) {
     if (message.kind === "frame") arrived.set(message.camera, message);
     else if (message.kind === "rays") view.setRays(message);
@@ -233,6 +239,30 @@ const hand = new HandInput(get<HTMLCanvasElement>("view"), view, {
     get("hint").classList.add("gone");
   },
 });
+
+// What the page's link asks for, once it is there.
+const asked = linked(location.search);
+function goToMoment({ cameras, playback }: State): void {
+  const recording = longest(cameras);
+  if (asked.frame === null || !recording || !playback) return;
+  connection.ask({ seek: Math.min(1, asked.frame / (recording.frames - 1)) });
+  connection.ask({ play: { ...playback, paused: true } });
+  asked.frame = null;
+}
+function goToView(): void {
+  if (asked.orbit && view.frames > 0) view.setOrbit(asked.orbit);
+  if (view.frames > 0) asked.orbit = null;
+}
+function share(): void {
+  const frame = state?.playback ? (longest(state.cameras)?.place ?? null) : null;
+  const link = linkTo(location.href, view.orbit, frame);
+  history.replaceState(null, "", link);
+  const copied = navigator.clipboard?.writeText(link) ?? Promise.reject(new Error());
+  copied.then(
+    () => toast("The link to this view is copied."),
+    () => toast("The link to this view is the page's address."),
+  );
+}
 
 function contactRadius(): number {
   return state?.parameters.r_c ?? 0.005;
@@ -277,12 +307,17 @@ function showTick(now: number): void {
   }
 }
 
+let looped = 0; // [ms]
 function loop(now: number): void {
   for (const [camera, frame] of arrived) {
     view.showFrame(frame);
     connection.send(encodeShown(camera, frame.number));
   }
   arrived.clear();
+  if (asked.orbit) goToView();
+  const stick = document.hidden ? null : stickOf(navigator.getGamepads?.() ?? []);
+  if (stick) hand.steer(stick, Math.min(now - looped, LONGEST_STEP) / 1000);
+  looped = now;
   hand.showPointer();
   const time = recordedHand && timeline.timeNow(now);
   if (recordedHand && time !== null)
@@ -306,7 +341,7 @@ function switchColour(): void {
   view.setTinted(!view.isTinted);
 }
 function record(): void {
-  if (state?.recording.possible && mayOperate(state))
+  if (state && mayOperate(state))
     connection.ask({ record: state.recording.path === null });
 }
 function help(): void {
@@ -369,6 +404,7 @@ get("more-plots").addEventListener("click", () => {
   plots.show(all);
 });
 get("reset").addEventListener("click", () => view.resetView());
+get("share").addEventListener("click", share);
 get("theme").addEventListener("click", switchTheme);
 get("ask").addEventListener("click", help);
 for (const [id, share] of [

@@ -471,7 +471,6 @@ export interface State {
     trouble: string;
   };
   recording: {
-    possible: boolean;
     path: string | null;
     message: string;
     /** why the last was ended by its limits; empty: it was not */

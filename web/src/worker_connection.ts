@@ -1,44 +1,90 @@
 // SPDX-License-Identifier: Apache-2.0
 // In place of connection.ts on a page without a server: the session runs in a Worker of the page.
 import { dispatch, type Handlers, type Toast } from "./dispatch";
+import { element, get } from "./dom";
 import type { Command } from "./protocol";
+import { deviceAxes } from "./share";
 
 /** Nobody needs a token here. */
 export const unknownToken = "";
 
+const INVERSE_SERVICE = "ws://localhost:10001";
+const SEEN = 100; // [ms] between two words to the Worker that the page is seen
+
 /**
  * What the page's address asks for: `?scene=desk&material=wood`, of which the rest is the scene's
- * options, or `?file=URL`.
+ * options, or `?file=URL`; `inverse3` is the address of Haply's service.
  */
-export function asked(search: string): { scene: string; file: string | null } {
+export function asked(search: string): { scene: string; file: string | null; inverse3: string } {
   const options = new URLSearchParams(search);
   const scene = options.get("scene") ?? "desk";
   const file = options.get("file");
-  for (const name of ["scene", "file"]) options.delete(name);
+  const inverse3 = options.get("inverse3") ?? INVERSE_SERVICE;
+  for (const name of ["scene", "file", "inverse3", "view", "t"]) options.delete(name);
   const more = options.toString();
-  return { scene: `synthetic:${scene}${more ? `?${more}` : ""}`, file };
+  return { scene: `synthetic:${scene}${more ? `?${more}` : ""}`, file, inverse3 };
+}
+
+/** Gives the person a file. */
+function download(name: string, bytes: Uint8Array<ArrayBuffer>): void {
+  const href = URL.createObjectURL(new Blob([bytes]));
+  element("a", { href, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 60_000);
 }
 
 /** The line to the Worker that owns session, clock and files. */
 export class Connection {
   connected = false;
   private readonly worker = new Worker("palpate-core.js");
+  private leadByInverse3: (on: boolean) => void = () => {};
 
-  constructor(handlers: Handlers) {
-    const { scene, file } = asked(location.search);
-    this.worker.onmessage = ({ data }: MessageEvent<string | ArrayBuffer>) => {
+  constructor(private readonly handlers: Handlers) {
+    const { scene, file, inverse3 } = asked(location.search);
+    this.worker.onmessage = ({ data }) => {
       if (!this.connected) {
         this.connected = true;
         handlers.opened();
-        if (file) void this.fetchFile(file, handlers);
+        if (file) void this.fetchFile(file);
       }
-      dispatch(data, handlers);
+      if (data.inverse3 === null) this.leadByInverse3(false);
+      else if (data.bytes) download(data.name, data.bytes);
+      else dispatch(data, handlers);
     };
     this.worker.onerror = ({ message }) => {
       this.connected = false;
       handlers.lost(`The page's own palpate has ended: ${message}. Load the page again.`);
     };
     this.worker.postMessage({ open: scene });
+    this.offer(inverse3);
+    // Offline after the first load, where the page is from https or this computer.
+    void navigator.serviceWorker?.register("offline.js").catch(() => {});
+  }
+
+  // What only a page with a Worker has.
+  private offer(service: string): void {
+    get<HTMLInputElement>("file").accept += ",.zip";
+    get("compare").hidden = false;
+    get("compare").addEventListener("click", () => this.worker.postMessage('{"replay":true}'));
+    const button = get("inverse3");
+    button.hidden = false;
+    const lead = (on: boolean) => {
+      const axes = on && deviceAxes(this.handlers.orbit());
+      this.worker.postMessage({ inverse3: axes ? { address: service, axes } : null });
+    };
+    let timer = 0;
+    this.leadByInverse3 = (on) => {
+      if (on === timer > 0) return;
+      button.setAttribute("aria-pressed", String(on));
+      clearInterval(timer);
+      timer = on ? window.setInterval(() => lead(true), SEEN) : 0;
+      lead(on);
+    };
+    button.addEventListener("click", () => this.leadByInverse3(timer === 0));
+    for (const end of ["freeze", "visibilitychange"])
+      document.addEventListener(end, () => {
+        if (document.hidden || end === "freeze") this.leadByInverse3(false);
+      });
+    addEventListener("pagehide", () => this.leadByInverse3(false));
   }
 
   send(data: ArrayBuffer): void {
@@ -58,14 +104,14 @@ export class Connection {
     this.worker.postMessage({ name, bytes: new Uint8Array(bytes) }, [bytes]);
   }
 
-  private async fetchFile(url: string, handlers: Handlers): Promise<void> {
+  private async fetchFile(url: string): Promise<void> {
     try {
       const answer = await fetch(url);
       if (!answer.ok) throw new Error(`${answer.status} ${answer.statusText}`);
       const name = new URL(url, location.href).pathname.split("/").pop() || "file";
       this.give(name.replace(/[^A-Za-z0-9._-]+/g, "_"), await answer.arrayBuffer());
     } catch (error) {
-      handlers.refused(
+      this.handlers.refused(
         `${url}: it cannot be fetched: ${(error as Error).message}; ` +
           "its host must allow other pages to read it (CORS)",
       );

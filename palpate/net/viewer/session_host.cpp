@@ -126,8 +126,7 @@ nlohmann::json fixture_to_draw(const Fixture& fixture) {
 
 void SessionHost::attach(Session& session) {
   bounds_.emplace(session.settings().safety, rules_.operator_limits);
-  if (rules_.records)
-    recordings_ = std::make_unique<ObserverRecordings>(session, rules_.recordings);
+  recordings_ = std::make_unique<ObserverRecordings>(session, rules_.recordings);
   session_ = &session;
   mouse_ = session.mouse();
   if (mouse_ != nullptr) target_ = start_ = mouse_->start_position();
@@ -303,8 +302,7 @@ std::string SessionHost::state() {
     servo["compute_p99"] = 1e-9 * static_cast<double>(timing->compute.quantile(0.99));
     servo["wake_up_p99"] = 1e-9 * static_cast<double>(timing->wake_up.quantile(0.99));
   }
-  json recording = {{"possible", rules_.records},
-                    {"path", nullptr},
+  json recording = {{"path", nullptr},
                     {"message", state.recording.message},
                     {"ended", recording_ended()},
                     {"seconds", state.recording.seconds},
@@ -492,8 +490,6 @@ void SessionHost::command(const Command& command, Role role) {
   } else if (const auto* method = std::get_if<SetMethod>(&command)) {
     session_->change([&](ServoSettings& settings) { settings.method = method->name; });
   } else if (const auto* record = std::get_if<SetRecording>(&command)) {
-    if (!rules_.records)
-      throw Error("recording", "this session does not record", "run the program palpate");
     record->on ? recordings_->start() : recordings_->stop();
   } else if (const auto* play = std::get_if<SetPlayback>(&command)) {
     session_->set_playback({.paused = play->paused, .loop = play->loop, .speed = play->speed});

@@ -92,7 +92,6 @@ struct PageRules {
   /// The robot that the hand leads; empty: there is none. The server's thread.
   std::function<std::optional<RobotPicture>()> robot = {};
   std::string notice = {};  ///< what pages are told when they join; empty: nothing
-  bool records = true;      ///< the operator's page can record
 };
 
 /// A session as pages see it: an observer that reads its ticks and frames and sends settings back.
@@ -127,6 +126,10 @@ class SessionHost final : public ViewerHost {
   std::filesystem::path begin_file(const std::string& name, std::uint64_t size) override;
   void end_file(const std::filesystem::path& file, bool whole) override;
 
+  /// Ends a page's recording that has reached a limit, where nobody else looks (RecordingRules).
+  void look_at_recordings() {
+    if (recordings_) recordings_->look();
+  }
   /// Why the last recording of a page was ended by its limits; empty if it was not.
   [[nodiscard]] std::string recording_ended() const {
     return recordings_ ? recordings_->ended() : std::string();

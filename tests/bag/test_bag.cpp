@@ -12,6 +12,7 @@
 #include "palpate/io/bag/bag_reader.hpp"
 #include "palpate/io/bag/bag_writer.hpp"
 #include "palpate/io/bag/compression.hpp"
+#include "palpate/io/bag/database.hpp"
 #include "palpate/io/bag/messages.hpp"
 
 #include "tests/support/bag_contents.hpp"

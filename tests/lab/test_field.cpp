@@ -16,6 +16,7 @@
 #include "lab/experiment.hpp"
 #include "lab/field/field_cases.hpp"
 #include "lab/field/field_judge.hpp"
+#include "lab/field/field_setting.hpp"
 #include "lab/method.hpp"
 #include "lab/runner.hpp"
 #include "palpate/kernel/core/error.hpp"

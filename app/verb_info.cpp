@@ -163,6 +163,7 @@ int info(InfoOptions options) {
     throw Error(options.uri, fmt::format("it has delivered no frame in {} s", first_frame_timeout),
                 "check the camera, its cable and its permissions");
   if (!frame) throw Error(options.uri, "it has no frames", "use a source with at least one frame");
+  if (!about.assumed.empty()) json["assumed"] = about.assumed;
   if (!about.notes.empty()) json["notes"] = about.notes;  // a live camera's come with its frame
   Json first = {{"stamp_s", frame->stamp}};
   if (!about.details.empty()) first["details"] = about.details;

@@ -66,8 +66,9 @@ int trace(TraceOptions options) {
       press ? std::nullopt : std::optional(HipPath::read_csv(options.path));
   for (std::size_t camera = 0; camera < playback.cameras(); ++camera) {
     const SourceInfo& about = playback.source(camera).info();
-    for (const std::string& note : about.notes)
-      fmt::print(stderr, "palpate: {}: {}\n", about.uri, note);
+    std::vector<std::string> notes = about.notes;
+    if (!about.assumed.empty()) notes.push_back(about.assumed);
+    for (const std::string& note : notes) fmt::print(stderr, "palpate: {}: {}\n", about.uri, note);
   }
   const MethodRegistry methods = program_methods(&playback.source(0));
   const SessionConfig config = options.method.session(methods);

@@ -115,8 +115,9 @@ class CameraFeed::Worker {
     if (!first_) first_ = read(timeout);
     return first_;
   }
-  void connect(Sink sink) {
+  void connect(Sink sink, Hand hand) {
     sink_ = std::move(sink);
+    hand_ = std::move(hand);
     is_connected_ = true;
   }
 
@@ -196,6 +197,7 @@ class CameraFeed::Worker {
   bool run_recording();
   bool read_ahead(int& errors);
   void run_live();
+  void follow();
   std::optional<Frame> read(double timeout);
   void take_live(Frame frame);
   void deliver(const FedFrame& fed);
@@ -232,6 +234,7 @@ class CameraFeed::Worker {
   // Held while the sink is called. Recursive: a sink may stop its own camera.
   std::recursive_mutex sink_mutex_;
   Sink sink_;
+  Hand hand_;
   bool is_connected_ = false;
 };
 
@@ -303,6 +306,16 @@ bool CameraFeed::Worker::open_again() {
   }
 }
 
+// Tells the source where the hand is.
+void CameraFeed::Worker::follow() {
+  std::optional<Vec3> hand;
+  {
+    const std::lock_guard lock(sink_mutex_);
+    if (is_connected_ && hand_) hand = hand_();
+  }
+  if (hand && source_) source_->follow(*hand);
+}
+
 // A recording, until it is to stop or has to be opened again. False: it is over.
 bool CameraFeed::Worker::run_recording() {
   for (int errors = 0;;) {
@@ -339,6 +352,7 @@ bool CameraFeed::Worker::read_ahead(int& errors) {
   const double begin = now();
   try {
     const Watch watch(*this, Source::no_timeout);
+    follow();
     player_.read(begin, took_);
     took_ = now() - begin;
     errors = 0;
@@ -387,6 +401,7 @@ void CameraFeed::Worker::run_live() {
 // A live camera's next frame, with its arrival. @throws what its source throws
 std::optional<Frame> CameraFeed::Worker::read(double timeout) {
   const Watch watch(*this, timeout);
+  follow();
   std::optional<Frame> frame = source_->next(timeout);
   const double end = now();
   if (!frame || !frame->cloud) return std::nullopt;
@@ -487,9 +502,9 @@ std::optional<Frame> CameraFeed::first_frame(double timeout) {
   return worker_->first_frame(timeout);
 }
 
-void CameraFeed::start(Sink sink) {
+void CameraFeed::start(Sink sink, Hand hand) {
   if (thread_.joinable()) return;
-  worker_->connect(std::move(sink));
+  worker_->connect(std::move(sink), std::move(hand));
   thread_ = std::thread([worker = worker_] { worker->run(); });
 }
 

@@ -72,6 +72,8 @@ class CameraFeed {
   /// Called on the camera's thread for each frame. Must be quick and must not throw.
   using Sink = std::function<void(const FedFrame&)>;
   using Open = Player::Open;
+  /// Where the hand is [m, world]; none: not known. Called on the camera's thread before it reads.
+  using Hand = std::function<std::optional<Vec3>()>;
 
   /// Opens the source. @throws Error as open_source.
   explicit CameraFeed(const std::string& uri, FeedOptions options = {});
@@ -89,12 +91,13 @@ class CameraFeed {
   /// @throws Error as Source::next, or if a recording holds no frames.
   std::optional<Frame> first_frame(double timeout);
 
-  /// Starts the thread, which calls `sink`. Once.
-  void start(Sink sink);
+  /// Starts the thread, which calls `sink` and, if there is one, `hand` for a source that follows
+  /// it. Once.
+  void start(Sink sink, Hand hand = {});
 
-  /// Asks the thread to end and returns at once (after a sink that is just being called). Never is
-  /// the sink called after this has returned. Hold no lock that the sink takes. Any thread; from
-  /// within the sink, too.
+  /// Asks the thread to end and returns at once (after a sink that is just being called). Never are
+  /// sink and hand called after this has returned. Hold no lock that the sink takes. Any thread;
+  /// from within the sink, too.
   void request_stop() noexcept;
   /// Waits up to `timeout` [s, real time] for the thread to end.
   /// @return false if it has not, because the source hangs

@@ -94,11 +94,14 @@ void touch(FrameSequence& frames, Method& method, const HipPath::Sample& first, 
   check_rate(rate);
   frames.check(method);
   method.seat(first.hip);
+  frames.follow(first.hip);
   for (std::int64_t i = 0;; ++i) {
     const double t = first.t + static_cast<double>(i) / rate;
     frames.adopt_until(t, [&](const Observation& seen) { method.observe(seen); });
     const std::optional<Vec3> hip = hand(t);
-    if (!hip || !on_tick(method.tick(*hip, t))) return;
+    if (!hip) return;
+    frames.follow(*hip);
+    if (!on_tick(method.tick(*hip, t))) return;
   }
 }
 

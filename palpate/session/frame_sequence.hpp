@@ -41,6 +41,11 @@ class FrameSequence {
   /// @throws Error if a frame cannot be read.
   void adopt_until(double t, const std::function<void(const Observation&)>& adopt);
 
+  /// Where the hand is [m, world], for sources that follow it.
+  void follow(const Vec3& hand) {
+    for (Player& player : players_) player.follow(hand);
+  }
+
   /// @throws Error if the method cannot touch what a camera shows first.
   void check(const Method& method) const;
   /// Frames handed over so far, each once.

@@ -32,6 +32,7 @@ Player::Player(std::shared_ptr<Source> source, Open open, Playing playing)
              .kind = info.kind,
              .sensor = info.sensor,
              .rate = info.frame_rate.value_or(0.0),
+             .doubt = info.assumed,
              .recorded = info.live ? 0 : info.frames.value_or(0)};
   if (playing_ == Playing::in_real_time) return;
   status_.state = CameraState::live;

@@ -69,7 +69,7 @@ struct CameraStatus {
   /// The last frame is declared valid until another one replaces it: a static image, or a recording
   /// that is paused or has ended. Never true for a live camera that stopped.
   bool stays_valid = false;
-  std::string doubt{};       ///< why its depth unit may be wrong; empty: no sign of it
+  std::string doubt{};       ///< why its unit or its axes may be wrong; empty: no sign of it
   Playback playback{};       ///< of a recording
   std::size_t recorded = 0;  ///< frames of a recording; 0: not known, or no recording
   std::size_t place = 0;     ///< of a recording: number of the frame shown last, from 0
@@ -113,6 +113,11 @@ class Player {
   /// many that are left out. @throws Error as next_until.
   const Frame* look_ahead();
   [[nodiscard]] const Frame* upcoming() const { return next_ ? &*next_ : nullptr; }
+
+  /// Where the hand is [m, world], for the frames that are read from now on.
+  void follow(const Vec3& hand) {
+    if (source_) source_->follow(hand);
+  }
 
   /// From time `now` [s] on.
   void set_playback(const Playback& playback, double now);

@@ -212,7 +212,7 @@ class Session::Impl {
     }
     started_ = true;
     for (std::size_t i = 0; i < feeds_.size(); ++i)
-      feeds_[i]->start([this, i](const FedFrame& frame) { take(i, frame); });
+      feeds_[i]->start([this, i](const FedFrame& frame) { take(i, frame); }, hand_place());
     housekeeper_ = std::thread([this] { keep_house(); });
   }
 
@@ -586,6 +586,14 @@ class Session::Impl {
     return cloud;
   }
 
+  // Tells where the first hand is [m, world]; of one thread.
+  [[nodiscard]] std::function<std::optional<Vec3>()> hand_place() const {
+    return [reader = hands_.front()->cycle().reader(), place = std::optional<Vec3>()]() mutable {
+      for (ServoTick record{}; reader.try_pop(record);) place = record.tick.hip;
+      return place;
+    };
+  }
+
   // To the method and the recorder.
   void give(std::size_t camera, const FedFrame& fed) {
     std::shared_ptr<const Cloud> painted =
@@ -619,13 +627,16 @@ class Session::Impl {
 
   void begin_free() {
     for (const auto& hand : hands_) hand->device().enable();
+    free_hand_ = hand_place();
     started_ = true;
   }
 
   void run_tick(std::int64_t number) {
     const double t = static_cast<double>(number) / options_.rate;
     free_t_ = t;
+    const std::optional<Vec3> place = free_hand_();
     for (std::size_t camera = 0; camera < played_.size(); ++camera) {
+      if (place) played_[camera].follow(*place);
       while (const auto frame = played_[camera].next_until(t)) take(camera, *frame);
     }
     for (const auto& hand : hands_) hand->run_at(t);
@@ -792,7 +803,8 @@ class Session::Impl {
   // held, and used with either.
   std::vector<std::unique_ptr<SessionHand>> hands_;
   std::atomic<double> free_t_{0.0};  // [s]
-  std::int64_t next_tick_ = 0;       // of `advance`
+  std::function<std::optional<Vec3>()> free_hand_;
+  std::int64_t next_tick_ = 0;  // of `advance`
   std::atomic<bool> started_{false};
   std::atomic<bool> stopped_{false};
 

@@ -98,6 +98,7 @@ class SourceWithMaterials final : public Source {
   }
   std::size_t skip(std::size_t count) override { return source_->skip(count); }
   void cancel() noexcept override { source_->cancel(); }
+  void follow(const Vec3& hand) override { source_->follow(hand); }
   [[nodiscard]] const SourceInfo& info() const override { return source_->info(); }
 
  private:

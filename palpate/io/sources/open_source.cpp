@@ -11,6 +11,7 @@
 #include "palpate/io/sources/point_file_source.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -48,12 +49,20 @@ std::size_t Source::skip(std::size_t /*count*/) {
 
 void Source::cancel() noexcept {}
 
+void Source::follow(const Vec3& /*hand*/) {}
+
+bool Source::place(const Eigen::Isometry3d& /*world_from_source*/, const std::string& /*uri*/) {
+  return false;
+}
+
 const Registry<SourceScheme>& standard_sources() {
   static const Registry<SourceScheme> schemes(
       "type of source", ":",
       {{"synthetic", "synthetic:SCENE, a simulated depth camera", open_synthetic},
        {"pcd", "pcd:FILE|DIR, point clouds of the Point Cloud Library", open_point_files},
        {"ply", "ply:FILE|DIR, point clouds and meshes", open_point_files},
+       {"map", "map:FILE, a mesh as PLY or STL, looked at where the hand is", open_map},
+       {"splat", "splat:FILE, Gaussians as PLY, looked at where the hand is", open_splat},
        {"tum", "tum:DIR, a recording of the TUM RGB-D layout", open_tum},
        {"depth", "depth:DIR|FILE.png, depth images as 16-bit PNG", open_depth},
        {"recording", "recording:BAG, a session of palpate's, or another bag of ROS",
@@ -63,10 +72,11 @@ const Registry<SourceScheme>& standard_sources() {
 
 std::string uri_of_file(const std::filesystem::path& file) {
   const std::string ending = lower_case(file.extension().string());
-  for (const auto& [known, scheme] :
+  for (auto [known, scheme] :
        {std::pair(".pcd", "pcd:"), std::pair(".ply", "ply:"), std::pair(".db3", "recording:"),
         std::pair(".mcap", "recording:"), std::pair(".bag", "recording:")}) {
     if (ending != known) continue;
+    if (ending == ".ply" && holds_splat(file)) scheme = "splat:";
     const std::string path = file.string();
     return scheme + path + (path.find('?') == std::string::npos ? "" : "?");
   }
@@ -135,6 +145,7 @@ class PosedSource final : public Source {
   }
   std::size_t skip(std::size_t count) override { return source_->skip(count); }
   void cancel() noexcept override { source_->cancel(); }
+  void follow(const Vec3& hand) override { source_->follow(hand); }
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
  private:
@@ -191,6 +202,7 @@ class PosedSource final : public Source {
 
 std::unique_ptr<Source> with_pose(std::unique_ptr<Source> source,
                                   const Eigen::Isometry3d& world_from_camera, std::string uri) {
+  if (source->place(world_from_camera, uri)) return source;
   return std::make_unique<PosedSource>(std::move(source), world_from_camera, std::move(uri));
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <fstream>
 
 #include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/point_file.hpp"
@@ -133,12 +134,13 @@ PlyHeader read_ply_header(Cursor& file) {
   file.fail("the header has no end_header line", cut_short);
 }
 
-// Asks for three properties as coordinates. False unless the element has each of the names once,
+// Asks for some properties as coordinates. False unless the element has each of the names once,
 // and not as a list.
-bool ask_for(const std::array<std::string_view, 3>& names, Element& element,
+template <std::size_t N>
+bool ask_for(const std::array<std::string_view, N>& names, Element& element,
              std::vector<Vec3>& into) {
-  std::array<Property*, 3> found{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
+  std::array<Property*, N> found{};
+  for (std::size_t axis = 0; axis < N; ++axis) {
     for (Property& property : element.properties) {
       if (property.name != names[axis]) continue;
       if (found[axis] != nullptr || property.length) return false;
@@ -146,9 +148,9 @@ bool ask_for(const std::array<std::string_view, 3>& names, Element& element,
     }
     if (found[axis] == nullptr) return false;
   }
-  for (int axis = 0; axis < 3; ++axis) {
+  for (std::size_t axis = 0; axis < N; ++axis) {
     found[axis]->into = &into;
-    found[axis]->axis = axis;
+    found[axis]->axis = static_cast<int>(axis);
   }
   return true;
 }
@@ -362,9 +364,14 @@ void read_element(Cursor& file, const Element& element, std::string_view encodin
   }
 }
 
-}  // namespace
+// Asks for all that makes points Gaussians. False unless the element has it.
+bool ask_for_splat(Element& element, SplatColumns& into) {
+  return ask_for<3>({"scale_0", "scale_1", "scale_2"}, element, into.log_scales) &&
+         ask_for<2>({"rot_0", "opacity"}, element, into.heads) &&
+         ask_for<3>({"rot_1", "rot_2", "rot_3"}, element, into.rotations);
+}
 
-PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
+PointFile parse(std::span<const std::byte> bytes, std::string_view name, bool as_splat) {
   Cursor file(bytes, name);
   PlyHeader header = read_ply_header(file);
   const auto is_vertex = [](const Element& element) { return element.name == "vertex"; };
@@ -378,11 +385,16 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
   std::vector<Vec3> viewpoints;
   for (Element& element : header.elements) {
     if (is_vertex(element)) {
-      if (!ask_for({"x", "y", "z"}, element, cloud.points))
+      if (!ask_for<3>({"x", "y", "z"}, element, cloud.points))
         file.fail("element vertex does not have one x, one y and one z that are no lists",
                   "give a file that holds points");
-      ask_for({"nx", "ny", "nz"}, element, cloud.normals);
-      ask_for_colours(element, cloud.colours);
+      if (as_splat && !ask_for_splat(element, cloud.splat.emplace()))
+        file.fail("its points have no opacity, scale_0 to scale_2 and rot_0 to rot_3",
+                  "give a splat; points and meshes are opened by ply: and map:");
+      if (!as_splat) {
+        ask_for<3>({"nx", "ny", "nz"}, element, cloud.normals);
+        ask_for_colours(element, cloud.colours);
+      }
       for (const Property& property : element.properties)
         cloud.fields.push_back(
             {std::string(property.name),
@@ -391,7 +403,7 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
       ask_for_corners(file, element);
       faces.strips = element.name == "tristrips";
     } else if (element.name == "camera") {
-      ask_for({"view_px", "view_py", "view_pz"}, element, viewpoints);
+      ask_for<3>({"view_px", "view_py", "view_pz"}, element, viewpoints);
     }
     read_element(file, element, header.encoding, faces);
   }
@@ -405,8 +417,43 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
   return cloud;
 }
 
+}  // namespace
+
+PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name) {
+  return parse(bytes, name, false);
+}
+
 PointFile read_ply(const std::filesystem::path& path) {
   return parse_ply(read_file(path, detail::largest_file), path.string());
+}
+
+PointFile parse_splat(std::span<const std::byte> bytes, std::string_view name) {
+  return parse(bytes, name, true);
+}
+
+PointFile read_splat(const std::filesystem::path& path) {
+  return parse_splat(read_file(path, detail::largest_file), path.string());
+}
+
+bool holds_splat(const std::filesystem::path& path) {
+  constexpr std::size_t longest_header = 16384;  // [B] that is looked at
+  std::string text(longest_header, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
+  const std::size_t end = text.find("end_header");
+  try {
+    if (end == std::string::npos) return false;
+    text.resize(text.find('\n', end));
+    Cursor cursor(std::as_bytes(std::span(text)), path.string());
+    SplatColumns columns;
+    PlyHeader header = read_ply_header(cursor);
+    return std::any_of(header.elements.begin(), header.elements.end(), [&](Element& element) {
+      return element.name == "vertex" && ask_for_splat(element, columns);
+    });
+  } catch (const Error&) {
+    return false;
+  }
 }
 
 }  // namespace palpate

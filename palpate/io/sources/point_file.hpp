@@ -22,6 +22,13 @@ struct PointField {
   std::size_t count = 1;  ///< how many values of that type a point has; 1 for a list
 };
 
+/// Of each Gaussian of a splat, as stored.
+struct SplatColumns {
+  std::vector<Vec3> log_scales;  ///< natural logarithms of the deviations along its axes
+  std::vector<Vec3> heads;       ///< w of its rotation, logit of its opacity, and 0
+  std::vector<Vec3> rotations;   ///< x, y, z of its rotation, a quaternion of any length
+};
+
 /// The content of a PCD or PLY file, in its own coordinates and unit (usually metres).
 struct PointFile {
   /// Every point in the order of the file; holes of an organised cloud stay, as NaN, so that the
@@ -43,9 +50,10 @@ struct PointFile {
   /// normals are turned towards it), though its viewer moves the points by it. Here too
   /// nothing is transformed, and the orientation is not used.
   std::optional<Vec3> viewpoint;
-  std::string encoding;            ///< as in the header, e.g. "binary_compressed"
-  std::vector<PointField> fields;  ///< of a point, in the order of the file
-  std::size_t non_finite = 0;      ///< how many points have a coordinate that is NaN or infinite
+  std::optional<SplatColumns> splat;  ///< of a splat that is read as one
+  std::string encoding;               ///< as in the header, e.g. "binary_compressed"
+  std::vector<PointField> fields;     ///< of a point, in the order of the file
+  std::size_t non_finite = 0;         ///< how many points have a coordinate that is NaN or infinite
   /// Bytes after the data that the header declares, not counting white space. They are not read:
   /// PCL pads binary files to a whole page.
   std::size_t bytes_unread = 0;
@@ -69,6 +77,14 @@ PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name);
 PointFile read_ply(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name);
+
+/// Reads a PLY whose points are Gaussians as 3D Gaussian splatting writes them: `opacity`,
+/// `scale_0` to `scale_2`, `rot_0` to `rot_3`, w first. Otherwise as read_ply.
+PointFile read_splat(const std::filesystem::path& path);
+/// The same for bytes in memory; `name` is what an error calls them.
+PointFile parse_splat(std::span<const std::byte> bytes, std::string_view name);
+/// Does the header of a PLY file declare Gaussians? False too of what cannot be read.
+bool holds_splat(const std::filesystem::path& path);
 
 /// Reads an STL file, binary or ascii, into `points` and `triangles`. Corners at the same place are
 /// one point. Normals and attributes are passed over.

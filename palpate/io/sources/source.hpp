@@ -45,7 +45,8 @@ struct SourceInfo {
   std::optional<double> frame_rate{};   ///< [Hz] nominal, or the median of the stamps
   double start_time = 0.0;              ///< [s] stamp 0 by the recording's own clock
   std::vector<std::string> notes{};     ///< remarks for the user, such as frames left out
-  std::string details{};                ///< of the frame read last: its file's encoding, fields
+  std::string assumed{};  ///< of unit and axes, where nothing says them; shown while it plays
+  std::string details{};  ///< of the frame read last: its file's encoding, fields
   /// True for a camera that captures now: frames come when the camera has them, and one that is not
   /// taken in time is lost. False for a recording or simulation, which waits for its reader.
   bool live = false;
@@ -84,6 +85,14 @@ class Source {
   /// thread; returns at once. A source that never waits need not override it.
   virtual void cancel() noexcept;
 
+  /// Where the hand is [m, world], for a source that looks where it goes; called before `next`.
+  virtual void follow(const Vec3& hand);
+
+  /// Puts what a source of its own frame shows elsewhere, where poses of a camera mean nothing.
+  /// @param uri  the source's from now on; empty: its own
+  /// @return false: it is none such, its frames have poses
+  virtual bool place(const Eigen::Isometry3d& world_from_source, const std::string& uri);
+
   [[nodiscard]] virtual const SourceInfo& info() const = 0;
 };
 
@@ -96,14 +105,15 @@ struct SourceScheme {
 };
 
 /// The library's own: `synthetic:SCENE?...`, `tum:DIR`, `depth:DIR`, `pcd:FILE|DIR`,
-/// `ply:FILE|DIR`, `recording:BAG`. To add to them, copy the registry.
+/// `ply:FILE|DIR`, `map:FILE`, `splat:FILE`, `recording:BAG`. To add to them, copy the registry.
 const Registry<SourceScheme>& standard_sources();
 
 /// The kind of camera that a recording's option `sensor` names; without it, `known`.
 /// @throws Error for another word.
 SensorKind sensor_option(const Uri& uri, SensorKind known);
 
-/// The URI of a single file by what its name ends with: .pcd, .ply, .db3, .mcap or .bag.
+/// The URI of a single file by what its name ends with: .pcd, .ply, .db3, .mcap or .bag; of a .ply
+/// also by whether it holds Gaussians.
 /// @throws Error for any other ending, saying what to do with such a file.
 std::string uri_of_file(const std::filesystem::path& file);
 
@@ -123,8 +133,9 @@ std::unique_ptr<Source> open_source(std::string_view uri,
 
 /// A source whose camera stands elsewhere than the source says: every frame's pose is replaced.
 ///
-/// Depth images get the pose as their world_from_camera; points and their viewpoint, which are in
-/// the world already, are moved by it. Copies each frame, on the camera's thread.
+/// A source that can `place` itself does. Of others, depth images get the pose as their
+/// world_from_camera; points and their viewpoint, which are in the world already, are moved by it.
+/// Copies each frame, on the camera's thread.
 /// @param world_from_camera  of the optical frame; of points, world_from_source
 /// @param uri  the source's, if it says this pose; empty: the source's own
 std::unique_ptr<Source> with_pose(std::unique_ptr<Source> source,

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/io/sources/virtual_camera.hpp"
+
+namespace palpate {
+
+/// One Gaussian of a splat.
+struct Gaussian {
+  Eigen::Vector3f mean;   ///< [m]
+  Eigen::Vector3f sigma;  ///< [m] along the axes of `turn`
+  Eigen::Quaternionf turn;
+  float opacity;  ///< [-] 0 to 1, at the mean
+};
+
+/// A splat: depth is where the opacity gathered along a ray passes one half.
+///
+/// Each Gaussian counts at the place of the ray where its own response is greatest, not at its
+/// centre; of those that lie within 3 mm of one another there, the mean by what they hide.
+class SplatBody final : public Body {
+ public:
+  /// Gaussians that are not finite or hide less than 5 % at their centre are left out.
+  /// @param name  for messages
+  /// @throws Error if none is left that hides half.
+  SplatBody(std::vector<Gaussian> gaussians, const std::string& name);
+
+  [[nodiscard]] std::size_t size() const { return gaussians_.size(); }
+  [[nodiscard]] const Box& bounds() const override { return tree_->bounds(); }
+  [[nodiscard]] Vec3 nearest(const Vec3& at) const override;
+  void draw(const View& view, std::span<float> depth) const override;
+
+ private:
+  std::vector<Gaussian> gaussians_;  // in the order of the tree
+  std::optional<BoxTree> tree_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "palpate/io/sources/source.hpp"
+#include "palpate/kernel/core/box_tree.hpp"
+
+namespace palpate {
+
+/// What a virtual camera looks at: a mesh, a splat. At rest, in a frame of its own [m]; immutable.
+class Body {
+ public:
+  /// A pinhole camera without distortion, and between which depths it sees.
+  struct View {
+    Eigen::Isometry3d body_from_camera;  ///< optical frame
+    Intrinsics intrinsics;
+    double nearest, farthest;  ///< [m] along the optical axis, > 0
+  };
+
+  virtual ~Body() = default;
+  [[nodiscard]] virtual const Box& bounds() const = 0;
+  /// The place of its surface that is nearest to `at`.
+  [[nodiscard]] virtual Vec3 nearest(const Vec3& at) const = 0;
+  /// Draws the depth [m, along the optical axis] that each pixel sees, row by row; infinite where
+  /// there is nothing. @param depth  of width * height
+  virtual void draw(const View& view, std::span<float> depth) const = 0;
+};
+
+/// The part of space that a view sees, in the body's frame.
+class SeenSpace {
+ public:
+  explicit SeenSpace(const Body::View& view);
+  /// May it hold part of a box? Also true of some boxes that it just misses.
+  [[nodiscard]] bool meets(const Box& box) const noexcept;
+
+ private:
+  std::array<Eigen::Vector4d, 6> planes_;  // (n, d): seen where n . place + d >= 0
+};
+
+/// The pixels whose rays (x, y, 1) have x and y within these bounds.
+ViewingRays::Window pixels_between(const Intrinsics& k, const Eigen::Array2d& low,
+                                   const Eigen::Array2d& high) noexcept;
+
+/// A depth camera that looks at a body where the hand is, from outside: a window of 96 x 96 pixels
+/// of 1 mm, seen from 0.25 m, in units of 10 um, without noise.
+///
+/// It looks against the direction in which the space about the hand is free. While the hand is
+/// pressed into what the window before showed, it stays in front of that surface. Its pose is kept
+/// until the place moves by more than 15 mm across the window or that direction turns by more than
+/// 20 degrees, as methods average over frames of one pose. What would hide the place is cut away.
+/// Windows depend on the places of the hand alone, so the same path gives the same frames.
+class VirtualCamera final : public Source {
+ public:
+  /// @param frame_rate  [Hz] > 0
+  VirtualCamera(std::unique_ptr<const Body> body, double frame_rate, SourceInfo info);
+
+  /// Frame k is stamped k / frame_rate. Before a hand is known, the body is seen from above.
+  std::optional<Frame> next(double timeout = no_timeout) override;
+  std::size_t skip(std::size_t count) override;
+  void follow(const Vec3& hand) override;
+  bool place(const Eigen::Isometry3d& world_from_body, const std::string& uri) override;
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+ private:
+  // A place of the surface, and the unit vector from there to where the camera is to be.
+  struct Aim {
+    Vec3 place, outward;
+    double free;  // [m] above the place, up to which nothing hides it
+  };
+  [[nodiscard]] std::optional<Aim> pressed();
+  [[nodiscard]] Aim aim();
+  [[nodiscard]] Aim aim_from(const Vec3& place, const Vec3& from) const;
+  [[nodiscard]] bool shows(const Aim& aim) const;
+  void look(const Aim& aim);
+
+  std::unique_ptr<const Body> body_;
+  SourceInfo info_;
+  std::shared_ptr<const ViewingRays> rays_;
+  double frame_rate_;
+  std::uint64_t next_frame_ = 0;
+  Eigen::Isometry3d world_from_body_ = Eigen::Isometry3d::Identity();
+  // All in the body's frame.
+  Vec3 hand_, hand_before_;
+  bool was_pressed_ = false;
+  bool is_hidden_ = false;
+  Body::View view_;
+  std::vector<float> depth_;  // as seen last; empty before
+};
+
+/// What a URI says of a body's files: `scale` of a unit [m], `up`, the axis which is the world's z.
+struct BodyOptions {
+  double scale;
+  Eigen::Matrix3d turn;  ///< world_from_file
+  double frame_rate;     ///< [Hz]
+  std::string assumed;   ///< as SourceInfo::assumed
+};
+
+/// Options scale=1m up=z fps=60Hz. @throws Error for others, or values out of range
+BodyOptions body_options(const Uri& uri);
+
+/// A virtual camera on a body, said to look at `what`, "a mesh of 12 triangles".
+std::unique_ptr<Source> open_body(const Uri& uri, const BodyOptions& options,
+                                  std::unique_ptr<const Body> body, const std::string& what);
+
+/// `map:FILE?scale=1m&up=z&fps=60Hz`: a mesh as PLY or STL.
+/// @throws Error if the file cannot be read or has no triangles, or an option is not known.
+std::unique_ptr<Source> open_map(const Uri& uri);
+/// `splat:FILE`, with the same options: Gaussians as PLY. @throws Error if it is no splat
+std::unique_ptr<Source> open_splat(const Uri& uri);
+
+}  // namespace palpate

@@ -26,7 +26,6 @@ double layer_gap(const SurfaceEstimate& surface) {
 constexpr std::size_t beam_points = 256;
 // Radius within which an occluder is looked for: that of the cells of SurfaceEstimate::judge [m].
 constexpr double shadow_radius = 15e-3;
-constexpr std::size_t wide_beam_points = 512;
 // A fit is used for contacts within this of its centre [m].
 constexpr double serves = 1.5e-3;
 // While the surface is hidden it cannot be fitted anew: the last fit is used this far from its
@@ -101,6 +100,11 @@ SightTracker::Event SightTracker::hold(double since) noexcept {
   return Event::hidden;
 }
 
+SightTracker::Event SightTracker::lose() noexcept {
+  note(Evidence::lost);
+  return Event::none;
+}
+
 SightTracker::Ring SightTracker::nothing_beside() noexcept {
   Ring ring;
   ring.fill(nothing);
@@ -138,6 +142,103 @@ bool SightTracker::others_show(const ObservedClouds& clouds, std::size_t camera,
   return false;
 }
 
+// Where the surface is expected after `elapsed` [s]: below the proxy, moved by its velocity.
+SightTracker::Expectation SightTracker::expect(const Vec3& proxy, double elapsed) const noexcept {
+  const LocalFrame& axes = surface_.frame();
+  const Vec3 hand = axes.local_from_world(proxy);
+  Expectation expected{
+      .rise = surface_.velocity() * std::min(elapsed, SurfaceEstimate::longest_gap),
+      .foot = surface_.surface().nearest(hand, hand.head<2>(), surface_.centre(),
+                                         holding() ? serves_while_held : 2.0 * serves),
+      .surface = surface_.surface(),
+      // After a hold the gate is narrow: the surface is where it was, and what remains of an
+      // occluder may be close to it.
+      .gate = holding() ? surface_.gate(gate_after_hold) : surface_.gate()};
+  // An unchanged centre lets frames be compared cell by cell.
+  if ((expected.foot - surface_.centre()).norm() < serves) expected.foot = surface_.centre();
+  expected.surface.c[0] += expected.rise;
+  expected.place = axes.world_from_local(
+      Vec3(expected.foot.x(), expected.foot.y(), expected.surface.height(expected.foot)));
+  return expected;
+}
+
+// What a frame measures along its lines of sight through the place where the surface is expected.
+void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expectation& expected,
+                              Sighting& sighting) noexcept {
+  const LocalFrame& axes = surface_.frame();
+  const Vec3& place = expected.place;
+  gather(cloud, Beam{place, shadow_radius * surface_.coarseness(), occluder_reach, axes.up},
+         wide_beam_points, patch_);
+  const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
+  if (viewpoint) surface_.set_distance(camera, (*viewpoint - place).norm());
+  sighting.is_camera = viewpoint.has_value();
+  sighting.line = viewpoint ? Vec3((*viewpoint - place).normalized()) : axes.up;
+  const SightCone inner({place, surface_.resolution(), occluder_reach, axes.up}, viewpoint);
+  const Eigen::Vector3f axis = inner.axis().cast<float>();
+  const auto radius = static_cast<float>(inner.radius_at(0.0));
+  const auto widening = static_cast<float>(inner.radius_at(1.0) - inner.radius_at(0.0));
+  const Eigen::Vector3f towards = sighting.line.cast<float>();
+  const FloatQuadric surface(expected.surface);
+  const std::size_t size = std::min(patch_.size(), wide_beam_points);
+  points_.take(patch_, axes);
+  std::array<float, wide_beam_points> above_surface;
+  std::array<float, wide_beam_points> off_axis;  // [m^2] squared distance, less the cone's radius
+  std::array<float, wide_beam_points> height;
+  for (std::size_t i = 0; i < size; ++i) {
+    const float x = patch_.x()[i];
+    const float y = patch_.y()[i];
+    const float z = patch_.z()[i];
+    const float along = x * axis.x() + y * axis.y() + z * axis.z();
+    const float r = std::max(radius + widening * along, 0.0F);
+    off_axis[i] = x * x + y * y + z * z - along * along - r * r;
+    height[i] = x * towards.x() + y * towards.y() + z * towards.z();
+    above_surface[i] = points_.z[i] - surface.height(points_.x[i], points_.y[i]);
+  }
+  std::size_t near = 0;
+  std::array<float, wide_beam_points + 1> near_above;
+  const auto gate = static_cast<float>(expected.gate);
+  for (std::size_t i = 0; i < size; ++i) {
+    const float above = above_surface[i];
+    sighting.before += above > gate ? 1 : 0;
+    const bool counts = (off_axis[i] <= 0.0F) & (above <= static_cast<float>(occluder_reach)) &
+                        (above >= static_cast<float>(-reach));
+    const bool is_near = counts & (std::abs(above) <= gate);
+    near_above[near] = above;
+    near += is_near ? 1 : 0;
+    sighting.heights[sighting.seen] = height[i];
+    sighting.seen += counts ? 1 : 0;
+  }
+  const auto all = static_cast<double>(sighting.seen);
+  const auto share = static_cast<double>(near);
+  sighting.near = share / patch_.share();
+  sighting.there = near >= SurfaceEstimate::least_points && share >= least_share_ * all;
+  // Of a surface that moved beyond the gate, the tail of the noise is still inside.
+  if (sighting.there && share < most_support * all) {
+    const float middle = kth_smallest(std::span(near_above.data(), near), near / 2);
+    sighting.there = std::abs(middle) <= 0.5F * gate;
+  }
+}
+
+// How much of the disc a camera sees. An occluder that moves in front of a resting contact first
+// hides a part of the disc: the border of the rest is not an edge of the surface. Points that
+// vanish without an occluder in front of them lie in a stereo camera's shadow beside one. A hand
+// that slid there itself has come beside what stood there before.
+void SightTracker::outline(View& view, const Sighting& sighting, const Vec2& foot,
+                           const Vec3& hip) const noexcept {
+  constexpr double usual = 0.75;           // [-] of the points
+  constexpr std::size_t least_before = 3;  // points
+  const Vec3& up = surface_.frame().up;
+  const Vec3 slid = hip - view.hip;
+  const double still = 0.5 * surface_.resolution();
+  const bool slides = (slid - slid.dot(up) * up).squaredNorm() > still * still;
+  if (slides) view.hip = hip;
+  const bool stays = foot == surface_.centre() && !slides;
+  if (!stays || sighting.near > view.near_usual) view.near_usual = sighting.near;
+  const bool covered = sighting.before >= least_before || sighting.near < usual * view.near_usual;
+  const bool arrived = stays && (holding() || view.outline != Outline::cut);
+  view.outline = !covered ? Outline::whole : arrived ? Outline::shadowed : Outline::cut;
+}
+
 SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_t camera,
                                         double stamp, double interval, const Vec3& hip,
                                         const Vec3& proxy, double hardest_strike) noexcept {
@@ -154,132 +255,44 @@ SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_
   const double elapsed = alone ? interval : stamp - surface_.stamp();
   // What was captured before the newest evidence says nothing about now.
   if (!alone && elapsed < 0.0 && elapsed >= -SurfaceEstimate::longest_gap) return Event::none;
-  // Where the surface is expected: below the proxy, moved by its velocity.
+  const Expectation expected = expect(proxy, elapsed);
+  Sighting sighting;
+  look_along(cloud, camera, expected, sighting);
   const LocalFrame& axes = surface_.frame();
-  const double expected = surface_.velocity() * std::min(elapsed, SurfaceEstimate::longest_gap);
-  const Vec3 hand = axes.local_from_world(proxy);
-  Vec2 foot = surface_.surface().nearest(hand, hand.head<2>(), surface_.centre(),
-                                         holding() ? serves_while_held : 2.0 * serves);
-  // An unchanged centre lets frames be compared cell by cell.
-  if ((foot - surface_.centre()).norm() < serves) foot = surface_.centre();
-  Quadric moved = surface_.surface();
-  moved.c[0] += expected;
-  const Vec3 place = axes.world_from_local(Vec3(foot.x(), foot.y(), moved.height(foot)));
-
-  gather(cloud, Beam{place, shadow_radius * surface_.coarseness(), occluder_reach, axes.up},
-         wide_beam_points, patch_);
-  const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
-  if (viewpoint) surface_.set_distance(camera, (*viewpoint - place).norm());
-  const Vec3 line = viewpoint ? Vec3((*viewpoint - place).normalized()) : axes.up;
-  const bool from_behind = line.dot(axes.up) < 0.0;
-  std::array<float, wide_beam_points> heights;
-  std::size_t seen = 0;
-  std::size_t near = 0;
-  std::size_t before = 0;  // points between the viewpoint and the surface
-  // After a hold the gate is narrow: the surface is where it was, and what remains of an occluder
-  // may be close to it.
-  const double wide = holding() ? surface_.gate(gate_after_hold) : surface_.gate();
-  const SightCone inner({place, surface_.resolution(), occluder_reach, axes.up}, viewpoint);
-  const Eigen::Vector3f axis = inner.axis().cast<float>();
-  const auto radius = static_cast<float>(inner.radius_at(0.0));
-  const auto widening = static_cast<float>(inner.radius_at(1.0) - inner.radius_at(0.0));
-  const Eigen::Vector3f towards = line.cast<float>();
-  const FloatQuadric expected_surface(moved);
-  const std::size_t size = std::min(patch_.size(), wide_beam_points);
-  const double share = patch_.share();
-  points_.take(patch_, axes);
-  std::array<float, wide_beam_points> above_surface;
-  std::array<float, wide_beam_points> off_axis;  // [m^2] squared distance, less the cone's radius
-  std::array<float, wide_beam_points> height;
-  for (std::size_t i = 0; i < size; ++i) {
-    const float x = patch_.x()[i];
-    const float y = patch_.y()[i];
-    const float z = patch_.z()[i];
-    const float along = x * axis.x() + y * axis.y() + z * axis.z();
-    const float r = std::max(radius + widening * along, 0.0F);
-    off_axis[i] = x * x + y * y + z * z - along * along - r * r;
-    height[i] = x * towards.x() + y * towards.y() + z * towards.z();
-    above_surface[i] = points_.z[i] - expected_surface.height(points_.x[i], points_.y[i]);
-  }
-  std::array<float, wide_beam_points + 1> near_above;
-  const auto gate = static_cast<float>(wide);
-  for (std::size_t i = 0; i < size; ++i) {
-    const float above = above_surface[i];
-    before += above > gate ? 1 : 0;
-    const bool counts = (off_axis[i] <= 0.0F) & (above <= static_cast<float>(occluder_reach)) &
-                        (above >= static_cast<float>(-reach));
-    const bool is_near = counts & (std::abs(above) <= gate);
-    near_above[near] = above;
-    near += is_near ? 1 : 0;
-    heights[seen] = height[i];
-    seen += counts ? 1 : 0;
-  }
-
-  bool there = near >= SurfaceEstimate::least_points &&
-               static_cast<double>(near) >= least_share_ * static_cast<double>(seen);
-  // Of a surface that moved beyond the gate, the tail of the noise is still inside.
-  if (there && static_cast<double>(near) < most_support * static_cast<double>(seen)) {
-    const float middle = kth_smallest(std::span(near_above.data(), near), near / 2);
-    there = std::abs(middle) <= 0.5F * gate;
-  }
   if (!alone) {
-    const Vec3 normal = axes.direction_in_world(moved.normal(foot));
-    const bool is_faced = viewpoint && line.dot(normal) > faces_at;
-    if (!(there && is_faced) && others_show(clouds, camera, place, normal, wide))
+    const Vec3 normal = axes.direction_in_world(expected.surface.normal(expected.foot));
+    const bool is_faced = sighting.is_camera && sighting.line.dot(normal) > faces_at;
+    if (!(sighting.there && is_faced) &&
+        others_show(clouds, camera, expected.place, normal, expected.gate))
       return Event::none;
   }
   const double previous_stamp = surface_.stamp();
   surface_.start_frame(camera, stamp, interval);
-  Event event = Event::followed;
+  const double towards = sighting.line.dot(axes.up);
   double jump = 0.0;  // [m] along up, from where it was expected
-  if (!there) {
+  if (!sighting.there) {
     const std::optional<Layer> layer =
-        first_layer(std::span(heights.data(), seen),
+        first_layer(std::span(sighting.heights.data(), sighting.seen),
                     std::max(layer_gap(surface_), surface_.spread()), least_share_);
-    if (from_behind && layer) {
-      // A surface touched from behind has left the gate: the proxy goes on over the points.
-      note(Evidence::lost);
-      return Event::none;
-    }
+    // A surface touched from behind has left the gate: the proxy goes on over the points.
+    if (towards < 0.0 && layer) return lose();
     if (!layer) return hold(previous_stamp);
-    jump = layer->height / std::max(line.dot(axes.up), 0.2);
-    const bool nearer = jump > 0.0;
-    if (nearer && (holding() || is_occluder(view.beside, look_beside(cloud, place), jump + expected,
-                                            jump, hardest_strike))) {
+    jump = layer->height / std::max(towards, 0.2);
+    if (jump > 0.0 && (holding() || is_occluder(view.beside, look_beside(cloud, expected.place),
+                                                jump + expected.rise, jump, hardest_strike)))
       return hold(previous_stamp);
-    }
-    event = Event::jumped;
   }
-  const bool resumed = holding();
-  surface_.shift(expected + jump);
-  if (resumed && event == Event::jumped) surface_.forget_frames();
-  // An occluder that moves in front of a resting contact first hides a part of the disc. The border
-  // of the rest is not an edge of the surface. Points that vanish without an occluder in front of
-  // them lie in a stereo camera's shadow beside one.
-  // A hand that slid there itself has come beside what stood there before.
-  const Vec3 slid = hip - view.hip;
-  const double still = 0.5 * surface_.resolution();
-  const bool slides = (slid - slid.dot(axes.up) * axes.up).squaredNorm() > still * still;
-  if (slides) view.hip = hip;
-  const bool stays = foot == surface_.centre() && !slides;
-  const double all_near = static_cast<double>(near) / share;
-  if (!stays || all_near > view.near_usual) view.near_usual = all_near;
-  const bool covered = before >= 3 || all_near < 0.75 * view.near_usual;
-  const bool arrived = stays && (resumed || view.outline != Outline::cut);
-  view.outline = !covered ? Outline::whole : arrived ? Outline::shadowed : Outline::cut;
-  const bool shadowed = view.outline == Outline::shadowed;
-  if (!surface_.add(cloud, foot, {wide, event == Event::jumped, shadowed})) {
-    surface_.shift(-expected - jump);
+  surface_.shift(expected.rise + jump);
+  if (holding() && !sighting.there) surface_.forget_frames();
+  outline(view, sighting, expected.foot, hip);
+  if (!surface_.add(cloud, expected.foot, {expected.gate, !sighting.there, is_shadowed(camera)})) {
+    surface_.shift(-expected.rise - jump);
     // What is seen behind it is not hidden by anything: the surface ends here, as over a hole.
-    if (jump < 0.0) {
-      note(Evidence::lost);
-      return Event::none;
-    }
-    return hold(previous_stamp);
+    return jump < 0.0 ? lose() : hold(previous_stamp);
   }
   note(Evidence::seen);
   view.beside = look_beside(cloud, surface_.place());
-  return event;
+  return sighting.there ? Event::followed : Event::jumped;
 }
 
 void SightTracker::watch(const ObservedClouds& clouds, const Vec3& proxy) noexcept {

@@ -110,7 +110,31 @@ class SightTracker {
     double near_usual = 0.0;  // points of the surface in the beam without an occluder
     Ring beside = nothing_beside();
   };
+  /// Where the surface is expected in a frame.
+  struct Expectation {
+    double rise;                // [m] since its last frame
+    Vec2 foot;                  // [m] local: below the proxy
+    Quadric surface;            // as it will lie there
+    double gate;                // [m]
+    Vec3 place = Vec3::Zero();  // [m] world: the foot
+  };
+  static constexpr std::size_t wide_beam_points = 512;
+  /// What is seen there.
+  struct Sighting {
+    bool there = false;                           // the surface
+    bool is_camera = false;                       // is the viewpoint known?
+    Vec3 line = Vec3::UnitZ();                    // [-] unit, towards it
+    std::size_t before = 0;                       // points between the viewpoint and the surface
+    double near = 0.0;                            // points of the surface, thinned or not
+    std::size_t seen = 0;                         // points in the beam
+    std::array<float, wide_beam_points> heights;  // [m] of those, along the line
+  };
   static Ring nothing_beside() noexcept;
+  [[nodiscard]] Expectation expect(const Vec3& proxy, double elapsed) const noexcept;
+  void look_along(const Cloud& cloud, std::size_t camera, const Expectation& expected,
+                  Sighting& sighting) noexcept;
+  void outline(View& view, const Sighting& sighting, const Vec2& foot,
+               const Vec3& hip) const noexcept;
 
   void start(const ObservedClouds& clouds, std::size_t camera, const Vec3& foot,
              const Vec3& up) noexcept;
@@ -118,6 +142,7 @@ class SightTracker {
   [[nodiscard]] bool others_show(const ObservedClouds& clouds, std::size_t camera,
                                  const Vec3& place, const Vec3& normal, double gate) noexcept;
   Event hold(double since) noexcept;
+  Event lose() noexcept;
   [[nodiscard]] bool is_shadowed(std::size_t camera) const noexcept {
     return views_[camera].outline == Outline::shadowed;
   }

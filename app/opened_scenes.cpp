@@ -42,7 +42,8 @@ bool is_within(const fs::path& file, const fs::path& folder) {
 
 std::string absolute_uri(std::string_view text) {
   const Uri uri(text);
-  const std::array<std::string_view, 5> of_files = {"tum", "depth", "pcd", "ply", "recording"};
+  const std::array<std::string_view, 7> of_files = {"tum", "depth", "pcd",      "ply",
+                                                    "map", "splat", "recording"};
   if (std::find(of_files.begin(), of_files.end(), uri.scheme()) == of_files.end()) return {};
   std::error_code error;
   const fs::path path = fs::absolute(uri.path(), error).lexically_normal();

@@ -138,7 +138,9 @@ TEST(Follow, IsWhatASessionTellsItsCamera) {
   Session session(std::move(options));
   std::size_t ticks = 0;
   session.run(3.5, [&](const ServoTick& tick) {
-    if (++ticks > 600) EXPECT_NEAR(tick.tick.force.norm(), 3.0, 0.15) << ticks;
+    if (++ticks > 600) {
+      EXPECT_NEAR(tick.tick.force.norm(), 3.0, 0.15) << ticks;
+    }
   });
   EXPECT_EQ(ticks, 3500U);
 }

@@ -18,7 +18,7 @@ namespace {
 constexpr int window_size = 96;           // [px] width and height
 constexpr double pixel_size = 1e-3;       // [m] at the surface
 constexpr double standoff = 0.25;         // [m] from the surface to the camera
-constexpr double last_depth = 0.6;        // [m] which fits into 16 bits
+constexpr double last_depth = 0.4;        // [m] far behind where a hand is before the next frame
 constexpr double first_depth = 1e-3;      // [m]
 constexpr double drawn_units = 1e5;       // [1/m] 10 um
 constexpr double most_across = 15e-3;     // [m] by which the place may leave the axis

@@ -5,7 +5,8 @@ program's. `scripts/figures/site.py COST_OF_TICKS`, after scripts/site; COST_OF_
 build with tests (tests/cost). For the browser: PALPATE_SITE_SPEED=1 web/browser/run site.
 
 Native and Node run in turn, and the ratios are medians of those of each turn: on a machine under
-other load these are valid. A tick is of `paper`; of `sight`, nearly all is what a frame costs.
+other load these are valid. Means over all ticks, the frames at 30 Hz included, which are most of
+what `sight` costs.
 """
 import gzip
 import pathlib

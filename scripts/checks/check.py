@@ -17,17 +17,18 @@ KNOWS = {
     "core": set(),
     "paper": {"core"},
     "sight": {"core", "paper", "cloud"},
+    "tool": {"core", "cloud", "sight"},
     "feel": {"core"},
-    "methods": {"core", "paper", "sight", "feel"},
+    "methods": {"core", "paper", "sight", "feel", "tool"},
     "cloud": {"core"},
     "fixtures": {"core"},
     "servo": {"core", "fixtures"},
     "teleop": {"core", "fixtures", "servo"},
     "bag": {"core"},
-    "sources": {"core", "cloud", "fixtures", "bag"},
+    "sources": {"core", "cloud", "fixtures", "bag", "tool"},
     "devices": {"core", "servo"},
     "drivers": {"core", "cloud", "servo", "bag", "sources", "devices"},
-    "record": {"core", "methods", "cloud", "fixtures", "servo", "bag", "sources"},
+    "record": {"core", "tool", "methods", "cloud", "fixtures", "servo", "bag", "sources"},
     "session": {"core", "methods", "cloud", "servo", "sources", "devices", "drivers", "bag",
                 "record"},
     "node": {"core", "methods", "servo", "bag", "drivers", "session"},
@@ -53,7 +54,7 @@ KNOWS["app/bench"] = KNOWS["app"] | {"app", "bench"}
 GROUPS = {"kernel", "io", "net"}
 
 # Methods are pure: neither threads nor clocks nor files, and no library but Eigen.
-PURE = {"core", "paper", "sight", "feel", "methods", "fixtures"}
+PURE = {"core", "paper", "sight", "feel", "methods", "fixtures", "tool"}
 # Between frame and force they call none of the mathematical library but what rounds exactly: its
 # results differ from machine to machine (core/mathematics.hpp).
 LIBM = re.compile(r"\bstd::(exp|exp2|expm1|log|log2|log10|log1p|pow|cbrt|hypot|sin|cos|tan|asin"

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/kernel/methods/methods.hpp"
 
+#include <string>
+#include <utility>
 #include <vector>
 
+#include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/feel/feel.hpp"
 #include "palpate/kernel/paper/paper.hpp"
 #include "palpate/kernel/sight/sight.hpp"
+#include "palpate/kernel/tool/shape_touch.hpp"
 
 namespace palpate {
 
@@ -41,7 +45,16 @@ const MethodRegistry& standard_methods() {
 }
 
 std::unique_ptr<Method> make_method(std::string_view name, const Parameters& parameters,
-                                    const MethodRegistry& methods) {
+                                    const MethodRegistry& methods,
+                                    std::shared_ptr<const ToolShape> tool) {
+  if (tool) {
+    static_cast<void>(methods.find(name));
+    if (name != default_method)
+      throw Error("method '" + std::string(name) + "'",
+                  "it touches with a ball, not with the tool '" + tool->text() + "'",
+                  "use the method 'sight', or the tool ball");
+    return std::make_unique<ShapeTouch>(std::move(tool), parameters);
+  }
   return std::make_unique<Feel>(methods.find(name).make(parameters), parameters);
 }
 

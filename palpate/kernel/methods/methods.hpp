@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "palpate/kernel/core/method.hpp"
+#include "palpate/kernel/tool/tool_shape.hpp"
 
 namespace palpate {
 
@@ -17,10 +18,12 @@ inline constexpr std::string_view default_method = "sight";
 const MethodRegistry& standard_methods();
 
 /// A method by its name, with what surfaces feel like around it (`Feel`).
-/// @throws Error for an unknown name, naming the nearest and listing all, or if the parameters do
-///         not validate.
+/// @param tool  what it touches with; null: a ball. Surfaces feel like nothing else to other tools.
+/// @throws Error for an unknown name, naming the nearest and listing all, if the parameters do not
+///         validate, or if the method cannot touch with the tool.
 std::unique_ptr<Method> make_method(std::string_view name = default_method,
                                     const Parameters& parameters = {},
-                                    const MethodRegistry& methods = standard_methods());
+                                    const MethodRegistry& methods = standard_methods(),
+                                    std::shared_ptr<const ToolShape> tool = nullptr);
 
 }  // namespace palpate

@@ -1,0 +1,477 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/kernel/tool/seen_surface.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "palpate/kernel/sight/monitor.hpp"
+#include "palpate/kernel/sight/surface_fit.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+// As sight's averaged points have them: docs/sight.md, 5.
+constexpr std::size_t most_frames = 64;  // of a level
+constexpr float most_relief = 128.0F;    // frames in a cell's mean
+constexpr float newest_weight = 0.25F;   // [-] of the newest deviation in a cell's drift
+constexpr float most_drift = 1.7F;       // [-] 4.5 standard deviations of that mean
+constexpr float drift_frames = 4.0F;     // that a drift is worth
+constexpr float outlier = 4.0F;          // [-] standard deviations
+// [intervals] over which small corrections of a cell are shown, [s] over which large ones are, and
+// [-] spreads that are large.
+constexpr double slow_intervals = 4.0;
+constexpr double quick = 10e-3;
+constexpr float large_spreads = 1.0F;
+constexpr int rows_of_tick = 8;          // of cells that take the newest frame in
+constexpr double longest_tick = 20e-3;   // [s] over more, nothing is smooth
+constexpr float most_growth = 1.1F;      // [-] of the spread in a frame
+constexpr float spread_weight = 0.2F;    // of the newest frame in it
+constexpr int most_across = 15;          // cells that measure the level, along either axis
+constexpr std::size_t least_cells = 8;   // that measure a level
+constexpr double nearest_camera = 1e-3;  // [m] from it to a place, along its axis
+constexpr double farthest_pixel = 1e6;   // [px] beyond any image
+constexpr int coarsest = 16;             // [px] of a cell
+constexpr double steepest = 2.75;        // [-] slope of 70 degrees: steeper is an edge
+constexpr float layer = 10e-3F;          // [m] pixels of one cell farther apart are of two surfaces
+constexpr int near_cells = 2;            // of a fit, on either side of the middle one
+constexpr int wide_cells = 4;            // the same of a wide fit
+constexpr int wide_step = 4;             // cells from one of those to the next
+// [-] scatter about a wide plane over a cell's noise: up to here noise explains it, and from there
+// on it is shape.
+constexpr double farthest_cell = 1.0;  // [m] from the place
+constexpr double trusted_scatter = 1.5;
+constexpr double refused_scatter = 3.0;
+// [m] and spreads below an edge: a place so deep is beside a body, not on its rim.
+constexpr double rim = 1.5e-3;
+constexpr double rim_spreads = 4.0;
+
+double ease(double x) noexcept {  // from 1 to 0 with slopes 0
+  x = std::clamp(x, 0.0, 1.0);
+  return 1.0 - x * x * (3.0 - 2.0 * x);
+}
+
+}  // namespace
+
+Vec3 SeenSurface::in_camera(const Vec3& place) const noexcept {
+  return pose_.linear().transpose() * (place - pose_.translation());
+}
+
+double SeenSurface::level(double t) const noexcept {
+  return level_ + moved_since(velocity_, t - stamp_, interval_);  // (6)
+}
+
+// The mean of a cell's pixels that are of its nearest layer; 0: nothing.
+float SeenSurface::read(int u, int v) const noexcept {
+  const Intrinsics& k = image_->intrinsics();
+  if (stride_ == 1) {
+    const bool is_inside = u >= 0 && v >= 0 && u < k.width && v < k.height;
+    return is_inside ? static_cast<float>(image_->depth_at(u, v)) : 0.0F;
+  }
+  const int first = stride_ / 4;
+  const int step = std::max(stride_ / 2, 1);
+  std::array<float, 4> depths{};
+  std::size_t size = 0;
+  float nearest = std::numeric_limits<float>::max();
+  for (int y = v * stride_ + first; y < (v + 1) * stride_; y += step) {
+    for (int x = u * stride_ + first; x < (u + 1) * stride_; x += step) {
+      if (x < 0 || y < 0 || x >= k.width || y >= k.height) continue;
+      const auto z = static_cast<float>(image_->depth_at(x, y));
+      if (z <= 0.0F) continue;
+      depths[size++] = z;
+      nearest = std::min(nearest, z);
+    }
+  }
+  float sum = 0.0F;
+  float of = 0.0F;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (depths[i] > nearest + layer) continue;
+    sum += depths[i];
+    of += 1.0F;
+  }
+  return size == 0 ? 0.0F : sum / of;
+}
+
+void SeenSurface::start_cell(int u, int v) noexcept {
+  Cells& all = cells_[0];
+  const std::size_t i = index(u, v);
+  const float z = read(u, v);
+  all.relief[i] = z > 0.0F ? z - newest_ : unknown;
+  all.smooth[i] = all.relief[i];
+  all.drift[i] = 0.0F;
+  all.frames[i] = z > 0.0F ? 1.0F : 0.0F;
+  all.seen[i] = stamp_;
+}
+
+// Keeps the cells about a tool; what they leave is forgotten.
+void SeenSurface::aim_at(const Aim& aim) noexcept {
+  const Intrinsics& k = image_->intrinsics();
+  const Vec3 p = in_camera(aim.place);
+  // The part of the tool that is nearest to the camera spans most pixels.
+  const double z = std::max(p.z(), nearest_camera);
+  const double near = std::max(p.z() - aim.radius, 0.5 * z);
+  const double across = 2.0 * aim.radius * std::max(k.fx, k.fy) / near;  // [px]
+  const bool fits = across <= side * stride_ && (stride_ == 1 || 3.0 * across > side * stride_);
+  const int from_stride = stride_;
+  if (!fits || frames_ == 0) {
+    stride_ = 1;
+    while (stride_ < coarsest && 1.2 * across > side * stride_) stride_ *= 2;
+  }
+  const auto pixel = [](double x) { return std::clamp(x, -farthest_pixel, farthest_pixel); };
+  double u = pixel(k.cx + k.fx * p.x() / z);
+  double v = pixel(k.cy + k.fy * p.y() / z);
+  if (k.distorted() && p.z() > nearest_camera) {
+    const ViewingRays::Window window = image_->rays().window(p, 0.5 * p.z() / k.fx);
+    if (!window.empty()) {
+      shift_u_ = 0.5 * (window.u_begin + window.u_end - 1) - u;
+      shift_v_ = 0.5 * (window.v_begin + window.v_end - 1) - v;
+    }
+    u += shift_u_;
+    v += shift_v_;
+  }
+  const int first_u = static_cast<int>(std::floor(u / stride_)) - side / 2;
+  const int first_v = static_cast<int>(std::floor(v / stride_)) - side / 2;
+  const bool all_new = frames_ == 0 || stride_ != from_stride;
+  if (!all_new && std::abs(first_u - u_) <= side / 16 && std::abs(first_v - v_) <= side / 16)
+    return;
+  const int from_u = u_;
+  const int from_v = v_;
+  u_ = first_u;
+  v_ = first_v;
+  for (int y = v_; y < v_ + side; ++y)
+    for (int x = u_; x < u_ + side; ++x)
+      if (all_new || x < from_u || y < from_v || x >= from_u + side || y >= from_v + side)
+        start_cell(x, y);
+}
+
+// The newest frame's level (5): the median of what cells are above their relief. False: too few.
+bool SeenSurface::find_level(const Aim& aim, const SightParameters& parameters) noexcept {
+  const Cells& all = cells_[0];
+  const Intrinsics& k = image_->intrinsics();
+  const Vec3 p = in_camera(aim.place);
+  const double pitch = std::max(p.z(), nearest_camera) * stride_ / k.fx;  // [m] of a cell
+  const int reach = std::clamp(static_cast<int>(aim.radius / pitch), 2, side / 2 - 1);
+  const int step = 1 + 2 * reach / most_across;
+  std::array<float, std::size_t{most_across + 1} * (most_across + 1)> values;
+  std::size_t size = 0;
+  for (int y = v_ + side / 2 - reach; y <= v_ + side / 2 + reach; y += step) {
+    for (int x = u_ + side / 2 - reach; x <= u_ + side / 2 + reach; x += step) {
+      const float relief = all.relief[index(x, y)];
+      const float z = read(x, y);
+      if (z > 0.0F && relief == relief && size < values.size()) values[size++] = z - relief;
+    }
+  }
+  if (size < least_cells) return false;
+  const std::span<float> near(values.data(), size);
+  const float level = kth_smallest(near, size / 2);
+  // What comes so much nearer at once is an occluder: it measures nothing.
+  if (level < static_cast<float>(this->level(stamp_) - farthest_strike) && frames_ > 1)
+    return false;
+  newest_ = level;
+  const float deviation = std::max(deviation_about<float>(newest_, near),
+                                   static_cast<float>(0.5 / image_->units_per_metre()));
+  spread_ = spread_ == 0.0F
+                ? deviation
+                : std::min(spread_ + spread_weight * (deviation - spread_), most_growth * spread_);
+  // How much one frame's level varies: by second differences, which no steady motion changes.
+  constexpr double memory = 0.05;  // [-] of the newest of them
+  if (frames_ >= 2) {
+    const double bend = newest_ - 2.0 * levels_[0].height + levels_[1].height;
+    const double usual =
+        parameters.usual_noise > 0.0 ? parameters.usual_noise : SightParameters::unknown_noise;
+    const double size_of = std::min(bend * bend / 6.0, p.squaredNorm() * usual * usual);
+    wobble_ = std::sqrt((1.0 - memory) * wobble_ * wobble_ + memory * size_of);
+  }
+  return true;
+}
+
+// Takes the newest reading [m], 0 for none, into a cell's relief (7).
+void SeenSurface::update(std::size_t i, float z, const SightParameters& parameters) noexcept {
+  Cells& all = cells_[0];
+  if (!(all.frames[i] > 0.0F)) {
+    if (z > 0.0F) {
+      all.relief[i] = all.smooth[i] = z - newest_;
+      all.frames[i] = 1.0F;
+      all.drift[i] = 0.0F;
+      all.seen[i] = stamp_;
+    }
+    return;
+  }
+  const float off = z - newest_ - all.relief[i];
+  if (z == 0.0F || off < static_cast<float>(-farthest_strike)) {  // hidden
+    if (stamp_ - all.seen[i] > parameters.hidden_hold + parameters.hidden_fade) {
+      all.relief[i] = all.smooth[i] = unknown;
+      all.frames[i] = 0.0F;
+    }
+    return;
+  }
+  all.seen[i] = stamp_;
+  const float counts = std::clamp(off, -outlier * spread_, outlier * spread_);
+  const float drift = all.drift[i] + newest_weight * (counts - all.drift[i]);
+  const bool drifts = std::abs(drift) > most_drift * spread_;
+  if (drifts && counts != off) {  // another surface
+    all.relief[i] = z - newest_;
+    all.frames[i] = 1.0F;
+  } else if (drifts) {
+    all.relief[i] += drift;
+    all.frames[i] = std::min(all.frames[i], drift_frames);
+  } else {
+    all.frames[i] = std::min(all.frames[i] + 1.0F, most_relief);
+    all.relief[i] += counts / all.frames[i];
+    all.drift[i] = drift;
+    return;
+  }
+  all.drift[i] = 0.0F;
+}
+
+// Takes further rows of the newest frame in: all at once would be felt as a late tick.
+void SeenSurface::read_rows(int rows, const SightParameters& parameters) noexcept {
+  for (; rows > 0 && rows_read_ < side; --rows, ++rows_read_) {
+    const int v = v_ + ((rows_read_ - v_) & (side - 1));  // each row of the memory once
+    for (int u = u_; u < u_ + side; ++u) update(index(u, v), read(u, v), parameters);
+  }
+}
+
+void SeenSurface::observe(const DepthImage& image, const Aim& aim, double stamp, double interval,
+                          const SightParameters& parameters) noexcept {
+  const bool goes_on = image_ != nullptr && frames_ > 0 && stamp > stamp_ &&
+                       pose_.matrix() == image.world_from_camera().matrix();
+  if (goes_on) read_rows(side, parameters);  // what is left of the frame before
+  if (!blend_due_) carried_ = level(t_) + offset(t_);
+  image_ = &image;
+  pose_ = image.world_from_camera();
+  stamp_ = stamp;
+  interval_ = interval;
+  if (!goes_on) {
+    frames_ = 0;
+    newest_ = static_cast<float>(in_camera(aim.place).z());
+    spread_ = 0.0F;
+    const double usual =
+        parameters.usual_noise > 0.0 ? parameters.usual_noise : SightParameters::unknown_noise;
+    // [-] of a reading's noise that is left in the median of many, which correlate.
+    constexpr double left = 0.2;
+    wobble_ = left * usual * newest_ * newest_;
+    aim_at(aim);
+    level_ = newest_;
+    velocity_ = 0.0;
+    blend_due_ = false;
+    blend_start_ = -std::numeric_limits<double>::infinity();
+    levels_[0] = {stamp, level_};
+    frames_ = 1;
+    rows_read_ = side;
+    spread_ = static_cast<float>(usual * newest_ * newest_);
+    return;
+  }
+  aim_at(aim);
+  blend_due_ = true;
+  if (find_level(aim, parameters)) {
+    std::copy_backward(levels_.begin(), levels_.begin() + most_frames - 1,
+                       levels_.begin() + most_frames);
+    levels_[0] = {stamp, double{newest_}};
+    frames_ = std::min(frames_ + 1, most_frames);
+    const double least = 0.1 / image.units_per_metre();  // [m] no level is known better
+    const HeightTrack track = track_height(std::span(levels_.data(), frames_),
+                                           std::max(wobble_, least), interval, parameters);
+    level_ = track.height;
+    velocity_ = track.velocity;
+  } else {
+    velocity_ = 0.0;
+  }
+  rows_read_ = 0;
+}
+
+void SeenSurface::start_tick(const Aim& aim, double t, const SightParameters& parameters) noexcept {
+  if (image_ == nullptr) return;
+  Cells& all = cells_[0];
+  aim_at(aim);
+  read_rows(rows_of_tick, parameters);
+  if (blend_due_) {  // (8): the level goes on from where it was
+    blend_due_ = false;
+    blend_start_ = t;
+    blend_time_ = parameters.blend * interval_;
+    offset_ = carried_ - level(t);
+  }
+  // (9): small corrections of the relief are followed slowly, large ones at once.
+  const double dt = std::clamp(t - t_, 0.0, longest_tick);
+  const auto slow = static_cast<float>(dt / (dt + slow_intervals * interval_));
+  const auto more = static_cast<float>(dt / (dt + quick)) - slow;
+  const float large = 1.0F / std::max(large_spreads * spread_, 1e-4F);
+  const auto now = static_cast<float>(level(t) + offset(t));
+  for (std::size_t i = 0; i < count; ++i) {
+    const float off = all.relief[i] - all.smooth[i];
+    const float size = std::abs(off) * large;
+    all.smooth[i] += (slow + more * (size < 1.0F ? size : 1.0F)) * off;
+    all.shown[i] = now + all.smooth[i];
+  }
+  t_ = t;
+}
+
+// [m] by which the level is shown otherwise, so that no frame makes it jump.
+double SeenSurface::offset(double t) const noexcept {
+  return ease((t - blend_start_) / std::max(blend_time_, 1e-9)) * offset_;
+}
+
+SeenSurface::View SeenSurface::view(const Eigen::Isometry3d& world_from_tool) const noexcept {
+  const Intrinsics& k = image_->intrinsics();
+  View view{};
+  const Eigen::Matrix3d turn = pose_.linear().transpose() * world_from_tool.linear();
+  const Vec3 shift = in_camera(world_from_tool.translation());
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      view.turn[static_cast<std::size_t>(3 * row + column)] = static_cast<float>(turn(row, column));
+    view.shift[static_cast<std::size_t>(row)] = static_cast<float>(shift[row]);
+  }
+  // The middle of a cell of s pixels is (s - 1) / 2 pixels behind its first.
+  const double middle = 0.5 * (stride_ - 1);
+  view.fu = static_cast<float>(k.fx / stride_);
+  view.fv = static_cast<float>(k.fy / stride_);
+  view.cu = static_cast<float>((k.cx + shift_u_ - middle) / stride_);
+  view.cv = static_cast<float>((k.cy + shift_v_ - middle) / stride_);
+  view.u = u_;
+  view.v = v_;
+  view.depth = cells_[0].shown.data();
+  return view;
+}
+
+double SeenSurface::noise() const noexcept {
+  return spread_ / std::sqrt(static_cast<double>(std::max<std::size_t>(frames_, 1)));
+}
+
+Vec3 SeenSurface::velocity(double t) const noexcept {
+  constexpr double dt = 1e-3;  // [s]
+  return (level(t) - level(t - dt)) / dt * pose_.linear().col(2);
+}
+
+std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place,
+                                                 double side_depth) const noexcept {
+  const Cells& all = cells_[0];
+  const Intrinsics& k = image_->intrinsics();
+  const Vec3 p = in_camera(place);
+  if (!(p.z() > nearest_camera)) return std::nullopt;
+  const double middle = 0.5 * (stride_ - 1);
+  const double x = (k.cx + shift_u_ + k.fx * p.x() / p.z() - middle) / stride_ - u_;
+  const double y = (k.cy + shift_v_ + k.fy * p.y() / p.z() - middle) / stride_ - v_;
+  if (!(x >= 0.0 && y >= 0.0 && x < side - 1 && y < side - 1)) return std::nullopt;
+  const int u = u_ + static_cast<int>(x);
+  const int v = v_ + static_cast<int>(y);
+  const double a = x - std::floor(x), b = y - std::floor(y);
+  // The four cells about it: are they of one surface?
+  const std::array<double, 4> corner{all.shown[index(u, v)], all.shown[index(u + 1, v)],
+                                     all.shown[index(u, v + 1)], all.shown[index(u + 1, v + 1)]};
+  double low = std::numeric_limits<double>::max(), high = 0.0;
+  std::size_t known = 0;
+  for (const double z : corner) {
+    if (!(z > 0.0)) continue;
+    low = std::min(low, z);
+    high = std::max(high, z);
+    ++known;
+  }
+  if (known == 0) return std::nullopt;
+  const double pitch = p.z() * stride_ / k.fx;  // [m] between cells
+  const double jump = steepest * pitch + rim_spreads * noise();
+  const std::size_t nearest = index(a < 0.5 ? u : u + 1, b < 0.5 ? v : v + 1);
+  Fit result{};
+  double from = known == 4 ? (1 - b) * ((1 - a) * corner[0] + a * corner[1]) +
+                                 b * ((1 - a) * corner[2] + a * corner[3])
+                           : double{all.shown[nearest]};
+  if (!(from > 0.0)) from = low;
+  Vec3 normal;
+  if (high - low > jump) {
+    if (known == 4 && p.z() > low + rim + rim_spreads * noise()) {
+      if (p.z() > low + side_depth) return std::nullopt;
+      // The side of a body: the ramp between its edge and what is behind.
+      const double along_u =
+          ((1 - b) * (corner[1] - corner[0]) + b * (corner[3] - corner[2])) / pitch;
+      const double along_v =
+          ((1 - a) * (corner[2] - corner[0]) + a * (corner[3] - corner[1])) / pitch;
+      const double steep = std::sqrt(1.0 + along_u * along_u + along_v * along_v);
+      normal = Vec3(along_u, along_v, -1.0) / steep;
+      result = {.gap = (from - p.z()) / steep, .normal = {}, .unseen = 0.0, .wall = true};
+      result.normal = pose_.linear() * normal;
+      result.unseen = unseen_since(all.seen[nearest]);
+      return result;
+    }
+    // On the layer of the nearest cell: a rim ends half a cell beyond its last one.
+    const double here = all.shown[nearest];
+    from = here > 0.0 ? here : low;
+  }
+  // The plane through the cells of that surface (10): through far ones, too, as far as noise alone
+  // explains their distances from it.
+  const auto plane = [&](int cells, int step) {
+    return plane_about({p, x, y, from, jump}, cells, step);
+  };
+  Plane near = plane(near_cells, 1);
+  if (near.cells == 0) return std::nullopt;
+  if (const Plane wide = plane(wide_cells, wide_step); wide.cells > near.cells / 2) {
+    const double scatter = wide.scatter / std::max(noise(), 0.3 / image_->units_per_metre());
+    const double share = ease((scatter - trusted_scatter) / (refused_scatter - trusted_scatter));
+    near.height += share * (wide.height - near.height);
+    near.slope += share * (wide.slope - near.slope);
+  }
+  normal = Vec3(near.slope.x(), near.slope.y(), -1.0).normalized();
+  return Fit{.gap = (p.z() - near.height) * normal.z(),
+             .normal = pose_.linear() * normal,
+             .unseen = unseen_since(near.newest),
+             .wall = false};
+}
+
+// The plane through the cells on a lattice, `step` apart, of so many on either side of the middle.
+SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells,
+                                            int step) const noexcept {
+  const Cells& all = cells_[0];
+  const Intrinsics& k = image_->intrinsics();
+  const int middle_u = u_ + static_cast<int>(middle.x + 0.5);
+  const int middle_v = v_ + static_cast<int>(middle.y + 0.5);
+  const int reach = cells * step;
+  // Half a pixel from the middle where a cell has an even number of them.
+  const double half = stride_ % 2 == 0 ? 0.5 : 0.0;
+  double sx = 0.0, sy = 0.0, sz = 0.0, xx = 0.0, xy = 0.0, yy = 0.0, xz = 0.0, yz = 0.0, zz = 0.0;
+  Plane plane;
+  for (int v = middle_v - reach; v <= middle_v + reach; v += step) {
+    for (int u = middle_u - reach; u <= middle_u + reach; u += step) {
+      if (u < u_ || v < v_ || u >= u_ + side || v >= v_ + side) continue;
+      const std::size_t i = index(u, v);
+      const double z = all.shown[i];
+      const double away = std::max(std::abs(u - u_ - middle.x), std::abs(v - v_ - middle.y));
+      if (!(std::abs(z - middle.from) <= middle.jump * std::max(away, 1.0))) continue;
+      const Eigen::Vector2d ray =
+          image_->rays().ray(std::clamp(u * stride_ + stride_ / 2, 0, k.width - 1),
+                             std::clamp(v * stride_ + stride_ / 2, 0, k.height - 1));
+      // Relative to the place: small numbers, whose squares lose nothing.
+      const double px = (ray.x() - half / k.fx) * z - middle.p.x();
+      const double py = (ray.y() - half / k.fy) * z - middle.p.y();
+      const double pz = z - middle.from;
+      if (!(std::abs(px) + std::abs(py) < farthest_cell)) continue;  // nor a pixel without a ray
+      sx += px;
+      sy += py;
+      sz += pz;
+      xx += px * px;
+      xy += px * py;
+      yy += py * py;
+      xz += px * pz;
+      yz += py * pz;
+      zz += pz * pz;
+      plane.newest = std::max(plane.newest, all.seen[i]);
+      ++plane.cells;
+    }
+  }
+  if (plane.cells == 0) return plane;
+  const auto of = static_cast<double>(plane.cells);
+  const double mx = sx / of, my = sy / of, mz = sz / of;
+  plane.height = middle.from + mz;
+  const double pitch = middle.p.z() * stride_ / k.fx;
+  // Cells on a line have no slope across it.
+  const double least = 1e-6 * of * pitch * pitch;
+  const double cxx = xx - sx * mx + least, cxy = xy - sx * my, cyy = yy - sy * my + least;
+  const double cxz = xz - sx * mz, cyz = yz - sy * mz;
+  const double determinant = cxx * cyy - cxy * cxy;
+  if (plane.cells < least_cells || !(determinant > 0.0)) return plane;
+  plane.slope = Eigen::Vector2d(cyy * cxz - cxy * cyz, cxx * cyz - cxy * cxz) / determinant;
+  plane.height -= plane.slope.x() * mx + plane.slope.y() * my;
+  const double left = zz - sz * mz - plane.slope.x() * cxz - plane.slope.y() * cyz;
+  plane.scatter = std::sqrt(std::max(left, 0.0) / of);
+  return plane;
+}
+
+}  // namespace palpate

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/sight/height_track.hpp"
+
+namespace palpate {
+
+/// What one camera sees about a tool, averaged over its frames and continuous in time: 64 x 64
+/// cells of one pixel or more, which move with the tool. docs/tools.md, equations (5) to (10).
+///
+/// A cell's depth is modelled as level + relief + noise, as sight's averaged points are: all cells
+/// share the level, which moves and is extrapolated between frames; the relief is a mean that
+/// begins again where new frames contradict it. What a frame corrects is spread over most of an
+/// interval, so no surface jumps past a tool. A cell that shows nothing, or something that comes
+/// nearer by more than a touched surface can, keeps what it showed for `hidden_hold` and
+/// `hidden_fade`.
+///
+/// [servo] Nothing here allocates, locks or throws after construction.
+class SeenSurface {
+ public:
+  /// The place of a tool.
+  struct Aim {
+    Vec3 place;     ///< [m] world: its origin
+    double radius;  ///< [m] about it, in which cells are wanted
+  };
+  /// The surface at one place in the image.
+  struct Fit {
+    double gap;     ///< [m] from the place to the surface along its normal; negative: behind
+    Vec3 normal;    ///< [-] unit, world, towards the free side
+    double unseen;  ///< [s] since its cells were seen last
+    bool wall;      ///< the side of a body of which the camera sees the edge alone
+  };
+
+  SeenSurface() : cells_(1) {}
+
+  /// A new frame. @param stamp, interval  [s] of it, and until the next
+  void observe(const DepthImage& image, const Aim& aim, double stamp, double interval,
+               const SightParameters& parameters) noexcept;
+  void forget() noexcept { image_ = nullptr; }
+  /// Moves the cells with the tool, and their depths on to time `t` [s].
+  void start_tick(const Aim& aim, double t, const SightParameters& parameters) noexcept;
+  [[nodiscard]] bool active() const noexcept { return image_ != nullptr; }
+
+  /// The part of a tick that is done for each point, without calls.
+  struct View {
+    std::array<float, 9> turn;  ///< camera_from_tool, row by row
+    std::array<float, 3> shift;
+    float fu, fv, cu, cv;  ///< cells by slope
+    int u, v;              ///< the first cell
+    const float* depth;    ///< [m] of cells, by `index`; NaN: unknown
+  };
+  [[nodiscard]] View view(const Eigen::Isometry3d& world_from_tool) const noexcept;
+  /// [m] along the optical axis from a point of the tool to the surface; NaN: nothing is known.
+  [[nodiscard]] static float gap(const View& view, float x, float y, float z) noexcept;
+
+  /// The surface about the cell that a place [m, world] is before or behind.
+  /// @param side_depth  [m] how deep the sides of bodies are
+  [[nodiscard]] std::optional<Fit> fit(const Vec3& place, double side_depth) const noexcept;
+  /// [m] standard deviation of a cell's average.
+  [[nodiscard]] double noise() const noexcept;
+  /// [m/s] world: how the surface moves.
+  [[nodiscard]] Vec3 velocity(double t) const noexcept;
+  /// [-] world, towards the camera from a place.
+  [[nodiscard]] Vec3 line(const Vec3& place) const noexcept {
+    return (image_->world_from_camera().translation() - place).normalized();
+  }
+
+  static constexpr int side = 64;  // cells along the window, a power of two
+
+ private:
+  static constexpr std::size_t count = std::size_t{side} * side;
+  struct Cells {
+    std::array<float, count> shown;   // [m] depth now
+    std::array<float, count> relief;  // [m] above the level; NaN: unknown
+    std::array<float, count> drift;   // [m] mean of the newest deviations from it
+    std::array<float, count> frames;  // [-] in the relief
+    std::array<float, count> smooth;  // [m] the relief as it is shown
+    std::array<double, count> seen;   // [s] stamp of the newest frame that showed it
+  };
+
+  /// Where a plane is fitted.
+  struct Middle {
+    Vec3 p;       // [m] the place, in the camera's axes
+    double x, y;  // [cells] in the window
+    double from;  // [m] depth of the surface there, about
+    double jump;  // [m] cells that differ by more are of another surface
+  };
+  struct Plane {
+    double height = 0.0;                              // [m] depth at the place
+    Eigen::Vector2d slope = Eigen::Vector2d::Zero();  // [-]
+    double scatter = 0.0;                             // [m] of the cells about it
+    double newest = 0.0;                              // [s] stamp of the newest of them
+    std::size_t cells = 0;
+  };
+  [[nodiscard]] Plane plane_about(const Middle& middle, int cells, int step) const noexcept;
+
+  static std::size_t index(int u, int v) noexcept {
+    return static_cast<std::size_t>((v & (side - 1)) * side + (u & (side - 1)));
+  }
+  void aim_at(const Aim& aim) noexcept;
+  void start_cell(int u, int v) noexcept;
+  [[nodiscard]] float read(int u, int v) const noexcept;
+  bool find_level(const Aim& aim, const SightParameters& parameters) noexcept;
+  void update(std::size_t i, float z, const SightParameters& parameters) noexcept;
+  void read_rows(int rows, const SightParameters& parameters) noexcept;
+  [[nodiscard]] Vec3 in_camera(const Vec3& place) const noexcept;
+  [[nodiscard]] double level(double t) const noexcept;
+  [[nodiscard]] double offset(double t) const noexcept;
+  [[nodiscard]] double unseen_since(double stamp) const noexcept {
+    return stamp < stamp_ - 1.5 * interval_ ? t_ - stamp : 0.0;  // one reading may be missing
+  }
+
+  std::vector<Cells> cells_;  // one, on the heap
+  const DepthImage* image_ = nullptr;
+  Eigen::Isometry3d pose_ = Eigen::Isometry3d::Identity();
+  int stride_ = 1;                                   // [px] of a cell
+  int u_ = 0, v_ = 0;                                // the first cell
+  double shift_u_ = 0.0, shift_v_ = 0.0;             // [px] of a distorted lens, here
+  double stamp_ = 0.0, interval_ = 0.0;              // [s]
+  std::array<HeightSample, most_heights> levels_{};  // the newest first
+  std::size_t frames_ = 0;
+  int rows_read_ = side;   // of the newest frame
+  float newest_ = 0.0F;    // [m] level of the newest frame
+  float spread_ = 0.0F;    // [m] of cells about level and relief
+  double wobble_ = 0.0;    // [m] standard deviation of one frame's level
+  double level_ = 0.0;     // [m] as estimated
+  double velocity_ = 0.0;  // [m/s] of it
+  // The blend from before the newest frame: it begins with the first tick after it.
+  bool blend_due_ = false;
+  double carried_ = 0.0;     // [m] the level shown before
+  double offset_ = 0.0;      // [m] of the level, at the blend's start
+  double blend_time_ = 0.0;  // [s]
+  double blend_start_ = -std::numeric_limits<double>::infinity();
+  double t_ = -std::numeric_limits<double>::infinity();  // [s] of the last tick
+};
+
+inline float SeenSurface::gap(const View& view, float x, float y, float z) noexcept {
+  constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
+  const std::array<float, 9>& r = view.turn;
+  const float depth = r[6] * x + r[7] * y + r[8] * z + view.shift[2];
+  const float inverse = 1.0F / depth;
+  const float u = view.cu + view.fu * ((r[0] * x + r[1] * y + r[2] * z + view.shift[0]) * inverse);
+  const float v = view.cv + view.fv * ((r[3] * x + r[4] * y + r[5] * z + view.shift[1]) * inverse);
+  // Written so that a NaN is outside. The window's last row and column have no next one.
+  const float inside_u = u - static_cast<float>(view.u);
+  const float inside_v = v - static_cast<float>(view.v);
+  if (!(depth > 0.0F && inside_u >= 0.0F && inside_v >= 0.0F && inside_u < side - 1 &&
+        inside_v < side - 1))
+    return nowhere;
+  const int a = static_cast<int>(inside_u);
+  const int b = static_cast<int>(inside_v);
+  const float p = inside_u - static_cast<float>(a);
+  const float q = inside_v - static_cast<float>(b);
+  const int left = (view.u + a) & (side - 1);
+  const int right = (view.u + a + 1) & (side - 1);
+  const float* upper = view.depth + ((view.v + b) & (side - 1)) * side;
+  const float* lower = view.depth + ((view.v + b + 1) & (side - 1)) * side;
+  const float above = upper[left] + p * (upper[right] - upper[left]);
+  const float below = lower[left] + p * (lower[right] - lower[left]);
+  const float surface = above + q * (below - above);
+  if (surface == surface) return surface - depth;
+  return (q < 0.5F ? upper : lower)[p < 0.5F ? left : right] - depth;  // beside a hole
+}
+
+}  // namespace palpate

@@ -1,0 +1,415 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "palpate/kernel/tool/shape_touch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/mathematics.hpp"
+
+namespace palpate {
+namespace {
+
+// [m] that a tool's points move in a step at most, so that a surface is straight over it; and at
+// least, where they would cross an edge.
+constexpr double longest_step = 3e-3;
+constexpr double shortest_step = 1e-4;
+// [m] Contacts are looked for so far before a surface: more than a step.
+constexpr double margin = 4e-3;
+// [m] A point deeper than that behind a surface, and never seen in front of it, is behind another
+// body, not in this one.
+constexpr double deepest = 10e-3;
+// [points/tick] over which a tick's steps are taken: 100 us at 10 ns.
+constexpr std::size_t scanned = 10'000;
+// Points of the coarse level that looks whether a hand is in free space.
+constexpr std::size_t coarse = 256;
+constexpr std::size_t most_moves = 4;  // of a tick
+constexpr double at_rest = 2e-6;       // [m] a shorter step is none
+constexpr double same_plane = 0.5e-3;  // [m] of a point in a tick before a plane is fitted anew
+constexpr double lost = 0.3;           // [m] between hand and proxy: no contact is so far away
+constexpr double spin_time = 2e-3;     // [s] over which a spin is smoothed, as HandVelocity is
+constexpr double longest_gap = 20e-3;  // [s] over more, differences are no velocity
+constexpr double free_gap = 0.5e-3;    // [m] beside the noise, that a free tool is in front
+constexpr double facing =
+    0.5;  // [-] cosine between outward normal and the surface's: more is its far side
+
+double ease(double x) noexcept {  // from 1 to 0 with slopes 0
+  x = std::clamp(x, 0.0, 1.0);
+  return 1.0 - x * x * (3.0 - 2.0 * x);
+}
+
+// Quaternions in one order of operations on every processor: Eigen's is that of its vectors.
+Rotation unit(const Rotation& q) noexcept {
+  const double length = std::sqrt(q.x() * q.x() + q.y() * q.y() + q.z() * q.z() + q.w() * q.w());
+  return {q.w() / length, q.x() / length, q.y() / length, q.z() / length};
+}
+
+Rotation product(const Rotation& a, const Rotation& b) noexcept {
+  return {a.w() * b.w() - a.x() * b.x() - a.y() * b.y() - a.z() * b.z(),
+          a.w() * b.x() + a.x() * b.w() + a.y() * b.z() - a.z() * b.y(),
+          a.w() * b.y() + a.y() * b.w() + a.z() * b.x() - a.x() * b.z(),
+          a.w() * b.z() + a.z() * b.w() + a.x() * b.y() - a.y() * b.x()};
+}
+
+// The rotation from b to a.
+Rotation between(const Rotation& a, const Rotation& b) noexcept {
+  return product(a, Rotation(b.w(), -b.x(), -b.y(), -b.z()));
+}
+
+}  // namespace
+
+Vec3 rotation_vector(const Rotation& turn) noexcept {
+  const double sign = turn.w() < 0.0 ? -1.0 : 1.0;
+  const Vec3 v = sign * turn.vec();
+  const double sine = v.norm();
+  if (sine < 1e-9) return 2.0 * v;
+  // Half the angle from its sine and cosine: that of the smaller is exact.
+  const double w = std::min(sign * turn.w(), 1.0);
+  const double half = math::acos(w);
+  if (sine > 0.1) return 2.0 * half / sine * v;
+  const double s2 = sine * sine;  // arcsin by its series, as cosines near 1 say little
+  return 2.0 * (1.0 + s2 * (1.0 / 6 + s2 * (3.0 / 40 + s2 * (15.0 / 336)))) * v;
+}
+
+Rotation rotation_by(const Vec3& vector) noexcept {
+  const double angle = vector.norm();
+  const double half = 0.5 * angle;
+  const double share = angle > 1e-9 ? math::sin(half) / angle : 0.5;
+  return unit({math::cos(half), share * vector.x(), share * vector.y(), share * vector.z()});
+}
+
+ShapeTouch::ShapeTouch(std::shared_ptr<const ToolShape> shape, const Parameters& parameters)
+    : shape_(std::move(shape)), parameters_(parameters), stride_(longest_step) {
+  validate(parameters);
+  const auto& points = shape_->points();
+  for (const ToolShape::Point& point : points) {
+    x_.push_back(static_cast<float>(point.at.x()));
+    y_.push_back(static_cast<float>(point.at.y()));
+    z_.push_back(static_cast<float>(point.at.z()));
+    patch_.push_back(static_cast<std::uint8_t>(point.patch));
+  }
+  behind_.assign(points.size(), 0);
+  behind_now_.assign(points.size(), 0);
+}
+
+void ShapeTouch::check(const Cloud& cloud) const {
+  for (const Cloud* part : cloud.parts()) check(*part);
+  if (cloud.parts().empty() && cloud.image() == nullptr)
+    throw Error("tool '" + shape_->text() + "'",
+                "points without an image cannot be touched with it",
+                "use a depth camera or a depth recording, or the tool ball");
+}
+
+Eigen::Isometry3d ShapeTouch::isometry(const Pose& pose) const noexcept {
+  Eigen::Isometry3d isometry = Eigen::Isometry3d::Identity();
+  isometry.linear() = pose.turn.toRotationMatrix();
+  isometry.translation() = pose.at;
+  return isometry;
+}
+
+void ShapeTouch::seat(const Vec3& proxy) noexcept {
+  if (!is_place(proxy)) return;
+  release({proxy, pose_.turn});
+  hand_velocity_.reset();
+}
+
+// Nothing is felt until the tool is free.
+void ShapeTouch::release(const Pose& hand) noexcept {
+  placed_ = true;
+  pose_ = kept_ = hand;
+  loose_ = true;
+  touching_ = false;
+  stride_ = longest_step;
+  held_ = {};
+  contact_count_ = 0;
+}
+
+void ShapeTouch::observe(const Observation& seen) noexcept {
+  if (seen.camera >= Patch::max_views) return;
+  frame_.take(seen, 1.0 / parameters_.motion.frame_rate);
+  timing_.frame(frame_.stamp(),
+                frame_.in_order() && frame_.count() > 1 ? frame_.camera_interval() : 0.0);
+  fresh_ = true;
+  if (seen.camera >= most_cameras) return;
+  SeenSurface& surface = seen_[seen.camera];
+  const DepthImage* image = seen.cloud.image();
+  if (image == nullptr) {
+    surface.forget();
+    return;
+  }
+  const double interval =
+      frame_.in_order() ? frame_.camera_interval() : 1.0 / parameters_.motion.frame_rate;
+  surface.observe(*image, {pose_.at, shape_->reach() + deepest}, frame_.camera_stamp(), interval,
+                  parameters_.sight);
+}
+
+// Looks where the tool's points are at a pose: (4), one transform, projection and look-up a point.
+void ShapeTouch::scan(const Pose& pose, std::size_t points, Scan& scan,
+                      std::uint8_t* behind) const noexcept {
+  constexpr float infinite = std::numeric_limits<float>::infinity();
+  scan.inside = scan.crossed = scan.known = 0;
+  scan.least = infinite;
+  scan.gap.fill(infinite);
+  const Eigen::Isometry3d world_from_tool = isometry(pose);
+  std::array<SeenSurface::View, most_cameras> views{};
+  std::array<std::uint8_t, most_cameras> camera{};
+  std::size_t cameras = 0;
+  float noise = 0.0F;
+  for (std::size_t i = 0; i < most_cameras; ++i) {
+    if (!seen_[i].active()) continue;
+    views[cameras] = seen_[i].view(world_from_tool);
+    camera[cameras++] = static_cast<std::uint8_t>(i);
+    noise = std::max(noise, static_cast<float>(seen_[i].noise()));
+  }
+  const auto side_depth = static_cast<float>(parameters_.sight.side_depth);
+  const float inside = -static_cast<float>(free_gap) - 2.0F * noise;
+  constexpr auto too_deep = static_cast<float>(-deepest);
+  constexpr auto near = static_cast<float>(2.0 * margin);
+  for (std::size_t i = 0; i < points; ++i) {
+    // The camera that shows most free space is right: others are hidden from it.
+    float gap = -infinite;
+    std::size_t of = 0;
+    for (std::size_t k = 0; k < cameras; ++k) {
+      const float one = SeenSurface::gap(views[k], x_[i], y_[i], z_[i]);
+      if (one > gap) {
+        gap = one;
+        of = k;
+      }
+    }
+    std::uint8_t is_behind = 0;
+    if (gap > -infinite) {
+      ++scan.known;
+      scan.least = std::min(scan.least, gap);
+      if (gap < inside && gap > -side_depth) ++scan.inside;
+      if (gap < too_deep) {
+        is_behind = 1;
+        if (gap > -side_depth && behind_[i] == 0) ++scan.crossed;
+      } else if (gap < near || behind_[i] != 0) {
+        // Behind until it has been in front again.
+        if (behind_[i] != 0 && gap < 0.0F) {
+          is_behind = 1;
+        } else if (gap < scan.gap[patch_[i]]) {
+          scan.gap[patch_[i]] = gap;
+          scan.point[patch_[i]] = static_cast<std::uint32_t>(i);
+          scan.camera[patch_[i]] = camera[of];
+        }
+      }
+    }
+    if (behind != nullptr) behind[i] = is_behind;
+  }
+}
+
+void ShapeTouch::find_contacts(const Scan& scan) noexcept {
+  contact_count_ = 0;
+  for (std::size_t i = 0; i < most_contacts; ++i) {
+    if (!(scan.gap[i] < static_cast<float>(2.0 * margin))) continue;
+    const ToolShape::Point& point = shape_->points()[scan.point[i]];
+    const Vec3 lever = pose_.turn * point.at;
+    const Vec3 place = pose_.at + lever;
+    Plane& plane = planes_[i];
+    if (plane.tick != ticks_ || plane.point != scan.point[i] ||
+        (place - plane.place).squaredNorm() > same_plane * same_plane) {
+      plane = {ticks_, scan.point[i], place,
+               seen_[scan.camera[i]].fit(place, parameters_.sight.side_depth)};
+    }
+    std::optional<SeenSurface::Fit> fit = plane.fit;
+    if (fit) fit->gap += fit->normal.dot(place - plane.place);
+    if (!fit || fit->gap > margin || !(fit->gap > -2.0 * deepest)) continue;
+    if ((pose_.turn * point.inward).dot(fit->normal) < -facing) continue;
+    contacts_[contact_count_++] = {lever, *fit, scan.camera[i]};
+  }
+}
+
+// One step of the proxy: the motion nearest to the one to the hand that keeps all contacts open.
+void ShapeTouch::step(const Pose& hand) noexcept {
+  const double length = shape_->turn_length();  // (2)
+  std::array<MotionLimit, most_contacts> limits;
+  for (std::size_t i = 0; i < contact_count_; ++i) {
+    const Contact& contact = contacts_[i];
+    limits[i].direction << contact.fit.normal, contact.lever.cross(contact.fit.normal) / length;
+    limits[i].least = -contact.fit.gap;
+  }
+  const Vec3 turn = rotation_vector(between(hand.turn, pose_.turn));
+  Motion6 motion;
+  motion << hand.at - pose_.at, length * turn;
+  const double farthest = (hand.at - pose_.at).norm() + shape_->reach() * turn.norm();
+  if (farthest > stride_) motion *= stride_ / farthest;
+  held_ = least_motion(std::span(limits.data(), contact_count_), motion);  // (3)
+  pose_.at += motion.head<3>();
+  pose_.turn = unit(product(rotation_by(motion.tail<3>() / length), pose_.turn));
+}
+
+// [m] How far a point of the tool moves at most from the proxy to the hand.
+double ShapeTouch::way_to(const Pose& hand) const noexcept {
+  return (hand.at - pose_.at).norm() +
+         2.0 * shape_->reach() * between(hand.turn, pose_.turn).vec().norm();
+}
+
+// May a proxy without contacts go to the hand at once? Not into a surface that it has not reached.
+bool ShapeTouch::can_follow(const Pose& hand) const noexcept {
+  if (stride_ < longest_step) return false;
+  if (way_to(hand) <= stride_) return true;
+  Scan found;
+  scan(hand, x_.size(), found, nullptr);
+  return found.inside == 0;
+}
+
+// Moves the proxy towards the hand until it rests. True if it touches.
+bool ShapeTouch::move(const Pose& hand) noexcept {
+  const std::size_t points = x_.size();
+  const std::size_t most = std::clamp<std::size_t>(scanned / points, 1, most_moves);
+  Scan found;
+  if (touching_) {
+    // A hand in free space pulls its proxy out of whatever it is caught behind.
+    scan(hand, std::min(coarse, points), found, nullptr);
+    double noise = 0.0;
+    for (const SeenSurface& each : seen_)
+      if (each.active()) noise = std::max(noise, each.noise());
+    if (2 * found.known > std::min(coarse, points) && found.least > free_gap + 4.0 * noise) {
+      pose_ = kept_ = hand;
+      held_ = {};
+      contact_count_ = 0;
+      return false;
+    }
+  }
+  for (std::size_t i = 0; i < most; ++i) {
+    scan(pose_, points, found, behind_now_.data());
+    ++steps_;
+    if (found.crossed > 0 && !fresh_ && stride_ > shortest_step) {
+      // The step went through the side of a body: shorter steps meet it.
+      pose_ = kept_;
+      stride_ = std::max(0.25 * stride_, shortest_step);
+      scan(pose_, points, found, behind_now_.data());
+    } else if (found.crossed == 0) {
+      stride_ = std::min(2.0 * stride_, longest_step);
+    }
+    fresh_ = false;
+    kept_ = pose_;
+    behind_.swap(behind_now_);
+    find_contacts(found);
+    if (contact_count_ == 0 && can_follow(hand)) {
+      pose_ = hand;
+      held_ = {};
+      return false;
+    }
+    step(hand);
+    if (way_to(kept_) < at_rest) break;
+  }
+  return held_.count > 0;
+}
+
+// [-] of a force that is left where its contacts are hidden, or frames do not come.
+double ShapeTouch::known_share(double t) const noexcept {
+  const SightParameters& sight = parameters_.sight;
+  double pushes = 0.0, known = 0.0;
+  for (std::size_t i = 0; i < held_.count; ++i) {
+    const Contact& contact = contacts_[held_.limit[i]];
+    pushes += held_.push[i];
+    known += held_.push[i] * ease((contact.fit.unseen - sight.hidden_hold) / sight.hidden_fade);
+  }
+  double share = pushes > 0.0 ? known / pushes : 1.0;
+  // As sight has it: a single frame is a scan, not a stream that stopped.
+  const double fade = std::max(parameters_.motion.max_extrapolation, 1e-3);
+  const double late = std::max(fade, 2.5 * timing_.interval());
+  if (frame_.count() > 1) share *= ease((timing_.age(t) - late) / fade);
+  return share;
+}
+
+// The virtual coupling, (1): what pulls the hand to the proxy, in translation and in rotation.
+void ShapeTouch::render(const Pose& hand, double t, Tick& tick) noexcept {
+  const Coupling& coupling = parameters_.coupling;
+  const double length = shape_->turn_length();  // (2)
+  const Vec3 u = pose_.at - hand.at;
+  const Vec3 turn = rotation_vector(between(pose_.turn, hand.turn));
+  const Vec3 surface = seen_[contacts_[held_.limit[0]].camera].velocity(t);
+  tick.surface_motion = surface;
+  // Each pushes harder while the hand goes deeper, and never pulls.
+  const auto push = [&](const Vec3& way, const Vec3& velocity, double stiffness, double damping) {
+    const double size = way.norm();
+    if (!(size > 0.0)) return Vec3(Vec3::Zero());
+    const double rate = -velocity.dot(way) / size;
+    return Vec3(std::max(stiffness * size + damping * rate, 0.0) / size * way);
+  };
+  tick.force = push(u, hand_velocity_.value() - surface, coupling.stiffness, coupling.damping);
+  tick.torque =
+      push(turn, spin_, coupling.stiffness * length * length, coupling.damping * length * length);
+  const double share = known_share(t);
+  if (share <= 0.0) {
+    tick.force = tick.torque = Vec3::Zero();
+    release(hand);
+    return;
+  }
+  double scale = share;
+  if (const double size = share * tick.force.norm(); size > coupling.max_force) {
+    scale *= (1.0 - 1e-15) * coupling.max_force / size;
+    tick.flags |= force_saturated;
+  }
+  tick.force *= scale;
+  tick.torque *= scale;
+  tick.state = ContactState::contact;
+  if (const double size = tick.force.norm(); size > undirected_force)
+    tick.normal = tick.force / size;
+  for (std::size_t i = 0; i < held_.count; ++i)
+    if (contacts_[held_.limit[i]].fit.unseen > 0.0) tick.flags |= surface_hidden;
+  tick.surface_velocity = surface.dot(tick.normal);
+}
+
+Tick ShapeTouch::tick(const HandPose& given, double t) noexcept {
+  Tick tick = free_tick(given.position, t, frame_.number());
+  tick.orientation = tick.proxy_orientation = given.orientation;
+  const double length = given.orientation.norm();
+  if (!is_place(given.position) || !std::isfinite(t) || !(length > 0.5 && length < 2.0)) {
+    tick.proxy = placed_ ? pose_.at : Vec3::Zero();
+    tick.flags = non_finite_input;
+    return tick;
+  }
+  const Pose hand{given.position, unit(given.orientation)};
+  hand_velocity_.update(hand.at, t);
+  const double dt = t - last_t_;
+  if (dt > 0.0 && dt < longest_gap) {
+    const Vec3 spin = rotation_vector(between(hand.turn, last_turn_)) / dt;
+    spin_ += -math::expm1(-dt / spin_time) * (spin - spin_);
+  } else if (dt != 0.0) {
+    spin_ = Vec3::Zero();
+  }
+  last_turn_ = hand.turn;
+  last_t_ = t;
+  if (!placed_) release(hand);
+  if (frame_.cloud() == nullptr) {
+    pose_ = kept_ = hand;
+    tick.flags = no_frame;
+    return tick;
+  }
+  timing_.tick(t);
+  const SeenSurface::Aim aim{loose_ ? hand.at : pose_.at, shape_->reach() + deepest};
+  for (SeenSurface& each : seen_) each.start_tick(aim, t, parameters_.sight);
+  steps_ = 0;
+  ++ticks_;
+  if (loose_) {
+    Scan found;
+    behind_.assign(behind_.size(), 0);
+    scan(hand, x_.size(), found, behind_now_.data());
+    pose_ = kept_ = hand;
+    fresh_ = false;
+    behind_.swap(behind_now_);
+    loose_ = found.inside > 0;
+  }
+  if (!loose_) {
+    touching_ = move(hand);
+    if (touching_) render(hand, t, tick);
+    if ((pose_.at - hand.at).norm() > lost) {
+      release(hand);
+      tick.force = tick.torque = tick.normal = Vec3::Zero();
+      tick.state = ContactState::free_motion;
+      tick.flags |= proxy_let_go;
+    }
+  }
+  tick.steps = steps_;
+  tick.proxy = pose_.at;
+  tick.proxy_orientation = pose_.turn;
+  if (frame_.count() > 1 && t - frame_.stamp() > parameters_.motion.max_extrapolation)
+    tick.flags |= frame_stale;
+  return tick;
+}
+
+}  // namespace palpate

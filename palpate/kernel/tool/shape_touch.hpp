@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "palpate/kernel/core/hand_velocity.hpp"
+#include "palpate/kernel/core/method.hpp"
+#include "palpate/kernel/core/newest_frame.hpp"
+#include "palpate/kernel/sight/frame_timing.hpp"
+#include "palpate/kernel/tool/least_motion.hpp"
+#include "palpate/kernel/tool/seen_surface.hpp"
+#include "palpate/kernel/tool/tool_shape.hpp"
+
+namespace palpate {
+
+/// Touches depth images with a tool that has a shape: a proxy with a pose, held outside what the
+/// cameras see by Gauss' principle of least constraint, gives force and torque. docs/tools.md.
+class ShapeTouch final : public Method {
+ public:
+  /// Allocates all it will ever need.
+  /// @param shape  not null
+  /// @throws Error if the parameters do not validate.
+  ShapeTouch(std::shared_ptr<const ToolShape> shape, const Parameters& parameters);
+
+  void seat(const Vec3& proxy) noexcept override;
+  void observe(const Observation& seen) noexcept override;
+  Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip, {}}, t); }
+  Tick tick(const HandPose& hand, double t) noexcept override;
+  void set_parameters(const Parameters& parameters) noexcept override { parameters_ = parameters; }
+  /// @throws Error for points without an image, which have no lines of sight to look along.
+  void check(const Cloud& cloud) const override;
+
+ private:
+  struct Pose {
+    Vec3 at = Vec3::Zero();
+    Rotation turn = Rotation::Identity();
+  };
+  /// One place where tool and surface are near each other.
+  struct Contact {
+    Vec3 lever;  // [m] from the proxy's origin to the tool's point
+    SeenSurface::Fit fit;
+    std::size_t camera;
+  };
+  static constexpr std::size_t most_cameras = 4;  // those of further ones are not touched
+  static constexpr std::size_t most_contacts = ToolShape::most_patches;
+  /// What the tool's points meet at a pose.
+  struct Scan {
+    std::size_t inside = 0;   // points within a surface, not deeper than its sides
+    std::size_t crossed = 0;  // of these, how many were in front in the last scan that was kept
+    float least = 0.0F;       // [m] the smallest gap along the line of sight of all points known
+    std::size_t known = 0;
+    std::array<std::uint32_t, most_contacts> point{};  // the nearest of each patch
+    std::array<float, most_contacts> gap{};            // [m] its
+    std::array<std::uint8_t, most_contacts> camera{};
+  };
+
+  [[nodiscard]] Eigen::Isometry3d isometry(const Pose& pose) const noexcept;
+  void scan(const Pose& pose, std::size_t points, Scan& scan, std::uint8_t* behind) const noexcept;
+  void find_contacts(const Scan& scan) noexcept;
+  [[nodiscard]] double way_to(const Pose& hand) const noexcept;
+  [[nodiscard]] bool can_follow(const Pose& hand) const noexcept;
+  bool move(const Pose& hand) noexcept;
+  void step(const Pose& hand) noexcept;
+  [[nodiscard]] double known_share(double t) const noexcept;
+  void render(const Pose& hand, double t, Tick& tick) noexcept;
+  void release(const Pose& hand) noexcept;
+
+  std::shared_ptr<const ToolShape> shape_;
+  std::vector<float> x_, y_, z_;          // [m] of its points
+  std::vector<std::uint8_t> patch_;       // of each
+  std::vector<std::uint8_t> behind_;      // which are behind what they never were in front of
+  std::vector<std::uint8_t> behind_now_;  // the same of the newest scan
+  Parameters parameters_;
+  NewestFrame frame_;
+  FrameTiming timing_;
+  std::array<SeenSurface, most_cameras> seen_;
+  bool placed_ = false;
+  bool loose_ = true;  // began inside something, or lost it: nothing is felt until it is free
+  bool touching_ = false;
+  bool fresh_ = false;   // a frame came since the last scan
+  Pose pose_;            // of the proxy
+  Pose kept_;            // the newest that a scan has shown to be possible
+  double stride_ = 0.0;  // [m] that a point may move in a step
+  std::array<Contact, most_contacts> contacts_{};
+  std::size_t contact_count_ = 0;
+  /// The surface under a patch's point, as it was fitted in a tick.
+  struct Plane {
+    std::uint64_t tick = 0;
+    std::uint32_t point = 0;
+    Vec3 place = Vec3::Zero();  // [m] world
+    std::optional<SeenSurface::Fit> fit = {};
+  };
+  std::array<Plane, most_contacts> planes_{};
+  std::uint64_t ticks_ = 0;
+  HeldBy held_;
+  int steps_ = 0;
+  HandVelocity hand_velocity_;
+  Rotation last_turn_ = Rotation::Identity();
+  Vec3 spin_ = Vec3::Zero();  // [rad/s] world, of the hand, smoothed
+  double last_t_ = 0.0;
+};
+
+/// The rotation vector [rad] of a rotation: its axis times its angle of at most pi.
+Vec3 rotation_vector(const Rotation& turn) noexcept;
+/// The rotation by a rotation vector [rad].
+Rotation rotation_by(const Vec3& vector) noexcept;
+
+}  // namespace palpate

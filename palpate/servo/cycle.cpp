@@ -316,6 +316,7 @@ void Cycle::run(const Wake& wake) noexcept {
        .frame_intervals = age.intervals,
        .surface_velocity = tick.surface_velocity,
        .surface_motion = tick.surface_motion,
+       .torque = tick.torque,
        .held = support,
        .transient = tick.transient,
        .vibration = tick.vibration,
@@ -330,12 +331,13 @@ void Cycle::run(const Wake& wake) noexcept {
   const Placement& placement = workspace_.placement();
   const SafetyParameters& allowed = safety_.parameters();
   const Vec3 wanted = workspace_.force_in_device(safe.force);
+  const Vec3 wanted_torque = workspace_.force_in_device(safe.torque);
   const double torque_share = limits.max_torque / limits.max_force;  // [m]
   const LastGate::Sent sent =
       gate_.write(device_,
                   {.t = t,
                    .force = gate_vector(wanted),
-                   .torque = {},
+                   .torque = gate_vector(wanted_torque),
                    .held = gate_vector(-support * placement.down),
                    .ring = safe.ring,
                    .frame_age = age.age,
@@ -356,6 +358,9 @@ void Cycle::run(const Wake& wake) noexcept {
   // In the world as it was asked for, to the bit, where the gate did nothing.
   const Vec3 force =
       sent.force == wanted ? safe.force : Vec3(placement.world_from_device.linear() * sent.force);
+  const Vec3 torque = sent.wrench.torque == wanted_torque
+                          ? safe.torque
+                          : Vec3(placement.world_from_device.linear() * sent.wrench.torque);
   std::uint32_t flags = safe.flags;
   if ((sent.verdict & palpate_gate_refused) != 0) flags |= output_refused;
   if (force != safe.force) add(statistics_.gate_cuts, 1);
@@ -375,6 +380,7 @@ void Cycle::run(const Wake& wake) noexcept {
                          .guidance = fixtures.guidance,
                          .place = hip + kept_out,
                          .force = force,
+                         .torque = torque,
                          .position = hand.position,
                          .handle = hand.orientation.value_or(Eigen::Quaterniond::Identity()),
                          .gain = safe.gain,

@@ -28,6 +28,8 @@
 
 namespace palpate {
 
+class ToolShape;
+
 /// What a user sets, also while the loop runs.
 struct ServoSettings {
   /// The method's name, for the record: a new method object is what switches.
@@ -37,6 +39,8 @@ struct ServoSettings {
   Placement placement;
   /// Virtual fixtures: forbidden regions, guides, viscous regions. Null: none.
   std::shared_ptr<const FixtureSet> fixtures = {};
+  /// What the method touches with, for the record, as `method` is. Null: a ball.
+  std::shared_ptr<const ToolShape> tool = {};
 };
 
 /// @throws Error if one of them does not validate.
@@ -86,7 +90,7 @@ struct ServoTick {
   /// position is sent to a robot.
   Vec3 place = Vec3::Zero();
   Vec3 force = Vec3::Zero();  ///< [N] world: the force sent to the device
-  /// [N m] world: the torque sent. Zero: no stage of the safety chain bounds a torque yet.
+  /// [N m] world: the torque sent. Zero on a device without motors for it.
   Vec3 torque = Vec3::Zero();
   Vec3 position = Vec3::Zero();  ///< [m] of the hand, device frame
   /// device_from_handle; of a device that tells none the identity

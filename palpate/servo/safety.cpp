@@ -300,6 +300,21 @@ Vec3 SafetyChain::limited(const SafetyInput& input, double share,
   return force;
 }
 
+// As much of the torque as is left of the force, and of both what the motors for it bear.
+Vec3 SafetyChain::limited_torque(const SafetyInput& input, double most, Vec3& force,
+                                 std::uint32_t& flags) const noexcept {
+  const double asked = (input.force - input.transient).norm();
+  const double left = asked > undirected_force ? std::min(force.norm() / asked, 1.0)
+                                               : std::min(calm_, energy_ceiling_);
+  Vec3 torque = left * input.torque;
+  const double size = torque.norm();
+  if (!has(force_cut) || size <= most) return torque;
+  flags |= force_cut;
+  force *= most / size;
+  cut_to(most, torque);
+  return torque;
+}
+
 namespace {
 
 // What of a grain's vibration is in the force that was sent: as much as of the rest, and never more
@@ -406,11 +421,11 @@ double SafetyChain::ceiling(const SafetyInput& input, double demand,
   return ceiling;
 }
 
-// Shrinks along the last force at fall_rate and changes otherwise at rise_rate.
+// Shrinks along the last force or torque by `fall` at most and changes otherwise by `rise`.
 // Hazard: force-step
-Vec3 SafetyChain::slewed(const Vec3& force, double rise, double fall) const noexcept {
-  const double last = last_force_.norm();
-  const Vec3 along = last > 0.0 ? Vec3(last_force_ / last) : Vec3::Zero();
+Vec3 SafetyChain::slewed(const Vec3& before, const Vec3& force, double rise, double fall) noexcept {
+  const double last = before.norm();
+  const Vec3 along = last > 0.0 ? Vec3(before / last) : Vec3::Zero();
   const double least = std::max(last - fall, 0.0);
   const Vec3 from = std::clamp(force.dot(along), least, last) * along;
   Vec3 change = force - from;
@@ -465,9 +480,9 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   const bool sound = in_order && is_sound(input.force) && is_sound(input.normal) &&
                      is_sound(input.hip) && is_sound(input.proxy) && is_sound(input.position) &&
                      std::abs(input.surface_velocity) <= largest &&
-                     is_sound(input.surface_motion) && is_sound(input.transient) &&
-                     is_sound(input.vibration) && is_sound(input.region) &&
-                     is_sound(input.guidance);
+                     is_sound(input.surface_motion) && is_sound(input.torque) &&
+                     is_sound(input.transient) && is_sound(input.vibration) &&
+                     is_sound(input.region) && is_sound(input.guidance);
   const double since_last = in_order && last_t_ ? input.t - *last_t_ : 0.0;
   const double dt = std::min(since_last, longest_credit);
   fault_clock_ += since_last;
@@ -485,10 +500,14 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   note_faults(flags);
 
   Vec3 force = Vec3::Zero();
+  Vec3 torque = Vec3::Zero();
+  const double lever = device_.max_torque / device_.max_force;  // [m]
   if (flags == 0) {
     // Before the limits: a softer surface still holds a hand with all the force that is allowed.
     force = limited(input, softened(input, since_last, dt, flags), flags);
-    double most = ceiling(input, force.norm(), flags);
+    if (lever > 0.0) torque = limited_torque(input, lever * peak(), force, flags);
+    const double turning = lever > 0.0 ? torque.norm() / lever : 0.0;
+    double most = ceiling(input, std::max(force.norm(), turning), flags);
     if (stalls_at(input.t)) {
       flags |= stalled;
       most = 0.0;
@@ -496,6 +515,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     gain_ = has(ramping) ? std::min(most, gain_ + dt / parameters_.ramp_time) : most;
     if (gain_ < most) flags |= ramping;
     force *= gain_;
+    torque *= gain_;
   } else {
     gain_ = 0.0;
     engaged_ = false;
@@ -508,23 +528,31 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   if (has(slew_cut)) {
     // Without a clock the force falls as if a tick had passed.
     const Vec3 wanted = force;
-    force =
-        slewed(wanted, rise, parameters_.fall_rate * (in_order && last_t_ ? dt : longest_credit));
-    if (force != wanted) flags |= slew_cut;
+    const double fall = parameters_.fall_rate * (in_order && last_t_ ? dt : longest_credit);
+    const Vec3 wanted_torque = torque;
+    force = slewed(last_force_, wanted, rise, fall);
+    torque = slewed(last_torque_, wanted_torque, lever * rise, lever * fall);
+    if (force != wanted || torque != wanted_torque) flags |= slew_cut;
   }
   force = bounded(force, rise, flags);
   // Nor may what rang in the last tick be made up for while a frame is late.
-  if ((flags & frame_late) != 0) cut_to(last_sent_.norm(), force);
+  if ((flags & frame_late) != 0) {
+    cut_to(last_sent_.norm(), force);
+    cut_to(last_torque_.norm(), torque);
+  }
+  if (has(force_cut)) cut_to(std::max(last_torque_.norm(), lever * peak()), torque);
+  if ((flags & output_refused) != 0 || !torque.allFinite()) torque = Vec3::Zero();
 
   if (std::isfinite(input.t)) last_t_ = input.t;
   last_force_ = force;
+  last_torque_ = torque;
   last_vibration_ = vibration_in(input, force);
   last_sent_ = with_transient(input, force, flags);
   for (std::size_t i = 0; i < safety_flag_count; ++i) {
     if (((flags & ~last_flags_) >> i & 1u) != 0) ++interventions_[i];
   }
   last_flags_ = flags;
-  return {last_sent_, flags, (last_sent_ - force).norm(), gain_};
+  return {last_sent_, flags, (last_sent_ - force).norm(), gain_, torque};
 }
 
 }  // namespace palpate

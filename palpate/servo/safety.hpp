@@ -117,6 +117,9 @@ struct SafetyInput {
   double frame_intervals;   ///< [intervals] the most overdue camera is without one; Freshness::Age
   double surface_velocity;  ///< [m/s] of the surface along the normal, as the method tracks it
   Vec3 surface_motion = Vec3::Zero();  ///< [m/s] world: the same as a vector; refused if not finite
+  /// [N m] world: what the method asks for about the HIP. What scales the force down scales it, and
+  /// the other way round, so that they stay one wrench. A device without motors for it gets none.
+  Vec3 torque = Vec3::Zero();
   /// [N] magnitude of the force that the motors apply in addition to `force` to support the
   /// handle's weight. It reduces the available force and counts in the thermal model.
   double held = 0.0;
@@ -134,10 +137,11 @@ struct SafetyInput {
 
 /// What the device gets.
 struct SafetyOutput {
-  Vec3 force;           ///< [N] world; finite, within all limits
-  std::uint32_t flags;  ///< SafetyFlag bits
-  double ring;          ///< [N] length of the part of it that is an impact's
-  double gain;          ///< [-] 0 disengaged, 1 engaged and nothing faded
+  Vec3 force;                  ///< [N] world; finite, within all limits
+  std::uint32_t flags;         ///< SafetyFlag bits
+  double ring;                 ///< [N] length of the part of it that is an impact's
+  double gain;                 ///< [-] 0 disengaged, 1 engaged and nothing faded
+  Vec3 torque = Vec3::Zero();  ///< [N m] world; finite, within all limits
 };
 
 /// Last stage before the device; independent of the rendering method and of clocks.
@@ -208,6 +212,7 @@ class SafetyChain {
     way("energy_ceiling", self.energy_ceiling_);
     TransientBudget::walk(way, self.transients_);
     way("last_sent", self.last_sent_);
+    way("last_torque", self.last_torque_);
     way("engaged", self.engaged_);
     way("quiet_ticks", self.quiet_ticks_);
     way("gain", self.gain_);
@@ -237,7 +242,10 @@ class SafetyChain {
   double ceiling(const SafetyInput& input, double demand, std::uint32_t& flags) noexcept;
   double oscillation_ceiling(double t, double dt) noexcept;
   double energy_ceiling(const SafetyInput& input, double since_last) noexcept;
-  [[nodiscard]] Vec3 slewed(const Vec3& force, double rise, double fall) const noexcept;
+  Vec3 limited_torque(const SafetyInput& input, double most, Vec3& force,
+                      std::uint32_t& flags) const noexcept;
+  [[nodiscard]] static Vec3 slewed(const Vec3& before, const Vec3& force, double rise,
+                                   double fall) noexcept;
   [[nodiscard]] Vec3 bounded(Vec3 force, double rise, std::uint32_t& flags) noexcept;
   [[nodiscard]] Vec3 with_transient(const SafetyInput& input, const Vec3& force,
                                     std::uint32_t& flags) noexcept;
@@ -252,6 +260,7 @@ class SafetyChain {
   Vec3 last_force_ = Vec3::Zero();      // as sent, but for what rang
   Vec3 last_vibration_ = Vec3::Zero();  // the grain's part of it
   Vec3 last_sent_ = Vec3::Zero();       // all of it
+  Vec3 last_torque_ = Vec3::Zero();     // [N m] as sent
   double held_ = 0.0;                   // [N] SafetyInput::held of this tick
   std::uint32_t last_flags_ = 0;
   std::array<std::uint64_t, safety_flag_count> interventions_{};

@@ -423,6 +423,77 @@ TEST(SafetyChain, RisesNoFasterThanItsSlewLimitAndFallsFaster) {
   EXPECT_NEAR(quick.run(0.0, 0.5 * ms).force.z(), 2.0, 1e-9) << "1 N in half a millisecond";
 }
 
+// Force and torque as one wrench.
+constexpr DeviceLimits with_wrist{.max_force = 12.0, .continuous_force = 12.0, .max_torque = 0.4};
+constexpr SafetyParameters strong{.max_force = 12.0, .initial_heat = 0.0};
+
+TEST(SafetyChain, SendsNoTorqueToADeviceWithoutMotorsForIt) {
+  Session session = engaged_without(0, never_hot);
+  session.input.torque = Vec3(0.1, 0, 0);
+  const SafetyOutput output = session.run_for(0.1, 0.8);
+  EXPECT_TRUE(output.torque.isZero(0.0));
+  EXPECT_NEAR(output.force.z(), 0.8, 1e-12);
+}
+
+TEST(SafetyChain, PassesAModestTorque) {
+  Session session(all, with_wrist, strong);
+  session.engage();
+  session.input.torque = Vec3(0, 0.05, 0);
+  const SafetyOutput output = session.run_for(0.2, 0.8);
+  EXPECT_NEAR(output.torque.y(), 0.05, 1e-12);
+  EXPECT_EQ(output.flags, 0U);
+}
+
+TEST(SafetyChain, ScalesForceAndTorqueByOneFactorAtEitherLimit) {
+  for (const auto& [newtons, torque] : {std::pair(24.0, 0.1), std::pair(3.0, 0.8)}) {
+    Session session(all, with_wrist, strong);
+    session.engage();
+    session.input.torque = Vec3(torque, 0, 0);
+    const SafetyOutput output = session.run_for(1.0, newtons);
+    EXPECT_NEAR(output.force.norm() / newtons, output.torque.norm() / torque, 1e-9);
+    EXPECT_NEAR(output.force.norm() / newtons, 0.5, 1e-9);
+    EXPECT_NE(output.flags & force_cut, 0U);
+  }
+  // Without the link the torque passes whole.
+  Session session(all & ~std::uint32_t{force_cut}, with_wrist, strong);
+  session.engage();
+  session.input.torque = Vec3(0.8, 0, 0);
+  EXPECT_NEAR(session.run_for(1.0, 3.0).torque.norm(), 0.8, 1e-9);
+}
+
+TEST(SafetyChain, RampsAndSlewsATorqueAlone) {
+  Session session(all, with_wrist, strong);
+  session.engage();
+  session.input.torque = Vec3(0.2, 0, 0);
+  double last = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    const double torque = session.run(0.0).torque.norm();
+    EXPECT_LE(torque - last, 0.4 / 12.0 * strong.rise_rate * ms + 1e-12);
+    last = torque;
+  }
+  EXPECT_NEAR(last, 0.2, 1e-9);
+}
+
+TEST(SafetyChain, EngagesForNoTorqueThatIsAlreadyThere) {
+  Session session(all, with_wrist, strong);
+  session.input.torque = Vec3(0.2, 0, 0);
+  const SafetyOutput output = session.run_for(3.0, 0.0);
+  EXPECT_NE(output.flags & disengaged, 0U);
+  EXPECT_TRUE(output.torque.isZero(0.0));
+  session.input.torque = Vec3::Constant(nan);
+  EXPECT_NE(session.run(0.0).flags & input_refused, 0U);
+}
+
+TEST(SafetyChain, LetsATorqueOnlyFallOnceAFrameIsLate) {
+  Session session(all, with_wrist, strong);
+  session.engage();
+  session.input.torque = Vec3(0.1, 0, 0);
+  session.run_for(0.5, 1.0);
+  session.input.frame_intervals = 4.0;
+  session.input.torque = Vec3(0.3, 0, 0);
+  EXPECT_LE(session.run_for(0.1, 1.0).torque.norm(), 0.1 + 1e-12);
+}
+
 TEST(SafetyChain, TurnsTheForceRoundThroughZeroAndNoFaster) {
   Session session = engaged_without(pull_removed, never_hot);
   session.run_for(0.1, 3.0);

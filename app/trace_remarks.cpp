@@ -267,13 +267,14 @@ void append(std::string& line, const Vec3& v) {
 
 }  // namespace
 
-TraceWriter::TraceWriter(const std::string& path)
+TraceWriter::TraceWriter(const std::string& path, bool has_tool)
     : path_(path == "-" ? "standard output" : path),
+      has_tool_(has_tool),
       file_(path == "-" ? stdout : std::fopen(path.c_str(), "wb")) {
   if (file_ == nullptr)
     throw Error(path, std::string("cannot be written: ") + std::strerror(errno),
                 "give a file in a folder that you may write to");
-  buffer_ = std::string(header) + '\n';
+  buffer_ = std::string(header) + (has_tool_ ? tool_header : "") + '\n';
 }
 
 TraceWriter::~TraceWriter() {
@@ -292,6 +293,11 @@ void TraceWriter::write(const Tick& tick) {
   append(buffer_, tick.surface_velocity);
   append(buffer_, tick.frame);
   append(buffer_, tick.flags);
+  if (has_tool_) {
+    for (const Rotation* turn : {&tick.orientation, &tick.proxy_orientation})
+      for (int i = 0; i < 4; ++i) append(buffer_, turn->coeffs()[i]);
+    append(buffer_, tick.torque);
+  }
   buffer_.back() = '\n';
   if (buffer_.size() >= buffered) flush();
 }

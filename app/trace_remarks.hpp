@@ -80,8 +80,13 @@ class TraceWriter {
       "t,hip_x,hip_y,hip_z,proxy_x,proxy_y,proxy_z,normal_x,normal_y,normal_z,"
       "force_x,force_y,force_z,state,steps,surface_velocity,frame,flags";
 
+  /// Behind it where a tool has a shape.
+  static constexpr const char* tool_header =
+      ",hip_qx,hip_qy,hip_qz,hip_qw,proxy_qx,proxy_qy,proxy_qz,proxy_qw,"
+      "torque_x,torque_y,torque_z";
+
   /// @param path  where to, `-` for standard output. @throws Error if it cannot be opened.
-  explicit TraceWriter(const std::string& path);
+  explicit TraceWriter(const std::string& path, bool has_tool = false);
   ~TraceWriter();
   TraceWriter(const TraceWriter&) = delete;
   TraceWriter& operator=(const TraceWriter&) = delete;
@@ -97,6 +102,7 @@ class TraceWriter {
   void flush();
 
   std::string path_;
+  bool has_tool_;
   std::FILE* file_;
   std::string buffer_;
 };

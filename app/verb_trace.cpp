@@ -17,6 +17,7 @@
 #include "app/verbs.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/io/devices/hip_path.hpp"
+#include "palpate/io/sources/tool_file.hpp"
 #include "palpate/kernel/cloud/proposed_touch.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/sensor.hpp"
@@ -31,6 +32,7 @@ struct TraceOptions {
   std::vector<std::string> cameras;
   std::optional<std::string> material;
   std::string path;
+  std::optional<std::string> tool;
   std::string press, slide_to;
   PressOptions pressing;
   std::string out = "-";
@@ -82,10 +84,12 @@ int trace(TraceOptions options) {
   if (const std::string remark = radius_remark(*seen.front(), r_c);
       !config.radii_chosen && !remark.empty())
     fmt::print(stderr, "palpate: {}: {}\n", options.cameras.front(), remark);
-  const std::unique_ptr<Method> method = make_method(name, parameters, methods);
+  const std::string& tool_text = options.tool ? *options.tool : config.tool;
+  const auto tool = tool_text.empty() ? nullptr : read_tool(tool_text);
+  const std::unique_ptr<Method> method = make_method(name, parameters, methods, tool);
   const std::string sparse = sparse_remark(*seen.front(), options.cameras.front(), r_c);
   playback.check(*method);  // before a file is written over
-  TraceWriter writer(options.out);
+  TraceWriter writer(options.out, tool != nullptr);
   Summary summary;
   TraceRemarks remarks(r_c, press.has_value(), sparse);
   const Interruption interruption;
@@ -144,7 +148,11 @@ Verb add_trace(CLI::App& program) {
       ->allow_extra_args(false);
   command->add_option("--material", options->material,
                       "material of its surfaces, such as wood, or a TOML file");
-  command->add_option("--path", options->path, "CSV of the HIP's path: t,x,y,z in s and m, world");
+  command->add_option("--path", options->path,
+                      "CSV of the HIP's path: t,x,y,z in s and m, world; with qx,qy,qz,qw, too, "
+                      "how the tool is turned");
+  command->add_option("--tool", options->tool,
+                      "what touches, such as box:40x20x5mm or mesh:FILE.stl?unit=mm (a ball)");
   command->add_option("--press", options->press,
                       "instead of a path: press the surface at this pixel, U,V, in the newest "
                       "frame, along the line of sight, and lift again");

@@ -99,7 +99,8 @@ class PythonSession {
                 const py::dict& limits, bool without_watchdog,
                 const std::optional<std::string>& fixtures, const py::iterable& hands,
                 const std::optional<MaterialsOf>& materials,
-                const std::optional<py::function>& labels, const py::kwargs& parameters)
+                const std::optional<py::function>& labels, const std::string& tool,
+                const py::kwargs& parameters)
       : free_running_(free_running) {
     SessionOptions options;
     if (py::isinstance<py::str>(camera)) {
@@ -110,6 +111,7 @@ class PythonSession {
     }
     options.hands[0].device = device;
     options.method = method;
+    options.tool = tool;
     set_all(options.parameters, parameters);
     for (const auto& [name, value] : parameters)
       options.radii_chosen = options.radii_chosen || is_proxy_radius(py::cast<std::string>(name));
@@ -283,21 +285,22 @@ void define_session(py::module_& m) {
                     const std::string&, double, const std::optional<Numbers>&, double,
                     const py::dict&, bool, const std::optional<std::string>&, const py::iterable&,
                     const std::optional<MaterialsOf>&, const std::optional<py::function>&,
-                    const py::kwargs&>(),
+                    const std::string&, const py::kwargs&>(),
            py::arg("camera"), py::arg("device") = "hand:", py::kw_only(),
            py::arg("method") = "sight", py::arg("free_running") = false, py::arg("rate") = 1000.0,
            py::arg("record") = "", py::arg("stroke_time") = 20.0,
            py::arg("world_from_device") = py::none(), py::arg("scale") = 1.0,
            py::arg("limits") = py::dict(), py::arg("without_watchdog") = false,
            py::arg("fixtures") = py::none(), py::arg("hands") = py::tuple(),
-           py::arg("materials") = py::none(), py::arg("labels") = py::none(),
+           py::arg("materials") = py::none(), py::arg("labels") = py::none(), py::arg("tool") = "",
            "camera: a URI or a list of them. device: a URI. free_running: as fast as the machine\n"
            "can, with the same forces each time. limits: of the safety chain\n"
            "(palpate.limits()). fixtures: a TOML file of virtual fixtures, or its text.\n"
            "hands: further hands, each a device's URI or a dict with keys of [[hand]]\n"
            "(docs/session.md); while one of the hands is in trouble, none has a force. labels: a\n"
            "function that is called with a camera's number and depth for each of its frames, and\n"
-           "returns uint8 (height, width), 0 for none and i for the i-th of `materials`. Further\n"
+           "returns uint8 (height, width), 0 for none and i for the i-th of `materials`. tool:\n"
+           "what touches, such as \"box:40x20x5mm\" (docs/tools.md); empty: a ball. Further\n"
            "keywords are parameters (palpate.parameters()).")
       .def("__enter__",
            [](const py::object& self) {

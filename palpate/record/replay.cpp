@@ -152,7 +152,8 @@ class Rerun {
 
  private:
   [[nodiscard]] std::shared_ptr<Method> made_method() const {
-    return make_method(commands_.settings.method, commands_.settings.parameters, methods_);
+    return make_method(commands_.settings.method, commands_.settings.parameters, methods_,
+                       commands_.settings.tool);
   }
 
   void put(std::uint64_t number) {

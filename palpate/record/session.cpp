@@ -10,6 +10,7 @@
 
 #include "palpate/io/sources/fixture_file.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/tool/tool_shape.hpp"
 
 namespace palpate {
 namespace {
@@ -71,14 +72,15 @@ std::filesystem::path hand_folder(const std::filesystem::path& first, const std:
 }
 
 std::string to_json(const SessionInfo& info) {
-  json object = {
-      {"palpate", info.version},
-      {"cameras", info.cameras},
-      {"device", info.device},
-      {"device_limits",
-       {{"max_force", info.limits.max_force}, {"continuous_force", info.limits.continuous_force}}},
-      {"epoch_ns", info.epoch},
-      {"tick_columns", tick_columns()}};
+  json object = {{"palpate", info.version},
+                 {"cameras", info.cameras},
+                 {"device", info.device},
+                 {"device_limits",
+                  {{"max_force", info.limits.max_force},
+                   {"continuous_force", info.limits.continuous_force},
+                   {"max_torque", info.limits.max_torque}}},
+                 {"epoch_ns", info.epoch},
+                 {"tick_columns", tick_columns()}};
   if (!info.hand.empty()) object["hand"] = info.hand;
   if (!info.more_hands.empty()) object["more_hands"] = info.more_hands;
   if (info.frames_in_parent) object["frames_in_parent"] = true;
@@ -94,7 +96,8 @@ SessionInfo session_from_json(const std::string& text, const std::string& name) 
     info.epoch = whole_of<std::int64_t>(object.at("epoch_ns"), name);
     const json& limits = object.at("device_limits");
     info.limits = {.max_force = limits.at("max_force").get<double>(),
-                   .continuous_force = limits.at("continuous_force").get<double>()};
+                   .continuous_force = limits.at("continuous_force").get<double>(),
+                   .max_torque = limits.value("max_torque", 0.0)};
     info.tick_columns = object.at("tick_columns").get<std::vector<std::string>>();
     info.hand = object.value("hand", std::string());
     info.more_hands = object.value("more_hands", std::vector<std::string>());
@@ -106,6 +109,30 @@ SessionInfo session_from_json(const std::string& text, const std::string& name) 
     return info;
   });
 }
+
+namespace {
+
+// A tool's points, so that a replay needs no mesh.
+json tool_json(const ToolShape& tool) {
+  json numbers = json::array();
+  for (const ToolShape::Point& point : tool.points())
+    for (const Vec3* v : {&point.at, &point.inward})
+      for (int axis = 0; axis < 3; ++axis) numbers.push_back((*v)[axis]);
+  return {{"text", tool.text()}, {"turning", tool.turning()}, {"points", numbers}};
+}
+
+std::shared_ptr<const ToolShape> tool_from_json(const json& object) {
+  const auto numbers = object.at("points").get<std::vector<double>>();
+  std::vector<ToolShape::Point> points(numbers.size() / 6);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double* n = numbers.data() + 6 * i;
+    points[i] = {Vec3(n[0], n[1], n[2]), Vec3(n[3], n[4], n[5]), 0};
+  }
+  return std::make_shared<const ToolShape>(std::move(points), object.at("text").get<std::string>(),
+                                           object.at("turning").get<double>());
+}
+
+}  // namespace
 
 std::string to_json(const ServoCommands& commands) {
   const ServoSettings& all = commands.settings;
@@ -129,6 +156,7 @@ std::string to_json(const ServoCommands& commands) {
                  {"scene", commands.scene},
                  {"hold", commands.hold}};
   if (all.placement.clutch_button) object["clutch_button"] = *all.placement.clutch_button;
+  if (all.tool) object["tool"] = tool_json(*all.tool);
   if (all.fixtures) object["fixtures"] = json::parse(fixtures_json(*all.fixtures));
   return object.dump();
 }
@@ -169,6 +197,7 @@ ServoCommands commands_from_json(const std::string& text, const std::string& nam
     if (object.contains("scene"))
       commands.scene = whole_of<std::uint64_t>(object.at("scene"), name);
     commands.hold = object.value("hold", false);
+    if (object.contains("tool")) all.tool = tool_from_json(object.at("tool"));
     if (object.contains("fixtures"))
       all.fixtures = fixtures_from_json(object.at("fixtures").dump(), name);
     validate(all);

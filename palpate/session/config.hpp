@@ -59,6 +59,10 @@ struct SessionConfig : SessionSpec {
   template <class Self, class Way>
   static void walk_keys(Self& self, const Way& way) {
     way(Key{"method", "", "how forces are computed"}, self.method);
+    way(Key{"tool", "--tool",
+            "what touches, such as box:40x20x5mm, capsule:80x8mm or mesh:FILE.stl?unit=mm; empty: "
+            "a ball (docs/tools.md)"},
+        self.tool);
     way(Key{"device", "", "URI of the haptic device; empty: the default"},
         self.hands.front().device);
     way(Key{"without_watchdog", "--without-watchdog",

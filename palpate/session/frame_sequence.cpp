@@ -89,7 +89,7 @@ std::int64_t ticks_along(const HipPath& path, double rate) {
 }
 
 void touch(FrameSequence& frames, Method& method, const HipPath::Sample& first, double rate,
-           const std::function<std::optional<Vec3>(double)>& hand,
+           const std::function<std::optional<HandPose>(double)>& hand,
            const std::function<bool(const Tick&)>& on_tick) {
   check_rate(rate);
   frames.check(method);
@@ -98,10 +98,10 @@ void touch(FrameSequence& frames, Method& method, const HipPath::Sample& first, 
   for (std::int64_t i = 0;; ++i) {
     const double t = first.t + static_cast<double>(i) / rate;
     frames.adopt_until(t, [&](const Observation& seen) { method.observe(seen); });
-    const std::optional<Vec3> hip = hand(t);
-    if (!hip) return;
-    frames.follow(*hip);
-    if (!on_tick(method.tick(*hip, t))) return;
+    const std::optional<HandPose> pose = hand(t);
+    if (!pose) return;
+    frames.follow(pose->position);
+    if (!on_tick(method.tick(*pose, t))) return;
   }
 }
 
@@ -110,7 +110,8 @@ void touch_along(FrameSequence& frames, Method& method, const HipPath& path, dou
   std::int64_t left = ticks_along(path, rate);
   touch(
       frames, method, path.samples().front(), rate,
-      [&](double t) { return left-- > 0 ? std::optional(path.at(t)) : std::nullopt; }, on_tick);
+      [&](double t) { return left-- > 0 ? std::optional(path.pose_at(t)) : std::nullopt; },
+      on_tick);
 }
 
 }  // namespace palpate

@@ -77,7 +77,7 @@ class FrameSequence {
 ///              the end
 /// Else as touch_along.
 void touch(FrameSequence& frames, Method& method, const HipPath::Sample& first, double rate,
-           const std::function<std::optional<Vec3>(double)>& hand,
+           const std::function<std::optional<HandPose>(double)>& hand,
            const std::function<bool(const Tick&)>& on_tick);
 
 /// How many ticks `touch_along` makes.

@@ -338,13 +338,13 @@ void touch_along(FrameSequence& frames, Method& method, Press& press, double rat
   std::optional<Tick> last;
   touch(
       frames, method, {frames.upcoming(0)->stamp, press.hip()}, rate,
-      [&](double t) -> std::optional<Vec3> {
+      [&](double t) -> std::optional<HandPose> {
         if (press.done()) return std::nullopt;
         if (frames.newest().front() != seen) {
           seen = frames.newest().front();
           press.frame(*seen);
         }
-        return press.step(t, last ? &*last : nullptr);
+        return HandPose{.position = press.step(t, last ? &*last : nullptr)};
       },
       [&](const Tick& tick) {
         last = tick;

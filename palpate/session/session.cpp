@@ -19,6 +19,7 @@
 #include "palpate/io/devices/mouse_device.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
 #include "palpate/io/sources/source.hpp"
+#include "palpate/io/sources/tool_file.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/cloud/proposed_touch.hpp"
@@ -161,6 +162,7 @@ class Session::Impl {
                  .fixtures = options_.fixture_set};
     if (!settings_.fixtures && !options_.fixtures.empty())
       settings_.fixtures = std::make_shared<const FixtureSet>(read_fixtures(options_.fixtures));
+    if (!options_.tool.empty()) settings_.tool = read_tool(options_.tool);
     validate(settings_);
     newest_.resize(options_.cameras.size());
     stamps_.resize(options_.cameras.size());
@@ -348,7 +350,8 @@ class Session::Impl {
     }
     settings = for_cameras(std::move(settings));
     if (settings.fixtures != settings_.fixtures) check_materials(settings.fixtures.get(), newest());
-    const bool with_new_methods = settings.method != settings_.method;
+    const bool with_new_methods =
+        settings.method != settings_.method || settings.tool != settings_.tool;
     tell([&](SessionHand& hand,
              ServoCommands& told) { told.settings = settings_of(hand, settings); },
          with_new_methods ? &settings : nullptr);
@@ -511,7 +514,7 @@ class Session::Impl {
   [[nodiscard]] std::shared_ptr<Method> open_method(
       const ServoSettings& settings, const std::vector<std::shared_ptr<const Cloud>>& seen) const {
     std::shared_ptr<Method> method =
-        make_method(settings.method, settings.parameters, options_.methods);
+        make_method(settings.method, settings.parameters, options_.methods, settings.tool);
     for (const auto& cloud : seen) {
       if (cloud) method->check(*cloud);
     }

@@ -56,6 +56,8 @@ struct SessionSpec {
   /// fault (is_in_trouble), none of them has a force.
   std::vector<HandSpec> hands = {HandSpec()};
   std::string method = "sight";
+  /// What the method touches with, as make_tool reads it; `ball`, or empty: a ball.
+  std::string tool = {};
   /// Those with value 0 that depend on the sensor type are replaced by for_sensors().
   Parameters parameters = {};
   /// Somebody chose the proxy's radii. If not, they are as for_points has them for what the cameras

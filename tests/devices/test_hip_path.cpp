@@ -2,6 +2,8 @@
 #include <filesystem>
 #include <fstream>
 #include <limits>
+#include <numbers>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -98,6 +100,24 @@ TEST(HipPath, NamesTheFileAndTheLineThatIsWrong) {
     EXPECT_NE(message_of_content(content).find(expected), std::string::npos)
         << "for " << content << "it says: " << message_of_content(content);
   }
+}
+
+TEST(HipPath, TurnsOnTheShortestWayBetweenItsSamples) {
+  std::istringstream text(
+      "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,1,0,0,-0.70710678,-0.70710678\n");
+  const HipPath path = HipPath::parse_csv(text, "p.csv");
+  EXPECT_TRUE(path.turns());
+  EXPECT_TRUE(path.pose_at(-1.0).orientation.isApprox(Rotation::Identity()));
+  // 90 degrees about z: halfway, 45.
+  const HandPose half = path.pose_at(0.5);
+  EXPECT_NEAR(half.position.z(), 0.5, 1e-12);
+  EXPECT_NEAR(std::abs(half.orientation.z()), std::sin(std::numbers::pi / 8), 1e-8);
+  ScriptedDevice device(path, false);
+  ASSERT_TRUE(device.read(0.0).orientation);
+  std::istringstream still("t,x,y,z\n0,0,0,0\n");
+  EXPECT_FALSE(HipPath::parse_csv(still, "p.csv").turns());
+  std::istringstream wrong("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,2\n");
+  EXPECT_THROW(HipPath::parse_csv(wrong, "p.csv"), Error);
 }
 
 TEST(HipPath, SaysWhichFileItCannotRead) {

@@ -18,10 +18,12 @@ namespace palpate::test {
 /// Runs a hand through the floor and records it. @return the ticks as they were
 inline std::vector<ServoTick> record_press(SessionWriter& writer, const Parameters& parameters,
                                            int ticks, bool close = true,
-                                           const std::string& method = "sight") {
+                                           const std::string& method = "sight",
+                                           const std::shared_ptr<const ToolShape>& tool = {}) {
   const auto place = [](int i) { return Vec3(0.03 + 1e-5 * i, -0.05, -0.01 - 4e-4 * i); };
   FakeDevice device;
-  Cycle cycle(make_method(method, parameters), device, {method, parameters, {}, {}});
+  Cycle cycle(make_method(method, parameters, standard_methods(), tool), device,
+              {method, parameters, {}, {}, {}, tool});
   CycleReader reader = cycle.full_reader();
   writer.commands(cycle.commands(), 0.0);
   std::vector<ServoTick> recorded;

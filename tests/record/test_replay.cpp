@@ -49,6 +49,23 @@ INSTANTIATE_TEST_SUITE_P(Methods, Replay,
                            return name;
                          });
 
+TEST(ReplayOf, AToolGivesTheSameForcesAndTorquesBitForBit) {
+  const TemporaryFolder folder;
+  const auto tool = make_tool("box:30x20x10mm?points=400", {});
+  std::vector<ServoTick> ticks;
+  {
+    SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
+    ticks = record_press(writer, {}, 150, true, "sight", tool);
+  }
+  double largest = 0.0;
+  for (const ServoTick& tick : ticks) largest = std::max(largest, tick.tick.torque.norm());
+  ASSERT_GT(largest, 1e-3);  // [N m] it touched
+  SessionReader reader(folder.path() / "bag");
+  const ReplayReport report = replay(reader);
+  EXPECT_TRUE(report.identical()) << text_of(report);
+  EXPECT_EQ(report.ticks, 150U);
+}
+
 // Records anew what was recorded, with some of it changed.
 ReplayReport replay_changed(const std::function<bool(ServoTick&)>& change) {
   const TemporaryFolder folder;

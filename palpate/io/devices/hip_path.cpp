@@ -5,7 +5,9 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <span>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -18,13 +20,15 @@ namespace {
 
 constexpr double farthest = 1e6;  // [m] where the renderer stops calling it a place
 constexpr double longest = 1e6;   // [s] 10^9 ticks at 1 kHz
-constexpr std::array<std::string_view, 4> columns{"t", "x", "y", "z"};
+constexpr std::array<std::string_view, 8> columns{"t", "x", "y", "z", "qx", "qy", "qz", "qw"};
+constexpr std::size_t still = 4;  // of them, of a hand that does not turn
 
 // What is wrong with a sample after another one, or nothing.
 std::string fault(const HipPath::Sample& sample, std::span<const HipPath::Sample> before) {
   if (!std::isfinite(sample.t)) return "t is not finite";
   if (!sample.hip.allFinite()) return "x, y or z is not finite";
   if (sample.hip.cwiseAbs().maxCoeff() > farthest) return "the position is beyond 1000 km";
+  if (!(std::abs(sample.turn.norm() - 1.0) < 0.01)) return "qx,qy,qz,qw is no unit quaternion";
   if (before.empty()) return {};
   if (!(sample.t > before.back().t)) return "t does not increase";
   if (sample.t - before.front().t > longest) return "the path is longer than 1000000 s";
@@ -51,13 +55,21 @@ HipPath HipPath::read_csv(const std::filesystem::path& file) {
 }
 
 HipPath HipPath::parse_csv(std::istream& in, const std::string& name) {
-  CsvColumns lines(in, name, columns);
+  // The header says whether the hand turns: it is read twice.
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  std::istringstream whole(text);
+  const std::string header = text.substr(0, text.find_first_of("\r\n"));
+  const bool turns = header.find("qw") != std::string::npos;
+  const auto wanted = std::span(columns).first(turns ? columns.size() : still);
+  CsvColumns lines(whole, name, wanted);
   std::vector<Sample> samples;
-  std::array<double, columns.size()> values{};
-  while (lines.next(values)) {
-    const Sample sample{values[0], Vec3(values[1], values[2], values[3])};
+  std::array<double, columns.size()> values{0, 0, 0, 0, 0, 0, 0, 1};
+  while (lines.next(std::span(values).first(wanted.size()))) {
+    Sample sample{values[0], Vec3(values[1], values[2], values[3]),
+                  Rotation(values[7], values[4], values[5], values[6])};
     const std::string wrong = fault(sample, samples);
     if (!wrong.empty()) throw Error(lines.where(), wrong, fault_remedy);
+    sample.turn.normalize();
     samples.push_back(sample);
   }
   check_not_empty(samples, name);
@@ -71,16 +83,25 @@ HipPath::HipPath(std::vector<Sample> samples) : samples_(std::move(samples)) {
     if (!wrong.empty()) {
       throw Error("HIP path: sample " + std::to_string(i + 1), wrong, fault_remedy);
     }
+    turns_ = turns_ || samples_[i].turn.w() != 1.0;
   }
 }
 
-Vec3 HipPath::at(double t) const noexcept {
-  if (!(t > samples_.front().t)) return samples_.front().hip;
-  if (t >= samples_.back().t) return samples_.back().hip;
+HandPose HipPath::pose_at(double t) const noexcept {
+  if (!(t > samples_.front().t)) return {samples_.front().hip, samples_.front().turn};
+  if (t >= samples_.back().t) return {samples_.back().hip, samples_.back().turn};
   const auto next = std::upper_bound(samples_.begin(), samples_.end(), t,
                                      [](double time, const Sample& s) { return time < s.t; });
   const auto last = next - 1;
-  return last->hip + (t - last->t) / (next->t - last->t) * (next->hip - last->hip);
+  const double share = (t - last->t) / (next->t - last->t);
+  HandPose pose{last->hip + share * (next->hip - last->hip), last->turn};
+  if (!turns_) return pose;
+  // Between neighbours a straight line in quaternions turns nearly evenly, and needs no sine.
+  const double sign = last->turn.dot(next->turn) < 0.0 ? -1.0 : 1.0;
+  pose.orientation.coeffs() =
+      (1.0 - share) * last->turn.coeffs() + share * sign * next->turn.coeffs();
+  if (pose.orientation.norm() > 1e-6) pose.orientation.normalize();
+  return pose;
 }
 
 ScriptedDevice::ScriptedDevice(HipPath path, bool repeat, std::string uri)
@@ -93,7 +114,10 @@ HandState ScriptedDevice::read(double t) noexcept {
   double along = t - *began_;
   const double length = path_.last_time() - path_.first_time();
   if (repeat_ && length > 0.0) along = std::fmod(along, length);
-  return {.position = path_.at(path_.first_time() + along)};
+  const HandPose pose = path_.pose_at(path_.first_time() + along);
+  HandState hand{.position = pose.position};
+  if (path_.turns()) hand.orientation = Eigen::Quaterniond(pose.orientation);
+  return hand;
 }
 
 }  // namespace palpate

@@ -494,7 +494,7 @@ TEST_F(Program, InfoSaysWhatIsAtAPixel) {
   EXPECT_NE(text.out.find("at:\n  pixel: [0,0]\n"), std::string::npos) << text.out;
   expect_refusal(small + " --at 64,0", {"pixel 64,0", "64x48", "0 to 63"});
   expect_refusal(small + " --at=-1,0", {"pixel -1,0"});
-  expect_refusal(small + " --at 3", {"--at", "'3'", "--at 320,240"});
+  expect_refusal(small + " --at 3", {"--at", "'3'", "column and row, such as 320,240"});
   expect_refusal(small + " --at 3,4x", {"--at", "3,4x"});
   const std::string points = write("two.pcd", "FIELDS x y z\nPOINTS 2\nDATA ascii\n0 0 1\n0 0 2\n");
   expect_refusal("info pcd:" + points + " --at 0,0", {"not an image", "--at"});
@@ -831,13 +831,14 @@ TEST_F(Program, GoesOnWithoutItsRecordingWhenTheDiskIsFull) {
 }
 
 TEST_F(Program, FailsWithOneWhenAReplayDiffers) {
-  ASSERT_EQ(run("run --headless --duration 2 --record " + path("bag") +
+  ASSERT_EQ(run("run --headless --duration 6 --record " + path("bag") +
                 " --camera synthetic:desk?size=160x120")
                 .code,
             0);
   const std::string file = path("bag/bag_0.mcap");
   std::string flipped = read(file);
-  flipped[flipped.size() / 2] = static_cast<char>(flipped[flipped.size() / 2] ^ 1);
+  char& late = flipped[flipped.size() / 4 * 3];  // in a later chunk than the session's beginning
+  late = static_cast<char>(late ^ 1);
   const std::string hurt = write("hurt.mcap", flipped);
   const Outcome damaged = run("replay " + hurt);
   EXPECT_EQ(damaged.code, 1);

@@ -13,8 +13,9 @@
 namespace palpate {
 namespace {
 
+using Vec5 = Eigen::Matrix<double, 5, 1>;
+
 constexpr double widest_gate = 60e-3;  // [m]
-constexpr double outlier = 6.0;        // [-] standard deviations
 constexpr std::size_t inner_points = 768;
 constexpr std::size_t outer_points = 1280;
 constexpr std::size_t inner_rungs = 2;
@@ -25,6 +26,8 @@ constexpr double narrowest_cell = 4.5e-3;  // [m]
 constexpr double least_radius = 3.0;
 // Discs of coarse images grow at least by this from rung to rung; fine ones' by 1.57 to 1.7.
 constexpr double least_growth = 1.25;
+// Residuals this small are no structure, whatever the noise [m].
+constexpr double structure_floor = 50e-6;
 // Noise may grow by this much at once, however little there was [m].
 constexpr double unnoticed_noise = 50e-6;
 // Upper 99 % confidence bounds of a variance estimated from 1 to 5 samples, in multiples of it.
@@ -121,10 +124,6 @@ void SurfaceEstimate::set(const SightParameters& parameters) noexcept {
   parameters_ = parameters;
   if (parameters_.usual_noise == 0.0) parameters_.usual_noise = SightParameters::unknown_noise;
   if (parameters_.noise_growth == 0) parameters_.noise_growth = SightParameters::unknown_growth;
-}
-
-bool SurfaceEstimate::is_measured(std::size_t rung) const noexcept {
-  return scatter_[evidence(0).camera][rung].samples > static_cast<double>(upper_bounds.size());
 }
 
 double SurfaceEstimate::height_sd() const noexcept {
@@ -231,7 +230,7 @@ bool SurfaceEstimate::start(const Cloud& cloud, const Vec3& foot, const Vec3& up
   frame_ = LocalFrame::about(foot, up);
   surface_ = {};
   count_ = 0;
-  fit_test_.forget();
+  for (Cells& past : cells_) past.full = false;
   stop();
   jumped_ = false;
   smooth_ = false;
@@ -299,80 +298,8 @@ bool SurfaceEstimate::recentre(const Vec2& foot, double wide, double& cut) noexc
   surface_.c[0] += near->median;
   // Smoothed, since quantised depth makes single deviations jump between its steps.
   spread_ = count_ == 0 ? near->deviation : spread_ + 0.2 * (near->deviation - spread_);
-  cut = std::clamp(outlier * std::max(near->deviation, spread_), 0.5e-3, wide);
+  cut = std::clamp(6.0 * std::max(near->deviation, spread_), 0.5e-3, wide);
   return true;
-}
-
-// Without an estimate to start from, the shape is found by iterating the fit. False if there are
-// too few points.
-bool SurfaceEstimate::find_shape(const Vec2& foot, double wide, double& cut) noexcept {
-  constexpr int iterations = 3;
-  constexpr double least_weight = 6.0;  // [points] as many as there are coefficients
-  constexpr double least_cut = 2e-3;    // [m]
-  constexpr double prior = 0.1;         // [1/cm^4] for each point
-  for (int i = 0; i < iterations; ++i) {
-    if (!recentre(foot, wide, cut)) return false;
-    const Moments moments = disc_moments(patch_, frame_, surface_,
-                                         Disc{foot, 0.0, radii_[1], std::max(cut, least_cut)});
-    if (moments.xy[0] < least_weight) return false;
-    surface_.c += fit_quadric(moments, prior * moments.xy[0]).c;
-  }
-  return true;
-}
-
-// Makes room for a new frame's evidence.
-void SurfaceEstimate::begin_evidence(bool jumped) noexcept {
-  // Heights from before a jump belong to another surface, unless the next frame's jump says that
-  // it was a motion.
-  const bool goes_on = jumped && jumped_;
-  jumped_ = jumped;
-  if (count_ == 0 || (jumped && !goes_on)) settled_ = 0;
-  if (settled_ == 0) rested_ = 0;
-  settled_ += goes_on && settled_ == 1 ? 2 : 1;
-  newest_ = (newest_ + 1) % history;
-  count_ = std::min(count_ + 1, most_frames());
-  evidence(0).camera = camera_;
-  is_known_.fill(false);
-  for (std::size_t i = 0; i < count_; ++i) is_known_[evidence(i).camera] = true;
-  cameras_ = static_cast<std::size_t>(std::count(is_known_.begin(), is_known_.end(), true));
-}
-
-// Sums of the patch's points in the discs from `first` to `end`.
-void SurfaceEstimate::measure_discs(std::size_t first, std::size_t end, double cut) noexcept {
-  Evidence& now = evidence(0);
-  for (std::size_t j = first; j < end; ++j) {
-    Moments moments = disc_moments(patch_, frame_, surface_,
-                                   Disc{now.centre, j == 0 ? 0.0 : radii_[j - 1], radii_[j], cut});
-    now.extent[j] = moments.xy[0] / patch_.share() + (j > 0 ? now.extent[j - 1] : 0.0);
-    moments.raise(surface_);
-    if (j > 0) moments.add(now.disc[j - 1]);
-    now.disc[j] = moments;
-    now.shape[j] = Shape::of(moments);
-  }
-  now.rungs = end;
-}
-
-// Where there is noise to average away, looks farther.
-void SurfaceEstimate::measure_wide_discs(const Cloud& cloud, const Vec3& place, double wide,
-                                         double cut) noexcept {
-  constexpr double negligible = 20e-6;        // [m] noise of the inner discs
-  constexpr double negligible_spread = 1e-4;  // [m] of their points
-  const Evidence& now = evidence(0);
-  const Scatter& inner = scatter_[now.camera][1];
-  const bool noisy =
-      inner.samples >= 1.0 ? inner.variance > squared(negligible) : spread_ > negligible_spread;
-  const std::size_t most = most_rungs();
-  if (!noisy || most <= inner_rungs) return;
-  const double widest = radii_[most - 1];
-  gather(cloud, Beam{place, widest * 1.1, wide + widest, frame_.up}, outer_points, patch_);
-  points_.take(patch_, frame_);
-  // Noise that is common to the inner disc is not common to the wide ones: their outliers are
-  // judged by their own median and deviation.
-  if (const std::optional<Residuals> far = residuals(now.centre, widest, wide)) {
-    surface_.c[0] += far->median;
-    cut = std::clamp(outlier * far->deviation, cut, wide);
-  }
-  measure_discs(inner_rungs, most, cut);
 }
 
 // Measures the surface around `foot` in the newest frame, and estimates anew from all frames.
@@ -380,266 +307,289 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
                               bool new_frame) noexcept {
   const double wide = look.gate;
   const Vec3 place = frame_.world_from_local(Vec3(foot.x(), foot.y(), surface_.height(foot)));
-  gather(cloud, Beam{place, radii_[1] * 1.2, wide + 2.0 * radii_[1], frame_.up}, inner_points,
-         patch_);
+  const double deep = wide + 2.0 * radii_[1];
+  gather(cloud, Beam{place, radii_[1] * 1.2, deep, frame_.up}, inner_points, patch_);
   points_.take(patch_, frame_);
   const Quadric before = surface_;
   double cut = 0.0;
   const bool first = count_ == 0;
-  if (!(first ? find_shape(foot, wide, cut) : recentre(foot, wide, cut))) {
-    surface_ = before;
-    return false;
+  // Without an estimate to start from, the shape is found by iterating the fit.
+  for (int i = 0; i < (first ? 3 : 1); ++i) {
+    if (!recentre(foot, wide, cut)) {
+      surface_ = before;
+      return false;
+    }
+    if (!first) break;
+    Moments moments =
+        disc_moments(patch_, frame_, surface_, Disc{foot, 0.0, radii_[1], std::max(cut, 2e-3)});
+    if (moments.xy[0] < 6.0) {
+      surface_ = before;
+      return false;
+    }
+    const Quadric correction = fit_quadric(moments, 0.1 * moments.xy[0]);
+    surface_.c += correction.c;
   }
-  if (new_frame || first) begin_evidence(look.jumped);
+
+  if (new_frame || count_ == 0) {
+    // Heights from before a jump belong to another surface, unless the next frame's jump says that
+    // it was a motion.
+    const bool goes_on = look.jumped && jumped_;
+    jumped_ = look.jumped;
+    if (count_ == 0 || (look.jumped && !goes_on)) settled_ = 0;
+    if (settled_ == 0) rested_ = 0;
+    settled_ += goes_on && settled_ == 1 ? 2 : 1;
+    newest_ = (newest_ + 1) % history;
+    count_ = std::min(count_ + 1, most_frames());
+    evidence(0).camera = camera_;
+    is_known_.fill(false);
+    for (std::size_t i = 0; i < count_; ++i) is_known_[evidence(i).camera] = true;
+    cameras_ = static_cast<std::size_t>(std::count(is_known_.begin(), is_known_.end(), true));
+  }
   Evidence& now = evidence(0);
   now.stamp = stamp_;
   now.centre = foot;
   now.whole = !look.partial;
   now.lost = 0;
-  measure_discs(0, inner_rungs, cut);
-  fit_test_.take(points_, surface_, {foot, cell_size_, wide, !look.partial, new_frame});
-  measure_wide_discs(cloud, place, wide, cut);
+  const auto add_ring = [&](std::size_t j) {
+    Moments moments = disc_moments(patch_, frame_, surface_,
+                                   Disc{foot, j == 0 ? 0.0 : radii_[j - 1], radii_[j], cut});
+    now.extent[j] = moments.xy[0] / patch_.share() + (j > 0 ? now.extent[j - 1] : 0.0);
+    moments.raise(surface_);
+    if (j > 0) moments.add(now.disc[j - 1]);
+    now.disc[j] = moments;
+  };
+  for (std::size_t j = 0; j < inner_rungs; ++j) add_ring(j);
+  now.rungs = inner_rungs;
+
+  look_at_cells(foot, look, new_frame);
+
+  // Where there is noise to average away, look farther.
+  const Scatter& inner = scatter_[now.camera][1];
+  const bool noisy = inner.samples >= 1.0 ? inner.variance > squared(20e-6) : spread_ > 0.1e-3;
+  const std::size_t most = most_rungs();
+  if (noisy && most > inner_rungs) {
+    const double widest = radii_[most - 1];
+    gather(cloud, Beam{place, widest * 1.1, wide + widest, frame_.up}, outer_points, patch_);
+    points_.take(patch_, frame_);
+    // Noise that is common to the inner disc is not common to the wide ones: their outliers are
+    // judged by their own median and deviation.
+    if (const std::optional<Residuals> far = residuals(foot, widest, wide)) {
+      surface_.c[0] += far->median;
+      cut = std::clamp(6.0 * far->deviation, cut, wide);
+    }
+    for (std::size_t j = inner_rungs; j < most; ++j) add_ring(j);
+    now.rungs = most;
+  }
+  for (std::size_t j = 0; j < now.rungs; ++j) now.shape[j] = Shape::of(now.disc[j]);
   if (first && !spans_area(now.shape[0])) {
     surface_ = before;
     count_ = 0;
     return false;
   }
   estimate(foot, new_frame, new_frame);
-  if (!look.partial) smooth_ = is_whole(foot) && fit_test_.judge(smooth_);
+  if (!look.partial) judge(foot);
   now.smooth = smooth_;
-  if (cameras_ > 1 && !look.partial) smooth_ = smooth_ || others_are_smooth(foot);
+  // What one camera sees whole another may see cut off by a shadow, in turn.
+  std::array<bool, Patch::max_views> is_judged{};
+  for (std::size_t i = 0; i < count_ && cameras_ > 1 && !look.partial; ++i) {
+    const Evidence& e = evidence(i);
+    if (std::exchange(is_judged[e.camera], true) || stamp_ - e.stamp > longest_gap) continue;
+    smooth_ = smooth_ || (e.smooth && (e.centre - foot).squaredNorm() < squared(same_centre));
+  }
   centre_ = foot;
   if (foot.norm() > 4e-3 * coarseness()) move_origin(foot);
   return true;
 }
 
-// What one camera sees whole another may see cut off by a shadow, in turn.
-bool SurfaceEstimate::others_are_smooth(const Vec2& foot) noexcept {
-  std::array<bool, Patch::max_views> is_judged{};
-  for (std::size_t i = 0; i < count_; ++i) {
-    const Evidence& e = evidence(i);
-    if (std::exchange(is_judged[e.camera], true) || stamp_ - e.stamp > longest_gap) continue;
-    if (e.smooth && (e.centre - foot).squaredNorm() < squared(same_centre)) return true;
-  }
-  return false;
-}
-
-// Shape and heights of a disc, from the frames whose disc overlaps the newest one's well.
-void SurfaceEstimate::average(std::size_t j, const Vec5& basis, Average& average) noexcept {
-  const Evidence& now = evidence(0);
-  std::array<double, Patch::max_views> doubts{};
-  for (std::size_t c = 0; c < doubts.size(); ++c)
-    if (is_known_[c]) doubts[c] = doubt(j, c);
-  const std::size_t most =
-      std::min(count_, cameras_ * static_cast<std::size_t>(parameters_.averaged_frames));
-  const double farthest = squared(overlap(j));
-  Shape::Sums sums = Shape::Sums::Zero();
-  std::array<SlopeWindow, slope_windows> windows;
-  std::size_t filled = 0;
-  std::size_t whole = 0;
-  std::size_t n = 0;
-  for (; n < most; ++n) {
-    const Evidence& e = evidence(n);
-    if (j < e.lost || e.rungs <= j || (e.centre - now.centre).squaredNorm() > farthest) break;
-    // A partly hidden disc determines the height, but hardly the slope.
-    if (!e.whole && n > 0) continue;
-    sums += 1.0 / doubts[e.camera] * e.shape[j].sums;
-    if (++whole == std::size_t{2} << filled && filled < slope_windows) {
-      windows[filled++] = {Shape::matrix(sums), Shape::right_side(sums)};
-    }
-  }
-  average.frames = n;
-  // What one point weighs, with correlated noise counted by its effect [cm^2].
-  const double point_variance =
-      variance(j) * std::max(now.shape[j].points, 1.0) / squared(Moments::unit);
-  Eigen::Matrix<double, 5, 5> matrix = Shape::matrix(sums);
-  matrix.diagonal().array() += 1e-9;
-  matrix.diagonal().tail<3>().array() +=
-      point_variance / squared(parameters_.curvature_sd * Moments::unit);
-  average.shape = solve_symmetric<5>(matrix, Shape::right_side(sums));
-  // One deviation more than elsewhere: each of four windows could be wrong in each frame.
-  confine_slopes(average.shape, std::span(windows.data(), filled), point_variance,
-                 parameters_.confidence + 1.0);
-  const double above = average.shape.dot(basis);
-  std::array<double, Patch::max_views> extents{};  // of each camera
-  std::array<double, Patch::max_views> frames{};
-  for (std::size_t i = 0; i < n; ++i) {
-    const Evidence& e = evidence(i);
-    average.heights[i] = {
-        e.stamp, (e.shape[j].height - e.shape[j].means.dot(average.shape) + above) * Moments::unit};
-    extents[e.camera] += e.extent[j];
-    ++frames[e.camera];
-  }
-  // A disc that an occluder begins to hide has fewer points and more noise.
-  constexpr double usual = 0.8;  // [-] of the points
-  constexpr double least = 0.1;
-  for (std::size_t i = 0; i < n; ++i) {
-    const Evidence& e = evidence(i);
-    const double share = e.extent[j] * frames[e.camera] / extents[e.camera];
-    average.heights[i].doubt =
-        doubts[e.camera] * (share < usual ? 1.0 / squared(std::max(share, least)) : 1.0);
-  }
-}
-
-// Learns how the heights of a disc scatter, from this camera's newest ones.
-void SurfaceEstimate::learn_noise(std::size_t j, const Average& average) noexcept {
-  constexpr double most_samples = 40.0;
-  constexpr std::array<double, 5> binomial = {1.0, -4.0, 6.0, -4.0, 1.0};
-  const Evidence& now = evidence(0);
-  Scatter& scatter = scatter_[now.camera][j];
-  // Fourth differences do not see a smooth motion; their variance is 70 times a height's.
-  double fourth = 0.0;
-  double doubts = 0.0;
-  std::size_t own = 0;
-  for (std::size_t i = 0; i < average.frames && own < binomial.size(); ++i) {
-    if (evidence(i).camera != now.camera) continue;
-    fourth += binomial[own] * average.heights[i].height;
-    doubts += squared(binomial[own++]) * average.heights[i].doubt;
-  }
-  const double doubt_of_camera = doubt(j, now.camera);
-  if (own == binomial.size() && now.whole) {
-    double change = fourth * fourth * doubt_of_camera / doubts;
-    // A single jump is not noise.
-    if (scatter.samples >= 4.0)
-      change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise));
-    scatter.samples = std::min(scatter.samples + 1.0, most_samples);
-    scatter.variance += (change - scatter.variance) / scatter.samples;
-  }
-  scatter.at_rest =
-      doubt_of_camera * variance_at_rest(average.heights, std::min(average.frames, rested_));
-}
-
-// The variance of a disc's height [m^2] that is expected. Until its noise has been measured over
-// time, what its points scatter counts at most: the usual noise of a camera would let a wide disc
-// agree that reaches beyond a body.
-double SurfaceEstimate::expected_variance(std::size_t j) const noexcept {
-  constexpr double unmeasured = 0.5;  // [-] of the spread
-  return is_measured(j) ? variance(j) : std::min(variance(j), squared(unmeasured * spread_));
-}
-
-// Does disc j agree with the narrower disc i, or does it at least move with it? The differences
-// between discs are taken frame by frame, so that motion cancels and their scatter is the noise.
-// @param learns  whether the scatter of the differences is learned from
-SurfaceEstimate::Agreement SurfaceEstimate::compare(const Average& narrow, const Average& wide,
-                                                    std::size_t i, std::size_t j,
-                                                    bool learns) noexcept {
-  const double negligible =
-      2e-6 + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
-  const std::size_t n = std::min(narrow.frames, wide.frames);
-  const auto difference = [&](std::size_t k) {
-    return wide.heights[k].height - narrow.heights[k].height;
-  };
-  const auto [sum, squares] = sums_over<2>(n, [&](std::size_t k) {
-    const double d = difference(k);
-    return std::array{d, d * d};
-  });
-  const auto count = static_cast<double>(n);
-  const double mean = sum / count;
-  const double about_mean = std::max(squares - count * mean * mean, 0.0);
-  // Noise falls at most with the area it is averaged over, so the difference from the next
-  // narrower disc is a lower bound of a disc's noise.
-  if (i + 1 == j && n >= 4) {
-    scatter_[evidence(0).camera][j].least =
-        (1.0 + 2.0 / count) * about_mean / count / (squared(radii_[j] / radii_[i]) - 1.0);
-  }
-  // Few differences may happen to be alike: what the heights' noise lets expect counts as `prior`
-  // more. Without it a contact that slides falls back on narrow discs in single frames.
-  constexpr double prior = 4.0;
-  const double freedom = count - 1.0 + prior;
-  const double scattered =
-      (about_mean + prior * (expected_variance(i) + expected_variance(j))) / freedom;
-  // What is not measured yet is bounded, not estimated.
-  const bool measured = is_measured(i) && is_measured(j);
-  const double sds = parameters_.confidence + (j <= rung_ ? hysteresis : 0.0);
-  const double confidence = measured ? t_quantile(sds, freedom) : sds;
-  Agreement result;
-  result.agree = std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
-  // What slides in under a contact at rest changes the newest frames alone: of the mean over all
-  // it is a small part, and it scatters. Only noise that was measured before shows it.
-  const auto most = [&](double variance) { return sds * std::sqrt(variance) + negligible; };
-  if (measured && changed_since(n, most(variance(i) + variance(j)), difference) > 0) {
-    result.agree = false;
-    // Where the narrower one has changed itself, it is another surface that is touched.
-    if (learns)
-      result.changed = changed_since(n, most(variance(i)),
-                                     [&](std::size_t k) { return narrow.heights[k].height; });
-    return result;
-  }
-  result.moves_along = n >= 4 && std::abs(difference(0) - mean) <=
-                                     parameters_.confidence * std::sqrt(scattered) + negligible;
-  return result;
-}
-
-// Lepski's rule: the widest disc that agrees with all narrower ones determines the height. A disc
-// may differ from the narrower ones, because the surface is not a quadric over its width, and yet
-// move with them: then it determines the motion only.
-SurfaceEstimate::Choice SurfaceEstimate::choose(const std::array<Average, rungs>& discs,
-                                                bool learns) noexcept {
-  // [-] A disc that is emptier than this, beside the narrowest, reaches beyond the body: at a
-  // straight edge half of it is empty.
-  constexpr double least_filled = 0.45;
-  const Evidence& now = evidence(0);
-  Choice choice;
-  bool agree = true;
-  for (std::size_t j = 1; j < now.rungs; ++j) {
-    if (now.extent[j] < least_filled * now.extent[0] * squared(radii_[j] / radii_[0])) break;
-    bool moves_along = discs[j].frames >= std::min<std::size_t>(discs[0].frames, 2);
-    for (std::size_t i = 0; i < j && moves_along; ++i) {
-      const Agreement found = compare(discs[i], discs[j], i, j, learns);
-      if (choice.changed == 0) choice.changed = found.changed;
-      agree = agree && found.agree;
-      moves_along = agree || found.moves_along;
-    }
-    if (!moves_along) break;
-    if (agree && variance(j) <= variance(choice.rung)) choice.rung = j;
-    if (variance(j) <= variance(choice.mover)) choice.mover = j;
-  }
-  return choice;
-}
-
 // @param learns  new_frame, and nothing was learned from it yet
 void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) noexcept {
+  Evidence& now = evidence(0);
   const Vec2 at = foot / Moments::unit;
   Vec5 basis;
   basis << at.x(), at.y(), at.x() * at.x(), at.x() * at.y(), at.y() * at.y();
-  std::array<Average, rungs> discs;
-  for (std::size_t j = 0; j < evidence(0).rungs; ++j) {
-    average(j, basis, discs[j]);
-    if (cameras_ > 1) align_cameras(std::span(discs[j].heights.data(), discs[j].frames));
-    if (learns) learn_noise(j, discs[j]);
+  const double cm2 = squared(Moments::unit);
+
+  std::array<Vec5, rungs> shapes;
+  std::array<std::array<HeightSample, history>, rungs> heights;
+  std::array<std::size_t, rungs> frames{};
+  std::size_t chosen = 0;
+  const std::size_t averaged =
+      std::min(count_, cameras_ * static_cast<std::size_t>(parameters_.averaged_frames));
+  for (std::size_t j = 0; j < now.rungs; ++j) {
+    std::array<double, Patch::max_views> doubts{};
+    for (std::size_t c = 0; c < doubts.size(); ++c)
+      if (is_known_[c]) doubts[c] = doubt(j, c);
+    // Evidence from frames whose disc overlaps this one's well.
+    const double farthest = squared(overlap(j));
+    Shape::Sums sums = Shape::Sums::Zero();
+    std::array<SlopeWindow, slope_windows> windows;
+    std::size_t filled = 0;
+    std::size_t whole = 0;
+    std::size_t n = 0;
+    for (; n < averaged; ++n) {
+      const Evidence& e = evidence(n);
+      if (j < e.lost || e.rungs <= j || (e.centre - foot).squaredNorm() > farthest) break;
+      // A partly hidden disc determines the height, but hardly the slope.
+      if (!e.whole && n > 0) continue;
+      sums += 1.0 / doubts[e.camera] * e.shape[j].sums;
+      if (++whole == std::size_t{2} << filled && filled < slope_windows) {
+        windows[filled++] = {Shape::matrix(sums), Shape::right_side(sums)};
+      }
+    }
+    frames[j] = n;
+    const double points = std::max(now.shape[j].points, 1.0);
+    Scatter& scatter = scatter_[now.camera][j];
+    // Weight of the curvature prior in points, with correlated noise counted by its effect.
+    const double prior =
+        variance(j) * points / cm2 / squared(parameters_.curvature_sd * Moments::unit);
+    const auto fit_shape = [&](Eigen::Matrix<double, 5, 5> a, const Vec5& b) {
+      a.diagonal().array() += 1e-9;
+      a.diagonal().tail<3>().array() += prior;
+      shapes[j] = solve_symmetric<5>(a, b);
+    };
+    fit_shape(Shape::matrix(sums), Shape::right_side(sums));
+    // One deviation more than elsewhere: each of four windows could be wrong in each frame.
+    confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / cm2,
+                   parameters_.confidence + 1.0);
+    const double above = shapes[j].dot(basis);
+    std::array<double, Patch::max_views> own_frames{};
+    for (std::size_t i = 0; i < n; ++i) ++own_frames[evidence(i).camera];
+    std::array<double, Patch::max_views> usual_extent{};
+    std::array<HeightSample, 5> h;  // of this camera, without what it is worth beside others
+    std::size_t own = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Evidence& e = evidence(i);
+      heights[j][i] = {
+          e.stamp, (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * Moments::unit};
+      usual_extent[e.camera] += e.extent[j] / own_frames[e.camera];
+    }
+    // A disc that an occluder begins to hide has fewer points and more noise.
+    for (std::size_t i = 0; i < n; ++i) {
+      const Evidence& e = evidence(i);
+      HeightSample& height = heights[j][i];
+      const double share = e.extent[j] / usual_extent[e.camera];
+      if (share < 0.8) height.doubt = 1.0 / squared(std::max(share, 0.1));
+      if (e.camera == now.camera && own < h.size()) h[own++] = height;
+      height.doubt *= doubts[e.camera];
+    }
+    if (cameras_ > 1) align_cameras(std::span(heights[j].data(), n));
+    if (learns && own == h.size() && now.whole) {
+      // Fourth differences do not see a smooth motion; their variance is 70 times a height's.
+      const double fourth =
+          h[0].height - 4.0 * h[1].height + 6.0 * h[2].height - 4.0 * h[3].height + h[4].height;
+      double change =
+          fourth * fourth /
+          (h[0].doubt + 16.0 * (h[1].doubt + h[3].doubt) + 36.0 * h[2].doubt + h[4].doubt);
+      // A single jump is not noise.
+      if (scatter.samples >= 4.0) {
+        change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise));
+      }
+      scatter.samples = std::min(scatter.samples + 1.0, 40.0);
+      scatter.variance += (change - scatter.variance) / scatter.samples;
+    }
+    if (learns)
+      scatter.at_rest = doubts[now.camera] * variance_at_rest(heights[j], std::min(n, rested_));
   }
-  const Choice choice = choose(discs, learns);
-  if (choice.changed > 0) {
-    count_ = choice.changed;
-    settled_ = std::min(settled_, choice.changed);
+  // Lepski's rule: the widest disc that agrees with all narrower ones determines the height. The
+  // differences between discs are taken frame by frame, so that motion cancels and their scatter is
+  // the noise. A disc may differ from the narrower ones, because the surface is not a quadric over
+  // its width, and yet move with them: then it determines the motion only.
+  const double negligible =
+      2e-6 + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
+  // Until a disc's noise has been measured over time, what its points scatter counts at most: the
+  // usual noise of a camera would let a wide disc agree that reaches beyond a body.
+  constexpr double unmeasured = 0.5;  // [-] of the spread
+  const auto measured = [&](std::size_t j) {
+    return scatter_[now.camera][j].samples > static_cast<double>(upper_bounds.size());
+  };
+  const auto expected = [&](std::size_t j) {
+    return measured(j) ? variance(j) : std::min(variance(j), squared(unmeasured * spread_));
+  };
+  // [-] A disc that is emptier than this, beside the narrowest, reaches beyond the body: at a
+  // straight edge half of it is empty.
+  constexpr double least_filled = 0.45;
+  std::size_t mover = 0;
+  std::size_t changed = 0;  // frames since
+  bool agree = true;
+  for (std::size_t j = 1; j < now.rungs; ++j) {
+    if (now.extent[j] < least_filled * now.extent[0] * squared(radii_[j] / radii_[0])) break;
+    bool moves_along = frames[j] >= std::min<std::size_t>(frames[0], 2);
+    for (std::size_t i = 0; i < j && moves_along; ++i) {
+      const std::size_t n = std::min(frames[i], frames[j]);
+      const auto [sum, squares] = sums_over<2>(n, [&](std::size_t k) {
+        const double d = heights[j][k].height - heights[i][k].height;
+        return std::array{d, d * d};
+      });
+      const auto count = static_cast<double>(n);
+      const double mean = sum / count;
+      const double about_mean = std::max(squares - count * mean * mean, 0.0);
+      // Noise falls at most with the area it is averaged over, so the difference from the next
+      // narrower disc is a lower bound of a disc's noise.
+      if (i + 1 == j && n >= 4) {
+        scatter_[now.camera][j].least =
+            (1.0 + 2.0 / count) * about_mean / count / (squared(radii_[j] / radii_[i]) - 1.0);
+      }
+      // Few differences may happen to be alike: what the heights' noise lets expect counts as
+      // `prior` more. Without it a contact that slides falls back on narrow discs in single frames.
+      constexpr double prior = 4.0;
+      const double freedom = count - 1.0 + prior;
+      const double scattered = (about_mean + prior * (expected(i) + expected(j))) / freedom;
+      // What is not measured yet is bounded, not estimated.
+      const double sds = parameters_.confidence + (j <= rung_ ? hysteresis : 0.0);
+      const double confidence = measured(i) && measured(j) ? t_quantile(sds, freedom) : sds;
+      agree = agree && std::abs(mean) <= confidence * std::sqrt(scattered / count) + negligible;
+      // What slides in under a contact at rest changes the newest frames alone: of the mean over
+      // all it is a small part, and it scatters. Only noise that was measured before shows it.
+      const auto most = [&](double variance) { return sds * std::sqrt(variance) + negligible; };
+      const bool differs = measured(i) && measured(j) &&
+                           changed_since(n, most(variance(i) + variance(j)), [&](std::size_t k) {
+                             return heights[j][k].height - heights[i][k].height;
+                           }) > 0;
+      // Where the narrower one has changed itself, it is another surface that is touched.
+      if (differs && learns && changed == 0)
+        changed = changed_since(n, most(variance(i)),
+                                [&](std::size_t k) { return heights[i][k].height; });
+      agree = agree && !differs;
+      const double newest = heights[j][0].height - heights[i][0].height;
+      moves_along = agree || (n >= 4 && !differs &&
+                              std::abs(newest - mean) <=
+                                  parameters_.confidence * std::sqrt(scattered) + negligible);
+    }
+    if (!moves_along) break;
+    if (agree && variance(j) <= variance(chosen)) chosen = j;
+    if (variance(j) <= variance(mover)) mover = j;
+  }
+  if (changed > 0) {
+    count_ = changed;
+    settled_ = std::min(settled_, changed);
     rested_ = 0;
     estimate(foot, new_frame, false);
     return;
   }
-  rung_ = choice.rung;
-  mover_ = choice.mover;
-  const Average& chosen = discs[rung_];
-  Average& mover = discs[mover_];
-  if (mover_ != rung_) {
-    const std::size_t known = std::min(chosen.frames, mover.frames);
+  rung_ = chosen;
+  mover_ = mover;
+  std::array<HeightSample, history>& past = heights[mover];
+  const std::size_t known = std::min(frames[chosen], frames[mover]);
+  if (mover != chosen) {
     double difference = 0.0;
     for (std::size_t k = 0; k < known; ++k) {
-      difference +=
-          (chosen.heights[k].height - mover.heights[k].height) / static_cast<double>(known);
+      difference += (heights[chosen][k].height - past[k].height) / static_cast<double>(known);
     }
-    for (std::size_t k = 0; k < mover.frames; ++k) mover.heights[k].height += difference;
+    for (std::size_t k = 0; k < frames[mover]; ++k) past[k].height += difference;
   }
-  const std::span<const HeightSample> since(mover.heights.data(),
-                                            std::clamp<std::size_t>(settled_, 1, mover.frames));
-  const HeightTrack track = track_height(since, height_sd(), interval_, parameters_);
+  const std::span<const HeightSample> since(past.data(),
+                                            std::clamp<std::size_t>(settled_, 1, frames[mover]));
+  const double sd = height_sd();
+  const HeightTrack track = track_height(since, sd, interval_, parameters_);
   if (new_frame) {
     velocity_ = track.velocity;
     rested_ = velocity_ == 0.0 ? std::min(rested_ + 1, history) : 0;
   }
-  surface_.c.tail<5>() = chosen.shape;
+  const double height = track.height;
+  surface_.c.tail<5>() = shapes[chosen];
   surface_.c.tail<3>() /= Moments::unit;
-  surface_.c[0] = track.height - chosen.shape.dot(basis) * Moments::unit;
-  above_mean_ = since.front().height - track.height;
+  above_mean_ = since.front().height - height;
+  surface_.c[0] = height - shapes[chosen].dot(basis) * Moments::unit;
 }
 
 // Where cameras' poses are not quite right, their heights differ by what is no motion: takes from
@@ -679,6 +629,73 @@ void SurfaceEstimate::align_cameras(std::span<HeightSample> heights) noexcept {
   }
 }
 
+// Means of the inner patch's points in cells of a square about `foot`. Structure stays from frame
+// to frame, noise does not.
+void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept {
+  if (new_frame) newest_cells_ = (newest_cells_ + 1) % cell_frames;
+  Cells& now = cells_[newest_cells_];
+  const Vec2 corner = foot / cell_size_ - Vec2::Constant(0.5 * cells_per_side);
+  now.first = corner.array().round().cast<int>();
+  now.heights.fill(0.0);
+  now.means.fill(Vec6::Zero());
+  const FloatQuadric surface(surface_);
+  const auto first_u = static_cast<float>(now.first.x());
+  const auto first_v = static_cast<float>(now.first.y());
+  const auto per_cell = static_cast<float>(1.0 / cell_size_);
+  const auto gate = static_cast<float>(look.gate);
+  for (std::size_t i = 0; i < points_.size; ++i) {
+    const float x = points_.x[i];
+    const float y = points_.y[i];
+    const float z = points_.z[i];
+    const float u = x * per_cell - first_u;
+    const float v = y * per_cell - first_v;
+    if (!(u >= 0.0F && v >= 0.0F && u < cells_per_side && v < cells_per_side)) continue;
+    if (!(std::abs(z - surface.height(x, y)) <= gate)) continue;
+    const auto k =
+        static_cast<std::size_t>(static_cast<int>(v) * cells_per_side + static_cast<int>(u));
+    now.heights[k] += double{z};
+    now.means[k] += quadric_basis(Vec2(x, y));
+  }
+  // Noise leaves single cells empty, an edge leaves a whole row.
+  constexpr int most_empty = 2;
+  int empty = 0;
+  for (std::size_t k = 0; k < cells; ++k) {
+    const double count = now.means[k][0];
+    if (!(count > 0.0)) {
+      ++empty;
+      continue;
+    }
+    now.heights[k] /= count;
+    now.means[k] /= count;
+  }
+  now.full = !look.partial && empty <= most_empty;
+}
+
+// Mean square of the cells' residuals about their own best quadric [m^2]: errors of the fit, which
+// grow towards the corners, do not count as structure.
+double SurfaceEstimate::squared_structure(const Cells& frame,
+                                          const std::array<double, cells>& residuals) noexcept {
+  Eigen::Matrix<double, 6, 6> a = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
+  Vec6 b = Vec6::Zero();
+  std::array<Vec6, cells> basis;
+  for (std::size_t k = 0; k < cells; ++k) {
+    Vec6& means = basis[k];
+    means = frame.means[k];
+    means.segment<2>(1) *= 1.0 / Moments::unit;
+    means.tail<3>() *= 1.0 / squared(Moments::unit);
+    a.noalias() += means * means.transpose();
+    b += residuals[k] * means;
+  }
+  const Vec6 c = solve_symmetric<6>(a, b);
+  double sum = 0.0;
+  double present = 0.0;
+  for (std::size_t k = 0; k < cells; ++k) {
+    sum += squared(residuals[k] - c.dot(basis[k]));
+    present += frame.means[k][0];
+  }
+  return sum / (present - 6.0);
+}
+
 // Do the points span an area, so that they determine a slope? Those of a border seen from its side
 // lie in a line.
 bool SurfaceEstimate::spans_area(const Shape& inner) const noexcept {
@@ -689,17 +706,88 @@ bool SurfaceEstimate::spans_area(const Shape& inner) const noexcept {
   return least > 0.05 * full_disc();
 }
 
-// Are there points all around? At an edge they lie to one side of the disc, at a gap around an
-// empty middle.
-bool SurfaceEstimate::is_whole(const Vec2& foot) noexcept {
-  const Shape& inner = evidence(0).shape[0];
+// Does the fit describe the surface, up to noise?
+void SurfaceEstimate::judge(const Vec2& foot) noexcept {
+  const Evidence& now = evidence(0);
+  // At an edge the points lie to one side of the disc, at a gap around an empty middle.
+  const Shape& inner = now.shape[0];
   const Vec2 middle(inner.means[0], inner.means[1]);
   const Vec2 spread = Vec2(inner.means[2], inner.means[4]) - Vec2(middle.cwiseAbs2());
   // Hysteresis, so that the way to rest does not change from frame to frame.
   const double slack = smooth_ ? 0.5 : 0.35;
-  return (middle * Moments::unit - foot).norm() < 0.85 * slack * radii_[0] &&
-         spread.minCoeff() > (1.0 - slack) * full_disc() &&
-         spread.maxCoeff() < (1.0 + slack) * full_disc();
+  const bool whole = (middle * Moments::unit - foot).norm() < 0.85 * slack * radii_[0] &&
+                     spread.minCoeff() > (1.0 - slack) * full_disc() &&
+                     spread.maxCoeff() < (1.0 + slack) * full_disc();
+  if (!whole) {
+    smooth_ = false;
+    return;
+  }
+  const Cells& newest = cells_[newest_cells_];
+  if (!newest.full) {
+    smooth_ = false;
+    return;
+  }
+  // Residuals over the surface as it is known now, less what all cells share; 0 of empty ones.
+  const auto residuals_of = [this](const Cells& frame) {
+    std::array<double, cells> residuals;
+    double sum = 0.0;
+    double present = 0.0;
+    for (std::size_t k = 0; k < cells; ++k) {
+      residuals[k] = frame.heights[k] - surface_.c.dot(frame.means[k]);
+      sum += residuals[k];
+      present += frame.means[k][0];
+    }
+    for (std::size_t k = 0; k < cells; ++k) residuals[k] -= frame.means[k][0] * sum / present;
+    return residuals;
+  };
+  const std::array<double, cells> residuals = residuals_of(newest);
+  std::array<double, cells> sums = residuals;
+  std::size_t frames = 1;
+  for (; frames < cell_frames; ++frames) {
+    const Cells& past = cells_[(newest_cells_ + cell_frames - frames) % cell_frames];
+    if (!past.full) break;
+    const std::array<double, cells> older = residuals_of(past);
+    if (frames == 1) learn_cell_noise(newest, residuals, past, older);
+    if (past.first != newest.first) break;
+    for (std::size_t k = 0; k < cells; ++k) sums[k] += older[k];
+  }
+  const auto n = static_cast<double>(frames);
+  const double structure = squared_structure(newest, sums) / squared(n);
+  // Structure below the noise of one frame is ignored: over points the proxy would not rest better.
+  const double times = std::max((smooth_ ? 6.0 : 3.0) / n, smooth_ ? 2.0 : 1.0);
+  smooth_ = structure <= squared(structure_floor) + times * cell_scatter_.variance;
+}
+
+// Noise of a cell, from the differences of two frames in the cells that both measured, less their
+// common part.
+void SurfaceEstimate::learn_cell_noise(const Cells& newest,
+                                       const std::array<double, cells>& residuals,
+                                       const Cells& past,
+                                       const std::array<double, cells>& older) noexcept {
+  const Eigen::Vector2i offset = newest.first - past.first;
+  double sum = 0.0;
+  double squares = 0.0;
+  double shared = 0.0;
+  for (int v = 0; v < cells_per_side; ++v) {
+    for (int u = 0; u < cells_per_side; ++u) {
+      const int past_u = u + offset.x();
+      const int past_v = v + offset.y();
+      if (past_u < 0 || past_v < 0 || past_u >= cells_per_side || past_v >= cells_per_side)
+        continue;
+      const auto k = static_cast<std::size_t>(v * cells_per_side + u);
+      const auto past_k = static_cast<std::size_t>(past_v * cells_per_side + past_u);
+      if (newest.means[k][0] == 0.0 || past.means[past_k][0] == 0.0) continue;
+      const double change = residuals[k] - older[past_k];
+      sum += change;
+      squares += squared(change);
+      shared += 1.0;
+    }
+  }
+  constexpr double enough = 6.0;
+  if (shared < enough) return;
+  const double change = std::max(squares - sum * sum / shared, 0.0) / (2.0 * (shared - 1.0));
+  cell_scatter_.samples = std::min(cell_scatter_.samples + 1.0, 30.0);
+  cell_scatter_.variance += (change - cell_scatter_.variance) / cell_scatter_.samples;
 }
 
 // Keeps the local origin near the contact: sums of fourth powers lose digits far from it.
@@ -713,7 +801,18 @@ void SurfaceEstimate::move_origin(const Vec2& foot) noexcept {
   surface_.c[1] = gradient.x();
   surface_.c[2] = gradient.y();
   centre_ -= to;
-  fit_test_.move_origin(step, shift.z());
+  for (Cells& past : cells_) {
+    past.first -= step;
+    for (std::size_t k = 0; k < cells; ++k) {
+      Vec6& m = past.means[k];
+      if (m[0] == 0.0) continue;  // empty
+      past.heights[k] -= shift.z();
+      m[3] += to.x() * (to.x() - 2.0 * m[1]);
+      m[4] += to.x() * to.y() - to.x() * m[2] - to.y() * m[1];
+      m[5] += to.y() * (to.y() - 2.0 * m[2]);
+      m.segment<2>(1) -= to;
+    }
+  }
   // A disc that lies twice as far as discs may overlap from a newer frame's is never reached again,
   // nor is what is older. The newest frame's may still be moved.
   const Vec2 newer = count_ > 1 ? evidence(1).centre : foot;

@@ -8,7 +8,6 @@
 #include <span>
 
 #include "palpate/kernel/core/cloud.hpp"
-#include "palpate/kernel/sight/fit_test.hpp"
 #include "palpate/kernel/sight/height_track.hpp"
 #include "palpate/kernel/sight/surface_fit.hpp"
 
@@ -126,18 +125,22 @@ class SurfaceEstimate {
  private:
   static constexpr std::size_t history = most_heights;
   static constexpr std::size_t frames_of_a_camera = 64;
+  static constexpr int cells_per_side = 4;
+  static constexpr std::size_t cells = cells_per_side * cells_per_side;
 
   /// Moments with the height eliminated (Schur's complement): what remains determines slope and
   /// curvature.
   struct Shape {
     using Sums = Eigen::Matrix<double, 20, 1>;  // they add up over frames
-    Sums sums;      // lower triangle of the matrix, row by row, and right side
-    Vec5 means;     // of x, y, xx, xy, yy
-    double height;  // mean z [cm]
+    Sums sums;                          // lower triangle of the matrix, row by row, and right side
+    Eigen::Matrix<double, 5, 1> means;  // of x, y, xx, xy, yy
+    double height;                      // mean z [cm]
     double points;
 
     static Eigen::Matrix<double, 5, 5> matrix(const Sums& sums) noexcept;
-    static Vec5 right_side(const Sums& sums) noexcept { return sums.tail<5>(); }
+    static Eigen::Matrix<double, 5, 1> right_side(const Sums& sums) noexcept {
+      return sums.tail<5>();
+    }
     static Shape of(const Moments& disc) noexcept;
   };
   /// What was measured in one frame.
@@ -153,29 +156,26 @@ class SurfaceEstimate {
     std::array<Shape, SurfaceEstimate::rungs> shape;
     std::array<double, SurfaceEstimate::rungs> extent;  // points in reach, thinned or not
   };
+  /// Means over the points in each cell of a square about a frame's contact. Cells are those of a
+  /// lattice through the local origin, so that frames can be compared while the contact slides.
+  struct Cells {
+    Cells() noexcept {
+      heights.fill(0.0);
+      means.fill(Vec6::Zero());
+    }
+
+    bool full = false;  // nearly all cells have points, and no occluder hid any
+    Eigen::Vector2i first = Eigen::Vector2i::Zero();  // of the lattice's cells
+    std::array<double, cells> heights;                // [m]
+    std::array<Vec6, cells> means;                    // of quadric_basis
+  };
+  static constexpr std::size_t cell_frames = 8;
   /// Variance of a height from frame to frame.
   struct Scatter {
     double variance = 0.0;  // [m^2] from fourth differences, which smooth motion hardly changes
     double samples = 0.0;
     double at_rest = 0.0;  // [m^2] about the mean while the surface rests; 0 if unknown
     double least = 0.0;    // [m^2] a lower bound, from differences to the next narrower disc
-  };
-  /// A disc over the frames about one place.
-  struct Average {
-    Vec5 shape;                                 // slopes [-] and curvatures [1/cm]
-    std::array<HeightSample, history> heights;  // the newest first
-    std::size_t frames = 0;
-  };
-  /// What two discs say about each other.
-  struct Agreement {
-    bool agree = false;        // on where the surface is
-    bool moves_along = false;  // they differ, but always by the same
-    std::size_t changed = 0;   // frames since the surface became another one; 0: it did not
-  };
-  struct Choice {
-    std::size_t rung = 0;     // the disc that determines shape and height
-    std::size_t mover = 0;    // and motion
-    std::size_t changed = 0;  // as in Agreement
   };
   struct Residuals {
     float median;      // [m]
@@ -187,18 +187,9 @@ class SurfaceEstimate {
                                                    double gate) const noexcept;
   bool recentre(const Vec2& foot, double gate, double& cut) noexcept;
   void estimate(const Vec2& foot, bool new_frame, bool learns) noexcept;
-  void average(std::size_t rung, const Vec5& basis, Average& average) noexcept;
-  void learn_noise(std::size_t rung, const Average& average) noexcept;
-  [[nodiscard]] Agreement compare(const Average& narrow, const Average& wide, std::size_t i,
-                                  std::size_t j, bool learns) noexcept;
-  [[nodiscard]] Choice choose(const std::array<Average, rungs>& discs, bool learns) noexcept;
-  [[nodiscard]] double expected_variance(std::size_t rung) const noexcept;
-  [[nodiscard]] bool is_measured(std::size_t rung) const noexcept;
-  bool find_shape(const Vec2& foot, double wide, double& cut) noexcept;
-  void begin_evidence(bool jumped) noexcept;
-  void measure_discs(std::size_t first, std::size_t end, double cut) noexcept;
-  void measure_wide_discs(const Cloud& cloud, const Vec3& place, double wide, double cut) noexcept;
-  [[nodiscard]] bool others_are_smooth(const Vec2& foot) noexcept;
+  void look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept;
+  static double squared_structure(const Cells& frame,
+                                  const std::array<double, cells>& residuals) noexcept;
   [[nodiscard]] bool spans_area(const Shape& inner) const noexcept;
   /// Variance of a full narrowest disc along each axis [cm^2].
   [[nodiscard]] double full_disc() const noexcept {
@@ -208,12 +199,11 @@ class SurfaceEstimate {
   [[nodiscard]] double overlap(std::size_t rung) const noexcept {
     return std::max(3e-3, 0.5 * radii_[rung]);
   }
-  [[nodiscard]] bool is_whole(const Vec2& foot) noexcept;
+  void judge(const Vec2& foot) noexcept;
+  void learn_cell_noise(const Cells& newest, const std::array<double, cells>& residuals,
+                        const Cells& past, const std::array<double, cells>& older) noexcept;
   void move_origin(const Vec2& foot) noexcept;
   [[nodiscard]] Evidence& evidence(std::size_t age) noexcept {
-    return ring_[(newest_ + history - age) % history];
-  }
-  [[nodiscard]] const Evidence& evidence(std::size_t age) const noexcept {
     return ring_[(newest_ + history - age) % history];
   }
   [[nodiscard]] double variance(std::size_t rung, std::size_t camera) const noexcept;
@@ -245,7 +235,8 @@ class SurfaceEstimate {
   std::size_t mover_ = 0;  // the disc that determines motion
 
   std::array<Evidence, history> ring_;
-  FitTest fit_test_;
+  std::array<Cells, cell_frames> cells_;
+  std::size_t newest_cells_ = 0;
   std::size_t newest_ = 0;
   std::size_t count_ = 0;
   std::size_t settled_ = 0;
@@ -262,6 +253,7 @@ class SurfaceEstimate {
 
   // The sensor's noise is kept when a contact ends.
   std::array<std::array<Scatter, rungs>, Patch::max_views> scatter_;  // by camera
+  Scatter cell_scatter_;
 };
 
 }  // namespace palpate

@@ -16,7 +16,6 @@
 namespace palpate {
 
 using Vec2 = Eigen::Vector2d;
-using Vec5 = Eigen::Matrix<double, 5, 1>;
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 
 /// Axes fixed in the world in which a piece of surface is a height z over the plane (x, y).

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "palpate/kernel/core/parameters.hpp"
+#include "palpate/kernel/core/patch.hpp"
 
 namespace palpate {
 

@@ -17,8 +17,8 @@ namespace palpate::lab {
 #define PALPATE_EXPERIMENTS(name)                                                            \
   name(flat) name(jump) name(single_lift) name(lift) name(bound) name(speed)                 \
   name(first_contact) name(hold) name(force) name(damping) name(corners) name(scan)          \
-  name(fidelity) name(feel) name(zwidth) name(materials) name(teleop) name(teleop_faults)    \
-  name(pop) name(field) name(visits) name(real)
+  name(fidelity) name(feel) name(zwidth) name(tool) name(materials) name(teleop)             \
+  name(teleop_faults) name(pop) name(field) name(visits) name(real)
 // clang-format on
 
 #define PALPATE_DECLARE(name) Experiment name##_experiment();

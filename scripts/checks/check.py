@@ -38,7 +38,7 @@ KNOWS = {
     "site": {"core", "methods", "cloud", "servo", "bag", "sources", "devices", "drivers", "record",
              "session", "viewer"},
     "search": {"core"},
-    "lab": {"core", "paper", "methods", "cloud", "fixtures", "servo", "teleop", "sources",
+    "lab": {"core", "paper", "methods", "cloud", "fixtures", "tool", "servo", "teleop", "sources",
             "devices", "search"},
     "robot": {"core", "cloud", "sources", "servo", "teleop"},
     "bench": {"core", "paper", "methods", "cloud", "search"},

@@ -121,6 +121,11 @@ struct Sdk {
   bool (*has_gripper)(char id) = library.find("dhdHasGripper");
   int (*enable_expert_mode)() = library.find("dhdEnableExpertMode");
   int (*set_watchdog)(unsigned char units, char id) = library.find("dhdSetWatchdog");
+  // Of arms with motors in their wrist; torques in N m about the arm's axes.
+  bool (*has_active_wrist)(char id) = library.try_find("dhdHasActiveWrist");
+  int (*set_force_and_torque)(double x, double y, double z, double about_x, double about_y,
+                              double about_z, char id) = library.try_find("dhdSetForceAndTorque");
+  int (*set_max_torque)(double newton_metres, char id) = library.try_find("dhdSetMaxTorque");
   // Of libdrd alone:
   int (*drd_open_id)(char id) = library.try_find("drdOpenID");
   bool (*drd_is_initialized)(char id) = library.try_find("drdIsInitialized");
@@ -136,14 +141,15 @@ struct Model {
   double damping;         // [N s/m]
   double radius;          // [m]
   std::string_view body;  // the simulated model whose mechanics are nearest; empty: unknown
+  double torque = 0.0;    // [N m] of its wrist; 0: it has no motors there
 };
-constexpr std::array models = {Model{63, 63, 20.0, 5000.0, 30.0, 0.15, ""},        // delta.3
-                               Model{33, 37, 12.0, 5000.0, 30.0, 0.075, "omega"},  // omega
-                               Model{104, 105, 12.0, 4000.0, 30.0, 0.075, ""},     // sigma.7
-                               Model{206, 206, 12.0, 4000.0, 30.0, 0.075, ""},     // sigma.3
-                               Model{108, 109, 12.0, 8000.0, 30.0, 0.1125, ""},    // lambda.7
-                               Model{131, 132, 12.0, 8000.0, 30.0, 0.1125, ""},    // lambda.6
-                               Model{203, 203, 12.0, 8000.0, 30.0, 0.1125, ""},    // lambda.3
+constexpr std::array models = {Model{63, 63, 20.0, 5000.0, 30.0, 0.15, ""},           // delta.3
+                               Model{33, 37, 12.0, 5000.0, 30.0, 0.075, "omega"},     // omega
+                               Model{104, 105, 12.0, 4000.0, 30.0, 0.075, "", 0.2},   // sigma.7
+                               Model{206, 206, 12.0, 4000.0, 30.0, 0.075, ""},        // sigma.3
+                               Model{108, 109, 12.0, 8000.0, 30.0, 0.1125, "", 0.2},  // lambda.7
+                               Model{131, 132, 12.0, 8000.0, 30.0, 0.1125, "", 0.2},  // lambda.6
+                               Model{203, 203, 12.0, 8000.0, 30.0, 0.1125, ""},       // lambda.3
                                Model{60, 60, 8.0, 3000.0, 20.0, 0.04, "falcon"}};
 // For a type that is not in the table: the weakest.
 constexpr Model unknown_model{0, 0, 8.0, 3000.0, 20.0, 0.04, ""};
@@ -222,15 +228,15 @@ class Arm final : public Device {
     return state;
   }
 
-  void write(const Vec3& force, double t) noexcept override {
+  void write(const Vec3& force, double t) noexcept override { write(Wrench{force}, t); }
+
+  void write(const Wrench& wrench, double t) noexcept override {
     if (reopener_->is_lost()) return;
     const DriverCalls::Turn turn(calls_);
     if (!turn) return;
     const bool enabled = enabled_.load(std::memory_order_acquire);
-    if (!enabled || !force.isZero(0.0)) last_force_ = t;
-    const Vec3 sent = to_arm(enabled ? force : Vec3::Zero());
-    // MOTOR_SATURATED (2) is no error.
-    if (sdk_->set_force(sent.x(), sent.y(), sent.z(), id()) < 0) {
+    if (!enabled || !wrench.force.isZero(0.0) || !wrench.torque.isZero(0.0)) last_force_ = t;
+    if (!send(enabled ? wrench : Wrench{})) {
       if (++failures_ >= failures_of_loss) reopener_->ask();
       return;
     }
@@ -247,7 +253,7 @@ class Arm final : public Device {
   void enable() override {
     bool done = false;
     const bool called = calls_.call(call_time, [&] {
-      done = sdk_->set_force(0.0, 0.0, 0.0, id()) >= 0 && sdk_->enable_force(1, id()) >= 0;
+      done = send({}) && sdk_->enable_force(1, id()) >= 0;
       if (done) enabled_.store(true, std::memory_order_release);
     });
     if (!called) throw Error(info_.uri, "its driver does not answer", "plug it in again");
@@ -262,7 +268,7 @@ class Arm final : public Device {
     enabled_.store(false, std::memory_order_release);
     const DriverCalls::Turn turn(calls_);
     if (!turn || reopener_ == nullptr || reopener_->is_lost()) return;
-    sdk_->set_force(0.0, 0.0, 0.0, id());
+    send({});
     sdk_->enable_force(0, id());
   }
 
@@ -287,6 +293,16 @@ class Arm final : public Device {
 
  private:
   [[nodiscard]] char id() const { return id_.load(std::memory_order_relaxed); }
+
+  // MOTOR_SATURATED (2) is no error. A wrist with motors keeps its torque over a force alone.
+  bool send(const Wrench& wrench) const noexcept {
+    const Vec3 force = to_arm(wrench.force);
+    if (info_.limits.max_torque <= 0.0)
+      return sdk_->set_force(force.x(), force.y(), force.z(), id()) >= 0;
+    const Vec3 torque = to_arm(wrench.torque);
+    return sdk_->set_force_and_torque(force.x(), force.y(), force.z(), torque.x(), torque.y(),
+                                      torque.z(), id()) >= 0;
+  }
 
   void open() {
     const int opened = wanted_.serial ? sdk_->open_serial(*wanted_.serial) : sdk_->open();
@@ -331,6 +347,11 @@ class Arm final : public Device {
                     .continuous_force = force,
                     .max_stiffness = model.stiffness,
                     .max_damping = model.damping};
+    // A torque that the SDK does not bound is not sent.
+    if (model.torque > 0.0 && sdk_->set_max_torque != nullptr &&
+        sdk_->set_force_and_torque != nullptr && sdk_->has_active_wrist != nullptr &&
+        sdk_->has_active_wrist(id()))
+      info_.limits.max_torque = model.torque * force / model.force;
     info_.reach = DeviceReach::ball(model.radius);
     if (!model.body.empty()) {
       const DeviceBody& body = device_preset(model.body).body;
@@ -351,6 +372,10 @@ class Arm final : public Device {
       throw Error(wanted_.uri, "its watchdog cannot be set (" + sdk_->last_error() + ")",
                   "use an arm and an SDK with dhdSetWatchdog, from 3.3.2 on");
     sdk_->set_max_force(info_.limits.max_force, id());
+    if (const double torque = info_.limits.max_torque;
+        torque > 0.0 && sdk_->set_max_torque(torque, id()) < 0)
+      throw Error(wanted_.uri, "its torque cannot be bounded (" + sdk_->last_error() + ")",
+                  "switch the device off and on again");
     sdk_->set_brakes(0, id());
     sdk_->set_gravity_compensation(wanted_.gravity ? 1 : 0, id());
     sdk_->enable_force(0, id());

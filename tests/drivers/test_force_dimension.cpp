@@ -46,6 +46,34 @@ TEST_F(ForceDimension, BringsItsAxesIntoOurs) {
   EXPECT_EQ(bench.force[2], 0.3);
 }
 
+TEST_F(ForceDimension, SendsATorqueWhereTheWristHasMotors) {
+  EXPECT_EQ(open("force-dimension:")->info().limits.max_torque, 0.0) << "omega.3";
+  bench.active_wrist = true;
+  EXPECT_DOUBLE_EQ(open("force-dimension:?max_force=6")->info().limits.max_torque, 0.1);
+  const auto arm = open("force-dimension:");
+  EXPECT_DOUBLE_EQ(arm->info().limits.max_torque, 0.2);
+  EXPECT_TRUE(arm->read(0.0).orientation.has_value());
+  const Wrench wrench{{0.1, 0.2, 0.3}, {0.01, 0.02, 0.03}};  // right, away, up
+  arm->write(wrench, 0.0);
+  EXPECT_EQ(bench.torque[2], 0.0) << "not enabled";
+  arm->enable();
+  arm->write(wrench, 0.001);
+  EXPECT_EQ(bench.force[0], -0.2) << "x is towards the user";
+  EXPECT_EQ(bench.torque[0], -0.02);
+  EXPECT_EQ(bench.torque[1], 0.01);
+  EXPECT_EQ(bench.torque[2], 0.03);
+  arm->write(Wrench{Vec3::Zero(), Vec3::UnitZ()}, 0.002);
+  EXPECT_DOUBLE_EQ(bench.torque[2], 0.2) << "the SDK was told the limit";
+  arm->write(Vec3::UnitZ(), 0.003);
+  EXPECT_EQ(bench.torque[2], 0.0) << "a force alone leaves no torque";
+  arm->write(wrench, 0.004);
+  arm->disable();
+  EXPECT_EQ(bench.torque[2], 0.0);
+  EXPECT_FALSE(bench.force_on);
+  arm->write(wrench, 0.005);
+  EXPECT_EQ(bench.torque[2], 0.0) << "disabled";
+}
+
 TEST_F(ForceDimension, SwitchesItsForcesOffAndOn) {
   const auto arm = open("force-dimension:");
   arm->write(Vec3::UnitZ(), 0.0);

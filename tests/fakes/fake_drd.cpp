@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Force Dimension's SDK with arms that nobody sees: omega.3 of serial numbers 10517, 10518, ...
-// Axes: x towards the user, y to the right, z up; metres, newtons. FAKE_DHD leaves out what libdrd
-// has beyond libdhd; FAKE_OLD leaves out the watchdog.
+// With an active wrist they are sigma.7, whose torque stays until another is set. Axes: x towards
+// the user, y to the right, z up; metres, newtons. FAKE_DHD leaves out what libdrd has beyond
+// libdhd; FAKE_OLD leaves out the watchdog.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -103,10 +104,11 @@ EXPORT int dhdStop(char id) {
   return 0;
 }
 EXPORT int dhdGetSystemType(char id) {
-  return arm_of(id) == nullptr ? -1 : 33;
+  return arm_of(id) == nullptr ? -1 : workbench().active_wrist ? 104 : 33;
 }
 EXPORT const char* dhdGetSystemName(char id) {
-  return arm_of(id) == nullptr ? nullptr : "omega.3";
+  if (arm_of(id) == nullptr) return nullptr;
+  return workbench().active_wrist ? "sigma.7" : "omega.3";
 }
 EXPORT int dhdGetSerialNumber(unsigned short* number, char id) {
   if (arm_of(id) == nullptr) return -1;
@@ -150,6 +152,23 @@ EXPORT int dhdSetForce(double x, double y, double z, char id) {
   workbench().command(x, y, z, clock_now());
   return std::hypot(x, y, z) > 0.5 ? 2 : 0;  // motors saturated: no error
 }
+EXPORT int dhdSetForceAndTorque(double x, double y, double z, double about_x, double about_y,
+                                double about_z, char id) {
+  const int result = dhdSetForce(x, y, z, id);
+  if (result < 0 || !workbench().active_wrist) return -1;
+  const double most = workbench().max_torque;
+  const double size = std::hypot(about_x, about_y, about_z);
+  const double share = most >= 0.0 && size > most ? most / size : 1.0;
+  workbench().torque[0] = share * about_x;
+  workbench().torque[1] = share * about_y;
+  workbench().torque[2] = share * about_z;
+  return result;
+}
+EXPORT int dhdSetMaxTorque(double newton_metres, char id) {
+  if (arm_of(id) == nullptr) return -1;
+  workbench().max_torque = newton_metres;
+  return 0;
+}
 EXPORT int dhdEnableForce(unsigned char on, char id) {
   Arm* arm = arm_of(id);
   if (arm == nullptr) return -1;
@@ -185,7 +204,10 @@ EXPORT int dhdGetStatus(int* status, char id) {
   return 0;
 }
 EXPORT bool dhdHasWrist(char id) {
-  return arm_of(id) == nullptr;
+  return arm_of(id) == nullptr || workbench().active_wrist;
+}
+EXPORT bool dhdHasActiveWrist(char id) {
+  return arm_of(id) != nullptr && workbench().active_wrist;
 }
 EXPORT bool dhdHasGripper(char /*id*/) {
   return false;

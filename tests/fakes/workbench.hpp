@@ -30,18 +30,20 @@ struct Workbench {
   static constexpr const char* variable = "PALPATE_FAKE_WORKBENCH";
 
   // Set by the test.
-  std::atomic<bool> plugged_in{true}, calibrated{true}, too_fast{false};
+  std::atomic<bool> plugged_in{true}, calibrated{true}, too_fast{false}, active_wrist{false};
   std::atomic<int> devices{1};
   std::atomic<int> error{0};  ///< the vendor's code that the next call reports once
   std::atomic<Path> path{Path::press_and_lift};
 
   // Set by the fake: what its motors and its firmware do, in the vendor's axes.
-  std::array<std::atomic<double>, 3> force{};  ///< [N] of the last command
-  std::atomic<double> commanded{0.0};          ///< [s] when that was
-  std::atomic<double> watchdog{0.0};           ///< [s] of the firmware; 0: none
-  std::atomic<bool> force_on{false};           ///< the motors take forces
-  std::atomic<double> largest{0.0};            ///< [N] so far
-  std::atomic<double> largest_first{0.0};      ///< [N] of forces that came after none
+  std::array<std::atomic<double>, 3> force{};   ///< [N] of the last command
+  std::array<std::atomic<double>, 3> torque{};  ///< [N m] the same
+  std::atomic<double> max_torque{-1.0};         ///< [N m] that it may be; negative: any
+  std::atomic<double> commanded{0.0};           ///< [s] when that was
+  std::atomic<double> watchdog{0.0};            ///< [s] of the firmware; 0: none
+  std::atomic<bool> force_on{false};            ///< the motors take forces
+  std::atomic<double> largest{0.0};             ///< [N] so far
+  std::atomic<double> largest_first{0.0};       ///< [N] of forces that came after none
   std::atomic<int> opens{0}, commands{0}, calibrations{0}, closes{0};
   std::atomic<double> fell{0.0};         ///< [s] when a force ended last, by the computer's word
   std::atomic<double> longest_gap{0.0};  ///< [s] between commands since the test set it to 0

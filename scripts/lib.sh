@@ -54,7 +54,8 @@ has_room() {
 # build_in FOLDER -DNAME=VALUE... [-- TARGETS...]: configures and builds. With every argument in
 # CMake's cache it leaves it to ninja to see whether anything has changed: sources, their headers,
 # CMake's files, and the folders' contents. Writes to stderr alone: stdout is the program's.
-# A folder that was configured from another source folder (-S) is begun anew.
+# A folder that was configured from another source folder (-S) or for other compilers is begun anew:
+# CMake would forget all other settings.
 build_in() {
   local folder=$1 said sources=$PWD arguments=() targets=()
   shift
@@ -69,6 +70,15 @@ build_in() {
       -e "CMAKE_HOME_DIRECTORY:INTERNAL=$(realpath "$sources")" "$folder/CMakeCache.txt"; then
     rm -rf "$folder"
   fi
+  local argument name cache=
+  if [[ -e $folder/CMakeCache.txt ]]; then cache=$'\n'$(<"$folder/CMakeCache.txt")$'\n'; fi
+  for argument in "${arguments[@]}"; do
+    name=${argument#-D} name=${name%%=*}
+    if [[ $cache && $name =~ ^CMAKE_(C|CXX)_COMPILER$ ]] &&
+      ! [[ $cache =~ $'\n'"$name":[A-Z]+=([^$'\n']*/)?"${argument##*[=/]}"$'\n' ]]; then
+      rm -rf "$folder"
+    fi
+  done
   if (($#)); then targets=("${@:2}"); fi
   if command -v ccache >/dev/null; then
     arguments+=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)

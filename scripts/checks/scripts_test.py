@@ -48,14 +48,14 @@ class Build(unittest.TestCase):
         (self.folder / "build" / "CMakeCache.txt").write_text(
             f"CMAKE_HOME_DIRECTORY:INTERNAL={self.folder}\n")
 
-    def build(self, ninja, stderr):
+    def build(self, ninja, stderr, arguments=""):
         for name, script in (("ninja", ninja), ("cmake", "")):
             program = self.folder / name
             program.write_text(f"#!/bin/sh\n{script}\n")
             program.chmod(0o755)
         path = f"{self.folder}:{os.environ['PATH']}"
-        return subprocess.run(["bash", "-c", BUILD], cwd=self.folder, stderr=stderr, timeout=60,
-                              env={**os.environ, "PATH": path}, check=False)
+        return subprocess.run(["bash", "-c", BUILD + arguments], cwd=self.folder, stderr=stderr,
+                              timeout=60, env={**os.environ, "PATH": path}, check=False)
 
     def test_shows_errors_whole_however_slowly_they_come_and_fails_as_the_build_does(self):
         done = self.build("printf '@1/2 a.cpp\\nb.cpp: '; sleep 1.5; printf 'error\\n@2/2 b.cpp\\n'"
@@ -77,6 +77,13 @@ class Build(unittest.TestCase):
         (self.folder / "build" / "build.ninja").unlink()
         self.assertEqual(self.build("", subprocess.PIPE).returncode, 0)
         self.assertFalse((self.folder / "build" / "CMakeCache.txt").exists())
+
+    def test_begins_anew_for_another_compiler_alone(self):
+        cache = self.folder / "build" / "CMakeCache.txt"
+        cache.write_text(cache.read_text() + "CMAKE_CXX_COMPILER:STRING=/usr/bin/g++\n")
+        for compiler, stays in (("g++", True), ("/usr/bin/g++", True), ("clang++", False)):
+            self.build("", subprocess.PIPE, f" -DCMAKE_CXX_COMPILER={compiler}")
+            self.assertEqual(cache.exists(), stays, compiler)
 
     def test_says_which_folder_is_full(self):
         done = subprocess.run(["bash", "-c", BUILD], cwd=self.folder, stderr=subprocess.PIPE,

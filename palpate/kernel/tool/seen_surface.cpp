@@ -6,6 +6,7 @@
 #include <span>
 
 #include "palpate/kernel/sight/monitor.hpp"
+#include "palpate/kernel/sight/render.hpp"
 #include "palpate/kernel/sight/surface_fit.hpp"
 
 namespace palpate {
@@ -46,11 +47,6 @@ constexpr double refused_scatter = 3.0;
 // [m] and spreads below an edge: a place so deep is beside a body, not on its rim.
 constexpr double rim = 1.5e-3;
 constexpr double rim_spreads = 4.0;
-
-double ease(double x) noexcept {  // from 1 to 0 with slopes 0
-  x = std::clamp(x, 0.0, 1.0);
-  return 1.0 - x * x * (3.0 - 2.0 * x);
-}
 
 }  // namespace
 
@@ -421,8 +417,8 @@ SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells,
                                             int step) const noexcept {
   const Cells& all = cells_[0];
   const Intrinsics& k = image_->intrinsics();
-  const int middle_u = u_ + static_cast<int>(middle.x + 0.5);
-  const int middle_v = v_ + static_cast<int>(middle.y + 0.5);
+  const int middle_u = u_ + static_cast<int>(std::lround(middle.x));
+  const int middle_v = v_ + static_cast<int>(std::lround(middle.y));
   const int reach = cells * step;
   // Half a pixel from the middle where a cell has an even number of them.
   const double half = stride_ % 2 == 0 ? 0.5 : 0.0;

@@ -6,6 +6,7 @@
 
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/mathematics.hpp"
+#include "palpate/kernel/sight/render.hpp"
 
 namespace palpate {
 namespace {
@@ -32,11 +33,6 @@ constexpr double longest_gap = 20e-3;  // [s] over more, differences are no velo
 constexpr double free_gap = 0.5e-3;    // [m] beside the noise, that a free tool is in front
 constexpr double facing =
     0.5;  // [-] cosine between outward normal and the surface's: more is its far side
-
-double ease(double x) noexcept {  // from 1 to 0 with slopes 0
-  x = std::clamp(x, 0.0, 1.0);
-  return 1.0 - x * x * (3.0 - 2.0 * x);
-}
 
 // Quaternions in one order of operations on every processor: Eigen's is that of its vectors.
 Rotation unit(const Rotation& q) noexcept {

@@ -84,9 +84,9 @@ double area_of(const Triangles& surface) {
 Triangles box(const Vec3& centre, const Vec3& sides) {
   Triangles mesh;
   for (int corner = 0; corner < 8; ++corner)
-    mesh.points.push_back(centre + 0.5 * Vec3((corner & 1) != 0 ? sides.x() : -sides.x(),
-                                              (corner & 2) != 0 ? sides.y() : -sides.y(),
-                                              (corner & 4) != 0 ? sides.z() : -sides.z()));
+    mesh.points.emplace_back(centre + 0.5 * Vec3((corner & 1) != 0 ? sides.x() : -sides.x(),
+                                                 (corner & 2) != 0 ? sides.y() : -sides.y(),
+                                                 (corner & 4) != 0 ? sides.z() : -sides.z()));
   mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
                     {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
   return mesh;

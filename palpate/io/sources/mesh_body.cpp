@@ -55,7 +55,6 @@ void draw_triangle(const std::array<Vec3, 3>& p, const Body::View& view, std::sp
 MeshBody::MeshBody(const std::vector<Vec3>& points,
                    const std::vector<std::array<std::uint32_t, 3>>& triangles,
                    const std::string& name) {
-  std::vector<Corners> all;
   std::vector<Box> boxes;
   for (const auto& triangle : triangles) {
     Corners corners;
@@ -69,15 +68,12 @@ MeshBody::MeshBody(const std::vector<Vec3>& points,
       box.include(corners[i].cast<double>());
     }
     if (!is_finite) continue;
-    all.push_back(corners);
+    triangles_.push_back(corners);
     boxes.push_back(box);
   }
-  if (all.empty())
+  if (triangles_.empty())
     throw Error(name, "it has no triangles", "give a mesh; open points by ply: or splat:");
-  std::vector<std::uint32_t> order;
-  tree_.emplace(boxes, order);
-  triangles_.reserve(order.size());
-  for (const std::uint32_t i : order) triangles_.push_back(all[i]);
+  tree_.emplace(boxes, triangles_);
 }
 
 Vec3 MeshBody::nearest(const Vec3& at) const {

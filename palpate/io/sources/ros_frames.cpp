@@ -36,14 +36,14 @@ std::uint16_t quantised(double metres, double units) {
 }
 
 // Byte offsets of x, y and z in a point, and whether they are doubles.
-struct Axes {
+struct AxisFields {
   std::array<std::size_t, 3> offset{};
   std::array<bool, 3> is_double{};
 };
 
-Axes axes_of(const ros::PointCloud2& message, const std::string& name) {
+AxisFields axis_fields_of(const ros::PointCloud2& message, const std::string& name) {
   constexpr std::array<std::string_view, 3> wanted{"x", "y", "z"};
-  Axes axes;
+  AxisFields axes;
   for (std::size_t axis = 0; axis < wanted.size(); ++axis) {
     const auto field = std::find_if(message.fields.begin(), message.fields.end(),
                                     [&](const auto& f) { return f.name == wanted[axis]; });
@@ -277,7 +277,7 @@ std::vector<std::uint8_t> rgb_of(const ros::PointCloud2& message) {
 
 std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name) {
   if (message.width == 0 || message.height == 0) return {};
-  const Axes axes = axes_of(message, name);
+  const AxisFields axes = axis_fields_of(message, name);
   const std::size_t row = std::size_t{message.width} * message.point_step;
   if (message.height > 1 && message.row_step < row)
     throw Error(name, "has rows that overlap", "it may be damaged");

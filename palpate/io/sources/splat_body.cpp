@@ -70,10 +70,8 @@ SplatBody::SplatBody(std::vector<Gaussian> gaussians, const std::string& name) {
   if (!carries)
     throw Error(name, "none of its Gaussians hides what is behind it",
                 "check that its opacities are logits");
-  std::vector<std::uint32_t> order;
-  tree_.emplace(boxes, order);
-  gaussians_.reserve(order.size());
-  for (const std::uint32_t i : order) gaussians_.push_back(gaussians[i]);
+  tree_.emplace(boxes, gaussians);
+  gaussians_ = std::move(gaussians);
 }
 
 // The nearest place of the rectangles of two standard deviations along the two longer axes.

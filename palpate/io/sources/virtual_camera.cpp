@@ -7,9 +7,8 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/linear.hpp"
 #include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
@@ -178,10 +177,7 @@ std::optional<VirtualCamera::Aim> VirtualCamera::pressed() {
   Vec3 normal = -Vec3::UnitZ();
   if (count > 2 * plane_radius) {
     const Vec3 mean = sum / count;
-    normal =
-        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(products - count * mean * mean.transpose())
-            .eigenvectors()
-            .col(0);
+    normal = axes_of(products - count * mean * mean.transpose()).vectors.col(0);
     if (normal.z() > 0.0) normal = -normal;
   }
   const double depth = (centre - hand).dot(normal);  // [m] of the hand behind that plane

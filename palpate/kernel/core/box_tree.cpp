@@ -10,7 +10,7 @@ constexpr std::size_t items_in_leaf = 4;
 
 }  // namespace
 
-BoxTree::BoxTree(std::span<const Box> boxes, std::vector<std::uint32_t>& order) {
+std::vector<std::uint32_t> BoxTree::build(std::span<const Box> boxes) {
   std::vector<Item> items(boxes.size());
   for (std::uint32_t i = 0; i < items.size(); ++i) {
     const Eigen::Vector3f centre = (0.5 * (boxes[i].low + boxes[i].high)).cast<float>();
@@ -19,8 +19,9 @@ BoxTree::BoxTree(std::span<const Box> boxes, std::vector<std::uint32_t>& order) 
   nodes_.reserve(boxes.size());
   nodes_.emplace_back();
   build(0, items, 0, boxes);
-  order.clear();
+  std::vector<std::uint32_t> order;
   for (const Item& item : items) order.push_back(item.number);
+  return order;
 }
 
 void BoxTree::build(std::uint32_t node, std::span<Item> items, std::uint32_t first,

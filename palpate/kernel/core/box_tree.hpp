@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "palpate/kernel/core/patch.hpp"
@@ -30,13 +31,19 @@ struct Box {
   }
 };
 
-/// A tree of boxes over many items, which finds those near a place or in a region. Whoever uses it
-/// keeps the items in the order of the leaves. Built off the servo thread, then immutable.
+/// A tree of boxes over many items, which finds those near a place or in a region. Built off the
+/// servo thread, then immutable.
 class BoxTree {
  public:
-  /// @param boxes  of the items, 1 to 2^31
-  /// @param order  set to the items' numbers in the order of the leaves
-  BoxTree(std::span<const Box> boxes, std::vector<std::uint32_t>& order);
+  /// Puts the items into the order of the leaves: so they have to stay.
+  /// @param boxes  one for each of the items, 1 to 2^31
+  template <class T>
+  BoxTree(std::span<const Box> boxes, std::vector<T>& items) {
+    std::vector<T> sorted;
+    sorted.reserve(items.size());
+    for (const std::uint32_t number : build(boxes)) sorted.push_back(items[number]);
+    items = std::move(sorted);
+  }
 
   [[nodiscard]] const Box& bounds() const noexcept { return nodes_.front().box; }
 
@@ -91,6 +98,8 @@ class BoxTree {
     std::uint32_t number;
   };
 
+  /// @return the items' numbers in the order of the leaves
+  std::vector<std::uint32_t> build(std::span<const Box> boxes);
   void build(std::uint32_t node, std::span<Item> items, std::uint32_t first,
              std::span<const Box> boxes);
 

@@ -5,27 +5,17 @@
 #include <cmath>
 
 #include "palpate/kernel/cloud/implied_points.hpp"
-#include "palpate/kernel/sight/surface_fit.hpp"
+#include "palpate/kernel/sight/relief.hpp"
 
 namespace palpate {
 namespace {
 
 constexpr std::size_t most_frames = 64;  // in a mean, as in a fit's
-// [-] Weight of the newest deviation in a pixel's drift, which so is a mean over some seven frames.
-constexpr float newest_weight = 0.25F;
-// [-] 4.5 standard deviations of such a mean, in multiples of one reading's: noise alone exceeds
-// that a few times a minute among a thousand pixels.
-constexpr float most_drift = 1.7F;
-constexpr float drift_frames = 4.0F;  // that a drift is worth
-// [-] standard deviations: what is beyond is an outlier, and counts as if it were so far off.
-constexpr float outlier = 4.0F;
 // [frames] in a row without a measurement make a hole; flicker at an edge is shorter.
 constexpr float most_missed = 3.0F;
 constexpr std::size_t least_pixels = 8;  // that measure a level
 // The spread is that of a region wider than the one that measures the level, as noise correlates.
 constexpr double spread_region = 3.0;
-constexpr float most_growth = 1.1F;      // [-] of it in a frame: what is new there is not noise
-constexpr float spread_weight = 0.2F;    // of the newest frame in the spread
 constexpr int most_across = 16;          // pixels that are looked at, along either axis
 constexpr double nearest_camera = 1e-3;  // [m] from it to a place, along its axis
 constexpr double farthest_pixel = 1e6;   // [px] beyond any image
@@ -99,12 +89,7 @@ bool FusedImage::find_level(int u, int v, double radius) noexcept {
   newest_ = kth_smallest(near, near.size() / 2);
   const std::span<float> wide = look(spread_region * radius);
   if (wide.size() < least_pixels) return false;
-  // No spread is less than half a step of the depth.
-  const float deviation = std::max(deviation_about<float>(newest_, wide),
-                                   static_cast<float>(0.5 / image_->units_per_metre()));
-  spread_ = spread_ == 0.0F
-                ? deviation
-                : std::min(spread_ + spread_weight * (deviation - spread_), most_growth * spread_);
+  spread_ = next_spread(spread_, newest_, wide, image_->units_per_metre());
   return true;
 }
 
@@ -117,23 +102,8 @@ void FusedImage::update(std::size_t i, float z) noexcept {
     return;
   }
   known.missed[i] = 0.0F;
-  const float off = z - newest_ - known.relief[i];
-  const float counts = std::clamp(off, -outlier * spread_, outlier * spread_);
-  const float drift = known.drift[i] + newest_weight * (counts - known.drift[i]);
-  const bool drifts = std::abs(drift) > most_drift * spread_;
-  if (known.frames[i] == 0.0F || (drifts && counts != off)) {  // another surface
-    known.relief[i] = z - newest_;
-    known.frames[i] = 1.0F;
-  } else if (drifts) {
-    known.relief[i] += drift;
-    known.frames[i] = std::min(known.frames[i], drift_frames);
-  } else {
-    known.frames[i] = std::min(known.frames[i] + 1.0F, static_cast<float>(most_frames));
-    known.relief[i] += counts / known.frames[i];
-    known.drift[i] = drift;
-    return;
-  }
-  known.drift[i] = 0.0F;
+  follow_relief(z - newest_, spread_, most_frames, known.relief[i], known.drift[i],
+                known.frames[i]);
 }
 
 void FusedImage::update() noexcept {

@@ -6,8 +6,8 @@
 #include <span>
 
 #include "palpate/kernel/sight/monitor.hpp"
+#include "palpate/kernel/sight/relief.hpp"
 #include "palpate/kernel/sight/render.hpp"
-#include "palpate/kernel/sight/surface_fit.hpp"
 
 namespace palpate {
 namespace {
@@ -16,10 +16,6 @@ constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 // As sight's averaged points have them: docs/sight.md, 5.
 constexpr std::size_t most_frames = 64;  // of a level
 constexpr float most_relief = 128.0F;    // frames in a cell's mean
-constexpr float newest_weight = 0.25F;   // [-] of the newest deviation in a cell's drift
-constexpr float most_drift = 1.7F;       // [-] 4.5 standard deviations of that mean
-constexpr float drift_frames = 4.0F;     // that a drift is worth
-constexpr float outlier = 4.0F;          // [-] standard deviations
 // [intervals] over which small corrections of a cell are shown, [s] over which large ones are, and
 // [-] spreads that are large.
 constexpr double slow_intervals = 4.0;
@@ -27,8 +23,6 @@ constexpr double quick = 10e-3;
 constexpr float large_spreads = 1.0F;
 constexpr int rows_of_tick = 8;          // of cells that take the newest frame in
 constexpr double longest_tick = 20e-3;   // [s] over more, nothing is smooth
-constexpr float most_growth = 1.1F;      // [-] of the spread in a frame
-constexpr float spread_weight = 0.2F;    // of the newest frame in it
 constexpr int most_across = 15;          // cells that measure the level, along either axis
 constexpr std::size_t least_cells = 8;   // that measure a level
 constexpr double nearest_camera = 1e-3;  // [m] from it to a place, along its axis
@@ -165,11 +159,7 @@ bool SeenSurface::find_level(const Aim& aim, const SightParameters& parameters) 
   if (level < static_cast<float>(this->level(stamp_) - farthest_strike) && frames_ > 1)
     return false;
   newest_ = level;
-  const float deviation = std::max(deviation_about<float>(newest_, near),
-                                   static_cast<float>(0.5 / image_->units_per_metre()));
-  spread_ = spread_ == 0.0F
-                ? deviation
-                : std::min(spread_ + spread_weight * (deviation - spread_), most_growth * spread_);
+  spread_ = next_spread(spread_, newest_, near, image_->units_per_metre());
   // How much one frame's level varies: by second differences, which no steady motion changes.
   constexpr double memory = 0.05;  // [-] of the newest of them
   if (frames_ >= 2) {
@@ -194,8 +184,7 @@ void SeenSurface::update(std::size_t i, float z, const SightParameters& paramete
     }
     return;
   }
-  const float off = z - newest_ - all.relief[i];
-  if (z == 0.0F || off < static_cast<float>(-farthest_strike)) {  // hidden
+  if (z == 0.0F || z - newest_ - all.relief[i] < static_cast<float>(-farthest_strike)) {  // hidden
     if (stamp_ - all.seen[i] > parameters.hidden_hold + parameters.hidden_fade) {
       all.relief[i] = all.smooth[i] = unknown;
       all.frames[i] = 0.0F;
@@ -203,22 +192,7 @@ void SeenSurface::update(std::size_t i, float z, const SightParameters& paramete
     return;
   }
   all.seen[i] = stamp_;
-  const float counts = std::clamp(off, -outlier * spread_, outlier * spread_);
-  const float drift = all.drift[i] + newest_weight * (counts - all.drift[i]);
-  const bool drifts = std::abs(drift) > most_drift * spread_;
-  if (drifts && counts != off) {  // another surface
-    all.relief[i] = z - newest_;
-    all.frames[i] = 1.0F;
-  } else if (drifts) {
-    all.relief[i] += drift;
-    all.frames[i] = std::min(all.frames[i], drift_frames);
-  } else {
-    all.frames[i] = std::min(all.frames[i] + 1.0F, most_relief);
-    all.relief[i] += counts / all.frames[i];
-    all.drift[i] = drift;
-    return;
-  }
-  all.drift[i] = 0.0F;
+  follow_relief(z - newest_, spread_, most_relief, all.relief[i], all.drift[i], all.frames[i]);
 }
 
 // Takes further rows of the newest frame in: all at once would be felt as a late tick.

@@ -15,7 +15,7 @@ in_cache() {
     [[ $argument == -D* ]] || continue
     name=${argument#-D} value=${argument#*=}
     name=${name%%=*}
-    [[ $cache =~ $'\n'"$name":[A-Z]+="$value"$'\n' ]] || return 1
+    [[ $cache =~ $'\n'"$name":[^=]+="$value"$'\n' ]] || return 1
   done
 }
 
@@ -66,8 +66,7 @@ build_in() {
     shift
   done
   if [[ -e $folder/CMakeCache.txt ]] &&
-    ! grep -qxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$sources" \
-      -e "CMAKE_HOME_DIRECTORY:INTERNAL=$(realpath "$sources")" "$folder/CMakeCache.txt"; then
+    ! [[ $(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' "$folder/CMakeCache.txt") -ef $sources ]]; then
     rm -rf "$folder"
   fi
   local argument name cache=
@@ -75,7 +74,7 @@ build_in() {
   for argument in "${arguments[@]}"; do
     name=${argument#-D} name=${name%%=*}
     if [[ $cache && $name =~ ^CMAKE_(C|CXX)_COMPILER$ ]] &&
-      ! [[ $cache =~ $'\n'"$name":[A-Z]+=([^$'\n']*/)?"${argument##*[=/]}"$'\n' ]]; then
+      ! [[ $cache =~ $'\n'"$name":[^=]+=([^$'\n']*/)?"${argument##*[=/]}"$'\n' ]]; then
       rm -rf "$folder"
     fi
   done

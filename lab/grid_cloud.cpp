@@ -21,7 +21,7 @@ void add_correlated_noise(std::vector<Vec3>& points, int columns, int rows, doub
   float squares = 0.0F;
   for (int d = -half; d <= half; ++d) {
     const double at = d / length;
-    kernel.push_back(static_cast<float>(std::exp(-2.0 * at * at)));
+    kernel.push_back(static_cast<float>(math::exp(-2.0 * at * at)));
     squares += kernel.back() * kernel.back();
   }
   for (float& k : kernel) k /= std::sqrt(squares);

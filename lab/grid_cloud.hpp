@@ -12,6 +12,7 @@
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/mathematics.hpp"
 
 namespace palpate::lab {
 
@@ -52,7 +53,7 @@ void push_by_sine(const std::string& name, const ExperimentOptions& options,
   constexpr double stroke = 0.020;  // [m]
   const double r_c = options.parameters.proxy.r_c();
   const auto height = [](double t) {
-    return 0.5 * stroke * (1.0 - std::cos(2.0 * std::numbers::pi * t));
+    return 0.5 * stroke * (1.0 - math::cos(2.0 * std::numbers::pi * t));
   };
   Parameters parameters = options.parameters;
   parameters.coupling.max_force = 100.0;

@@ -76,7 +76,7 @@ class Program {
     std::array<int, 2> ends{};
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) fail_to_start(errno);
     socket_ = ends[0];
-    const timeval limit{patience.count() / 1000,
+    const timeval limit{static_cast<time_t>(patience.count() / 1000),
                         static_cast<suseconds_t>(patience.count() % 1000 * 1000)};
     setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
     setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);

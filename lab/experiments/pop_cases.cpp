@@ -15,6 +15,7 @@
 #include "lab/method.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/mathematics.hpp"
 #include "palpate/kernel/core/uri.hpp"
 
 namespace palpate::lab {
@@ -407,15 +408,17 @@ PopStage random_scene(const PopCase& c, const Parameters& /*parameters*/) {
     if (kind == 3) shape = block(Vec3(size, length, 0.03));
     if (i == 0) width = std::min(size, length);
     const double spread = i == 0 ? 0.0 : 0.07;
-    const Vec3 centre(chance(-spread, spread), chance(-spread, spread),
-                      chance(-0.02, 0.02) - (kind == 3 ? 0.03 : size));
+    // One by one: compilers differ in the order in which they find a call's arguments.
+    const double z = chance(-0.02, 0.02) - (kind == 3 ? 0.03 : size);
+    const double y = chance(-spread, spread);
+    const Vec3 centre(chance(-spread, spread), y, z);
     const double heading = chance(0.0, 2.0 * pi);
     Motion motion;
     motion.start = 0.5;
     motion.stroke = c["stroke"] * chance(-1.0, 1.0);
     motion.frequency = chance(0.25, 1.5);
     motion.swing = i == 0 && !slides ? c["swing"] : 0.0;
-    motion.axis = Vec3(std::cos(heading), std::sin(heading), 0.0);
+    motion.axis = Vec3(math::cos(heading), math::sin(heading), 0.0);
     motion.pivot = centre;
     const Eigen::Isometry3d pose =
         at(centre) * Eigen::Isometry3d(Eigen::AngleAxisd(chance(0.0, pi), Vec3::UnitZ()));
@@ -453,8 +456,8 @@ PopStage press_slide_lift(const PopCase& c, const std::shared_ptr<const Scene>& 
   const auto hip = [=](double t) {
     const double way =
         stroke.slide * std::clamp((t - slide_from) / (slide_to - slide_from + 1e-9), 0.0, 1.0);
-    const double x = stroke.x + way * std::cos(stroke.heading);
-    const double y = stroke.y + way * std::sin(stroke.heading);
+    const double x = stroke.x + way * math::cos(stroke.heading);
+    const double y = stroke.y + way * math::sin(stroke.heading);
     const double above =
         t < up_from ? std::max(from - stroke.speed * std::max(t - stroke.wait, 0.0), -stroke.press)
                     : std::min(stroke.speed * (t - up_from) - stroke.press, to);
@@ -593,7 +596,7 @@ PopCase draw_pop_case(const PopFamily& family, std::uint64_t seed, std::uint64_t
         value = chance(range.low, range.high);
         break;
       case by_factor:
-        value = range.low * std::pow(range.high / range.low, chance());
+        value = range.low * math::pow(range.high / range.low, chance());
         break;
       case whole:
         value = std::floor(chance(range.low, range.high + 1.0));

@@ -46,7 +46,8 @@ std::vector<Part> parts_of(Chance& chance) {
   std::vector<Part> parts{{HalfSpace{}, pose, motion}};
   if (chance() < 0.5) {
     const double radius = chance(0.02, 0.05);
-    const Vec3 place(chance(-0.03, 0.03), chance(-0.03, 0.03), -0.3 * radius);
+    const double y = chance(-0.03, 0.03);  // first, as in `wander`
+    const Vec3 place(chance(-0.03, 0.03), y, -0.3 * radius);
     parts.push_back({Sphere{radius}, Eigen::Isometry3d(Eigen::Translation3d(place)), motion});
   }
   return parts;
@@ -56,7 +57,10 @@ HipPath wander(Chance& chance) {
   Vec3 place(0.0, 0.0, 0.07);
   std::vector<HipPath::Sample> path = {{0.0, place}, {begins, place}};
   while (path.back().t < episode_duration) {
-    const Vec3 to(chance(-aside, aside), chance(-aside, aside), chance(-0.02, 0.06));
+    // One by one: compilers differ in the order in which they find a call's arguments.
+    const double z = chance(-0.02, 0.06);
+    const double y = chance(-aside, aside);
+    const Vec3 to(chance(-aside, aside), y, z);
     const double speed = chance(0.03, fastest);
     path.push_back({path.back().t + std::max((to - place).norm() / speed, 1e-3), to});
     path.push_back({path.back().t + chance(0.05, 0.6), to});

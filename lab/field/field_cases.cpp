@@ -7,9 +7,14 @@
 #include <utility>
 
 #include "lab/field/field_setting.hpp"
+#include "palpate/kernel/core/mathematics.hpp"
 
 namespace palpate::lab::field {
 namespace {
+
+double cotangent(double x) {
+  return math::cos(x) / math::sin(x);
+}
 
 constexpr double edge_feature = 0.010;  // [m] the sphere on an edge: two r_c
 
@@ -22,7 +27,7 @@ std::vector<Vec3> under_surface(const FieldScene& scene, double x, double y, dou
   constexpr int pieces = 60;
   for (int i = 0; i <= pieces; ++i) {
     const double way = length * i / pieces;
-    const Place place = below(scene, x + way * std::cos(heading), y + way * std::sin(heading));
+    const Place place = below(scene, x + way * math::cos(heading), y + way * math::sin(heading));
     places.emplace_back(place.point - depth * place.normal);
   }
   return places;
@@ -158,8 +163,8 @@ void slide_on(Draw& draw, Setting& setting, double start, double x, double y, do
   const double length = draw.even("slide", 0.4 * longest, longest);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const std::vector<Vec3> places =
-      under_surface(setting.scene, x - 0.5 * length * std::cos(heading),
-                    y - 0.5 * length * std::sin(heading), heading, length, p.depth);
+      under_surface(setting.scene, x - 0.5 * length * math::cos(heading),
+                    y - 0.5 * length * math::sin(heading), heading, length, p.depth);
   play_script(setting,
               stroke_and_lift(places, p.out, p, start, draw.by_factor("slide_speed", 0.08, 0.5)));
 }
@@ -197,7 +202,7 @@ void bowl_press(Draw& draw, Setting& setting, double start) {
   const double off = draw.even("off", 0.0, 0.5) * draw.even("bowl", 0.035, 0.08);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const Place place =
-      below(setting.scene, off * std::cos(heading), off * std::sin(heading), 0.0, 0.02);
+      below(setting.scene, off * math::cos(heading), off * math::sin(heading), 0.0, 0.02);
   Pressing p = pressing(draw, place.normal);
   p.out = Vec3::UnitZ();  // straight in and out: the rim is all round
   play_script(setting, press_and_lift(place, p, start));
@@ -211,7 +216,7 @@ void bowl_slide(Draw& draw, Setting& setting, double start) {
   const double far = 0.7 * draw.even("bowl", 0.035, 0.08);
   const double depth = std::min(p.depth, 0.008);
   const std::vector<Vec3> places =
-      under_surface(setting.scene, -0.4 * far * std::cos(heading), -0.4 * far * std::sin(heading),
+      under_surface(setting.scene, -0.4 * far * math::cos(heading), -0.4 * far * math::sin(heading),
                     heading, 1.4 * far, depth);
   play_script(setting, stroke_and_lift(places, Vec3::UnitZ(), p, start,
                                        draw.by_factor("slide_speed", 0.05, 0.2)));
@@ -401,8 +406,8 @@ void torso_palpate(Draw& draw, Setting& setting, double start) {
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const double length = draw.even("slide", 0.04, 0.09);
   const std::vector<Vec3> places =
-      under_surface(setting.scene, -0.5 * length * std::cos(heading),
-                    -0.5 * length * std::sin(heading), heading, length, p.depth);
+      under_surface(setting.scene, -0.5 * length * math::cos(heading),
+                    -0.5 * length * math::sin(heading), heading, length, p.depth);
   Script script(places.front() + (p.depth + p.hover) * Vec3::UnitZ());
   script.wait(start)
       .reach(places.front(), p.speed)
@@ -491,7 +496,7 @@ void wedge_under(Draw& draw, Setting& setting, double start) {
   // Its upper face begins at the origin and rises towards -x at first, before it comes.
   const Eigen::Isometry3d tilted = turned(slope, Vec3::UnitY()) * at(-long_half, 0.0, -thick_half);
   const double before = 0.10;
-  const double after = lift / std::tan(slope);
+  const double after = lift * cotangent(slope);
   const Vec3 way = toward(heading);
   const double seconds = seconds_for(before + after, draw.by_factor("push", 0.1, 0.3));
   const Eigen::Isometry3d turn = turned(heading, Vec3::UnitZ()) * tilted;
@@ -627,8 +632,8 @@ void lift_off(Draw& draw, Setting& setting, double start) {
   const double length = draw.even("slide", 0.0, 0.06);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const std::vector<Vec3> places =
-      under_surface(setting.scene, -0.5 * length * std::cos(heading),
-                    -0.5 * length * std::sin(heading), heading, length, p.depth);
+      under_surface(setting.scene, -0.5 * length * math::cos(heading),
+                    -0.5 * length * math::sin(heading), heading, length, p.depth);
   Script script(places.front() + (p.depth + p.hover) * p.out);
   script.wait(start)
       .reach(places.front(), p.speed)
@@ -710,7 +715,7 @@ CameraPlan camera_of(Draw& draw) {
     case SensorKind::coarse:
       setup.width = draw.whole("pixels", 2) == 1 ? 100 : 80;
       setup.height = setup.width * 4 / 5 - (setup.width == 80 ? 4 : 0);
-      setup.focal = 0.5 * setup.width / std::tan(0.5 * draw.even("field_of_view", 0.95, 1.25));
+      setup.focal = 0.5 * setup.width * cotangent(0.5 * draw.even("field_of_view", 0.95, 1.25));
       setup.noise = draw.even("range_noise", 0.003, 0.008);
       setup.memory = draw.even("memory", 0.0, 0.7);
       most = 1.0;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "palpate/kernel/core/mathematics.hpp"
+
 namespace palpate::lab::field {
 namespace {
 
@@ -140,7 +142,7 @@ class Cylinder final : public Shape {
     const Vec2 beyond(p.head<2>().norm() - radius_, std::abs(p.z()) - half_);
     return beyond.cwiseMax(0.0).norm() + std::min(beyond.maxCoeff(), 0.0);
   }
-  double radius() const override { return std::hypot(radius_, half_); }
+  double radius() const override { return math::hypot(radius_, half_); }
 
  private:
   double radius_;
@@ -151,7 +153,7 @@ class Torus final : public Shape {
  public:
   Torus(double ring, double tube) : ring_(ring), tube_(tube) {}
   double distance(const Vec3& p, double /*t*/) const override {
-    return std::hypot(p.head<2>().norm() - ring_, p.z()) - tube_;
+    return math::hypot(p.head<2>().norm() - ring_, p.z()) - tube_;
   }
   double radius() const override { return ring_ + tube_; }
 
@@ -241,7 +243,7 @@ class Terrain final : public Relief {
   explicit Terrain(std::vector<Bump> bumps) : bumps_(std::move(bumps)) {
     for (const Bump& bump : bumps_) {
       highest_ += std::max(bump.height, 0.0);
-      steepest_ += std::abs(bump.height) / bump.width * std::exp(-0.5);
+      steepest_ += std::abs(bump.height) / bump.width * math::exp(-0.5);
     }
   }
 
@@ -252,7 +254,7 @@ class Terrain final : public Relief {
       const double narrow = 1.0 / (bump.width * bump.width);
       const double dx = x - bump.x;
       const double dy = y - bump.y;
-      const double part = bump.height * std::exp(-0.5 * (dx * dx + dy * dy) * narrow);
+      const double part = bump.height * math::exp(-0.5 * (dx * dx + dy * dy) * narrow);
       sum.z += part;
       sum.along_x -= dx * narrow * part;
       sum.along_y -= dy * narrow * part;
@@ -279,14 +281,14 @@ class Cloth final : public Relief {
     Height sum{0.0, 0.0, 0.0};
     for (const Wave& wave : waves_) {
       const double k = 2.0 * std::numbers::pi / wave.length;
-      const double kx = k * std::cos(wave.heading);
-      const double ky = k * std::sin(wave.heading);
+      const double kx = k * math::cos(wave.heading);
+      const double ky = k * math::sin(wave.heading);
       const double angle =
           kx * x + ky * y - 2.0 * std::numbers::pi * wave.frequency * t + wave.phase;
       const double tall =
           wave.height * ease((t - wave.begin) / swell) * (1.0 - ease((t - wave.end) / swell));
-      const double slope = tall * std::cos(angle);
-      sum.z += tall * std::sin(angle);
+      const double slope = tall * math::cos(angle);
+      sum.z += tall * math::sin(angle);
       sum.along_x += kx * slope;
       sum.along_y += ky * slope;
     }
@@ -316,7 +318,7 @@ class Torso final : public Shape {
 
  private:
   Vec3 half(double t) const {
-    return rest_ + 0.5 * (1.0 - std::cos(2.0 * std::numbers::pi * frequency_ * t)) * breath_;
+    return rest_ + 0.5 * (1.0 - math::cos(2.0 * std::numbers::pi * frequency_ * t)) * breath_;
   }
   Vec3 rest_;
   Vec3 breath_;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "palpate/kernel/core/mathematics.hpp"
+
 namespace palpate::lab::field {
 
 namespace {
@@ -25,7 +27,7 @@ const std::vector<double>& normal_quantiles() {
       const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(size);
       for (int round = 0; round < 8; ++round) {
         const double above = 0.5 * std::erfc(x / std::numbers::sqrt2);
-        const double density = std::exp(-0.5 * x * x) / std::sqrt(2.0 * std::numbers::pi);
+        const double density = math::exp(-0.5 * x * x) / std::sqrt(2.0 * std::numbers::pi);
         x += (share - 1.0 + above) / density;
       }
       quantiles[i] = x;
@@ -331,7 +333,7 @@ double Sensor::measured_depth(int u, int v) {
     if (std::abs(farthest_off) > flying_jump && chance_.even() < flying_share)
       range += chance_.even() * farthest_off;
   }
-  const double wiggle = setup_.wiggle * std::sin(2.0 * std::numbers::pi * range / wiggle_period);
+  const double wiggle = setup_.wiggle * math::sin(2.0 * std::numbers::pi * range / wiggle_period);
   return (range + wiggle + setup_.noise * range / std::sqrt(clean_.cosine[i]) * noise_[i]) *
          along_[i];
 }
@@ -352,9 +354,9 @@ std::shared_ptr<const DepthImage> Sensor::capture(const FieldScene& scene, doubl
 
 Eigen::Isometry3d camera_pose(const Vec3& target, double distance, double tilt, double azimuth,
                               double roll) {
-  const Vec3 back(std::sin(tilt) * std::cos(azimuth), std::sin(tilt) * std::sin(azimuth),
-                  std::cos(tilt));
-  const Vec3 side = Vec3(-std::sin(azimuth), std::cos(azimuth), 0.0);
+  const Vec3 back(math::sin(tilt) * math::cos(azimuth), math::sin(tilt) * math::sin(azimuth),
+                  math::cos(tilt));
+  const Vec3 side = Vec3(-math::sin(azimuth), math::cos(azimuth), 0.0);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   Eigen::Matrix3d axes;
   axes.col(2) = -back;

@@ -10,6 +10,7 @@
 #include "lab/field/field_scene.hpp"
 #include "lab/method.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/mathematics.hpp"
 
 namespace palpate::lab::field {
 
@@ -67,7 +68,7 @@ double Draw::even(std::string_view key, double low, double high) {
 }
 
 double Draw::by_factor(std::string_view key, double low, double high) {
-  return given(key, low * std::pow(high / low, chance_of(key)), 0.01 * low, 10.0 * high);
+  return given(key, low * math::pow(high / low, chance_of(key)), 0.01 * low, 10.0 * high);
 }
 
 int Draw::whole(std::string_view key, int count) {
@@ -113,7 +114,7 @@ Body moving(ShapePtr shape, std::function<Eigen::Isometry3d(double)> motion) {
   return {std::move(shape), Eigen::Isometry3d::Identity(), std::move(motion)};
 }
 Vec3 toward(double heading) {
-  return {std::cos(heading), std::sin(heading), 0.0};
+  return {math::cos(heading), math::sin(heading), 0.0};
 }
 
 Place below(const FieldScene& scene, double x, double y, double t, double from) {

@@ -365,8 +365,9 @@ FieldScene pile_of(Draw& draw) {
     Vec3 place = any(chance, -0.07, 0.07);
     const double out = place.head<2>().norm();
     place.z() = chance.even(-0.035, -0.015) - 3.0 * out * out;
-    const Eigen::Isometry3d pose =
-        at(place) * turned(chance.even(0.0, pi), any(chance, -1.0, 1.0).normalized());
+    // One by one: compilers differ in the order in which they find a call's arguments.
+    const Vec3 axis = any(chance, -1.0, 1.0).normalized();
+    const Eigen::Isometry3d pose = at(place) * turned(chance.even(0.0, pi), axis);
     const Vec3 size = any(chance, 0.010, 0.022);
     const double kind = chance.even();
     scene.push_back(still(kind < 0.4   ? ball(size.x())

@@ -5,10 +5,11 @@ program's. `scripts/figures/site.py COST_OF_TICKS`, after scripts/site; COST_OF_
 build with tests (tests/cost). For the browser: PALPATE_SITE_SPEED=1 web/browser/run site.
 
 Native and Node run in turn, and the ratios are medians of those of each turn: on a machine under
-other load these are valid. Means over all ticks, the frames at 30 Hz included, which are most of
-what `sight` costs.
+other load these are valid. A tick is a mean over all, with its share of the frames at 30 Hz; a
+frame is told from how much dearer ticks are with three times as many of them.
 """
 import gzip
+import os
 import pathlib
 import resource
 import statistics
@@ -26,26 +27,33 @@ def seconds(*command):
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
 
 
-def tick(program, method, ticks):
-    """[s] of a tick, without the program's start."""
-    start = seconds(*program, str(ticks // 10), method)
-    return (seconds(*program, str(ticks), method) - start) / (ticks - ticks // 10)
+def tick_and_frame(program, method):
+    """[s] of a tick and of a frame, without the program's start."""
+    def one(ticks_a_frame):
+        few, many = (seconds(*program, str(ticks), method, "", str(ticks_a_frame))
+                     for ticks in (TICKS // 10, TICKS))
+        return (many - few) / (TICKS - TICKS // 10)
+    seldom, often = one(33), one(11)
+    return seldom, (often - seldom) / (1 / 11 - 1 / 33)
 
 
 def main(native):
     size = sum(len(gzip.compress(file.read_bytes(), 9))
                for file in (ROOT / "build/site").iterdir() if file.is_file())
     print(f"build/site: {size} bytes, compressed by gzip")
+    # Debian's emscripten looks for its JavaScript where only Debian's node does.
     subprocess.run(["ninja", "-C", ROOT / "build/wasm", "cost_of_ticks"], check=True,
-                   stdout=subprocess.DEVNULL)
+                   stdout=subprocess.DEVNULL, env={**os.environ, "NODE_PATH": "/usr/share/nodejs"})
     # With fetch() in Node, emscripten of 2022 takes it for a browser.
     node = ["node", "--no-experimental-fetch", str(ROOT / "build/wasm/cost_of_ticks.js")]
     for method in ("paper", "sight"):
-        turns = [(tick([native], method, TICKS), tick(node, method, TICKS)) for _ in range(TURNS)]
-        here, there = (statistics.median(turn) for turn in zip(*turns))
-        ratio = statistics.median(there / here for here, there in turns)
-        print(f"{method}: {1e6 * here:.2f} us a tick natively, {1e6 * there:.2f} us in Node.js, "
-              f"{ratio:.2f} times")
+        turns = [(tick_and_frame([native], method),
+                  tick_and_frame(node, method)) for _ in range(TURNS)]
+        for i, what in enumerate(("tick", "frame")):
+            here, there = (statistics.median(place[i] for place in turn) for turn in zip(*turns))
+            ratio = statistics.median(there[i] / here[i] for here, there in turns)
+            print(f"{method}: {1e6 * here:.2f} us a {what} natively, {1e6 * there:.2f} us in "
+                  f"Node.js, {ratio:.2f} times", flush=True)
 
 
 if __name__ == "__main__":

@@ -134,6 +134,27 @@ void ViewerHost::end_file(const std::filesystem::path& /*file*/, bool /*whole*/)
 namespace site {
 namespace {
 
+// The depth camera of the device that shows the page (WebXR): its newest frame, until that is read.
+std::optional<Frame>& newest_depth() {
+  static std::optional<Frame> frame;
+  return frame;
+}
+constexpr const char* page_camera = "webxr:";
+
+class PageCamera final : public Source {
+ public:
+  std::optional<Frame> next(double /*timeout*/) override {
+    return std::exchange(newest_depth(), std::nullopt);
+  }
+  [[nodiscard]] const SourceInfo& info() const override { return info_; }
+
+ private:
+  SourceInfo info_{.uri = page_camera,
+                   .kind = "depth camera of this device",
+                   .live = true,
+                   .clock = StampClock::session};
+};
+
 // A scene that is touched, from its opening to the next one's.
 class Scene {
  public:
@@ -219,6 +240,9 @@ class Scene {
   SessionOptions options_of(const std::string& uri) {
     SessionOptions options;
     options.cameras = {{.uri = uri}};
+    options.sources.add({.name = "webxr",
+                         .summary = "webxr:, the depth camera of this device",
+                         .open = [](const Uri&) { return std::make_unique<PageCamera>(); }});
     options.hands = {{.device = "mouse:"}};
     options.pace = Pace::free_running;
     options.on_frame = [this](std::size_t camera, const FedFrame& frame) {
@@ -270,6 +294,7 @@ struct Page {
   std::shared_ptr<DroppedFiles> files = std::make_shared<DroppedFiles>(most_file_bytes);
   std::unique_ptr<Scene> scene;
   std::string wanted;   // scene that is to be opened; empty: none
+  std::string shown;    // the scene that is touched
   double opened = 0.0;  // [s] on the Worker's clock
 };
 
@@ -324,12 +349,15 @@ extern "C" {
 /// Opens a scene in place of the one before, which stays where this one cannot be opened.
 /// @return whether it is open
 EMSCRIPTEN_KEEPALIVE bool palpate_open(const char* uri, double now) {
-  return tried([&] {
+  const double before = std::exchange(page().opened, now);
+  const bool is_open = tried([&] {
     page().scene = std::make_unique<palpate::site::Scene>(
         palpate::source_uri(uri), [](const std::string& wanted) { page().wanted = wanted; },
         page().files);
-    page().opened = now;
+    page().shown = uri;
   });
+  if (!is_open) page().opened = before;
+  return is_open;
 }
 
 /// @param now  [s] on the Worker's clock
@@ -345,6 +373,30 @@ EMSCRIPTEN_KEEPALIVE void palpate_take(const std::byte* bytes, std::size_t size)
 
 EMSCRIPTEN_KEEPALIVE void palpate_command(const char* text) {
   if (page().scene) tried([&] { page().scene->command(text); });
+}
+
+/// A frame of the device's own depth camera, which is touched from the first one on.
+/// @param depth   [mm] row by row
+/// @param camera  focal lengths and principal point [px]
+/// @param pose    world_from_camera of the optical frame [m], 4 x 4, column by column
+/// @param now     [s] on the Worker's clock
+EMSCRIPTEN_KEEPALIVE void palpate_depth(int width, int height, const std::uint16_t* depth,
+                                        const double* camera, const double* pose, double now) {
+  tried([&] {
+    using namespace palpate;
+    const bool is_shown = page().shown == site::page_camera;
+    const Eigen::Map<const Eigen::Matrix4d> matrix(pose);
+    Eigen::Isometry3d world_from_camera(Eigen::Translation3d(matrix.topRightCorner<3, 1>()));
+    world_from_camera.rotate(Eigen::Quaterniond(Mat3(matrix.topLeftCorner<3, 3>())).normalized());
+    site::newest_depth() = {
+        .stamp = is_shown ? now - page().opened : 0.0,
+        .cloud = std::make_shared<DepthImage>(
+            std::make_shared<const ViewingRays>(
+                Intrinsics{width, height, camera[0], camera[1], camera[2], camera[3]}),
+            std::vector<std::uint16_t>(depth, depth + std::ptrdiff_t{width} * height), 1000.0,
+            world_from_camera)};
+    if (!is_shown) palpate_open(site::page_camera, now);
+  });
 }
 
 /// Where a hand is to be [m, world], or that it was let go.

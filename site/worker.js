@@ -77,6 +77,14 @@ const palpateTake = (message) => {
   if (message.open) {
     return palpateCall("palpate_open", ["string", "number"], message.open, palpateSeconds());
   }
+  if (message.depth) {
+    const of = message.depth;
+    const bytes = (numbers) => new Uint8Array(numbers.buffer);
+    const types = ["number", "number", "array", "array", "array", "number"];
+    const [depth, camera, pose] = [of.depth, of.camera, of.pose].map(bytes);
+    const now = palpateSeconds();
+    return palpateCall("palpate_depth", types, of.width, of.height, depth, camera, pose, now);
+  }
   if (message.inverse3 !== undefined) return palpateInverse3.lead(message.inverse3);
   palpateTakeFile(message.name, message.bytes);
 };

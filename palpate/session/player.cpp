@@ -25,6 +25,7 @@ void count(CameraStatus& status, StampProblem problem) {
 Player::Player(std::shared_ptr<Source> source, Open open, Playing playing)
     : source_(std::move(source)), open_(std::move(open)), playing_(playing) {
   const SourceInfo& info = source_->info();
+  if (gives_frames_later()) playing_ = Playing::by_its_stamps;
   if (info.live && playing_ == Playing::freely)
     throw Error(info.uri, "a live camera cannot be played faster than it captures",
                 "run the session in real time");
@@ -100,6 +101,7 @@ void Player::read(double now, double took) {
     ++status_.dropped;
     throw;
   }
+  if (!frame && gives_frames_later()) return;
   if (!frame)
     end();
   else if (++at_ > sought_)
@@ -147,6 +149,7 @@ const Frame* Player::look_ahead() {
       begin(open_());
     }
     read();
+    if (gives_frames_later()) break;
   }
   return upcoming();
 }

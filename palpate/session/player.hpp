@@ -100,7 +100,8 @@ class Player {
 
   /// @param source  open
   /// @param open    opens it again at its end; empty: it cannot be
-  /// @throws Error if the source is live and played freely.
+  /// A live source on StampClock::session is played by its stamps.
+  /// @throws Error if any other source is live and played freely.
   Player(std::shared_ptr<Source> source, Open open, Playing playing = Playing::freely);
 
   /// The first frame, which next_until gives later. @throws Error if there is none, or as read.
@@ -151,6 +152,9 @@ class Player {
   [[nodiscard]] CameraStatus& status() { return status_; }
 
  private:
+  [[nodiscard]] bool gives_frames_later() const {
+    return source_->info().live && source_->info().clock == StampClock::session;
+  }
   [[nodiscard]] bool is_still() const {
     const bool paused = status_.playback.paused;
     return next_ ? paused && !is_new_place_ : has_ended_ && (stays_ || paused);

@@ -131,6 +131,25 @@ TEST(Player, EndsEachLookAtASourceThatRepeatsOneStampForEver) {
   EXPECT_GT(source.status().dropped, 0U);
 }
 
+TEST(Player, TakesALiveCameraOnTheSessionsClockAsItsFramesCome) {
+  double now = 0.0;
+  Player source(std::make_unique<MadeSource>(
+                    [&now](int k) {
+                      const double stamp = 0.1 * k;
+                      return stamp <= now ? std::optional(Frame{stamp, wall()}) : std::nullopt;
+                    },
+                    SourceInfo{.uri = "page:", .live = true, .clock = StampClock::session}),
+                {});
+  EXPECT_EQ(source.first_frame().stamp, 0.0);
+  std::vector<double> stamps;
+  for (int i = 0; i <= 250; ++i) {
+    now = 1e-3 * i;
+    while (auto fed = source.next_until(now)) stamps.push_back(fed->frame.stamp);
+  }
+  EXPECT_EQ(stamps, (std::vector{0.0, 0.1, 0.2}));
+  EXPECT_FALSE(source.has_ended());
+}
+
 TEST(Player, RefusesLiveCamerasAndEmptyRecordings) {
   const auto open = [] { return stamped({}); };
   const auto live = [] {

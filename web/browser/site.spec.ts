@@ -100,6 +100,39 @@ function tumZip(png: Uint8Array): Buffer {
   return Buffer.from(zipSync({ ...texts, "wall/depth/1305031031.1.png": png }));
 }
 
+/** In the page: WebXR of a phone 1 m above a floor, which it looks down at. */
+function simulatePhone(): void {
+  const identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+  const view = {
+    projectionMatrix: Float32Array.from(identity, (x, i) => (i === 5 ? 4 / 3 : x)),
+    transform: { matrix: Float32Array.of(1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 1, 0, 1) },
+  };
+  const depth = {
+    width: 160,
+    height: 120,
+    data: new Uint16Array(160 * 120).fill(2000).buffer,
+    rawValueToMeters: 0.0005,
+    normDepthBufferFromNormView: { matrix: Float32Array.from(identity) },
+  };
+  const frame = { getViewerPose: () => ({ views: [view] }), getDepthInformation: () => depth };
+  class Session extends EventTarget {
+    depthDataFormat = "luminance-alpha";
+    private running = true;
+    updateRenderState(): void {}
+    requestReferenceSpace = async () => ({});
+    requestAnimationFrame(draw: (time: number, of: typeof frame) => void): void {
+      setTimeout(() => this.running && draw(performance.now(), frame), 33);
+    }
+    async end(): Promise<void> {
+      this.running = false;
+      this.dispatchEvent(new Event("end"));
+    }
+  }
+  const xr = { isSessionSupported: async () => true, requestSession: async () => new Session() };
+  Object.defineProperty(navigator, "xr", { value: xr });
+  Object.assign(globalThis, { XRWebGLLayer: class {} });
+}
+
 describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site", () => {
   beforeAll(async () => {
     ({ host, address } = await hosted(site));
@@ -180,6 +213,20 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
     const { hash } = replayed(folder);
     expect(await compared(page)).toContain(identically(hash));
     expect(faults).toEqual([]);
+    await page.close();
+  });
+
+  test("the depth camera of a phone is touched, where its browser gives one", async () => {
+    const page = await browser.newPage({ viewport: { width: 900, height: 600 } });
+    await page.addInitScript(simulatePhone);
+    await page.goto(`${address}/index.html?size=160x120`, { timeout: patience });
+    await drawn(page);
+    await page.locator("#webxr").click();
+    await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain("webxr:");
+    await drawn(page);
+    await press(page);
+    await page.locator("#webxr").click();
+    await expect.poll(() => page.locator("#webxr").getAttribute("aria-pressed")).toBe("false");
     await page.close();
   });
 

@@ -4,6 +4,7 @@ import { dispatch, type Handlers, type Toast } from "./dispatch";
 import { element, get } from "./dom";
 import type { Command } from "./protocol";
 import { deviceAxes } from "./share";
+import { hasDepth, watchDepth } from "./webxr";
 
 /** Nobody needs a token here. */
 export const unknownToken = "";
@@ -56,6 +57,7 @@ export class Connection {
     };
     this.worker.postMessage({ open: scene });
     this.offer(inverse3);
+    void hasDepth().then((has) => has && this.offerDepth());
     // Offline after the first load, where the page is from https or this computer.
     void navigator.serviceWorker?.register("offline.js").catch(() => {});
   }
@@ -85,6 +87,23 @@ export class Connection {
         if (document.hidden || end === "freeze") this.leadByInverse3(false);
       });
     addEventListener("pagehide", () => this.leadByInverse3(false));
+  }
+
+  // The depth camera of this device, where its browser gives one.
+  private offerDepth(): void {
+    const button = get("webxr");
+    button.hidden = false;
+    let end: (() => void) | null = null;
+    const show = (ending: (() => void) | null) => {
+      end = ending;
+      button.setAttribute("aria-pressed", String(ending !== null));
+    };
+    const refuse = ({ message }: Error) =>
+      this.handlers.refused(`the camera of this device: ${message}; allow it for this page`);
+    button.addEventListener("click", () => {
+      if (end) return end();
+      watchDepth((depth) => this.worker.postMessage({ depth }), () => show(null)).then(show, refuse);
+    });
   }
 
   send(data: ArrayBuffer): void {

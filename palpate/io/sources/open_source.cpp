@@ -29,6 +29,8 @@ std::string_view name_of(StampClock clock) noexcept {
       return "monotonic";
     case StampClock::system:
       return "system";
+    case StampClock::session:
+      return "session";
     case StampClock::sensor:
       break;
   }

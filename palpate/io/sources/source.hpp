@@ -26,6 +26,7 @@ enum class StampClock : std::uint8_t {
   monotonic,  ///< this machine's CLOCK_MONOTONIC, which the servo loop uses too
   system,     ///< this machine's wall clock, CLOCK_REALTIME: seconds since 1970
   sensor,     ///< the camera's own: any origin, drifts against this machine's clocks, may jump
+  session,    ///< that of the session, whose caller gives the frames: `next` never waits
 };
 
 /// Distances between which a camera can measure [m].
@@ -34,7 +35,7 @@ struct DepthRange {
   double farthest = std::numeric_limits<double>::infinity();
 };
 
-/// "recording", "monotonic", "system", "sensor".
+/// "recording", "monotonic", "system", "sensor", "session".
 [[nodiscard]] std::string_view name_of(StampClock clock) noexcept;
 
 /// What is known of a source before, or without, reading all of it.

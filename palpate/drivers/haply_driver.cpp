@@ -68,19 +68,20 @@ const char* remedy() {
          "by ?host=NAME&port=NUMBER";
 }
 
-// What GET /version says, or nothing.
+// What the service says of its version, or nothing.
 std::string version_of(const Wanted& wanted) {
   try {
-    return http_get(wanted.host, wanted.port, "/version", 1.0);
-  } catch (const Error&) {
+    return Json::parse(web::http_get(wanted.host, wanted.port, "/version", 1.0))
+        .value("git_tag", "");
+  } catch (const std::exception&) {
     return "";
   }
 }
 
 // @throws Error with the remedy
-std::unique_ptr<WebSocketClient> connect(const Wanted& wanted) {
+std::unique_ptr<web::WebSocket> connect(const Wanted& wanted) {
   try {
-    return std::make_unique<WebSocketClient>(wanted.host, wanted.port, opening_time);
+    return std::make_unique<web::WebSocket>(wanted.host, wanted.port, opening_time);
   } catch (const Error& error) {
     throw Error(wanted.uri, std::string("no Inverse Service at ") + error.what(), remedy());
   }
@@ -98,64 +99,61 @@ int number_of_version(const std::string& text) {
   return 100 * std::clamp(major, 0, 99) + std::clamp(minor, 0, 99);
 }
 
-// A vector of the service; what is left out keeps its value in `fallback`.
+// What the service says first. @throws Error if it does not
+Json inventory_of(web::WebSocket& service, const Wanted& wanted) {
+  const std::string text = service.receive(opening_time);
+  if (text.empty())
+    throw Error(wanted.uri, "the service does not speak first, as an Inverse Service does",
+                remedy());
+  return Json::parse(text);
+}
+
+// All that follows throws a Json::exception where a message is not as the service writes it.
+
+// What is left out keeps its value in `fallback`.
 Vec3 vector_of(const Json& object, const char* name, const Vec3& fallback) {
-  Vec3 value = fallback;
-  const auto found = object.find(name);
-  if (found == object.end() || !found->is_object()) return value;
-  for (int i = 0; i < 3; ++i) {
-    const auto one = found->find(std::string(1, "xyz"[i]));
-    if (one != found->end() && one->is_number()) value[i] = one->get<double>();
-  }
-  return value;
+  const Json vector = object.value(name, Json::object());
+  return {vector.value("x", fallback.x()), vector.value("y", fallback.y()),
+          vector.value("z", fallback.z())};
 }
 
-// True, unless the service says false.
-bool holds(const Json& object, const char* name) {
-  const auto found = object.find(name);
-  return found == object.end() || !found->is_boolean() || found->get<bool>();
-}
-
-const Json* member(const Json& object, const char* name) {
-  const auto found = object.find(name);
-  return found == object.end() ? nullptr : &*found;
+Json devices_in(const Json& message) {
+  return message.value("inverse3", Json::array());
 }
 
 // The device of that id in a message, or the first if `id` is empty; null if there is none.
-const Json* device_in(const Json& message, const std::string& id) {
-  if (!message.is_object()) return nullptr;
-  const Json* list = member(message, "inverse3");
-  if (list == nullptr || !list->is_array()) return nullptr;
-  for (const Json& device : *list) {
-    if (device.is_object() && (id.empty() || device.value("device_id", "") == id)) return &device;
+Json device_in(const Json& message, const std::string& id) {
+  for (const Json& device : devices_in(message)) {
+    if (id.empty() || device.value("device_id", "") == id) return device;
   }
   return nullptr;
 }
 
+DeviceFault fault_of_status(const Json& status) {
+  if (!status.value("calibrated", true)) return DeviceFault::not_calibrated;
+  if (!status.value("power_supply", true) || !status.value("ready", true))
+    return DeviceFault::other;
+  return DeviceFault::none;
+}
+
 // Bits of all grips' buttons, and the orientation of the first that tells one.
 void read_grips(const Json& message, HandState& state) {
-  std::uint32_t buttons = 0;
-  bool found = false;
+  std::optional<std::uint32_t> buttons;
   for (const char* kind : {"verse_grip", "wireless_verse_grip"}) {
-    const Json* list = member(message, kind);
-    if (list == nullptr || !list->is_array() || list->empty() || !list->front().is_object())
-      continue;
-    const Json* grip = member(list->front(), "state");
-    if (grip == nullptr || !grip->is_object()) continue;
-    found = true;
-    if (grip->value("button", false)) buttons |= 1U;
-    if (const Json* several = member(*grip, "buttons");
-        several != nullptr && several->is_object()) {
-      for (unsigned i = 0; i < 3; ++i)
-        if (several->value(std::string(1, "abc"[i]), false)) buttons |= 1U << i;
-    }
-    if (const Json* turn = member(*grip, "orientation"); turn != nullptr && turn->is_object()) {
-      const Eigen::Quaterniond q(turn->value("w", 1.0), turn->value("x", 0.0),
-                                 turn->value("y", 0.0), turn->value("z", 0.0));
-      if (q.coeffs().allFinite() && q.norm() > 0.5) state.orientation = q.normalized();
-    }
+    const Json grips = message.value(kind, Json::array());
+    if (grips.empty()) continue;
+    const Json grip = grips.front().value("state", Json::object());
+    std::uint32_t pressed = grip.value("button", false) ? 1U : 0U;
+    const Json several = grip.value("buttons", Json::object());
+    for (unsigned i = 0; i < 3; ++i)
+      if (several.value(std::string(1, "abc"[i]), false)) pressed |= 1U << i;
+    buttons = buttons.value_or(0) | pressed;
+    const Json turn = grip.value("orientation", Json::object());
+    const Eigen::Quaterniond q(turn.value("w", 0.0), turn.value("x", 0.0), turn.value("y", 0.0),
+                               turn.value("z", 0.0));
+    if (q.coeffs().allFinite() && q.norm() > 0.5) state.orientation = q.normalized();
   }
-  if (found) state.buttons = buttons;
+  if (buttons) state.buttons = buttons;
 }
 
 class Inverse final : public ChannelHand {
@@ -227,17 +225,14 @@ class Inverse final : public ChannelHand {
 
   // One connection, to its end.
   void converse(std::promise<void>*& waiting) {
-    const std::unique_ptr<WebSocketClient> service = connect(wanted_);
-    WebSocketClient& channel = *service;
-    const std::string inventory_text = channel.receive(opening_time);
-    if (inventory_text.empty())
-      throw Error(wanted_.uri, "the service does not speak first, as an Inverse Service does",
-                  remedy());
+    const std::unique_ptr<web::WebSocket> service = connect(wanted_);
+    web::WebSocket& channel = *service;
+    const Json inventory = inventory_of(channel, wanted_);
     if (waiting != nullptr) {
-      identify(Json::parse(inventory_text, nullptr, false));
+      identify(inventory);
       waiting->set_value();
       waiting = nullptr;
-    } else if (device_in(Json::parse(inventory_text, nullptr, false), id_) == nullptr) {
+    } else if (device_in(inventory, id_).is_null()) {
       throw Error(wanted_.uri, "the device is not plugged in");
     }
     channel.send(first_message());
@@ -247,7 +242,7 @@ class Inverse final : public ChannelHand {
       const double now = monotonic_now();
       if (!answer.empty()) {
         heard = now;
-        take(Json::parse(answer, nullptr, false), now);
+        take(Json::parse(answer), now);
         word_.wait(idle_wait);
         channel.send(message_with(next_force()));
         continue;
@@ -263,35 +258,27 @@ class Inverse final : public ChannelHand {
   }
 
   void identify(const Json& inventory) {
-    const Json* device = device_in(inventory, wanted_.id);
-    if (device == nullptr) {
+    const Json device = device_in(inventory, wanted_.id);
+    if (device.is_null()) {
       std::string ids;
-      if (const Json* list = inventory.is_object() ? member(inventory, "inverse3") : nullptr;
-          list != nullptr && list->is_array()) {
-        for (const Json& one : *list)
-          if (one.is_object()) add_to_list(ids, one.value("device_id", ""));
-      }
+      for (const Json& one : devices_in(inventory)) add_to_list(ids, one.value("device_id", ""));
       if (ids.empty())
         throw Error(wanted_.uri, "the service sees no Inverse3", "check its power and its cable");
       throw Error(wanted_.uri, "there is no device '" + wanted_.id + "'", "there are: " + ids);
     }
-    id_ = device->value("device_id", "");
-    if (const DeviceFault fault = fault_of_status(*device); fault == DeviceFault::not_calibrated)
-      throw Error(wanted_.uri, "the device " + id_ + " is not calibrated",
-                  "calibrate it in Haply's Hub");
-    else if (fault == DeviceFault::other)
-      throw Error(wanted_.uri, "the device " + id_ + " has no power or is not ready",
-                  "plug in its power supply");
-    const std::string version = version_of(wanted_);
-    const Json told = Json::parse(version, nullptr, false);
-    const std::string tag =
-        told.is_object() && told.contains("git_tag") && told["git_tag"].is_string()
-            ? told["git_tag"].get<std::string>()
-            : "";
-    key_ = number_of_version(tag) >= 305 ? "vector" : "values";
-    std::string type = "inverse3";
-    if (const Json* config = member(*device, "config"); config != nullptr && config->is_object())
-      type = config->value("type", type);
+    id_ = device.value("device_id", "");
+    switch (fault_of_status(device.value("status", Json::object()))) {
+      case DeviceFault::not_calibrated:
+        throw Error(wanted_.uri, "the device " + id_ + " is not calibrated",
+                    "calibrate it in Haply's Hub");
+      case DeviceFault::other:
+        throw Error(wanted_.uri, "the device " + id_ + " has no power or is not ready",
+                    "plug in its power supply");
+      default:
+        break;
+    }
+    key_ = number_of_version(version_of(wanted_)) >= 305 ? "vector" : "values";
+    const std::string type = device.value("config", Json::object()).value("type", "inverse3");
     info_.uri = wanted_.uri;
     info_.kind = type + " by Haply's Inverse Service";
     info_.limits = {.max_force = wanted_.max_force,
@@ -327,28 +314,20 @@ class Inverse final : public ChannelHand {
     return asked_ = newest_.state.fault == DeviceFault::none ? force : Vec3::Zero();
   }
 
-  static DeviceFault fault_of_status(const Json& device) {
-    const Json* status = member(device, "status");
-    if (status == nullptr || !status->is_object()) return DeviceFault::none;
-    if (!holds(*status, "calibrated")) return DeviceFault::not_calibrated;
-    if (!holds(*status, "power_supply") || !holds(*status, "ready")) return DeviceFault::other;
-    return DeviceFault::none;
-  }
-
   // A state that the service has sent.
   void take(const Json& message, double now) {
-    const Json* device = device_in(message, id_);
-    const Json* told = device == nullptr ? nullptr : member(*device, "state");
-    if (told == nullptr || !told->is_object()) return let_go(DeviceFault::disconnected);
+    const Json device = device_in(message, id_);
+    if (!device.contains("state")) return let_go(DeviceFault::disconnected);
+    const Json& told = device.at("state");
     HandState& state = newest_.state;
-    state.position = vector_of(*told, "cursor_position", state.position);
+    state.position = vector_of(told, "cursor_position", state.position);
     read_grips(message, state);
-    if (member(*device, "status") != nullptr) status_ = fault_of_status(*device);
+    if (device.contains("status")) status_ = fault_of_status(device.at("status"));
     state.fault = status_;
     if (state.fault == DeviceFault::none && now < rest_until_) state.fault = rest_fault_;
     newest_.time = now;
     seen_.put(newest_);
-    doubt(vector_of(*told, "current_cursor_force", Vec3::Zero()));
+    doubt(vector_of(told, "current_cursor_force", Vec3::Zero()));
     if (state.fault == DeviceFault::none) set_trouble_once("");
   }
 
@@ -416,21 +395,15 @@ DriverReport look() {
   DriverReport report;
   Wanted wanted = usual_place();
   wanted.uri = scheme;
-  const std::unique_ptr<WebSocketClient> service = connect(wanted);
+  const std::unique_ptr<web::WebSocket> service = connect(wanted);
   report.library = "ws://" + wanted.host + ":" + std::to_string(wanted.port);
-  const Json version = Json::parse(version_of(wanted), nullptr, false);
-  if (version.is_object()) report.version = version.value("git_tag", "");
-  const Json inventory = Json::parse(service->receive(1.0), nullptr, false);
-  const Json* list = inventory.is_object() ? member(inventory, "inverse3") : nullptr;
-  if (list == nullptr || !list->is_array()) return report;
-  for (const Json& device : *list) {
-    if (!device.is_object()) continue;
+  report.version = version_of(wanted);
+  for (const Json& device : devices_in(inventory_of(*service, wanted))) {
     const std::string id = device.value("device_id", "");
     PluggedIn one{.uri = std::string(scheme) + id, .name = "Inverse3", .serial = id};
-    if (const Json* status = member(device, "status"); status != nullptr && status->is_object()) {
-      if (!holds(*status, "calibrated")) one.note = "not calibrated: calibrate it in Haply's Hub";
-      if (!holds(*status, "power_supply")) one.note = "no power: plug in its power supply";
-    }
+    const Json status = device.value("status", Json::object());
+    if (!status.value("calibrated", true)) one.note = "not calibrated: calibrate it in Haply's Hub";
+    if (!status.value("power_supply", true)) one.note = "no power: plug in its power supply";
     report.found.push_back(one);
   }
   return report;

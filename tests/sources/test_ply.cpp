@@ -128,65 +128,17 @@ std::string valid_file(const std::string& encoding) {
          values.text();
 }
 
-template <class T>
-constexpr std::array<const char*, 2> names_of() {
-  if constexpr (std::is_floating_point_v<T>) {
-    return sizeof(T) == 4 ? std::array{"float", "float32"} : std::array{"double", "float64"};
-  } else if constexpr (sizeof(T) == 1) {
-    return std::is_signed_v<T> ? std::array{"char", "int8"} : std::array{"uchar", "uint8"};
-  } else if constexpr (sizeof(T) == 2) {
-    return std::is_signed_v<T> ? std::array{"short", "int16"} : std::array{"ushort", "uint16"};
-  } else {
-    return std::is_signed_v<T> ? std::array{"int", "int32"} : std::array{"uint", "uint32"};
-  }
-}
-
-template <class T>
-class PlyOfType : public testing::Test {};
-using Types = testing::Types<std::int8_t, std::uint8_t, std::int16_t, std::uint16_t, std::int32_t,
-                             std::uint32_t, float, double>;
-TYPED_TEST_SUITE(PlyOfType, Types);
-
-TYPED_TEST(PlyOfType, GivesBackTheCoordinatesThatWereWrittenInEveryEncoding) {
-  using T = TypeParam;
-  const auto coordinate = [](int k, int axis) {
-    return static_cast<T>(std::is_signed_v<T> ? 10 * axis - 7 * k : 10 * axis + 7 * k);
-  };
-  constexpr int count = 12;
-  for (const std::string encoding : encodings) {
-    for (const char* type : names_of<T>()) {
-      Values values(encoding);
-      for (int k = 0; k < count; ++k) {
-        values.add(coordinate(k, 0)).add(coordinate(k, 1)).add(coordinate(k, 2)).end_row();
-      }
+TEST(Ply, KnowsEachTypeByBothOfItsNames) {
+  for (const auto& [name, known] :
+       {std::pair("char", "int8"), std::pair("uchar", "uint8"), std::pair("short", "int16"),
+        std::pair("ushort", "uint16"), std::pair("int", "int32"), std::pair("uint", "uint32"),
+        std::pair("float", "float32"), std::pair("double", "float64")}) {
+    for (const char* type : {name, known}) {
       const PointFile cloud =
-          parse(header(encoding, "element vertex 12\n" + vertices_of(type)) + values.text());
-      EXPECT_EQ(cloud.encoding, encoding);
-      EXPECT_EQ(cloud.width, 12u);
-      EXPECT_EQ(cloud.height, 1u);
-      ASSERT_EQ(cloud.points.size(), 12u);
-      for (int k = 0; k < count; ++k) {
-        for (int axis = 0; axis < 3; ++axis) {
-          EXPECT_EQ(cloud.points[k][axis], static_cast<double>(coordinate(k, axis)));
-        }
-      }
+          parse(header("ascii", "element vertex 1\n" + vertices_of(type)) + "1 2 3\n");
+      EXPECT_EQ(cloud.fields[2].type, known);
+      EXPECT_EQ(cloud.points[0], Vec3(1, 2, 3));
     }
-  }
-}
-
-TEST(Ply, FindsItsVerticesBetweenOtherElementsListsAndProperties) {
-  for (const char* encoding : encodings) {
-    SCOPED_TRACE(encoding);
-    const PointFile cloud = parse(valid_file(encoding));
-    ASSERT_EQ(cloud.points.size(), 3u);
-    EXPECT_EQ(cloud.points[0], Vec3(1, 2, 3));
-    EXPECT_EQ(cloud.points[1], Vec3(4, 5, 6));
-    EXPECT_EQ(cloud.points[2], Vec3(7, 8, 9));
-    ASSERT_EQ(cloud.fields.size(), 5u);
-    EXPECT_EQ(cloud.fields[0].name, "a");
-    EXPECT_EQ(cloud.fields[0].type, "int16");
-    EXPECT_EQ(cloud.fields[2].type, "list of float64");
-    EXPECT_EQ(cloud.bytes_unread, 0u);
   }
 }
 
@@ -263,11 +215,11 @@ TEST(Ply, SaysWhichFaceNamesAVertexThatIsNotThere) {
     EXPECT_EQ(parse(bad(encoding, 2)).triangles.size(), 1U);
     for (const int corner : {3, -1, -2147483647 - 1}) {
       EXPECT_TRUE(fails_saying([&] { return parse(bad(encoding, corner)); },
-                               "\"face\" names vertex " + std::to_string(corner),
+                               "\"face\": vertex " + std::to_string(corner) + " is named",
                                "but there are 3"));
     }
     EXPECT_TRUE(fails_saying([&] { return parse(bad(encoding, -2, "tristrips")); },
-                             "\"tristrips\" names vertex -2"));
+                             "\"tristrips\": vertex -2 is named"));
   }
   EXPECT_TRUE(fails_saying([&] { return parse(bad("ascii", 3)); }, "line 13: "));
   EXPECT_TRUE(fails_saying([&] { return parse(bad("binary_big_endian", 3)); }, "byte "));
@@ -275,7 +227,7 @@ TEST(Ply, SaysWhichFaceNamesAVertexThatIsNotThere) {
                                                "element face 1\n"
                                                "property list uchar int vertex_indices\n");
   EXPECT_TRUE(fails_saying([&] { return parse(list + "1 2 3\n3 0 0 0.5\n"); },
-                           "line 11: a vertex of element \"face\" is \"0.5\""));
+                           "line 11: one of vertex_indices is \"0.5\""));
   EXPECT_TRUE(fails_saying([&] { return parse(list + "1 2 3\n3 0 0\n"); }, "line 11: has too few"));
   for (const char* property : {"list uchar float vertex_indices", "int vertex_index"}) {
     EXPECT_TRUE(fails_saying(
@@ -288,10 +240,7 @@ TEST(Ply, SaysWhichFaceNamesAVertexThatIsNotThere) {
   }
 }
 
-TEST(Ply, RemembersFromWhereThePointsWereSeenIfPclWroteIt) {
-  const PointFile cloud = parse(valid_file("binary_big_endian"));
-  ASSERT_TRUE(cloud.viewpoint.has_value());
-  EXPECT_EQ(*cloud.viewpoint, Vec3(0.5, 0.25, 0.125));
+TEST(Ply, HasAViewpointIfPclWroteIt) {
   EXPECT_FALSE(parse(header("ascii", "element vertex 0\n" + vertices)).viewpoint.has_value());
   EXPECT_TRUE(fails_saying(
       [] {
@@ -313,19 +262,6 @@ TEST(Ply, AcceptsHeadersWithCarriageReturnsBeforeBinaryDataThatBeginsWithALineFe
   EXPECT_EQ(parse(head + "\n\r ").points.at(0), Vec3(10, 13, 32));
 }
 
-TEST(Ply, CountsPointsThatAreNotFinite) {
-  const PointFile cloud =
-      parse(header("ascii", "element vertex 3\n" + vertices) + "1 2 3\nnan 0 0\n0 0 -inf\n");
-  EXPECT_EQ(cloud.non_finite, 2u);
-  EXPECT_EQ(cloud.points.size(), 3u);
-}
-
-TEST(Ply, TellsOfBytesThatItsHeaderDoesNotAccountFor) {
-  EXPECT_EQ(parse(valid_file("ascii") + "\n \r\n").bytes_unread, 0u);
-  EXPECT_EQ(parse(valid_file("ascii") + "1 2 3").bytes_unread, 5u);
-  EXPECT_EQ(parse(valid_file("binary_big_endian") + std::string(100, '\0')).bytes_unread, 100u);
-}
-
 TEST(Ply, RejectsAHeaderThatPromisesMoreThanTheFileHolds) {
   for (const std::string encoding : encodings) {
     EXPECT_TRUE(fails_saying(
@@ -333,7 +269,7 @@ TEST(Ply, RejectsAHeaderThatPromisesMoreThanTheFileHolds) {
           return parse(header(encoding, "element vertex 1000000000000\n" + vertices) +
                        "1 2 3 4 5 6\n");
         },
-        "test file", "\"vertex\" promises 1000000000000 rows", "12 bytes"));
+        "test file", "promises 1000000000000 rows of element \"vertex\"", "12 bytes"));
     EXPECT_TRUE(fails_saying(
         [&] {
           return parse(header(encoding, "element vertex 18446744073709551615\n" + vertices +
@@ -398,14 +334,7 @@ TEST(Ply, SaysWhatIsWrongWithAHeader) {
   EXPECT_TRUE(fails_saying([] { return parse(""); }, "does not begin with `ply`"));
 }
 
-TEST(Ply, SaysInWhichLineOfTheDataItFailed) {
-  const std::string head = header("ascii", "element vertex 2\n" + vertices);
-  EXPECT_TRUE(
-      fails_saying([&] { return parse(head + "1.0 2.0 3.0\n4.0 5.0\n"); }, "line 9: has too few"));
-  EXPECT_TRUE(fails_saying([&] { return parse(head + "1 2 3 4\n5 6\n"); }, "line 8: has too many"));
-  EXPECT_TRUE(
-      fails_saying([&] { return parse(head + "1 2 3\n\n4 o 6\n"); }, "line 10: y is \"o\""));
-  EXPECT_TRUE(fails_saying([&] { return parse(head + "1 2 3\n        "); }, "ends within element"));
+TEST(Ply, SaysInWhichListItFailed) {
   const std::string list = header(
       "ascii", "element vertex 0\n" + vertices + "element face 1\nproperty list uchar int i\n");
   EXPECT_TRUE(fails_saying([&] { return parse(list + "-1 2 3\n"); }, "line 10: a list's length"));

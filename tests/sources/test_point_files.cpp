@@ -14,6 +14,22 @@
 
 namespace palpate::test {
 
+TEST_P(PointFiles, GiveTheirPointsBetweenValuesOfOtherSizes) {
+  for (const std::string encoding : GetParam().encodings) {
+    SCOPED_TRACE(encoding);
+    const std::string text = GetParam().valid_file(encoding);
+    const PointFile cloud = parse(GetParam().parser, text);
+    EXPECT_EQ(cloud.points, (std::vector{Vec3(1, 2, 3), Vec3(4, 5, 6), Vec3(7, 8, 9)}));
+    EXPECT_EQ(cloud.viewpoint, Vec3(0.5, 0.25, 0.125));
+    ASSERT_EQ(cloud.fields.size(), 5U);
+    EXPECT_EQ(cloud.fields[0].name, "a");
+    EXPECT_EQ(cloud.non_finite, 0U);
+    EXPECT_EQ(parse(GetParam().parser, text + "\n \r\n").bytes_unread, 0U);
+    EXPECT_EQ(parse(GetParam().parser, text + "\n1 2 3").bytes_unread, 5U);
+    EXPECT_EQ(parse(GetParam().parser, text + std::string(100, '\0')).bytes_unread, 100U);
+  }
+}
+
 TEST_P(PointFiles, FailCleanlyWhereverTheyAreCutShort) {
   for (const std::string encoding : GetParam().encodings) {
     const std::string whole = GetParam().valid_file(encoding);

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 
 #include <lzf.h>
 
@@ -16,6 +15,7 @@
 namespace palpate {
 namespace {
 
+using detail::Column;
 using detail::Cursor;
 using detail::cut_short;
 using detail::Scalar;
@@ -26,43 +26,6 @@ constexpr const char* write_anew = "write the file again";
 
 // The values of each line of the header, by keyword.
 using PcdHeader = std::map<std::string_view, std::vector<std::string_view>>;
-
-// What a column is read for.
-enum class Use : std::uint8_t { x, y, z, colour, none };
-
-struct Column {
-  PointField field;
-  Scalar type;
-  Use use = Use::none;
-  [[nodiscard]] std::size_t bytes() const { return detail::size_of(type) * field.count; }
-  [[nodiscard]] bool is_padding() const { return field.name == "_"; }
-};
-
-// What is read of each point.
-struct Values {
-  Values(const std::vector<Column>& columns, std::size_t size) : points(size) {
-    for (const Column& column : columns) {
-      if (column.use == Use::colour) rgb.resize(3 * size);
-    }
-  }
-  void set_colour(std::size_t point, std::uint32_t packed) {
-    for (std::size_t channel = 0; channel < 3; ++channel)
-      rgb[3 * point + channel] = static_cast<std::uint8_t>(packed >> (16 - 8 * channel));
-  }
-  // Takes a column whose values begin at `first`, each `stride` bytes behind the one before.
-  void take(const Column& column, const std::byte* first, std::size_t stride) {
-    if (column.use == Use::colour) {
-      for (std::size_t k = 0; k < points.size(); ++k)
-        set_colour(k, detail::load<std::uint32_t>(first + k * stride, std::endian::little));
-    } else if (column.use != Use::none) {
-      detail::load_column(first, stride, column.type, std::endian::little, points,
-                          static_cast<int>(column.use));
-    }
-  }
-
-  std::vector<Vec3> points;
-  std::vector<std::uint8_t> rgb;  // 3 of each point; empty without a colour
-};
 
 std::string counted(std::uint64_t number, const std::string& noun) {
   return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
@@ -115,28 +78,27 @@ std::optional<std::uint64_t> count_of(const Cursor& file, const PcdHeader& heade
   return count;
 }
 
-Scalar type_of(const Cursor& file, std::string_view type, std::string_view size) {
-  constexpr std::array<std::pair<std::string_view, Scalar>, 10> types{{{"I1", Scalar::int8},
-                                                                       {"U1", Scalar::uint8},
-                                                                       {"I2", Scalar::int16},
-                                                                       {"U2", Scalar::uint16},
-                                                                       {"I4", Scalar::int32},
-                                                                       {"U4", Scalar::uint32},
-                                                                       {"I8", Scalar::int64},
-                                                                       {"U8", Scalar::uint64},
-                                                                       {"F4", Scalar::float32},
-                                                                       {"F8", Scalar::float64}}};
+const Scalar* type_of(const Cursor& file, std::string_view type, std::string_view size) {
   const std::string wanted = std::string(type) + std::string(size);
-  const auto* const found = std::find_if(types.begin(), types.end(),
-                                         [&](const auto& known) { return known.first == wanted; });
-  if (found == types.end())
+  const auto* const found = std::find_if(detail::scalars.begin(), detail::scalars.end(),
+                                         [&](const Scalar& known) { return known.pcd == wanted; });
+  if (found == detail::scalars.end())
     file.fail(
         "no field can have TYPE " + detail::quoted(type) + " and SIZE " + detail::quoted(size),
         "types are I and U of 1, 2, 4, 8 bytes, and F of 4, 8");
-  return found->second;
+  return found;
 }
 
-std::vector<Column> columns_of(const Cursor& file, const PcdHeader& header) {
+// Puts a packed colour, 0xAARRGGBB, where it goes. Nothing depends on a colour: one that is no
+// number is black.
+void set_colour(std::vector<std::uint8_t>& colours, std::size_t point, double value) {
+  const auto packed = static_cast<std::int64_t>(std::abs(value) < 0x1p53 ? value : 0.0);
+  for (std::size_t channel = 0; channel < 3; ++channel)
+    colours[3 * point + channel] = static_cast<std::uint8_t>(packed >> (16 - 8 * channel));
+}
+
+// The columns, with what is read of them going into `cloud`.
+std::vector<Column> columns_of(const Cursor& file, const PcdHeader& header, PointFile& cloud) {
   const auto fields = header.find("FIELDS");
   if (fields == header.end()) file.fail("the header has no FIELDS line", not_pcd);
   const std::size_t size = fields->second.size();
@@ -163,40 +125,36 @@ std::vector<Column> columns_of(const Cursor& file, const PcdHeader& header) {
       file.fail(
           "COUNT " + detail::quoted(counts[i]) + " is not in 1.." + std::to_string(largest_count),
           correct_header);
-    const Scalar type = type_of(file, types[i], sizes[i]);
-    columns.push_back({{std::string(fields->second[i]), std::string(detail::name_of(type)),
-                        static_cast<std::size_t>(*count)},
-                       type});
+    const Scalar* type = type_of(file, types[i], sizes[i]);
+    columns.push_back(
+        {.name = fields->second[i], .type = type, .count = static_cast<std::size_t>(*count)});
+    cloud.fields.push_back(
+        {std::string(columns.back().name), std::string(type->name), columns.back().count});
   }
-  for (const Use use : {Use::x, Use::y, Use::z}) {
-    const std::string name(1, "xyz"[static_cast<int>(use)]);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::string name(1, "xyz"[axis]);
     std::size_t found = 0;
     for (Column& column : columns) {
-      if (column.field.name != name) continue;
-      column.use = use;
-      found += column.field.count;
+      if (column.name != name) continue;
+      detail::ask_for(column, cloud.points, axis);
+      found += column.count;
     }
     if (found != 1)
       file.fail("FIELDS must name " + name + " once, with COUNT 1",
                 "give a file whose points have the fields x, y and z");
   }
-  // PCL packs a colour into 4 bytes, 0xAARRGGBB, and declares them as a float or a whole number.
+  // PCL packs a colour into 4 bytes and declares them as a float or a whole number.
   const auto colour = std::find_if(columns.begin(), columns.end(), [](const Column& column) {
-    return (column.field.name == "rgb" || column.field.name == "rgba") && column.field.count == 1 &&
-           detail::size_of(column.type) == 4;
+    return (column.name == "rgb" || column.name == "rgba") && column.count == 1 &&
+           column.type->size == 4;
   });
-  if (colour != columns.end()) colour->use = Use::colour;
+  if (colour == columns.end()) return columns;
+  colour->is_bits = colour->type->is_float;
+  if (colour->is_bits) colour->type = type_of(file, "U", "4");
+  colour->is_needed = false;
+  colour->prepare = [&cloud](std::size_t rows) { cloud.colours.resize(3 * rows); };
+  colour->put = [&cloud](std::size_t row, double value) { set_colour(cloud.colours, row, value); };
   return columns;
-}
-
-// A packed colour written as text. Nothing depends on a colour: one that is no number is black.
-std::uint32_t packed_colour(std::string_view token, Scalar type) {
-  if (type == Scalar::float32) {
-    const double number = detail::to_number(token).value_or(0.0);
-    const bool fits = std::abs(number) <= double{std::numeric_limits<float>::max()};
-    return std::bit_cast<std::uint32_t>(fits ? static_cast<float>(number) : 0.0F);
-  }
-  return static_cast<std::uint32_t>(detail::to_index(token).value_or(0));
 }
 
 // Sets the cloud's width and height. Old files have no WIDTH, some no POINTS.
@@ -230,72 +188,6 @@ std::optional<Vec3> viewpoint_of(const Cursor& file, const PcdHeader& header) {
   return Vec3(numbers[0], numbers[1], numbers[2]);
 }
 
-// The size of a point, if each column takes up `size(column)`.
-template <class Size>
-std::size_t size_of_point(const std::vector<Column>& columns, const Size& size) {
-  return std::accumulate(columns.begin(), columns.end(), std::size_t{0},
-                         [&](std::size_t sum, const Column& column) { return sum + size(column); });
-}
-
-[[noreturn]] void fail_promise(const Cursor& file, std::size_t points) {
-  file.fail("the header promises " + counted(points, "point") + ", more than the " +
-                counted(file.left(), "byte") + " after it can hold",
-            cut_short);
-}
-
-Values read_ascii(Cursor& file, const std::vector<Column>& columns, std::size_t size) {
-  const std::size_t needed =
-      size_of_point(columns, [](const Column& column) { return column.field.count; });
-  // A value and what separates it take two bytes at least; the last line may lack its end.
-  if (size > (file.left() + 1) / (2 * needed)) fail_promise(file, size);
-  Values read(columns, size);
-  for (std::size_t k = 0; k < size; ++k) {
-    auto line = file.next_full_line();
-    if (!line)
-      file.fail("ends after " + std::to_string(k) + " of " + counted(size, "point"), cut_short);
-    std::size_t values = 0;
-    const auto next = [&] {
-      const std::string_view token = detail::next_token(*line);
-      if (token.empty())
-        file.fail_in_line(
-            "has " + counted(values, "value") + " where the FIELDS need " + std::to_string(needed),
-            "complete the line, or correct the header");
-      ++values;
-      return token;
-    };
-    for (const Column& column : columns) {
-      const std::string_view token = next();
-      if (column.use == Use::colour) {
-        read.set_colour(k, packed_colour(token, column.type));
-      } else if (column.use != Use::none) {
-        const auto number = detail::to_number(token);
-        if (!number)
-          file.fail_in_line(column.field.name + " is " + detail::quoted(token) + ", not a number",
-                            "correct the line; nan marks a hole");
-        read.points[k][static_cast<int>(column.use)] = *number;
-      }
-      for (std::size_t i = 1; i < column.field.count; ++i) next();
-    }
-    if (!detail::next_token(*line).empty())
-      file.fail_in_line("has more than the " + counted(needed, "value") + " of the FIELDS",
-                        "shorten the line, or correct the header");
-  }
-  return read;
-}
-
-// Point after point, little endian: PCL writes what is in memory.
-Values read_binary(Cursor& file, const std::vector<Column>& columns, std::size_t size) {
-  const std::size_t bytes = size_of_point(columns, std::mem_fn(&Column::bytes));
-  if (size > file.left() / bytes) fail_promise(file, size);
-  Values read(columns, size);
-  const std::byte* first = file.take(size * bytes);
-  for (const Column& column : columns) {
-    read.take(column, first, bytes);
-    first += column.bytes();
-  }
-  return read;
-}
-
 // Two 32-bit sizes, then LZF.
 std::vector<std::byte> decompress(Cursor& file) {
   if (file.left() < 8) file.fail_at_offset("ends before the compressed data", cut_short);
@@ -320,21 +212,22 @@ std::vector<std::byte> decompress(Cursor& file) {
 }
 
 // All of the first field, then all of the second, and so on. PCL leaves padding out, others don't.
-Values read_compressed(Cursor& file, const std::vector<Column>& columns, std::size_t size) {
+void read_compressed(Cursor& file, const std::vector<Column>& columns, std::size_t size) {
   const std::vector<std::byte> data = decompress(file);
   for (const bool has_padding : {true, false}) {
     const auto bytes_in_point = [&](const Column& column) {
-      return column.is_padding() && !has_padding ? 0 : column.bytes();
+      return column.name == "_" && !has_padding ? 0 : column.bytes();
     };
-    const std::size_t stride = size_of_point(columns, bytes_in_point);
-    if (data.size() % stride != 0 || data.size() / stride != size) continue;
-    Values read(columns, size);
+    std::size_t of_point = 0;
+    for (const Column& column : columns) of_point += bytes_in_point(column);
+    if (data.size() % of_point != 0 || data.size() / of_point != size) continue;
+    detail::prepare(columns, size);
     const std::byte* first = data.data();
     for (const Column& column : columns) {
-      read.take(column, first, column.bytes());
+      if (column.put) detail::take_column(column, first, column.bytes(), size, std::endian::little);
       first += size * bytes_in_point(column);
     }
-    return read;
+    return;
   }
   file.fail("the header declares " + counted(size, "point") + ", which is not what the " +
                 counted(data.size(), "byte") + " of compressed data hold",
@@ -351,23 +244,22 @@ PointFile parse_pcd(std::span<const std::byte> bytes, std::string_view name) {
   if (version && std::find(versions.begin(), versions.end(), *version) == versions.end())
     file.fail("PCD version " + detail::quoted(*version) + " is not known",
               "write the file as version 0.7");
-  const std::vector<Column> columns = columns_of(file, header);
 
   PointFile cloud;
-  for (const Column& column : columns) cloud.fields.push_back(column.field);
+  const std::vector<Column> columns = columns_of(file, header, cloud);
   read_extent(file, header, cloud);
   cloud.viewpoint = viewpoint_of(file, header);
   cloud.encoding = value_of(file, header, "DATA").value();
   const std::size_t size = cloud.width * cloud.height;
-  const bool is_binary = cloud.encoding == "binary";
-  if (!is_binary && cloud.encoding != "ascii" && cloud.encoding != "binary_compressed")
+  if (cloud.encoding == "ascii")
+    detail::read_rows(file, columns, size, {}, "points");
+  else if (cloud.encoding == "binary")  // little endian: PCL writes what is in memory
+    detail::read_rows(file, columns, size, std::endian::little, "points");
+  else if (cloud.encoding == "binary_compressed")
+    read_compressed(file, columns, size);
+  else
     file.fail("DATA " + detail::quoted(cloud.encoding) + " is not known",
               "it can be ascii, binary or binary_compressed");
-  Values read = is_binary                   ? read_binary(file, columns, size)
-                : cloud.encoding == "ascii" ? read_ascii(file, columns, size)
-                                            : read_compressed(file, columns, size);
-  cloud.points = std::move(read.points);
-  cloud.colours = std::move(read.rgb);
   cloud.non_finite = detail::count_non_finite(cloud.points);
   cloud.bytes_unread = file.left_after_blanks();
   return cloud;

@@ -2,6 +2,9 @@
 #include "palpate/io/sources/point_file_detail.hpp"
 
 #include <charconv>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
 #include <system_error>
 
 #include "palpate/kernel/core/error.hpp"
@@ -20,24 +23,80 @@ std::optional<T> to_whole(std::string_view token) noexcept {
   return error == std::errc{} && stop == end ? std::optional(value) : std::nullopt;
 }
 
-}  // namespace
-
-std::string_view name_of(Scalar type) noexcept {
-  constexpr std::array<std::string_view, 10> names{"int8",    "uint8",  "int16", "uint16",
-                                                   "int32",   "uint32", "int64", "uint64",
-                                                   "float32", "float64"};
-  return names[static_cast<std::size_t>(type)];
+// A value as text; one that is not needed and is no number is 0.
+double value_of(const Cursor& file, const Column& column, std::string_view token) {
+  const std::optional<double> number = to_number(token);
+  if (!number && column.is_needed)
+    file.fail_in_line(std::string(column.name) + " is " + quoted(token) + ", not a number",
+                      "correct the line; nan marks a hole");
+  const double value = number.value_or(0.0);
+  if (!column.is_bits) return value;
+  const bool fits = std::abs(value) <= double{std::numeric_limits<float>::max()};
+  return std::bit_cast<std::uint32_t>(fits ? static_cast<float>(value) : 0.0F);
 }
 
-void load_column(const std::byte* first, std::size_t stride, Scalar type, std::endian order,
-                 std::span<Vec3> points, int axis) {
-  visit_scalar(type, [&](auto value) {
-    for (Vec3& point : points) {
-      point[axis] = static_cast<double>(load<decltype(value)>(first, order));
-      first += stride;
+void read_line(Cursor& file, std::span<const Column> columns, std::size_t row,
+               std::string_view line, std::vector<std::int64_t>& list) {
+  const auto next = [&] {
+    const std::string_view token = next_token(line);
+    if (token.empty())
+      file.fail_in_line("has too few values", "complete the line, or correct the header");
+    return token;
+  };
+  for (const Column& column : columns) {
+    if (column.length == nullptr) {
+      const std::string_view first = next();
+      if (column.put) column.put(row, value_of(file, column, first));
+      for (std::size_t i = 1; i < column.count; ++i) next();
+      continue;
     }
-  });
+    const std::string_view token = next();
+    const auto length = to_whole<std::uint64_t>(token);
+    if (!length) file.fail_in_line("a list's length is " + quoted(token), "correct the line");
+    list.clear();
+    for (std::uint64_t k = 0; k < *length; ++k) {
+      const std::string_view text = next();
+      if (!column.put_list) continue;
+      const auto value = to_whole<std::int64_t>(text);
+      if (!value)
+        file.fail_in_line(
+            "one of " + std::string(column.name) + " is " + quoted(text) + ", not a whole number",
+            "correct the line");
+      list.push_back(*value);
+    }
+    if (column.put_list) column.put_list(list);
+  }
+  if (!next_token(line).empty())
+    file.fail_in_line("has too many values", "shorten the line, or correct the header");
 }
+
+// A row in which lists are.
+void read_lists(Cursor& file, std::span<const Column> columns, std::size_t row, std::endian order,
+                const std::string& noun, std::vector<std::int64_t>& list) {
+  for (const Column& column : columns) {
+    if (file.left() < column.bytes()) file.fail_at_offset("ends within the " + noun, cut_short);
+    const std::byte* const value = file.take(column.bytes());
+    if (column.length == nullptr) {
+      if (column.put) take_column(column, value, 0, 1, order, row);
+      continue;
+    }
+    const auto length = static_cast<std::int64_t>(column.length->value(value, order));
+    const std::size_t size = column.type->size;
+    if (length < 0 || static_cast<std::uint64_t>(length) > file.left() / size)
+      file.fail_at_offset("a list promises " + std::to_string(length) + " values, but " +
+                              std::to_string(file.left()) + " bytes are left",
+                          cut_short);
+    const auto count = static_cast<std::size_t>(length);
+    const std::byte* const values = file.take(count * size);
+    if (!column.put_list) continue;
+    list.clear();
+    for (std::size_t k = 0; k < count; ++k)
+      list.push_back(static_cast<std::int64_t>(column.type->value(values + k * size, order)));
+    column.put_list(list);
+  }
+}
+
+}  // namespace
 
 std::string_view next_token(std::string_view& rest) noexcept {
   const auto is_blank = [](char c) { return blanks.find(c) != std::string_view::npos; };
@@ -60,10 +119,6 @@ std::optional<double> to_number(std::string_view token) noexcept {
 
 std::optional<std::uint64_t> to_count(std::string_view token) noexcept {
   return to_whole<std::uint64_t>(token);
-}
-
-std::optional<std::int64_t> to_index(std::string_view token) noexcept {
-  return to_whole<std::int64_t>(token);
 }
 
 std::string quoted(std::string_view piece) {
@@ -126,6 +181,68 @@ void Cursor::fail_at_offset(const std::string& reason, const std::string& remedy
 
 void Cursor::fail(const std::string& reason, const std::string& remedy) const {
   throw Error(name_, reason, remedy);
+}
+
+void take_column(const Column& column, const std::byte* first, std::size_t stride, std::size_t rows,
+                 std::endian order, std::size_t first_row) {
+  for (std::size_t row = first_row; row < first_row + rows; ++row, first += stride)
+    column.put(row, column.type->value(first, order));
+}
+
+void ask_for(Column& column, std::vector<Vec3>& points, std::size_t axis) {
+  column.prepare = [&points](std::size_t rows) { points.resize(rows); };
+  column.put = [&points, axis](std::size_t row, double value) {
+    points[row][static_cast<Eigen::Index>(axis)] = value;
+  };
+}
+
+void prepare(std::span<const Column> columns, std::size_t rows) {
+  for (const Column& column : columns)
+    if (column.prepare) column.prepare(rows);
+}
+
+void read_rows(Cursor& file, std::span<const Column> columns, std::size_t rows, Order order,
+               const std::string& noun) {
+  std::size_t least = 0;  // [bytes] of a row; in text a digit and what separates it
+  bool has_lists = false;
+  for (const Column& column : columns) {
+    least += order ? column.bytes() : 2 * column.count;
+    has_lists |= column.length != nullptr;
+  }
+  if (least == 0) return;  // rows of nothing take no space, whatever their number
+  // The last line of a text may lack its end.
+  if (rows > (file.left() + (order ? 0 : 1)) / least)
+    file.fail_at_offset("the header promises " + std::to_string(rows) + " " + noun +
+                            ", more than the " + std::to_string(file.left()) +
+                            " bytes from here can hold",
+                        cut_short);
+  prepare(columns, rows);
+  if (order && !has_lists) {
+    const std::byte* first = file.take(rows * least);
+    for (const Column& column : columns) {
+      if (column.put) take_column(column, first, least, rows, *order);
+      first += column.bytes();
+    }
+    return;
+  }
+  std::vector<std::int64_t> list;
+  try {
+    for (std::size_t row = 0; row < rows; ++row) {
+      if (order) {
+        read_lists(file, columns, row, *order, noun, list);
+        continue;
+      }
+      const auto line = file.next_full_line();
+      if (!line)
+        file.fail("ends after " + std::to_string(row) + " of " + std::to_string(rows) + " " + noun,
+                  cut_short);
+      read_line(file, columns, row, *line, list);
+    }
+  } catch (const std::invalid_argument& wrong) {
+    const std::string reason = noun + ": " + wrong.what();
+    if (order) file.fail_at_offset(reason, "write the file again, or remove its faces");
+    file.fail_in_line(reason, "correct the line");
+  }
 }
 
 }  // namespace palpate::detail

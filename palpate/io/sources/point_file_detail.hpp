@@ -7,10 +7,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "palpate/kernel/core/patch.hpp"
@@ -21,68 +23,44 @@ namespace palpate::detail {
 /// The remedy for a file that ends too early.
 inline constexpr const char* cut_short = "copy the file again, it may have been cut short";
 
-/// Types of values in point files.
-enum class Scalar : std::uint8_t {
-  int8,
-  uint8,
-  int16,
-  uint16,
-  int32,
-  uint32,
-  int64,
-  uint64,
-  float32,
-  float64
-};
-
-[[nodiscard]] std::string_view name_of(Scalar type) noexcept;
-
-/// Calls `visit` with a value of the C++ type that `type` stands for.
-template <class Visit>
-decltype(auto) visit_scalar(Scalar type, const Visit& visit) {
-  switch (type) {
-    case Scalar::int8:
-      return visit(std::int8_t{});
-    case Scalar::uint8:
-      return visit(std::uint8_t{});
-    case Scalar::int16:
-      return visit(std::int16_t{});
-    case Scalar::uint16:
-      return visit(std::uint16_t{});
-    case Scalar::int32:
-      return visit(std::int32_t{});
-    case Scalar::uint32:
-      return visit(std::uint32_t{});
-    case Scalar::int64:
-      return visit(std::int64_t{});
-    case Scalar::uint64:
-      return visit(std::uint64_t{});
-    case Scalar::float32:
-      return visit(float{});
-    case Scalar::float64:
-      break;
-  }
-  return visit(double{});
-}
-
-[[nodiscard]] inline std::size_t size_of(Scalar type) {
-  return visit_scalar(type, [](auto value) { return sizeof value; });
-}
-
 template <class T>
 T load(const std::byte* from, std::endian order) noexcept {
   std::array<std::byte, sizeof(T)> bytes;
   std::memcpy(bytes.data(), from, sizeof(T));
-  if (order != std::endian::native) {
-    std::reverse(bytes.begin(), bytes.end());
-  }
+  if (order != std::endian::native) std::reverse(bytes.begin(), bytes.end());
   return std::bit_cast<T>(bytes);
 }
 
-/// Fills coordinate `axis` of `points` with values of `type`, the first at `first` and each
-/// `stride` bytes behind the one before.
-void load_column(const std::byte* first, std::size_t stride, Scalar type, std::endian order,
-                 std::span<Vec3> points, int axis);
+/// A type of values in point files: its names here, in the header of a PCD (TYPE and SIZE) and in
+/// that of a PLY, which also takes the first.
+struct Scalar {
+  std::string_view name, pcd, ply;
+  bool is_float;
+  std::size_t size;  ///< [bytes]
+  double (*value)(const std::byte* from, std::endian order) noexcept;
+
+  template <class T>
+  static constexpr Scalar of(std::string_view name, std::string_view pcd, std::string_view ply) {
+    return {name,
+            pcd,
+            ply,
+            std::is_floating_point_v<T>,
+            sizeof(T),
+            [](const std::byte* from, std::endian order) noexcept {
+              return static_cast<double>(load<T>(from, order));
+            }};
+  }
+};
+inline constexpr std::array scalars{Scalar::of<std::int8_t>("int8", "I1", "char"),
+                                    Scalar::of<std::uint8_t>("uint8", "U1", "uchar"),
+                                    Scalar::of<std::int16_t>("int16", "I2", "short"),
+                                    Scalar::of<std::uint16_t>("uint16", "U2", "ushort"),
+                                    Scalar::of<std::int32_t>("int32", "I4", "int"),
+                                    Scalar::of<std::uint32_t>("uint32", "U4", "uint"),
+                                    Scalar::of<std::int64_t>("int64", "I8", ""),
+                                    Scalar::of<std::uint64_t>("uint64", "U8", ""),
+                                    Scalar::of<float>("float32", "F4", "float"),
+                                    Scalar::of<double>("float64", "F8", "double")};
 
 /// The next token of `rest`, which shrinks by it; empty if there is none. Blanks separate.
 [[nodiscard]] std::string_view next_token(std::string_view& rest) noexcept;
@@ -90,7 +68,6 @@ void load_column(const std::byte* first, std::size_t stride, Scalar type, std::e
 /// The whole token as a number, "nan" and "inf" included; none if it is no number in range.
 [[nodiscard]] std::optional<double> to_number(std::string_view token) noexcept;
 [[nodiscard]] std::optional<std::uint64_t> to_count(std::string_view token) noexcept;
-[[nodiscard]] std::optional<std::int64_t> to_index(std::string_view token) noexcept;
 
 /// A piece of a file as a message can show it: in quotes, printable and short.
 [[nodiscard]] std::string quoted(std::string_view piece);
@@ -129,5 +106,46 @@ class Cursor {
   std::size_t at_ = 0;
   std::size_t line_ = 0;
 };
+
+/// A value of each row of a table, or a list of them.
+struct Column {
+  std::string_view name;
+  const Scalar* type = nullptr;
+  std::size_t count = 1;           ///< values of a row, of which the first is used
+  const Scalar* length = nullptr;  ///< the type of a list's length; null: no list
+  bool is_bits = false;            ///< in text, a float32 whose bits are the value
+  /// Takes a row's value; empty: it is checked and passed over.
+  std::function<void(std::size_t row, double value)> put{};
+  /// Makes room for that.
+  std::function<void(std::size_t rows)> prepare{};
+  /// A value in text has to be a number.
+  bool is_needed = true;
+  /// Takes the whole numbers of a row's list. @throws std::invalid_argument with what is wrong
+  std::function<void(std::span<const std::int64_t> values)> put_list{};
+
+  /// Of a row without a list's values.
+  [[nodiscard]] std::size_t bytes() const {
+    return length != nullptr ? length->size : count * type->size;
+  }
+};
+
+/// A column's values become coordinate `axis` of `points`, which must outlive it.
+void ask_for(Column& column, std::vector<Vec3>& points, std::size_t axis);
+
+/// Makes room for what was asked for.
+void prepare(std::span<const Column> columns, std::size_t rows);
+
+/// Gives a column the values of some rows, the first at `first` and each `stride` bytes behind the
+/// one before.
+void take_column(const Column& column, const std::byte* first, std::size_t stride, std::size_t rows,
+                 std::endian order, std::size_t first_row = 0);
+
+/// How a table is written; order of none: as text, a line for each row.
+using Order = std::optional<std::endian>;
+
+/// Reads a table, whose rows are `noun`: "points". Nothing is allocated before their number is held
+/// against what is left of the file.
+void read_rows(Cursor& file, std::span<const Column> columns, std::size_t rows, Order order,
+               const std::string& noun);
 
 }  // namespace palpate::detail

@@ -62,8 +62,9 @@ PointFile parse_stl(std::span<const std::byte> bytes, std::string_view name) {
       for (std::size_t corner = 0; corner < 3; ++corner) {
         Vec3 place;
         for (int axis = 0; axis < 3; ++axis)
-          detail::load_column(&bytes[at + 12 + 12 * corner + 4 * static_cast<std::size_t>(axis)], 0,
-                              detail::Scalar::float32, std::endian::little, {&place, 1}, axis);
+          place[axis] = detail::load<float>(
+              &bytes[at + 12 + 12 * corner + 4 * static_cast<std::size_t>(axis)],
+              std::endian::little);
         welder.corner(finite(place));
       }
     }

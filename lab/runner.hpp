@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -21,8 +20,7 @@ struct RunnerOptions {
 /// Runs an experiment and writes its CSV to `file`. Returns the CSV.
 ///
 /// Cells may end in any order; the CSV has them in theirs. Finished cells are kept in FILE.part
-/// until the CSV is whole, so an interrupted run can continue. Under MPI the ranks share the cells,
-/// rank 0 writes, and the other ranks return an empty text.
+/// until the CSV is whole, so an interrupted run can continue.
 /// @throws Error if the file cannot be written, or there is nothing that fits to resume.
 std::string run_experiment(const Experiment& experiment, const ExperimentOptions& options,
                            const RunnerOptions& runner, const std::filesystem::path& file);
@@ -31,20 +29,5 @@ std::string run_experiment(const Experiment& experiment, const ExperimentOptions
 /// @param print  identifies the run by its options, one line: what was left is resumed under it
 std::string run_cells(const std::vector<Cell>& cells, const std::string& print,
                       const RunnerOptions& runner, const std::filesystem::path& file);
-
-/// The ranks of an MPI run, from construction to destruction of the object; one rank without MPI.
-class Ranks {
- public:
-  Ranks(int* argc, char*** argv);
-  ~Ranks();
-  Ranks(const Ranks&) = delete;
-  Ranks& operator=(const Ranks&) = delete;
-  [[nodiscard]] static int rank();
-  [[nodiscard]] static int size();
-  /// What rank 0 has, on every rank. All ranks call it.
-  [[nodiscard]] static std::uint64_t of_rank_0(std::uint64_t value);
-  /// The sum over the ranks, on rank 0. All ranks call it.
-  [[nodiscard]] static double sum(double value);
-};
 
 }  // namespace palpate::lab

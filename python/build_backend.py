@@ -87,7 +87,7 @@ def _install(folder, settings):
         launcher = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
         _run("cmake", "-G", "Ninja", "-S", str(ROOT), "-B", build, "-DCMAKE_BUILD_TYPE=Release",
              "-DCMAKE_UNITY_BUILD=ON", "-DPALPATE_PYTHON=ON", "-DPALPATE_TESTS=OFF",
-             "-DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON", f"-DPython3_EXECUTABLE={sys.executable}",
+             f"-DPython3_EXECUTABLE={sys.executable}",
              *launcher)
     _run("cmake", "--build", build, "--target", "palpate_python", "palpate", "palpate-lab",
          "--parallel", str(len(os.sched_getaffinity(0))))

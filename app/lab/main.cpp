@@ -3,7 +3,6 @@
 #include <array>
 
 #include "app/program.hpp"
-#include "lab/runner.hpp"
 
 namespace palpate::app {
 Verb add_eval(CLI::App& program);
@@ -12,7 +11,6 @@ Verb add_bench_check(CLI::App& program);
 }  // namespace palpate::app
 
 int main(int argc, char** argv) {
-  const palpate::lab::Ranks ranks(&argc, &argv);
   constexpr std::array<palpate::app::AddVerb, 3> own = {
       palpate::app::add_eval, palpate::app::add_bench_entry, palpate::app::add_bench_check};
   return palpate::app::run_program(argc, argv, own);

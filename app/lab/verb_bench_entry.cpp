@@ -43,14 +43,14 @@ std::uint64_t by_chance() {
   return bits();
 }
 
-// One thread a core, or one a rank; a line of progress where a person watches.
+// One thread a core; a line of progress where a person watches.
 lab::RunnerOptions runner_options(int jobs, std::shared_ptr<Progress>& progress) {
   if (jobs < 0 || jobs > 1024)
     throw Error("--jobs " + std::to_string(jobs), "the number of threads is out of range",
                 "use 1 to 1024, or 0 for one per core");
   const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   lab::RunnerOptions runner;
-  runner.jobs = jobs > 0 ? jobs : lab::Ranks::size() > 1 ? 1 : cores;
+  runner.jobs = jobs > 0 ? jobs : cores;
   runner.progress = [&progress](std::size_t done, std::size_t total) {
     if (!progress) progress = std::make_shared<Progress>("bench", total);
     progress->set(done);
@@ -69,7 +69,7 @@ std::string now() {
 
 int enter(const EntryArguments& arguments) {
   lab::EntryOptions options = arguments.entry;
-  options.seed = lab::Ranks::of_rank_0(arguments.seed.value_or(by_chance()));
+  options.seed = arguments.seed.value_or(by_chance());
   const Machine machine = look_at_machine();
   const lab::EntryRun run = {
       {"date", now()}, {"processor", machine.processor}, {"compiler", __VERSION__}};
@@ -77,7 +77,6 @@ int enter(const EntryArguments& arguments) {
   lab::RunnerOptions runner = runner_options(arguments.jobs, progress);
   runner.resume = arguments.resume;
   const std::string text = lab::make_entry(options, run, runner, arguments.out);
-  if (lab::Ranks::rank() != 0) return 0;
   if (progress) progress->finish();
   const nlohmann::json entry = nlohmann::json::parse(text);
   const auto line = [](const std::string& name, const nlohmann::json& score) {
@@ -102,10 +101,8 @@ int check(const CheckArguments& arguments) {
   if (arguments.sample == 0) throw Error("--sample 0", "no case would be run", "give 1 or more");
   std::shared_ptr<Progress> progress;
   const lab::RunnerOptions runner = runner_options(arguments.jobs, progress);
-  const lab::EntryCheck check =
-      lab::check_entry(arguments.file, arguments.sample, lab::Ranks::of_rank_0(by_chance()),
-                       arguments.recordings, {}, runner);
-  if (lab::Ranks::rank() != 0) return 0;
+  const lab::EntryCheck check = lab::check_entry(arguments.file, arguments.sample, by_chance(),
+                                                 arguments.recordings, {}, runner);
   if (progress) progress->finish();
   for (const std::string& fault : check.faults) fmt::print("{}\n", fault);
   for (const std::string& difference : check.differences) fmt::print("{}\n", difference);

@@ -76,8 +76,6 @@ lab::ExperimentOptions experiment_options(const EvalOptions& options) {
   else if (options.noise != "white")
     throw Error("--noise " + options.noise, "there is no such noise", "choose white or correlated");
   result.recording = options.recording;
-  // The true surface of a recording is unknown, so `ideal` cannot take part.
-  if (!options.recording.empty() && options.methods.empty()) result.methods = {"paper", "sight"};
   return result;
 }
 
@@ -111,7 +109,7 @@ int eval(const EvalOptions& options) {
     throw Error("--grid", "the experiment '" + options.name + "' has no grid", "leave it out");
   if (!all && !given.recording.empty() && !experiments.front()->takes_recording)
     throw Error("--recording", "the experiment '" + options.name + "' is a simulation",
-                "remove this option, or use scan");
+                "remove this option, or use real");
   if (options.jobs < 0 || options.jobs > 1024)
     throw Error("--jobs " + std::to_string(options.jobs), "the number of threads is out of range",
                 "use 1 to 1024, or 0 for one per core");
@@ -123,18 +121,14 @@ int eval(const EvalOptions& options) {
                 "use a folder with write permission");
   lab::RunnerOptions runner;
   const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  // Under MPI a rank is a core.
-  runner.jobs = options.jobs > 0 ? options.jobs : lab::Ranks::size() > 1 ? 1 : cores;
+  runner.jobs = options.jobs > 0 ? options.jobs : cores;
   runner.resume = options.resume;
 
   std::vector<lab::Result> results;
   for (const lab::Experiment* experiment : experiments) {
     lab::ExperimentOptions fitting = given;
     if (!experiment->has_grid) fitting.grid.reset();
-    if (!experiment->takes_recording) {
-      fitting.recording.clear();
-      fitting.methods = options.methods;
-    }
+    if (!experiment->takes_recording) fitting.recording.clear();
     std::unique_ptr<Progress> progress;
     runner.progress = [&](std::size_t done, std::size_t total) {
       if (!progress) progress = std::make_unique<Progress>(std::string(experiment->name), total);
@@ -142,15 +136,11 @@ int eval(const EvalOptions& options) {
     };
     const fs::path csv = fs::path(options.out) / (std::string(experiment->name) + ".csv");
     const std::string text = lab::run_experiment(*experiment, fitting, runner, csv);
-    if (lab::Ranks::rank() != 0) continue;
     if (progress) progress->finish();
     results.push_back(lab::make_result(*experiment, fitting, text, options.out));
     fmt::print("{}", lab::result_as_text(results.back()));
   }
-  if (lab::Ranks::rank() == 0) {
-    const fs::path page = lab::write_report(results, options.out);
-    fmt::print("wrote {}\n", page.string());
-  }
+  fmt::print("wrote {}\n", lab::write_report(results, options.out).string());
   return 0;
 }
 
@@ -183,9 +173,8 @@ Verb add_eval(CLI::App& program) {
   command->add_option("--case", options->case_text,
                       "pop, field, visits: one case as a run printed it, such as field:...");
   command->add_option("--noise", options->noise, "white (default) or correlated");
-  command->add_option(
-      "--recording", options->recording,
-      "scan, real: touch a recording, e.g. tum:FOLDER, instead of the synthetic desk");
+  command->add_option("--recording", options->recording,
+                      "real: touch a recording, e.g. tum:FOLDER, instead of the synthetic desk");
   command->add_option("--seed", options->seed, "random seed of all noise (1)");
   command->add_option("--jobs", options->jobs, "threads (one a core)");
   command->add_flag("--resume", options->resume,

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <memory>
 
 #include <fmt/format.h>
@@ -12,7 +10,6 @@
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
-#include "palpate/kernel/core/linear.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -309,33 +306,6 @@ std::vector<Cell> bound_cells(const Experiment& experiment, const ExperimentOpti
   return cells;
 }
 
-// Least-squares polynomial through (x, y), highest power first.
-Eigen::VectorXd polynomial_fit(const std::vector<double>& x, const std::vector<double>& y,
-                               int degree) {
-  const auto n = static_cast<Eigen::Index>(x.size());
-  // Powers of x / largest x, or the columns differ by ten orders of magnitude.
-  const double scale = *std::max_element(x.begin(), x.end());
-  Eigen::MatrixXd a(n, degree + 1);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    for (int p = 0; p <= degree; ++p)
-      a(i, p) = std::pow(x[static_cast<std::size_t>(i)] / scale, degree - p);
-  }
-  Eigen::VectorXd fit = least_squares(a, Eigen::Map<const Eigen::VectorXd>(y.data(), n));
-  for (int p = 0; p <= degree; ++p) fit[p] /= std::pow(scale, degree - p);
-  return fit;
-}
-
-std::string formula(const Eigen::VectorXd& fit) {
-  std::string text;
-  const auto degree = fit.size() - 1;
-  for (Eigen::Index p = 0; p <= degree; ++p)
-    text += fmt::format("{}{:.2g}{}", p == 0 ? "" : " ", fit[p],
-                        degree - p > 1    ? fmt::format("s^{}", degree - p)
-                        : degree - p == 1 ? "s"
-                                          : "");
-  return text;
-}
-
 std::vector<Claim> bound_claims(const Table& table) {
   const auto rows = [&table](std::size_t row) { return table.text(row, "method") == "paper"; };
   std::vector<double> sigma = table.numbers("noise_rc", rows);
@@ -356,15 +326,13 @@ std::vector<Claim> bound_claims(const Table& table) {
   return {
       {"6.2, (23)", "h(s) = 5.5e4 s^4 - 6.7e3 s^3 + 63 s^2 + s - 4.1e-5",
        fmt::format("h(2 r_c) = {:.2f} mm", 1e3 * printed.back()),
-       fmt::format("h(2 r_c) = {:.2f} mm; fit {}", 1e3 * h.back(),
-                   formula(polynomial_fit(sigma, h, 4))),
+       fmt::format("h(2 r_c) = {:.2f} mm", 1e3 * h.back()),
        worst < 2e-3 ? fmt::format("reproduced within {:.2f} mm", 1e3 * worst)
                     : fmt::format("differs by up to {:.2f} mm: how h is measured is not printed",
                                   1e3 * worst)},
       {"6.2, (24)", "e_n(s), a polynomial of degree 5",
        fmt::format("e_n(2 r_c) = {:.3f}", table.numbers("printed_e_n", rows).back()),
-       fmt::format("e_n(2 r_c) = {:.3f}; fit {}", e.back(), formula(polynomial_fit(sigma, e, 5))),
-       "compared in the figure"},
+       fmt::format("e_n(2 r_c) = {:.3f}", e.back()), "compared in the figure"},
       {"6.2", "pop through never occurred for a = 0 up to 2 r_c", "0",
        fmt::format("{:g} of {} lifts", popped, 20 * sigma.size()),
        popped == 0
@@ -383,155 +351,6 @@ Figure bound_figure(const Table& table) {
   add_methods(error, table, "noise_rc", "e_n", {1.0, 1.0}, true);
   add_reference(error, table, "(23) and (24)", "noise_rc", "printed_e_n");
   return {{thickness, error}};
-}
-
-// How far nothing was lost, and from where on something was.
-struct Reach {
-  double held = 0.0;
-  double lost = std::numeric_limits<double>::infinity();
-};
-
-// @param asked  (row) -> bool: which rows count
-template <class Asked>
-Reach reach(const Table& table, std::string_view column, const Asked& asked) {
-  Reach result;
-  std::vector<double> held;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (!asked(row)) continue;
-    const double at = table.number(row, column);
-    if (table.number(row, "popped") != 0.0)
-      result.lost = std::min(result.lost, at);
-    else
-      held.push_back(at);
-  }
-  for (const double at : held)
-    if (at < result.lost) result.held = std::max(result.held, at);
-  return result;
-}
-
-// A surface that rises to `velocity`: at once, or gaining 100 r_c/s every second; then ten frames.
-Law speed_law(double r_c, double velocity, bool sudden) {
-  const double gain = 100.0 * r_c;
-  const double start = -4.0 * r_c;
-  if (sudden)
-    return {[=](double t) { return start + velocity * t; }, (4.0 * r_c) / velocity + 10.0 / f_c};
-  const double ramp = velocity / gain;
-  return {[=](double t) {
-            return t < ramp ? start + 0.5 * gain * t * t
-                            : start + 0.5 * gain * ramp * ramp + velocity * (t - ramp);
-          },
-          std::max(ramp, std::sqrt(8.0 * r_c / gain)) + 12.0 / f_c};
-}
-
-constexpr std::array speeds = {4, 8, 12, 14, 16, 18, 20, 24, 28, 29, 31, 32, 40, 60, 100, 200, 400};
-
-std::vector<Cell> speed_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  const double r_c = options.parameters.proxy.r_c();
-  std::vector<Cell> cells;
-  for (const std::string& name : methods_of(experiment, options)) {
-    for (const bool sudden : {true, false}) {
-      for (const int speed : speeds) {
-        for (int k = 0; k < 5; ++k) {
-          cells.emplace_back([=] {
-            // A different phase of the frames each time: they start a little later.
-            const Law whole = speed_law(r_c, speed * r_c, sudden);
-            const double delay = k / (5.0 * f_c);
-            const Law law{[=](double t) { return whole.height(t - delay); },
-                          whole.duration + delay};
-            const Lifted result = lift(name, options, law, 0.0, options.seed);
-            return csv_row(name, sudden ? "sudden" : "gradual", speed,
-                           options.seed + static_cast<std::uint64_t>(k), result.popped);
-          });
-        }
-      }
-    }
-  }
-  return cells;
-}
-
-std::vector<Claim> speed_claims(const Table& table) {
-  const auto held = [&table](std::string_view method, std::string_view onset) {
-    return reach(table, "velocity_rc",
-                 [&](std::size_t row) {
-                   return table.text(row, "method") == method && table.text(row, "onset") == onset;
-                 })
-        .held;
-  };
-  std::vector<Claim> claims;
-  const double fixed = held("fixed-step", "sudden");
-  if (fixed > 0.0)
-    claims.push_back(
-        {"5.2", "[1]: velocities above 16 r_c/s resulted in pop through", "16 r_c/s",
-         fmt::format("{:g} r_c/s", fixed),
-         fixed >= 12 && fixed <= 20
-             ? "reproduced (tolerance: one step of the table)"
-             : "differs: [1]'s step budget, servo rate and camera rate are not printed here, and "
-               "each of them shifts it"});
-  const double gradual = held("paper", "gradual");
-  if (gradual > 0.0)
-    claims.push_back({"4.5", "a bound on acceleration rather than velocity", "no number",
-                      fmt::format("gradual: {:g} r_c/s and more; sudden: {:g} r_c/s", gradual,
-                                  held("paper", "sudden")),
-                      "reproduced; from free space the bound is still a velocity, r_1 f_c"});
-  return claims;
-}
-
-Figure speed_figure(const Table& table) {
-  Panel panel{.x = {.label = "velocity [r_c/s]", .log = true},
-              .y = {.label = "lifts lost of 5", .low = -0.2, .high = 5.2}};
-  int colour = 0;
-  for (const std::string& method : methods_in(table)) {
-    const auto lost = [&](std::string_view onset) {
-      return sums(points(table, {{"method", method}, {"onset", onset}}, "velocity_rc", "popped"));
-    };
-    panel.series.push_back({method + ", sudden", lost("sudden"), Line::solid, Mark::disc, colour});
-    panel.series.push_back(
-        {method + ", gradual", lost("gradual"), Line::dashed, Mark::ring, colour++});
-  }
-  return {{panel}};
-}
-
-constexpr std::array contact_speeds = {0.05, 0.1, 0.14, 0.15, 0.16, 0.2, 0.3,
-                                       0.5,  1.0, 2.0,  3.0,  5.0,  8.0};
-
-std::vector<Cell> first_contact_cells(const Experiment& experiment,
-                                      const ExperimentOptions& options) {
-  const double r_c = options.parameters.proxy.r_c();
-  std::vector<Cell> cells;
-  for (const std::string& name : methods_of(experiment, options)) {
-    for (const double speed : contact_speeds) {
-      constexpr int phases = 20;
-      for (int k = 0; k < phases; ++k) {
-        cells.emplace_back([=] {
-          // It comes from 0.3 m or three frames away, whichever is farther, and passes the hand at
-          // another phase of the frames each time.
-          const double away = std::max(0.3, 3.0 * speed / f_c) + speed * k / (phases * f_c);
-          const Law law{[=](double t) { return -away + speed * t; }, away / speed + 5.0 / f_c};
-          const Lifted result = lift(name, options, law, 0.1 * r_c,
-                                     cell_seed(options.seed, k, static_cast<int>(1e3 * speed)));
-          return csv_row(name, speed, options.seed + static_cast<std::uint64_t>(k), result.popped);
-        });
-      }
-    }
-  }
-  return cells;
-}
-
-std::vector<Claim> first_contact_claims(const Table& table) {
-  const Reach paper =
-      reach(table, "speed", [&](std::size_t row) { return table.text(row, "method") == "paper"; });
-  return {{"4.5", "assume v_0 = 0: the velocity is known only after contact",
-           "r_1 f_c = 0.15 m/s, not printed",
-           fmt::format("no pop-through up to {:g} m/s, first at {:g} m/s", paper.held, paper.lost),
-           "not stated in the paper: a surface from free space pops through above r_1 f_c"}};
-}
-
-Figure first_contact_figure(const Table& table) {
-  Panel panel{.x = {.label = "speed [m/s]", .log = true},
-              .y = {.label = "lost of 20", .low = -0.5, .high = 20.5}};
-  add_methods(panel, table, "speed", "popped", {1.0, 1.0}, true);
-  for (Series& series : panel.series) series.points = sums(series.points);
-  return {{panel}};
 }
 
 }  // namespace
@@ -567,28 +386,6 @@ Experiment bound_experiment() {
           bound_cells,
           bound_figure,
           bound_claims};
-}
-
-Experiment speed_experiment() {
-  return {"speed",
-          "5.2: the highest velocity of a lift without pop-through",
-          "method,onset,velocity_rc,seed,popped",
-          {"fixed-step", "paper"},
-          false,
-          speed_cells,
-          speed_figure,
-          speed_claims};
-}
-
-Experiment first_contact_experiment() {
-  return {"first-contact",
-          "a surface that approaches from free space at 0.05 to 8 m/s",
-          "method,speed,seed,popped",
-          {"fixed-step", "paper", "paper-as-printed"},
-          false,
-          first_contact_cells,
-          first_contact_figure,
-          first_contact_claims};
 }
 
 }  // namespace palpate::lab

@@ -71,61 +71,6 @@ Figure flat_figure(const Table& table) {
   return {{height, contact}};
 }
 
-// The HIP jumps from the resting proxy to `depth` below the plane; when is the proxy on it?
-std::vector<Cell> jump_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  std::vector<Cell> cells;
-  for (const std::string& name : methods_of(experiment, options)) {
-    for (const int depth : {1, 2, 4, 6, 10, 20})
-      cells.emplace_back([=] {
-        const double r_c = options.parameters.proxy.r_c();
-        GridCloud grid = level_grid(r_c, 0.06);
-        const auto method = make_method(name, {options.parameters, flat_truth()});
-        int ticks = 0;
-        int steps = 0;
-        double rest = 0.0;
-        bool there = false;
-        play(*method,
-             {.duration = 2.0,
-              .cloud = [&](std::uint64_t frame, double) { return grid.capture(frame, 0.0); },
-              .hip =
-                  [&](double t) {
-                    return Vec3(0.1 * r_c, 0.1 * r_c, t >= 1.0 - 1e-9 ? -depth * r_c : 2.0 * r_c);
-                  }},
-             [&](const Tick& tick) {
-               if (tick.t < 1.0 - 1e-9 || there) return true;
-               ++ticks;
-               steps += tick.steps;
-               rest = tick.proxy.z() - r_c;
-               there = std::abs(rest) < 0.03 * r_c;
-               return true;
-             });
-        return csv_row(name, depth, there ? ticks : -1, steps, rest);
-      });
-  }
-  return cells;
-}
-
-std::vector<Claim> jump_claims(const Table& table) {
-  double ticks = 0.0;
-  double steps = 0.0;
-  bool all = true;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (table.text(row, "method") != "paper") continue;
-    all = all && table.number(row, "ticks") > 0;
-    ticks = std::max(ticks, table.number(row, "ticks"));
-    steps = std::max(steps, table.number(row, "steps"));
-  }
-  return {{"5.1", "less than 1 ms to move down to the surface after the jump", "< 1 ms",
-           fmt::format("{:g} tick of 1 ms, at most {:g} steps", ticks, steps),
-           all && ticks == 1 ? "reproduced: in the tick of the jump" : "differs"}};
-}
-
-Figure jump_figure(const Table& table) {
-  Panel panel{.x = {"depth of the jump [r_c]"}, .y = {.label = "steps to the surface", .low = 0.0}};
-  add_methods(panel, table, "jump_rc", "steps", {1.0, 1.0}, true);
-  return {{panel}};
-}
-
 // 5.3: a 300 x 100 grid shaped as a triangle wave with growing amplitude.
 std::vector<Cell> corners_cells(const Experiment& experiment, const ExperimentOptions& options) {
   std::vector<Cell> cells;
@@ -209,17 +154,6 @@ Experiment flat_experiment() {
           flat_cells,
           flat_figure,
           flat_claims};
-}
-
-Experiment jump_experiment() {
-  return {"jump",
-          "5.1: ticks and steps to the surface after the HIP jumps below it",
-          "method,jump_rc,ticks,steps,rest_m",
-          {"fixed-step", "paper"},
-          false,
-          jump_cells,
-          jump_figure,
-          jump_claims};
 }
 
 Experiment corners_experiment() {

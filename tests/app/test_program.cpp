@@ -619,7 +619,7 @@ TEST_F(Program, SuggestsTheWordThatWasMeant) {
 
 TEST_F(ProgramWithLab, RefusesRecordingsThatAnExperimentCannotTake) {
   expect_refusal("eval lift --recording tum:there", {"--recording", "lift"});
-  expect_refusal("eval scan --recording tum:nowhere", {"nowhere"});
+  expect_refusal("eval real --recording tum:nowhere", {"nowhere"});
 }
 
 // The commands of a page of the documentation: its blocks of `sh`, one after the other.

@@ -142,9 +142,9 @@ TEST(Plot, DrawsTheFilesOfOtherVerbs) {
   EXPECT_EQ(trace.size(), 6U) << "three curves, and in the key";
   EXPECT_TRUE(test::fails_saying([&] { return draw(folder.path() / "none.csv"); }, "none.csv",
                                  "no such file"));
-  std::ofstream(folder.path() / "jumpp.csv") << "method\npaper\n";
-  EXPECT_TRUE(test::fails_saying([&] { return draw(folder.path() / "jumpp.csv"); }, "jumpp",
-                                 "did you mean 'jump'"));
+  std::ofstream(folder.path() / "corner.csv") << "method\npaper\n";
+  EXPECT_TRUE(test::fails_saying([&] { return draw(folder.path() / "corner.csv"); }, "corner",
+                                 "did you mean 'corners'"));
 }
 
 }  // namespace test_plot

@@ -66,7 +66,8 @@ build_in() {
     shift
   done
   if [[ -e $folder/CMakeCache.txt ]] &&
-    ! [[ $(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' "$folder/CMakeCache.txt") -ef $sources ]]; then
+    ! [[ $(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' \
+      "$folder/CMakeCache.txt") -ef $sources ]]; then
     rm -rf "$folder"
   fi
   local argument name cache=

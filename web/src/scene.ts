@@ -95,6 +95,29 @@ function nameSprite(whole: string, colour: string): THREE.Sprite {
   return sprite;
 }
 
+const BALL = new THREE.SphereGeometry(1, 48, 32);
+const FLAT = { depthTest: false, transparent: true, side: THREE.DoubleSide } as const;
+
+type Ball = THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
+
+function ball(look: THREE.MeshStandardMaterialParameters): Ball {
+  return new THREE.Mesh(BALL, new THREE.MeshStandardMaterial(look));
+}
+
+function line(look: THREE.LineBasicMaterialParameters) {
+  return new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial(look));
+}
+
+function segments(opacity: number) {
+  const material = new THREE.LineBasicMaterial({ transparent: true, opacity });
+  return new THREE.LineSegments(new THREE.BufferGeometry(), material);
+}
+
+// A cylinder one long that stands on its origin.
+function rod(radius: number, sides: number): THREE.CylinderGeometry {
+  return new THREE.CylinderGeometry(radius, radius, 1, sides).translate(0, 0.5, 0);
+}
+
 function isSoftwareRenderer(gl: WebGL2RenderingContext): boolean {
   const info = gl.getExtension("WEBGL_debug_renderer_info");
   const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
@@ -110,6 +133,7 @@ export class SceneView {
   drawnPoints = 0;
   drawings = 0;
 
+  private readonly software: boolean;
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(
@@ -119,39 +143,69 @@ export class SceneView {
     100,
   );
   private readonly clouds = new Map<number, CameraCloud>();
-  private readonly proxy: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
-  private readonly ring: THREE.Sprite;
-  private readonly hip: THREE.Mesh<THREE.SphereGeometry, THREE.MeshBasicMaterial>;
-  private readonly link: THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial>;
-  private readonly plumb: THREE.Line<THREE.BufferGeometry, THREE.LineDashedMaterial>;
-  private readonly trail: THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial>;
-  private readonly shadow: THREE.Mesh<THREE.CircleGeometry, THREE.MeshBasicMaterial>;
-  private readonly spot: THREE.Mesh<THREE.RingGeometry, THREE.MeshBasicMaterial>;
-  private readonly grid: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly proxy = ball({ roughness: 0.35 });
+  private readonly ring = new THREE.Sprite(
+    new THREE.SpriteMaterial({ map: ringTexture(), depthTest: false, sizeAttenuation: false }),
+  );
+  private readonly hip = new THREE.Mesh(BALL, new THREE.MeshBasicMaterial({ depthTest: false }));
+  private readonly link = line({ depthTest: false });
+  private readonly plumb = new THREE.Line(
+    new THREE.BufferGeometry(),
+    new THREE.LineDashedMaterial({ dashSize: 0.004, gapSize: 0.003 }),
+  );
+  private readonly trail = line({ transparent: true, opacity: 0.7 });
+  private readonly shadow = new THREE.Mesh(
+    new THREE.CircleGeometry(1, 40),
+    new THREE.MeshBasicMaterial({ ...FLAT, color: 0x000000, opacity: 0.45 }),
+  );
+  private readonly spot = new THREE.Mesh(
+    new THREE.RingGeometry(0.8, 1, 40),
+    new THREE.MeshBasicMaterial({ ...FLAT, opacity: 0.9 }),
+  );
+  private readonly grid = segments(0.16);
   // Each with its name; those that give a force in another colour.
   private readonly fixtures = new THREE.Group();
   private readonly idle = new THREE.LineBasicMaterial({ transparent: true, opacity: 0.8 });
   private readonly acting = new THREE.LineBasicMaterial();
-  private readonly frusta: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
-  private readonly paint: THREE.InstancedMesh<THREE.CircleGeometry, THREE.MeshBasicMaterial>;
+  private readonly frusta = segments(0.5);
+  private readonly paint = new THREE.InstancedMesh(
+    new THREE.CircleGeometry(1, 24),
+    new THREE.MeshBasicMaterial({ transparent: true, depthWrite: false, opacity: 0.45 }),
+    MOST_DABS,
+  );
   // The robot that the hand leads.
-  private readonly tool: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
-  private readonly arm: THREE.InstancedMesh<THREE.CylinderGeometry, THREE.MeshStandardMaterial>;
-  private readonly push: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly tool = ball({ roughness: 0.4 });
+  private readonly arm = new THREE.InstancedMesh(
+    rod(1, 12),
+    new THREE.MeshStandardMaterial({ roughness: 0.6 }),
+    MOST_LINKS,
+  );
+  private readonly push = segments(1);
   // The hands beside the first: proxies and HIPs in turn.
-  private readonly otherBalls: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>[] = [];
-  private readonly otherLines: THREE.LineSegments<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly otherBalls: Ball[] = [];
+  private readonly otherLines = segments(1);
   private fixturesDrawn = "";
   private readonly dab = new THREE.Object3D(); // where one of them is
   private readonly axes = new THREE.AxesHelper(AXES_LENGTH);
-  // The hand that was recorded.
-  private readonly ghost: THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
-  private readonly ghostTrail: THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial>;
-  private readonly pin: THREE.Mesh<THREE.CylinderGeometry, THREE.MeshStandardMaterial>;
+  // The hand that was recorded, which presses into the surface.
+  private readonly ghost = ball({
+    transparent: true,
+    opacity: 0.6,
+    roughness: 0.8,
+    depthTest: false,
+  });
+  private readonly ghostTrail = line({ transparent: true, opacity: 0.6, depthTest: false });
+  private readonly pin = new THREE.Mesh(
+    rod(0.09, 12),
+    new THREE.MeshStandardMaterial({ roughness: 0.6 }),
+  );
   private readonly arrow = new THREE.Group();
-  private readonly shaft: THREE.Mesh;
-  private readonly head: THREE.Mesh;
   private readonly arrowMaterial = new THREE.MeshStandardMaterial({ roughness: 0.5 });
+  private readonly shaft = new THREE.Mesh(rod(1, 20), this.arrowMaterial);
+  private readonly head = new THREE.Mesh(
+    new THREE.ConeGeometry(1, 1, 28).translate(0, 0.5, 0),
+    this.arrowMaterial,
+  );
   private readonly lamp = new THREE.DirectionalLight(0xffffff, 2.2);
   private readonly trailPoints: number[] = [];
   private palette!: Palette;
@@ -166,7 +220,6 @@ export class SceneView {
   private lastDrawing = 0; // [ms] 0: measured
   private drawnAt = -Infinity; // [ms]
   private tinted = true;
-  private readonly software: boolean;
 
   /** Throws if the browser has no WebGL 2. */
   constructor(private readonly canvas: HTMLCanvasElement) {
@@ -181,76 +234,8 @@ export class SceneView {
     // Asking how the shaders do waits for them to be made, one after the other.
     this.renderer.debug.checkShaderErrors = import.meta.env.DEV;
 
-    const ball = new THREE.SphereGeometry(1, 48, 32);
-    this.proxy = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ roughness: 0.35 }));
-    this.hip = new THREE.Mesh(ball, new THREE.MeshBasicMaterial({ depthTest: false }));
-    this.ghost = new THREE.Mesh(
-      ball,
-      new THREE.MeshStandardMaterial({
-        transparent: true,
-        opacity: 0.6,
-        roughness: 0.8,
-        depthTest: false, // it presses into the surface
-      }),
-    );
-    this.ring = new THREE.Sprite(
-      new THREE.SpriteMaterial({ map: ringTexture(), depthTest: false, sizeAttenuation: false }),
-    );
-    this.tool = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({ roughness: 0.4 }));
-    this.link = new THREE.Line(
-      new THREE.BufferGeometry(),
-      new THREE.LineBasicMaterial({ depthTest: false }),
-    );
-    this.plumb = new THREE.Line(
-      new THREE.BufferGeometry(),
-      new THREE.LineDashedMaterial({ dashSize: 0.004, gapSize: 0.003 }),
-    );
-    this.trail = new THREE.Line(
-      new THREE.BufferGeometry(),
-      new THREE.LineBasicMaterial({ transparent: true, opacity: 0.7 }),
-    );
-    this.ghostTrail = new THREE.Line(
-      new THREE.BufferGeometry(),
-      new THREE.LineBasicMaterial({ transparent: true, opacity: 0.6, depthTest: false }),
-    );
-    const flat = { depthTest: false, transparent: true, side: THREE.DoubleSide } as const;
-    this.shadow = new THREE.Mesh(
-      new THREE.CircleGeometry(1, 40),
-      new THREE.MeshBasicMaterial({ ...flat, color: 0x000000, opacity: 0.45 }),
-    );
-    this.spot = new THREE.Mesh(
-      new THREE.RingGeometry(0.8, 1, 40),
-      new THREE.MeshBasicMaterial({ ...flat, opacity: 0.9 }),
-    );
-    this.paint = new THREE.InstancedMesh(
-      new THREE.CircleGeometry(1, 24),
-      new THREE.MeshBasicMaterial({ transparent: true, depthWrite: false, opacity: 0.45 }),
-      MOST_DABS,
-    );
     this.paint.count = 0;
     this.paint.frustumCulled = false;
-    const thin = (opacity: number) => new THREE.LineBasicMaterial({ transparent: true, opacity });
-    this.grid = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.16));
-    this.frusta = new THREE.LineSegments(new THREE.BufferGeometry(), thin(0.5));
-    this.arm = new THREE.InstancedMesh(
-      new THREE.CylinderGeometry(1, 1, 1, 12).translate(0, 0.5, 0),
-      new THREE.MeshStandardMaterial({ roughness: 0.6 }),
-      MOST_LINKS,
-    );
-    this.push = new THREE.LineSegments(new THREE.BufferGeometry(), thin(1));
-    this.otherLines = new THREE.LineSegments(new THREE.BufferGeometry(), thin(1));
-    this.pin = new THREE.Mesh(
-      new THREE.CylinderGeometry(0.09, 0.09, 1, 12).translate(0, 0.5, 0),
-      new THREE.MeshStandardMaterial({ roughness: 0.6 }),
-    );
-    this.shaft = new THREE.Mesh(
-      new THREE.CylinderGeometry(1, 1, 1, 20).translate(0, 0.5, 0),
-      this.arrowMaterial,
-    );
-    this.head = new THREE.Mesh(
-      new THREE.ConeGeometry(1, 1, 28).translate(0, 0.5, 0),
-      this.arrowMaterial,
-    );
     this.arrow.add(this.shaft, this.head);
     const lines = [
       ...[this.link, this.plumb, this.trail, this.ghostTrail],
@@ -387,12 +372,8 @@ export class SceneView {
   /** The hands beside the first, and their lines. */
   showHands(hands: readonly OtherHand[], ends: readonly number[]): void {
     while (this.otherBalls.length < 2 * hands.length) {
-      const ball = new THREE.Mesh(
-        this.proxy.geometry,
-        new THREE.MeshStandardMaterial({ roughness: 0.35 }),
-      );
-      this.otherBalls.push(ball);
-      this.scene.add(ball);
+      this.otherBalls.push(ball({ roughness: 0.35 }));
+      this.scene.add(this.otherBalls.at(-1)!);
     }
     hands.forEach(({ hip, proxy, touches }, i) => {
       const [at, pulled] = [this.otherBalls[2 * i]!, this.otherBalls[2 * i + 1]!];

@@ -2,6 +2,7 @@
 // The surface that a camera measured, as geometry: where a ray of the eye meets it, its normal, and
 // what is measured on the camera's sightline through a point.
 
+import { Ray, Vector3 } from "three";
 import { add, clamp, cross, dot, horizon, length, posed, scale, sub, unit } from "./camera_math";
 import type { Frame, Rays, Vec3 } from "./protocol";
 
@@ -22,7 +23,6 @@ const LEAST_CONE = 0.003; // [m]
 const WIDER = [1, 2, 4]; // cones that are looked at in turn, where points are sparse
 const LEAST_POINTS = 6; // that give a normal
 const NEAREST = 0.02; // [m] depth
-const EDGE = 1e-6; // [-] of a face, by which a ray may pass it: no ray slips through between two
 const ALIKE = 0.5; // cosine between normals of faces that are averaged
 
 /**
@@ -177,40 +177,16 @@ export class SeenSurface {
   private meetFaces(start: Vec3, direction: Vec3): { distance: number; normal: Vec3 } | null {
     const points = this.frame.points!;
     const corners = this.frame.triangles!;
-    const [dx, dy, dz] = direction;
+    const ray = new Ray(new Vector3(...start), new Vector3(...direction));
+    const [a, b, c, hit] = [new Vector3(), new Vector3(), new Vector3(), new Vector3()];
     let [distance, met] = [Infinity, -1];
-    // Moeller and Trumbore's test, without a vector made for each of what may be a million faces.
     for (let i = 0; i + 2 < corners.length; i += 3) {
-      const a = 3 * corners[i]!;
-      const b = 3 * corners[i + 1]!;
-      const c = 3 * corners[i + 2]!;
-      const ax = points[a]!;
-      const ay = points[a + 1]!;
-      const az = points[a + 2]!;
-      const ex = points[b]! - ax;
-      const ey = points[b + 1]! - ay;
-      const ez = points[b + 2]! - az;
-      const fx = points[c]! - ax;
-      const fy = points[c + 1]! - ay;
-      const fz = points[c + 2]! - az;
-      const px = dy * fz - dz * fy;
-      const py = dz * fx - dx * fz;
-      const pz = dx * fy - dy * fx;
-      const scaled = 1 / (ex * px + ey * py + ez * pz);
-      const sx = start[0] - ax;
-      const sy = start[1] - ay;
-      const sz = start[2] - az;
-      const u = (sx * px + sy * py + sz * pz) * scaled;
-      if (!(u >= -EDGE && u <= 1 + EDGE)) continue; // not a number: the ray lies in its plane
-      const qx = sy * ez - sz * ey;
-      const qy = sz * ex - sx * ez;
-      const qz = sx * ey - sy * ex;
-      const v = (dx * qx + dy * qy + dz * qz) * scaled;
-      if (!(v >= -EDGE && u + v <= 1 + EDGE)) continue;
-      const t = (fx * qx + fy * qy + fz * qz) * scaled;
-      if (!(t > NEAREST && t < distance)) continue;
-      distance = t;
-      met = i;
+      a.fromArray(points, 3 * corners[i]!);
+      b.fromArray(points, 3 * corners[i + 1]!);
+      c.fromArray(points, 3 * corners[i + 2]!);
+      if (!ray.intersectTriangle(a, b, c, false, hit)) continue;
+      const t = hit.distanceTo(ray.origin);
+      if (t > NEAREST && t < distance) [distance, met] = [t, i];
     }
     if (met < 0) return null;
     const at = add(start, scale(direction, distance));

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <string_view>
 
+#include <Eigen/Geometry>
 #include <Eigen/SVD>
 
 #include "palpate/kernel/core/csv.hpp"
@@ -94,38 +95,24 @@ struct Rigid {
   double rms;
 };
 
-// Umeyama's solution; `mirrored` allows a reflection.
+// Umeyama's solution. @param mirrored  of the device's points with their z axis turned round
 Rigid best_fit(std::span<const PointPair> pairs, const FitOptions& options, bool mirrored) {
-  const auto n = static_cast<double>(pairs.size());
-  Vec3 device_mean = Vec3::Zero();
-  Vec3 world_mean = Vec3::Zero();
-  for (const PointPair& pair : pairs) {
-    device_mean += pair.device / n;
-    world_mean += pair.world / n;
+  const double given = options.fit_scale ? 1.0 : options.scale;
+  const auto count = static_cast<Eigen::Index>(pairs.size());
+  const Vec3 axes(given, given, mirrored ? -given : given);
+  Eigen::Matrix3Xd device(3, count);
+  Eigen::Matrix3Xd world(3, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const PointPair& pair = pairs[static_cast<std::size_t>(i)];
+    device.col(i) = axes.cwiseProduct(pair.device);
+    world.col(i) = pair.world;
   }
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  double device_variance = 0.0;
-  for (const PointPair& pair : pairs) {
-    const Vec3 device = pair.device - device_mean;
-    covariance += (pair.world - world_mean) * device.transpose() / n;
-    device_variance += device.squaredNorm() / n;
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance,
-                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Vec3 signs = Vec3::Ones();
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-  if (sign < 0.0 && !mirrored) signs.z() = -1.0;
-  Rigid fit{};
-  fit.rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
-  fit.scale = options.fit_scale ? svd.singularValues().dot(signs) / device_variance : options.scale;
-  fit.translation = world_mean - fit.scale * (fit.rotation * device_mean);
-  double squares = 0.0;
-  for (const PointPair& pair : pairs) {
-    squares +=
-        (pair.world - fit.scale * (fit.rotation * pair.device) - fit.translation).squaredNorm();
-  }
-  fit.rms = std::sqrt(squares / n);
-  return fit;
+  const Eigen::Affine3d fit(Eigen::umeyama(device, world, options.fit_scale));
+  const double scale = fit.linear().col(0).norm();
+  return {.rotation = fit.linear() / scale,
+          .scale = options.fit_scale ? scale : options.scale,
+          .translation = fit.translation(),
+          .rms = std::sqrt((fit * device - world).colwise().squaredNorm().mean())};
 }
 
 // The mean distance of the points from their centre [m].

@@ -27,9 +27,8 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/sensor.hpp"
 #include "palpate/kernel/core/uri.hpp"
-#include "palpate/session/hand_paths.hpp"
 #include "palpate/session/player.hpp"
-#include "palpate/session/session_hand.hpp"
+#include "palpate/session/press.hpp"
 
 namespace palpate {
 namespace {
@@ -142,769 +141,645 @@ void refuse_without_watchdog(const DeviceInfo& device, const SafetyParameters& s
 
 }  // namespace
 
-class Session::Impl {
- public:
-  explicit Impl(SessionOptions options) : options_(std::move(options)) {
-    options_.cameras.resize(std::max(options_.cameras.size(), options_.open_cameras.size()));
-    options_.open_cameras.resize(options_.cameras.size());
-    if (options_.cameras.empty())
-      throw Error("camera", "the session has none", "give one, such as synthetic:desk");
-    if (options_.cameras.size() > Patch::max_views)
-      throw Error("camera", std::to_string(options_.cameras.size()) + " cameras are too many",
-                  "give at most " + std::to_string(Patch::max_views));
-    if (!is_live() && !(options_.rate >= 1.0 && options_.rate <= 100'000.0))
-      throw Error("servo rate", std::to_string(options_.rate) + " Hz is out of range",
-                  "give a rate from 1 to 100000 Hz");
-    settings_ = {.method = options_.method,
-                 .parameters = options_.parameters,
-                 .safety = options_.safety,
-                 .placement = options_.hands.empty() ? Placement() : options_.hands[0].placement,
-                 .fixtures = options_.fixture_set};
-    if (!settings_.fixtures && !options_.fixtures.empty())
-      settings_.fixtures = std::make_shared<const FixtureSet>(read_fixtures(options_.fixtures));
-    if (!options_.tool.empty()) settings_.tool = read_tool(options_.tool);
-    validate(settings_);
-    newest_.resize(options_.cameras.size());
-    stamps_.resize(options_.cameras.size());
-    numbers_.resize(options_.cameras.size());
-    for (std::size_t i = 0; i < stamps_.size(); ++i) stamps_[i].camera = i;
-    std::vector<std::shared_ptr<const Cloud>> first;
-    for (std::size_t i = 0; i < options_.cameras.size(); ++i)
-      first.push_back(
-          with_materials(open_camera(options_.cameras[i], std::move(options_.open_cameras[i])), i));
-    open_hands(*first.front());
-    for (const auto& hand : hands_) {
-      if (needs_watchdog()) refuse_without_watchdog(hand->device().info(), settings_.safety);
-    }
-    settings_ = for_cameras(std::move(settings_));
-    if (!options_.radii_chosen) {
-      std::vector<const Cloud*> seen;
-      for (const auto& cloud : first) seen.push_back(cloud.get());
-      settings_.parameters = for_points(settings_.parameters, seen);
-    }
-    check_materials(settings_.fixtures.get(), first);
-    proxy_radius_ = settings_.parameters.proxy.r_c();
-    for (std::size_t i = 0; i < hands_.size(); ++i) {
-      ServoOptions servo{.rate = options_.rate, .realtime = options_.realtime};
-      servo.realtime.core += static_cast<unsigned>(i);
-      hands_[i]->begin(open_method(settings_, first), settings_of(*hands_[i], settings_),
-                       is_live() ? std::optional(servo) : std::nullopt);
-    }
-    if (hands_.size() > 1) {
-      for (const auto& hand : hands_) hand->link(hands_);
-    }
-    if (!options_.record.empty()) open_recorder(options_.record, false);
+Session::Session(SessionOptions options) : options_(std::move(options)) {
+  options_.cameras.resize(std::max(options_.cameras.size(), options_.open_cameras.size()));
+  options_.open_cameras.resize(options_.cameras.size());
+  if (options_.cameras.empty())
+    throw Error("camera", "the session has none", "give one, such as synthetic:desk");
+  if (options_.cameras.size() > Patch::max_views)
+    throw Error("camera", std::to_string(options_.cameras.size()) + " cameras are too many",
+                "give at most " + std::to_string(Patch::max_views));
+  if (!is_live() && !(options_.rate >= 1.0 && options_.rate <= 100'000.0))
+    throw Error("servo rate", std::to_string(options_.rate) + " Hz is out of range",
+                "give a rate from 1 to 100000 Hz");
+  settings_ = {.method = options_.method,
+               .parameters = options_.parameters,
+               .safety = options_.safety,
+               .placement = options_.hands.empty() ? Placement() : options_.hands[0].placement,
+               .fixtures = options_.fixture_set};
+  if (!settings_.fixtures && !options_.fixtures.empty())
+    settings_.fixtures = std::make_shared<const FixtureSet>(read_fixtures(options_.fixtures));
+  if (!options_.tool.empty()) settings_.tool = read_tool(options_.tool);
+  validate(settings_);
+  newest_.resize(options_.cameras.size());
+  stamps_.resize(options_.cameras.size());
+  numbers_.resize(options_.cameras.size());
+  for (std::size_t i = 0; i < stamps_.size(); ++i) stamps_[i].camera = i;
+  std::vector<std::shared_ptr<const Cloud>> first;
+  for (std::size_t i = 0; i < options_.cameras.size(); ++i)
+    first.push_back(
+        with_materials(open_camera(options_.cameras[i], std::move(options_.open_cameras[i])), i));
+  open_hands(*first.front());
+  for (const auto& hand : hands_) {
+    if (needs_watchdog()) refuse_without_watchdog(hand->device().info(), settings_.safety);
   }
-
-  ~Impl() { stop(); }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
-  void start() {
-    refuse_if_stopped();
-    if (started_) return;
-    if (!is_live())
-      throw Error("session", "a free-running session cannot be started in real time",
-                  "call run, or choose real time");
-    try {
-      for (const auto& hand : hands_) hand->loop()->start();
-    } catch (...) {
-      stop_loops();  // of those that have begun
-      throw;
-    }
-    started_ = true;
-    for (std::size_t i = 0; i < feeds_.size(); ++i)
-      feeds_[i]->start([this, i](const FedFrame& frame) { take(i, frame); }, hand_place());
-    housekeeper_ = std::thread([this] { keep_house(); });
+  settings_ = for_cameras(std::move(settings_));
+  if (!options_.radii_chosen) {
+    std::vector<const Cloud*> seen;
+    for (const auto& cloud : first) seen.push_back(cloud.get());
+    settings_.parameters = for_points(settings_.parameters, seen);
   }
-
-  void stop() noexcept {
-    if (stopped_.exchange(true)) {
-      for (const auto& hand : hands_) {
-        if (hand->loop() != nullptr && !hand->loop()->has_ended()) hand->device().disable();
-      }
-      return;
-    }
-    // Zero force leaves first: nothing above this line may wait for anything.
-    stop_loops();
-    for (const auto& feed : feeds_) feed->request_stop();
-    {
-      const std::lock_guard lock(house_mutex_);
-      house_ends_ = true;
-    }
-    house_wakes_.notify_all();
-    if (housekeeper_.joinable()) housekeeper_.join();
-    for (const auto& feed : feeds_) static_cast<void>(feed->join(camera_join_time));
-    {
-      const std::lock_guard lock(control_);
-      end_recording();
-    }
-    drain();
-    const std::lock_guard lock(control_);
-    for (auto& recording : closing_) {
-      for (auto& recorder : recording) {
-        if (!recorder->try_stop(options_.record_patience)) leave_behind(std::move(recorder));
-      }
-      std::erase(recording, nullptr);
-    }
-    report_closed();
+  check_materials(settings_.fixtures.get(), first);
+  proxy_radius_ = settings_.parameters.proxy.r_c();
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    ServoOptions servo{.rate = options_.rate, .realtime = options_.realtime};
+    servo.realtime.core += static_cast<unsigned>(i);
+    hands_[i]->begin(open_method(settings_, first), settings_of(*hands_[i], settings_),
+                     is_live() ? std::optional(servo) : std::nullopt);
   }
-
-  // Every hand is let go before any is waited for.
-  void stop_loops() noexcept {
-    for (const auto& hand : hands_) {
-      if (hand->loop() != nullptr) hand->loop()->request_stop();
-      if (!is_live() && started_) LastGate::write_zero(hand->device(), free_t_);
-    }
-    for (const auto& hand : hands_) {
-      if (hand->loop() != nullptr) hand->loop()->stop();
-      hand->device().disable();
-    }
+  if (hands_.size() > 1) {
+    for (const auto& hand : hands_) hand->link(hands_);
   }
+  if (!options_.record.empty()) open_recorder(options_.record, false);
+}
 
-  void run(std::optional<double> duration, const std::function<void(const ServoTick&)>& on_tick,
-           const std::atomic<bool>& stop_requested) {
-    refuse_if_stopped();
-    // Also where a source or the caller's function throws.
-    struct End {
-      Impl& session;
-      ~End() { session.stop(); }
-    } const end_of_run{*this};
-    if (is_live()) {
-      start();
-      const double end = monotonic_now() + duration.value_or(1e18);
-      while (!stop_requested.load(std::memory_order_relaxed) && monotonic_now() < end)
-        std::this_thread::sleep_for(stop_poll_interval);
-    } else {
-      run_free(duration, on_tick, stop_requested);
-    }
-  }
-
-  void advance(double t) {
-    refuse_if_stopped();
-    if (!started_) begin_free();
-    const auto due = static_cast<std::int64_t>(t * options_.rate);
-    const auto most = static_cast<std::int64_t>(longest_catch_up * options_.rate);
-    for (next_tick_ = std::max(next_tick_, due - most); next_tick_ <= due; ++next_tick_)
-      run_tick(next_tick_);
-    drain();
-    wait_for_recorder();
-  }
-
-  [[nodiscard]] std::vector<std::shared_ptr<const Cloud>> newest() const {
-    const std::lock_guard lock(frames_mutex_);
-    return newest_;
-  }
-
-  SessionState state() {
-    drain();
-    SessionState state;
-    for (const auto& feed : feeds_) state.cameras.push_back(feed->status());
-    for (const Player& played : played_) state.cameras.push_back(played.status());
-    for (const auto& hand : hands_) state.hands.push_back(report(*hand));
-    const ServoLoop* loop = hands_.front()->loop();
-    state.rate = loop != nullptr ? loop->rate() : options_.rate;
-    state.running = started_ && !stopped_;
-    {
-      const std::lock_guard lock(frames_mutex_);
-      for (SessionHandState& hand : state.hands) hand.summary.frames = frames_;
-      for (std::size_t i = 0; i < state.cameras.size(); ++i) {
-        std::string& doubt = state.cameras[i].doubt;
-        const std::string& trouble = materials_trouble_[i];
-        if (!trouble.empty()) doubt += (doubt.empty() ? "" : "; ") + trouble;
-      }
-    }
-    const std::lock_guard lock(control_);
-    state.settings = settings_;
-    state.held = held_;
-    for (std::size_t i = 0; i < hands_.size(); ++i) state.hands[i].placement = hands_[i]->placement;
-    if (is_recording() && std::any_of(hands_.begin(), hands_.end(), [](const auto& hand) {
-          return !hand->recorder->status().trouble.empty();
-        }))
-      end_recording();
-    report_closed();
-    state.recording = recording_;
-    state.recording.on = is_recording();
-    state.recording.closing = !closing_.empty();
-    if (is_recording()) {
-      state.recording.folder = hands_.front()->recorder->status().folder.string();
-      state.recording.seconds = now() - recording_since_;
-      state.recording.bytes = 0.0;
-      for (const auto& hand : hands_)
-        state.recording.bytes += static_cast<double>(hand->recorder->status().bytes);
-    }
-    return state;
-  }
-
-  [[nodiscard]] ServoSettings settings() const {
-    const std::lock_guard lock(control_);
-    return settings_;
-  }
-
-  void change(const std::function<void(ServoSettings&)>& edit) {
-    const std::lock_guard lock(control_);
-    ServoSettings settings = settings_;
-    edit(settings);
-    for (const auto& hand : hands_) {
-      if (needs_watchdog()) refuse_without_watchdog(hand->device().info(), settings.safety);
-    }
-    settings = for_cameras(std::move(settings));
-    if (settings.fixtures != settings_.fixtures) check_materials(settings.fixtures.get(), newest());
-    const bool with_new_methods =
-        settings.method != settings_.method || settings.tool != settings_.tool;
-    tell([&](SessionHand& hand,
-             ServoCommands& told) { told.settings = settings_of(hand, settings); },
-         with_new_methods ? &settings : nullptr);
-    hands_.front()->placement = settings.placement;
-    settings_ = settings;
-    proxy_radius_ = settings.parameters.proxy.r_c();
-  }
-
-  void place(std::size_t number, const Placement& placement) {
-    const std::lock_guard lock(control_);
-    SessionHand& hand = *hands_.at(number);
-    note(hand,
-         hand.cycle().command([&](ServoCommands& told) { told.settings.placement = placement; }));
-    hand.placement = placement;
-    if (number == 0) settings_.placement = placement;
-  }
-
-  void hold(bool on) {
-    const std::lock_guard lock(control_);
-    if (held_ == on) return;
-    held_ = on;
-    tell([&](SessionHand& /*hand*/, ServoCommands& told) { told.hold = on; });
-  }
-
-  void set_playback(const Playback& playback) {
-    for (const auto& feed : feeds_) feed->set_playback(playback);
-    for (Player& played : played_) played.set_playback(playback, now());
-  }
-
-  void seek(double share) {
-    for (const auto& feed : feeds_) feed->seek(share);
-    for (Player& played : played_) played.seek(share);
-  }
-
-  void start_recording(const std::string& folder) {
-    const std::lock_guard lock(control_);
-    if (is_recording())
-      throw Error(folder, "a recording is on already", "stop it before another is begun");
-    open_recorder(folder, hands_.front()->cycle().statistics().ticks > 0);
-  }
-
-  void stop_recording() {
-    const std::lock_guard lock(control_);
-    end_recording();
-  }
-
-  Paint& paint() { return paint_; }
-  [[nodiscard]] std::size_t hands() const { return hands_.size(); }
-  [[nodiscard]] SessionHand& hand(std::size_t number) const { return *hands_.at(number); }
-  void reset_faults() noexcept {
-    for (const auto& hand : hands_) hand->cycle().reset_faults();
-  }
-  [[nodiscard]] MouseDevice* mouse() const {
-    for (const auto& hand : hands_) {
-      if (hand->mouse() != nullptr) return hand->mouse();
-    }
-    return nullptr;
-  }
-  [[nodiscard]] const MethodRegistry& methods() const { return options_.methods; }
-
- private:
-  [[nodiscard]] bool is_live() const { return options_.pace == Pace::real_time; }
-  [[nodiscard]] bool needs_watchdog() const { return is_live() && !options_.without_watchdog; }
-  void refuse_if_stopped() const {
-    if (stopped_)
-      throw Error("session", "it has been stopped and cannot go on", "make another session");
-  }
-  // With control_ held: a recorder whose disk hangs. Its threads use nothing of the session.
-  void leave_behind(std::unique_ptr<Recorder> recorder) {
-    const Recorder::Status status = recorder->status();
-    const std::uint64_t ticks = status.ticks + status.ticks_waiting;
-    recording_.failed = true;
-    recording_.message = status.folder.string() +
-                         ": the disk hangs: " + std::to_string(ticks - status.committed_ticks) +
-                         " of " + std::to_string(ticks) + " ticks and " +
-                         std::to_string(status.frames_waiting) +
-                         " frames are not written; what was written before can be read";
-    std::thread([left = std::move(recorder)]() mutable { left.reset(); }).detach();
-  }
-  // What is left to the cameras' kind is that of those that are open.
-  [[nodiscard]] ServoSettings for_cameras(ServoSettings settings) const {
-    settings.parameters = for_sensors(settings.parameters, sensors_);
-    return settings;
-  }
-  // [s] on the session's clock
-  [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }
-
-  void open_hands(const Cloud& seen) {
-    std::vector<HandSpec>& hands = options_.hands;
-    hands.resize(std::max({hands.size(), options_.open_devices.size(), std::size_t{1}}));
-    options_.open_devices.resize(hands.size());
-    if (hands.size() > most_hands)
-      throw Error("hands", std::to_string(hands.size()) + " are too many",
-                  "give at most " + std::to_string(most_hands));
-    const bool alone = hands.size() == 1;
-    for (std::size_t i = 0; i < hands.size(); ++i) {
-      HandSpec& hand = hands[i];
-      if (hand.name.empty() && !alone) hand.name = "hand_" + std::to_string(i + 1);
-      if (!hand.name.empty()) check_name(hand.name, hands_);
-      if (hand.device.empty()) hand.device = "hand:";
-      validate(hand.placement);
-      std::unique_ptr<Device> device = std::move(options_.open_devices[i]);
-      if (!device) device = open_hand(options_, hand.device, seen);
-      std::function<void(const ServoTick&)> on_tick;
-      if (options_.on_tick)
-        on_tick = [this, i](const ServoTick& tick) { options_.on_tick(i, tick); };
-      hands_.push_back(std::make_unique<SessionHand>(hand.name, std::move(device), hand.placement,
-                                                     std::move(on_tick)));
-    }
-    const auto mice = std::count_if(hands_.begin(), hands_.end(),
-                                    [](const auto& hand) { return hand->mouse() != nullptr; });
-    if (mice > 1)
-      throw Error("mouse:", "two hands cannot be moved by one mouse", "give it to one of them");
-    if (alone) return;
-    for (const auto& hand : hands_) hand->prepare_link();
-  }
-
-  [[nodiscard]] static SessionHandState report(const SessionHand& hand) {
-    SessionHandState state{.name = hand.name(), .placement = {}, .device = {}, .summary = {}};
-    if (hand.loop() != nullptr) state.device = hand.loop()->device_status();
-    const CycleStatistics& statistics = hand.cycle().statistics();
-    for (std::size_t i = 0; i < safety_flag_count; ++i)
-      state.interventions[i] = statistics.interventions[i].load();
-    state.latched_by = statistics.latched_by.load();
-    state.summary = hand.summary();
-    return state;
-  }
-
-  std::shared_ptr<const Cloud> open_camera(CameraSpec& camera, std::unique_ptr<Source> source) {
-    std::function<std::unique_ptr<Source>()> open;
-    if (source) {
-      if (camera.uri.empty()) camera.uri = source->info().uri;
-      if (camera.world_from_camera)
-        source = with_pose(std::move(source), *camera.world_from_camera);
-    } else {
-      open = opener(camera, options_.sources);
-      source = open();
-    }
-    sensors_.push_back(source->info().sensor);
-    const SourceInfo& known = source->info();
-    const double length = known.frames
-                              ? static_cast<double>(*known.frames) / known.frame_rate.value_or(30.0)
-                              : std::numeric_limits<double>::infinity();  // [s]
-    // A hand that strokes is out of the surface before the recording begins again.
-    if (length >= shortest_loop) options_.stroke_time = std::min(options_.stroke_time, length);
-    if (!is_live()) {
-      played_.emplace_back(std::move(source), std::move(open));
-      return played_.back().first_frame().cloud;
-    }
-    feeds_.push_back(std::make_unique<CameraFeed>(
-        std::move(source), FeedOptions{.schemes = options_.sources}, std::move(open)));
-    if (length < shortest_loop) feeds_.back()->set_playback({.loop = false});
-    const std::optional<Frame> first = feeds_.back()->first_frame(first_frame_timeout);
-    if (!first)
-      throw Error(camera.uri, "it has delivered no frame in " + seconds_text(first_frame_timeout),
-                  "check the camera, its cable and its permissions");
-    return first->cloud;
-  }
-
-  [[nodiscard]] std::shared_ptr<Method> open_method(
-      const ServoSettings& settings, const std::vector<std::shared_ptr<const Cloud>>& seen) const {
-    std::shared_ptr<Method> method =
-        make_method(settings.method, settings.parameters, options_.methods, settings.tool);
-    for (const auto& cloud : seen) {
-      if (cloud) method->check(*cloud);
-    }
-    return method;
-  }
-
-  // A hand's settings, where the session's are these, which have the first one's placement.
-  [[nodiscard]] ServoSettings settings_of(const SessionHand& hand, ServoSettings settings) const {
-    if (&hand != hands_.front().get()) settings.placement = hand.placement;
-    return settings;
-  }
-
-  // With control_ held: what a hand's cycle was told.
-  void note(SessionHand& hand, const ServoCommands& told) {
-    if (hand.recorder) hand.recorder->commands(told, now());
-  }
-
-  // With control_ held: all hands; throws before any of them is told.
-  // @param new_methods  the settings for which methods are made anew; null: the old ones go on
-  void tell(const std::function<void(SessionHand&, ServoCommands&)>& edit,
-            const ServoSettings* new_methods = nullptr) {
-    std::vector<std::shared_ptr<Method>> methods(hands_.size());
-    if (new_methods != nullptr) {
-      const auto seen = newest();
-      for (auto& method : methods) method = open_method(*new_methods, seen);
-    }
-    for (std::size_t i = 0; i < hands_.size(); ++i) {
-      SessionHand& hand = *hands_[i];
-      note(hand, hand.cycle().command([&](ServoCommands& told) { edit(hand, told); },
-                                      std::move(methods[i])));
-    }
-  }
-
-  // What is seen jumps. Before the frame after the jump the hands are disengaged; after it methods
-  // take over that remember nothing of before, on the free side of what is seen now.
-  void change_scene(bool methods_begin_anew) {
-    const std::lock_guard lock(control_);
-    tell([](SessionHand& /*hand*/, ServoCommands& told) { ++told.scene; },
-         methods_begin_anew ? &settings_ : nullptr);
-  }
-
-  // A camera's thread, or the free-running one: a frame to all who want it.
-  void take(std::size_t camera, const FedFrame& fed) {
-    if (fed.after_jump) change_scene(false);
-    give(camera, fed);
-    if (fed.after_jump) change_scene(true);
-    if (options_.on_frame) options_.on_frame(camera, fed);
-  }
-
-  // What the session's options say that a frame is made of.
-  std::shared_ptr<const Cloud> with_materials(std::shared_ptr<const Cloud> cloud,
-                                              std::size_t camera) {
-    const DepthImage* image = cloud->image();
-    if (!options_.materials || image == nullptr) return cloud;
-    std::string trouble;
-    try {
-      std::shared_ptr<const MaterialMap> map = options_.materials(camera, *image);
-      const auto* labels = dynamic_cast<const LabelImage*>(map.get());
-      if (labels != nullptr && labels->size() != image->depth().size()) {
-        trouble = "it is given materials for " + std::to_string(labels->size()) +
-                  " pixels and has " + std::to_string(image->depth().size());
-      } else if (map) {
-        auto made = std::make_shared<DepthImage>(*image);
-        made->set_materials(std::move(map));
-        cloud = std::move(made);
-      }
-    } catch (const std::exception& error) {
-      trouble = std::string("its materials could not be assigned: ") + error.what();
-    }
-    const std::lock_guard lock(frames_mutex_);
-    materials_trouble_[camera] = std::move(trouble);
-    return cloud;
-  }
-
-  // Tells where the first hand is [m, world]; of one thread.
-  [[nodiscard]] std::function<std::optional<Vec3>()> hand_place() const {
-    return [reader = hands_.front()->cycle().reader(), place = std::optional<Vec3>()]() mutable {
-      for (ServoTick record{}; reader.try_pop(record);) place = record.tick.hip;
-      return place;
-    };
-  }
-
-  // To the method and the recorder.
-  void give(std::size_t camera, const FedFrame& fed) {
-    std::shared_ptr<const Cloud> painted =
-        paint_.on(with_materials(fed.frame.cloud, camera), camera);
-    const std::lock_guard lock(frames_mutex_);
-    stamps_[camera].stamp = fed.frame.stamp;
-    std::vector<CameraFrame> cameras = stamps_;
-    std::swap(cameras.front(), cameras[camera]);
-    // Each hand counts the same frames, so a frame has the same number for all.
-    for (const auto& hand : hands_) {
-      numbers_[camera] = hand->cycle().put_frame(painted, fed.frame.stamp, cameras, now());
-      if (hand->recorder) hand->recorder->frame(numbers_[camera], fed.frame.stamp, camera, painted);
-    }
-    newest_[camera] = std::move(painted);
-    ++frames_;
-  }
-
-  void run_free(std::optional<double> duration,
-                const std::function<void(const ServoTick&)>& on_tick,
-                const std::atomic<bool>& stop_requested) {
-    begin_free();
-    const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.rate);
-    TickRing<ServoTick>::Reader reader = hands_.front()->cycle().reader();
-    for (std::int64_t i = 0; i < ticks && !stop_requested.load(std::memory_order_relaxed); ++i) {
-      run_tick(i);
-      if (ServoTick record{}; on_tick && reader.try_pop(record)) on_tick(record);
-      drain();
-      if (i % ticks_between_flushes == 0) wait_for_recorder();
-    }
-  }
-
-  void begin_free() {
-    for (const auto& hand : hands_) hand->device().enable();
-    free_hand_ = hand_place();
-    started_ = true;
-  }
-
-  void run_tick(std::int64_t number) {
-    const double t = static_cast<double>(number) / options_.rate;
-    free_t_ = t;
-    const std::optional<Vec3> place = free_hand_();
-    for (std::size_t camera = 0; camera < played_.size(); ++camera) {
-      if (place) played_[camera].follow(*place);
-      while (const auto frame = played_[camera].next_until(t)) take(camera, *frame);
-    }
-    for (const auto& hand : hands_) hand->run_at(t);
-  }
-
-  // The clock waits for the disk here, as it runs faster than time: recorders have no threads then.
-  void wait_for_recorder() {
-    const std::lock_guard lock(control_);
-    for (const auto& hand : hands_) {
-      if (hand->recorder) hand->recorder->flush();
-    }
-  }
-
-  void keep_house() {
-    std::unique_lock lock(house_mutex_);
-    while (!house_wakes_.wait_for(lock, housekeeping_interval, [this] { return house_ends_; })) {
-      lock.unlock();
-      drain();
-      lock.lock();
-    }
-  }
-
-  void drain() {
-    const double r_c = proxy_radius_.load(std::memory_order_relaxed);
-    const auto seen = newest();
-    for (const auto& hand : hands_) hand->count(seen, r_c);
-  }
-
-  [[nodiscard]] bool is_recording() const { return hands_.front()->recorder != nullptr; }
-
-  // With control_ held, or before anything runs. The first hand's recording holds the frames; those
-  // of the others lie in folders within it.
-  void open_recorder(const std::string& folder, bool is_on) {
-    struct Opened {
-      std::unique_ptr<Recorder> recorder;
-      std::shared_ptr<std::promise<Recorder*>> promise =
-          std::make_shared<std::promise<Recorder*>>();
-    };
-    std::vector<Opened> opened(hands_.size());
-    for (std::size_t i = 0; i < hands_.size(); ++i) {
-      SessionHand& hand = *hands_[i];
-      std::function<void()> begin_anew;
-      if (is_on) {
-        // On the recorder's thread, once: the recording begins with a method that remembers
-        // nothing.
-        begin_anew = [this, &hand, promise = opened[i].promise, settings = settings_] {
-          Recorder* recorder = promise->get_future().get();
-          if (recorder != nullptr)
-            recorder->commands(
-                hand.cycle().command([](ServoCommands&) {}, open_method(settings, newest())),
-                now());
-        };
-      }
-      try {
-        opened[i].recorder = std::make_unique<Recorder>(
-            i == 0 ? folder : hand_folder(folder, hand.name()).string(), info_of(hand),
-            hand.cycle().full_reader(), std::move(begin_anew),
-            RecorderOptions{.with_frames = i == 0, .own_threads = is_live()});
-      } catch (...) {
-        for (Opened& each : opened) each.promise->set_value(nullptr);
-        throw;
-      }
-      opened[i].recorder->commands(hand.cycle().commands(), now());
-    }
-    {
-      const std::lock_guard lock(frames_mutex_);
-      for (std::size_t i = 0; i < hands_.size(); ++i) {
-        // The first tick of the recording uses these frames, or some that are yet to come.
-        std::map<std::uint64_t, std::size_t> cameras;  // by the number of their newest frame
-        for (std::size_t camera = 0; camera < newest_.size(); ++camera)
-          if (newest_[camera]) cameras[numbers_[camera]] = camera;
-        for (const auto& [number, camera] : cameras)
-          opened[i].recorder->frame(number, stamps_[camera].stamp, camera, newest_[camera]);
-        hands_[i]->recorder = std::move(opened[i].recorder);
-      }
-    }
-    for (std::size_t i = 0; i < hands_.size(); ++i)
-      opened[i].promise->set_value(hands_[i]->recorder.get());
-    recording_ = RecordingState();
-    recording_.folder = folder;
-    recording_since_ = now();
-  }
-
-  [[nodiscard]] SessionInfo info_of(const SessionHand& hand) const {
-    using std::chrono::nanoseconds;
-    using std::chrono::system_clock;
-    SessionInfo info{.version = options_.version};
-    for (const CameraSpec& camera : options_.cameras) info.cameras.push_back(camera.uri);
-    info.device = hand.device().info().uri;
-    info.limits = hand.device().info().limits;
-    info.epoch =
-        std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count() -
-        std::llround(1e9 * now());
-    info.hand = hand.name();
-    if (&hand == hands_.front().get()) {
-      for (std::size_t i = 1; i < hands_.size(); ++i) info.more_hands.push_back(hands_[i]->name());
-    }
-    return info;
-  }
-
-  // With control_ held. Closing takes as long as the disk does, and nobody waits for that.
-  void end_recording() {
-    if (!is_recording()) return;
-    Recording recording;
-    {
-      const std::lock_guard lock(frames_mutex_);
-      for (const auto& hand : hands_) recording.push_back(std::move(hand->recorder));
-    }
-    for (const auto& recorder : recording) recorder->request_stop();
-    recording_.folder = recording.front()->status().folder.string();
-    recording_.message = recording_.folder + ": closing";
-    recording_.seconds = now() - recording_since_;
-    closing_.push_back(std::move(recording));
-  }
-
-  // With control_ held: how the recordings ended that are closed by now.
-  void report_closed() {
-    std::erase_if(closing_, [this](const Recording& recording) {
-      std::vector<Recorder::Status> parts;
-      for (const auto& recorder : recording) parts.push_back(recorder->status());
-      if (!std::all_of(parts.begin(), parts.end(), [](const auto& part) { return part.done; }))
-        return false;
-      if (!parts.empty()) report_closed(parts);
-      return true;
-    });
-  }
-
-  // What went wrong with any part of a recording comes before what went well.
-  void report_closed(const std::vector<Recorder::Status>& parts) {
-    const auto counts = [](std::uint64_t ticks, std::uint64_t frames) {
-      return std::to_string(ticks) + " ticks, " + std::to_string(frames) + " frames";
-    };
-    recording_.bytes = 0.0;
-    for (const Recorder::Status& part : parts) recording_.bytes += static_cast<double>(part.bytes);
-    for (const Recorder::Status& part : parts) {
-      if (part.trouble.empty()) continue;
-      recording_.failed = true;
-      recording_.message = "the recording has stopped: " + part.trouble;
-      return;
-    }
-    std::string text;
-    for (const Recorder::Status& part : parts) {
-      if (part.lost_ticks + part.lost_frames > 0) {
-        recording_.failed = true;
-        recording_.message = part.folder.string() + ": the machine was too slow for " +
-                             counts(part.lost_ticks, part.lost_frames);
-        return;
-      }
-      text += text.empty() ? part.folder.string() + ": " + counts(part.ticks, part.frames)
-                           : "; " + part.folder.filename().string() + ": " +
-                                 std::to_string(part.ticks) + " ticks";
-    }
-    std::array<char, 32> seconds{};
-    std::snprintf(seconds.data(), seconds.size(), "; %.1f s, ", recording_.seconds);
-    recording_.message = text + seconds.data() + size_text(recording_.bytes);
-  }
-
-  SessionOptions options_;
-  Paint paint_;
-  std::vector<SensorKind> sensors_;                 // of the cameras
-  std::vector<std::unique_ptr<CameraFeed>> feeds_;  // in real time
-  std::vector<Player> played_;                      // free-running
-  // As many from the first thread on. Recorders are set and reset with control_ and frames_mutex_
-  // held, and used with either.
-  std::vector<std::unique_ptr<SessionHand>> hands_;
-  std::atomic<double> free_t_{0.0};  // [s]
-  std::function<std::optional<Vec3>()> free_hand_;
-  std::int64_t next_tick_ = 0;  // of `advance`
-  std::atomic<bool> started_{false};
-  std::atomic<bool> stopped_{false};
-
-  mutable std::mutex frames_mutex_;  // taken by the cameras' threads; never held for long
-  std::vector<std::shared_ptr<const Cloud>> newest_;  // guarded by frames_mutex_
-  std::vector<CameraFrame> stamps_;                   // of these; guarded by frames_mutex_
-  std::array<std::string, Patch::max_views> materials_trouble_;  // guarded by frames_mutex_
-  std::vector<std::uint64_t> numbers_;                           // guarded by frames_mutex_
-  std::size_t frames_ = 0;                                       // guarded by frames_mutex_
-
-  mutable std::mutex control_;  // settings and recordings; taken before frames_mutex_
-  ServoSettings settings_;      // guarded by control_; the placement is the first hand's
-  bool held_ = false;           // guarded by control_
-  RecordingState recording_;    // guarded by control_
-  double recording_since_ = 0;  // [s] on the session's clock; guarded by control_
-  // Of each hand, the first hand's first.
-  using Recording = std::vector<std::unique_ptr<Recorder>>;
-  std::vector<Recording> closing_;  // guarded by control_
-  std::atomic<double> proxy_radius_{ProxyParameters{}.r_c()};
-
-  std::thread housekeeper_;
-  std::mutex house_mutex_;
-  std::condition_variable house_wakes_;
-  bool house_ends_ = false;  // guarded by house_mutex_
-};
-
-Session::Session(SessionOptions options) : impl_(std::make_unique<Impl>(std::move(options))) {}
-
-Session::~Session() = default;
+Session::~Session() {
+  stop();
+}
 
 void Session::start() {
-  impl_->start();
+  refuse_if_stopped();
+  if (started_) return;
+  if (!is_live())
+    throw Error("session", "a free-running session cannot be started in real time",
+                "call run, or choose real time");
+  try {
+    for (const auto& hand : hands_) hand->loop()->start();
+  } catch (...) {
+    stop_loops();  // of those that have begun
+    throw;
+  }
+  started_ = true;
+  for (std::size_t i = 0; i < feeds_.size(); ++i)
+    feeds_[i]->start([this, i](const FedFrame& frame) { take(i, frame); }, hand_place());
+  housekeeper_ = std::thread([this] { keep_house(); });
 }
 
 void Session::stop() noexcept {
-  impl_->stop();
+  if (stopped_.exchange(true)) {
+    for (const auto& hand : hands_) {
+      if (hand->loop() != nullptr && !hand->loop()->has_ended()) hand->device().disable();
+    }
+    return;
+  }
+  // Zero force leaves first: nothing above this line may wait for anything.
+  stop_loops();
+  for (const auto& feed : feeds_) feed->request_stop();
+  {
+    const std::lock_guard lock(house_mutex_);
+    house_ends_ = true;
+  }
+  house_wakes_.notify_all();
+  if (housekeeper_.joinable()) housekeeper_.join();
+  for (const auto& feed : feeds_) static_cast<void>(feed->join(camera_join_time));
+  {
+    const std::lock_guard lock(control_);
+    end_recording();
+  }
+  drain();
+  const std::lock_guard lock(control_);
+  for (auto& recording : closing_) {
+    for (auto& recorder : recording) {
+      if (!recorder->try_stop(options_.record_patience)) leave_behind(std::move(recorder));
+    }
+    std::erase(recording, nullptr);
+  }
+  report_closed();
+}
+
+// Every hand is let go before any is waited for.
+void Session::stop_loops() noexcept {
+  for (const auto& hand : hands_) {
+    if (hand->loop() != nullptr) hand->loop()->request_stop();
+    if (!is_live() && started_) LastGate::write_zero(hand->device(), free_t_);
+  }
+  for (const auto& hand : hands_) {
+    if (hand->loop() != nullptr) hand->loop()->stop();
+    hand->device().disable();
+  }
 }
 
 void Session::run(std::optional<double> duration,
                   const std::function<void(const ServoTick&)>& on_tick) {
-  impl_->run(duration, on_tick, stop_requested_);
+  refuse_if_stopped();
+  // Also where a source or the caller's function throws.
+  struct End {
+    Session& session;
+    ~End() { session.stop(); }
+  } const end_of_run{*this};
+  if (is_live()) {
+    start();
+    const double end = monotonic_now() + duration.value_or(1e18);
+    while (!stop_requested_.load(std::memory_order_relaxed) && monotonic_now() < end)
+      std::this_thread::sleep_for(stop_poll_interval);
+  } else {
+    run_free(duration, on_tick);
+  }
 }
 
 void Session::advance(double t) {
-  impl_->advance(t);
-}
-
-std::size_t Session::hands() const {
-  return impl_->hands();
-}
-
-const std::string& Session::hand_name(std::size_t hand) const {
-  return impl_->hand(hand).name();
-}
-
-TickRing<ServoTick>::Reader Session::ticks(std::size_t hand) const {
-  return impl_->hand(hand).cycle().reader();
+  refuse_if_stopped();
+  if (!started_) begin_free();
+  const auto due = static_cast<std::int64_t>(t * options_.rate);
+  const auto most = static_cast<std::int64_t>(longest_catch_up * options_.rate);
+  for (next_tick_ = std::max(next_tick_, due - most); next_tick_ <= due; ++next_tick_)
+    run_tick(next_tick_);
+  drain();
+  wait_for_recorder();
 }
 
 std::vector<std::shared_ptr<const Cloud>> Session::newest_clouds() const {
-  return impl_->newest();
+  const std::lock_guard lock(frames_mutex_);
+  return newest_;
 }
 
 SessionState Session::state() {
-  return impl_->state();
+  drain();
+  SessionState state;
+  for (const auto& feed : feeds_) state.cameras.push_back(feed->status());
+  for (const Player& played : played_) state.cameras.push_back(played.status());
+  for (const auto& hand : hands_) state.hands.push_back(report(*hand));
+  const ServoLoop* loop = hands_.front()->loop();
+  state.rate = loop != nullptr ? loop->rate() : options_.rate;
+  state.running = started_ && !stopped_;
+  {
+    const std::lock_guard lock(frames_mutex_);
+    for (SessionHandState& hand : state.hands) hand.summary.frames = frames_;
+    for (std::size_t i = 0; i < state.cameras.size(); ++i) {
+      std::string& doubt = state.cameras[i].doubt;
+      const std::string& trouble = materials_trouble_[i];
+      if (!trouble.empty()) doubt += (doubt.empty() ? "" : "; ") + trouble;
+    }
+  }
+  const std::lock_guard lock(control_);
+  state.settings = settings_;
+  state.held = held_;
+  for (std::size_t i = 0; i < hands_.size(); ++i) state.hands[i].placement = hands_[i]->placement;
+  if (is_recording() && std::any_of(hands_.begin(), hands_.end(), [](const auto& hand) {
+        return !hand->recorder->status().trouble.empty();
+      }))
+    end_recording();
+  report_closed();
+  state.recording = recording_;
+  state.recording.on = is_recording();
+  state.recording.closing = !closing_.empty();
+  if (is_recording()) {
+    state.recording.folder = hands_.front()->recorder->status().folder.string();
+    state.recording.seconds = now() - recording_since_;
+    state.recording.bytes = 0.0;
+    for (const auto& hand : hands_)
+      state.recording.bytes += static_cast<double>(hand->recorder->status().bytes);
+  }
+  return state;
 }
 
 ServoSettings Session::settings() const {
-  return impl_->settings();
-}
-
-void Session::set(const ServoSettings& settings) {
-  impl_->change([&](ServoSettings& now) { now = settings; });
+  const std::lock_guard lock(control_);
+  return settings_;
 }
 
 void Session::change(const std::function<void(ServoSettings&)>& edit) {
-  impl_->change(edit);
+  const std::lock_guard lock(control_);
+  ServoSettings settings = settings_;
+  edit(settings);
+  for (const auto& hand : hands_) {
+    if (needs_watchdog()) refuse_without_watchdog(hand->device().info(), settings.safety);
+  }
+  settings = for_cameras(std::move(settings));
+  if (settings.fixtures != settings_.fixtures)
+    check_materials(settings.fixtures.get(), newest_clouds());
+  const bool with_new_methods =
+      settings.method != settings_.method || settings.tool != settings_.tool;
+  tell([&](SessionHand& hand, ServoCommands& told) { told.settings = settings_of(hand, settings); },
+       with_new_methods ? &settings : nullptr);
+  hands_.front()->placement = settings.placement;
+  settings_ = settings;
+  proxy_radius_ = settings.parameters.proxy.r_c();
 }
 
-void Session::place(std::size_t hand, const Placement& placement) {
-  impl_->place(hand, placement);
-}
-
-void Session::set_playback(const Playback& playback) {
-  impl_->set_playback(playback);
-}
-
-void Session::seek(double share) {
-  impl_->seek(share);
+void Session::place(std::size_t number, const Placement& placement) {
+  const std::lock_guard lock(control_);
+  SessionHand& hand = *hands_.at(number);
+  note(hand,
+       hand.cycle().command([&](ServoCommands& told) { told.settings.placement = placement; }));
+  hand.placement = placement;
+  if (number == 0) settings_.placement = placement;
 }
 
 void Session::hold(bool on) {
-  impl_->hold(on);
+  const std::lock_guard lock(control_);
+  if (held_ == on) return;
+  held_ = on;
+  tell([&](SessionHand& /*hand*/, ServoCommands& told) { told.hold = on; });
+}
+
+void Session::set_playback(const Playback& playback) {
+  for (const auto& feed : feeds_) feed->set_playback(playback);
+  for (Player& played : played_) played.set_playback(playback, now());
+}
+
+void Session::seek(double share) {
+  for (const auto& feed : feeds_) feed->seek(share);
+  for (Player& played : played_) played.seek(share);
+}
+
+void Session::start_recording(const std::string& folder) {
+  const std::lock_guard lock(control_);
+  if (is_recording())
+    throw Error(folder, "a recording is on already", "stop it before another is begun");
+  open_recorder(folder, hands_.front()->cycle().statistics().ticks > 0);
+}
+
+void Session::stop_recording() {
+  const std::lock_guard lock(control_);
+  end_recording();
 }
 
 void Session::reset_faults() noexcept {
-  impl_->reset_faults();
+  for (const auto& hand : hands_) hand->cycle().reset_faults();
+}
+
+MouseDevice* Session::mouse() const {
+  for (const auto& hand : hands_) {
+    if (hand->mouse() != nullptr) return hand->mouse();
+  }
+  return nullptr;
+}
+
+void Session::refuse_if_stopped() const {
+  if (stopped_)
+    throw Error("session", "it has been stopped and cannot go on", "make another session");
+}
+
+// With control_ held: a recorder whose disk hangs. Its threads use nothing of the session.
+void Session::leave_behind(std::unique_ptr<Recorder> recorder) {
+  const Recorder::Status status = recorder->status();
+  const std::uint64_t ticks = status.ticks + status.ticks_waiting;
+  recording_.failed = true;
+  recording_.message = status.folder.string() +
+                       ": the disk hangs: " + std::to_string(ticks - status.committed_ticks) +
+                       " of " + std::to_string(ticks) + " ticks and " +
+                       std::to_string(status.frames_waiting) +
+                       " frames are not written; what was written before can be read";
+  std::thread([left = std::move(recorder)]() mutable { left.reset(); }).detach();
+}
+
+// What is left to the cameras' kind is that of those that are open.
+ServoSettings Session::for_cameras(ServoSettings settings) const {
+  settings.parameters = for_sensors(settings.parameters, sensors_);
+  return settings;
+}
+
+void Session::open_hands(const Cloud& seen) {
+  std::vector<HandSpec>& hands = options_.hands;
+  hands.resize(std::max({hands.size(), options_.open_devices.size(), std::size_t{1}}));
+  options_.open_devices.resize(hands.size());
+  if (hands.size() > most_hands)
+    throw Error("hands", std::to_string(hands.size()) + " are too many",
+                "give at most " + std::to_string(most_hands));
+  const bool alone = hands.size() == 1;
+  for (std::size_t i = 0; i < hands.size(); ++i) {
+    HandSpec& hand = hands[i];
+    if (hand.name.empty() && !alone) hand.name = "hand_" + std::to_string(i + 1);
+    if (!hand.name.empty()) check_name(hand.name, hands_);
+    if (hand.device.empty()) hand.device = "hand:";
+    validate(hand.placement);
+    std::unique_ptr<Device> device = std::move(options_.open_devices[i]);
+    if (!device) device = open_hand(options_, hand.device, seen);
+    std::function<void(const ServoTick&)> on_tick;
+    if (options_.on_tick) on_tick = [this, i](const ServoTick& tick) { options_.on_tick(i, tick); };
+    hands_.push_back(std::make_unique<SessionHand>(hand.name, std::move(device), hand.placement,
+                                                   std::move(on_tick)));
+  }
+  const auto mice = std::count_if(hands_.begin(), hands_.end(),
+                                  [](const auto& hand) { return hand->mouse() != nullptr; });
+  if (mice > 1)
+    throw Error("mouse:", "two hands cannot be moved by one mouse", "give it to one of them");
+  if (alone) return;
+  for (const auto& hand : hands_) hand->prepare_link();
+}
+
+SessionHandState Session::report(const SessionHand& hand) {
+  SessionHandState state{.name = hand.name(), .placement = {}, .device = {}, .summary = {}};
+  if (hand.loop() != nullptr) state.device = hand.loop()->device_status();
+  const CycleStatistics& statistics = hand.cycle().statistics();
+  for (std::size_t i = 0; i < safety_flag_count; ++i)
+    state.interventions[i] = statistics.interventions[i].load();
+  state.latched_by = statistics.latched_by.load();
+  state.summary = hand.summary();
+  return state;
+}
+
+std::shared_ptr<const Cloud> Session::open_camera(CameraSpec& camera,
+                                                  std::unique_ptr<Source> source) {
+  std::function<std::unique_ptr<Source>()> open;
+  if (source) {
+    if (camera.uri.empty()) camera.uri = source->info().uri;
+    if (camera.world_from_camera) source = with_pose(std::move(source), *camera.world_from_camera);
+  } else {
+    open = opener(camera, options_.sources);
+    source = open();
+  }
+  sensors_.push_back(source->info().sensor);
+  const SourceInfo& known = source->info();
+  const double length = known.frames
+                            ? static_cast<double>(*known.frames) / known.frame_rate.value_or(30.0)
+                            : std::numeric_limits<double>::infinity();  // [s]
+  // A hand that strokes is out of the surface before the recording begins again.
+  if (length >= shortest_loop) options_.stroke_time = std::min(options_.stroke_time, length);
+  if (!is_live()) {
+    played_.emplace_back(std::move(source), std::move(open));
+    return played_.back().first_frame().cloud;
+  }
+  feeds_.push_back(std::make_unique<CameraFeed>(
+      std::move(source), FeedOptions{.schemes = options_.sources}, std::move(open)));
+  if (length < shortest_loop) feeds_.back()->set_playback({.loop = false});
+  const std::optional<Frame> first = feeds_.back()->first_frame(first_frame_timeout);
+  if (!first)
+    throw Error(camera.uri, "it has delivered no frame in " + seconds_text(first_frame_timeout),
+                "check the camera, its cable and its permissions");
+  return first->cloud;
+}
+
+std::shared_ptr<Method> Session::open_method(
+    const ServoSettings& settings, const std::vector<std::shared_ptr<const Cloud>>& seen) const {
+  std::shared_ptr<Method> method =
+      make_method(settings.method, settings.parameters, options_.methods, settings.tool);
+  for (const auto& cloud : seen) {
+    if (cloud) method->check(*cloud);
+  }
+  return method;
+}
+
+// A hand's settings, where the session's are these, which have the first one's placement.
+ServoSettings Session::settings_of(const SessionHand& hand, ServoSettings settings) const {
+  if (&hand != hands_.front().get()) settings.placement = hand.placement;
+  return settings;
+}
+
+// With control_ held: what a hand's cycle was told.
+void Session::note(SessionHand& hand, const ServoCommands& told) {
+  if (hand.recorder) hand.recorder->commands(told, now());
+}
+
+// With control_ held: all hands; throws before any of them is told.
+// @param new_methods  the settings for which methods are made anew; null: the old ones go on
+void Session::tell(const std::function<void(SessionHand&, ServoCommands&)>& edit,
+                   const ServoSettings* new_methods) {
+  std::vector<std::shared_ptr<Method>> methods(hands_.size());
+  if (new_methods != nullptr) {
+    const auto seen = newest_clouds();
+    for (auto& method : methods) method = open_method(*new_methods, seen);
+  }
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    SessionHand& hand = *hands_[i];
+    note(hand, hand.cycle().command([&](ServoCommands& told) { edit(hand, told); },
+                                    std::move(methods[i])));
+  }
+}
+
+// What is seen jumps. Before the frame after the jump the hands are disengaged; after it methods
+// take over that remember nothing of before, on the free side of what is seen now.
+void Session::change_scene(bool methods_begin_anew) {
+  const std::lock_guard lock(control_);
+  tell([](SessionHand& /*hand*/, ServoCommands& told) { ++told.scene; },
+       methods_begin_anew ? &settings_ : nullptr);
+}
+
+// A camera's thread, or the free-running one: a frame to all who want it.
+void Session::take(std::size_t camera, const FedFrame& fed) {
+  if (fed.after_jump) change_scene(false);
+  give(camera, fed);
+  if (fed.after_jump) change_scene(true);
+  if (options_.on_frame) options_.on_frame(camera, fed);
+}
+
+// What the session's options say that a frame is made of.
+std::shared_ptr<const Cloud> Session::with_materials(std::shared_ptr<const Cloud> cloud,
+                                                     std::size_t camera) {
+  const DepthImage* image = cloud->image();
+  if (!options_.materials || image == nullptr) return cloud;
+  std::string trouble;
+  try {
+    std::shared_ptr<const MaterialMap> map = options_.materials(camera, *image);
+    const auto* labels = dynamic_cast<const LabelImage*>(map.get());
+    if (labels != nullptr && labels->size() != image->depth().size()) {
+      trouble = "it is given materials for " + std::to_string(labels->size()) + " pixels and has " +
+                std::to_string(image->depth().size());
+    } else if (map) {
+      auto made = std::make_shared<DepthImage>(*image);
+      made->set_materials(std::move(map));
+      cloud = std::move(made);
+    }
+  } catch (const std::exception& error) {
+    trouble = std::string("its materials could not be assigned: ") + error.what();
+  }
+  const std::lock_guard lock(frames_mutex_);
+  materials_trouble_[camera] = std::move(trouble);
+  return cloud;
+}
+
+// Tells where the first hand is [m, world]; of one thread.
+std::function<std::optional<Vec3>()> Session::hand_place() const {
+  return [reader = hands_.front()->cycle().reader(), place = std::optional<Vec3>()]() mutable {
+    for (ServoTick record{}; reader.try_pop(record);) place = record.tick.hip;
+    return place;
+  };
+}
+
+// To the method and the recorder.
+void Session::give(std::size_t camera, const FedFrame& fed) {
+  std::shared_ptr<const Cloud> painted = paint_.on(with_materials(fed.frame.cloud, camera), camera);
+  const std::lock_guard lock(frames_mutex_);
+  stamps_[camera].stamp = fed.frame.stamp;
+  std::vector<CameraFrame> cameras = stamps_;
+  std::swap(cameras.front(), cameras[camera]);
+  // Each hand counts the same frames, so a frame has the same number for all.
+  for (const auto& hand : hands_) {
+    numbers_[camera] = hand->cycle().put_frame(painted, fed.frame.stamp, cameras, now());
+    if (hand->recorder) hand->recorder->frame(numbers_[camera], fed.frame.stamp, camera, painted);
+  }
+  newest_[camera] = std::move(painted);
+  ++frames_;
+}
+
+void Session::run_free(std::optional<double> duration,
+                       const std::function<void(const ServoTick&)>& on_tick) {
+  begin_free();
+  const auto ticks = static_cast<std::int64_t>(duration.value_or(1e9) * options_.rate);
+  TickRing<ServoTick>::Reader reader = hands_.front()->cycle().reader();
+  for (std::int64_t i = 0; i < ticks && !stop_requested_.load(std::memory_order_relaxed); ++i) {
+    run_tick(i);
+    if (ServoTick record{}; on_tick && reader.try_pop(record)) on_tick(record);
+    drain();
+    if (i % ticks_between_flushes == 0) wait_for_recorder();
+  }
+}
+
+void Session::begin_free() {
+  for (const auto& hand : hands_) hand->device().enable();
+  free_hand_ = hand_place();
+  started_ = true;
+}
+
+void Session::run_tick(std::int64_t number) {
+  const double t = static_cast<double>(number) / options_.rate;
+  free_t_ = t;
+  const std::optional<Vec3> place = free_hand_();
+  for (std::size_t camera = 0; camera < played_.size(); ++camera) {
+    if (place) played_[camera].follow(*place);
+    while (const auto frame = played_[camera].next_until(t)) take(camera, *frame);
+  }
+  for (const auto& hand : hands_) hand->run_at(t);
+}
+
+// The clock waits for the disk here, as it runs faster than time: recorders have no threads then.
+void Session::wait_for_recorder() {
+  const std::lock_guard lock(control_);
+  for (const auto& hand : hands_) {
+    if (hand->recorder) hand->recorder->flush();
+  }
+}
+
+void Session::keep_house() {
+  std::unique_lock lock(house_mutex_);
+  while (!house_wakes_.wait_for(lock, housekeeping_interval, [this] { return house_ends_; })) {
+    lock.unlock();
+    drain();
+    lock.lock();
+  }
+}
+
+void Session::drain() {
+  const double r_c = proxy_radius_.load(std::memory_order_relaxed);
+  const auto seen = newest_clouds();
+  for (const auto& hand : hands_) hand->count(seen, r_c);
+}
+
+// With control_ held, or before anything runs. The first hand's recording holds the frames; those
+// of the others lie in folders within it.
+void Session::open_recorder(const std::string& folder, bool is_on) {
+  struct Opened {
+    std::unique_ptr<Recorder> recorder;
+    std::shared_ptr<std::promise<Recorder*>> promise = std::make_shared<std::promise<Recorder*>>();
+  };
+  std::vector<Opened> opened(hands_.size());
+  for (std::size_t i = 0; i < hands_.size(); ++i) {
+    SessionHand& hand = *hands_[i];
+    std::function<void()> begin_anew;
+    if (is_on) {
+      // On the recorder's thread, once: the recording begins with a method that remembers
+      // nothing.
+      begin_anew = [this, &hand, promise = opened[i].promise, settings = settings_] {
+        Recorder* recorder = promise->get_future().get();
+        if (recorder != nullptr)
+          recorder->commands(
+              hand.cycle().command([](ServoCommands&) {}, open_method(settings, newest_clouds())),
+              now());
+      };
+    }
+    try {
+      opened[i].recorder = std::make_unique<Recorder>(
+          i == 0 ? folder : hand_folder(folder, hand.name()).string(), info_of(hand),
+          hand.cycle().full_reader(), std::move(begin_anew),
+          RecorderOptions{.with_frames = i == 0, .own_threads = is_live()});
+    } catch (...) {
+      for (Opened& each : opened) each.promise->set_value(nullptr);
+      throw;
+    }
+    opened[i].recorder->commands(hand.cycle().commands(), now());
+  }
+  {
+    const std::lock_guard lock(frames_mutex_);
+    for (std::size_t i = 0; i < hands_.size(); ++i) {
+      // The first tick of the recording uses these frames, or some that are yet to come.
+      std::map<std::uint64_t, std::size_t> cameras;  // by the number of their newest frame
+      for (std::size_t camera = 0; camera < newest_.size(); ++camera)
+        if (newest_[camera]) cameras[numbers_[camera]] = camera;
+      for (const auto& [number, camera] : cameras)
+        opened[i].recorder->frame(number, stamps_[camera].stamp, camera, newest_[camera]);
+      hands_[i]->recorder = std::move(opened[i].recorder);
+    }
+  }
+  for (std::size_t i = 0; i < hands_.size(); ++i)
+    opened[i].promise->set_value(hands_[i]->recorder.get());
+  recording_ = RecordingState();
+  recording_.folder = folder;
+  recording_since_ = now();
+}
+
+SessionInfo Session::info_of(const SessionHand& hand) const {
+  using std::chrono::nanoseconds;
+  using std::chrono::system_clock;
+  SessionInfo info{.version = options_.version};
+  for (const CameraSpec& camera : options_.cameras) info.cameras.push_back(camera.uri);
+  info.device = hand.device().info().uri;
+  info.limits = hand.device().info().limits;
+  info.epoch =
+      std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count() -
+      std::llround(1e9 * now());
+  info.hand = hand.name();
+  if (&hand == hands_.front().get()) {
+    for (std::size_t i = 1; i < hands_.size(); ++i) info.more_hands.push_back(hands_[i]->name());
+  }
+  return info;
+}
+
+// With control_ held. Closing takes as long as the disk does, and nobody waits for that.
+void Session::end_recording() {
+  if (!is_recording()) return;
+  Recording recording;
+  {
+    const std::lock_guard lock(frames_mutex_);
+    for (const auto& hand : hands_) recording.push_back(std::move(hand->recorder));
+  }
+  for (const auto& recorder : recording) recorder->request_stop();
+  recording_.folder = recording.front()->status().folder.string();
+  recording_.message = recording_.folder + ": closing";
+  recording_.seconds = now() - recording_since_;
+  closing_.push_back(std::move(recording));
+}
+
+// With control_ held: how the recordings ended that are closed by now.
+void Session::report_closed() {
+  std::erase_if(closing_, [this](const Recording& recording) {
+    std::vector<Recorder::Status> parts;
+    for (const auto& recorder : recording) parts.push_back(recorder->status());
+    if (!std::all_of(parts.begin(), parts.end(), [](const auto& part) { return part.done; }))
+      return false;
+    if (!parts.empty()) report_closed(parts);
+    return true;
+  });
+}
+
+// What went wrong with any part of a recording comes before what went well.
+void Session::report_closed(const std::vector<Recorder::Status>& parts) {
+  const auto counts = [](std::uint64_t ticks, std::uint64_t frames) {
+    return std::to_string(ticks) + " ticks, " + std::to_string(frames) + " frames";
+  };
+  recording_.bytes = 0.0;
+  for (const Recorder::Status& part : parts) recording_.bytes += static_cast<double>(part.bytes);
+  for (const Recorder::Status& part : parts) {
+    if (part.trouble.empty()) continue;
+    recording_.failed = true;
+    recording_.message = "the recording has stopped: " + part.trouble;
+    return;
+  }
+  std::string text;
+  for (const Recorder::Status& part : parts) {
+    if (part.lost_ticks + part.lost_frames > 0) {
+      recording_.failed = true;
+      recording_.message = part.folder.string() + ": the machine was too slow for " +
+                           counts(part.lost_ticks, part.lost_frames);
+      return;
+    }
+    text += text.empty() ? part.folder.string() + ": " + counts(part.ticks, part.frames)
+                         : "; " + part.folder.filename().string() + ": " +
+                               std::to_string(part.ticks) + " ticks";
+  }
+  std::array<char, 32> seconds{};
+  std::snprintf(seconds.data(), seconds.size(), "; %.1f s, ", recording_.seconds);
+  recording_.message = text + seconds.data() + size_text(recording_.bytes);
 }
 
 std::string size_text(double bytes) {
@@ -916,41 +791,13 @@ std::string size_text(double bytes) {
   return text.data();
 }
 
-void Session::start_recording(const std::string& folder) {
-  impl_->start_recording(folder);
-}
-
-void Session::stop_recording() {
-  impl_->stop_recording();
-}
-
-Paint& Session::paint() {
-  return impl_->paint();
-}
-
-const Device& Session::device(std::size_t hand) const {
-  return impl_->hand(hand).device();
-}
-
-MouseDevice* Session::mouse() const {
-  return impl_->mouse();
-}
-
-const MethodRegistry& Session::methods() const {
-  return impl_->methods();
-}
-
-const CycleStatistics& Session::statistics(std::size_t hand) const {
-  return impl_->hand(hand).cycle().statistics();
-}
-
 const Timing* Session::timing(std::size_t hand) const {
-  const ServoLoop* loop = impl_->hand(hand).loop();
+  const ServoLoop* loop = hands_.at(hand)->loop();
   return loop == nullptr ? nullptr : &loop->timing();
 }
 
 const RealtimeReport* Session::realtime(std::size_t hand) const {
-  const ServoLoop* loop = impl_->hand(hand).loop();
+  const ServoLoop* loop = hands_.at(hand)->loop();
   return loop == nullptr ? nullptr : &loop->realtime();
 }
 

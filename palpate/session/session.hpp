@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "palpate/drivers/drivers.hpp"
@@ -17,6 +21,7 @@
 #include "palpate/servo/servo_loop.hpp"
 #include "palpate/session/camera_feed.hpp"
 #include "palpate/session/paint.hpp"
+#include "palpate/session/session_hand.hpp"
 #include "palpate/session/session_spec.hpp"
 #include "palpate/session/summary.hpp"
 
@@ -149,11 +154,15 @@ class Session {
   /// Makes `run` return soon. Any thread, and a signal handler.
   void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
 
-  [[nodiscard]] std::size_t hands() const;
+  [[nodiscard]] std::size_t hands() const { return hands_.size(); }
   /// Empty for a first hand that is alone; hand_1 if it is not.
-  [[nodiscard]] const std::string& hand_name(std::size_t hand) const;
+  [[nodiscard]] const std::string& hand_name(std::size_t hand) const {
+    return hands_.at(hand)->name();
+  }
   /// Sees every tick from the next one on; must not outlive the session.
-  [[nodiscard]] TickRing<ServoTick>::Reader ticks(std::size_t hand = 0) const;
+  [[nodiscard]] TickRing<ServoTick>::Reader ticks(std::size_t hand = 0) const {
+    return hands_.at(hand)->cycle().reader();
+  }
   /// What each camera saw last; null before its first frame.
   [[nodiscard]] std::vector<std::shared_ptr<const Cloud>> newest_clouds() const;
   /// Counts what has happened so far; looks at no more than the last second of ticks.
@@ -164,7 +173,9 @@ class Session {
   /// @throws Error, leaving everything as it was, if something does not validate, there is no such
   ///         method, it cannot touch what the cameras see, the force limit needs a watchdog, or a
   ///         fixture is of a material that no camera knows.
-  void set(const ServoSettings& settings);
+  void set(const ServoSettings& settings) {
+    change([&](ServoSettings& now) { now = settings; });
+  }
   /// As `set`, for what others may change meanwhile: `edit` gets the settings as they are, and
   /// nobody else's change comes between that and what it makes of them. It must not use the
   /// session.
@@ -192,20 +203,91 @@ class Session {
   void stop_recording();
 
   /// What is painted on the cameras' frames; see Paint.
-  [[nodiscard]] Paint& paint();
+  [[nodiscard]] Paint& paint() { return paint_; }
 
-  [[nodiscard]] const Device& device(std::size_t hand = 0) const;
+  [[nodiscard]] const Device& device(std::size_t hand = 0) const {
+    return hands_.at(hand)->device();
+  }
   /// The device that a page moves; null if there is none.
   [[nodiscard]] MouseDevice* mouse() const;
-  [[nodiscard]] const MethodRegistry& methods() const;
-  [[nodiscard]] const CycleStatistics& statistics(std::size_t hand = 0) const;
+  [[nodiscard]] const MethodRegistry& methods() const { return options_.methods; }
+  [[nodiscard]] const CycleStatistics& statistics(std::size_t hand = 0) const {
+    return hands_.at(hand)->cycle().statistics();
+  }
   /// Real time: of the hand's loop. Free-running: null.
   [[nodiscard]] const Timing* timing(std::size_t hand = 0) const;
   [[nodiscard]] const RealtimeReport* realtime(std::size_t hand = 0) const;
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  using Recording = std::vector<std::unique_ptr<Recorder>>;
+
+  void stop_loops() noexcept;
+  [[nodiscard]] bool is_live() const { return options_.pace == Pace::real_time; }
+  [[nodiscard]] bool needs_watchdog() const { return is_live() && !options_.without_watchdog; }
+  void refuse_if_stopped() const;
+  void leave_behind(std::unique_ptr<Recorder> recorder);
+  [[nodiscard]] ServoSettings for_cameras(ServoSettings settings) const;
+  [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }
+  void open_hands(const Cloud& seen);
+  [[nodiscard]] static SessionHandState report(const SessionHand& hand);
+  std::shared_ptr<const Cloud> open_camera(CameraSpec& camera, std::unique_ptr<Source> source);
+  [[nodiscard]] std::shared_ptr<Method> open_method(
+      const ServoSettings& settings, const std::vector<std::shared_ptr<const Cloud>>& seen) const;
+  [[nodiscard]] ServoSettings settings_of(const SessionHand& hand, ServoSettings settings) const;
+  void note(SessionHand& hand, const ServoCommands& told);
+  void tell(const std::function<void(SessionHand&, ServoCommands&)>& edit,
+            const ServoSettings* new_methods = nullptr);
+  void change_scene(bool methods_begin_anew);
+  void take(std::size_t camera, const FedFrame& fed);
+  std::shared_ptr<const Cloud> with_materials(std::shared_ptr<const Cloud> cloud,
+                                              std::size_t camera);
+  [[nodiscard]] std::function<std::optional<Vec3>()> hand_place() const;
+  void give(std::size_t camera, const FedFrame& fed);
+  void run_free(std::optional<double> duration,
+                const std::function<void(const ServoTick&)>& on_tick);
+  void begin_free();
+  void run_tick(std::int64_t number);
+  void wait_for_recorder();
+  void keep_house();
+  void drain();
+  [[nodiscard]] bool is_recording() const { return hands_.front()->recorder != nullptr; }
+  void open_recorder(const std::string& folder, bool is_on);
+  [[nodiscard]] SessionInfo info_of(const SessionHand& hand) const;
+  void end_recording();
+  void report_closed();
+  void report_closed(const std::vector<Recorder::Status>& parts);
+
+  SessionOptions options_;
+  Paint paint_;
+  std::vector<SensorKind> sensors_;                 // of the cameras
+  std::vector<std::unique_ptr<CameraFeed>> feeds_;  // in real time
+  std::vector<Player> played_;                      // free-running
+  // As many from the first thread on. Recorders are set and reset with control_ and frames_mutex_
+  // held, and used with either.
+  std::vector<std::unique_ptr<SessionHand>> hands_;
+  std::atomic<double> free_t_{0.0};  // [s]
+  std::function<std::optional<Vec3>()> free_hand_;
+  std::int64_t next_tick_ = 0;  // of `advance`
+  std::atomic<bool> started_{false};
+  std::atomic<bool> stopped_{false};
+  mutable std::mutex frames_mutex_;  // taken by the cameras' threads; never held for long
+  std::vector<std::shared_ptr<const Cloud>> newest_;  // guarded by frames_mutex_
+  std::vector<CameraFrame> stamps_;                   // of these; guarded by frames_mutex_
+  std::array<std::string, Patch::max_views> materials_trouble_;  // guarded by frames_mutex_
+  std::vector<std::uint64_t> numbers_;                           // guarded by frames_mutex_
+  std::size_t frames_ = 0;                                       // guarded by frames_mutex_
+  mutable std::mutex control_;  // settings and recordings; taken before frames_mutex_
+  ServoSettings settings_;      // guarded by control_; the placement is the first hand's
+  bool held_ = false;           // guarded by control_
+  RecordingState recording_;    // guarded by control_
+  double recording_since_ = 0;  // [s] on the session's clock; guarded by control_
+  // Of each hand, the first hand's first.
+  std::vector<Recording> closing_;  // guarded by control_
+  std::atomic<double> proxy_radius_{ProxyParameters{}.r_c()};
+  std::thread housekeeper_;
+  std::mutex house_mutex_;
+  std::condition_variable house_wakes_;
+  bool house_ends_ = false;  // guarded by house_mutex_
   std::atomic<bool> stop_requested_{false};
 };
 

@@ -363,7 +363,7 @@ void Cycle::run(const Wake& wake) noexcept {
                           : Vec3(placement.world_from_device.linear() * sent.wrench.torque);
   std::uint32_t flags = safe.flags;
   if ((sent.verdict & palpate_gate_refused) != 0) flags |= output_refused;
-  if (force != safe.force) add(statistics_.gate_cuts, 1);
+  if (force != safe.force || torque != safe.torque) add(statistics_.gate_cuts, 1);
   const ServoEnergy& energy =
       passivity_.run({.t = t,
                       .handle = placement.world_from_device.linear() * hand.position,

@@ -4,9 +4,16 @@
 #ifdef __FRAMAC__ /* whatever a square root gives: no proof relies on it */
 /*@ assigns \nothing; */
 double sqrt(double x);
+/*@ assigns \nothing; ensures \result == (x < 0 ? -x : x); */
+double fabs(double x);
+#define INLINE static
 #else
 #include <math.h>
+/* Structs by value are the easiest to prove; inlined, they are not copied: half of a tick's time.
+ */
+#define INLINE static inline __attribute__((always_inline))
 #endif
+#define SELDOM(condition) __builtin_expect(condition, 0)
 
 typedef struct palpate_gate_vector Vector;
 typedef struct palpate_gate_bounds Bounds;
@@ -74,79 +81,83 @@ typedef struct {
 */
 
 /*@ assigns \nothing; ensures \result == greater_of(a, b); */
-static double greater(double a, double b) {
+INLINE double greater(double a, double b) {
   return a > b ? a : b;
 }
 /*@ assigns \nothing; ensures \result == lesser_of(a, b); */
-static double lesser(double a, double b) {
+INLINE double lesser(double a, double b) {
   return a < b ? a : b;
 }
 /*@ assigns \nothing; ensures \result <==> low <= x <= high; */
-static int between(double x, double low, double high) {
+INLINE int between(double x, double low, double high) {
   return x >= low && x <= high;
 }
 
 /*@ assigns \nothing; ensures \result <==> sound(v); */
-static int is_sound(Vector v) {
-  return between(v.x, -LARGEST, LARGEST) && between(v.y, -LARGEST, LARGEST) &&
-         between(v.z, -LARGEST, LARGEST);
+INLINE int is_sound(Vector v) {
+  return fabs(v.x) <= LARGEST && fabs(v.y) <= LARGEST && fabs(v.z) <= LARGEST;
+}
+
+/*@ assigns \nothing; ensures \result <==> zero(v); */
+INLINE int is_nothing(Vector v) {
+  return v.x == 0.0 && v.y == 0.0 && v.z == 0.0;
 }
 
 /*@ assigns \nothing; ensures \result == a.x * b.x + a.y * b.y + a.z * b.z; */
-static double dot(Vector a, Vector b) {
+INLINE double dot(Vector a, Vector b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 
 /*@ assigns \nothing; ensures \result <==> no_longer(v, bound); */
-static int is_within(Vector v, double bound) {
+INLINE int is_within(Vector v, double bound) {
   return is_sound(v) && dot(v, v) <= bound * bound;
 }
 
 /*@ assigns \nothing; ensures \result == widened(bound); */
-static double widen(double bound) {
+INLINE double widen(double bound) {
   return bound > 0.0 ? bound * WIDEN + GRAIN : 0.0;
 }
 
 /*@ assigns \nothing;
     ensures \result.x == k * v.x && \result.y == k * v.y && \result.z == k * v.z; */
-static Vector scaled(double k, Vector v) {
+INLINE Vector scaled(double k, Vector v) {
   const Vector result = {k * v.x, k * v.y, k * v.z};
   return result;
 }
 
 /*@ requires good_bounds(b) && good_tick(t);
     assigns \nothing; ensures 0 <= \result == fall_step(b, t); */
-static double step_of(Bounds b, Tick t) {
+INLINE double step_of(Bounds b, Tick t) {
   return greater(greater(b.fall, b.limit * CLOSE_RATE) * t.fall_time, 0.0);
 }
 
 /*@ requires good_channel(c) && good_bounds(b) && good_tick(t);
     assigns \nothing; ensures 0 <= \result <= LARGEST_LIMIT && \result == new_ceiling(c, b, t); */
-static double ceiling_of(Channel c, Bounds b, Tick t) {
+INLINE double ceiling_of(Channel c, Bounds b, Tick t) {
   return greater(b.limit, c.ceiling - step_of(b, t));
 }
 
 /*@ requires good_channel(c) && good_bounds(b) && good_tick(t);
     assigns \nothing; ensures 0 <= \result <= LARGEST_REST && \result == new_rest(c, b, t); */
-static double rest_of(Channel c, Bounds b, Tick t) {
+INLINE double rest_of(Channel c, Bounds b, Tick t) {
   return greater(0.0, (t.share > 0.0 ? c.rest : c.size + c.ring) - step_of(b, t));
 }
 
 /*@ requires good_channel(c) && good_bounds(b) && good_tick(t);
     assigns \nothing; ensures \result == top(c, b, t); */
-static double top_of(Channel c, Bounds b, Tick t) {
+INLINE double top_of(Channel c, Bounds b, Tick t) {
   const double ceiling = ceiling_of(c, b, t);
   return lesser(ceiling, t.share * ceiling + rest_of(c, b, t) + t.ring);
 }
 
 /*@ assigns \nothing; ensures \result == turn(c, b, t); */
-static double turn_of(Channel c, Bounds b, Tick t) {
+INLINE double turn_of(Channel c, Bounds b, Tick t) {
   return b.rise * t.add_time + c.ring + t.ring;
 }
 
 /* Square of v - kept * last. */
 /*@ assigns \nothing; ensures \result == turn_square(v, kept, last); */
-static double changed_by(Vector v, double kept, Vector last) {
+INLINE double changed_by(Vector v, double kept, Vector last) {
   const double x = v.x - kept * last.x;
   const double y = v.y - kept * last.y;
   const double z = v.z - kept * last.z;
@@ -158,14 +169,19 @@ typedef struct {
   double k, kept;
 } Guess;
 /*@ assigns \nothing; */
-static double kept_at(double k, double along, double before) {
-  return along > 0.0 ? lesser(k * along / before, 1.0) : 0.0;
+INLINE double kept_at(double k, double along, double before) {
+  return !(along > 0.0) ? 0.0 : k * along >= before ? 1.0 : k * along / before;
+}
+/* Of a wish along the last force, times that one's length. */
+/*@ assigns \nothing; */
+INLINE double along_of(Vector last, Vector wish) {
+  return dot(last, last) > 0.0 ? greater(dot(wish, last), 0.0) : 0.0;
 }
 /*@ assigns \nothing; */
-static Guess guess(Channel c, int late, double top, double turn, Vector wish) {
+INLINE Guess guess(Channel c, int late, double top, double turn, Vector wish) {
   const double square = dot(wish, wish);
   const double before = dot(c.last, c.last);
-  const double along = before > 0.0 ? greater(dot(wish, c.last), 0.0) : 0.0;
+  const double along = along_of(c.last, wish);
   double k = 1.0;
   if (!is_within(wish, widen(top))) k = SHRINK * top / sqrt(square);
   if (late && !(square <= before)) k = lesser(k, SHRINK * c.size / sqrt(square));
@@ -184,7 +200,7 @@ static Guess guess(Channel c, int late, double top, double turn, Vector wish) {
     ensures limited: \result != 0 ==> no_longer(v, widened(top)) && 0 <= kept <= 1;
     ensures added: \result != 0 ==> turned(v, kept, last, widened(turn));
     ensures late: \result != 0 && late != 0 ==> square(v) <= square(last); */
-static int is_allowed(Vector v, double kept, Vector last, int late, double top, double turn) {
+INLINE int is_allowed(Vector v, double kept, Vector last, int late, double top, double turn) {
   return is_within(v, widen(top)) && between(kept, 0.0, 1.0) &&
          changed_by(v, kept, last) <= widen(turn) * widen(turn) &&
          (!late || dot(v, v) <= dot(last, last));
@@ -192,7 +208,7 @@ static int is_allowed(Vector v, double kept, Vector last, int late, double top, 
 
 /*@ requires 0 <= most <= 2 * LARGEST_LIMIT; assigns \nothing;
     ensures 0 <= \result <= most && \result * \result <= square(v) * ROUNDED; */
-static double size_of(Vector v, double most) {
+INLINE double size_of(Vector v, double most) {
   const double size = lesser(sqrt(dot(v, v)), most);
   return between(size, 0.0, most) && size * size <= dot(v, v) * ROUNDED ? size : 0.0;
 }
@@ -211,26 +227,32 @@ static double size_of(Vector v, double most) {
     ensures late: t.late != 0 ==> square(\result.last) <= square(c.last) && \result.size <= c.size;
     ensures ceiling: \result.ceiling == new_ceiling(c, b, t) && \result.ring == t.ring &&
       \result.rest == new_rest(c, b, t); */
-static Channel passed(Channel c, Bounds b, Tick t, Vector wish) {
+INLINE Channel passed(Channel c, Bounds b, Tick t, Vector wish) {
+  Channel next = {wish, 0.0, t.ring, rest_of(c, b, t), ceiling_of(c, b, t), 0.0, 0};
+  if (is_nothing(wish)) {
+    /*@ assert square(next.last) == 0; */
+    return next;
+  }
   const double top = top_of(c, b, t);
   const double turn = turn_of(c, b, t);
-  const Guess g = guess(c, t.late, top, turn, wish);
-  Channel next = {wish, 0.0, t.ring, rest_of(c, b, t), ceiling_of(c, b, t), g.kept, 0};
-  if (!(g.k >= 1.0)) {
+  next.kept = kept_at(1.0, along_of(c.last, wish), dot(c.last, c.last));
+  if (!is_allowed(wish, next.kept, c.last, t.late, top, turn)) {
+    const Guess g = guess(c, t.late, top, turn, wish);
     next.last = scaled(g.k, wish);
+    next.kept = g.kept;
     next.verdict = palpate_gate_cut;
-  }
-  if (!is_allowed(next.last, next.kept, c.last, t.late, top, turn)) {
-    next.last = nothing;
-    next.kept = 0.0;
-    next.verdict = palpate_gate_refused;
+    if (!is_allowed(next.last, next.kept, c.last, t.late, top, turn)) {
+      next.last = nothing;
+      next.kept = 0.0;
+      next.verdict = palpate_gate_refused;
+    }
   }
   next.size = size_of(next.last, t.late ? c.size : 2.0 * LARGEST_LIMIT);
   return next;
 }
 
 /*@ assigns \nothing; ensures \result <==> good_bounds(b); */
-static int is_good(Bounds b) {
+INLINE int is_good(Bounds b) {
   return between(b.limit, 0.0, LARGEST_LIMIT) && between(b.rise, 0.0, LARGEST) &&
          between(b.fall, 0.0, LARGEST);
 }
@@ -246,21 +268,21 @@ static int is_good(Bounds b) {
     logic real held_bound(real share) = widened(share * MOST_HELD); */
 
 /*@ assigns \nothing; ensures \result <==> good_wish(w); */
-static int is_good_wish(Wish w) {
+INLINE int is_good_wish(Wish w) {
   return is_sound(w.force) && is_sound(w.torque) && is_sound(w.held) && is_good(w.force_bounds) &&
          is_good(w.torque_bounds) && between(w.ramp_time, 1e-3, 1000.0) &&
          between(w.longest_gap, 1e-3, 1.0) && between(w.longest_time, 0.0, 0.1);
 }
 
 /*@ assigns \nothing; */
-static double share_within(double bound, Vector v) {
+INLINE double share_within(double bound, Vector v) {
   return SHRINK * bound / sqrt(dot(v, v));
 }
 
 /* What supports the handle's weight: nothing at once, and all of it only after HELD_TIME. */
 /*@ requires 0 <= share <= 1 && sound(wish);
     assigns \nothing; ensures no_longer(\result, held_bound(share)); */
-static Vector held_within(double share, Vector wish) {
+INLINE Vector held_within(double share, Vector wish) {
   const double most = share * MOST_HELD;
   if (is_within(wish, widen(most))) return wish;
   const Vector less = scaled(share_within(most, wish), wish);
@@ -268,19 +290,19 @@ static Vector held_within(double share, Vector wish) {
 }
 
 /*@ assigns \nothing; ensures \result <==> in_time(g, w); */
-static int is_in_time(struct palpate_gate g, Wish w) {
+INLINE int is_in_time(struct palpate_gate g, Wish w) {
   return g.started && between(w.t, -LARGEST_TIME, LARGEST_TIME) &&
          between(w.t - g.t, SHORTEST, w.longest_gap);
 }
 
 /*@ requires b > 0; assigns \nothing; ensures \result == a / b; */
-static double ratio(double a, double b) {
+INLINE double ratio(double a, double b) {
   return a / b;
 }
 
 /*@ requires 0 <= share <= 1 && 0 <= more; assigns \nothing;
     ensures 0 <= \result <= 1 && \result <= share + more; */
-static double raised(double share, double more) {
+INLINE double raised(double share, double more) {
   return lesser(1.0, greater(share + more, 0.0));
 }
 
@@ -290,12 +312,13 @@ static double raised(double share, double more) {
     ensures !open(w) ==> \result.share == 0 && \result.ring == 0;
     ensures 0 <= \result.add_time <= w.longest_time;
     ensures \result.late == 0 <==> w.frame_intervals <= w.late_intervals; */
-static Tick tick_of(struct palpate_gate g, Wish w) {
+INLINE Tick tick_of(struct palpate_gate g, Wish w) {
   const double since = w.t - g.t;
   const int is_open = w.engaged && w.hand && !w.latched && w.frame_age <= w.lost_age;
   const double add_time = lesser(since, w.longest_time);
-  const Tick tick = {is_open ? raised(g.share, ratio(add_time, w.ramp_time)) : 0.0, add_time,
-                     lesser(greater(since, TICK_MIN), TICK_MAX),
+  double share = 0.0;
+  if (is_open) share = g.share < 1.0 ? raised(g.share, ratio(add_time, w.ramp_time)) : 1.0;
+  const Tick tick = {share, add_time, lesser(greater(since, TICK_MIN), TICK_MAX),
                      is_open && w.ring > 0.0 ? lesser(w.ring, MOST_RING) : 0.0,
                      !(w.frame_intervals <= w.late_intervals)};
   return tick;
@@ -312,7 +335,7 @@ static Tick tick_of(struct palpate_gate g, Wish w) {
     ensures sum: zero(\result.held) && \result.sum == \result.force.last ||
       no_longer(\result.held, held_bound(\result.held_share)) &&
       no_longer(\result.sum, widened(\result.force.ceiling)); */
-static struct palpate_gate stepped(struct palpate_gate g, Wish w) {
+INLINE struct palpate_gate stepped(struct palpate_gate g, Wish w) {
   const int timed = between(w.t, -LARGEST_TIME, LARGEST_TIME);
   struct palpate_gate next = {{nothing, 0.0, 0.0, 0.0, 0.0, 0.0, palpate_gate_shut},
                               {nothing, 0.0, 0.0, 0.0, 0.0, 0.0, palpate_gate_shut},
@@ -322,21 +345,23 @@ static struct palpate_gate stepped(struct palpate_gate g, Wish w) {
                               0.0,
                               0.0,
                               timed || g.started};
-  if (!is_in_time(g, w) || !is_good_wish(w)) return next;
+  if (SELDOM(!is_in_time(g, w) || !is_good_wish(w))) return next;
 
   Tick tick = tick_of(g, w);
   next.share = tick.share;
-  next.held_share = w.may_hold ? raised(g.held_share, ratio(tick.add_time, HELD_TIME)) : 0.0;
+  if (w.may_hold) next.held_share = raised(g.held_share, ratio(tick.add_time, HELD_TIME));
   next.force = passed(g.force, w.force_bounds, tick, w.force);
   tick.ring = 0.0;
   next.torque = passed(g.torque, w.torque_bounds, tick, w.torque);
 
   const Vector force = next.force.last;
+  next.sum = force;
+  if (!w.may_hold) return next;
   const Vector held = held_within(next.held_share, w.held);
   const Vector sum = {force.x + held.x, force.y + held.y, force.z + held.z};
-  const int holds = w.may_hold && is_within(sum, widen(next.force.ceiling));
-  next.held = holds ? held : nothing;
-  next.sum = holds ? sum : force;
+  if (!is_within(sum, widen(next.force.ceiling))) return next;
+  next.held = held;
+  next.sum = sum;
   return next;
 }
 

@@ -181,7 +181,7 @@ void check_falling(void) {
 }
 
 /* One channel: what it sends is what is_allowed was asked about with the tick's own bounds and has
-   allowed, or nothing; and the state keeps its invariant. */
+   allowed, or nothing, as which a wish for nothing passes; and the state keeps its invariant. */
 void check_channel(void) {
   const Channel c = any_channel();
   const Bounds b = any_bounds();
@@ -193,12 +193,13 @@ void check_channel(void) {
   if (judged.result) {
     ASSERT(v.x == judged.v.x && v.y == judged.v.y && v.z == judged.v.z, "judged");
     ASSERT(next.kept == judged.kept, "kept");
+    ASSERT(judged.last.x == c.last.x && judged.last.y == c.last.y && judged.last.z == c.last.z,
+           "last");
+    ASSERT((judged.late != 0) == (t.late != 0), "judged_late");
   } else {
-    ASSERT(is_zero(v) && next.kept == 0.0 && next.verdict == palpate_gate_refused, "refused");
+    ASSERT(is_zero(v) && next.kept == 0.0, "nothing");
+    ASSERT(is_zero(wish) || next.verdict == palpate_gate_refused, "refused");
   }
-  ASSERT(judged.last.x == c.last.x && judged.last.y == c.last.y && judged.last.z == c.last.z,
-         "last");
-  ASSERT((judged.late != 0) == (t.late != 0), "judged_late");
   ASSERT(!t.late || next.size <= c.size, "late_size");
   ASSERT(next.ring == t.ring, "ring");
   ASSERT(is_good_channel(next), "invariant");

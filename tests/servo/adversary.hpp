@@ -15,7 +15,9 @@
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/methods/methods.hpp"
+#include "palpate/kernel/tool/shape_touch.hpp"
 #include "palpate/servo/cycle.hpp"
+#include "palpate/servo/linked_device.hpp"
 
 #include "tests/servo/fake_device.hpp"
 #include "tests/support/grids.hpp"
@@ -23,13 +25,15 @@
 namespace palpate::test {
 
 /// Everything that can go wrong around a cycle, at random and from a seed: hands that press, shake,
-/// jump and are no number; frames that move, flicker, are empty, come from another clock or not at
-/// all; a method that asks for nonsense now and then; ticks that stall, repeat and run backwards;
-/// settings and methods that change. After each cycle it holds
-/// what the device got against the promises of the safety chain, by its own book-keeping.
+/// jump and are no number; devices that fail; frames that move, flicker, are empty, come from
+/// another clock or not at all; a method or tool that asks for nonsense now and then; ticks that
+/// stall, repeat and run backwards; settings and methods that change; another hand. After each
+/// cycle it holds what the device got against the promises of the safety chain, by its own
+/// book-keeping.
 class Adversary {
  public:
-  explicit Adversary(std::uint64_t seed) : random_(seed), cycle_(spoiled("sight"), device_) {
+  explicit Adversary(std::uint64_t seed)
+      : random_(seed), cycle_(spoiled(make_method("sight")), link_) {
     auto rays = std::make_shared<const ViewingRays>(
         Intrinsics{.width = 80, .height = 60, .fx = 70, .fy = 70, .cx = 39.5, .cy = 29.5});
     Eigen::Isometry3d looking_down = Eigen::Isometry3d::Identity();
@@ -58,6 +62,15 @@ class Adversary {
     device_.hand.position = {0, 0, 0.02};
   }
 
+  /// As two hands of one session: neither may push while the other is in trouble. Before any step.
+  static void link(Adversary& one, Adversary& two) {
+    for (auto [hand, other] : {std::pair(&one, &two), std::pair(&two, &one)}) {
+      hand->other_ =
+          std::shared_ptr<const CycleStatistics>(std::shared_ptr<void>{}, &other->statistics());
+      hand->link_.link({hand->other_}, inf);
+    }
+  }
+
   /// Runs one more cycle; empty if every promise was kept, else what was broken and when.
   std::string step() {
     if (ticks_ % 2048 == 0) choose();
@@ -69,6 +82,7 @@ class Adversary {
     if (random_() % 20'000 == 0) switch_method();
     if (latched_ && one_in(500)) cycle_.reset_faults();
     const double given = one_in(50'000) ? nan : t_;
+    const bool alone = other_ == nullptr || !is_in_trouble(*other_, given, inf);
     cycle_.run({.t = given});
     ServoTick record{};
     if (!ticks_seen_.try_pop(record)) return "a tick that does not come out of the ring";
@@ -81,19 +95,22 @@ class Adversary {
     if (away.allFinite() && away.norm() < 1e3) clutched_away_ = away;
     const double since_last = given - last_given_;
     if (std::isfinite(given)) last_given_ = given;
-    return verdict(given, since_last);
+    return verdict(given, since_last, alone);
   }
 
   [[nodiscard]] std::uint64_t ticks() const { return ticks_; }
   [[nodiscard]] double strongest() const { return strongest_; }
+  [[nodiscard]] double strongest_torque() const { return strongest_torque_; }
   [[nodiscard]] std::uint64_t forceful_ticks() const { return forceful_ticks_; }
   [[nodiscard]] const CycleStatistics& statistics() const { return cycle_.statistics(); }
 
  private:
   static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   static constexpr double inf = std::numeric_limits<double>::infinity();
+  static constexpr double max_torque = 0.1;          // [N m]
+  static constexpr double lever = max_torque / 3.3;  // [m]
 
-  // A method, but one force in a thousand is wrong.
+  // A method, but one force in a thousand is wrong; with a torque like a tool's.
   class Spoiled final : public Method {
    public:
     Spoiled(std::unique_ptr<Method> method, std::uint64_t seed)
@@ -101,8 +118,12 @@ class Adversary {
     void seat(const Vec3& proxy) noexcept override { method_->seat(proxy); }
     void observe(const Observation& seen) noexcept override { method_->observe(seen); }
     void set_parameters(const Parameters& p) noexcept override { method_->set_parameters(p); }
-    Tick tick(const Vec3& hip, double t) noexcept override {
-      Tick tick = method_->tick(hip, t);
+    Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip, {}}, t); }
+    Tick tick(const HandPose& hand, double t) noexcept override {
+      Tick tick = method_->tick(hand, t);
+      if (random_() % 3000 == 0) arm_ = 0.025 * static_cast<double>(random_() % 4);
+      const bool is_ball = tick.torque.isZero(0.0);
+      if (is_ball) tick.torque = arm_ * Vec3(tick.force.z(), tick.force.x(), -tick.force.y());
       switch (random_() % 6000) {
         case 0:
           tick.force.x() = nan;
@@ -129,6 +150,15 @@ class Adversary {
         case 7:
           rings_ = 400;
           break;
+        case 8:
+          tick.torque.y() = random_() % 2 == 0 ? nan : 1e308;
+          break;
+        case 9:
+          tick.torque *= -100.0;
+          break;
+        case 10:
+          tick.torque = Vec3(0.0, 0.0, 0.3);
+          break;
         default:
           break;
       }
@@ -142,12 +172,13 @@ class Adversary {
 
    private:
     int rings_ = 0;
+    double arm_ = 0.0;  // [m]
     std::unique_ptr<Method> method_;
     std::mt19937_64 random_;
   };
 
-  std::shared_ptr<Method> spoiled(std::string_view name) {
-    return std::make_shared<Spoiled>(make_method(name), random_());
+  std::shared_ptr<Method> spoiled(std::unique_ptr<Method> method) {
+    return std::make_shared<Spoiled>(std::move(method), random_());
   }
 
   double between(double low, double high) {
@@ -194,6 +225,9 @@ class Adversary {
     if (!device_.hand.present && one_in(100)) device_.hand.present = true;
     if (one_in(5000)) device_.hand.clutched = !device_.hand.clutched;
     if (device_.hand.clutched && one_in(100)) device_.hand.clutched = false;
+    if (one_in(30'000)) device_.hand.fault = DeviceFault::disconnected;
+    if (one_in(100)) device_.hand.fault = DeviceFault::none;
+    if (one_in(100)) device_.hand.orientation = Eigen::Quaterniond(rotation_by(place(0.5)));
   }
 
   double tick_interval() {
@@ -263,19 +297,40 @@ class Adversary {
 
   void switch_method() {
     const auto& methods = standard_methods().entries();
-    auto method = spoiled(methods[random_() % methods.size()].name);
-    cycle_.command([&](ServoCommands& told) { told.settings = settings(); }, std::move(method));
+    auto method =
+        one_in(20)  // a tool's tick takes ten times as long
+            ? std::make_unique<ShapeTouch>(make_tool("box:20x10x5mm?points=100", {}), Parameters{})
+            : make_method(methods[random_() % methods.size()].name);
+    cycle_.command([&](ServoCommands& told) { told.settings = settings(); },
+                   spoiled(std::move(method)));
   }
 
-  std::string verdict(double t, double since_last) {
+  // The same promises of the torque, but that nothing rings.
+  std::string torque_verdict(bool growing, double rise, double fall) {
+    const double length = device_.torque.norm();
+    const double grown = length - last_torque_.norm();
+    const double change = (device_.torque - last_torque_).norm();
+    last_torque_ = device_.torque;
+    strongest_torque_ = std::max(strongest_torque_, length);
+    if (!device_.torque.allFinite()) return "a torque that is not finite";
+    if (length > max_torque + 1e-9) return "a torque above the limit";
+    if (grown > rise || (change > rise + fall && length > 0.0))
+      return "a torque that rises too fast";
+    if (!growing && grown > 0.0) return "a torque that grows while a frame is late";
+    if (idle_time_ > 3e-3 && length > 0.0) return "a torque without fresh data or without a hand";
+    return {};
+  }
+
+  std::string verdict(double t, double since_last, bool alone) {
     const Vec3& force = device_.force;
     const double length = force.norm();
     const double credit = std::min(std::isfinite(since_last) ? since_last : 0.0, 1e-3);
     const double rise = 500.0 * std::max(credit, 0.0) + 1e-9;
     const double fall = 2000.0 * 1e-3 + 1e-9;
     const double age = std::max(t_ - fresh_at_, t_ - fresh_stamp_);
-    const bool allowed =
-        any_frame_ && age <= 0.5 && device_.hand.present && !device_.hand.clutched && !latched_;
+    const bool allowed = any_frame_ && age <= 0.5 && device_.hand.present &&
+                         !device_.hand.clutched && !latched_ &&
+                         device_.hand.fault == DeviceFault::none && alone;
     const double elapsed = std::isfinite(since_last) ? std::max(since_last, 0.0) : 0.0;
     heat_ += -std::expm1(-elapsed / 20.0) * (last_.squaredNorm() - heat_);
 
@@ -310,6 +365,9 @@ class Adversary {
     idle_time_ = allowed ? 0.0 : idle_time_ + std::max(credit, 0.0);
     if (!allowed && idle_time_ > 3e-3 && length > 0.0)
       broken = "a force without fresh data or without a hand";
+    const std::string torque_broken =
+        torque_verdict((last_safety_ & frame_late) == 0, lever * rise, lever * fall);
+    if (!torque_broken.empty()) broken = torque_broken;
     last_forceful_ = length > 0.0 ? ticks_ : last_forceful_;
     if (ticks_ - last_forceful_ > 500'000) broken = "a loop that never recovers";
     if (!broken.empty()) {
@@ -325,8 +383,12 @@ class Adversary {
   }
 
   std::mt19937_64 random_;
-  FakeDevice device_;
+  std::unique_ptr<FakeDevice> made_ =
+      std::make_unique<FakeDevice>(DeviceLimits{.max_torque = max_torque});
+  FakeDevice& device_ = *made_;
+  LinkedDevice link_{std::move(made_)};
   Cycle cycle_;
+  std::shared_ptr<const CycleStatistics> other_;
   TickRing<ServoTick>::Reader ticks_seen_ = cycle_.reader();
   std::vector<std::shared_ptr<const Cloud>> clouds_;
   int hand_mode_ = 0, camera_mode_ = 0, time_mode_ = 0;
@@ -345,8 +407,8 @@ class Adversary {
   bool any_frame_ = false;
   double last_stamp_ = 0.0, fresh_at_ = 0.0, fresh_stamp_ = 0.0;
   std::uint64_t ticks_ = 0, forceful_ticks_ = 0, last_forceful_ = 0;
-  Vec3 last_ = Vec3::Zero();
-  double heat_ = 0.0, idle_time_ = 0.0, strongest_ = 0.0;
+  Vec3 last_ = Vec3::Zero(), last_torque_ = Vec3::Zero();
+  double heat_ = 0.0, idle_time_ = 0.0, strongest_ = 0.0, strongest_torque_ = 0.0;
 };
 
 }  // namespace palpate::test

@@ -11,11 +11,16 @@ namespace palpate::test {
 /// A device whose hand is where the test puts it and which keeps what it was told.
 class FakeDevice final : public Device {
  public:
+  explicit FakeDevice(const DeviceLimits& limits = {}) { info_.limits = limits; }
   [[nodiscard]] const DeviceInfo& info() const override { return info_; }
   HandState read(double /*t*/) noexcept override { return hand; }
   void write(const Vec3& newtons, double /*t*/) noexcept override {
     force = newtons;
     ++writes;
+  }
+  void write(const Wrench& wrench, double t) noexcept override {
+    torque = wrench.torque;
+    write(wrench.force, t);
   }
 
   void enable() override { ++enables; }
@@ -27,6 +32,7 @@ class FakeDevice final : public Device {
   std::atomic<int> enables{0};
   std::atomic<int> disables{0};
   Vec3 force = Vec3::Constant(-1.0);
+  Vec3 torque = Vec3::Zero();
   int writes = 0;
 
  private:

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Do the tests of the servo room notice a fault? Puts in each mutant of tests/servo/mutants.txt.
+"""Do the tests of a room notice a fault? Puts in each mutant of tests/servo/mutants.txt.
 
 scripts/mutants.py BUILD [NUMBER | FIRST-LAST]...
-  BUILD        a build folder with an up-to-date test_servo, such as build/test/gcc
+  BUILD        a build folder with up-to-date tests of these rooms, such as build/test/gcc
   NUMBER       mutants to try, such as 12 33 274-293; all without
 
 All mutants are compiled into a copy of the sources at once, each behind a switch that an
@@ -12,6 +12,7 @@ notice it come first. Prints a verdict on each; exits 1 if fewer than 95 % of th
 equivalent are noticed.
 """
 import concurrent.futures
+import itertools
 import os
 import pathlib
 import re
@@ -23,16 +24,25 @@ import time
 import variants
 
 LIST = variants.ROOT / "tests/servo/mutants.txt"
+PROGRAMS = {"palpate/kernel/tool": "tests/tool/test_tool",
+            "palpate/drivers": "tests/drivers/test_drivers"}
 SLOW = ("Adversary.*:EnergyLink.LetsHonest*:EnergyLink.StopsEvery*:Cycle.FindsNoFault*:"
         "SafetyChain.KeepsItsBounds*:*Loop.Disables*:*Loop.Stops*:ServoLoop.TicksWhile*:"
         "DrivenLoop.RefusesADevice*")
 NEAR = {"safety": "Safety*", "freshness": "Freshness*", "energy_monitor": "Energy*",
         "cycle": "Cycle*:DeviceFault*", "free_side": "FreeSide*", "workspace": "Cycle*:Clutch*",
-        "force_watchdog": "ForceWatchdog*", "servo_loop": "*Loop.*"}
+        "force_watchdog": "ForceWatchdog*", "servo_loop": "*Loop.*",
+        "last_gate": "LastGate*:Cycle*"}
+
+
+def program_of(file):
+    return PROGRAMS.get(str(pathlib.Path(file).parent), "tests/servo/test_servo")
 
 
 def stages(file):
     """Filters of tests: the likeliest to notice a mutant of `file` first, the slow ones last."""
+    if str(pathlib.Path(file).parent) in PROGRAMS:
+        return ["*" if "tool" in file else "ForceDimension*"]
     near = NEAR.get(pathlib.Path(file).stem)
     return ([f"{near}-{SLOW}"] if near else []) + [f"-{SLOW}", SLOW]
 
@@ -44,10 +54,10 @@ def run_tests(program, number, tests, limit):
                           capture_output=True, text=True, errors="replace")
 
 
-def time_limits(program):
+def time_limits(program, files):
     """{filter: [s]} after which a mutant hangs: ten times what the tests take without any."""
     limits = {}
-    for tests in sorted({t for file in [*NEAR, ""] for t in stages(file)}):
+    for tests in sorted({t for file in files for t in stages(file)}):
         began = time.time()
         run = run_tests(program, 0, tests, None)
         if run.returncode != 0:
@@ -79,14 +89,19 @@ def main():
     chosen = variants.numbers_of(sys.argv[2:], len(mutants))
     survivors, killed, began = [], 0, time.time()
     with tempfile.TemporaryDirectory() as scratch:
-        for i, batch in enumerate(variants.batches(mutants)):
+        groups = itertools.product(variants.batches(mutants), ["", *PROGRAMS])
+        for i, (batch, room) in enumerate(groups):
+            target = PROGRAMS.get(room, program_of(""))
+            batch = [piece for piece in batch if program_of(piece.file) == target]
             numbers = [n for piece in batch for n, _ in piece.variants if not chosen or n in chosen]
             if not numbers:
                 continue
+            files = {mutants[number - 1].file for number in numbers}
+            batch = [piece for piece in batch if piece.file in files]
             folder = pathlib.Path(scratch) / str(i)
             folder.mkdir()
-            program = variants.build(batch, build_folder, folder, "tests/servo/test_servo")
-            limits = time_limits(program)
+            program = variants.build(batch, build_folder, folder, target)
+            limits = time_limits(program, files)
             with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as workers:
                 tried = [(n, workers.submit(noticed, program, n, mutants[n - 1].file, limits))
                          for n in sorted(numbers)]

@@ -18,6 +18,7 @@ import typing
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 VARIABLE = "PALPATE_VARIANT"  # of the environment: the number of the variant in force, from 1
+USERS = {"palpate/servo/last_gate.hpp": "palpate/servo/cycle.cpp"}
 SWITCH = f"""#pragma once
 #include <cstdlib>
 inline int palpate_variant() {{
@@ -128,20 +129,27 @@ def batches(variants):
 
 
 def build(batch, build_folder, folder, target, flags=()):
-    """Links ninja's `target` with the switched sources before the libraries. @return its path."""
+    """Links ninja's `target` with the switched sources before the libraries. @return its path.
+    A header's variants are in what includes it of the name in USERS."""
     (folder / "switch.hpp").write_text(SWITCH)
     objects = []
-    for file in sorted({piece.file for piece in batch}):
+    files = {piece.file for piece in batch}
+    for file in sorted(files, key=lambda name: (name not in USERS, name)):
         source = source_of(file)
         for piece in sorted((p for p in batch if p.file == file), key=lambda p: p.at, reverse=True):
             source = (source[:piece.at] + switched(piece.original, piece.kind, piece.variants) +
                       source[piece.at + len(piece.original):])
-        copy = folder / pathlib.Path(file).name
+        copy = folder / (file if file in USERS else pathlib.Path(file).name)
+        copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_text(source)
-        objects.append(copy.with_suffix(".o"))
-        subprocess.run(["c++", "-std=c++20", "-O2", "-w", *flags, f"-I{ROOT}", "-isystem",
-                        "/usr/include/eigen3", "-include", folder / "switch.hpp", "-c", copy, "-o",
-                        objects[-1]], check=True)
+        if file in USERS:
+            if USERS[file] in files:
+                continue
+            copy = ROOT / USERS[file]
+        objects.append(folder / f"{len(objects)}.o")
+        subprocess.run(["c++", "-std=c++20", "-O2", "-w", *flags, f"-I{folder}", f"-I{ROOT}",
+                        "-isystem", "/usr/include/eigen3", "-include", folder / "switch.hpp", "-c",
+                        copy, "-o", objects[-1]], check=True)
     command = subprocess.run(["ninja", "-C", build_folder, "-t", "commands", "-s", target],
                              check=True, capture_output=True, text=True).stdout
     link = command.partition("&& ")[2].partition(" && ")[0]

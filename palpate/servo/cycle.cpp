@@ -36,6 +36,8 @@ std::uint32_t hand_bits(const HandState& hand) noexcept {
 constexpr double gravity = 9.80665;  // [m/s^2]
 // [s] for which a tick may add to the force, as the safety chain's longest_credit.
 constexpr double longest_tick = 1e-3;
+// In such a tick the chain has let go of the hand, which has to be engaged anew.
+constexpr std::uint32_t let_go = disengaged | input_refused | direction_refused;
 // What also ends the support of a handle's weight at once.
 constexpr std::uint32_t no_support =
     input_refused | hand_too_fast | stalled | fault_latched | output_refused;
@@ -350,7 +352,7 @@ void Cycle::run(const Wake& wake) noexcept {
                    .ramp_time = allowed.ramp_time,
                    .longest_gap = allowed.stall_time,
                    .longest_time = longest_tick,
-                   .engaged = (safe.flags & disengaged) == 0,
+                   .engaged = (safe.flags & let_go) == 0,
                    .hand = holds,
                    .latched = safety_.latched_by() != 0,
                    .may_hold = may_hold},

@@ -361,6 +361,9 @@ class Adversary {
       if (length > std::max(last_.norm() - step, 0.0) + 1e-5)
         broken = "a closed gate that takes off too little";
     }
+    // Its step where the clock fails.
+    if (!(since_last >= 1e-7 && since_last <= 5e-3) && length > 0.0)
+      broken = "a force while the clock stands or jumps";
     // 3.3 N are gone in two milliseconds of time; ticks without time take none off.
     idle_time_ = allowed ? 0.0 : idle_time_ + std::max(credit, 0.0);
     if (!allowed && idle_time_ > 3e-3 && length > 0.0)

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "palpate/servo/device.hpp"
+#include "palpate/servo/last_gate.h"
 
 namespace palpate::test {
 
@@ -23,6 +24,7 @@ class FakeDevice final : public Device {
     write(wrench.force, t);
   }
 
+  void announce(const palpate_gate_wish& told) noexcept override { wish = told; }
   void enable() override { ++enables; }
   void disable() noexcept override { ++disables; }
   [[nodiscard]] std::string fault_text() const override { return text; }
@@ -33,6 +35,7 @@ class FakeDevice final : public Device {
   std::atomic<int> disables{0};
   Vec3 force = Vec3::Constant(-1.0);
   Vec3 torque = Vec3::Zero();
+  palpate_gate_wish wish{};
   int writes = 0;
 
  private:

@@ -86,6 +86,88 @@ TEST(Cycle, GivesTheDeviceTheMethodsForceOnceTheHandIsEngaged) {
   EXPECT_EQ(record.hand, 1U);
 }
 
+// A tool that is always pressed and turned.
+class Pressed final : public Method {
+ public:
+  void seat(const Vec3& /*proxy*/) noexcept override {}
+  void observe(const Observation& /*seen*/) noexcept override {}
+  void set_parameters(const Parameters& /*parameters*/) noexcept override {}
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    Tick tick = free_tick(hip, t, 0);
+    tick.force = force;
+    tick.torque = torque;
+    tick.normal = Vec3::UnitZ();
+    return tick;
+  }
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+};
+
+// Hazard: chain-wrong, torque
+TEST(Cycle, TellsTheLastGateWhatToJudgeBy) {
+  ServoSettings settings;
+  settings.placement.world_from_device = Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX());
+  settings.safety.max_force = 2.0;
+  settings.safety.lost_age = 0.4;
+  settings.safety.late_intervals = 2.5;
+  settings.safety.ramp_time = 1.25;
+  settings.safety.stall_time = 4 * ms;
+  FakeDevice device({.continuous_force = 3.3, .max_torque = 0.33});
+  const auto tool = std::make_shared<Pressed>();
+  Cycle cycle(tool, device, settings);
+  double t = 10.0;
+  const auto run = [&](double seconds, bool frames = true) {
+    for (int i = 0; i < std::lround(seconds / ms); ++i) {
+      t += ms;
+      if (frames && i % 33 == 0) cycle.put_frame(plane_at(0.0), t, t);
+      cycle.run({.t = t});
+    }
+    return device.wish;
+  };
+  palpate_gate_wish wish = run(0.001);
+  EXPECT_EQ(wish.engaged, 0) << "not yet";
+  wish = run(2.0);
+  EXPECT_TRUE(wish.engaged != 0 && wish.hand != 0 && wish.latched == 0 && wish.may_hold != 0);
+  EXPECT_EQ(wish.t, t);
+  EXPECT_EQ(wish.lost_age, 0.4);
+  EXPECT_EQ(wish.late_intervals, 2.5);
+  EXPECT_EQ(wish.ramp_time, 1.25);
+  EXPECT_EQ(wish.longest_gap, 4 * ms);
+  EXPECT_EQ(wish.longest_time, 1 * ms) << "SafetyChain's longest credit";
+  EXPECT_EQ(wish.force_bounds.limit, 2.0);
+  EXPECT_EQ(wish.force_bounds.rise, settings.safety.rise_rate);
+  EXPECT_EQ(wish.force_bounds.fall, settings.safety.fall_rate);
+  EXPECT_EQ(wish.torque_bounds.limit, 0.33);
+  EXPECT_DOUBLE_EQ(wish.torque_bounds.rise, 0.1 * settings.safety.rise_rate);
+  EXPECT_DOUBLE_EQ(wish.torque_bounds.fall, 0.1 * settings.safety.fall_rate);
+  EXPECT_NEAR(wish.frame_age, 0.02, 0.02);
+  EXPECT_LT(wish.frame_intervals, 1.5);
+
+  tool->force = Vec3(0.0, 0.0, 1.0);
+  tool->torque = Vec3(0.0, 0.0, 0.05);
+  wish = run(1.0);
+  EXPECT_NEAR(wish.force.y, 1.0, 1e-9) << "in the device's frame";
+  EXPECT_NEAR(wish.torque.y, 0.05, 1e-9);
+  EXPECT_LT((device.force - vector_of(wish.force)).norm(), 1e-12);
+  EXPECT_EQ(device.torque, vector_of(wish.torque));
+  EXPECT_EQ(cycle.statistics().gate_cuts, 0U);
+
+  device.hand.present = false;
+  wish = run(0.01);
+  EXPECT_TRUE(wish.hand == 0 && wish.engaged == 0 && wish.may_hold == 0);
+  device.hand.present = true;
+  wish = run(0.2, false);
+  EXPECT_GT(wish.frame_intervals, 2.5) << "late";
+  EXPECT_NEAR(wish.frame_age, 0.2, 0.06);
+  tool->force = tool->torque = Vec3::Zero();
+  run(2.0);
+  for (const double x : {1.0, 0.0, 1.0, 0.0, 1.0}) {
+    tool->force.x() = x > 0.0 ? std::numeric_limits<double>::quiet_NaN() : 0.0;
+    wish = run(0.01);
+  }
+  EXPECT_NE(wish.latched, 0);
+  EXPECT_EQ(wish.may_hold, 0);
+}
+
 TEST(Cycle, UsesAFrameInTheFirstCycleAfterItWasPut) {
   Session session;
   session.cloud = nullptr;

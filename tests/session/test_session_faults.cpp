@@ -8,12 +8,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <fstream>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
 #include <random>
+#include <set>
 #include <sstream>
 #include <string>
 #include <tuple>
@@ -22,9 +25,11 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/io/devices/device_guard.hpp"
 #include "palpate/io/devices/mouse_device.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/methods/methods.hpp"
+#include "palpate/servo/force_watchdog.hpp"
 #include "palpate/session/session.hpp"
 
 #include "tests/session/fakes.hpp"
@@ -343,8 +348,26 @@ std::uint32_t flags_that_tell(Place place) {
   return 0;
 }
 
+/// The steps of a force in tests/gate/stop.pml, in tenths of the limit: see servo() there.
+struct StopModel {
+  enum Cause { none, hand_lost, disengaged_only, latched, frames_stale, number_fails };
+  static Cause cause_of(const ServoTick& tick) {
+    if ((tick.safety & (input_refused | direction_refused)) != 0) return number_fails;
+    if ((tick.safety & fault_latched) != 0) return latched;
+    if ((tick.safety & frame_lost) != 0) return frames_stale;
+    if ((tick.hand & hand_present) == 0 || (tick.hand & hand_fault) != 0) return hand_lost;
+    return (tick.safety & disengaged) != 0 ? disengaged_only : none;
+  }
+  static int tenths(double share) { return static_cast<int>(std::ceil(10.0 * share - 1e-6)); }
+  static int most_after(Cause cause, int sent) {
+    return cause == none ? 10 : std::max(sent - 1, 0);
+  }
+
+  std::set<std::pair<Cause, bool>> seen;  // what began with a force, or without
+};
+
 /// Runs a session and says which promise was broken first, and when; empty: none.
-std::string violation_of(const Scenario& scenario) {
+std::string violation_of(const Scenario& scenario, StopModel* model = nullptr) {
   std::array<std::shared_ptr<std::vector<double>>, 2> good;
   SessionOptions options;
   for (std::size_t i = 0; i < good.size(); ++i) {
@@ -399,6 +422,11 @@ std::string violation_of(const Scenario& scenario) {
     demand(force <= limits.max_force + 1e-9, "it is larger than the limit");
     demand(force - before <= 1e-3 * limits.rise_rate + 1e-9, "it rises too fast");
     demand(before - force <= 1e-3 * limits.fall_rate + 1e-9, "it falls too fast");
+    const StopModel::Cause cause = StopModel::cause_of(tick);
+    const int sent_before = StopModel::tenths(before / limits.max_force);
+    demand(StopModel::tenths(force / limits.max_force) <= StopModel::most_after(cause, sent_before),
+           "tests/gate/stop.pml has no such step");
+    if (model != nullptr) model->seen.insert({cause, before > 0.0});
     if (has_faulty_camera) {
       const double age = age_at(t);
       const double late_age = limits.late_intervals * frame_interval + slack;
@@ -458,6 +486,35 @@ std::string violation_of(const Scenario& scenario) {
   }
   expect(sent.back() > 2.0, "it does not come back when all is well again");
   return violation;
+}
+
+// Every cell of the matrix below is held to it, too.
+// Hazard: chain-wrong
+TEST(StopModel, HasEveryStepOfSessionsWithFaults) {
+  StopModel model;
+  for (const auto& [fault, place] :
+       {std::pair(Fault::off, Place::hand), std::pair(Fault::off, Place::device),
+        std::pair(Fault::off, Place::first_camera), std::pair(Fault::garbage, Place::method),
+        std::pair(Fault::intermittent, Place::hand), std::pair(Fault::intermittent, Place::method)})
+    EXPECT_EQ(violation_of({Motion::contact, {{.fault = fault, .place = place}}}, &model), "");
+  using enum StopModel::Cause;
+  for (const auto cause : {none, hand_lost, frames_stale, number_fails})
+    EXPECT_TRUE(model.seen.contains({cause, true})) << cause << ": never with a force";
+  for (const auto cause : {none, hand_lost, disengaged_only, latched, frames_stale, number_fails})
+    EXPECT_TRUE(model.seen.contains({cause, false})) << cause << ": never without a force";
+}
+
+TEST(StopModel, HasTheTimesOfTheCode) {
+  std::ifstream file(PALPATE_STOP_MODEL);
+  std::map<std::string, double> ms;
+  for (std::string line, word, name; std::getline(file, line);) {
+    std::istringstream words(line);
+    if (double value = 0.0; words >> word >> name >> value && word == "#define") ms[name] = value;
+  }
+  EXPECT_EQ(ms["FORCE_TIME"], 1e3 * ForceWatchdog::Limits().force_time);
+  EXPECT_EQ(ms["WATCH_TIME"], 1e3 * ForceWatchdog::Limits().watch_time);
+  EXPECT_EQ(ms["BEAT_TIME"], 1e3 * GuardLimits().beat_time);
+  EXPECT_EQ(ms["LATE"], 1e3 * SafetyParameters().stall_time);
 }
 
 using Cell = std::tuple<Fault, Place, Motion>;

@@ -387,7 +387,8 @@ EMSCRIPTEN_KEEPALIVE void palpate_depth(int width, int height, const std::uint16
     const bool is_shown = page().shown == site::page_camera;
     const Eigen::Map<const Eigen::Matrix4d> matrix(pose);
     Eigen::Isometry3d world_from_camera(Eigen::Translation3d(matrix.topRightCorner<3, 1>()));
-    world_from_camera.rotate(Eigen::Quaterniond(Mat3(matrix.topLeftCorner<3, 3>())).normalized());
+    world_from_camera.rotate(
+        Eigen::Quaterniond(Eigen::Matrix3d(matrix.topLeftCorner<3, 3>())).normalized());
     site::newest_depth() = {
         .stamp = is_shown ? now - page().opened : 0.0,
         .cloud = std::make_shared<DepthImage>(

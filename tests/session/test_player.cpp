@@ -133,13 +133,14 @@ TEST(Player, EndsEachLookAtASourceThatRepeatsOneStampForEver) {
 
 TEST(Player, TakesALiveCameraOnTheSessionsClockAsItsFramesCome) {
   double now = 0.0;
-  Player source(std::make_unique<MadeSource>(
-                    [&now](int k) {
-                      const double stamp = 0.1 * k;
-                      return stamp <= now ? std::optional(Frame{stamp, wall()}) : std::nullopt;
-                    },
-                    SourceInfo{.uri = "page:", .live = true, .clock = StampClock::session}),
-                {});
+  Player source(
+      std::make_unique<MadeSource>(
+          [&now](int k) {
+            const double stamp = 0.1 * k;
+            return stamp <= now ? std::optional(Frame{stamp, wall()}) : std::nullopt;
+          },
+          SourceInfo{.uri = "page:", .kind = "page", .live = true, .clock = StampClock::session}),
+      {});
   EXPECT_EQ(source.first_frame().stamp, 0.0);
   std::vector<double> stamps;
   for (int i = 0; i <= 250; ++i) {

@@ -16,10 +16,8 @@
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
 
-#include "lab/experiments/fidelity.hpp"
 #include "lab/experiments/pop.hpp"
 #include "lab/experiments/pop_cases.hpp"
-#include "lab/experiments/real.hpp"
 #include "lab/pipe_method.hpp"
 #include "lab/sha256.hpp"
 #include "lab/statistics.hpp"
@@ -370,11 +368,7 @@ std::string make_entry(const EntryOptions& options, const EntryRun& run,
   said["cpu_seconds"] = std::round(10.0 * cost) / 10.0;
   entry["run"] = said;
   std::string text = entry.dump(1) + "\n";
-  std::ofstream out(file, std::ios::binary | std::ios::trunc);
-  out << text << std::flush;
-  if (!out)
-    throw Error(file.string(), std::string("it cannot be written: ") + std::strerror(errno),
-                "use a file with write permission");
+  write_file(file, text);
   return text;
 }
 

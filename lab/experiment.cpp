@@ -8,6 +8,7 @@
 #include "lab/method.hpp"
 #include "lab/pipe_method.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate::lab {
 
@@ -53,6 +54,14 @@ std::vector<std::string> methods_of(const Experiment& experiment,
     if (!is_own) static_cast<void>(methods().find(name));
   }
   return options.methods;
+}
+
+void check_families(const ExperimentOptions& options, std::string_view what,
+                    std::span<const std::string_view> known) {
+  for (const std::string& name : options.families) {
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      throw Error("--families " + name, std::string(what), did_you_mean(name, known));
+  }
 }
 
 AimTable::AimTable(std::vector<std::string> labels, std::vector<std::string> methods)

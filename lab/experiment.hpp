@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -67,23 +68,17 @@ struct Scores {
 /// byte for byte, however its cells are spread over threads and machines.
 struct Experiment {
   std::string_view name;
-  std::string_view summary;                       ///< one line, with the paper's section
-  std::string_view header;                        ///< of the CSV
-  std::vector<std::string_view> default_methods;  ///< empty: it compares none
-  bool has_grid;                                  ///< takes --grid
+  std::string_view summary;                            ///< one line, with the paper's section
+  std::string_view header;                             ///< of the CSV
+  std::vector<std::string_view> default_methods = {};  ///< empty: it compares none
   std::vector<Cell> (*cells)(const Experiment&, const ExperimentOptions&);
   Figure (*figure)(const Table&);
-  std::vector<Claim> (*claims)(const Table&);
-  /// A bench has scores; what redraws the paper has none.
-  Scores (*scores)(const Table&) = nullptr;
-  bool takes_recording = false;  ///< takes --recording
-  bool plays_programs = false;   ///< takes methods `pipe:COMMAND`
+  std::vector<Claim> (*claims)(const Table&) = nullptr;  ///< of what redraws the paper
+  Scores (*scores)(const Table&) = nullptr;              ///< of a bench
+  bool has_grid = false;                                 ///< takes --grid
+  bool takes_recording = false;                          ///< takes --recording
+  bool plays_programs = false;                           ///< takes methods `pipe:COMMAND`
 };
-
-/// The claims of a bench, which redraws nothing of the paper.
-inline std::vector<Claim> no_claims(const Table& /*table*/) {
-  return {};
-}
 
 /// All experiments, in the order of the report.
 const std::vector<Experiment>& known_experiments();
@@ -94,6 +89,11 @@ const Experiment& find_experiment(std::string_view name);
 /// The methods to run: those asked for, else the experiment's own.
 /// @throws Error for an unknown one.
 std::vector<std::string> methods_of(const Experiment& experiment, const ExperimentOptions& options);
+
+/// @param what  such as "feel has no such scene"  @param known  all names that --families takes
+/// @throws Error for another, naming the nearest.
+void check_families(const ExperimentOptions& options, std::string_view what,
+                    std::span<const std::string_view> known);
 
 /// Scores of a bench that measures methods beside aims, which are upper bounds: a row a measure, a
 /// column a method. What misses its aim is marked, and the last row counts the aims met.

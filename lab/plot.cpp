@@ -315,20 +315,8 @@ Points points(const Table& table, const std::function<bool(std::size_t)>& keep, 
 
 Points points(const Table& table, Where where, std::string_view x, std::string_view y,
               Units units) {
-  const auto keep = [&](std::size_t row) {
-    return std::all_of(where.begin(), where.end(), [&](const auto& column) {
-      return table.text(row, column.first) == column.second;
-    });
-  };
-  return points(table, keep, x, y, units);
-}
-
-Points sums(const Points& points) {
-  std::map<double, double> sum;
-  for (const auto& [x, y] : points) sum[x] += y;
-  Points result;
-  for (const auto& [x, y] : sum) result.push_back({x, y});
-  return result;
+  return points(
+      table, [&](std::size_t row) { return table.is(row, where); }, x, y, units);
 }
 
 void add_methods(Panel& panel, const Table& table, std::string_view x, std::string_view y,

@@ -68,8 +68,6 @@ std::string svg(const Figure& figure, std::string_view title);
 /// Text as XML and HTML have it.
 std::string escaped(std::string_view text);
 
-/// Columns and the text that each has in the rows that are meant.
-using Where = std::initializer_list<std::pair<std::string_view, std::string_view>>;
 /// What the numbers of x and y are divided by.
 using Units = std::array<double, 2>;
 
@@ -79,9 +77,6 @@ Points points(const Table& table, Where where, std::string_view x, std::string_v
 /// Of those that `keep(row)` is true for.
 Points points(const Table& table, const std::function<bool(std::size_t)>& keep, std::string_view x,
               std::string_view y, Units units = {1.0, 1.0});
-
-/// The sum of y at each x, in the order of x.
-Points sums(const Points& points);
 
 /// Adds a curve of each method of the column "method". @param marked  with its points
 void add_methods(Panel& panel, const Table& table, std::string_view x, std::string_view y,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/runner.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <exception>
@@ -10,6 +11,7 @@
 #include <sstream>
 #include <thread>
 
+#include "lab/table.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate::lab {
@@ -102,59 +104,44 @@ class FinishedCells {
   std::map<std::size_t, std::string> rows_;
 };
 
-// Hands out cells and takes their results, from several threads.
-class Desk {
- public:
-  Desk(const std::vector<Cell>& cells, FinishedCells& finished, const RunnerOptions& runner)
-      : cells_(cells), finished_(finished), runner_(runner) {}
-
-  // The next cell to run; none: all are handed out, or one has failed.
-  std::optional<std::size_t> next() {
-    const std::lock_guard lock(mutex_);
-    while (next_ < cells_.size() && finished_.has(next_)) ++next_;
-    if (failure_ || next_ == cells_.size()) return std::nullopt;
-    return next_++;
-  }
-
-  void put(std::size_t index, const std::string& rows) {
-    const std::lock_guard lock(mutex_);
-    finished_.add(index, rows);
-    if (runner_.progress) runner_.progress(finished_.count(), cells_.size());
-  }
-
-  // Runs cells until there are none left.
-  void work() {
-    try {
-      while (const auto index = next()) put(*index, cells_[*index]());
-    } catch (...) {
-      const std::lock_guard lock(mutex_);
-      if (!failure_) failure_ = std::current_exception();
-    }
-  }
-
-  void rethrow() const {
-    if (failure_) std::rethrow_exception(failure_);
-  }
-
- private:
-  const std::vector<Cell>& cells_;
-  FinishedCells& finished_;
-  const RunnerOptions& runner_;
-  std::mutex mutex_;
-  std::size_t next_ = 0;
-  std::exception_ptr failure_;
-};
-
 }  // namespace
+
+int threads_of(int jobs) {
+  if (jobs < 0 || jobs > 1024)
+    throw Error("--jobs " + std::to_string(jobs), "the number of threads is out of range",
+                "use 1 to 1024, or 0 for one per core");
+  return jobs > 0 ? jobs : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+}
 
 std::string run_cells(const std::vector<Cell>& cells, const std::string& print,
                       const RunnerOptions& runner, const std::filesystem::path& file) {
   FinishedCells finished(file, print, runner.resume);
-  Desk desk(cells, finished, runner);
+  std::mutex mutex;
+  std::size_t next = 0;        // guarded by mutex, as `finished` is
+  std::exception_ptr failure;  // likewise: then nothing more is begun
+  const auto next_cell = [&]() -> std::optional<std::size_t> {
+    const std::lock_guard lock(mutex);
+    while (next < cells.size() && finished.has(next)) ++next;
+    if (failure || next == cells.size()) return std::nullopt;
+    return next++;
+  };
+  const auto work = [&] {
+    try {
+      while (const auto index = next_cell()) {
+        const std::string rows = cells[*index]();
+        const std::lock_guard lock(mutex);
+        finished.add(*index, rows);
+        if (runner.progress) runner.progress(finished.count(), cells.size());
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      if (!failure) failure = std::current_exception();
+    }
+  };
   std::vector<std::thread> threads;
-  for (int i = 0; i < runner.jobs; ++i) threads.emplace_back([&desk] { desk.work(); });
+  for (int i = 0; i < runner.jobs; ++i) threads.emplace_back(work);
   for (std::thread& thread : threads) thread.join();
-  desk.rethrow();
+  if (failure) std::rethrow_exception(failure);
   std::string rows = finished.rows();
   finished.remove();
   return rows;
@@ -165,11 +152,7 @@ std::string run_experiment(const Experiment& experiment, const ExperimentOptions
   const std::string rows = run_cells(experiment.cells(experiment, options),
                                      fingerprint(experiment, options), runner, file);
   std::string csv = std::string(experiment.header) + '\n' + rows;
-  std::ofstream out(file, std::ios::binary | std::ios::trunc);
-  out << csv << std::flush;
-  if (!out)
-    throw Error(file.string(), std::string("cannot be written: ") + std::strerror(errno),
-                "use a folder with write permission and free disk space");
+  write_file(file, csv);
   return csv;
 }
 

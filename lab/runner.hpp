@@ -17,6 +17,9 @@ struct RunnerOptions {
   std::function<void(std::size_t done, std::size_t total)> progress;  ///< after every cell
 };
 
+/// @param jobs  threads that --jobs asks for; 0: one a core. @throws Error if it is out of range.
+int threads_of(int jobs);
+
 /// Runs an experiment and writes its CSV to `file`. Returns the CSV.
 ///
 /// Cells may end in any order; the CSV has them in theirs. Finished cells are kept in FILE.part

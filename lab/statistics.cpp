@@ -11,6 +11,12 @@
 
 namespace palpate::lab {
 
+double mean(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
+}
+
 double rms(const std::vector<double>& values) {
   double squares = 0.0;
   for (const double v : values) squares += v * v;

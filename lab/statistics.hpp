@@ -7,6 +7,9 @@
 
 namespace palpate::lab {
 
+/// 0 of nothing.
+double mean(const std::vector<double>& values);
+
 /// Root of the mean of the squares; 0 of nothing.
 double rms(const std::vector<double>& values);
 

@@ -3,8 +3,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
+#include <cstring>
+#include <fstream>
 #include <limits>
+#include <set>
 
 #include "palpate/kernel/core/error.hpp"
 
@@ -67,13 +71,25 @@ double Table::number(std::size_t row, std::string_view column) const {
   return value;
 }
 
+bool Table::is(std::size_t row, Where where) const {
+  return std::all_of(where.begin(), where.end(),
+                     [&](const auto& wanted) { return text(row, wanted.first) == wanted.second; });
+}
+
+std::vector<std::size_t> first_rows(const Table& table,
+                                    const std::function<std::string(std::size_t row)>& key) {
+  std::vector<std::size_t> rows;
+  std::set<std::string> seen;
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    if (seen.insert(key(row)).second) rows.push_back(row);
+  return rows;
+}
+
 std::vector<std::string> methods_in(const Table& table) {
   std::vector<std::string> methods;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string& method = table.text(row, "method");
-    if (std::find(methods.begin(), methods.end(), method) == methods.end())
-      methods.push_back(method);
-  }
+  for (const std::size_t row :
+       first_rows(table, [&](std::size_t any) { return table.text(any, "method"); }))
+    methods.push_back(table.text(row, "method"));
   return methods;
 }
 
@@ -87,6 +103,14 @@ double median(std::vector<double> values) {
 std::string csv_field(double number) {
   std::array<char, 32> text{};
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), number).ptr};
+}
+
+void write_file(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out << text << std::flush;
+  if (!out)
+    throw Error(file.string(), std::string("cannot be written: ") + std::strerror(errno),
+                "use a folder with write permission and free disk space");
 }
 
 }  // namespace palpate::lab

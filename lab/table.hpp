@@ -3,11 +3,18 @@
 
 #include <concepts>
 #include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <initializer_list>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace palpate::lab {
+
+/// Columns and the text that each has in the rows that are meant.
+using Where = std::initializer_list<std::pair<std::string_view, std::string_view>>;
 
 /// A CSV as read back, to make claims from.
 class Table {
@@ -30,6 +37,11 @@ class Table {
     }
     return values;
   }
+  [[nodiscard]] std::vector<double> numbers(std::string_view column, Where where) const {
+    return numbers(column, [&](std::size_t row) { return is(row, where); });
+  }
+  /// Are all of these in the row?
+  [[nodiscard]] bool is(std::size_t row, Where where) const;
 
  private:
   [[nodiscard]] std::size_t index(std::string_view column) const;
@@ -38,6 +50,10 @@ class Table {
   std::vector<std::string> columns_;
   std::vector<std::vector<std::string>> rows_;
 };
+
+/// The first row of each key, in their order.
+std::vector<std::size_t> first_rows(const Table& table,
+                                    const std::function<std::string(std::size_t row)>& key);
 
 /// The methods of a table's column "method", in the order of their first rows.
 std::vector<std::string> methods_in(const Table& table);
@@ -63,5 +79,8 @@ std::string csv_row(const Fields&... fields) {
   line.back() = '\n';
   return line;
 }
+
+/// Writes a file as a whole. @throws Error if it cannot be written.
+void write_file(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace palpate::lab

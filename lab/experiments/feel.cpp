@@ -10,7 +10,6 @@
 #include "lab/experiment.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/text.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -108,20 +107,13 @@ std::string rows_of(std::string_view scene, const FeelFigures& figures) {
   return rows;
 }
 
-void check_scenes(const ExperimentOptions& options) {
+// All methods play a scene in one cell, so that its frames are made but once.
+std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptions& options) {
   std::vector<std::string_view> scenes;
   for (const Measure& measure : measures()) {
     if (scenes.empty() || scenes.back() != measure.scene) scenes.push_back(measure.scene);
   }
-  for (const std::string& name : options.families) {
-    if (std::find(scenes.begin(), scenes.end(), name) != scenes.end()) continue;
-    throw Error("--families " + name, "feel has no such scene", did_you_mean(name, scenes));
-  }
-}
-
-// All methods play a scene in one cell, so that its frames are made but once.
-std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  check_scenes(options);
+  check_families(options, "feel has no such scene", scenes);
   std::vector<Contestant> contestants;
   for (const std::string& name : methods_of(experiment, options))
     contestants.push_back(
@@ -172,10 +164,10 @@ Scores feel_scores(const Table& table) {
     for (const std::string_view loop : measure.loops) {
       std::vector<std::optional<double>> values;
       for (const std::string& method : scores.methods()) {
-        const std::vector<double> rows = table.numbers("value", [&](std::size_t row) {
-          return table.text(row, "method") == method && table.text(row, "scene") == measure.scene &&
-                 table.text(row, "loop") == loop && table.text(row, "measure") == measure.name;
-        });
+        const std::vector<double> rows = table.numbers("value", {{"method", method},
+                                                                 {"scene", measure.scene},
+                                                                 {"loop", loop},
+                                                                 {"measure", measure.name}});
         constexpr double exact = 1e-6;  // of any unit here: rounding
         double sum = 0.0;               // more than one row only where cases are counted
         for (const double value : rows) sum += value;
@@ -209,15 +201,15 @@ Figure feel_figure(const Table& table) {
 }  // namespace
 
 Experiment feel_experiment() {
-  return {"feel",
-          "force quality: open loop, with a device and a hand, and through the safety chain",
-          "method,scene,loop,measure,unit,aim,value,case",
-          {"paper", "sight", "ideal"},
-          true,
-          feel_cells,
-          feel_figure,
-          no_claims,
-          feel_scores};
+  return {
+      .name = "feel",
+      .summary = "force quality: open loop, with a device and a hand, and through the safety chain",
+      .header = "method,scene,loop,measure,unit,aim,value,case",
+      .default_methods = {"paper", "sight", "ideal"},
+      .cells = feel_cells,
+      .figure = feel_figure,
+      .scores = feel_scores,
+      .has_grid = true};
 }
 
 }  // namespace palpate::lab

@@ -173,13 +173,6 @@ struct Signal {
   }
   /// [%] of what the method asks for, in the mean
   [[nodiscard]] double share() const { return 100.0 * mean(force) / std::max(mean(asked), 1e-9); }
-
- private:
-  static double mean(const std::vector<double>& values) {
-    double sum = 0.0;
-    for (const double value : values) sum += value;
-    return sum / static_cast<double>(values.size());
-  }
 };
 
 // Plays a camera to loops and keeps their signals from `from` to the end, rulers' left out.

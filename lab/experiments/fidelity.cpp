@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/fidelity.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,13 +8,13 @@
 #include <fmt/format.h>
 
 #include "lab/experiment.hpp"
+#include "lab/experiments/pop.hpp"
 #include "lab/grid_cloud.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 #include "lab/statistics.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/text.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -112,12 +110,6 @@ void watch(Method& method, const Scenario& scenario, const Truth& truth, double 
   } else {
     watched.felt += felt_rms(force);
   }
-}
-
-double mean(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double v : values) sum += v;
-  return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
 }
 
 // A case that was lost in every repeat has no other figure.
@@ -307,12 +299,9 @@ std::string push_by_sine(const std::string& name, const ExperimentOptions& optio
 }
 
 std::vector<Cell> fidelity_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  for (const std::string& name : options.families) {
-    std::vector<std::string_view> scenes;
-    for (const Measure& measure : measures) scenes.push_back(measure.scene);
-    if (std::find(scenes.begin(), scenes.end(), name) == scenes.end())
-      throw Error("--families " + name, "fidelity has no such scene", did_you_mean(name, scenes));
-  }
+  std::vector<std::string_view> scenes;
+  for (const Measure& measure : measures) scenes.push_back(measure.scene);
+  check_families(options, "fidelity has no such scene", scenes);
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options)) {
     // What plays a scene gets the method, the options, the scene's name and more.
@@ -340,18 +329,11 @@ std::vector<Cell> fidelity_cells(const Experiment& experiment, const ExperimentO
 Scores fidelity_scores(const Table& table) {
   AimTable scores({"scene", "measure"}, methods_in(table));
   for (const Measure& measure : measures) {
-    const bool played =
-        !table
-             .numbers("value",
-                      [&](std::size_t row) { return table.text(row, "scene") == measure.scene; })
-             .empty();
-    if (!played) continue;
+    if (table.numbers("value", {{"scene", measure.scene}}).empty()) continue;
     std::vector<std::optional<double>> values;
     for (const std::string& method : scores.methods()) {
-      const std::vector<double> rows = table.numbers("value", [&](std::size_t row) {
-        return table.text(row, "method") == method && table.text(row, "scene") == measure.scene &&
-               table.text(row, "measure") == measure.name;
-      });
+      const std::vector<double> rows = table.numbers(
+          "value", {{"method", method}, {"scene", measure.scene}, {"measure", measure.name}});
       values.push_back(rows.empty() ? std::nullopt : std::optional(rows.front()));
     }
     scores.add({std::string(measure.scene), measure_text(measure.name, measure.unit)}, measure.aim,
@@ -376,17 +358,15 @@ bool is_without_chance(std::string_view scene) {
 }
 
 Experiment fidelity_experiment() {
-  Experiment experiment{"fidelity",
-                        "accuracy of contact and force, compared with the aims",
-                        "method,scene,measure,unit,aim,value",
-                        {"paper", "sight"},
-                        true,
-                        fidelity_cells,
-                        fidelity_figure,
-                        no_claims,
-                        fidelity_scores};
-  experiment.plays_programs = true;
-  return experiment;
+  return {.name = "fidelity",
+          .summary = "accuracy of contact and force, compared with the aims",
+          .header = "method,scene,measure,unit,aim,value",
+          .default_methods = {"paper", "sight"},
+          .cells = fidelity_cells,
+          .figure = fidelity_figure,
+          .scores = fidelity_scores,
+          .has_grid = true,
+          .plays_programs = true};
 }
 
 }  // namespace palpate::lab

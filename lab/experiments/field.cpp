@@ -283,25 +283,25 @@ constexpr std::string_view header =
 }  // namespace
 
 Experiment field_experiment() {
-  return {"field",
-          "the field set: independent scenes, sensors and HIP paths, which share no code with "
-          "those of pop and feel",
-          header,
-          {"paper", "sight"},
-          false,
-          field_cells,
-          field_figure,
-          no_claims,
-          field_scores};
+  return {.name = "field",
+          .summary =
+              "the field set: independent scenes, sensors and HIP paths, which share no code with "
+              "those of pop and feel",
+          .header = header,
+          .default_methods = {"paper", "sight"},
+          .cells = field_cells,
+          .figure = field_figure,
+          .scores = field_scores};
 }
 
 Experiment visits_experiment() {
-  return {
-      "visits",     "the visits set: what comes, goes and moves around a hand that rests or works",
-      header,       {"sight", "direct", "paper"},
-      false,        visits_cells,
-      field_figure, no_claims,
-      visits_scores};
+  return {.name = "visits",
+          .summary = "the visits set: what comes, goes and moves around a hand that rests or works",
+          .header = header,
+          .default_methods = {"sight", "direct", "paper"},
+          .cells = visits_cells,
+          .figure = field_figure,
+          .scores = visits_scores};
 }
 
 }  // namespace palpate::lab

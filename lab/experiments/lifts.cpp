@@ -7,37 +7,12 @@
 #include <fmt/format.h>
 
 #include "lab/experiment.hpp"
-#include "lab/grid_cloud.hpp"
+#include "lab/experiments/pop_cases.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 
 namespace palpate::lab {
 namespace {
-
-// The height of a surface over time, and for how long to watch.
-struct Law {
-  std::function<double(double t)> height;
-  double duration;
-};
-
-// 5.2: from 10 r_c below the origin at 20 r_c/s until it is there, then with an acceleration for
-// 10 frames.
-Law lift_law(double r_c, double acceleration) {
-  const double v0 = 20.0 * r_c;
-  constexpr double begin = 0.5;  // [s] = 10 r_c / (20 r_c/s)
-  return {[=](double t) {
-            const double after = std::max(t - begin, 0.0);
-            return -10.0 * r_c + v0 * t + 0.5 * acceleration * after * after;
-          },
-          begin + 10.0 / f_c};
-}
-
-// The hand waits at the origin; once the cloud has passed it, it keeps 6 r_c below the cloud as the
-// newest frame shows it (below the surface itself, it would overtake a proxy between two frames).
-double hand_height(const Law& law, double r_c, double t) {
-  const double shown = law.height(std::floor(t * f_c + 1e-6) / f_c);
-  return shown > 0.0 ? shown - 6.0 * r_c : 0.0;
-}
 
 struct Lifted {
   bool popped = false;
@@ -46,37 +21,38 @@ struct Lifted {
   int frames = 0;
 };
 
-// What the proxy was like just before a frame, `shown` being the height in the frame before [m].
-using BeforeFrame = std::function<void(const Tick& last, double shown)>;
+// [m] of the surface; not -0
+double height(const PopStage& stage, double t) {
+  return 0.0 - stage.truth(Vec3::Zero(), t).distance;
+}
 
-Lifted lift(std::string_view name, const ExperimentOptions& options, const Law& law, double sigma,
-            std::uint64_t seed, const BeforeFrame& before_frame = {}) {
+// What the proxy was like just before a frame, `shown` being the height in the frame before [m].
+using BeforeFrame = std::function<void(const Tick& last, double true_height, double shown)>;
+
+// @param acceleration  [m/s^2]  @param sigma  [m]
+Lifted lift(std::string_view name, const ExperimentOptions& options, double acceleration,
+            double sigma, std::uint64_t seed, const BeforeFrame& before_frame = {}) {
   const double r_c = options.parameters.proxy.r_c();
-  GridCloud grid = level_grid(r_c, 12.0 * r_c);
-  grid.sigma = sigma;
-  grid.noise = options.noise;
-  grid.seed = seed;
-  const Truth truth = flat_truth(law.height);
-  const std::unique_ptr<Method> method = make_method(name, {options.parameters, truth});
+  const PopStage stage = grid_lift(
+      {.family = {}, .values = {{"noise", sigma}, {"acceleration", acceleration}}, .seed = seed},
+      options.parameters, options.noise);
+  const std::unique_ptr<Method> method = make_method(name, {options.parameters, stage.truth});
   method->seat(Vec3::Zero());
-  const Scenario scenario{
-      .duration = law.duration,
-      .cloud = [&](std::uint64_t frame, double t) { return grid.capture(frame, law.height(t)); },
-      .hip = [&](double t) { return Vec3(0.0, 0.0, hand_height(law, r_c, t)); }};
   Lifted result;
   double shown = 0.0;  // height in the newest frame
   Tick last{};
   last.proxy.setZero();
   std::int64_t frame = -1;
-  play(*method, scenario, [&](const Tick& tick) {
-    if (tick.frame != frame && frame >= 0 && before_frame) before_frame(last, shown);
+  play(*method, stage.scenario, [&](const Tick& tick) {
+    if (tick.frame != frame && frame >= 0 && before_frame)
+      before_frame(last, height(stage, last.t), shown);
     if (tick.frame != frame && frame >= 0 && last.state != ContactState::free_motion) {
       result.thickness += last.proxy.z() - r_c - shown;
       result.normal_error += 1.0 - last.normal.z();
       ++result.frames;
     }
     frame = tick.frame;
-    shown = law.height(static_cast<double>(frame) / f_c);
+    shown = height(stage, static_cast<double>(frame) / f_c);
     last = tick;
     return true;
   });
@@ -108,11 +84,10 @@ std::vector<Cell> single_lift_cells(const Experiment& experiment,
   std::vector<Cell> cells;
   for (const std::string& name : methods_of(experiment, options))
     cells.emplace_back([=] {
-      const Law law = lift_law(r_c, single_acceleration * r_c);
       std::string rows;
-      lift(name, options, law, single_noise * r_c, options.seed,
-           [&](const Tick& last, double shown) {
-             rows += csv_row(name, last.t, law.height(last.t), shown, last.hip.z(), last.proxy.z(),
+      lift(name, options, single_acceleration * r_c, single_noise * r_c, options.seed,
+           [&](const Tick& last, double true_height, double shown) {
+             rows += csv_row(name, last.t, true_height, shown, last.hip.z(), last.proxy.z(),
                              last.state != ContactState::free_motion);
            });
       return rows;
@@ -175,8 +150,7 @@ std::vector<Cell> lift_cells(const Experiment& experiment, const ExperimentOptio
             accelerations > 1 ? most_acceleration * j / (accelerations - 1) : 0.0;
         const std::uint64_t seed = cell_seed(options.seed, i, j);
         cells.emplace_back([=] {
-          const Lifted result =
-              lift(name, options, lift_law(r_c, acceleration * r_c), noise * r_c, seed);
+          const Lifted result = lift(name, options, acceleration * r_c, noise * r_c, seed);
           return csv_row(name, acceleration, noise, options.seed, result.popped);
         });
       }
@@ -293,7 +267,7 @@ std::vector<Cell> bound_cells(const Experiment& experiment, const ExperimentOpti
         int popped = 0;
         for (int k = 0; k < repeats; ++k) {
           const Lifted result =
-              lift(name, options, lift_law(r_c, 0.0), noise * r_c, cell_seed(options.seed, i, k));
+              lift(name, options, 0.0, noise * r_c, cell_seed(options.seed, i, k));
           thickness += result.thickness / repeats;
           normal_error += result.normal_error / repeats;
           popped += result.popped ? 1 : 0;
@@ -356,36 +330,36 @@ Figure bound_figure(const Table& table) {
 }  // namespace
 
 Experiment single_lift_experiment() {
-  return {"single-lift",
-          "5.2, Fig. 12: one lift over time, at every update",
-          "method,t,true_y,cloud_y,hip_y,proxy_y,touching",
-          {"paper", "fixed-step", "sight"},
-          false,
-          single_lift_cells,
-          single_lift_figure,
-          single_lift_claims};
+  return {.name = "single-lift",
+          .summary = "5.2, Fig. 12: one lift over time, at every update",
+          .header = "method,t,true_y,cloud_y,hip_y,proxy_y,touching",
+          .default_methods = {"paper", "fixed-step", "sight"},
+          .cells = single_lift_cells,
+          .figure = single_lift_figure,
+          .claims = single_lift_claims};
 }
 
 Experiment lift_experiment() {
-  return {"lift",
-          "5.2, Fig. 13: lifts with acceleration and noise",
-          "method,acceleration_rc,noise_rc,seed,popped",
-          {"fixed-step", "paper"},
-          true,
-          lift_cells,
-          lift_figure,
-          lift_claims};
+  return {.name = "lift",
+          .summary = "5.2, Fig. 13: lifts with acceleration and noise",
+          .header = "method,acceleration_rc,noise_rc,seed,popped",
+          .default_methods = {"fixed-step", "paper"},
+          .cells = lift_cells,
+          .figure = lift_figure,
+          .claims = lift_claims,
+          .has_grid = true};
 }
 
 Experiment bound_experiment() {
-  return {"bound",
+  return {
+      .name = "bound",
+      .summary =
           "6: the thickness h and normal error e_n caused by noise, compared with (23) and (24)",
-          "method,noise_rc,seed,h_m,e_n,printed_h_m,printed_e_n,popped",
-          {"paper"},
-          false,
-          bound_cells,
-          bound_figure,
-          bound_claims};
+      .header = "method,noise_rc,seed,h_m,e_n,printed_h_m,printed_e_n,popped",
+      .default_methods = {"paper"},
+      .cells = bound_cells,
+      .figure = bound_figure,
+      .claims = bound_claims};
 }
 
 }  // namespace palpate::lab

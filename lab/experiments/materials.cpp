@@ -87,36 +87,32 @@ std::vector<Cell> material_cells(const Experiment& /*experiment*/,
   return cells;
 }
 
+std::vector<std::string> materials_in(const Table& table) {
+  std::vector<std::string> names;
+  const auto name = [&](std::size_t row) { return table.text(row, "material"); };
+  for (const std::size_t row : first_rows(table, name)) names.push_back(name(row));
+  return names;
+}
+
 Scores material_scores(const Table& table) {
   Scores scores;
   scores.columns = {"material",     "stiffness [N/m]", "strike [N]",
                     "friction [-]", "stroke [mN]",     "rest [mN]"};
-  std::vector<std::string> names;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (names.empty() || names.back() != table.text(row, "material"))
-      names.push_back(table.text(row, "material"));
-  }
-  for (const std::string& name : names) {
+  for (const std::string& name : materials_in(table)) {
     const auto during = [&](std::string_view column, double from, double to) {
       return table.numbers(column, [&](std::size_t row) {
         const double t = table.number(row, "t");
         return table.text(row, "material") == name && t >= from - 1e-9 && t < to - 1e-9;
       });
     };
-    const auto mean = [&](std::string_view column, double from, double to) {
-      const std::vector<double> values = during(column, from, to);
-      double sum = 0.0;
-      for (const double value : values) sum += value;
-      return sum / static_cast<double>(values.size());
-    };
     // Between 1 and 4 mm of the slow press.
     const auto press_at = [](double depth) { return press_from + depth / pressed * press_for; };
-    const double stiffness = (mean("normal", press_at(4e-3), press_at(4e-3) + 0.01) -
-                              mean("normal", press_at(1e-3), press_at(1e-3) + 0.01)) /
+    const double stiffness = (mean(during("normal", press_at(4e-3), press_at(4e-3) + 0.01)) -
+                              mean(during("normal", press_at(1e-3), press_at(1e-3) + 0.01))) /
                              3e-3;
     const double hits = engaged + above / strike;
     const std::vector<double> blow = during("normal", hits, hits + 0.06);
-    const double held = mean("normal", hits + 0.3, hits + 0.4);
+    const double held = mean(during("normal", hits + 0.3, hits + 0.4));
     const double slides = stroke_from + 0.2;
     const double stops = stroke_from + stroke_for;
     const double rests = stops + 0.1;
@@ -127,7 +123,8 @@ Scores material_scores(const Table& table) {
     scores.rows.push_back(
         {name, fmt::format("{:.0f}", stiffness),
          fmt::format("{:.2f}", *std::max_element(blow.begin(), blow.end()) - held),
-         fmt::format("{:.2f}", mean("tangential", slides, stops) / mean("normal", slides, stops)),
+         fmt::format("{:.2f}", mean(during("tangential", slides, stops)) /
+                                   mean(during("normal", slides, stops))),
          fmt::format("{:.1f}", shaking(slides, stops)),
          fmt::format("{:.1f}", shaking(rests, duration))});
   }
@@ -149,11 +146,8 @@ Figure material_figure(const Table& table) {
                   .x = {"time [ms]"},
                   .y = {"normal, less its mean [N]"}}},
                 2};
-  std::vector<std::string> names;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string& name = table.text(row, "material");
-    if (!names.empty() && names.back() == name) continue;
-    names.push_back(name);
+  int drawn = 0;
+  for (const std::string& name : materials_in(table)) {
     const auto of = [&](double from, double to, std::string_view x, std::string_view y) {
       const auto during = [&](std::size_t other) {
         const double t = table.number(other, "t");
@@ -166,7 +160,7 @@ Figure material_figure(const Table& table) {
     Points shaking = of(4.6, 4.7, "t", "normal");
     double mean = 0.0;
     for (const auto& point : shaking) mean += point[1] / static_cast<double>(shaking.size());
-    const double below = 0.5 * static_cast<double>(names.size() - 1);  // a line each
+    const double below = 0.5 * drawn++;  // a line each
     for (auto& point : shaking) point = {1e3 * (point[0] - 4.6), point[1] - mean - below};
     figure.panels[0].series.push_back({name, hit});
     figure.panels[1].series.push_back(
@@ -181,15 +175,12 @@ Figure material_figure(const Table& table) {
 }  // namespace
 
 Experiment materials_experiment() {
-  return {"materials",
-          "force of an impact, a press and a slide on each standard material",
-          "material,t,depth,along,normal,tangential",
-          {},
-          false,
-          material_cells,
-          material_figure,
-          no_claims,
-          material_scores};
+  return {.name = "materials",
+          .summary = "force of an impact, a press and a slide on each standard material",
+          .header = "material,t,depth,along,normal,tangential",
+          .cells = material_cells,
+          .figure = material_figure,
+          .scores = material_scores};
 }
 
 }  // namespace palpate::lab

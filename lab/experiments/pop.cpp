@@ -380,19 +380,16 @@ Judgement judge(const std::string& method, const PopCase& c, const ExperimentOpt
 }
 
 Experiment pop_experiment() {
-  Experiment experiment{
-      "pop",
-      "pop-through in families of random cases, failures reduced to simple ones",
-      "method,family,from,cases,lost,dipped,worst_step_n,worst_change_n,worst_caused_n,"
-      "noticeable,first_lost,simplest,ghost,numb,wrong,right,worst_ghost_n,first_not_right",
-      {"paper", "sight"},
-      false,
-      pop_cells,
-      pop_figure,
-      no_claims,
-      pop_scores};
-  experiment.plays_programs = true;
-  return experiment;
+  return {.name = "pop",
+          .summary = "pop-through in families of random cases, failures reduced to simple ones",
+          .header =
+              "method,family,from,cases,lost,dipped,worst_step_n,worst_change_n,worst_caused_n,"
+              "noticeable,first_lost,simplest,ghost,numb,wrong,right,worst_ghost_n,first_not_right",
+          .default_methods = {"paper", "sight"},
+          .cells = pop_cells,
+          .figure = pop_figure,
+          .scores = pop_scores,
+          .plays_programs = true};
 }
 
 }  // namespace palpate::lab

@@ -1,6 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
 #include "lab/experiment.hpp"
 #include "palpate/kernel/core/tick.hpp"
 
@@ -48,5 +57,36 @@ struct Judgement {
 
 /// Plays one case.
 Judgement judge(const std::string& method, const PopCase& c, const ExperimentOptions& options);
+
+/// A measure of a scene, and the most that it is to be.
+struct FidelityMeasure {
+  std::string_view scene;
+  std::string_view name;
+  std::string_view unit;
+  std::optional<double> aim;  ///< none: it is only shown
+};
+std::span<const FidelityMeasure> fidelity_measures();
+
+/// Has a scene no noise, so that every seed gives the same?
+bool is_without_chance(std::string_view scene);
+
+/// One case on a recording: a place and a motion drawn at random.
+struct RealCase {
+  std::string text;  ///< all that was drawn
+  std::function<Judgement(const std::string& method, const ExperimentOptions& options)> play;
+};
+
+struct RealCases {
+  std::string hash;    ///< SHA-256 of the recording's frames
+  std::size_t frames;  ///< that are taken of it
+  std::vector<RealCase> cases;
+};
+
+/// Cases on the recording of a camera at rest: they follow from its frames, the seed and their
+/// number alone, the motions composed exactly.
+/// @param name  what the recording is called in the cases' texts
+/// @throws Error if it cannot be read, its camera moved, or it shows nothing flat.
+RealCases draw_real_cases(const std::string& uri, const std::string& name, std::uint64_t seed,
+                          std::size_t count);
 
 }  // namespace palpate::lab

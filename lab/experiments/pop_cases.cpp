@@ -62,24 +62,28 @@ std::function<double(double)> lift_law(double r_c, double acceleration) {
 }
 constexpr double lift_duration = 0.5 + 10.0 / f_c;
 
-PopStage lift(const PopCase& c, const Parameters& parameters, Noise noise) {
+}  // namespace
+
+PopStage grid_lift(const PopCase& c, const Parameters& parameters, Noise noise) {
   PopStage stage = on_grid(c, parameters, noise,
                            lift_law(parameters.proxy.r_c(), c["acceleration"]), lift_duration);
   stage.judged_at_end = true;
   return stage;
 }
 
+namespace {
+
 constexpr std::array lift_white_ranges = {PopRange{"noise", 0.0, 0.0, 0.010, even, 0.1},
                                           PopRange{"acceleration", 0.0, 0.0, 90.0, even, 1000.0}};
 PopStage lift_white(const PopCase& c, const Parameters& parameters) {
-  return lift(c, parameters, Noise::white);
+  return grid_lift(c, parameters, Noise::white);
 }
 
 constexpr std::array lift_correlated_ranges = {
     PopRange{"noise", 0.0, 0.0, 0.005, even, 0.1},
     PopRange{"acceleration", 0.0, 0.0, 90.0, even, 1000.0}};
 PopStage lift_correlated(const PopCase& c, const Parameters& parameters) {
-  return lift(c, parameters, Noise::correlated);
+  return grid_lift(c, parameters, Noise::correlated);
 }
 
 // A ball that is lifted, and beyond its rim a plane beneath it.

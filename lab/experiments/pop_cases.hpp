@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "lab/experiment.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 
@@ -73,6 +74,10 @@ struct PopFamily {
   std::span<const PopRange> ranges;
   PopStage (*stage)(const PopCase&, const Parameters&);
 };
+
+/// 5.2: a level grid of points that is lifted with an acceleration under noise, once the hand waits
+/// above it, for ten frames. @param c  with its noise [m] and acceleration [m/s^2]
+PopStage grid_lift(const PopCase& c, const Parameters& parameters, Noise noise);
 
 /// All families, in the order of the tables.
 std::span<const PopFamily> pop_families();

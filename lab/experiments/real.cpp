@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/real.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "lab/experiment.hpp"
+#include "lab/experiments/pop.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
@@ -415,19 +414,15 @@ RealCases draw_real_cases(const std::string& uri, const std::string& name, std::
 }
 
 Experiment real_experiment() {
-  Experiment experiment{
-      "real",
-      "recordings of a camera, at rest and with exact composed motion",
-      "method,action,place,distance_m,lost,suspected,error_mm,felt_n,step_n,range_n",
-      {"paper", "sight"},
-      false,
-      real_cells,
-      real_figure,
-      no_claims,
-      real_scores};
-  experiment.takes_recording = true;
-  experiment.plays_programs = true;
-  return experiment;
+  return {.name = "real",
+          .summary = "recordings of a camera, at rest and with exact composed motion",
+          .header = "method,action,place,distance_m,lost,suspected,error_mm,felt_n,step_n,range_n",
+          .default_methods = {"paper", "sight"},
+          .cells = real_cells,
+          .figure = real_figure,
+          .scores = real_scores,
+          .takes_recording = true,
+          .plays_programs = true};
 }
 
 }  // namespace palpate::lab

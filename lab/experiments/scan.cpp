@@ -148,14 +148,13 @@ Figure scan_figure(const Table& table) {
 }  // namespace
 
 Experiment scan_experiment() {
-  return {"scan",
-          "5.4, Fig. 16: over a ramp and a box seen by a synthetic Kinect",
-          "method,t,hip_y,hip_z,proxy_y,proxy_z,surface_z,force_n,steps,touching",
-          {"paper", "ideal"},
-          false,
-          scan_cells,
-          scan_figure,
-          scan_claims};
+  return {.name = "scan",
+          .summary = "5.4, Fig. 16: over a ramp and a box seen by a synthetic Kinect",
+          .header = "method,t,hip_y,hip_z,proxy_y,proxy_z,surface_z,force_n,steps,touching",
+          .default_methods = {"paper", "ideal"},
+          .cells = scan_cells,
+          .figure = scan_figure,
+          .claims = scan_claims};
 }
 
 }  // namespace palpate::lab

@@ -146,25 +146,23 @@ Figure corners_figure(const Table& table) {
 }  // namespace
 
 Experiment flat_experiment() {
-  return {"flat",
-          "5.1, Fig. 11: along a flat grid, above and below it",
-          "method,t,hip_x,hip_y,proxy_x,proxy_y,contact_y,force_n,steps",
-          {"paper", "ideal"},
-          false,
-          flat_cells,
-          flat_figure,
-          flat_claims};
+  return {.name = "flat",
+          .summary = "5.1, Fig. 11: along a flat grid, above and below it",
+          .header = "method,t,hip_x,hip_y,proxy_x,proxy_y,contact_y,force_n,steps",
+          .default_methods = {"paper", "ideal"},
+          .cells = flat_cells,
+          .figure = flat_figure,
+          .claims = flat_claims};
 }
 
 Experiment corners_experiment() {
-  return {"corners",
-          "5.3, Fig. 14: a triangle wave with growing amplitude",
-          "method,hip_x,proxy_x,proxy_z,contact_x,contact_z,true_z,gap",
-          {"paper", "ideal"},
-          false,
-          corners_cells,
-          corners_figure,
-          corners_claims};
+  return {.name = "corners",
+          .summary = "5.3, Fig. 14: a triangle wave with growing amplitude",
+          .header = "method,hip_x,proxy_x,proxy_z,contact_x,contact_z,true_z,gap",
+          .default_methods = {"paper", "ideal"},
+          .cells = corners_cells,
+          .figure = corners_figure,
+          .claims = corners_claims};
 }
 
 }  // namespace palpate::lab

@@ -47,9 +47,6 @@ Motion motion_of(std::string_view name) {
   } else if (name == "come") {
     motion.start = engaged + 0.5;
     motion.speed = top_speed;
-  } else if (name != "rest") {
-    throw Error("--families " + std::string(name), "teleop has no such scene",
-                did_you_mean(name, scenes));
   }
   return motion;
 }
@@ -162,7 +159,7 @@ std::string rows_of(std::string_view name, std::string_view sensor, std::string_
 }
 
 std::vector<Cell> teleop_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  for (const std::string& name : options.families) motion_of(name);  // throws for an unknown one
+  check_families(options, "teleop has no such scene", scenes);
   std::vector<Cell> cells;
   std::vector<std::string> ways = options.methods;
   if (ways.empty())
@@ -190,16 +187,13 @@ Scores teleop_scores(const Table& table) {
   scores.columns = {
       "way",       "scene",      "sensor",      "force [N], 0 to 500 ms", "worst, %", "shake [mm]",
       "made [mJ]", "depth [mm]", "contact [N]", "tool's swing [mm]"};
-  std::vector<std::string> done;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto key = [&](std::size_t of) {
-      return table.text(of, "way") + ',' + table.text(of, "scene") + ',' + table.text(of, "sensor");
-    };
-    const std::string mine = key(row);
-    if (std::find(done.begin(), done.end(), mine) != done.end()) continue;
-    done.push_back(mine);
+  const auto key = [&](std::size_t row) {
+    return table.text(row, "way") + ',' + table.text(row, "scene") + ',' +
+           table.text(row, "sensor");
+  };
+  for (const std::size_t row : first_rows(table, key)) {
     const auto all = [&](std::string_view column) {
-      return table.numbers(column, [&](std::size_t other) { return key(other) == mine; });
+      return table.numbers(column, [&](std::size_t other) { return key(other) == key(row); });
     };
     const auto most = [&](std::string_view column) {
       const std::vector<double> values = all(column);
@@ -248,15 +242,15 @@ Figure teleop_figure(const Table& table) {
 }  // namespace
 
 Experiment teleop_experiment() {
-  return {"teleop",
-          "teleoperation of a robot, compared with force coupling, by delay, jitter and loss",
-          "way,scene,sensor,round_trip,link,force,most_force,shake,energy,depth,contact,swing",
-          {"palpate", "position-force", "wave", "tdpa"},
-          false,
-          teleop_cells,
-          teleop_figure,
-          no_claims,
-          teleop_scores};
+  return {.name = "teleop",
+          .summary =
+              "teleoperation of a robot, compared with force coupling, by delay, jitter and loss",
+          .header =
+              "way,scene,sensor,round_trip,link,force,most_force,shake,energy,depth,contact,swing",
+          .default_methods = {"palpate", "position-force", "wave", "tdpa"},
+          .cells = teleop_cells,
+          .figure = teleop_figure,
+          .scores = teleop_scores};
 }
 
 }  // namespace palpate::lab

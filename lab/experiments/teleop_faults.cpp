@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/experiments/teleop_faults.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,9 +10,9 @@
 #include "lab/experiment.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/experiments/pop_cases.hpp"
+#include "lab/experiments/teleop.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/text.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -72,9 +70,6 @@ HipPath wander(Chance& chance) {
 }  // namespace
 
 TeleopEpisode teleop_episode(std::string_view fault, std::uint64_t seed) {
-  if (std::find(faults.begin(), faults.end(), fault) == faults.end())
-    throw Error("--families " + std::string(fault), "teleop-faults has no such fault",
-                did_you_mean(fault, faults));
   Chance chance(seed * 1000003U + 17U);
   std::vector<Part> parts = parts_of(chance);
   const bool moves = !parts.front().motion.rests();
@@ -156,7 +151,7 @@ namespace {
 
 std::vector<Cell> episode_cells(const Experiment& /*experiment*/,
                                 const ExperimentOptions& options) {
-  for (const std::string& fault : options.families) teleop_episode(fault, 1);  // throws
+  check_families(options, "teleop-faults has no such fault", faults);
   std::vector<Cell> cells;
   const int cases = options.cases.value_or(usual_cases);
   for (const std::string_view fault : faults) {
@@ -186,9 +181,7 @@ Scores episode_scores(const Table& table) {
   for (const std::string_view fault : faults) {
     for (const std::string_view scene : {"rests", "moves"}) {
       const auto of = [&](std::string_view column) {
-        return table.numbers(column, [&](std::size_t row) {
-          return table.text(row, "fault") == fault && table.text(row, "scene") == scene;
-        });
+        return table.numbers(column, {{"fault", fault}, {"scene", scene}});
       };
       const auto most = [&](std::string_view column) {
         const std::vector<double> values = of(column);
@@ -229,15 +222,13 @@ Figure episode_figure(const Table& table) {
 }  // namespace
 
 Experiment teleop_faults_experiment() {
-  return {"teleop-faults",
-          "teleoperation while network, camera or a process fails: fixtures, force, stops",
-          "fault,scene,sensor,number,breach,contact,unseen,rise,force,stop",
-          {},
-          false,
-          episode_cells,
-          episode_figure,
-          no_claims,
-          episode_scores};
+  return {
+      .name = "teleop-faults",
+      .summary = "teleoperation while network, camera or a process fails: fixtures, force, stops",
+      .header = "fault,scene,sensor,number,breach,contact,unseen,rise,force,stop",
+      .cells = episode_cells,
+      .figure = episode_figure,
+      .scores = episode_scores};
 }
 
 }  // namespace palpate::lab

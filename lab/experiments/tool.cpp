@@ -13,7 +13,6 @@
 #include "lab/statistics.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/text.hpp"
 #include "palpate/kernel/tool/shape_touch.hpp"
 
 namespace palpate::lab {
@@ -266,9 +265,7 @@ std::vector<Cell> tool_cells(const Experiment& /*experiment*/, const ExperimentO
   const std::vector<ToolCase> cases = tool_cases();
   std::vector<std::string_view> names;
   for (const ToolCase& one : cases) names.push_back(one.name);
-  for (const std::string& name : options.families)
-    if (std::find(names.begin(), names.end(), name) == names.end())
-      throw Error("--families " + name, "tool has no such case", did_you_mean(name, names));
+  check_families(options, "tool has no such case", names);
   std::vector<Cell> cells;
   for (const ToolCase& one : cases) {
     if (!options.wants(one.name)) continue;
@@ -292,14 +289,11 @@ Scores tool_scores(const Table& table) {
                     "Means over seeds; of the last column the largest. Errors in percent of "
                     "stiffness times depth, and of that times half of the tool's length. "
                     "docs/tools.md."};
-  std::vector<std::string> done;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto key = [&](std::size_t of) {
-      return table.text(of, "case") + "," + table.text(of, "camera") + "," +
-             table.text(of, "method");
-    };
-    if (std::find(done.begin(), done.end(), key(row)) != done.end()) continue;
-    done.push_back(key(row));
+  const auto key = [&](std::size_t row) {
+    return table.text(row, "case") + "," + table.text(row, "camera") + "," +
+           table.text(row, "method");
+  };
+  for (const std::size_t row : first_rows(table, key)) {
     const auto values = [&](std::string_view column) {
       return table.numbers(column, [&](std::size_t other) {
         return key(other) == key(row) && !table.text(other, column).empty();
@@ -340,16 +334,16 @@ Figure tool_figure(const Table& table) {
 }  // namespace
 
 Experiment tool_experiment() {
-  return {"tool",
+  return {
+      .name = "tool",
+      .summary =
           "tools with a shape against the truth: force, torque, noise, side; beside penalties",
+      .header =
           "case,camera,method,seed,force,torque,force_error,torque_error,force_noise,torque_noise,"
           "behind",
-          {},
-          false,
-          tool_cells,
-          tool_figure,
-          no_claims,
-          tool_scores};
+      .cells = tool_cells,
+      .figure = tool_figure,
+      .scores = tool_scores};
 }
 
 }  // namespace palpate::lab

@@ -15,7 +15,6 @@
 #include "palpate/io/devices/sampled_wall.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/text.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -73,11 +72,8 @@ std::vector<Part> parts_of(std::string_view name) {
     return {{Sphere{radius}, Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, -radius)), Motion{}}};
   if (name == "edge") {
     for (int i = 0; i < 2; ++i) add(i * std::numbers::pi);
-  } else if (name == "corner") {
+  } else {  // corner
     for (int i = 0; i < 3; ++i) add(i * 2.0 * std::numbers::pi / 3.0);
-  } else {
-    throw Error("--families " + std::string(name), "zwidth has no such scene",
-                did_you_mean(name, scenes));
   }
   return walls;
 }
@@ -232,7 +228,7 @@ std::string rows_of(std::string_view scene_name, std::string_view camera,
 }
 
 std::vector<Cell> zwidth_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  for (const std::string& name : options.families) parts_of(name);  // throws for an unknown one
+  check_families(options, "zwidth has no such scene", scenes);
   const std::vector<std::string> names = methods_of(experiment, options);
   std::vector<Cell> cells;
   const std::vector<ZHolding> all = z_holdings();
@@ -267,22 +263,21 @@ Scores zwidth_scores(const Table& table) {
     scores.columns.push_back(method);
     scores.columns.push_back(method + ", chain");
   }
-  std::vector<std::vector<std::string>> done;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::vector<std::string> key = {table.text(row, "device"), table.text(row, "hand"),
-                                          table.text(row, "damping")};
-    if (std::find(done.begin(), done.end(), key) != done.end()) continue;
-    done.push_back(key);
-    std::vector<std::string> line = key;
+  for (const std::size_t row : first_rows(table, [&](std::size_t any) {
+         return table.text(any, "device") + ',' + table.text(any, "hand") + ',' +
+                table.text(any, "damping");
+       })) {
+    std::vector<std::string> line = {table.text(row, "device"), table.text(row, "hand"),
+                                     table.text(row, "damping")};
     line.push_back(fmt::format("{:.0f}", table.number(row, "bound")));
     line.push_back(stiffness_text(table.number(row, "linear")));
     for (const std::string& method : methods) {
       for (const std::string_view way : {"straight", "chain"}) {
-        const std::vector<double> values = table.numbers("stiffness", [&](std::size_t other) {
-          return table.text(other, "device") == key[0] && table.text(other, "hand") == key[1] &&
-                 table.text(other, "damping") == key[2] && table.text(other, "method") == method &&
-                 table.text(other, "way") == way;
-        });
+        const std::vector<double> values = table.numbers("stiffness", {{"device", line[0]},
+                                                                       {"hand", line[1]},
+                                                                       {"damping", line[2]},
+                                                                       {"method", method},
+                                                                       {"way", way}});
         if (values.empty()) {
           line.emplace_back("-");
           continue;
@@ -343,15 +338,14 @@ Figure zwidth_figure(const Table& table) {
 }  // namespace
 
 Experiment zwidth_experiment() {
-  return {"zwidth",
-          "largest stable stiffness: device, hand, scene and method, through the safety chain",
-          "device,hand,scene,camera,method,way,damping,stiffness,bound,linear",
-          {"paper", "sight", "ideal"},
-          false,
-          zwidth_cells,
-          zwidth_figure,
-          no_claims,
-          zwidth_scores};
+  return {.name = "zwidth",
+          .summary =
+              "largest stable stiffness: device, hand, scene and method, through the safety chain",
+          .header = "device,hand,scene,camera,method,way,damping,stiffness,bound,linear",
+          .default_methods = {"paper", "sight", "ideal"},
+          .cells = zwidth_cells,
+          .figure = zwidth_figure,
+          .scores = zwidth_scores};
 }
 
 }  // namespace palpate::lab

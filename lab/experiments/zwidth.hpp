@@ -28,7 +28,6 @@ class ZScene {
   /// @param name  `plane`, `sphere` (40 mm), `edge` or `corner` (of two or three walls, from
   /// inside)
   /// @param sensor  as in `synthetic:`
-  /// @throws Error for another name
   ZScene(std::string_view name, std::string_view sensor, std::uint64_t seed);
 
   [[nodiscard]] const Truth& truth() const { return truth_; }

@@ -13,7 +13,6 @@
 #include "lab/entry.hpp"
 #include "lab/experiments/pop.hpp"
 #include "lab/experiments/pop_cases.hpp"
-#include "lab/experiments/real.hpp"
 #include "lab/pipe_method.hpp"
 #include "lab/sha256.hpp"
 #include "lab/statistics.hpp"

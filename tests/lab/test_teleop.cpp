@@ -9,7 +9,6 @@
 
 #include "lab/experiment.hpp"
 #include "lab/experiments/teleop.hpp"
-#include "lab/experiments/teleop_faults.hpp"
 
 #include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"
@@ -104,7 +103,11 @@ TEST(TeleopFaults, EpisodesBreakNothingWhileThingsRest) {
       ++played;
     }
   }
-  EXPECT_TRUE(test::fails_saying([] { teleop_episode("linc", 1); }, "linc", "no such", "link"));
+  const Experiment& experiment = find_experiment("teleop-faults");
+  ExperimentOptions options;
+  options.families = {"linc"};
+  EXPECT_TRUE(test::fails_saying([&] { experiment.cells(experiment, options); }, "linc", "no such",
+                                 "link"));
 }
 
 // A ball beside a wall that is forbidden, before an exact camera: what keeps the tool out of the

@@ -30,4 +30,11 @@ std::string robots_help();
 /// What is led where nothing is named: a scene with a robot in it, and its camera.
 std::string usual_cell();
 
+/// What every program can lead: the library's robots, and a tool in a synthetic scene.
+/// @throws Error as open_cell.
+Cell open_standard_cell(const std::string& uri);
+
+/// What those are, as one part of the help of --robot.
+std::string standard_robots_help();
+
 }  // namespace palpate::app

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/standard_cells.hpp"
-
 #include <utility>
 
+#include "app/program_robots.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/net/telelink/robots.hpp"

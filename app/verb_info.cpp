@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "app/point_remarks.hpp"
+#include "app/remarks.hpp"
 #include "app/verbs.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/io/sources/source.hpp"

@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 #include "app/opened_scenes.hpp"
-#include "app/point_remarks.hpp"
+#include "app/remarks.hpp"
 #include "app/running_session.hpp"
 #include "app/signals.hpp"
 #include "app/verbs.hpp"

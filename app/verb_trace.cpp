@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <cerrno>
+#include <charconv>
 #include <cstdio>
+#include <cstring>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "app/options.hpp"
-#include "app/point_remarks.hpp"
 #include "app/program_methods.hpp"
 #include "app/progress.hpp"
+#include "app/remarks.hpp"
 #include "app/signals.hpp"
 #include "app/summary_text.hpp"
-#include "app/trace_remarks.hpp"
 #include "app/verbs.hpp"
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/io/devices/hip_path.hpp"
@@ -39,6 +42,93 @@ struct TraceOptions {
   double rate = 1000.0;
   bool json = false;
   MethodOptions method;
+};
+
+// Writes ticks as CSV, one row each, numbers in the shortest form that reads back to the same bits.
+// The columns are those of the header line.
+class TraceWriter {
+ public:
+  static constexpr const char* header =
+      "t,hip_x,hip_y,hip_z,proxy_x,proxy_y,proxy_z,normal_x,normal_y,normal_z,"
+      "force_x,force_y,force_z,state,steps,surface_velocity,frame,flags";
+
+  // Behind it where a tool has a shape.
+  static constexpr const char* tool_header =
+      ",hip_qx,hip_qy,hip_qz,hip_qw,proxy_qx,proxy_qy,proxy_qz,proxy_qw,"
+      "torque_x,torque_y,torque_z";
+
+  // @param path  where to, `-` for standard output. @throws Error if it cannot be opened.
+  TraceWriter(const std::string& path, bool has_tool)
+      : path_(path == "-" ? "standard output" : path),
+        has_tool_(has_tool),
+        file_(path == "-" ? stdout : std::fopen(path.c_str(), "wb")) {
+    if (file_ == nullptr)
+      throw Error(path, std::string("cannot be written: ") + std::strerror(errno),
+                  "give a file in a folder that you may write to");
+    buffer_ = std::string(header) + (has_tool_ ? tool_header : "") + '\n';
+  }
+  ~TraceWriter() {
+    if (file_ != stdout) std::fclose(file_);
+  }
+  TraceWriter(const TraceWriter&) = delete;
+  TraceWriter& operator=(const TraceWriter&) = delete;
+
+  // @throws std::runtime_error if nothing more can be written (a full disk).
+  void write(const Tick& tick) {
+    append(tick.t);
+    append(tick.hip);
+    append(tick.proxy);
+    append(tick.normal);
+    append(tick.force);
+    buffer_ += to_string(tick.state);
+    buffer_ += ',';
+    append(tick.steps);
+    append(tick.surface_velocity);
+    append(tick.frame);
+    append(tick.flags);
+    if (has_tool_) {
+      for (const Rotation* turn : {&tick.orientation, &tick.proxy_orientation})
+        for (int i = 0; i < 4; ++i) append(turn->coeffs()[i]);
+      append(tick.torque);
+    }
+    buffer_.back() = '\n';
+    if (buffer_.size() >= buffered) flush();
+  }
+  // Where the rows go, for people.
+  [[nodiscard]] const std::string& name() const { return path_; }
+  // Flushes the buffer; the trace is complete after it. Throws as `write`.
+  void finish() {
+    flush();
+    check(std::fflush(file_) == 0);
+  }
+
+ private:
+  static constexpr std::size_t buffered = 1U << 16U;  // [bytes]
+
+  template <class Number>
+  void append(Number value) {
+    std::array<char, 32> text{};
+    const auto result = std::to_chars(text.data(), text.data() + text.size(), value);
+    buffer_.append(text.data(), result.ptr);
+    buffer_ += ',';
+  }
+  void append(const Vec3& v) {
+    for (int axis = 0; axis < 3; ++axis) append(v[axis]);
+  }
+  void flush() {
+    check(std::fwrite(buffer_.data(), 1, buffer_.size(), file_) == buffer_.size());
+    buffer_.clear();
+  }
+  void check(bool written) const {
+    if (!written)
+      throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno) +
+                               "; free some space");
+  }
+
+  std::string path_;
+  bool has_tool_;
+  std::FILE* file_;
+  std::string buffer_;
 };
 
 // A hand that presses what the first camera sees; none: a path is given.

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "app/machine.hpp"
 #include "app/options.hpp"
 #include "app/progress.hpp"
 #include "app/verbs.hpp"
@@ -47,14 +48,6 @@ struct BenchOptions {
 
 double budget_of(const BenchOptions& options) {
   return options.quick ? 0.001 : 0.25;
-}
-
-std::string first_line_with(const std::string& file, const std::string& key) {
-  std::ifstream in(file);
-  for (std::string line; std::getline(in, line);) {
-    if (line.starts_with(key)) return line.substr(line.find(':') + 2);
-  }
-  return "unknown processor";
 }
 
 // Resident memory of this process [bytes].
@@ -165,7 +158,8 @@ int report(const BenchOptions& options) {
   const Row& one_metre = rows[2];  // 640x480 at summary_distance
   const SearchCosts& tree = search_named(one_metre, "nanoflann");
   const std::size_t growth = growth_of_memory(method, budget_of(options));
-  const std::string processor = first_line_with("/proc/cpuinfo", "model name");
+  const std::string known = look_at_machine().processor;
+  const std::string processor = known.empty() ? "unknown processor" : known;
 
   if (options.json) {
     const KernelCosts& kernel = one_metre.kernel;

@@ -6,7 +6,6 @@
 #include <optional>
 #include <random>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -45,12 +44,8 @@ std::uint64_t by_chance() {
 
 // One thread a core; a line of progress where a person watches.
 lab::RunnerOptions runner_options(int jobs, std::shared_ptr<Progress>& progress) {
-  if (jobs < 0 || jobs > 1024)
-    throw Error("--jobs " + std::to_string(jobs), "the number of threads is out of range",
-                "use 1 to 1024, or 0 for one per core");
-  const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   lab::RunnerOptions runner;
-  runner.jobs = jobs > 0 ? jobs : cores;
+  runner.jobs = lab::threads_of(jobs);
   runner.progress = [&progress](std::size_t done, std::size_t total) {
     if (!progress) progress = std::make_shared<Progress>("bench", total);
     progress->set(done);

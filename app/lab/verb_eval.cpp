@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
@@ -110,20 +108,15 @@ int eval(const EvalOptions& options) {
   if (!all && !given.recording.empty() && !experiments.front()->takes_recording)
     throw Error("--recording", "the experiment '" + options.name + "' is a simulation",
                 "remove this option, or use real");
-  if (options.jobs < 0 || options.jobs > 1024)
-    throw Error("--jobs " + std::to_string(options.jobs), "the number of threads is out of range",
-                "use 1 to 1024, or 0 for one per core");
+  lab::RunnerOptions runner;
+  runner.jobs = lab::threads_of(options.jobs);
+  runner.resume = options.resume;
 
   std::error_code error;
   fs::create_directories(options.out, error);
   if (error)
     throw Error("--out " + options.out, "the folder cannot be created: " + error.message(),
                 "use a folder with write permission");
-  lab::RunnerOptions runner;
-  const int cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  runner.jobs = options.jobs > 0 ? options.jobs : cores;
-  runner.resume = options.resume;
-
   std::vector<lab::Result> results;
   for (const lab::Experiment* experiment : experiments) {
     lab::ExperimentOptions fitting = given;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "app/program_robots.hpp"
 
-#include "app/standard_cells.hpp"
-
 #include "robot/simulated_cell.hpp"
 
 namespace palpate::app {

@@ -1,23 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "app/trace_remarks.hpp"
+#include "app/remarks.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
-#include <charconv>
 #include <cmath>
-#include <cstring>
-#include <stdexcept>
 
 #include <fmt/format.h>
 
-#include "app/point_remarks.hpp"
+#include "palpate/io/sources/point_file_source.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
-#include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/cloud/proposed_touch.hpp"
 #include "palpate/session/summary.hpp"
 
 namespace palpate::app {
+
+std::string length_text(double metres) {
+  return metres < 1.0 ? fmt::format("{:.3g} mm", 1e3 * metres) : fmt::format("{:.4g} m", metres);
+}
+
+std::string radius_remark(const Cloud& cloud, double r_c) {
+  const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+  const double usual = ProxyParameters{}.r_c();
+  if (points == nullptr || r_c <= usual) return {};
+  return fmt::format(
+      "its points are {} apart, so the proxy has r_c = {} and cannot fall between them; "
+      "--set r_c={:.3g} sets the default",
+      length_text(proposed_touch(*points).spacing), length_text(r_c), usual);
+}
+
+std::string sparse_remark(const Cloud& cloud, const std::string& uri, double r_c) {
+  const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+  if (points == nullptr) return {};
+  const ProposedTouch proposed = proposed_touch(*points);
+  if (proposed.spacing == 0.0)
+    return fmt::format("{} points are too few for a surface; use a file with more points",
+                       points->size());
+  if (proposed.scale == 1.0 && proposed.radius <= r_c) return {};
+  const bool has_proxy = proposed.scale == 1.0;
+  const std::string what = fmt::format(
+      "it is {} long with points {} apart, too {} for {}; ", length_text(proposed.extent),
+      length_text(proposed.spacing), proposed.scale > 1.0 ? "small" : "sparse",
+      has_proxy ? "a proxy with r_c = " + length_text(r_c) : "any proxy");
+  if (has_proxy)
+    return what + fmt::format("give --set r_c={:.2g}, or leave r_c out", proposed.radius);
+  const std::string larger = rescaled(uri, proposed.scale);
+  if (larger.empty()) return what + "press where they are denser";
+  return what + fmt::format("give --camera '{}' to touch it {} long", larger,
+                            length_text(proposed.scale * proposed.extent));
+}
 
 namespace {
 
@@ -247,73 +277,6 @@ std::vector<std::string> TraceRemarks::lines(std::span<const ShownFrames> shown,
   else if (!is_felt)
     lines.push_back(hardly_felt(shown));
   return lines;
-}
-
-namespace {
-
-constexpr std::size_t buffered = 1U << 16U;
-
-template <class Number>
-void append(std::string& line, Number value) {
-  std::array<char, 32> text{};
-  const auto result = std::to_chars(text.data(), text.data() + text.size(), value);
-  line.append(text.data(), result.ptr);
-  line += ',';
-}
-
-void append(std::string& line, const Vec3& v) {
-  for (int axis = 0; axis < 3; ++axis) append(line, v[axis]);
-}
-
-}  // namespace
-
-TraceWriter::TraceWriter(const std::string& path, bool has_tool)
-    : path_(path == "-" ? "standard output" : path),
-      has_tool_(has_tool),
-      file_(path == "-" ? stdout : std::fopen(path.c_str(), "wb")) {
-  if (file_ == nullptr)
-    throw Error(path, std::string("cannot be written: ") + std::strerror(errno),
-                "give a file in a folder that you may write to");
-  buffer_ = std::string(header) + (has_tool_ ? tool_header : "") + '\n';
-}
-
-TraceWriter::~TraceWriter() {
-  if (file_ != stdout) std::fclose(file_);
-}
-
-void TraceWriter::write(const Tick& tick) {
-  append(buffer_, tick.t);
-  append(buffer_, tick.hip);
-  append(buffer_, tick.proxy);
-  append(buffer_, tick.normal);
-  append(buffer_, tick.force);
-  buffer_ += to_string(tick.state);
-  buffer_ += ',';
-  append(buffer_, tick.steps);
-  append(buffer_, tick.surface_velocity);
-  append(buffer_, tick.frame);
-  append(buffer_, tick.flags);
-  if (has_tool_) {
-    for (const Rotation* turn : {&tick.orientation, &tick.proxy_orientation})
-      for (int i = 0; i < 4; ++i) append(buffer_, turn->coeffs()[i]);
-    append(buffer_, tick.torque);
-  }
-  buffer_.back() = '\n';
-  if (buffer_.size() >= buffered) flush();
-}
-
-void TraceWriter::finish() {
-  flush();
-  if (std::fflush(file_) != 0)
-    throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno) +
-                             "; free some space");
-}
-
-void TraceWriter::flush() {
-  if (std::fwrite(buffer_.data(), 1, buffer_.size(), file_) != buffer_.size())
-    throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno) +
-                             "; free some space");
-  buffer_.clear();
 }
 
 }  // namespace palpate::app

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -18,6 +17,17 @@
 #include "palpate/session/frame_sequence.hpp"
 
 namespace palpate::app {
+
+/// Distances for people: millimetres up to a metre.
+std::string length_text(double metres);
+
+/// One sentence about points that are touched by a larger proxy than the usual one; empty: they
+/// are not. @param r_c  [m] of the proxy
+std::string radius_remark(const Cloud& cloud, double r_c);
+
+/// Why points without an image are not felt, and what to do; empty: nothing is odd about them.
+/// @param uri  of their source  @param r_c  [m] of the proxy
+std::string sparse_remark(const Cloud& cloud, const std::string& uri, double r_c);
 
 /// What is odd about a trace, noticed while it is made: a path that meets nothing, frames that
 /// begin after the path or end before it, a path that begins inside the surface.
@@ -70,41 +80,6 @@ class TraceRemarks {
   double nearest_ = std::numeric_limits<double>::infinity();  // [m] ever
   double nearest_t_ = 0.0;                                    // [s]
   Eigen::AlignedBox3d nearest_extent_;                        // [m] of the points of that frame
-};
-
-/// Writes ticks as CSV, one row each, numbers in the shortest form that reads back to the same
-/// bits. The columns are those of the header line.
-class TraceWriter {
- public:
-  static constexpr const char* header =
-      "t,hip_x,hip_y,hip_z,proxy_x,proxy_y,proxy_z,normal_x,normal_y,normal_z,"
-      "force_x,force_y,force_z,state,steps,surface_velocity,frame,flags";
-
-  /// Behind it where a tool has a shape.
-  static constexpr const char* tool_header =
-      ",hip_qx,hip_qy,hip_qz,hip_qw,proxy_qx,proxy_qy,proxy_qz,proxy_qw,"
-      "torque_x,torque_y,torque_z";
-
-  /// @param path  where to, `-` for standard output. @throws Error if it cannot be opened.
-  explicit TraceWriter(const std::string& path, bool has_tool = false);
-  ~TraceWriter();
-  TraceWriter(const TraceWriter&) = delete;
-  TraceWriter& operator=(const TraceWriter&) = delete;
-
-  /// @throws std::runtime_error if nothing more can be written (a full disk).
-  void write(const Tick& tick);
-  /// Where the rows go, for people.
-  [[nodiscard]] const std::string& name() const { return path_; }
-  /// Flushes the buffer; the trace is complete after it. Throws as `write`.
-  void finish();
-
- private:
-  void flush();
-
-  std::string path_;
-  bool has_tool_;
-  std::FILE* file_;
-  std::string buffer_;
 };
 
 }  // namespace palpate::app

@@ -2,11 +2,12 @@
 // A session of the program and a browser that looks at it, for tests and pictures.
 
 import { spawn, type ChildProcess } from "node:child_process";
-import { createReadStream, existsSync, mkdtempSync, rmSync } from "node:fs";
+import { createReadStream, existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { createServer, type Server } from "node:http";
 import type { AddressInfo } from "node:net";
 import { tmpdir } from "node:os";
 import { extname, join } from "node:path";
+import { gzipSync } from "node:zlib";
 import { chromium, type Browser, type Page } from "playwright-core";
 
 /** The program with its page, until stopped. */
@@ -67,15 +68,30 @@ const types: Record<string, string> = {
   ".wasm": "application/wasm",
 };
 
-/** A folder behind what any static host does; each `.ply` is a wall. */
-export async function hosted(folder: string): Promise<{ host: Server; address: string }> {
+/**
+ * A folder behind what any static host does; each `.ply` is a wall.
+ * @param speed  [byte/s] of the line to it, by which all answers go, compressed by gzip
+ */
+export async function hosted(
+  folder: string,
+  speed = Infinity,
+): Promise<{ host: Server; address: string }> {
+  let free = 0; // [ms] when the line is free
   const host = createServer((request, answer) => {
     const { pathname } = new URL(request.url!, "http://host");
     const file = join(folder, pathname === "/" ? "index.html" : pathname);
     if (file.endsWith(".ply")) return answer.end(wallPly());
     if (!existsSync(file)) return answer.writeHead(404).end();
-    answer.writeHead(200, { "Content-Type": types[extname(file)] ?? "text/plain" });
-    createReadStream(file).pipe(answer);
+    const type = { "Content-Type": types[extname(file)] ?? "text/plain" };
+    if (speed === Infinity) {
+      answer.writeHead(200, type);
+      return createReadStream(file).pipe(answer);
+    }
+    const bytes = gzipSync(readFileSync(file));
+    free = Math.max(free, performance.now()) + (1000 * bytes.length) / speed;
+    setTimeout(() => {
+      answer.writeHead(200, { ...type, "Content-Encoding": "gzip" }).end(bytes);
+    }, free - performance.now());
   });
   await new Promise<void>((resolve) => host.listen(0, "127.0.0.1", resolve));
   return { host, address: `http://127.0.0.1:${(host.address() as AddressInfo).port}` };

@@ -38,6 +38,12 @@ constexpr double gravity = 9.80665;  // [m/s^2]
 constexpr double longest_tick = 1e-3;
 // In such a tick the chain has let go of the hand, which has to be engaged anew.
 constexpr std::uint32_t let_go = disengaged | input_refused | direction_refused;
+// [rad] A turn of much less than a radian, as a vector along its axis.
+Vec3 turn_between(const Rotation& before, const Rotation& after) noexcept {
+  const Rotation turn = after * before.conjugate();
+  return (turn.w() < 0.0 ? -2.0 : 2.0) * turn.vec();
+}
+
 // What also ends the support of a handle's weight at once.
 constexpr std::uint32_t no_support =
     input_refused | hand_too_fast | stalled | fault_latched | output_refused;
@@ -151,6 +157,7 @@ void Cycle::walk(Way& way, Self& self) {
   way("number", self.number_);
   way("last_proxy", self.last_proxy_);
   way("frame_stamp", self.last_stamp_);
+  for (int i = 0; i < 4; ++i) way("orientation", self.last_orientation_.coeffs()[i]);
   SafetyChain::walk(way, self.safety_);
   Workspace::walk(way, self.workspace_);
   Freshness::walk(way, self.freshness_);
@@ -165,6 +172,7 @@ std::vector<std::string> cycle_state_names() {
     std::uint64_t number_ = 0;
     Vec3 last_proxy_ = Vec3::Zero();
     double last_stamp_ = 0.0;
+    Rotation last_orientation_ = Rotation::Identity();
     SafetyChain safety_{};
     Workspace workspace_{};
     Freshness freshness_{};
@@ -284,8 +292,11 @@ void Cycle::run(const Wake& wake) noexcept {
     reseated = true;
     method_->seat(free_side(seen_, last_proxy_, last_normal_, parameters_.proxy.r_c(), patch_));
   }
-  const Tick tick = method_->tick(
-      HandPose{.position = hip, .orientation = workspace_.orientation_in_world(hand)}, t);
+  const HandPose pose{.position = hip, .orientation = workspace_.orientation_in_world(hand)};
+  const Vec3 turned = jumped || number_ == 0 ? Vec3(Vec3::Zero())
+                                             : turn_between(last_orientation_, pose.orientation);
+  last_orientation_ = pose.orientation;
+  const Tick tick = method_->tick(pose, t);
   last_proxy_ = tick.proxy;
   last_normal_ = tick.normal;
   const bool holds = hand.present && !hand.clutched && !is_faulty(hand) && !jumped && !on_hold_;
@@ -319,6 +330,7 @@ void Cycle::run(const Wake& wake) noexcept {
        .surface_velocity = tick.surface_velocity,
        .surface_motion = tick.surface_motion,
        .torque = tick.torque,
+       .turned = turned,
        .held = support,
        .transient = tick.transient,
        .vibration = tick.vibration,
@@ -373,7 +385,9 @@ void Cycle::run(const Wake& wake) noexcept {
                       .scale = placement.workspace_scale,
                       .surface = tick.surface_motion,
                       .jumped = jumped,
-                      .sent = force});
+                      .sent = force,
+                      .torque = torque,
+                      .turned = turned});
 
   Vec3 kept_out = fixtures.displacement;
   join(tick.proxy - hip, kept_out);
@@ -400,10 +414,11 @@ void Cycle::run(const Wake& wake) noexcept {
                                  (switched ? method_switched : 0U) | (reset ? faults_reset : 0U) |
                                  (on_hold_ ? force_on_hold : 0U)};
   ring_.push(record);
-  keep_statistics(record, sent.wrench.force.norm());
+  keep_statistics(record, sent.wrench);
 }
 
-void Cycle::keep_statistics(const ServoTick& record, double sent) noexcept {
+void Cycle::keep_statistics(const ServoTick& record, const Wrench& wrench) noexcept {
+  const double sent = wrench.force.norm();
   statistics_.last_t.store(record.tick.t, std::memory_order_relaxed);
   add(statistics_.ticks, 1);
   add(statistics_.steps, static_cast<std::uint64_t>(std::max(record.tick.steps, 0)));
@@ -411,7 +426,7 @@ void Cycle::keep_statistics(const ServoTick& record, double sent) noexcept {
   if (std::isfinite(record.frame_age)) statistics_.frame_age.add(nanoseconds(record.frame_age));
   statistics_.hand.store(record.hand, std::memory_order_relaxed);
   statistics_.safety.store(record.safety, std::memory_order_relaxed);
-  statistics_.force_out.store(sent > 0.0, std::memory_order_relaxed);
+  statistics_.force_out.store(sent > 0.0 || !wrench.torque.isZero(0.0), std::memory_order_relaxed);
   if (sent > statistics_.max_force.load(std::memory_order_relaxed))
     statistics_.max_force.store(sent, std::memory_order_relaxed);
   for (std::size_t i = 0; i < safety_flag_count; ++i) {

@@ -123,7 +123,7 @@ struct CycleStatistics {
   Histogram frame_age;                           ///< [ns] at each tick that had a frame
   Histogram hand_over;  ///< [ns] from put_frame to the tick that uses the frame
   std::array<std::atomic<std::uint64_t>, safety_flag_count> interventions{};
-  std::atomic<bool> force_out{false};        ///< the last tick sent a force other than zero
+  std::atomic<bool> force_out{false};  ///< the last tick sent a force or torque other than zero
   std::atomic<std::uint32_t> latched_by{0};  ///< SafetyFlag bits, as SafetyChain::latched_by
   std::atomic<std::uint64_t> gate_cuts{0};   ///< ticks in which the LastGate sent less than asked
   std::atomic<double> heat{0.0};             ///< [-] of the motors, as SafetyChain::heat
@@ -240,7 +240,7 @@ class Cycle {
   bool adopt_frames(bool method_switched, double t) noexcept;
   void adopt_frame(const CapturedFrame& frame, double t) noexcept;
   void tell_of(const CapturedFrame& frame) noexcept;
-  void keep_statistics(const ServoTick& record, double sent) noexcept;
+  void keep_statistics(const ServoTick& record, const Wrench& wrench) noexcept;
   template <class Way, class Self>
   static void walk(Way& way, Self& self);
   friend std::vector<std::string> cycle_state_names();
@@ -271,6 +271,7 @@ class Cycle {
   Vec3 last_proxy_ = Vec3::Zero();
   Vec3 last_normal_ = Vec3::Zero();
   double last_stamp_ = 0.0;                                       // [s] of the frame taken last
+  Rotation last_orientation_ = Rotation::Identity();              // world_from_handle
   std::uint64_t frame_number_ = 0;                                // the highest taken
   ObservedClouds seen_;                                           // in use
   std::array<std::uint64_t, Freshness::max_cameras> taken_in_{};  // tick that took each of them

@@ -25,20 +25,25 @@ void begin_contact(PortEnergy& port) noexcept {
 
 const ServoEnergy& PassivityObserver::run(const Input& input) noexcept {
   const bool sound = std::isfinite(input.t) && is_place(input.handle) && is_place(input.hip) &&
-                     is_place(input.surface) && is_place(input.sent);
+                     is_place(input.surface) && is_place(input.sent) && is_place(input.torque) &&
+                     is_place(input.turned);
   if (!sound) {
     started_ = false;
     return energy_;
   }
   const double dt = input.t - t_;
-  if (started_ && dt > 0.0 && dt <= longest_gap && !sent_.isZero(0.0)) {
+  const auto acts = [](const Vec3& force, const Vec3& torque) {
+    return !force.isZero(0.0) || !torque.isZero(0.0);
+  };
+  if (started_ && dt > 0.0 && dt <= longest_gap && acts(sent_, torque_)) {
     const Vec3 moved = input.handle - handle_;
     const Vec3 relative =
         input.jumped ? moved : Vec3((input.hip - hip_ - dt * input.surface) / input.scale);
-    give(energy_.absolute, sent_.dot(moved));
-    give(energy_.relative, sent_.dot(relative));
+    const double turning = torque_.dot(input.turned);
+    give(energy_.absolute, sent_.dot(moved) + turning);
+    give(energy_.relative, sent_.dot(relative) + turning);
   }
-  if (!input.sent.isZero(0.0)) {
+  if (acts(input.sent, input.torque)) {
     if (!touching_) {
       touching_ = true;
       ++energy_.contacts;
@@ -54,6 +59,7 @@ const ServoEnergy& PassivityObserver::run(const Input& input) noexcept {
   handle_ = input.handle;
   hip_ = input.hip;
   sent_ = input.sent;
+  torque_ = input.torque;
   return energy_;
 }
 

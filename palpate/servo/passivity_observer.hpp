@@ -31,8 +31,8 @@ struct ServoEnergy {
   std::uint64_t contacts = 0;  ///< so far, with the one in progress
 };
 
-/// Sums what the force that was really sent has done on the hand, tick by tick: a passivity
-/// observer. docs/energy.md.
+/// Sums what force and torque that were really sent have done on the hand, tick by tick: a
+/// passivity observer. docs/energy.md.
 ///
 /// The force of a tick is taken to act, held, until the next tick, over the real time between them.
 /// A contact begins with a force and ends when there was none for `apart`. Knows no clock but the
@@ -47,6 +47,8 @@ class PassivityObserver {
     Vec3 surface;  ///< [m/s] world: of the surface at the proxy since the tick before
     bool jumped;   ///< the HIP went elsewhere without the hand: scene or placement have changed
     Vec3 sent;     ///< [N] world: what is sent to the device in this tick
+    Vec3 torque = Vec3::Zero();  ///< [N m] world: likewise
+    Vec3 turned = Vec3::Zero();  ///< [rad] world: how far the hand has turned since the tick before
   };
 
   const ServoEnergy& run(const Input& input) noexcept;
@@ -67,6 +69,7 @@ class PassivityObserver {
     way("passivity.handle", self.handle_);
     way("passivity.hip", self.hip_);
     way("passivity.sent", self.sent_);
+    way("passivity.torque", self.torque_);
     way("passivity.relative.excess", self.energy_.relative.excess);
     way("passivity.relative.most", self.energy_.relative.most);
     way("passivity.relative.made", self.energy_.relative.made);
@@ -87,6 +90,7 @@ class PassivityObserver {
   Vec3 handle_ = Vec3::Zero();
   Vec3 hip_ = Vec3::Zero();
   Vec3 sent_ = Vec3::Zero();
+  Vec3 torque_ = Vec3::Zero();
   ServoEnergy energy_;
 };
 

@@ -249,7 +249,7 @@ void SafetyChain::note_faults(std::uint32_t flags) noexcept {
 // not stalled: whether the motors were off is not known.
 // Hazard: hot-motors
 void SafetyChain::warm_up(double since_last) noexcept {
-  const double given = last_sent_.norm() + held_;
+  const double given = std::max(last_sent_.norm() + held_, last_turning().norm());
   const double change = given * given - heat_;
   const double elapsed = change > 0.0 ? since_last : std::min(since_last, parameters_.stall_time);
   heat_ += share_of(elapsed, parameters_.continuous_time) * change;
@@ -290,9 +290,7 @@ Vec3 SafetyChain::limited(const SafetyInput& input, double share,
   } else if (has(force_cut) && cut_to(peak(), force)) {
     flags |= force_cut;
   }
-  if (has(continuous_cut) && device_.continuous_force < peak() + held_ &&
-      cut_to(peak_as_warm(), force))
-    flags |= continuous_cut;
+  if (warms() && cut_to(peak_as_warm(), force)) flags |= continuous_cut;
 
   if (has(frame_late) && !(input.frame_intervals <= parameters_.late_intervals)) {
     flags |= frame_late;
@@ -301,15 +299,18 @@ Vec3 SafetyChain::limited(const SafetyInput& input, double share,
 }
 
 // As much of the torque as is left of the force, and of both what the motors for it bear.
-Vec3 SafetyChain::limited_torque(const SafetyInput& input, double most, Vec3& force,
+// Hazard: torque, hot-motors
+Vec3 SafetyChain::limited_torque(const SafetyInput& input, Vec3& force,
                                  std::uint32_t& flags) const noexcept {
   const double asked = (input.force - input.transient).norm();
   const double left = asked > undirected_force ? std::min(force.norm() / asked, 1.0)
                                                : std::min(calm_, energy_ceiling_);
   Vec3 torque = left * input.torque;
   const double size = torque.norm();
-  if (!has(force_cut) || size <= most) return torque;
-  flags |= force_cut;
+  const double warm = lever() * (warms() ? peak_as_warm() : largest);
+  const double most = has(force_cut) ? std::min(lever() * peak(), warm) : warm;
+  if (size <= most) return torque;
+  flags |= most < warm ? force_cut : continuous_cut;
   force *= most / size;
   cut_to(most, torque);
   return torque;
@@ -333,8 +334,9 @@ Vec3 vibration_in(const SafetyInput& input, const Vec3& sent) noexcept {
 // Halves what is allowed at each train of fast, large swings, and gives it back when they stop.
 // Hazard: fast-oscillation
 double SafetyChain::oscillation_ceiling(double t, double dt) noexcept {
-  const Vec3 steady = last_force_ - last_vibration_;
-  for (int axis = 0; axis < 3; ++axis) {
+  Eigen::Matrix<double, 6, 1> steady;
+  steady << last_force_ - last_vibration_, last_turning();
+  for (int axis = 0; axis < 6; ++axis) {
     Swings& swings = swings_[static_cast<std::size_t>(axis)];
     const double x = swings.up ? steady[axis] : -steady[axis];
     if (x > swings.extreme) swings.extreme = x;
@@ -355,14 +357,18 @@ double SafetyChain::oscillation_ceiling(double t, double dt) noexcept {
 // long a time that the next one is not felt as one more burst of a vibration.
 // Hazard: slow-oscillation
 double SafetyChain::energy_ceiling(const SafetyInput& input, double since_last) noexcept {
-  if (since_last > parameters_.stall_time) energy_.restart();
+  if (since_last > parameters_.stall_time) restart_energy();
+  const EnergyMonitor::Limits limits{parameters_.cycle_distance, parameters_.cycle_count,
+                                     energy_ceiling_ < 1.0};
+  turned_ += lever() * input.turned;
+  const bool turns =
+      turning_energy_.run(since_last, last_turning(), turned_, input.torque, 0.0, limits);
   // Across the boundary that gives the larger force.
   const bool by_region = input.region.squaredNorm() > input.force.squaredNorm();
   const bool found =
       energy_.run(since_last, last_force_, input.hip, by_region ? input.region : input.normal,
-                  by_region ? 0.0 : input.surface_velocity,
-                  {parameters_.cycle_distance, parameters_.cycle_count, energy_ceiling_ < 1.0});
-  if (found) {
+                  by_region ? 0.0 : input.surface_velocity, limits);
+  if (found || turns) {
     energy_ceiling_ *= 0.5;
   } else if (energy_ceiling_ < 1.0) {
     energy_ceiling_ += share_of(since_last, parameters_.cut_memory) * (1.0 - energy_ceiling_);
@@ -477,12 +483,12 @@ Vec3 SafetyChain::with_transient(const SafetyInput& input, const Vec3& force,
 SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   std::uint32_t flags = 0;
   const bool in_order = std::isfinite(input.t) && (!last_t_ || input.t >= *last_t_);
-  const bool sound = in_order && is_sound(input.force) && is_sound(input.normal) &&
-                     is_sound(input.hip) && is_sound(input.proxy) && is_sound(input.position) &&
-                     std::abs(input.surface_velocity) <= largest &&
-                     is_sound(input.surface_motion) && is_sound(input.torque) &&
-                     is_sound(input.transient) && is_sound(input.vibration) &&
-                     is_sound(input.region) && is_sound(input.guidance);
+  const bool sound =
+      in_order && is_sound(input.force) && is_sound(input.normal) && is_sound(input.hip) &&
+      is_sound(input.proxy) && is_sound(input.position) &&
+      std::abs(input.surface_velocity) <= largest && is_sound(input.surface_motion) &&
+      is_sound(input.torque) && is_sound(input.turned) && is_sound(input.transient) &&
+      is_sound(input.vibration) && is_sound(input.region) && is_sound(input.guidance);
   const double since_last = in_order && last_t_ ? input.t - *last_t_ : 0.0;
   const double dt = std::min(since_last, longest_credit);
   fault_clock_ += since_last;
@@ -501,12 +507,11 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
 
   Vec3 force = Vec3::Zero();
   Vec3 torque = Vec3::Zero();
-  const double lever = device_.max_torque / device_.max_force;  // [m]
   if (flags == 0) {
     // Before the limits: a softer surface still holds a hand with all the force that is allowed.
     force = limited(input, softened(input, since_last, dt, flags), flags);
-    if (lever > 0.0) torque = limited_torque(input, lever * peak(), force, flags);
-    const double turning = lever > 0.0 ? torque.norm() / lever : 0.0;
+    if (lever() > 0.0) torque = limited_torque(input, force, flags);
+    const double turning = lever() > 0.0 ? torque.norm() / lever() : 0.0;
     double most = ceiling(input, std::max(force.norm(), turning), flags);
     if (stalls_at(input.t)) {
       flags |= stalled;
@@ -520,7 +525,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     gain_ = 0.0;
     engaged_ = false;
     quiet_ticks_ = 0.0;
-    energy_.restart();
+    restart_energy();
     if (latched_by_ != 0) flags |= fault_latched;
   }
 
@@ -531,7 +536,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     const double fall = parameters_.fall_rate * (in_order && last_t_ ? dt : longest_credit);
     const Vec3 wanted_torque = torque;
     force = slewed(last_force_, wanted, rise, fall);
-    torque = slewed(last_torque_, wanted_torque, lever * rise, lever * fall);
+    torque = slewed(last_torque_, wanted_torque, lever() * rise, lever() * fall);
     if (force != wanted || torque != wanted_torque) flags |= slew_cut;
   }
   force = bounded(force, rise, flags);
@@ -540,7 +545,7 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     cut_to(last_sent_.norm(), force);
     cut_to(last_torque_.norm(), torque);
   }
-  if (has(force_cut)) cut_to(std::max(last_torque_.norm(), lever * peak()), torque);
+  if (has(force_cut)) cut_to(std::max(last_torque_.norm(), lever() * peak()), torque);
   if ((flags & output_refused) != 0 || !torque.allFinite()) torque = Vec3::Zero();
 
   if (std::isfinite(input.t)) last_t_ = input.t;

@@ -120,6 +120,7 @@ struct SafetyInput {
   /// [N m] world: what the method asks for about the HIP. What scales the force down scales it, and
   /// the other way round, so that they stay one wrench. A device without motors for it gets none.
   Vec3 torque = Vec3::Zero();
+  Vec3 turned = Vec3::Zero();  ///< [rad] world: how far the hand has turned since the tick before
   /// [N] magnitude of the force that the motors apply in addition to `force` to support the
   /// handle's weight. It reduces the available force and counts in the thermal model.
   double held = 0.0;
@@ -209,6 +210,8 @@ class SafetyChain {
     way("swung_at", self.swung_at_);
     way("calm", self.calm_);
     EnergyMonitor::walk(way, self.energy_);
+    EnergyMonitor::walk(way, self.turning_energy_);
+    way("turned", self.turned_);
     way("energy_ceiling", self.energy_ceiling_);
     TransientBudget::walk(way, self.transients_);
     way("last_sent", self.last_sent_);
@@ -221,7 +224,7 @@ class SafetyChain {
   }
 
  private:
-  // Counts swings of one coordinate of the force.
+  // Counts swings of one coordinate of the force, or of the torque over `lever`.
   struct Swings {
     double extreme = 0.0;
     double turned_at = 0.0;
@@ -242,8 +245,22 @@ class SafetyChain {
   double ceiling(const SafetyInput& input, double demand, std::uint32_t& flags) noexcept;
   double oscillation_ceiling(double t, double dt) noexcept;
   double energy_ceiling(const SafetyInput& input, double since_last) noexcept;
-  Vec3 limited_torque(const SafetyInput& input, double most, Vec3& force,
-                      std::uint32_t& flags) const noexcept;
+  void restart_energy() noexcept {
+    energy_.restart();
+    turning_energy_.restart();
+  }
+  Vec3 limited_torque(const SafetyInput& input, Vec3& force, std::uint32_t& flags) const noexcept;
+  /// [m] The torque limit over that of the force: over it, turning is judged as pushing is. 0: the
+  /// device has no motors for a torque.
+  [[nodiscard]] double lever() const noexcept { return device_.max_torque / device_.max_force; }
+  /// [N] world: the torque of the last tick, as such a force.
+  [[nodiscard]] Vec3 last_turning() const noexcept {
+    return lever() > 0.0 ? Vec3(last_torque_ / lever()) : Vec3(Vec3::Zero());
+  }
+  /// Is less than the peak left while the motors are warm?
+  [[nodiscard]] bool warms() const noexcept {
+    return has(continuous_cut) && device_.continuous_force < peak() + held_;
+  }
   [[nodiscard]] static Vec3 slewed(const Vec3& before, const Vec3& force, double rise,
                                    double fall) noexcept;
   [[nodiscard]] Vec3 bounded(Vec3 force, double rise, std::uint32_t& flags) noexcept;
@@ -265,7 +282,9 @@ class SafetyChain {
   std::uint32_t last_flags_ = 0;
   std::array<std::uint64_t, safety_flag_count> interventions_{};
 
-  double heat_ = 0.0;  // [N^2] mean square of the force over continuous_time
+  // [N^2] mean square of the force over continuous_time, or of the torque over `lever`: of each
+  // tick the larger counts.
+  double heat_ = 0.0;
   // Faults: when the last few of them began, on a clock that only counts time that makes sense.
   struct Fault {
     double began;
@@ -276,11 +295,13 @@ class SafetyChain {
   std::array<Fault, most_faults> last_faults_{};
   std::size_t faults_ = 0;
   std::uint32_t latched_by_ = 0;  // SafetyFlag bits
-  std::array<Swings, 3> swings_{};
+  std::array<Swings, 6> swings_{};
   double swung_at_ = 0.0;  // [s] last swing of an oscillation
   double calm_ = 1.0;      // [-] what the oscillation detector allows
   EnergyMonitor energy_;
-  double energy_ceiling_ = 1.0;  // [-] what the energy link allows
+  EnergyMonitor turning_energy_;  // the same of torque and turning
+  Vec3 turned_ = Vec3::Zero();    // [m] of the hand so far, times `lever`
+  double energy_ceiling_ = 1.0;   // [-] what the energy link allows
   TransientBudget transients_;
   bool engaged_ = false;
   double quiet_ticks_ = 0.0;

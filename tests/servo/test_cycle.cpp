@@ -150,6 +150,9 @@ TEST(Cycle, TellsTheLastGateWhatToJudgeBy) {
   EXPECT_LT((device.force - vector_of(wish.force)).norm(), 1e-12);
   EXPECT_EQ(device.torque, vector_of(wish.torque));
   EXPECT_EQ(cycle.statistics().gate_cuts, 0U);
+  tool->force.setZero();
+  run(0.5);
+  EXPECT_TRUE(cycle.statistics().force_out) << "the watchdog waits no longer for a torque alone";
 
   device.hand.present = false;
   wish = run(0.01);

@@ -60,6 +60,24 @@ TEST(PassivityObserver, SeesWhatASpringThatIsHeldOverEachTickMakes) {
   }
 }
 
+// Hazard: torque
+TEST(PassivityObserver, AddsTheWorkOfATorque) {
+  PassivityObserver observer;
+  PassivityObserver::Input input{.t = 0.0,
+                                 .handle = Vec3::Zero(),
+                                 .hip = Vec3::Zero(),
+                                 .scale = 2.0,
+                                 .surface = Vec3::Zero(),
+                                 .jumped = false,
+                                 .sent = Vec3::Zero(),
+                                 .torque = Vec3(0, 0.05, 0),
+                                 .turned = Vec3(0, 0.01, 0.02)};
+  for (int i = 0; i <= 10; ++i, input.t += period) observer.run(input);
+  EXPECT_NEAR(observer.energy().absolute.excess, 0.05 * 0.1, 1e-12);
+  EXPECT_NEAR(observer.energy().relative.excess, 0.05 * 0.1, 1e-12);
+  EXPECT_EQ(observer.energy().contacts, 1U);
+}
+
 TEST(PassivityObserver, AddsUpContactsAndCountsThoseThatMakeMuch) {
   Spring spring;
   spring.press(0.008, 0.1);   // 0.48 mJ

@@ -104,6 +104,7 @@ TEST(SafetyChain, AnswersWhatIsNotFiniteWithNoForce) {
   EXPECT_EQ(worst(0, [](SafetyInput& input) { input.force.y() = inf; }), 0.0);
   EXPECT_EQ(worst(0, [](SafetyInput& input) { input.force.y() = 1e308; }), 0.0);
   EXPECT_EQ(worst(0, [](SafetyInput& input) { input.hip.y() = nan; }), 0.0);
+  EXPECT_EQ(worst(0, [](SafetyInput& input) { input.turned.y() = nan; }), 0.0);
   EXPECT_EQ(worst(0, [](SafetyInput& input) { input.proxy.y() = -inf; }), 0.0);
   EXPECT_EQ(worst(0, [](SafetyInput& input) { input.normal.y() = nan; }), 0.0);
   EXPECT_EQ(worst(0, [](SafetyInput& input) { input.position.y() = 1e200; }), 0.0);
@@ -492,6 +493,52 @@ TEST(SafetyChain, LetsATorqueOnlyFallOnceAFrameIsLate) {
   session.input.frame_intervals = 4.0;
   session.input.torque = Vec3(0.3, 0, 0);
   EXPECT_LE(session.run_for(0.1, 1.0).torque.norm(), 0.1 + 1e-12);
+}
+
+// Hazard: torque, fast-oscillation
+TEST(SafetyChain, SeesAnOscillationOfTheTorque) {
+  for (int axis = 0; axis < 3; ++axis) {
+    Session session(all, with_wrist);
+    session.engage();
+    std::uint32_t flags = 0;
+    for (int i = 0; i < 1000; ++i) {
+      session.input.torque = ((i / 10) % 2 == 0 ? 0.08 : 0.01) * Vec3::Unit(axis);
+      flags |= session.run(0.0).flags;
+    }
+    EXPECT_TRUE(flags & oscillation_cut) << axis;
+  }
+}
+
+// Hazard: torque, hot-motors
+TEST(SafetyChain, ComesDownToWhatTheWristsMotorsBear) {
+  Session session(all, {.max_force = 12.0, .continuous_force = 3.0, .max_torque = 0.4},
+                  {.max_force = 12.0, .initial_heat = 0.0});
+  session.engage();
+  session.input.torque = Vec3(0.3, 0, 0);
+  EXPECT_NEAR(session.run_for(0.1, 0.0).torque.norm(), 0.3, 1e-9) << "a moment's turn is not cut";
+  const SafetyOutput output = session.run_for(60.0, 0.0);
+  EXPECT_TRUE(output.flags & continuous_cut);
+  EXPECT_NEAR(output.torque.norm(), 0.4 * 3.0 / 12.0, 0.005);
+  EXPECT_NEAR(session.chain.heat(), 1.0, 0.05);
+}
+
+// Hazard: torque, slow-oscillation
+TEST(SafetyChain, SeesAnOscillationThatTheTorqueKeepsUp) {
+  // A wrist that swings by 0.3 rad at 12 Hz on a torsion spring, which answers `late` ticks later.
+  const auto flags_of = [](int late) {
+    Session session(all, with_wrist);
+    session.engage();
+    const auto angle = [](int tick) { return 0.3 * std::sin(2.0 * 3.14159265 * 12.0 * ms * tick); };
+    std::uint32_t flags = 0;
+    for (int i = 0; i < 3000; ++i) {
+      session.input.turned = (angle(i) - angle(i - 1)) * Vec3::UnitX();
+      session.input.torque = 0.3 * std::max(-angle(i - late), 0.0) * Vec3::UnitX();
+      flags |= session.run(0.0).flags;
+    }
+    return flags & energy_cut;
+  };
+  EXPECT_NE(flags_of(10), 0U);
+  EXPECT_EQ(flags_of(-1), 0U) << "a spring, and the tick that the device holds it";
 }
 
 TEST(SafetyChain, TurnsTheForceRoundThroughZeroAndNoFaster) {

@@ -4,7 +4,7 @@ import { dispatch, type Handlers, type Toast } from "./dispatch";
 import { element, get } from "./dom";
 import type { Command } from "./protocol";
 import { deviceAxes } from "./share";
-import { hasDepth, watchDepth } from "./webxr";
+import { hasDepth, watchDepth, type DepthFrame } from "./webxr";
 
 /** Nobody needs a token here. */
 export const unknownToken = "";
@@ -102,7 +102,8 @@ export class Connection {
       this.handlers.refused(`the camera of this device: ${message}; allow it for this page`);
     button.addEventListener("click", () => {
       if (end) return end();
-      watchDepth((depth) => this.worker.postMessage({ depth }), () => show(null)).then(show, refuse);
+      const give = (depth: DepthFrame) => this.worker.postMessage({ depth });
+      watchDepth(give, () => show(null)).then(show, refuse);
     });
   }
 

@@ -23,10 +23,14 @@ function expectClose(found: number[], wanted: number[]) {
   wanted.forEach((x, i) => expect(found[i]).toBeCloseTo(x, 5));
 }
 
+// Of a place in the view, from 0 to 1, the place in the buffer: and its matrix.
+const asTheView = (x: number, y: number) => [x, y] as const;
+const onItsSide = (x: number, y: number) => [y, 1 - x] as const; // as a phone's, held upright
+
 test.each([
-  ["as the view", [1, 0, 0, 1], [0, 0], (x: number, y: number) => [x, y]],
-  ["on its side, as a phone's that is held upright", [0, -1, 1, 0], [0, 1], (x: number, y: number) => [y, 1 - x]],
-] as const)("a depth buffer %s has its places where the view sees them", (_, turn, shift, buffer) => {
+  ["as the view", [1, 0, 0, 1], [0, 0], asTheView],
+  ["on its side", [0, -1, 1, 0], [0, 1], onItsSide],
+] as const)("a depth buffer that lies %s shows what the view sees", (_, turn, shift, buffer) => {
   const matrix = new Float32Array(16);
   matrix.set([turn[0], turn[1]], 0);
   matrix.set([turn[2], turn[3]], 4);
@@ -34,7 +38,7 @@ test.each([
   const view = { projectionMatrix, transform };
   const found = pinholeOf(view, { ...size, normDepthBufferFromNormView: { matrix } })!;
   for (const [x, y] of [[0.5, 0.5], [0.2, 0.9]] as const) {
-    const [s, t] = buffer(x, y) as [number, number];
+    const [s, t] = buffer(x, y);
     const place = placeOf(found, s * size.width - 0.5, t * size.height - 0.5);
     const right = (2 * x - 1 + aside) / across;
     const up = (1 - 2 * y + above) / down;

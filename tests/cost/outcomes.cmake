@@ -1,6 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 # For site/CMakeLists.txt: the bench, but for what needs threads. What its cases come to is compared
 # with the same program of a usual build (scripts/figures/outcomes.py); it is no part of the page.
+# Without the libraries of the lab (scripts/setup lab) there is no such target.
+foreach(header fmt/core.h nanoflann.hpp)
+  find_path(at NAMES ${header} PATHS /usr/include NO_DEFAULT_PATH NO_CMAKE_FIND_ROOT_PATH NO_CACHE)
+  if(NOT at)
+    return()
+  endif()
+  unset(at)
+endforeach()
 palpate_header(fmt::fmt fmt)
 palpate_header(nanoflann nanoflann.hpp)
 palpate_header(Eigen3::unsupported unsupported)

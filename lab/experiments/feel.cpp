@@ -64,7 +64,8 @@ std::vector<Measure> all_measures() {
   add("rub", "ratio", "%", 5.0, {"path"}, {});
   add("stick", "drift", "mm", 0.1, {"light"}, {});
   add("stick-bob", "drift", "mm", 0.1, {"light"}, {});
-  for (const std::string_view scene : {"energy-0.45m", "energy-0.7m", "energy-0.95m"}) {
+  for (const std::string_view scene :
+       {"energy-exact", "energy-0.45m", "energy-0.7m", "energy-0.95m"}) {
     const std::vector<std::string_view> loops = {"light", "firm", "omega", "chain"};
     add(scene, "above", "mJ", 0.1, {"light", "firm", "omega"}, {"chain"});
     add(scene, "above-99%", "mJ", none, {}, loops);
@@ -73,6 +74,7 @@ std::vector<Measure> all_measures() {
     add(scene, "made", "mJ", none, {}, loops);
     add(scene, "exact", "mJ", none, {}, loops);
     add(scene, "contacts", "", none, {}, {"light"});
+    add(scene, "chain-above", "mJ", none, {}, {"chain"});
   }
   add("free-hands", "runs", "", none, {}, {"path"});
   add("free-hands", "felt", "runs", 0.0, {"path"}, {});
@@ -147,9 +149,10 @@ std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptio
   add("rub", play_rub);
   add("stick", play_stick, 0.0);
   add("stick-bob", play_stick, 0.02);
-  add("energy-0.45m", play_energy, 0.45);
-  add("energy-0.7m", play_energy, 0.7);
-  add("energy-0.95m", play_energy, 0.95);
+  add("energy-exact", play_energy, 0.45, "ideal");
+  add("energy-0.45m", play_energy, 0.45, "d4xx");
+  add("energy-0.7m", play_energy, 0.7, "d4xx");
+  add("energy-0.95m", play_energy, 0.95, "d4xx");
   const int hands = options.cases.value_or(usual_free_hands);
   for (int from = 0; from < hands; from += hands_a_row)
     add("free-hands", play_free_hands, from, std::min(hands_a_row, hands - from));

@@ -88,18 +88,19 @@ class Meter {
 }  // namespace
 
 FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOptions& options,
-                        double distance) {
+                        double distance, const std::string& sensor) {
   struct Counted {
     std::vector<double> above;  // [mJ]
     double sum = 0.0;           // [mJ]
     double ruler = 0.0;         // [mJ] the same of the exact surface
   };
+  std::vector<double> by_chain;  // [mJ] of the exact surface, above the same without the chain
   std::vector<std::vector<Counted>> counted(contestants.size(),
                                             std::vector<Counted>(holdings.size()));
   for (int k = 0; k < options.repeats; ++k) {
     const std::uint64_t seed = 10 * options.seed + 1 + static_cast<std::uint64_t>(k);
     const auto camera = open_synthetic_camera(
-        Uri("synthetic:plane?" + camera_options(distance, 0.3, "d4xx", seed)));
+        Uri("synthetic:plane?" + camera_options(distance, 0.3, sensor, seed)));
     const Truth truth = truth_of(std::make_shared<const Scene>(camera->scene()));
     std::vector<Presses> hands;
     for (int i = 0; i < std::max(options.phases / 4, 1); ++i)
@@ -133,6 +134,12 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
          .hip = nullptr},
         [&](std::size_t loop, const Felt& felt) { meters[loop].add(felt); });
     const std::size_t group = 1 + contestants.size();
+    for (std::size_t i = 0; i < hands.size(); ++i) {
+      const std::vector<double>& straight = meters[i * group].made;
+      const std::vector<double>& chain = meters[(3 * hands.size() + i) * group].made;
+      for (std::size_t c = 0; c < chain.size(); ++c)
+        by_chain.push_back(1e3 * (chain[c] - straight[c]));
+    }
     for (std::size_t h = 0; h < holdings.size(); ++h) {
       for (std::size_t i = 0; i < hands.size(); ++i) {
         const std::size_t ruler = (h * hands.size() + i) * group;
@@ -168,6 +175,8 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
       add("made", counts.sum / static_cast<double>(n));
       add("exact", counts.ruler / static_cast<double>(n));
       add("contacts", static_cast<double>(n));
+      if (holdings[h].by_chain)
+        add("chain-above", *std::max_element(by_chain.begin(), by_chain.end()));
     }
   }
   return figures;

@@ -73,10 +73,11 @@ FeelFigures play_rub(const std::vector<Contestant>& contestants, const FeelOptio
 FeelFigures play_stick(const std::vector<Contestant>& contestants, const FeelOptions& options,
                        double stroke);
 
-/// Hands that press on a resting plane before a D4xx and come off again: the energy that each
-/// contact gives them, beside what it is on an exact surface. @param distance  [m] from the camera
+/// Hands that press on a resting plane and come off again: the energy that each contact gives them,
+/// beside what it is on an exact surface; and what the chain adds there.
+/// @param distance  [m] from the camera  @param sensor  its, as of a synthetic camera
 FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOptions& options,
-                        double distance);
+                        double distance, const std::string& sensor);
 
 /// Hands that press, slide and are lifted, cases of the family `lift-off` of the bench `pop`: those
 /// numbered from `from` on. Those of one block of `hands_a_camera` see the same camera and body.

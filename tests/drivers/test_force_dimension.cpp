@@ -46,6 +46,7 @@ TEST_F(ForceDimension, BringsItsAxesIntoOurs) {
   EXPECT_EQ(bench.force[2], 0.3);
 }
 
+// Hazard: torque
 TEST_F(ForceDimension, SendsATorqueWhereTheWristHasMotors) {
   EXPECT_EQ(open("force-dimension:")->info().limits.max_torque, 0.0) << "omega.3";
   bench.active_wrist = true;

@@ -10,7 +10,7 @@
 namespace palpate {
 namespace test_adversary {
 
-constexpr std::uint64_t ticks = test::sanitized ? 50'000 : 1'000'000;
+constexpr std::uint64_t ticks = test::sanitized ? 50'000 : 400'000;
 
 // The same for longer: `ninja adversarial_ticks`.
 // Hazard: too-much-force, torque, another-hand

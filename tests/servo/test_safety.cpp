@@ -428,6 +428,7 @@ TEST(SafetyChain, RisesNoFasterThanItsSlewLimitAndFallsFaster) {
 constexpr DeviceLimits with_wrist{.max_force = 12.0, .continuous_force = 12.0, .max_torque = 0.4};
 constexpr SafetyParameters strong{.max_force = 12.0, .initial_heat = 0.0};
 
+// Hazard: torque
 TEST(SafetyChain, SendsNoTorqueToADeviceWithoutMotorsForIt) {
   Session session = engaged_without(0, never_hot);
   session.input.torque = Vec3(0.1, 0, 0);
@@ -445,6 +446,7 @@ TEST(SafetyChain, PassesAModestTorque) {
   EXPECT_EQ(output.flags, 0U);
 }
 
+// Hazard: torque
 TEST(SafetyChain, ScalesForceAndTorqueByOneFactorAtEitherLimit) {
   for (const auto& [newtons, torque] : {std::pair(24.0, 0.1), std::pair(3.0, 0.8)}) {
     Session session(all, with_wrist, strong);
@@ -462,6 +464,7 @@ TEST(SafetyChain, ScalesForceAndTorqueByOneFactorAtEitherLimit) {
   EXPECT_NEAR(session.run_for(1.0, 3.0).torque.norm(), 0.8, 1e-9);
 }
 
+// Hazard: torque
 TEST(SafetyChain, RampsAndSlewsATorqueAlone) {
   Session session(all, with_wrist, strong);
   session.engage();
@@ -475,6 +478,7 @@ TEST(SafetyChain, RampsAndSlewsATorqueAlone) {
   EXPECT_NEAR(last, 0.2, 1e-9);
 }
 
+// Hazard: torque
 TEST(SafetyChain, EngagesForNoTorqueThatIsAlreadyThere) {
   Session session(all, with_wrist, strong);
   session.input.torque = Vec3(0.2, 0, 0);
@@ -485,6 +489,7 @@ TEST(SafetyChain, EngagesForNoTorqueThatIsAlreadyThere) {
   EXPECT_NE(session.run(0.0).flags & input_refused, 0U);
 }
 
+// Hazard: torque
 TEST(SafetyChain, LetsATorqueOnlyFallOnceAFrameIsLate) {
   Session session(all, with_wrist, strong);
   session.engage();
@@ -539,6 +544,18 @@ TEST(SafetyChain, SeesAnOscillationThatTheTorqueKeepsUp) {
   };
   EXPECT_NE(flags_of(10), 0U);
   EXPECT_EQ(flags_of(-1), 0U) << "a spring, and the tick that the device holds it";
+}
+
+// Hazard: torque, fast-oscillation
+TEST(SafetyChain, SoftensATorqueAloneWhereTheForceOscillated) {
+  Session session(all, with_wrist, strong);
+  session.engage();
+  session.input.torque = Vec3(0.1, 0, 0);
+  for (int i = 0; i < 1000; ++i) session.run((i / 10) % 2 == 0 ? 2.8 : 0.3);
+  const double softened = session.run_for(0.1, 0.0).torque.norm();
+  EXPECT_GT(softened, 0.0);
+  EXPECT_LT(softened, 0.06);
+  EXPECT_NEAR(session.run_for(3.0, 0.0).torque.norm(), 0.1, 1e-9) << "it recovers";
 }
 
 TEST(SafetyChain, TurnsTheForceRoundThroughZeroAndNoFaster) {

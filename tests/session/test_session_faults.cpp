@@ -43,12 +43,13 @@ using test::wall;
 using test::wall_depth;
 
 enum class Fault { off, stuck, garbage, wrong, slow, delayed, intermittent };
-enum class Place { first_camera, second_camera, hand, device, method };
+enum class Place { first_camera, second_camera, hand, device, method, other_hand };
 enum class Motion { free, contact, moving };
 
 constexpr std::array fault_names = {"Off",  "Stuck",   "Garbage",     "Wrong",
                                     "Slow", "Delayed", "Intermittent"};
-constexpr std::array place_names = {"FirstCamera", "SecondCamera", "Hand", "Device", "Method"};
+constexpr std::array place_names = {"FirstCamera", "SecondCamera", "Hand",
+                                    "Device",      "Method",       "OtherHand"};
 constexpr std::array motion_names = {"Free", "Contact", "Moving"};
 
 const std::vector<Motion> motions =
@@ -175,6 +176,8 @@ bool is_odd(double t) {
   return static_cast<int>(std::floor(t / 0.02)) % 2 != 0;
 }
 
+constexpr double max_torque = 0.1;  // [N m]
+
 /// Hovers or presses until 5 s, lets go of the wall, and presses again at 6 s.
 class FaultyHand final : public Device {
  public:
@@ -235,10 +238,15 @@ class FaultyHand final : public Device {
 
   Motion motion_;
   std::vector<Failure> hand_, device_;
-  DeviceInfo info_{.uri = "faulty:", .kind = "faulty", .limits = no_motors};
+  DeviceInfo info_{.uri = "faulty:",
+                   .kind = "faulty",
+                   .limits = {.max_force = no_motors.max_force,
+                              .continuous_force = no_motors.continuous_force,
+                              .motors = false,
+                              .max_torque = max_torque}};
 };
 
-/// The default method, with faults in what it returns.
+/// The default method with a torque, as of a tool, and with faults in what it returns.
 class FaultyMethod final : public Method {
  public:
   FaultyMethod(const Parameters& parameters, std::vector<Failure> failures)
@@ -250,7 +258,8 @@ class FaultyMethod final : public Method {
   }
 
   Tick tick(const Vec3& hip, double t) noexcept override {
-    const Tick good = method_->tick(hip, t);
+    Tick good = method_->tick(hip, t);
+    good.torque = 0.02 * Vec3(good.force.z(), good.force.x(), good.force.y());
     past_.push_back(good);
     if (past_.size() > 200) past_.pop_front();
     const Failure* failure = failure_at(failures_, t);
@@ -270,6 +279,7 @@ class FaultyMethod final : public Method {
         break;
       case Fault::wrong:  // through the surface
         bad.force = -good.force;
+        bad.torque = -good.torque;
         bad.normal = -good.normal;
         break;
       case Fault::slow:  // a new force in 50 ms
@@ -292,7 +302,7 @@ class FaultyMethod final : public Method {
   void spoil(Tick& tick) noexcept {
     constexpr std::array values = {nan, inf, -1e300, 1e300};
     const double value = values[++spoiled_ % values.size()];
-    tick.force = Vec3(value, 1.0, value);
+    (spoiled_ % 2 == 0 ? tick.torque : tick.force) = Vec3(value, 1.0, value);
     tick.normal = tick.proxy = Vec3::Constant(value);
     tick.surface_velocity = value;
   }
@@ -318,6 +328,7 @@ bool ends_the_force(const Failure& failure) {
     case Place::hand:
       return fault == Fault::off || fault == Fault::garbage || fault == Fault::intermittent;
     case Place::device:
+    case Place::other_hand:
       return true;
     case Place::method:
       return fault == Fault::off || fault == Fault::garbage || fault == Fault::wrong ||
@@ -344,6 +355,8 @@ std::uint32_t flags_that_tell(Place place) {
       return std::uint32_t{disengaged} | input_refused | fault_latched;
     case Place::method:
       return std::uint32_t{input_refused} | direction_refused | fault_latched;
+    case Place::other_hand:
+      return disengaged;
   }
   return 0;
 }
@@ -378,6 +391,11 @@ std::string violation_of(const Scenario& scenario, StopModel* model = nullptr) {
   }
   options.open_devices[0] = std::make_unique<FaultyHand>(
       scenario.motion, failures_of(scenario, Place::hand), failures_of(scenario, Place::device));
+  if (const auto of_other = failures_of(scenario, Place::other_hand); !of_other.empty()) {
+    options.open_devices.push_back(
+        std::make_unique<FaultyHand>(scenario.motion, std::vector<Failure>{}, of_other));
+    options.hands.resize(2);
+  }
   options.methods.add(
       {.name = "faulty", .summary = "", .make = [&scenario](const Parameters& parameters) {
          return std::make_unique<FaultyMethod>(parameters, failures_of(scenario, Place::method));
@@ -408,7 +426,8 @@ std::string violation_of(const Scenario& scenario, StopModel* model = nullptr) {
   std::vector<std::uint32_t> told(scenario.failures.size());  // SafetyFlag bits during each
   std::uint32_t telling = 0;  // those of which one is enough: a fault may hide another
   for (const Failure& failure : scenario.failures) telling |= flags_that_tell(failure.place);
-  double before = 0.0;
+  double before = 0.0, torque_before = 0.0;
+  const double lever = max_torque / limits.max_force;  // [m]
   session.run(session_ends, [&](const ServoTick& tick) {
     const double t = tick.tick.t;
     const double force = tick.force.norm();
@@ -422,6 +441,13 @@ std::string violation_of(const Scenario& scenario, StopModel* model = nullptr) {
     demand(force <= limits.max_force + 1e-9, "it is larger than the limit");
     demand(force - before <= 1e-3 * limits.rise_rate + 1e-9, "it rises too fast");
     demand(before - force <= 1e-3 * limits.fall_rate + 1e-9, "it falls too fast");
+    const double torque = tick.torque.norm();
+    demand(tick.torque.allFinite() && torque <= max_torque + 1e-9, "its torque is too large");
+    demand(torque - torque_before <= 1e-3 * lever * limits.rise_rate + 1e-9,
+           "its torque rises too fast");
+    demand(force > 0.0 || torque <= std::max(torque_before - 0.5 * max_torque, 0.0) + 1e-9,
+           "its torque stays without a force");
+    torque_before = torque;
     const StopModel::Cause cause = StopModel::cause_of(tick);
     const int sent_before = StopModel::tenths(before / limits.max_force);
     demand(StopModel::tenths(force / limits.max_force) <= StopModel::most_after(cause, sent_before),
@@ -527,7 +553,7 @@ std::string name_of_cell(const testing::TestParamInfo<Cell>& info) {
 
 class SessionFaults : public testing::TestWithParam<Cell> {};
 
-// Hazard: lost-camera, nobody-holds, not-a-number
+// Hazard: lost-camera, nobody-holds, not-a-number, torque, another-hand
 TEST_P(SessionFaults, TakeTheForceOffAndGiveItBack) {
   const Scenario scenario{std::get<2>(GetParam()),
                           {{.fault = std::get<0>(GetParam()), .place = std::get<1>(GetParam())}}};
@@ -539,7 +565,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Combine(testing::Values(Fault::off, Fault::stuck, Fault::garbage, Fault::wrong,
                                      Fault::slow, Fault::delayed, Fault::intermittent),
                      testing::Values(Place::first_camera, Place::second_camera, Place::hand,
-                                     Place::device, Place::method),
+                                     Place::device, Place::method, Place::other_hand),
                      testing::ValuesIn(motions)),
     name_of_cell);
 

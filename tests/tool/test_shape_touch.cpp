@@ -3,9 +3,11 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -44,7 +46,7 @@ class Stage {
     Tick tick;
     const double end = t_ + duration;
     for (; t_ < end - 1e-9; t_ += 1e-3) {
-      if (t_ >= frames_ * frame_time - 1e-9) {
+      if (streams && t_ >= frames_ * frame_time - 1e-9) {
         frame_ = camera_.capture(frames_ * frame_time, static_cast<std::uint64_t>(frames_));
         ++frames_;
         touch_.observe({*frame_.cloud, frame_.stamp});
@@ -64,6 +66,8 @@ class Stage {
   }
   [[nodiscard]] ShapeTouch& touch() { return touch_; }
   [[nodiscard]] double now() const { return t_; }
+
+  bool streams = true;  // are there new frames?
 
  private:
   static CameraSetup setup(double distance, double tilt) {
@@ -162,6 +166,7 @@ TEST(ShapeTouch, LiesInAConcaveCorner) {
   EXPECT_LT(tick.torque.norm(), 0.05 * stiffness * 5e-3 * 20e-3);
 }
 
+// Hazard: tool-pushes
 TEST(ShapeTouch, BeginsInsideAndFeelsNothingUntilItIsFree) {
   Stage stage(plane());
   const Tick inside = stage.run(0.5, [](double) { return pose({0, 0, -4e-3}); });
@@ -170,6 +175,7 @@ TEST(ShapeTouch, BeginsInsideAndFeelsNothingUntilItIsFree) {
   EXPECT_GT(stage.press(pose({0, 0, -2.5e-3})).force.z(), 2.5);
 }
 
+// Hazard: tool-pushes
 TEST(ShapeTouch, IsNeverBehindASurfaceThatComes) {
   Part rising = part(HalfSpace{});
   rising.motion.start = 1.0;
@@ -194,6 +200,7 @@ TEST(ShapeTouch, IsNeverBehindASurfaceThatComes) {
   }
 }
 
+// Hazard: tool-pushes
 TEST(ShapeTouch, IsStoppedByTheSideOfABodyOfWhichTheEdgeAloneIsSeen) {
   // A block 60 mm high beside the tool, seen from straight above.
   Part block_ = part(block(Vec3(0.05, 0.05, 0.03)));
@@ -209,6 +216,7 @@ TEST(ShapeTouch, IsStoppedByTheSideOfABodyOfWhichTheEdgeAloneIsSeen) {
   EXPECT_NEAR(tick.force.z(), 0.0, 0.5);
 }
 
+// Hazard: tool-pushes
 TEST(ShapeTouch, KeepsThePartsOfOneWrenchAtItsLimit) {
   Parameters soft;
   soft.coupling.max_force = 1.0;
@@ -218,6 +226,55 @@ TEST(ShapeTouch, KeepsThePartsOfOneWrenchAtItsLimit) {
   EXPECT_NEAR(tick.force.norm(), 1.0, 1e-9);
   EXPECT_TRUE((tick.flags & force_saturated) != 0);
   EXPECT_NEAR(tick.torque.norm(), 1.0 * 19e-3, 2e-3);
+}
+
+// Hazard: tool-pushes
+TEST(ShapeTouch, LetsGoWhereFramesDoNotCome) {
+  Stage stage(plane());
+  const HandPose at = pose({0, 0, 0}, {0, 0.3, 0});
+  const Tick pressed = stage.press(at);
+  stage.streams = false;
+  const auto hand = [&](double) { return at; };
+  EXPECT_EQ(stage.run(0.05, hand).force, pressed.force) << "one that is late takes nothing";
+  EXPECT_LT(stage.run(0.09, hand).torque.norm(), 0.9 * pressed.torque.norm());
+  const Tick gone = stage.run(0.2, hand);
+  EXPECT_TRUE(gone.force.isZero(0.0) && gone.torque.isZero(0.0));
+}
+
+// Hazard: tool-pushes, not-a-number
+TEST(ShapeTouch, FeelsNothingForAHandThatIsNowhere) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  Stage stage(plane());
+  const HandPose at = pose({0, 0, 0});
+  const double pressed = stage.press(at).force.z();
+  const double t = stage.now();
+  const std::pair<HandPose, double> nowhere[] = {
+      {{Vec3(0, nan, 0), at.orientation}, t},     {{Vec3(1e9, 0, 0), at.orientation}, t},
+      {{at.position, Rotation(0.4, 0, 0, 0)}, t}, {{at.position, Rotation(2.1, 0, 0, 0)}, t},
+      {{at.position, Rotation(nan, 0, 0, 0)}, t}, {at, nan}};
+  for (const auto& [hand, when] : nowhere) {
+    const Tick tick = stage.touch().tick(hand, when);
+    EXPECT_TRUE(tick.force.isZero(0.0) && tick.torque.isZero(0.0));
+    EXPECT_TRUE((tick.flags & non_finite_input) != 0);
+    EXPECT_TRUE(tick.proxy.allFinite());
+  }
+  EXPECT_NEAR(stage.run(0.1, [&](double) { return at; }).force.z(), pressed, 0.05);
+}
+
+// Hazard: tool-pushes
+TEST(ShapeTouch, PushesAndNeverPullsAHandThatIsTakenAway) {
+  Parameters damped;
+  damped.coupling.damping = 20.0;
+  Stage stage(plane());
+  stage.touch().set_parameters(damped);
+  stage.press(pose({0, 0, 0}, {0, 0.3, 0}));
+  const double begin = stage.now();
+  stage.run(
+      0.1,
+      [&](double t) {
+        return pose({0, 0, 0.3 * (t - begin)}, {0, 0.3 - 5.0 * (t - begin), 0});
+      },
+      [](const Tick& tick) { EXPECT_GE(tick.force.z(), -1e-9); });
 }
 
 TEST(ShapeTouch, AllocatesNothing) {

@@ -294,6 +294,7 @@ bool ShapeTouch::move(const Pose& hand) noexcept {
   return held_.count > 0;
 }
 
+// Hazard: tool-pushes
 // [-] of a force that is left where its contacts are hidden, or frames do not come.
 double ShapeTouch::known_share(double t) const noexcept {
   const SightParameters& sight = parameters_.sight;

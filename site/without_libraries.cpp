@@ -7,9 +7,8 @@
 #include <vector>
 
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/io/bag/bag_writer.hpp"
+#include "palpate/io/bag/bag_file.hpp"
 #include "palpate/io/bag/compression.hpp"
-#include "palpate/io/bag/database.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 #include "site/page.hpp"
@@ -51,37 +50,8 @@ std::vector<std::byte> decompress_bz2(std::span<const std::byte> /*packed*/,
   refuse(name, "it is compressed with bzip2");
 }
 
-void Database::Close::operator()(sqlite3* /*database*/) const noexcept {}
-void Statement::Finalize::operator()(sqlite3_stmt* /*statement*/) const noexcept {}
-
-Database Database::create(const std::filesystem::path& file) {
-  refuse(file.string(), "it is to be a database of SQLite");
-}
-Database Database::open(const std::filesystem::path& file) {
+std::unique_ptr<BagFile> open_sqlite_file(const std::filesystem::path& file) {
   refuse(file.string(), "it is a database of SQLite");
-}
-void Database::run(const std::string& /*sql*/) {}
-
-// There is no database, so there is no statement.
-Statement::Statement(const Database& database, std::string_view /*sql*/) : database_(&database) {
-  refuse(database.file().string(), "it is a database of SQLite");
-}
-void Statement::bind(int /*parameter*/, std::int64_t /*value*/) {}
-void Statement::bind(int /*parameter*/, std::string_view /*text*/) {}
-void Statement::bind(int /*parameter*/, std::span<const std::byte> /*bytes*/) {}
-bool Statement::step() {
-  return false;
-}
-void Statement::run() {}
-void Statement::reset() noexcept {}
-std::int64_t Statement::integer(int /*column*/) const {
-  return 0;
-}
-std::string Statement::text(int /*column*/) const {
-  return {};
-}
-std::span<const std::byte> Statement::bytes(int /*column*/) const {
-  return {};
 }
 
 }  // namespace palpate

@@ -316,49 +316,5 @@ TEST(Mcap, OfRosbag2IsWhatItIsInSqlite) {
   EXPECT_EQ(reader.check().damage, "");
 }
 
-std::vector<std::byte> lz4(const std::vector<std::byte>& bytes) {
-  std::vector<std::byte> packed(LZ4F_compressFrameBound(bytes.size(), nullptr));
-  packed.resize(
-      LZ4F_compressFrame(packed.data(), packed.size(), bytes.data(), bytes.size(), nullptr));
-  return packed;
-}
-
-TEST(Lz4, GivesBackFramesOneAfterAnother) {
-  std::mt19937 random(3);
-  std::vector<std::byte> noise(70'000);
-  for (std::byte& byte : noise) byte = static_cast<std::byte>(random());
-  const std::vector<std::byte> zeros(1'000'000);
-  auto packed = lz4(noise);
-  EXPECT_EQ(decompress_lz4(packed, noise.size(), "it"), noise);
-  EXPECT_EQ(decompress_lz4(lz4({}), 0, "it"), std::vector<std::byte>{});
-  const auto more = lz4(zeros);
-  packed.insert(packed.end(), more.begin(), more.end());
-  auto both = noise;
-  both.insert(both.end(), zeros.begin(), zeros.end());
-  EXPECT_EQ(decompress_lz4(packed, both.size(), "it"), both);
-  EXPECT_TRUE(fails_saying([&] { return decompress_lz4(packed, both.size() - 1, "it"); }, "it",
-                           "more than 1069999 bytes"));
-  EXPECT_TRUE(fails_saying([] { return decompress_lz4({}, 9, "it"); }, "it", "too early"));
-}
-
-TEST(Lz4, OfDamagedDataIsAnErrorOrWhatItBecame) {
-  std::mt19937 random(4);
-  std::vector<std::byte> bytes(5000);
-  for (std::byte& byte : bytes) byte = static_cast<std::byte>(random() % 3);
-  const auto packed = lz4(bytes);
-  int errors = 0;
-  for (int i = 0; i < 2000; ++i) {
-    auto damaged = packed;
-    damaged[random() % damaged.size()] ^= static_cast<std::byte>(1U << random() % 8);
-    if (i % 3 == 0) damaged.resize(random() % damaged.size());
-    try {
-      ASSERT_LE(decompress_lz4(damaged, 10'000, "it").size(), 10'000U);
-    } catch (const Error&) {
-      ++errors;
-    }
-  }
-  EXPECT_GT(errors, 700);
-}
-
 }  // namespace test_mcap
 }  // namespace palpate

@@ -10,8 +10,9 @@
 
 #include <zstd.h>
 
-#include "palpate/io/bag/database.hpp"
 #include "palpate/io/bag/messages.hpp"
+
+#include "tests/support/sqlite.hpp"
 
 namespace palpate::test {
 
@@ -24,19 +25,20 @@ class RealSenseRecording {
   static constexpr const char* units_topic = "/device_0/sensor_0/option/Depth_Units/value";
   static constexpr const char* device_topic = "/device_0/info";
 
-  RealSenseRecording(const std::filesystem::path& file, bool compressed)
-      : database_(Database::create(file)), compressed_(compressed) {
-    database_.run(
-        "CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,"
-        "serialization_format TEXT NOT NULL,offered_qos_profiles TEXT NOT NULL);"
-        "CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,"
-        "timestamp INTEGER NOT NULL,data BLOB NOT NULL);"
-        "CREATE INDEX timestamp_idx ON messages(timestamp ASC);"
-        "BEGIN");
+  RealSenseRecording(std::filesystem::path file, bool compressed)
+      : file_(std::move(file)),
+        compressed_(compressed),
+        sql_(
+            "CREATE TABLE topics(id INTEGER PRIMARY KEY,name TEXT NOT NULL,type TEXT NOT NULL,"
+            "serialization_format TEXT NOT NULL,offered_qos_profiles TEXT NOT NULL);"
+            "CREATE TABLE messages(id INTEGER PRIMARY KEY,topic_id INTEGER NOT NULL,"
+            "timestamp INTEGER NOT NULL,data BLOB NOT NULL);"
+            "CREATE INDEX timestamp_idx ON messages(timestamp ASC);"
+            "BEGIN;") {
     write("/file_version", "std_msgs/msg/UInt32", 0, std::vector<std::byte>(8));
   }
 
-  ~RealSenseRecording() { database_.run("COMMIT"); }
+  ~RealSenseRecording() { run_sql(file_, sql_ + "COMMIT"); }
   RealSenseRecording(const RealSenseRecording&) = delete;
   RealSenseRecording& operator=(const RealSenseRecording&) = delete;
 
@@ -59,17 +61,17 @@ class RealSenseRecording {
     if (id == 0) {
       topics_.emplace_back(topic);
       id = static_cast<std::int64_t>(topics_.size());
-      Statement add(database_, "INSERT INTO topics VALUES(?,?,?,'cdr','')");
-      add.bind(0, id);
-      add.bind(1, topic);
-      add.bind(2, type);
-      add.run();
+      sql_ += "INSERT INTO topics VALUES(" + std::to_string(id) + ",'" + std::string(topic) +
+              "','" + std::string(type) + "','cdr','');";
     }
-    Statement add(database_, "INSERT INTO messages(topic_id,timestamp,data) VALUES(?,?,?)");
-    add.bind(0, id);
-    add.bind(1, at);
-    add.bind(2, std::span(bytes));
-    add.run();
+    constexpr std::string_view digits = "0123456789abcdef";
+    sql_ += "INSERT INTO messages(topic_id,timestamp,data) VALUES(" + std::to_string(id) + "," +
+            std::to_string(at) + ",x'";
+    for (const std::byte byte : bytes) {
+      sql_ += digits[std::to_integer<unsigned>(byte) >> 4U];
+      sql_ += digits[std::to_integer<unsigned>(byte) & 15U];
+    }
+    sql_ += "');";
   }
   void text(std::string_view topic, std::int64_t at, const std::string& text) {
     write(topic, ros::String::type, at, ros::encode(ros::String{text}));
@@ -96,8 +98,9 @@ class RealSenseRecording {
   }
 
  private:
-  Database database_;
+  std::filesystem::path file_;
   bool compressed_;
+  std::string sql_;
   std::vector<std::string> topics_;
 };
 

@@ -84,11 +84,7 @@ CameraOptions camera_options(const Uri& uri) {
 struct Pending {
   double stamp = 0.0;    // [s] since 1970
   double arrival = 0.0;  // [s, monotonic]
-  std::string tf_frame;
-  std::vector<std::uint16_t> depth;
-  double units = 0.0;  // [1/m]
-  std::optional<std::vector<Vec3>> points;
-  std::size_t columns = 0, rows = 0;  // of points
+  RosFrame seen;
 };
 
 bool is_of_camera(const std::string& type) {
@@ -241,16 +237,17 @@ class Camera final : public LiveCamera {
     info_name_ = wanted_.info_topic.empty() ? camera_of_topic(wanted_.topic, type) + "/camera_info"
                                             : wanted_.info_topic;
     const dds::Quality quality{.reliable = wanted_.reliable};
-    if (type == ros::Image::type) {
-      images_.emplace(participant_, wanted_.topic, ros::Image{}, quality);
-    } else if (wanted_.topic.ends_with("/slices")) {
+    type_ = type;
+    if (wanted_.topic.ends_with("/slices"))
       slices_.emplace(participant_, wanted_.topic, camera_of_topic(wanted_.topic, type));
-    } else if (type == ros::CompressedImage::type) {
-      packed_.emplace(participant_, wanted_.topic, ros::CompressedImage{}, quality);
-    } else {
-      clouds_.emplace(participant_, wanted_.topic, ros::PointCloud2{}, quality);
-    }
-    if (!clouds_) lenses_.emplace(participant_, info_name_, ros::CameraInfo{}, best_effort);
+    else if (type == ros::Image::type)
+      frames_.emplace(participant_, wanted_.topic, ros::Image{}, quality);
+    else if (type == ros::CompressedImage::type)
+      frames_.emplace(participant_, wanted_.topic, ros::CompressedImage{}, quality);
+    else
+      frames_.emplace(participant_, wanted_.topic, ros::PointCloud2{}, quality);
+    if (type != ros::PointCloud2::type)
+      lenses_.emplace(participant_, info_name_, ros::CameraInfo{}, best_effort);
     if (wanted_.fixed_frame != "none") {
       tf_.emplace(participant_, std::string(transforms_topic), ros::TFMessage{}, of_tf);
       static_tf_.emplace(participant_, std::string(static_transforms_topic), ros::TFMessage{},
@@ -359,66 +356,38 @@ class Camera final : public LiveCamera {
   // The newest message; one that a frame still waits with gives way to it.
   void take_newest() {
     const std::string name = wanted_.uri + ": message";
-    if (clouds_) {
-      while (const auto cloud = clouds_->take<ros::PointCloud2>()) {
-        Pending& next = begin(cloud->header);
-        next.points = points_of(*cloud, name);
-        next.columns = cloud->width;
-        next.rows = cloud->height;
-        info_.details = "PointCloud2";
+    if (!slices_) {
+      while (frames_->take([&](std::span<const std::byte> cdr) {
+        begin(ros_frame_of(type_, cdr, wanted_.units, name));
+      })) {
       }
-    } else if (images_) {
-      while (const auto image = images_->take<ros::Image>())
-        take_image(*image, name,
-                   wanted_.units ? *wanted_.units : depth_units(image->encoding, name));
-    } else if (slices_) {
-      if (auto taken = slices_->take(name)) take_slices(std::move(*taken), name);
-    } else {
-      while (auto packed = packed_->take<ros::CompressedImage>()) {
-        const std::string format = packed->format;
-        const double units = wanted_.units ? *wanted_.units : depth_units(format, name);
-        take_image(unpacked(std::move(*packed), units, name), name, units);
-        info_.details = format;
-      }
+      return;
     }
-  }
-
-  void take_slices(SliceReader::Taken taken, const std::string& name) {
-    info_.details = taken.format;
-    if (!rays_) return;  // its CameraInfo comes beside it
-    check_size(taken.image.width, taken.image.height);
-    Pending& next = begin(taken.header);
-    next.units = wanted_.units ? *wanted_.units : depth_units(taken.format, name);
-    next.depth = std::move(taken.image.depth);
+    auto taken = slices_->take(name);
+    if (!taken) return;
+    begin({.header = std::move(taken->header),
+           .details = taken->format,
+           .width = static_cast<std::uint32_t>(taken->image.width),
+           .height = static_cast<std::uint32_t>(taken->image.height),
+           .depth = std::move(taken->image.depth),
+           .units = wanted_.units ? *wanted_.units : depth_units(taken->format, name)});
   }
 
   // @throws Error if the lens is of images of another size
-  void check_size(int width, int height) const {
-    const Intrinsics& k = rays_->intrinsics();
-    if (k.width == width && k.height == height) return;
-    throw Error(wanted_.uri,
-                "gives images of " + std::to_string(width) + "x" + std::to_string(height) +
-                    " pixels, but " + info_name_ + " says " + std::to_string(k.width) + "x" +
-                    std::to_string(k.height),
-                "name the CameraInfo that belongs to it with ?info=/TOPIC");
-  }
-
-  void take_image(const ros::Image& image, const std::string& name, double units) {
-    std::vector<std::uint16_t> depth = raw_depth(image, units, name);
-    info_.details = image.encoding;
-    if (!rays_) return;  // its CameraInfo comes beside it
-    check_size(static_cast<int>(image.width), static_cast<int>(image.height));
-    Pending& next = begin(image.header);
-    next.depth = std::move(depth);
-    next.units = units;
-  }
-
-  Pending& begin(const ros::Header& header) {
-    pending_.emplace();
-    pending_->arrival = monotonic_now();
-    pending_->stamp = header.stamp.seconds();
-    pending_->tf_frame = header.frame_id;
-    return *pending_;
+  void begin(RosFrame seen) {
+    info_.details = seen.details;
+    if (!seen.points) {
+      if (!rays_) return;  // its CameraInfo comes beside it
+      const Intrinsics& k = rays_->intrinsics();
+      if (k.width != static_cast<int>(seen.width) || k.height != static_cast<int>(seen.height))
+        throw Error(wanted_.uri,
+                    "gives images of " + std::to_string(seen.width) + "x" +
+                        std::to_string(seen.height) + " pixels, but " + info_name_ + " says " +
+                        std::to_string(k.width) + "x" + std::to_string(k.height),
+                    "name the CameraInfo that belongs to it with ?info=/TOPIC");
+    }
+    const double stamp = seen.header.stamp.seconds();
+    pending_ = Pending{.stamp = stamp, .arrival = monotonic_now(), .seen = std::move(seen)};
   }
 
   // In which frame points are is decided once: a pose that came later would move the whole scene.
@@ -461,10 +430,11 @@ class Camera final : public LiveCamera {
   }
 
   std::optional<Frame> frame_of_pending() {
-    if (!decide_pose(pending_->tf_frame)) return std::nullopt;
+    if (!decide_pose(pending_->seen.header.frame_id)) return std::nullopt;
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     if (!fixed_.empty()) {
-      const TransformWay way = transforms_.links().way(pending_->tf_frame, fixed_, "TF");
+      const TransformWay way =
+          transforms_.links().way(pending_->seen.header.frame_id, fixed_, "TF");
       const bool late = monotonic_now() - pending_->arrival > longest_wait_for_tf;
       if (!late && !transforms_.reach(way, pending_->stamp)) return std::nullopt;
       const std::optional<Eigen::Isometry3d> found = transforms_.at(way, pending_->stamp);
@@ -477,17 +447,8 @@ class Camera final : public LiveCamera {
     Frame frame;
     frame.stamp = pending_->stamp - (clock_ ? clock_->relation().difference() : 0.0);
     frame.arrival = pending_->arrival;
-    if (pending_->points) {
-      frame.cloud = organised_.image(*pending_->points, pending_->columns, pending_->rows,
-                                     std::nullopt, pose);
-      if (!frame.cloud) {
-        for (Vec3& point : *pending_->points) point = pose * point;
-        frame.cloud = std::make_shared<PointCloud>(*pending_->points);
-      }
-    } else {
-      frame.cloud =
-          std::make_shared<DepthImage>(rays_, std::move(pending_->depth), pending_->units, pose);
-    }
+    pending_->seen.rgb.clear();  // shown of recordings alone
+    frame.cloud = cloud_of(std::move(pending_->seen), rays_, pose, organised_);
     pending_.reset();
     return frame;
   }
@@ -496,7 +457,8 @@ class Camera final : public LiveCamera {
   dds::Participant participant_;
   const double opened_;    // [s, monotonic]
   std::string info_name_;  // topic of CameraInfo
-  std::optional<dds::Reader> images_, packed_, clouds_, lenses_, tf_, static_tf_;
+  std::string type_;
+  std::optional<dds::Reader> frames_, lenses_, tf_, static_tf_;
   std::optional<SliceReader> slices_;
   std::optional<RemoteClock> clock_;
   std::string clock_note_;

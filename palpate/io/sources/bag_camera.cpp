@@ -10,7 +10,6 @@
 #include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/material_file.hpp"
 #include "palpate/io/sources/realsense_lens.hpp"
-#include "palpate/io/sources/ros_frames.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
@@ -298,7 +297,7 @@ std::vector<double> BagCamera::exact(std::size_t number, std::size_t size) {
 }
 
 const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
-                                                          const ros::Image& image) {
+                                                          const RosFrame& image) {
   // In other bags the intrinsics are taken to be constant: those of the first CameraInfo.
   const std::size_t which = is_ours() ? number : 0;
   if (which >= info_places_.size())
@@ -327,28 +326,23 @@ const std::shared_ptr<const ViewingRays>& BagCamera::rays(std::size_t number,
   return rays_;
 }
 
-std::optional<Frame> BagCamera::read_depth(std::size_t number, ros::Image image) {
-  const double units = options_.units  ? *options_.units
-                       : is_realsense_ ? realsense_units(number)
-                                       : depth_units(details_, name(number));
-  std::vector<std::uint16_t> depth = raw_depth(image, units, name(number));
-  const std::shared_ptr<const ViewingRays>& seen = rays(number, image);
-  if (!is_ours()) {
-    const double taken = stamp(number, image.header);
-    const std::optional<Eigen::Isometry3d> pose = pose_at(taken);
-    if (!pose) return std::nullopt;
-    return Frame{
-        .stamp = taken,
-        .cloud = std::make_shared<DepthImage>(seen, std::move(depth), units, *pose),
-        .colour = colour_ ? colour_->at(places_[number].nanoseconds, taken, *pose) : nullptr};
+// Of palpate's own bags.
+Frame BagCamera::own_frame(std::size_t number, RosFrame seen) {
+  if (seen.points) {
+    const std::vector<double> numbers = exact(number, 6);
+    std::optional<Vec3> viewpoint;
+    if (numbers[2] != 0.0) viewpoint = Vec3(numbers[3], numbers[4], numbers[5]);
+    return Frame{numbers[0], std::make_shared<PointCloud>(*seen.points, viewpoint)};
   }
+  const std::shared_ptr<const ViewingRays>& rays = this->rays(number, seen);
   const std::vector<double> numbers = exact(number, 14);
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column)
       world_from_camera(row, column) = numbers[static_cast<std::size_t>(2 + 4 * row + column)];
   }
-  auto cloud = std::make_shared<DepthImage>(seen, std::move(depth), numbers[1], world_from_camera);
+  auto cloud =
+      std::make_shared<DepthImage>(rays, std::move(seen.depth), numbers[1], world_from_camera);
   if (numbers.size() > 14) cloud->set_materials(materials(number, numbers[14], numbers[15]));
   return Frame{numbers[0], std::move(cloud)};
 }
@@ -397,48 +391,19 @@ std::shared_ptr<const MaterialMap> BagCamera::materials(std::size_t number, doub
   return materials_;
 }
 
-std::optional<Frame> BagCamera::read_points(std::size_t number, const ros::PointCloud2& message) {
-  std::vector<Vec3> points = points_of(message, name(number));
-  if (!is_ours()) {
-    const double taken = stamp(number, message.header);
-    const std::optional<Eigen::Isometry3d> pose = pose_at(taken);
-    if (!pose) return std::nullopt;
-    std::shared_ptr<ColourImage> colour;
-    if (std::vector<std::uint8_t> rgb = rgb_of(message); !rgb.empty()) {
-      colour = std::make_shared<ColourImage>();
-      colour->width = static_cast<int>(message.width);
-      colour->height = static_cast<int>(message.height);
-      colour->rgb = std::move(rgb);
-    }
-    if (auto image = organised_.image(points, message.width, message.height, std::nullopt, *pose))
-      return Frame{taken, std::move(image), std::move(colour)};
-    for (Vec3& point : points) point = *pose * point;
-    if (!colour) return Frame{taken, std::make_shared<PointCloud>(points)};
-    Surface surface{.points = std::move(points)};
-    return Frame{taken, std::make_shared<PointCloud>(std::move(surface)), std::move(colour)};
-  }
-  const std::vector<double> numbers = exact(number, 6);
-  std::optional<Vec3> viewpoint;
-  if (numbers[2] != 0.0) viewpoint = Vec3(numbers[3], numbers[4], numbers[5]);
-  return Frame{numbers[0], std::make_shared<PointCloud>(points, viewpoint)};
-}
-
 std::optional<Frame> BagCamera::frame(std::size_t number) {
-  const std::vector<std::byte> bytes = bag_.read(places_[number]);
-  const std::string message = name(number);
-  if (type_ == ros::PointCloud2::type) {
-    details_ = "PointCloud2";
-    return read_points(number, ros::decode<ros::PointCloud2>(bytes, message));
-  }
-  if (type_ == ros::Image::type) {
-    auto image = ros::decode<ros::Image>(bytes, message);
-    details_ = image.encoding;
-    return read_depth(number, std::move(image));
-  }
-  auto packed = ros::decode<ros::CompressedImage>(bytes, message);
-  details_ = packed.format;
-  const double units = options_.units ? *options_.units : depth_units(details_, message);
-  return read_depth(number, unpacked(std::move(packed), units, message));
+  std::optional<double> units = options_.units;
+  if (!units && is_realsense_) units = realsense_units(number);
+  RosFrame seen = ros_frame_of(type_, bag_.read(places_[number]), units, name(number));
+  details_ = seen.details;
+  if (is_ours()) return own_frame(number, std::move(seen));
+  const double taken = stamp(number, seen.header);
+  const std::optional<Eigen::Isometry3d> pose = pose_at(taken);
+  if (!seen.points) rays(number, seen);
+  if (!pose) return std::nullopt;
+  std::shared_ptr<const ColourImage> colour = seen.colour();
+  if (colour_) colour = colour_->at(places_[number].nanoseconds, taken, *pose);
+  return Frame{taken, cloud_of(std::move(seen), rays_, *pose, organised_), std::move(colour)};
 }
 
 std::unique_ptr<Source> open_recording(const Uri& uri) {

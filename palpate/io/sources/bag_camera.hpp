@@ -11,6 +11,7 @@
 #include "palpate/io/bag/bag_reader.hpp"
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/io/sources/bag_colour.hpp"
+#include "palpate/io/sources/ros_frames.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/io/sources/transforms.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
@@ -94,12 +95,11 @@ class BagCamera {
   void follow_transforms();
   void find_colour();
   [[nodiscard]] ros::Header first_header() const;
-  std::optional<Frame> read_depth(std::size_t number, ros::Image image);
-  std::optional<Frame> read_points(std::size_t number, const ros::PointCloud2& message);
+  Frame own_frame(std::size_t number, RosFrame seen);
   [[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(double stamp) const;
   [[nodiscard]] std::vector<double> exact(std::size_t number, std::size_t size);
   std::shared_ptr<const MaterialMap> materials(std::size_t number, double image, double table);
-  const std::shared_ptr<const ViewingRays>& rays(std::size_t number, const ros::Image& image);
+  const std::shared_ptr<const ViewingRays>& rays(std::size_t number, const RosFrame& image);
   [[nodiscard]] std::string text(const BagReader::Place& place, const std::string& topic) const;
   [[nodiscard]] double realsense_units(std::size_t number) const;
   [[nodiscard]] double stamp(std::size_t number, const ros::Header& header) const;

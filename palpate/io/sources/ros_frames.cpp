@@ -11,6 +11,7 @@
 
 #include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/depth_rvl.hpp"
+#include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
@@ -75,41 +76,6 @@ std::string format_of(std::string_view packing, double units_per_metre) {
   return format.append(digits.data(), end);
 }
 
-std::string above(const std::string& topic) {
-  return topic.substr(0, topic.rfind('/'));
-}
-
-}  // namespace
-
-bool is_topic_of_depth(const std::string& topic, const std::string& type) {
-  if (type == ros::Image::type)
-    return topic.find("depth") != std::string::npos || topic.find("/Depth_") != std::string::npos;
-  return (type == ros::CompressedImage::type &&
-          (topic.ends_with("/compressedDepth") || topic.ends_with("/slices"))) ||
-         type == ros::PointCloud2::type;
-}
-
-std::string camera_of_topic(const std::string& topic, const std::string& type) {
-  const bool is_deep = type == ros::CompressedImage::type || topic.ends_with("/image/data");
-  return above(is_deep ? above(topic) : topic);
-}
-
-double depth_units(const std::string& format, const std::string& name) {
-  const std::size_t at = format.find(units_key);
-  if (at == std::string::npos)
-    return is_float(format.substr(0, format.find(';'))) ? units_of_32fc1 : units_of_16uc1;
-  const char* begin = format.data() + at + units_key.size();
-  double units = 0.0;
-  const auto [end, error] = std::from_chars(begin, format.data() + format.size(), units);
-  if (error != std::errc() || !(units >= least_units && units <= most_units) ||
-      (end != format.data() + format.size() && *end != ';'))
-    throw Error(name, "says '" + format.substr(at) + "' for its unit of depth",
-                "give the raw values per metre, such as ?units=1000");
-  return units;
-}
-
-namespace {
-
 // @param size  [bytes] of a pixel
 void check_size(const ros::Image& image, std::size_t size, const std::string& name) {
   if (image.width == 0 || image.height == 0 || image.width > largest_side ||
@@ -120,28 +86,6 @@ void check_size(const ros::Image& image, std::size_t size, const std::string& na
                     std::to_string(image.height) + " pixels in " +
                     std::to_string(image.data.size()) + " bytes, which do not fit",
                 "it may be damaged");
-}
-
-}  // namespace
-
-std::vector<std::uint8_t> rgb_of(const ros::Image& image, const std::string& name) {
-  const std::string& encoding = image.encoding;
-  const bool is_rgb = encoding == "rgb8" || encoding == "rgba8";
-  if (!is_rgb && encoding != "bgr8" && encoding != "bgra8")
-    throw Error(name, "is an image of encoding '" + encoding + "', not of colour",
-                "record rgb8 or bgr8");
-  const std::size_t size = encoding.size() - 1;  // [bytes] of a pixel: one for each letter
-  check_size(image, size, name);
-  std::vector<std::uint8_t> rgb;
-  rgb.reserve(3 * std::size_t{image.width} * image.height);
-  for (std::size_t v = 0; v < image.height; ++v) {
-    for (std::size_t u = 0; u < image.width; ++u) {
-      const std::size_t at = v * image.step + u * size;
-      for (std::size_t channel : {0U, 1U, 2U})
-        rgb.push_back(static_cast<std::uint8_t>(image.data[at + (is_rgb ? channel : 2 - channel)]));
-    }
-  }
-  return rgb;
 }
 
 std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
@@ -188,6 +132,96 @@ ros::Image unpacked(ros::CompressedImage message, double units, const std::strin
   const auto bytes = std::as_bytes(std::span(raw.depth));
   image.data.assign(bytes.begin(), bytes.end());
   return image;
+}
+
+// Fills points, row by row, and their colours where the message has `rgb` or `rgba`.
+void read_points(const ros::PointCloud2& message, const std::string& name, RosFrame& frame) {
+  std::vector<Vec3>& points = frame.points.emplace();
+  if (message.width == 0 || message.height == 0) return;
+  const AxisFields axes = axis_fields_of(message, name);
+  const std::size_t row = std::size_t{message.width} * message.point_step;
+  if (message.height > 1 && message.row_step < row)
+    throw Error(name, "has rows that overlap", "it may be damaged");
+  const std::size_t row_step = message.height > 1 ? message.row_step : row;
+  if (row > message.data.size() || message.height - 1 > (message.data.size() - row) / row_step)
+    throw Error(name, "declares more points than it contains", "it may be damaged");
+  const bool swapped = message.is_bigendian != (std::endian::native == std::endian::big);
+  const auto colour =
+      std::find_if(message.fields.begin(), message.fields.end(), [&](const auto& f) {
+        return (f.name == "rgb" || f.name == "rgba") &&
+               (f.datatype == uint32 || f.datatype == float32) &&
+               f.offset + std::size_t{4} <= message.point_step;
+      });
+  points.reserve(std::size_t{message.width} * message.height);
+  for (std::size_t v = 0; v < message.height; ++v) {
+    for (std::size_t u = 0; u < message.width; ++u) {
+      const std::size_t at = v * row_step + u * message.point_step;
+      Vec3& point = points.emplace_back();
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::size_t place = at + axes.offset[axis];
+        point[static_cast<Eigen::Index>(axis)] =
+            axes.is_double[axis] ? value_at<double>(message.data, place, swapped)
+                                 : double{value_at<float>(message.data, place, swapped)};
+      }
+      if (colour == message.fields.end()) continue;
+      const auto packed = value_at<std::uint32_t>(message.data, at + colour->offset, swapped);
+      for (const unsigned shift : {16U, 8U, 0U})
+        frame.rgb.push_back(static_cast<std::uint8_t>(packed >> shift));
+    }
+  }
+}
+
+std::string above(const std::string& topic) {
+  return topic.substr(0, topic.rfind('/'));
+}
+
+}  // namespace
+
+bool is_topic_of_depth(const std::string& topic, const std::string& type) {
+  if (type == ros::Image::type)
+    return topic.find("depth") != std::string::npos || topic.find("/Depth_") != std::string::npos;
+  return (type == ros::CompressedImage::type &&
+          (topic.ends_with("/compressedDepth") || topic.ends_with("/slices"))) ||
+         type == ros::PointCloud2::type;
+}
+
+std::string camera_of_topic(const std::string& topic, const std::string& type) {
+  const bool is_deep = type == ros::CompressedImage::type || topic.ends_with("/image/data");
+  return above(is_deep ? above(topic) : topic);
+}
+
+double depth_units(const std::string& format, const std::string& name) {
+  const std::size_t at = format.find(units_key);
+  if (at == std::string::npos)
+    return is_float(format.substr(0, format.find(';'))) ? units_of_32fc1 : units_of_16uc1;
+  const char* begin = format.data() + at + units_key.size();
+  double units = 0.0;
+  const auto [end, error] = std::from_chars(begin, format.data() + format.size(), units);
+  if (error != std::errc() || !(units >= least_units && units <= most_units) ||
+      (end != format.data() + format.size() && *end != ';'))
+    throw Error(name, "says '" + format.substr(at) + "' for its unit of depth",
+                "give the raw values per metre, such as ?units=1000");
+  return units;
+}
+
+std::vector<std::uint8_t> rgb_of(const ros::Image& image, const std::string& name) {
+  const std::string& encoding = image.encoding;
+  const bool is_rgb = encoding == "rgb8" || encoding == "rgba8";
+  if (!is_rgb && encoding != "bgr8" && encoding != "bgra8")
+    throw Error(name, "is an image of encoding '" + encoding + "', not of colour",
+                "record rgb8 or bgr8");
+  const std::size_t size = encoding.size() - 1;  // [bytes] of a pixel: one for each letter
+  check_size(image, size, name);
+  std::vector<std::uint8_t> rgb;
+  rgb.reserve(3 * std::size_t{image.width} * image.height);
+  for (std::size_t v = 0; v < image.height; ++v) {
+    for (std::size_t u = 0; u < image.width; ++u) {
+      const std::size_t at = v * image.step + u * size;
+      for (std::size_t channel : {0U, 1U, 2U})
+        rgb.push_back(static_cast<std::uint8_t>(image.data[at + (is_rgb ? channel : 2 - channel)]));
+    }
+  }
+  return rgb;
 }
 
 Intrinsics intrinsics_of(const ros::CameraInfo& info, bool is_rectified, const std::string& name) {
@@ -253,54 +287,55 @@ bool is_depth_slice(const ros::CompressedImage& message) {
   return message.format.find(slice_packing) != std::string::npos;
 }
 
-std::vector<std::uint8_t> rgb_of(const ros::PointCloud2& message) {
-  const auto field = std::find_if(message.fields.begin(), message.fields.end(), [](const auto& f) {
-    return (f.name == "rgb" || f.name == "rgba") && (f.datatype == uint32 || f.datatype == float32);
-  });
-  if (field == message.fields.end() || field->offset + std::size_t{4} > message.point_step)
-    return {};
-  const bool swapped = message.is_bigendian != (std::endian::native == std::endian::big);
-  const std::size_t row = std::size_t{message.width} * message.point_step;
-  const std::size_t row_step = message.height > 1 ? message.row_step : row;
-  std::vector<std::uint8_t> rgb;
-  rgb.reserve(3 * std::size_t{message.width} * message.height);
-  for (std::size_t v = 0; v < message.height; ++v) {
-    for (std::size_t u = 0; u < message.width; ++u) {
-      const auto packed = value_at<std::uint32_t>(
-          message.data, v * row_step + u * message.point_step + field->offset, swapped);
-      for (const unsigned shift : {16U, 8U, 0U})
-        rgb.push_back(static_cast<std::uint8_t>(packed >> shift));
-    }
-  }
-  return rgb;
+std::shared_ptr<ColourImage> RosFrame::colour() const {
+  if (rgb.empty()) return nullptr;
+  auto image = std::make_shared<ColourImage>();
+  image->width = static_cast<int>(width);
+  image->height = static_cast<int>(height);
+  image->rgb = rgb;
+  return image;
 }
 
-std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name) {
-  if (message.width == 0 || message.height == 0) return {};
-  const AxisFields axes = axis_fields_of(message, name);
-  const std::size_t row = std::size_t{message.width} * message.point_step;
-  if (message.height > 1 && message.row_step < row)
-    throw Error(name, "has rows that overlap", "it may be damaged");
-  const std::size_t row_step = message.height > 1 ? message.row_step : row;
-  if (row > message.data.size() || message.height - 1 > (message.data.size() - row) / row_step)
-    throw Error(name, "declares more points than it contains", "it may be damaged");
-  const bool swapped = message.is_bigendian != (std::endian::native == std::endian::big);
-  std::vector<Vec3> points;
-  points.reserve(std::size_t{message.width} * message.height);
-  for (std::size_t v = 0; v < message.height; ++v) {
-    for (std::size_t u = 0; u < message.width; ++u) {
-      const std::size_t at = v * row_step + u * message.point_step;
-      Vec3 point;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::size_t place = at + axes.offset[axis];
-        point[static_cast<Eigen::Index>(axis)] =
-            axes.is_double[axis] ? value_at<double>(message.data, place, swapped)
-                                 : double{value_at<float>(message.data, place, swapped)};
-      }
-      points.push_back(point);
-    }
+RosFrame ros_frame_of(std::string_view type, std::span<const std::byte> cdr,
+                      const std::optional<double>& units, const std::string& name) {
+  RosFrame frame;
+  if (type == ros::PointCloud2::type) {
+    auto cloud = ros::decode<ros::PointCloud2>(cdr, name);
+    frame.details = "PointCloud2";
+    frame.width = cloud.width;
+    frame.height = cloud.height;
+    read_points(cloud, name, frame);
+    frame.header = std::move(cloud.header);
+    return frame;
   }
-  return points;
+  ros::Image image;
+  if (type == ros::Image::type) {
+    image = ros::decode<ros::Image>(cdr, name);
+    frame.details = image.encoding;
+    frame.units = units ? *units : depth_units(frame.details, name);
+  } else {
+    auto packed = ros::decode<ros::CompressedImage>(cdr, name);
+    frame.details = packed.format;
+    frame.units = units ? *units : depth_units(frame.details, name);
+    image = unpacked(std::move(packed), frame.units, name);
+  }
+  frame.width = image.width;
+  frame.height = image.height;
+  frame.depth = raw_depth(image, frame.units, name);
+  frame.header = std::move(image.header);
+  return frame;
+}
+
+std::shared_ptr<const Cloud> cloud_of(RosFrame frame, std::shared_ptr<const ViewingRays> rays,
+                                      const Eigen::Isometry3d& pose, OrganisedClouds& organised) {
+  if (!frame.points)
+    return std::make_shared<DepthImage>(std::move(rays), std::move(frame.depth), frame.units, pose);
+  std::vector<Vec3>& points = *frame.points;
+  if (auto image = organised.image(points, frame.width, frame.height, std::nullopt, pose))
+    return image;
+  for (Vec3& point : points) point = pose * point;
+  if (frame.rgb.empty()) return std::make_shared<PointCloud>(points);
+  return std::make_shared<PointCloud>(Surface{.points = std::move(points)});
 }
 
 }  // namespace palpate

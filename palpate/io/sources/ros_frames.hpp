@@ -3,12 +3,17 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/cloud/frame.hpp"
+#include "palpate/kernel/cloud/organised.hpp"
 
 // What ROS 2's messages of cameras hold, the same from a bag and from the network. `name` is the
 // message's, for errors.
@@ -32,18 +37,9 @@ std::string camera_of_topic(const std::string& topic, const std::string& type);
 /// @throws Error if the format says what cannot be.
 double depth_units(const std::string& format, const std::string& name);
 
-/// The raw depth of an image of 16UC1, mono16 or 32FC1, row by row; floats in units of 1/`units`
-/// metres. @throws Error if it is of another encoding, or damaged.
-std::vector<std::uint16_t> raw_depth(const ros::Image& image, double units,
-                                     const std::string& name);
-
 /// The colours of an image of rgb8, bgr8, rgba8 or bgra8, row by row: red, green, blue.
 /// @throws Error if it is of another encoding, or damaged.
 std::vector<std::uint8_t> rgb_of(const ros::Image& image, const std::string& name);
-
-/// The image in a message of compressed_depth_image_transport. Floats, which are stored as rounded
-/// inverse depth, are returned as 16UC1 in `units`. @throws Error if it is none, or damaged.
-ros::Image unpacked(ros::CompressedImage message, double units, const std::string& name);
 
 /// @param is_rectified  the images are: the projection counts, not the lens
 /// @throws Error if its distortion is neither zero nor Brown and Conrady's.
@@ -72,12 +68,32 @@ ros::CompressedImage depth_slice(const ros::Header& header, std::span<const std:
 /// Is it one?
 bool is_depth_slice(const ros::CompressedImage& message);
 
-/// The colours of all points, row by row: red, green, blue; empty without `rgb` or `rgba`.
-/// @pre points_of took the message
-std::vector<std::uint8_t> rgb_of(const ros::PointCloud2& message);
+/// What a message of a camera shows.
+struct RosFrame {
+  ros::Header header{};
+  std::string details{};                      ///< encoding or format
+  std::uint32_t width = 0, height = 0;        ///< [px], or of points
+  std::vector<std::uint16_t> depth{};         ///< row by row, in `units`
+  double units = 0.0;                         ///< [1/m]
+  std::optional<std::vector<Vec3>> points{};  ///< instead of depth
+  std::vector<std::uint8_t> rgb{};            ///< of the points; empty without
 
-/// All points, row by row, in the frame of the message; what was not measured is not a number.
-/// @throws Error without x, y and z, or if it is damaged.
-std::vector<Vec3> points_of(const ros::PointCloud2& message, const std::string& name);
+  /// As an image: null if there is none.
+  [[nodiscard]] std::shared_ptr<ColourImage> colour() const;
+};
+
+/// Depth of 16UC1, mono16 or 32FC1, also compressed by compressed_depth_image_transport; points
+/// with x, y and z, of which those that were not measured are not a number.
+/// @param type   Image, CompressedImage or PointCloud2
+/// @param units  raw values per metre, to which floats are rounded; none: what the message says
+/// @throws Error if it is none of depth or points, or damaged.
+RosFrame ros_frame_of(std::string_view type, std::span<const std::byte> cdr,
+                      const std::optional<double>& units, const std::string& name);
+
+/// The cloud of a frame: a depth image, also of points that a pinhole camera could have seen, or
+/// points, of which those with colours are a Surface.
+/// @param rays  of the camera, if the frame has depth
+std::shared_ptr<const Cloud> cloud_of(RosFrame frame, std::shared_ptr<const ViewingRays> rays,
+                                      const Eigen::Isometry3d& pose, OrganisedClouds& organised);
 
 }  // namespace palpate

@@ -2,16 +2,11 @@
 #include "palpate/drivers/ros2_publisher.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cctype>
 #include <cmath>
-#include <mutex>
-#include <thread>
 #include <utility>
 #include <vector>
 
-#include "palpate/drivers/dds.hpp"
-#include "palpate/drivers/link_estimates.hpp"
 #include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/depth_rvl.hpp"
 #include "palpate/io/sources/ros_frames.hpp"
@@ -53,112 +48,76 @@ std::string report_topic(const std::string& camera) {
   return camera + "/slices/report";
 }
 
-// Others hear of what is published in this order: whoever has heard of the images has heard of all.
-struct Ros2CameraPublisher::Topics {
-  Topics(const std::string& wanted, DepthPacking packed_as)
-      : name(checked_name(wanted)),
-        packing(packed_as),
-        participant("ros2:" + name),
-        topic("/" + name + "/depth/image_raw/compressedDepth"),
-        slices_topic("/" + name + "/depth/image_raw/slices"),
-        questions(participant, clock_question_topic("/" + name + "/depth"), ros::TimeReference{},
-                  best_effort),
-        answers(participant, clock_answer_topic("/" + name + "/depth"), ros::TimeReference{},
-                best_effort),
-        reports(participant, report_topic("/" + name + "/depth"), ros::Float64MultiArray{},
-                best_effort),
-        transforms(participant, std::string(transforms_topic), ros::TFMessage{}, reliable),
-        lenses(participant, "/" + name + "/depth/camera_info", ros::CameraInfo{}, reliable),
-        images(participant, topic, ros::CompressedImage{}, resent),
-        slices(participant, slices_topic, ros::CompressedImage{}, best_effort),
-        listener([this] { listen(); }) {}
-  ~Topics() {
-    ends = true;
-    listener.join();
-  }
-  Topics(const Topics&) = delete;
-  Topics& operator=(const Topics&) = delete;
-
-  void listen() {
-    while (!ends) {
-      participant.wait(longest_wait);
-      while (const auto report = reports.take_whole<ros::Float64MultiArray>()) {
-        if (report->data.size() != 3) continue;
-        const std::lock_guard lock(rate_mutex);
-        rate.report(monotonic_now(), report->data[0], report->data[1], report->data[2]);
-      }
-      while (const auto question = questions.take_whole<ros::TimeReference>())
-        answers.write(ros::TimeReference{.header = {ros::Time::now(), ""},
-                                         .time_ref = question->header.stamp,
-                                         .source = question->source});
-    }
-  }
-
-  // How often the slices of an image that is captured now are to be sent.
-  int copies() {
-    const std::lock_guard lock(rate_mutex);
-    return rate.allows(monotonic_now()) ? rate.copies() : 0;
-  }
-
-  std::string name;
-  DepthPacking packing;
-  dds::Participant participant;
-  std::string topic, slices_topic;
-  dds::Reader questions;
-  dds::Writer answers;
-  dds::Reader reports;
-  dds::Writer transforms, lenses, images, slices;
-  std::mutex rate_mutex;
-  SendRate rate;
-  std::uint32_t number = 0;  // of an image in slices
-  std::atomic<bool> ends{false};
-  std::thread listener;
-};
-
 Ros2CameraPublisher::Ros2CameraPublisher(const std::string& name, DepthPacking packing)
-    : topics_(std::make_unique<Topics>(name, packing)) {}
-Ros2CameraPublisher::~Ros2CameraPublisher() = default;
+    : name_(checked_name(name)),
+      packing_(packing),
+      participant_("ros2:" + name_),
+      topic_("/" + name_ + "/depth/image_raw/compressedDepth"),
+      slices_topic_("/" + name_ + "/depth/image_raw/slices"),
+      questions_(participant_, clock_question_topic("/" + name_ + "/depth"), ros::TimeReference{},
+                 best_effort),
+      answers_(participant_, clock_answer_topic("/" + name_ + "/depth"), ros::TimeReference{},
+               best_effort),
+      reports_(participant_, report_topic("/" + name_ + "/depth"), ros::Float64MultiArray{},
+               best_effort),
+      transforms_(participant_, std::string(transforms_topic), ros::TFMessage{}, reliable),
+      lenses_(participant_, "/" + name_ + "/depth/camera_info", ros::CameraInfo{}, reliable),
+      images_(participant_, topic_, ros::CompressedImage{}, resent),
+      slices_(participant_, slices_topic_, ros::CompressedImage{}, best_effort),
+      listener_([this] { listen(); }) {}
+
+Ros2CameraPublisher::~Ros2CameraPublisher() {
+  ends_ = true;
+  listener_.join();
+}
+
+void Ros2CameraPublisher::listen() {
+  while (!ends_) {
+    participant_.wait(longest_wait);
+    while (const auto report = reports_.take_whole<ros::Float64MultiArray>()) {
+      if (report->data.size() != 3) continue;
+      const std::lock_guard lock(rate_mutex_);
+      rate_.report(monotonic_now(), report->data[0], report->data[1], report->data[2]);
+    }
+    while (const auto question = questions_.take_whole<ros::TimeReference>())
+      answers_.write(ros::TimeReference{.header = {ros::Time::now(), ""},
+                                        .time_ref = question->header.stamp,
+                                        .source = question->source});
+  }
+}
+
+// How often the slices of an image that is captured now are to be sent.
+int Ros2CameraPublisher::copies_wanted() {
+  const std::lock_guard lock(rate_mutex_);
+  return rate_.allows(monotonic_now()) ? rate_.copies() : 0;
+}
 
 void Ros2CameraPublisher::publish(const DepthImage& image, double stamp) {
   const Intrinsics& k = image.intrinsics();
   const auto nanoseconds = static_cast<std::int64_t>(std::llround(1e9 * stamp));
-  const std::string frame = topics_->name + "_optical_frame";
+  const std::string frame = name_ + "_optical_frame";
   const ros::Header header{ros::Time::at(nanoseconds), frame};
-  topics_->transforms.write(
+  transforms_.write(
       ros::TFMessage{{transform_of({header.stamp, "world"}, frame, image.world_from_camera())}});
-  topics_->lenses.write(camera_info_of(header, k));
-  if (topics_->images.readers() > 0) {
-    const bool is_rvl = topics_->packing == DepthPacking::rvl;
-    topics_->images.write(compressed_depth(header,
-                                           is_rvl
-                                               ? encode_depth_rvl(k.width, k.height, image.depth())
-                                               : encode_depth_png(k.width, k.height, image.depth()),
-                                           image.units_per_metre(), topics_->packing));
+  lenses_.write(camera_info_of(header, k));
+  if (images_.readers() > 0) {
+    const bool is_rvl = packing_ == DepthPacking::rvl;
+    images_.write(compressed_depth(header,
+                                   is_rvl ? encode_depth_rvl(k.width, k.height, image.depth())
+                                          : encode_depth_png(k.width, k.height, image.depth()),
+                                   image.units_per_metre(), packing_));
   }
-  const int copies = topics_->slices.readers() > 0 ? topics_->copies() : 0;
+  const int copies = slices_.readers() > 0 ? copies_wanted() : 0;
   if (copies == 0) return;
   // Copies come when all have been sent once: a link often loses some in a row
   std::vector<ros::CompressedImage> again;
-  encode_depth_slices(topics_->number++, k.width, k.height, image.depth(),
+  encode_depth_slices(number_++, k.width, k.height, image.depth(),
                       [&](std::span<const std::byte> slice) {
                         auto message = depth_slice(header, slice, image.units_per_metre());
-                        topics_->slices.write(message);
+                        slices_.write(message);
                         if (copies > 1) again.push_back(std::move(message));
                       });
-  for (const ros::CompressedImage& message : again) topics_->slices.write(message);
-}
-
-const std::string& Ros2CameraPublisher::topic() const {
-  return topics_->topic;
-}
-const std::string& Ros2CameraPublisher::slices_topic() const {
-  return topics_->slices_topic;
-}
-std::uint32_t Ros2CameraPublisher::domain() const {
-  return topics_->participant.domain();
-}
-int Ros2CameraPublisher::readers() const {
-  return topics_->images.readers() + topics_->slices.readers();
+  for (const ros::CompressedImage& message : again) slices_.write(message);
 }
 
 }  // namespace palpate

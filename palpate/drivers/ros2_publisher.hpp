@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstdint>
-#include <memory>
+#include <mutex>
 #include <string>
+#include <thread>
 
+#include "palpate/drivers/dds.hpp"
+#include "palpate/drivers/link_estimates.hpp"
 #include "palpate/io/sources/ros_frames.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 
@@ -32,19 +36,36 @@ class Ros2CameraPublisher {
   /// @throws Error if `name` is not a valid topic name, or DDS is missing.
   explicit Ros2CameraPublisher(const std::string& name, DepthPacking packing = DepthPacking::rvl);
   ~Ros2CameraPublisher();
+  Ros2CameraPublisher(const Ros2CameraPublisher&) = delete;
+  Ros2CameraPublisher& operator=(const Ros2CameraPublisher&) = delete;
 
   /// @param stamp  [s since 1970] of the capture
   void publish(const DepthImage& image, double stamp);
   /// Of the images, and of the slices.
-  [[nodiscard]] const std::string& topic() const;
-  [[nodiscard]] const std::string& slices_topic() const;
-  [[nodiscard]] std::uint32_t domain() const;
+  [[nodiscard]] const std::string& topic() const { return topic_; }
+  [[nodiscard]] const std::string& slices_topic() const { return slices_topic_; }
+  [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
   /// How many read images or slices now.
-  [[nodiscard]] int readers() const;
+  [[nodiscard]] int readers() const { return images_.readers() + slices_.readers(); }
 
  private:
-  struct Topics;
-  std::unique_ptr<Topics> topics_;
+  void listen();
+  int copies_wanted();
+
+  std::string name_;
+  DepthPacking packing_;
+  dds::Participant participant_;
+  std::string topic_, slices_topic_;
+  // Others hear of them in this order: whoever has heard of the images has heard of all.
+  dds::Reader questions_;
+  dds::Writer answers_;
+  dds::Reader reports_;
+  dds::Writer transforms_, lenses_, images_, slices_;
+  std::mutex rate_mutex_;
+  SendRate rate_;             // guarded by it
+  std::uint32_t number_ = 0;  // of an image in slices
+  std::atomic<bool> ends_{false};
+  std::thread listener_;
 };
 
 }  // namespace palpate

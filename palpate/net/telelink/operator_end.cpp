@@ -2,21 +2,16 @@
 #include "palpate/net/telelink/operator_end.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <exception>
-#include <mutex>
 #include <string_view>
-#include <thread>
 #include <utility>
 #include <vector>
 
-#include "palpate/drivers/dds.hpp"
 #include "palpate/io/bag/geometry.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/net/telelink/topics.hpp"
 #include "palpate/net/telelink/touched_paint.hpp"
 #include "palpate/net/teleop/led_hand.hpp"
 
@@ -33,197 +28,165 @@ constexpr dds::Quality soon{.lifespan = 0.5};
 
 }  // namespace
 
-class OperatorEnd::Impl {
- public:
-  Impl(Session& session, const OperatorEndOptions& options)
-      : session_(session),
-        topics_(options.name),
-        index_(options.index),
-        learns_(options.learn),
-        ticks_(session.ticks()),
-        given_(session.settings().safety),
-        participant_("teleop"),
-        places_(participant_, topics_.place, ros::PoseStamped{}, soon),
-        presses_(participant_, topics_.press, ros::WrenchStamped{}, soon),
-        tools_(participant_, topics_.tool, ros::PoseStamped{}, newest_alone),
-        twists_(participant_, topics_.twist, ros::TwistStamped{}, newest_alone),
-        contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
-        links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
-        joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
-        faults_(participant_, topics_.fault, ros::String{}, kept_for_late),
-        regions_(participant_, topics_.regions, ros::String{}, kept_for_late),
-        touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
-        thread_([this] { run(); }) {}
-  ~Impl() {
-    ends_ = true;
-    thread_.join();
-  }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
-  [[nodiscard]] RobotView robot() const {
-    const std::lock_guard lock(mutex_);
-    RobotView view = view_;
-    if (view.state) {
-      view.age = monotonic_now() - view.state->t;
-      view.heard = view.age <= silence;
-    }
-    return view;
-  }
-  [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
-
- private:
-  void run() {
-    double send_due = monotonic_now();
-    double look_due = send_due;
-    while (!ends_) {
-      try {
-        participant_.wait(std::clamp(send_due - monotonic_now(), 0.0, send_interval));
-        const double now = monotonic_now();
-        hear(now);
-        if (now < send_due) continue;
-        send_due = std::max(send_due + send_interval, now);
-        send(now);
-        if (now < look_due) continue;
-        look_due = now + look_interval;
-        follow_latency();
-      } catch (
-          const std::exception& error) {  // the session continues; what is not sent stops a robot
-        const std::lock_guard lock(mutex_);
-        if (!view_.state) view_.state.emplace();
-        view_.state->fault = error.what();
-      }
-    }
-  }
-
-  void send(double now) {
-    bool any = false;
-    while (ticks_.try_pop(tick_)) any = true;
-    if (!any) return;  // nothing renders: nothing leads
-    const Lead lead = lead_of(tick_);
-    {
-      const std::lock_guard lock(mutex_);
-      view_.led = lead.leads && !index_;
-    }
-    if (!lead.leads) return;
-    if (index_) {
-      bring_to_hand();
-      return;
-    }
-    const ros::Header header{dds::stamp_of(now), "world"};
-    presses_.write(ros::WrenchStamped{header, components(lead.press), {}});
-    places_.write(ros::PoseStamped{header, components(lead.place)});
-  }
-
-  // The device's place in the world moves so that the hand is where the tool is.
-  void bring_to_hand() {
-    std::optional<RobotState> state;
-    {
-      const std::lock_guard lock(mutex_);
-      state = view_.state;
-    }
-    if (!state) return;
-    const Vec3 way = state->position - tick_.tick.hip;
-    session_.change(
-        [&](ServoSettings& settings) { settings.placement.world_from_device.pretranslate(way); });
-    index_ = false;
-    while (ticks_.try_pop(tick_)) {
-    }
-  }
-
-  void hear(double now) {
-    const std::lock_guard lock(mutex_);
-    while (const auto tool = tools_.take_whole<ros::PoseStamped>()) {
-      const Vec3 position(tool->position[0], tool->position[1], tool->position[2]);
-      if (!is_place(position)) continue;
-      if (!view_.state) view_.state.emplace();
-      view_.state->position = position;
-      view_.state->t = now;
-    }
-    if (!view_.state) return;
-    while (const auto twist = twists_.take_whole<ros::TwistStamped>())
-      view_.state->velocity = Vec3(twist->linear[0], twist->linear[1], twist->linear[2]);
-    while (const auto contact = contacts_.take_whole<ros::WrenchStamped>())
-      view_.state->force = Vec3(contact->force[0], contact->force[1], contact->force[2]);
-    while (const auto joints = joints_.take_whole<ros::JointState>())
-      view_.state->joints = joints->position;
-    while (const auto links = links_.take_whole<ros::Float64MultiArray>()) {
-      view_.state->links.clear();
-      for (std::size_t i = 0; i + 2 < links->data.size(); i += 3)
-        view_.state->links.emplace_back(links->data[i], links->data[i + 1], links->data[i + 2]);
-    }
-    while (const auto fault = faults_.take_whole<ros::String>()) view_.state->fault = fault->data;
-    while (const auto regions = regions_.take_whole<ros::String>()) use_regions(regions->data);
-    while (const auto message = touched_.take_whole<ros::Float64MultiArray>()) {
-      const Touched touched = touched_of(*message);
-      view_.touched = touched;
-      view_.ignored = learns_
-                          ? paint_touched(session_.paint(), session_.settings().parameters, touched)
-                          : "ignored: the operator's end was started without --learn";
-    }
-  }
-
-  // What the robot may not do, instead of what it said before; the operator's own fixtures stay.
-  void use_regions(const std::string& json) {
-    const auto told = fixtures_from_json(json, topics_.regions);
-    session_.change([&](ServoSettings& settings) {
-      std::vector<Fixture> all;
-      if (settings.fixtures) all = settings.fixtures->fixtures();
-      std::erase_if(all, [](const Fixture& one) { return one.name.starts_with(region_prefix); });
-      for (Fixture& fixture : told->fixtures()) {
-        fixture.name = std::string(region_prefix) + fixture.name;
-        all.push_back(std::move(fixture));
-      }
-      settings.fixtures = std::make_shared<const FixtureSet>(all);
-    });
-  }
-
-  void follow_latency() {
-    double latency = 0.0;
-    for (const CameraStatus& camera : session_.state().cameras)
-      latency = std::max(latency, camera.latency);
-    {
-      const std::lock_guard lock(mutex_);
-      view_.latency = latency;
-    }
-    if (std::abs(latency - followed_) < worth_a_change) return;
-    session_.change([&](ServoSettings& settings) {
-      const SafetyParameters before = for_link(given_, followed_);
-      const bool is_ours = followed_ == 0.0 ? settings.safety.fade_age == given_.fade_age
-                                            : settings.safety.fade_age == before.fade_age;
-      if (!is_ours) return;
-      const SafetyParameters now = for_link(given_, latency);
-      settings.safety.fade_age = now.fade_age;
-      settings.safety.lost_age = now.lost_age;
-    });
-    followed_ = latency;
-  }
-
-  Session& session_;
-  const TeleopTopics topics_;
-  bool index_;  // still to be done
-  const bool learns_;
-  TickRing<ServoTick>::Reader ticks_;
-  ServoTick tick_;
-  const SafetyParameters given_;
-  double followed_ = 0.0;  // [s] the latency that the session's limits are for
-  mutable std::mutex mutex_;
-  RobotView view_;  // guarded by it
-  dds::Participant participant_;
-  dds::Writer places_, presses_;
-  dds::Reader tools_, twists_, contacts_, links_, joints_, faults_, regions_, touched_;
-  std::atomic<bool> ends_{false};
-  std::thread thread_;
-};
-
 OperatorEnd::OperatorEnd(Session& session, const OperatorEndOptions& options)
-    : impl_(std::make_unique<Impl>(session, options)) {}
-OperatorEnd::~OperatorEnd() = default;
-RobotView OperatorEnd::robot() const {
-  return impl_->robot();
+    : session_(session),
+      topics_(options.name),
+      index_(options.index),
+      learns_(options.learn),
+      ticks_(session.ticks()),
+      given_(session.settings().safety),
+      participant_("teleop"),
+      places_(participant_, topics_.place, ros::PoseStamped{}, soon),
+      presses_(participant_, topics_.press, ros::WrenchStamped{}, soon),
+      tools_(participant_, topics_.tool, ros::PoseStamped{}, newest_alone),
+      twists_(participant_, topics_.twist, ros::TwistStamped{}, newest_alone),
+      contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
+      links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
+      joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
+      faults_(participant_, topics_.fault, ros::String{}, kept_for_late),
+      regions_(participant_, topics_.regions, ros::String{}, kept_for_late),
+      touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
+      thread_([this] { run(); }) {}
+
+OperatorEnd::~OperatorEnd() {
+  ends_ = true;
+  thread_.join();
 }
-std::uint32_t OperatorEnd::domain() const {
-  return impl_->domain();
+
+RobotView OperatorEnd::robot() const {
+  const std::lock_guard lock(mutex_);
+  RobotView view = view_;
+  if (view.state) {
+    view.age = monotonic_now() - view.state->t;
+    view.heard = view.age <= silence;
+  }
+  return view;
+}
+
+void OperatorEnd::run() {
+  double send_due = monotonic_now();
+  double look_due = send_due;
+  while (!ends_) {
+    try {
+      participant_.wait(std::clamp(send_due - monotonic_now(), 0.0, send_interval));
+      const double now = monotonic_now();
+      hear(now);
+      if (now < send_due) continue;
+      send_due = std::max(send_due + send_interval, now);
+      send(now);
+      if (now < look_due) continue;
+      look_due = now + look_interval;
+      follow_latency();
+    } catch (
+        const std::exception& error) {  // the session continues; what is not sent stops a robot
+      const std::lock_guard lock(mutex_);
+      if (!view_.state) view_.state.emplace();
+      view_.state->fault = error.what();
+    }
+  }
+}
+
+void OperatorEnd::send(double now) {
+  bool any = false;
+  while (ticks_.try_pop(tick_)) any = true;
+  if (!any) return;  // nothing renders: nothing leads
+  const Lead lead = lead_of(tick_);
+  {
+    const std::lock_guard lock(mutex_);
+    view_.led = lead.leads && !index_;
+  }
+  if (!lead.leads) return;
+  if (index_) {
+    bring_to_hand();
+    return;
+  }
+  const ros::Header header{dds::stamp_of(now), "world"};
+  presses_.write(ros::WrenchStamped{header, components(lead.press), {}});
+  places_.write(ros::PoseStamped{header, components(lead.place)});
+}
+
+// The device's place in the world moves so that the hand is where the tool is.
+void OperatorEnd::bring_to_hand() {
+  std::optional<RobotState> state;
+  {
+    const std::lock_guard lock(mutex_);
+    state = view_.state;
+  }
+  if (!state) return;
+  const Vec3 way = state->position - tick_.tick.hip;
+  session_.change(
+      [&](ServoSettings& settings) { settings.placement.world_from_device.pretranslate(way); });
+  index_ = false;
+  while (ticks_.try_pop(tick_)) {
+  }
+}
+
+void OperatorEnd::hear(double now) {
+  const std::lock_guard lock(mutex_);
+  while (const auto tool = tools_.take_whole<ros::PoseStamped>()) {
+    const Vec3 position(tool->position[0], tool->position[1], tool->position[2]);
+    if (!is_place(position)) continue;
+    if (!view_.state) view_.state.emplace();
+    view_.state->position = position;
+    view_.state->t = now;
+  }
+  if (!view_.state) return;
+  while (const auto twist = twists_.take_whole<ros::TwistStamped>())
+    view_.state->velocity = Vec3(twist->linear[0], twist->linear[1], twist->linear[2]);
+  while (const auto contact = contacts_.take_whole<ros::WrenchStamped>())
+    view_.state->force = Vec3(contact->force[0], contact->force[1], contact->force[2]);
+  while (const auto joints = joints_.take_whole<ros::JointState>())
+    view_.state->joints = joints->position;
+  while (const auto links = links_.take_whole<ros::Float64MultiArray>()) {
+    view_.state->links.clear();
+    for (std::size_t i = 0; i + 2 < links->data.size(); i += 3)
+      view_.state->links.emplace_back(links->data[i], links->data[i + 1], links->data[i + 2]);
+  }
+  while (const auto fault = faults_.take_whole<ros::String>()) view_.state->fault = fault->data;
+  while (const auto regions = regions_.take_whole<ros::String>()) use_regions(regions->data);
+  while (const auto message = touched_.take_whole<ros::Float64MultiArray>()) {
+    const Touched touched = touched_of(*message);
+    view_.touched = touched;
+    view_.ignored = learns_
+                        ? paint_touched(session_.paint(), session_.settings().parameters, touched)
+                        : "ignored: the operator's end was started without --learn";
+  }
+}
+
+// What the robot may not do, instead of what it said before; the operator's own fixtures stay.
+void OperatorEnd::use_regions(const std::string& json) {
+  const auto told = fixtures_from_json(json, topics_.regions);
+  session_.change([&](ServoSettings& settings) {
+    std::vector<Fixture> all;
+    if (settings.fixtures) all = settings.fixtures->fixtures();
+    std::erase_if(all, [](const Fixture& one) { return one.name.starts_with(region_prefix); });
+    for (Fixture& fixture : told->fixtures()) {
+      fixture.name = std::string(region_prefix) + fixture.name;
+      all.push_back(std::move(fixture));
+    }
+    settings.fixtures = std::make_shared<const FixtureSet>(all);
+  });
+}
+
+void OperatorEnd::follow_latency() {
+  double latency = 0.0;
+  for (const CameraStatus& camera : session_.state().cameras)
+    latency = std::max(latency, camera.latency);
+  {
+    const std::lock_guard lock(mutex_);
+    view_.latency = latency;
+  }
+  if (std::abs(latency - followed_) < worth_a_change) return;
+  session_.change([&](ServoSettings& settings) {
+    const SafetyParameters before = for_link(given_, followed_);
+    const bool is_ours = followed_ == 0.0 ? settings.safety.fade_age == given_.fade_age
+                                          : settings.safety.fade_age == before.fade_age;
+    if (!is_ours) return;
+    const SafetyParameters now = for_link(given_, latency);
+    settings.safety.fade_age = now.fade_age;
+    settings.safety.lost_age = now.lost_age;
+  });
+  followed_ = latency;
 }
 
 }  // namespace palpate

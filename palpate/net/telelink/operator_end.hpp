@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <memory>
+#include <atomic>
+#include <cstdint>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 
+#include "palpate/net/telelink/topics.hpp"
 #include "palpate/net/teleop/robot.hpp"
 #include "palpate/net/teleop/touched.hpp"
 #include "palpate/session/session.hpp"
@@ -45,13 +49,35 @@ class OperatorEnd {
   /// @throws Error if the name is not valid, or DDS is missing.
   OperatorEnd(Session& session, const OperatorEndOptions& options);
   ~OperatorEnd();
+  OperatorEnd(const OperatorEnd&) = delete;
+  OperatorEnd& operator=(const OperatorEnd&) = delete;
 
   [[nodiscard]] RobotView robot() const;
-  [[nodiscard]] std::uint32_t domain() const;
+  [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  void run();  // the thread
+  void send(double now);
+  void bring_to_hand();
+  void hear(double now);
+  void use_regions(const std::string& json);
+  void follow_latency();
+
+  Session& session_;
+  const TeleopTopics topics_;
+  bool index_;  // still to be done
+  const bool learns_;
+  TickRing<ServoTick>::Reader ticks_;
+  ServoTick tick_;
+  const SafetyParameters given_;
+  double followed_ = 0.0;  // [s] the latency that the session's limits are for
+  mutable std::mutex mutex_;
+  RobotView view_;  // guarded by it
+  dds::Participant participant_;
+  dds::Writer places_, presses_;
+  dds::Reader tools_, twists_, contacts_, links_, joints_, faults_, regions_, touched_;
+  std::atomic<bool> ends_{false};
+  std::thread thread_;
 };
 
 }  // namespace palpate

@@ -2,28 +2,18 @@
 #include "palpate/net/telelink/robot_end.hpp"
 
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <exception>
-#include <mutex>
-#include <optional>
 #include <thread>
 #include <utility>
-#include <vector>
 
-#include "palpate/drivers/dds.hpp"
-#include "palpate/drivers/ros2_publisher.hpp"
 #include "palpate/io/bag/geometry.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/net/telelink/topics.hpp"
 #include "palpate/net/telelink/touched_paint.hpp"
-#include "palpate/net/teleop/robot_step.hpp"
-#include "palpate/net/teleop/touched.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
@@ -99,207 +89,148 @@ SetPointOptions set_point_of(const RobotInfo& info, const RobotEndOptions& optio
 
 }  // namespace
 
-class RobotEnd::Impl {
- public:
-  Impl(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
-      : robot_(std::move(robot)),
-        state_(first_of(*robot_)),
-        regions_(regions_of(robot_->info(), options.fixtures)),
-        options_(options),
-        hand_(std::make_shared<LedHand>(state_.position, limits_of(robot_->info()))),
-        step_(*hand_, set_point_of(robot_->info(), options, regions_)),
-        topics_(options.name),
-        publisher_(options.name, options.packing),
-        participant_("teleop"),
-        places_(participant_, topics_.place, ros::PoseStamped{}, newest_alone),
-        presses_(participant_, topics_.press, ros::WrenchStamped{}, newest_alone),
-        tools_(participant_, topics_.tool, ros::PoseStamped{}, newest_alone),
-        twists_(participant_, topics_.twist, ros::TwistStamped{}, newest_alone),
-        contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
-        links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
-        joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
-        faults_(participant_, topics_.fault, ros::String{}, kept_for_late),
-        region_texts_(participant_, topics_.regions, ros::String{}, kept_for_late),
-        touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
-        learner_(robot_->info().tool_radius) {
-    region_texts_.write(ros::String{fixtures_json(*regions_)});
-    faults_.write(ros::String{""});
-  }
-  ~Impl() { detach(); }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
-  void prepare(SessionOptions& options) const {
-    options.open_devices.at(0) = std::make_unique<Borrowed>(hand_);
-    set_parameter(options.parameters, "r_c", robot_->info().tool_radius + options_.margin);
-    options.fixture_set = robot_fixtures(*regions_);
-  }
-
-  void on_frame(std::size_t camera, const FedFrame& fed) {
-    const DepthImage* image = fed.frame.cloud->image();
-    // What others touch is the first camera's.
-    if (camera == 0 && image != nullptr)
-      publisher_.publish(*image, dds::stamp_of(fed.frame.stamp).seconds());
-    const std::lock_guard lock(mutex_);
-    if (watches_.size() <= camera) watches_.resize(camera + 1);
-    watches_[camera].frame(fed.frame.cloud, fed.frame.stamp, state_.position);
-  }
-
-  void attach(Session& session) {
-    ends_ = false;
-    ticks_.emplace(session.ticks());
-    thread_ = std::thread([this] { lead(); });
-  }
-  void detach() {
-    ends_ = true;
-    if (thread_.joinable()) thread_.join();
-    ticks_.reset();
-  }
-
-  [[nodiscard]] const RobotInfo& info() const { return robot_->info(); }
-  [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
-  [[nodiscard]] RobotState state() const {
-    const std::lock_guard lock(mutex_);
-    return state_;
-  }
-  [[nodiscard]] bool is_led() const { return hand_->is_led(); }
-
- private:
-  void lead() {
-    double order_due = monotonic_now();
-    double report_due = order_due;
-    while (!ends_) {
-      participant_.wait(std::clamp(order_due - monotonic_now(), 0.0, order_interval));
-      const double now = monotonic_now();
-      hear(now);
-      if (now < order_due) continue;
-      order_due = std::max(order_due + order_interval, now);
-      try {
-        order(now);
-        if (now >= report_due) {
-          report_due = std::max(report_due + report_interval, now);
-          report(now);
-        }
-      } catch (const std::exception& error) {  // no orders: the robot stops by itself
-        say(error.what());
-      }
-    }
-  }
-
-  void hear(double now) {
-    while (const auto press = presses_.take_whole<ros::WrenchStamped>())
-      lead_.press = Vec3(press->force[0], press->force[1], press->force[2]);
-    bool any = false;
-    while (const auto place = places_.take_whole<ros::PoseStamped>()) {
-      const std::int64_t stamp = place->header.stamp.nanoseconds();
-      // What was overtaken on the way is late; a stamp long before begins again.
-      constexpr std::int64_t anew = 1'000'000'000;  // [ns]
-      if (stamp <= heard_ && stamp > heard_ - anew) continue;
-      heard_ = stamp;
-      lead_.place = Vec3(place->position[0], place->position[1], place->position[2]);
-      any = true;
-    }
-    if (!any) return;
-    lead_.leads = lead_.place.allFinite() && lead_.press.allFinite();
-    hand_->lead(lead_, now);
-  }
-
-  void order(double now) {
-    if (std::optional<RobotState> state = robot_->state()) {
-      hand_->tool_is_at(state->position);
-      const std::lock_guard lock(mutex_);
-      state_ = *std::move(state);
-    }
-    bool any = false;
-    ServoTick tick;
-    while (ticks_->try_pop(tick)) any = true;
-    if (!any) return;  // nothing guards the robot now
-    RobotState at;
-    Outlook seen;
-    {
-      const std::lock_guard lock(mutex_);
-      at = state_;
-      seen = outlook(watches_, tick.place, at.position, robot_->info().tool_radius, now);
-    }
-    const SetPoint::Order order = step_.next(tick, seen, lead_.press, at, now);
-    contact_ = at.force;
-    if (at.fault.empty()) robot_->command(order.position, order.velocity, now);
-    if (const auto found =
-            learner_.next(at.t, at.position, at.velocity, at.force, tick.tick.normal))
-      touched_.write(message_of(*found));
-    say(at.fault);
-  }
-
-  void report(double now) {
-    const RobotState at = state();
-    const ros::Header header{dds::stamp_of(now), "world"};
-    tools_.write(ros::PoseStamped{header, components(at.position)});
-    twists_.write(ros::TwistStamped{header, components(at.velocity)});
-    contacts_.write(ros::WrenchStamped{header, components(contact_), {}});
-    ros::Float64MultiArray links;
-    for (const Vec3& place : at.links)
-      links.data.insert(links.data.end(), {place.x(), place.y(), place.z()});
-    links_.write(links);
-    if (!at.joints.empty())
-      joints_.write(ros::JointState{header, robot_->info().joint_names, at.joints, {}, {}});
-  }
-
-  void say(const std::string& fault) {
-    if (fault == said_) return;
-    said_ = fault;
-    faults_.write(ros::String{fault});
-  }
-
-  std::unique_ptr<Robot> robot_;
-  mutable std::mutex mutex_;  // of state_ and watches_
-  RobotState state_;
-  std::vector<ApproachWatch> watches_;  // one a camera
-  const std::shared_ptr<const FixtureSet> regions_;
-  const RobotEndOptions options_;
-  std::shared_ptr<LedHand> hand_;
-  RobotStep step_;  // of the leading thread
-  const TeleopTopics topics_;
-  Ros2CameraPublisher publisher_;
-  dds::Participant participant_;
-  dds::Reader places_, presses_;
-  dds::Writer tools_, twists_, contacts_, links_, joints_, faults_, region_texts_, touched_;
-  // Of the leading thread
-  TouchLearner learner_;
-  Vec3 contact_ = Vec3::Zero();  // [N] without what the sensor shows in free space
-  Lead lead_;
-  std::int64_t heard_ = 0;  // [ns] stamp of the newest place
-  std::string said_;
-  std::optional<TickRing<ServoTick>::Reader> ticks_;
-  std::atomic<bool> ends_{false};
-  std::thread thread_;
-};
-
 RobotEnd::RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
-    : impl_(std::make_unique<Impl>(std::move(robot), options)) {}
-RobotEnd::~RobotEnd() = default;
+    : robot_(std::move(robot)),
+      state_(first_of(*robot_)),
+      regions_(regions_of(robot_->info(), options.fixtures)),
+      options_(options),
+      hand_(std::make_shared<LedHand>(state_.position, limits_of(robot_->info()))),
+      step_(*hand_, set_point_of(robot_->info(), options, regions_)),
+      topics_(options.name),
+      publisher_(options.name, options.packing),
+      participant_("teleop"),
+      places_(participant_, topics_.place, ros::PoseStamped{}, newest_alone),
+      presses_(participant_, topics_.press, ros::WrenchStamped{}, newest_alone),
+      tools_(participant_, topics_.tool, ros::PoseStamped{}, newest_alone),
+      twists_(participant_, topics_.twist, ros::TwistStamped{}, newest_alone),
+      contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
+      links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
+      joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
+      faults_(participant_, topics_.fault, ros::String{}, kept_for_late),
+      region_texts_(participant_, topics_.regions, ros::String{}, kept_for_late),
+      touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
+      learner_(robot_->info().tool_radius) {
+  region_texts_.write(ros::String{fixtures_json(*regions_)});
+  faults_.write(ros::String{""});
+}
+RobotEnd::~RobotEnd() {
+  detach();
+}
+
 void RobotEnd::prepare(SessionOptions& options) const {
-  impl_->prepare(options);
+  options.open_devices.at(0) = std::make_unique<Borrowed>(hand_);
+  set_parameter(options.parameters, "r_c", robot_->info().tool_radius + options_.margin);
+  options.fixture_set = robot_fixtures(*regions_);
 }
-void RobotEnd::on_frame(std::size_t camera, const FedFrame& frame) {
-  impl_->on_frame(camera, frame);
+
+void RobotEnd::on_frame(std::size_t camera, const FedFrame& fed) {
+  const DepthImage* image = fed.frame.cloud->image();
+  // What others touch is the first camera's.
+  if (camera == 0 && image != nullptr)
+    publisher_.publish(*image, dds::stamp_of(fed.frame.stamp).seconds());
+  const std::lock_guard lock(mutex_);
+  if (watches_.size() <= camera) watches_.resize(camera + 1);
+  watches_[camera].frame(fed.frame.cloud, fed.frame.stamp, state_.position);
 }
+
 void RobotEnd::attach(Session& session) {
-  impl_->attach(session);
+  ends_ = false;
+  ticks_.emplace(session.ticks());
+  thread_ = std::thread([this] { lead(); });
 }
 void RobotEnd::detach() {
-  impl_->detach();
+  ends_ = true;
+  if (thread_.joinable()) thread_.join();
+  ticks_.reset();
 }
-const RobotInfo& RobotEnd::info() const {
-  return impl_->info();
-}
-std::uint32_t RobotEnd::domain() const {
-  return impl_->domain();
-}
+
 RobotState RobotEnd::state() const {
-  return impl_->state();
+  const std::lock_guard lock(mutex_);
+  return state_;
 }
-bool RobotEnd::is_led() const {
-  return impl_->is_led();
+
+void RobotEnd::lead() {
+  double order_due = monotonic_now();
+  double report_due = order_due;
+  while (!ends_) {
+    participant_.wait(std::clamp(order_due - monotonic_now(), 0.0, order_interval));
+    const double now = monotonic_now();
+    hear(now);
+    if (now < order_due) continue;
+    order_due = std::max(order_due + order_interval, now);
+    try {
+      order(now);
+      if (now >= report_due) {
+        report_due = std::max(report_due + report_interval, now);
+        report(now);
+      }
+    } catch (const std::exception& error) {  // no orders: the robot stops by itself
+      say(error.what());
+    }
+  }
+}
+
+void RobotEnd::hear(double now) {
+  while (const auto press = presses_.take_whole<ros::WrenchStamped>())
+    lead_.press = Vec3(press->force[0], press->force[1], press->force[2]);
+  bool any = false;
+  while (const auto place = places_.take_whole<ros::PoseStamped>()) {
+    const std::int64_t stamp = place->header.stamp.nanoseconds();
+    // What was overtaken on the way is late; a stamp long before begins again.
+    constexpr std::int64_t anew = 1'000'000'000;  // [ns]
+    if (stamp <= heard_ && stamp > heard_ - anew) continue;
+    heard_ = stamp;
+    lead_.place = Vec3(place->position[0], place->position[1], place->position[2]);
+    any = true;
+  }
+  if (!any) return;
+  lead_.leads = lead_.place.allFinite() && lead_.press.allFinite();
+  hand_->lead(lead_, now);
+}
+
+void RobotEnd::order(double now) {
+  if (std::optional<RobotState> state = robot_->state()) {
+    hand_->tool_is_at(state->position);
+    const std::lock_guard lock(mutex_);
+    state_ = *std::move(state);
+  }
+  bool any = false;
+  ServoTick tick;
+  while (ticks_->try_pop(tick)) any = true;
+  if (!any) return;  // nothing guards the robot now
+  RobotState at;
+  Outlook seen;
+  {
+    const std::lock_guard lock(mutex_);
+    at = state_;
+    seen = outlook(watches_, tick.place, at.position, robot_->info().tool_radius, now);
+  }
+  const SetPoint::Order order = step_.next(tick, seen, lead_.press, at, now);
+  contact_ = at.force;
+  if (at.fault.empty()) robot_->command(order.position, order.velocity, now);
+  if (const auto found = learner_.next(at.t, at.position, at.velocity, at.force, tick.tick.normal))
+    touched_.write(message_of(*found));
+  say(at.fault);
+}
+
+void RobotEnd::report(double now) {
+  const RobotState at = state();
+  const ros::Header header{dds::stamp_of(now), "world"};
+  tools_.write(ros::PoseStamped{header, components(at.position)});
+  twists_.write(ros::TwistStamped{header, components(at.velocity)});
+  contacts_.write(ros::WrenchStamped{header, components(contact_), {}});
+  ros::Float64MultiArray links;
+  for (const Vec3& place : at.links)
+    links.data.insert(links.data.end(), {place.x(), place.y(), place.z()});
+  links_.write(links);
+  if (!at.joints.empty())
+    joints_.write(ros::JointState{header, robot_->info().joint_names, at.joints, {}, {}});
+}
+
+void RobotEnd::say(const std::string& fault) {
+  if (fault == said_) return;
+  said_ = fault;
+  faults_.write(ros::String{fault});
 }
 
 }  // namespace palpate

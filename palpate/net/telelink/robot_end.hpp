@@ -1,13 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
+#include <thread>
+#include <vector>
 
-#include "palpate/io/sources/ros_frames.hpp"
+#include "palpate/drivers/ros2_publisher.hpp"
+#include "palpate/net/telelink/topics.hpp"
+#include "palpate/net/teleop/approach_watch.hpp"
 #include "palpate/net/teleop/led_hand.hpp"
 #include "palpate/net/teleop/robot.hpp"
+#include "palpate/net/teleop/robot_step.hpp"
 #include "palpate/net/teleop/set_point.hpp"
+#include "palpate/net/teleop/touched.hpp"
 #include "palpate/session/session.hpp"
 
 namespace palpate {
@@ -36,6 +46,8 @@ class RobotEnd {
   /// @throws Error if the robot reports nothing, an option is out of range, or DDS is missing.
   RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options);
   ~RobotEnd();  ///< the robot rests
+  RobotEnd(const RobotEnd&) = delete;
+  RobotEnd& operator=(const RobotEnd&) = delete;
 
   /// Adds what the session here needs: its device, radius of the proxy, fixtures. Once.
   void prepare(SessionOptions& options) const;
@@ -45,15 +57,41 @@ class RobotEnd {
   void attach(Session& session);
   void detach();
 
-  [[nodiscard]] const RobotInfo& info() const;
-  [[nodiscard]] std::uint32_t domain() const;
+  [[nodiscard]] const RobotInfo& info() const { return robot_->info(); }
+  [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
   /// The robot's last state; `fault` reports a missing command.
   [[nodiscard]] RobotState state() const;
-  [[nodiscard]] bool is_led() const;
+  [[nodiscard]] bool is_led() const { return hand_->is_led(); }
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  void lead();  // the leading thread
+  void hear(double now);
+  void order(double now);
+  void report(double now);
+  void say(const std::string& fault);
+
+  std::unique_ptr<Robot> robot_;
+  mutable std::mutex mutex_;  // of state_ and watches_
+  RobotState state_;
+  std::vector<ApproachWatch> watches_;  // one a camera
+  const std::shared_ptr<const FixtureSet> regions_;
+  const RobotEndOptions options_;
+  std::shared_ptr<LedHand> hand_;
+  RobotStep step_;  // of the leading thread
+  const TeleopTopics topics_;
+  Ros2CameraPublisher publisher_;
+  dds::Participant participant_;
+  dds::Reader places_, presses_;
+  dds::Writer tools_, twists_, contacts_, links_, joints_, faults_, region_texts_, touched_;
+  // Of the leading thread
+  TouchLearner learner_;
+  Vec3 contact_ = Vec3::Zero();  // [N] without what the sensor shows in free space
+  Lead lead_;
+  std::int64_t heard_ = 0;  // [ns] stamp of the newest place
+  std::string said_;
+  std::optional<TickRing<ServoTick>::Reader> ticks_;
+  std::atomic<bool> ends_{false};
+  std::thread thread_;
 };
 
 }  // namespace palpate

@@ -39,29 +39,6 @@ const PointCloud& cloud_of(const Frame& frame) {
   return dynamic_cast<const PointCloud&>(*frame.cloud);
 }
 
-TEST(NaturalOrder, ComparesNumbersAsNumbersOfAnyLength) {
-  const std::vector<std::string> sorted{"",
-                                        "01",
-                                        "1",
-                                        "2",
-                                        "10",
-                                        "a",
-                                        "a1",
-                                        "a2b3",
-                                        "a2b10",
-                                        "a10b1",
-                                        "a99999999999999999999",
-                                        "a100000000000000000000",
-                                        "frame",
-                                        "frame_9.pcd",
-                                        "frame_10.pcd"};
-  for (std::size_t i = 0; i < sorted.size(); ++i) {
-    for (std::size_t j = 0; j < sorted.size(); ++j) {
-      EXPECT_EQ(natural_less(sorted[i], sorted[j]), i < j) << sorted[i] << " < " << sorted[j];
-    }
-  }
-}
-
 TEST(PointFiles, OfAFolderAreFramesInNaturalOrderStampedByTheirNumber) {
   const TemporaryFolder folder;
   for (const int k : {10, 9, 1, 100}) {

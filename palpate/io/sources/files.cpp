@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <system_error>
 
@@ -10,20 +11,6 @@
 #include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
-namespace {
-
-constexpr std::string_view digits = "0123456789";
-
-// Cuts the digits that `rest` begins with from it; returns them without leading zeros.
-std::string_view take_number(std::string_view& rest) noexcept {
-  std::string_view number = rest.substr(0, rest.find_first_not_of(digits));
-  rest.remove_prefix(number.size());
-  number.remove_prefix(std::min(number.find_first_not_of('0'), number.size()));
-  return number;
-}
-
-}  // namespace
-
 std::vector<std::byte> read_file(const std::filesystem::path& path, std::uintmax_t max_bytes) {
   std::error_code error;
   const std::filesystem::file_status status = std::filesystem::status(path, error);
@@ -70,27 +57,9 @@ std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder,
   }
   std::sort(files.begin(), files.end(),
             [](const std::filesystem::path& a, const std::filesystem::path& b) {
-              return natural_less(a.filename().native(), b.filename().native());
+              return strverscmp(a.filename().c_str(), b.filename().c_str()) < 0;
             });
   return files;
-}
-
-bool natural_less(std::string_view a, std::string_view b) noexcept {
-  std::string_view x = a, y = b;
-  while (!x.empty() && !y.empty()) {
-    const bool x_number = digits.find(x.front()) != std::string_view::npos;
-    const bool y_number = digits.find(y.front()) != std::string_view::npos;
-    if (x_number && y_number) {
-      const std::string_view m = take_number(x), n = take_number(y);
-      if (m != n) return m.size() != n.size() ? m.size() < n.size() : m < n;
-    } else if (x.front() != y.front()) {
-      return x.substr(0, 1) < y.substr(0, 1);
-    } else {
-      x.remove_prefix(1);
-      y.remove_prefix(1);
-    }
-  }
-  return x.empty() && y.empty() ? a < b : x.empty();
 }
 
 }  // namespace palpate

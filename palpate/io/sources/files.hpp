@@ -19,15 +19,9 @@ std::vector<std::byte> read_file(const std::filesystem::path& path, std::uintmax
 std::string read_text(const std::filesystem::path& path, std::uintmax_t max_bytes);
 
 /// The files in a folder, not below it, whose extension is `extension` (".pcd"; upper and lower
-/// case are the same), in natural order of their names.
+/// case are the same), in natural order of their names: frame_2 before frame_10.
 /// @throws Error if the folder cannot be listed.
 std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder,
                                             std::string_view extension);
-
-/// Does `a` come before `b` in the order people number files: frame_2 before frame_10?
-///
-/// Runs of digits compare as numbers of any length, all else byte by byte. Names that are equal so
-/// (frame_1 and frame_01) compare byte by byte: a strict total order.
-[[nodiscard]] bool natural_less(std::string_view a, std::string_view b) noexcept;
 
 }  // namespace palpate

@@ -6,9 +6,13 @@
 #include <functional>
 #include <memory>
 
+#include <gtest/gtest.h>
+
 #include "palpate/record/recorder.hpp"
+#include "palpate/record/replay.hpp"
 
 #include "tests/record/sessions.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace palpate::test {
 
@@ -32,6 +36,21 @@ class LoopSession final : public PressedFloor {
   void begin_anew() {
     recorder_->commands(cycle_->command([](ServoCommands&) {}, make_method(settings_.method)),
                         now());
+  }
+
+  /// Runs for `before` ticks, then records some more into the folder `bag` in `folder`, and replays
+  /// them, which has to give the same ticks.
+  SessionReader recorded(const TemporaryFolder& folder, int before, int ticks) {
+    run(before);
+    record(folder.path() / "bag");
+    run(ticks);
+    recorder_->stop();
+    EXPECT_EQ(recorder_->status().trouble, "");
+    SessionReader reader(folder.path() / "bag");
+    const ReplayReport report = replay(reader);
+    EXPECT_TRUE(report.identical()) << text_of(report);
+    EXPECT_GE(report.ticks, static_cast<std::uint64_t>(ticks - 100));
+    return SessionReader(folder.path() / "bag");
   }
 
   void hand_no_more_frames() { handing_ = false; }

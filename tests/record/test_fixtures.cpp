@@ -41,14 +41,7 @@ TEST(RecordedFixtures, AreReplayedBitForBit) {
     SCOPED_TRACE(before);
     const test::TemporaryFolder folder;
     test::LoopSession session("sight", fixtures_about_the_hand());
-    session.run(before);
-    session.record(folder.path() / "bag");
-    session.run(400);
-    session.recorder().stop();
-    EXPECT_EQ(session.recorder().status().trouble, "");
-    SessionReader reader(folder.path() / "bag");
-    const ReplayReport report = replay(reader);
-    EXPECT_TRUE(report.identical()) << text_of(report);
+    SessionReader reader = session.recorded(folder, before, 400);
     std::uint32_t acting = 0;
     for (std::size_t i = 0; i < reader.ticks(); ++i) acting |= reader.tick(i).fixtures;
     EXPECT_EQ(acting & 0b1101U, 0b1101U);  // what is replayed did something

@@ -299,38 +299,29 @@ TEST(Ply, RejectsAHeaderThatPromisesMoreThanTheFileHolds) {
 
 TEST(Ply, SaysWhatIsWrongWithAHeader) {
   const std::string good = header("ascii", "element vertex 1\n" + vertices) + "1 2 3\n";
-  ASSERT_EQ(parse(good).points.size(), 1u);
-  struct Case {
-    std::string from, to, says;
+  const std::array refusals{
+      test::Refusal{"ply\n", "plx\n", "does not begin with `ply`"},
+      test::Refusal{"ascii 1.0", "ascii 2.0", "line 2: PLY version \"2.0\""},
+      test::Refusal{"ascii", "text", "line 2: format \"text\""},
+      test::Refusal{"format ascii 1.0\n", "", "no format line"},
+      test::Refusal{"element vertex 1", "element vertex -1", "line 3: an element is"},
+      test::Refusal{"element vertex 1", "element vertex 99999999999999999999",
+                    "line 3: an element is"},
+      test::Refusal{"element vertex 1", "element vertex 1 2", "line 3: an element is"},
+      test::Refusal{"element vertex 1", "element point 1", "one element vertex"},
+      test::Refusal{"end_header", "element vertex 1\nend_header", "one element vertex"},
+      test::Refusal{"element vertex 1\n", "", "line 3: a property before any element"},
+      test::Refusal{"float y", "bool y", "line 5: \"bool\" is not a type"},
+      test::Refusal{"float y", "float", "line 5: a property is"},
+      test::Refusal{"float y", "float y y", "line 5: a property is"},
+      test::Refusal{"float y", "list float int y", "length cannot be a float"},
+      test::Refusal{"float y", "list uchar float y", "one x, one y and one z that are no lists"},
+      test::Refusal{"float y", "float x", "one x, one y and one z"},
+      test::Refusal{"float z", "float w", "one x, one y and one z"},
+      test::Refusal{"property float z", "proper float z", "line 6: \"proper\" does not begin"},
+      test::Refusal{"end_header\n1 2 3\n", "", "no end_header line"},
   };
-  const std::array cases{
-      Case{"ply\n", "plx\n", "does not begin with `ply`"},
-      Case{"ascii 1.0", "ascii 2.0", "line 2: PLY version \"2.0\""},
-      Case{"ascii", "text", "line 2: format \"text\""},
-      Case{"format ascii 1.0\n", "", "no format line"},
-      Case{"element vertex 1", "element vertex -1", "line 3: an element is"},
-      Case{"element vertex 1", "element vertex 99999999999999999999", "line 3: an element is"},
-      Case{"element vertex 1", "element vertex 1 2", "line 3: an element is"},
-      Case{"element vertex 1", "element point 1", "one element vertex"},
-      Case{"end_header", "element vertex 1\nend_header", "one element vertex"},
-      Case{"element vertex 1\n", "", "line 3: a property before any element"},
-      Case{"float y", "bool y", "line 5: \"bool\" is not a type"},
-      Case{"float y", "float", "line 5: a property is"},
-      Case{"float y", "float y y", "line 5: a property is"},
-      Case{"float y", "list float int y", "length cannot be a float"},
-      Case{"float y", "list uchar float y", "one x, one y and one z that are no lists"},
-      Case{"float y", "float x", "one x, one y and one z"},
-      Case{"float z", "float w", "one x, one y and one z"},
-      Case{"property float z", "proper float z", "line 6: \"proper\" does not begin"},
-      Case{"end_header\n1 2 3\n", "", "no end_header line"},
-  };
-  for (const Case& c : cases) {
-    std::string bad = good;
-    const std::size_t at = bad.find(c.from);
-    ASSERT_NE(at, std::string::npos) << c.from;
-    bad.replace(at, c.from.size(), c.to);
-    EXPECT_TRUE(fails_saying([&] { return parse(bad); }, "test file: ", c.says, "; "));
-  }
+  test::expect_refusals(parse_ply, good, refusals);
   EXPECT_TRUE(fails_saying([] { return parse(""); }, "does not begin with `ply`"));
 }
 

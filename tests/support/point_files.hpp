@@ -66,6 +66,22 @@ inline void expect_defined_on_damage(Parse parser, const std::string& valid, int
   }
 }
 
+/// A change of a file, and what the error about it says.
+struct Refusal {
+  std::string from, to, says;
+};
+inline void expect_refusals(Parse parser, const std::string& good,
+                            std::span<const Refusal> refusals) {
+  EXPECT_EQ(parse(parser, good).points.size(), 1U);
+  for (const Refusal& each : refusals) {
+    std::string bad = good;
+    const std::size_t at = bad.find(each.from);
+    ASSERT_NE(at, std::string::npos) << each.from;
+    bad.replace(at, each.from.size(), each.to);
+    EXPECT_TRUE(fails_saying([&] { return parse(parser, bad); }, "test file: ", each.says, "; "));
+  }
+}
+
 /// A format of point files, as the tests that all of them must pass need it.
 struct PointFormat {
   const char* name;

@@ -261,7 +261,7 @@ TEST(Feel, CountsTheEnergyThatAMethodGivesBeyondAnExactSurface) {
                                if (last->out && !tick.force.isZero()) tick.force.z() += 0.6;
                              });
                            }};
-  const FeelFigures figures = play_energy({plane_with(), pushing}, once(), 0.7);
+  const FeelFigures figures = play_energy({plane_with(), pushing}, once(), 0.7, "d4xx");
   const auto figure = [&](std::string_view method, std::string_view loop,
                           std::string_view measure) {
     return figure_of(figures, loop, measure, method);

@@ -66,6 +66,12 @@ Registry<SourceScheme> all_sources(const Registry<Driver>& drivers = standard_dr
 /// Kinds of device: standard_devices() and the devices among the drivers.
 Registry<DeviceScheme> all_devices(const Registry<Driver>& drivers = standard_drivers());
 
+/// Opens a Camera, which is made from its URI: for Driver::open_camera.
+template <class Camera>
+std::unique_ptr<Source> opened(const Uri& uri) {
+  return std::make_unique<Camera>(uri);
+}
+
 /// A look that says what `look` throws as the report's problem.
 std::function<DriverReport()> reporting(std::function<DriverReport()> look);
 

@@ -257,9 +257,7 @@ Driver freenect_driver() {
           .summary = "freenect:SERIAL, a Kinect v1 by libfreenect",
           .tried = "a mock library, and the package's fakenect with depth=11bit",
           .usb = {"045e:02ae"},
-          .open_camera = [](const Uri& uri) -> std::unique_ptr<Source> {
-            return std::make_unique<freenect::Camera>(uri);
-          },
+          .open_camera = opened<freenect::Camera>,
           .look = reporting(freenect::look)};
 }
 

@@ -433,9 +433,7 @@ Driver openni2_driver() {
           .summary = "openni2:SERIAL|FILE.oni, a Kinect v1, Xtion, Carmine or Astra by OpenNI2",
           .tried = "the library itself with a camera of the tests' own",
           .usb = {"1d27", "2bc5", "045e:02ae"},
-          .open_camera = [](const Uri& uri) -> std::unique_ptr<Source> {
-            return std::make_unique<openni2::Camera>(uri);
-          },
+          .open_camera = opened<openni2::Camera>,
           .look = reporting(openni2::look)};
 }
 

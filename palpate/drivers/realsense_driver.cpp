@@ -580,9 +580,7 @@ Driver realsense_driver() {
           .summary = "realsense:SERIAL, a RealSense camera by librealsense2",
           .tried = "a mock library only",
           .usb = {"8086:0a", "8086:0b"},
-          .open_camera = [](const Uri& uri) -> std::unique_ptr<Source> {
-            return std::make_unique<realsense::Camera>(uri);
-          },
+          .open_camera = opened<realsense::Camera>,
           .look = reporting(realsense::look)};
 }
 

@@ -291,9 +291,7 @@ Driver v4l2_driver() {
           .summary = "v4l2:/dev/videoN?intrinsics=FILE.json, depth as Z16 by the kernel",
           .tried = "only mocked kernel calls",
           .usb = {},
-          .open_camera = [](const Uri& uri) -> std::unique_ptr<Source> {
-            return std::make_unique<v4l2::Camera>(uri);
-          },
+          .open_camera = opened<v4l2::Camera>,
           .look = reporting(v4l2::look)};
 }
 

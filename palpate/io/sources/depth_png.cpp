@@ -67,24 +67,17 @@ class PngReader {
     return true;
   }
 
-  // Configures the reading of the rows.
-  bool turn_grey(const Header& header) noexcept {
+  // Makes its rows of 8 bits, in grey or in colour.
+  bool turn(const Header& header, bool to_colour) noexcept {
     if (setjmp(png_jmpbuf(png_)) != 0) return false;
     png_set_expand(png_);
     png_set_scale_16(png_);
     png_set_strip_alpha(png_);
-    if ((header.colour & PNG_COLOR_MASK_COLOR) != 0)
+    const bool is_colour = (header.colour & PNG_COLOR_MASK_COLOR) != 0;
+    if (to_colour && !is_colour) png_set_gray_to_rgb(png_);
+    if (!to_colour && is_colour)
       png_set_rgb_to_gray_fixed(png_, PNG_ERROR_ACTION_NONE, PNG_RGB_TO_GRAY_DEFAULT,
                                 PNG_RGB_TO_GRAY_DEFAULT);
-    return true;
-  }
-
-  bool turn_colour(const Header& header) noexcept {
-    if (setjmp(png_jmpbuf(png_)) != 0) return false;
-    png_set_expand(png_);
-    png_set_scale_16(png_);
-    png_set_strip_alpha(png_);
-    if ((header.colour & PNG_COLOR_MASK_COLOR) == 0) png_set_gray_to_rgb(png_);
     return true;
   }
 
@@ -252,7 +245,8 @@ GreyPng read_grey_png(const std::filesystem::path& path) {
   GreyPng image;
   image.brightness = decode<std::uint8_t>(
       read_file(path, largest_png_file), path.string(), "a PNG is needed", image.width,
-      image.height, [](PngReader& reader, const auto& header) { return reader.turn_grey(header); });
+      image.height,
+      [](PngReader& reader, const auto& header) { return reader.turn(header, false); });
   return image;
 }
 
@@ -261,7 +255,7 @@ ColourPng read_colour_png(const std::filesystem::path& path) {
   image.rgb = decode<std::uint8_t, 3>(
       read_file(path, largest_png_file), path.string(), "a PNG is needed", image.width,
       image.height,
-      [](PngReader& reader, const auto& header) { return reader.turn_colour(header); });
+      [](PngReader& reader, const auto& header) { return reader.turn(header, true); });
   return image;
 }
 

@@ -96,11 +96,49 @@ class Pressed final : public Method {
     Tick tick = free_tick(hip, t, 0);
     tick.force = force;
     tick.torque = torque;
+    tick.transient = transient;
     tick.normal = Vec3::UnitZ();
     return tick;
   }
-  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero(), transient = Vec3::Zero();
 };
+
+// The chain takes a force off in two ticks then, and the gate at once.
+// Hazard: late-loop, torque
+TEST(Cycle, SaysWhatTheLastGateSentAfterAStall) {
+  for (const double newtons : {3.0, 0.0}) {
+    ServoSettings settings;
+    settings.safety.max_force = 12.0;
+    settings.placement.world_from_device = Eigen::AngleAxisd(0.3, Vec3::UnitX());
+    FakeDevice device({.continuous_force = 3.3, .max_torque = 0.33});
+    const auto tool = std::make_shared<Pressed>();
+    Cycle cycle(tool, device, settings);
+    TickRing<ServoTick>::Reader reader = cycle.reader();
+    double t = 10.0;
+    ServoTick record{};
+    const auto run = [&](double dt) {
+      cycle.put_frame(plane_at(0.0), t += dt, t);
+      cycle.run({.t = t});
+      while (reader.try_pop(record)) {
+      }
+    };
+    for (int i = 0; i < 3000; ++i) {
+      if (i == 2000) tool->force.z() = newtons;
+      if (i == 2000) tool->torque = Vec3(0.05, 0.1, 0.25);
+      run(ms);
+    }
+    EXPECT_EQ(device.wish.force_bounds.limit, 3.3) << "the device's, which is lower";
+    EXPECT_EQ(record.force.z(), newtons);
+    EXPECT_EQ(record.torque, tool->torque) << "to the bit";
+    EXPECT_EQ(cycle.statistics().gate_cuts, 0U);
+    run(6 * ms);
+    EXPECT_TRUE(device.force.isZero(0.0) && device.torque.isZero(0.0));
+    EXPECT_TRUE(record.force.isZero(0.0) && record.torque.isZero(0.0));
+    EXPECT_TRUE(vector_of(device.wish.force).isZero(0.0)) << "is announced as it was sent";
+    EXPECT_TRUE(vector_of(device.wish.torque).isZero(0.0));
+    EXPECT_EQ(cycle.statistics().gate_cuts, 1U);
+  }
+}
 
 // Hazard: chain-wrong, torque
 TEST(Cycle, TellsTheLastGateWhatToJudgeBy) {
@@ -149,6 +187,12 @@ TEST(Cycle, TellsTheLastGateWhatToJudgeBy) {
   EXPECT_NEAR(wish.torque.y, 0.05, 1e-9);
   EXPECT_LT((device.force - vector_of(wish.force)).norm(), 1e-12);
   EXPECT_EQ(device.torque, vector_of(wish.torque));
+  EXPECT_EQ(wish.ring, 0.0);
+  tool->force.z() += tool->transient.z() = 0.8;
+  EXPECT_NEAR(run(ms).ring, 0.8, 1e-9);
+  tool->force.z() -= tool->transient.z();
+  tool->transient.setZero();
+  run(0.1);
   EXPECT_EQ(cycle.statistics().gate_cuts, 0U);
   tool->force.setZero();
   run(0.5);
@@ -164,8 +208,10 @@ TEST(Cycle, TellsTheLastGateWhatToJudgeBy) {
   tool->force = tool->torque = Vec3::Zero();
   run(2.0);
   for (const double x : {1.0, 0.0, 1.0, 0.0, 1.0}) {
+    EXPECT_EQ(device.wish.latched, 0);
     tool->force.x() = x > 0.0 ? std::numeric_limits<double>::quiet_NaN() : 0.0;
     wish = run(0.01);
+    EXPECT_TRUE(x == 0.0 || wish.engaged == 0) << "refused";
   }
   EXPECT_NE(wish.latched, 0);
   EXPECT_EQ(wish.may_hold, 0);

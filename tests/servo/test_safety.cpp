@@ -456,7 +456,14 @@ TEST(SafetyChain, ScalesForceAndTorqueByOneFactorAtEitherLimit) {
     EXPECT_NEAR(output.force.norm() / newtons, output.torque.norm() / torque, 1e-9);
     EXPECT_NEAR(output.force.norm() / newtons, 0.5, 1e-9);
     EXPECT_NE(output.flags & force_cut, 0U);
+    EXPECT_EQ(output.flags & slew_cut, 0U) << "it was cut before it was slewed";
   }
+  SafetyParameters half = strong;
+  half.max_force = 6.0;
+  Session weaker(all, with_wrist, half);
+  weaker.engage();
+  weaker.input.torque = Vec3(0.8, 0, 0);
+  EXPECT_NEAR(weaker.run_for(1.0, 3.0).torque.norm(), 0.2, 1e-9) << "as the user's limit of force";
   // Without the link the torque passes whole.
   Session session(all & ~std::uint32_t{force_cut}, with_wrist, strong);
   session.engage();
@@ -471,17 +478,30 @@ TEST(SafetyChain, RampsAndSlewsATorqueAlone) {
   session.input.torque = Vec3(0.2, 0, 0);
   double last = 0.0;
   for (int i = 0; i < 100; ++i) {
-    const double torque = session.run(0.0).torque.norm();
+    const SafetyOutput output = session.run(0.0);
+    const double torque = output.torque.norm();
+    if (torque < 0.199) EXPECT_NE(output.flags & slew_cut, 0U);
     EXPECT_LE(torque - last, 0.4 / 12.0 * strong.rise_rate * ms + 1e-12);
     last = torque;
   }
   EXPECT_NEAR(last, 0.2, 1e-9);
+
+  // One that turns while it shrinks slowly is longer neither than the limit nor than before.
+  SafetyParameters slow = strong;
+  slow.rise_rate = 2000.0;
+  slow.fall_rate = 100.0;
+  Session turning(all, with_wrist, slow);
+  turning.engage();
+  turning.input.torque = Vec3(0.4, 0, 0);
+  EXPECT_NEAR(turning.run_for(1.0, 0.0).torque.norm(), 0.4, 1e-9);
+  turning.input.torque = Vec3(0, 0.4, 0);
+  EXPECT_LE(turning.run(0.0).torque.norm(), 0.4 + 1e-12);
 }
 
 // Hazard: torque
 TEST(SafetyChain, EngagesForNoTorqueThatIsAlreadyThere) {
   Session session(all, with_wrist, strong);
-  session.input.torque = Vec3(0.2, 0, 0);
+  session.input.torque = Vec3(0.1, 0, 0);
   const SafetyOutput output = session.run_for(3.0, 0.0);
   EXPECT_NE(output.flags & disengaged, 0U);
   EXPECT_TRUE(output.torque.isZero(0.0));

@@ -117,7 +117,8 @@ TEST(Cycle, SaysWhatTheLastGateSentAfterAStall) {
     double t = 10.0;
     ServoTick record{};
     const auto run = [&](double dt) {
-      cycle.put_frame(plane_at(0.0), t += dt, t);
+      t += dt;
+      cycle.put_frame(plane_at(0.0), t, t);
       cycle.run({.t = t});
       while (reader.try_pop(record)) {
       }

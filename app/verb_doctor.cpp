@@ -32,6 +32,7 @@
 #include "palpate/kernel/core/vectorise.hpp"
 #include "palpate/net/viewer/server.hpp"
 #include "palpate/servo/periodic_thread.hpp"
+#include "palpate/servo/safety.hpp"
 #include "palpate/servo/stiffness.hpp"
 #include "palpate/session/session.hpp"
 
@@ -58,10 +59,12 @@ struct DoctorOptions {
 // Fit for haptics: what a hand does not feel. A wake-up half a tick late at 1 kHz is still in time.
 constexpr double most_late = 0.5e-3;        // [s] 99.9 % of the wake-ups
 constexpr double most_late_ticks = 1.0e-3;  // [-] share of ticks that are not done when due
+// [s] After a single longer pause the safety chain takes the force off, and ramps it up again.
+constexpr double longest_pause = SafetyParameters{}.stall_time;
 
 bool is_fit(const Json& loop) {
   const double ticks = std::max(loop["ticks"].get<double>(), 1.0);
-  return loop["wake_up_p999_s"] <= most_late &&
+  return loop["wake_up_p999_s"] <= most_late && loop["wake_up_max_s"] <= longest_pause &&
          loop["late_ticks"].get<double>() / ticks <= most_late_ticks;
 }
 
@@ -132,10 +135,13 @@ Json look_at_time(const DoctorOptions& options, const Machine& machine,
   const bool fit = is_fit(loop) && is_fit(felt);
   if (!fit) {
     advice.push_back(fmt::format(
-        "servo ticks are late ({} of {} in an empty loop, {} of {} in a session): close other "
+        "servo ticks are late ({} of {} in an empty loop, {} of {} in a session, the latest by "
+        "{:.1f} ms; {:.0f} ms take the force off): close other "
         "programs, grant the real-time permissions listed here, or install a PREEMPT_RT kernel",
         loop["late_ticks"].get<int>(), loop["ticks"].get<int>(), felt["late_ticks"].get<int>(),
-        felt["ticks"].get<int>()));
+        felt["ticks"].get<int>(),
+        1e3 * std::max(loop["wake_up_max_s"].get<double>(), felt["wake_up_max_s"].get<double>()),
+        1e3 * longest_pause));
     name_obstacles(machine, granted, half.count(), interrupts, advice);
   }
   if (const auto throttled = look_at_machine().throttled; throttled > machine.throttled)

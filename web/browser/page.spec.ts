@@ -68,6 +68,7 @@ test("shows a scene that moves", async () => {
 
 test("a press touches the spot that is pointed at, a drag slides, release lets go", async () => {
   const page = await open(PLANE);
+  await until(page, (seen) => seen.clearance !== null);
   const before = await glimpse(page);
   expect(before.state).toBe(0);
   expect(before.clearance!).toBeGreaterThan(0.03);

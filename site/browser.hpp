@@ -8,7 +8,7 @@
 #undef EIGEN_COMP_GNUC
 #define EIGEN_COMP_GNUC 0
 
-// What emscripten's standard library of 2022 (Debian 12) lacks of C++20.
+// What emscripten's standard libraries of 2022 (Debian 12) and 2024 (Debian 13) lack of C++20.
 #include <algorithm>
 #include <charconv>
 #include <cstdio>
@@ -25,7 +25,7 @@ constexpr To bit_cast(const From& from) noexcept {
 }
 #endif
 
-#if !defined(__cpp_lib_to_chars)
+#if _LIBCPP_VERSION < 200000
 // Decimal numbers alone, as no file and no option holds others.
 inline from_chars_result from_chars(const char* first, const char* last, double& value) {
   const char* digits = first != last && *first == '-' ? first + 1 : first;
@@ -49,7 +49,9 @@ inline from_chars_result from_chars(const char* first, const char* last, float& 
   if (result.ec == errc()) value = static_cast<float>(number);
   return result;
 }
+#endif
 
+#if _LIBCPP_VERSION < 14000
 // The fewest digits, of up to 17, that are read as the same number.
 inline to_chars_result to_chars(char* first, char* last, double value) {
   char text[32];

@@ -28,12 +28,6 @@ struct ServeOptions {
   double duration = 0.0;  // [s]; 0: until a signal comes
 };
 
-// From the servo loop's clock to the wall clock, which stamps of ROS are on.
-double since_1970(double monotonic) {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration<double>(now).count() + monotonic - monotonic_now();
-}
-
 int serve(const ServeOptions& options) {
   if (options.camera.empty())
     throw Error("serve-camera", "no camera is named", "give --camera URI");
@@ -49,7 +43,7 @@ int serve(const ServeOptions& options) {
     if (image == nullptr)
       is_depth = false;
     else
-      publisher.publish(*image, since_1970(fed.frame.stamp));
+      publisher.publish(*image, 1e-9 * static_cast<double>(since_1970(fed.frame.stamp)));
   });
   fmt::print(stderr,
              "palpate: publishes {} as ros2:{} in domain {}, and for lossy networks as ros2:{}; "

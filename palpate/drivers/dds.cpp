@@ -6,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -265,21 +264,7 @@ std::vector<std::uint32_t> instructions(const std::vector<ros::CField>& fields) 
 }
 
 ros::Time stamp_of(double monotonic) {
-  // A thread that loses the processor between its looks at two clocks is wrong by as long: the
-  // quickest of several looks counts.
-  constexpr int most_looks = 8;
-  constexpr double quick = 20e-6;  // [s]
-  double least = std::numeric_limits<double>::infinity();
-  std::int64_t stamp = 0;
-  for (int i = 0; i < most_looks && least > quick; ++i) {
-    const double before = monotonic_now();
-    const std::int64_t wall = ros::Time::now().nanoseconds();
-    const double after = monotonic_now();
-    if (after - before >= least) continue;
-    least = after - before;
-    stamp = wall - std::llround(1e9 * (0.5 * (before + after) - monotonic));
-  }
-  return ros::Time::at(stamp);
+  return ros::Time::at(since_1970(monotonic));
 }
 
 std::string dds_type(std::string_view type) {

@@ -3,8 +3,10 @@
 
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstdint>
 #include <ctime>
+#include <limits>
 
 #include <fcntl.h>
 #include <pthread.h>
@@ -101,6 +103,24 @@ RealtimeThread::RealtimeThread(const RealtimeRequest& request) {
 
 RealtimeThread::~RealtimeThread() {
   if (latency_file_ >= 0) close(latency_file_);
+}
+
+std::int64_t since_1970(double monotonic) noexcept {
+  constexpr int most_looks = 8;
+  constexpr double quick = 20e-6;  // [s]
+  double least = std::numeric_limits<double>::infinity();
+  std::int64_t time = 0;
+  for (int i = 0; i < most_looks && least > quick; ++i) {
+    timespec wall{};
+    const double before = monotonic_now();
+    clock_gettime(CLOCK_REALTIME, &wall);
+    const double after = monotonic_now();
+    if (after - before >= least) continue;
+    least = after - before;
+    time = std::int64_t{1'000'000'000} * wall.tv_sec + wall.tv_nsec -
+           std::llround(1e9 * (0.5 * (before + after) - monotonic));
+  }
+  return time;
 }
 
 double monotonic_now() noexcept {

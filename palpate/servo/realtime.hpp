@@ -47,6 +47,10 @@ class RealtimeThread {
 
 /// Seconds on CLOCK_MONOTONIC: the clock of the servo loop and of live frames' stamps. [servo]
 double monotonic_now() noexcept;
+/// CLOCK_REALTIME at that time on CLOCK_MONOTONIC [ns since 1970]. A thread that loses the
+/// processor between its looks at two clocks is wrong by as long: the quickest of several looks
+/// counts.
+std::int64_t since_1970(double monotonic) noexcept;
 /// Sleeps until then on the same clock. @param deadline [ns]
 void sleep_until(std::uint64_t deadline) noexcept;
 

@@ -46,9 +46,8 @@ constexpr std::array<const char*, stamp_problem_count> problem_words{
 class MachineClock final : public FeedClock {
  public:
   [[nodiscard]] double now() const override { return monotonic_now(); }
-  [[nodiscard]] double system_now() const override {
-    using std::chrono::duration;
-    return duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  [[nodiscard]] double system_start() const override {
+    return 1e-9 * static_cast<double>(since_1970(0.0));
   }
   void wait(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
             double t) override {
@@ -416,7 +415,7 @@ void CameraFeed::Worker::take_live(Frame frame) {
   is_starting_ = false;
   status.trouble.clear();
   pause_ = 0.0;
-  const double known = options_.clock->now() - options_.clock->system_now();
+  const double known = -options_.clock->system_start();
   const StampClock clock = source_->info().clock;
   const double stamp = frame.stamp;
   const PlacedStamp placed =

@@ -22,8 +22,8 @@ class FeedClock {
   virtual ~FeedClock() = default;
   /// [s] the servo loop's clock, CLOCK_MONOTONIC. Any thread.
   [[nodiscard]] virtual double now() const = 0;
-  /// [s since 1970] the wall clock, CLOCK_REALTIME.
-  [[nodiscard]] virtual double system_now() const = 0;
+  /// [s since 1970] the wall clock, CLOCK_REALTIME, when `now` was 0.
+  [[nodiscard]] virtual double system_start() const = 0;
   /// Waits on `changed` until it is notified or time `t` [s] has come; may return early.
   virtual void wait(std::unique_lock<std::mutex>& lock, std::condition_variable& changed,
                     double t) = 0;

@@ -709,15 +709,11 @@ void Session::open_recorder(const std::string& folder, bool is_on) {
 }
 
 SessionInfo Session::info_of(const SessionHand& hand) const {
-  using std::chrono::nanoseconds;
-  using std::chrono::system_clock;
   SessionInfo info{.version = options_.version};
   for (const CameraSpec& camera : options_.cameras) info.cameras.push_back(camera.uri);
   info.device = hand.device().info().uri;
   info.limits = hand.device().info().limits;
-  info.epoch =
-      std::chrono::duration_cast<nanoseconds>(system_clock::now().time_since_epoch()).count() -
-      std::llround(1e9 * now());
+  info.epoch = since_1970(0.0);
   info.hand = hand.name();
   if (&hand == hands_.front().get()) {
     for (std::size_t i = 1; i < hands_.size(); ++i) info.more_hands.push_back(hands_[i]->name());

@@ -32,7 +32,7 @@ constexpr double bound = 30.0;  // [s] for a join that must succeed; never waite
 class FakeClock final : public FeedClock {
  public:
   [[nodiscard]] double now() const override { return now_; }
-  [[nodiscard]] double system_now() const override { return now_ + 1.7e9; }
+  [[nodiscard]] double system_start() const override { return 1.7e9; }
   void wait(std::unique_lock<std::mutex>& lock, std::condition_variable& /*changed*/,
             double t) override {
     lock.unlock();

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 #include "palpate/servo/free_side.hpp"
 
 namespace palpate {
@@ -38,12 +39,6 @@ constexpr double gravity = 9.80665;  // [m/s^2]
 constexpr double longest_tick = 1e-3;
 // In such a tick the chain has let go of the hand, which has to be engaged anew.
 constexpr std::uint32_t let_go = disengaged | input_refused | direction_refused;
-// [rad] A turn of much less than a radian, as a vector along its axis.
-Vec3 turn_between(const Rotation& before, const Rotation& after) noexcept {
-  const Rotation turn = after * before.conjugate();
-  return (turn.w() < 0.0 ? -2.0 : 2.0) * turn.vec();
-}
-
 // What also ends the support of a handle's weight at once.
 constexpr std::uint32_t no_support =
     input_refused | hand_too_fast | stalled | fault_latched | output_refused;
@@ -293,8 +288,9 @@ void Cycle::run(const Wake& wake) noexcept {
     method_->seat(free_side(seen_, last_proxy_, last_normal_, parameters_.proxy.r_c(), patch_));
   }
   const HandPose pose{.position = hip, .orientation = workspace_.orientation_in_world(hand)};
-  const Vec3 turned = jumped || number_ == 0 ? Vec3(Vec3::Zero())
-                                             : turn_between(last_orientation_, pose.orientation);
+  const Vec3 turned = jumped || number_ == 0
+                          ? Vec3(Vec3::Zero())
+                          : rotation_vector(between(pose.orientation, last_orientation_));
   last_orientation_ = pose.orientation;
   const Tick tick = method_->tick(pose, t);
   last_proxy_ = tick.proxy;

@@ -9,6 +9,7 @@
 #include "palpate/kernel/core/hand_velocity.hpp"
 #include "palpate/kernel/core/method.hpp"
 #include "palpate/kernel/core/newest_frame.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 #include "palpate/kernel/sight/frame_timing.hpp"
 #include "palpate/kernel/tool/least_motion.hpp"
 #include "palpate/kernel/tool/seen_surface.hpp"
@@ -102,10 +103,5 @@ class ShapeTouch final : public Method {
   Vec3 spin_ = Vec3::Zero();  // [rad/s] world, of the hand, smoothed
   double last_t_ = 0.0;
 };
-
-/// The rotation vector [rad] of a rotation: its axis times its angle of at most pi.
-Vec3 rotation_vector(const Rotation& turn) noexcept;
-/// The rotation by a rotation vector [rad].
-Rotation rotation_by(const Vec3& vector) noexcept;
 
 }  // namespace palpate

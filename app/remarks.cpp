@@ -19,7 +19,7 @@ std::string length_text(double metres) {
 }
 
 std::string radius_remark(const Cloud& cloud, double r_c) {
-  const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+  const auto* points = cloud.point_cloud();
   const double usual = ProxyParameters{}.r_c();
   if (points == nullptr || r_c <= usual) return {};
   return fmt::format(
@@ -29,7 +29,7 @@ std::string radius_remark(const Cloud& cloud, double r_c) {
 }
 
 std::string sparse_remark(const Cloud& cloud, const std::string& uri, double r_c) {
-  const auto* points = dynamic_cast<const PointCloud*>(&cloud);
+  const auto* points = cloud.point_cloud();
   if (points == nullptr) return {};
   const ProposedTouch proposed = proposed_touch(*points);
   if (proposed.spacing == 0.0)

@@ -15,12 +15,17 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 METHODS = ("paper", "direct", "sight")
 
 
-def main(native, cases="1"):
+def in_node(program):
+    """The command that runs a program of build/wasm, which is built for it."""
     # Debian's emscripten looks for its JavaScript where only Debian's node does.
-    subprocess.run(["ninja", "-C", ROOT / "build/wasm", "outcomes"], check=True,
+    subprocess.run(["ninja", "-C", ROOT / "build/wasm", program], check=True,
                    stdout=subprocess.DEVNULL, env={**os.environ, "NODE_PATH": "/usr/share/nodejs"})
     # With fetch() in Node, emscripten of 2022 takes it for a browser.
-    node = ["node", "--no-experimental-fetch", str(ROOT / "build/wasm/outcomes.js")]
+    return ["node", "--no-experimental-fetch", str(ROOT / f"build/wasm/{program}.js")]
+
+
+def main(native, cases="1"):
+    node = in_node("outcomes")
     differ = 0
     for bench in ("pop", "field", "visits"):
         here, there = (subprocess.run([*program, bench, cases, *METHODS], check=True, text=True,

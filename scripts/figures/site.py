@@ -9,14 +9,13 @@ other load these are valid. A tick is a mean over all, with its share of the fra
 frame is told from how much dearer ticks are with three times as many of them.
 """
 import gzip
-import os
-import pathlib
 import resource
 import statistics
 import subprocess
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from outcomes import ROOT, in_node
+
 TURNS = 9
 TICKS = 20000
 
@@ -41,11 +40,7 @@ def main(native):
     size = sum(len(gzip.compress(file.read_bytes(), 9))
                for file in (ROOT / "build/site").iterdir() if file.is_file())
     print(f"build/site: {size} bytes, compressed by gzip")
-    # Debian's emscripten looks for its JavaScript where only Debian's node does.
-    subprocess.run(["ninja", "-C", ROOT / "build/wasm", "cost_of_ticks"], check=True,
-                   stdout=subprocess.DEVNULL, env={**os.environ, "NODE_PATH": "/usr/share/nodejs"})
-    # With fetch() in Node, emscripten of 2022 takes it for a browser.
-    node = ["node", "--no-experimental-fetch", str(ROOT / "build/wasm/cost_of_ticks.js")]
+    node = in_node("cost_of_ticks")
     for method in ("paper", "sight"):
         turns = [(tick_and_frame([native], method),
                   tick_and_frame(node, method)) for _ in range(TURNS)]

@@ -38,14 +38,7 @@ OperatorEnd::OperatorEnd(Session& session, const OperatorEndOptions& options)
       participant_("teleop"),
       places_(participant_, topics_.place, ros::PoseStamped{}, soon),
       presses_(participant_, topics_.press, ros::WrenchStamped{}, soon),
-      tools_(participant_, topics_.tool, ros::PoseStamped{}, newest_alone),
-      twists_(participant_, topics_.twist, ros::TwistStamped{}, newest_alone),
-      contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
-      links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
-      joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
-      faults_(participant_, topics_.fault, ros::String{}, kept_for_late),
-      regions_(participant_, topics_.regions, ros::String{}, kept_for_late),
-      touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
+      hears_(participant_, topics_),
       thread_([this] { run(); }) {}
 
 OperatorEnd::~OperatorEnd() {
@@ -123,7 +116,7 @@ void OperatorEnd::bring_to_hand() {
 
 void OperatorEnd::hear(double now) {
   const std::lock_guard lock(mutex_);
-  while (const auto tool = tools_.take_whole<ros::PoseStamped>()) {
+  while (const auto tool = hears_.tool.take_whole<ros::PoseStamped>()) {
     const Vec3 position(tool->position[0], tool->position[1], tool->position[2]);
     if (!is_place(position)) continue;
     if (!view_.state) view_.state.emplace();
@@ -131,20 +124,21 @@ void OperatorEnd::hear(double now) {
     view_.state->t = now;
   }
   if (!view_.state) return;
-  while (const auto twist = twists_.take_whole<ros::TwistStamped>())
+  while (const auto twist = hears_.twist.take_whole<ros::TwistStamped>())
     view_.state->velocity = Vec3(twist->linear[0], twist->linear[1], twist->linear[2]);
-  while (const auto contact = contacts_.take_whole<ros::WrenchStamped>())
+  while (const auto contact = hears_.contact.take_whole<ros::WrenchStamped>())
     view_.state->force = Vec3(contact->force[0], contact->force[1], contact->force[2]);
-  while (const auto joints = joints_.take_whole<ros::JointState>())
+  while (const auto joints = hears_.joints.take_whole<ros::JointState>())
     view_.state->joints = joints->position;
-  while (const auto links = links_.take_whole<ros::Float64MultiArray>()) {
+  while (const auto links = hears_.links.take_whole<ros::Float64MultiArray>()) {
     view_.state->links.clear();
     for (std::size_t i = 0; i + 2 < links->data.size(); i += 3)
       view_.state->links.emplace_back(links->data[i], links->data[i + 1], links->data[i + 2]);
   }
-  while (const auto fault = faults_.take_whole<ros::String>()) view_.state->fault = fault->data;
-  while (const auto regions = regions_.take_whole<ros::String>()) use_regions(regions->data);
-  while (const auto message = touched_.take_whole<ros::Float64MultiArray>()) {
+  while (const auto fault = hears_.fault.take_whole<ros::String>())
+    view_.state->fault = fault->data;
+  while (const auto regions = hears_.regions.take_whole<ros::String>()) use_regions(regions->data);
+  while (const auto message = hears_.touched.take_whole<ros::Float64MultiArray>()) {
     const Touched touched = touched_of(*message);
     view_.touched = touched;
     view_.ignored = learns_

@@ -75,7 +75,7 @@ class OperatorEnd {
   RobotView view_;  // guarded by it
   dds::Participant participant_;
   dds::Writer places_, presses_;
-  dds::Reader tools_, twists_, contacts_, links_, joints_, faults_, regions_, touched_;
+  FromRobot<dds::Reader> hears_;
   std::atomic<bool> ends_{false};
   std::thread thread_;
 };

@@ -101,17 +101,10 @@ RobotEnd::RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
       participant_("teleop"),
       places_(participant_, topics_.place, ros::PoseStamped{}, newest_alone),
       presses_(participant_, topics_.press, ros::WrenchStamped{}, newest_alone),
-      tools_(participant_, topics_.tool, ros::PoseStamped{}, newest_alone),
-      twists_(participant_, topics_.twist, ros::TwistStamped{}, newest_alone),
-      contacts_(participant_, topics_.contact, ros::WrenchStamped{}, newest_alone),
-      links_(participant_, topics_.links, ros::Float64MultiArray{}, newest_alone),
-      joints_(participant_, topics_.joints, ros::JointState{}, newest_alone),
-      faults_(participant_, topics_.fault, ros::String{}, kept_for_late),
-      region_texts_(participant_, topics_.regions, ros::String{}, kept_for_late),
-      touched_(participant_, topics_.touched, ros::Float64MultiArray{}, each_one),
+      says_(participant_, topics_),
       learner_(robot_->info().tool_radius) {
-  region_texts_.write(ros::String{fixtures_json(*regions_)});
-  faults_.write(ros::String{""});
+  says_.regions.write(ros::String{fixtures_json(*regions_)});
+  says_.fault.write(ros::String{""});
 }
 RobotEnd::~RobotEnd() {
   detach();
@@ -209,28 +202,28 @@ void RobotEnd::order(double now) {
   contact_ = at.force;
   if (at.fault.empty()) robot_->command(order.position, order.velocity, now);
   if (const auto found = learner_.next(at.t, at.position, at.velocity, at.force, tick.tick.normal))
-    touched_.write(message_of(*found));
+    says_.touched.write(message_of(*found));
   say(at.fault);
 }
 
 void RobotEnd::report(double now) {
   const RobotState at = state();
   const ros::Header header{dds::stamp_of(now), "world"};
-  tools_.write(ros::PoseStamped{header, components(at.position)});
-  twists_.write(ros::TwistStamped{header, components(at.velocity)});
-  contacts_.write(ros::WrenchStamped{header, components(contact_), {}});
+  says_.tool.write(ros::PoseStamped{header, components(at.position)});
+  says_.twist.write(ros::TwistStamped{header, components(at.velocity)});
+  says_.contact.write(ros::WrenchStamped{header, components(contact_), {}});
   ros::Float64MultiArray links;
   for (const Vec3& place : at.links)
     links.data.insert(links.data.end(), {place.x(), place.y(), place.z()});
-  links_.write(links);
+  says_.links.write(links);
   if (!at.joints.empty())
-    joints_.write(ros::JointState{header, robot_->info().joint_names, at.joints, {}, {}});
+    says_.joints.write(ros::JointState{header, robot_->info().joint_names, at.joints, {}, {}});
 }
 
 void RobotEnd::say(const std::string& fault) {
   if (fault == said_) return;
   said_ = fault;
-  faults_.write(ros::String{fault});
+  says_.fault.write(ros::String{fault});
 }
 
 }  // namespace palpate

@@ -82,7 +82,7 @@ class RobotEnd {
   Ros2CameraPublisher publisher_;
   dds::Participant participant_;
   dds::Reader places_, presses_;
-  dds::Writer tools_, twists_, contacts_, links_, joints_, faults_, region_texts_, touched_;
+  FromRobot<dds::Writer> says_;
   // Of the leading thread
   TouchLearner learner_;
   Vec3 contact_ = Vec3::Zero();  // [N] without what the sensor shows in free space

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "palpate/drivers/dds.hpp"
+#include "palpate/io/bag/node_messages.hpp"
 
 namespace palpate {
 
@@ -29,5 +30,22 @@ struct TeleopTopics {
 inline constexpr dds::Quality newest_alone{};
 inline constexpr dds::Quality each_one{.reliable = true};
 inline constexpr dds::Quality kept_for_late{.reliable = true, .keeps_for_late = true};
+
+/// What the robot's end says by a dds::Writer for each topic, and the operator's hears by a
+/// dds::Reader: of the same types and qualities, or neither finds the other.
+template <class Port>
+struct FromRobot {
+  FromRobot(dds::Participant& participant, const TeleopTopics& topics)
+      : tool(participant, topics.tool, ros::PoseStamped{}, newest_alone),
+        twist(participant, topics.twist, ros::TwistStamped{}, newest_alone),
+        contact(participant, topics.contact, ros::WrenchStamped{}, newest_alone),
+        links(participant, topics.links, ros::Float64MultiArray{}, newest_alone),
+        joints(participant, topics.joints, ros::JointState{}, newest_alone),
+        fault(participant, topics.fault, ros::String{}, kept_for_late),
+        regions(participant, topics.regions, ros::String{}, kept_for_late),
+        touched(participant, topics.touched, ros::Float64MultiArray{}, each_one) {}
+
+  Port tool, twist, contact, links, joints, fault, regions, touched;
+};
 
 }  // namespace palpate

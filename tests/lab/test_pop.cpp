@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // The bench itself: that the ruler passes, that what fails is found, shrunk and can be run again.
 #include <cmath>
+#include <memory>
 #include <set>
 #include <string>
+#include <utility>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "lab/experiment.hpp"
 #include "lab/experiments/pop.hpp"
 #include "lab/experiments/pop_cases.hpp"
 #include "lab/runner.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 #include "tests/lab/drawn.hpp"
@@ -119,6 +123,74 @@ TEST_F(Pop, ThePaperLosesEverySweepOfAnOccluderAndTheFailureIsShrunkAndRunsAgain
   EXPECT_NE(scores.note.find(", occluder: 1 cases: 0 with a force in free space"),
             std::string::npos);
   EXPECT_EQ(scores.note.find("--case ''"), std::string::npos) << scores.note;
+}
+
+// A method in a world in which all lengths and times are other multiples. Depth images alone.
+class Rescaled final : public Method {
+ public:
+  Rescaled(Parameters p, double length, double time) : length_(length), time_(time) {
+    p.proxy.r_1 *= length;
+    p.proxy.r_2 *= length;
+    p.proxy.r_3 *= length;
+    p.coupling.max_force *= length;
+    p.motion.frame_rate /= time;
+    p.motion.max_extrapolation *= time;
+    p.sight.hidden_hold *= time;
+    p.sight.hidden_fade *= time;
+    p.sight.oldest_frame *= time;
+    p.sight.hardest_strike *= length / (time * time);
+    p.sight.return_speed *= length / time;
+    p.sight.side_depth *= length;
+    p.sight.curvature_sd /= length;
+    p.sight.usual_noise = SightParameters::unknown_noise / length;
+    p.sight.noise_growth = 2;
+    method_ = lab::make_method("sight", {p, nullptr});
+  }
+  void seat(const Vec3& proxy) noexcept override { method_->seat(length_ * proxy); }
+  void observe(const Observation& seen) noexcept override {
+    const DepthImage& image = *seen.cloud.image();
+    Eigen::Isometry3d pose = image.world_from_camera();
+    pose.translation() *= length_;
+    auto scaled = std::make_unique<DepthImage>(image.shared_rays(), image.depth(),
+                                               image.units_per_metre() / length_, pose);
+    method_->observe({*scaled, time_ * seen.stamp, seen.camera});
+    image_ = std::move(scaled);
+  }
+  Tick tick(const Vec3& hip, double t) noexcept override {
+    Tick tick = method_->tick(length_ * hip, time_ * t);
+    for (Vec3* each : {&tick.hip, &tick.proxy, &tick.force}) *each /= length_;
+    tick.t = t;
+    return tick;
+  }
+  void set_parameters(const Parameters& /*parameters*/) noexcept override {}
+
+ private:
+  double length_, time_;
+  std::unique_ptr<Method> method_;
+  std::unique_ptr<DepthImage> image_;
+};
+
+TEST_F(Pop, SightHasTheSameOutcomesWhateverTheLengthsAndTimesAreMultiplesOf) {
+  ExperimentOptions options = with("sight", 1);
+  options.families = {"occluder", "layers", "finger", "random"};
+  options.parameters.sight.usual_noise = SightParameters::unknown_noise;
+  options.parameters.sight.noise_growth = 2;
+  for (const auto& [length, time] : {std::pair(0.2, 1.0), {3.0, 1.0}, {1.0, 0.5}, {1.7, 7.0}}) {
+    const std::string name = fmt::format("sight {} m {} s", length, time);
+    options.methods.push_back(name);
+    options.own_methods.push_back({name, [length = length, time = time](const MethodSetup& setup) {
+                                     return std::make_unique<Rescaled>(setup.parameters, length,
+                                                                       time);
+                                   }});
+  }
+  const Table table = run(options);
+  const std::size_t families = options.families.size();
+  ASSERT_EQ(table.rows(), families * options.methods.size());
+  for (std::size_t row = families; row < table.rows(); ++row) {
+    for (const char* column : {"lost", "right", "ghost", "numb", "wrong"})
+      EXPECT_EQ(table.number(row, column), table.number(row % families, column))
+          << table.text(row, "method") << ", " << table.text(row, "family") << ": " << column;
+  }
 }
 
 // What sight lost once, each for a reason of its own, shrunk.

@@ -124,7 +124,9 @@ TEST(Monitor, BringsAProxyBackInFrontWhenTwoFramesShowItBehind) {
 
 TEST(Monitor, WaitsForAsManyFramesAsItIsTold) {
   Monitor monitor;
-  monitor.set({.evidence_frames = 3});
+  Parameters parameters;
+  parameters.sight.evidence_frames = 3;
+  monitor.set(parameters);
   meet(monitor, 1.0);
   const PointCloud plane = plane_at(0.0);
   Monitor::Contact lost = pressed(-0.01, -0.01);
@@ -376,7 +378,7 @@ TEST(SightTracker, CountsTheTimeOfAHoldFromItsBeginning) {
   ObservedClouds clouds;
   const auto frame = [&](const PointCloud& cloud, int k) {
     clouds.take(0, cloud);
-    tracker.frame(clouds, 0, k * interval, interval, Vec3::Zero(), Vec3(0, 0, r_c), 90.0);
+    tracker.frame(clouds, nullptr, 0, k * interval, interval, Vec3::Zero(), Vec3(0, 0, r_c), 90.0);
   };
   for (int k = 0; k < 10; ++k) frame(plane, k);
   ASSERT_TRUE(tracker.tracking());

@@ -96,6 +96,11 @@ constexpr std::array table = {
     row_of<&P::sight, &Sight::hidden_fade>(
         "hidden_fade", "", "s", 0.01, 10.0,
         "time over which the force of an occluded surface then fades out", "ours (sight)"),
+    row_of<&P::sight, &Sight::oldest_frame>(
+        "oldest_frame", "", "s", 0.01, 10.0,
+        "a frame that is older when it arrives is history, not a surface to touch; frames half as "
+        "far apart tell no motion",
+        "ours (sight)"),
     row_of<&P::sight, &Sight::hardest_strike>(
         "hardest_strike", "", "m/s^2", 1.0, 1e4,
         "largest acceleration of a touched surface; a jump that needs more is an occluder",
@@ -129,7 +134,7 @@ constexpr std::array table = {
         "Smaller: finer objects are felt, but also outliers",
         "ours (sight)"),
     row_of<&P::sight, &Sight::widest_disc>(
-        "widest_disc", "", "m", 11e-3, 85e-3,
+        "widest_disc", "", "r_c", 2.2, 17.0,
         "maximum radius of the fitted area. Smaller: more noise, but small objects are "
         "correct earlier",
         "ours (sight)"),

@@ -163,6 +163,7 @@ struct MotionParameters {
 struct SightParameters {
   double hidden_hold = 0.4;      ///< [s] the force of an occluded surface is kept in full this long
   double hidden_fade = 0.3;      ///< [s] and then fades out over this
+  double oldest_frame = 0.5;     ///< [s] a frame that is older when it arrives is not touched
   double hardest_strike = 90.0;  ///< [m/s^2] a faster jump is treated as an occluder
   double return_speed = 0.01;    ///< [m/s] at which a surface returns after it was occluded or lost
   double side_depth = 0.1;       ///< [m] depth of the side faces synthesised behind visible edges
@@ -174,7 +175,7 @@ struct SightParameters {
   int noise_growth = 0;         ///< [-] power of the distance with which it grows: 1 or 2
   double confidence = 3.0;      ///< [-] standard deviations that noise explains
   double least_share = 0.3;     ///< [-] of the points in the viewing cone: fewer are no surface
-  double widest_disc = 85e-3;   ///< [m] radius that a fit is averaged over at most
+  double widest_disc = 17.0;    ///< [r_c] radius that a fit is averaged over at most
   int averaged_frames = 64;     ///< that a fit is averaged over at most
   double rest_odds = 4.0;       ///< [-] logarithm, of rest against any motion, before a measurement
   double motion_memory = 0.85;  ///< [-] forgetting factor of the motion estimate, per frame
@@ -184,6 +185,12 @@ struct SightParameters {
 
   static constexpr double unknown_noise = 5e-3;  ///< [m] at 1 m
   static constexpr int unknown_growth = 2;
+  /// [m] Standard deviation of the depth `distance` [m] away from the camera.
+  [[nodiscard]] double usual_noise_at(double distance) const noexcept {
+    const int growth = noise_growth > 0 ? noise_growth : unknown_growth;
+    return (usual_noise > 0.0 ? usual_noise : unknown_noise) *
+           (growth == 1 ? distance : distance * distance);
+  }
 };
 
 /// Friction along the surface, around any method. docs/friction.md.

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "palpate/kernel/core/parameters.hpp"
+
 namespace palpate {
 
 /// Latency and interval of the newest eight frames: by these a slow or distant camera, whose frames
@@ -14,6 +16,8 @@ namespace palpate {
 /// [servo] Nothing here allocates, locks or throws.
 class FrameTiming {
  public:
+  /// What is older than `oldest` [s] when it comes is history, not a surface to touch.
+  void set(double oldest) noexcept { oldest_ = oldest; }
   /// A frame captured at `stamp` [s] is in use; `interval` [s] after the one before, 0 if unknown.
   void frame(double stamp, double interval) noexcept {
     stamp_ = stamp;
@@ -30,19 +34,15 @@ class FrameTiming {
   }
   /// [s] since the newest frame would have come if it had been as punctual as the best of the last.
   [[nodiscard]] double age(double t) const noexcept { return t - stamp_ - latency(); }
-  /// [s] the shortest of the last latencies, `longest_latency` at most.
+  /// [s] the shortest of the last latencies, `oldest` at most.
   [[nodiscard]] double latency() const noexcept {
-    return std::min(*std::min_element(latencies_.begin(), latencies_.end()), longest_latency);
+    return std::min(*std::min_element(latencies_.begin(), latencies_.end()), oldest_);
   }
-  /// [s] the shortest of the last intervals, `longest_interval` at most.
+  /// [s] the shortest of the last intervals, half of that at most: at less than 4 Hz a hand outruns
+  /// what it is shown.
   [[nodiscard]] double interval() const noexcept {
-    return std::min(*std::min_element(intervals_.begin(), intervals_.end()), longest_interval);
+    return std::min(*std::min_element(intervals_.begin(), intervals_.end()), 0.5 * oldest_);
   }
-
-  /// [s] What is older than this when it comes is history, not a surface to touch.
-  static constexpr double longest_latency = 0.5;
-  /// [s] At less than 4 Hz a hand outruns what it is shown.
-  static constexpr double longest_interval = 0.25;
 
  private:
   static constexpr std::size_t remembered = 8;
@@ -53,6 +53,7 @@ class FrameTiming {
     return all;
   }
 
+  double oldest_ = SightParameters().oldest_frame;
   double stamp_ = 0.0;
   std::array<double, remembered> latencies_ = nothing();
   std::array<double, remembered> intervals_ = nothing();

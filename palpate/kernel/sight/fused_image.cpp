@@ -16,9 +16,8 @@ constexpr float most_missed = 3.0F;
 constexpr std::size_t least_pixels = 8;  // that measure a level
 // The spread is that of a region wider than the one that measures the level, as noise correlates.
 constexpr double spread_region = 3.0;
-constexpr int most_across = 16;          // pixels that are looked at, along either axis
-constexpr double nearest_camera = 1e-3;  // [m] from it to a place, along its axis
-constexpr double farthest_pixel = 1e6;   // [px] beyond any image
+constexpr int most_across = 16;         // pixels that are looked at, along either axis
+constexpr double farthest_pixel = 1e6;  // [px] beyond any image
 
 // A place in a camera's axes.
 Vec3 seen_from(const DepthImage& image, const Vec3& place) {
@@ -121,7 +120,7 @@ void FusedImage::observe(const DepthImage& image, const Look& look,
   stamp_ = look.stamp;
   interval_ = look.interval;
   const Vec3 p = seen_from(image, look.place);
-  const Vec3 ray = p / std::max(p.z(), nearest_camera);
+  const Vec3 ray = p / std::max(p.z(), look.radius);  // never at the camera itself
   ray_ = image.world_from_camera().linear() * ray;
   const Intrinsics& k = image.intrinsics();
   const int u = nearest_pixel(k.cx, k.fx, ray.x());
@@ -143,7 +142,7 @@ void FusedImage::observe(const DepthImage& image, const Look& look,
 
 bool FusedImage::is_in_front(const Vec3& place) const noexcept {
   const Vec3 p = seen_from(*image_, place);
-  if (!(p.z() > nearest_camera)) return false;
+  if (!(p.z() > 0.0)) return false;
   const int u = nearest_pixel(camera_.cx, camera_.fx, p.x() / p.z());
   const int v = nearest_pixel(camera_.cy, camera_.fy, p.y() / p.z());
   return holds(u, v) && window_[0].frames[index(u, v)] > 0.0F && depth(u, v) > p.z();

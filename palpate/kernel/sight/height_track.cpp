@@ -10,13 +10,14 @@
 namespace palpate {
 namespace {
 
-// Jerk assumed by each filter of the bank [m/s^3], from a surface that a hand moves slowly to one
-// that is struck (18 000 r_c/s^2 within one frame).
-constexpr std::array<double, 5> jerks = {1.0, 6.0, 40.0, 250.0, 3000.0};
-// Change of velocity from frame to frame assumed by each of the others [m/s], from a surface that
+// Units of the bank: r_c, and the mean interval T between heights.
+// Jerk assumed by each filter of the bank [r_c/T^3], from a surface that a hand moves slowly to one
+// that is struck.
+constexpr std::array<double, 5> jerks = {0.0075, 0.045, 0.3, 1.85, 22.0};
+// Change of velocity from frame to frame assumed by each of the others [r_c/T], from a surface that
 // is drawn along to one that is dropped. Without an acceleration to believe in, they do not
 // overshoot where a motion begins at once.
-constexpr std::array<double, 4> velocity_steps = {0.01, 0.05, 0.25, 1.2};
+constexpr std::array<double, 4> velocity_steps = {0.067, 0.33, 1.67, 8.0};
 constexpr std::size_t filters = jerks.size() + velocity_steps.size();
 // Older frames say little about the present motion.
 constexpr std::size_t motion_frames = 24;
@@ -29,9 +30,11 @@ constexpr double plain_bonus = 8.0;
 // few minutes. A motion that begins is proved by the frame after it, or at once by one that is five
 // standard deviations away instead of four.
 constexpr double single_proof = 4.5;
-// Standard deviations of a surface's velocity [m/s] and acceleration [m/s^2] before it is known.
-constexpr double first_velocity = 3.0;
-constexpr double first_acceleration = 10.0;
+// Standard deviations of a surface's velocity [r_c/T] and acceleration [r_c/T^2] before it is
+// known.
+constexpr double first_velocity = 20.0;
+constexpr double first_acceleration = 2.2;
+constexpr double least_sd = 2e-5;  // [r_c] less noise is not told from rounding
 
 // Kalman filters of height, velocity and acceleration, side by side: filter i in lane i. Those of
 // velocity steps have no acceleration.
@@ -44,15 +47,19 @@ struct Bank {
 
   double memory;  // of the likelihood's logarithm, from frame to frame
 
-  Bank(double height, double variance, double remembered) noexcept : memory(remembered) {
+  // @param speed  [m/s] r_c in each mean interval, `period` [s]
+  Bank(double height, double variance, double remembered, double speed, double period) noexcept
+      : memory(remembered) {
+    const double acceleration = speed / period;
     x.fill(height);
     xx.fill(variance);
-    vv.fill(first_velocity * first_velocity);
+    vv.fill((first_velocity * speed) * (first_velocity * speed));
     for (std::size_t i = 0; i < filters; ++i) {
       const bool accelerates = i < jerks.size();
-      jerk[i] = accelerates ? jerks[i] : 0.0;
-      velocity_step[i] = accelerates ? 0.0 : velocity_steps[i - jerks.size()];
-      aa[i] = accelerates ? first_acceleration * first_acceleration : 0.0;
+      const double first = accelerates ? first_acceleration * acceleration : 0.0;
+      jerk[i] = accelerates ? jerks[i] * (acceleration / period) : 0.0;
+      velocity_step[i] = accelerates ? 0.0 : velocity_steps[i - jerks.size()] * speed;
+      aa[i] = first * first;
     }
   }
 
@@ -168,17 +175,21 @@ double agreed_height(std::span<const HeightSample> samples, double sd, double co
 }
 
 HeightTrack track_height(std::span<const HeightSample> all, double sd, double interval,
-                         const SightParameters& parameters) noexcept {
+                         const SightParameters& parameters, double r_c) noexcept {
   const double confidence = parameters.confidence;
   const double memory = parameters.motion_memory;
   const std::span<const HeightSample> samples = all.first(std::min(all.size(), most_heights));
   const double resting = agreed_height(samples, sd, confidence);
   const std::size_t frames = std::min(samples.size(), motion_frames);
-  if (frames < 2 || !(interval > 0.0)) return {resting, 0.0};
+  const double period = frames < 2 ? 0.0
+                                   : (samples.front().stamp - samples[frames - 1].stamp) /
+                                         static_cast<double>(frames - 1);
+  if (!(period > 0.0 && interval > 0.0)) return {resting, 0.0};
 
   const double base = samples.front().height;
-  const double variance = std::max(sd * sd, 1e-14);
-  Bank bank(samples[frames - 1].height - base, samples[frames - 1].doubt * variance, memory);
+  const double variance = std::max(sd * sd, (least_sd * r_c) * (least_sd * r_c));
+  Bank bank(samples[frames - 1].height - base, samples[frames - 1].doubt * variance, memory,
+            r_c / period, period);
   Bank::Lanes before{};  // the newest height
   for (std::size_t i = frames - 1; i-- > 0;) {
     before = bank.likelihood;

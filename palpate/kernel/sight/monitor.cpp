@@ -14,9 +14,9 @@ namespace {
 // A camera that measures fewer points than this in a footprint says nothing about it: with fewer a
 // median is no better than a single pixel.
 constexpr std::size_t least_points = 8;
-// [m] What lies along a line of sight is looked for this far from a place: as far as the tracker
-// looks for a surface.
-constexpr double look_reach = 0.3;
+// [r_c] What lies along a line of sight is looked for this far from a place: as far as the tracker
+// looks for what hides a surface. A place that something far in front hides is not free.
+constexpr double look_reach = 240.0;
 // [-] Share of the points that may lie before a hand in free space: flying pixels and other strays.
 // More would let go of a hand at an edge that only grazes its lines of sight.
 constexpr double strays = 0.05;
@@ -27,13 +27,7 @@ constexpr double hand_radius = 2.0;
 constexpr double narrowest = 1.8;
 // [-] Where holes leave too few points, a footprint is widened by this, up to twice.
 constexpr double widening = 3.0;
-constexpr double least_margin = 1e-3;  // [m] rounding of depth, in common cameras
-// [1/m] No estimate of the noise counts beyond this times the squared distance: 5 mm at 1 m, what a
-// stereo camera's is. So a wrong estimate cannot blind the monitor.
-constexpr double most_noise = 5e-3;
-double most_margin(double confidence, double distance) {
-  return confidence * most_noise * distance * distance;
-}
+constexpr double least_margin = 0.2;  // [r_c] rounding of depth, in common cameras
 // [-] footprint's radius: a look without an edge has 80 % of its points within this along the line
 // of sight, and the margin for noise. A plane at 70 degrees from facing the camera spans 4.4.
 constexpr double one_layer = 4.0;
@@ -42,16 +36,18 @@ constexpr double one_layer = 4.0;
 // by 70 degrees rises on the way, `steepest_rise` times that, is no step.
 constexpr double edge_step = 2.0;
 constexpr double steepest_rise = 2.75;  // [-] tan 70 degrees
-constexpr double sideways = 2e-3;       // [m]
+constexpr double sideways = 0.4;        // [r_c]
 // [-] Cosine: a force that points away from the camera, within 73 degrees of its line of sight.
 constexpr double away = -0.3;
-// [m] A look serves as long as its place moves less than this: a fifth of r_c.
-constexpr double look_serves = 1e-3;
+// [r_c] A look serves as long as its place moves less than this.
+constexpr double look_serves = 0.2;
 
 }  // namespace
 
-void Monitor::set(const SightParameters& parameters) noexcept {
-  parameters_ = parameters;
+// [m] No estimate of the noise counts beyond what is usual, so that a wrong one cannot blind the
+// monitor.
+double Monitor::most_margin(double distance) const noexcept {
+  return parameters_.confidence * parameters_.usual_noise_at(distance);
 }
 
 void Monitor::forget() noexcept {
@@ -68,7 +64,7 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
   result.fresh = true;
   result.place = place;
   result.radius = radius;
-  gather(cloud, Beam{place, radius, look_reach, Vec3::UnitZ()}, look_points, patch_);
+  gather(cloud, Beam{place, radius, look_reach * r_c_, Vec3::UnitZ()}, look_points, patch_);
   std::array<float, look_points> heights;
   for (std::size_t v = 0; v < patch_.view_count(); ++v) {
     const Patch::View& view = patch_.view(v);
@@ -102,7 +98,7 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
 // The look at `place`, taken anew only if the last one does not serve any more.
 const Monitor::Look& Monitor::look_at(const Cloud& cloud, const Vec3& place, double radius,
                                       Look& last) noexcept {
-  if (last.fresh && (place - last.place).squaredNorm() < look_serves * look_serves) return last;
+  if (last.fresh && (place - last.place).norm() < look_serves * r_c_) return last;
   radius = std::max(radius, narrowest * cloud.spacing(place));
   for (int i = 0; i < 3; ++i, radius *= widening) {
     look(cloud, place, radius, last);
@@ -120,9 +116,9 @@ bool Monitor::still_shown(const Cloud& cloud, double margin) noexcept {
 
 // Keeps account of the side of what the camera sees on which the proxy is. Does the look show a
 // proxy that belongs in front behind?
-bool Monitor::is_behind(const Cloud& cloud, double margin, double deepest, double r_c) noexcept {
+bool Monitor::is_behind(const Cloud& cloud, double margin, double deepest) noexcept {
   if (!proxy_.seen) return false;
-  const bool in_front = proxy_.behind < -margin - r_c;
+  const bool in_front = proxy_.behind < -margin - r_c_;
   if (side_ == Side::unknown) side_ = proxy_.behind < 0.0 ? Side::front : Side::behind;
   if (side_ == Side::behind && in_front) side_ = Side::front;
   if (side_ != Side::front) return false;
@@ -142,32 +138,32 @@ bool Monitor::is_behind(const Cloud& cloud, double margin, double deepest, doubl
     const double nearer = way.dot(line) + proxy_.behind - last_front_.behind;
     const double aside = (way - way.dot(line) * line).norm();
     // Noise of the two looks must not end the watch over the front, however small it is estimated.
-    const double noise = most_margin(parameters_.confidence, proxy_.distance);
+    const double noise = most_margin(proxy_.distance);
     // What came before the surface, while the proxy moved, is no edge that it passed.
     const bool past_edge =
-        nearer > edge_step * r_c + noise + steepest_rise * aside && aside > sideways &&
+        nearer > edge_step * r_c_ + noise + steepest_rise * aside && aside > sideways * r_c_ &&
         (frame_judged_ ? frames_past_edge_ > 0 : still_shown(cloud, margin + noise));
     count_past_edge(past_edge);
     if (past_edge) {
       if (frames_past_edge_ >= parameters_.evidence_frames) side_ = Side::behind;
       return false;
     }
-    if (nearer > farthest_strike + margin) return false;
+    if (nearer > farthest_strike * r_c_ + margin) return false;
   }
   return proxy_.behind <= deepest + margin;
 }
 
 Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noexcept {
   Verdict verdict;
-  const double r_c = contact.r_c;
+  const double r_c = r_c_;
   const auto margin_at = [&](double distance) {
-    return std::max(least_margin, std::min(parameters_.confidence * contact.noise,
-                                           most_margin(parameters_.confidence, distance)));
+    return std::max(least_margin * r_c,
+                    std::min(parameters_.confidence * contact.noise, most_margin(distance)));
   };
   // The frame shows the surface where it was when the frame was captured.
   const Look& proxy = look_at(cloud, contact.proxy - contact.carried, r_c, proxy_);
   const double margin = margin_at(proxy.distance);
-  verdict.behind = is_behind(cloud, margin, contact.deepest, r_c);
+  verdict.behind = is_behind(cloud, margin, contact.deepest);
   verdict.hidden = proxy.seen && proxy.low > edge_step * r_c + margin;
   if (!frame_judged_) {
     frame_judged_ = true;

@@ -9,10 +9,10 @@
 
 namespace palpate {
 
-/// [m] What comes nearer by more than this from frame to frame, whatever their interval, is no
+/// [r_c] What comes nearer by more than this from frame to frame, whatever their interval, is no
 /// surface that a hand rests on, but came between it and the camera: a surface at rest struck with
 /// 90 m/s^2 moves 50 mm in an interval at 30 Hz. Nor is a proxy brought back that lies deeper.
-inline constexpr double farthest_strike = 65e-3;
+inline constexpr double farthest_strike = 13.0;
 
 /// The last word on a contact: checks hand and proxy against what the newest frame itself measures
 /// on their lines of sight. It estimates nothing and trusts no fit. docs/sight.md, 7.
@@ -37,7 +37,6 @@ class Monitor {
     bool held = false;            ///< the surface is hidden and still felt as it was
     Vec3 carried = Vec3::Zero();  ///< [m] world: how far the surface moved since its frame
     double noise = 0.0;           ///< [m] standard deviation of a footprint's height
-    double r_c = 5e-3;            ///< [m] the proxy's contact radius
     double deepest = 0.0;         ///< [m] penetration at which the coupling saturates
   };
   struct Verdict {
@@ -48,7 +47,10 @@ class Monitor {
     Vec3 normal = Vec3::Zero();  ///< [-] unit: there, towards the camera
   };
 
-  void set(const SightParameters& parameters) noexcept;
+  void set(const Parameters& parameters) noexcept {
+    parameters_ = parameters.sight;
+    r_c_ = parameters.proxy.r_c();
+  }
   /// Forgets on which side of the surface the proxy is.
   void forget() noexcept;
   /// A camera's new frame is in use: looks at the one before are void. What has to be so in several
@@ -85,10 +87,12 @@ class Monitor {
 
   const Look& look_at(const Cloud& cloud, const Vec3& place, double radius, Look& look) noexcept;
   void look(const Cloud& cloud, const Vec3& place, double radius, Look& look) noexcept;
-  bool is_behind(const Cloud& cloud, double margin, double deepest, double r_c) noexcept;
+  bool is_behind(const Cloud& cloud, double margin, double deepest) noexcept;
+  [[nodiscard]] double most_margin(double distance) const noexcept;
   bool still_shown(const Cloud& cloud, double margin) noexcept;
 
   SightParameters parameters_;
+  double r_c_ = ProxyParameters().r_c();  // [m]
   Patch patch_;
   Look hand_, proxy_;
   Side side_ = Side::unknown;

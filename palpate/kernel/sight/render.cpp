@@ -2,6 +2,7 @@
 #include "palpate/kernel/sight/render.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "palpate/kernel/core/hand.hpp"
 
@@ -42,13 +43,19 @@ Vec3 ForceRenderer::left_behind(Vec3 force, const Input& input, double stiffness
 // The force falls at once with the knowledge of the surface. It rises as if the surface came back
 // to the hand at `return_speed`: a handle that nobody holds moves along with it, and swings about
 // that speed by no more than that speed. A force that is ramped up in time throws it. Until the
-// surface is back and r_c farther, what frames correct does not make it come faster.
+// surface is back and r_c farther, what frames correct does not make it come faster: only as far as
+// hand and surface move in a tick may the hand get deeper or less deep.
 Vec3 ForceRenderer::come_back(Vec3 force, const Input& input, double stiffness) noexcept {
   const double push = force.norm();
   const double depth = push / stiffness;
-  const double deeper = push > 0.0 ? (hip_ - input.hip).dot(force) / push : 0.0;
-  const double back = input.return_speed * std::max(input.t - t_, 0.0);
+  const double elapsed = std::max(input.t - t_, 0.0);
+  const double way = (input.hip - hip_).norm() + elapsed * input.velocity.norm();
+  const double pressed = std::exchange(pressed_, input.force.norm() / stiffness);
+  const double deeper = std::clamp(pressed_ - pressed, -way, way);
+  const double back = input.return_speed * elapsed;
   felt_ = std::max(felt_ + back + deeper, 0.0);
+  if (input.returned && push > 0.0)
+    felt_ = std::min(felt_, std::max(rendered_.dot(force), 0.0) / (push * stiffness));
   if (input.known < 1.0)
     felt_ = std::min(felt_, input.known * depth);
   else if (felt_ >= depth + input.r_c)
@@ -63,7 +70,7 @@ Vec3 ForceRenderer::render(const Input& input, const Coupling& coupling) noexcep
   if (const double length = force.norm(); length > coupling.max_force)
     force *= (1.0 - 1e-15) * coupling.max_force / length;  // after rounding, too
   force_ = force;
-  force = come_back(force, input, stiffness);
+  rendered_ = force = come_back(force, input, stiffness);
   hip_ = input.hip;
   t_ = input.t;
   return force;

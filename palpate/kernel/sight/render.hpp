@@ -28,8 +28,10 @@ class ForceRenderer {
     double t;                    ///< [s]
     Vec3 force;                  ///< [N] world: the coupling's, from the newest estimate
     std::optional<Vec3> normal;  ///< [-] unit, world: of the surface that is touched
+    Vec3 velocity;               ///< [m/s] world: of that surface, as it is rendered
     double blend;                ///< [s] over which a correction is spread
     double known;                ///< [-] 0 to 1: how well the surface is known
+    bool returned;               ///< the proxy was put back in front: nothing more is felt at once
     double return_speed;         ///< [m/s] at which it comes back once it is known again
     double r_c;                  ///< [m] and so much beyond itself
   };
@@ -47,7 +49,7 @@ class ForceRenderer {
   }
   void forget() noexcept {
     release();
-    force_ = Vec3::Zero();
+    force_ = rendered_ = Vec3::Zero();
     felt_ = fully;
   }
   Vec3 render(const Input& input, const Coupling& coupling) noexcept;
@@ -67,11 +69,13 @@ class ForceRenderer {
   std::optional<Vec3> due_;         // [m/s] a correction came since the last force
   Vec3 offset_ = Vec3::Zero();      // [N] that it leaves to blend out
   double start_ = 0.0;              // [s] of that
-  Vec3 force_ = Vec3::Zero();       // [N] the last one
+  Vec3 force_ = Vec3::Zero();       // [N] the last one, before it faded
+  Vec3 rendered_ = Vec3::Zero();    // [N] and after
   Vec3 hip_ = Vec3::Zero();         // [m] then
   double t_ = 0.0;                  // [s] then
   Vec3 left_at_ = Vec3::Zero();     // [m] the hand in the last tick in which it pressed
   Vec3 left_along_ = Vec3::Zero();  // [-] the last normal there was
+  double pressed_ = 0.0;            // [m] how deep the coupling had the hand then
   double felt_ = fully;             // [m] inside the surface that the hand is felt at most
 };
 

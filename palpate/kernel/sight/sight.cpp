@@ -27,8 +27,9 @@ Sight::Sight(const Parameters& parameters)
 void Sight::set_parameters(const Parameters& parameters) noexcept {
   parameters_ = parameters;
   contact_.mover.set(mover_options(parameters));
-  contact_.tracker.set(parameters.sight);
-  contact_.monitor.set(parameters.sight);
+  contact_.tracker.set(parameters);
+  contact_.monitor.set(parameters);
+  timing_.set(parameters.sight.oldest_frame);
 }
 
 void Sight::seat(const Vec3& proxy) noexcept {
@@ -78,7 +79,7 @@ Vec3 Sight::displacement(double t) const noexcept {
 
 // [m/s, world] of that, as it is rendered at time t [s].
 Vec3 Sight::surface_velocity(double t) const noexcept {
-  constexpr double dt = 1e-3;  // [s]
+  const double dt = contact_.tracker.surface().interval() / 32.0;  // [s] a small part of it
   return (displacement(t) - displacement(t - dt)) / dt;
 }
 
@@ -131,6 +132,7 @@ void Sight::repair_side(const Vec3& points_moved) noexcept {
 void Sight::observe(const Observation& seen) noexcept {
   using Event = SightTracker::Event;
   if (seen.camera >= Patch::max_views) return;
+  const Cloud* previous = frame_.cloud() != nullptr ? frame_.cloud()->of(seen.camera) : nullptr;
   frame_.take(seen, 1.0 / parameters_.motion.frame_rate);
   timing_.frame(frame_.stamp(),
                 frame_.in_order() && frame_.count() > 1 ? frame_.camera_interval() : 0.0);
@@ -146,14 +148,14 @@ void Sight::observe(const Observation& seen) noexcept {
   const Vec3& proxy = *contact_.proxy.at;
   SightTracker& tracker = contact_.tracker;
   // A hidden surface is kept only while the proxy is near it.
-  constexpr double leaves = 20e-3;  // [m]
+  constexpr double leaves = 5.0;  // [r_c] from its centre
   if (tracker.holding() && !rests_on_fit(mode()) &&
-      tracker.contact(proxy, frame_.stamp()).distance > parameters_.proxy.r_c() + leaves) {
+      tracker.contact(proxy, frame_.stamp()).distance > leaves * parameters_.proxy.r_c()) {
     tracker.note(Evidence::lost);
   }
   constexpr double infinite = std::numeric_limits<double>::infinity();
-  const Event event = tracker.frame(*frame_.cloud(), seen.camera, frame_.camera_stamp(), interval(),
-                                    contact_.renderer.hip(), proxy,
+  const Event event = tracker.frame(*frame_.cloud(), previous, seen.camera, frame_.camera_stamp(),
+                                    interval(), contact_.renderer.hip(), proxy,
                                     touches(mode()) ? parameters_.sight.hardest_strike : infinite);
   fuse(seen, event);
   if (event == Event::followed || event == Event::jumped) repair_side(points_moved);
@@ -161,10 +163,10 @@ void Sight::observe(const Observation& seen) noexcept {
 
 // Is a place as near to the fit as the points' noise can stop a proxy?
 bool Sight::is_near_fit(const Vec3& place, double t) const noexcept {
-  constexpr double near = 10e-3;  // [m]
+  constexpr double near = 3.0;  // [r_c]
   const SightTracker& tracker = contact_.tracker;
   return tracker.contact(place, t).distance <=
-         parameters_.proxy.r_c() + near + 4.0 * tracker.surface().spread();
+         near * parameters_.proxy.r_c() + 4.0 * tracker.surface().spread();
 }
 
 // Rests the proxy on the fit, or frees it from there. False if the fit does not say where it is.
@@ -268,20 +270,20 @@ void Sight::release(const Vec3& hip, Movement& movement) noexcept {
 
 // What the newest frame itself shows overrules every estimate: docs/sight.md, 7.
 void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
-  // A frame's correction moves a proxy no farther than a surface is looked for [m].
-  constexpr double farthest_move = 0.3;
+  // [r_c] A frame's correction moves a proxy no farther than a surface is looked for.
+  constexpr double farthest_move = 60.0;
   Proxy& proxy = contact_.proxy;
   SightTracker& tracker = contact_.tracker;
   const double r_c = parameters_.proxy.r_c();
   if (contact_.last_proxy &&
-      (*proxy.at - hip).norm() > (*contact_.last_proxy - hip).norm() + farthest_move) {
+      (*proxy.at - hip).norm() > (*contact_.last_proxy - hip).norm() + farthest_move * r_c) {
     release(hip, movement);
     movement.flags |= proxy_let_go;
   }
   const SightParameters& sight = parameters_.sight;
   const Coupling& coupling = parameters_.coupling;
-  const double deepest =
-      r_c + std::min(coupling.max_force / std::max(coupling.stiffness, 1e-9), farthest_strike);
+  const double deepest = r_c + std::min(coupling.max_force / std::max(coupling.stiffness, 1e-9),
+                                        farthest_strike * r_c);
   const Monitor::Verdict verdict = contact_.monitor.judge(
       *frame_.cloud(), {.hip = hip,
                         .proxy = *proxy.at,
@@ -291,7 +293,6 @@ void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
                                 t - tracker.held_since() < sight.hidden_hold + sight.hidden_fade,
                         .carried = displacement(t),
                         .noise = tracker.surface().beam_sd(),
-                        .r_c = r_c,
                         .deepest = deepest});
   if (verdict.behind) movement.flags |= pop_through_suspected;
   contact_.mover.set_hidden(verdict.hidden);
@@ -337,8 +338,7 @@ Vec3 Sight::render_force(const Vec3& hip, double t, std::uint32_t& flags) noexce
 }
 
 // [-] 0 to 1: how well the surface is known. It fades while it is hidden, and while no frame comes.
-double Sight::knowledge(double t, std::uint32_t flags) const noexcept {
-  if ((flags & returned_to_front) != 0) return 0.0;
+double Sight::knowledge(double t) const noexcept {
   const SightParameters& sight = parameters_.sight;
   const SightTracker& tracker = contact_.tracker;
   double known = 1.0;
@@ -368,8 +368,10 @@ Tick Sight::tick(const Vec3& hip, double t) noexcept {
                                          .t = t,
                                          .force = render_force(hip, t, tick.flags),
                                          .normal = contact_.proxy.normal,
+                                         .velocity = surface_velocity(t),
                                          .blend = parameters_.sight.blend * interval(),
-                                         .known = knowledge(t, tick.flags),
+                                         .known = knowledge(t),
+                                         .returned = (tick.flags & returned_to_front) != 0,
                                          .return_speed = parameters_.sight.return_speed,
                                          .r_c = parameters_.proxy.r_c()},
                                         parameters_.coupling);

@@ -61,7 +61,7 @@ class Sight final : public Method {
   void release(const Vec3& hip, Movement& movement) noexcept;
   void repair_side(const Vec3& points_moved) noexcept;
   Vec3 render_force(const Vec3& hip, double t, std::uint32_t& flags) noexcept;
-  [[nodiscard]] double knowledge(double t, std::uint32_t flags) const noexcept;
+  [[nodiscard]] double knowledge(double t) const noexcept;
   [[nodiscard]] double interval() const noexcept;
   void fuse(const Observation& seen, SightTracker::Event event) noexcept;
   [[nodiscard]] const FusedImage* fused() const noexcept;

@@ -15,25 +15,27 @@ namespace {
 
 using Vec5 = Eigen::Matrix<double, 5, 1>;
 
-constexpr double widest_gate = 60e-3;  // [m]
+constexpr double widest_gate = 12.0;  // [r_c]
 constexpr std::size_t inner_points = 768;
 constexpr std::size_t outer_points = 1280;
 constexpr std::size_t inner_rungs = 2;
 constexpr std::size_t median_points = 192;
-constexpr double narrowest_cell = 4.5e-3;  // [m]
+constexpr double narrowest_cell = 0.9;  // [r_c]
 // A disc's radius in multiples of what lies between points: pi 3^2 = 28 points are enough for a
 // quadric and for an outlier test, and half of them still are at an edge.
 constexpr double least_radius = 3.0;
 // Discs of coarse images grow at least by this from rung to rung; fine ones' by 1.57 to 1.7.
 constexpr double least_growth = 1.25;
-// Residuals this small are no structure, whatever the noise [m].
-constexpr double structure_floor = 50e-6;
-// Noise may grow by this much at once, however little there was [m].
-constexpr double unnoticed_noise = 50e-6;
+// Residuals this small are no structure, whatever the noise [r_c].
+constexpr double structure_floor = 0.01;
+// Noise may grow by this much at once, however little there was [r_c].
+constexpr double unnoticed_noise = 0.01;
+// Less noise is not told from rounding: a standard deviation [r_c].
+constexpr double least_sd = 2e-4;
 // Upper 99 % confidence bounds of a variance estimated from 1 to 5 samples, in multiples of it.
 constexpr std::array upper_bounds = {6000.0, 400.0, 120.0, 50.0, 28.0};
-// [m] Places of a fit that differ by less are the same.
-constexpr double same_centre = 1e-6;
+// [r_c] Places of a fit that differ by less are the same.
+constexpr double same_centre = 2e-4;
 // [-] standard deviations. A disc in use needs so much stronger evidence against it: a change is
 // felt.
 constexpr double hysteresis = 0.5;
@@ -90,7 +92,7 @@ std::size_t changed_since(std::size_t frames, double most, const Reading& readin
 }
 
 // Normal equations of the shape over the newest 2, 4, 8, ... frames: matrix * shape = right_side,
-// in centimetres.
+// in units.
 constexpr std::size_t slope_windows = 4;
 struct SlopeWindow {
   Eigen::Matrix<double, 5, 5> matrix;
@@ -101,7 +103,7 @@ struct SlopeWindow {
 // deviations of what each window of the newest ones gives, the longest first: a surface that turns
 // is never farther off than their noise, and a false alarm costs no more than a little of the
 // averaging.
-// @param point_variance  [cm^2] what one point weighs
+// @param point_variance  [unit^2] what one point weighs
 void confine_slopes(Vec5& shape, std::span<const SlopeWindow> windows, double point_variance,
                     double confidence) {
   for (std::size_t i = windows.size(); i-- > 0;) {
@@ -120,10 +122,14 @@ void confine_slopes(Vec5& shape, std::span<const SlopeWindow> windows, double po
 
 }  // namespace
 
-void SurfaceEstimate::set(const SightParameters& parameters) noexcept {
-  parameters_ = parameters;
-  if (parameters_.usual_noise == 0.0) parameters_.usual_noise = SightParameters::unknown_noise;
-  if (parameters_.noise_growth == 0) parameters_.noise_growth = SightParameters::unknown_growth;
+void SurfaceEstimate::set(const Parameters& parameters) noexcept {
+  parameters_ = parameters.sight;
+  const double before = std::exchange(r_c_, parameters.proxy.r_c());
+  if (r_c_ != before) {
+    set_spacing(0.0);
+    forget_frames();
+    for (Cells& past : cells_) past.full = false;
+  }
 }
 
 double SurfaceEstimate::height_sd() const noexcept {
@@ -150,30 +156,29 @@ double SurfaceEstimate::variance(std::size_t rung, std::size_t camera) const noe
   const std::array<Scatter, rungs>& scatters = scatter_[camera];
   const Scatter& scatter = scatters[rung];
   // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
-  const double most = 4.0 * spread_ + 0.5e-3;
-  const double grown =
-      parameters_.noise_growth == 1 ? distances_[camera] : squared(distances_[camera]);
-  const double usual =
-      squared(std::min(parameters_.usual_noise * grown, most)) + 0.03 * squared(spread_) + 1e-12;
+  const double most = 4.0 * spread_ + 0.1 * r_c_;
+  const double floor = squared(least_sd * r_c_);
+  const double usual = squared(std::min(parameters_.usual_noise_at(distances_[camera]), most)) +
+                       0.03 * squared(spread_) + floor;
   // Noise falls with the area it is averaged over: a wider disc's is the least of this one's.
   double wider = 0.0;
   for (std::size_t j = rung + 1; j < rungs; ++j) wider = std::max(wider, scatters[j].variance);
   if (scatter.samples < 1.0) return std::max(usual, wider);
   const double measured = std::max({scatter.variance * (1.0 + 4.0 / scatter.samples), scatter.least,
                                     std::min(scatter.at_rest, 4.0 * scatter.variance)}) +
-                          1e-12;
+                          floor;
   if (scatter.samples > static_cast<double>(upper_bounds.size())) return measured;
   const double largest =
-      upper_bounds[static_cast<std::size_t>(scatter.samples) - 1] * (scatter.variance + 1e-12);
+      upper_bounds[static_cast<std::size_t>(scatter.samples) - 1] * (scatter.variance + floor);
   return std::max({std::min(usual, largest), measured, wider});
 }
 
 void SurfaceEstimate::set_spacing(double spacing) noexcept {
   double least = least_radius * spacing;
   for (std::size_t j = 0; j < rungs; ++j, least *= least_growth) {
-    radii_[j] = std::max(narrowest_discs[j], least);
+    radii_[j] = std::max(narrowest_discs[j] * r_c_, least);
   }
-  cell_size_ = narrowest_cell * coarseness();
+  cell_size_ = narrowest_cell * r_c_ * coarseness();
 }
 
 std::size_t SurfaceEstimate::most_rungs() const noexcept {
@@ -184,13 +189,13 @@ std::size_t SurfaceEstimate::most_rungs() const noexcept {
 
 bool SurfaceEstimate::misfits(double spacing) const noexcept {
   constexpr double tolerated = 1.4;
-  const double ratio = std::max(narrowest_discs[0], least_radius * spacing) / radii_[0];
+  const double ratio = std::max(narrowest_discs[0] * r_c_, least_radius * spacing) / radii_[0];
   return spacing > 0.0 && (ratio > tolerated || ratio < 1.0 / tolerated);
 }
 
 double SurfaceEstimate::gate(double narrowest) const noexcept {
   // The beam is as wide as the narrowest disc, whose height is the noisiest.
-  return std::clamp(std::max(4.0 * spread_, 6.0 * beam_sd()), narrowest, widest_gate);
+  return std::clamp(std::max(4.0 * spread_, 6.0 * beam_sd()), narrowest, widest_gate * r_c_);
 }
 
 double SurfaceEstimate::displacement(double t) const noexcept {
@@ -218,7 +223,7 @@ SurfaceContact SurfaceEstimate::contact(const Vec3& point, double t, double reac
 void SurfaceEstimate::start_frame(std::size_t camera, double stamp, double interval) noexcept {
   const bool follows = stamp > stamp_ || (stamp == stamp_ && camera != camera_);
   camera_ = camera;
-  if (!(follows && stamp - stamp_ <= longest_gap)) {
+  if (!(follows && stamp - stamp_ <= longest_gap())) {
     stop();
     settled_ = 0;
   }
@@ -235,7 +240,7 @@ bool SurfaceEstimate::start(const Cloud& cloud, const Vec3& foot, const Vec3& up
   jumped_ = false;
   smooth_ = false;
   // Wide enough for the narrowest disc on a surface that leans by 60 degrees
-  const double gate = narrowest_gate * coarseness() + 4.0 * spread_;
+  const double gate = narrowest_gate * r_c_ * coarseness() + 4.0 * spread_;
   return measure(cloud, Vec2::Zero(), Look{gate}, true);
 }
 
@@ -298,7 +303,7 @@ bool SurfaceEstimate::recentre(const Vec2& foot, double wide, double& cut) noexc
   surface_.c[0] += near->median;
   // Smoothed, since quantised depth makes single deviations jump between its steps.
   spread_ = count_ == 0 ? near->deviation : spread_ + 0.2 * (near->deviation - spread_);
-  cut = std::clamp(6.0 * std::max(near->deviation, spread_), 0.5e-3, wide);
+  cut = std::clamp(6.0 * std::max(near->deviation, spread_), 0.1 * r_c_, wide);
   return true;
 }
 
@@ -320,13 +325,13 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
       return false;
     }
     if (!first) break;
-    Moments moments =
-        disc_moments(patch_, frame_, surface_, Disc{foot, 0.0, radii_[1], std::max(cut, 2e-3)});
+    Moments moments = disc_moments(patch_, frame_, surface_,
+                                   Disc{foot, 0.0, radii_[1], std::max(cut, 0.4 * r_c_)}, unit());
     if (moments.xy[0] < 6.0) {
       surface_ = before;
       return false;
     }
-    const Quadric correction = fit_quadric(moments, 0.1 * moments.xy[0]);
+    const Quadric correction = fit_quadric(moments, 0.1 * moments.xy[0], unit());
     surface_.c += correction.c;
   }
 
@@ -351,10 +356,10 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   now.whole = !look.partial;
   now.lost = 0;
   const auto add_ring = [&](std::size_t j) {
-    Moments moments = disc_moments(patch_, frame_, surface_,
-                                   Disc{foot, j == 0 ? 0.0 : radii_[j - 1], radii_[j], cut});
+    Moments moments = disc_moments(
+        patch_, frame_, surface_, Disc{foot, j == 0 ? 0.0 : radii_[j - 1], radii_[j], cut}, unit());
     now.extent[j] = moments.xy[0] / patch_.share() + (j > 0 ? now.extent[j - 1] : 0.0);
-    moments.raise(surface_);
+    moments.raise(surface_, unit());
     if (j > 0) moments.add(now.disc[j - 1]);
     now.disc[j] = moments;
   };
@@ -365,7 +370,8 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
 
   // Where there is noise to average away, look farther.
   const Scatter& inner = scatter_[now.camera][1];
-  const bool noisy = inner.samples >= 1.0 ? inner.variance > squared(20e-6) : spread_ > 0.1e-3;
+  const bool noisy =
+      inner.samples >= 1.0 ? inner.variance > squared(4e-3 * r_c_) : spread_ > 0.02 * r_c_;
   const std::size_t most = most_rungs();
   if (noisy && most > inner_rungs) {
     const double widest = radii_[most - 1];
@@ -393,21 +399,22 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   std::array<bool, Patch::max_views> is_judged{};
   for (std::size_t i = 0; i < count_ && cameras_ > 1 && !look.partial; ++i) {
     const Evidence& e = evidence(i);
-    if (std::exchange(is_judged[e.camera], true) || stamp_ - e.stamp > longest_gap) continue;
-    smooth_ = smooth_ || (e.smooth && (e.centre - foot).squaredNorm() < squared(same_centre));
+    if (std::exchange(is_judged[e.camera], true) || stamp_ - e.stamp > longest_gap()) continue;
+    smooth_ =
+        smooth_ || (e.smooth && (e.centre - foot).squaredNorm() < squared(same_centre * r_c_));
   }
   centre_ = foot;
-  if (foot.norm() > 4e-3 * coarseness()) move_origin(foot);
+  if (foot.norm() > 0.8 * r_c_ * coarseness()) move_origin(foot);
   return true;
 }
 
 // @param learns  new_frame, and nothing was learned from it yet
 void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) noexcept {
   Evidence& now = evidence(0);
-  const Vec2 at = foot / Moments::unit;
+  const Vec2 at = foot / unit();
   Vec5 basis;
   basis << at.x(), at.y(), at.x() * at.x(), at.x() * at.y(), at.y() * at.y();
-  const double cm2 = squared(Moments::unit);
+  const double area = squared(unit());
 
   std::array<Vec5, rungs> shapes;
   std::array<std::array<HeightSample, history>, rungs> heights;
@@ -440,8 +447,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
     const double points = std::max(now.shape[j].points, 1.0);
     Scatter& scatter = scatter_[now.camera][j];
     // Weight of the curvature prior in points, with correlated noise counted by its effect.
-    const double prior =
-        variance(j) * points / cm2 / squared(parameters_.curvature_sd * Moments::unit);
+    const double prior = variance(j) * points / area / squared(parameters_.curvature_sd * unit());
     const auto fit_shape = [&](Eigen::Matrix<double, 5, 5> a, const Vec5& b) {
       a.diagonal().array() += 1e-9;
       a.diagonal().tail<3>().array() += prior;
@@ -449,7 +455,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
     };
     fit_shape(Shape::matrix(sums), Shape::right_side(sums));
     // One deviation more than elsewhere: each of four windows could be wrong in each frame.
-    confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / cm2,
+    confine_slopes(shapes[j], std::span(windows.data(), filled), variance(j) * points / area,
                    parameters_.confidence + 1.0);
     const double above = shapes[j].dot(basis);
     std::array<double, Patch::max_views> own_frames{};
@@ -459,8 +465,8 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
     std::size_t own = 0;
     for (std::size_t i = 0; i < n; ++i) {
       const Evidence& e = evidence(i);
-      heights[j][i] = {
-          e.stamp, (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * Moments::unit};
+      heights[j][i] = {e.stamp,
+                       (e.shape[j].height - e.shape[j].means.dot(shapes[j]) + above) * unit()};
       usual_extent[e.camera] += e.extent[j] / own_frames[e.camera];
     }
     // A disc that an occluder begins to hide has fewer points and more noise.
@@ -482,7 +488,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
           (h[0].doubt + 16.0 * (h[1].doubt + h[3].doubt) + 36.0 * h[2].doubt + h[4].doubt);
       // A single jump is not noise.
       if (scatter.samples >= 4.0) {
-        change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise));
+        change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise * r_c_));
       }
       scatter.samples = std::min(scatter.samples + 1.0, 40.0);
       scatter.variance += (change - scatter.variance) / scatter.samples;
@@ -495,7 +501,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
   // the noise. A disc may differ from the narrower ones, because the surface is not a quadric over
   // its width, and yet move with them: then it determines the motion only.
   const double negligible =
-      2e-6 + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
+      4e-4 * r_c_ + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
   // Until a disc's noise has been measured over time, what its points scatter counts at most: the
   // usual noise of a camera would let a wide disc agree that reaches beyond a body.
   constexpr double unmeasured = 0.5;  // [-] of the spread
@@ -580,16 +586,16 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
   const std::span<const HeightSample> since(past.data(),
                                             std::clamp<std::size_t>(settled_, 1, frames[mover]));
   const double sd = height_sd();
-  const HeightTrack track = track_height(since, sd, interval_, parameters_);
+  const HeightTrack track = track_height(since, sd, interval_, parameters_, r_c_);
   if (new_frame) {
     velocity_ = track.velocity;
     rested_ = velocity_ == 0.0 ? std::min(rested_ + 1, history) : 0;
   }
   const double height = track.height;
   surface_.c.tail<5>() = shapes[chosen];
-  surface_.c.tail<3>() /= Moments::unit;
+  surface_.c.tail<3>() /= unit();
   above_mean_ = since.front().height - height;
-  surface_.c[0] = height - shapes[chosen].dot(basis) * Moments::unit;
+  surface_.c[0] = height - shapes[chosen].dot(basis) * unit();
 }
 
 // Where cameras' poses are not quite right, their heights differ by what is no motion: takes from
@@ -673,16 +679,16 @@ void SurfaceEstimate::look_at_cells(const Vec2& foot, const Look& look, bool new
 
 // Mean square of the cells' residuals about their own best quadric [m^2]: errors of the fit, which
 // grow towards the corners, do not count as structure.
-double SurfaceEstimate::squared_structure(const Cells& frame,
-                                          const std::array<double, cells>& residuals) noexcept {
+double SurfaceEstimate::squared_structure(
+    const Cells& frame, const std::array<double, cells>& residuals) const noexcept {
   Eigen::Matrix<double, 6, 6> a = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
   Vec6 b = Vec6::Zero();
   std::array<Vec6, cells> basis;
   for (std::size_t k = 0; k < cells; ++k) {
     Vec6& means = basis[k];
     means = frame.means[k];
-    means.segment<2>(1) *= 1.0 / Moments::unit;
-    means.tail<3>() *= 1.0 / squared(Moments::unit);
+    means.segment<2>(1) *= 1.0 / unit();
+    means.tail<3>() *= 1.0 / squared(unit());
     a.noalias() += means * means.transpose();
     b += residuals[k] * means;
   }
@@ -715,7 +721,7 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   const Vec2 spread = Vec2(inner.means[2], inner.means[4]) - Vec2(middle.cwiseAbs2());
   // Hysteresis, so that the way to rest does not change from frame to frame.
   const double slack = smooth_ ? 0.5 : 0.35;
-  const bool whole = (middle * Moments::unit - foot).norm() < 0.85 * slack * radii_[0] &&
+  const bool whole = (middle * unit() - foot).norm() < 0.85 * slack * radii_[0] &&
                      spread.minCoeff() > (1.0 - slack) * full_disc() &&
                      spread.maxCoeff() < (1.0 + slack) * full_disc();
   if (!whole) {
@@ -755,7 +761,7 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   const double structure = squared_structure(newest, sums) / squared(n);
   // Structure below the noise of one frame is ignored: over points the proxy would not rest better.
   const double times = std::max((smooth_ ? 6.0 : 3.0) / n, smooth_ ? 2.0 : 1.0);
-  smooth_ = structure <= squared(structure_floor) + times * cell_scatter_.variance;
+  smooth_ = structure <= squared(structure_floor * r_c_) + times * cell_scatter_.variance;
 }
 
 // Noise of a cell, from the differences of two frames in the cells that both measured, less their
@@ -824,7 +830,7 @@ void SurfaceEstimate::move_origin(const Vec2& foot) noexcept {
     e.lost = std::max(e.lost, lost);
     e.centre -= to;
     for (std::size_t j = e.lost; j < e.rungs; ++j) {
-      e.disc[j] = e.disc[j].moved(shift);
+      e.disc[j] = e.disc[j].moved(shift / unit());
       e.shape[j] = Shape::of(e.disc[j]);
     }
   }

@@ -37,7 +37,8 @@ class SurfaceEstimate {
     bool partial = false;  ///< something hides a part of it: where points end is no edge
   };
 
-  void set(const SightParameters& parameters) noexcept;
+  SurfaceEstimate() noexcept { set({}); }
+  void set(const Parameters& parameters) noexcept;
   /// A frame of `camera` at `stamp` [s], `interval` [s] after that camera's one before, will be
   /// measured.
   void start_frame(std::size_t camera, double stamp, double interval) noexcept;
@@ -107,19 +108,24 @@ class SurfaceEstimate {
   }
   /// Points within this [m] of where the surface is expected are its own; `narrowest` [m] at
   /// least.
-  [[nodiscard]] double gate(double narrowest = narrowest_gate) const noexcept;
+  [[nodiscard]] double gate() const noexcept { return gate(narrowest_gate * r_c_); }
+  [[nodiscard]] double gate(double narrowest) const noexcept;
 
   /// [m] of the narrowest disc: nothing smaller is known of the surface.
   [[nodiscard]] double resolution() const noexcept { return radii_[0]; }
   /// [-] that, in multiples of what it is before a fine image.
-  [[nodiscard]] double coarseness() const noexcept { return radii_[0] / narrowest_discs[0]; }
+  [[nodiscard]] double coarseness() const noexcept {
+    return radii_[0] / (narrowest_discs[0] * r_c_);
+  }
+  /// [m] the proxy's contact radius, in multiples of which lengths are given here.
+  [[nodiscard]] double r_c() const noexcept { return r_c_; }
+  /// [s] between frames that can tell a motion.
+  [[nodiscard]] double longest_gap() const noexcept { return 0.5 * parameters_.oldest_frame; }
 
   static constexpr std::size_t rungs = 6;
-  /// Of the discs that a fit may be averaged over [m], before a fine image.
-  static constexpr std::array<double, rungs> narrowest_discs = {7e-3,  11e-3, 18e-3,
-                                                                30e-3, 50e-3, 85e-3};
-  static constexpr double narrowest_gate = 12e-3;  ///< [m]
-  static constexpr double longest_gap = 0.25;      ///< [s] between frames that can tell a motion
+  /// Of the discs that a fit may be averaged over [r_c], before a fine image.
+  static constexpr std::array<double, rungs> narrowest_discs = {1.4, 2.2, 3.6, 6.0, 10.0, 17.0};
+  static constexpr double narrowest_gate = 2.4;  ///< [r_c]
   static constexpr std::size_t least_points = 8;
 
  private:
@@ -134,7 +140,7 @@ class SurfaceEstimate {
     using Sums = Eigen::Matrix<double, 20, 1>;  // they add up over frames
     Sums sums;                          // lower triangle of the matrix, row by row, and right side
     Eigen::Matrix<double, 5, 1> means;  // of x, y, xx, xy, yy
-    double height;                      // mean z [cm]
+    double height;                      // mean z [unit]
     double points;
 
     static Eigen::Matrix<double, 5, 5> matrix(const Sums& sums) noexcept;
@@ -188,17 +194,17 @@ class SurfaceEstimate {
   bool recentre(const Vec2& foot, double gate, double& cut) noexcept;
   void estimate(const Vec2& foot, bool new_frame, bool learns) noexcept;
   void look_at_cells(const Vec2& foot, const Look& look, bool new_frame) noexcept;
-  static double squared_structure(const Cells& frame,
-                                  const std::array<double, cells>& residuals) noexcept;
+  [[nodiscard]] double squared_structure(const Cells& frame,
+                                         const std::array<double, cells>& residuals) const noexcept;
   [[nodiscard]] bool spans_area(const Shape& inner) const noexcept;
-  /// Variance of a full narrowest disc along each axis [cm^2].
+  /// [m] of the moments.
+  [[nodiscard]] double unit() const noexcept { return 2.0 * r_c_; }
+  /// Variance of a full narrowest disc along each axis [unit^2].
   [[nodiscard]] double full_disc() const noexcept {
-    return 0.25 * radii_[0] * radii_[0] / (Moments::unit * Moments::unit);
+    return 0.25 * (radii_[0] / unit()) * (radii_[0] / unit());
   }
   /// Discs of a rung are evidence about the same place if their centres are within this [m].
-  [[nodiscard]] double overlap(std::size_t rung) const noexcept {
-    return std::max(3e-3, 0.5 * radii_[rung]);
-  }
+  [[nodiscard]] double overlap(std::size_t rung) const noexcept { return 0.5 * radii_[rung]; }
   void judge(const Vec2& foot) noexcept;
   void learn_cell_noise(const Cells& newest, const std::array<double, cells>& residuals,
                         const Cells& past, const std::array<double, cells>& older) noexcept;
@@ -222,6 +228,7 @@ class SurfaceEstimate {
   [[nodiscard]] std::size_t most_rungs() const noexcept;
 
   SightParameters parameters_;
+  double r_c_ = 0.0;  // [m]
   Patch patch_;
   LocalPoints points_;  // of the patch
   LocalFrame frame_;
@@ -247,9 +254,9 @@ class SurfaceEstimate {
   std::size_t camera_ = 0;                         // of the frame that is measured
   std::size_t cameras_ = 1;                        // of the frames that are remembered
   std::array<bool, Patch::max_views> is_known_{};  // those
-  std::array<double, Patch::max_views> distances_{};   // [m] from the viewpoints
-  std::array<double, rungs> radii_ = narrowest_discs;  // [m] of the discs
-  double cell_size_ = 4.5e-3;                          // [m]
+  std::array<double, Patch::max_views> distances_{};  // [m] from the viewpoints
+  std::array<double, rungs> radii_{};                 // [m] of the discs
+  double cell_size_ = 0.0;                            // [m]
 
   // The sensor's noise is kept when a contact ends.
   std::array<std::array<Scatter, rungs>, Patch::max_views> scatter_;  // by camera

@@ -168,11 +168,11 @@ constexpr std::int32_t ordered(std::int32_t bits) {
   return bits ^ ((bits >> 31) & 0x7fffffff);
 }
 
-// Coefficients from metres to centimetres: a term of degree d has the unit m^(1-d).
-Vec6 in_units(const Vec6& metres) {
+// Coefficients from metres to units [m]: a term of degree d has the unit m^(1-d).
+Vec6 in_units(const Vec6& metres, double unit) {
   Vec6 c = metres;
-  c[0] /= Moments::unit;
-  c.tail<3>() *= Moments::unit;
+  c[0] /= unit;
+  c.tail<3>() *= unit;
   return c;
 }
 
@@ -206,6 +206,7 @@ Vec2 Quadric::nearest(const Vec3& point, const Vec2& start, const Vec2& centre,
     const double length = d.norm();
     return length <= reach ? p : Vec2(centre + reach / length * d);
   };
+  constexpr double settled = 1e-6;  // [reach]
   Vec2 at = within(start);
   for (int i = 0; i < 8; ++i) {
     // Half the squared distance: its gradient, and its Hessian without (with) the curvature term.
@@ -230,7 +231,7 @@ Vec2 Quadric::nearest(const Vec3& point, const Vec2& start, const Vec2& centre,
     const Vec2 next = within(at - step);
     const double moved = (next - at).norm();
     at = next;
-    if (moved < 1e-9) break;
+    if (moved <= settled * reach) break;
   }
   return at;
 }
@@ -255,14 +256,13 @@ Vec6 Moments::right_side() const noexcept {
   return Eigen::Map<const Vec6>(z.data());
 }
 
-void Moments::raise(const Quadric& surface) noexcept {
-  const Vec6 c = in_units(surface.c);
+void Moments::raise(const Quadric& surface, double unit) noexcept {
+  const Vec6 c = in_units(surface.c, unit);
   const Vec6 ac = normal_matrix() * c;
   Eigen::Map<Vec6>(z.data()) += ac;
 }
 
-Moments Moments::moved(const Vec3& shift) const noexcept {
-  const Vec3 s = shift / unit;
+Moments Moments::moved(const Vec3& s) const noexcept {
   // Powers of x - s_x and y - s_y by the binomial theorem.
   constexpr std::array<std::array<double, 5>, 5> choose = {
       {{1, 0, 0, 0, 0}, {1, 1, 0, 0, 0}, {1, 2, 1, 0, 0}, {1, 3, 3, 1, 0}, {1, 4, 6, 4, 1}}};
@@ -293,17 +293,14 @@ Moments Moments::moved(const Vec3& shift) const noexcept {
 }
 
 Moments disc_moments(const Patch& patch, const LocalFrame& frame, const Quadric& surface,
-                     const Disc& disc) noexcept {
-  constexpr double per_metre = 1.0 / Moments::unit;
-  const Rows rows = rows_of(frame, patch.ball().centre, Moments::unit);
-  const Vec6 in_cm = in_units(surface.c);
-  const Eigen::Matrix<float, 6, 1> c = in_cm.cast<float>();
-  const auto squared = [](double r) { return static_cast<float>(r * r * per_metre * per_metre); };
-  const FloatMoments sums =
-      vectorised<sum_moments>(patch.x(), patch.y(), patch.z(), patch.padded_size(), rows, c.data(),
-                              static_cast<float>(disc.centre.x() * per_metre),
-                              static_cast<float>(disc.centre.y() * per_metre), squared(disc.inner),
-                              squared(disc.outer), static_cast<float>(Moments::unit / disc.cut));
+                     const Disc& disc, double unit) noexcept {
+  const Rows rows = rows_of(frame, patch.ball().centre, unit);
+  const Eigen::Matrix<float, 6, 1> c = in_units(surface.c, unit).cast<float>();
+  const auto squared = [unit](double r) { return static_cast<float>((r / unit) * (r / unit)); };
+  const FloatMoments sums = vectorised<sum_moments>(
+      patch.x(), patch.y(), patch.z(), patch.padded_size(), rows, c.data(),
+      static_cast<float>(disc.centre.x() / unit), static_cast<float>(disc.centre.y() / unit),
+      squared(disc.inner), squared(disc.outer), static_cast<float>(unit / disc.cut));
   Moments moments;
   const auto z = sums.begin() + static_cast<std::ptrdiff_t>(moments.xy.size());
   std::copy(sums.begin(), z, moments.xy.begin());
@@ -311,15 +308,15 @@ Moments disc_moments(const Patch& patch, const LocalFrame& frame, const Quadric&
   return moments;
 }
 
-Quadric fit_quadric(const Moments& moments, double curvature_prior) noexcept {
+Quadric fit_quadric(const Moments& moments, double curvature_prior, double unit) noexcept {
   Eigen::Matrix<double, 6, 6> a = moments.normal_matrix();
   // A very weak prior keeps coefficients at 0 that no point determines.
   for (int i = 0; i < 6; ++i) a(i, i) += 1e-9;
   a.diagonal().tail<3>().array() += curvature_prior;
   Quadric quadric;
   quadric.c = solve_symmetric<6>(a, moments.right_side());
-  quadric.c[0] *= Moments::unit;
-  quadric.c.tail<3>() /= Moments::unit;
+  quadric.c[0] *= unit;
+  quadric.c.tail<3>() /= unit;
   return quadric;
 }
 

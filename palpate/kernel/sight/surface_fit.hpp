@@ -112,19 +112,17 @@ Real deviation_about(float centre, std::span<float> values) noexcept {
 
 /// What points say about a quadric, all that a least-squares fit needs: sums of weights times
 /// monomials x^a y^b, a + b <= 4, and times z x^a y^b, a + b <= 2. They add up, over points and
-/// over frames. Lengths in centimetres, so that all sums are of one magnitude.
+/// over frames. Lengths in a unit of the caller's, such that all sums are of one magnitude.
 struct Moments {
-  static constexpr double unit = 0.01;  ///< [m]
-
   std::array<double, 15> xy{};  ///< 1, x, y, xx, xy, yy, xxx, ...
   std::array<double, 6> z{};    ///< z, zx, zy, zxx, zxy, zyy
 
   void add(const Moments& other) noexcept;
-  /// Adds `surface` to every point's height.
-  void raise(const Quadric& surface) noexcept;
-  /// The same sums about another origin, `shift` [m] from this one.
+  /// Adds `surface` to every point's height. @param unit  [m]
+  void raise(const Quadric& surface, double unit) noexcept;
+  /// The same sums about another origin, `shift` [units] from this one.
   [[nodiscard]] Moments moved(const Vec3& shift) const noexcept;
-  /// A^T A of the fit, and A^T z; in centimetres.
+  /// A^T A of the fit, and A^T z; in units.
   [[nodiscard]] Eigen::Matrix<double, 6, 6> normal_matrix() const noexcept;
   [[nodiscard]] Vec6 right_side() const noexcept;
 };
@@ -137,12 +135,14 @@ struct Disc {
 };
 
 /// Moments of the residuals of a patch's points over `surface`, Tukey-weighted. O(points).
+/// @param unit  [m] of the moments
 Moments disc_moments(const Patch& patch, const LocalFrame& frame, const Quadric& surface,
-                     const Disc& disc) noexcept;
+                     const Disc& disc, double unit) noexcept;
 
 /// Quadric from moments with every frame's height free or not, in metres.
 /// @param curvature_prior  added to the diagonal of the curvature terms: how many points' worth of
-///                         evidence says that a surface is flat [1/cm^4]
-Quadric fit_quadric(const Moments& moments, double curvature_prior) noexcept;
+///                         evidence says that a surface is flat [1/unit^4]
+/// @param unit  [m] of the moments
+Quadric fit_quadric(const Moments& moments, double curvature_prior, double unit) noexcept;
 
 }  // namespace palpate

@@ -10,30 +10,36 @@
 namespace palpate {
 namespace {
 
-// Along a line of sight a surface is looked for this far from where it is expected [m].
-constexpr double reach = 0.3;
-// Occluders are looked for this far in front of the surface [m]: an arm may be held high.
-constexpr double occluder_reach = 1.2;
-constexpr double most_support = 0.7;      // beyond this share nothing else is checked
-constexpr double gate_after_hold = 5e-3;  // [m]
-// Layers along a line of sight are separated by a gap of at least this [m], and by what a surface
+// Lengths are in multiples of r_c, the proxy's contact radius.
+// Along a line of sight a surface is looked for this far from where it is expected [r_c].
+constexpr double reach_in_radii = 60.0;
+double reach(const SurfaceEstimate& surface) {
+  return reach_in_radii * surface.r_c();
+}
+// Occluders are looked for this far in front of the surface [r_c]: an arm may be held high.
+constexpr double occluder_reach = 240.0;
+constexpr double most_support = 0.7;     // beyond this share nothing else is checked
+constexpr double gate_after_hold = 1.0;  // [r_c]
+// Layers along a line of sight are separated by a gap of at least this [r_c], and by what a surface
 // that leans by 70 degrees falls from point to point: tan 70 degrees by a third of the resolution.
-constexpr double narrowest_layer_gap = 20e-3;
+constexpr double narrowest_layer_gap = 4.0;
 constexpr double steepest = 0.92;  // [-]
 double layer_gap(const SurfaceEstimate& surface) {
-  return std::max(narrowest_layer_gap, steepest * surface.resolution());
+  return std::max(narrowest_layer_gap * surface.r_c(), steepest * surface.resolution());
 }
 constexpr std::size_t beam_points = 256;
-// Radius within which an occluder is looked for: that of the cells of SurfaceEstimate::judge [m].
-constexpr double shadow_radius = 15e-3;
-// A fit is used for contacts within this of its centre [m].
-constexpr double serves = 1.5e-3;
+// Radius within which an occluder is looked for: that of the cells of SurfaceEstimate::judge [r_c].
+constexpr double shadow_radius = 3.0;
+// A fit is used for contacts within this of its centre [r_c].
+constexpr double serves = 0.3;
 // While the surface is hidden it cannot be fitted anew: the last fit is used this far from its
-// centre [m].
-constexpr double serves_while_held = 15e-3;
-// Radii of the rings of the map of heights beside the contact [m].
-constexpr double beside_inner = 12e-3;
-constexpr std::array<double, 5> beside_bands = {40e-3, 80e-3, 140e-3, 220e-3, 320e-3};
+// centre [r_c].
+constexpr double serves_while_held = 3.0;
+// Radii of the rings of the map of heights beside the contact [r_c].
+constexpr double beside_inner = 2.4;
+constexpr std::array<double, 5> beside_bands = {8.0, 16.0, 28.0, 44.0, 64.0};
+// [r_c] Beside the contact, heights that differ by less are of one surface, whatever the noise.
+constexpr double one_surface = 3.0;
 constexpr std::size_t beside_points = 640;
 // From so many frames on, a jump is compared with `hardest_strike`.
 constexpr std::size_t well_known = 4;
@@ -83,13 +89,13 @@ std::optional<Layer> first_layer(std::span<float> heights, double gap,
   return std::nullopt;
 }
 
-void SightTracker::set(const SightParameters& parameters) noexcept {
-  least_share_ = parameters.least_share;
+void SightTracker::set(const Parameters& parameters) noexcept {
+  least_share_ = parameters.sight.least_share;
   surface_.set(parameters);
 }
 
 SurfaceContact SightTracker::contact(const Vec3& point, double t) const noexcept {
-  return surface_.contact(point, t, holding() ? serves_while_held : serves);
+  return surface_.contact(point, t, (holding() ? serves_while_held : serves) * surface_.r_c());
 }
 
 // The surface was not measured: it is kept as it was at `since` [s].
@@ -119,8 +125,8 @@ std::size_t SightTracker::best_camera(const ObservedClouds& clouds, const Vec3& 
     const Cloud* cloud = clouds.of(i);
     if (cloud == nullptr) continue;
     if (clouds.parts().size() == 1) return i;
-    gather(*cloud, Beam{place, surface_.resolution(), reach, surface_.frame().up}, beam_points,
-           patch_);
+    gather(*cloud, Beam{place, surface_.resolution(), reach(surface_), surface_.frame().up},
+           beam_points, patch_);
     if (patch_.size() > most || clouds.of(best) == nullptr) best = i;
     most = std::max(most, patch_.size());
   }
@@ -132,8 +138,7 @@ bool SightTracker::others_show(const ObservedClouds& clouds, std::size_t camera,
                                const Vec3& normal, double gate) noexcept {
   for (std::size_t i = 0; i < views_.size(); ++i) {
     const double since = views_[camera].stamp - views_[i].stamp;
-    if (i == camera || clouds.of(i) == nullptr || !(since <= SurfaceEstimate::longest_gap))
-      continue;
+    if (i == camera || clouds.of(i) == nullptr || !(since <= surface_.longest_gap())) continue;
     const std::optional<Seen> shown = look_at(*clouds.of(i), place, surface_.resolution());
     if (shown && shown->line.dot(normal) > faces_at &&
         std::abs(shown->above * shown->line.dot(normal)) <= gate)
@@ -146,16 +151,17 @@ bool SightTracker::others_show(const ObservedClouds& clouds, std::size_t camera,
 SightTracker::Expectation SightTracker::expect(const Vec3& proxy, double elapsed) const noexcept {
   const LocalFrame& axes = surface_.frame();
   const Vec3 hand = axes.local_from_world(proxy);
+  const double r_c = surface_.r_c();
   Expectation expected{
-      .rise = surface_.velocity() * std::min(elapsed, SurfaceEstimate::longest_gap),
+      .rise = surface_.velocity() * std::min(elapsed, surface_.longest_gap()),
       .foot = surface_.surface().nearest(hand, hand.head<2>(), surface_.centre(),
-                                         holding() ? serves_while_held : 2.0 * serves),
+                                         (holding() ? serves_while_held : 2.0 * serves) * r_c),
       .surface = surface_.surface(),
       // After a hold the gate is narrow: the surface is where it was, and what remains of an
       // occluder may be close to it.
-      .gate = holding() ? surface_.gate(gate_after_hold) : surface_.gate()};
+      .gate = holding() ? surface_.gate(gate_after_hold * r_c) : surface_.gate()};
   // An unchanged centre lets frames be compared cell by cell.
-  if ((expected.foot - surface_.centre()).norm() < serves) expected.foot = surface_.centre();
+  if ((expected.foot - surface_.centre()).norm() < serves * r_c) expected.foot = surface_.centre();
   expected.surface.c[0] += expected.rise;
   expected.place = axes.world_from_local(
       Vec3(expected.foot.x(), expected.foot.y(), expected.surface.height(expected.foot)));
@@ -167,16 +173,18 @@ void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expe
                               Sighting& sighting) noexcept {
   const LocalFrame& axes = surface_.frame();
   const Vec3& place = expected.place;
-  gather(cloud, Beam{place, shadow_radius * surface_.coarseness(), occluder_reach, axes.up},
+  const double r_c = surface_.r_c();
+  const double far = occluder_reach * r_c;
+  gather(cloud, Beam{place, shadow_radius * r_c * surface_.coarseness(), far, axes.up},
          wide_beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   if (viewpoint) surface_.set_distance(camera, (*viewpoint - place).norm());
   sighting.is_camera = viewpoint.has_value();
   sighting.line = viewpoint ? Vec3((*viewpoint - place).normalized()) : axes.up;
-  const SightCone inner({place, surface_.resolution(), occluder_reach, axes.up}, viewpoint);
+  const SightCone inner({place, surface_.resolution(), far, axes.up}, viewpoint);
   const Eigen::Vector3f axis = inner.axis().cast<float>();
   const auto radius = static_cast<float>(inner.radius_at(0.0));
-  const auto widening = static_cast<float>(inner.radius_at(1.0) - inner.radius_at(0.0));
+  const auto widening = static_cast<float>((inner.radius_at(far) - inner.radius_at(0.0)) / far);
   const Eigen::Vector3f towards = sighting.line.cast<float>();
   const FloatQuadric surface(expected.surface);
   const std::size_t size = std::min(patch_.size(), wide_beam_points);
@@ -200,8 +208,8 @@ void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expe
   for (std::size_t i = 0; i < size; ++i) {
     const float above = above_surface[i];
     sighting.before += above > gate ? 1 : 0;
-    const bool counts = (off_axis[i] <= 0.0F) & (above <= static_cast<float>(occluder_reach)) &
-                        (above >= static_cast<float>(-reach));
+    const bool counts = (off_axis[i] <= 0.0F) & (above <= static_cast<float>(far)) &
+                        (above >= static_cast<float>(-reach(surface_)));
     const bool is_near = counts & (std::abs(above) <= gate);
     near_above[near] = above;
     near += is_near ? 1 : 0;
@@ -222,9 +230,10 @@ void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expe
 // How much of the disc a camera sees. An occluder that moves in front of a resting contact first
 // hides a part of the disc: the border of the rest is not an edge of the surface. Points that
 // vanish without an occluder in front of them lie in a stereo camera's shadow beside one. A hand
-// that slid there itself has come beside what stood there before.
-void SightTracker::outline(View& view, const Sighting& sighting, const Vec2& foot,
-                           const Vec3& hip) const noexcept {
+// that slid there itself has come beside what stood there before: the camera's previous image
+// tells that from what came over the place since.
+void SightTracker::outline(View& view, const Sighting& sighting, const Expectation& expected,
+                           const Vec3& hip, const Cloud* previous) noexcept {
   constexpr double usual = 0.75;           // [-] of the points
   constexpr std::size_t least_before = 3;  // points
   const Vec3& up = surface_.frame().up;
@@ -232,16 +241,38 @@ void SightTracker::outline(View& view, const Sighting& sighting, const Vec2& foo
   const double still = 0.5 * surface_.resolution();
   const bool slides = (slid - slid.dot(up) * up).squaredNorm() > still * still;
   if (slides) view.hip = hip;
-  const bool stays = foot == surface_.centre() && !slides;
+  const bool stays = expected.foot == surface_.centre() && !slides;
   if (!stays || sighting.near > view.near_usual) view.near_usual = sighting.near;
   const bool covered = sighting.before >= least_before || sighting.near < usual * view.near_usual;
-  const bool arrived = stays && (holding() || view.outline != Outline::cut);
+  const auto came = [&] {
+    return sighting.before >= least_before && previous != nullptr &&
+           2 * covering(*previous, expected) < sighting.before;
+  };
+  const bool arrived = stays ? holding() || view.outline != Outline::cut
+                             : covered && (view.outline == Outline::shadowed || came());
   view.outline = !covered ? Outline::whole : arrived ? Outline::shadowed : Outline::cut;
 }
 
-SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_t camera,
-                                        double stamp, double interval, const Vec3& hip,
-                                        const Vec3& proxy, double hardest_strike) noexcept {
+// How many points of an image lie before the expected surface, of those looked at.
+std::size_t SightTracker::covering(const Cloud& cloud, const Expectation& expected) noexcept {
+  const LocalFrame& axes = surface_.frame();
+  gather(cloud,
+         Beam{expected.place, shadow_radius * surface_.r_c() * surface_.coarseness(),
+              occluder_reach * surface_.r_c(), axes.up},
+         wide_beam_points, patch_);
+  points_.take(patch_, axes);
+  const FloatQuadric surface(expected.surface);
+  const auto gate = static_cast<float>(expected.gate);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < points_.size; ++i)
+    count += points_.z[i] - surface.height(points_.x[i], points_.y[i]) > gate ? 1 : 0;
+  return count;
+}
+
+SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, const Cloud* previous,
+                                        std::size_t camera, double stamp, double interval,
+                                        const Vec3& hip, const Vec3& proxy,
+                                        double hardest_strike) noexcept {
   const Cloud& cloud = *clouds.of(camera);
   View& view = views_[camera];
   view.stamp = stamp;
@@ -254,7 +285,7 @@ SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_
   const bool alone = clouds.parts().size() == 1;
   const double elapsed = alone ? interval : stamp - surface_.stamp();
   // What was captured before the newest evidence says nothing about now.
-  if (!alone && elapsed < 0.0 && elapsed >= -SurfaceEstimate::longest_gap) return Event::none;
+  if (!alone && elapsed < 0.0 && elapsed >= -surface_.longest_gap()) return Event::none;
   const Expectation expected = expect(proxy, elapsed);
   Sighting sighting;
   look_along(cloud, camera, expected, sighting);
@@ -284,7 +315,7 @@ SightTracker::Event SightTracker::frame(const ObservedClouds& clouds, std::size_
   }
   surface_.shift(expected.rise + jump);
   if (holding() && !sighting.there) surface_.forget_frames();
-  outline(view, sighting, expected.foot, hip);
+  outline(view, sighting, expected, hip, previous);
   if (!surface_.add(cloud, expected.foot, {expected.gate, !sighting.there, is_shadowed(camera)})) {
     surface_.shift(-expected.rise - jump);
     // What is seen behind it is not hidden by anything: the surface ends here, as over a hole.
@@ -299,14 +330,14 @@ void SightTracker::watch(const ObservedClouds& clouds, const Vec3& proxy) noexce
   if (tracking()) {
     if (holding()) return;
     const Vec2 below = surface_.frame().local_from_world(proxy).head<2>();
-    if ((below - surface_.centre()).norm() < 5e-3) return;
+    if ((below - surface_.centre()).norm() < surface_.r_c()) return;
   }
   note(Evidence::lost);
   const std::size_t camera = best_camera(clouds, proxy);
   const Cloud& cloud = *clouds.of(camera);
   surface_.set_spacing(cloud.spacing(proxy));
-  gather(cloud, Beam{proxy, surface_.resolution(), reach, surface_.frame().up}, beam_points,
-         patch_);
+  gather(cloud, Beam{proxy, surface_.resolution(), reach(surface_), surface_.frame().up},
+         beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   if (!viewpoint) return;  // no line of sight to follow
   const Vec3 line = (*viewpoint - proxy).normalized();
@@ -329,9 +360,10 @@ void SightTracker::touch(const ObservedClouds& clouds, const Vec3& foot,
     const Vec2 at = local.head<2>();
     const double off = local.z() - surface_.surface().height(at);
     const double away = (at - surface_.centre()).norm();
-    if (faces(normal) && away < 12e-3 &&
-        std::abs(off) < 3e-3 + 4.0 * (surface_.spread() + surface_.height_sd())) {
-      if (away < serves) return;
+    const double r_c = surface_.r_c();
+    if (faces(normal) && away < SurfaceEstimate::narrowest_gate * r_c &&
+        std::abs(off) < 0.6 * r_c + 4.0 * (surface_.spread() + surface_.height_sd())) {
+      if (away < serves * r_c) return;
       const std::size_t measured_by = surface_.camera();
       if (surface_.move_to(*clouds.of(measured_by), at,
                            {surface_.gate(), false, is_shadowed(measured_by)}))
@@ -342,12 +374,11 @@ void SightTracker::touch(const ObservedClouds& clouds, const Vec3& foot,
   const Cloud& cloud = *clouds.of(camera);
   // Where the camera sees the surface well behind this place, the contact from behind is with a
   // stray point.
+  const double gate = SurfaceEstimate::narrowest_gate * surface_.r_c();
   const std::optional<Seen> seen = look_at(cloud, foot, surface_.resolution());
-  if (seen && seen->line.dot(normal) < 0.0 && seen->above < -SurfaceEstimate::narrowest_gate)
-    return;
+  if (seen && seen->line.dot(normal) < 0.0 && seen->above < -gate) return;
   surface_.set_spacing(cloud.spacing(foot));
-  gather(cloud, Beam{foot, surface_.resolution(), SurfaceEstimate::narrowest_gate, normal},
-         beam_points, patch_);
+  gather(cloud, Beam{foot, surface_.resolution(), gate, normal}, beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   Vec3 up = normal;
   if (viewpoint) {
@@ -387,7 +418,7 @@ void SightTracker::start(const ObservedClouds& clouds, std::size_t camera, const
 
 std::optional<SightTracker::Seen> SightTracker::look_at(const Cloud& cloud, const Vec3& place,
                                                         double radius) noexcept {
-  gather(cloud, Beam{place, radius, reach, surface_.frame().up}, beam_points, patch_);
+  gather(cloud, Beam{place, radius, reach(surface_), surface_.frame().up}, beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   if (!viewpoint) return std::nullopt;
   const Vec3 line = (*viewpoint - place).normalized();
@@ -418,7 +449,9 @@ std::optional<Vec3> SightTracker::in_front(const ObservedClouds& clouds, const V
 SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& place) noexcept {
   Ring ring = nothing_beside();
   const LocalFrame& axes = surface_.frame();
-  gather(cloud, Beam{place, beside_bands.back(), reach, axes.up}, beside_points, patch_);
+  const double r_c = surface_.r_c();
+  gather(cloud, Beam{place, beside_bands.back() * r_c, reach(surface_), axes.up}, beside_points,
+         patch_);
   points_.take(patch_, axes);
   const Eigen::Vector3f at = axes.local_from_world(place).cast<float>();
   // Beside the contact the surface is continued as its tangent plane.
@@ -426,7 +459,7 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
   plane.c.segment<2>(1) = surface_.surface().gradient(surface_.centre());
   plane.c[0] = surface_.surface().height(surface_.centre()) - plane.height(surface_.centre());
   const FloatQuadric tangent(plane);
-  const auto squared_band = [](double r) { return static_cast<float>(r * r); };
+  const auto squared_band = [r_c](double r) { return static_cast<float>((r * r_c) * (r * r_c)); };
   for (std::size_t i = 0; i < points_.size; ++i) {
     const float dx = points_.x[i] - at.x();
     const float dy = points_.y[i] - at.y();
@@ -456,17 +489,21 @@ bool SightTracker::is_occluder(const Ring& ring_before, const Ring& now, double 
   constexpr double infinite = std::numeric_limits<double>::infinity();
   const double struck =
       surface_.settled() >= well_known ? 0.5 * hardest_strike * (interval * interval) : infinite;
-  const double most =
-      std::isfinite(hardest_strike) ? times * std::min(struck, farthest_strike) : infinite;
-  if (jump > most + 15e-3 + 4.0 * noise) return true;
-  const double tolerance = std::max(15e-3, 4.0 * noise);
+  const double most = std::isfinite(hardest_strike)
+                          ? times * std::min(struck, farthest_strike * surface_.r_c())
+                          : infinite;
+  const double r_c = surface_.r_c();
+  const double tolerance = std::max(one_surface * r_c, 4.0 * noise);
+  if (jump > most + one_surface * r_c + 4.0 * noise) return true;
   // A cell keeps its nearest point, which is the extreme of the noise.
-  const double nearer = std::max(15e-3, 6.0 * noise);
+  const double nearer = std::max(one_surface * r_c, 6.0 * noise);
   std::size_t same_before = 0;
   std::size_t unchanged = 0;
   for (std::size_t i = 0; i < now.size(); ++i) {
     const double before = ring_before[i];
-    if (before > nearer && std::abs(before - height) < std::min(30e-3, 0.6 * height)) return true;
+    if (before > nearer &&
+        std::abs(before - height) < std::min(2.0 * one_surface * r_c, 0.6 * height))
+      return true;
     if (std::abs(before) < tolerance) {
       ++same_before;
       if (std::abs(now[i] - before) < std::min(tolerance, 0.3 * height)) ++unchanged;

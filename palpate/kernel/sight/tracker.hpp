@@ -37,20 +37,21 @@ class SightTracker {
     hidden,    ///< by an occluder, or nothing was measured: held as it was
   };
 
-  void set(const SightParameters& parameters) noexcept;
+  void set(const Parameters& parameters) noexcept;
   /// Notes what a tick shows. What frames show the tracker notes itself.
   void note(Evidence evidence) noexcept { mode_ = next_mode(mode_, evidence); }
 
   /// Takes a camera's new frame into use: it alone says what is new, and where it does not show the
   /// surface the others' newest ones may.
   /// @param clouds     what each camera saw last, this frame included
+  /// @param previous   what this camera saw before; null: nothing
   /// @param stamp     [s] of the frame
   /// @param interval  [s] after that camera's one before
   /// @param hip, proxy  [m] world
   /// @param hardest_strike  [m/s^2] a layer that would need a larger acceleration is an occluder;
   ///                        infinite for a surface that is not touched yet
-  Event frame(const ObservedClouds& clouds, std::size_t camera, double stamp, double interval,
-              const Vec3& hip, const Vec3& proxy, double hardest_strike) noexcept;
+  Event frame(const ObservedClouds& clouds, const Cloud* previous, std::size_t camera, double stamp,
+              double interval, const Vec3& hip, const Vec3& proxy, double hardest_strike) noexcept;
   /// Looks for a surface to follow behind a proxy in free space, unless one is followed there.
   void watch(const ObservedClouds& clouds, const Vec3& proxy) noexcept;
   /// Follows the surface at a contact that was made with its points.
@@ -99,7 +100,7 @@ class SightTracker {
   enum class Outline : std::uint8_t {
     whole,
     cut,      ///< something hides a part of it
-    shadowed  ///< the same, and it arrived while the contact stayed in place
+    shadowed  ///< the same, and it arrived: the contact did not slide beside it
   };
   // How a camera sees the surface and what is beside it.
   struct View {
@@ -133,8 +134,9 @@ class SightTracker {
   [[nodiscard]] Expectation expect(const Vec3& proxy, double elapsed) const noexcept;
   void look_along(const Cloud& cloud, std::size_t camera, const Expectation& expected,
                   Sighting& sighting) noexcept;
-  void outline(View& view, const Sighting& sighting, const Vec2& foot,
-               const Vec3& hip) const noexcept;
+  void outline(View& view, const Sighting& sighting, const Expectation& expected, const Vec3& hip,
+               const Cloud* previous) noexcept;
+  [[nodiscard]] std::size_t covering(const Cloud& cloud, const Expectation& expected) noexcept;
 
   void start(const ObservedClouds& clouds, std::size_t camera, const Vec3& foot,
              const Vec3& up) noexcept;

@@ -188,7 +188,7 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
     }
     if (verdict.action == Action::release || verdict.action == Action::let_go) return verdict;
   }
-  if (verdict.behind && frames_behind_ >= parameters_.evidence_frames && !contact.held)
+  if (verdict.behind && frames_behind_ >= parameters_.evidence_frames)
     verdict.action = Action::return_to_front;
   if (verdict.action == Action::return_to_front) {
     verdict.normal = proxy.line;

@@ -34,7 +34,6 @@ class Monitor {
     Vec3 proxy;                   ///< [m] world
     Vec3 normal;                  ///< [-] unit, world: where the force points; any if free
     bool touching = false;        ///< is there a force?
-    bool held = false;            ///< the surface is hidden and still felt as it was
     Vec3 carried = Vec3::Zero();  ///< [m] world: how far the surface moved since its frame
     double noise = 0.0;           ///< [m] standard deviation of a footprint's height
     double deepest = 0.0;         ///< [m] penetration at which the coupling saturates

@@ -280,7 +280,6 @@ void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
     release(hip, movement);
     movement.flags |= proxy_let_go;
   }
-  const SightParameters& sight = parameters_.sight;
   const Coupling& coupling = parameters_.coupling;
   const double deepest = r_c + std::min(coupling.max_force / std::max(coupling.stiffness, 1e-9),
                                         farthest_strike * r_c);
@@ -289,8 +288,6 @@ void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
                         .proxy = *proxy.at,
                         .normal = proxy.normal.value_or(Vec3::Zero()),
                         .touching = touches(mode()) || !contact_.renderer.last().isZero(),
-                        .held = tracker.holding() &&
-                                t - tracker.held_since() < sight.hidden_hold + sight.hidden_fade,
                         .carried = displacement(t),
                         .noise = tracker.surface().beam_sd(),
                         .deepest = deepest});

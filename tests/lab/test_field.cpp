@@ -556,10 +556,7 @@ TEST_F(Field, TheRulerIsRightInEveryClassOfVisitsAndAMethodWithoutForcesNumb) {
 // Each for a reason of its own: docs/sight.md, 3, 6 and 7.
 TEST_F(Field, SightIsRightWhereItOnceWasNot) {
   for (const char* text :
-       {"visits:arm-visits?seed=1816226221",      // an arm comes over a sliding hand
-        "visits:arm-visits?seed=1160688892",      // the same, with a stereo camera
-        "visits:person-passes?seed=1770746347",   // near the camera
-        "visits:box-against?seed=1051249893",     // a box that looks like an arm above the hand
+       {"visits:box-against?seed=1051249893",     // a box that looks like an arm above the hand
         "visits:door-ride?seed=1874517061",       // the hand rides on a door, and frames are late
         "field:torus-slide?seed=1830770285",      // it slides down a ring
         "field:corner-slide?seed=1786436634"}) {  // a proxy that seems to be behind

@@ -45,6 +45,7 @@ constexpr std::uint32_t no_support =
 
 }  // namespace
 
+// Hazard: bad-settings
 void validate(const ServoSettings& settings) {
   validate(settings.parameters);
   validate(settings.safety);
@@ -125,6 +126,7 @@ ServoCommands Cycle::commands() const {
   return newest_change_.commands;
 }
 
+// Hazard: scene-jumps, method-switched
 // The proxy is all that another method is told of the one before. True if it is another.
 bool Cycle::adopt_change(const Change& change) noexcept {
   const ServoSettings& settings = change.commands.settings;

@@ -142,6 +142,7 @@ TEST(MeasureDevice, SaysThatItIsUnsureWhereItCannotKnow) {
   EXPECT_FALSE(propose(stiff->info(), stuck));
 }
 
+// Hazard: probe
 TEST(MeasureDevice, EndsWithoutAForceWhenTheHandleGoesTooFarOrTheDeviceLetsGo) {
   const auto ends = [](Wrapped& device, const char* word) {
     const DeviceMeasurement found = measure_device(device);
@@ -173,6 +174,7 @@ TEST(MeasureDevice, EndsWithoutAForceWhenTheHandleGoesTooFarOrTheDeviceLetsGo) {
   EXPECT_FALSE(propose(falling.info(), found));
 }
 
+// Hazard: probe
 TEST(MeasureDevice, RefusesWhatItCannotMeasure) {
   const auto mouse = open_device("mouse:");
   EXPECT_TRUE(fails_saying([&] { return measure_device(*mouse); }, "mouse:", "no motors"));

@@ -25,6 +25,7 @@ TeleopCase over(std::string_view way, double round_trip, bool poor = false) {
   return {.way = way, .up = link, .down = link};
 }
 
+// Hazard: link-delay
 TEST(Teleop, FeelsTheSameAtEveryDelay) {
   const TeleopFigures here = play_teleop_case(teleop_scene("rest", "ideal", 1), over("palpate", 0));
   ASSERT_GT(here.force, 1.0);
@@ -39,6 +40,7 @@ TEST(Teleop, FeelsTheSameAtEveryDelay) {
   }
 }
 
+// Hazard: robot-struck
 TEST(Teleop, KeepsTheToolOutOfWhatComes) {
   for (const std::string_view sensor : {"ideal", "d4xx"}) {
     const TeleopFigures figures =
@@ -56,6 +58,7 @@ TEST(Teleop, ForcesThatCrossTheLinkSwing) {
   }
 }
 
+// Hazard: robot-runaway
 // The hand presses on a resting plane while the link is down for 1.5 s and comes back.
 TEST(Teleop, StopsWithTheLinkAndComesBackWithoutAKick) {
   TeleopScene scene = teleop_scene("rest", "ideal", 1);

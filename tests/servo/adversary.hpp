@@ -14,6 +14,7 @@
 
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/feel/feel.hpp"
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/kernel/tool/shape_touch.hpp"
 #include "palpate/servo/cycle.hpp"
@@ -34,13 +35,14 @@ class Adversary {
  public:
   explicit Adversary(std::uint64_t seed)
       : random_(seed), cycle_(spoiled(make_method("sight")), link_) {
+    constexpr int width = 40, height = 30;
     auto rays = std::make_shared<const ViewingRays>(
-        Intrinsics{.width = 80, .height = 60, .fx = 70, .fy = 70, .cx = 39.5, .cy = 29.5});
+        Intrinsics{.width = width, .height = height, .fx = 35, .fy = 35, .cx = 19.5, .cy = 14.5});
     Eigen::Isometry3d looking_down = Eigen::Isometry3d::Identity();
     looking_down.linear() = Vec3(1, -1, -1).asDiagonal();
     looking_down.translation() = Vec3(0, 0, 0.15);
     for (int i = 0; i < 24; ++i) {
-      std::vector<std::uint16_t> depth(80 * 60);
+      std::vector<std::uint16_t> depth(width * height);
       for (auto& reading : depth) {
         const double z = 0.15 + 0.004 * std::sin(i) + between(-0.003, 0.003);
         const int fate = i % 6 == 5 ? 0 : static_cast<int>(random_() % 50);
@@ -51,9 +53,10 @@ class Adversary {
       clouds_.push_back(std::make_shared<DepthImage>(rays, depth, 10'000.0, looking_down));
     }
     for (int i = 0; i < 8; ++i) {
-      std::vector<Vec3> points = flat_grid(0.002 * i - 0.006, 1.5e-3, 30);
+      const bool many = i == 0;  // a tick takes as long as there are points
+      std::vector<Vec3> points = flat_grid(0.002 * i - 0.006, many ? 1.5e-3 : 3e-3, many ? 30 : 8);
       points.emplace_back(nan, 0, 0);
-      for (int k = 0; k < 300; ++k) points.push_back(place(0.02));
+      for (int k = 0; k < (many ? 300 : 30); ++k) points.push_back(place(0.02));
       clouds_.push_back(std::make_shared<PointCloud>(points, Vec3(0, 0, 1)));
     }
     clouds_.push_back(std::make_shared<PointCloud>(std::vector<Vec3>{}));
@@ -79,7 +82,8 @@ class Adversary {
     t_ += tick_interval();
     feed();
     if (random_() % 20'000 == 0) cycle_.set_settings(settings());
-    if (random_() % 20'000 == 0) switch_method();
+    if (one_in(touches_with_tool_ ? 1000 : 20'000)) switch_method();
+    if (touches_with_tool_) ++tool_ticks_;
     if (latched_ && one_in(500)) cycle_.reset_faults();
     const double given = one_in(50'000) ? nan : t_;
     const bool alone = other_ == nullptr || !is_in_trouble(*other_, given, inf);
@@ -102,6 +106,8 @@ class Adversary {
   [[nodiscard]] double strongest() const { return strongest_; }
   [[nodiscard]] double strongest_torque() const { return strongest_torque_; }
   [[nodiscard]] std::uint64_t forceful_ticks() const { return forceful_ticks_; }
+  [[nodiscard]] std::uint64_t turning_ticks() const { return turning_ticks_; }
+  [[nodiscard]] std::uint64_t tool_ticks() const { return tool_ticks_; }
   [[nodiscard]] const CycleStatistics& statistics() const { return cycle_.statistics(); }
 
  private:
@@ -109,6 +115,60 @@ class Adversary {
   static constexpr double inf = std::numeric_limits<double>::infinity();
   static constexpr double max_torque = 0.1;          // [N m]
   static constexpr double lever = max_torque / 3.3;  // [m]
+
+  // A plane that each frame puts elsewhere and that moves between frames, hard or soft, late to
+  // follow the hand or not: as much to the chain as any method, and a tick costs nearly nothing.
+  class Wall final : public Method {
+   public:
+    explicit Wall(std::uint64_t seed) : random_(seed) {}
+    void seat(const Vec3& /*proxy*/) noexcept override { felt_ = 0.0; }
+    void observe(const Observation& /*seen*/) noexcept override {
+      if (random_() % 4 != 0) return;
+      height_ = 0.006 * share();
+      speed_ = random_() % 2 == 0 ? 0.0 : 0.1 * share();
+      pull_ = (random_() % 8 == 0 ? 3.0 : 0.0) * Vec3(share(), share(), share());
+      sees_inside_out_ = random_() % 40 == 0;
+      if (random_() % 30 != 0) return;
+      normal_ = Vec3(0.7 * share(), 0.7 * share(), 1.0).normalized();
+      lag_ = random_() % 2 == 0 ? 1.0 : 0.05 + 0.4 * std::abs(share());
+      hardness_ = random_() % 3 == 0 ? 0.3 : 1.0;
+    }
+    void set_parameters(const Parameters& p) noexcept override { coupling_ = p.coupling; }
+    Tick tick(const Vec3& hip, double t) noexcept override {
+      const double dt = std::clamp(t - last_t_, 0.0, 1e-3);
+      if (std::isfinite(t)) last_t_ = t;
+      if (std::isfinite(dt)) height_ = std::clamp(height_ + speed_ * dt, -0.01, 0.01);
+      Tick tick = free_tick(hip, t, 0);
+      const double depth = height_ - normal_.dot(hip);
+      if (!is_place(hip) || depth <= 0.0) {
+        felt_ = 0.0;
+        if (!is_place(hip)) tick.proxy = Vec3::Zero();
+        return tick;
+      }
+      felt_ += lag_ * (depth - felt_);
+      tick.proxy = hip + depth * normal_;
+      tick.normal = sees_inside_out_ ? Vec3(-normal_) : normal_;
+      tick.state = ContactState::contact;
+      const double size = hardness_ * coupling_.stiffness * felt_ + coupling_.damping * speed_;
+      tick.force = std::clamp(size, 0.0, coupling_.max_force) * normal_ + pull_;
+      tick.surface_velocity = speed_;
+      tick.surface_motion = speed_ * normal_;
+      tick.hardness = hardness_;
+      return tick;
+    }
+
+   private:
+    double share() { return static_cast<double>(random_() >> 11) * 0x1p-52 - 1.0; }  // -1 to 1
+    std::mt19937_64 random_;
+    Coupling coupling_;
+    Vec3 normal_ = Vec3::UnitZ();
+    double height_ = 0.0, felt_ = 0.0;  // [m]
+    Vec3 pull_ = Vec3::Zero();          // [N]
+    bool sees_inside_out_ = false;
+    double speed_ = 0.0;                 // [m/s]
+    double lag_ = 1.0, hardness_ = 1.0;  // [-]
+    double last_t_ = 0.0;                // [s]
+  };
 
   // A method, but one force in a thousand is wrong; with a torque like a tool's.
   class Spoiled final : public Method {
@@ -121,7 +181,7 @@ class Adversary {
     Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip, {}}, t); }
     Tick tick(const HandPose& hand, double t) noexcept override {
       Tick tick = method_->tick(hand, t);
-      if (random_() % 3000 == 0) arm_ = 0.025 * static_cast<double>(random_() % 4);
+      if (random_() % 3000 == 0) arm_ = any_arm();
       const bool is_ball = tick.torque.isZero(0.0);
       if (is_ball) tick.torque = arm_ * Vec3(tick.force.z(), tick.force.x(), -tick.force.y());
       switch (random_() % 6000) {
@@ -172,9 +232,10 @@ class Adversary {
 
    private:
     int rings_ = 0;
-    double arm_ = 0.0;  // [m]
+    double any_arm() { return 0.025 * static_cast<double>(random_() % 4); }  // [m]
     std::unique_ptr<Method> method_;
     std::mt19937_64 random_;
+    double arm_ = any_arm();
   };
 
   std::shared_ptr<Method> spoiled(std::unique_ptr<Method> method) {
@@ -192,15 +253,19 @@ class Adversary {
   // How the next two seconds go: mostly a hand that touches a live surface, or nothing would be
   // at stake.
   void choose() {
-    hand_mode_ = !one_in(4) ? 0 : static_cast<int>(random_() % 6);
+    hand_mode_ = one_in(4) ? static_cast<int>(random_() % 7) : one_in(6) ? 5 : 0;
     camera_mode_ = !one_in(4) ? 0 : static_cast<int>(random_() % 7);
     time_mode_ = !one_in(4) ? 0 : static_cast<int>(random_() % 4);
+    swing_ = between(0.5e-3, 5e-3);
+    swing_rate_ = between(2.0, 40.0);
     aim_ = Vec3(between(-0.02, 0.02), between(-0.02, 0.02), between(-0.015, 0.015));
   }
 
   void move_hand() {
     Vec3& hand = device_.hand.position;
-    const Vec3 aim = aim_ - clutched_away_;
+    Vec3 aim = aim_ - clutched_away_;
+    // Whoever feels nothing for a while comes out, as one has to, to engage again.
+    if (ticks_ - last_forceful_ > 50 && ticks_ % 512 < 256) aim.z() += 0.05;
     if (!hand.allFinite() || (hand - aim).norm() > 1.0) hand = aim;
     switch (hand_mode_) {
       case 0:
@@ -218,6 +283,9 @@ class Adversary {
       case 4:
         hand += 4e-3 * (aim - hand).normalized();
         break;  // 4 m/s
+      case 5:
+        hand = aim + Vec3(0, 0, swing_ * std::sin(6.283 * swing_rate_ * t_));
+        break;  // swings
       default:  // is no number
         if (one_in(30)) hand = Vec3(one_in(2) ? nan : inf, one_in(2) ? 1e300 : 0.0, 0);
     }
@@ -295,14 +363,19 @@ class Adversary {
     return std::make_shared<FixtureSet>(std::vector<Fixture>{region, guide, honey});
   }
 
-  void switch_method() {
+  // Mostly the plane: methods that look at a cloud have tests of their own, and take ten times as
+  // long; a tool takes a hundred times as long, and does not stay.
+  std::unique_ptr<Method> any_method() {
+    touches_with_tool_ = one_in(10);
+    if (touches_with_tool_)
+      return std::make_unique<ShapeTouch>(make_tool("box:20x10x5mm?points=100", {}), Parameters{});
+    if (!one_in(4)) return std::make_unique<Feel>(std::make_unique<Wall>(random_()), Parameters{});
     const auto& methods = standard_methods().entries();
-    auto method =
-        one_in(20)  // a tool's tick takes ten times as long
-            ? std::make_unique<ShapeTouch>(make_tool("box:20x10x5mm?points=100", {}), Parameters{})
-            : make_method(methods[random_() % methods.size()].name);
-    cycle_.command([&](ServoCommands& told) { told.settings = settings(); },
-                   spoiled(std::move(method)));
+    return make_method(methods[random_() % methods.size()].name);
+  }
+
+  void switch_method() {
+    cycle_.command([&](ServoCommands& told) { told.settings = settings(); }, spoiled(any_method()));
   }
 
   // The same promises of the torque, but that nothing rings.
@@ -332,7 +405,8 @@ class Adversary {
                          !device_.hand.clutched && !latched_ &&
                          device_.hand.fault == DeviceFault::none && alone;
     const double elapsed = std::isfinite(since_last) ? std::max(since_last, 0.0) : 0.0;
-    heat_ += -std::expm1(-elapsed / 20.0) * (last_.squaredNorm() - heat_);
+    const double warms = std::max(last_.norm(), last_torque_.norm() / lever);  // [N]
+    heat_ += -std::expm1(-elapsed / 20.0) * (warms * warms - heat_);
 
     std::string broken;
     if (!force.allFinite()) broken = "a force that is not finite";
@@ -351,7 +425,7 @@ class Adversary {
       if (change > 2.0 + rise + fall) broken = "a force that changes too fast";
     }
     rang_ = rings_;
-    if (heat_ > 0.88 * 0.88 * 1.001) broken = "more force than the motors bear for long";
+    if (heat_ > 0.88 * 0.88 * 1.001) broken = "more than the motors bear for long";
     if ((last_safety_ & frame_late) != 0 && length > last_.norm())
       broken = "a force that grows while a frame is late";
     if ((last_safety_ & output_refused) != 0) broken = "a chain that had to refuse its own result";
@@ -381,6 +455,7 @@ class Adversary {
     }
     strongest_ = std::max(strongest_, length);
     if (length > 0.0) ++forceful_ticks_;
+    if (!device_.torque.isZero(0.0)) ++turning_ticks_;
     last_ = force;
     return broken;
   }
@@ -396,7 +471,8 @@ class Adversary {
   std::vector<std::shared_ptr<const Cloud>> clouds_;
   int hand_mode_ = 0, camera_mode_ = 0, time_mode_ = 0;
   Vec3 aim_ = Vec3::Zero();
-  Vec3 clutched_away_ = Vec3::Zero();  // from the hand to the HIP
+  double swing_ = 0.0, swing_rate_ = 0.0;  // [m], [Hz]
+  Vec3 clutched_away_ = Vec3::Zero();      // from the hand to the HIP
   double t_ = 100.0, next_frame_ = 0.0, stuck_ = 100.0;
   std::size_t cloud_ = 0;
   double last_given_ = 100.0;  // [s] the time that a cycle was told last, if it was one
@@ -409,7 +485,9 @@ class Adversary {
   std::uint32_t last_safety_ = 0;
   bool any_frame_ = false;
   double last_stamp_ = 0.0, fresh_at_ = 0.0, fresh_stamp_ = 0.0;
-  std::uint64_t ticks_ = 0, forceful_ticks_ = 0, last_forceful_ = 0;
+  bool touches_with_tool_ = false;
+  std::uint64_t ticks_ = 0, forceful_ticks_ = 0, turning_ticks_ = 0, tool_ticks_ = 0,
+                last_forceful_ = 0;
   Vec3 last_ = Vec3::Zero(), last_torque_ = Vec3::Zero();
   double heat_ = 0.0, idle_time_ = 0.0, strongest_ = 0.0, strongest_torque_ = 0.0;
 };

@@ -27,6 +27,8 @@ TEST(Adversary, GetsNoForceThatBreaksAPromise) {
     EXPECT_GT(hand.strongest(), 3.0) << "nothing was at stake";
     EXPECT_GT(hand.strongest_torque(), 0.09) << "nothing was at stake";
     EXPECT_GT(hand.forceful_ticks(), ticks / 100) << "nothing was at stake";
+    EXPECT_GT(hand.turning_ticks(), ticks / 400) << "nothing was at stake";
+    EXPECT_GT(hand.tool_ticks(), 0) << "nothing was at stake";
   }
 }
 

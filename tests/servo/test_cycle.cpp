@@ -270,6 +270,7 @@ TEST(Cycle, HoldsTheHipWhileTheHandIsClutchedAndGoesOnFromThere) {
   EXPECT_LT((session.run().tick.hip - Vec3(0, 0, 0.01)).norm(), 1e-15);
 }
 
+// Hazard: not-a-number
 TEST(Cycle, ForgetsAHandThatWasNoNumberOnceItIsOneAgain) {
   Session session;
   session.run_for(0.1);
@@ -451,6 +452,7 @@ TEST(Cycle, FindsNoFaultInTheDirectionsOfHonestContacts) {
   EXPECT_GT(forceful, 400 * runs) << "nothing was at stake";
 }
 
+// Hazard: scene-jumps
 TEST(Cycle, MovesTheHipWithThePlacementAndSeatsTheProxyAnew) {
   Session session;
   session.run_for(2.0);
@@ -463,6 +465,7 @@ TEST(Cycle, MovesTheHipWithThePlacementAndSeatsTheProxyAnew) {
   EXPECT_FALSE(session.run().hand & proxy_reseated) << "once";
 }
 
+// Hazard: scene-jumps
 TEST(Cycle, LetsGoOfTheHandWhereAnotherSceneBegins) {
   Session session;
   session.run_for(2.0);
@@ -502,6 +505,7 @@ TEST(Cycle, KeepsTheForceOffWhileItIsOnHold) {
   EXPECT_TRUE(record.safety & disengaged);
 }
 
+// Hazard: fast-hand
 TEST(Cycle, JudgesTheHandsSpeedOnTheDeviceWhateverTheScale) {
   ServoSettings settings;
   settings.placement.workspace_scale = 10.0;
@@ -519,6 +523,7 @@ TEST(Cycle, JudgesTheHandsSpeedOnTheDeviceWhateverTheScale) {
   EXPECT_EQ(record.position, session.device.hand.position);
 }
 
+// Hazard: nobody-holds
 TEST(Cycle, LetsGoOfADeviceThatNobodyHolds) {
   Session session;
   session.run_for(2.0);
@@ -530,6 +535,7 @@ TEST(Cycle, LetsGoOfADeviceThatNobodyHolds) {
   EXPECT_TRUE(record.safety & disengaged);
 }
 
+// Hazard: late-frame
 TEST(Cycle, SaysThatAFrameIsLateWhateverTheClockOfWhoPutIt) {
   for (const double ahead : {0.0, 100.0}) {
     Session session;
@@ -562,6 +568,7 @@ TEST(Cycle, KeepsTheLargestForceAndTheAgesOfFramesInItsStatistics) {
   EXPECT_GE(statistics.max_force.load(), pressed);
 }
 
+// Hazard: late-loop
 TEST(Cycle, SeatsTheProxyOnTheFreeSideAfterAStall) {
   // While the loop stood still for 50 ms the surface rose by 30 mm, past the proxy.
   Session session;
@@ -622,6 +629,7 @@ TEST(Cycle, TellsTheSafetyChainHowTheSurfaceMoves) {
   EXPECT_TRUE(is_cut(0.0));
 }
 
+// Hazard: late-loop
 TEST(FreeSide, IsBeyondAllThatIsSeenAlongTheSightline) {
   Patch patch;
   std::vector<Vec3> points = flat_grid(0.01, 1.5e-3, 20);
@@ -639,6 +647,7 @@ TEST(FreeSide, IsBeyondAllThatIsSeenAlongTheSightline) {
       << "and no farther than the camera";
 }
 
+// Hazard: bad-settings
 TEST(Cycle, AdoptsSettingsInTheNextCycleAndRefusesBadOnesAtTheDoor) {
   Session session;
   session.run_for(2.0);
@@ -732,6 +741,7 @@ TEST(Cycle, NeitherAllocatesNorReleasesMemory) {
   EXPECT_GT(contacts, 500U) << "it must have touched all of that";
 }
 
+// Hazard: method-switched
 TEST(Cycle, GoesOnWithAnotherMethodWhereTheOldOneWas) {
   Session session;
   session.run_for(2.0);
@@ -782,6 +792,7 @@ Vec3 press_while_methods_change(const std::vector<std::string>& names) {
   return record.tick.force;
 }
 
+// Hazard: method-switched
 TEST(Cycle, SwitchesMethodsWithoutLeavingOneOnesVelocityToTheNext) {
   // A surface at rest gives the same force whichever methods came before.
   const double alone = press_while_methods_change({"sight"}).z();

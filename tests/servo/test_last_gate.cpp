@@ -286,5 +286,28 @@ TEST(LastGate, HoldsAHandlesWeightBesideTheForceWithinOneNewtonAndTheLimit) {
   EXPECT_NEAR(session.run(Vec3(0, 0, 1.0)).z(), 1.0 + 1.0 / 1500.0, 1e-6) << "by a ramp";
 }
 
+// Hazard: chain-wrong, dead-process
+TEST(LastGate, TellsTheDeviceWhatItPassedAndWritesThatAgainOrReleasesIt) {
+  Gated session;
+  session.open();
+  session.wish.held = {0.0, 0.0, 5.0};
+  session.wish.torque = {0.0, 0.01, 0.0};
+  session.run(Vec3(0.3, 0.0, 0.0));
+  EXPECT_EQ(session.device.torque, Vec3(0.0, 0.01, 0.0));
+  EXPECT_EQ(vector_of(session.device.wish.force), Vec3(0.3, 0.0, 0.0));
+  EXPECT_NEAR(session.device.wish.held.z, 1.0, 1e-9) << "not what was asked for";
+  const Vec3 force = session.device.force;
+  EXPECT_EQ(force, Vec3(0.3, 0.0, session.device.wish.held.z));
+  session.device.force = session.device.torque = Vec3::Zero();
+  session.gate.write_again(session.device, session.wish.t);
+  EXPECT_EQ(session.device.force, force);
+  EXPECT_EQ(session.device.torque, Vec3(0.0, 0.01, 0.0));
+
+  session.gate.release(session.device, session.wish.t);
+  EXPECT_EQ(session.device.force, Vec3(0.0, 0.0, 0.0));
+  EXPECT_EQ(session.run(Vec3(0.3, 0.0, 0.0)), Vec3(0.0, 0.0, 0.0)) << "it starts again";
+  EXPECT_LT(session.run(Vec3(0.3, 0.0, 0.0)).norm(), 0.01) << "by the ramp";
+}
+
 }  // namespace test_last_gate
 }  // namespace palpate

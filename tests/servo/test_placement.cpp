@@ -39,6 +39,7 @@ TEST(PlacementTable, GivesBackWhatWasSetAndLeavesTheRestAlone) {
             1e-12);
 }
 
+// Hazard: bad-settings
 TEST(PlacementTable, RefusesUnknownNamesAndValuesOutOfRange) {
   Placement placement;
   const auto set = [&](const char* name, double value) {
@@ -53,6 +54,7 @@ TEST(PlacementTable, RefusesUnknownNamesAndValuesOutOfRange) {
   EXPECT_EQ(placement, Placement{});
 }
 
+// Hazard: scene-jumps
 TEST(Placement, ThatChangesInContactTakesTheForceOffUntilTheHandEngagesAgain) {
   test::FakeDevice device;
   Cycle cycle(make_method(), device);

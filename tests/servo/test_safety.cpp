@@ -549,21 +549,29 @@ TEST(SafetyChain, ComesDownToWhatTheWristsMotorsBear) {
 
 // Hazard: torque, slow-oscillation
 TEST(SafetyChain, SeesAnOscillationThatTheTorqueKeepsUp) {
-  // A wrist that swings by 0.3 rad at 12 Hz on a torsion spring, which answers `late` ticks later.
-  const auto flags_of = [](int late) {
+  // A wrist that swings by `most` [rad] at 12 Hz on a torsion spring, which answers `late` ticks
+  // later. What is left of a torque of 0.1 N m afterwards.
+  const auto left_by = [](int late, double most) {
     Session session(all, with_wrist);
     session.engage();
-    const auto angle = [](int tick) { return 0.3 * std::sin(2.0 * 3.14159265 * 12.0 * ms * tick); };
+    const auto angle = [most](int tick) {
+      return most * std::sin(2.0 * 3.14159265 * 12.0 * ms * tick);
+    };
     std::uint32_t flags = 0;
     for (int i = 0; i < 3000; ++i) {
       session.input.turned = (angle(i) - angle(i - 1)) * Vec3::UnitX();
-      session.input.torque = 0.3 * std::max(-angle(i - late), 0.0) * Vec3::UnitX();
+      session.input.torque = 0.09 / most * std::max(-angle(i - late), 0.0) * Vec3::UnitX();
       flags |= session.run(0.0).flags;
     }
-    return flags & energy_cut;
+    session.input.turned = Vec3::Zero();
+    session.input.torque = Vec3(0.1, 0, 0);
+    const double left = session.run_for(0.1, 0.0).torque.norm();
+    EXPECT_EQ((flags & energy_cut) != 0, left < 0.06) << left;
+    return left;
   };
-  EXPECT_NE(flags_of(10), 0U);
-  EXPECT_EQ(flags_of(-1), 0U) << "a spring, and the tick that the device holds it";
+  EXPECT_LT(left_by(10, 0.3), 0.06);
+  EXPECT_LT(left_by(10, 0.05), 0.06) << "by 1.7 mm at the lever";
+  EXPECT_NEAR(left_by(-1, 0.3), 0.1, 1e-9) << "a spring, and the tick that the device holds it";
 }
 
 // Hazard: torque, fast-oscillation
@@ -975,7 +983,7 @@ TEST(SafetyChain, KeepsItsPromisesForAnyInput) {
   EXPECT_GT(strongest, 3.0) << "the chain was hardly ever engaged";
 }
 
-// Hazard: too-much-force
+// Hazard: too-much-force, bad-settings
 TEST(SafetyChain, StaysWithinItsLimitsWithWhateverParametersAreAllowed) {
   // A force that turns while it may shrink only slowly is neither the old nor the new one.
   Session session(all & ~pull_removed, never_hot,
@@ -1085,6 +1093,7 @@ TEST(SafetyParameters, HaveATableThatKnowsEveryOneAndItsDefault) {
   EXPECT_EQ(safety_flag_names()[std::countr_zero(unsigned{fault_latched})], "fault_latched");
 }
 
+// Hazard: bad-settings
 TEST(SafetyParameters, AreRefusedByNameAndRange) {
   SafetyParameters parameters;
   set_parameter(parameters, "ramp_time", 1.0);

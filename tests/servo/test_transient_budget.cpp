@@ -88,6 +88,27 @@ TEST(TransientBudget, KeepsTheLimitsOfTheForce) {
   EXPECT_TRUE(output.flags & force_cut);
 }
 
+// Hazard: impact, engaging-inside
+TEST(TransientBudget, IsRampedAsTheForce) {
+  Touching hand;
+  hand.input.hand = false;
+  hand.run(0.0, 0.0);
+  hand.input.hand = true;
+  for (int i = 0; i < 300; ++i) hand.run(0.0, 0.0);
+  const SafetyOutput output = hand.run(1.0, 0.9);
+  EXPECT_GT(output.gain, 0.1);
+  EXPECT_LT(output.gain, 0.5);
+  EXPECT_NEAR(output.ring, output.gain * 0.9, 1e-9);
+}
+
+// Hazard: impact, late-frame
+TEST(TransientBudget, IsNotReplacedByALastingForceWhileAFrameIsLate) {
+  Touching hand;
+  ASSERT_NEAR(hand.run(1.0, 0.9).force.z(), 1.9, 1e-9);
+  hand.input.frame_intervals = 9.0;
+  EXPECT_LE(hand.run(3.0, 0.0).force.norm(), 1.0 + 1e-9);
+}
+
 // Hazard: impact
 TEST(TransientBudget, IsNothingWhileSomethingIsAmiss) {
   const auto rings = [](const auto& amiss) {

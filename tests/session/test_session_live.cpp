@@ -391,7 +391,7 @@ TEST(LiveSession, EndsARunWhenItIsAskedTo) {
   ASSERT_NE(session.timing(), nullptr);
 }
 
-// Hazard: session-stops
+// Hazard: session-stops, scene-jumps
 TEST(LiveSession, LetsGoOfTheHandWhereTimeJumpsInARecording) {
   SessionOptions options = patient(std::make_shared<Log>());
   options.open_cameras[0] = std::make_unique<test::MadeSource>(

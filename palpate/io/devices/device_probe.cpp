@@ -428,6 +428,7 @@ void doubt(DeviceMeasurement& result) {
 
 }  // namespace
 
+// Hazard: probe
 DeviceMeasurement measure_device(Device& device, const ProbeOptions& options) {
   check(device, options);
   const auto exciter = std::make_shared<Exciter>(options);

@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-// Hazard: robot-runaway, robot-collides
+// Hazard: robot-runaway, robot-collides, link-delay
 Lead lead_of(const ServoTick& tick) noexcept {
   constexpr std::uint32_t blind = frame_lost | fault_latched | output_refused;
   constexpr std::uint32_t away = hand_clutched | hand_fault;

@@ -7,7 +7,8 @@ import shutil
 import subprocess
 import sys
 
-LOOPS = {"move": "sqrtps", "travel": "sqrtps", "escape": "sqrtps", "deproject_pixels": "cvtdq2ps"}
+LOOPS = {"move": "sqrtps", "travel": "sqrtps", "escape": "sqrtps", "deproject_pixels": "cvtdq2ps",
+         "raise": "divps"}
 REGISTERS = {"any": "xmm", "avx2": "ymm", "avx512": "zmm"}
 LEAST = 12  # packed operations on the widest registers in a loop
 

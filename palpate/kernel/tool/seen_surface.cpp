@@ -5,6 +5,7 @@
 #include <cmath>
 #include <span>
 
+#include "palpate/kernel/core/lanes.hpp"
 #include "palpate/kernel/sight/monitor.hpp"
 #include "palpate/kernel/sight/relief.hpp"
 #include "palpate/kernel/sight/render.hpp"
@@ -38,11 +39,82 @@ constexpr int wide_step = 4;             // cells from one of those to the next
 constexpr double farthest_cell = 1.0;  // [m] from the place
 constexpr double trusted_scatter = 1.5;
 constexpr double refused_scatter = 3.0;
+// [-] cosine between the tool's outward normal and the surface's: more is its far side.
+constexpr double facing = 0.5;
 // [m] and spreads below an edge: a place so deep is beside a body, not on its rim.
 constexpr double rim = 1.5e-3;
 constexpr double rim_spreads = 4.0;
 
+// (4), block by block: compilers make vector code of all but the look-up.
+PALPATE_VECTORISED
+void raise(const SeenSurface::View& view, const PointArrays& points, float* gap) {
+  constexpr int side = SeenSurface::side;
+  constexpr float last = side - 1;  // the window's last row and column have no next one
+  const auto [x, y, z, size] = points;
+  const std::array<float, 9>& r = view.turn;
+  const std::array<float, 3>& s = view.shift;
+  for (std::size_t block = 0; block < whole_blocks(size); block += sum_lanes) {
+    FloatLanes depth, p, q, upper_left, upper_right, lower_left, lower_right;
+    std::array<std::int32_t, sum_lanes> cell;
+    for (std::size_t lane = 0; lane < sum_lanes; ++lane) {
+      const std::size_t i = block + lane;
+      const float away = r[6] * x[i] + r[7] * y[i] + r[8] * z[i] + s[2];
+      const float inverse = 1.0F / away;
+      float u = view.cu + view.fu * ((r[0] * x[i] + r[1] * y[i] + r[2] * z[i] + s[0]) * inverse);
+      float v = view.cv + view.fv * ((r[3] * x[i] + r[4] * y[i] + r[5] * z[i] + s[1]) * inverse);
+      // One condition at a time, as vectors have them. A NaN meets none.
+      float known = away > 0.0F ? away : unknown;
+      known = u >= 0.0F ? known : unknown;
+      known = v >= 0.0F ? known : unknown;
+      known = u < last ? known : unknown;
+      known = v < last ? known : unknown;
+      u = known > 0.0F ? u : 0.0F;
+      v = known > 0.0F ? v : 0.0F;
+      const auto a = static_cast<std::int32_t>(u);
+      const auto b = static_cast<std::int32_t>(v);
+      p[lane] = u - static_cast<float>(a);
+      q[lane] = v - static_cast<float>(b);
+      cell[lane] = b * side + a;
+      depth[lane] = known;
+    }
+    for (std::size_t lane = 0; lane < sum_lanes; ++lane) {
+      const float* here = view.depth + cell[lane];
+      upper_left[lane] = here[0];
+      upper_right[lane] = here[1];
+      lower_left[lane] = here[side];
+      lower_right[lane] = here[side + 1];
+    }
+    for (std::size_t lane = 0; lane < sum_lanes; ++lane) {
+      const float above = upper_left[lane] + p[lane] * (upper_right[lane] - upper_left[lane]);
+      const float below = lower_left[lane] + p[lane] * (lower_right[lane] - lower_left[lane]);
+      const float surface = above + q[lane] * (below - above);
+      // Beside a hole that of the nearest cell.
+      const float upper = p[lane] < 0.5F ? upper_left[lane] : upper_right[lane];
+      const float lower = p[lane] < 0.5F ? lower_left[lane] : lower_right[lane];
+      const float nearest = q[lane] < 0.5F ? upper : lower;
+      const float here = (surface == surface ? surface : nearest) - depth[lane];
+      float& highest = gap[block + lane];
+      highest = here > highest ? here : highest;
+    }
+  }
+}
+
+// (9), cell by cell: small corrections of the relief are followed slowly, large ones at once.
+PALPATE_VECTORISED
+void follow(const float* relief, std::size_t size, float slow, float more, float large,
+            float* smooth) {
+  for (std::size_t i = 0; i < whole_blocks(size); ++i) {
+    const float off = relief[i] - smooth[i];
+    const float share = std::abs(off) * large;
+    smooth[i] += (slow + more * (share < 1.0F ? share : 1.0F)) * off;
+  }
+}
+
 }  // namespace
+
+void SeenSurface::raise_gaps(const View& view, const PointArrays& points, float* gap) noexcept {
+  vectorised<raise>(view, points, gap);
+}
 
 Vec3 SeenSurface::in_camera(const Vec3& place) const noexcept {
   return pose_.linear().transpose() * (place - pose_.translation());
@@ -87,6 +159,14 @@ void SeenSurface::start_cell(int u, int v) noexcept {
   Cells& all = cells_[0];
   const std::size_t i = index(u, v);
   const float z = read(u, v);
+  // The middle of a cell with an even number of pixels is half a pixel before the next one's.
+  const Intrinsics& k = image_->intrinsics();
+  const Eigen::Vector2d ray =
+      image_->rays().ray(std::clamp(u * stride_ + stride_ / 2, 0, k.width - 1),
+                         std::clamp(v * stride_ + stride_ / 2, 0, k.height - 1));
+  const double half = stride_ % 2 == 0 ? 0.5 : 0.0;
+  all.ray_x[i] = static_cast<float>(ray.x() - half / k.fx);
+  all.ray_y[i] = static_cast<float>(ray.y() - half / k.fy);
   all.relief[i] = z > 0.0F ? z - newest_ : unknown;
   all.smooth[i] = all.relief[i];
   all.drift[i] = 0.0F;
@@ -262,17 +342,18 @@ void SeenSurface::start_tick(const Aim& aim, double t, const SightParameters& pa
     blend_time_ = parameters.blend * interval_;
     offset_ = carried_ - level(t);
   }
-  // (9): small corrections of the relief are followed slowly, large ones at once.
   const double dt = std::clamp(t - t_, 0.0, longest_tick);
   const auto slow = static_cast<float>(dt / (dt + slow_intervals * interval_));
   const auto more = static_cast<float>(dt / (dt + quick)) - slow;
   const float large = 1.0F / std::max(large_spreads * spread_, 1e-4F);
+  vectorised<follow>(all.relief.data(), count, slow, more, large, all.smooth.data());
   const auto now = static_cast<float>(level(t) + offset(t));
-  for (std::size_t i = 0; i < count; ++i) {
-    const float off = all.relief[i] - all.smooth[i];
-    const float size = std::abs(off) * large;
-    all.smooth[i] += (slow + more * (size < 1.0F ? size : 1.0F)) * off;
-    all.shown[i] = now + all.smooth[i];
+  float* shown = all.shown.data();
+  for (int v = v_; v < v_ + side; ++v) {
+    const float* row = &all.smooth[index(0, v)];
+    const int first = u_ & (side - 1);
+    for (int u = first; u < side; ++u) *shown++ = now + row[u];
+    for (int u = 0; u < first; ++u) *shown++ = now + row[u];
   }
   t_ = t;
 }
@@ -296,10 +377,8 @@ SeenSurface::View SeenSurface::view(const Eigen::Isometry3d& world_from_tool) co
   const double middle = 0.5 * (stride_ - 1);
   view.fu = static_cast<float>(k.fx / stride_);
   view.fv = static_cast<float>(k.fy / stride_);
-  view.cu = static_cast<float>((k.cx + shift_u_ - middle) / stride_);
-  view.cv = static_cast<float>((k.cy + shift_v_ - middle) / stride_);
-  view.u = u_;
-  view.v = v_;
+  view.cu = static_cast<float>((k.cx + shift_u_ - middle) / stride_ - u_);
+  view.cv = static_cast<float>((k.cy + shift_v_ - middle) / stride_ - v_);
   view.depth = cells_[0].shown.data();
   return view;
 }
@@ -313,7 +392,7 @@ Vec3 SeenSurface::velocity(double t) const noexcept {
   return (level(t) - level(t - dt)) / dt * pose_.linear().col(2);
 }
 
-std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place,
+std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place, const Vec3& outward,
                                                  double side_depth) const noexcept {
   const Cells& all = cells_[0];
   const Intrinsics& k = image_->intrinsics();
@@ -327,8 +406,8 @@ std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place,
   const int v = v_ + static_cast<int>(y);
   const double a = x - std::floor(x), b = y - std::floor(y);
   // The four cells about it: are they of one surface?
-  const std::array<double, 4> corner{all.shown[index(u, v)], all.shown[index(u + 1, v)],
-                                     all.shown[index(u, v + 1)], all.shown[index(u + 1, v + 1)]};
+  const float* four = &all.shown[shown_index(u, v)];
+  const std::array<double, 4> corner{four[0], four[1], four[side], four[side + 1]};
   double low = std::numeric_limits<double>::max(), high = 0.0;
   std::size_t known = 0;
   for (const double z : corner) {
@@ -340,13 +419,13 @@ std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place,
   if (known == 0) return std::nullopt;
   const double pitch = p.z() * stride_ / k.fx;  // [m] between cells
   const double jump = steepest * pitch + rim_spreads * noise();
-  const std::size_t nearest = index(a < 0.5 ? u : u + 1, b < 0.5 ? v : v + 1);
-  Fit result{};
+  const int nearest_u = a < 0.5 ? u : u + 1;
+  const int nearest_v = b < 0.5 ? v : v + 1;
+  const double here = all.shown[shown_index(nearest_u, nearest_v)];
   double from = known == 4 ? (1 - b) * ((1 - a) * corner[0] + a * corner[1]) +
                                  b * ((1 - a) * corner[2] + a * corner[3])
-                           : double{all.shown[nearest]};
+                           : here;
   if (!(from > 0.0)) from = low;
-  Vec3 normal;
   if (high - low > jump) {
     if (known == 4 && p.z() > low + rim + rim_spreads * noise()) {
       if (p.z() > low + side_depth) return std::nullopt;
@@ -356,14 +435,12 @@ std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place,
       const double along_v =
           ((1 - a) * (corner[2] - corner[0]) + a * (corner[3] - corner[1])) / pitch;
       const double steep = std::sqrt(1.0 + along_u * along_u + along_v * along_v);
-      normal = Vec3(along_u, along_v, -1.0) / steep;
-      result = {.gap = (from - p.z()) / steep, .normal = {}, .unseen = 0.0, .wall = true};
-      result.normal = pose_.linear() * normal;
-      result.unseen = unseen_since(all.seen[nearest]);
-      return result;
+      return Fit{.gap = (from - p.z()) / steep,
+                 .normal = pose_.linear() * (Vec3(along_u, along_v, -1.0) / steep),
+                 .unseen = unseen_since(all.seen[index(nearest_u, nearest_v)]),
+                 .wall = true};
     }
     // On the layer of the nearest cell: a rim ends half a cell beyond its last one.
-    const double here = all.shown[nearest];
     from = here > 0.0 ? here : low;
   }
   // The plane through the cells of that surface (10): through far ones, too, as far as noise alone
@@ -373,15 +450,19 @@ std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place,
   };
   Plane near = plane(near_cells, 1);
   if (near.cells == 0) return std::nullopt;
+  const auto normal_of = [&](const Eigen::Vector2d& slope) -> Vec3 {
+    return pose_.linear() * Vec3(slope.x(), slope.y(), -1.0).normalized();
+  };
+  if (normal_of(near.slope).dot(outward) > facing) return std::nullopt;
   if (const Plane wide = plane(wide_cells, wide_step); wide.cells > near.cells / 2) {
     const double scatter = wide.scatter / std::max(noise(), 0.3 / image_->units_per_metre());
     const double share = ease((scatter - trusted_scatter) / (refused_scatter - trusted_scatter));
     near.height += share * (wide.height - near.height);
     near.slope += share * (wide.slope - near.slope);
   }
-  normal = Vec3(near.slope.x(), near.slope.y(), -1.0).normalized();
-  return Fit{.gap = (p.z() - near.height) * normal.z(),
-             .normal = pose_.linear() * normal,
+  const Vec3 normal = normal_of(near.slope);
+  return Fit{.gap = (p.z() - near.height) * pose_.linear().col(2).dot(normal),
+             .normal = normal,
              .unseen = unseen_since(near.newest),
              .wall = false};
 }
@@ -390,27 +471,21 @@ std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place,
 SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells,
                                             int step) const noexcept {
   const Cells& all = cells_[0];
-  const Intrinsics& k = image_->intrinsics();
-  const int middle_u = u_ + static_cast<int>(std::lround(middle.x));
-  const int middle_v = v_ + static_cast<int>(std::lround(middle.y));
+  const int middle_u = static_cast<int>(std::lround(middle.x));
+  const int middle_v = static_cast<int>(std::lround(middle.y));
   const int reach = cells * step;
-  // Half a pixel from the middle where a cell has an even number of them.
-  const double half = stride_ % 2 == 0 ? 0.5 : 0.0;
+  const auto first = [&](int at) { return at < reach ? at % step : at - reach; };
   double sx = 0.0, sy = 0.0, sz = 0.0, xx = 0.0, xy = 0.0, yy = 0.0, xz = 0.0, yz = 0.0, zz = 0.0;
   Plane plane;
-  for (int v = middle_v - reach; v <= middle_v + reach; v += step) {
-    for (int u = middle_u - reach; u <= middle_u + reach; u += step) {
-      if (u < u_ || v < v_ || u >= u_ + side || v >= v_ + side) continue;
-      const std::size_t i = index(u, v);
-      const double z = all.shown[i];
-      const double away = std::max(std::abs(u - u_ - middle.x), std::abs(v - v_ - middle.y));
+  for (int v = first(middle_v); v <= std::min(middle_v + reach, side - 1); v += step) {
+    for (int u = first(middle_u); u <= std::min(middle_u + reach, side - 1); u += step) {
+      const double z = all.shown[static_cast<std::size_t>(v * side + u)];
+      const double away = std::max(std::abs(u - middle.x), std::abs(v - middle.y));
       if (!(std::abs(z - middle.from) <= middle.jump * std::max(away, 1.0))) continue;
-      const Eigen::Vector2d ray =
-          image_->rays().ray(std::clamp(u * stride_ + stride_ / 2, 0, k.width - 1),
-                             std::clamp(v * stride_ + stride_ / 2, 0, k.height - 1));
+      const std::size_t i = index(u_ + u, v_ + v);
       // Relative to the place: small numbers, whose squares lose nothing.
-      const double px = (ray.x() - half / k.fx) * z - middle.p.x();
-      const double py = (ray.y() - half / k.fy) * z - middle.p.y();
+      const double px = double{all.ray_x[i]} * z - middle.p.x();
+      const double py = double{all.ray_y[i]} * z - middle.p.y();
       const double pz = z - middle.from;
       if (!(std::abs(px) + std::abs(py) < farthest_cell)) continue;  // nor a pixel without a ray
       sx += px;
@@ -430,7 +505,7 @@ SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells,
   const auto of = static_cast<double>(plane.cells);
   const double mx = sx / of, my = sy / of, mz = sz / of;
   plane.height = middle.from + mz;
-  const double pitch = middle.p.z() * stride_ / k.fx;
+  const double pitch = middle.p.z() * stride_ / image_->intrinsics().fx;
   // Cells on a line have no slope across it.
   const double least = 1e-6 * of * pitch * pitch;
   const double cxx = xx - sx * mx + least, cxy = xy - sx * my, cyy = yy - sy * my + least;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/core/patch_loops.hpp"
 #include "palpate/kernel/sight/height_track.hpp"
 
 namespace palpate {
@@ -48,21 +49,25 @@ class SeenSurface {
   void start_tick(const Aim& aim, double t, const SightParameters& parameters) noexcept;
   [[nodiscard]] bool active() const noexcept { return image_ != nullptr; }
 
-  /// The part of a tick that is done for each point, without calls.
+  /// How points of a tool are projected to cells.
   struct View {
     std::array<float, 9> turn;  ///< camera_from_tool, row by row
     std::array<float, 3> shift;
     float fu, fv, cu, cv;  ///< cells by slope
-    int u, v;              ///< the first cell
-    const float* depth;    ///< [m] of cells, by `index`; NaN: unknown
+    const float* depth;    ///< [m] of cells, row by row; NaN: unknown
   };
   [[nodiscard]] View view(const Eigen::Isometry3d& world_from_tool) const noexcept;
-  /// [m] along the optical axis from a point of the tool to the surface; NaN: nothing is known.
-  [[nodiscard]] static float gap(const View& view, float x, float y, float z) noexcept;
+  /// Raises each gap to that of its point: [m] along the optical axis to the surface (4). A point
+  /// of which nothing is known raises none.
+  /// @param points  [m] of the tool, in whole blocks
+  static void raise_gaps(const View& view, const PointArrays& points, float* gap) noexcept;
 
   /// The surface about the cell that a place [m, world] is before or behind.
+  /// @param outward     [-] unit, world: where the tool's surface faces there
   /// @param side_depth  [m] how deep the sides of bodies are
-  [[nodiscard]] std::optional<Fit> fit(const Vec3& place, double side_depth) const noexcept;
+  /// @return none where nothing is known, or the surface cannot touch this side of the tool
+  [[nodiscard]] std::optional<Fit> fit(const Vec3& place, const Vec3& outward,
+                                       double side_depth) const noexcept;
   /// [m] standard deviation of a cell's average.
   [[nodiscard]] double noise() const noexcept;
   /// [m/s] world: how the surface moves.
@@ -77,12 +82,14 @@ class SeenSurface {
  private:
   static constexpr std::size_t count = std::size_t{side} * side;
   struct Cells {
-    std::array<float, count> shown;   // [m] depth now
+    std::array<float, count> shown;   // [m] depth now, row by row of the window
     std::array<float, count> relief;  // [m] above the level; NaN: unknown
     std::array<float, count> drift;   // [m] mean of the newest deviations from it
     std::array<float, count> frames;  // [-] in the relief
     std::array<float, count> smooth;  // [m] the relief as it is shown
     std::array<double, count> seen;   // [s] stamp of the newest frame that showed it
+    std::array<float, count> ray_x;   // [-] of the ray through its middle
+    std::array<float, count> ray_y;
   };
 
   /// Where a plane is fitted.
@@ -103,6 +110,10 @@ class SeenSurface {
 
   static std::size_t index(int u, int v) noexcept {
     return static_cast<std::size_t>((v & (side - 1)) * side + (u & (side - 1)));
+  }
+  // The same of `shown`.
+  [[nodiscard]] std::size_t shown_index(int u, int v) const noexcept {
+    return static_cast<std::size_t>((v - v_) * side + (u - u_));
   }
   void aim_at(const Aim& aim) noexcept;
   void start_cell(int u, int v) noexcept;
@@ -140,33 +151,5 @@ class SeenSurface {
   double blend_start_ = -std::numeric_limits<double>::infinity();
   double t_ = -std::numeric_limits<double>::infinity();  // [s] of the last tick
 };
-
-inline float SeenSurface::gap(const View& view, float x, float y, float z) noexcept {
-  constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
-  const std::array<float, 9>& r = view.turn;
-  const float depth = r[6] * x + r[7] * y + r[8] * z + view.shift[2];
-  const float inverse = 1.0F / depth;
-  const float u = view.cu + view.fu * ((r[0] * x + r[1] * y + r[2] * z + view.shift[0]) * inverse);
-  const float v = view.cv + view.fv * ((r[3] * x + r[4] * y + r[5] * z + view.shift[1]) * inverse);
-  // Written so that a NaN is outside. The window's last row and column have no next one.
-  const float inside_u = u - static_cast<float>(view.u);
-  const float inside_v = v - static_cast<float>(view.v);
-  if (!(depth > 0.0F && inside_u >= 0.0F && inside_v >= 0.0F && inside_u < side - 1 &&
-        inside_v < side - 1))
-    return nowhere;
-  const int a = static_cast<int>(inside_u);
-  const int b = static_cast<int>(inside_v);
-  const float p = inside_u - static_cast<float>(a);
-  const float q = inside_v - static_cast<float>(b);
-  const int left = (view.u + a) & (side - 1);
-  const int right = (view.u + a + 1) & (side - 1);
-  const float* upper = view.depth + ((view.v + b) & (side - 1)) * side;
-  const float* lower = view.depth + ((view.v + b + 1) & (side - 1)) * side;
-  const float above = upper[left] + p * (upper[right] - upper[left]);
-  const float below = lower[left] + p * (lower[right] - lower[left]);
-  const float surface = above + q * (below - above);
-  if (surface == surface) return surface - depth;
-  return (q < 0.5F ? upper : lower)[p < 0.5F ? left : right] - depth;  // beside a hole
-}
 
 }  // namespace palpate

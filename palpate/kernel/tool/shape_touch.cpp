@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/lanes.hpp"
 #include "palpate/kernel/core/mathematics.hpp"
 #include "palpate/kernel/sight/render.hpp"
 
@@ -22,8 +23,9 @@ constexpr double margin = 4e-3;
 constexpr double deepest = 10e-3;
 // [points/tick] over which a tick's steps are taken: 100 us at 10 ns.
 constexpr std::size_t scanned = 10'000;
-// Points of the coarse level that looks whether a hand is in free space.
-constexpr std::size_t coarse = 256;
+// Points of each patch that tell whether a hand is in free space.
+constexpr std::size_t coarse = patch_block;
+constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
 constexpr std::size_t most_moves = 4;  // of a tick
 constexpr double at_rest = 2e-6;       // [m] a shorter step is none
 constexpr double same_plane = 0.5e-3;  // [m] of a point in a tick before a plane is fitted anew
@@ -31,23 +33,57 @@ constexpr double lost = 0.3;           // [m] between hand and proxy: no contact
 constexpr double spin_time = 2e-3;     // [s] over which a spin is smoothed, as HandVelocity is
 constexpr double longest_gap = 20e-3;  // [s] over more, differences are no velocity
 constexpr double free_gap = 0.5e-3;    // [m] beside the noise, that a free tool is in front
-constexpr double facing =
-    0.5;  // [-] cosine between outward normal and the surface's: more is its far side
+
+constexpr float infinite = std::numeric_limits<float>::infinity();
+constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
+
+struct Known {
+  float least;        // [m] of all gaps that are known
+  std::size_t count;  // of them
+};
+PALPATE_VECTORISED
+Known summarise(const float* gap, std::size_t size) {
+  FloatLanes least;
+  std::array<std::uint32_t, sum_lanes> count{};
+  least.fill(infinite);
+  for (std::size_t block = 0; block < whole_blocks(size); block += sum_lanes) {
+    for (std::size_t lane = 0; lane < sum_lanes; ++lane) {
+      const float here = gap[block + lane];
+      const bool is_known = here > -infinite;
+      const float known = is_known ? here : infinite;
+      least[lane] = known < least[lane] ? known : least[lane];
+      count[lane] += is_known ? 1U : 0U;
+    }
+  }
+  return {least_of_lanes(least), sum_of_lanes(count)};
+}
 
 }  // namespace
 
 ShapeTouch::ShapeTouch(std::shared_ptr<const ToolShape> shape, const Parameters& parameters)
     : shape_(std::move(shape)), parameters_(parameters), stride_(longest_step) {
   validate(parameters);
-  const auto& points = shape_->points();
-  for (const ToolShape::Point& point : points) {
-    x_.push_back(static_cast<float>(point.at.x()));
-    y_.push_back(static_cast<float>(point.at.y()));
-    z_.push_back(static_cast<float>(point.at.z()));
-    patch_.push_back(static_cast<std::uint8_t>(point.patch));
+  std::size_t longest = 0;
+  for (std::size_t patch = 0; patch < most_contacts; ++patch) {
+    shell_.begin[patch] = shell_.x.size();
+    for (std::uint32_t i = 0; i < shape_->points().size(); ++i)
+      if (const ToolShape::Point& point = shape_->points()[i]; point.patch == patch)
+        add_point(point.at.cast<float>(), i);
+    shell_.size[patch] = shell_.x.size() - shell_.begin[patch];
+    while (shell_.x.size() % patch_block != 0) add_point(Eigen::Vector3f::Constant(nowhere), 0);
+    longest = std::max(longest, shell_.x.size() - shell_.begin[patch]);
   }
-  behind_.assign(points.size(), 0);
-  behind_now_.assign(points.size(), 0);
+  shell_.begin.back() = shell_.x.size();
+  gap_.resize(longest);
+  behind_.is.resize(shell_.x.size());
+  behind_now_ = behind_;
+}
+
+void ShapeTouch::add_point(const Eigen::Vector3f& at, std::uint32_t point) {
+  shell_.x.push_back(at.x());
+  shell_.y.push_back(at.y());
+  shell_.z.push_back(at.z());
+  shell_.point.push_back(point);
 }
 
 void ShapeTouch::check(const Cloud& cloud) const {
@@ -101,11 +137,10 @@ void ShapeTouch::observe(const Observation& seen) noexcept {
                   parameters_.sight);
 }
 
-// Looks where the tool's points are at a pose: (4), one transform, projection and look-up a point.
-void ShapeTouch::scan(const Pose& pose, std::size_t points, Scan& scan,
-                      std::uint8_t* behind) const noexcept {
-  constexpr float infinite = std::numeric_limits<float>::infinity();
-  scan.inside = scan.crossed = scan.known = 0;
+// Looks where the tool's points are at a pose, at most so many of each patch: (4), one transform,
+// projection and look-up a point.
+void ShapeTouch::scan(const Pose& pose, std::size_t most, Scan& scan, Behind* behind) noexcept {
+  scan.inside = scan.crossed = scan.known = scan.looked = 0;
   scan.least = infinite;
   scan.gap.fill(infinite);
   const Eigen::Isometry3d world_from_tool = isometry(pose);
@@ -123,37 +158,60 @@ void ShapeTouch::scan(const Pose& pose, std::size_t points, Scan& scan,
   const float inside = -static_cast<float>(free_gap) - 2.0F * noise;
   constexpr auto too_deep = static_cast<float>(-deepest);
   constexpr auto near = static_cast<float>(2.0 * margin);
-  for (std::size_t i = 0; i < points; ++i) {
+  for (std::size_t patch = 0; patch < most_contacts; ++patch) {
+    const std::size_t begin = shell_.begin[patch];
+    const std::size_t size = std::min(shell_.begin[patch + 1] - begin, most);
+    if (size == 0) continue;
+    const PointArrays points{&shell_.x[begin], &shell_.y[begin], &shell_.z[begin], size};
+    std::fill_n(gap_.begin(), size, -infinite);
     // The camera that shows most free space is right: others are hidden from it.
-    float gap = -infinite;
-    std::size_t of = 0;
-    for (std::size_t k = 0; k < cameras; ++k) {
-      const float one = SeenSurface::gap(views[k], x_[i], y_[i], z_[i]);
-      if (one > gap) {
-        gap = one;
-        of = k;
-      }
+    for (std::size_t k = 0; k < cameras; ++k)
+      SeenSurface::raise_gaps(views[k], points, gap_.data());
+    const Known known = vectorised<summarise>(gap_.data(), size);
+    scan.known += known.count;
+    scan.least = std::min(scan.least, known.least);
+    scan.looked += std::min(size, shell_.size[patch]);
+    std::size_t nearest = size;
+    if (behind != nullptr && behind->in_patch[patch] != 0) {
+      std::fill_n(behind->is.begin() + begin, size, 0);
+      behind->in_patch[patch] = 0;
     }
-    std::uint8_t is_behind = 0;
-    if (gap > -infinite) {
-      ++scan.known;
-      scan.least = std::min(scan.least, gap);
-      if (gap < inside && gap > -side_depth) ++scan.inside;
-      if (gap < too_deep) {
-        is_behind = 1;
-        if (gap > -side_depth && behind_[i] == 0) ++scan.crossed;
-      } else if (gap < near || behind_[i] != 0) {
+    if (behind_.in_patch[patch] == 0 && known.least >= inside) {  // nearly always
+      if (known.least < near)
+        nearest = std::find(gap_.begin(), gap_.begin() + size, known.least) - gap_.begin();
+    } else {
+      float least = near;
+      for (std::size_t i = 0; i < size; ++i) {
+        const float gap = gap_[i];
+        if (gap == -infinite) continue;
+        const bool was_behind = behind_.is[begin + i] != 0;
+        if (gap < inside && gap > -side_depth) ++scan.inside;
+        if (gap < too_deep && gap > -side_depth && !was_behind) ++scan.crossed;
         // Behind until it has been in front again.
-        if (behind_[i] != 0 && gap < 0.0F) {
-          is_behind = 1;
-        } else if (gap < scan.gap[patch_[i]]) {
-          scan.gap[patch_[i]] = gap;
-          scan.point[patch_[i]] = static_cast<std::uint32_t>(i);
-          scan.camera[patch_[i]] = camera[of];
+        if (gap < too_deep || (was_behind && gap < 0.0F)) {
+          if (behind == nullptr) continue;
+          behind->is[begin + i] = 1;
+          ++behind->in_patch[patch];
+        } else if (gap < least) {
+          least = gap;
+          nearest = i;
         }
       }
     }
-    if (behind != nullptr) behind[i] = is_behind;
+    if (nearest == size) continue;
+    scan.gap[patch] = gap_[nearest];
+    scan.point[patch] = shell_.point[begin + nearest];
+    std::size_t of = 0;
+    for (; of + 1 < cameras; ++of) {
+      const std::size_t block = begin + nearest / patch_block * patch_block;
+      FloatLanes gap;
+      gap.fill(-infinite);
+      SeenSurface::raise_gaps(views[of],
+                              {&shell_.x[block], &shell_.y[block], &shell_.z[block], patch_block},
+                              gap.data());
+      if (gap[nearest % patch_block] == gap_[nearest]) break;
+    }
+    scan.camera[patch] = camera[of];
   }
 }
 
@@ -168,12 +226,12 @@ void ShapeTouch::find_contacts(const Scan& scan) noexcept {
     if (plane.tick != ticks_ || plane.point != scan.point[i] ||
         (place - plane.place).squaredNorm() > same_plane * same_plane) {
       plane = {ticks_, scan.point[i], place,
-               seen_[scan.camera[i]].fit(place, parameters_.sight.side_depth)};
+               seen_[scan.camera[i]].fit(place, -(pose_.turn * point.inward),
+                                         parameters_.sight.side_depth)};
     }
     std::optional<SeenSurface::Fit> fit = plane.fit;
     if (fit) fit->gap += fit->normal.dot(place - plane.place);
     if (!fit || fit->gap > margin || !(fit->gap > -2.0 * deepest)) continue;
-    if ((pose_.turn * point.inward).dot(fit->normal) < -facing) continue;
     contacts_[contact_count_++] = {lever, *fit, scan.camera[i]};
   }
 }
@@ -204,26 +262,26 @@ double ShapeTouch::way_to(const Pose& hand) const noexcept {
 }
 
 // May a proxy without contacts go to the hand at once? Not into a surface that it has not reached.
-bool ShapeTouch::can_follow(const Pose& hand) const noexcept {
+bool ShapeTouch::can_follow(const Pose& hand) noexcept {
   if (stride_ < longest_step) return false;
   if (way_to(hand) <= stride_) return true;
   Scan found;
-  scan(hand, x_.size(), found, nullptr);
+  scan(hand, all, found, nullptr);
   return found.inside == 0;
 }
 
 // Moves the proxy towards the hand until it rests. True if it touches.
 bool ShapeTouch::move(const Pose& hand) noexcept {
-  const std::size_t points = x_.size();
-  const std::size_t most = std::clamp<std::size_t>(scanned / points, 1, most_moves);
+  const std::size_t most =
+      std::clamp<std::size_t>(scanned / shape_->points().size(), 1, most_moves);
   Scan found;
   if (touching_) {
     // A hand in free space pulls its proxy out of whatever it is caught behind.
-    scan(hand, std::min(coarse, points), found, nullptr);
+    scan(hand, coarse, found, nullptr);
     double noise = 0.0;
     for (const SeenSurface& each : seen_)
       if (each.active()) noise = std::max(noise, each.noise());
-    if (2 * found.known > std::min(coarse, points) && found.least > free_gap + 4.0 * noise) {
+    if (2 * found.known > found.looked && found.least > free_gap + 4.0 * noise) {
       pose_ = kept_ = hand;
       held_ = {};
       contact_count_ = 0;
@@ -231,19 +289,19 @@ bool ShapeTouch::move(const Pose& hand) noexcept {
     }
   }
   for (std::size_t i = 0; i < most; ++i) {
-    scan(pose_, points, found, behind_now_.data());
+    scan(pose_, all, found, &behind_now_);
     ++steps_;
     if (found.crossed > 0 && !fresh_ && stride_ > shortest_step) {
       // The step went through the side of a body: shorter steps meet it.
       pose_ = kept_;
       stride_ = std::max(0.25 * stride_, shortest_step);
-      scan(pose_, points, found, behind_now_.data());
+      scan(pose_, all, found, &behind_now_);
     } else if (found.crossed == 0) {
       stride_ = std::min(2.0 * stride_, longest_step);
     }
     fresh_ = false;
     kept_ = pose_;
-    behind_.swap(behind_now_);
+    std::swap(behind_, behind_now_);
     find_contacts(found);
     if (contact_count_ == 0 && can_follow(hand)) {
       pose_ = hand;
@@ -346,11 +404,12 @@ Tick ShapeTouch::tick(const HandPose& given, double t) noexcept {
   ++ticks_;
   if (loose_) {
     Scan found;
-    behind_.assign(behind_.size(), 0);
-    scan(hand, x_.size(), found, behind_now_.data());
+    std::fill(behind_.is.begin(), behind_.is.end(), std::uint8_t{0});
+    behind_.in_patch = {};
+    scan(hand, all, found, &behind_now_);
     pose_ = kept_ = hand;
     fresh_ = false;
-    behind_.swap(behind_now_);
+    std::swap(behind_, behind_now_);
     loose_ = found.inside > 0;
   }
   if (!loose_) {

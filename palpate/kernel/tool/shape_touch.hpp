@@ -47,22 +47,36 @@ class ShapeTouch final : public Method {
   };
   static constexpr std::size_t most_cameras = 4;  // those of further ones are not touched
   static constexpr std::size_t most_contacts = ToolShape::most_patches;
+  /// The tool's points, patch by patch from coarse to fine; each patch fills whole blocks of
+  /// `patch_block` with points that are nowhere.
+  struct Shell {
+    std::vector<float> x, y, z;                          // [m]
+    std::vector<std::uint32_t> point;                    // its number in the tool
+    std::array<std::size_t, most_contacts + 1> begin{};  // of each patch
+    std::array<std::size_t, most_contacts> size{};       // the same without the rest of a block
+  };
+  /// Which points are behind what they never were in front of.
+  struct Behind {
+    std::vector<std::uint8_t> is;                         // of the shell's points
+    std::array<std::uint32_t, most_contacts> in_patch{};  // how many of them
+  };
   /// What the tool's points meet at a pose.
   struct Scan {
     std::size_t inside = 0;   // points within a surface, not deeper than its sides
     std::size_t crossed = 0;  // of these, how many were in front in the last scan that was kept
     float least = 0.0F;       // [m] the smallest gap along the line of sight of all points known
-    std::size_t known = 0;
+    std::size_t looked = 0, known = 0;  // points, and those of which the surface is known
     std::array<std::uint32_t, most_contacts> point{};  // the nearest of each patch
     std::array<float, most_contacts> gap{};            // [m] its
     std::array<std::uint8_t, most_contacts> camera{};
   };
 
+  void add_point(const Eigen::Vector3f& at, std::uint32_t point);
   [[nodiscard]] Eigen::Isometry3d isometry(const Pose& pose) const noexcept;
-  void scan(const Pose& pose, std::size_t points, Scan& scan, std::uint8_t* behind) const noexcept;
+  void scan(const Pose& pose, std::size_t most, Scan& scan, Behind* behind) noexcept;
   void find_contacts(const Scan& scan) noexcept;
   [[nodiscard]] double way_to(const Pose& hand) const noexcept;
-  [[nodiscard]] bool can_follow(const Pose& hand) const noexcept;
+  [[nodiscard]] bool can_follow(const Pose& hand) noexcept;
   bool move(const Pose& hand) noexcept;
   void step(const Pose& hand) noexcept;
   [[nodiscard]] double known_share(double t) const noexcept;
@@ -70,10 +84,9 @@ class ShapeTouch final : public Method {
   void release(const Pose& hand) noexcept;
 
   std::shared_ptr<const ToolShape> shape_;
-  std::vector<float> x_, y_, z_;          // [m] of its points
-  std::vector<std::uint8_t> patch_;       // of each
-  std::vector<std::uint8_t> behind_;      // which are behind what they never were in front of
-  std::vector<std::uint8_t> behind_now_;  // the same of the newest scan
+  Shell shell_;
+  std::vector<float> gap_;      // [m] of the patch that is looked at
+  Behind behind_, behind_now_;  // at the last scan that was kept, and at the newest
   Parameters parameters_;
   NewestFrame frame_;
   FrameTiming timing_;

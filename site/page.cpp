@@ -125,6 +125,10 @@ void ViewerServer::show_path(std::uint8_t /*camera*/, ViewerMessage path) {
   post(path);
 }
 
+void ViewerServer::show_tool(ViewerMessage tool) {
+  post(tool);
+}
+
 std::filesystem::path ViewerHost::begin_file(const std::string& name, std::uint64_t /*size*/) {
   throw Error(name, "this session opens no files", "open the page without ?file=");
 }

@@ -114,6 +114,21 @@ TEST(Protocol, PutsTheFacesOfAMeshBehindItsCorners) {
   EXPECT_EQ(at<std::uint32_t>(path_message(0, std::vector<float>(8)).head, 4), 2u);
 }
 
+TEST(Protocol, SendsTheSurfaceOfATool) {
+  const ViewerMessage message = tool_message(make_tool("box:40x20x5mm?points=100", {}).get());
+  EXPECT_EQ(at<std::uint32_t>(message.head, 0), 5u);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 4), 8u);
+  EXPECT_EQ(at<std::uint32_t>(message.head, 8), 12u);
+  const std::vector<std::byte> payload(message.payload.begin(), message.payload.end());
+  ASSERT_EQ(payload.size(), 12u * (8 + 12));
+  EXPECT_EQ(std::abs(at<float>(payload, 0)), 0.02F);
+  EXPECT_LT(at<std::uint32_t>(payload, 12 * 8), 8u);
+  const ViewerMessage ball = tool_message(nullptr);
+  EXPECT_EQ(ball.head.size(), 12u);
+  EXPECT_EQ(at<std::uint32_t>(ball.head, 8), 0u);
+  EXPECT_TRUE(ball.payload.empty());
+}
+
 TEST(Protocol, SendsTheNewestSamplesWithTheirAge) {
   TickBatch batch;
   batch.t = 100.0;
@@ -217,6 +232,9 @@ TEST(Protocol, UnderstandsEachCommand) {
   ASSERT_TRUE(limit && std::holds_alternative<SetSafetyParameter>(*limit));
   const auto method = parse_command(R"({"method": "paper"})");
   ASSERT_TRUE(method && std::holds_alternative<SetMethod>(*method));
+  const auto tool = parse_command(R"({"tool": "cone:60x6mm"})");
+  ASSERT_TRUE(tool && std::holds_alternative<SetTool>(*tool));
+  EXPECT_EQ(std::get<SetTool>(*tool).text, "cone:60x6mm");
   const auto record = parse_command(R"({"record": false})");
   ASSERT_TRUE(record && std::holds_alternative<SetRecording>(*record));
   EXPECT_FALSE(std::get<SetRecording>(*record).on);
@@ -266,6 +284,7 @@ TEST(Protocol, RefusesCommandsThatAreNotItsOwn) {
                            R"({"set": {"name": "x", "value": "1"}})",
                            R"({"set": {"name": "x", "value": 1, "more": 1}})",
                            R"({"method": 1})",
+                           R"({"tool": null})",
                            R"({"record": "yes"})",
                            R"({"reset": false})",
                            R"({"reset_faults": 1})",

@@ -36,6 +36,7 @@ TEST(Roles, AllowALookingPageNothing) {
 // Hazard: strangers-limits
 TEST(Roles, LeaveMethodPlacementAndRecordingToTheOperator) {
   EXPECT_TRUE(fails_saying(asking(SetMethod{"paper"}, Role::holding), "operator"));
+  EXPECT_TRUE(fails_saying(asking(SetTool{"ball"}, Role::holding), "tool", "operator"));
   EXPECT_TRUE(fails_saying(asking(SetPlacement{"scale", 2.0}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(SetRecording{true}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(SetRecording{false}, Role::holding), "operator"));

@@ -326,6 +326,15 @@ TEST_F(ViewerServerTest, SendsRaysBeforeTheFrameThatNeedsThem) {
   EXPECT_NE(kinds.find('\3'), std::string::npos);
 }
 
+TEST_F(ViewerServerTest, ShowsTheToolToWhoIsThereAndToWhoeverJoins) {
+  Page first(server.port());
+  first.until("presence");
+  server.show_tool(tool_message(make_tool("box:40x20x5mm?points=100", {}).get()));
+  EXPECT_EQ(first.until_kind(5).size(), 12u + 12 * (8 + 12));
+  Page second(server.port());
+  EXPECT_EQ(second.until_kind(5).size(), 12u + 12 * (8 + 12));
+}
+
 TEST_F(ViewerServerTest, GivesASlowPageFewerFrames) {
   Page page(server.port());
   page.until("hello");

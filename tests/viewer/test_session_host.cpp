@@ -15,6 +15,7 @@
 
 #include "palpate/io/devices/mouse_device.hpp"
 #include "palpate/net/viewer/session_host.hpp"
+#include "palpate/record/replay.hpp"
 
 #include "tests/session/fakes.hpp"
 #include "tests/support/errors.hpp"
@@ -316,6 +317,72 @@ TEST(SessionHost, PutsTheHandWhereThePageSaysWhateverThePlacement) {
     EXPECT_TRUE(present);
     EXPECT_LT((hip - place).norm(), 1e-6) << "scale " << scale << ": " << hip.transpose();
   }
+}
+
+TEST(SessionHost, GivesTheHandAnotherToolThatItsPageTurns) {
+  const test::TemporaryFolder folder;
+  const std::string bag = (folder.path() / "bag").string();
+  Hosted hosted({}, "mouse:?x=0&y=0&z=0.4");
+  hosted.session.start_recording(bag);
+  auto ticks = hosted.session.ticks();
+  ServoTick newest{};
+  TickBatch shown;
+  double t = 0.0;
+  const auto play = [&](double seconds, const HandMessage& hand) {
+    for (const double end = t + seconds; t < end; hosted.session.advance(t += 0.05))
+      hosted.host.hand(hand);
+    while (ticks.try_pop(newest)) {
+    }
+    shown = hosted.host.ticks().value();
+  };
+  const auto choose = [&](const std::string& tool) {
+    hosted.host.command(SetTool{tool}, Role::operating);
+    return hosted.state()["tool"];
+  };
+  EXPECT_EQ(hosted.state()["tool"], "ball");
+  const json offered = json::parse(hosted.host.hello())["tools"];
+  EXPECT_EQ(choose(offered[1]), "box:40x20x5mm");
+  // Tilted about x by 0.2 rad: the edge at +y touches first.
+  const Rotation tilted(std::cos(0.1), std::sin(0.1), 0.0, 0.0);
+  play(0.5, {true, Vec3(0.0, 0.0, 0.45), tilted});
+  EXPECT_TRUE(newest.force.isZero());
+  EXPECT_NEAR(newest.tick.orientation.x(), std::sin(0.1), 1e-6);
+  play(1.0, {true, Vec3(0.0, 0.0, 0.497), tilted});
+  EXPECT_LT(newest.force.z(), -0.5);
+  EXPECT_TRUE(newest.torque.isZero()) << "a mouse has no motors for it";
+  EXPECT_LT(shown.torque.x(), -5e-3) << "the wall pushes the edge at +y back";
+  // What it does not offer it makes, but a page opens no files.
+  EXPECT_TRUE(fails_saying(hosted.asking(SetTool{"mesh:/etc/passwd.stl?unit=mm"}, Role::operating),
+                           "cannot be read"));
+  EXPECT_TRUE(fails_saying(hosted.asking(SetTool{"spoon:4mm"}, Role::operating), "no tool"));
+  EXPECT_TRUE(fails_saying(hosted.asking(SetMethod{"paper"}, Role::operating), "ball"));
+  EXPECT_EQ(hosted.state()["tool"], "box:40x20x5mm");
+  // A hand that is let go does not turn back.
+  play(0.2, {});
+  EXPECT_NEAR(newest.tick.orientation.x(), std::sin(0.1), 1e-6);
+  EXPECT_EQ(choose("ball"), "ball");
+  play(1.0, {true, Vec3(0.0, 0.0, 0.45), tilted});
+  play(1.0, {true, Vec3(0.0, 0.0, 0.497), tilted});
+  EXPECT_LT(newest.force.z(), -0.5);
+  EXPECT_TRUE(shown.torque.isZero());
+  hosted.session.stop();
+  SessionReader reader(bag);
+  EXPECT_TRUE(replay(reader).identical());
+}
+
+TEST(SessionHost, OffersTheToolThatTheSessionBeganWith) {
+  SessionOptions options = wall_options("mouse:");
+  options.tool = "box:41x20x5mm?points=200";
+  Session session(std::move(options));
+  SessionHost host("1.2.3");
+  host.attach(session);
+  const auto began = session.settings().tool;
+  EXPECT_EQ(json::parse(host.hello())["tools"].back(), "box:41x20x5mm?points=200");
+  host.command(SetTool{"ball"}, Role::operating);
+  EXPECT_EQ(session.settings().tool, nullptr);
+  host.command(SetTool{"box:41x20x5mm?points=200"}, Role::operating);
+  EXPECT_EQ(session.settings().tool, began) << "a mesh is not read again";
+  host.detach();
 }
 
 TEST(SessionHost, LetsTheHandGoTowardsAPlaceWithoutHoldingIt) {

@@ -66,6 +66,67 @@ test("shows a scene that moves", async () => {
     .toBeGreaterThan(300);
 });
 
+test("a tool with a shape is chosen, drawn where surfaces keep it, and turned", async () => {
+  const page = await open(PLANE);
+  const tool = () =>
+    page.evaluate(() => {
+      const { view, newest } = (window as any).palpate;
+      const { orientation, proxyOrientation, torque } = newest().tick;
+      return { ...view.drawnTool, orientation, proxyOrientation, torque, reach: view.reach };
+    });
+  expect(await tool()).toMatchObject({ proxy: null, ball: true, reach: 0 });
+  expect(await page.locator("#torque").textContent()).toBe("");
+  await page.locator("#tool").selectOption("box:40x20x5mm");
+  await expect.poll(async () => (await tool()).ball).toBe(false);
+  expect((await tool()).reach).toBeCloseTo(Math.hypot(20, 10, 2.5) / 1000, 6);
+
+  // Flat on a plane: its middle rests half its thickness above it.
+  const at = await placeWhere(page, "surface");
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await until(page, (seen) => seen.force > 1 && Math.abs(seen.proxy[2]! - 0.0025) < 0.002);
+  const before = await tool();
+  expect(before.proxy).not.toBeNull();
+  expect(Math.hypot(...before.torque)).toBeLessThan(0.05);
+
+  // Turned while it presses: the plane keeps it flat, which is a torque.
+  await page.keyboard.down("g");
+  await page.mouse.move(at.x, at.y + 60, { steps: 6 });
+  if (process.env.PALPATE_PICTURES)
+    await page.screenshot({ path: join(process.env.PALPATE_PICTURES, "tool.png") });
+  await expect.poll(async () => Math.hypot(...(await tool()).torque)).toBeGreaterThan(0.02);
+  await expect.poll(() => page.locator("#torque").textContent()).toMatch(/^[1-9]\d+ mN m$/);
+  expect((await tool()).proxy).not.toBeNull();
+  const turned = await tool();
+  // 60 pixels are 0.3 rad.
+  const halfAngle = Math.asin(Math.hypot(...turned.orientation.slice(0, 3)));
+  expect(2 * halfAngle).toBeCloseTo(0.3, 2);
+  const kept = Math.asin(Math.hypot(...turned.proxyOrientation.slice(0, 3)));
+  expect(kept).toBeLessThan(halfAngle);
+  // The place that is pressed stayed where it was.
+  const { hip } = await glimpse(page);
+  const spot = await spotUnder(page, at);
+  expect(Math.hypot(hip[0]! - spot[0]!, hip[1]! - spot[1]!)).toBeLessThan(0.01);
+  await page.keyboard.up("g");
+  await page.mouse.up();
+  await until(page, (seen) => seen.force === 0 && seen.hip[2]! > 0.015);
+  expect((await tool()).orientation[3]).toBeCloseTo(turned.orientation[3], 3);
+
+  // In the air a drag with the key turns it, and touches nothing.
+  await page.keyboard.down("g");
+  await page.mouse.move(at.x, at.y);
+  await page.mouse.down();
+  await page.mouse.move(at.x + 40, at.y, { steps: 4 });
+  await expect
+    .poll(async () => Math.abs((await tool()).orientation[3] - turned.orientation[3]))
+    .toBeGreaterThan(0.003);
+  expect((await glimpse(page)).state).toBe(0);
+  await page.mouse.up();
+  await page.keyboard.up("g");
+  await page.locator("#tool").selectOption("ball");
+  await expect.poll(async () => (await tool()).ball).toBe(true);
+});
+
 test("a press touches the spot that is pointed at, a drag slides, release lets go", async () => {
   const page = await open(PLANE);
   await until(page, (seen) => seen.clearance !== null);

@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mouse, fingers and keys: they press where they point, or turn the view.
+// Mouse, fingers and keys: they press where they point, or turn the view, or the tool in the hand.
 
+import { Quaternion, Vector3 } from "three";
 import {
   add,
   axes,
   depthOf,
   dragged,
+  length,
   metresPerPixel,
   scale,
   turned,
+  unit,
   within,
   zoomed,
 } from "./camera_math";
 import type { Stick } from "./gamepad";
 import { Pointers, type Place } from "./pointers";
 import { outOf, Press, type Felt } from "./press";
-import { Grip, type Vec3 } from "./protocol";
+import { Grip, type Quat, type Ticks, type Vec3 } from "./protocol";
 import type { SceneView } from "./scene";
 import { onPlane, type Spot } from "./surface";
 
@@ -26,6 +29,7 @@ const ZOOM = 0.0012; // logarithm, a pixel of wheel
 const KEY_SPEED = 0.16; // [-] of the hand's distance, a second
 const KEY_PRESS = 0.01; // [m/s] deeper while a pointer presses
 const KEY_TURN = 1.1; // [rad/s]
+const ROLL = 0.001; // [rad] of the tool, a pixel of wheel
 const FINE = 0.2; // [-] with Alt
 const STEP = 16; // [ms]
 const DEEPEST = 0.05; // [m] of the hand in what is touched: a mouse feels no wall
@@ -35,18 +39,21 @@ const FARTHEST_SLIDE = 0.1; // [m] over a hole, in the plane of what was pressed
 
 export interface HandHost {
   /** The newest tick: a hand that is taken begins at its proxy. */
-  newest(): Felt | null;
+  newest(): (Felt & Pick<Ticks, "orientation">) | null;
   /** Can the page move the hand at all? */
   takesHand(): boolean;
-  /** contact radius [m] and stiffness [N/m] */
-  touch(): { r_c: number; stiffness: number };
-  moved(grip: Grip, target: Vec3): void;
+  /** contact radius [m], stiffness [N/m], and how far a tool reaches [m]; 0: it is a ball */
+  touch(): { r_c: number; stiffness: number; reach: number };
+  /** @param turn  of the tool; null: as it is */
+  moved(grip: Grip, target: Vec3, turn: Quat | null): void;
 }
 
 export class HandInput {
   private held = false;
   private byKeys = false;
   private target: Vec3 = [0, 0, 0];
+  private turn: Quat | null = null; // of a tool with a shape
+  private spun: Place = { x: 0, y: 0 }; // [px] that the pressing pointer turned the tool by
   private readonly pointers = new Pointers();
   private press: Press | null = null;
   // A pointer that went down where nothing was seen, and the frames until then: where the camera
@@ -76,7 +83,30 @@ export class HandInput {
     addEventListener("keyup", (event) => this.keys.delete(event.code));
     for (const end of ["blur", "pagehide"] as const) addEventListener(end, () => this.letGo());
     document.addEventListener("visibilitychange", () => document.hidden && this.letGo());
-    setInterval(() => this.held && this.host.moved(Grip.held, this.target), REPEAT);
+    setInterval(() => this.held && this.moved(Grip.held, this.target), REPEAT);
+  }
+
+  /** Do drags turn the tool without a key, as fingers need it? */
+  spinByDrags = false;
+
+  private get spins(): boolean {
+    return (this.spinByDrags || this.keys.has("KeyG")) && this.host.touch().reach > 0;
+  }
+
+  private moved(grip: Grip, target: Vec3): void {
+    this.host.moved(grip, target, this.turn);
+  }
+
+  // Turns the tool in the picture: about its right and up, as a drag does, and about the way in.
+  private spin(x: number, y: number, roll: number): void {
+    if (!this.take() || !this.turn) return;
+    const { right, up, forward } = axes(this.view.orbit);
+    const about = add(add(scale(right, y), scale(up, x)), scale(forward, roll));
+    const angle = length(about);
+    const by = new Quaternion().setFromAxisAngle(new Vector3(...unit(about)), angle);
+    const { x: i, y: j, z: k, w } = by.multiply(new Quaternion(...this.turn)).normalize();
+    this.turn = [i, j, k, w];
+    this.moved(Grip.held, this.target);
   }
 
   /** The hand, and all fingers and keys, are off: the connection is lost, or the page left. */
@@ -111,8 +141,9 @@ export class HandInput {
     const felt = this.host.newest();
     if (!felt || !this.host.takesHand()) return false;
     this.target = felt.proxy;
+    this.turn = this.host.touch().reach > 0 ? felt.orientation : null;
     this.held = true;
-    this.host.moved(Grip.held, this.target);
+    this.moved(Grip.held, this.target);
     return true;
   }
 
@@ -129,7 +160,7 @@ export class HandInput {
     this.over = { x: -1, y: -1 };
     if (!this.held) return;
     this.held = false;
-    this.host.moved(away ? Grip.letGoTowards : Grip.letGo, away ?? this.target);
+    this.moved(away ? Grip.letGoTowards : Grip.letGo, away ?? this.target);
   }
 
   private moveTarget(pixels: { x: number; y: number }, into: number): void {
@@ -137,7 +168,7 @@ export class HandInput {
     this.target = dragged(this.view.orbit, this.target, pixels, into, this.view.height);
     const felt = this.host.newest();
     if (felt?.touching) this.target = within(this.target, felt.proxy, DEEPEST);
-    this.host.moved(Grip.held, this.target);
+    this.moved(Grip.held, this.target);
   }
 
   private down(event: PointerEvent): void {
@@ -151,13 +182,13 @@ export class HandInput {
     const at = { x: event.clientX, y: event.clientY };
     const near = this.pressable(at);
     const turns = event.shiftKey || event.ctrlKey;
-    const pressed = this.pointers.pressing !== null;
-    const may = { press: near !== null };
+    const held = this.pointers.hold;
+    const may = { press: near !== null, spin: this.spins };
     const gesture = this.pointers.down(event.pointerId, at, event.button, turns, may);
-    if (pressed && this.pointers.pressing === null) this.release();
+    if (held && !this.pointers.hold) this.release();
     this.canvas.dataset.gesture = gesture;
     const { frames } = this.view;
-    const mayWait = event.button === 0 && !turns && this.pointers.count === 1;
+    const mayWait = event.button === 0 && !turns && !may.spin && this.pointers.count === 1;
     this.waits = !near && mayWait ? { id: event.pointerId, at, frames } : null;
     if (this.waits) this.start();
     if (gesture === "press" && near) this.beginPress(at, near);
@@ -173,6 +204,7 @@ export class HandInput {
     const ahead = (place: Vec3) => this.view.ahead(place);
     this.press = new Press(this.target, near.spot, this.host.touch(), ahead);
     this.pressed = { pointer: at, at: near.at, frames: this.view.frames };
+    this.spun = { x: 0, y: 0 };
     this.start();
   }
 
@@ -198,6 +230,9 @@ export class HandInput {
     if (pressed && (left || this.pointers.pressing === null)) return this.up(event.pointerId);
     if (!motion) {
       if (this.pointers.count === 0) this.over = at;
+    } else if (motion.gesture === "spin" || (motion.gesture === "press" && this.spins)) {
+      this.spun = { x: this.spun.x + motion.x, y: this.spun.y + motion.y };
+      this.spin(TURN * motion.x, TURN * motion.y, 0);
     } else if (motion.gesture === "turn") {
       const orbit = zoomed(this.view.orbit, motion.zoom);
       this.view.setOrbit(turned(orbit, -motion.x * TURN, motion.y * TURN));
@@ -207,10 +242,10 @@ export class HandInput {
   }
 
   private up(id: number): void {
-    const pressed = this.pointers.pressing !== null;
+    const held = this.pointers.hold;
     this.waits = null;
     this.pointers.up(id);
-    if (pressed && this.pointers.pressing === null) this.release();
+    if (held && !this.pointers.hold && !this.byKeys) this.release();
     if (this.pointers.count === 0) delete this.canvas.dataset.gesture;
   }
 
@@ -226,7 +261,9 @@ export class HandInput {
     event.preventDefault();
     const pixels = event.deltaY * (event.deltaMode === 1 ? 33 : event.deltaMode === 2 ? 400 : 1);
     const fine = event.altKey ? FINE : 1;
-    if (!this.held || event.ctrlKey) {
+    if (this.spins) {
+      this.spin(0, 0, pixels * ROLL * fine);
+    } else if (!this.held || event.ctrlKey) {
       this.view.setOrbit(zoomed(this.view.orbit, Math.exp(pixels * ZOOM)));
     } else if (this.press) {
       this.press.refine(-pixels * WHEEL_PRESS * fine);
@@ -245,7 +282,7 @@ export class HandInput {
       else this.takeByKeys();
       return;
     }
-    if (!/^(Arrow(Up|Down|Left|Right)|Key[EQ]|Equal|Minus|Numpad(Add|Subtract))$/.test(event.code))
+    if (!/^(Arrow(Up|Down|Left|Right)|Key[EQG]|Equal|Minus|Numpad(Add|Subtract))$/.test(event.code))
       return;
     event.preventDefault();
     this.keys.add(event.code);
@@ -272,18 +309,19 @@ export class HandInput {
   }
 
   private pressStep(press: Press, seconds: number): void {
-    const pointer = this.pointers.pressing;
-    if (!pointer || !this.pressed) return;
+    const { pressing } = this.pointers;
+    if (!pressing || !this.pressed) return;
+    const pointer = { x: pressing.x - this.spun.x, y: pressing.y - this.spun.y };
     const { x, y } = this.pressed.pointer;
     const moved = pointer.x !== x || pointer.y !== y;
     if (moved || this.view.frames !== this.pressed.frames) {
       const at = this.aimAnew(press, pointer, moved);
-      this.pressed = { pointer: { ...pointer }, at, frames: this.view.frames };
+      this.pressed = { pointer, at, frames: this.view.frames };
     }
     const target = press.step(seconds, this.host.newest());
     if (target.every((x, i) => x === this.target[i])) return;
     this.target = target;
-    this.host.moved(Grip.held, target);
+    this.moved(Grip.held, target);
   }
 
   // What is pressed now that the pointer moved, or a frame came.
@@ -321,6 +359,11 @@ export class HandInput {
     if (nearer !== 0) orbit = zoomed(orbit, Math.exp(-nearer * seconds));
     if (orbit !== this.view.orbit) this.view.setOrbit(orbit);
     if (this.shiftHeld) [x, y] = [0, 0];
+    if (this.spins) {
+      const turn = KEY_TURN * fine * seconds;
+      if (x !== 0 || y !== 0 || into !== 0) this.spin(x * turn, y * turn, into * turn);
+      return;
+    }
     this.steer({ x, y, into }, fine * seconds);
   }
 

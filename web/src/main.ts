@@ -26,7 +26,7 @@ import { GHOST_TRAIL, SceneView, type Palette } from "./scene";
 import { Senses } from "./senses";
 import { linked, linkTo } from "./share";
 import { handAt, longest, Timeline, trailAt } from "./timeline";
-import { flagNames, SteadyWhy, why } from "./why";
+import { contactRadius, flagNames, SteadyWhy, why } from "./why";
 
 const DISENGAGED = 1 << 6; // SafetyFlag
 const PLOT_SHARE = 12; // drawings of the scene for one of the plots, where drawing is slow
@@ -87,6 +87,7 @@ const panel = new Panel({
   setLimit: (name, value) => connection.ask({ set_safety: { name, value } }),
   place: (name, value) => connection.ask({ place: { name, value } }),
   setMethod: (name) => connection.ask({ method: name }),
+  setTool: (tool) => connection.ask({ tool }),
   openScene: (uri) => connection.ask({ open: uri }),
 });
 
@@ -205,6 +206,7 @@ const connection = new Connection({
     if (message.kind === "frame") arrived.set(message.camera, message);
     else if (message.kind === "rays") view.setRays(message);
     else if (message.kind === "path") recordedHand = message.places;
+    else if (message.kind === "tool") view.showTool(message);
     else {
       tick = message;
       plots.add(message.samples);
@@ -231,11 +233,12 @@ const hand = new HandInput(get<HTMLCanvasElement>("view"), view, {
     },
   takesHand: () => state?.device.takes_hand ?? false,
   touch: () => ({
-    r_c: contactRadius(),
+    r_c: contactRadius(state),
     stiffness: state?.parameters.stiffness ?? 600,
+    reach: view.reach,
   }),
-  moved(grip, target) {
-    connection.send(encodeHand(grip, target));
+  moved(grip, target, turn) {
+    connection.send(encodeHand(grip, target, turn));
     get("hint").classList.add("gone");
   },
 });
@@ -264,10 +267,6 @@ function share(): void {
   );
 }
 
-function contactRadius(): number {
-  return state?.parameters.r_c ?? 0.005;
-}
-
 function write(id: string, text: string): void {
   writeIn(get(id), text);
 }
@@ -288,6 +287,9 @@ function showTick(now: number): void {
   const facts = { connected, tick, flags, hand: whose, state, acting, clearance, spacing };
   const { word, detail, text, link } = steadyWhy.show(why(facts), now);
   write("force", connected && tick ? length(tick.force).toFixed(2) : "–");
+  const turns = tick && state && state.tool !== "ball" ? length(tick.torque) : null;
+  write("torque", turns === null ? "" : `${(1e3 * turns).toFixed(0)} mN m`);
+  get("spin").hidden = view.reach === 0;
   write("state", word);
   get("state").dataset.state = String(tick?.state ?? 0);
   write("detail", detail);
@@ -387,6 +389,10 @@ for (const [id, set] of [
   });
 }
 get("follow").addEventListener("click", follow);
+get("spin").addEventListener("click", () => {
+  hand.spinByDrags = !hand.spinByDrags;
+  get("spin").setAttribute("aria-pressed", String(hand.spinByDrags));
+});
 get("record").addEventListener("click", record);
 get("reset-faults").addEventListener("click", () => connection.ask({ reset_faults: true }));
 get("proposal-yes").addEventListener("click", () => {

@@ -251,6 +251,13 @@ function symbol(text: string): HTMLElement {
   return made;
 }
 
+/** `box:40x20x5mm` as people read it. */
+export function toolName(tool: string): string {
+  const [kind, rest = ""] = tool.split("?")[0]!.split(/:(.*)/);
+  if (kind === "mesh") return rest.split("/").pop()!;
+  return [kind, rest.replaceAll("x", " × ").replace(/(\d)(mm|cm|m)$/, "$1 $2")].join(" ").trim();
+}
+
 function sizeText(bytes: number): string {
   return bytes >= 1e9 ? `${(bytes / 1e9).toFixed(1)} GB` : `${(bytes / 1e6).toFixed(0)} MB`;
 }
@@ -273,6 +280,7 @@ export interface PanelActions {
   setLimit(name: string, value: number): void;
   place(name: string, value: number): void;
   setMethod(name: string): void;
+  setTool(tool: string): void;
   openScene(uri: string): void;
 }
 
@@ -280,6 +288,7 @@ export class Panel {
   private readonly root = get("panel");
   private readonly method = get<HTMLSelectElement>("method-name");
   private readonly scene = get<HTMLSelectElement>("scene");
+  private readonly tool = get<HTMLSelectElement>("tool");
   private readonly opener = element(
     "button",
     { id: "open-recording", className: "tool", hidden: true },
@@ -307,6 +316,7 @@ export class Panel {
     });
     this.open("touch");
     this.method.addEventListener("change", () => this.actions.setMethod(this.method.value));
+    this.tool.addEventListener("change", () => this.actions.setTool(this.tool.value));
     this.scene.addEventListener("change", () => this.actions.openScene(this.scene.value));
     get("record").after(this.opener);
     this.opener.addEventListener("click", () => this.actions.openScene(this.opener.value));
@@ -343,6 +353,9 @@ export class Panel {
         element("option", { value: name }, name.replaceAll("-", " ")),
       ),
     );
+    this.tool.replaceChildren(
+      ...hello.tools.map((tool) => element("option", { value: tool, title: tool }, toolName(tool))),
+    );
     const build = (
       id: string,
       table: ParameterRow[],
@@ -370,6 +383,7 @@ export class Panel {
 
   /** The program has refused what the page asked for. */
   refused(): void {
+    this.tool.blur(); // it shows what is in the hand again
     for (const rows of [this.rows, this.limits, this.placement])
       for (const row of rows.values()) row.refused();
   }
@@ -388,6 +402,7 @@ export class Panel {
   update(state: State, inOwnFrame: boolean): void {
     this.showRecording(state);
     if (document.activeElement !== this.method) this.method.value = state.method;
+    if (document.activeElement !== this.tool) this.tool.value = state.tool;
     if (document.activeElement !== this.scene) this.scene.value = state.cameras[0]?.uri ?? "";
     const method = this.hello?.methods.find(({ name }) => name === state.method);
     write(get("method-meaning"), method?.meaning ?? "");
@@ -418,7 +433,7 @@ export class Panel {
   private showRole(role: Role): void {
     if (role === this.role) return;
     this.role = role;
-    this.method.disabled = this.scene.disabled = role !== "operating";
+    this.method.disabled = this.scene.disabled = this.tool.disabled = role !== "operating";
     get<HTMLButtonElement>("open-file").disabled = role !== "operating";
     for (const row of this.rows.values()) row.allow(role !== "looking");
     for (const row of this.limits.values()) row.allow(maySetLimit(role, row.row));

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the pointers on the scene do: one on the surface presses; beside it, with the right button
-// or Shift, or as two fingers, they turn the view; the middle button shifts it.
+// or Shift, or as two fingers, they turn the view; the middle button shifts it. One that
+// spins turns the tool in the hand.
 
-export type Gesture = "press" | "turn" | "shift";
+export type Gesture = "press" | "turn" | "shift" | "spin";
 
 export interface Place {
   /** [px] */
@@ -54,11 +55,19 @@ export function nearestAbout<Found>(
 export class Pointers {
   private readonly pointers = new Map<number, { at: Place; gesture: Gesture }>();
 
-  /** A pointer goes down. @param may  press: it is on a surface, and the hand can be had */
-  down(id: number, at: Place, button: number, shift: boolean, may: { press: boolean }): Gesture {
+  /** A pointer goes down. @param may  press: it is on a surface, and the hand can be had; spin: its
+   * tool can be turned */
+  down(
+    id: number,
+    at: Place,
+    button: number,
+    shift: boolean,
+    may: { press: boolean; spin?: boolean },
+  ): Gesture {
     let gesture: Gesture = "turn";
     if (button === 1) gesture = "shift";
-    else if (button === 0 && !shift && may.press && this.pointers.size === 0) gesture = "press";
+    else if (button === 0 && !shift && this.pointers.size === 0)
+      gesture = may.spin ? "spin" : may.press ? "press" : "turn";
     // A second finger: all look around now, also when one is lifted again.
     for (const pointer of this.pointers.values()) pointer.gesture = "turn";
     this.pointers.set(id, { at: { ...at }, gesture });
@@ -108,6 +117,11 @@ export class Pointers {
   get pressing(): Place | null {
     for (const { at, gesture } of this.pointers.values()) if (gesture === "press") return at;
     return null;
+  }
+
+  /** Does one press, or turn the tool? */
+  get hold(): boolean {
+    return [...this.pointers.values()].some(({ gesture }) => /press|spin/.test(gesture));
   }
 
   get count(): number {

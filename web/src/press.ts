@@ -58,8 +58,8 @@ export function approach(from: Vec3, to: Vec3, most: number): Vec3 {
 }
 
 /** Where a hand hovers over a spot. */
-export function above(spot: Spot): Vec3 {
-  return add(spot.at, scale(spot.normal, HOVER));
+export function above(spot: Spot, hover = HOVER): Vec3 {
+  return add(spot.at, scale(spot.normal, hover));
 }
 
 /**
@@ -94,7 +94,8 @@ export function flight(from: Vec3, to: Vec3, ahead: Ahead): Vec3[] {
 export class Press {
   private place: Vec3;
   private way: Vec3[];
-  private depth = -HOVER; // [m] of the hand below the spot's plane
+  private readonly hover: number; // [m] above the surface
+  private depth: number; // [m] of the hand below the spot's plane
   private wanted: number; // [m] depth below the surface that is felt; negative: above it
   private touching = false;
   private chased = 0; // [m] that frames have led the hand since the pointer moved
@@ -104,16 +105,19 @@ export class Press {
   /**
    * @param start  [m] where the hand is
    * @param spot   where it is to press
-   * @param hand   its contact radius [m], and the stiffness of the coupling [N/m]
+   * @param hand   its contact radius [m], the stiffness of the coupling [N/m], and how far a tool
+   *               reaches from it [m]
    */
   constructor(
     start: Vec3,
     private spot: Spot,
-    private readonly hand: { r_c: number; stiffness: number },
+    private readonly hand: { r_c: number; stiffness: number; reach?: number },
     private readonly ahead: Ahead,
   ) {
     this.place = start;
-    this.way = flight(start, above(spot), ahead);
+    this.hover = HOVER + (hand.reach ?? 0);
+    this.depth = -this.hover;
+    this.way = flight(start, above(spot, this.hover), ahead);
     this.isSeen = ahead(spot.at) !== null;
     this.wanted = clamp(PRESS_FORCE / Math.max(hand.stiffness, 1), ...DEPTHS);
   }
@@ -145,8 +149,8 @@ export class Press {
 
   private beginAgain(): void {
     this.missed = 0;
-    this.depth = -HOVER;
-    this.way = flight(this.place, above(this.spot), this.ahead);
+    this.depth = -this.hover;
+    this.way = flight(this.place, above(this.spot, this.hover), this.ahead);
   }
 
   /** The pointer rests, and a new frame says where its spot is: follows, in contact calmly. */
@@ -186,7 +190,7 @@ export class Press {
       }
       return this.place;
     }
-    this.depth = clamp(this.depth + this.rate(felt) * dt, -HOVER, DEEPEST);
+    this.depth = clamp(this.depth + this.rate(felt) * dt, -this.hover, DEEPEST);
     let goal = sub(this.spot.at, scale(this.spot.normal, this.depth));
     if (felt?.touching) goal = this.nearProxy(goal, felt.proxy);
     this.place = approach(this.place, goal, (felt?.touching ? SLIDE : TRAVEL) * dt);
@@ -195,7 +199,7 @@ export class Press {
 
   /** Where the hand goes when it is let go: out of what it touches, or above the spot. */
   retreat(felt: Felt | null): Vec3 {
-    return (!this.travelling && felt && outOf(felt)) || above(this.spot);
+    return (!this.travelling && felt && outOf(felt)) || above(this.spot, this.hover);
   }
 
   // A hand that slides does not run away from its proxy; how deep it is, is not touched by that.
@@ -218,7 +222,7 @@ export class Press {
       return clamp(GAIN * (wanted - feltDepth), -PULL, PUSH);
     }
     // Out of the image, or in a hole of it, the hand waits: what comes there must meet it outside.
-    const wanted = this.isSeen && !this.ahead(this.spot.at) ? -HOVER : this.wanted;
+    const wanted = this.isSeen && !this.ahead(this.spot.at) ? -this.hover : this.wanted;
     const rate = clamp(AIR_GAIN * (wanted - this.depth), -PULL, DESCENT);
     return wanted > 0 ? Math.max(rate, SEEK) : rate;
   }

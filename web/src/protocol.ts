@@ -2,18 +2,22 @@
 // The messages of docs/protocol.md, as the page sees them. All numbers are little-endian.
 
 export type Vec3 = readonly [number, number, number];
+/** A unit quaternion: x y z w. */
+export type Quat = readonly [number, number, number, number];
 
-const Kind = { frame: 1, ticks: 2, rays: 3, path: 4, hand: 16, shown: 17 } as const;
+const Kind = { frame: 1, ticks: 2, rays: 3, path: 4, tool: 5, hand: 16, shown: 17 } as const;
 const Format = { depth: 0, depthWithRays: 1, points: 2 } as const;
 const Colours = { none: 0, registered: 1, ownCamera: 2 } as const;
 
 const FRAME_HEADER = 96;
 const COLOUR_HEADER = 72;
-const TICKS_HEADER = 156; // from 112 on orientations and torque, which no tool shows yet
+const TICKS_HEADER = 156;
 const SAMPLE_FLOATS = 7;
 const RAYS_HEADER = 12;
 const PATH_HEADER = 8;
+const TOOL_HEADER = 12;
 const HAND_BYTES = 32;
+const TURNED_HAND_BYTES = 64;
 const SHOWN_BYTES = 8;
 
 /** An image in visible light: red, green and blue, row by row. */
@@ -78,6 +82,12 @@ export interface Ticks {
   guidance: number;
   /** bit i: fixture i of the state gives a force */
   fixtures: number;
+  /** world_from_handle */
+  orientation: Quat;
+  /** of the tool that surfaces keep outside; of a ball that of the handle */
+  proxyOrientation: Quat;
+  /** [N m] world: as sent, or, where the device has no motors for it, as it would be */
+  torque: Vec3;
   samples: Sample[];
 }
 
@@ -114,10 +124,23 @@ export interface HandPath {
   places: Float32Array;
 }
 
-export type Message = Frame | Ticks | Rays | HandPath;
+/** The surface of the tool in the hand, in its own frame; without triangles: a ball. */
+export interface Tool {
+  kind: "tool";
+  /** x y z [m] */
+  points: Float32Array;
+  /** three of the points each */
+  triangles: Uint32Array;
+}
+
+export type Message = Frame | Ticks | Rays | HandPath | Tool;
 
 function vec3(view: DataView, at: number): Vec3 {
   return [view.getFloat32(at, true), view.getFloat32(at + 4, true), view.getFloat32(at + 8, true)];
+}
+
+function quat(view: DataView, at: number): Quat {
+  return [...vec3(view, at), view.getFloat32(at + 12, true)];
 }
 
 function need(condition: boolean, what: string): asserts condition {
@@ -218,6 +241,9 @@ function decodeTicks(buffer: ArrayBuffer, view: DataView): Ticks {
     guidance: view.getFloat32(104, true),
     fixtures: view.getUint32(108, true),
     frame: view.getInt32(76, true),
+    orientation: quat(view, 112),
+    proxyOrientation: quat(view, 128),
+    torque: vec3(view, 144),
     samples,
   };
 }
@@ -238,6 +264,18 @@ function decodePath(buffer: ArrayBuffer, view: DataView): HandPath {
   return { kind: "path", camera: view.getUint8(1), places: new Float32Array(buffer, PATH_HEADER) };
 }
 
+function decodeTool(buffer: ArrayBuffer, view: DataView): Tool {
+  need(buffer.byteLength >= TOOL_HEADER, "a tool without its header");
+  const [points, triangles] = [view.getUint32(4, true), view.getUint32(8, true)];
+  const behind = TOOL_HEADER + 12 * points;
+  need(buffer.byteLength === behind + 12 * triangles, "a tool cut short");
+  return {
+    kind: "tool",
+    points: new Float32Array(buffer, TOOL_HEADER, 3 * points),
+    triangles: new Uint32Array(buffer, behind),
+  };
+}
+
 /** Takes a binary message apart without copying its payload. Throws if it is malformed. */
 export function decode(buffer: ArrayBuffer): Message {
   need(buffer.byteLength > 0, "empty");
@@ -252,6 +290,8 @@ export function decode(buffer: ArrayBuffer): Message {
       return decodeRays(buffer, view);
     case Kind.path:
       return decodePath(buffer, view);
+    case Kind.tool:
+      return decodeTool(buffer, view);
     default:
       throw new Error(`message: kind ${kind} is not known`);
   }
@@ -261,13 +301,13 @@ export function decode(buffer: ArrayBuffer): Message {
 export const Grip = { letGo: 0, held: 1, letGoTowards: 2 } as const;
 export type Grip = (typeof Grip)[keyof typeof Grip];
 
-/** Where the hand is to be [m, world]. */
-export function encodeHand(grip: Grip, target: Vec3): ArrayBuffer {
-  const buffer = new ArrayBuffer(HAND_BYTES);
+/** Where the hand is to be [m, world], and its orientation; null: as it is. */
+export function encodeHand(grip: Grip, target: Vec3, turn: Quat | null = null): ArrayBuffer {
+  const buffer = new ArrayBuffer(turn ? TURNED_HAND_BYTES : HAND_BYTES);
   const view = new DataView(buffer);
   view.setUint8(0, Kind.hand);
   view.setUint8(1, grip);
-  target.forEach((value, i) => view.setFloat64(8 + 8 * i, value, true));
+  [...target, ...(turn ?? [])].forEach((value, i) => view.setFloat64(8 + 8 * i, value, true));
   return buffer;
 }
 
@@ -307,6 +347,8 @@ export interface Hello {
   /** the token in the page's address is none that the program knows, and none is needed */
   token?: "unknown";
   methods: { name: string; meaning: string }[];
+  /** that can be chosen, as `--tool` reads them */
+  tools: string[];
   /** what can be chosen to be touched; none: nothing can */
   scenes: { uri: string; meaning: string; group: string }[];
   /** [bytes] of the files that the operator's page may send; 0: it may send none */
@@ -421,6 +463,8 @@ export interface FixtureState {
 export interface State {
   role: Role;
   method: string;
+  /** `ball`, or one with a shape */
+  tool: string;
   /** values of the rows, by name */
   parameters: Record<string, number>;
   safety: Record<string, number>;
@@ -491,6 +535,7 @@ export type Command =
   | { set_safety: { name: string; value: number } }
   | { place: { name: string; value: number } }
   | { method: string }
+  | { tool: string }
   | { record: boolean }
   | { play: Playback }
   | { seek: number }

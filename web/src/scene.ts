@@ -8,6 +8,7 @@ import { CameraCloud } from "./cloud";
 import {
   add,
   axes,
+  clamp,
   depthOf,
   dot,
   eye,
@@ -24,12 +25,16 @@ import {
 import { firstView, offCentre, type Room } from "./first_view";
 import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";
 import { nearestAbout, type Place } from "./pointers";
-import type { Frame, OtherHand, Rays, Ticks, Vec3 } from "./protocol";
+import type { Frame, OtherHand, Rays, Ticks, Tool, Vec3 } from "./protocol";
 import type { Spot } from "./surface";
 import { SOFTWARE_LEVEL, Thinning } from "./thinning";
 
 const ARROW_PER_NEWTON = 0.055; // of the view's height
 const LONGEST_ARROW = 0.4; // likewise
+const RING_PER_NEWTON_METRE = 0.5; // of the view's height: the torque's radius
+const RINGS = [0.04, 0.15] as const; // likewise: least and most
+const TOOL_EDGES = 30; // [degrees] between faces that have an edge
+const LEAST_TORQUE = 1e-3; // [N m] that is drawn
 const PIN = 3.2; // contact radii
 const TRAIL = 360; // ticks messages
 /** Places of the line behind the recorded hand. */
@@ -98,6 +103,12 @@ function nameSprite(whole: string, colour: string): THREE.Sprite {
 const BALL = new THREE.SphereGeometry(1, 48, 32);
 const FLAT = { depthTest: false, transparent: true, side: THREE.DoubleSide } as const;
 
+const NO_TOOL: Tool = {
+  kind: "tool",
+  points: new Float32Array(),
+  triangles: new Uint32Array(),
+};
+
 type Ball = THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
 
 function ball(look: THREE.MeshStandardMaterialParameters): Ball {
@@ -116,6 +127,13 @@ function segments(opacity: number) {
 // A cylinder one long that stands on its origin.
 function rod(radius: number, sides: number): THREE.CylinderGeometry {
   return new THREE.CylinderGeometry(radius, radius, 1, sides).translate(0, 0.5, 0);
+}
+
+// Three quarters of a ring about z, with a point: the way that something turns.
+function turningArrow(material: THREE.Material): THREE.Group {
+  const arc = new THREE.TorusGeometry(1, 0.07, 12, 40, 1.5 * Math.PI);
+  const point = new THREE.ConeGeometry(0.22, 0.5, 20).rotateZ(1.5 * Math.PI).translate(0.1, -1, 0);
+  return new THREE.Group().add(...[arc, point].map((part) => new THREE.Mesh(part, material)));
 }
 
 function isSoftwareRenderer(gl: WebGL2RenderingContext): boolean {
@@ -206,6 +224,19 @@ export class SceneView {
     new THREE.ConeGeometry(1, 1, 28).translate(0, 0.5, 0),
     this.arrowMaterial,
   );
+  // The tool in the hand, if it has a shape: held off by surfaces, and as the hand holds it.
+  private readonly heldTool = new THREE.Mesh(
+    new THREE.BufferGeometry(),
+    new THREE.MeshStandardMaterial({ flatShading: true, roughness: 0.5 }),
+  );
+  private readonly handTool = new THREE.Mesh(
+    this.heldTool.geometry,
+    new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.35, depthTest: false }),
+  );
+  private readonly handToolEdges = segments(1);
+  private toolReach = 0; // [m] from the hand; 0: it is a ball
+  private readonly turningMaterial = new THREE.MeshBasicMaterial({ depthTest: false });
+  private readonly turning = turningArrow(this.turningMaterial);
   private readonly lamp = new THREE.DirectionalLight(0xffffff, 2.2);
   private readonly trailPoints: number[] = [];
   private palette!: Palette;
@@ -246,13 +277,17 @@ export class SceneView {
     this.spot.renderOrder = 1;
     this.hip.renderOrder = 3;
     this.link.renderOrder = 2;
+    this.handTool.renderOrder = 1;
+    this.handTool.add(this.handToolEdges);
+    this.handToolEdges.material.depthTest = false;
+    for (const part of [this.handToolEdges, ...this.turning.children]) part.renderOrder = 2;
     this.ring.renderOrder = 4;
 
     const marks = [
       ...[this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin],
       ...[this.shadow, this.spot, this.grid, this.frusta, this.axes],
       ...[this.ghost, this.ghostTrail, this.paint, this.tool, this.arm, this.push],
-      this.otherLines,
+      ...[this.otherLines, this.heldTool, this.handTool, this.turning],
     ];
     for (const mark of marks) mark.visible = false;
     this.arrow.visible = false;
@@ -279,7 +314,10 @@ export class SceneView {
     this.palette = palette;
     const colour = (text: string) => new THREE.Color(text);
     this.proxy.material.color = colour(palette.proxy);
-    this.hip.material.color = colour(palette.hip);
+    this.heldTool.material.color = colour(palette.proxy);
+    this.hip.material.color = this.handTool.material.color = colour(palette.hip);
+    this.handToolEdges.material.color = colour(palette.hip);
+    this.turningMaterial.color = colour(palette.force);
     this.link.material.color = colour(palette.hip);
     this.ghost.material.color = this.ghostTrail.material.color = colour(palette.text);
     this.ring.material.color = colour(palette.text);
@@ -389,6 +427,36 @@ export class SceneView {
     this.touch();
   }
 
+  /** The tool in the hand from now on. */
+  showTool({ points, triangles }: Tool): void {
+    const shape = new THREE.BufferGeometry();
+    shape.setAttribute("position", new THREE.BufferAttribute(points, 3));
+    shape.setIndex(new THREE.BufferAttribute(triangles, 1));
+    this.heldTool.geometry.dispose();
+    this.heldTool.geometry = this.handTool.geometry = shape;
+    this.handToolEdges.geometry.dispose();
+    this.handToolEdges.geometry = new THREE.EdgesGeometry(shape, TOOL_EDGES);
+    this.toolReach = 0;
+    for (let i = 0; i < points.length; i += 3)
+      this.toolReach = Math.max(this.toolReach, Math.hypot(...points.subarray(i, i + 3)));
+    this.touch();
+  }
+
+  /** [m] How far the tool reaches from the hand; 0: it is a ball. */
+  get reach(): number {
+    return this.toolReach;
+  }
+
+  /** For tests: what of the tool is drawn, and how it is turned. */
+  get drawnTool() {
+    return {
+      proxy: this.heldTool.visible ? this.heldTool.quaternion.toArray() : null,
+      hand: this.handTool.visible ? this.handTool.quaternion.toArray() : null,
+      torque: this.turning.visible,
+      ball: this.proxy.visible,
+    };
+  }
+
   /** For tests: where the other hands' proxies are drawn [m]. */
   get otherProxies(): Vec3[] {
     return this.otherBalls.filter((_, i) => i % 2 === 0).map((ball) => ball.position.toArray());
@@ -427,6 +495,7 @@ export class SceneView {
     }
     this.clouds.clear();
     this.home = this.tick = this.pointedAt = this.under = null;
+    this.showTool(NO_TOOL);
     this.trailPoints.length = this.drawnPoints = 0;
     this.ghost.visible = this.ghostTrail.visible = false;
     for (const lines of [this.grid, this.frusta, this.trail]) lines.visible = false;
@@ -471,8 +540,12 @@ export class SceneView {
 
   showTick(tick: Ticks): void {
     const before = this.tick;
-    const moves = (["hip", "place", "force", "normal"] as const).some(
-      (part) => !before || length(sub(tick[part], before[part])) > 1e-5,
+    const parts = [
+      ...(["hip", "place", "force", "normal", "torque"] as const),
+      ...(["orientation", "proxyOrientation"] as const),
+    ];
+    const moves = parts.some(
+      (part) => !before || tick[part].some((x, i) => Math.abs(x - before[part][i]!) > 1e-5),
     );
     this.tick = tick;
     // What rests is not drawn anew thirty times a second.
@@ -652,7 +725,8 @@ export class SceneView {
     for (const cloud of this.clouds.values()) {
       cloud.prepare(this.thinning.stride, pixelsPerMetre, this.renderer.getPixelRatio());
       cloud.setLight(lampAt);
-      if (this.tick) cloud.setProxy(this.tick.proxy, this.radii.r_1, this.radii.r_3);
+      const { r_1, r_3 } = this.toolReach > 0 ? { r_1: 0, r_3: 0 } : this.radii;
+      if (this.tick) cloud.setProxy(this.tick.proxy, r_1, r_3);
       if (cloud.object.visible) this.drawnPoints += cloud.object.geometry.drawRange.count;
     }
     if (this.tick) this.placeMarks(this.tick);
@@ -728,6 +802,12 @@ export class SceneView {
       mark.scale.setScalar(size);
     };
     place(this.proxy, tick.place, r_c); // forbidden regions keep it, too
+    this.proxy.visible = this.toolReach === 0;
+    place(this.heldTool, tick.place, 1);
+    this.heldTool.quaternion.set(...tick.proxyOrientation);
+    place(this.handTool, tick.hip, 1);
+    this.handTool.quaternion.set(...tick.orientation);
+    this.heldTool.visible = this.handTool.visible = this.toolReach > 0;
     place(this.hip, tick.hip, 0.3 * r_c);
     // The ring is there to find the proxy from afar; near by, the sphere speaks for itself.
     const size = metresPerPixel(depthOf(this.orbit, tick.place), this.height);
@@ -736,7 +816,7 @@ export class SceneView {
       tick.place,
       ((2 * 15) / Math.max(this.height, 1)) * Math.tan(FIELD_OF_VIEW / 2),
     );
-    const radius = r_c / size;
+    const radius = (this.toolReach || r_c) / size;
     this.ring.material.opacity = Math.min(1, Math.max(0, (24 - radius) / 12)) * 0.85;
     this.ring.visible = this.ring.material.opacity > 0;
 
@@ -744,7 +824,7 @@ export class SceneView {
     this.link.visible = length(sub(tick.hip, tick.place)) > 0.3 * r_c;
 
     const hasNormal = length(tick.normal) > 0.5;
-    this.pin.visible = hasNormal;
+    this.pin.visible = hasNormal && this.toolReach === 0;
     if (hasNormal) this.stand(this.pin, tick.proxy, tick.normal, r_c, PIN * r_c);
 
     const newtons = length(tick.force);
@@ -752,13 +832,22 @@ export class SceneView {
     this.arrow.visible = newtons > 0.01;
     if (this.arrow.visible) {
       const direction = unit(tick.force);
-      const foot = [0, 1, 2].map((i) => tick.place[i]! + r_c * direction[i]!) as unknown as Vec3;
+      const foot = add(tick.place, scale(direction, this.toolReach > 0 ? 0 : r_c));
       const thickness = 0.006 * size * this.height;
       const headLength = Math.min(0.4 * shown, 4 * thickness);
       this.stand(this.shaft, [0, 0, 0], [0, 1, 0], thickness * 0.55, shown - headLength);
       this.stand(this.head, [0, shown - headLength, 0], [0, 1, 0], thickness * 1.5, headLength);
       this.stand(this.arrow, foot, direction, 1, 1);
     }
+
+    const turns = length(tick.torque);
+    this.turning.visible = turns > LEAST_TORQUE;
+    if (this.turning.visible)
+      this.lay(
+        this.turning,
+        { at: tick.place, normal: unit(tick.torque) },
+        clamp(turns * RING_PER_NEWTON_METRE, ...RINGS) * size * this.height,
+      );
 
     // The shadow on what the hand is over, and the line down to it.
     const under = (this.under = this.underHand());

@@ -18,14 +18,16 @@ export interface Why {
   rank: number;
 }
 
+type Unsaid = "kind" | "samples" | "t" | "steps" | "orientation" | "proxyOrientation" | "torque";
+
 /** What it is made of. */
 export interface Facts {
   connected: boolean;
-  tick: Omit<Ticks, "kind" | "samples" | "t" | "steps"> | null;
+  tick: Omit<Ticks, Unsaid> | null;
   /** names of the flags that are set */
   flags: ReadonlySet<string>;
   hand: "you" | "other" | "free";
-  state: Pick<State, "device" | "parameters"> | null;
+  state: Pick<State, "device" | "parameters" | "tool"> | null;
   /** names of the fixtures that give a force */
   acting: readonly string[];
   /** [m] of the proxy above what is seen, below 0 behind it; null: nothing is seen there */
@@ -46,6 +48,11 @@ export function flagNames(bits: number, table: readonly { name: string }[]): str
 export function depthBelow(tick: Pick<Ticks, "hip" | "proxy" | "normal">, r_c: number): number {
   const out = sub(tick.proxy, tick.hip);
   return (length(tick.normal) > 0.5 ? dot(out, tick.normal) : length(out)) - r_c;
+}
+
+/** [m] between the proxy and what it touches: a tool touches with its own surface. */
+export function contactRadius(state: Facts["state"]): number {
+  return state && state.tool === "ball" ? (state.parameters.r_c ?? 0) : 0;
 }
 
 const LEAST_FORCE = 0.005; // [N] less is written as 0.00
@@ -127,15 +134,15 @@ const LESS: readonly [flag: string, say: Say][] = [
 
 // Nothing is sent, and no flag says why.
 function noForce({ tick, state, hand, clearance, spacing }: Parameters<Say>[0]): string {
-  const r_c = state?.parameters.r_c ?? 0;
+  const r_c = contactRadius(state);
   if (isLeft({ state, hand }))
     return "nobody holds the hand; press on the surface to touch it.";
   if (touches(tick))
     return depthBelow(tick, r_c) > 0
       ? "the surface asks for none here."
-      : "the sphere touches, the hand is still above the surface.";
+      : "the proxy touches, the hand is still above the surface.";
   if (tick.frame < 0) return "there is nothing to touch yet.";
-  if (spacing !== null && spacing > r_c && (clearance ?? 0) < r_c)
+  if (spacing !== null && r_c > 0 && spacing > r_c && (clearance ?? 0) < r_c)
     return (
       `points ${millimetres(spacing)} mm apart are too sparse for a sphere of ` +
       `${millimetres(2 * r_c)} mm.`
@@ -157,7 +164,7 @@ function plainForce(facts: Parameters<Say>[0]): string {
       : `${capital(who)} ${verb} this force.`;
   }
   if (!touches(tick)) return "Fading, as the contact has ended.";
-  const depth = depthBelow(tick, state?.parameters.r_c ?? 0);
+  const depth = depthBelow(tick, contactRadius(state));
   if (depth <= 0) return "Fading, as the hand is out of the surface.";
   const set = state?.parameters.stiffness ?? 0;
   const acts = sent(tick) / depth;
@@ -204,7 +211,7 @@ export function why(facts: Facts): Why {
   if (!facts.connected) return { ...nothing, text: "No word from the program.", rank: -3 };
   const { tick, clearance, state } = facts;
   if (!tick) return { ...nothing, text: "No tick yet.", rank: -2 };
-  const height = touches(tick) ? -depthBelow(tick, state?.parameters.r_c ?? 0) : clearance;
+  const height = touches(tick) ? -depthBelow(tick, contactRadius(state)) : clearance;
   const inside = touches(tick) ? "inside" : "behind";
   const isIn = height !== null && height < (touches(tick) ? 0 : -BEHIND);
   return {

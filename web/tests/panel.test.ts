@@ -9,10 +9,17 @@ import {
   shortNumber,
   sliderFromValue,
   stiffnessFirst,
+  toolName,
   valueFromSlider,
   warningText,
   whyNot,
 } from "../src/panel";
+
+test("tools have names for people", () => {
+  expect(toolName("ball")).toBe("ball");
+  expect(toolName("box:40x20x5mm?points=100")).toBe("box 40 × 20 × 5 mm");
+  expect(toolName("mesh:parts/a:b.stl?unit=mm")).toBe("a:b.stl");
+});
 
 test("a slider's ends are the range's ends, to the bit", () => {
   for (const row of [

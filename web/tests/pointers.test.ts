@@ -21,6 +21,19 @@ test("the left button presses on a surface and turns the view beside it", () => 
   expect(pointers.down(1, at(5), 1, false, SURFACE)).toBe("shift");
 });
 
+test("where drags turn the tool, the left button does, on a surface and beside it", () => {
+  const pointers = new Pointers();
+  for (const press of [true, false]) {
+    expect(pointers.down(1, at(5), 0, false, { press, spin: true })).toBe("spin");
+    expect(pointers.pressing).toBeNull();
+    expect(pointers.hold).toBe(true);
+    expect(pointers.move(1, at(8, 1), 1)).toEqual({ gesture: "spin", x: 3, y: 1, zoom: 1 });
+    pointers.up(1);
+    expect(pointers.hold).toBe(false);
+  }
+  expect(pointers.down(1, at(5), 2, false, { press: true, spin: true })).toBe("turn");
+});
+
 test("a second finger ends the press, and one that stays turns the view", () => {
   const pointers = new Pointers();
   pointers.down(1, at(0), 0, false, SURFACE);

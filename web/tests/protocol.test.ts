@@ -9,6 +9,7 @@ import {
   type HandPath,
   type Rays,
   type Ticks,
+  type Tool,
 } from "../src/protocol";
 
 function frameMessage(
@@ -50,6 +51,7 @@ function ticksMessage(samples: number[][]): ArrayBuffer {
   view.setFloat32(84, 12, true);
   [13, 14, 15, 2, 0.5].forEach((value, i) => view.setFloat32(88 + 4 * i, value, true));
   view.setUint32(108, 5, true);
+  for (let i = 0; i < 11; ++i) view.setFloat32(112 + 4 * i, 20 + i, true);
   samples.flat().forEach((value, i) => view.setFloat32(156 + 4 * i, value, true));
   return buffer;
 }
@@ -64,6 +66,22 @@ test("a recorded hand's path keeps its four numbers a place", () => {
   expect(decode(buffer)).toMatchObject({ kind: "path", camera: 3 });
   expect([...(decode(buffer) as HandPath).places]).toEqual([0, 1, 2, 3, 0.5, 4, 5, 6]);
   expect(() => decode(buffer.slice(0, 24))).toThrow("cut short");
+});
+
+test("a tool is its points and their triangles", () => {
+  const buffer = new ArrayBuffer(12 + 36 + 12);
+  const view = new DataView(buffer);
+  view.setUint8(0, 5);
+  [3, 1].forEach((count, i) => view.setUint32(4 + 4 * i, count, true));
+  new Float32Array(buffer, 12, 9).set([0, 0, 0, 1, 0, 0, 0, 1, 0]);
+  new Uint32Array(buffer, 48).set([2, 0, 1]);
+  const { points, triangles } = decode(buffer) as Tool;
+  expect([...points]).toEqual([0, 0, 0, 1, 0, 0, 0, 1, 0]);
+  expect([...triangles]).toEqual([2, 0, 1]);
+  expect(() => decode(buffer.slice(0, 56))).toThrow("cut short");
+  view.setUint32(4, 0, true);
+  view.setUint32(8, 0, true);
+  expect((decode(buffer.slice(0, 12)) as Tool).triangles).toHaveLength(0); // a ball
 });
 
 describe("a frame", () => {
@@ -141,6 +159,9 @@ describe("ticks", () => {
     expect(ticks.hip).toEqual([1, 2, 3]);
     expect(ticks.force).toEqual([10, 11, 12]);
     expect(ticks.frame).toBe(-1);
+    expect(ticks.orientation).toEqual([20, 21, 22, 23]);
+    expect(ticks.proxyOrientation).toEqual([24, 25, 26, 27]);
+    expect(ticks.torque).toEqual([28, 29, 30]);
     expect(ticks).toMatchObject({ gain: 0.5, askedForce: 12, place: [13, 14, 15] });
     expect(ticks).toMatchObject({ region: 2, guidance: 0.5, fixtures: 5 });
     expect(ticks.samples[0]!.t).toBeCloseTo(99.99);

@@ -32,6 +32,7 @@ const facts = (flags: string[], more: Partial<Facts> = {}): Facts => ({
   state: {
     device: { uri: "mouse:", kind: "mouse", takes_hand: true, fault: "", warnings: [] },
     parameters: { stiffness: 600, r_c },
+    tool: "ball",
   },
   acting: [],
   clearance: 0.03,
@@ -51,6 +52,10 @@ describe("why the force is what it is", () => {
       "Stiffness 120 N/m times 2.0 mm.", // of another material
     );
     expect(why(facts([], { tick: air })).text).toContain("in the air");
+    // A tool with a shape touches with its own surface.
+    const state = { ...facts([]).state!, tool: "box:40x20x5mm" };
+    const box = why(facts([], { state, tick: tick({ proxy: [0, 0, 0], place: [0, 0, 0] }) }));
+    expect(box.detail).toBe("hand 2.0 mm inside");
     const touches = tick({ hip: [0, 0, 0.002], force: [0, 0, 0], askedForce: 0 });
     expect(why(facts([], { tick: touches })).text).toContain("still above the surface");
   });

@@ -207,7 +207,7 @@ Triangles mesh_of(const std::string& text, const Uri& uri, const MeshReader& rea
 }  // namespace
 
 ToolShape::ToolShape(const Triangles& surface, std::size_t count, std::string text, double turning)
-    : text_(std::move(text)), turning_(turning) {
+    : surface_(surface), text_(std::move(text)), turning_(turning) {
   if (count < 4 || count > most_points)
     refuse(text_, std::to_string(count) + " points are not between 4 and 10000");
   const double area = area_of(surface);

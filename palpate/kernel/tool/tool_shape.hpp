@@ -48,6 +48,8 @@ class ToolShape {
   ToolShape(std::vector<Point> points, std::string text, double turning);
 
   [[nodiscard]] const std::vector<Point>& points() const noexcept { return points_; }
+  /// What was sampled, for drawing; empty if it was made from points.
+  [[nodiscard]] const Triangles& surface() const noexcept { return surface_; }
   /// [m] The farthest point's distance from the origin.
   [[nodiscard]] double reach() const noexcept { return reach_; }
   /// [-] Stiffness of the coupling in rotation, over k_s times the square of the reach.
@@ -64,6 +66,7 @@ class ToolShape {
   void finish();
 
   std::vector<Point> points_;
+  Triangles surface_ = {};
   double reach_ = 0.0, spacing_ = 0.0, turn_length_ = 0.0;
   std::string text_;
   double turning_;

@@ -17,7 +17,15 @@ namespace {
 static_assert(std::endian::native == std::endian::little,
               "depths and points are sent as they lie in memory");
 
-enum Kind : std::uint8_t { frame = 1, ticks = 2, rays = 3, path = 4, hand = 16, shown = 17 };
+enum Kind : std::uint8_t {
+  frame = 1,
+  ticks = 2,
+  rays = 3,
+  path = 4,
+  tool = 5,
+  hand = 16,
+  shown = 17
+};
 // What a hand message says of the hand.
 enum Grip : std::uint8_t { let_go = 0, held = 1, let_go_towards = 2 };
 enum Format : std::uint8_t { depth = 0, depth_with_rays = 1, points = 2 };
@@ -145,6 +153,22 @@ ViewerMessage path_message(std::uint8_t camera, std::vector<float> txyz) {
   return message;
 }
 
+ViewerMessage tool_message(const ToolShape* tool) {
+  const Triangles surface = tool == nullptr ? Triangles() : tool->surface();
+  std::vector<float> values;
+  for (const Vec3& point : surface.points)
+    for (int axis = 0; axis < 3; ++axis) values.push_back(static_cast<float>(point[axis]));
+  for (const auto& corners : surface.triangles)
+    for (const std::uint32_t corner : corners) values.push_back(std::bit_cast<float>(corner));
+  ViewerMessage message;
+  Writer(message.head)
+      .put(std::uint32_t{Kind::tool})
+      .put(static_cast<std::uint32_t>(surface.points.size()))
+      .put(static_cast<std::uint32_t>(surface.triangles.size()));
+  std::tie(message.payload, message.owner) = shared_bytes(std::move(values));
+  return message;
+}
+
 ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32_t height,
                            std::vector<float> rays) {
   if (rays.size() != 2 * std::size_t{width} * height)
@@ -229,6 +253,7 @@ std::optional<Command> parse_command(std::string_view message) {
     return SetSafetyParameter{name->get<std::string>(), value->get<double>()};
   }
   if (verb == "method" && what.is_string()) return SetMethod{what.get<std::string>()};
+  if (verb == "tool" && what.is_string()) return SetTool{what.get<std::string>()};
   if (verb == "record" && what.is_boolean()) return SetRecording{what.get<bool>()};
   if (verb == "open" && what.is_string()) return OpenScene{what.get<std::string>()};
   if (verb == "seek" && what.is_number()) return Seek{what.get<double>()};

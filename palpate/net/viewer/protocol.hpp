@@ -16,6 +16,7 @@
 #include "palpate/kernel/cloud/frame.hpp"
 #include "palpate/kernel/core/hand.hpp"
 #include "palpate/kernel/core/patch.hpp"
+#include "palpate/kernel/tool/tool_shape.hpp"
 
 namespace palpate {
 
@@ -65,6 +66,9 @@ ViewerMessage rays_message(std::uint8_t camera, std::uint32_t width, std::uint32
 /// frame], x, y, z [m, world] after one another.
 ViewerMessage path_message(std::uint8_t camera, std::vector<float> txyz);
 
+/// The surface of the tool in the hand, in its frame; null: a ball.
+ViewerMessage tool_message(const ToolShape* tool);
+
 /// A few ticks in one: what the plots show of them.
 struct TickSample {
   double t = 0.0;            ///< [s] of the last
@@ -95,7 +99,8 @@ struct TickBatch {
   std::uint32_t fixtures = 0;                   ///< bit i: the session's fixture i gives a force
   Rotation orientation = Rotation::Identity();  ///< world_from_handle
   Rotation proxy_orientation = Rotation::Identity();  ///< of a ball that of the hand
-  Vec3 torque = Vec3::Zero();                         ///< [N m] sent
+  Vec3 torque =
+      Vec3::Zero();  ///< [N m] sent, or, where the device has no motors for it, what would be
   std::vector<TickSample> samples;  ///< oldest first; at most `max_samples` are sent, the newest
   static constexpr std::size_t max_samples = 1024;
 };
@@ -132,6 +137,10 @@ struct SetPlacement {
 };
 struct SetMethod {
   std::string name;
+};
+/// From now on the method touches with another tool; see make_tool.
+struct SetTool {
+  std::string text;
 };
 struct SetRecording {
   bool on;
@@ -173,7 +182,7 @@ struct RemoveFixture {
 struct ResetHand {};
 /// Ends a latched fault of the safety chain; see Session::reset_faults.
 struct ResetFaults {};
-using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod,
+using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod, SetTool,
                              SetRecording, SetPlayback, Seek, OpenScene, SetBrush, DropBrush,
                              ClearPaint, Forbid, Guide, RemoveFixture, ResetHand, ResetFaults>;
 

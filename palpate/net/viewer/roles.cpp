@@ -49,6 +49,8 @@ void check_allowed(const Command& command, Role role) {
   if (role == Role::operating) return;
   if (std::holds_alternative<SetMethod>(command))
     throw Error("method", "only the operator changes it", operator_remedy);
+  if (std::holds_alternative<SetTool>(command))
+    throw Error("tool", "only the operator chooses it", operator_remedy);
   if (std::holds_alternative<SetRecording>(command))
     throw Error("recording", "only the operator starts and ends it", operator_remedy);
   if (std::holds_alternative<SetPlayback>(command) || std::holds_alternative<Seek>(command))

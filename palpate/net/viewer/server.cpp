@@ -343,7 +343,10 @@ class ViewerServer::Impl final : public Hub {
 
   struct Camera {
     SharedMessage rays, path, frame;
+    SharedMessage tool;  // of the hand: with the first camera alone
   };
+
+  static constexpr std::array sent_once = {&Camera::rays, &Camera::path, &Camera::tool};
 
   void publish(std::uint8_t camera, ViewerMessage message, SharedMessage Camera::*slot) {
     if (camera >= Patch::max_views) return;
@@ -403,8 +406,8 @@ class ViewerServer::Impl final : public Hub {
     page->send(shared_text("{\"hello\":" + hello + "}"));
     send_state({page});
     for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
-      if (cameras_[camera].rays) page->send(cameras_[camera].rays);
-      if (cameras_[camera].path) page->send(cameras_[camera].path);
+      for (const auto once : sent_once)
+        if (cameras_[camera].*once) page->send(cameras_[camera].*once);
       if (cameras_[camera].frame) page->offer(camera, 0, cameras_[camera].frame);
     }
     tell_presence(false);
@@ -595,7 +598,7 @@ class ViewerServer::Impl final : public Hub {
       posted_ = false;
     }
     for (std::size_t i = 0; i < arrived.size(); ++i) {
-      for (const auto once : {&Camera::rays, &Camera::path}) {
+      for (const auto once : sent_once) {
         if (!(arrived[i].*once)) continue;
         cameras_[i].*once = arrived[i].*once;
         for (const auto& page : pages_) page->send(arrived[i].*once);
@@ -895,6 +898,9 @@ void ViewerServer::describe(std::uint8_t camera, ViewerMessage rays) {
 }
 void ViewerServer::show_path(std::uint8_t camera, ViewerMessage path) {
   impl_->publish(camera, std::move(path), &Impl::Camera::path);
+}
+void ViewerServer::show_tool(ViewerMessage tool) {
+  impl_->publish(0, std::move(tool), &Impl::Camera::tool);
 }
 
 std::string make_token() {

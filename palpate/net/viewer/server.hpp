@@ -90,6 +90,8 @@ class ViewerServer {
   void describe(std::uint8_t camera, ViewerMessage rays);
   /// The path of the hand that was recorded with a camera's frames. Any thread.
   void show_path(std::uint8_t camera, ViewerMessage path);
+  /// The tool in the hand, for all pages from now on. Any thread.
+  void show_tool(ViewerMessage tool);
 
  private:
   class Impl;

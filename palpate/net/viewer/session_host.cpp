@@ -27,6 +27,10 @@ namespace {
 using nlohmann::json;
 
 constexpr double samples_per_second = 200.0;  // of the page's plots
+// Tools that a page can choose.
+constexpr std::array<const char*, 7> tools = {
+    "ball",        "box:40x20x5mm",    "box:30x30x30mm", "capsule:80x8mm", "cylinder:40x20mm",
+    "cone:60x6mm", "gripper:40x30x8mm"};
 
 json energy_of(const PortEnergy& port) {
   return {{"made", port.made}, {"generating", port.generating}};
@@ -128,6 +132,7 @@ void SessionHost::attach(Session& session) {
   bounds_.emplace(session.settings().safety, rules_.operator_limits);
   recordings_ = std::make_unique<ObserverRecordings>(session, rules_.recordings);
   session_ = &session;
+  first_tool_ = session.settings().tool;
   mouse_ = session.mouse();
   if (mouse_ != nullptr) target_ = start_ = mouse_->start_position();
   reader_.emplace(session.ticks());
@@ -162,15 +167,25 @@ std::string SessionHost::hello() {
   for (std::size_t i = 0; i < safety_flag_count; ++i)
     safety_flags.push_back(
         {{"name", safety_flag_names()[i]}, {"meaning", safety_flag_meanings()[i]}});
+  json choices = tools;
+  if (first_tool_ &&
+      std::find(choices.begin(), choices.end(), first_tool_->text()) == choices.end())
+    choices.push_back(first_tool_->text());
   json scenes = json::array();
   for (const SceneChoice& scene : rules_.scenes)
     scenes.push_back({{"uri", scene.uri}, {"meaning", scene.meaning}, {"group", scene.group}});
   const std::uint64_t most = rules_.files && rules_.open_scene ? rules_.files->limit() : 0;
-  return json{{"file_limit", most},      {"scenes", scenes},
-              {"notice", rules_.notice}, {"version", version_},
-              {"methods", methods},      {"parameters", rows_json(parameter_table())},
-              {"safety", safety},        {"placement", rows_json(placement_table())},
-              {"flags", flags},          {"safety_flags", safety_flags}}
+  return json{{"file_limit", most},
+              {"scenes", scenes},
+              {"notice", rules_.notice},
+              {"version", version_},
+              {"methods", methods},
+              {"tools", choices},
+              {"parameters", rows_json(parameter_table())},
+              {"safety", safety},
+              {"placement", rows_json(placement_table())},
+              {"flags", flags},
+              {"safety_flags", safety_flags}}
       .dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -262,6 +277,7 @@ void SessionHost::look_at_points(const std::string& uri) {
 std::string SessionHost::state() {
   SessionState state = session_->state();
   look_at_points(state.cameras.front().uri);
+  show_tool(state.settings.tool);
   json cameras = json::array();
   const SessionHandState& first = state.hands.front();
   json playback;
@@ -332,6 +348,7 @@ std::string SessionHost::state() {
                          state.settings.placement.workspace_scale, state.rate);
   return json{
       {"method", state.settings.method},
+      {"tool", state.settings.tool ? state.settings.tool->text() : "ball"},
       {"parameters", values_json(parameter_table(), state.settings.parameters)},
       {"safety", values_json(safety_parameter_table(), state.settings.safety)},
       {"placement", values_json(placement_table(), state.settings.placement)},
@@ -401,11 +418,27 @@ std::string SessionHost::more_hands() {
   return hands.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
+// [m] between the proxy and what it touches; a tool touches with its own surface.
+double SessionHost::contact_radius() const {
+  const ServoSettings settings = session_->settings();
+  return settings.tool ? 0.0 : settings.parameters.proxy.r_c();
+}
+
+// To all pages, if it is another than before.
+void SessionHost::show_tool(const std::shared_ptr<const ToolShape>& tool) {
+  ViewerServer* server = server_.load(std::memory_order_acquire);
+  if (server == nullptr || tool == tool_) return;
+  tool_ = tool;
+  server->show_tool(tool_message(tool.get()));
+}
+
 std::optional<TickBatch> SessionHost::ticks() {
-  const double contact_radius = session_->settings().parameters.proxy.r_c();
+  const double radius = contact_radius();
+  const bool has_torque = session_->device().info().limits.max_torque > 0.0;
   for (ServoTick record{}; reader_->try_pop(record);) {
-    batcher_->add(record, contact_radius);
-    paint(record, contact_radius);  // each, so that a stroke is the same however often it is drawn
+    if (!has_torque) record.torque = record.gain * record.tick.torque;  // shown, never felt
+    batcher_->add(record, radius);
+    paint(record, radius);  // each, so that a stroke is the same however often it is drawn
   }
   return batcher_->take();
 }
@@ -459,17 +492,16 @@ void SessionHost::paint(const ServoTick& record, double contact_radius) {
 
 void SessionHost::hand(const HandMessage& hand) {
   if (mouse_ == nullptr) return;
-  std::optional<Eigen::Quaterniond> orientation;
   if (hand.target) {
     const Placement placement = session_->settings().placement;
     if (hand.orientation)
-      orientation = Eigen::Quaterniond(placement.world_from_device.linear().transpose() *
-                                       hand.orientation->toRotationMatrix());
+      turn_ = Eigen::Quaterniond(placement.world_from_device.linear().transpose() *
+                                 hand.orientation->toRotationMatrix());
     const Vec3 place =
         placement.world_from_device.inverse() * *hand.target / placement.workspace_scale;
     if (is_place(place)) target_ = place;
   }
-  mouse_->aim({.position = target_, .orientation = orientation, .present = hand.held});
+  mouse_->aim({.position = target_, .orientation = turn_, .present = hand.held});
 }
 
 void SessionHost::command(const Command& command, Role role) {
@@ -489,6 +521,11 @@ void SessionHost::command(const Command& command, Role role) {
     });
   } else if (const auto* method = std::get_if<SetMethod>(&command)) {
     session_->change([&](ServoSettings& settings) { settings.method = method->name; });
+  } else if (const auto* tool = std::get_if<SetTool>(&command)) {
+    // A page names no files: of meshes it has the session's own.
+    const bool is_first = first_tool_ && first_tool_->text() == tool->text;
+    const auto chosen = is_first ? first_tool_ : make_tool(tool->text, {});
+    session_->change([&](ServoSettings& settings) { settings.tool = chosen; });
   } else if (const auto* record = std::get_if<SetRecording>(&command)) {
     record->on ? recordings_->start() : recordings_->stop();
   } else if (const auto* play = std::get_if<SetPlayback>(&command)) {
@@ -529,6 +566,7 @@ void SessionHost::command(const Command& command, Role role) {
   } else if (std::holds_alternative<ResetFaults>(command)) {
     session_->reset_faults();
   } else if (mouse_ != nullptr) {
+    turn_.reset();
     mouse_->aim({.position = target_ = start_, .present = false});
   }
 }

@@ -137,6 +137,8 @@ class SessionHost final : public ViewerHost {
 
  private:
   [[nodiscard]] std::vector<std::string> paintable() const;
+  [[nodiscard]] double contact_radius() const;
+  void show_tool(const std::shared_ptr<const ToolShape>& tool);
   [[nodiscard]] std::string recorded_scene(const RecordingState& recording) const;
   void look_at_points(const std::string& uri);
   void paint(const ServoTick& record, double contact_radius);
@@ -150,8 +152,11 @@ class SessionHost final : public ViewerHost {
   std::atomic<ViewerServer*> server_{nullptr};
   std::array<std::uint32_t, Patch::max_views> numbers_{};  // of each camera's own frames
   MouseDevice* mouse_ = nullptr;
-  Vec3 start_ = Vec3::Zero();   // [m, device] where the mouse's hand began
-  Vec3 target_ = Vec3::Zero();  // [m, device] where it was sent last
+  Vec3 start_ = Vec3::Zero();                    // [m, device] where the mouse's hand began
+  Vec3 target_ = Vec3::Zero();                   // [m, device] where it was sent last
+  std::optional<Eigen::Quaterniond> turn_;       // device_from_handle, likewise
+  std::shared_ptr<const ToolShape> first_tool_;  // of the session, as it began; null: a ball
+  std::shared_ptr<const ToolShape> tool_;        // that pages show
   void forbid(const Forbid& wanted);
   void guide(const Guide& wanted);
   // Gives the session one more, which it names.

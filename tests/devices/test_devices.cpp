@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <ostream>
 #include <string>
 #include <thread>
@@ -277,6 +278,21 @@ TEST(MouseDevice, MakesASmoothMoveOfSixtyPlacesASecond) {
   EXPECT_GT(slowest, 0.1);
   EXPECT_LT(fastest, 0.3);
   EXPECT_LT(lag, 0.2 * (0.025 + 0.016) + 1e-4);
+}
+
+TEST(MouseDevice, TurnsWithoutAJump) {
+  MouseDevice mouse(Vec3::Zero(), 0.025);
+  EXPECT_FALSE(mouse.read(0.0).orientation);
+  const Eigen::Quaterniond quarter(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitZ()));
+  double left = std::numbers::pi / 2;
+  for (int i = 1; i <= 600; ++i) {
+    if (i % 100 == 1) mouse.aim({.orientation = quarter});
+    const double now = mouse.read(i * ms).orientation.value().angularDistance(quarter);
+    // 1 - exp(-w dt) of what is left, w = 2 / 25 ms, at most 4 rad/s
+    ASSERT_NEAR(now, std::max(left * std::exp(-2.0 / 0.025 * ms), left - 4.0 * ms), 1e-6);
+    left = now;
+  }
+  EXPECT_LT(left, 1e-5);
 }
 
 TEST(MouseDevice, GoesTheSameWayWhateverTheServosRate) {

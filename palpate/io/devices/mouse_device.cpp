@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/io/devices/mouse_device.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -9,6 +10,8 @@
 
 namespace palpate {
 namespace {
+
+constexpr double fastest_turn = 4.0;  // [rad/s] of the hand: brisk for a wrist
 
 void check_place(const Vec3& place) {
   constexpr double farthest = 1e6;  // [m]
@@ -64,8 +67,14 @@ HandState MouseDevice::read(double t) noexcept {
   const double length = move.norm();
   if (length > max_speed_ * dt) move *= max_speed_ * dt / length;
   position_ += move;
+  const Eigen::Quaterniond before = orientation_.value_or(Eigen::Quaterniond::Identity());
+  orientation_ = target_.orientation;
+  if (orientation_) {
+    const double left = std::max(before.angularDistance(*orientation_), 1e-9);  // [rad]
+    orientation_ = before.slerp(std::min(1.0 - decay, fastest_turn * dt / left), *orientation_);
+  }
   return {.position = position_,
-          .orientation = target_.orientation,
+          .orientation = orientation_,
           .present = target_.present,
           .clutched = target_.clutched};
 }

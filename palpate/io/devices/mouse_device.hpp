@@ -13,7 +13,7 @@ namespace palpate {
 /// Where a person at a screen wants the hand.
 struct MouseTarget {
   Vec3 position = Vec3::Zero();  ///< [m] device frame
-  /// device_from_handle, taken as it is, not made smooth
+  /// device_from_handle
   std::optional<Eigen::Quaterniond> orientation = {};
   bool present = true;    ///< false releases: no force until it is back
   bool clutched = false;  ///< true: the hand moves and the HIP stays
@@ -22,7 +22,8 @@ struct MouseTarget {
 /// A hand led by few, coarse places a second (a mouse, a touch screen), made smooth.
 ///
 /// Between targets the hand follows a critically damped spring, x'' = w^2 (target - x) - 2 w x',
-/// integrated exactly, and is never faster than `max_speed`: a jump of the mouse is a glide. Before
+/// integrated exactly, and is never faster than `max_speed`: a jump of the mouse is a glide. It
+/// turns by the share 1 - exp(-w dt) of what is left, at 4 rad/s at most. Before
 /// the first target nobody holds it, nor when no target has come for `silence`: a page that holds
 /// the hand repeats its target several times a second.
 class MouseDevice final : public Device {
@@ -59,6 +60,7 @@ class MouseDevice final : public Device {
   std::optional<double> aimed_t_;  // [s] when the newest target was first read
   Vec3 position_;
   Vec3 velocity_ = Vec3::Zero();
+  std::optional<Eigen::Quaterniond> orientation_;
 };
 
 }  // namespace palpate

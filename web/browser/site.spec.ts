@@ -187,6 +187,11 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
     await page.locator("#record").click();
     await expect.poll(() => page.locator("#record").getAttribute("aria-pressed")).toBe("true");
     await press(page);
+    // The same with a tool, which is chosen meanwhile and drawn.
+    await page.locator("#tool").selectOption("box:40x20x5mm");
+    const drawnTool = () => page.evaluate(() => (window as any).palpate.view.drawnTool);
+    await expect.poll(drawnTool).toMatchObject({ ball: false });
+    await press(page);
     const downloaded = page.waitForEvent("download");
     await page.locator("#record").click();
     const file = join(folder_of_files, (await downloaded).suggestedFilename());

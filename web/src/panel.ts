@@ -316,7 +316,10 @@ export class Panel {
     });
     this.open("touch");
     this.method.addEventListener("change", () => this.actions.setMethod(this.method.value));
-    this.tool.addEventListener("change", () => this.actions.setTool(this.tool.value));
+    this.tool.addEventListener("change", () => {
+      this.actions.setTool(this.tool.value);
+      this.tool.blur(); // G turns the tool, and does not choose the gripper
+    });
     this.scene.addEventListener("change", () => this.actions.openScene(this.scene.value));
     get("record").after(this.opener);
     this.opener.addEventListener("click", () => this.actions.openScene(this.opener.value));
@@ -383,7 +386,6 @@ export class Panel {
 
   /** The program has refused what the page asked for. */
   refused(): void {
-    this.tool.blur(); // it shows what is in the hand again
     for (const rows of [this.rows, this.limits, this.placement])
       for (const row of rows.values()) row.refused();
   }

@@ -2,6 +2,7 @@
 #include "python/arrays.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "palpate/kernel/core/error.hpp"
@@ -12,6 +13,10 @@ namespace {
 
 std::array<double, 3> numbers(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
+}
+
+std::array<double, 4> numbers(const Rotation& q) {
+  return {q.x(), q.y(), q.z(), q.w()};
 }
 
 template <class Record>
@@ -30,6 +35,9 @@ TickRecord record_of(const Tick& tick) {
           .proxy = numbers(tick.proxy),
           .normal = numbers(tick.normal),
           .force = numbers(tick.force),
+          .torque = numbers(tick.torque),
+          .orientation = numbers(tick.orientation),
+          .proxy_orientation = numbers(tick.proxy_orientation),
           .surface_velocity = tick.surface_velocity,
           .frame = tick.frame,
           .steps = tick.steps,
@@ -44,7 +52,10 @@ CycleRecord record_of(const ServoTick& tick) {
           .normal = numbers(tick.tick.normal),
           .asked = numbers(tick.tick.force),
           .force = numbers(tick.force),
+          .torque = numbers(tick.torque),
           .position = numbers(tick.position),
+          .orientation = numbers(tick.tick.orientation),
+          .proxy_orientation = numbers(tick.tick.proxy_orientation),
           .surface_velocity = tick.tick.surface_velocity,
           .gain = tick.gain,
           .frame_age = tick.frame_age,
@@ -86,6 +97,17 @@ Vec3 vector_of(const Numbers& numbers, const char* name) {
   if (numbers.size() != 3 || numbers.shape(0) != 3)  // a column will do
     check_shape(numbers, name, {3}, "x, y and z in the world's frame");
   return {numbers.data()[0], numbers.data()[1], numbers.data()[2]};
+}
+
+Rotation rotation_of(const std::optional<Numbers>& quaternion) {
+  if (!quaternion) return Rotation::Identity();
+  const char* const give = "a unit quaternion x, y, z, w that turns the tool into the world";
+  check_shape(*quaternion, "orientation", {4}, give);
+  const Rotation turn(Eigen::Map<const Eigen::Vector4d>(quaternion->data()));
+  if (!(std::abs(turn.norm() - 1.0) <= 0.01))
+    throw Error("orientation", "its length is " + std::to_string(turn.norm()) + ", not 1",
+                std::string("give ") + give);
+  return turn.normalized();
 }
 
 Eigen::Isometry3d pose_of(const Numbers& matrix, const char* name) {

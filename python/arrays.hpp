@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,7 +29,8 @@ using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 /// A tick as a record of a structured array.
 struct TickRecord {
   double t;
-  std::array<double, 3> hip, proxy, normal, force;
+  std::array<double, 3> hip, proxy, normal, force, torque;
+  std::array<double, 4> orientation, proxy_orientation;  // x y z w
   double surface_velocity;
   std::int64_t frame;
   std::int64_t steps;
@@ -39,7 +41,8 @@ struct TickRecord {
 /// A cycle of a session as a record of a structured array.
 struct CycleRecord {
   double t;
-  std::array<double, 3> hip, proxy, normal, asked, force, position;
+  std::array<double, 3> hip, proxy, normal, asked, force, torque, position;
+  std::array<double, 4> orientation, proxy_orientation;  // x y z w
   double surface_velocity, gain, frame_age;
   std::int64_t frame;
   std::uint64_t number;
@@ -63,6 +66,10 @@ void check_shape(const py::array& array, const std::string& name,
 
 /// Three numbers as a place or direction in the world. @throws Error naming `name`
 Vec3 vector_of(const Numbers& numbers, const char* name);
+
+/// A unit quaternion x y z w as world_from_handle; none: the identity.
+/// @throws Error if it is none, or not of length 1
+Rotation rotation_of(const std::optional<Numbers>& quaternion);
 
 /// A 4x4 matrix as a rigid pose. @throws Error naming `name` if it is none.
 Eigen::Isometry3d pose_of(const Numbers& matrix, const char* name);

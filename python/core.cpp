@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "palpate/io/sources/material_file.hpp"
+#include "palpate/io/sources/tool_file.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
@@ -146,9 +147,12 @@ Points rows_of(const std::vector<Vec3>& points) {
 /// A method, and the frame that it touches.
 class Renderer {
  public:
-  Renderer(const py::object& method, const py::kwargs& parameters) {
+  Renderer(const py::object& method, const std::string& tool, const py::kwargs& parameters) {
     set_all(parameters_, parameters);
-    method_ = method_of(method, parameters_, trouble_);
+    const auto shape = tool.empty() ? nullptr : read_tool(tool);
+    method_ = shape ? make_method(py::cast<std::string>(py::str(method)), parameters_,
+                                  standard_methods(), shape)
+                    : method_of(method, parameters_, trouble_);
   }
 
   void frame(const std::shared_ptr<Cloud>& cloud, double stamp, std::size_t number) {
@@ -164,8 +168,8 @@ class Renderer {
     trouble_->rethrow();
   }
 
-  Tick tick(const Numbers& hip, double t) {
-    const Tick tick = method_->tick(vector_of(hip, "hip"), t);
+  Tick tick(const Numbers& hip, double t, const std::optional<Numbers>& orientation) {
+    const Tick tick = method_->tick(HandPose{vector_of(hip, "hip"), rotation_of(orientation)}, t);
     trouble_->rethrow();
     return tick;
   }
@@ -416,6 +420,14 @@ void define_renderer(py::module_& m) {
       .def_readonly("proxy", &Tick::proxy, "[m] world, the centre of the sphere")
       .def_readonly("normal", &Tick::normal, "[-] unit, away from the surface; zero: none near")
       .def_readonly("force", &Tick::force, "[N] world, on the hand; at most max_force long")
+      .def_readonly("torque", &Tick::torque,
+                    "[N m] world, on the hand about the HIP; zero without a tool")
+      .def_property_readonly(
+          "orientation", [](const Tick& tick) { return tick.orientation.coeffs(); },
+          "of the hand, as given: a unit quaternion x y z w, world from tool")
+      .def_property_readonly(
+          "proxy_orientation", [](const Tick& tick) { return tick.proxy_orientation.coeffs(); },
+          "of the proxy, likewise; of a ball that of the hand")
       .def_readonly("state", &Tick::state)
       .def_readonly("steps", &Tick::steps, "proxy steps taken")
       .def_readonly("surface_velocity", &Tick::surface_velocity, "[m/s] towards the proxy")
@@ -435,9 +447,11 @@ void define_renderer(py::module_& m) {
       "A method of haptic rendering: frames and HIPs in, proxy and force out.\n\n"
       "The same calls give the same ticks, bit for bit. No safety chain stands behind it: what\n"
       "drives a motor belongs into a Session.")
-      .def(py::init<const py::object&, const py::kwargs&>(), py::arg("method") = "sight",
+      .def(py::init<const py::object&, const std::string&, const py::kwargs&>(),
+           py::arg("method") = "sight", py::kw_only(), py::arg("tool") = "",
            "A method by its name (palpate.methods()) or an object of a class derived from\n"
-           "palpate.Method; parameters by their names (palpate.parameters()), in SI units.")
+           "palpate.Method; what it touches with, such as \"box:40x20x5mm\" (docs/tools.md);\n"
+           "parameters by their names (palpate.parameters()), in SI units.")
       .def("frame", &Renderer::frame, py::arg("cloud"), py::arg("stamp"),
            py::arg("camera_number") = 0,
            "Takes a frame into use: a DepthImage or PointCloud, and when it was captured [s]; "
@@ -469,8 +483,12 @@ void define_renderer(py::module_& m) {
           },
           py::arg("points"), py::kw_only(), py::arg("stamp"), py::arg("viewpoint") = py::none(),
           py::arg("camera_number") = 0, "The same from points (n, 3) [m, world].")
-      .def("tick", &Renderer::tick, py::arg("hip"), py::arg("t"),
-           "Moves the proxy towards the HIP [m, world] at time t [s] and renders the force.")
+      .def(
+          "tick", &Renderer::tick, py::arg("hip"), py::arg("t"),
+          py::arg("orientation") = py::none(),
+          "Moves the proxy towards the HIP [m, world] at time t [s] and renders force and torque.\n"
+          "orientation: of the tool, a unit quaternion x y z w, world from tool; None: the world's "
+          "axes.")
       .def("ticks", &Renderer::ticks, py::arg("hips"), py::arg("times"),
            "Many ticks on one frame: HIPs (n, 3) and times (n,) in, a structured array out.")
       .def("set", &Renderer::set, "Changes parameters between two ticks; the contact stays.")

@@ -17,10 +17,11 @@ PYBIND11_MODULE(_core, m) {
 #endif
   const auto error = py::register_exception<palpate::Error>(m, "Error", PyExc_ValueError);
   error.attr("__doc__") = "Bad input: one line that says what was wrong and what to do.";
-  PYBIND11_NUMPY_DTYPE(TickRecord, t, hip, proxy, normal, force, surface_velocity, frame, steps,
-                       flags, state);
-  PYBIND11_NUMPY_DTYPE(CycleRecord, t, hip, proxy, normal, asked, force, position, surface_velocity,
-                       gain, frame_age, frame, number, steps, flags, safety, hand, state);
+  PYBIND11_NUMPY_DTYPE(TickRecord, t, hip, proxy, normal, force, torque, orientation,
+                       proxy_orientation, surface_velocity, frame, steps, flags, state);
+  PYBIND11_NUMPY_DTYPE(CycleRecord, t, hip, proxy, normal, asked, force, torque, position,
+                       orientation, proxy_orientation, surface_velocity, gain, frame_age, frame,
+                       number, steps, flags, safety, hand, state);
   define_core(m);
   define_sources(m);
   define_session(m);

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "palpate/io/sources/fixture_file.hpp"
+#include "palpate/io/sources/tool_file.hpp"
 #include "palpate/kernel/cloud/proposed_touch.hpp"
 #include "palpate/kernel/core/error.hpp"
 
@@ -193,11 +194,14 @@ class PythonSession {
     return lost;
   }
 
-  void set(const std::optional<std::string>& method, const py::kwargs& values) {
+  void set(const std::optional<std::string>& method, const std::optional<std::string>& tool,
+           const py::kwargs& values) {
     const auto numbers = numbers_of(values);
     const py::gil_scoped_release released;
+    const auto shape = tool ? read_tool(*tool) : nullptr;
     session_->change([&](ServoSettings& settings) {
       if (method) settings.method = *method;
+      if (tool) settings.tool = shape;
       for (const auto& [name, value] : numbers) set_parameter(settings.parameters, name, value);
     });
   }
@@ -322,8 +326,9 @@ void define_session(py::module_& m) {
           "How many cycles were overwritten before `ticks` was called, of all hands.")
       .def("state", &PythonSession::state, "How the session does: a dict.")
       .def("clouds", &PythonSession::clouds, "What each camera saw last; None before that.")
-      .def("set", &PythonSession::set, py::arg("method") = py::none(),
-           "Changes method and parameters in the next tick; the contact stays.")
+      .def("set", &PythonSession::set, py::arg("method") = py::none(), py::arg("tool") = py::none(),
+           "Changes method, tool and parameters in the next tick; the contact stays, but not that\n"
+           "of a tool which is inside a surface: it feels nothing until it is free.")
       .def("fixtures", &PythonSession::fixtures, py::arg("fixtures"),
            "Other virtual fixtures from the next tick on: a TOML file, its text, or None for none.")
       .def("limit", &PythonSession::limit, "Changes limits of the safety chain.")

@@ -101,6 +101,20 @@ class Session(unittest.TestCase):
         self.assertEqual(state["ticks"], 2000)
         self.assertTrue(palpate.safety_flags(int(ticks["safety"][0])))
 
+    def test_changes_its_tool(self):
+        session = palpate.Session("synthetic:plane?size=160x120", free_running=True, stroke_time=2)
+        session.set(tool="box:40x20x5mm?points=200")
+        for wrong in ({"tool": "spoon:4mm"}, {"method": "paper"}):
+            with self.assertRaises(palpate.Error):
+                session.set(**wrong)
+        session.run(1.5)
+        ticks = session.ticks()
+        self.assertGreater(numpy.abs(ticks["force"]).max(), 0.5)
+        numpy.testing.assert_array_equal(ticks["orientation"][-1], (0, 0, 0, 1))
+        # A ball would be r_c = 5 mm above the plane, the box is 2.5 mm.
+        pressed = ticks[numpy.abs(ticks["force"][:, 2]) > 0.5]
+        self.assertLess(pressed["proxy"][:, 2].max(), 4e-3)
+
     def test_records_what_it_can_read(self):
         with tempfile.TemporaryDirectory() as folder:
             bag = os.path.join(folder, "session")

@@ -33,6 +33,31 @@ class Renderer(unittest.TestCase):
         numpy.testing.assert_allclose(tick.normal, (0, 0, -1), atol=1e-3)
         self.assertEqual(palpate.flags(tick.flags), {})
 
+    def test_touches_with_a_tool_that_is_turned(self):
+        touch = palpate.Renderer("sight", tool="box:40x20x5mm")
+        touch.frame(wall(), camera=CAMERA, stamp=0.0)
+        flat, tilted = (0, 0, 0, 1), (numpy.sin(0.1), 0, 0, numpy.cos(0.1))
+        for i in range(200):
+            tick = touch.tick((0, 0, 0.95), 1e-3 * i, tilted)
+        numpy.testing.assert_allclose(tick.orientation, tilted)
+        numpy.testing.assert_array_equal(tick.torque, 0)
+        for i in range(400):
+            tick = touch.tick((0, 0, 0.9951), 0.2 + 1e-3 * i, tilted)
+        # The edge at +y is 10 mm sin 0.2 + 2.5 mm cos 0.2 = 4.4 mm ahead of the hand.
+        self.assertEqual(tick.force[2], 0)
+        for i in range(400):
+            tick = touch.tick((0, 0, 0.999), 0.7 + 1e-3 * i, tilted)
+        self.assertLess(tick.force[2], -1)
+        self.assertLess(tick.torque[0], -5e-3)
+        self.assertLess(tick.proxy_orientation[0], tick.orientation[0])
+        for wrong, message in (((0, 0, 0, 2), "length"), ((0, 0, 1), "shape")):
+            with self.assertRaisesRegex(palpate.Error, message):
+                touch.tick((0, 0, 0.9), 2.0, wrong)
+        with self.assertRaisesRegex(palpate.Error, "ball"):
+            palpate.Renderer("paper", tool="box:40x20x5mm")
+        ticks = palpate.Renderer().ticks([(0, 0, 0)], [0.0])
+        numpy.testing.assert_array_equal(ticks["proxy_orientation"], [flat])
+
     def test_feels_what_a_pixel_is_made_of(self):
         materials = palpate.Materials([{"name": "cushion", "like": "foam", "stiffness": 150},
                                        {"name": "board", "friction": 0.5}])

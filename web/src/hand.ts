@@ -99,7 +99,7 @@ export class HandInput {
 
   // Turns the tool in the picture: about its right and up, as a drag does, and about the way in.
   private spin(x: number, y: number, roll: number): void {
-    if (!this.take() || !this.turn) return;
+    if (!(this.held || this.takeByKeys()) || !this.turn) return;
     const { right, up, forward } = axes(this.view.orbit);
     const about = add(add(scale(right, y), scale(up, x)), scale(forward, roll));
     const angle = length(about);
@@ -192,6 +192,7 @@ export class HandInput {
     this.waits = !near && mayWait ? { id: event.pointerId, at, frames } : null;
     if (this.waits) this.start();
     if (gesture === "press" && near) this.beginPress(at, near);
+    if (gesture === "spin") this.take();
   }
 
   private pressable(at: Place): { at: Place; spot: Spot } | null {

@@ -3,8 +3,10 @@
 // rmw_cyclonedds_cpp asks them.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -117,6 +119,45 @@ TEST_F(RosNodeTest, PublishesTicksAndReports) {
   ASSERT_EQ(report->status.size(), 5U);
   EXPECT_EQ(report->status[0].name, "palpate: servo loop");
   EXPECT_NE(report->status[1].name.find("synthetic:plane"), std::string::npos);
+}
+
+// A hand whose tool is tilted about x by 0.2 rad and goes down to the plane, with motors in the
+// wrist.
+class TiltedHand final : public Device {
+ public:
+  [[nodiscard]] const DeviceInfo& info() const override { return info_; }
+  HandState read(double t) noexcept override {
+    begin_ = std::min(begin_, t);
+    return {.position = {0.0, 0.0, std::max(0.002, 0.03 - 0.02 * (t - begin_))},
+            .orientation = Eigen::Quaterniond(std::cos(0.1), std::sin(0.1), 0.0, 0.0)};
+  }
+  void write(const Vec3& /*force*/, double /*t*/) noexcept override {}
+
+ private:
+  DeviceInfo info_{
+      .uri = "tilted:", .kind = "tilted", .limits = {.max_torque = 0.2}, .simulated = true};
+  double begin_ = std::numeric_limits<double>::infinity();
+};
+
+TEST_F(RosNodeTest, PublishesHowAToolIsTurnedAndItsTorque) {
+  SessionOptions options;
+  options.cameras.push_back({.uri = "synthetic:plane?size=320x240"});
+  options.tool = "box:40x20x5mm?points=500";
+  options.open_devices[0] = std::make_unique<TiltedHand>();
+  begin(std::move(options));
+  open();
+  // The plane pushes the edge at -y, which is the lower one.
+  const auto force = hears<ros::WrenchStamped>(
+      "/palpate/force", [](const auto& m) { return m.force[2] > 0.3 && m.torque[0] < -2e-3; });
+  ASSERT_TRUE(force);
+  const auto any = [](const auto&) { return true; };
+  const auto hip = hears<ros::PoseStamped>("/palpate/hip", any);
+  ASSERT_TRUE(hip);
+  EXPECT_NEAR(hip->orientation[0], std::sin(0.1), 1e-9);
+  EXPECT_NEAR(hip->orientation[3], std::cos(0.1), 1e-9);
+  const auto proxy = hears<ros::PoseStamped>("/palpate/proxy", any);
+  ASSERT_TRUE(proxy);
+  EXPECT_LT(proxy->orientation[0], std::sin(0.1) - 1e-4) << "the plane turns it back";
 }
 
 TEST_F(RosNodeTest, PublishesEachHandOfTheSession) {

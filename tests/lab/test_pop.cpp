@@ -17,6 +17,7 @@
 #include "palpate/kernel/core/error.hpp"
 
 #include "tests/lab/drawn.hpp"
+#include "tests/support/scale.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace palpate::lab {
@@ -128,44 +129,28 @@ TEST_F(Pop, ThePaperLosesEverySweepOfAnOccluderAndTheFailureIsShrunkAndRunsAgain
 // A method in a world in which all lengths and times are other multiples. Depth images alone.
 class Rescaled final : public Method {
  public:
-  Rescaled(Parameters p, double length, double time) : length_(length), time_(time) {
-    p.proxy.r_1 *= length;
-    p.proxy.r_2 *= length;
-    p.proxy.r_3 *= length;
-    p.coupling.max_force *= length;
-    p.motion.frame_rate /= time;
-    p.motion.max_extrapolation *= time;
-    p.sight.hidden_hold *= time;
-    p.sight.hidden_fade *= time;
-    p.sight.oldest_frame *= time;
-    p.sight.hardest_strike *= length / (time * time);
-    p.sight.return_speed *= length / time;
-    p.sight.side_depth *= length;
-    p.sight.curvature_sd /= length;
-    p.sight.usual_noise = SightParameters::unknown_noise / length;
-    p.sight.noise_growth = 2;
-    method_ = lab::make_method("sight", {p, nullptr});
-  }
-  void seat(const Vec3& proxy) noexcept override { method_->seat(length_ * proxy); }
+  Rescaled(const Parameters& parameters, const test::Scale& scale)
+      : scale_(scale), method_(make_method("sight", {test::scaled(parameters, scale), nullptr})) {}
+  void seat(const Vec3& proxy) noexcept override { method_->seat(scale_.length * proxy); }
   void observe(const Observation& seen) noexcept override {
     const DepthImage& image = *seen.cloud.image();
     Eigen::Isometry3d pose = image.world_from_camera();
-    pose.translation() *= length_;
+    pose.translation() *= scale_.length;
     auto scaled = std::make_unique<DepthImage>(image.shared_rays(), image.depth(),
-                                               image.units_per_metre() / length_, pose);
-    method_->observe({*scaled, time_ * seen.stamp, seen.camera});
+                                               image.units_per_metre() / scale_.length, pose);
+    method_->observe({*scaled, scale_.time * seen.stamp, seen.camera});
     image_ = std::move(scaled);
   }
   Tick tick(const Vec3& hip, double t) noexcept override {
-    Tick tick = method_->tick(length_ * hip, time_ * t);
-    for (Vec3* each : {&tick.hip, &tick.proxy, &tick.force}) *each /= length_;
+    Tick tick = method_->tick(scale_.length * hip, scale_.time * t);
+    for (Vec3* each : {&tick.hip, &tick.proxy, &tick.force}) *each /= scale_.length;
     tick.t = t;
     return tick;
   }
   void set_parameters(const Parameters& /*parameters*/) noexcept override {}
 
  private:
-  double length_, time_;
+  test::Scale scale_;
   std::unique_ptr<Method> method_;
   std::unique_ptr<DepthImage> image_;
 };
@@ -175,12 +160,11 @@ TEST_F(Pop, SightHasTheSameOutcomesWhateverTheLengthsAndTimesAreMultiplesOf) {
   options.families = {"occluder", "layers", "finger", "random"};
   options.parameters.sight.usual_noise = SightParameters::unknown_noise;
   options.parameters.sight.noise_growth = 2;
-  for (const auto& [length, time] : {std::pair(0.2, 1.0), {3.0, 1.0}, {1.0, 0.5}, {1.7, 7.0}}) {
-    const std::string name = fmt::format("sight {} m {} s", length, time);
+  for (const test::Scale scale : {test::Scale{0.2, 1.0}, {3.0, 1.0}, {1.0, 0.5}, {1.7, 7.0}}) {
+    const std::string name = fmt::format("sight {} m {} s", scale.length, scale.time);
     options.methods.push_back(name);
-    options.own_methods.push_back({name, [length = length, time = time](const MethodSetup& setup) {
-                                     return std::make_unique<Rescaled>(setup.parameters, length,
-                                                                       time);
+    options.own_methods.push_back({name, [scale](const MethodSetup& setup) {
+                                     return std::make_unique<Rescaled>(setup.parameters, scale);
                                    }});
   }
   const Table table = run(options);

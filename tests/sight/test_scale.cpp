@@ -13,36 +13,12 @@
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/sight/sight.hpp"
 
+#include "tests/support/scale.hpp"
+
 namespace palpate {
 namespace {
 
-// How many times as long all lengths and all times are.
-struct Scale {
-  double length = 1.0, time = 1.0;
-};
-
-// The coupling's stiffness stays, so forces grow with lengths. The damper's filter is a time of the
-// device's; without damping it has no part.
-Parameters scaled(const Scale& scale) {
-  const auto [s, k] = scale;
-  Parameters p;
-  p.proxy.r_1 *= s;
-  p.proxy.r_2 *= s;
-  p.proxy.r_3 *= s;
-  p.coupling.max_force *= s;
-  p.motion.frame_rate /= k;
-  p.motion.max_extrapolation *= k;
-  p.sight.hidden_hold *= k;
-  p.sight.hidden_fade *= k;
-  p.sight.oldest_frame *= k;
-  p.sight.hardest_strike *= s / (k * k);
-  p.sight.return_speed *= s / k;
-  p.sight.side_depth *= s;
-  p.sight.curvature_sd /= s;
-  p.sight.usual_noise = 5e-3 / s;  // at 1 m, growing with the square of the distance
-  p.sight.noise_growth = 2;
-  return p;
-}
+using test::Scale;
 
 // [m] above the plane z = 0, at a place and time of the unscaled session.
 using Relief = std::function<double(double x, double y, double t)>;
@@ -63,7 +39,7 @@ std::vector<Tick> play(const Scene& scene, const Scale& scale) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = Vec3(1, -1, -1).asDiagonal();
   pose.translation() = Vec3(0, 0, scale.length * distance);
-  Sight sight(scaled(scale));
+  Sight sight(test::scaled({}, scale));
   sight.seat(scale.length * scene.hip(0.0));
   std::mt19937 random(7);
   std::normal_distribution<double> noise(0.0, scene.noise);

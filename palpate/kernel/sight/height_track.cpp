@@ -34,7 +34,7 @@ constexpr double single_proof = 4.5;
 // known.
 constexpr double first_velocity = 20.0;
 constexpr double first_acceleration = 2.2;
-constexpr double least_sd = 2e-5;  // [r_c] less noise is not told from rounding
+constexpr double least_height_sd = 2e-5;  // [r_c] less noise is not told from rounding
 
 // Kalman filters of height, velocity and acceleration, side by side: filter i in lane i. Those of
 // velocity steps have no acceleration.
@@ -187,7 +187,7 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
   if (!(period > 0.0 && interval > 0.0)) return {resting, 0.0};
 
   const double base = samples.front().height;
-  const double variance = std::max(sd * sd, (least_sd * r_c) * (least_sd * r_c));
+  const double variance = std::max(sd * sd, (least_height_sd * r_c) * (least_height_sd * r_c));
   Bank bank(samples[frames - 1].height - base, samples[frames - 1].doubt * variance, memory,
             r_c / period, period);
   Bank::Lanes before{};  // the newest height

@@ -205,11 +205,12 @@ void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expe
   std::size_t near = 0;
   std::array<float, wide_beam_points + 1> near_above;
   const auto gate = static_cast<float>(expected.gate);
+  const auto nearest = static_cast<float>(far);
+  const auto farthest = static_cast<float>(-reach(surface_));
   for (std::size_t i = 0; i < size; ++i) {
     const float above = above_surface[i];
     sighting.before += above > gate ? 1 : 0;
-    const bool counts = (off_axis[i] <= 0.0F) & (above <= static_cast<float>(far)) &
-                        (above >= static_cast<float>(-reach(surface_)));
+    const bool counts = (off_axis[i] <= 0.0F) & (above <= nearest) & (above >= farthest);
     const bool is_near = counts & (std::abs(above) <= gate);
     near_above[near] = above;
     near += is_near ? 1 : 0;

@@ -88,9 +88,6 @@ void look_at_processor(const fs::path& root, Machine& machine) {
     const auto known = std::find(machine.governors.begin(), machine.governors.end(), governor);
     if (!governor.empty() && known == machine.governors.end())
       machine.governors.push_back(governor);
-    for (const char* cause : {"core", "package"})
-      machine.throttled += static_cast<std::uint64_t>(
-          number_in(core / "thermal_throttle" / (std::string(cause) + "_throttle_count")));
     for (const fs::path& state : entries(core / "cpuidle")) {
       if (first_line(state / "disable") != "1")
         machine.deepest_sleep =
@@ -179,6 +176,15 @@ std::map<std::string, std::uint64_t> interrupts_on(int core, const fs::path& roo
       counts[number + " " + name] += on_core;
   }
   return counts;
+}
+
+std::uint64_t times_throttled(const fs::path& root) {
+  std::uint64_t times = 0;
+  for (const fs::path& core : entries(root / "sys/devices/system/cpu"))
+    for (const char* cause : {"core", "package"})
+      times += static_cast<std::uint64_t>(
+          number_in(core / "thermal_throttle" / (std::string(cause) + "_throttle_count")));
+  return times;
 }
 
 Machine look_at_machine(const fs::path& root) {

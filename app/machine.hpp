@@ -36,7 +36,6 @@ struct Machine {
   double fifo_share = 1.0;             ///< [-] of the time that real-time threads may take
   double deepest_sleep = 0.0;          ///< [s] to wake from the deepest idle state in use
   bool threads_share_cores = false;    ///< SMT is on
-  std::uint64_t throttled = 0;         ///< how often a core was slowed down by its heat
   std::vector<NetworkCard> network;
   bool is_virtual = false;
   std::vector<FoundDevice> devices;
@@ -45,6 +44,9 @@ struct Machine {
 /// Looks below `root` as at a system's own folders: dev, proc, sys. Never throws for what is
 /// missing.
 Machine look_at_machine(const std::filesystem::path& root = "/");
+
+/// How often a core was slowed down by its heat since the system started.
+std::uint64_t times_throttled(const std::filesystem::path& root = "/");
 
 /// How many interrupts a core has served, by what they are called. Empty if nothing says so.
 std::map<std::string, std::uint64_t> interrupts_on(int core,

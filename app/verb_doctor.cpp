@@ -114,6 +114,7 @@ void name_slow_cards(const Machine& machine, std::vector<std::string>& advice) {
 Json look_at_time(const DoctorOptions& options, const Machine& machine,
                   std::vector<std::string>& advice) {
   const auto half = std::chrono::duration<double>(0.5 * options.seconds);
+  const std::uint64_t throttled_before = times_throttled();
   PeriodicThread thread(options.rate, RealtimeRequest{}, [](const Wake&) {});
   const RealtimeReport& granted = thread.realtime();
   auto interrupts = interrupts_on(granted.core);
@@ -144,11 +145,11 @@ Json look_at_time(const DoctorOptions& options, const Machine& machine,
         1e3 * longest_pause));
     name_obstacles(machine, granted, half.count(), interrupts, advice);
   }
-  if (const auto throttled = look_at_machine().throttled; throttled > machine.throttled)
+  if (const auto throttled = times_throttled(); throttled > throttled_before)
     advice.push_back(
         fmt::format("the processor was slowed down by its heat {} times meanwhile: "
                     "improve its cooling",
-                    throttled - machine.throttled));
+                    throttled - throttled_before));
   advice.insert(advice.begin(), granted.advice.begin(), granted.advice.end());
   const double delay = felt["wake_up_p999_s"].get<double>() + felt["compute_p999_s"].get<double>();
   Json report = {{"fit", fit},

@@ -18,7 +18,8 @@ import typing
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 VARIABLE = "PALPATE_VARIANT"  # of the environment: the number of the variant in force, from 1
-USERS = {"palpate/servo/last_gate.hpp": "palpate/servo/cycle.cpp"}
+USERS = {"palpate/servo/last_gate.hpp": ["palpate/servo/cycle.cpp",
+                                         "tests/servo/test_last_gate.cpp"]}
 SWITCH = f"""#pragma once
 #include <cstdlib>
 inline int palpate_variant() {{
@@ -130,7 +131,7 @@ def batches(variants):
 
 def build(batch, build_folder, folder, target, flags=()):
     """Links ninja's `target` with the switched sources before the libraries. @return its path.
-    A header's variants are in what includes it of the name in USERS."""
+    A header's variants are in what USERS names; a test that it names is there twice, then."""
     (folder / "switch.hpp").write_text(SWITCH)
     objects = []
     files = {piece.file for piece in batch}
@@ -142,14 +143,12 @@ def build(batch, build_folder, folder, target, flags=()):
         copy = folder / (file if file in USERS else pathlib.Path(file).name)
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_text(source)
-        if file in USERS:
-            if USERS[file] in files:
-                continue
-            copy = ROOT / USERS[file]
-        objects.append(folder / f"{len(objects)}.o")
-        subprocess.run(["c++", "-std=c++20", "-O2", "-w", *flags, f"-I{folder}", f"-I{ROOT}",
-                        "-isystem", "/usr/include/eigen3", "-include", folder / "switch.hpp", "-c",
-                        copy, "-o", objects[-1]], check=True)
+        users = USERS.get(file)
+        for source in [ROOT / user for user in users if user not in files] if users else [copy]:
+            objects.append(folder / f"{len(objects)}.o")
+            subprocess.run(["c++", "-std=c++20", "-O2", "-w", *flags, f"-I{folder}", f"-I{ROOT}",
+                            "-isystem", "/usr/include/eigen3", "-include", folder / "switch.hpp",
+                            "-c", source, "-o", objects[-1]], check=True)
     command = subprocess.run(["ninja", "-C", build_folder, "-t", "commands", "-s", target],
                              check=True, capture_output=True, text=True).stdout
     link = command.partition("&& ")[2].partition(" && ")[0]

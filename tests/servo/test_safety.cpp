@@ -463,7 +463,9 @@ TEST(SafetyChain, ScalesForceAndTorqueByOneFactorAtEitherLimit) {
   Session weaker(all, with_wrist, half);
   weaker.engage();
   weaker.input.torque = Vec3(0.8, 0, 0);
-  EXPECT_NEAR(weaker.run_for(1.0, 3.0).torque.norm(), 0.2, 1e-9) << "as the user's limit of force";
+  const SafetyOutput output = weaker.run_for(1.0, 3.0);
+  EXPECT_NEAR(output.torque.norm(), 0.2, 1e-9) << "as the user's limit of force";
+  EXPECT_NEAR(output.force.norm(), 0.25 * 3.0, 1e-9) << "by the same factor";
   // Without the link the torque passes whole.
   Session session(all & ~std::uint32_t{force_cut}, with_wrist, strong);
   session.engage();

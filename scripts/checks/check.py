@@ -17,7 +17,7 @@ KNOWS = {
     "core": set(),
     "paper": {"core"},
     "sight": {"core", "paper", "cloud"},
-    "tool": {"core", "cloud", "sight"},
+    "tool": {"core", "cloud", "feel", "sight"},
     "feel": {"core"},
     "methods": {"core", "paper", "sight", "feel", "tool"},
     "cloud": {"core"},

@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/io/sources/synthetic_camera.hpp"
+#include "palpate/kernel/cloud/material_map.hpp"
 #include "palpate/kernel/core/vectorise.hpp"
 #include "palpate/kernel/tool/shape_touch.hpp"
 
@@ -50,7 +51,10 @@ class Stage {
       if (streams && t_ >= frames_ * frame_time - 1e-9) {
         frame_ = camera_.capture(frames_ * frame_time, static_cast<std::uint64_t>(frames_));
         ++frames_;
-        touch_.observe({*frame_.cloud, frame_.stamp});
+        auto image = std::make_unique<DepthImage>(*frame_.cloud->image());
+        image->set_materials(materials);
+        touch_.observe({*image, frame_.stamp});
+        image_ = std::move(image);
       }
       tick = touch_.tick(hand(t_), t_);
       if (see) see(tick);
@@ -69,6 +73,7 @@ class Stage {
   [[nodiscard]] double now() const { return t_; }
 
   bool streams = true;  // are there new frames?
+  std::shared_ptr<const MaterialMap> materials;
 
  private:
   static CameraSetup setup(double distance, double tilt) {
@@ -79,6 +84,7 @@ class Stage {
   SyntheticCamera camera_;
   ShapeTouch touch_;
   Frame frame_;
+  std::unique_ptr<DepthImage> image_;
   int frames_ = 0;
   double t_ = 0.0;
 };
@@ -165,6 +171,160 @@ TEST(ShapeTouch, LiesInAConcaveCorner) {
   const Tick tick = stage.press(pose({0, 0, 22.5e-3 - 5e-3}), 0.04);
   EXPECT_NEAR(tick.force.z(), stiffness * 5e-3, 0.05 * stiffness * 5e-3);
   EXPECT_LT(tick.torque.norm(), 0.05 * stiffness * 5e-3 * 20e-3);
+}
+
+Parameters rough(double friction) {
+  Parameters parameters;
+  parameters.friction.friction = friction;
+  parameters.friction.kinetic_share = 1.0;
+  return parameters;
+}
+
+// Hazard: material-force
+TEST(ToolFriction, APlateOnASlopeSticksBelowTheAngleOfFrictionAndSlidesAboveIt) {
+  constexpr double mass = 0.2, damping = 2.0;  // [kg], [N s/m] of the hand
+  const double angle = std::atan(0.5);         // of friction
+  for (const double off : {-0.03, 0.03}) {     // [rad] 1.7 degrees
+    const Rotation slope = rotation_by(Vec3(0, angle + off, 0));
+    Part ground = part(HalfSpace{});
+    ground.world_from_part.linear() = slope.toRotationMatrix();
+    Stage stage(Scene({ground}));
+    stage.touch().set_parameters(rough(0.5));
+    Vec3 at = slope * Vec3(-0.01, 0, 4e-3), velocity = Vec3::Zero(), resting = at;
+    stage.run(
+        3.0,
+        [&](double) {
+          return HandPose{at, slope};
+        },
+        [&](const Tick& tick) {
+          if (tick.t < 0.2) return;  // the first frames
+          const Vec3 force = tick.force - mass * Vec3(0, 0, 9.81) - damping * velocity;
+          velocity += 1e-3 * force / mass;
+          at += 1e-3 * velocity;
+          if (tick.t < 1.0) resting = at;
+        });
+    const double slid = (slope.conjugate() * (at - resting)).x();
+    if (off < 0.0) {
+      EXPECT_LT(std::abs(slid), 1e-4);
+    } else {
+      EXPECT_GT(slid, 0.02);
+    }
+  }
+}
+
+// Hazard: material-force
+TEST(ToolFriction, DragsWithTheCoefficientTimesTheNormalForce) {
+  for (const double share : {1.0, 0.7}) {
+    Parameters parameters = rough(0.6);
+    parameters.friction.kinetic_share = share;
+    Stage stage(plane());
+    stage.touch().set_parameters(parameters);
+    stage.press(pose({-0.03, 0, -2.5e-3}));
+    const double begin = stage.now();
+    const Vec3 way = Vec3(0.8, 0.6, 0);  // at 0.1 m/s
+    const Tick tick = stage.run(
+        0.5, [&](double t) { return pose(Vec3(-0.03, 0, -2.5e-3) + 0.1 * (t - begin) * way); });
+    EXPECT_NEAR(tick.force.z(), 3.0, 0.1);
+    EXPECT_NEAR(tick.force.dot(way) / tick.force.z(), -0.6 * share, 0.02);
+    EXPECT_NEAR(tick.force.dot(Vec3(-0.6, 0.8, 0)), 0.0, 0.1);
+  }
+}
+
+// Hazard: material-force
+TEST(ToolFriction, ResistsATurnAboutTheNormal) {
+  Stage stage(plane());
+  stage.touch().set_parameters(rough(0.6));
+  stage.press(pose({0, 0, -2.5e-3}));
+  const double begin = stage.now();
+  stage.run(
+      2.0,
+      [&](double t) {
+        return pose({0, 0, -2.5e-3}, {0, 0, 0.2 * (t - begin)});
+      },
+      [&](const Tick& tick) {
+        EXPECT_NEAR(tick.force.z(), 3.0, 0.2);
+        if (tick.t < begin + 0.5) return;  // it sticks at first
+        // Between the torque of contacts half of its width away and that of its corners.
+        EXPECT_LT(tick.torque.z(), -0.6 * 3.0 * 5e-3);
+        EXPECT_GT(tick.torque.z(), -1.05 * 0.6 * 3.0 * 22.4e-3);
+      });
+}
+
+// Hazard: material-force
+TEST(ToolFriction, AHeldPlateDoesNotCreep) {
+  for (const char* sensor : {"ideal", "d4xx"}) {
+    Stage stage(plane(), "box:40x20x5mm", sensor, 0.5, 0.3);
+    stage.touch().set_parameters(rough(0.6));
+    stage.press(pose({0, 0, -2.5e-3}));
+    const Vec3 pulled(1.2e-3, 0.9e-3, -2.5e-3);  // half of 0.6 times 5 mm
+    const Vec3 before = stage.run(1.0, [&](double) { return pose(pulled); }).proxy;
+    const Tick tick = stage.run(test::sanitized ? 1.0 : 5.0, [&](double) { return pose(pulled); });
+    EXPECT_LT((tick.proxy - before).head<2>().norm(), 1e-4) << sensor;
+    EXPECT_LT(tick.force.head<2>().norm() / tick.force.z(), 0.6) << sensor;
+    EXPECT_GT(tick.force.head<2>().norm(), 0.7) << sensor;
+  }
+}
+
+// One material for x < 0.
+class LeftHalf final : public MaterialMap {
+ public:
+  explicit LeftHalf(const Material& material) : MaterialMap(table_of(material)) {}
+  [[nodiscard]] std::uint8_t label(std::size_t, const Vec3& point) const noexcept override {
+    return point.x() < 0.0 ? 1 : 0;
+  }
+  [[nodiscard]] std::uint8_t brightness(std::size_t, const Vec3&) const noexcept override {
+    return 0;
+  }
+  [[nodiscard]] bool has_brightness() const noexcept override { return false; }
+  [[nodiscard]] bool is_by_pixel() const noexcept override { return false; }
+
+ private:
+  static std::shared_ptr<const MaterialTable> table_of(const Material& material) {
+    auto table = std::make_shared<MaterialTable>();
+    table->materials = {{.name = "left", .material = material}};
+    return table;
+  }
+};
+
+// Hazard: material-force
+TEST(ToolFriction, EachContactHasTheMaterialUnderIt) {
+  Material soft;
+  soft.stiffness = 150.0;
+  Stage stage(plane());
+  stage.materials = std::make_shared<LeftHalf>(soft);
+  const Tick on_soft = stage.press(pose({-0.04, 0, -2.5e-3}));
+  EXPECT_NEAR(on_soft.force.z(), 150.0 * 5e-3, 0.05);
+  EXPECT_NEAR(on_soft.hardness, 0.25, 1e-6);
+  stage.run(0.2, [](double) { return pose({0, 0, 0.02}); });
+  EXPECT_NEAR(stage.press(pose({0.04, 0, -2.5e-3})).force.z(), 3.0, 0.1);
+  // Two fingers, the left one on the soft half: each gives half of 3 N, and that a quarter of it.
+  Stage both(plane(), "gripper:40x30x8mm");
+  both.materials = stage.materials;
+  const Tick on_both = both.press(pose({0, 0, -1e-3}, {0, 0, std::numbers::pi / 2}));
+  EXPECT_NEAR(on_both.force.z(), 1.5 + 0.25 * 1.5, 0.1);
+  EXPECT_LT(on_both.torque.y(), -(1.5 - 0.375) * 14e-3) << "about the fingers' inner edges";
+  EXPECT_GT(on_both.torque.y(), -(1.5 - 0.375) * 24e-3) << "about their outer edges";
+}
+
+// Hazard: material-force
+TEST(ToolFriction, RingsAndRattlesAsTheBallDoes) {
+  Parameters parameters;
+  parameters.tap.tap = 5.0;
+  parameters.texture.grain = 0.2;
+  Stage stage(plane());
+  stage.touch().set_parameters(parameters);
+  double ringing = 0.0, rattling = 0.0, resting = 0.0;
+  const auto hand = [](double t) {
+    return pose({0.05 * std::clamp(t - 1.0, 0.0, 1.0), 0, std::max(0.05 - 0.2 * t, -2.5e-3)});
+  };
+  stage.run(3.0, hand, [&](const Tick& tick) {
+    ringing = std::max(ringing, tick.transient.norm());
+    (tick.t < 2.05 ? rattling : resting) += tick.vibration.norm();
+    EXPECT_LE(tick.force.norm(), Parameters{}.coupling.max_force * (1.0 + 1e-12));
+  });
+  EXPECT_GT(ringing, 0.3);
+  EXPECT_GT(rattling, 50.0);  // [N] summed over a second
+  EXPECT_EQ(resting, 0.0);
 }
 
 // Hazard: tool-pushes
@@ -282,12 +442,18 @@ TEST(ShapeTouch, PushesAndNeverPullsAHandThatIsTakenAway) {
 TEST(ShapeTouch, AllocatesNothing) {
   if (!test::memory_is_counted) GTEST_SKIP() << "a sanitizer counts";
   Stage stage(plane());
+  Parameters felt = rough(0.5);
+  felt.texture.grain = 0.1;
+  stage.touch().set_parameters(felt);
   stage.press(pose({0, 0, 0}));
-  const std::function<HandPose(double)> hand = [](double) { return pose({0, 0, 0}, {0, 0.1, 0}); };
+  const std::function<HandPose(double)> hand = [](double t) {
+    return pose({0.5 * t, 0, 0}, {0, 0.1, 0});
+  };
   ShapeTouch& touch = stage.touch();
   const test::MemoryCalls calls;
   double force = 0.0;
-  for (int i = 0; i < 20; ++i) force += touch.tick(hand(0), stage.now() + i * 1e-3).force.z();
+  for (int i = 0; i < 20; ++i)
+    force += touch.tick(hand(i * 1e-3), stage.now() + i * 1e-3).force.z();
   EXPECT_EQ(calls.count(), 0u);
   EXPECT_GT(force, 0.0);
 }
@@ -331,10 +497,10 @@ TEST(ShapeTouch, IsQuietBeforeANoisyCamera) {
 }
 
 // The bits of a path: the image, the path and the tool are made without the mathematical library.
-std::uint64_t hash_of_path() {
+std::uint64_t hash_of_path(const Parameters& parameters) {
   Intrinsics k{.width = 160, .height = 120, .fx = 180.0, .fy = 181.0, .cx = 79.3, .cy = 60.1};
   const auto rays = std::make_shared<const ViewingRays>(k);
-  ShapeTouch touch(tool("box:40x20x10mm?points=500"), Parameters{});
+  ShapeTouch touch(tool("box:40x20x10mm?points=500"), parameters);
   std::uint64_t hash = 0xcbf29ce484222325U;
   std::unique_ptr<DepthImage> image;
   double force = 0.0;
@@ -366,7 +532,8 @@ TEST(ShapeTouch, GivesTheSameBitsEverywhere) {
   const std::string usual(vector_set_in_use());
   for (const std::string_view set : vector_sets()) {
     use_vector_set(set);
-    EXPECT_EQ(hash_of_path(), 17351193844532323594U) << set;
+    EXPECT_EQ(hash_of_path({}), 17351193844532323594U) << set;
+    EXPECT_EQ(hash_of_path(rough(0.4)), 13906034626751651996U) << set;
   }
   use_vector_set(usual);
 }

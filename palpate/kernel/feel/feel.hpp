@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "palpate/kernel/core/hand_velocity.hpp"
-#include "palpate/kernel/core/material.hpp"
 #include "palpate/kernel/core/method.hpp"
+#include "palpate/kernel/feel/contact_material.hpp"
 #include "palpate/kernel/feel/friction.hpp"
 #include "palpate/kernel/feel/grain.hpp"
 #include "palpate/kernel/feel/hardness.hpp"
@@ -20,9 +20,6 @@ namespace palpate {
 /// are passed on unchanged, bit for bit.
 class Feel final : public Method {
  public:
-  /// [m] over which materials are averaged along the surface: no border causes a step.
-  static constexpr double averaged = 3e-3;
-
   /// @param method  what renders the normal force; not null
   Feel(std::unique_ptr<Method> method, const Parameters& parameters);
 
@@ -46,7 +43,6 @@ class Feel final : public Method {
   void look_whether_to_feel() noexcept;
   void forget_contact() noexcept;
   Movement move(const Tick& tick) noexcept;
-  void look_at_surface(const Tick& tick) noexcept;
   struct Texture {
     Vec3 force = Vec3::Zero(), vibration = Vec3::Zero();  // [N] of relief and grains; of these
   };
@@ -61,10 +57,7 @@ class Feel final : public Method {
   FrictionParameters bristles_;
   Material scene_;  // where no other is
 
-  Material here_;                  // under the foot
-  Vec3 slope_ = Vec3::Zero();      // [1/m] of the brightness there
-  Vec3 looked_at_ = Vec3::Zero();  // [m] the foot when both were looked up
-  bool looked_ = false;
+  ContactMaterial here_;  // under the foot
   Hardness hardness_;
   Friction friction_;
   Grain grain_;

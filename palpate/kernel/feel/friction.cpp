@@ -28,6 +28,11 @@ double sliding_share(double bend, bool back) {
 
 }  // namespace
 
+double friction_coefficient(const FrictionParameters& p, double speed) noexcept {
+  const double faster = speed / p.stribeck_speed;
+  return p.friction * (p.kinetic_share + (1.0 - p.kinetic_share) * math::exp(-faster * faster));
+}
+
 void Friction::reset() noexcept {
   bristle_ = normal_ = Vec3::Zero();
   pressed_ = sliding_ = 0.0;
@@ -56,11 +61,8 @@ Vec3 Friction::update(const Vec3& push, const Vec3& moved, const Vec3& velocity,
   const double speed = slide.norm();
   Vec3 force = Vec3::Zero();
   if (p.friction > 0.0) {
-    // Stribeck: from the static coefficient to the kinetic one as the anchor gets faster. The
-    // hand's speed would let a hand that sticks and trembles slip.
-    const double faster = sliding_ * speed / p.stribeck_speed;
-    const double coefficient =
-        p.friction * (p.kinetic_share + (1.0 - p.kinetic_share) * math::exp(-faster * faster));
+    // By the anchor's speed: the hand's would let a hand that sticks and trembles slip.
+    const double coefficient = friction_coefficient(p, sliding_ * speed);
     const double steady = coefficient * pressed_ / p.bristle_stiffness;  // [m]
     const double bend = bristle_.norm() / steady;
     sliding_ = sliding_share(bend, bristle_.dot(step) < 0.0);

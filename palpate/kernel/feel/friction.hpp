@@ -6,6 +6,10 @@
 
 namespace palpate {
 
+/// [-] Stribeck: from the static coefficient to the kinetic one as a contact slides faster.
+/// @param speed  [m/s] of what slides
+double friction_coefficient(const FrictionParameters& parameters, double speed) noexcept;
+
 /// Dry friction between hand and surface: the elasto-plastic model of Dupont, Hayward, Armstrong
 /// and Altpeter (2002), LuGre's bristle with a range in which it only bends.
 ///

@@ -12,7 +12,6 @@ namespace {
 constexpr int most_steps = 40;      // each takes a limit in or drops one; contacts need some ten
 constexpr double met = 1e-9;        // [m] a limit violated by less is met
 constexpr double dependent = 1e-9;  // [-] of a direction's square that is new: less is nothing
-constexpr std::size_t most_limits = 128;
 
 using Six = std::array<double, 6>;
 
@@ -57,9 +56,9 @@ void drop(HeldBy& held, std::size_t i) noexcept {
 
 HeldBy least_motion(std::span<const MotionLimit> limits, Motion6& motion) noexcept {
   constexpr double infinite = std::numeric_limits<double>::infinity();
-  limits = limits.first(std::min(limits.size(), most_limits));
+  limits = limits.first(std::min(limits.size(), most_motion_limits));
   HeldBy held;
-  std::bitset<most_limits> contradicts;
+  std::bitset<most_motion_limits> contradicts;
   for (int step = 0; step < most_steps;) {
     std::size_t worst = limits.size();
     double slack = -met;

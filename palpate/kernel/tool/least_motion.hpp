@@ -26,6 +26,9 @@ struct HeldBy {
   bool all_met = true;  ///< false: limits contradict one another, or the steps were used up
 };
 
+/// More limits than that are left out: a tool's contacts, and the friction of some twenty.
+inline constexpr std::size_t most_motion_limits = 160;
+
 /// The motion nearest to the wanted one within all limits: equation (3) of docs/tools.md, by the
 /// dual method of Goldfarb and Idnani (1983) with the identity as its matrix. Where limits
 /// contradict one another, the more violated ones come first. At most 40 steps.

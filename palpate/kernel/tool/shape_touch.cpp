@@ -2,6 +2,7 @@
 #include "palpate/kernel/tool/shape_touch.hpp"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 
 #include "palpate/kernel/core/error.hpp"
@@ -30,9 +31,14 @@ constexpr std::size_t most_moves = 4;  // of a tick
 constexpr double at_rest = 2e-6;       // [m] a shorter step is none
 constexpr double same_plane = 0.5e-3;  // [m] of a point in a tick before a plane is fitted anew
 constexpr double lost = 0.3;           // [m] between hand and proxy: no contact is so far away
-constexpr double spin_time = 2e-3;     // [s] over which a spin is smoothed, as HandVelocity is
-constexpr double longest_gap = 20e-3;  // [s] over more, differences are no velocity
-constexpr double free_gap = 0.5e-3;    // [m] beside the noise, that a free tool is in front
+constexpr int friction_rounds = 4;     // of a step, until all contacts that push have friction
+constexpr int friction_contacts = 4;   // get it beside these: four hold a tool
+constexpr double least_slide = 1e-9;   // [m] less is none
+constexpr double still_touching = 0.05e-3;  // [m] before a surface
+constexpr double sliding_time = 10e-3;      // [s] over which the proxy's own velocity is smoothed
+constexpr double spin_time = 2e-3;          // [s] over which a spin is smoothed, as HandVelocity is
+constexpr double longest_gap = 20e-3;       // [s] over more, differences are no velocity
+constexpr double free_gap = 0.5e-3;         // [m] beside the noise, that a free tool is in front
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
 constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
@@ -63,6 +69,7 @@ Known summarise(const float* gap, std::size_t size) {
 ShapeTouch::ShapeTouch(std::shared_ptr<const ToolShape> shape, const Parameters& parameters)
     : shape_(std::move(shape)), parameters_(parameters), stride_(longest_step) {
   validate(parameters);
+  feel_.set(parameters);
   std::size_t longest = 0;
   for (std::size_t patch = 0; patch < most_contacts; ++patch) {
     shell_.begin[patch] = shell_.x.size();
@@ -120,6 +127,7 @@ void ShapeTouch::release(const Pose& hand) noexcept {
 
 void ShapeTouch::observe(const Observation& seen) noexcept {
   if (seen.camera >= Patch::max_views) return;
+  feel_.take(seen);
   frame_.take(seen, 1.0 / parameters_.motion.frame_rate);
   timing_.frame(frame_.stamp(),
                 frame_.in_order() && frame_.count() > 1 ? frame_.camera_interval() : 0.0);
@@ -232,25 +240,97 @@ void ShapeTouch::find_contacts(const Scan& scan) noexcept {
     std::optional<SeenSurface::Fit> fit = plane.fit;
     if (fit) fit->gap += fit->normal.dot(place - plane.place);
     if (!fit || fit->gap > margin || !(fit->gap > -2.0 * deepest)) continue;
-    contacts_[contact_count_++] = {lever, *fit, scan.camera[i]};
+    contacts_[contact_count_++] = {lever, *fit, scan.camera[i], i};
   }
+}
+
+void ShapeTouch::Limits::add(const Contact& of, std::size_t number, const Vec3& direction,
+                             double length) noexcept {
+  if (size == limit.size()) return;
+  contact[size] = number;
+  limit[size].direction << direction, of.lever.cross(direction) / length;
+  limit[size++].least = -of.fit.gap;
+}
+
+// [m/s] world: of the hand's tool at a lever.
+Vec3 ShapeTouch::hand_velocity_at(const Vec3& lever) const noexcept {
+  return movement_.velocity + spin_.cross(lever);
+}
+
+// [m] How a tool's motion moves the point of a contact.
+Vec3 ShapeTouch::motion_at(const Motion6& motion, const Contact& contact) const noexcept {
+  return motion.head<3>() + motion.tail<3>().cross(contact.lever) / shape_->turn_length();
+}
+
+// (11): the sides of a contact's cone of friction, two of them along the way that it would slide.
+void ShapeTouch::add_friction(std::size_t number, const Motion6& wanted, Limits& limits) noexcept {
+  const Contact& contact = contacts_[number];
+  const Vec3& normal = contact.fit.normal;
+  const auto tangential = [&](const Vec3& v) -> Vec3 { return v - v.dot(normal) * normal; };
+  const double length = shape_->turn_length();
+  const double speed = std::min(tangential(sliding_ + sliding_spin_.cross(contact.lever)).norm(),
+                                tangential(hand_velocity_at(contact.lever)).norm());
+  const double coefficient = feel_.friction(contact.patch, pose_.at + contact.lever, normal, speed);
+  if (!(coefficient > 0.0)) return;
+  Vec3 along = tangential(motion_at(wanted, contact));
+  if (!(along.norm() > least_slide))  // any direction will do
+    along = tangential(std::abs(normal.x()) < 0.5 ? Vec3::UnitX() : Vec3::UnitY());
+  along.normalize();
+  const Vec3 across = normal.cross(along);
+  for (const Vec3& side : {along, across, Vec3(-along), Vec3(-across)})
+    limits.add(contact, number, normal + coefficient * side, length);
 }
 
 // One step of the proxy: the motion nearest to the one to the hand that keeps all contacts open.
 void ShapeTouch::step(const Pose& hand) noexcept {
   const double length = shape_->turn_length();  // (2)
-  std::array<MotionLimit, most_contacts> limits;
-  for (std::size_t i = 0; i < contact_count_; ++i) {
-    const Contact& contact = contacts_[i];
-    limits[i].direction << contact.fit.normal, contact.lever.cross(contact.fit.normal) / length;
-    limits[i].least = -contact.fit.gap;
-  }
+  Limits limits;
+  for (std::size_t i = 0; i < contact_count_; ++i)
+    limits.add(contacts_[i], i, contacts_[i].fit.normal, length);
   const Vec3 turn = rotation_vector(between(hand.turn, pose_.turn));
-  Motion6 motion;
-  motion << hand.at - pose_.at, length * turn;
+  Motion6 wanted;
+  wanted << hand.at - pose_.at, length * turn;
   const double farthest = (hand.at - pose_.at).norm() + shape_->reach() * turn.norm();
-  if (farthest > stride_) motion *= stride_ / farthest;
-  held_ = least_motion(std::span(limits.data(), contact_count_), motion);  // (3)
+  whole_ = std::max(farthest / stride_, 1.0);
+  if (farthest > stride_) wanted *= stride_ / farthest;
+  Motion6 motion = wanted;
+  const auto solve = [&] {
+    motion = wanted;
+    held_ = least_motion(std::span(limits.limit.data(), limits.size), motion);  // (3)
+  };
+  solve();
+  // Contacts that push get friction, and those that slide most: until all that push have it.
+  std::bitset<most_contacts> is_rough;
+  const auto roughen = [&](std::size_t number) {
+    if (is_rough[number]) return;
+    is_rough.set(number);
+    add_friction(number, wanted, limits);
+  };
+  for (int round = 0; feel_.feels() && round < friction_rounds; ++round) {
+    const std::size_t before = limits.size;
+    for (std::size_t i = 0; i < held_.count; ++i) roughen(limits.contact[held_.limit[i]]);
+    for (int more = 0; round == 0 && more < friction_contacts; ++more) {
+      double most = least_slide;
+      std::size_t worst = contact_count_;
+      for (std::size_t i = 0; i < contact_count_; ++i) {
+        const Contact& contact = contacts_[i];
+        const Vec3 way = motion_at(motion, contact);
+        const double along = way.dot(contact.fit.normal);
+        const double slide = (way - along * contact.fit.normal).norm();
+        if (is_rough[i] || contact.fit.gap + along > still_touching || slide <= most) continue;
+        most = slide;
+        worst = i;
+      }
+      if (worst == contact_count_) break;
+      roughen(worst);
+    }
+    if (limits.size == before) break;
+    solve();
+  }
+  for (std::size_t i = 0; i < held_.count; ++i) {
+    pushes_[i] = held_.push[i] * limits.limit[held_.limit[i]].direction.head<3>();
+    held_.limit[i] = limits.contact[held_.limit[i]];
+  }
   pose_.at += motion.head<3>();
   pose_.turn = unit(product(rotation_by(motion.tail<3>() / length), pose_.turn));
 }
@@ -332,6 +412,24 @@ double ShapeTouch::known_share(double t) const noexcept {
   return share;
 }
 
+// What the materials at the contacts make of the coupling's force and torque.
+void ShapeTouch::feel(const Pose& hand, Tick& tick) noexcept {
+  if (!feel_.feels()) return;
+  std::array<ToolFeel::Pushed, 6> pushed;
+  Vec3 normals = Vec3::Zero();
+  for (std::size_t i = 0; i < held_.count; ++i) {
+    const Contact& contact = contacts_[held_.limit[i]];
+    const Vec3 force = parameters_.coupling.stiffness * whole_ * pushes_[i];
+    normals += force.dot(contact.fit.normal) * contact.fit.normal;
+    pushed[i] = {contact.patch, pose_.at + contact.lever,
+                 contact.lever, contact.fit.normal,
+                 force,         hand_velocity_at(contact.lever) - tick.surface_motion};
+  }
+  if (normals.norm() > 0.0) tick.normal = normals.normalized();
+  movement_.by = hand.at - last_hand_ - movement_.dt * tick.surface_motion;
+  feel_.press(std::span(pushed.data(), held_.count), movement_, tick);
+}
+
 // The virtual coupling, (1): what pulls the hand to the proxy, in translation and in rotation.
 void ShapeTouch::render(const Pose& hand, double t, Tick& tick) noexcept {
   const Coupling& coupling = parameters_.coupling;
@@ -350,9 +448,12 @@ void ShapeTouch::render(const Pose& hand, double t, Tick& tick) noexcept {
   tick.force = push(u, hand_velocity_.value() - surface, coupling.stiffness, coupling.damping);
   tick.torque =
       push(turn, spin_, coupling.stiffness * length * length, coupling.damping * length * length);
+  if (const double size = tick.force.norm(); size > undirected_force)
+    tick.normal = tick.force / size;
+  feel(hand, tick);
   const double share = known_share(t);
   if (share <= 0.0) {
-    tick.force = tick.torque = Vec3::Zero();
+    tick.force = tick.torque = tick.normal = tick.vibration = Vec3::Zero();
     release(hand);
     return;
   }
@@ -363,9 +464,8 @@ void ShapeTouch::render(const Pose& hand, double t, Tick& tick) noexcept {
   }
   tick.force *= scale;
   tick.torque *= scale;
+  tick.vibration *= scale;
   tick.state = ContactState::contact;
-  if (const double size = tick.force.norm(); size > undirected_force)
-    tick.normal = tick.force / size;
   for (std::size_t i = 0; i < held_.count; ++i)
     if (contacts_[held_.limit[i]].fit.unseen > 0.0) tick.flags |= surface_hidden;
   tick.surface_velocity = surface.dot(tick.normal);
@@ -383,6 +483,7 @@ Tick ShapeTouch::tick(const HandPose& given, double t) noexcept {
   const Pose hand{given.position, unit(given.orientation)};
   hand_velocity_.update(hand.at, t);
   const double dt = t - last_t_;
+  movement_ = {Vec3::Zero(), hand_velocity_.value(), dt};
   if (dt > 0.0 && dt < longest_gap) {
     const Vec3 spin = rotation_vector(between(hand.turn, last_turn_)) / dt;
     spin_ += -math::expm1(-dt / spin_time) * (spin - spin_);
@@ -417,11 +518,21 @@ Tick ShapeTouch::tick(const HandPose& given, double t) noexcept {
     if (touching_) render(hand, t, tick);
     if ((pose_.at - hand.at).norm() > lost) {
       release(hand);
-      tick.force = tick.torque = tick.normal = Vec3::Zero();
+      tick.force = tick.torque = tick.normal = tick.vibration = Vec3::Zero();
       tick.state = ContactState::free_motion;
       tick.flags |= proxy_let_go;
     }
   }
+  if (dt > 0.0) {
+    const double newest = dt / (dt + sliding_time);
+    sliding_ += newest * ((pose_.at - last_pose_.at) / dt - sliding_);
+    sliding_spin_ +=
+        newest * (rotation_vector(between(pose_.turn, last_pose_.turn)) / dt - sliding_spin_);
+  }
+  last_pose_ = pose_;
+  last_hand_ = hand.at;
+  movement_.velocity -= tick.surface_motion;
+  feel_.ring(movement_, tick);
   tick.steps = steps_;
   tick.proxy = pose_.at;
   tick.proxy_orientation = pose_.turn;

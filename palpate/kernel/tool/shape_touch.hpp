@@ -13,6 +13,7 @@
 #include "palpate/kernel/sight/frame_timing.hpp"
 #include "palpate/kernel/tool/least_motion.hpp"
 #include "palpate/kernel/tool/seen_surface.hpp"
+#include "palpate/kernel/tool/tool_feel.hpp"
 #include "palpate/kernel/tool/tool_shape.hpp"
 
 namespace palpate {
@@ -30,7 +31,10 @@ class ShapeTouch final : public Method {
   void observe(const Observation& seen) noexcept override;
   Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip, {}}, t); }
   Tick tick(const HandPose& hand, double t) noexcept override;
-  void set_parameters(const Parameters& parameters) noexcept override { parameters_ = parameters; }
+  void set_parameters(const Parameters& parameters) noexcept override {
+    parameters_ = parameters;
+    feel_.set(parameters);
+  }
   /// @throws Error for points without an image, which have no lines of sight to look along.
   void check(const Cloud& cloud) const override;
 
@@ -43,7 +47,14 @@ class ShapeTouch final : public Method {
   struct Contact {
     Vec3 lever;  // [m] from the proxy's origin to the tool's point
     SeenSurface::Fit fit;
-    std::size_t camera;
+    std::size_t camera, patch;
+  };
+  /// The limits of a step, and the contact of each.
+  struct Limits {
+    std::array<MotionLimit, most_motion_limits> limit;
+    std::array<std::size_t, most_motion_limits> contact;
+    std::size_t size = 0;
+    void add(const Contact& of, std::size_t number, const Vec3& direction, double length) noexcept;
   };
   static constexpr std::size_t most_cameras = 4;  // those of further ones are not touched
   static constexpr std::size_t most_contacts = ToolShape::most_patches;
@@ -79,6 +90,10 @@ class ShapeTouch final : public Method {
   [[nodiscard]] bool can_follow(const Pose& hand) noexcept;
   bool move(const Pose& hand) noexcept;
   void step(const Pose& hand) noexcept;
+  void add_friction(std::size_t number, const Motion6& wanted, Limits& limits) noexcept;
+  [[nodiscard]] Vec3 motion_at(const Motion6& motion, const Contact& contact) const noexcept;
+  [[nodiscard]] Vec3 hand_velocity_at(const Vec3& lever) const noexcept;
+  void feel(const Pose& hand, Tick& tick) noexcept;
   [[nodiscard]] double known_share(double t) const noexcept;
   void render(const Pose& hand, double t, Tick& tick) noexcept;
   void release(const Pose& hand) noexcept;
@@ -109,7 +124,15 @@ class ShapeTouch final : public Method {
   };
   std::array<Plane, most_contacts> planes_{};
   std::uint64_t ticks_ = 0;
-  HeldBy held_;
+  HeldBy held_;                   // its limits are numbers of contacts
+  std::array<Vec3, 6> pushes_{};  // [m] world, of each of these, friction included
+  double whole_ = 1.0;            // [-] of the way to the hand, over that of the last step
+  ToolFeel feel_;
+  ToolFeel::Movement movement_{Vec3::Zero(), Vec3::Zero(), 0.0};  // of the hand
+  Pose last_pose_;                                                // of the proxy in the tick before
+  Vec3 sliding_ = Vec3::Zero();                                   // [m/s] of the proxy, smoothed
+  Vec3 sliding_spin_ = Vec3::Zero();                              // [rad/s] the same
+  Vec3 last_hand_ = Vec3::Zero();                                 // [m]
   int steps_ = 0;
   HandVelocity hand_velocity_;
   Rotation last_turn_ = Rotation::Identity();

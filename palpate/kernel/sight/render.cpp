@@ -2,6 +2,7 @@
 #include "palpate/kernel/sight/render.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "palpate/kernel/core/hand.hpp"
@@ -49,9 +50,13 @@ Vec3 ForceRenderer::come_back(Vec3 force, const Input& input, double stiffness) 
   const double push = force.norm();
   const double depth = push / stiffness;
   const double elapsed = std::max(input.t - t_, 0.0);
-  const double way = (input.hip - hip_).norm() + elapsed * input.velocity.norm();
+  const Vec3 moved = input.hip - hip_;
+  const double out = push > 0.0 ? moved.dot(force) / push : 0.0;
+  const double aside =
+      std::sqrt(std::max(moved.squaredNorm() - out * out, 0.0)) + elapsed * input.velocity.norm();
   const double pressed = std::exchange(pressed_, input.force.norm() / stiffness);
-  const double deeper = std::clamp(pressed_ - pressed, -way, way);
+  const double deeper =
+      std::clamp(pressed_ - pressed, -aside - std::max(out, 0.0), aside + std::max(-out, 0.0));
   const double back = input.return_speed * elapsed;
   felt_ = std::max(felt_ + back + deeper, 0.0);
   if (input.returned && push > 0.0)

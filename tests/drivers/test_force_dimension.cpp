@@ -49,7 +49,9 @@ TEST_F(ForceDimension, BringsItsAxesIntoOurs) {
 // Hazard: torque
 TEST_F(ForceDimension, SendsATorqueWhereTheWristHasMotors) {
   EXPECT_EQ(open("force-dimension:")->info().limits.max_torque, 0.0) << "omega.3";
-  bench.active_wrist = true;
+  bench.active_wrist = bench.wrist_is_off = true;
+  EXPECT_EQ(open("force-dimension:")->info().limits.max_torque, 0.0) << "a wrist that is off";
+  bench.wrist_is_off = false;
   EXPECT_DOUBLE_EQ(open("force-dimension:?max_force=6")->info().limits.max_torque, 0.1);
   const auto arm = open("force-dimension:");
   EXPECT_DOUBLE_EQ(arm->info().limits.max_torque, 0.2);
@@ -91,6 +93,7 @@ TEST_F(ForceDimension, SwitchesItsForcesOffAndOn) {
 }
 
 TEST_F(ForceDimension, KeepsForcesOffAfterItsFirmwareTookThemUntilNoneIsAskedForHalfASecond) {
+  bench.active_wrist = true;
   const auto arm = open("force-dimension:");
   arm->enable();
   double t = 0.0;
@@ -107,6 +110,11 @@ TEST_F(ForceDimension, KeepsForcesOffAfterItsFirmwareTookThemUntilNoneIsAskedFor
   EXPECT_FALSE(hand.present);
   EXPECT_EQ(hand.fault, DeviceFault::refused_command);
   EXPECT_NE(arm->fault_text().find("too fast"), std::string::npos) << arm->fault_text();
+  for (int i = 0; i < 600; ++i) {
+    static_cast<void>(arm->read(t += 0.001));
+    arm->write(Wrench{Vec3::Zero(), 0.01 * Vec3::UnitZ()}, t);
+  }
+  EXPECT_FALSE(bench.force_on) << "a torque is asked for";
   for (int i = 0; i < 490; ++i) tick(0.0);
   EXPECT_FALSE(bench.force_on);
   for (int i = 0; i < 30; ++i) tick(0.0);

@@ -207,7 +207,7 @@ EXPORT bool dhdHasWrist(char id) {
   return arm_of(id) == nullptr || workbench().active_wrist;
 }
 EXPORT bool dhdHasActiveWrist(char id) {
-  return arm_of(id) != nullptr && workbench().active_wrist;
+  return arm_of(id) != nullptr && workbench().active_wrist && !workbench().wrist_is_off;
 }
 EXPORT bool dhdHasGripper(char /*id*/) {
   return false;

@@ -31,6 +31,7 @@ struct Workbench {
 
   // Set by the test.
   std::atomic<bool> plugged_in{true}, calibrated{true}, too_fast{false}, active_wrist{false};
+  std::atomic<bool> wrist_is_off{false};  ///< of an arm that has one
   std::atomic<int> devices{1};
   std::atomic<int> error{0};  ///< the vendor's code that the next call reports once
   std::atomic<Path> path{Path::press_and_lift};

@@ -11,6 +11,7 @@
 
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/paper/paper.hpp"
+#include "palpate/kernel/paper/point_mover.hpp"
 
 #include "tests/support/grids.hpp"
 
@@ -236,6 +237,19 @@ TEST(Paper, AnswersANonFiniteHipWithNoForceAndStaysWhereItIs) {
     EXPECT_EQ(tick.proxy, before.proxy);
   }
   EXPECT_GT(paper.tick({0, 0, -0.01}, 0.2).force.z(), 0.0);
+}
+
+// Hazard: not-a-number, hang
+TEST(PointMover, EndsWhereItsWayIsNoNumber) {
+  const BruteForceCloud plane(flat_grid());
+  PointMover mover({});
+  Proxy proxy{.at = Vec3(0, 0, 0.01)};
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    EXPECT_EQ(mover.move(proxy, plane, {0, bad, 0}).steps, 0);
+    EXPECT_EQ(*proxy.at, Vec3(0, 0, 0.01));
+  }
+  EXPECT_TRUE(mover.move(proxy, plane, {0, 0, -0.01}).touched);
 }
 
 TEST(Paper, NeverAsksForMoreThanTheForceLimit) {

@@ -190,6 +190,20 @@ TEST(HeightTrack, HasNoVelocityAtRestUnderNoiseAndTheRightOneInSteadyMotion) {
   EXPECT_NEAR(track_height(rising, 1e-5, interval).velocity, 0.03, 1e-7);
 }
 
+// Hazard: not-a-number
+TEST(HeightTrack, IsANumberWhereAStampIsOfAnotherClock) {
+  for (const double jump : {1.0, 1e3, 1e6, 1e12}) {
+    for (int when = 1; when < 20; ++when) {
+      std::vector<HeightSample> newest_first;
+      for (int i = 20; i-- > 0;)
+        newest_first.push_back({i * interval + (i == when ? jump : 0.0), 1e-3 * (i % 3)});
+      const HeightTrack track = track_height(newest_first, 1e-3, interval);
+      EXPECT_LT(std::abs(track.height), 3e-3) << jump << " s at frame " << when;
+      EXPECT_LT(std::abs(track.velocity), 0.5);
+    }
+  }
+}
+
 TEST(HeightTrack, TakesNoMotionFromASingleFrameThatMayBeABadOne) {
   // In some minutes of pressing a frame is this far off. [m], of noise of 1 mm
   const auto after_rest = [](std::vector<double> newest) {

@@ -78,6 +78,11 @@ Movement PointMover::move(Proxy& proxy, const Cloud& cloud, const Vec3& hip) noe
     end = move_proxy(patch_, hip, options_.proxy, cos_theta_, options_.fixed_step, now);
     if (end != MovementEnd::patch_left) break;
     cover(proxy, cloud, now.at, hip - now.at, now.contact_normal);
+    // Nothing covers a way that is no number: no gather would ever be enough.
+    if (!patch_.covers(now.at, options_.proxy.r_3)) {
+      end = MovementEnd::at_rest;
+      break;
+    }
   }
   proxy.at = seen_from_ = now.at;
   state_ = now.state;

@@ -21,6 +21,9 @@ constexpr std::array<double, 4> velocity_steps = {0.067, 0.33, 1.67, 8.0};
 constexpr std::size_t filters = jerks.size() + velocity_steps.size();
 // Older frames say little about the present motion.
 constexpr std::size_t motion_frames = 24;
+// [s] After a pause as long as this nothing is known of the motion. What the filters would expect
+// after a longer one, such as to a stamp of another clock, is beyond the digits of a double.
+constexpr double longest_pause = 1.0;
 // Logarithm of the prior odds of a step of the velocity against an acceleration: a motion that
 // begins between two frames looks like a strong acceleration, which would carry the surface three
 // times too far.
@@ -193,7 +196,7 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
   Bank::Lanes before{};  // the newest height
   for (std::size_t i = frames - 1; i-- > 0;) {
     before = bank.likelihood;
-    const double dt = std::max(samples[i].stamp - samples[i + 1].stamp, 0.0);
+    const double dt = std::clamp(samples[i].stamp - samples[i + 1].stamp, 0.0, longest_pause);
     bank.step(dt, samples[i].height - base, samples[i].doubt * variance);
   }
   const Rest resting_odds = likelihood_of_rest(samples, frames, variance, memory);

@@ -21,9 +21,6 @@ constexpr std::array<double, 4> velocity_steps = {0.067, 0.33, 1.67, 8.0};
 constexpr std::size_t filters = jerks.size() + velocity_steps.size();
 // Older frames say little about the present motion.
 constexpr std::size_t motion_frames = 24;
-// [s] After a pause as long as this nothing is known of the motion. What the filters would expect
-// after a longer one, such as to a stamp of another clock, is beyond the digits of a double.
-constexpr double longest_pause = 1.0;
 // Logarithm of the prior odds of a step of the velocity against an acceleration: a motion that
 // begins between two frames looks like a strong acceleration, which would carry the surface three
 // times too far.
@@ -184,9 +181,8 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
   const std::span<const HeightSample> samples = all.first(std::min(all.size(), most_heights));
   const double resting = agreed_height(samples, sd, confidence);
   const std::size_t frames = std::min(samples.size(), motion_frames);
-  const double period = frames < 2 ? 0.0
-                                   : (samples.front().stamp - samples[frames - 1].stamp) /
-                                         static_cast<double>(frames - 1);
+  const double whole = samples.front().stamp - samples[frames - 1].stamp;
+  const double period = frames < 2 ? 0.0 : whole / static_cast<double>(frames - 1);
   if (!(period > 0.0 && interval > 0.0)) return {resting, 0.0};
 
   const double base = samples.front().height;
@@ -196,7 +192,8 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
   Bank::Lanes before{};  // the newest height
   for (std::size_t i = frames - 1; i-- > 0;) {
     before = bank.likelihood;
-    const double dt = std::clamp(samples[i].stamp - samples[i + 1].stamp, 0.0, longest_pause);
+    // A stamp of another clock lies days ahead: what would be expected then is beyond the digits.
+    const double dt = std::clamp(samples[i].stamp - samples[i + 1].stamp, 0.0, whole);
     bank.step(dt, samples[i].height - base, samples[i].doubt * variance);
   }
   const Rest resting_odds = likelihood_of_rest(samples, frames, variance, memory);
@@ -220,6 +217,7 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
     height += share * bank.x[i];
     next += share * (bank.x[i] + interval * (bank.v[i] + 0.5 * interval * bank.a[i]));
   }
+  if (!std::isfinite(next)) return {resting, 0.0};
   height /= shares;
   next /= shares;
   const double slack = confidence * sd * std::sqrt(samples.front().doubt);

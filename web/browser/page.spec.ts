@@ -72,7 +72,8 @@ test("a tool with a shape is chosen, drawn where surfaces keep it, and turned", 
     page.evaluate(() => {
       const { view, newest } = (window as any).palpate;
       const { orientation, proxyOrientation, torque } = newest().tick;
-      return { ...view.drawnTool, orientation, proxyOrientation, torque, reach: view.reach };
+      const { torque: ring, ...drawn } = view.drawnTool;
+      return { ...drawn, ring, orientation, proxyOrientation, torque, reach: view.reach };
     });
   expect(await tool()).toMatchObject({ proxy: null, ball: true, reach: 0 });
   expect(await page.locator("#torque").textContent()).toBe("");
@@ -95,6 +96,7 @@ test("a tool with a shape is chosen, drawn where surfaces keep it, and turned", 
   if (process.env.PALPATE_PICTURES)
     await page.screenshot({ path: join(process.env.PALPATE_PICTURES, "tool.png") });
   await expect.poll(async () => Math.hypot(...(await tool()).torque)).toBeGreaterThan(0.02);
+  await expect.poll(async () => (await tool()).ring).toBe(true);
   await expect.poll(() => page.locator("#torque").textContent()).toMatch(/^[1-9]\d+ mN m$/);
   expect((await tool()).proxy).not.toBeNull();
   const turned = await tool();

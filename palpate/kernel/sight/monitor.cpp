@@ -44,6 +44,11 @@ constexpr double look_serves = 0.2;
 
 }  // namespace
 
+void Monitor::set(const Parameters& parameters) noexcept {
+  parameters_ = parameters.sight;
+  r_c_ = parameters.proxy.r_c();
+}
+
 // [m] No estimate of the noise counts beyond what is usual, so that a wrong one cannot blind the
 // monitor.
 double Monitor::most_margin(double distance) const noexcept {

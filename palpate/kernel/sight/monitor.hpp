@@ -46,10 +46,7 @@ class Monitor {
     Vec3 normal = Vec3::Zero();  ///< [-] unit: there, towards the camera
   };
 
-  void set(const Parameters& parameters) noexcept {
-    parameters_ = parameters.sight;
-    r_c_ = parameters.proxy.r_c();
-  }
+  void set(const Parameters& parameters) noexcept;
   /// Forgets on which side of the surface the proxy is.
   void forget() noexcept;
   /// A camera's new frame is in use: looks at the one before are void. What has to be so in several

@@ -1005,7 +1005,7 @@ TEST(Sight, HeedsEachParameterOfItsEstimator) {
                                     {"noise_growth", 1.0},
                                     {"confidence", 1.0},
                                     {"least_share", 0.9},
-                                    {"widest_disc", 2.2},
+                                    {"widest_fit", 2.2},
                                     {"averaged_frames", 2.0},
                                     {"rest_odds", 0.0},
                                     {"motion_memory", 0.4},

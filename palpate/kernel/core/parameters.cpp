@@ -133,8 +133,8 @@ constexpr std::array table = {
         "minimum fraction of the points in the viewing cone that makes a surface. "
         "Smaller: finer objects are felt, but also outliers",
         "ours (sight)"),
-    row_of<&P::sight, &Sight::widest_disc>(
-        "widest_disc", "", "r_c", 2.2, 17.0,
+    row_of<&P::sight, &Sight::widest_fit>(
+        "widest_fit", "", "r_c", 2.2, 17.0,
         "maximum radius of the fitted area. Smaller: more noise, but small objects are "
         "correct earlier",
         "ours (sight)"),

@@ -183,7 +183,7 @@ void SurfaceEstimate::set_spacing(double spacing) noexcept {
 
 std::size_t SurfaceEstimate::most_rungs() const noexcept {
   std::size_t most = inner_rungs;
-  while (most < rungs && narrowest_discs[most] <= parameters_.widest_disc) ++most;
+  while (most < rungs && narrowest_discs[most] <= parameters_.widest_fit) ++most;
   return most;
 }
 

@@ -243,7 +243,8 @@ TEST(Paper, AnswersANonFiniteHipWithNoForceAndStaysWhereItIs) {
 TEST(PointMover, EndsWhereItsWayIsNoNumber) {
   const BruteForceCloud plane(flat_grid());
   PointMover mover({});
-  Proxy proxy{.at = Vec3(0, 0, 0.01)};
+  Proxy proxy;
+  proxy.at = Vec3(0, 0, 0.01);
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     EXPECT_EQ(mover.move(proxy, plane, {0, bad, 0}).steps, 0);

@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 LOOPS = {"move": "sqrtps", "travel": "sqrtps", "escape": "sqrtps", "deproject_pixels": "cvtdq2ps",
-         "raise": "divps"}
+         "raise": "mulps"}  # gcc 14 divides point by point there
 REGISTERS = {"any": "xmm", "avx2": "ymm", "avx512": "zmm"}
 LEAST = 12  # packed operations on the widest registers in a loop
 

@@ -25,6 +25,7 @@ inline Parameters scaled(Parameters p, const Scale& scale) {
   p.sight.oldest_frame *= k;
   p.sight.hardest_strike *= s / (k * k);
   p.sight.return_speed *= s / k;
+  p.sight.detail *= s;
   p.sight.side_depth *= s;
   p.sight.curvature_sd /= s;
   p.sight.usual_noise = SightParameters::unknown_noise / s;

@@ -133,11 +133,16 @@ constexpr std::array table = {
         "minimum fraction of the points in the viewing cone that makes a surface. "
         "Smaller: finer objects are felt, but also outliers",
         "ours (sight)"),
-    row_of<&P::sight, &Sight::widest_fit>(
-        "widest_fit", "", "r_c", 2.2, 17.0,
-        "maximum radius of the fitted area. Smaller: more noise, but small objects are "
-        "correct earlier",
+    row_of<&P::sight, &Sight::detail>(
+        "detail", "", "m", 1e-4, 0.1,
+        "the smallest thing that is told apart; all lengths of the tracker are multiples of it. "
+        "For scenes that are much smaller or larger than what hands touch",
         "ours (sight)"),
+    row_of<&P::sight, &Sight::widest_fit>("widest_fit", "", "-", 2.2, 17.0,
+                                          "maximum radius of the fitted area, in multiples of "
+                                          "detail. Smaller: more noise, but small objects are "
+                                          "correct earlier",
+                                          "ours (sight)"),
     row_of<&P::sight, &Sight::averaged_frames>(
         "averaged_frames", "", "frames", 1, 64,
         "frames that a fit is averaged over at most; fewer are noisier", "ours (sight)"),

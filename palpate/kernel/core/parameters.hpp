@@ -175,7 +175,8 @@ struct SightParameters {
   int noise_growth = 0;         ///< [-] power of the distance with which it grows: 1 or 2
   double confidence = 3.0;      ///< [-] standard deviations that noise explains
   double least_share = 0.3;     ///< [-] of the points in the viewing cone: fewer are no surface
-  double widest_fit = 17.0;     ///< [r_c] radius that a fit is averaged over at most
+  double detail = 5e-3;         ///< [m] unit of the tracker's lengths, whatever the proxy's radius
+  double widest_fit = 17.0;     ///< [detail] radius that a fit is averaged over at most
   int averaged_frames = 64;     ///< that a fit is averaged over at most
   double rest_odds = 4.0;       ///< [-] logarithm, of rest against any motion, before a measurement
   double motion_memory = 0.85;  ///< [-] forgetting factor of the motion estimate, per frame

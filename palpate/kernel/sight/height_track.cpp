@@ -10,11 +10,11 @@
 namespace palpate {
 namespace {
 
-// Units of the bank: r_c, and the mean interval T between heights.
-// Jerk assumed by each filter of the bank [r_c/T^3], from a surface that a hand moves slowly to one
+// Units of the bank: `detail` d, and the mean interval T between heights.
+// Jerk assumed by each filter of the bank [d/T^3], from a surface that a hand moves slowly to one
 // that is struck.
 constexpr std::array<double, 5> jerks = {0.0075, 0.045, 0.3, 1.85, 22.0};
-// Change of velocity from frame to frame assumed by each of the others [r_c/T], from a surface that
+// Change of velocity from frame to frame assumed by each of the others [d/T], from a surface that
 // is drawn along to one that is dropped. Without an acceleration to believe in, they do not
 // overshoot where a motion begins at once.
 constexpr std::array<double, 4> velocity_steps = {0.067, 0.33, 1.67, 8.0};
@@ -30,11 +30,11 @@ constexpr double plain_bonus = 8.0;
 // few minutes. A motion that begins is proved by the frame after it, or at once by one that is five
 // standard deviations away instead of four.
 constexpr double single_proof = 4.5;
-// Standard deviations of a surface's velocity [r_c/T] and acceleration [r_c/T^2] before it is
+// Standard deviations of a surface's velocity [d/T] and acceleration [d/T^2] before it is
 // known.
 constexpr double first_velocity = 20.0;
 constexpr double first_acceleration = 2.2;
-constexpr double least_height_sd = 2e-5;  // [r_c] less noise is not told from rounding
+constexpr double least_height_sd = 2e-5;  // [d] less noise is not told from rounding
 
 // Kalman filters of height, velocity and acceleration, side by side: filter i in lane i. Those of
 // velocity steps have no acceleration.
@@ -47,7 +47,7 @@ struct Bank {
 
   double memory;  // of the likelihood's logarithm, from frame to frame
 
-  // @param speed  [m/s] r_c in each mean interval, `period` [s]
+  // @param speed  [m/s] d in each mean interval, `period` [s]
   Bank(double height, double variance, double remembered, double speed, double period) noexcept
       : memory(remembered) {
     const double acceleration = speed / period;
@@ -175,8 +175,9 @@ double agreed_height(std::span<const HeightSample> samples, double sd, double co
 }
 
 HeightTrack track_height(std::span<const HeightSample> all, double sd, double interval,
-                         const SightParameters& parameters, double r_c) noexcept {
+                         const SightParameters& parameters) noexcept {
   const double confidence = parameters.confidence;
+  const double detail = parameters.detail;
   const double memory = parameters.motion_memory;
   const std::span<const HeightSample> samples = all.first(std::min(all.size(), most_heights));
   const double resting = agreed_height(samples, sd, confidence);
@@ -186,9 +187,10 @@ HeightTrack track_height(std::span<const HeightSample> all, double sd, double in
   if (!(period > 0.0 && interval > 0.0)) return {resting, 0.0};
 
   const double base = samples.front().height;
-  const double variance = std::max(sd * sd, (least_height_sd * r_c) * (least_height_sd * r_c));
+  const double variance =
+      std::max(sd * sd, (least_height_sd * detail) * (least_height_sd * detail));
   Bank bank(samples[frames - 1].height - base, samples[frames - 1].doubt * variance, memory,
-            r_c / period, period);
+            detail / period, period);
   Bank::Lanes before{};  // the newest height
   for (std::size_t i = frames - 1; i-- > 0;) {
     before = bank.likelihood;

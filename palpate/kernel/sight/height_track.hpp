@@ -43,17 +43,15 @@ double agreed_height(std::span<const HeightSample> newest_first, double sd,
 /// Estimates height and motion from measured heights.
 ///
 /// A bank of filters runs over the heights: one for a surface at rest, and Kalman filters for
-/// steps of velocity and for jerks from small to very large, in multiples of r_c and of the time
-/// between heights. Each is weighted by the likelihood of its innovations over the last frames,
-/// rest with a higher prior and jerks with a lower one. The
-/// height is the bank's mean, within `confidence` standard deviations of the newest measurement.
-/// O(most_heights), no allocation.
+/// steps of velocity and for jerks from small to very large, in multiples of `detail` and of the
+/// time between heights. Each is weighted by the likelihood of its innovations over the last
+/// frames, rest with a higher prior and jerks with a lower one. The height is the bank's mean,
+/// within `confidence` standard deviations of the newest measurement. O(most_heights), no
+/// allocation.
 /// @param newest_first  heights measured; at least one
 /// @param sd            [m] usual standard deviation of one of them
 /// @param interval      [s] until the next frame
-/// @param r_c           [m] the proxy's contact radius: a motion of a fraction of it is felt
 HeightTrack track_height(std::span<const HeightSample> newest_first, double sd, double interval,
-                         const SightParameters& parameters = {},
-                         double r_c = ProxyParameters().r_c()) noexcept;
+                         const SightParameters& parameters = {}) noexcept;
 
 }  // namespace palpate

@@ -14,9 +14,11 @@ namespace {
 // A camera that measures fewer points than this in a footprint says nothing about it: with fewer a
 // median is no better than a single pixel.
 constexpr std::size_t least_points = 8;
-// [r_c] What lies along a line of sight is looked for this far from a place: as far as the tracker
-// looks for what hides a surface. A place that something far in front hides is not free.
-constexpr double look_reach = 240.0;
+// [detail] Behind a place what lies along a line of sight is looked for this far: as far as the
+// tracker looks for a surface. Before it, as far as that looks for what hides one: a place that
+// something far in front hides is not free.
+constexpr double look_reach = 60.0;
+constexpr double hides_reach = 240.0;
 // [-] Share of the points that may lie before a hand in free space: flying pixels and other strays.
 // More would let go of a hand at an edge that only grazes its lines of sight.
 constexpr double strays = 0.05;
@@ -27,7 +29,7 @@ constexpr double hand_radius = 2.0;
 constexpr double narrowest = 1.8;
 // [-] Where holes leave too few points, a footprint is widened by this, up to twice.
 constexpr double widening = 3.0;
-constexpr double least_margin = 0.2;  // [r_c] rounding of depth, in common cameras
+constexpr double least_margin = 0.2;  // [detail] rounding of depth, in common cameras
 // [-] footprint's radius: a look without an edge has 80 % of its points within this along the line
 // of sight, and the margin for noise. A plane at 70 degrees from facing the camera spans 4.4.
 constexpr double one_layer = 4.0;
@@ -36,10 +38,10 @@ constexpr double one_layer = 4.0;
 // by 70 degrees rises on the way, `steepest_rise` times that, is no step.
 constexpr double edge_step = 2.0;
 constexpr double steepest_rise = 2.75;  // [-] tan 70 degrees
-constexpr double sideways = 0.4;        // [r_c]
+constexpr double sideways = 0.4;        // [detail]
 // [-] Cosine: a force that points away from the camera, within 73 degrees of its line of sight.
 constexpr double away = -0.3;
-// [r_c] A look serves as long as its place moves less than this.
+// [detail] A look serves as long as its place moves less than this.
 constexpr double look_serves = 0.2;
 
 }  // namespace
@@ -69,8 +71,10 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
   result.fresh = true;
   result.place = place;
   result.radius = radius;
-  gather(cloud, Beam{place, radius, look_reach * r_c_, Vec3::UnitZ()}, look_points, patch_);
+  gather(cloud, Beam{place, radius, hides_reach * parameters_.detail, Vec3::UnitZ()}, look_points,
+         patch_);
   std::array<float, look_points> heights;
+  const auto farthest = static_cast<float>(look_reach * parameters_.detail);
   for (std::size_t v = 0; v < patch_.view_count(); ++v) {
     const Patch::View& view = patch_.view(v);
     const std::size_t end = patch_.view_end(v);
@@ -81,7 +85,7 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
     for (std::size_t i = view.begin; i < end && size < look_points; ++i) {
       const float height =
           patch_.x()[i] * towards.x() + patch_.y()[i] * towards.y() + patch_.z()[i] * towards.z();
-      if (std::isfinite(height)) heights[size++] = height;
+      if (height >= -farthest && std::isfinite(height)) heights[size++] = height;
     }
     if (size < least_points) continue;
     const std::span<const float> all(heights.data(), size);
@@ -103,7 +107,7 @@ void Monitor::look(const Cloud& cloud, const Vec3& place, double radius, Look& r
 // The look at `place`, taken anew only if the last one does not serve any more.
 const Monitor::Look& Monitor::look_at(const Cloud& cloud, const Vec3& place, double radius,
                                       Look& last) noexcept {
-  if (last.fresh && (place - last.place).norm() < look_serves * r_c_) return last;
+  if (last.fresh && (place - last.place).norm() < look_serves * parameters_.detail) return last;
   radius = std::max(radius, narrowest * cloud.spacing(place));
   for (int i = 0; i < 3; ++i, radius *= widening) {
     look(cloud, place, radius, last);
@@ -146,14 +150,15 @@ bool Monitor::is_behind(const Cloud& cloud, double margin, double deepest) noexc
     const double noise = most_margin(proxy_.distance);
     // What came before the surface, while the proxy moved, is no edge that it passed.
     const bool past_edge =
-        nearer > edge_step * r_c_ + noise + steepest_rise * aside && aside > sideways * r_c_ &&
+        nearer > edge_step * r_c_ + noise + steepest_rise * aside &&
+        aside > sideways * parameters_.detail &&
         (frame_judged_ ? frames_past_edge_ > 0 : still_shown(cloud, margin + noise));
     count_past_edge(past_edge);
     if (past_edge) {
       if (frames_past_edge_ >= parameters_.evidence_frames) side_ = Side::behind;
       return false;
     }
-    if (nearer > farthest_strike * r_c_ + margin) return false;
+    if (nearer > farthest_strike * parameters_.detail + margin) return false;
   }
   return proxy_.behind <= deepest + margin;
 }
@@ -162,7 +167,7 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
   Verdict verdict;
   const double r_c = r_c_;
   const auto margin_at = [&](double distance) {
-    return std::max(least_margin * r_c,
+    return std::max(least_margin * parameters_.detail,
                     std::min(parameters_.confidence * contact.noise, most_margin(distance)));
   };
   // The frame shows the surface where it was when the frame was captured.

@@ -9,7 +9,7 @@
 
 namespace palpate {
 
-/// [r_c] What comes nearer by more than this from frame to frame, whatever their interval, is no
+/// [detail] What comes nearer by more than this from frame to frame, whatever their interval, is no
 /// surface that a hand rests on, but came between it and the camera: a surface at rest struck with
 /// 90 m/s^2 moves 50 mm in an interval at 30 Hz. Nor is a proxy brought back that lies deeper.
 inline constexpr double farthest_strike = 13.0;

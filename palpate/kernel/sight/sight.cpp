@@ -148,9 +148,10 @@ void Sight::observe(const Observation& seen) noexcept {
   const Vec3& proxy = *contact_.proxy.at;
   SightTracker& tracker = contact_.tracker;
   // A hidden surface is kept only while the proxy is near it.
-  constexpr double leaves = 5.0;  // [r_c] from its centre
+  constexpr double leaves = 4.0;  // [detail]
   if (tracker.holding() && !rests_on_fit(mode()) &&
-      tracker.contact(proxy, frame_.stamp()).distance > leaves * parameters_.proxy.r_c()) {
+      tracker.contact(proxy, frame_.stamp()).distance >
+          parameters_.proxy.r_c() + leaves * parameters_.sight.detail) {
     tracker.note(Evidence::lost);
   }
   constexpr double infinite = std::numeric_limits<double>::infinity();
@@ -163,10 +164,11 @@ void Sight::observe(const Observation& seen) noexcept {
 
 // Is a place as near to the fit as the points' noise can stop a proxy?
 bool Sight::is_near_fit(const Vec3& place, double t) const noexcept {
-  constexpr double near = 3.0;  // [r_c]
+  constexpr double near = 2.0;  // [detail]
   const SightTracker& tracker = contact_.tracker;
-  return tracker.contact(place, t).distance <=
-         near * parameters_.proxy.r_c() + 4.0 * tracker.surface().spread();
+  return tracker.contact(place, t).distance <= parameters_.proxy.r_c() +
+                                                   near * parameters_.sight.detail +
+                                                   4.0 * tracker.surface().spread();
 }
 
 // Rests the proxy on the fit, or frees it from there. False if the fit does not say where it is.
@@ -270,19 +272,20 @@ void Sight::release(const Vec3& hip, Movement& movement) noexcept {
 
 // What the newest frame itself shows overrules every estimate: docs/sight.md, 7.
 void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
-  // [r_c] A frame's correction moves a proxy no farther than a surface is looked for.
+  // [detail] A frame's correction moves a proxy no farther than a surface is looked for.
   constexpr double farthest_move = 60.0;
   Proxy& proxy = contact_.proxy;
   SightTracker& tracker = contact_.tracker;
   const double r_c = parameters_.proxy.r_c();
   if (contact_.last_proxy &&
-      (*proxy.at - hip).norm() > (*contact_.last_proxy - hip).norm() + farthest_move * r_c) {
+      (*proxy.at - hip).norm() >
+          (*contact_.last_proxy - hip).norm() + farthest_move * parameters_.sight.detail) {
     release(hip, movement);
     movement.flags |= proxy_let_go;
   }
   const Coupling& coupling = parameters_.coupling;
   const double deepest = r_c + std::min(coupling.max_force / std::max(coupling.stiffness, 1e-9),
-                                        farthest_strike * r_c);
+                                        farthest_strike * parameters_.sight.detail);
   const Monitor::Verdict verdict = contact_.monitor.judge(
       *frame_.cloud(), {.hip = hip,
                         .proxy = *proxy.at,

@@ -108,24 +108,24 @@ class SurfaceEstimate {
   }
   /// Points within this [m] of where the surface is expected are its own; `narrowest` [m] at
   /// least.
-  [[nodiscard]] double gate() const noexcept { return gate(narrowest_gate * r_c_); }
+  [[nodiscard]] double gate() const noexcept { return gate(narrowest_gate * detail_); }
   [[nodiscard]] double gate(double narrowest) const noexcept;
 
   /// [m] of the narrowest disc: nothing smaller is known of the surface.
   [[nodiscard]] double resolution() const noexcept { return radii_[0]; }
   /// [-] that, in multiples of what it is before a fine image.
   [[nodiscard]] double coarseness() const noexcept {
-    return radii_[0] / (narrowest_discs[0] * r_c_);
+    return radii_[0] / (narrowest_discs[0] * detail_);
   }
-  /// [m] the proxy's contact radius, in multiples of which lengths are given here.
-  [[nodiscard]] double r_c() const noexcept { return r_c_; }
+  /// [m] in multiples of which lengths are given here.
+  [[nodiscard]] double detail() const noexcept { return detail_; }
   /// [s] between frames that can tell a motion.
   [[nodiscard]] double longest_gap() const noexcept { return 0.5 * parameters_.oldest_frame; }
 
   static constexpr std::size_t rungs = 6;
-  /// Of the discs that a fit may be averaged over [r_c], before a fine image.
+  /// Of the discs that a fit may be averaged over [detail], before a fine image.
   static constexpr std::array<double, rungs> narrowest_discs = {1.4, 2.2, 3.6, 6.0, 10.0, 17.0};
-  static constexpr double narrowest_gate = 2.4;  ///< [r_c]
+  static constexpr double narrowest_gate = 2.4;  ///< [detail]
   static constexpr std::size_t least_points = 8;
 
  private:
@@ -198,7 +198,7 @@ class SurfaceEstimate {
                                          const std::array<double, cells>& residuals) const noexcept;
   [[nodiscard]] bool spans_area(const Shape& inner) const noexcept;
   /// [m] of the moments.
-  [[nodiscard]] double unit() const noexcept { return 2.0 * r_c_; }
+  [[nodiscard]] double unit() const noexcept { return 2.0 * detail_; }
   /// Variance of a full narrowest disc along each axis [unit^2].
   [[nodiscard]] double full_disc() const noexcept {
     return 0.25 * (radii_[0] / unit()) * (radii_[0] / unit());
@@ -228,7 +228,7 @@ class SurfaceEstimate {
   [[nodiscard]] std::size_t most_rungs() const noexcept;
 
   SightParameters parameters_;
-  double r_c_ = 0.0;  // [m]
+  double detail_ = 0.0;  // [m]
   Patch patch_;
   LocalPoints points_;  // of the patch
   LocalFrame frame_;

@@ -10,35 +10,37 @@
 namespace palpate {
 namespace {
 
-// Lengths are in multiples of r_c, the proxy's contact radius.
-// Along a line of sight a surface is looked for this far from where it is expected [r_c].
-constexpr double reach_in_radii = 60.0;
+// Lengths are in multiples of `detail`.
+// Along a line of sight a surface is looked for this far from where it is expected [detail].
+constexpr double reach_in_details = 60.0;
 double reach(const SurfaceEstimate& surface) {
-  return reach_in_radii * surface.r_c();
+  return reach_in_details * surface.detail();
 }
-// Occluders are looked for this far in front of the surface [r_c]: an arm may be held high.
+// Occluders are looked for this far in front of the surface [detail]: an arm may be held high.
 constexpr double occluder_reach = 240.0;
 constexpr double most_support = 0.7;     // beyond this share nothing else is checked
-constexpr double gate_after_hold = 1.0;  // [r_c]
-// Layers along a line of sight are separated by a gap of at least this [r_c], and by what a surface
-// that leans by 70 degrees falls from point to point: tan 70 degrees by a third of the resolution.
+constexpr double gate_after_hold = 1.0;  // [detail]
+// Layers along a line of sight are separated by a gap of at least this [detail], and by what a
+// surface that leans by 70 degrees falls from point to point: tan 70 degrees by a third of the
+// resolution.
 constexpr double narrowest_layer_gap = 4.0;
 constexpr double steepest = 0.92;  // [-]
 double layer_gap(const SurfaceEstimate& surface) {
-  return std::max(narrowest_layer_gap * surface.r_c(), steepest * surface.resolution());
+  return std::max(narrowest_layer_gap * surface.detail(), steepest * surface.resolution());
 }
 constexpr std::size_t beam_points = 256;
-// Radius within which an occluder is looked for: that of the cells of SurfaceEstimate::judge [r_c].
+// Radius within which an occluder is looked for: that of the cells of SurfaceEstimate::judge
+// [detail].
 constexpr double shadow_radius = 3.0;
-// A fit is used for contacts within this of its centre [r_c].
+// A fit is used for contacts within this of its centre [detail].
 constexpr double serves = 0.3;
 // While the surface is hidden it cannot be fitted anew: the last fit is used this far from its
-// centre [r_c].
+// centre [detail].
 constexpr double serves_while_held = 3.0;
-// Radii of the rings of the map of heights beside the contact [r_c].
+// Radii of the rings of the map of heights beside the contact [detail].
 constexpr double beside_inner = 2.4;
 constexpr std::array<double, 5> beside_bands = {8.0, 16.0, 28.0, 44.0, 64.0};
-// [r_c] Beside the contact, heights that differ by less are of one surface, whatever the noise.
+// [detail] Beside the contact, heights that differ by less are of one surface, whatever the noise.
 constexpr double one_surface = 3.0;
 constexpr std::size_t beside_points = 640;
 // From so many frames on, a jump is compared with `hardest_strike`.
@@ -95,7 +97,7 @@ void SightTracker::set(const Parameters& parameters) noexcept {
 }
 
 SurfaceContact SightTracker::contact(const Vec3& point, double t) const noexcept {
-  return surface_.contact(point, t, (holding() ? serves_while_held : serves) * surface_.r_c());
+  return surface_.contact(point, t, (holding() ? serves_while_held : serves) * surface_.detail());
 }
 
 // The surface was not measured: it is kept as it was at `since` [s].
@@ -151,17 +153,18 @@ bool SightTracker::others_show(const ObservedClouds& clouds, std::size_t camera,
 SightTracker::Expectation SightTracker::expect(const Vec3& proxy, double elapsed) const noexcept {
   const LocalFrame& axes = surface_.frame();
   const Vec3 hand = axes.local_from_world(proxy);
-  const double r_c = surface_.r_c();
+  const double detail = surface_.detail();
   Expectation expected{
       .rise = surface_.velocity() * std::min(elapsed, surface_.longest_gap()),
       .foot = surface_.surface().nearest(hand, hand.head<2>(), surface_.centre(),
-                                         (holding() ? serves_while_held : 2.0 * serves) * r_c),
+                                         (holding() ? serves_while_held : 2.0 * serves) * detail),
       .surface = surface_.surface(),
       // After a hold the gate is narrow: the surface is where it was, and what remains of an
       // occluder may be close to it.
-      .gate = holding() ? surface_.gate(gate_after_hold * r_c) : surface_.gate()};
+      .gate = holding() ? surface_.gate(gate_after_hold * detail) : surface_.gate()};
   // An unchanged centre lets frames be compared cell by cell.
-  if ((expected.foot - surface_.centre()).norm() < serves * r_c) expected.foot = surface_.centre();
+  if ((expected.foot - surface_.centre()).norm() < serves * detail)
+    expected.foot = surface_.centre();
   expected.surface.c[0] += expected.rise;
   expected.place = axes.world_from_local(
       Vec3(expected.foot.x(), expected.foot.y(), expected.surface.height(expected.foot)));
@@ -173,9 +176,9 @@ void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expe
                               Sighting& sighting) noexcept {
   const LocalFrame& axes = surface_.frame();
   const Vec3& place = expected.place;
-  const double r_c = surface_.r_c();
-  const double far = occluder_reach * r_c;
-  gather(cloud, Beam{place, shadow_radius * r_c * surface_.coarseness(), far, axes.up},
+  const double detail = surface_.detail();
+  const double far = occluder_reach * detail;
+  gather(cloud, Beam{place, shadow_radius * detail * surface_.coarseness(), far, axes.up},
          wide_beam_points, patch_);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   if (viewpoint) surface_.set_distance(camera, (*viewpoint - place).norm());
@@ -258,8 +261,8 @@ void SightTracker::outline(View& view, const Sighting& sighting, const Expectati
 std::size_t SightTracker::covering(const Cloud& cloud, const Expectation& expected) noexcept {
   const LocalFrame& axes = surface_.frame();
   gather(cloud,
-         Beam{expected.place, shadow_radius * surface_.r_c() * surface_.coarseness(),
-              occluder_reach * surface_.r_c(), axes.up},
+         Beam{expected.place, shadow_radius * surface_.detail() * surface_.coarseness(),
+              occluder_reach * surface_.detail(), axes.up},
          wide_beam_points, patch_);
   points_.take(patch_, axes);
   const FloatQuadric surface(expected.surface);
@@ -331,7 +334,7 @@ void SightTracker::watch(const ObservedClouds& clouds, const Vec3& proxy) noexce
   if (tracking()) {
     if (holding()) return;
     const Vec2 below = surface_.frame().local_from_world(proxy).head<2>();
-    if ((below - surface_.centre()).norm() < surface_.r_c()) return;
+    if ((below - surface_.centre()).norm() < surface_.detail()) return;
   }
   note(Evidence::lost);
   const std::size_t camera = best_camera(clouds, proxy);
@@ -361,10 +364,10 @@ void SightTracker::touch(const ObservedClouds& clouds, const Vec3& foot,
     const Vec2 at = local.head<2>();
     const double off = local.z() - surface_.surface().height(at);
     const double away = (at - surface_.centre()).norm();
-    const double r_c = surface_.r_c();
-    if (faces(normal) && away < SurfaceEstimate::narrowest_gate * r_c &&
-        std::abs(off) < 0.6 * r_c + 4.0 * (surface_.spread() + surface_.height_sd())) {
-      if (away < serves * r_c) return;
+    const double detail = surface_.detail();
+    if (faces(normal) && away < SurfaceEstimate::narrowest_gate * detail &&
+        std::abs(off) < 0.6 * detail + 4.0 * (surface_.spread() + surface_.height_sd())) {
+      if (away < serves * detail) return;
       const std::size_t measured_by = surface_.camera();
       if (surface_.move_to(*clouds.of(measured_by), at,
                            {surface_.gate(), false, is_shadowed(measured_by)}))
@@ -375,7 +378,7 @@ void SightTracker::touch(const ObservedClouds& clouds, const Vec3& foot,
   const Cloud& cloud = *clouds.of(camera);
   // Where the camera sees the surface well behind this place, the contact from behind is with a
   // stray point.
-  const double gate = SurfaceEstimate::narrowest_gate * surface_.r_c();
+  const double gate = SurfaceEstimate::narrowest_gate * surface_.detail();
   const std::optional<Seen> seen = look_at(cloud, foot, surface_.resolution());
   if (seen && seen->line.dot(normal) < 0.0 && seen->above < -gate) return;
   surface_.set_spacing(cloud.spacing(foot));
@@ -450,8 +453,8 @@ std::optional<Vec3> SightTracker::in_front(const ObservedClouds& clouds, const V
 SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& place) noexcept {
   Ring ring = nothing_beside();
   const LocalFrame& axes = surface_.frame();
-  const double r_c = surface_.r_c();
-  gather(cloud, Beam{place, beside_bands.back() * r_c, reach(surface_), axes.up}, beside_points,
+  const double detail = surface_.detail();
+  gather(cloud, Beam{place, beside_bands.back() * detail, reach(surface_), axes.up}, beside_points,
          patch_);
   points_.take(patch_, axes);
   const Eigen::Vector3f at = axes.local_from_world(place).cast<float>();
@@ -460,7 +463,9 @@ SightTracker::Ring SightTracker::look_beside(const Cloud& cloud, const Vec3& pla
   plane.c.segment<2>(1) = surface_.surface().gradient(surface_.centre());
   plane.c[0] = surface_.surface().height(surface_.centre()) - plane.height(surface_.centre());
   const FloatQuadric tangent(plane);
-  const auto squared_band = [r_c](double r) { return static_cast<float>((r * r_c) * (r * r_c)); };
+  const auto squared_band = [detail](double r) {
+    return static_cast<float>((r * detail) * (r * detail));
+  };
   for (std::size_t i = 0; i < points_.size; ++i) {
     const float dx = points_.x[i] - at.x();
     const float dy = points_.y[i] - at.y();
@@ -491,19 +496,19 @@ bool SightTracker::is_occluder(const Ring& ring_before, const Ring& now, double 
   const double struck =
       surface_.settled() >= well_known ? 0.5 * hardest_strike * (interval * interval) : infinite;
   const double most = std::isfinite(hardest_strike)
-                          ? times * std::min(struck, farthest_strike * surface_.r_c())
+                          ? times * std::min(struck, farthest_strike * surface_.detail())
                           : infinite;
-  const double r_c = surface_.r_c();
-  const double tolerance = std::max(one_surface * r_c, 4.0 * noise);
-  if (jump > most + one_surface * r_c + 4.0 * noise) return true;
+  const double detail = surface_.detail();
+  const double tolerance = std::max(one_surface * detail, 4.0 * noise);
+  if (jump > most + one_surface * detail + 4.0 * noise) return true;
   // A cell keeps its nearest point, which is the extreme of the noise.
-  const double nearer = std::max(one_surface * r_c, 6.0 * noise);
+  const double nearer = std::max(one_surface * detail, 6.0 * noise);
   std::size_t same_before = 0;
   std::size_t unchanged = 0;
   for (std::size_t i = 0; i < now.size(); ++i) {
     const double before = ring_before[i];
     if (before > nearer &&
-        std::abs(before - height) < std::min(2.0 * one_surface * r_c, 0.6 * height))
+        std::abs(before - height) < std::min(2.0 * one_surface * detail, 0.6 * height))
       return true;
     if (std::abs(before) < tolerance) {
       ++same_before;

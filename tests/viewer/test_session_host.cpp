@@ -362,7 +362,7 @@ TEST(SessionHost, GivesTheHandAnotherToolThatItsPageTurns) {
   EXPECT_NEAR(newest.tick.orientation.x(), std::sin(0.1), 1e-6);
   EXPECT_EQ(choose("ball"), "ball");
   play(1.0, {true, Vec3(0.0, 0.0, 0.45), tilted});
-  play(1.0, {true, Vec3(0.0, 0.0, 0.497), tilted});
+  play(1.0, {true, Vec3(0.0, 0.0, 0.505), tilted});
   EXPECT_LT(newest.force.z(), -0.5);
   EXPECT_TRUE(shown.torque.isZero());
   hosted.session.stop();

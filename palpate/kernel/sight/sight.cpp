@@ -27,7 +27,7 @@ Sight::Sight(const Parameters& parameters)
 void Sight::set_parameters(const Parameters& parameters) noexcept {
   parameters_ = parameters;
   contact_.mover.set(mover_options(parameters));
-  contact_.tracker.set(parameters);
+  contact_.tracker.set(parameters.sight);
   contact_.monitor.set(parameters);
   timing_.set(parameters.sight.oldest_frame);
 }

@@ -122,14 +122,13 @@ void confine_slopes(Vec5& shape, std::span<const SlopeWindow> windows, double po
 
 }  // namespace
 
-void SurfaceEstimate::set(const Parameters& parameters) noexcept {
-  parameters_ = parameters.sight;
-  const double before = std::exchange(detail_, parameters.sight.detail);
-  if (detail_ != before) {
-    set_spacing(0.0);
-    forget_frames();
-    for (Cells& past : cells_) past.full = false;
-  }
+void SurfaceEstimate::set(const SightParameters& parameters) noexcept {
+  const double before = parameters_.detail;
+  parameters_ = parameters;
+  if (detail() == before) return;
+  set_spacing(0.0);
+  forget_frames();
+  for (Cells& past : cells_) past.full = false;
 }
 
 double SurfaceEstimate::height_sd() const noexcept {
@@ -156,8 +155,8 @@ double SurfaceEstimate::variance(std::size_t rung, std::size_t camera) const noe
   const std::array<Scatter, rungs>& scatters = scatter_[camera];
   const Scatter& scatter = scatters[rung];
   // Correlated noise that moves a whole disc also spreads its points: little spread, little noise.
-  const double most = 4.0 * spread_ + 0.1 * detail_;
-  const double floor = squared(least_sd * detail_);
+  const double most = 4.0 * spread_ + 0.1 * detail();
+  const double floor = squared(least_sd * detail());
   const double usual = squared(std::min(parameters_.usual_noise_at(distances_[camera]), most)) +
                        0.03 * squared(spread_) + floor;
   // Noise falls with the area it is averaged over: a wider disc's is the least of this one's.
@@ -176,9 +175,9 @@ double SurfaceEstimate::variance(std::size_t rung, std::size_t camera) const noe
 void SurfaceEstimate::set_spacing(double spacing) noexcept {
   double least = least_radius * spacing;
   for (std::size_t j = 0; j < rungs; ++j, least *= least_growth) {
-    radii_[j] = std::max(narrowest_discs[j] * detail_, least);
+    radii_[j] = std::max(narrowest_discs[j] * detail(), least);
   }
-  cell_size_ = narrowest_cell * detail_ * coarseness();
+  cell_size_ = narrowest_cell * detail() * coarseness();
 }
 
 std::size_t SurfaceEstimate::most_rungs() const noexcept {
@@ -189,13 +188,13 @@ std::size_t SurfaceEstimate::most_rungs() const noexcept {
 
 bool SurfaceEstimate::misfits(double spacing) const noexcept {
   constexpr double tolerated = 1.4;
-  const double ratio = std::max(narrowest_discs[0] * detail_, least_radius * spacing) / radii_[0];
+  const double ratio = std::max(narrowest_discs[0] * detail(), least_radius * spacing) / radii_[0];
   return spacing > 0.0 && (ratio > tolerated || ratio < 1.0 / tolerated);
 }
 
 double SurfaceEstimate::gate(double narrowest) const noexcept {
   // The beam is as wide as the narrowest disc, whose height is the noisiest.
-  return std::clamp(std::max(4.0 * spread_, 6.0 * beam_sd()), narrowest, widest_gate * detail_);
+  return std::clamp(std::max(4.0 * spread_, 6.0 * beam_sd()), narrowest, widest_gate * detail());
 }
 
 double SurfaceEstimate::displacement(double t) const noexcept {
@@ -240,7 +239,7 @@ bool SurfaceEstimate::start(const Cloud& cloud, const Vec3& foot, const Vec3& up
   jumped_ = false;
   smooth_ = false;
   // Wide enough for the narrowest disc on a surface that leans by 60 degrees
-  const double gate = narrowest_gate * detail_ * coarseness() + 4.0 * spread_;
+  const double gate = narrowest_gate * detail() * coarseness() + 4.0 * spread_;
   return measure(cloud, Vec2::Zero(), Look{gate}, true);
 }
 
@@ -303,7 +302,7 @@ bool SurfaceEstimate::recentre(const Vec2& foot, double wide, double& cut) noexc
   surface_.c[0] += near->median;
   // Smoothed, since quantised depth makes single deviations jump between its steps.
   spread_ = count_ == 0 ? near->deviation : spread_ + 0.2 * (near->deviation - spread_);
-  cut = std::clamp(6.0 * std::max(near->deviation, spread_), 0.1 * detail_, wide);
+  cut = std::clamp(6.0 * std::max(near->deviation, spread_), 0.1 * detail(), wide);
   return true;
 }
 
@@ -325,8 +324,9 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
       return false;
     }
     if (!first) break;
-    Moments moments = disc_moments(
-        patch_, frame_, surface_, Disc{foot, 0.0, radii_[1], std::max(cut, 0.4 * detail_)}, unit());
+    Moments moments =
+        disc_moments(patch_, frame_, surface_,
+                     Disc{foot, 0.0, radii_[1], std::max(cut, 0.4 * detail())}, unit());
     if (moments.xy[0] < 6.0) {
       surface_ = before;
       return false;
@@ -371,7 +371,7 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
   // Where there is noise to average away, look farther.
   const Scatter& inner = scatter_[now.camera][1];
   const bool noisy =
-      inner.samples >= 1.0 ? inner.variance > squared(4e-3 * detail_) : spread_ > 0.02 * detail_;
+      inner.samples >= 1.0 ? inner.variance > squared(4e-3 * detail()) : spread_ > 0.02 * detail();
   const std::size_t most = most_rungs();
   if (noisy && most > inner_rungs) {
     const double widest = radii_[most - 1];
@@ -401,10 +401,10 @@ bool SurfaceEstimate::measure(const Cloud& cloud, const Vec2& foot, const Look& 
     const Evidence& e = evidence(i);
     if (std::exchange(is_judged[e.camera], true) || stamp_ - e.stamp > longest_gap()) continue;
     smooth_ =
-        smooth_ || (e.smooth && (e.centre - foot).squaredNorm() < squared(same_centre * detail_));
+        smooth_ || (e.smooth && (e.centre - foot).squaredNorm() < squared(same_centre * detail()));
   }
   centre_ = foot;
-  if (foot.norm() > 0.8 * detail_ * coarseness()) move_origin(foot);
+  if (foot.norm() > 0.8 * detail() * coarseness()) move_origin(foot);
   return true;
 }
 
@@ -488,7 +488,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
           (h[0].doubt + 16.0 * (h[1].doubt + h[3].doubt) + 36.0 * h[2].doubt + h[4].doubt);
       // A single jump is not noise.
       if (scatter.samples >= 4.0) {
-        change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise * detail_));
+        change = std::min(change, 9.0 * scatter.variance + squared(unnoticed_noise * detail()));
       }
       scatter.samples = std::min(scatter.samples + 1.0, 40.0);
       scatter.variance += (change - scatter.variance) / scatter.samples;
@@ -501,7 +501,7 @@ void SurfaceEstimate::estimate(const Vec2& foot, bool new_frame, bool learns) no
   // the noise. A disc may differ from the narrower ones, because the surface is not a quadric over
   // its width, and yet move with them: then it determines the motion only.
   const double negligible =
-      4e-4 * detail_ + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
+      4e-4 * detail() + 0.02 * spread_;  // [m] bias of noise along oblique lines of sight
   // Until a disc's noise has been measured over time, what its points scatter counts at most: the
   // usual noise of a camera would let a wide disc agree that reaches beyond a body.
   constexpr double unmeasured = 0.5;  // [-] of the spread
@@ -761,7 +761,7 @@ void SurfaceEstimate::judge(const Vec2& foot) noexcept {
   const double structure = squared_structure(newest, sums) / squared(n);
   // Structure below the noise of one frame is ignored: over points the proxy would not rest better.
   const double times = std::max((smooth_ ? 6.0 : 3.0) / n, smooth_ ? 2.0 : 1.0);
-  smooth_ = structure <= squared(structure_floor * detail_) + times * cell_scatter_.variance;
+  smooth_ = structure <= squared(structure_floor * detail()) + times * cell_scatter_.variance;
 }
 
 // Noise of a cell, from the differences of two frames in the cells that both measured, less their

@@ -37,8 +37,8 @@ class SurfaceEstimate {
     bool partial = false;  ///< something hides a part of it: where points end is no edge
   };
 
-  SurfaceEstimate() noexcept { set({}); }
-  void set(const Parameters& parameters) noexcept;
+  SurfaceEstimate() noexcept { set_spacing(0.0); }
+  void set(const SightParameters& parameters) noexcept;
   /// A frame of `camera` at `stamp` [s], `interval` [s] after that camera's one before, will be
   /// measured.
   void start_frame(std::size_t camera, double stamp, double interval) noexcept;
@@ -108,17 +108,17 @@ class SurfaceEstimate {
   }
   /// Points within this [m] of where the surface is expected are its own; `narrowest` [m] at
   /// least.
-  [[nodiscard]] double gate() const noexcept { return gate(narrowest_gate * detail_); }
+  [[nodiscard]] double gate() const noexcept { return gate(narrowest_gate * detail()); }
   [[nodiscard]] double gate(double narrowest) const noexcept;
 
   /// [m] of the narrowest disc: nothing smaller is known of the surface.
   [[nodiscard]] double resolution() const noexcept { return radii_[0]; }
   /// [-] that, in multiples of what it is before a fine image.
   [[nodiscard]] double coarseness() const noexcept {
-    return radii_[0] / (narrowest_discs[0] * detail_);
+    return radii_[0] / (narrowest_discs[0] * detail());
   }
   /// [m] in multiples of which lengths are given here.
-  [[nodiscard]] double detail() const noexcept { return detail_; }
+  [[nodiscard]] double detail() const noexcept { return parameters_.detail; }
   /// [s] between frames that can tell a motion.
   [[nodiscard]] double longest_gap() const noexcept { return 0.5 * parameters_.oldest_frame; }
 
@@ -198,7 +198,7 @@ class SurfaceEstimate {
                                          const std::array<double, cells>& residuals) const noexcept;
   [[nodiscard]] bool spans_area(const Shape& inner) const noexcept;
   /// [m] of the moments.
-  [[nodiscard]] double unit() const noexcept { return 2.0 * detail_; }
+  [[nodiscard]] double unit() const noexcept { return 2.0 * detail(); }
   /// Variance of a full narrowest disc along each axis [unit^2].
   [[nodiscard]] double full_disc() const noexcept {
     return 0.25 * (radii_[0] / unit()) * (radii_[0] / unit());
@@ -228,7 +228,6 @@ class SurfaceEstimate {
   [[nodiscard]] std::size_t most_rungs() const noexcept;
 
   SightParameters parameters_;
-  double detail_ = 0.0;  // [m]
   Patch patch_;
   LocalPoints points_;  // of the patch
   LocalFrame frame_;

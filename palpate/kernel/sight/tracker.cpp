@@ -91,8 +91,8 @@ std::optional<Layer> first_layer(std::span<float> heights, double gap,
   return std::nullopt;
 }
 
-void SightTracker::set(const Parameters& parameters) noexcept {
-  least_share_ = parameters.sight.least_share;
+void SightTracker::set(const SightParameters& parameters) noexcept {
+  least_share_ = parameters.least_share;
   surface_.set(parameters);
 }
 
@@ -171,15 +171,24 @@ SightTracker::Expectation SightTracker::expect(const Vec3& proxy, double elapsed
   return expected;
 }
 
+// The points about a place as far as occluders are looked for, in the surface's axes, too.
+void SightTracker::gather_wide_beam(const Cloud& cloud, const Vec3& place) noexcept {
+  const LocalFrame& axes = surface_.frame();
+  const double detail = surface_.detail();
+  gather(
+      cloud,
+      Beam{place, shadow_radius * detail * surface_.coarseness(), occluder_reach * detail, axes.up},
+      wide_beam_points, patch_);
+  points_.take(patch_, axes);
+}
+
 // What a frame measures along its lines of sight through the place where the surface is expected.
 void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expectation& expected,
                               Sighting& sighting) noexcept {
   const LocalFrame& axes = surface_.frame();
   const Vec3& place = expected.place;
-  const double detail = surface_.detail();
-  const double far = occluder_reach * detail;
-  gather(cloud, Beam{place, shadow_radius * detail * surface_.coarseness(), far, axes.up},
-         wide_beam_points, patch_);
+  const double far = occluder_reach * surface_.detail();
+  gather_wide_beam(cloud, place);
   const std::optional<Vec3> viewpoint = main_viewpoint(patch_);
   if (viewpoint) surface_.set_distance(camera, (*viewpoint - place).norm());
   sighting.is_camera = viewpoint.has_value();
@@ -191,7 +200,6 @@ void SightTracker::look_along(const Cloud& cloud, std::size_t camera, const Expe
   const Eigen::Vector3f towards = sighting.line.cast<float>();
   const FloatQuadric surface(expected.surface);
   const std::size_t size = std::min(patch_.size(), wide_beam_points);
-  points_.take(patch_, axes);
   std::array<float, wide_beam_points> above_surface;
   std::array<float, wide_beam_points> off_axis;  // [m^2] squared distance, less the cone's radius
   std::array<float, wide_beam_points> height;
@@ -259,12 +267,7 @@ void SightTracker::outline(View& view, const Sighting& sighting, const Expectati
 
 // How many points of an image lie before the expected surface, of those looked at.
 std::size_t SightTracker::covering(const Cloud& cloud, const Expectation& expected) noexcept {
-  const LocalFrame& axes = surface_.frame();
-  gather(cloud,
-         Beam{expected.place, shadow_radius * surface_.detail() * surface_.coarseness(),
-              occluder_reach * surface_.detail(), axes.up},
-         wide_beam_points, patch_);
-  points_.take(patch_, axes);
+  gather_wide_beam(cloud, expected.place);
   const FloatQuadric surface(expected.surface);
   const auto gate = static_cast<float>(expected.gate);
   std::size_t count = 0;

@@ -37,7 +37,7 @@ class SightTracker {
     hidden,    ///< by an occluder, or nothing was measured: held as it was
   };
 
-  void set(const Parameters& parameters) noexcept;
+  void set(const SightParameters& parameters) noexcept;
   /// Notes what a tick shows. What frames show the tracker notes itself.
   void note(Evidence evidence) noexcept { mode_ = next_mode(mode_, evidence); }
 
@@ -132,6 +132,7 @@ class SightTracker {
   };
   static Ring nothing_beside() noexcept;
   [[nodiscard]] Expectation expect(const Vec3& proxy, double elapsed) const noexcept;
+  void gather_wide_beam(const Cloud& cloud, const Vec3& place) noexcept;
   void look_along(const Cloud& cloud, std::size_t camera, const Expectation& expected,
                   Sighting& sighting) noexcept;
   void outline(View& view, const Sighting& sighting, const Expectation& expected, const Vec3& hip,

@@ -23,7 +23,7 @@ typedef struct palpate_gate_wish Wish;
 #define LARGEST 1e6         /* [N], [N m], [N/s], [s]: no number that means anything is larger */
 #define LARGEST_TIME 1e12   /* [s] */
 #define LARGEST_LIMIT 1e3   /* [N], [N m] */
-#define LARGEST_REST 2001.0 /* [N]: twice that limit, and what rings */
+#define LARGEST_REST 2000.0 /* [N]: twice that limit */
 #define SHORTEST 1e-7 /* [s] between two ticks; a tick alone takes longer, so the clock stands */
 #define CLOSE_RATE \
   100.0               /* [1/s] a closed gate takes its limit off in 10 ms, as the watchdog does */
@@ -74,7 +74,7 @@ typedef struct {
     logic real new_ceiling(Channel c, Bounds b, Tick t) =
       greater_of(b.limit, c.ceiling - fall_step(b, t));
     logic real new_rest(Channel c, Bounds b, Tick t) =
-      greater_of(0, (t.share > 0 ? c.rest : c.size + c.ring) - fall_step(b, t));
+      greater_of(0, (t.share > 0 ? c.rest : c.size) - fall_step(b, t));
     logic real top(Channel c, Bounds b, Tick t) = lesser_of(new_ceiling(c, b, t),
       t.share * new_ceiling(c, b, t) + new_rest(c, b, t) + t.ring);
     logic real turn(Channel c, Bounds b, Tick t) = b.rise * t.add_time + c.ring + t.ring;
@@ -140,7 +140,7 @@ INLINE double ceiling_of(Channel c, Bounds b, Tick t) {
 /*@ requires good_channel(c) && good_bounds(b) && good_tick(t);
     assigns \nothing; ensures 0 <= \result <= LARGEST_REST && \result == new_rest(c, b, t); */
 INLINE double rest_of(Channel c, Bounds b, Tick t) {
-  return greater(0.0, (t.share > 0.0 ? c.rest : c.size + c.ring) - step_of(b, t));
+  return greater(0.0, (t.share > 0.0 ? c.rest : c.size) - step_of(b, t));
 }
 
 /*@ requires good_channel(c) && good_bounds(b) && good_tick(t);

@@ -540,11 +540,14 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     if (force != wanted || torque != wanted_torque) flags |= slew_cut;
   }
   force = bounded(force, rise, flags);
-  // Nor may what rang in the last tick be made up for while a frame is late.
+  // Nor may what rang in the last tick be made up for while a frame is late, or as the force ends.
   if ((flags & frame_late) != 0) {
     cut_to(last_sent_.norm(), force);
     cut_to(last_torque_.norm(), torque);
   }
+  if ((flags & (disengaged | fault_latched | frame_lost)) != 0 &&
+      last_sent_.squaredNorm() < last_force_.squaredNorm())
+    cut_to(std::max(last_sent_.norm() - parameters_.fall_rate * dt, 0.0), force);
   if (has(force_cut)) cut_to(std::max(last_torque_.norm(), lever() * peak()), torque);
   if ((flags & output_refused) != 0 || !torque.allFinite()) torque = Vec3::Zero();
 

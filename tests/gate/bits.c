@@ -178,6 +178,7 @@ void check_falling(void) {
   const double rest = rest_of(c, b, t);
   ASSERT(between(rest, 0.0, LARGEST_REST), "range");
   ASSERT(!(t.share > 0.0) || rest <= c.rest, "rest");
+  ASSERT(t.share > 0.0 || rest <= c.size, "closed");
 }
 
 /* One channel: what it sends is what is_allowed was asked about with the tick's own bounds and has

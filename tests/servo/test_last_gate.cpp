@@ -125,6 +125,16 @@ TEST(LastGate, NeverSendsMoreWhileAFrameIsLate) {
   EXPECT_EQ(session.run(Vec3(0, 0, 0.6)).z(), 0.6);
 }
 
+// Hazard: chain-wrong
+TEST(LastGate, DoesNotMakeUpForAnImpactWhileItCloses) {
+  Gated session;
+  session.open(Vec3(0, 0, 1));
+  session.wish.ring = 0.9;
+  EXPECT_EQ(session.run(Vec3(0, 0, 0.5)).z(), 0.5);
+  session.wish.engaged = 0;
+  EXPECT_LE(session.run(Vec3(0, 0, 1), 0.2 * ms).z(), 0.5 - 0.399);
+}
+
 struct Closing {
   const char* name;
   void (*close)(palpate_gate_wish&);

@@ -71,6 +71,19 @@ struct Touching {
 };
 
 // Hazard: impact
+TEST(TransientBudget, IsNotMadeUpForByAForceThatEnds) {
+  Touching hand;
+  EXPECT_NEAR(hand.run(1.0, -0.6).force.z(), 0.4, 1e-9);
+  hand.input.hand = false;
+  EXPECT_EQ(hand.run(1.0, 0.0).force.z(), 0.0);
+  Touching slow;
+  slow.run(1.0, -0.6);
+  slow.input.hand = false;
+  slow.input.t -= 0.9 * dt;
+  EXPECT_NEAR(slow.run(1.0, 0.0).force.z(), 0.4 - 2000.0 * 0.1 * dt, 1e-9);
+}
+
+// Hazard: impact
 TEST(TransientBudget, IsBesideTheLimitOfTheRise) {
   Touching hand;
   EXPECT_NEAR(hand.run(1.0, 0.9).force.z(), 1.9, 1e-9);

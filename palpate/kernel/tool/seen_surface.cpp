@@ -32,18 +32,31 @@ constexpr int coarsest = 16;             // [px] of a cell
 constexpr double steepest = 2.75;        // [-] slope of 70 degrees: steeper is an edge
 constexpr float layer = 10e-3F;          // [m] pixels of one cell farther apart are of two surfaces
 constexpr int near_cells = 2;            // of a fit, on either side of the middle one
-constexpr int wide_cells = 4;            // the same of a wide fit
-constexpr int wide_step = 4;             // cells from one of those to the next
+// The wider fits: cells on either side of the middle, cells from one of those to the next, and [-]
+// how much better the fit before it knows the height at the place than one cell does.
+struct WideFit {
+  int cells, step;
+  double known;
+};
+constexpr std::array<WideFit, 2> wide_fits = {{{4, 4, 1.0}, {4, 14, 3.0}}};
+constexpr double farthest_cell = 1.0;  // [m] from the place
 // [-] scatter about a wide plane over a cell's noise: up to here noise explains it, and from there
 // on it is shape.
-constexpr double farthest_cell = 1.0;  // [m] from the place
 constexpr double trusted_scatter = 1.5;
 constexpr double refused_scatter = 3.0;
-// [-] cosine between the tool's outward normal and the surface's: more is its far side.
-constexpr double facing = 0.5;
+constexpr double same_plane = 3.0;  // [-] noise that a cell of a wider fit may be off the narrower
+// [-] share of the cells which must not be: a wall of a corner has more than half at its foot.
+constexpr double trusted_part = 0.6;
+constexpr double refused_part = 0.4;
+// [-] cosine between the tool's outward normal and the surface's: more is not a side that meets it.
+constexpr double facing = -0.4;
 // [m] and spreads below an edge: a place so deep is beside a body, not on its rim.
 constexpr double rim = 1.5e-3;
 constexpr double rim_spreads = 4.0;
+// A place in a body is pushed out through its side if that is at most so many cells away, and if
+// [-] so much of the tool's normal is across the line of sight.
+constexpr int farthest_side = 8;
+constexpr double least_across = 0.5;
 
 // (4), block by block: compilers make vector code of all but the look-up.
 PALPATE_VECTORISED
@@ -443,22 +456,31 @@ std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place, const Vec3& 
     // On the layer of the nearest cell: a rim ends half a cell beyond its last one.
     from = here > 0.0 ? here : low;
   }
+  const Middle around{p, x, y, from, jump};
+  if (p.z() > from + rim + rim_spreads * noise())
+    if (const std::optional<Fit> way_out = side_near(around, outward)) return way_out;
   // The plane through the cells of that surface (10): through far ones, too, as far as noise alone
   // explains their distances from it.
-  const auto plane = [&](int cells, int step) {
-    return plane_about({p, x, y, from, jump}, cells, step);
-  };
-  Plane near = plane(near_cells, 1);
+  Plane near = plane_about(around, near_cells, 1);
   if (near.cells == 0) return std::nullopt;
   const auto normal_of = [&](const Eigen::Vector2d& slope) -> Vec3 {
     return pose_.linear() * Vec3(slope.x(), slope.y(), -1.0).normalized();
   };
   if (normal_of(near.slope).dot(outward) > facing) return std::nullopt;
-  if (const Plane wide = plane(wide_cells, wide_step); wide.cells > near.cells / 2) {
-    const double scatter = wide.scatter / std::max(noise(), 0.3 / image_->units_per_metre());
-    const double share = ease((scatter - trusted_scatter) / (refused_scatter - trusted_scatter));
+  const double usual = std::max(noise(), 0.3 / image_->units_per_metre());
+  double reach = near_cells;
+  for (const WideFit& each : wide_fits) {
+    const Narrower narrower{near, same_plane * usual, reach};
+    const Plane wide = plane_about(around, each.cells, each.step, &narrower);
+    reach = each.cells * each.step;
+    if (wide.cells <= near.cells / 2) break;
+    const double off =
+        std::max(wide.scatter, each.known * std::abs(wide.height - near.height)) / usual;
+    const double share = ease((off - trusted_scatter) / (refused_scatter - trusted_scatter)) *
+                         ease((trusted_part - wide.part) / (trusted_part - refused_part));
     near.height += share * (wide.height - near.height);
     near.slope += share * (wide.slope - near.slope);
+    if (share < 1.0) break;
   }
   const Vec3 normal = normal_of(near.slope);
   return Fit{.gap = (p.z() - near.height) * pose_.linear().col(2).dot(normal),
@@ -467,9 +489,40 @@ std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place, const Vec3& 
              .wall = false};
 }
 
+// Of a place deep in a body: the side that it came through, a frame or a step before, if there is
+// one in the direction from which the tool's surface is.
+std::optional<SeenSurface::Fit> SeenSurface::side_near(const Middle& middle,
+                                                       const Vec3& outward) const noexcept {
+  const Cells& all = cells_[0];
+  Vec3 way = pose_.linear().transpose() * -outward;
+  way.z() = 0.0;
+  const double across = way.norm();
+  if (across < least_across) return std::nullopt;
+  way /= across;
+  const double pitch = middle.p.z() * stride_ / image_->intrinsics().fx;  // [m] between cells
+  const double farthest = (middle.p.z() - middle.from) / pitch;           // deeper than it is away
+  double before = middle.from, at = 0.0;  // [m] depth of the cell before, [cells] along the way
+  for (int i = 1; i <= std::min(static_cast<int>(farthest), farthest_side); ++i) {
+    const int u = static_cast<int>(std::lround(middle.x + i * way.x()));
+    const int v = static_cast<int>(std::lround(middle.y + i * way.y()));
+    if (u < 0 || v < 0 || u >= side || v >= side) break;
+    const double z = all.shown[static_cast<std::size_t>(v * side + u)];
+    if (!(z > 0.0)) continue;
+    const double along = (u - middle.x) * way.x() + (v - middle.y) * way.y();
+    if (z > middle.p.z() + rim)
+      return Fit{.gap = -pitch * (at + (middle.p.z() - before) / (z - before) * (along - at)),
+                 .normal = pose_.linear() * way,
+                 .unseen = unseen_since(all.seen[index(u_ + u, v_ + v)]),
+                 .wall = true};
+    before = z;
+    at = along;
+  }
+  return std::nullopt;
+}
+
 // The plane through the cells on a lattice, `step` apart, of so many on either side of the middle.
-SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells,
-                                            int step) const noexcept {
+SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells, int step,
+                                            const Narrower* narrower) const noexcept {
   const Cells& all = cells_[0];
   const int middle_u = static_cast<int>(std::lround(middle.x));
   const int middle_v = static_cast<int>(std::lround(middle.y));
@@ -477,6 +530,7 @@ SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells,
   const auto first = [&](int at) { return at < reach ? at % step : at - reach; };
   double sx = 0.0, sy = 0.0, sz = 0.0, xx = 0.0, xy = 0.0, yy = 0.0, xz = 0.0, yz = 0.0, zz = 0.0;
   Plane plane;
+  double looked = 0.0;
   for (int v = first(middle_v); v <= std::min(middle_v + reach, side - 1); v += step) {
     for (int u = first(middle_u); u <= std::min(middle_u + reach, side - 1); u += step) {
       const double z = all.shown[static_cast<std::size_t>(v * side + u)];
@@ -488,6 +542,8 @@ SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells,
       const double py = double{all.ray_y[i]} * z - middle.p.y();
       const double pz = z - middle.from;
       if (!(std::abs(px) + std::abs(py) < farthest_cell)) continue;  // nor a pixel without a ray
+      ++looked;
+      if (narrower != nullptr && !narrower->explains(px, py, z, away)) continue;
       sx += px;
       sy += py;
       sz += pz;
@@ -503,6 +559,7 @@ SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells,
   }
   if (plane.cells == 0) return plane;
   const auto of = static_cast<double>(plane.cells);
+  plane.part = of / looked;
   const double mx = sx / of, my = sy / of, mz = sz / of;
   plane.height = middle.from + mz;
   const double pitch = middle.p.z() * stride_ / image_->intrinsics().fx;

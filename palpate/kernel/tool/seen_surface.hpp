@@ -13,7 +13,7 @@
 
 namespace palpate {
 
-/// What one camera sees about a tool, averaged over its frames and continuous in time: 64 x 64
+/// What one camera sees about a tool, averaged over its frames and continuous in time: 128 x 128
 /// cells of one pixel or more, which move with the tool. docs/tools.md, equations (5) to (10).
 ///
 /// A cell's depth is modelled as level + relief + noise, as sight's averaged points are: all cells
@@ -77,7 +77,7 @@ class SeenSurface {
     return (image_->world_from_camera().translation() - place).normalized();
   }
 
-  static constexpr int side = 64;  // cells along the window, a power of two
+  static constexpr int side = 128;  // cells along the window, a power of two
 
  private:
   static constexpr std::size_t count = std::size_t{side} * side;
@@ -105,8 +105,22 @@ class SeenSurface {
     double scatter = 0.0;                             // [m] of the cells about it
     double newest = 0.0;                              // [s] stamp of the newest of them
     std::size_t cells = 0;
+    double part = 1.0;  // [-] of the cells looked at, that were near the narrower plane
   };
-  [[nodiscard]] Plane plane_about(const Middle& middle, int cells, int step) const noexcept;
+  [[nodiscard]] std::optional<Fit> side_near(const Middle& middle,
+                                             const Vec3& outward) const noexcept;
+  /// The plane of fewer cells, which those of a wider one must not contradict.
+  struct Narrower {
+    const Plane& plane;
+    double most;   // [m] that a cell may be off it,
+    double reach;  // [cells]; and twice that ten times as far away, since its slope is not exact
+    [[nodiscard]] bool explains(double x, double y, double z, double away) const noexcept {
+      const double off = z - plane.height - plane.slope.x() * x - plane.slope.y() * y;
+      return std::abs(off) <= most * (1.0 + 0.1 * away / reach);
+    }
+  };
+  [[nodiscard]] Plane plane_about(const Middle& middle, int cells, int step,
+                                  const Narrower* narrower = nullptr) const noexcept;
 
   static std::size_t index(int u, int v) noexcept {
     return static_cast<std::size_t>((v & (side - 1)) * side + (u & (side - 1)));

@@ -52,8 +52,12 @@ class Stage {
         frame_ = camera_.capture(frames_ * frame_time, static_cast<std::uint64_t>(frames_));
         ++frames_;
         auto image = std::make_unique<DepthImage>(*frame_.cloud->image());
+        if (blind)
+          *image =
+              DepthImage(image->shared_rays(), std::vector<std::uint16_t>(image->depth().size()),
+                         image->units_per_metre(), image->world_from_camera());
         image->set_materials(materials);
-        touch_.observe({*image, frame_.stamp});
+        touch_.observe({*image, frame_.stamp, camera});
         image_ = std::move(image);
       }
       tick = touch_.tick(hand(t_), t_);
@@ -72,7 +76,9 @@ class Stage {
   [[nodiscard]] ShapeTouch& touch() { return touch_; }
   [[nodiscard]] double now() const { return t_; }
 
-  bool streams = true;  // are there new frames?
+  bool streams = true;     // are there new frames?
+  bool blind = false;      // do they show nothing?
+  std::size_t camera = 0;  // its number
   std::shared_ptr<const MaterialMap> materials;
 
  private:
@@ -134,6 +140,7 @@ TEST(ShapeTouch, RestsFlatOnAPlane) {
   EXPECT_LT(tick.torque.norm(), 0.05 * stiffness * 5e-3 * 20e-3);
   EXPECT_NEAR(tick.proxy.z(), 2.5e-3, 1e-4);
   EXPECT_EQ(tick.state, ContactState::contact);
+  EXPECT_NEAR(tick.normal.z(), 1.0, 1e-3);
 }
 
 TEST(ShapeTouch, StandsOnAnEdgeAndOnACorner) {
@@ -436,6 +443,116 @@ TEST(ShapeTouch, LetsGoWhereFramesDoNotCome) {
   EXPECT_LT(stage.run(0.09, hand).torque.norm(), 0.9 * pressed.torque.norm());
   const Tick gone = stage.run(0.2, hand);
   EXPECT_TRUE(gone.force.isZero(0.0) && gone.torque.isZero(0.0));
+  stage.streams = true;
+  EXPECT_TRUE(stage.run(0.5, hand).force.isZero(0.0)) << "until it has been free";
+}
+
+// Hazard: tool-pushes
+TEST(ShapeTouch, FadesWhereItsSurfaceIsNotMeasured) {
+  Stage stage(plane());
+  const HandPose at = pose({0, 0, 0});
+  const double pressed = stage.press(at).force.z();
+  stage.blind = true;
+  const auto hand = [&](double) { return at; };
+  const Tick held = stage.run(0.3, hand);
+  EXPECT_NEAR(held.force.z(), pressed, 0.05 * pressed);
+  EXPECT_TRUE((held.flags & surface_hidden) != 0);
+  const double fading = stage.run(0.25, hand).force.z();
+  EXPECT_GT(fading, 0.1 * pressed);
+  EXPECT_LT(fading, 0.9 * pressed);
+  EXPECT_TRUE(stage.run(0.3, hand).force.isZero(0.0));
+}
+
+TEST(ShapeTouch, TouchesAScanAsLongAsOneLikes) {
+  Stage stage(plane());
+  stage.run(1e-3, [](double) { return pose({0, 0, 0.03}); });
+  stage.streams = false;
+  EXPECT_NEAR(stage.press(pose({0, 0, -2.5e-3})).force.z(), stiffness * 5e-3, 0.1);
+}
+
+TEST(ShapeTouch, FeelsNothingWithoutAFrameAndOfCamerasThatItDoesNotTouch) {
+  ShapeTouch touch(tool("box:40x20x5mm"), Parameters{});
+  EXPECT_EQ(touch.tick(pose({0, 0, 0.02}), 0.0).flags, std::uint32_t{no_frame});
+  Stage seen(plane());
+  seen.camera = Patch::max_views - 1;
+  EXPECT_TRUE(seen.press(pose({0, 0, 0})).force.isZero(0.0));
+}
+
+// Hazard: tool-pushes
+TEST(ShapeTouch, LetsGoOfAHandThatIsFarAway) {
+  Stage stage(plane());
+  stage.press(pose({0, 0, 0}));
+  const double begin = stage.now();
+  bool lets_go = false;
+  const Tick tick = stage.run(
+      0.5,
+      [&](double t) {
+        return pose({0, 0, -(t - begin)});
+      },
+      [&](const Tick& each) {
+        lets_go = lets_go || (each.flags & proxy_let_go) != 0;
+        EXPECT_LT((each.proxy - each.hip).norm(), 0.302);
+      });
+  EXPECT_TRUE(lets_go);
+  EXPECT_TRUE(tick.force.isZero(0.0));
+}
+
+// What a damper adds to the wrench at the end of a path of the hand's, for 5 N s/m.
+Wrench6 damped_part(const Scene& scene, double duration,
+                    const std::function<HandPose(double)>& hand) {
+  Wrench6 part{Vec3::Zero(), Vec3::Zero()};
+  for (const double damping : {5.0, 0.0}) {
+    Parameters parameters;
+    parameters.coupling.damping = damping;
+    Stage stage(scene);
+    stage.touch().set_parameters(parameters);
+    stage.run(1.0, [](double) { return pose({0, 0, 0.02}); });
+    const Tick tick = stage.run(duration, hand);
+    part.force = tick.force - part.force;
+    part.torque = tick.torque - part.torque;
+  }
+  return {-part.force, -part.torque};
+}
+
+TEST(ShapeTouch, DampsWhatTheHandMovesAgainstTheSurface) {
+  const Vec3 down(0, 0, -2.5e-3);
+  const double length = std::sqrt(ToolShape::usual_turning) * tool("box:40x20x5mm")->reach();
+  // Down at 0.1 m/s, and a turn that begins 20 ms before the end, at 1 rad/s.
+  const auto pressing = [&](double t) {
+    return pose({0, 0, std::max(0.02 - 0.1 * (t - 1.0), down.z())});
+  };
+  EXPECT_NEAR(damped_part(plane(), 0.22, pressing).force.z(), 0.5, 0.05);
+  const auto turning = [&](double t) {
+    return HandPose{pressing(t).position, rotation_by(Vec3(std::max(t - 1.48, 0.0), 0, 0))};
+  };
+  EXPECT_NEAR(damped_part(plane(), 0.5, turning).torque.x(), -5.0 * length * length,
+              0.5 * length * length);
+  // After a gap, differences are no velocity.
+  const auto jumping = [&](double t) {
+    return HandPose{pressing(t).position, rotation_by(Vec3(t < 1.4 ? 0.0 : 0.05, 0, 0))};
+  };
+  Parameters damped;
+  damped.coupling.damping = 5.0;
+  Stage stage(plane());
+  stage.touch().set_parameters(damped);
+  stage.run(1.0, [](double) { return pose({0, 0, 0.02}); });
+  stage.run(0.39, pressing);
+  const double t = stage.now() + 0.05;
+  const double jumped = stage.touch().tick(jumping(t), t).torque.x();
+  EXPECT_NEAR(jumped, stage.touch().tick(jumping(t), t + 1e-3).torque.x(), 2.5 * length * length);
+}
+
+TEST(ShapeTouch, IsCarriedByASurfaceThatRises) {
+  Part rising = part(HalfSpace{});
+  rising.motion = {.start = 1.5, .speed = 0.05};
+  const auto hand = [](double t) {
+    const double height = 0.05 * std::max(t - 1.5, 0.0);
+    return pose({0, 0, height + std::max(0.02 - 0.1 * (t - 1.0), -2.5e-3)});
+  };
+  EXPECT_NEAR(damped_part(Scene({rising}), 1.5, hand).force.z(), 0.0, 0.05);
+  Stage stage(Scene({rising}));
+  stage.run(1.0, [](double) { return pose({0, 0, 0.02}); });
+  EXPECT_NEAR(stage.run(1.5, hand).surface_velocity, 0.05, 5e-3);
 }
 
 // Hazard: tool-pushes, not-a-number

@@ -114,18 +114,9 @@ class Rerun {
     }
     // What was in use before, of each camera.
     std::vector<FrameInUse> in_use;
-    const auto use = [&](std::uint64_t number) {
-      for (FrameInUse& frame : session.seen(number)) in_use.push_back(std::move(frame));
-      frame_number_ = std::max(frame_number_, number);
-      ++frames_;
-    };
-    bool any_known = false;
-    for (const auto& [number, frame] : session.adopted()) {
-      any_known = any_known || frame.tick;
-      if (frame.tick && *frame.tick < first.number) use(number);
-    }
-    if (!any_known && first.frame_number > 0 && !session.adopted().contains(first.frame_number))
-      use(first.frame_number);
+    for (const auto& [number, frame] : session.adopted())
+      if (frame.tick < first.number) in_use.push_back(session.seen(number));
+    frames_ = in_use.size();
     cycle_.restore(*session.state(), in_use);
   }
 
@@ -138,7 +129,7 @@ class Rerun {
                      switched ? made_method() : nullptr);
     }
     if ((recorded.hand & faults_reset) != 0) cycle_.reset_faults();
-    for (const std::uint64_t number : session_.taken_in(recorded, frame_number_)) put(number);
+    for (const std::uint64_t number : session_.taken_in(recorded)) put(number);
     device_.set_hand(recorded);
     cycle_.run({.t = recorded.tick.t,
                 .wake_up_ns = recorded.wake_up_ns,
@@ -157,24 +148,13 @@ class Rerun {
   }
 
   void put(std::uint64_t number) {
-    const auto adopted = session_.adopted().find(number);
-    if (adopted == session_.adopted().end())
-      throw Error("recording", "lacks how frame " + std::to_string(number) + " was handed over",
+    const AdoptedFrame& frame = session_.adopted().at(number);
+    const FrameInUse seen = session_.seen(number);
+    if (seen.camera != frame.cameras[0].camera)
+      throw Error("recording", "has a frame " + std::to_string(number) + " of another camera",
                   "it may be damaged");
-    AdoptedFrame frame = adopted->second;
-    const std::span<CameraFrame> cameras(frame.cameras.data(), frame.camera_count);
-    for (const FrameInUse& seen : session_.seen(number)) {
-      // In an old recording its camera need not be the first.
-      const auto own = std::find_if(cameras.begin(), cameras.end(), [&](const CameraFrame& each) {
-        return each.camera == seen.camera;
-      });
-      if (own == cameras.end())
-        throw Error("recording", "has a frame " + std::to_string(number) + " of another camera",
-                    "it may be damaged");
-      std::iter_swap(cameras.begin(), own);
-      cycle_.put_frame(seen.cloud, frame.stamp, cameras, frame.put_at);
-    }
-    frame_number_ = std::max(frame_number_, number);
+    cycle_.put_frame(seen.cloud, frame.stamp, std::span(frame.cameras).first(frame.camera_count),
+                     frame.put_at);
     ++frames_;
   }
 
@@ -184,7 +164,6 @@ class Rerun {
   ServoCommands commands_;
   Cycle cycle_;
   TickRing<ServoTick>::Reader ticks_;
-  std::uint64_t frame_number_ = 0;
   std::uint64_t frames_ = 0;
 };
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/record/session.hpp"
 
-#include <cmath>
-#include <limits>
-#include <type_traits>
 #include <utility>
 
 #include <nlohmann/json.hpp>
@@ -45,25 +42,26 @@ std::vector<double> row_of(const AdoptedFrame& frame) {
   std::vector<double> row{static_cast<double>(frame.number), frame.stamp, frame.put_at};
   for (std::size_t i = 0; i < frame.camera_count; ++i)
     row.insert(row.end(), {static_cast<double>(frame.cameras[i].camera), frame.cameras[i].stamp});
-  if (frame.tick) row.push_back(static_cast<double>(*frame.tick));
+  row.push_back(static_cast<double>(frame.tick));
   return row;
 }
 
 AdoptedFrame adopted_of(std::span<const double> row, const std::string& name) {
-  constexpr std::size_t fixed = 3;
-  constexpr double most = 9007199254740992.0;  // 2^53
-  const auto whole = [&](double value) {
-    if (!(value >= 0.0 && value <= most && value == std::floor(value)))
-      throw Error(name, "has a number of " + std::to_string(value), "it may be damaged");
-    return static_cast<std::uint64_t>(value);
-  };
-  if (row.size() < fixed || row.size() > fixed + 2 * Freshness::max_cameras + 1)
+  constexpr std::size_t fixed = 4;
+  if (row.size() < fixed + 2 || row.size() > fixed + 2 * Freshness::max_cameras ||
+      row.size() % 2 != fixed % 2)
     throw Error(name, "has " + std::to_string(row.size()) + " numbers", "it may be damaged");
-  AdoptedFrame frame{.number = whole(row[0]), .stamp = row[1], .put_at = row[2]};
-  if (row.size() % 2 != fixed % 2) frame.tick = whole(row.back());
-  for (std::size_t i = fixed; i + 1 < row.size(); i += 2)
-    frame.cameras[frame.camera_count++] = {.camera = static_cast<std::size_t>(whole(row[i])),
-                                           .stamp = row[i + 1]};
+  AdoptedFrame frame;
+  GetNumbers get(row, name);
+  get("number", frame.number);
+  get("stamp", frame.stamp);
+  get("put_at", frame.put_at);
+  frame.camera_count = (row.size() - fixed) / 2;
+  for (CameraFrame& camera : std::span(frame.cameras).first(frame.camera_count)) {
+    get("camera", camera.camera);
+    get("stamp", camera.stamp);
+  }
+  get("tick", frame.tick);
   return frame;
 }
 
@@ -97,7 +95,7 @@ SessionInfo session_from_json(const std::string& text, const std::string& name) 
     const json& limits = object.at("device_limits");
     info.limits = {.max_force = limits.at("max_force").get<double>(),
                    .continuous_force = limits.at("continuous_force").get<double>(),
-                   .max_torque = limits.value("max_torque", 0.0)};
+                   .max_torque = limits.at("max_torque").get<double>()};
     info.tick_columns = object.at("tick_columns").get<std::vector<std::string>>();
     info.hand = object.value("hand", std::string());
     info.more_hands = object.value("more_hands", std::vector<std::string>());
@@ -186,17 +184,13 @@ ServoCommands commands_from_json(const std::string& text, const std::string& nam
     all.placement.workspace_scale = object.at("workspace_scale").get<double>();
     if (object.contains("clutch_button"))
       all.placement.clutch_button = whole_of<int>(object.at("clutch_button"), name);
-    all.placement.bubble_radius = object.value("bubble_radius", all.placement.bubble_radius);
-    all.placement.bubble_speed = object.value("bubble_speed", all.placement.bubble_speed);
-    all.placement.handle_weight = object.value("handle_weight", all.placement.handle_weight);
-    if (object.contains("down")) {
-      for (int axis = 0; axis < 3; ++axis)
-        all.placement.down[axis] =
-            object.at("down").at(static_cast<std::size_t>(axis)).get<double>();
-    }
-    if (object.contains("scene"))
-      commands.scene = whole_of<std::uint64_t>(object.at("scene"), name);
-    commands.hold = object.value("hold", false);
+    all.placement.bubble_radius = object.at("bubble_radius").get<double>();
+    all.placement.bubble_speed = object.at("bubble_speed").get<double>();
+    all.placement.handle_weight = object.at("handle_weight").get<double>();
+    for (int axis = 0; axis < 3; ++axis)
+      all.placement.down[axis] = object.at("down").at(static_cast<std::size_t>(axis)).get<double>();
+    commands.scene = whole_of<std::uint64_t>(object.at("scene"), name);
+    commands.hold = object.at("hold").get<bool>();
     if (object.contains("tool")) all.tool = tool_from_json(object.at("tool"));
     if (object.contains("fixtures"))
       all.fixtures = fixtures_from_json(object.at("fixtures").dump(), name);

@@ -2,24 +2,12 @@
 #include "palpate/record/session_reader.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "palpate/io/bag/messages.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
-namespace {
-
-constexpr double most = 9007199254740992.0;  // 2^53
-
-std::uint64_t whole(double value, const std::string& name) {
-  if (!(value >= 0.0 && value <= most && value == std::floor(value)))
-    throw Error(name, "has a number of " + std::to_string(value), "it may be damaged");
-  return static_cast<std::uint64_t>(value);
-}
-
-}  // namespace
 
 template <class Message, class Take>
 void SessionReader::read_all(std::string_view topic, const Take& take) {
@@ -65,12 +53,23 @@ SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
     ServoCommands commands = commands_from_json(message.data, name);
     commands_[commands.number] = std::move(commands);
   });
-  read_frames();
+  read_all<ros::Float64MultiArray>(session_topic::frame,
+                                   [&](const auto& message, const auto& name) {
+                                     GetNumbers get(message.data, name);
+                                     std::uint64_t number = 0;
+                                     get("number", number);
+                                     PutFrame& frame = frames_[number];
+                                     get("stamp", frame.stamp);
+                                     if (get.at_end()) return;
+                                     auto& [camera, image] = frame.image.emplace();
+                                     get("camera", camera);
+                                     get("image", image);
+                                   });
   read_all<ros::Float64MultiArray>(session_topic::adopted,
                                    [&](const auto& message, const auto& name) {
                                      const AdoptedFrame frame = adopted_of(message.data, name);
-                                     if (!adopted_.contains(frame.number) && frame.tick)
-                                       taken_[*frame.tick].push_back(frame.number);
+                                     if (!adopted_.contains(frame.number))
+                                       taken_[frame.tick].push_back(frame.number);
                                      adopted_[frame.number] = frame;
                                    });
   read_all<ros::Float64MultiArray>(
@@ -84,30 +83,6 @@ SessionReader::SessionReader(const std::filesystem::path& path) : bag_(path) {
         std::copy(row.begin(), row.end(), state_->numbers.begin());
       });
   ticks_ = bag_.places(session_topic::tick);
-}
-
-void SessionReader::read_frames() {
-  std::map<std::size_t, std::size_t> newest;  // image of each camera
-  read_all<ros::Float64MultiArray>(
-      session_topic::frame, [&](const auto& message, const auto& name) {
-        const std::vector<double>& row = message.data;
-        if (row.size() < 2 || row.size() % 2 != 0)
-          throw Error(name, "has " + std::to_string(row.size()) + " numbers", "it may be damaged");
-        PutFrame& frame = frames_[whole(row[0], name)];
-        frame.stamp = row[1];
-        for (std::size_t i = 2; i < row.size(); i += 2)
-          frame.images.emplace_back(whole(row[i], name), whole(row[i + 1], name));
-        // An old recording names what all cameras saw last; what has changed was new.
-        if (frame.images.size() > 1) {
-          std::vector<std::pair<std::size_t, std::size_t>> fresh;
-          for (const auto& image : frame.images) {
-            const auto known = newest.find(image.first);
-            if (known == newest.end() || known->second != image.second) fresh.push_back(image);
-          }
-          if (!fresh.empty()) frame.images = std::move(fresh);
-        }
-        for (const auto& [camera, image] : frame.images) newest[camera] = image;
-      });
 }
 
 ServoTick SessionReader::tick(std::size_t index) {
@@ -140,30 +115,25 @@ std::shared_ptr<const Cloud> SessionReader::cloud(std::size_t camera, std::size_
   return entry.cloud;
 }
 
-std::vector<std::uint64_t> SessionReader::taken_in(const ServoTick& tick,
-                                                   std::uint64_t before) const {
-  if (const auto taken = taken_.find(tick.number); taken != taken_.end()) return taken->second;
-  if (!taken_.empty() || tick.frame_number == before) return {};
-  return {tick.frame_number};
+std::span<const std::uint64_t> SessionReader::taken_in(const ServoTick& tick) const {
+  const auto taken = taken_.find(tick.number);
+  return taken == taken_.end() ? std::span<const std::uint64_t>() : taken->second;
 }
 
-std::vector<FrameInUse> SessionReader::seen(std::uint64_t number) {
+FrameInUse SessionReader::seen(std::uint64_t number) {
   if (parent_) return parent_->seen(number);
   const auto found = frames_.find(number);
   if (found == frames_.end())
     throw Error("recording", "lacks frame " + std::to_string(number),
                 "the disk was too slow, or the recording is damaged");
   const PutFrame& frame = found->second;
-  if (frame.images.empty())
+  if (!frame.image)
     throw Error("recording", "a frame was dropped during recording",
                 "the computer or its disk was too slow to record all frames");
-  std::vector<FrameInUse> all;
-  for (const auto& [camera, image] : frame.images) {
-    if (camera >= Freshness::max_cameras)
-      throw Error("recording", "has a camera " + std::to_string(camera), "it may be damaged");
-    all.push_back({.cloud = cloud(camera, image), .stamp = frame.stamp, .camera = camera});
-  }
-  return all;
+  const auto [camera, image] = *frame.image;
+  if (camera >= Freshness::max_cameras)
+    throw Error("recording", "has a camera " + std::to_string(camera), "it may be damaged");
+  return {.cloud = cloud(camera, image), .stamp = frame.stamp, .camera = camera};
 }
 
 }  // namespace palpate

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -37,25 +38,22 @@ class SessionReader {
   /// A frame as the renderer got it.
   struct PutFrame {
     double stamp = 0.0;  ///< [s]
-    /// Which camera's which image; none if the frame was left out of the recording. More than one
-    /// only in an old recording.
-    std::vector<std::pair<std::size_t, std::size_t>> images;
+    /// Which camera's which image; none if the frame was left out of the recording.
+    std::optional<std::pair<std::size_t, std::size_t>> image;
   };
   /// By their number.
   [[nodiscard]] const std::map<std::uint64_t, PutFrame>& frames() const {
     return parent_ ? parent_->frames() : frames_;
   }
-  /// How frames were taken into use, by their number; none in old recordings.
+  /// How frames were taken into use, by their number.
   [[nodiscard]] const std::map<std::uint64_t, AdoptedFrame>& adopted() const { return adopted_; }
   /// What the cycle remembered before the first tick; none of a session from its start, or of
   /// another version's state.
   [[nodiscard]] const std::optional<CycleState>& state() const { return state_; }
   /// The numbers of the frames that a tick took into use.
-  /// @param before  the highest taken before it
-  [[nodiscard]] std::vector<std::uint64_t> taken_in(const ServoTick& tick,
-                                                    std::uint64_t before) const;
+  [[nodiscard]] std::span<const std::uint64_t> taken_in(const ServoTick& tick) const;
   /// What was seen, and by which camera. @throws Error if it is damaged or was left out.
-  [[nodiscard]] std::vector<FrameInUse> seen(std::uint64_t number);
+  [[nodiscard]] FrameInUse seen(std::uint64_t number);
 
  private:
   struct Camera {
@@ -65,7 +63,6 @@ class SessionReader {
   };
 
   static std::unique_ptr<SessionReader> parent_of(const std::filesystem::path& path);
-  void read_frames();
   std::shared_ptr<const Cloud> cloud(std::size_t camera, std::size_t number);
   template <class Message, class Take>
   void read_all(std::string_view topic, const Take& take);

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <bit>
-#include <cmath>
-#include <limits>
 #include <span>
-#include <type_traits>
 #include <utility>
 
 #include "palpate/kernel/core/error.hpp"
@@ -59,91 +56,11 @@ void walk(Way& way, T& record) {
   way("torque", record.torque);
 }
 
-// The axes of a field's numbers; a single number has no axis.
-template <class T>
-constexpr std::string_view axes_of{};
-template <>
-constexpr std::string_view axes_of<Vec3> = "xyz";
-template <>
-constexpr std::string_view axes_of<Rotation> = "xyzw";  // as a rotation's coeffs()
-
-class Names {
- public:
-  template <class T>
-  void operator()(std::string_view name, const T& /*value*/) {
-    if constexpr (axes_of<T>.empty()) names.emplace_back(name);
-    for (const char axis : axes_of<T>) names.push_back(std::string(name) + "_" + axis);
-  }
-  std::vector<std::string> names;
-};
-
-class Put {
- public:
-  void operator()(std::string_view /*name*/, const Vec3& v) {
-    row.insert(row.end(), v.begin(), v.end());
-  }
-  void operator()(std::string_view /*name*/, const Rotation& q) {
-    row.insert(row.end(), q.coeffs().begin(), q.coeffs().end());
-  }
-  template <class T>
-  void operator()(std::string_view /*name*/, const T& value) {
-    row.push_back(static_cast<double>(value));  // whole numbers are far below 2^53
-  }
-  std::vector<double> row;
-};
-
-class Get {
- public:
-  Get(std::span<const double> row, std::span<const std::optional<std::size_t>> places,
-      const std::string& name)
-      : row_(row), places_(places), name_(name) {}
-
-  void operator()(std::string_view /*field*/, double& value) { value = next().value_or(value); }
-  void operator()(std::string_view /*field*/, Vec3& v) {
-    for (double& value : v) value = next().value_or(value);
-  }
-  void operator()(std::string_view /*field*/, Rotation& q) {
-    for (double& value : q.coeffs()) value = next().value_or(value);
-  }
-  template <class T>
-  void operator()(std::string_view field, T& value) {
-    const std::optional<double> number = next();
-    if (!number) return;
-    if constexpr (std::is_enum_v<T>) {
-      value = static_cast<T>(static_cast<int>(whole(field, *number, 0.0, 2.0)));
-    } else {
-      constexpr double most = 9007199254740992.0;  // 2^53
-      using Limits = std::numeric_limits<T>;
-      value =
-          static_cast<T>(whole(field, *number, std::max(static_cast<double>(Limits::min()), -most),
-                               std::min(static_cast<double>(Limits::max()), most)));
-    }
-  }
-
- private:
-  std::optional<double> next() {
-    const std::optional<std::size_t> place = places_[at_++];
-    return place ? std::optional(row_[*place]) : std::nullopt;
-  }
-  [[nodiscard]] double whole(std::string_view field, double value, double least,
-                             double most) const {
-    if (!(value >= least && value <= most && value == std::floor(value)))
-      throw Error(name_, "has a " + std::string(field) + " of " + std::to_string(value),
-                  "it may be damaged");
-    return value;
-  }
-
-  std::span<const double> row_;
-  std::span<const std::optional<std::size_t>> places_;
-  const std::string& name_;
-  std::size_t at_ = 0;
-};
-
 }  // namespace
 
 const std::vector<std::string>& tick_columns() {
   static const std::vector<std::string> columns = [] {
-    Names names;
+    NameNumbers names;
     const ServoTick tick;
     walk(names, tick);
     return std::move(names.names);
@@ -152,10 +69,10 @@ const std::vector<std::string>& tick_columns() {
 }
 
 std::vector<double> row_of(const ServoTick& tick) {
-  Put put;
-  put.row.reserve(tick_columns().size());
+  std::vector<double> row(tick_columns().size());
+  PutNumbers put(row);
   walk(put, tick);
-  return std::move(put.row);
+  return row;
 }
 
 void add_to_hash(std::uint64_t& hash, const ServoTick& tick) {
@@ -183,7 +100,10 @@ ServoTick TickRows::read(std::span<const double> row, const std::string& name) c
         name, "has " + std::to_string(row.size()) + " numbers instead of " + std::to_string(width_),
         "it may be damaged");
   ServoTick tick;
-  Get get(row, places_, name);
+  std::vector<double> all = row_of(tick);
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (has(i)) all[i] = row[*places_[i]];
+  GetNumbers get(all, name);
   walk(get, tick);
   return tick;
 }

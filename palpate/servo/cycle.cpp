@@ -178,13 +178,14 @@ std::vector<std::string> cycle_state_names() {
     WeightSupport support_{};
     LastGate gate_{};
   } memory;
-  NameState name;
+  NameNumbers name;
   Cycle::walk(name, memory);
   return std::move(name.names);
 }
 
 void Cycle::restore(const CycleState& state, std::span<const FrameInUse> frames) {
-  GetState get(state);
+  GetNumbers get(std::span(state.numbers).first(std::min(state.count, CycleState::capacity)),
+                 "state of the cycle");
   walk(get, *this);
   if (!get.at_end())
     throw Error("state of the cycle", "has too many numbers",
@@ -268,8 +269,9 @@ void Cycle::run(const Wake& wake) noexcept {
   const Change* change = changes_.take();
   if (change != nullptr && change->method.get() != method_) {
     CycleState state;
-    PutState put(state);
+    PutNumbers put(state.numbers);
     walk(put, *this);
+    state.count = put.count();
     states_.push(state);
   }
   const bool switched = change != nullptr && adopt_change(*change);

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/hand.hpp"
 #include "palpate/kernel/core/patch.hpp"
 #include "palpate/servo/freshness.hpp"
 
@@ -29,8 +30,7 @@ struct AdoptedFrame {
   /// The first `camera_count` count: the camera that captured it, then the others.
   std::array<CameraFrame, Freshness::max_cameras> cameras{};
   std::uint64_t camera_count = 0;
-  /// Number of the cycle that took it, as ServoTick::number; none in an old recording.
-  std::optional<std::uint64_t> tick{};
+  std::uint64_t tick = 0;  ///< number of the cycle that took it, as ServoTick::number
 };
 
 /// State of a Cycle between two ticks as an array of numbers, without method and settings: safety
@@ -42,82 +42,98 @@ struct CycleState {
   std::uint64_t count = 0;
 };
 
-// Visitors of the state of an object. Each class has a `walk(way, self)` that calls `way(name,
-// value)` for each value in turn, so that names, writing and reading cannot differ.
+// Visitors of an object's values, as numbers. Each class has a `walk(way, self)` that calls
+// `way(name, value)` for each value in turn, so that names, writing and reading cannot differ.
 
-/// Writes the values as numbers. [servo]
-class PutState {
+/// Writes the values, as many as there is room for. [servo]
+class PutNumbers {
  public:
-  explicit PutState(CycleState& state) noexcept : state_(state) { state_.count = 0; }
+  explicit PutNumbers(std::span<double> numbers) noexcept : numbers_(numbers) {}
 
-  void operator()(std::string_view /*name*/, const Vec3& v) noexcept {
-    for (int axis = 0; axis < 3; ++axis) put(v[axis]);
-  }
-  void operator()(std::string_view /*name*/, const std::optional<double>& v) noexcept {
-    put(v.value_or(std::numeric_limits<double>::quiet_NaN()));
-  }
   template <class T>
-  requires std::is_arithmetic_v<T>
   void operator()(std::string_view /*name*/, const T& v) noexcept {
-    put(static_cast<double>(v));  // whole numbers are far below 2^53
+    if constexpr (std::is_same_v<T, Vec3>) {
+      for (const double number : v) put(number);
+    } else if constexpr (std::is_same_v<T, Rotation>) {
+      for (const double number : v.coeffs()) put(number);
+    } else if constexpr (std::is_same_v<T, std::optional<double>>) {
+      put(v.value_or(std::numeric_limits<double>::quiet_NaN()));
+    } else {
+      put(static_cast<double>(v));  // whole numbers are far below 2^53
+    }
   }
+  [[nodiscard]] std::size_t count() const noexcept { return count_; }
 
  private:
   void put(double number) noexcept {
-    if (state_.count < CycleState::capacity) state_.numbers[state_.count++] = number;
+    if (count_ < numbers_.size()) numbers_[count_++] = number;
   }
-  CycleState& state_;
+  std::span<double> numbers_;
+  std::size_t count_ = 0;
 };
 
 /// Collects the names of the numbers.
-class NameState {
+class NameNumbers {
  public:
-  void operator()(std::string_view name, const Vec3& /*v*/) {
-    for (const char* axis : {"_x", "_y", "_z"}) names.push_back(std::string(name) + axis);
-  }
   template <class T>
   void operator()(std::string_view name, const T& /*v*/) {
-    names.emplace_back(name);
+    constexpr std::string_view axes = std::is_same_v<T, Vec3>       ? "xyz"
+                                      : std::is_same_v<T, Rotation> ? "xyzw"
+                                                                    : "";
+    if (axes.empty()) names.emplace_back(name);
+    for (const char axis : axes) names.push_back(std::string(name) + "_" + axis);
   }
   std::vector<std::string> names;
 };
 
-/// Reads the values back; each call throws Error for a number that its value cannot have.
-class GetState {
+/// Reads the values back; each call throws Error about `what` for a number that its value cannot
+/// have.
+class GetNumbers {
  public:
-  explicit GetState(const CycleState& state) : state_(state) {}
+  GetNumbers(std::span<const double> numbers, std::string what)
+      : numbers_(numbers), what_(std::move(what)) {}
 
-  void operator()(std::string_view /*name*/, Vec3& v) {
-    for (int axis = 0; axis < 3; ++axis) v[axis] = next();
-  }
-  void operator()(std::string_view /*name*/, std::optional<double>& v) {
-    const double number = next();
-    v = std::isnan(number) ? std::nullopt : std::optional(number);
-  }
-  void operator()(std::string_view /*name*/, double& v) { v = next(); }
   template <class T>
-  requires std::is_integral_v<T>
   void operator()(std::string_view name, T& v) {
+    if constexpr (std::is_same_v<T, Vec3>) {
+      for (double& number : v) number = next();
+    } else if constexpr (std::is_same_v<T, Rotation>) {
+      for (double& number : v.coeffs()) number = next();
+    } else if constexpr (std::is_same_v<T, std::optional<double>>) {
+      const double number = next();
+      v = std::isnan(number) ? std::nullopt : std::optional(number);
+    } else if constexpr (std::is_enum_v<T>) {
+      v = static_cast<T>(whole<int>(name, 0.0, 2.0));
+    } else if constexpr (std::is_integral_v<T>) {
+      using Limits = std::numeric_limits<T>;
+      v = whole<T>(name, static_cast<double>(Limits::min()), static_cast<double>(Limits::max()));
+    } else {
+      v = next();
+    }
+  }
+  /// A whole number of these limits.
+  template <class T>
+  T whole(std::string_view name, double least, double most) {
     constexpr double exact = 9007199254740992.0;  // 2^53
-    const double most = std::min(exact, static_cast<double>(std::numeric_limits<T>::max()));
     const double number = next();
-    if (!(number >= 0.0 && number <= most && number == std::floor(number)))
-      throw Error("state of the cycle",
-                  "has a " + std::string(name) + " of " + std::to_string(number),
+    if (!(number >= std::max(least, -exact) && number <= std::min(most, exact) &&
+          number == std::floor(number)))
+      throw Error(what_, "has a " + std::string(name) + " of " + std::to_string(number),
                   "it may be damaged, or of another version of palpate");
-    v = static_cast<T>(number);
+    return static_cast<T>(number);
   }
 
-  [[nodiscard]] bool at_end() const { return at_ == state_.count; }
+  [[nodiscard]] bool at_end() const { return at_ == numbers_.size(); }
 
  private:
   double next() {
-    if (at_ >= state_.count || at_ >= CycleState::capacity)
-      throw Error("state of the cycle", "has too few numbers",
+    if (at_end())
+      throw Error(what_, "has " + std::to_string(at_) + " numbers, too few",
                   "it may be damaged, or of another version of palpate");
-    return state_.numbers[at_++];
+    return numbers_[at_++];
   }
-  const CycleState& state_;
+  std::span<const double> numbers_;
+  std::string what_;
   std::size_t at_ = 0;
 };
 

@@ -144,7 +144,7 @@ ReplayReport replay_changed(const std::function<void(ServoTick&)>& change) {
     for (std::uint64_t i = 0; i <= reader.tick(reader.ticks() - 1).settings_number; ++i)
       writer.commands(reader.commands(i), 0.0);
     for (const auto& [number, frame] : reader.frames()) {
-      const auto cloud = reader.seen(number).front().cloud;
+      const auto cloud = reader.seen(number).cloud;
       writer.frame(number, frame.stamp, 0, cloud);
       writer.adopted(reader.adopted().at(number));
     }

@@ -80,7 +80,7 @@ ReplayReport replay_changed(const std::function<bool(ServoTick&)>& change) {
     writer.commands({}, 0.0);
     for (const auto& [number, frame] : reader.frames()) {
       if (number == 4) continue;  // of ticks 99 to 119
-      const auto cloud = reader.seen(number).front().cloud;
+      const auto cloud = reader.seen(number).cloud;
       writer.frame(number, frame.stamp, 0, cloud);
     }
     for (const auto& [number, frame] : reader.adopted()) writer.adopted(frame);

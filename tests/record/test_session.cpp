@@ -133,14 +133,13 @@ TEST(Session, KeepsEachBitOfADepthImage) {
   ASSERT_EQ(reader.frames().size(), 4U);
   EXPECT_EQ(reader.frames().at(5).stamp, 2.0 / 3.0);
   // The first camera's image was not written again.
-  using Images = std::vector<std::pair<std::size_t, std::size_t>>;
-  EXPECT_EQ(reader.frames().at(5).images, (Images{{1, 1}}));
-  EXPECT_EQ(reader.frames().at(6).images, (Images{{0, 0}}));
+  using Image = std::pair<std::size_t, std::size_t>;
+  EXPECT_EQ(reader.frames().at(5).image, (Image{1, 1}));
+  EXPECT_EQ(reader.frames().at(6).image, (Image{0, 0}));
   for (std::size_t i = 0; i < 2; ++i) {
-    const std::vector<FrameInUse> seen = reader.seen(6 - i);
-    ASSERT_EQ(seen.size(), 1U);
-    EXPECT_EQ(seen.front().camera, i);
-    const DepthImage* read = seen.front().cloud->image();
+    const FrameInUse seen = reader.seen(6 - i);
+    EXPECT_EQ(seen.camera, i);
+    const DepthImage* read = seen.cloud->image();
     const auto& wrote = dynamic_cast<const DepthImage&>(*cameras[i]);
     ASSERT_NE(read, nullptr);
     EXPECT_EQ(read->depth(), wrote.depth());
@@ -165,7 +164,7 @@ TEST(Session, KeepsPointsInTheOrderInWhichTheyAreGathered) {
     writer.close();
   }
   SessionReader reader(folder.path() / "bag");
-  const auto read = reader.seen(1).front().cloud;
+  const auto read = reader.seen(1).cloud;
   const auto patch_of = [](const Cloud& from) {
     auto patch = std::make_unique<Patch>();
     gather(from, Ball{Vec3(0.01, 0.0, 0.1), 0.02}, *patch);

@@ -3,7 +3,7 @@
 
 import { clamp } from "./camera_math";
 import { element, get, write } from "./dom";
-import type { State } from "./protocol";
+import type { Command, State } from "./protocol";
 
 const NONE = "none";
 const ERASER = "erase";
@@ -43,15 +43,11 @@ export class Brush {
   private readonly clear = get<HTMLButtonElement>("brush-clear");
   private offered = "";
 
-  constructor(actions: {
-    brush(brush: ReturnType<typeof brushOf>): void;
-    clear(): void;
-  }) {
-    const change = () =>
-      actions.brush(brushOf(this.material.value, this.radius.valueAsNumber));
+  constructor(ask: (command: Command) => void) {
+    const change = () => ask({ brush: brushOf(this.material.value, this.radius.valueAsNumber) });
     this.material.addEventListener("change", change);
     this.radius.addEventListener("change", change);
-    this.clear.addEventListener("click", () => actions.clear());
+    this.clear.addEventListener("click", () => ask({ clear_paint: true }));
   }
 
   update({ paint, role }: State): void {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Virtual fixtures: where they are, as lines, and what the page adds and removes.
 
-import { posed } from "./camera_math";
+import { clamp, posed } from "./camera_math";
 import { element, get } from "./dom";
-import type { FixtureState, Role, State, Vec3 } from "./protocol";
+import type { Command, FixtureState, Role, State, Vec3 } from "./protocol";
 
 const ROUND = 32; // sides of a circle
 const PLATE = 0.15; // [m] half of what is drawn of a plane
@@ -89,40 +89,31 @@ export function fixtureLines(fixture: FixtureState): number[] {
   ]);
 }
 
+// Of what a field holds in mm.
+function metres(x: number, low: number, high: number, usual: number): number {
+  return clamp(Number.isFinite(x) ? x : usual, low, high) / 1e3;
+}
+
 /** What the button that adds a region asks for, of sizes in mm. */
 export function forbidOf(size: number, margin: number): { size: number; margin: number } {
-  const within = (x: number, low: number, high: number, usual: number) =>
-    Math.min(Math.max(Number.isFinite(x) ? x : usual, low), high) / 1e3;
-  return { size: within(size, 10, 1000, 100), margin: within(margin, 2, 100, 10) };
+  return { size: metres(size, 10, 1000, 100), margin: metres(margin, 2, 100, 10) };
 }
 
 /** What the button that adds a guide asks for, of a width in mm. */
 export function guideOf(slack: number): { slack: number } {
-  return { slack: Math.min(Math.max(Number.isFinite(slack) ? slack : 2, 0), 50) / 1e3 };
+  return { slack: metres(slack, 0, 50, 2) };
 }
 
 export class Fixtures {
   private shown = "";
   private role: Role | null = null;
 
-  constructor(
-    private readonly actions: {
-      forbid(wanted: ReturnType<typeof forbidOf>): void;
-      guide(wanted: ReturnType<typeof guideOf>): void;
-      remove(name: string): void;
-    },
-  ) {
+  constructor(private readonly ask: (command: Command) => void) {
+    const number = (id: string) => get<HTMLInputElement>(id).valueAsNumber;
     get("forbid").addEventListener("click", () =>
-      this.actions.forbid(
-        forbidOf(
-          get<HTMLInputElement>("forbid-size").valueAsNumber,
-          get<HTMLInputElement>("forbid-margin").valueAsNumber,
-        ),
-      ),
+      ask({ forbid: forbidOf(number("forbid-size"), number("forbid-margin")) }),
     );
-    get("guide").addEventListener("click", () =>
-      this.actions.guide(guideOf(get<HTMLInputElement>("guide-slack").valueAsNumber)),
-    );
+    get("guide").addEventListener("click", () => ask({ guide: guideOf(number("guide-slack")) }));
   }
 
   update({ fixtures, role }: State): void {
@@ -137,7 +128,7 @@ export class Fixtures {
       ...fixtures.map(({ name, kind, shape }) => {
         const remove = element("button", { className: "tool", title: `Remove ${name}` }, "×");
         remove.disabled = !may;
-        remove.addEventListener("click", () => this.actions.remove(name));
+        remove.addEventListener("click", () => this.ask({ remove_fixture: name }));
         const what = `${kind}, ${shape.replaceAll("_", " ")}`;
         return element("li", {}, `${name} (${what}) `, remove);
       }),

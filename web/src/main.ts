@@ -16,6 +16,7 @@ import { radiusRemark, scaleQuestion } from "./proposal";
 import {
   encodeHand,
   encodeShown,
+  type Command,
   type Frame,
   type Hello,
   type State,
@@ -82,27 +83,11 @@ function findRoom(): void {
 for (const id of ["view", "panel"]) new ResizeObserver(findRoom).observe(get(id));
 findRoom();
 
-const panel = new Panel({
-  setParameter: (name, value) => connection.ask({ set: { name, value } }),
-  setLimit: (name, value) => connection.ask({ set_safety: { name, value } }),
-  place: (name, value) => connection.ask({ place: { name, value } }),
-  setMethod: (name) => connection.ask({ method: name }),
-  setTool: (tool) => connection.ask({ tool }),
-  openScene: (uri) => connection.ask({ open: uri }),
-});
-
-const brush = new Brush({
-  brush: (chosen) => connection.ask({ brush: chosen }),
-  clear: () => connection.ask({ clear_paint: true }),
-});
-
-const fixtures = new Fixtures({
-  forbid: (wanted) => connection.ask({ forbid: wanted }),
-  guide: (wanted) => connection.ask({ guide: wanted }),
-  remove: (name) => connection.ask({ remove_fixture: name }),
-});
-
-const timeline = new Timeline((command) => connection.ask(command));
+const ask = (command: Command) => connection.ask(command);
+const panel = new Panel(ask);
+const brush = new Brush(ask);
+const fixtures = new Fixtures(ask);
+const timeline = new Timeline(ask);
 
 const connection = new Connection({
   opened() {
@@ -248,8 +233,8 @@ const asked = linked(location.search);
 function goToMoment({ cameras, playback }: State): void {
   const recording = longest(cameras);
   if (asked.frame === null || !recording || !playback) return;
-  connection.ask({ seek: Math.min(1, asked.frame / (recording.frames - 1)) });
-  connection.ask({ play: { ...playback, paused: true } });
+  ask({ seek: Math.min(1, asked.frame / (recording.frames - 1)) });
+  ask({ play: { ...playback, paused: true } });
   asked.frame = null;
 }
 function goToView(): void {
@@ -344,7 +329,7 @@ function switchColour(): void {
 }
 function record(): void {
   if (state && mayOperate(state))
-    connection.ask({ record: state.recording.path === null });
+    ask({ record: state.recording.path === null });
 }
 function help(): void {
   const dialog = get<HTMLDialogElement>("help");
@@ -394,9 +379,9 @@ get("spin").addEventListener("click", () => {
   get("spin").setAttribute("aria-pressed", String(hand.spinByDrags));
 });
 get("record").addEventListener("click", record);
-get("reset-faults").addEventListener("click", () => connection.ask({ reset_faults: true }));
+get("reset-faults").addEventListener("click", () => ask({ reset_faults: true }));
 get("proposal-yes").addEventListener("click", () => {
-  if (state?.points) connection.ask({ open: state.points.rescaled });
+  if (state?.points) ask({ open: state.points.rescaled });
 });
 get("proposal-no").addEventListener("click", () => {
   declined = state?.points?.rescaled ?? "";

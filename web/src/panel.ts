@@ -2,7 +2,7 @@
 // Method, parameters, safety and session: what the program says of itself, and what can be set.
 
 import { element, get, write } from "./dom";
-import type { Hello, ParameterRow, Role, State } from "./protocol";
+import type { Command, Hello, ParameterRow, Role, State } from "./protocol";
 
 /** What a page is called, and what it may do. */
 export const roleNames: Record<Role, { name: string; may: string }> = {
@@ -275,15 +275,6 @@ function recordingText(recording: State["recording"]): string {
   return `${path}: ${recordingClock(recording)}${left}`;
 }
 
-export interface PanelActions {
-  setParameter(name: string, value: number): void;
-  setLimit(name: string, value: number): void;
-  place(name: string, value: number): void;
-  setMethod(name: string): void;
-  setTool(tool: string): void;
-  openScene(uri: string): void;
-}
-
 export class Panel {
   private readonly root = get("panel");
   private readonly method = get<HTMLSelectElement>("method-name");
@@ -302,7 +293,7 @@ export class Panel {
   private safetySeen = 0;
   private role: Role | null = null;
 
-  constructor(private readonly actions: PanelActions) {
+  constructor(private readonly ask: (command: Command) => void) {
     const tabs = [...this.root.querySelectorAll<HTMLButtonElement>("[role=tab]")];
     tabs.forEach((tab, i) => {
       tab.addEventListener("click", () => this.open(tab.dataset.tab!));
@@ -315,14 +306,14 @@ export class Panel {
       });
     });
     this.open("touch");
-    this.method.addEventListener("change", () => this.actions.setMethod(this.method.value));
+    this.method.addEventListener("change", () => this.ask({ method: this.method.value }));
     this.tool.addEventListener("change", () => {
-      this.actions.setTool(this.tool.value);
+      this.ask({ tool: this.tool.value });
       this.tool.blur(); // G turns the tool, and does not choose the gripper
     });
-    this.scene.addEventListener("change", () => this.actions.openScene(this.scene.value));
+    this.scene.addEventListener("change", () => this.ask({ open: this.scene.value }));
     get("record").after(this.opener);
-    this.opener.addEventListener("click", () => this.actions.openScene(this.opener.value));
+    this.opener.addEventListener("click", () => this.ask({ open: this.opener.value }));
   }
 
   open(tab: string): void {
@@ -362,18 +353,21 @@ export class Panel {
     const build = (
       id: string,
       table: ParameterRow[],
-      set: (name: string, value: number) => void,
+      command: (change: { name: string; value: number }) => Command,
     ) => {
       const parent = get(id);
       parent.replaceChildren();
       return new Map(
-        table.map((row) => [row.name, new Row(parent, row, id, (value) => set(row.name, value))]),
+        table.map((row) => {
+          const set = (value: number) => this.ask(command({ name: row.name, value }));
+          return [row.name, new Row(parent, row, id, set)];
+        }),
       );
     };
     const parameters = stiffnessFirst(hello.parameters);
-    this.rows = build("parameters", parameters, this.actions.setParameter);
-    this.limits = build("limits", hello.safety, this.actions.setLimit);
-    this.placement = build("placement", hello.placement, this.actions.place);
+    this.rows = build("parameters", parameters, (set) => ({ set }));
+    this.limits = build("limits", hello.safety, (set_safety) => ({ set_safety }));
+    this.placement = build("placement", hello.placement, (place) => ({ place }));
     const tally = (id: string, flags: Hello["flags"]) =>
       get(id).replaceChildren(
         ...flags.map(({ name, meaning }) =>

@@ -112,28 +112,11 @@ ViewerServer::ViewerServer(const ViewerOptions& /*options*/, ViewerHost& /*host*
 
 ViewerServer::~ViewerServer() = default;
 
-void ViewerServer::show(std::uint8_t camera, ViewerMessage frame) {
-  cameras()[camera].frame = std::move(frame);
+void ViewerServer::show(std::uint8_t camera, ViewerMessage message) {
+  if (!message.is_frame) return post(message);
+  cameras()[camera].frame = std::move(message);
   cameras()[camera].offer();
 }
-
-void ViewerServer::describe(std::uint8_t /*camera*/, ViewerMessage rays) {
-  post(rays);
-}
-
-void ViewerServer::show_path(std::uint8_t /*camera*/, ViewerMessage path) {
-  post(path);
-}
-
-void ViewerServer::show_tool(ViewerMessage tool) {
-  post(tool);
-}
-
-std::filesystem::path ViewerHost::begin_file(const std::string& name, std::uint64_t /*size*/) {
-  throw Error(name, "this session opens no files", "open the page without ?file=");
-}
-
-void ViewerHost::end_file(const std::filesystem::path& /*file*/, bool /*whole*/) {}
 
 namespace site {
 namespace {
@@ -173,8 +156,6 @@ class Scene {
     host_.show_on(&server_);
   }
   ~Scene() { host_.show_on(nullptr); }
-  Scene(const Scene&) = delete;
-  Scene& operator=(const Scene&) = delete;
 
   void advance(double t) {
     t_ = t;

@@ -70,8 +70,6 @@ class Participant {
   /// @throws Error if the library is missing, or has no network.
   explicit Participant(const std::string& who, std::string_view user_data = {});
   ~Participant();
-  Participant(const Participant&) = delete;
-  Participant& operator=(const Participant&) = delete;
 
   [[nodiscard]] const std::string& library_path() const;
   [[nodiscard]] std::uint32_t domain() const { return domain_; }

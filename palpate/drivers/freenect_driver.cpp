@@ -169,8 +169,6 @@ class Camera final : public LiveCamera {
     if (api_.start(kinect_.get()) < 0) throw Error(info_.uri, "it does not start", plug_in);
   }
   ~Camera() override { api_.stop(kinect_.get()); }
-  Camera(const Camera&) = delete;
-  Camera& operator=(const Camera&) = delete;
 
  private:
   void open(const std::string& serial) {

@@ -196,8 +196,6 @@ class Camera final : public LiveCamera {
       if (stream != nullptr) api_.stream_stop(stream);
     }
   }
-  Camera(const Camera&) = delete;
-  Camera& operator=(const Camera&) = delete;
 
  private:
   [[nodiscard]] bool try_open(const char* address) {

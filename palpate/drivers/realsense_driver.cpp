@@ -328,8 +328,6 @@ class Camera final : public LiveCamera {
     } catch (const Refusal&) {  // it has ended
     }
   }
-  Camera(const Camera&) = delete;
-  Camera& operator=(const Camera&) = delete;
 
  private:
   [[nodiscard]] Error error(const Refusal& refusal) const {

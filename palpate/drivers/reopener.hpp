@@ -90,8 +90,6 @@ class Reopener {
   explicit Reopener(std::function<bool()> attempt, double interval = 0.25);
   /// Ends after an attempt that is under way.
   ~Reopener();
-  Reopener(const Reopener&) = delete;
-  Reopener& operator=(const Reopener&) = delete;
 
   /// The device is gone: attempts begin. [servo]
   void ask() noexcept;

@@ -36,8 +36,6 @@ class Ros2CameraPublisher {
   /// @throws Error if `name` is not a valid topic name, or DDS is missing.
   explicit Ros2CameraPublisher(const std::string& name, DepthPacking packing = DepthPacking::rvl);
   ~Ros2CameraPublisher();
-  Ros2CameraPublisher(const Ros2CameraPublisher&) = delete;
-  Ros2CameraPublisher& operator=(const Ros2CameraPublisher&) = delete;
 
   /// @param stamp  [s since 1970] of the capture
   void publish(const DepthImage& image, double stamp);

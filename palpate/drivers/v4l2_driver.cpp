@@ -151,8 +151,6 @@ class Camera final : public LiveCamera {
     int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     static_cast<void>(node_.control(VIDIOC_STREAMOFF, type));
   }
-  Camera(const Camera&) = delete;
-  Camera& operator=(const Camera&) = delete;
 
  private:
   static RecordedCamera lens_of(const Uri& uri) {

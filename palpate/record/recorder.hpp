@@ -63,8 +63,6 @@ class Recorder {
            std::function<void()> renew = {}, const RecorderOptions& options = {});
   /// Stops, and waits until it is done.
   ~Recorder();
-  Recorder(const Recorder&) = delete;
-  Recorder& operator=(const Recorder&) = delete;
 
   /// A frame that the loop got, with its number there, in their order. Any thread. Does not wait
   /// for the disk.

@@ -136,4 +136,14 @@ FrameInUse SessionReader::seen(std::uint64_t number) {
   return {.cloud = cloud(camera, image), .stamp = frame.stamp, .camera = camera};
 }
 
+std::vector<Tick> recorded_hand(const std::filesystem::path& recording, std::size_t most) {
+  SessionReader session(recording);
+  std::vector<Tick> path;
+  const std::size_t count = session.ticks();
+  const std::size_t points = std::min(count, std::max<std::size_t>(most, 2));
+  for (std::size_t i = 0; i < points; ++i)
+    path.push_back(session.tick(points == 1 ? 0 : i * (count - 1) / (points - 1)).tick);
+  return path;
+}
+
 }  // namespace palpate

@@ -80,4 +80,9 @@ class SessionReader {
   std::map<std::size_t, Camera> cameras_;
 };
 
+/// The path of the hand in a recording: evenly spaced ticks, the last included.
+/// @param most  of them, at least 2
+/// @throws Error if it is no recording of palpate's, or damaged.
+std::vector<Tick> recorded_hand(const std::filesystem::path& recording, std::size_t most);
+
 }  // namespace palpate

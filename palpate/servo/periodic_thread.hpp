@@ -49,8 +49,6 @@ class PeriodicThread {
                  std::function<void(const Wake&)> cycle, std::function<void()> last = {});
   /// Stops after the cycle in progress.
   ~PeriodicThread();
-  PeriodicThread(const PeriodicThread&) = delete;
-  PeriodicThread& operator=(const PeriodicThread&) = delete;
 
   /// The same, and keeps the timing. Not from within a cycle.
   void stop();

@@ -50,8 +50,6 @@ class ServoLoop {
   /// Stops, and waits for a cycle that hangs, however long it does: the device is disabled by then,
   /// and what the cycle uses must live until it returns.
   ~ServoLoop();
-  ServoLoop(const ServoLoop&) = delete;
-  ServoLoop& operator=(const ServoLoop&) = delete;
 
   /// Enables the device and starts the ticks, once; returns when the thread has its rights or the
   /// device's first callback has come.
@@ -73,20 +71,6 @@ class ServoLoop {
 
   /// What runs in each tick; alive from construction to destruction.
   [[nodiscard]] Cycle& cycle() { return cycle_; }
-  /// As Cycle's.
-  std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp) {
-    return cycle_.put_frame(std::move(cloud), stamp, monotonic_now());
-  }
-  std::uint64_t put_frame(std::shared_ptr<const Cloud> cloud, double stamp,
-                          std::span<const CameraFrame> cameras) {
-    return cycle_.put_frame(std::move(cloud), stamp, cameras, monotonic_now());
-  }
-  void reset_faults() noexcept { cycle_.reset_faults(); }
-  std::uint64_t set_settings(const ServoSettings& settings) {
-    return cycle_.set_settings(settings);
-  }
-  [[nodiscard]] TickRing<ServoTick>::Reader reader() const { return cycle_.reader(); }
-  [[nodiscard]] CycleReader full_reader() const { return cycle_.full_reader(); }
   [[nodiscard]] const CycleStatistics& statistics() const { return cycle_.statistics(); }
 
   /// Of the thread that ticks; empty before `start`, kept after `stop`. On a device's thread the

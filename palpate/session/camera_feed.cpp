@@ -105,7 +105,7 @@ class CameraFeed::Worker {
         source_(std::move(source)),
         is_live_(source_->info().live),
         player_(source_, open_, Playing::in_real_time),
-        placer_(source_->info().clock, options_.stamps),
+        placer_(source_->info().clock),
         status_(player_.status()) {}
 
   // Before the thread.

@@ -40,7 +40,6 @@ struct FeedOptions {
   double longest_pause = 5.0;  ///< [s] at most
   double waiting = 0.25;       ///< [s] without a frame after which its state says so
   int frozen_frames = 10;      ///< identical depth images in a row that make a live camera frozen
-  StampPlacerOptions stamps{};
   Registry<SourceScheme> schemes = all_sources();  ///< opens the URI, also again
   std::shared_ptr<FeedClock> clock = machine_clock();
 };
@@ -82,8 +81,6 @@ class CameraFeed {
   explicit CameraFeed(std::unique_ptr<Source> source, FeedOptions options = {}, Open open = {});
   /// stop().
   ~CameraFeed();
-  CameraFeed(const CameraFeed&) = delete;
-  CameraFeed& operator=(const CameraFeed&) = delete;
 
   /// Before start(): the first frame, read on the caller's thread and handed over after start().
   /// Its stamp is the source's own.

@@ -31,8 +31,6 @@ class ObserverRecordings {
   /// @param session  must outlive this
   ObserverRecordings(Session& session, RecordingRules rules);
   ~ObserverRecordings();
-  ObserverRecordings(const ObserverRecordings&) = delete;
-  ObserverRecordings& operator=(const ObserverRecordings&) = delete;
 
   /// Begins a recording, unless one is on. @throws Error if the limit is reached, the disk is
   /// nearly full or the folder cannot be made.

@@ -11,6 +11,14 @@
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {
+namespace {
+
+constexpr double rest_time = 0.5;     // [s] a device without buttons rests for so long
+constexpr double rest_radius = 1e-3;  // [m] within this distance of where the rest began
+constexpr double least_travel =
+    0.01;  // [m] from the last point, or from the start, before the next
+
+}  // namespace
 
 std::optional<Vec3> PointCapture::add(const HandState& hand, double t) noexcept {
   if (!hand.present || hand.fault != DeviceFault::none || !hand.position.allFinite()) {
@@ -25,8 +33,8 @@ std::optional<Vec3> PointCapture::add(const HandState& hand, double t) noexcept 
     return position;
   }
   if (!reference_) reference_ = position;
-  travelled_ = travelled_ || (position - *reference_).norm() >= options_.least_travel;
-  if (!rest_began_ || (position - rest_at_).norm() > options_.rest_radius) {
+  travelled_ = travelled_ || (position - *reference_).norm() >= least_travel;
+  if (!rest_began_ || (position - rest_at_).norm() > rest_radius) {
     rest_began_ = t;
     rest_at_ = position;
     sum_.setZero();
@@ -34,7 +42,7 @@ std::optional<Vec3> PointCapture::add(const HandState& hand, double t) noexcept 
   }
   sum_ += position;
   count_ += 1.0;
-  if (!travelled_ || t - *rest_began_ < options_.rest_time) return std::nullopt;
+  if (!travelled_ || t - *rest_began_ < rest_time) return std::nullopt;
   const Vec3 point = sum_ / count_;
   reference_ = point;
   travelled_ = false;
@@ -43,11 +51,10 @@ std::optional<Vec3> PointCapture::add(const HandState& hand, double t) noexcept 
 }
 
 std::vector<Vec3> capture_points(Device& device, std::size_t count, double timeout,
-                                 const std::function<void(const Vec3&)>& captured,
-                                 const PointCaptureOptions& options) {
+                                 const std::function<void(const Vec3&)>& captured) {
   constexpr double period = 1e-3;  // [s]
   std::mutex mutex;                // a device's callback may be on a thread of its own
-  PointCapture capture(options);
+  PointCapture capture;
   std::vector<Vec3> points;
   HandState last;
   const auto read = [&](double t) {

@@ -10,25 +10,15 @@
 
 namespace palpate {
 
-/// When a device's position counts as a point that was touched on purpose.
-struct PointCaptureOptions {
-  double rest_time = 0.5;      ///< [s] a device without buttons rests for so long
-  double rest_radius = 1e-3;   ///< [m] within this distance of where the rest began
-  double least_travel = 0.01;  ///< [m] from the last point, or from the start, before the next
-};
-
 /// Recognises the points that a person touches with a device: where a button goes down, or, on a
-/// device without buttons, where the tip rests after it has moved.
+/// device without buttons, where the tip rests for half a second after it has moved by 1 cm.
 class PointCapture {
  public:
-  explicit PointCapture(const PointCaptureOptions& options = {}) : options_(options) {}
-
   /// One reading of the device. @param t  [s] increasing
   /// @return the point [m, device], when one has just been taken
   std::optional<Vec3> add(const HandState& hand, double t) noexcept;
 
  private:
-  PointCaptureOptions options_;
   std::optional<Vec3> reference_;  // the last point, or where the device was first
   bool travelled_ = false;
   std::optional<std::uint32_t> buttons_;  // of the reading before
@@ -46,7 +36,6 @@ class PointCapture {
 /// @param captured  called for each point, on the calling thread
 /// @throws Error if the time is over, or the device reports a fault.
 std::vector<Vec3> capture_points(Device& device, std::size_t count, double timeout,
-                                 const std::function<void(const Vec3&)>& captured = {},
-                                 const PointCaptureOptions& options = {});
+                                 const std::function<void(const Vec3&)>& captured = {});
 
 }  // namespace palpate

@@ -126,8 +126,6 @@ class Session {
   explicit Session(SessionOptions options);
   /// stop().
   ~Session();
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
 
   /// Real time: starts loop and cameras, and returns. A session runs once.
   /// @throws Error if the device refuses, or the session has been stopped.

@@ -30,8 +30,6 @@ class SessionHand {
               std::function<void(const ServoTick&)> on_tick = {});
   /// Leaves loop and device to a thread of their own if a cycle hangs.
   ~SessionHand();
-  SessionHand(const SessionHand&) = delete;
-  SessionHand& operator=(const SessionHand&) = delete;
 
   /// Puts the device behind a LinkedDevice, for `link`. Before `begin`.
   void prepare_link();

@@ -8,6 +8,14 @@
 namespace palpate {
 namespace {
 
+constexpr double max_drift =
+    200e-6;  // [-] how fast the offset may grow: crystals differ by 100 ppm
+constexpr double window_time = 10.0;  // [s] of arrivals, whose least latency counts
+constexpr double least_jump =
+    0.005;                       // [s] a stamp this much too late cannot be jitter of the estimate
+constexpr double max_age = 1.0;  // [s] a stamp older than this at arrival is not believed
+constexpr double departure = 0.05;  // [s] between estimate and window beyond which it is a drift
+constexpr double settling = 1.0;    // [s] after a (re)start in which the offset may fall freely
 constexpr int needed_suspects = 3;  // in a row, to believe that the clock was reset
 constexpr double agreement = 0.02;  // [s] within which such stamps agree: jitter of a latency
 constexpr double deepest_settling = 0.25;  // [s] first frames of a camera come at most this late
@@ -21,32 +29,12 @@ bool is_of_this_machine(StampClock clock) {
 
 }  // namespace
 
-std::string_view name_of(StampProblem problem) noexcept {
-  switch (problem) {
-    case StampProblem::jumped:
-      return "jumped";
-    case StampProblem::drifted:
-      return "drifted";
-    case StampProblem::from_the_future:
-      return "from the future";
-    case StampProblem::too_old:
-      return "too old";
-    case StampProblem::not_increasing:
-      return "not increasing";
-    case StampProblem::none:
-      break;
-  }
-  return "none";
-}
-
-StampPlacer::StampPlacer(StampClock clock, const StampPlacerOptions& options)
-    : options_(options),
-      is_known_(is_of_this_machine(clock)),
-      last_time_(-std::numeric_limits<double>::infinity()) {}
+StampPlacer::StampPlacer(StampClock clock)
+    : is_known_(is_of_this_machine(clock)), last_time_(-std::numeric_limits<double>::infinity()) {}
 
 void StampPlacer::restart(StampClock clock) {
   const double last_time = last_time_;
-  *this = StampPlacer(clock, options_);
+  *this = StampPlacer(clock);
   last_time_ = last_time;
 }
 
@@ -70,10 +58,10 @@ PlacedStamp StampPlacer::place(double stamp, double arrival, double known_offset
   }
   // After a stamp that cannot be true the next ones are believed only if they agree with the
   // offset.
-  const bool is_doubted = suspects_ > 0 && std::abs(difference - offset_) > 2.0 * options_.jump;
+  const bool is_doubted = suspects_ > 0 && std::abs(difference - offset_) > 2.0 * least_jump;
   if (is_doubted && problem == StampProblem::none) problem = StampProblem::too_old;
   const bool is_queue =
-      !is_doubted && problem == StampProblem::too_old && difference - offset_ > options_.max_age &&
+      !is_doubted && problem == StampProblem::too_old && difference - offset_ > max_age &&
       interval_count_ > 3 &&
       intervals_[(interval_count_ - 1) % intervals_.size()] <= queue_periods * period();
   if (problem != StampProblem::none && !is_queue) {
@@ -86,7 +74,7 @@ PlacedStamp StampPlacer::place(double stamp, double arrival, double known_offset
     const StampProblem drift = follow(difference, arrival);
     if (drift != StampProblem::none) problem = drift;
   }
-  const double age = std::clamp(difference - offset_, 0.0, options_.max_age);
+  const double age = std::clamp(difference - offset_, 0.0, max_age);
   latency_ += latency_weight * (age - latency_);
   return give(stamp + offset_, arrival, problem);
 }
@@ -96,15 +84,14 @@ StampProblem StampPlacer::judge(double stamp, double arrival) const {
   const double age = arrival - stamp - offset_;
   if (!is_first_ && stamp <= last_stamp_) return StampProblem::not_increasing;
   const bool settles = !is_known_ && arrival < settled_ && age > -deepest_settling;
-  if (age < -options_.jump && !settles) return StampProblem::from_the_future;
-  if (age > options_.max_age) return StampProblem::too_old;
+  if (age < -least_jump && !settles) return StampProblem::from_the_future;
+  if (age > max_age) return StampProblem::too_old;
   // A clock set back by less than a period: the stamps' interval is off, the arrivals' is not.
   // Where the clock is known it is a link that lost images and held others up.
   if (is_known_) return StampProblem::none;
   const double interval = stamp - last_stamp_;
   const double lost = arrival - last_arrival_ - interval;
-  if (!is_first_ && lost > 2.0 * options_.jump && !is_regular(interval))
-    return StampProblem::too_old;
+  if (!is_first_ && lost > 2.0 * least_jump && !is_regular(interval)) return StampProblem::too_old;
   return StampProblem::none;
 }
 
@@ -142,7 +129,7 @@ StampProblem StampPlacer::suspect(double difference, double arrival, StampProble
 void StampPlacer::begin(double difference, double arrival) {
   offset_ = difference;
   latency_ = 0.0;
-  settled_ = arrival + options_.settling;
+  settled_ = arrival + settling;
   suspects_ = 0;
   window_.clear();
   window_.push_back({arrival, difference});
@@ -153,13 +140,13 @@ StampProblem StampPlacer::follow(double difference, double arrival) {
   const double since = window_.empty() ? 0.0 : arrival - window_.back().arrival;
   while (!window_.empty() && window_.back().difference >= difference) window_.pop_back();
   window_.push_back({arrival, difference});
-  while (window_.front().arrival < arrival - options_.window) window_.pop_front();
+  while (window_.front().arrival < arrival - window_time) window_.pop_front();
   const double least = window_.front().difference;
-  if (least - offset_ > options_.departure) {
+  if (least - offset_ > departure) {
     offset_ = least;
     return StampProblem::drifted;
   }
-  const double growth = options_.max_drift * std::max(since, 0.0);
+  const double growth = max_drift * std::max(since, 0.0);
   offset_ = std::min(least, offset_ + growth);
   return StampProblem::none;
 }

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <string_view>
 
 #include "palpate/io/sources/source.hpp"
 
@@ -17,13 +16,10 @@ enum class StampProblem : std::uint8_t {
   jumped,           ///< the camera's clock was reset; the offset was measured again
   drifted,          ///< the clock, or the camera's latency, moved slowly beyond what is followed
   from_the_future,  ///< later than the frame's arrival
-  too_old,          ///< older than `max_age` at arrival, or older than the frames before explain
+  too_old,          ///< older than 1 s at arrival, or older than the frames before explain
   not_increasing,   ///< not later than the frame before
 };
 constexpr std::size_t stamp_problem_count = 6;
-
-/// "jumped", "drifted", "from the future", "too old", "not increasing"; "none".
-[[nodiscard]] std::string_view name_of(StampProblem problem) noexcept;
 
 /// When a frame was captured, on the servo loop's clock.
 struct PlacedStamp {
@@ -33,23 +29,13 @@ struct PlacedStamp {
   bool usable = true;
 };
 
-struct StampPlacerOptions {
-  double max_drift =
-      200e-6;               ///< [-] how fast the offset may grow: crystals differ by up to 100 ppm
-  double window = 10.0;     ///< [s] of arrivals, whose least latency counts
-  double jump = 0.005;      ///< [s] a stamp this much too late cannot be jitter of the estimate
-  double max_age = 1.0;     ///< [s] a stamp older than this at arrival is not believed
-  double departure = 0.05;  ///< [s] between estimate and window beyond which it is a drift
-  double settling = 1.0;    ///< [s] after a (re)start in which the offset may fall freely
-};
-
 /// Converts capture timestamps of a camera to the servo loop's clock, from the arrival times.
 ///
 /// Model: arrival = timestamp + offset + latency, latency >= 0. The offset is the minimum of
-/// arrival - timestamp over the last `window` seconds; it may fall at once and rise by `max_drift`
-/// at most, so that a growing latency is not mistaken for a drift. The minimum latency cannot be
-/// observed, so converted timestamps are late by it: some 10 to 70 ms for USB cameras. While the
-/// clock is accurate the offset is constant, so that intervals between timestamps stay the same.
+/// arrival - timestamp over the last 10 s; it may fall at once and rise by 200 ppm at most, so that
+/// a growing latency is not mistaken for a drift. The minimum latency cannot be observed, so
+/// converted timestamps are late by it: some 10 to 70 ms for USB cameras. While the clock is
+/// accurate the offset is constant, so that intervals between timestamps stay the same.
 ///
 /// Clocks of this computer (StampClock::monotonic, system) have a known offset, which is used as
 /// long as the timestamps agree with it.
@@ -62,8 +48,7 @@ struct StampPlacerOptions {
 /// Values in, values out: no clock, no thread. Used on the camera's thread.
 class StampPlacer {
  public:
-  explicit StampPlacer(StampClock clock = StampClock::sensor,
-                       const StampPlacerOptions& options = {});
+  explicit StampPlacer(StampClock clock = StampClock::sensor);
 
   /// @param stamp         [s] of capture, by the camera's clock
   /// @param arrival       [s, CLOCK_MONOTONIC] when the frame reached this machine
@@ -91,7 +76,6 @@ class StampPlacer {
   StampProblem follow(double difference, double arrival);
   PlacedStamp give(double time, double arrival, StampProblem problem);
 
-  StampPlacerOptions options_;
   bool is_known_;         // the offset is given rather than estimated
   bool is_first_ = true;  // no stamp since the (re)start
   double offset_ = 0.0;   // [s]

@@ -12,7 +12,6 @@
 #include <unistd.h>
 
 #include "palpate/io/sources/source.hpp"
-#include "palpate/record/recorded_hand.hpp"
 #include "palpate/record/replay.hpp"
 
 #include "tests/record/sessions.hpp"
@@ -37,7 +36,7 @@ TEST(RecordedHand, IsThatOfEvenlySpacedTicks) {
   const TemporaryFolder folder;
   SessionWriter writer(folder.path() / "bag", press_info(), 0.0);
   const std::vector<ServoTick> ticks = record_press(writer, {}, 101);
-  const std::vector<RecordedHand> path = recorded_hand(folder.path() / "bag", 11);
+  const std::vector<Tick> path = recorded_hand(folder.path() / "bag", 11);
   ASSERT_EQ(path.size(), 11u);
   for (std::size_t i = 0; i < path.size(); ++i) {
     EXPECT_EQ(path[i].t, ticks[10 * i].tick.t);

@@ -75,7 +75,7 @@ void wait_until(const std::function<bool()>& done) {
 TEST(DrivenLoop, RunsItsCyclesOnTheDevicesThreadAndKeepsTheirTiming) {
   DrivingDevice device;
   ServoLoop loop(make_method("paper"), device);
-  auto reader = loop.reader();
+  auto reader = loop.cycle().reader();
   loop.start();
   EXPECT_TRUE(device.enabled);
   EXPECT_EQ(loop.rate(), 2000.0);
@@ -210,7 +210,7 @@ TEST(ServoLoop, DisablesADeviceWithAForceLongBeforeTheWatchTime) {
   bool in_time = false;
   for (int attempt = 0; attempt < 20 && !in_time; ++attempt) {  // on a machine with other work
     const auto cloud = std::make_shared<PointCloud>(test::flat_grid(0.0, 2e-3, 10));
-    loop.put_frame(cloud, monotonic_now());
+    loop.cycle().put_frame(cloud, monotonic_now(), monotonic_now());
     wait_until([&] { return loop.statistics().force_out.load(); });
     const int before = device.disables;
     const double began = monotonic_now();

@@ -99,24 +99,25 @@ TEST(ServoLoop, TicksWhileACameraFloodsItAndViewersComeAndGo) {
   FakeDevice device;
   device.hand.position = {0, 0, 0.01};
   ServoLoop loop(make_method("paper"), device);
-  auto recorder = loop.reader();
+  auto recorder = loop.cycle().reader();
   loop.start();
   std::atomic<bool> done{false};
   std::thread camera([&] {
     while (!done) {
-      loop.put_frame(std::make_shared<PointCloud>(test::flat_grid(0.0, 2e-3, 10)), monotonic_now());
+      loop.cycle().put_frame(std::make_shared<PointCloud>(test::flat_grid(0.0, 2e-3, 10)),
+                             monotonic_now(), monotonic_now());
     }
   });
   std::thread viewer([&] {
     double stiffness = 100.0;
     while (!done) {
-      auto reader = loop.reader();
+      auto reader = loop.cycle().reader();
       ServoTick record{};
       while (!done && !reader.try_pop(record)) std::this_thread::yield();
       ServoSettings settings;
       settings.parameters.coupling.stiffness = stiffness =
           stiffness < 900.0 ? stiffness + 1.0 : 100;
-      loop.set_settings(settings);
+      loop.cycle().set_settings(settings);
       static_cast<void>(loop.timing().wake_up.quantile(0.99));
       static_cast<void>(loop.statistics().max_force.load());
     }

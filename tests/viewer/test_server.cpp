@@ -35,7 +35,7 @@ class FakeHost final : public ViewerHost {
     const std::lock_guard gate(gate_);
     waits_ = false;
     TickBatch batch;
-    batch.t = ++beats_;
+    batch.tick.tick.t = ++beats_;
     return batch;
   }
   void hand(const HandMessage& hand) override {
@@ -314,7 +314,7 @@ TEST_F(ViewerServerTest, ShowsTheNewestFrameToWhoeverJoins) {
 }
 
 TEST_F(ViewerServerTest, SendsRaysBeforeTheFrameThatNeedsThem) {
-  server.describe(2, rays_message(2, 2, 1, {0.0F, 0.1F, 0.2F, 0.3F}));
+  server.show(2, rays_message(2, 2, 1, {0.0F, 0.1F, 0.2F, 0.3F}));
   server.show(2, frame(0, 2));
   Page page(server.port());
   std::string kinds;
@@ -329,7 +329,7 @@ TEST_F(ViewerServerTest, SendsRaysBeforeTheFrameThatNeedsThem) {
 TEST_F(ViewerServerTest, ShowsTheToolToWhoIsThereAndToWhoeverJoins) {
   Page first(server.port());
   first.until("presence");
-  server.show_tool(tool_message(make_tool("box:40x20x5mm?points=100", {}).get()));
+  server.show(0, tool_message(make_tool("box:40x20x5mm?points=100", {}).get()));
   EXPECT_EQ(first.until_kind(5).size(), 12u + 12 * (8 + 12));
   Page second(server.port());
   EXPECT_EQ(second.until_kind(5).size(), 12u + 12 * (8 + 12));

@@ -28,8 +28,6 @@ class BagWriter {
   explicit BagWriter(const std::filesystem::path& folder);
   /// Closes; what goes wrong then is not told.
   ~BagWriter();
-  BagWriter(const BagWriter&) = delete;
-  BagWriter& operator=(const BagWriter&) = delete;
 
   /// The topic to write to; made when it is first named.
   /// @param type     such as sensor_msgs/msg/Image

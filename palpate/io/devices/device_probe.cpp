@@ -286,16 +286,16 @@ void run_live(Device& device, const ProbeOptions& options, const std::shared_ptr
               Watcher& watcher) {
   ServoLoop loop(exciter, device, settings_of(options),
                  {.rate = options.rate, .realtime = options.realtime});
-  auto reader = loop.reader();
+  auto reader = loop.cycle().reader();
   const auto points = std::make_shared<NoPoints>();
-  loop.put_frame(points, monotonic_now());
+  loop.cycle().put_frame(points, monotonic_now(), monotonic_now());
   loop.start();
   const double began = monotonic_now();
   double last_tick = began;
   for (bool goes_on = true; goes_on;) {
     std::this_thread::sleep_for(std::chrono::duration<double>(frame_time));
     const double now = monotonic_now();
-    loop.put_frame(points, now);
+    loop.cycle().put_frame(points, now, monotonic_now());
     ServoTick tick;
     while (goes_on && reader.try_pop(tick)) {
       goes_on = watcher.add(tick);

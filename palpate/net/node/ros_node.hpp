@@ -30,8 +30,6 @@ class RosNode {
   /// @throws Error if a name is none, the rate is out of range, or DDS is missing.
   RosNode(Session& session, const RosNodeOptions& options);
   ~RosNode();
-  RosNode(const RosNode&) = delete;
-  RosNode& operator=(const RosNode&) = delete;
 
   /// With its namespace: "/palpate".
   [[nodiscard]] const std::string& name() const;

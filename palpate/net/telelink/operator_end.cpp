@@ -30,15 +30,15 @@ constexpr dds::Quality soon{.lifespan = 0.5};
 
 OperatorEnd::OperatorEnd(Session& session, const OperatorEndOptions& options)
     : session_(session),
-      topics_(options.name),
+      name_(options.name),
       index_(options.index),
       learns_(options.learn),
       ticks_(session.ticks()),
       given_(session.settings().safety),
       participant_("teleop"),
-      places_(participant_, topics_.place, ros::PoseStamped{}, soon),
-      presses_(participant_, topics_.press, ros::WrenchStamped{}, soon),
-      hears_(participant_, topics_),
+      places_(participant_, teleop_topic(name_, "place"), ros::PoseStamped{}, soon),
+      presses_(participant_, teleop_topic(name_, "press"), ros::WrenchStamped{}, soon),
+      hears_(participant_, name_),
       thread_([this] { run(); }) {}
 
 OperatorEnd::~OperatorEnd() {
@@ -149,7 +149,7 @@ void OperatorEnd::hear(double now) {
 
 // What the robot may not do, instead of what it said before; the operator's own fixtures stay.
 void OperatorEnd::use_regions(const std::string& json) {
-  const auto told = fixtures_from_json(json, topics_.regions);
+  const auto told = fixtures_from_json(json, teleop_topic(name_, "regions"));
   session_.change([&](ServoSettings& settings) {
     std::vector<Fixture> all;
     if (settings.fixtures) all = settings.fixtures->fixtures();

@@ -49,8 +49,6 @@ class OperatorEnd {
   /// @throws Error if the name is not valid, or DDS is missing.
   OperatorEnd(Session& session, const OperatorEndOptions& options);
   ~OperatorEnd();
-  OperatorEnd(const OperatorEnd&) = delete;
-  OperatorEnd& operator=(const OperatorEnd&) = delete;
 
   [[nodiscard]] RobotView robot() const;
   [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
@@ -64,7 +62,7 @@ class OperatorEnd {
   void follow_latency();
 
   Session& session_;
-  const TeleopTopics topics_;
+  const std::string name_;
   bool index_;  // still to be done
   const bool learns_;
   TickRing<ServoTick>::Reader ticks_;

@@ -96,12 +96,12 @@ RobotEnd::RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options)
       options_(options),
       hand_(std::make_shared<LedHand>(state_.position, limits_of(robot_->info()))),
       step_(*hand_, set_point_of(robot_->info(), options, regions_)),
-      topics_(options.name),
       publisher_(options.name, options.packing),
       participant_("teleop"),
-      places_(participant_, topics_.place, ros::PoseStamped{}, newest_alone),
-      presses_(participant_, topics_.press, ros::WrenchStamped{}, newest_alone),
-      says_(participant_, topics_),
+      places_(participant_, teleop_topic(options.name, "place"), ros::PoseStamped{}, newest_alone),
+      presses_(participant_, teleop_topic(options.name, "press"), ros::WrenchStamped{},
+               newest_alone),
+      says_(participant_, options.name),
       learner_(robot_->info().tool_radius) {
   says_.regions.write(ros::String{fixtures_json(*regions_)});
   says_.fault.write(ros::String{""});

@@ -46,8 +46,6 @@ class RobotEnd {
   /// @throws Error if the robot reports nothing, an option is out of range, or DDS is missing.
   RobotEnd(std::unique_ptr<Robot> robot, const RobotEndOptions& options);
   ~RobotEnd();  ///< the robot rests
-  RobotEnd(const RobotEnd&) = delete;
-  RobotEnd& operator=(const RobotEnd&) = delete;
 
   /// Adds what the session here needs: its device, radius of the proxy, fixtures. Once.
   void prepare(SessionOptions& options) const;
@@ -78,7 +76,6 @@ class RobotEnd {
   const RobotEndOptions options_;
   std::shared_ptr<LedHand> hand_;
   RobotStep step_;  // of the leading thread
-  const TeleopTopics topics_;
   Ros2CameraPublisher publisher_;
   dds::Participant participant_;
   dds::Reader places_, presses_;

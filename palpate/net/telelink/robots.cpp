@@ -89,8 +89,6 @@ class ToolInScene final : public SceneRobot {
     ends_ = true;
     thread_.join();
   }
-  ToolInScene(const ToolInScene&) = delete;
-  ToolInScene& operator=(const ToolInScene&) = delete;
 
   [[nodiscard]] const RobotInfo& info() const override { return info_; }
   void relate(double loop, double scene) override { ahead_ = scene - loop; }

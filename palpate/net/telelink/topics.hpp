@@ -8,23 +8,10 @@
 
 namespace palpate {
 
-/// The topics of a link, by the robot's name.
-struct TeleopTopics {
-  explicit TeleopTopics(const std::string& name)
-      : place("/" + name + "/teleop/place"),
-        press("/" + name + "/teleop/press"),
-        tool("/" + name + "/teleop/tool"),
-        twist("/" + name + "/teleop/twist"),
-        contact("/" + name + "/teleop/contact"),
-        links("/" + name + "/teleop/links"),
-        fault("/" + name + "/teleop/fault"),
-        regions("/" + name + "/teleop/regions"),
-        touched("/" + name + "/teleop/touched"),
-        joints("/" + name + "/joint_states") {}
-
-  std::string place, press;                                                  // from the operator
-  std::string tool, twist, contact, links, fault, regions, touched, joints;  // from the robot
-};
+/// A topic of a link.
+inline std::string teleop_topic(const std::string& robot, const char* of) {
+  return "/" + robot + "/teleop/" + of;
+}
 
 /// Of what is told again and again, of what is told when it happens, and of what holds on.
 inline constexpr dds::Quality newest_alone{};
@@ -35,15 +22,15 @@ inline constexpr dds::Quality kept_for_late{.reliable = true, .keeps_for_late = 
 /// dds::Reader: of the same types and qualities, or neither finds the other.
 template <class Port>
 struct FromRobot {
-  FromRobot(dds::Participant& participant, const TeleopTopics& topics)
-      : tool(participant, topics.tool, ros::PoseStamped{}, newest_alone),
-        twist(participant, topics.twist, ros::TwistStamped{}, newest_alone),
-        contact(participant, topics.contact, ros::WrenchStamped{}, newest_alone),
-        links(participant, topics.links, ros::Float64MultiArray{}, newest_alone),
-        joints(participant, topics.joints, ros::JointState{}, newest_alone),
-        fault(participant, topics.fault, ros::String{}, kept_for_late),
-        regions(participant, topics.regions, ros::String{}, kept_for_late),
-        touched(participant, topics.touched, ros::Float64MultiArray{}, each_one) {}
+  FromRobot(dds::Participant& participant, const std::string& robot)
+      : tool(participant, teleop_topic(robot, "tool"), ros::PoseStamped{}, newest_alone),
+        twist(participant, teleop_topic(robot, "twist"), ros::TwistStamped{}, newest_alone),
+        contact(participant, teleop_topic(robot, "contact"), ros::WrenchStamped{}, newest_alone),
+        links(participant, teleop_topic(robot, "links"), ros::Float64MultiArray{}, newest_alone),
+        joints(participant, "/" + robot + "/joint_states", ros::JointState{}, newest_alone),
+        fault(participant, teleop_topic(robot, "fault"), ros::String{}, kept_for_late),
+        regions(participant, teleop_topic(robot, "regions"), ros::String{}, kept_for_late),
+        touched(participant, teleop_topic(robot, "touched"), ros::Float64MultiArray{}, each_one) {}
 
   Port tool, twist, contact, links, joints, fault, regions, touched;
 };

@@ -103,6 +103,7 @@ ViewerMessage frame_message(const FrameHeader& header, Format format,
     writer.put_float(k.fx).put_float(k.fy).put_float(k.cx).put_float(k.cy);
     put_pose(writer, colour->camera->world_from_camera.inverse());
   }
+  message.is_frame = true;
   message.colour = header.colour;
   message.payload = payload;
   message.owner = std::move(owner);
@@ -184,17 +185,23 @@ ViewerMessage ticks_message(const TickBatch& batch) {
   ViewerMessage message;
   message.head.reserve(ticks_header_size + count * sample_size);
   Writer writer(message.head);
-  writer.put(Kind::ticks).put(batch.state).put(static_cast<std::uint16_t>(count));
-  writer.put(batch.flags).put(batch.t).put(batch.safety).put(batch.steps);
-  writer.put_vec3(batch.hip).put_vec3(batch.proxy).put_vec3(batch.normal).put_vec3(batch.force);
-  writer.put_float(batch.surface_velocity).put(batch.frame);
-  writer.put_float(batch.gain).put_float(batch.asked_force).put_vec3(batch.place);
-  writer.put_float(batch.region).put_float(batch.guidance).put(batch.fixtures);
-  writer.put_rotation(batch.orientation).put_rotation(batch.proxy_orientation);
-  writer.put_vec3(batch.torque);
+  const ServoTick& record = batch.tick;
+  const Tick& tick = record.tick;
+  Vec3 asked = record.region;
+  join(tick.force, asked);
+  asked += record.guidance;
+  writer.put(Kind::ticks).put(static_cast<std::uint8_t>(tick.state));
+  writer.put(static_cast<std::uint16_t>(count)).put(batch.flags).put(tick.t);
+  writer.put(batch.safety).put(static_cast<std::uint32_t>(tick.steps));
+  writer.put_vec3(tick.hip).put_vec3(tick.proxy).put_vec3(tick.normal).put_vec3(record.force);
+  writer.put_float(tick.surface_velocity).put(static_cast<std::int32_t>(tick.frame));
+  writer.put_float(record.gain).put_float(asked.norm()).put_vec3(record.place);
+  writer.put_float(record.region.norm()).put_float(record.guidance.norm()).put(record.fixtures);
+  writer.put_rotation(tick.orientation).put_rotation(tick.proxy_orientation);
+  writer.put_vec3(record.torque);
   const std::span<const TickSample> samples(batch.samples);
   for (const TickSample& sample : samples.last(count)) {
-    writer.put_float(batch.t - sample.t).put(sample.force).put(sample.penetration);
+    writer.put_float(tick.t - sample.t).put(sample.force).put(sample.penetration);
     writer.put(sample.steps).put(sample.tick_time);
     writer.put(sample.relative).put(sample.absolute);
   }
@@ -236,65 +243,58 @@ std::optional<std::variant<HandMessage, ShownMessage>> parse_binary(
   return std::nullopt;
 }
 
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SetParameter, name, value)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SetSafetyParameter, name, value)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SetPlacement, name, value)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SetPlayback, paused, loop, speed)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SetBrush, material, radius)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Forbid, size, margin)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Guide, slack)
+
+namespace {
+
+using nlohmann::json;
+
+// @throws json::exception if a member is not there or of another type
+template <class Asked>
+std::optional<Command> asked(const json& what) {
+  const auto command = what.get<Asked>();
+  if (json(command).size() != what.size()) return std::nullopt;  // it has other members, too
+  return command;
+}
+
+std::optional<Command> asked(const std::string& verb, const json& what) {
+  if (verb == "set") return asked<SetParameter>(what);
+  if (verb == "set_safety") return asked<SetSafetyParameter>(what);
+  if (verb == "place") return asked<SetPlacement>(what);
+  if (verb == "play") return asked<SetPlayback>(what);
+  if (verb == "forbid") return asked<Forbid>(what);
+  if (verb == "guide") return asked<Guide>(what);
+  if (verb == "brush") return what.is_null() ? DropBrush{} : asked<SetBrush>(what);
+  if (verb == "method") return SetMethod{what.get<std::string>()};
+  if (verb == "tool") return SetTool{what.get<std::string>()};
+  if (verb == "open") return OpenScene{what.get<std::string>()};
+  if (verb == "remove_fixture") return RemoveFixture{what.get<std::string>()};
+  if (verb == "record") return SetRecording{what.get<bool>()};
+  if (verb == "seek") return Seek{what.get<double>()};
+  if (what != true) return std::nullopt;
+  if (verb == "clear_paint") return ClearPaint{};
+  if (verb == "reset") return ResetHand{};
+  if (verb == "reset_faults") return ResetFaults{};
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::optional<Command> parse_command(std::string_view message) {
   if (message.size() > max_page_message) return std::nullopt;
-  const auto json = nlohmann::json::parse(message, nullptr, false);
-  if (!json.is_object() || json.size() != 1) return std::nullopt;
-  const std::string verb = json.begin().key();
-  const nlohmann::json& what = json.front();
-  if (verb == "set" || verb == "set_safety" || verb == "place") {
-    if (!what.is_object() || what.size() != 2) return std::nullopt;
-    const auto name = what.find("name");
-    const auto value = what.find("value");
-    if (name == what.end() || value == what.end() || !name->is_string() || !value->is_number())
-      return std::nullopt;
-    if (verb == "set") return SetParameter{name->get<std::string>(), value->get<double>()};
-    if (verb == "place") return SetPlacement{name->get<std::string>(), value->get<double>()};
-    return SetSafetyParameter{name->get<std::string>(), value->get<double>()};
+  try {
+    const json object = json::parse(message);
+    if (!object.is_object() || object.size() != 1) return std::nullopt;
+    return asked(object.begin().key(), object.front());
+  } catch (const json::exception&) {
+    return std::nullopt;
   }
-  if (verb == "method" && what.is_string()) return SetMethod{what.get<std::string>()};
-  if (verb == "tool" && what.is_string()) return SetTool{what.get<std::string>()};
-  if (verb == "record" && what.is_boolean()) return SetRecording{what.get<bool>()};
-  if (verb == "open" && what.is_string()) return OpenScene{what.get<std::string>()};
-  if (verb == "seek" && what.is_number()) return Seek{what.get<double>()};
-  if (verb == "play") {
-    if (!what.is_object() || what.size() != 3) return std::nullopt;
-    const auto paused = what.find("paused");
-    const auto loop = what.find("loop");
-    const auto speed = what.find("speed");
-    if (paused == what.end() || loop == what.end() || speed == what.end()) return std::nullopt;
-    if (!paused->is_boolean() || !loop->is_boolean() || !speed->is_number()) return std::nullopt;
-    return SetPlayback{paused->get<bool>(), loop->get<bool>(), speed->get<double>()};
-  }
-  if (verb == "brush") {
-    if (what.is_null()) return DropBrush{};
-    if (!what.is_object() || what.size() != 2) return std::nullopt;
-    const auto material = what.find("material");
-    const auto radius = what.find("radius");
-    if (material == what.end() || radius == what.end() || !material->is_string() ||
-        !radius->is_number())
-      return std::nullopt;
-    return SetBrush{material->get<std::string>(), radius->get<double>()};
-  }
-  if (verb == "clear_paint" && what == true) return ClearPaint{};
-  if (verb == "forbid") {
-    if (!what.is_object() || what.size() != 2) return std::nullopt;
-    const auto size = what.find("size");
-    const auto margin = what.find("margin");
-    if (size == what.end() || margin == what.end() || !size->is_number() || !margin->is_number())
-      return std::nullopt;
-    return Forbid{size->get<double>(), margin->get<double>()};
-  }
-  if (verb == "guide") {
-    if (!what.is_object() || what.size() != 1) return std::nullopt;
-    const auto slack = what.find("slack");
-    if (slack == what.end() || !slack->is_number()) return std::nullopt;
-    return Guide{slack->get<double>()};
-  }
-  if (verb == "remove_fixture" && what.is_string()) return RemoveFixture{what.get<std::string>()};
-  if (verb == "reset" && what == true) return ResetHand{};
-  if (verb == "reset_faults" && what == true) return ResetFaults{};
-  return std::nullopt;
 }
 
 }  // namespace palpate

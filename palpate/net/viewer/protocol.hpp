@@ -17,6 +17,7 @@
 #include "palpate/kernel/core/hand.hpp"
 #include "palpate/kernel/core/patch.hpp"
 #include "palpate/kernel/tool/tool_shape.hpp"
+#include "palpate/servo/cycle.hpp"
 
 namespace palpate {
 
@@ -25,6 +26,7 @@ namespace palpate {
 /// A message on its way to the pages: a head of its own, then what is shared, not copied.
 struct ViewerMessage {
   bool text = false;
+  bool is_frame = false;  ///< the camera's next one takes its place
   std::vector<std::byte> head;
   std::span<const std::byte> payload;
   std::shared_ptr<const void> owner;          ///< keeps the payload alive
@@ -82,25 +84,9 @@ struct TickSample {
 
 /// The newest tick, and what happened since the message before.
 struct TickBatch {
-  double t = 0.0;  ///< [s]
-  std::uint8_t state = 0;
-  std::uint32_t flags = 0;   ///< TickFlag bits of any tick
-  std::uint32_t safety = 0;  ///< SafetyFlag bits of any tick
-  std::uint32_t steps = 0;
-  std::int32_t frame = -1;
-  Vec3 hip = Vec3::Zero(), proxy = Vec3::Zero(), normal = Vec3::Zero(), force = Vec3::Zero();
-  double surface_velocity = 0.0;  ///< [m/s]
-  double gain = 0.0;              ///< [-] of the safety chain: 0 disengaged, 1 nothing faded
-  double asked_force = 0.0;       ///< [N] length of all that is asked for: surface and fixtures
-  /// [m] world: where the hand is kept by the surface and by forbidden regions; ServoTick::place
-  Vec3 place = Vec3::Zero();
-  double region = 0.0;                          ///< [N] length of what forbidden regions ask for
-  double guidance = 0.0;                        ///< [N] of what guides and viscous regions ask for
-  std::uint32_t fixtures = 0;                   ///< bit i: the session's fixture i gives a force
-  Rotation orientation = Rotation::Identity();  ///< world_from_handle
-  Rotation proxy_orientation = Rotation::Identity();  ///< of a ball that of the hand
-  Vec3 torque =
-      Vec3::Zero();  ///< [N m] sent, or, where the device has no motors for it, what would be
+  ServoTick tick = {};
+  std::uint32_t flags = 0;          ///< TickFlag bits of any tick
+  std::uint32_t safety = 0;         ///< SafetyFlag bits of any tick
   std::vector<TickSample> samples;  ///< oldest first; at most `max_samples` are sent, the newest
   static constexpr std::size_t max_samples = 1024;
 };

@@ -184,17 +184,16 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
         -1, ' ', false, nlohmann::json::error_handler_t::replace))));
   }
 
-  // A camera's newest frame, which takes the place of one that has not been sent yet.
-  void offer(std::size_t camera, std::uint32_t number, SharedMessage frame) {
-    cameras_[camera].next = std::move(frame);
-    cameras_[camera].next_number = number;
+  // What belongs to a camera; its newest frame takes the place of one that has not been sent yet.
+  void show(std::size_t camera, const SharedMessage& message) {
+    if (!message->is_frame) return send(message);
+    cameras_[camera].next = message;
     pump();
   }
 
  private:
   struct CameraFeed {
     SharedMessage next;
-    std::uint32_t next_number = 0;
     std::uint32_t ahead = 0;  // frames sent and not drawn yet
   };
 
@@ -283,12 +282,6 @@ class PageSession : public std::enable_shared_from_this<PageSession> {
 
 }  // namespace
 
-std::filesystem::path ViewerHost::begin_file(const std::string& name, std::uint64_t /*size*/) {
-  throw Error(name, "this session opens no files", "start the program with --camera");
-}
-
-void ViewerHost::end_file(const std::filesystem::path& /*file*/, bool /*whole*/) {}
-
 class ViewerServer::Impl final : public Hub {
  public:
   Impl(const ViewerOptions& options, ViewerHost& host)
@@ -329,8 +322,6 @@ class ViewerServer::Impl final : public Hub {
     context_.stop();
     thread_.join();
   }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
 
   [[nodiscard]] std::uint16_t port() const { return port_; }
   [[nodiscard]] std::string url(const std::string& host) const {
@@ -341,18 +332,15 @@ class ViewerServer::Impl final : public Hub {
   [[nodiscard]] std::string opening_url() const { return link(opening_token_); }
   [[nodiscard]] std::size_t viewers() const { return viewers_.load(); }
 
-  struct Camera {
-    SharedMessage rays, path, frame;
-    SharedMessage tool;  // of the hand: with the first camera alone
-  };
+  // What was shown of a camera last, by its kind: the frame comes last, as it needs the others.
+  using Camera = std::map<std::byte, SharedMessage, std::greater<>>;
 
-  static constexpr std::array sent_once = {&Camera::rays, &Camera::path, &Camera::tool};
-
-  void publish(std::uint8_t camera, ViewerMessage message, SharedMessage Camera::*slot) {
+  void show(std::uint8_t camera, ViewerMessage message) {
     if (camera >= Patch::max_views) return;
+    const std::byte kind = message.head.front();
     auto shared = std::make_shared<const ViewerMessage>(std::move(message));
     const std::lock_guard lock(mutex_);
-    arrived_[camera].*slot = std::move(shared);
+    arrived_[camera][kind] = std::move(shared);
     if (std::exchange(posted_, true)) return;  // the thread has not come to it yet
     asio::post(context_, [this] { distribute(); });
   }
@@ -405,11 +393,8 @@ class ViewerServer::Impl final : public Hub {
     if (page->admission().unknown_token) hello = with_member(hello, "token", "unknown");
     page->send(shared_text("{\"hello\":" + hello + "}"));
     send_state({page});
-    for (std::size_t camera = 0; camera < cameras_.size(); ++camera) {
-      for (const auto once : sent_once)
-        if (cameras_[camera].*once) page->send(cameras_[camera].*once);
-      if (cameras_[camera].frame) page->offer(camera, 0, cameras_[camera].frame);
-    }
+    for (std::size_t camera = 0; camera < cameras_.size(); ++camera)
+      for (const auto& [kind, message] : cameras_[camera]) page->show(camera, message);
     tell_presence(false);
   }
 
@@ -598,14 +583,9 @@ class ViewerServer::Impl final : public Hub {
       posted_ = false;
     }
     for (std::size_t i = 0; i < arrived.size(); ++i) {
-      for (const auto once : sent_once) {
-        if (!(arrived[i].*once)) continue;
-        cameras_[i].*once = arrived[i].*once;
-        for (const auto& page : pages_) page->send(arrived[i].*once);
-      }
-      if (arrived[i].frame) {
-        cameras_[i].frame = arrived[i].frame;
-        for (const auto& page : pages_) page->offer(i, 0, arrived[i].frame);
+      for (const auto& [kind, message] : arrived[i]) {
+        cameras_[i][kind] = message;
+        for (const auto& page : pages_) page->show(i, message);
       }
     }
   }
@@ -658,8 +638,6 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
     end_file(false);
     std::erase(server_.connections_, this);
   }
-  HttpSession(const HttpSession&) = delete;
-  HttpSession& operator=(const HttpSession&) = delete;
 
   void read() {
     parser_.emplace();
@@ -890,17 +868,8 @@ std::string ViewerServer::opening_url() const {
 std::size_t ViewerServer::viewers() const {
   return impl_->viewers();
 }
-void ViewerServer::show(std::uint8_t camera, ViewerMessage frame) {
-  impl_->publish(camera, std::move(frame), &Impl::Camera::frame);
-}
-void ViewerServer::describe(std::uint8_t camera, ViewerMessage rays) {
-  impl_->publish(camera, std::move(rays), &Impl::Camera::rays);
-}
-void ViewerServer::show_path(std::uint8_t camera, ViewerMessage path) {
-  impl_->publish(camera, std::move(path), &Impl::Camera::path);
-}
-void ViewerServer::show_tool(ViewerMessage tool) {
-  impl_->publish(0, std::move(tool), &Impl::Camera::tool);
+void ViewerServer::show(std::uint8_t camera, ViewerMessage message) {
+  impl_->show(camera, std::move(message));
 }
 
 std::string make_token() {

@@ -40,9 +40,9 @@ class ViewerHost {
   virtual void command(const Command& command, Role role) = 0;
   /// The operator's page begins to send a file that is to be touched.
   /// @return where it goes @throws Error to refuse: the page shows it.
-  virtual std::filesystem::path begin_file(const std::string& name, std::uint64_t size);
+  virtual std::filesystem::path begin_file(const std::string& name, std::uint64_t size) = 0;
   /// It has arrived, or (not `whole`) never will.
-  virtual void end_file(const std::filesystem::path& file, bool whole);
+  virtual void end_file(const std::filesystem::path& file, bool whole) = 0;
 };
 
 struct ViewerOptions {
@@ -69,8 +69,6 @@ class ViewerServer {
   ViewerServer(const ViewerOptions& options, ViewerHost& host);
   /// Ends all sessions and waits for the thread.
   ~ViewerServer();
-  ViewerServer(const ViewerServer&) = delete;
-  ViewerServer& operator=(const ViewerServer&) = delete;
 
   [[nodiscard]] std::uint16_t port() const;
   /// Where a browser finds the page, with the token: to look, and to hold the hand.
@@ -83,15 +81,12 @@ class ViewerServer {
   /// How many pages are connected. Any thread.
   [[nodiscard]] std::size_t viewers() const;
 
-  /// A camera's newest frame, for all pages; they see the newest, not each. Any thread; takes a
-  /// lock, so not the servo's. Of a camera beyond Patch::max_views nothing is shown.
-  void show(std::uint8_t camera, ViewerMessage frame);
-  /// The rays of a camera's pixels, before its first frame if its lens is distorted. Any thread.
-  void describe(std::uint8_t camera, ViewerMessage rays);
-  /// The path of the hand that was recorded with a camera's frames. Any thread.
-  void show_path(std::uint8_t camera, ViewerMessage path);
-  /// The tool in the hand, for all pages from now on. Any thread.
-  void show_tool(ViewerMessage tool);
+  /// For all pages from now on, until another of its kind comes: a camera's newest frame (pages see
+  /// the newest, not each), the rays of its pixels (before its first frame if its lens is
+  /// distorted), the path of the hand that was recorded with its frames, or, with the first camera,
+  /// the tool in the hand. Any thread; takes a lock, so not the servo's. Of a camera beyond
+  /// Patch::max_views nothing is shown.
+  void show(std::uint8_t camera, ViewerMessage message);
 
  private:
   class Impl;

@@ -17,7 +17,7 @@
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/uri.hpp"
-#include "palpate/record/recorded_hand.hpp"
+#include "palpate/record/session_reader.hpp"
 #include "palpate/servo/placement.hpp"
 #include "palpate/servo/stiffness.hpp"
 
@@ -31,6 +31,10 @@ constexpr double samples_per_second = 200.0;  // of the page's plots
 constexpr std::array<const char*, 7> tools = {
     "ball",        "box:40x20x5mm",    "box:30x30x30mm", "capsule:80x8mm", "cylinder:40x20mm",
     "cone:60x6mm", "gripper:40x30x8mm"};
+
+json numbers(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
 
 json energy_of(const PortEnergy& port) {
   return {{"made", port.made}, {"generating", port.generating}};
@@ -73,7 +77,7 @@ std::vector<float> path_of(const std::string& uri) {
   if (Uri(uri).scheme() != "recording") return path;
   try {
     const double first = open_source(uri)->info().start_time;
-    for (const RecordedHand& hand : recorded_hand(Uri(uri).path(), most_places)) {
+    for (const Tick& hand : recorded_hand(Uri(uri).path(), most_places)) {
       path.push_back(static_cast<float>(hand.t - first));
       for (int axis = 0; axis < 3; ++axis) path.push_back(static_cast<float>(hand.hip[axis]));
     }
@@ -96,12 +100,11 @@ std::string_view stricter_text(std::string_view limit) {
 }
 
 // What the page draws of a fixture.
-nlohmann::json fixture_to_draw(const Fixture& fixture) {
-  const auto numbers = [](const Vec3& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
-  nlohmann::json pose = nlohmann::json::array();
+json fixture_to_draw(const Fixture& fixture) {
+  json pose = nlohmann::json::array();
   for (int i = 0; i < 12; ++i) pose.push_back(fixture.world_from_fixture(i / 4, i % 4));
   Vec3 size = fixture.size;
-  nlohmann::json points = nlohmann::json::array();
+  json points = nlohmann::json::array();
   if (fixture.shape == FixtureShape::mesh) {  // its box
     Vec3 low = fixture.points.front();
     Vec3 high = low;
@@ -149,8 +152,8 @@ void SessionHost::show_on(ViewerServer* server) {
   for (std::size_t i = 0; i < cameras.size() && i < Patch::max_views; ++i) {
     std::vector<float> path = path_of(cameras[i].uri);
     if (!path.empty())
-      server->show_path(static_cast<std::uint8_t>(i),
-                        path_message(static_cast<std::uint8_t>(i), std::move(path)));
+      server->show(static_cast<std::uint8_t>(i),
+                   path_message(static_cast<std::uint8_t>(i), std::move(path)));
   }
 }
 
@@ -331,8 +334,8 @@ std::string SessionHost::state() {
     recording["open"] = uri;
   json dabs = json::array();
   for (const Dab& dab : session_->paint().dabs())
-    dabs.push_back({{"place", {dab.place.x(), dab.place.y(), dab.place.z()}},
-                    {"normal", {dab.normal.x(), dab.normal.y(), dab.normal.z()}},
+    dabs.push_back({{"place", numbers(dab.place)},
+                    {"normal", numbers(dab.normal)},
                     {"radius", dab.radius},
                     {"material", dab.material}});
   json fixtures = json::array();
@@ -381,15 +384,14 @@ std::string SessionHost::state() {
 std::string SessionHost::robot() {
   const std::optional<RobotPicture> robot = rules_.robot ? rules_.robot() : std::nullopt;
   if (!robot) return {};
-  const auto place = [](const Vec3& at) { return json{at.x(), at.y(), at.z()}; };
   json links = json::array();
-  for (const Vec3& link : robot->links) links.push_back(place(link));
+  for (const Vec3& link : robot->links) links.push_back(numbers(link));
   json tool;
-  if (robot->tool) tool = place(*robot->tool);
+  if (robot->tool) tool = numbers(*robot->tool);
   return json{{"name", robot->name},
               {"tool", tool},
               {"links", links},
-              {"force", place(robot->force)},
+              {"force", numbers(robot->force)},
               {"radius", robot->radius},
               {"age", robot->age},
               {"latency", robot->latency},
@@ -406,14 +408,13 @@ std::string SessionHost::more_hands() {
     while (other.reader.try_pop(other.newest)) {
     }
     const Tick& tick = other.newest.tick;
-    const auto numbers = [](const Vec3& v) { return json{v.x(), v.y(), v.z()}; };
     hands.push_back({{"name", session_->hand_name(i + 1)},
                      {"hip", numbers(tick.hip)},
                      {"proxy", numbers(tick.proxy)},
                      {"force", numbers(other.newest.force)},
                      {"touches", tick.state != ContactState::free_motion},
                      {"present", (other.newest.hand & hand_present) != 0},
-                     {"trouble", palpate::describe(fault_of(other.newest.hand))}});
+                     {"trouble", describe(fault_of(other.newest.hand))}});
   }
   return hands.dump(-1, ' ', false, json::error_handler_t::replace);
 }
@@ -429,7 +430,7 @@ void SessionHost::show_tool(const std::shared_ptr<const ToolShape>& tool) {
   ViewerServer* server = server_.load(std::memory_order_acquire);
   if (server == nullptr || tool == tool_) return;
   tool_ = tool;
-  server->show_tool(tool_message(tool.get()));
+  server->show(0, tool_message(tool.get()));
 }
 
 std::optional<TickBatch> SessionHost::ticks() {
@@ -572,7 +573,8 @@ void SessionHost::command(const Command& command, Role role) {
 }
 
 std::filesystem::path SessionHost::begin_file(const std::string& name, std::uint64_t size) {
-  if (!rules_.files || !rules_.open_scene) return ViewerHost::begin_file(name, size);
+  if (!rules_.files || !rules_.open_scene)
+    throw Error(name, "this session opens no files", "start the program with --camera");
   return rules_.files->begin(name, size);
 }
 
@@ -604,7 +606,7 @@ void SessionHost::show(std::size_t number, const FedFrame& fed) {
     header.metres_per_unit = 1.0 / image->units_per_metre();
     header.world_from_camera = image->world_from_camera();
     header.has_rays = k.distorted();
-    if (header.has_rays && header.number == 0) describe(camera, image->rays());
+    if (header.has_rays && header.number == 0) show_rays(camera, image->rays());
     header.colour = frame.colour;
     server->show(camera, depth_message(header, image->depth(), frame.cloud));
   } else if (const auto* points = frame.cloud->point_cloud()) {
@@ -645,7 +647,7 @@ void SessionHost::show(std::size_t number, const FedFrame& fed) {
   }
 }
 
-void SessionHost::describe(std::uint8_t camera, const ViewingRays& rays) {
+void SessionHost::show_rays(std::uint8_t camera, const ViewingRays& rays) {
   const Intrinsics& k = rays.intrinsics();
   std::vector<float> xy;
   xy.reserve(2 * static_cast<std::size_t>(k.width) * static_cast<std::size_t>(k.height));
@@ -656,9 +658,8 @@ void SessionHost::describe(std::uint8_t camera, const ViewingRays& rays) {
       xy.push_back(static_cast<float>(ray.y()));
     }
   }
-  server_.load()->describe(camera,
-                           rays_message(camera, static_cast<std::uint32_t>(k.width),
-                                        static_cast<std::uint32_t>(k.height), std::move(xy)));
+  server_.load()->show(camera, rays_message(camera, static_cast<std::uint32_t>(k.width),
+                                            static_cast<std::uint32_t>(k.height), std::move(xy)));
 }
 namespace {
 

@@ -142,7 +142,7 @@ class SessionHost final : public ViewerHost {
   [[nodiscard]] std::string recorded_scene(const RecordingState& recording) const;
   void look_at_points(const std::string& uri);
   void paint(const ServoTick& record, double contact_radius);
-  void describe(std::uint8_t camera, const ViewingRays& rays);
+  void show_rays(std::uint8_t camera, const ViewingRays& rays);
 
   std::string version_;
   PageRules rules_;

@@ -19,28 +19,9 @@ double penetration_of(const Tick& tick, double contact_radius) {
 
 void TickBatcher::add(const ServoTick& record, double contact_radius) {
   const Tick& tick = record.tick;
-  batch_.t = tick.t;
-  batch_.state = static_cast<std::uint8_t>(tick.state);
+  batch_.tick = record;
   batch_.flags |= tick.flags;
   batch_.safety |= record.safety;
-  batch_.steps = static_cast<std::uint32_t>(tick.steps);
-  batch_.frame = static_cast<std::int32_t>(tick.frame);
-  batch_.hip = tick.hip;
-  batch_.proxy = tick.proxy;
-  batch_.normal = tick.normal;
-  batch_.force = record.force;
-  batch_.surface_velocity = tick.surface_velocity;
-  batch_.gain = record.gain;
-  Vec3 asked = record.region;
-  join(tick.force, asked);
-  batch_.asked_force = (asked + record.guidance).norm();
-  batch_.place = record.place;
-  batch_.region = record.region.norm();
-  batch_.guidance = record.guidance.norm();
-  batch_.fixtures = record.fixtures;
-  batch_.orientation = tick.orientation;
-  batch_.proxy_orientation = tick.proxy_orientation;
-  batch_.torque = record.torque;
   any_ = true;
 
   const double penetration = penetration_of(tick, contact_radius);

@@ -70,8 +70,9 @@ void run(double seconds, double rate) {
   PeriodicThread null_loop(rate, anywhere, [](const Wake&) {});
   const double end = monotonic_now() + seconds;
   for (std::size_t frame = 0; monotonic_now() < end; ++frame) {
-    loop.put_frame(std::make_shared<DepthImage>(rays, images[frame % images.size()], 1000.0),
-                   monotonic_now());
+    loop.cycle().put_frame(
+        std::make_shared<DepthImage>(rays, images[frame % images.size()], 1000.0), monotonic_now(),
+        monotonic_now());
     std::this_thread::sleep_for(std::chrono::microseconds(33'333));
   }
   loop.stop();

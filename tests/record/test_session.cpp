@@ -2,7 +2,6 @@
 #include <bit>
 #include <csignal>
 #include <cstdlib>
-#include <fstream>
 #include <limits>
 #include <string>
 
@@ -306,60 +305,6 @@ TEST(Session, IsASourceOfItsFrames) {
     EXPECT_EQ(frame->stamp, (i * 33 * 1e-3 - 1e-4 / 3.0) - (0.0 - 1e-4 / 3.0));
   }
   EXPECT_FALSE(source->next());
-}
-
-// Everything that a reader of sessions does. @return false if it said that the bag is damaged
-bool read_all(const fs::path& file) {
-  bool whole = false;
-  try {
-    SessionReader reader(file);
-    for (const auto& [number, frame] : reader.frames()) static_cast<void>(reader.seen(number));
-    whole = replay(reader).broken_off.empty();
-    const auto source = open_source("recording:" + file.string());
-    while (source->next()) {
-    }
-  } catch (const Error& error) {
-    EXPECT_EQ(std::string_view(error.what()).find_first_of("\r\n"), std::string_view::npos)
-        << error.what();
-    return false;
-  }
-  return whole;
-}
-
-class DamagedSession : public ::testing::Test {
- protected:
-  DamagedSession() {
-    SessionWriter writer(folder_.path() / "bag", press_info(), 0.0);
-    static_cast<void>(record_press(writer, {}, 40));
-    std::ostringstream text;
-    text << std::ifstream(folder_.path() / "bag/bag_0.mcap", std::ios::binary).rdbuf();
-    whole_ = text.str();
-  }
-
-  TemporaryFolder folder_;
-  std::string whole_;
-};
-
-TEST_F(DamagedSession, CutAnywhereIsAnErrorOfOneLine) {
-  ASSERT_TRUE(read_all(folder_.path() / "bag"));
-  std::size_t damaged_up_to = 0;
-  for (std::size_t size = 0; size < whole_.size(); size += 397) {
-    if (!read_all(folder_.write("cut.mcap", whole_.substr(0, size)))) damaged_up_to = size;
-  }
-  // Whole chunks are read although the end is missing.
-  EXPECT_GT(damaged_up_to, 0U);
-}
-
-TEST_F(DamagedSession, WithBytesChangedIsReadOrAnErrorOfOneLine) {
-  std::mt19937 random(11);
-  int damaged = 0;
-  for (int i = 0; i < 400; ++i) {
-    std::string changed = whole_;
-    for (auto changes = random() % 20 + 1; changes > 0; --changes)
-      changed[random() % changed.size()] = static_cast<char>(random());
-    if (!read_all(folder_.write("changed.mcap", changed))) ++damaged;
-  }
-  EXPECT_GT(damaged, 0);
 }
 
 }  // namespace test_session

@@ -291,15 +291,6 @@ TEST(CameraFeed, GoesToAnotherPlaceOfARecordingAndSaysThatTimeJumps) {
   }
 }
 
-TEST(CameraFeed, SaysThatTimeJumpsWhereARecordingBeginsAgain) {
-  Playing run;
-  run.until(1.0, run.source(frames(12, 7.0), recording),
-            [&](int) { return run.source(frames(12, 7.0), recording); });
-  ASSERT_GE(run.given.size(), 25U);
-  for (std::size_t k = 0; k < run.given.size(); ++k)
-    EXPECT_EQ(run.given[k].fed.after_jump, k > 0 && k % 12 == 0) << k;
-}
-
 TEST(CameraFeed, RefusesAPlaceOrASpeedThatCannotBe) {
   Playing run;
   CameraFeed feed(run.source(frames(3, 7.0), recording));

@@ -140,14 +140,6 @@ TEST(SessionConfig, TakesWhatTheFileLeavesOutFromItsBase) {
   EXPECT_EQ(config.method, "paper");
 }
 
-TEST(SessionConfig, ReadsTheFormOfMethodAndParametersAlone) {
-  const SessionConfig config = parse_session_config(
-      "method = \"paper\"\n[parameters]\nstiffness = 400\nr_c = 0.006\n", "old.toml");
-  EXPECT_EQ(config.method, "paper");
-  EXPECT_EQ(config.parameters.coupling.stiffness, 400.0);
-  EXPECT_NEAR(config.parameters.proxy.r_c(), 0.006, 1e-12);
-}
-
 TEST(SessionConfig, TakesACameraInShort) {
   EXPECT_EQ(parse_session_config("camera = \"tum:a\"", "s").cameras.front().uri, "tum:a");
   EXPECT_EQ(parse_session_config("camera = [\"tum:a\", \"tum:b\"]", "s").cameras.back().uri,

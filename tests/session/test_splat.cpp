@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <numbers>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -129,6 +132,54 @@ TEST(Splat, IsFeltBehindFog) {
   const Forces forces = round(gaussians);
   EXPECT_GT(forces.least, 0.93 * expected);
   EXPECT_LT(forces.most, 1.07 * expected);
+}
+
+// [m] of one ray by the definition, in doubles; infinite where no half is hidden.
+double depth_of_ray(const std::vector<Gaussian>& in_order, const Vec3& ray) {
+  double left = 1.0, weight = 0.0, sum = 0.0;
+  for (const Gaussian& g : in_order) {
+    const Eigen::Matrix3d whitened = g.sigma.cast<double>().cwiseInverse().asDiagonal() *
+                                     g.turn.cast<double>().toRotationMatrix().transpose();
+    const Vec3 v = whitened * ray, mean = whitened * g.mean.cast<double>();
+    const double along = mean.dot(v) / v.squaredNorm();
+    const double share = g.opacity * std::exp(-0.5 * (mean - along * v).squaredNorm());
+    const bool is_same = weight > 0.0 && std::abs(along - sum / weight) < 3e-3;
+    if (share < 0.02 || (!is_same && left < 0.5)) continue;
+    if (!is_same) weight = sum = 0.0;
+    weight += left * share;
+    sum += left * share * along;
+    left *= 1.0 - share;
+  }
+  return left < 0.5 ? sum / weight : std::numeric_limits<double>::infinity();
+}
+
+TEST(Splat, IsDrawnAsItIsDefined) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> some(-1.0F, 1.0F);
+  const auto next = [&] { return some(random); };
+  std::vector<Gaussian> gaussians;
+  for (int i = 0; i < 400; ++i)
+    gaussians.push_back(
+        {{0.03F * next(), 0.03F * next(), 0.25F + 0.02F * next()},
+         {5e-3F + 4e-3F * next(), 5e-3F + 4e-3F * next(), i % 2 == 0 ? 2e-5F : 2e-3F},
+         Eigen::Quaternionf(1.0F, next(), next(), next()).normalized(),
+         0.5F + 0.4F * next()});
+  constexpr int size = 64;
+  const Intrinsics k{
+      .width = size, .height = size, .fx = 250.0, .fy = 250.0, .cx = 31.5, .cy = 31.5};
+  std::vector<float> depth(size * size, std::numeric_limits<float>::infinity());
+  SplatBody(gaussians, "some").draw({Eigen::Isometry3d::Identity(), k, 0.1, 0.4}, depth);
+  std::sort(gaussians.begin(), gaussians.end(),
+            [](const Gaussian& a, const Gaussian& b) { return a.mean.z() < b.mean.z(); });
+  int others = 0;  // where a share or a distance is just at its bound
+  for (int v = 0; v < size; ++v) {
+    for (int u = 0; u < size; ++u) {
+      const double expected = depth_of_ray(gaussians, {(u - k.cx) / k.fx, (v - k.cy) / k.fy, 1.0});
+      const double drawn = depth[static_cast<std::size_t>(v * size + u)];
+      others += drawn == expected || std::abs(drawn - expected) < 5e-5 ? 0 : 1;
+    }
+  }
+  EXPECT_LT(others, size * size / 50);
 }
 
 TEST(Splat, IsReadAsItIsStored) {

@@ -2,13 +2,16 @@
 #include "palpate/io/sources/splat_body.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
+#include "palpate/kernel/core/vectorise.hpp"
 
 namespace palpate {
 namespace {
@@ -18,7 +21,11 @@ constexpr float carrying_opacity = 0.5F;  // [-] of one that a hand can be near
 constexpr double reach_of_sigma = 3.0;    // standard deviations that are drawn
 constexpr float thinnest_sigma = 1e-5F;   // [m]
 constexpr double widest_sigma = 1e3;      // [m]
-constexpr double same_surface = 3e-3;     // [m] along a ray
+constexpr float same_surface = 3e-3F;     // [m] along a ray
+constexpr float least_left = 0.02F;       // [-] of light that is followed on
+constexpr float least_share = 0.02F;      // [-] of light that a Gaussian takes, where it is drawn
+constexpr int lanes = 8;                  // pixels that are drawn at once
+constexpr std::size_t often = 256;        // Gaussians, after which rays may all be closed
 
 Eigen::Matrix3d axes_of(const Gaussian& g) {
   return g.turn.cast<double>().toRotationMatrix();
@@ -30,23 +37,119 @@ Vec3 half_sides(const Gaussian& g) {
   return reach_of_sigma * scaled.rowwise().norm();
 }
 
-// A Gaussian as a camera sees it.
+// A Gaussian as a camera sees it. W makes it a ball of radius 1; v = W (x, y, 1) for a ray (x, y,
+// 1) which is (a, b) beside the one through the mean, whose v is v_0.
 struct SeenGaussian {
-  Eigen::Matrix3d precision;  // [1/m^2]
-  Vec3 towards;               // [1/m] precision * mean
-  double at_camera;           // [-] mean * precision * mean
-  double depth;               // [m] of the mean
-  double opacity;
-  ViewingRays::Window window;
+  float reach;             // [-] deviations up to which it is drawn
+  Eigen::Vector3f mean;    // [m], x and y as of its ray: divided by z
+  Eigen::Vector2f half;    // [-] reach in x and y, to first order
+  Eigen::Vector3f off;     // |z v_0 x v|^2 / |v_0|^2 = off . (a a, 2 a b, b b)
+  Eigen::Vector2f slope;   // v_0 . v / |v_0|^2 = 1 + slope . (a, b)
+  Eigen::Vector3f square;  // |v|^2 / |v_0|^2 = 1 + 2 slope . (a, b) + square . (a a, 2 a b, b b)
+
+  SeenGaussian(const Gaussian& g, const Eigen::Vector3f& at, const Eigen::Quaternionf& turn)
+      : reach(std::min(static_cast<float>(reach_of_sigma),
+                       std::sqrt(2.0F * std::log(g.opacity / least_share)))),
+        mean(at.x() / at.z(), at.y() / at.z(), at.z()) {
+    const Eigen::Matrix3f axes = (turn * g.turn).toRotationMatrix();
+    const Eigen::Matrix3f scaled = axes * g.sigma.asDiagonal();
+    half = reach / mean.z() *
+           Eigen::Vector2f((scaled.row(0) - mean.x() * scaled.row(2)).norm(),
+                           (scaled.row(1) - mean.y() * scaled.row(2)).norm());
+    const Eigen::Matrix3f whitened = g.sigma.cwiseInverse().asDiagonal() * axes.transpose();
+    const Eigen::Vector3f x = whitened.col(0);
+    const Eigen::Vector3f y = whitened.col(1);
+    const Eigen::Vector3f middle = mean.x() * x + mean.y() * y + whitened.col(2);
+    const float scale = 1.0F / middle.squaredNorm();
+    const Eigen::Vector3f across_x = mean.z() * middle.cross(x);
+    const Eigen::Vector3f across_y = mean.z() * middle.cross(y);
+    off = scale *
+          Eigen::Vector3f(across_x.squaredNorm(), across_x.dot(across_y), across_y.squaredNorm());
+    slope = scale * Eigen::Vector2f(middle.dot(x), middle.dot(y));
+    square = scale * Eigen::Vector3f(x.squaredNorm(), x.dot(y), y.squaredNorm());
+  }
 };
 
-// What a ray has gathered, front to back.
+// What rays have gathered, front to back, of a window row by row.
 struct Gathered {
-  double left = 1.0;    // [-] share of light that has passed
-  double weight = 0.0;  // of the surface met last
-  double sum = 0.0;     // [m] weighted depths of it
-  bool is_half = false;
+  explicit Gathered(std::size_t size)
+      : left(size + lanes, 1.0F), weight(size + lanes), sum(size + lanes) {}
+  std::vector<float> left;    // [-] share of light that has passed
+  std::vector<float> weight;  // of the surface met last
+  std::vector<float> sum;     // [m] weighted depths of it
 };
+
+// Pixels [u_begin, u_end) x [v_begin, v_end), and the rays of their first, from the mean's, to
+// them.
+struct Pixels {
+  int u_begin, u_end, v_begin, v_end, width;
+  float a, b, step_a, step_b;
+};
+
+PALPATE_VECTORISED
+void add_to_rays(const SeenGaussian& g, float opacity, float nearest, float farthest, Pixels pixels,
+                 float* left, float* weight, float* sum) {
+  const float reach_squared = g.reach * g.reach;
+  for (int v = pixels.v_begin; v < pixels.v_end; ++v) {
+    const float b = pixels.b + static_cast<float>(v - pixels.v_begin) * pixels.step_b;
+    const float ahead_0 = g.slope.y() * b;
+    const float off_0 = g.off.z() * b * b;
+    const float off_1 = 2.0F * g.off.y() * b;
+    const float square_0 = 1.0F + 2.0F * ahead_0 + g.square.z() * b * b;
+    const float square_1 = 2.0F * (g.slope.x() + g.square.y() * b);
+    const float off_2 = g.off.x(), square_2 = g.square.x(), ahead_1 = g.slope.x(), z = g.mean.z();
+    for (int u = pixels.u_begin; u < pixels.u_end; u += lanes) {
+      const int first = v * pixels.width + u;
+      const int count = pixels.u_end - u;
+      const float a_0 = pixels.a + static_cast<float>(u - pixels.u_begin) * pixels.step_a;
+#pragma omp simd
+      for (int lane = 0; lane < lanes; ++lane) {
+        const float a = a_0 + static_cast<float>(lane) * pixels.step_a;
+        const float square = square_0 + a * (square_1 + a * square_2);
+        // [m] of the greatest response, and how far off it is, in deviations, squared
+        const float along = z * (1.0F + ahead_0 + ahead_1 * a) / square;
+        const float off = (off_0 + a * (off_1 + a * off_2)) / square;
+        const float passed = left[first + lane];
+        const float surface = weight[first + lane];
+        const float depths = sum[first + lane];
+        const bool same = std::abs(along * surface - depths) < same_surface * surface;
+        const bool counts = (lane < count) & (passed >= least_left) & (off <= reach_squared) &
+                            (along >= nearest) & (along <= farthest) & (same | (passed >= 0.5F));
+        // e^(-off / 2), to 4e-4 of it, by the series of its eighth root
+        const float x = off * (-1.0F / 16.0F);
+        float e = 1.0F + x * (1.0F + x * (1.0F / 2 + x * (1.0F / 6 + x * (1.0F / 24 + x / 120))));
+        e *= e;
+        e *= e;
+        e *= e;
+        const float share = counts ? opacity * e : 0.0F;
+        const float gain = passed * share;
+        const bool begins = counts & !same;
+        weight[first + lane] = (begins ? 0.0F : surface) + gain;
+        sum[first + lane] = (begins ? 0.0F : depths) + (counts ? gain * along : 0.0F);
+        left[first + lane] = passed - gain;
+      }
+    }
+  }
+}
+
+// What is in sight, and how far away, in the order of depth by steps of 1/4095 of the range.
+struct Near {
+  Eigen::Vector3f at;  // [m] in the camera's frame
+  std::uint32_t number;
+};
+std::vector<Near> sorted(const std::vector<Near>& seen, double nearest, double farthest) {
+  constexpr std::size_t steps = 4096;
+  const auto step = [scale = static_cast<float>((steps - 1) / (farthest - nearest)),
+                     from = static_cast<float>(nearest)](const Near& each) {
+    return static_cast<std::size_t>(scale * std::max(each.at.z() - from, 0.0F));
+  };
+  std::array<std::uint32_t, steps + 2> begins{};
+  for (const Near& each : seen) ++begins[std::min(step(each), steps) + 1];
+  std::partial_sum(begins.begin(), begins.end(), begins.begin());
+  std::vector<Near> order(seen.size());
+  for (const Near& each : seen) order[begins[std::min(step(each), steps)]++] = each;
+  return order;
+}
 
 }  // namespace
 
@@ -102,71 +205,47 @@ Vec3 SplatBody::nearest(const Vec3& at) const {
 void SplatBody::draw(const View& view, std::span<float> depth) const {
   const SeenSpace space(view);
   const Eigen::Isometry3d camera_from_body = view.body_from_camera.inverse();
+  const Eigen::Isometry3f pose = camera_from_body.cast<float>();
+  const Eigen::Quaternionf turn(pose.linear());
   const Intrinsics& k = view.intrinsics;
-  std::vector<SeenGaussian> seen;
+  const auto nearest = static_cast<float>(view.nearest);
+  const auto farthest = static_cast<float>(view.farthest);
+  std::vector<Near> seen;
+  seen.reserve(often * often);
   tree_->walk([&](const Box& box) { return space.meets(box); },
               [&](std::uint32_t first, std::uint32_t end) {
                 for (std::uint32_t i = first; i < end; ++i) {
-                  const Gaussian& g = gaussians_[i];
-                  const Vec3 mean = camera_from_body * g.mean.cast<double>();
-                  if (mean.z() < view.nearest || mean.z() > view.farthest) continue;
-                  const Eigen::Matrix3d axes = camera_from_body.linear() * axes_of(g);
-                  const Eigen::Matrix3d scaled = axes * g.sigma.cast<double>().asDiagonal();
-                  const Eigen::Matrix3d whitened =
-                      g.sigma.cast<double>().cwiseInverse().asDiagonal() * axes.transpose();
-                  // How far the ellipsoid reaches in the image, to first order.
-                  const Eigen::Array2d middle = mean.head<2>().array() / mean.z();
-                  Eigen::Matrix<double, 2, 3> slope;
-                  slope << 1.0, 0.0, -middle.x(), 0.0, 1.0, -middle.y();
-                  const Eigen::Array2d half =
-                      reach_of_sigma / mean.z() * (slope * scaled).rowwise().norm().array();
-                  const auto window = pixels_between(k, middle - half, middle + half);
-                  if (window.empty()) continue;
-                  const Eigen::Matrix3d precision = whitened.transpose() * whitened;
-                  const Vec3 towards = precision * mean;
-                  seen.push_back(
-                      {precision, towards, mean.dot(towards), mean.z(), double{g.opacity}, window});
+                  const Eigen::Vector3f at = pose * gaussians_[i].mean;
+                  if (at.z() >= nearest && at.z() <= farthest) seen.push_back({at, i});
                 }
               });
-  std::vector<std::uint32_t> order(seen.size());
-  for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return seen[a].depth != seen[b].depth ? seen[a].depth < seen[b].depth : a < b;
-  });
-  std::vector<Gathered> rays(depth.size());
-  for (const std::uint32_t i : order) {
-    const SeenGaussian& g = seen[i];
-    const Eigen::Matrix3d& p = g.precision;
-    for (int v = g.window.v_begin; v < g.window.v_end; ++v) {
-      // Along a row both are polynomials of the ray's x.
-      const double y = (v - k.cy) / k.fy;
-      const double ahead_0 = g.towards.y() * y + g.towards.z();
-      const double square_0 = (p(1, 1) * y + 2.0 * p(1, 2)) * y + p(2, 2);
-      const double square_1 = 2.0 * (p(0, 1) * y + p(0, 2));
-      for (int u = g.window.u_begin; u < g.window.u_end; ++u) {
-        Gathered& ray = rays[static_cast<std::size_t>(v * k.width + u)];
-        if (ray.left < 0.02) continue;
-        const double x = (u - k.cx) / k.fx;
-        const double ahead = g.towards.x() * x + ahead_0;
-        // [m] of the greatest response
-        const double along = ahead / ((p(0, 0) * x + square_1) * x + square_0);
-        const double off = g.at_camera - ahead * along;  // squared, in deviations
-        if (off > reach_of_sigma * reach_of_sigma) continue;
-        const double share = g.opacity * std::exp(-0.5 * std::max(off, 0.0));
-        if (along < view.nearest || along > view.farthest) continue;
-        const bool is_same =
-            ray.weight > 0.0 && std::abs(along - ray.sum / ray.weight) < same_surface;
-        if (!is_same && ray.is_half) continue;
-        if (!is_same) ray.weight = ray.sum = 0.0;
-        ray.weight += ray.left * share;
-        ray.sum += ray.left * share * along;
-        ray.left *= 1.0 - share;
-        ray.is_half = ray.left < 0.5;
-      }
-    }
+  Gathered rays(depth.size());
+  const auto closed = [&] {
+    return std::none_of(rays.left.begin(), rays.left.end() - lanes,
+                        [](float left) { return left >= least_left; });
+  };
+  std::size_t drawn = 0;
+  for (const Near& each : sorted(seen, view.nearest, view.farthest)) {
+    if (++drawn % often == 0 && closed()) break;
+    const Gaussian& of = gaussians_[each.number];
+    const SeenGaussian g(of, each.at, turn);
+    const Eigen::Array2d middle = g.mean.head<2>().cast<double>().array();
+    const Eigen::Array2d half = g.half.cast<double>().array();
+    const auto window = pixels_between(k, middle - half, middle + half);
+    vectorised<add_to_rays>(g, of.opacity, nearest, farthest,
+                            {.u_begin = window.u_begin,
+                             .u_end = window.u_end,
+                             .v_begin = window.v_begin,
+                             .v_end = window.v_end,
+                             .width = k.width,
+                             .a = static_cast<float>((window.u_begin - k.cx) / k.fx - middle.x()),
+                             .b = static_cast<float>((window.v_begin - k.cy) / k.fy - middle.y()),
+                             .step_a = static_cast<float>(1.0 / k.fx),
+                             .step_b = static_cast<float>(1.0 / k.fy)},
+                            rays.left.data(), rays.weight.data(), rays.sum.data());
   }
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    if (rays[i].is_half) depth[i] = static_cast<float>(rays[i].sum / rays[i].weight);
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    if (rays.left[i] < 0.5F) depth[i] = rays.sum[i] / rays.weight[i];
   }
 }
 

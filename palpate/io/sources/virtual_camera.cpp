@@ -84,19 +84,18 @@ SeenSpace::SeenSpace(const Body::View& view) {
 
 bool SeenSpace::meets(const Box& box) const noexcept {
   return std::all_of(planes_.begin(), planes_.end(), [&](const Eigen::Vector4d& plane) {
-    const Vec3 normal = plane.head<3>();
-    return normal.cwiseProduct(box.low).cwiseMax(normal.cwiseProduct(box.high)).sum() >= -plane.w();
+    double most = plane.w();  // of the corner that is the farthest along the normal
+    for (int i = 0; i < 3; ++i) most += plane[i] * (plane[i] < 0.0 ? box.low[i] : box.high[i]);
+    return most >= 0.0;
   });
 }
 
 ViewingRays::Window pixels_between(const Intrinsics& k, const Eigen::Array2d& low,
                                    const Eigen::Array2d& high) noexcept {
-  const auto first = [](double at, int size) {
-    return static_cast<int>(std::ceil(std::clamp(at, 0.0, static_cast<double>(size))));
-  };
   const auto end = [](double at, int size) {
-    return static_cast<int>(std::floor(std::clamp(at + 1.0, 0.0, static_cast<double>(size))));
+    return static_cast<int>(std::clamp(at + 1.0, 0.0, static_cast<double>(size)));
   };
+  const auto first = [&](double at, int size) { return size - end(size - 1.0 - at, size); };
   return {first(k.fx * low.x() + k.cx, k.width), end(k.fx * high.x() + k.cx, k.width),
           first(k.fy * low.y() + k.cy, k.height), end(k.fy * high.y() + k.cy, k.height)};
 }

@@ -23,6 +23,7 @@ constexpr double slow_intervals = 4.0;
 constexpr double quick = 10e-3;
 constexpr float large_spreads = 1.0F;
 constexpr int rows_of_tick = 8;          // of cells that take the newest frame in
+constexpr int lag = 1;                   // [cells] by which they follow a tool late
 constexpr double longest_tick = 20e-3;   // [s] over more, nothing is smooth
 constexpr int most_across = 15;          // cells that measure the level, along either axis
 constexpr std::size_t least_cells = 8;   // that measure a level
@@ -216,8 +217,7 @@ void SeenSurface::aim_at(const Aim& aim) noexcept {
   const int first_u = static_cast<int>(std::floor(u / stride_)) - side / 2;
   const int first_v = static_cast<int>(std::floor(v / stride_)) - side / 2;
   const bool all_new = frames_ == 0 || stride_ != from_stride;
-  if (!all_new && std::abs(first_u - u_) <= side / 16 && std::abs(first_v - v_) <= side / 16)
-    return;
+  if (!all_new && std::abs(first_u - u_) <= lag && std::abs(first_v - v_) <= lag) return;
   const int from_u = u_;
   const int from_v = v_;
   u_ = first_u;

@@ -93,7 +93,7 @@ void plan_pop(const EntryOptions& options, Plan& plan) {
   }
 }
 
-// A scene gives a line of its measures, `NAME VALUE` each, in the order of their table.
+// A scene gives an object of its measures, in the order of their table.
 void plan_fidelity(const EntryOptions& options, Plan& plan) {
   const Experiment& fidelity = find_experiment("fidelity");
   std::vector<std::string> scenes;
@@ -114,11 +114,11 @@ void plan_fidelity(const EntryOptions& options, Plan& plan) {
              std::string csv = std::string(fidelity.header) + "\n";
              for (const Cell& cell : fidelity.cells(fidelity, given)) csv += cell();
              const Table table(scene, csv);
-             std::string line;
+             Json values = Json::object();
              for (std::size_t row = 0; row < table.rows(); ++row)
-               line += fmt::format("{}{} {:.6g}", row == 0 ? "" : " ", table.text(row, "measure"),
-                                   table.number(row, "value"));
-             return line;
+               values[table.text(row, "measure")] =
+                   std::stod(fmt::format("{:.6g}", table.number(row, "value")));
+             return values.dump();
            }});
     }
   }
@@ -195,17 +195,18 @@ Interval share_of(const std::string& digits) {
 
 // Of each part of `fidelity`, the share of the aims that are met. What has no noise counts in all
 // of them; what was lost in every repeat has no figure and misses its aim.
-std::vector<double> aims_met(const std::vector<std::map<std::string, double>>& measured) {
+std::vector<double> aims_met(const Json& parts) {
   std::vector<double> shares;
-  for (std::size_t part = 0; part < measured.size(); ++part) {
+  for (std::size_t part = 0; part < parts.size(); ++part) {
     int aims = 0;
     int met = 0;
     for (const FidelityMeasure& measure : fidelity_measures()) {
       if (!measure.aim) continue;
-      const auto& of_part = measured[is_without_chance(measure.scene) ? 0 : part];
-      const auto found = of_part.find(fmt::format("{} {}", measure.scene, measure.name));
+      const Json& values =
+          parts.at(is_without_chance(measure.scene) ? 0 : part).at(std::string(measure.scene));
+      const auto found = values.find(std::string(measure.name));
       ++aims;
-      met += found != of_part.end() && found->second <= *measure.aim ? 1 : 0;
+      met += found != values.end() && found->get<double>() <= *measure.aim ? 1 : 0;
     }
     shares.push_back(static_cast<double>(met) / aims);
   }
@@ -235,19 +236,10 @@ Json scores_of(const Json& outcomes) {
     right.push_back(share_of(all_right));
     real = Json{{"held", percent(held.back())}, {"right", percent(right.back())}};
   }
-  std::vector<std::map<std::string, double>> measured;
-  for (const Json& part : outcomes.at("fidelity")) {
-    std::map<std::string, double> values;
-    for (const auto& scene : part.items()) {
-      for (const auto& measure : scene.value().items())
-        values[scene.key() + " " + measure.key()] = measure.value().get<double>();
-    }
-    measured.push_back(std::move(values));
-  }
   scores["score"] = percent(mean_of(right));
   scores["held"] = percent(mean_of(held));
   scores["pop"] = Json{{"held", percent(pop_held)}, {"right", percent(pop_right)}};
-  scores["fidelity"] = Json{{"aims met", percent(student(aims_met(measured)))}};
+  scores["fidelity"] = Json{{"aims met", percent(student(aims_met(outcomes.at("fidelity"))))}};
   scores["real"] = real;
   return scores;
 }
@@ -271,10 +263,7 @@ Json outcomes_of(const Plan& plan, const std::vector<std::string>& lines) {
     // A scene that is there again begins another part.
     if (fidelity.empty() || fidelity.back().contains(item.family))
       fidelity.push_back(Json::object());
-    Json& scene = fidelity.back()[item.family] = Json::object();
-    std::istringstream in(lines.at(i));
-    std::string name;
-    for (double value = 0.0; in >> name >> value;) scene[name] = value;
+    fidelity.back()[item.family] = Json::parse(lines.at(i));
   }
   Json outcomes;
   outcomes["pop"] = pop;
@@ -406,29 +395,23 @@ std::vector<std::string> recordings_of(const Json& entry, const std::vector<std:
   return check.left_out.empty() ? found : std::vector<std::string>();
 }
 
+// Are the measures of a scene the same, but for rounding?
+bool same_measures(const Json& a, const Json& b) {
+  for (const auto& [name, value] : a.items()) {
+    if (!b.contains(name)) return false;
+    const auto x = value.get<double>();
+    const auto y = b.at(name).get<double>();
+    if (std::abs(x - y) > same_measure * std::max(std::abs(x), std::abs(y)) + 1e-9) return false;
+  }
+  return a.size() == b.size();
+}
+
 // How the outcome of an item differs from what the entry has.
 std::optional<std::string> difference(const Item& item, const std::string& entered,
                                       const std::string& played) {
   if (entered == played) return std::nullopt;
   if (item.bench == "fidelity") {
-    std::istringstream a(entered);
-    std::istringstream b(played);
-    std::string name_a;
-    std::string name_b;
-    double value_a = 0.0;
-    double value_b = 0.0;
-    bool same = true;
-    for (;;) {
-      const bool more_a = static_cast<bool>(a >> name_a >> value_a);
-      const bool more_b = static_cast<bool>(b >> name_b >> value_b);
-      same =
-          same && more_a == more_b &&
-          (!more_a || (name_a == name_b &&
-                       std::abs(value_a - value_b) <=
-                           same_measure * std::max(std::abs(value_a), std::abs(value_b)) + 1e-9));
-      if (!more_a || !more_b) break;
-    }
-    if (same) return std::nullopt;
+    if (same_measures(Json::parse(entered), Json::parse(played))) return std::nullopt;
     return fmt::format("{}: in the entry {}; now {}", item.text, entered, played);
   }
   const auto words = [](const std::string& line) {
@@ -445,11 +428,7 @@ std::vector<std::string> entered_lines(const Json& outcomes, const Plan& plan) {
   for (const Item& item : plan.items) {
     const std::size_t index = seen[item.bench + " " + item.family]++;
     if (item.bench == "fidelity") {
-      std::string line;
-      for (const auto& measure : outcomes.at("fidelity").at(index).at(item.family).items())
-        line += fmt::format("{}{} {:.6g}", line.empty() ? "" : " ", measure.key(),
-                            measure.value().get<double>());
-      lines.push_back(line);
+      lines.push_back(outcomes.at("fidelity").at(index).at(item.family).dump());
     } else {
       const Json& family = outcomes.at(item.bench).at(item.family);
       lines.push_back({family.at("held").get<std::string>().at(index),

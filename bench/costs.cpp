@@ -10,7 +10,6 @@
 #include "palpate/kernel/methods/methods.hpp"
 #include "palpate/kernel/paper/proxy.hpp"
 
-#include "bench/limit.hpp"
 #include "bench/pcl_searches.hpp"
 #include "search/kd_tree.hpp"
 
@@ -133,27 +132,6 @@ void measure_ticks(const Subject& subject, const MethodChoice& method, const Han
   costs.tick_after_frame = distribution(std::move(after_frame), 1);
 }
 
-// The pixels that a gather has to look at.
-double measure_window(const Cloud& cloud, const Ball& ball, double budget) {
-  if (!cloud.parts().empty()) {
-    double sum = 0.0;
-    for (const Cloud* part : cloud.parts()) sum += measure_window(*part, ball, budget);
-    return sum;
-  }
-  const DepthImage* image = cloud.image();
-  if (image == nullptr) return 0.0;
-  const Eigen::Isometry3d camera_from_world = image->world_from_camera().inverse();
-  const auto window = image->rays().window(camera_from_world * ball.centre, ball.radius);
-  if (window.empty()) return 0.0;
-  const auto row_length = static_cast<std::size_t>(image->intrinsics().width);
-  const auto columns = static_cast<std::size_t>(window.u_end - window.u_begin);
-  const auto rows = static_cast<std::size_t>(window.v_end - window.v_begin);
-  const std::uint16_t* first = image->depth().data() +
-                               static_cast<std::size_t>(window.v_begin) * row_length +
-                               static_cast<std::size_t>(window.u_begin);
-  return measure(budget, many, [&] { use(load_and_add(first, columns, rows, row_length)); }).median;
-}
-
 }  // namespace
 
 KernelCosts kernel_costs(const Subject& subject, const MethodChoice& method, const Hand& hand,
@@ -180,12 +158,6 @@ KernelCosts kernel_costs(const Subject& subject, const MethodChoice& method, con
   };
   const ProxyMovement start = move({.at = rest.proxy}, 0);
   costs.step = measure(budget, many, [&] { use(move(start, 1)); });
-  costs.limit_patch = measure(budget, many, [&] { use(load_and_add(patch)); }).median;
-  costs.limit_gather = measure_window(*subject.frames.front(), ball, budget);
-  // A step reads the patch once to look around and, unless it slides, once more to see how far it
-  // can go. Counted here: the looks. A tick's first is known from the tick before but after frames.
-  const double looks = costs.steps + hand.frame_rate / hand.tick_rate;
-  costs.limit_tick = looks * costs.limit_patch + costs.gathers * costs.limit_gather;
 
   std::size_t frames = 0;
   costs.frame = measure(budget, many, [&] {

@@ -37,9 +37,6 @@ struct KernelCosts {
   Distribution frame;             ///< handing a frame over
   Distribution step;              ///< one step from contact at rest, and the look around after it
   Distribution gather;            ///< of the points about the proxy at rest
-  double limit_patch = 0.0;       ///< [us] loading and adding that patch once
-  double limit_gather = 0.0;      ///< [us] loading and adding its pixel window; 0 if unorganised
-  double limit_tick = 0.0;        ///< [us] as many passes over patch and window as the ticks made
 };
 
 /// Runs the hand over the subject for about `budget` seconds a figure.

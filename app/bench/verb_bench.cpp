@@ -73,11 +73,7 @@ Json to_json(const KernelCosts& costs) {
           {"tick", to_json(costs.tick)},
           {"tick_after_frame", to_json(costs.tick_after_frame)},
           {"frame", to_json(costs.frame)},
-          {"gather", to_json(costs.gather)},
-          {"limit_patch_us", costs.limit_patch},
-          {"limit_gather_us", costs.limit_gather},
-          {"limit_tick_us", costs.limit_tick},
-          {"tick_over_limit", costs.tick.median / std::max(costs.limit_tick, 1e-6)}};
+          {"gather", to_json(costs.gather)}};
 }
 
 Json to_json(const SearchCosts& costs) {
@@ -175,7 +171,6 @@ int report(const BenchOptions& options) {
                  {"gather_us_median", kernel.gather.median},
                  {"kdtree_query_us_median", tree.query.median},
                  {"kdtree_build_us_median", tree.build->median},
-                 {"tick_over_limit", kernel.tick.median / std::max(kernel.limit_tick, 1e-6)},
                  {"resident_bytes", resident()},
                  {"resident_growth_bytes", growth},
                  {"scenes", Json::array()}};
@@ -191,22 +186,16 @@ int report(const BenchOptions& options) {
 
   fmt::print("{}, loops in {}; microseconds of the thread's own time\n\n", processor,
              vector_set_in_use());
-  fmt::print("{:<20}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>9}{:>9}{:>8}{:>8}{:>7}\n", "the kernel",
-             "points", "steps", "step", "gather", "tick", "p99", "p99.9", "max", "frame", "limit",
-             "ratio");
+  fmt::print("{:<20}{:>7}{:>7}{:>8}{:>8}{:>8}{:>8}{:>9}{:>9}{:>8}\n", "the kernel", "points",
+             "steps", "step", "gather", "tick", "p99", "p99.9", "max", "frame");
   for (const Row& row : rows) {
     const KernelCosts& k = row.kernel;
-    fmt::print(
-        "{:<20}{:>7.0f}{:>7.2f}{:>8.3f}{:>8.3f}{:>8.3f}{:>8.2f}{:>9.2f}{:>9.2f}{:>8.4f}{:>8.3f}"
-        "{:>7.1f}\n",
-        row.name, k.points, k.steps, k.step.median, k.gather.median, k.tick.median, k.tick.p99,
-        k.tick.p999, k.tick.max, k.frame.median, k.limit_tick,
-        k.tick.median / std::max(k.limit_tick, 1e-6));
+    fmt::print("{:<20}{:>7.0f}{:>7.2f}{:>8.3f}{:>8.3f}{:>8.3f}{:>8.2f}{:>9.2f}{:>9.2f}{:>8.4f}\n",
+               row.name, k.points, k.steps, k.step.median, k.gather.median, k.tick.median,
+               k.tick.p99, k.tick.p999, k.tick.max, k.frame.median);
   }
   fmt::print(
-      "\nstep, gather and frame are means over batches of 64; ticks are timed one by one.\n"
-      "limit: a loop that only loads and adds the same points and pixels, as often as the tick\n"
-      "reads them.\n");
+      "\nstep, gather and frame are means over batches of 64; ticks are timed one by one.\n");
   fmt::print("\n{:<20}{:<14}{:>14}{:>12}{:>10}{:>8}\n", "the search", "method", "build a frame",
              "query", "p99", "found");
   for (const Row& row : rows) {

@@ -3,7 +3,7 @@
 """Measures this machine and writes docs/performance.md and docs/images/growth.svg.
 
   scripts/figures/performance.py BUILD [RESULTS]
-    BUILD    a Release build with tests, made without ccache
+    BUILD    a Release build
     RESULTS  folder with bench.json, sight.json and growth.csv of an earlier run, to be drawn again
 """
 import csv
@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 def kernel_table(scenes):
     lines = ["| scene | points | steps per tick | step | gather | tick | p99 | p99.9 | max "
-             "| frame() | limit | tick / limit |", "|---|" + "---:|" * 11]
+             "| frame() |", "|---|" + "---:|" * 9]
     for scene in scenes:
         k = scene["kernel"]
         tick = k["tick"]
@@ -28,8 +28,7 @@ def kernel_table(scenes):
             f"| {scene['name']} | {k['points_per_patch']:.0f} | {k['steps_per_tick']:.1f} "
             f"| {k['step']['median_us']:.3f} | {k['gather']['median_us']:.2f} "
             f"| {tick['median_us']:.2f} | {tick['p99_us']:.1f} | {tick['p999_us']:.1f} "
-            f"| {tick['max_us']:.0f} | {k['frame']['median_us']:.4f} | {k['limit_tick_us']:.3f} "
-            f"| {k['tick_over_limit']:.1f} |")
+            f"| {tick['max_us']:.0f} | {k['frame']['median_us']:.4f} |")
     return "\n".join(lines)
 
 
@@ -56,22 +55,6 @@ def sight_table(scenes):
     return "\n".join(lines)
 
 
-def build_times(build):
-    """Seconds each folder's files took to compile, and the five longest, from ninja's own log."""
-    folders, files = {}, {}
-    for line in (build / ".ninja_log").read_text().splitlines()[1:]:
-        begin, end, _, output, _ = line.split("\t")
-        if output.endswith(".o"):
-            name = output.replace("CMakeFiles/", "").removesuffix(".o")
-            files[name] = (int(end) - int(begin)) / 1e3
-    for name, seconds in files.items():
-        top = name.split("/")[0]
-        folders[top] = folders.get(top, 0.0) + seconds
-    slowest = sorted(files, key=files.get, reverse=True)[:5]
-    return (", ".join(f"`{top}` {folders[top]:.0f} s" for top in sorted(folders)),
-            ", ".join(f"`{name.split('/')[-1]}` {files[name]:.0f} s" for name in slowest))
-
-
 def growth_table(rows):
     lines = ["| series | x | points | steps | tick | build |", "|---|" + "---:|" * 5]
     for r in rows:
@@ -96,7 +79,6 @@ def page(result, sight, rows, build, installed):
     ratios = ", ".join(f"{name}'s {query[name] / ours:.1f}"
                        for name in ["nanoflann", "voxel hash", *pcl, "brute force"])
     program = build / "app/palpate"
-    folders, slowest = build_times(build)
     tick = result["tick_us_median"]
     return f"""# Performance
 
@@ -117,13 +99,6 @@ palpate bench --growth --out .
 ## Time per tick, `paper`
 
 {kernel_table(result['scenes'])}
-
-*limit* is a loop that only loads and adds the same points, as often as the tick reads them, and
-the same pixels, as often as it gathers. It includes neither the roots and quotients of equations
-(2) and (9) nor the second pass of a step in free motion or out of entrenchment. Its passes overlap
-in the processor, whereas each proxy step must wait for the results of the step before, sums and
-quotient included. The fewer the points, the larger the share of this waiting time. The aim was a
-tick within three times the limit; it is missed, as the last column shows.
 
 ### Sight
 
@@ -166,9 +141,6 @@ not allocate (`tests/core`). The program is {size_of(program) / 2**20:.1f} MiB, 
 that is installed
 {size_of(installed) / 2**20:.1f} MiB.
 
-Compiling for Release with tests, one core's seconds by folder: {folders}. The longest files:
-{slowest}. This is divided over two cores; templates (Eigen, Boost, nanoflann) take most of it.
-
 ## Guaranteed by tests
 
 `tests/cost`: the versions of each loop for SSE2, AVX2 and AVX-512 are disassembled and must be
@@ -199,7 +171,8 @@ def main(build, results=None):
         installed = pathlib.Path(work) / "installed"
         subprocess.run(["cmake", "--install", build, "--prefix", installed], check=True,
                        stdout=subprocess.DEVNULL)
-        subprocess.run([program, "eval", "--draw", folder / "growth.csv"], check=True)
+        subprocess.run([sys.executable, ROOT / "python/palpate/figures.py", folder / "growth.csv"],
+                       check=True)
         shutil.copy(folder / "growth.svg", ROOT / "docs/images")
         (ROOT / "docs/performance.md").write_text(page(result, sight, rows, build,
                                                                  installed))

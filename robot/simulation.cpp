@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <mutex>
 #include <numbers>
 #include <stdexcept>
@@ -414,7 +413,6 @@ class Simulation::Implementation {
     const double height = data_->qpos[model_->jnt_qposadr[plate_joint_]];
     const double velocity = data_->qvel[plate_dof_];
     plate_height_ = height;
-    plate_velocity_ = velocity;
     data_->qfrc_applied[plate_dof_] =
         data_->qfrc_bias[plate_dof_] + plate_mass_ * want.acceleration +
         plate_stiffness * (want.height - height) + plate_damping * (want.velocity - velocity);
@@ -551,7 +549,7 @@ class Simulation::Implementation {
   Vec3 last_tip_ = Vec3::Zero(), tip_velocity_ = Vec3::Zero();
   Vec3 tip_force_ = Vec3::Zero(), filtered_force_ = Vec3::Zero();
   double penetration_ = 0.0, told_at_ = 0.0, max_torque_share_ = 0.0;
-  double plate_height_ = 0.0, plate_velocity_ = 0.0;
+  double plate_height_ = 0.0;
   RobotState state_;
   std::vector<BodyPoses> kept_;  // a ring
   std::size_t kept_count_ = 0;
@@ -625,7 +623,6 @@ Truth Simulation::truth() const {
   truth.tip_force = own.tip_force_;
   truth.penetration = own.penetration_;
   truth.plate_height = own.plate_height_;
-  truth.plate_velocity = own.plate_velocity_;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> mobilities(own.tip_mobility_,
                                                                   Eigen::EigenvaluesOnly);
   truth.apparent_mass = 1.0 / std::max(mobilities.eigenvalues()[0], 1e-9);
@@ -662,10 +659,6 @@ const std::vector<VisibleGeom>& Simulation::geoms() const {
 BodyPoses Simulation::poses(double t) const {
   const std::lock_guard lock(implementation_->mutex_);
   return implementation_->poses(t - implementation_->origin_);
-}
-
-BodyPoses Simulation::newest_poses() const {
-  return poses(std::numeric_limits<double>::infinity());
 }
 
 std::optional<double> Simulation::ray(const Vec3& origin, const Vec3& direction, bool arm) const {

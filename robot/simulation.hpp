@@ -58,7 +58,6 @@ struct Truth {
   Vec3 tip_force = Vec3::Zero();     ///< [N] world: on the tip's ball, unfiltered
   double penetration = 0.0;          ///< [m] deepest overlap of the tip's ball with anything, >= 0
   double plate_height = 0.0;         ///< [m] of its top
-  double plate_velocity = 0.0;       ///< [m/s] upwards
   /// [kg] with which the tip moves where it is heaviest; without bound where the arm is singular
   double apparent_mass = 0.0;
 };
@@ -113,7 +112,6 @@ class Simulation {
   [[nodiscard]] const std::vector<VisibleGeom>& geoms() const;
   /// The newest poses at or before t, or the oldest that are kept.
   [[nodiscard]] BodyPoses poses(double t) const;
-  [[nodiscard]] BodyPoses newest_poses() const;
   /// [m] along a ray of length-1 direction to the first thing, by MuJoCo itself; none if it meets
   /// nothing.
   [[nodiscard]] std::optional<double> ray(const Vec3& origin, const Vec3& direction,

@@ -244,28 +244,6 @@ TEST(GodObject, IsAsNearToTheHandAsAPlaneAllows) {
   }
 }
 
-TEST(GodObject, RestsInTheCornerOfThreePlanes) {
-  // A room's corner as a mesh: floor z = 0 and walls x = 0, y = 0, open towards + + +.
-  Surface room;
-  const double big = 0.1;
-  room.points = {{0, 0, 0}, {big, 0, 0}, {0, big, 0}, {0, 0, big}};
-  room.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}};
-  const PointCloud corner(std::move(room));
-  for (const char* name : {"god-object", "sphere-proxy"}) {
-    const double apart = std::string(name) == "sphere-proxy" ? r_c : 0.0;
-    const auto method = make_method(name, {});
-    method->seat({0.02, 0.02, 0.02});
-    method->observe({corner, 0.0});
-    const Vec3 hip(-0.004, -0.003, -0.002);
-    const Tick tick = go(*method, {0.02, 0.02, 0.02}, hip);
-    const Vec3 rest = Vec3::Constant(apart);
-    const Vec3 out = (rest - hip).normalized();
-    const Vec3 centre = apart > 0.0 ? tick.proxy : Vec3(tick.proxy - r_c * tick.normal);
-    EXPECT_LT((centre - rest).norm(), 1e-6) << name;
-    EXPECT_LT((tick.force.normalized() - out).norm(), 1e-5) << name;
-  }
-}
-
 // A mesh in a PLY file, as a session has it.
 class MeshFile {
  public:
@@ -483,30 +461,6 @@ TEST(GodObject, IsLostWhereItIsKeptAndASurfaceRisesOverIt) {
   }
 }
 
-TEST(ForceShading, SmoothsTheFacetsOfABall) {
-  // A ball of 40 mm sampled every 6 mm: facets of some nine degrees.
-  Surface ball;
-  const auto height = [](double x, double y) { return std::sqrt(0.04 * 0.04 - x * x - y * y); };
-  ball.points = test::grid(6e-3, 4, height);
-  ball.columns = ball.rows = 9;
-  const PointCloud cloud(std::move(ball), camera);
-  const auto worst = [&](const char* name) {
-    const auto method = make_method(name, {});
-    method->seat({0, 0, 0.06});
-    method->observe({cloud, 0.0});
-    go(*method, {0, 0, 0.06}, {0, 0, 0.035});
-    double largest = 0.0;
-    for (int i = 0; i <= 120; ++i) {
-      const double angle = 0.3 * i / 120.0;
-      const Vec3 out(std::sin(angle), 0.0, std::cos(angle));
-      const Tick tick = method->tick(0.035 * out, 1.0 + 1e-3 * i);
-      largest = std::max(largest, std::acos(std::min(1.0, tick.normal.dot(out))));
-    }
-    return largest;
-  };
-  EXPECT_LT(worst("force-shading"), 0.5 * worst("god-object"));
-}
-
 TEST(PointNormals, KeepsTheSideThatItsNormalsTell) {
   // The same points with normals down, as of a ceiling: it is touched from beneath.
   Surface ceiling;
@@ -518,18 +472,6 @@ TEST(PointNormals, KeepsTheSideThatItsNormalsTell) {
   method->observe({cloud, 0.0});
   const Tick tick = go(*method, {0, 0, -0.02}, {0, 0, 0.006});
   EXPECT_NEAR(tick.force.z(), -stiffness * 0.006, 1e-3);
-}
-
-TEST(PointNormals, RendersTheGivenNormalsEvenWhereNoiseHidesThem) {
-  GridCloud grid;
-  grid.sigma = 1e-3;
-  const auto cloud = grid.capture(1, 0.0);
-  const auto off = [&](const char* name) {
-    const auto method = make_method(name, {});
-    return std::acos(std::min(1.0, press(*method, *cloud, {0, 0, -0.008}).normal.z()));
-  };
-  EXPECT_LT(off("point-normals"), 1e-6);
-  EXPECT_GT(off("surfels"), 0.01) << "which has to estimate them";
 }
 
 TEST(ImageFeatures, FeelsHeightAndBrightnessAtItsOwnPixel) {

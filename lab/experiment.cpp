@@ -99,19 +99,4 @@ std::string measure_text(std::string_view name, std::string_view unit) {
   return unit.empty() ? std::string(name) : fmt::format("{} [{}]", name, unit);
 }
 
-Figure figure_of_aims(const Table& table, const std::function<bool(std::size_t)>& keep) {
-  const auto measure = [&](std::size_t row) {
-    return table.text(row, "aim") != "-" && keep(row)
-               ? table.text(row, "scene") + " " + table.text(row, "measure")
-               : std::string();
-  };
-  const auto ratio = [&](const std::vector<std::size_t>& rows) {
-    return table.number(rows.back(), "value") / table.number(rows.back(), "aim");
-  };
-  Panel panel = by_group(table, measure, ratio,
-                         {.label = "measured / aim", .log = true, .low = 1e-3, .high = 1e3});
-  panel.series.push_back({"", {{1.0, -anything}, {1.0, anything}}, Line::solid, Mark::none, grey});
-  return {{panel}};
-}
-
 }  // namespace palpate::lab

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "lab/method.hpp"
-#include "lab/plot.hpp"
 #include "lab/table.hpp"
 #include "palpate/kernel/core/parameters.hpp"
 
@@ -72,7 +71,6 @@ struct Experiment {
   std::string_view header;                             ///< of the CSV
   std::vector<std::string_view> default_methods = {};  ///< empty: it compares none
   std::vector<Cell> (*cells)(const Experiment&, const ExperimentOptions&);
-  Figure (*figure)(const Table&);
   std::vector<Claim> (*claims)(const Table&) = nullptr;  ///< of what redraws the paper
   Scores (*scores)(const Table&) = nullptr;              ///< of a bench
   bool has_grid = false;                                 ///< takes --grid
@@ -118,9 +116,5 @@ class AimTable {
 
 /// A measure as the table names it. @param unit  empty where it has none
 std::string measure_text(std::string_view name, std::string_view unit);
-
-/// Each measure of a table's columns "scene", "measure", "aim" and "value" divided by its aim, if
-/// it has one and `keep(row)` is true; what is exact or lost has no mark.
-Figure figure_of_aims(const Table& table, const std::function<bool(std::size_t)>& keep);
 
 }  // namespace palpate::lab

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "lab/experiment.hpp"
@@ -14,28 +15,20 @@ namespace palpate::lab {
 struct Result {
   const Experiment* experiment;
   std::string command;  ///< that gives this result
-  std::vector<Claim> claims;
-  std::filesystem::path figure;  ///< SVG
-  std::optional<Scores> scores;  ///< of a bench
+  std::vector<Claim> claims = {};
+  std::optional<Scores> scores = {};  ///< of a bench
 };
 
-/// Makes the claims and the figure from the CSV.
-/// @param folder  gets NAME.svg. @throws Error if that cannot be written.
+/// Makes claims and scores from the CSV.
 Result make_result(const Experiment& experiment, const ExperimentOptions& options,
-                   std::string_view csv, const std::filesystem::path& folder);
+                   std::string_view csv);
 
-/// Draws a CSV that `eval`, `bench --growth` or `trace` wrote.
-/// @param csv  NAME.csv of the experiment NAME, growth.csv or a trace of any name
-/// @return  the SVG beside it. @throws Error if it is none of them or cannot be written.
-std::filesystem::path draw(const std::filesystem::path& csv);
-
-/// The claims, the scores and where the figure is, for a terminal.
+/// The claims and the scores, for a terminal.
 std::string result_as_text(const Result& result);
 
-/// Writes report.html, one self-contained page, into the folder, and as tables for the
-/// documentation reproduction.md (what redraws the paper) and bench.md (benches).
-/// @return  the page. @throws Error if they cannot be written.
-std::filesystem::path write_report(const std::vector<Result>& results,
-                                   const std::filesystem::path& folder);
+/// Writes tables for the documentation into the folder, with their figures as images/NAME.svg:
+/// reproduction.md of what redraws the paper, bench.md of benches.
+/// @throws Error if they cannot be written.
+void write_report(const std::vector<Result>& results, const std::filesystem::path& folder);
 
 }  // namespace palpate::lab

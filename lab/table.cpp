@@ -53,10 +53,6 @@ std::size_t Table::index(std::string_view column) const {
   return static_cast<std::size_t>(found - columns_.begin());
 }
 
-bool Table::has(std::string_view column) const {
-  return std::find(columns_.begin(), columns_.end(), column) != columns_.end();
-}
-
 const std::string& Table::text(std::size_t row, std::string_view column) const {
   return rows_.at(row)[index(column)];
 }

@@ -26,7 +26,6 @@ class Table {
   /// @throws Error if there is no such column.
   [[nodiscard]] const std::string& text(std::size_t row, std::string_view column) const;
   [[nodiscard]] double number(std::size_t row, std::string_view column) const;
-  [[nodiscard]] bool has(std::string_view column) const;
 
   /// The numbers of a column in the rows that `keep(row)` is true for.
   template <class Keep>

@@ -34,7 +34,6 @@ struct EvalOptions {
   std::vector<std::string> families;
   std::vector<std::string> fixed;
   std::string case_text;
-  std::vector<std::string> drawn;
   bool resume = false;
   bool list_methods = false;
   bool list_experiments = false;
@@ -90,8 +89,6 @@ int list(const EvalOptions& options) {
 
 int eval(const EvalOptions& options) {
   if (options.list_methods || options.list_experiments) return list(options);
-  for (const std::string& csv : options.drawn) fmt::print("drawn in {}\n", lab::draw(csv).string());
-  if (!options.drawn.empty()) return 0;
   if (options.name.empty())
     throw Error("eval", "no experiment is given", "see 'palpate eval --list' for their names");
   const bool all = options.name == "all";
@@ -130,10 +127,11 @@ int eval(const EvalOptions& options) {
     const fs::path csv = fs::path(options.out) / (std::string(experiment->name) + ".csv");
     const std::string text = lab::run_experiment(*experiment, fitting, runner, csv);
     if (progress) progress->finish();
-    results.push_back(lab::make_result(*experiment, fitting, text, options.out));
+    results.push_back(lab::make_result(*experiment, fitting, text));
     fmt::print("{}", lab::result_as_text(results.back()));
   }
-  fmt::print("wrote {}\n", lab::write_report(results, options.out).string());
+  lab::write_report(results, options.out);
+  fmt::print("wrote {0}; `python3 -m palpate.figures {0}/*.csv` draws the figures\n", options.out);
   return 0;
 }
 
@@ -144,7 +142,7 @@ Verb add_eval(CLI::App& program) {
       "eval", "run experiments: the paper's figures and claims, and the benchmark of methods");
   const auto options = std::make_shared<EvalOptions>();
   command->add_option("experiment", options->name, "its name, or all; see --list");
-  command->add_option("--out", options->out, "folder for CSV, plots and the report (eval)");
+  command->add_option("--out", options->out, "folder for CSV files and tables (eval)");
   command
       ->add_option("--methods", options->methods,
                    "methods to compare, separated by commas; see --list-methods")
@@ -152,8 +150,7 @@ Verb add_eval(CLI::App& program) {
       ->allow_extra_args(false);
   command->add_option("--grid", options->grid, "NxM: size of the first two axes, e.g. 76x71");
   command->add_option("--cases", options->cases,
-                      "pop, field, visits: number of cases of each family or class (50, 5, 4); "
-                      "feel: hands in free space");
+                      "pop, field, visits: number of cases of each family or class (50, 5, 4)");
   command
       ->add_option("--families", options->families,
                    "pop, field, visits, fidelity, feel: which, separated by commas")
@@ -172,9 +169,6 @@ Verb add_eval(CLI::App& program) {
   command->add_option("--jobs", options->jobs, "threads (one a core)");
   command->add_flag("--resume", options->resume,
                     "continue from the finished cells of an interrupted run");
-  command->add_option(
-      "--draw", options->drawn,
-      "only draw the figures of these CSV files, of experiments, bench --growth or trace");
   command->add_flag("--list", options->list_experiments, "list the experiments");
   command->add_flag("--list-methods", options->list_methods, "list the methods, one per line");
   options->parameters.add_parameters_to(*command);

@@ -14,9 +14,6 @@
 namespace palpate::lab {
 namespace {
 
-constexpr int usual_free_hands = 200;
-constexpr int hands_a_row = 50;  // free hands a row
-
 // Measures, their scenes and loops, and their aims (upper bounds).
 struct Measure {
   std::string_view scene;
@@ -76,10 +73,6 @@ std::vector<Measure> all_measures() {
     add(scene, "contacts", "", none, {}, {"light"});
     add(scene, "chain-above", "mJ", none, {}, {"chain"});
   }
-  add("free-hands", "runs", "", none, {}, {"path"});
-  add("free-hands", "felt", "runs", 0.0, {"path"}, {});
-  add("free-hands", "trapped", "runs", 0.0, {"path"}, {});
-  add("swing", "swing", "mm", none, {}, {"0.26 N", "0.05 N", "0 N", "chain"});
   return all;
 }
 
@@ -102,9 +95,9 @@ std::string rows_of(std::string_view scene, const FeelFigures& figures) {
     // What the table does not show stands in the CSV.
     const Measure* measure = find_measure(scene, figure.measure, figure.loop);
     const std::optional<double> aim = measure != nullptr ? measure->aim : std::nullopt;
-    rows += csv_row(figure.method, scene, figure.loop, figure.measure,
-                    measure != nullptr ? measure->unit : "", aim ? csv_field(*aim) : "-",
-                    figure.value, figure.case_text);
+    rows +=
+        csv_row(figure.method, scene, figure.loop, figure.measure,
+                measure != nullptr ? measure->unit : "", aim ? csv_field(*aim) : "-", figure.value);
   }
   return rows;
 }
@@ -116,7 +109,7 @@ std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptio
     if (scenes.empty() || scenes.back() != measure.scene) scenes.push_back(measure.scene);
   }
   check_families(options, "feel has no such scene", scenes);
-  std::vector<Contestant> contestants;
+  std::vector<OwnMethod> contestants;
   for (const std::string& name : methods_of(experiment, options))
     contestants.push_back(
         {name, [name](const MethodSetup& setup) { return make_method(name, setup); }});
@@ -153,10 +146,6 @@ std::vector<Cell> feel_cells(const Experiment& experiment, const ExperimentOptio
   add("energy-0.45m", play_energy, 0.45, "d4xx");
   add("energy-0.7m", play_energy, 0.7, "d4xx");
   add("energy-0.95m", play_energy, 0.95, "d4xx");
-  const int hands = options.cases.value_or(usual_free_hands);
-  for (int from = 0; from < hands; from += hands_a_row)
-    add("free-hands", play_free_hands, from, std::min(hands_a_row, hands - from));
-  add("swing", play_swing);
   return cells;
 }
 
@@ -172,9 +161,7 @@ Scores feel_scores(const Table& table) {
                                                                  {"loop", loop},
                                                                  {"measure", measure.name}});
         constexpr double exact = 1e-6;  // of any unit here: rounding
-        double sum = 0.0;               // more than one row only where cases are counted
-        for (const double value : rows) sum += value;
-        if (!rows.empty()) values.emplace_back(sum < exact ? 0.0 : sum);
+        if (!rows.empty()) values.emplace_back(rows.front() < exact ? 0.0 : rows.front());
       }
       if (values.empty()) continue;
       values.resize(scores.methods().size());  // all methods play a scene
@@ -183,22 +170,7 @@ Scores feel_scores(const Table& table) {
           measure.aim, values);
     }
   }
-  std::string note = "* misses the aim. Measures: docs/feel.md.";
-  for (const std::string& method : scores.methods()) {
-    for (std::size_t row = 0; row < table.rows(); ++row) {
-      if (table.text(row, "method") != method || table.text(row, "case") == "-") continue;
-      note += fmt::format("\npalpate eval pop --methods {} --case '{}'", method,
-                          table.text(row, "case"));
-      break;
-    }
-  }
-  return scores.scores(note);
-}
-
-Figure feel_figure(const Table& table) {
-  return figure_of_aims(table, [&](std::size_t row) {
-    return table.text(row, "loop") == "path" || table.text(row, "loop") == "free";
-  });
+  return scores.scores("* misses the aim. Measures: docs/feel.md.");
 }
 
 }  // namespace
@@ -207,10 +179,9 @@ Experiment feel_experiment() {
   return {
       .name = "feel",
       .summary = "force quality: open loop, with a device and a hand, and through the safety chain",
-      .header = "method,scene,loop,measure,unit,aim,value,case",
+      .header = "method,scene,loop,measure,unit,aim,value",
       .default_methods = {"paper", "sight", "ideal"},
       .cells = feel_cells,
-      .figure = feel_figure,
       .scores = feel_scores,
       .has_grid = true};
 }

@@ -87,7 +87,7 @@ class Meter {
 
 }  // namespace
 
-FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_energy(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                         double distance, const std::string& sensor) {
   struct Counted {
     std::vector<double> above;  // [mJ]
@@ -122,7 +122,7 @@ FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOp
           meters.emplace_back(hand.ends);
         };
         add(make_method("ideal", {options.parameters, truth}));
-        for (const Contestant& contestant : contestants)
+        for (const OwnMethod& contestant : contestants)
           add(contestant.make({options.parameters, truth}));
       }
     }

@@ -13,13 +13,13 @@ namespace palpate::lab {
 namespace {
 
 // Plays one camera to a loop of each contestant.
-void play(const std::vector<Contestant>& contestants, const Parameters& parameters,
+void play(const std::vector<OwnMethod>& contestants, const Parameters& parameters,
           const std::string& camera_uri, double seconds, const std::function<HeldDevice()>& held,
           const std::function<void(std::size_t contestant, const Felt&)>& on_tick) {
   const auto camera = open_synthetic_camera(Uri(camera_uri));
   const Truth truth = truth_of(std::make_shared<const Scene>(camera->scene()));
   std::vector<std::unique_ptr<TouchLoop>> loops;
-  for (const Contestant& contestant : contestants)
+  for (const OwnMethod& contestant : contestants)
     loops.push_back(straight_loop(contestant.make({parameters, truth}), held()));
   play_to(loops,
           {.frame_rate = camera->setup().frame_rate,
@@ -36,7 +36,7 @@ Parameters with_friction(Parameters parameters, double coefficient) {
 
 }  // namespace
 
-FeelFigures play_rub(const std::vector<Contestant>& contestants, const FeelOptions& options) {
+FeelFigures play_rub(const std::vector<OwnMethod>& contestants, const FeelOptions& options) {
   constexpr double press = 0.008;  // [m]
   constexpr double from = 1.2;     // [s] sliding, after the first tenth
   constexpr double half = 0.1;     // [m] of the way
@@ -77,7 +77,7 @@ FeelFigures play_rub(const std::vector<Contestant>& contestants, const FeelOptio
   return figures;
 }
 
-FeelFigures play_stick(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_stick(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                        double stroke) {
   constexpr double coefficient = 0.6;
   constexpr double press = 0.025;      // [m] the hand wants to be that far below the surface

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scenes of `feel` with a plane; feel_free_hands.cpp has the one with bodies of all
-// kinds, feel_friction.cpp those with friction.
+// The scenes of `feel` with a plane; feel_friction.cpp has those with friction.
 #include "lab/experiments/feel_scenes.hpp"
 
 #include <algorithm>
@@ -56,7 +55,7 @@ struct Stage {
 // sphere on the true surface: what an exact surface with the same spring would give.
 class Loops {
  public:
-  Loops(const std::vector<Contestant>& contestants, const Parameters& parameters,
+  Loops(const std::vector<OwnMethod>& contestants, const Parameters& parameters,
         const std::shared_ptr<const Scene>& scene)
       : contestants_(contestants), parameters_(parameters), truth_(truth_of(scene)) {}
 
@@ -67,7 +66,7 @@ class Loops {
     loops.push_back(straight_loop(make_method("ideal", {parameters_, truth_}), held()));
     names.emplace_back("", name);
     rulers_.push_back(ruler);
-    for (const Contestant& contestant : contestants_) {
+    for (const OwnMethod& contestant : contestants_) {
       auto method = contestant.make({parameters_, truth_});
       loops.push_back(name == chain ? safe_loop(std::move(method), held(), parameters_)
                                     : straight_loop(std::move(method), held()));
@@ -99,7 +98,7 @@ class Loops {
   std::vector<std::pair<std::string, std::string_view>> names;  // method and loop
 
  private:
-  std::vector<Contestant> contestants_;
+  std::vector<OwnMethod> contestants_;
   Parameters parameters_;
   Truth truth_;
   std::vector<std::size_t> rulers_;
@@ -220,7 +219,7 @@ std::shared_ptr<SyntheticCamera> camera_before(const Scene& scene, const std::st
   return std::make_shared<SyntheticCamera>(scene, plain->setup(), plain->sensor().model());
 }
 
-FeelFigures play_slide(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_slide(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                        double distance) {
   constexpr double from = 1.2;
   constexpr double half = 0.1;  // [m] of the way
@@ -250,7 +249,7 @@ FeelFigures play_slide(const std::vector<Contestant>& contestants, const FeelOpt
   return figures;
 }
 
-FeelFigures play_onset(const std::vector<Contestant>& contestants, const FeelOptions& options) {
+FeelFigures play_onset(const std::vector<OwnMethod>& contestants, const FeelOptions& options) {
   constexpr double speed = 0.05;   // [m/s]
   constexpr double watched = 0.4;  // [s]
   Repeats repeats;
@@ -308,7 +307,7 @@ std::shared_ptr<const Scene> covered_plane(double from, double to) {
 
 }  // namespace
 
-FeelFigures play_return(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_return(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                         Unseen why) {
   constexpr double gone = 2.0;  // [s]
   const double back = why == Unseen::dropped ? gone + 10.0 / f_c : gone + 2.0;
@@ -345,7 +344,7 @@ FeelFigures play_return(const std::vector<Contestant>& contestants, const FeelOp
   return figures;
 }
 
-FeelFigures play_rest(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_rest(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                       double distance) {
   FeelOptions damped = options;
   damped.parameters.coupling.damping = 2.0;
@@ -372,7 +371,7 @@ FeelFigures play_rest(const std::vector<Contestant>& contestants, const FeelOpti
   return figures;
 }
 
-FeelFigures play_rate(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_rate(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                       double rate) {
   constexpr std::array latencies = {0.0, 0.1, 0.15, 0.3, 0.5};  // [s]
   Repeats repeats;
@@ -401,43 +400,6 @@ FeelFigures play_rate(const std::vector<Contestant>& contestants, const FeelOpti
   }
   repeats.largest_of("buzz", "buzz", figures);
   repeats.largest_of("mean-error", "mean-error", figures);
-  return figures;
-}
-
-FeelFigures play_swing(const std::vector<Contestant>& contestants, const FeelOptions& options) {
-  // A hand that pulls the handle down, but adds neither mass nor damping.
-  constexpr Grip loose{"loose", 0.0, 100.0, 0.0};
-  constexpr double watched = 0.5;  // [s] at the end
-  const double end = settled + 2.0;
-  FeelOptions stiff = options;
-  stiff.parameters.coupling.stiffness = 600.0;
-  DevicePreset new_touch = touch();
-  new_touch.body.friction = 0.05;
-  DevicePreset without_friction = touch();
-  without_friction.body.friction = 0.0;
-
-  const Stage stage("synthetic:plane?" + camera_options(middle, 0.3, "ideal", 1));
-  Loops loops(contestants, stiff.parameters, stage.scene);
-  const HipPath hand = coming_down(0.0);
-  loops.add("0.26 N", [&] { return in_hand(hand, loose, touch(), options.seed); });
-  loops.add("0.05 N", [&] { return in_hand(hand, loose, new_touch, options.seed); });
-  loops.add("0 N", [&] { return in_hand(hand, loose, without_friction, options.seed); });
-  loops.add(chain, [&] { return in_hand(hand, loose, without_friction, options.seed); });
-  struct Range {
-    double low = 1e9, high = -1e9;  // [m]
-  };
-  std::vector<Range> ranges(loops.loops.size());
-  play_to(loops.loops, stage.scenario(end), [&](std::size_t loop, const Felt& felt) {
-    if (felt.t < end - watched) return;
-    ranges[loop].low = std::min(ranges[loop].low, felt.hip.z());
-    ranges[loop].high = std::max(ranges[loop].high, felt.hip.z());
-  });
-  FeelFigures figures;
-  for (std::size_t i = 0; i < ranges.size(); ++i) {
-    if (!loops.is_ruler(i))
-      figures.push_back({loops.names[i].first, loops.names[i].second, "swing",
-                         1e3 * (ranges[i].high - ranges[i].low)});
-  }
   return figures;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -16,19 +15,12 @@ class SyntheticCamera;
 
 namespace palpate::lab {
 
-/// A method that takes part, and how to make it for a scene.
-struct Contestant {
-  std::string name;
-  std::function<std::unique_ptr<Method>(const MethodSetup&)> make;
-};
-
 /// One measured number. docs/feel.md says what each is.
 struct FeelFigure {
   std::string method;
   std::string_view loop;  ///< who touches, and by which way: `path`, `light`, `firm`, `chain`, ...
   std::string measure;
   double value = 0.0;
-  std::string case_text = "-";  ///< a case to play, where the figure is a count of cases
 };
 using FeelFigures = std::vector<FeelFigure>;
 
@@ -49,40 +41,32 @@ std::string camera_options(double distance, double across, std::string_view sens
 std::shared_ptr<SyntheticCamera> camera_before(const Scene& scene, const std::string& options);
 
 /// Along a resting plane at 0.1 m/s before a D4xx. @param distance  [m] from the camera
-FeelFigures play_slide(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_slide(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                        double distance);
 /// A plane begins to come at 0.05 m/s before an exact camera.
-FeelFigures play_onset(const std::vector<Contestant>& contestants, const FeelOptions& options);
+FeelFigures play_onset(const std::vector<OwnMethod>& contestants, const FeelOptions& options);
 /// The force comes back after a surface was not seen.
 enum class Unseen { covered, stopped, dropped };
-FeelFigures play_return(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_return(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                         Unseen why);
 /// A resting plane before a D4xx with k_d = 2 N s/m. @param distance  [m] from the camera
-FeelFigures play_rest(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_rest(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                       double distance);
 /// A resting plane before a D4xx of one frame rate, at several latencies. @param rate  [Hz]
-FeelFigures play_rate(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_rate(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                       double rate);
-/// A handle on a resting plane before an exact camera, held loosely: does it swing?
-FeelFigures play_swing(const std::vector<Contestant>& contestants, const FeelOptions& options);
 
 /// Along a resting plane at 0.1 m/s before a D4xx at 0.7 m, with friction of several coefficients.
-FeelFigures play_rub(const std::vector<Contestant>& contestants, const FeelOptions& options);
+FeelFigures play_rub(const std::vector<OwnMethod>& contestants, const FeelOptions& options);
 /// A lightly held handle that is drawn along a plane before a D4xx at 0.7 m with half of what its
 /// friction holds. @param stroke  [m] by which the plane bobs, at 1 Hz; 0: it rests
-FeelFigures play_stick(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_stick(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                        double stroke);
 
 /// Hands that press on a resting plane and come off again: the energy that each contact gives them,
 /// beside what it is on an exact surface; and what the chain adds there.
 /// @param distance  [m] from the camera  @param sensor  its, as of a synthetic camera
-FeelFigures play_energy(const std::vector<Contestant>& contestants, const FeelOptions& options,
+FeelFigures play_energy(const std::vector<OwnMethod>& contestants, const FeelOptions& options,
                         double distance, const std::string& sensor);
-
-/// Hands that press, slide and are lifted, cases of the family `lift-off` of the bench `pop`: those
-/// numbered from `from` on. Those of one block of `hands_a_camera` see the same camera and body.
-FeelFigures play_free_hands(const std::vector<Contestant>& contestants, const FeelOptions& options,
-                            int from, int count);
-constexpr int hands_a_camera = 10;
 
 }  // namespace palpate::lab

@@ -343,10 +343,6 @@ Scores fidelity_scores(const Table& table) {
       "* misses the aim; - popped through in every repeat. Measures: docs/pop.md.");
 }
 
-Figure fidelity_figure(const Table& table) {
-  return figure_of_aims(table, [](std::size_t) { return true; });
-}
-
 }  // namespace
 
 std::span<const FidelityMeasure> fidelity_measures() {
@@ -363,7 +359,6 @@ Experiment fidelity_experiment() {
           .header = "method,scene,measure,unit,aim,value",
           .default_methods = {"paper", "sight"},
           .cells = fidelity_cells,
-          .figure = fidelity_figure,
           .scores = fidelity_scores,
           .has_grid = true,
           .plays_programs = true};

@@ -262,19 +262,6 @@ Scores visits_scores(const Table& table) {
                            "median and the worst over the held cases."});
 }
 
-Figure field_figure(const Table& table) {
-  const auto known_class = [&](std::size_t row) {
-    return table.text(row, "unknown") == "-" ? table.text(row, "class") : std::string();
-  };
-  const auto share = [&](const std::vector<std::size_t>& rows) {
-    double right = 0.0;
-    for (const std::size_t row : rows) right += table.number(row, "right");
-    return 100.0 * right / static_cast<double>(rows.size());
-  };
-  return {
-      {by_group(table, known_class, share, {.label = "right [%]", .low = -2.0, .high = 102.0})}};
-}
-
 constexpr std::string_view header =
     "method,class,sensor,number,unknown,lost,right,behind_s,ghost_n,numb,wrong_side,worst_step_n,"
     "shake_mm,time_s,time_behind_s,alarmed_s,false_alarm_s,times_behind,quick_returns,text,"
@@ -290,7 +277,6 @@ Experiment field_experiment() {
           .header = header,
           .default_methods = {"paper", "sight"},
           .cells = field_cells,
-          .figure = field_figure,
           .scores = field_scores};
 }
 
@@ -300,7 +286,6 @@ Experiment visits_experiment() {
           .header = header,
           .default_methods = {"sight", "direct", "paper"},
           .cells = visits_cells,
-          .figure = field_figure,
           .scores = visits_scores};
 }
 

@@ -120,14 +120,6 @@ std::vector<Claim> single_lift_claims(const Table& table) {
            least > 0.0 ? "reproduced: never below the cloud" : "differs: lost"}};
 }
 
-Figure single_lift_figure(const Table& table) {
-  Panel panel{.x = {"time [s]"}, .y = {"height y [r_c]"}};
-  add_reference(panel, table, "true surface", "t", "true_y", {1.0, 5e-3}, Line::solid);
-  add_reference(panel, table, "HIP", "t", "hip_y", {1.0, 5e-3});
-  add_methods(panel, table, "t", "proxy_y", {1.0, 5e-3}, true);
-  return {{panel}};
-}
-
 // Fig. 13's axes: 76 noise levels up to 3 r_c and 71 accelerations up to 1400 r_c/s^2.
 constexpr double most_noise = 3.0;
 constexpr double most_acceleration = 1400.0;
@@ -225,32 +217,6 @@ std::vector<Claim> lift_claims(const Table& table) {
   return claims;
 }
 
-// A panel a method: what it held, and (25) with (20), solved for the acceleration.
-Figure lift_figure(const Table& table) {
-  constexpr double r_c = 5e-3;
-  constexpr double r_1 = 4.99e-3;
-  Points bound;
-  for (double noise = 0.0; noise <= most_noise; noise += 0.01) {
-    const double e = printed_e(noise * r_c);
-    bound.push_back({(r_1 + printed_h(noise * r_c) - 0.1 / f_c * e) /
-                         (1.0 / (f_c * f_c) + 9.0 / (f_c * f_c) * e) / r_c,
-                     noise});
-  }
-  Figure figure;
-  for (const std::string& method : methods_in(table))
-    figure.panels.push_back(
-        {.title = method,
-         .x = {.label = "acceleration a [r_c/s²]", .low = 0.0, .high = most_acceleration},
-         .y = {.label = "noise sigma [r_c]", .low = 0.0, .high = most_noise},
-         .series = {
-             {"held",
-              points(table, {{"method", method}, {"popped", "0"}}, "acceleration_rc", "noise_rc"),
-              Line::none, Mark::dot},
-             {"(25)", bound}}});
-  figure.columns = std::clamp<std::size_t>(figure.panels.size(), 1, 2);
-  return figure;
-}
-
 // Section 6.2: lifts without acceleration.
 constexpr int bound_levels = 21;
 
@@ -317,16 +283,6 @@ std::vector<Claim> bound_claims(const Table& table) {
                  from)}};
 }
 
-Figure bound_figure(const Table& table) {
-  Panel thickness{.x = {"noise sigma [r_c]"}, .y = {"thickness h [mm]"}};
-  Panel error{.x = thickness.x, .y = {"normal error e_n"}};
-  add_methods(thickness, table, "noise_rc", "h_m", {1.0, 1e-3}, true);
-  add_reference(thickness, table, "(23) and (24)", "noise_rc", "printed_h_m", {1.0, 1e-3});
-  add_methods(error, table, "noise_rc", "e_n", {1.0, 1.0}, true);
-  add_reference(error, table, "(23) and (24)", "noise_rc", "printed_e_n");
-  return {{thickness, error}};
-}
-
 }  // namespace
 
 Experiment single_lift_experiment() {
@@ -335,7 +291,6 @@ Experiment single_lift_experiment() {
           .header = "method,t,true_y,cloud_y,hip_y,proxy_y,touching",
           .default_methods = {"paper", "fixed-step", "sight"},
           .cells = single_lift_cells,
-          .figure = single_lift_figure,
           .claims = single_lift_claims};
 }
 
@@ -345,7 +300,6 @@ Experiment lift_experiment() {
           .header = "method,acceleration_rc,noise_rc,seed,popped",
           .default_methods = {"fixed-step", "paper"},
           .cells = lift_cells,
-          .figure = lift_figure,
           .claims = lift_claims,
           .has_grid = true};
 }
@@ -358,7 +312,6 @@ Experiment bound_experiment() {
       .header = "method,noise_rc,seed,h_m,e_n,printed_h_m,printed_e_n,popped",
       .default_methods = {"paper"},
       .cells = bound_cells,
-      .figure = bound_figure,
       .claims = bound_claims};
 }
 

@@ -135,43 +135,6 @@ Scores material_scores(const Table& table) {
   return scores;
 }
 
-Figure material_figure(const Table& table) {
-  const Axis normal{"normal force [N]"};
-  Figure figure{{{.title = "an impact at 0.15 m/s", .x = {"time [ms]"}, .y = normal},
-                 {.title = "a slow press", .x = {"depth of the HIP [mm]"}, .y = normal},
-                 {.title = "a slide at 60 mm/s, 3 mm deep",
-                  .x = {"travel of the HIP [mm]"},
-                  .y = {"force along the surface [N]"}},
-                 {.title = "the same, a tenth of a second of it",
-                  .x = {"time [ms]"},
-                  .y = {"normal, less its mean [N]"}}},
-                2};
-  int drawn = 0;
-  for (const std::string& name : materials_in(table)) {
-    const auto of = [&](double from, double to, std::string_view x, std::string_view y) {
-      const auto during = [&](std::size_t other) {
-        const double t = table.number(other, "t");
-        return table.text(other, "material") == name && t >= from - 1e-9 && t < to - 1e-9;
-      };
-      return points(table, during, x, y);
-    };
-    Points hit = of(1.925, 2.0, "t", "normal");
-    for (auto& point : hit) point[0] = 1e3 * (point[0] - engaged - above / strike);
-    Points shaking = of(4.6, 4.7, "t", "normal");
-    double mean = 0.0;
-    for (const auto& point : shaking) mean += point[1] / static_cast<double>(shaking.size());
-    const double below = 0.5 * drawn++;  // a line each
-    for (auto& point : shaking) point = {1e3 * (point[0] - 4.6), point[1] - mean - below};
-    figure.panels[0].series.push_back({name, hit});
-    figure.panels[1].series.push_back(
-        {name, of(press_from, press_from + press_for, "depth", "normal")});
-    figure.panels[2].series.push_back(
-        {name, of(stroke_from, stroke_from + stroke_for, "along", "tangential")});
-    figure.panels[3].series.push_back({name, shaking});
-  }
-  return figure;
-}
-
 }  // namespace
 
 Experiment materials_experiment() {
@@ -179,7 +142,6 @@ Experiment materials_experiment() {
           .summary = "force of an impact, a press and a slide on each standard material",
           .header = "material,t,depth,along,normal,tangential",
           .cells = material_cells,
-          .figure = material_figure,
           .scores = material_scores};
 }
 

@@ -338,20 +338,6 @@ Scores pop_scores(const Table& table) {
   return scores;
 }
 
-Figure pop_figure(const Table& table) {
-  const auto family = [&](std::size_t row) { return table.text(row, "family"); };
-  const auto held = [&](const std::vector<std::size_t>& rows) {
-    double cases = 0.0;
-    double lost = 0.0;
-    for (const std::size_t row : rows) {
-      cases += table.number(row, "cases");
-      lost += table.number(row, "lost");
-    }
-    return 100.0 * (cases - lost) / cases;
-  };
-  return {{by_group(table, family, held, {.label = "held [%]", .low = -2.0, .high = 102.0})}};
-}
-
 }  // namespace
 
 void ForceJudge::add(const Tick& tick, const Tick& ruler, double clear) {
@@ -387,7 +373,6 @@ Experiment pop_experiment() {
               "noticeable,first_lost,simplest,ghost,numb,wrong,right,worst_ghost_n,first_not_right",
           .default_methods = {"paper", "sight"},
           .cells = pop_cells,
-          .figure = pop_figure,
           .scores = pop_scores,
           .plays_programs = true};
 }

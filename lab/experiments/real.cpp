@@ -344,25 +344,6 @@ Scores real_scores(const Table& table) {
   return scores;
 }
 
-Figure real_figure(const Table& table) {
-  Panel panel{.x = {"distance from the camera [m]"},
-              .y = {.label = "force in 20 to 400 Hz [N rms]", .log = true}};
-  int colour = 0;
-  for (const std::string& method : methods_in(table)) {
-    const auto of = [&](std::string_view action, std::string_view lost, std::string_view y) {
-      return points(table, {{"method", method}, {"action", action}, {"lost", lost}}, "distance_m",
-                    y);
-    };
-    panel.series.push_back(
-        {method + " held", of("hold", "0", "felt_n"), Line::none, Mark::disc, colour});
-    panel.series.push_back(
-        {method + " moving", of("moving", "0", "felt_n"), Line::none, Mark::ring, colour});
-    panel.series.push_back(  // where there is nothing to measure: at 1 N
-        {method + " lost", of("hold", "1", "lost"), Line::none, Mark::cross, colour++});
-  }
-  return {{panel}};
-}
-
 // Everything that the cases of a recording depend on.
 std::string hash_of(const Recording& recording) {
   Sha256 hash;
@@ -419,7 +400,6 @@ Experiment real_experiment() {
           .header = "method,action,place,distance_m,lost,suspected,error_mm,felt_n,step_n,range_n",
           .default_methods = {"paper", "sight"},
           .cells = real_cells,
-          .figure = real_figure,
           .scores = real_scores,
           .takes_recording = true,
           .plays_programs = true};

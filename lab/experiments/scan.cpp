@@ -135,16 +135,6 @@ std::vector<Claim> scan_claims(const Table& table) {
                    : "differs: this machine is slower"}};
 }
 
-Figure scan_figure(const Table& table) {
-  Panel height{.x = {"along the scan y [m]"}, .y = {"z [m]"}};
-  Panel force{.x = height.x, .y = {"force [N]"}};
-  add_reference(height, table, "surface", "proxy_y", "surface_z", {1.0, 1.0}, Line::solid);
-  add_reference(height, table, "HIP", "hip_y", "hip_z");
-  add_methods(height, table, "proxy_y", "proxy_z");
-  add_methods(force, table, "hip_y", "force_n");
-  return {{height, force}};
-}
-
 }  // namespace
 
 Experiment scan_experiment() {
@@ -153,7 +143,6 @@ Experiment scan_experiment() {
           .header = "method,t,hip_y,hip_z,proxy_y,proxy_z,surface_z,force_n,steps,touching",
           .default_methods = {"paper", "ideal"},
           .cells = scan_cells,
-          .figure = scan_figure,
           .claims = scan_claims};
 }
 

@@ -61,16 +61,6 @@ std::vector<Claim> flat_claims(const Table& table) {
                : "differs"}};
 }
 
-Figure flat_figure(const Table& table) {
-  Panel height{.x = {"time [s]"}, .y = {"height y [m]"}};
-  Panel contact{.x = {.label = "time [s]", .low = 1.2, .high = 3.9},
-                .y = {.label = "contact point y [mm]", .low = -0.2, .high = 0.1}};
-  add_reference(height, table, "HIP", "t", "hip_y");
-  add_methods(height, table, "t", "proxy_y");
-  add_methods(contact, table, "t", "contact_y", {1.0, 1e-3});
-  return {{height, contact}};
-}
-
 // 5.3: a 300 x 100 grid shaped as a triangle wave with growing amplitude.
 std::vector<Cell> corners_cells(const Experiment& experiment, const ExperimentOptions& options) {
   std::vector<Cell> cells;
@@ -136,13 +126,6 @@ std::vector<Claim> corners_claims(const Table& table) {
                         : "differs"}};
 }
 
-Figure corners_figure(const Table& table) {
-  Panel panel{.x = {"x [r_c]"}, .y = {"height [r_c]"}};
-  add_reference(panel, table, "surface", "contact_x", "true_z", {5e-3, 5e-3}, Line::dotted);
-  add_methods(panel, table, "contact_x", "contact_z", {5e-3, 5e-3});
-  return {{panel}};
-}
-
 }  // namespace
 
 Experiment flat_experiment() {
@@ -151,7 +134,6 @@ Experiment flat_experiment() {
           .header = "method,t,hip_x,hip_y,proxy_x,proxy_y,contact_y,force_n,steps",
           .default_methods = {"paper", "ideal"},
           .cells = flat_cells,
-          .figure = flat_figure,
           .claims = flat_claims};
 }
 
@@ -161,7 +143,6 @@ Experiment corners_experiment() {
           .header = "method,hip_x,proxy_x,proxy_z,contact_x,contact_z,true_z,gap",
           .default_methods = {"paper", "ideal"},
           .cells = corners_cells,
-          .figure = corners_figure,
           .claims = corners_claims};
 }
 

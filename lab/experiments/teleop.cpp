@@ -220,25 +220,6 @@ Scores teleop_scores(const Table& table) {
   return scores;
 }
 
-Figure teleop_figure(const Table& table) {
-  Figure figure{{{.y = {"force on the hand [N]"}},
-                 {.y = {.label = "position deviation of the tool [mm]", .log = true}}}};
-  for (const std::string_view way : {"palpate", "position-force", "wave", "tdpa"}) {
-    const bool ours = way == "palpate";
-    for (std::size_t i = 0; i < 2; ++i)
-      figure.panels[i].series.push_back({ours ? "palpate, D4xx" : std::string(way),
-                                         points(table,
-                                                {{"way", way},
-                                                 {"scene", "rest"},
-                                                 {"sensor", ours ? "d4xx" : "ideal"},
-                                                 {"link", "even"}},
-                                                "round_trip", i == 0 ? "force" : "swing"),
-                                         Line::solid, ours ? Mark::disc : Mark::ring});
-  }
-  for (Panel& panel : figure.panels) panel.x.label = "round trip [ms]";
-  return figure;
-}
-
 }  // namespace
 
 Experiment teleop_experiment() {
@@ -249,7 +230,6 @@ Experiment teleop_experiment() {
               "way,scene,sensor,round_trip,link,force,most_force,shake,energy,depth,contact,swing",
           .default_methods = {"palpate", "position-force", "wave", "tdpa"},
           .cells = teleop_cells,
-          .figure = teleop_figure,
           .scores = teleop_scores};
 }
 

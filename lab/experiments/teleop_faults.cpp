@@ -207,18 +207,6 @@ Scores episode_scores(const Table& table) {
   return scores;
 }
 
-Figure episode_figure(const Table& table) {
-  Panel panel{.x = {"contact of the tool [N]"}, .y = {"share of episodes"}};
-  for (const std::string_view fault : faults) {
-    Points share = points(table, {{"fault", fault}}, "contact", "contact");
-    std::sort(share.begin(), share.end());
-    for (std::size_t i = 0; i < share.size(); ++i)
-      share[i][1] = static_cast<double>(i + 1) / static_cast<double>(share.size());
-    panel.series.push_back({std::string(fault), share, Line::steps});
-  }
-  return {{panel}};
-}
-
 }  // namespace
 
 Experiment teleop_faults_experiment() {
@@ -227,7 +215,6 @@ Experiment teleop_faults_experiment() {
       .summary = "teleoperation while network, camera or a process fails: fixtures, force, stops",
       .header = "fault,scene,sensor,number,breach,contact,unseen,rise,force,stop",
       .cells = episode_cells,
-      .figure = episode_figure,
       .scores = episode_scores};
 }
 

@@ -316,21 +316,6 @@ Scores tool_scores(const Table& table) {
   return scores;
 }
 
-Figure tool_figure(const Table& table) {
-  const auto name = [&](std::size_t row) {
-    return table.text(row, "torque_error").empty()
-               ? std::string()
-               : table.text(row, "case") + " " + table.text(row, "camera");
-  };
-  Figure figure{{}, 2};
-  for (const char* column : {"force_error", "torque_error"})
-    figure.panels.push_back(by_group(
-        table, name,
-        [&](const std::vector<std::size_t>& rows) { return table.number(rows.front(), column); },
-        {.label = column, .log = true, .low = 1e-4, .high = 10.0}));
-  return figure;
-}
-
 }  // namespace
 
 Experiment tool_experiment() {
@@ -342,7 +327,6 @@ Experiment tool_experiment() {
           "case,camera,method,seed,force,torque,force_error,torque_error,force_noise,torque_noise,"
           "behind",
       .cells = tool_cells,
-      .figure = tool_figure,
       .scores = tool_scores};
 }
 

@@ -295,46 +295,6 @@ Scores zwidth_scores(const Table& table) {
   return scores;
 }
 
-// The worst of scenes and cameras, beside theory.
-Figure zwidth_figure(const Table& table) {
-  const auto wall = [&](std::size_t row) {
-    return fmt::format("{} {} k_d={}", table.text(row, "device"), table.text(row, "hand"),
-                       table.text(row, "damping"));
-  };
-  const auto least = [&](std::string_view column, std::string_view way) {
-    return by_group(
-        table, wall,
-        [&, column, way](const std::vector<std::size_t>& rows) {
-          double worst = anything;
-          for (const std::size_t row : rows)
-            if (table.text(row, "way") == way) worst = std::min(worst, table.number(row, column));
-          return worst;
-        },
-        {.label = "largest stable stiffness [N/m]", .log = true, .low = 50.0, .high = 10000.0});
-  };
-  Panel panel = least("stiffness", "straight");
-  const std::size_t methods = panel.series.size();
-  for (const Series& chain : least("stiffness", "chain").series) panel.series.push_back(chain);
-  for (std::size_t i = 0; i < 2 * methods; ++i) {
-    Series& series = panel.series[i];
-    series.name += i < methods ? ", worst scene" : ", through the chain";
-    series.mark = i < methods ? Mark::disc : Mark::ring;
-    series.colour = static_cast<int>(i % methods);
-    for (auto& point : series.points) point[1] += 0.2 * (series.colour - 1);  // side by side
-  }
-  const auto beside = [&](std::string_view column, std::string name, Mark mark) {
-    for (const Series& any : least(column, "straight").series) {  // the same for all methods
-      panel.series.push_back({std::move(name), any.points, Line::none, mark, grey});
-      return;
-    }
-  };
-  beside("bound", "2(b+k_d)/(T+2t_d)", Mark::plus);
-  beside("linear", "linear loop, no friction", Mark::cross);
-  panel.series.push_back(
-      {"1,500 N/m", {{1500.0, -anything}, {1500.0, anything}}, Line::dashed, Mark::none, grey});
-  return {{panel}};
-}
-
 }  // namespace
 
 Experiment zwidth_experiment() {
@@ -344,7 +304,6 @@ Experiment zwidth_experiment() {
           .header = "device,hand,scene,camera,method,way,damping,stiffness,bound,linear",
           .default_methods = {"paper", "sight", "ideal"},
           .cells = zwidth_cells,
-          .figure = zwidth_figure,
           .scores = zwidth_scores};
 }
 

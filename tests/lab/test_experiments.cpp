@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -16,7 +15,6 @@
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
 
-#include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -29,9 +27,7 @@ namespace fs = std::filesystem;
 class Lab : public ::testing::Test {
  protected:
   [[nodiscard]] Table run(std::string_view name, const ExperimentOptions& options) const {
-    Table table(name, csv(name, options, 2));
-    expect_drawn(find_experiment(name).figure(table));
-    return table;
+    return {name, csv(name, options, 2)};
   }
 
   [[nodiscard]] std::string csv(std::string_view name, const ExperimentOptions& options, int jobs,
@@ -223,55 +219,22 @@ TEST_F(Lab, RefusesToResumeARunWithOtherOptions) {
   EXPECT_THROW(run_experiment(find_experiment("lift"), options, runner, file("lift")), Error);
 }
 
-TEST_F(Lab, MakesAPageAndATableOfEveryClaim) {
-  const Experiment& experiment = find_experiment("flat");
-  const std::string text = csv("flat", {}, 2);
-  const Result result = make_result(experiment, {}, text, file("flat").parent_path());
-  EXPECT_NE(result_as_text(result).find("drawn in " + result.figure.string()), std::string::npos);
-  const auto bytes = [&] {
-    std::ifstream figure(result.figure);
-    return std::string(std::istreambuf_iterator<char>(figure), {});
+TEST_F(Lab, WritesClaimsAndScoresIntoTablesOfTheirOwn) {
+  const Result flat = make_result(find_experiment("flat"), {}, csv("flat", {}, 2));
+  ASSERT_EQ(flat.claims.size(), 1U);
+  EXPECT_EQ(flat.claims[0].verdict.substr(0, 10), "reproduced");
+  const auto text_of = [&](const char* name) {
+    std::ifstream in(file("flat").replace_filename(name));
+    return std::string(std::istreambuf_iterator<char>(in), {});
   };
-  const std::string figure = bytes();
-  EXPECT_EQ(csv("flat", {}, 1), text);
-  EXPECT_EQ(draw(file("flat")), result.figure);
-  EXPECT_EQ(bytes(), figure) << "drawn anew of another run's file";
-  ASSERT_EQ(result.claims.size(), 1U);
-  EXPECT_EQ(result.claims[0].verdict.substr(0, 10), "reproduced");
-  const fs::path page = write_report({result}, file("flat").parent_path());
-  std::ifstream in(page);
-  std::ostringstream html;
-  html << in.rdbuf();
-  EXPECT_NE(html.str().find("amplitude of this periodic"), std::string::npos);
-  EXPECT_NE(html.str().find(figure), std::string::npos);
-  EXPECT_FALSE(fs::exists(page.parent_path() / "bench.md")) << "no bench was run";
-  EXPECT_EQ(html.str().find("src="), std::string::npos) << "the page needs nothing beside it";
-}
-
-// Of the paper are those experiments alone that have its claims.
-TEST_F(Lab, TitlesItsPageByWhatWasRun) {
-  const fs::path folder = file("title").parent_path();
-  const auto page_of = [&](const std::vector<Result>& results) {
-    std::ifstream in(write_report(results, folder));
-    std::ostringstream html;
-    html << in.rdbuf();
-    return html.str();
-  };
-  const Result pop{.experiment = &find_experiment("pop"),
-                   .command = "palpate eval pop",
-                   .claims = {},
-                   .figure = {},
-                   .scores = Scores{.columns = {"method"}, .rows = {{"sight"}}, .note = ""}};
-  const std::string measured = page_of({pop});
-  EXPECT_NE(measured.find("<h1>Methods, measured</h1>"), std::string::npos) << measured;
-  EXPECT_EQ(measured.find("The paper, reproduced"), std::string::npos) << measured;
-  EXPECT_NE(measured.find("<td>sight</td>"), std::string::npos) << measured;
-
-  Result flat = pop;
-  flat.experiment = &find_experiment("flat");
-  flat.claims.push_back({"5.1", "in less than 1 ms", "1 ms", "1 ms", "reproduced"});
-  const std::string paper = page_of({pop, flat});
-  EXPECT_NE(paper.find("<h1>The paper, reproduced</h1>"), std::string::npos) << paper;
+  write_report({flat}, file("flat").parent_path());
+  EXPECT_EQ(text_of("bench.md"), "") << "no bench was run";
+  Result pop{.experiment = &find_experiment("pop"), .command = "palpate eval pop"};
+  pop.scores = Scores{.columns = {"method"}, .rows = {{"sight"}}, .note = ""};
+  write_report({pop, flat}, file("flat").parent_path());
+  EXPECT_NE(text_of("reproduction.md").find("amplitude of this periodic"), std::string::npos);
+  EXPECT_EQ(text_of("reproduction.md").find("sight |"), std::string::npos);
+  EXPECT_NE(text_of("bench.md").find("| sight |"), std::string::npos);
 }
 
 TEST(Methods, AreFoundByNameAndTheNearestIsSuggested) {
@@ -307,14 +270,6 @@ TEST(Direct, PushesInProportionToTheDepthBelowAPlane) {
   EXPECT_NEAR(direct->tick({0, 0, -0.004}, 0.0).force.z(), 600.0 * 0.004, 1e-6);
   EXPECT_NEAR(direct->tick({0, 0, -0.008}, 0.0).force.z(), 600.0 * 0.008, 1e-6);
   EXPECT_TRUE(direct->tick({0, 0, 0.004}, 0.0).force.isZero());
-}
-
-TEST(Direct, LosesTheSideOnAThinPlate) {
-  // Seen from above only, the plate pushes a hand out upwards however far it came through.
-  const PointCloud plane(test::flat_grid(), Vec3(0, 0, 1));
-  const auto direct = make_method("direct", {});
-  direct->observe({plane, 0.0});
-  EXPECT_TRUE(direct->tick({0, 0, -0.04}, 0.0).force.isZero()) << "out of its radius: popped";
 }
 
 }  // namespace test_experiments

@@ -21,7 +21,6 @@
 #include "lab/runner.hpp"
 #include "palpate/kernel/core/error.hpp"
 
-#include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -608,7 +607,6 @@ TEST_F(Field, ScoresTheMeanOfTheClasses) {
                     "m,a,coarse,2,thin,0,1,0,0,0,0,0,-,4,3,0,1,7,0,field:a?seed=3,\n"
                     "m,b,exact,0,-,0,0,0,0,1,0,0.1,-,3,0,0,0.01,0,0,field:b?seed=4,\n"
                     "m,c,coarse,0,thin,0,1,0,0,0,0,0,-,4,0,0,0,0,0,field:c?seed=5,\n");
-  expect_drawn(find_experiment("field").figure(table));
   const Scores scores = find_experiment("field").scores(table);
   using Line = std::vector<std::string>;
   EXPECT_EQ(scores.rows.at(0), (Line{"a", "2", "1", "50.0", "50.0", "0.5"}));

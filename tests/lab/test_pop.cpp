@@ -16,7 +16,6 @@
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
 
-#include "tests/lab/drawn.hpp"
 #include "tests/support/scale.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -51,7 +50,6 @@ TEST_F(Pop, TheRulerHoldsEveryCaseOfEveryFamily) {
     EXPECT_EQ(table.number(row, "dipped"), 0.0) << table.text(row, "family");
     EXPECT_EQ(table.number(row, "right"), 1.0) << table.text(row, "first_not_right");
   }
-  expect_drawn(find_experiment("pop").figure(table));
   const Scores scores = find_experiment("pop").scores(table);
   EXPECT_EQ(scores.rows.back()[2], "100.00");
 }

@@ -8,7 +8,6 @@
 #include "lab/runner.hpp"
 #include "palpate/kernel/core/error.hpp"
 
-#include "tests/lab/drawn.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -36,7 +35,6 @@ double sum(const Table& table, std::string_view column, std::string_view action)
 TEST(Real, TheRulerFollowsWhatIsMovedExactly) {
   const Table table = touch("ideal", "synthetic:desk?sensor=d4xx&frames=4");
   ASSERT_EQ(table.rows(), 32U) << "four actions at eight places";
-  expect_drawn(find_experiment("real").figure(table));
   for (std::size_t row = 0; row < table.rows(); ++row) {
     EXPECT_EQ(table.number(row, "lost"), 0.0) << row;
     EXPECT_LT(table.number(row, "error_mm"), 1e-6) << row;

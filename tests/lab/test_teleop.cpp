@@ -10,7 +10,6 @@
 #include "lab/experiment.hpp"
 #include "lab/experiments/teleop.hpp"
 
-#include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"
 
 namespace palpate::lab {
@@ -150,11 +149,6 @@ TEST(Teleop, MakesItsTable) {
   const std::string rows = cells.back()();
   const Table table("teleop", std::string(teleop.header) + "\n" + rows);
   EXPECT_EQ(table.rows(), 11U);
-  expect_drawn(teleop.figure(table));
-  const Table faults("teleop-faults", "fault,contact\nlink,3\nlink,1\nrobot,2\n");
-  const Figure shares = find_experiment("teleop-faults").figure(faults);
-  expect_drawn(shares);
-  EXPECT_EQ(shares.panels.at(0).series.at(1).points, (Points{{1.0, 0.5}, {3.0, 1.0}}));
   const Scores scores = teleop.scores(table);
   ASSERT_EQ(scores.rows.size(), 1U);
   EXPECT_EQ(scores.rows[0].size(), scores.columns.size());

@@ -5,7 +5,6 @@
 #include "lab/experiment.hpp"
 #include "lab/runner.hpp"
 
-#include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -44,7 +43,6 @@ TEST(ToolExperiment, ABoxThatLiesFlatHasTheTrueForceAndAPenaltyHasNot) {
   }
   EXPECT_LT(value(table, "ideal", "shape", "torque_error"), 0.05);
   const Experiment& tool = find_experiment("tool");
-  expect_drawn(tool.figure(table));
   const Scores scores = tool.scores(table);
   ASSERT_EQ(scores.rows.size(), 4U);
   EXPECT_EQ(scores.rows[0].size(), scores.columns.size());

@@ -10,7 +10,6 @@
 #include "lab/runner.hpp"
 #include "palpate/io/devices/sampled_wall.hpp"
 
-#include "tests/lab/drawn.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -76,7 +75,7 @@ TEST(ZWidth, AHandThatFeelsNothingIsNoContact) {
   EXPECT_FALSE(through.decays());
 }
 
-TEST(ZWidth, IsAnExperimentWithAFigure) {
+TEST(ZWidth, IsAnExperiment) {
   const test::TemporaryFolder folder;
   ExperimentOptions options;
   options.families = {"plane"};
@@ -85,7 +84,6 @@ TEST(ZWidth, IsAnExperimentWithAFigure) {
   const Experiment& zwidth = find_experiment("zwidth");
   const Table table("zwidth", run_experiment(zwidth, options, {}, folder.path() / "zwidth.csv"));
   EXPECT_EQ(table.rows(), 4U * 3U * 2U) << "devices, hands, ways";
-  expect_drawn(zwidth.figure(table));
   const Scores scores = zwidth.scores(table);
   EXPECT_EQ(scores.rows.size(), 12U);
   EXPECT_EQ(scores.rows.front().size(), scores.columns.size());

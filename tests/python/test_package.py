@@ -19,7 +19,7 @@ import zipfile
 
 import numpy
 import palpate
-from palpate import _core
+from palpate import _core, figures
 
 SOURCES = pathlib.Path(os.environ["PALPATE_SOURCES"])
 
@@ -193,6 +193,33 @@ class Package(unittest.TestCase):
         frame = palpate.dataframe(ticks)
         self.assertEqual(frame.index.name, "t")
         self.assertTrue(numpy.array_equal(frame["force_z"], ticks["force"][:, 2]))
+
+    @unittest.skipUnless(importlib.util.find_spec("matplotlib"), "matplotlib is not installed")
+    def test_files_of_the_program_as_figures(self):
+        program = os.environ["PALPATE_PROGRAM"]
+        listed = subprocess.run([program, "eval", "--list"], check=True, capture_output=True,
+                                text=True).stdout
+        self.assertEqual({line.split()[0] for line in listed.splitlines()},
+                         figures.FIGURES.keys() - {"growth"})
+        with tempfile.TemporaryDirectory() as folder:
+            def drawn(name, text):
+                (pathlib.Path(folder) / name).write_text(text)
+                return figures.draw(f"{folder}/{name}")
+            held = drawn("pop.csv", "method,family,cases,lost\na,one,4,1\nb,one,4,0\na,two,5,5\n")
+            self.assertEqual([list(line.get_xdata()) for line in held.axes[0].lines],
+                             [[75.0, 0.0], [100.0]])
+            growth = drawn("growth.csv", "series,x,points,tick_us\ncameras,1,70,0.5\n"
+                           "cameras,2,140,0.9\nfocal_length,300,28,0.4\n")
+            self.assertEqual([list(axes.lines[0].get_xdata()) for axes in growth.axes[:3]],
+                             [[], [1.0, 2.0], [28.0]])
+            trace = drawn("press.csv", "hip_y,hip_z,proxy_y,proxy_z,force_x,force_y,force_z\n"
+                          "1,2,1,3,0,3,4\n")
+            self.assertEqual(list(trace.axes[1].lines[0].get_ydata()), [5.0])
+            subprocess.run([program, "eval", "fidelity", "--families", "sine", "--methods",
+                            "sight,ideal", "--out", folder], check=True, capture_output=True)
+            subprocess.run([sys.executable, "-m", "palpate.figures", f"{folder}/fidelity.csv"],
+                           check=True, capture_output=True)
+            self.assertIn("<svg", (pathlib.Path(folder) / "fidelity.svg").read_text())
 
     @unittest.skipUnless(importlib.util.find_spec("matplotlib"), "matplotlib is not installed")
     def test_ticks_as_a_figure(self):

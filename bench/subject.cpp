@@ -37,8 +37,7 @@ Subject noisy_plane(int width, int height, double focal_length, double distance,
                                                              .cx = 0.5 * (width - 1),
                                                              .cy = 0.5 * (height - 1),
                                                              .distortion = {}});
-  Subject subject{.name = "plane",
-                  .frames = {},
+  Subject subject{.frames = {},
                   .surface = Vec3(0, 0, distance),
                   .into = Vec3::UnitZ(),
                   .along = Vec3(0.8, 0.6, 0)};
@@ -66,8 +65,7 @@ Subject noisy_points(std::size_t points, double spacing) {
                         spacing * static_cast<double>(j) - half, error(random));
   }
   std::shuffle(list.begin(), list.end(), random);
-  return {.name = "points",
-          .frames = {std::make_shared<PointCloud>(list, Vec3(0, 0, -1))},
+  return {.frames = {std::make_shared<PointCloud>(list, Vec3(0, 0, -1))},
           .surface = Vec3::Zero(),
           .into = Vec3::UnitZ(),
           .along = Vec3(0.8, 0.6, 0)};
@@ -100,8 +98,7 @@ Subject recorded(const std::string& name, std::shared_ptr<const Cloud> frame) {
   }
   const Vec3 sight = surface - eye;
   const Vec3 into = sight.norm() > 1e-3 ? Vec3(sight.normalized()) : Vec3::UnitZ();
-  return {.name = name,
-          .frames = {std::move(frame)},
+  return {.frames = {std::move(frame)},
           .surface = surface,
           .into = into,
           .along = into.unitOrthogonal()};

@@ -11,7 +11,6 @@ namespace palpate::bench {
 
 /// What is touched in a measurement: frames that alternate, and where and how a hand presses them.
 struct Subject {
-  std::string name;
   std::vector<std::shared_ptr<const Cloud>> frames;
   Vec3 surface;  ///< [m] world: where the hand comes down
   Vec3 into;     ///< [-] unit, into the surface

@@ -65,12 +65,11 @@ class Palpate final : public Coupling {
     else
       let_go(t);
     if (t < one_.robot_dies)
-      sent_ = robot_end(t, tool, out);
+      sent_ = robot_end(t, tool);
     else if (t < one_.robot_dies + own_stop)
       stopped_ = tool.place();
     else
       sent_ = stopped_;
-    out.goal = sent_;
     tool.lead_to(sent_, t + period, period);
   }
 
@@ -97,7 +96,7 @@ class Palpate final : public Coupling {
     leads_.send(lead_of(felt), t);
   }
 
-  Vec3 robot_end(double t, SimulatedTool& tool, TeleopTick& out) {
+  Vec3 robot_end(double t, SimulatedTool& tool) {
     if (const std::optional<Lead> lead = leads_.arrived(t)) led_.lead(lead_ = *lead, t);
     led_.tool_is_at(tool.place());
     guard_.run({.t = t});
@@ -108,7 +107,6 @@ class Palpate final : public Coupling {
     RobotState at{
         .t = t, .position = tool.place(), .velocity = tool.velocity(), .force = tool.contact()};
     const SetPoint::Order order = step_.next(guarded, seen, lead_.press, at, t);
-    out.led = step_.is_led();
     if (newest_.cloud)
       watch_.frame(std::exchange(newest_.cloud, nullptr), newest_.stamp, tool.place());
     return order.position;
@@ -197,7 +195,6 @@ class PositionForce final : public ForceLink {
     places_.send(place, t);
     if (const auto arrived = places_.arrived(t)) place_ = *arrived;
     if (place_) tool.lead_to(*place_, t + period, period);
-    out.led = place_.has_value();
     forces_.send(tool.contact(), t);
     if (const auto arrived = forces_.arrived(t)) force_ = *arrived;
   }
@@ -235,7 +232,6 @@ class Wave final : public ForceLink {
     if (sent_.place) *led_to_ += (1.0 - std::exp(-period / drift_time)) * (*sent_.place - *led_to_);
     tool.push(pull, t + period, period);
     back_.send((impedance * led_at_ - pull) / root, t);
-    out.led = true;
   }
 
  private:
@@ -275,7 +271,6 @@ class Tdpa final : public ForceLink {
     out_.send({place, velocity_, taken_here_}, t);
 
     if (const auto arrived = out_.arrived(t)) sent_ = *arrived;
-    out.led = sent_.has_value();
     if (!sent_) return;
     if (!led_to_) led_to_ = sent_->place;
     const Vec3 pull = SimulatedTool::stiffness() * (*led_to_ - tool.place()) -

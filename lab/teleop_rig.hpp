@@ -120,10 +120,8 @@ struct TeleopTick {
   double work = 0.0;                  ///< [J] that the force has done on the hand so far
   Vec3 tool = Vec3::Zero();           ///< [m] world
   Vec3 tool_velocity = Vec3::Zero();  ///< [m/s]
-  Vec3 goal = Vec3::Zero();           ///< [m] world: where the tool is sent; palpate alone
   double depth = 0.0;                 ///< [m] of the tool in the true surface
   double contact = 0.0;               ///< [N] of the surface on the tool
-  bool led = false;
 };
 
 /// Plays a case at 1 kHz. Deterministic.

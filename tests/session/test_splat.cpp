@@ -134,7 +134,43 @@ TEST(Splat, IsFeltBehindFog) {
   EXPECT_LT(forces.most, 1.07 * expected);
 }
 
-// [m] of one ray by the definition, in doubles; infinite where no half is hidden.
+TEST(Splat, HasNoFloaters) {
+  std::vector<Gaussian> gaussians = ball();
+  for (std::size_t i = 0; i < count; i += 400) {
+    for (const float height : {1.25F, 1.3F}) {  // in pairs that touch one another
+      gaussians.push_back(gaussians[i]);
+      gaussians.back().mean *= height;
+    }
+  }
+  const SplatBody body(gaussians, "a ball with floaters");
+  EXPECT_EQ(body.size(), count);
+  EXPECT_EQ(body.floaters(), count / 200);
+  EXPECT_LT(body.bounds().high.z(), radius + 5e-3);
+  EXPECT_TRUE(fails_saying([&] { SplatBody({gaussians.back()}, "one"); }, "one", "beside it"));
+}
+
+TEST(Splat, FogAloneHasNoDepth) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> some(-0.5F, 0.5F);
+  const auto drawn = [&](float thick) {
+    std::vector<Gaussian> gaussians = ball();  // out of sight, so that something is opaque
+    for (int i = 0; i < 20000; ++i)
+      gaussians.push_back({{0.1F * some(random), 0.1F * some(random), 0.25F + thick * some(random)},
+                           {2e-3F, 2e-3F, 2e-3F},
+                           Eigen::Quaternionf::Identity(),
+                           0.1F});
+    constexpr int size = 32;
+    const Intrinsics k{
+        .width = size, .height = size, .fx = 250.0, .fy = 250.0, .cx = 15.5, .cy = 15.5};
+    std::vector<float> depth(size * size, std::numeric_limits<float>::infinity());
+    SplatBody(gaussians, "fog").draw({Eigen::Isometry3d::Identity(), k, 0.06, 0.5}, depth);
+    return std::count_if(depth.begin(), depth.end(), [](float z) { return std::isfinite(z); });
+  };
+  EXPECT_LT(drawn(0.3F), 10);
+  EXPECT_GT(drawn(2e-3F), 1000);  // of the same, but thin
+}
+
+// [m] of one ray by the definition, in doubles; infinite where no half is hidden, or in fog.
 double depth_of_ray(const std::vector<Gaussian>& in_order, const Vec3& ray) {
   double left = 1.0, weight = 0.0, sum = 0.0;
   for (const Gaussian& g : in_order) {
@@ -150,7 +186,7 @@ double depth_of_ray(const std::vector<Gaussian>& in_order, const Vec3& ray) {
     sum += left * share * along;
     left *= 1.0 - share;
   }
-  return left < 0.5 ? sum / weight : std::numeric_limits<double>::infinity();
+  return left < 0.5 && weight >= 0.25 ? sum / weight : std::numeric_limits<double>::infinity();
 }
 
 TEST(Splat, IsDrawnAsItIsDefined) {
@@ -158,15 +194,15 @@ TEST(Splat, IsDrawnAsItIsDefined) {
   std::uniform_real_distribution<float> some(-1.0F, 1.0F);
   const auto next = [&] { return some(random); };
   std::vector<Gaussian> gaussians;
-  for (int i = 0; i < 400; ++i)
+  for (int i = 0; i < 200; ++i)
     gaussians.push_back(
         {{0.03F * next(), 0.03F * next(), 0.25F + 0.02F * next()},
          {5e-3F + 4e-3F * next(), 5e-3F + 4e-3F * next(), i % 2 == 0 ? 2e-5F : 2e-3F},
          Eigen::Quaternionf(1.0F, next(), next(), next()).normalized(),
          0.5F + 0.4F * next()});
-  constexpr int size = 64;
+  constexpr int size = 32;
   const Intrinsics k{
-      .width = size, .height = size, .fx = 250.0, .fy = 250.0, .cx = 31.5, .cy = 31.5};
+      .width = size, .height = size, .fx = 250.0, .fy = 250.0, .cx = 15.5, .cy = 15.5};
   std::vector<float> depth(size * size, std::numeric_limits<float>::infinity());
   SplatBody(gaussians, "some").draw({Eigen::Isometry3d::Identity(), k, 0.1, 0.4}, depth);
   std::sort(gaussians.begin(), gaussians.end(),

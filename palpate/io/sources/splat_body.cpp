@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -22,6 +23,8 @@ constexpr double reach_of_sigma = 3.0;    // standard deviations that are drawn
 constexpr float thinnest_sigma = 1e-5F;   // [m]
 constexpr double widest_sigma = 1e3;      // [m]
 constexpr float same_surface = 3e-3F;     // [m] along a ray
+constexpr float least_surface = 0.25F;    // [-] of light that ends within that; of less, it is fog
+constexpr int least_neighbours = 4;       // whom a Gaussian of a surface touches; floaters do not
 constexpr float least_left = 0.02F;       // [-] of light that is followed on
 constexpr float least_share = 0.02F;      // [-] of light that a Gaussian takes, where it is drawn
 constexpr int lanes = 8;                  // pixels that are drawn at once
@@ -159,22 +162,54 @@ SplatBody::SplatBody(std::vector<Gaussian> gaussians, const std::string& name) {
              g.turn.norm() > 1e-6F && g.opacity >= least_opacity &&
              g.sigma.maxCoeff() < widest_sigma);
   });
-  bool carries = false;
-  std::vector<Box> boxes(gaussians.size());
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    Gaussian& g = gaussians[i];
+  for (Gaussian& g : gaussians) {
     g.turn.normalize();
     g.sigma = g.sigma.cwiseMax(thinnest_sigma);
-    carries = carries || g.opacity >= carrying_opacity;
+  }
+  gaussians_ = std::move(gaussians);
+  const std::size_t all = gaussians_.size();
+  if (all > 0) build_tree();
+  std::vector<Gaussian> rooted;
+  std::copy_if(gaussians_.begin(), gaussians_.end(), std::back_inserter(rooted),
+               [&](const Gaussian& g) { return touches_others(g); });
+  floaters_ = all - rooted.size();
+  gaussians_ = std::move(rooted);
+  if (std::none_of(gaussians_.begin(), gaussians_.end(),
+                   [](const Gaussian& g) { return g.opacity >= carrying_opacity; }))
+    throw Error(name, "none of its Gaussians hides what is behind it and has others beside it",
+                "check that its opacities are logits");
+  if (floaters_ > 0) build_tree();
+}
+
+void SplatBody::build_tree() {
+  std::vector<Box> boxes;
+  boxes.reserve(gaussians_.size());
+  for (const Gaussian& g : gaussians_) {
     const Vec3 mean = g.mean.cast<double>();
     const Vec3 half = half_sides(g);
-    boxes[i] = {mean - half, mean + half};
+    boxes.push_back({mean - half, mean + half});
   }
-  if (!carries)
-    throw Error(name, "none of its Gaussians hides what is behind it",
-                "check that its opacities are logits");
-  tree_.emplace(boxes, gaussians);
-  gaussians_ = std::move(gaussians);
+  tree_.emplace(boxes, gaussians_);
+}
+
+bool SplatBody::touches_others(const Gaussian& g) const {
+  const auto reach_of = [](const Gaussian& of) {
+    return static_cast<float>(reach_of_sigma) * of.sigma.maxCoeff();
+  };
+  const float reach = reach_of(g);
+  const Vec3 at = g.mean.cast<double>();
+  int touched = -1;  // itself
+  tree_->walk(
+      [&](const Box& box) {
+        return touched < least_neighbours && box.squared_distance(at) <= reach * reach;
+      },
+      [&](std::uint32_t first, std::uint32_t end) {
+        for (std::uint32_t i = first; i < end; ++i) {
+          const float touching = reach + reach_of(gaussians_[i]);
+          touched += (gaussians_[i].mean - g.mean).squaredNorm() <= touching * touching ? 1 : 0;
+        }
+      });
+  return touched >= least_neighbours;
 }
 
 // The nearest place of the rectangles of two standard deviations along the two longer axes.
@@ -245,7 +280,8 @@ void SplatBody::draw(const View& view, std::span<float> depth) const {
                             rays.left.data(), rays.weight.data(), rays.sum.data());
   }
   for (std::size_t i = 0; i < depth.size(); ++i) {
-    if (rays.left[i] < 0.5F) depth[i] = rays.sum[i] / rays.weight[i];
+    if (rays.left[i] < 0.5F && rays.weight[i] >= least_surface)
+      depth[i] = rays.sum[i] / rays.weight[i];
   }
 }
 
@@ -268,7 +304,8 @@ std::unique_ptr<Source> open_splat(const Uri& uri) {
   }
   file = {};
   auto body = std::make_unique<const SplatBody>(std::move(gaussians), uri.path());
-  const std::string what = "a splat of " + std::to_string(body->size()) + " Gaussians";
+  std::string what = "a splat of " + std::to_string(body->size()) + " Gaussians";
+  if (body->floaters() > 0) what += " and " + std::to_string(body->floaters()) + " floaters";
   return open_body(uri, options, std::move(body), what);
 }
 

@@ -22,22 +22,29 @@ struct Gaussian {
 /// A splat: depth is where the opacity gathered along a ray passes one half.
 ///
 /// Each Gaussian counts at the place of the ray where its own response is greatest, not at its
-/// centre; of those that lie within 3 mm of one another there, the mean by what they hide.
+/// centre; of those that lie within 3 mm of one another there, the mean by what they hide. Where
+/// these hide less than a quarter, it is fog, which has no depth.
 class SplatBody final : public Body {
  public:
-  /// Gaussians that are not finite or hide less than 5 % at their centre are left out.
+  /// Gaussians that are not finite or hide less than 5 % at their centre are left out, and those
+  /// that touch fewer than four others: floaters.
   /// @param name  for messages
   /// @throws Error if none is left that hides half.
   SplatBody(std::vector<Gaussian> gaussians, const std::string& name);
 
   [[nodiscard]] std::size_t size() const { return gaussians_.size(); }
+  [[nodiscard]] std::size_t floaters() const { return floaters_; }
   [[nodiscard]] const Box& bounds() const override { return tree_->bounds(); }
   [[nodiscard]] Vec3 nearest(const Vec3& at) const override;
   void draw(const View& view, std::span<float> depth) const override;
 
  private:
+  void build_tree();
+  [[nodiscard]] bool touches_others(const Gaussian& g) const;
+
   std::vector<Gaussian> gaussians_;  // in the order of the tree
   std::optional<BoxTree> tree_;
+  std::size_t floaters_ = 0;
 };
 
 }  // namespace palpate

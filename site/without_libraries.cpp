@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// In place of the files that need SQLite, zstd, lz4 and bzip2: what they read is refused in
+// In place of the files that need SQLite, zstd, lz4, bzip2 and zlib: what they read is refused in
 // one sentence, but for zstd, which the page's JavaScript decodes. There are no drivers, either.
 #include <cstring>
 #include <memory>
@@ -9,6 +9,7 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/io/bag/bag_file.hpp"
 #include "palpate/io/bag/compression.hpp"
+#include "palpate/io/sources/point_file.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 #include "site/page.hpp"
@@ -48,6 +49,10 @@ std::vector<std::byte> decompress_lz4(std::span<const std::byte> /*packed*/,
 std::vector<std::byte> decompress_bz2(std::span<const std::byte> /*packed*/,
                                       std::size_t /*max_bytes*/, const std::string& name) {
   refuse(name, "it is compressed with bzip2");
+}
+
+PointFile read_spz(const std::filesystem::path& path) {
+  refuse(path.string(), "it is an SPZ");
 }
 
 std::unique_ptr<BagFile> open_sqlite_file(const std::filesystem::path& file) {

@@ -106,7 +106,8 @@ TEST_F(VirtualCameraTest, TakesScaleAxesAndPoseFromTheUri) {
 
 TEST_F(VirtualCameraTest, SaysWhatIsWrongWithAFile) {
   EXPECT_TRUE(fails_saying([&] { open("up=w"); }, "'up'", "'w' is no axis", "give x, y, z"));
-  EXPECT_TRUE(fails_saying([] { open_source("map:a.obj"); }, "no PLY or STL", "FILE.stl"));
+  EXPECT_TRUE(
+      fails_saying([] { open_source("map:a.off"); }, "no PLY, STL, OBJ or glTF", "FILE.ply"));
   EXPECT_TRUE(fails_saying([] { open_source("map:none.ply"); }, "none.ply"));
   const std::string points =
       folder_

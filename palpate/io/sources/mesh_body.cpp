@@ -112,12 +112,17 @@ void MeshBody::draw(const View& view, std::span<float> depth) const {
 }
 
 std::unique_ptr<Source> open_map(const Uri& uri) {
-  const BodyOptions options = body_options(uri);
   const std::filesystem::path path = uri.path();
   const std::string ending = lower_case(path.extension().string());
-  if (ending != ".ply" && ending != ".stl")
-    throw Error(uri.text(), "it is no PLY or STL file", "give a mesh as FILE.ply or FILE.stl");
-  PointFile file = ending == ".ply" ? read_ply(path) : read_stl(path);
+  const bool is_gltf = ending == ".glb" || ending == ".gltf";
+  if (!is_gltf && ending != ".ply" && ending != ".stl" && ending != ".obj")
+    throw Error(uri.text(), "it is no PLY, STL, OBJ or glTF file",
+                "give a mesh as FILE.ply, .stl, .obj, .glb or .gltf");
+  const BodyOptions options = body_options(uri, is_gltf, is_gltf);
+  PointFile file = is_gltf            ? read_gltf(path, false)
+                   : ending == ".ply" ? read_ply(path)
+                   : ending == ".stl" ? read_stl(path)
+                                      : read_obj(path);
   for (Vec3& point : file.points) point = options.scale * (options.turn * point);
   auto body = std::make_unique<const MeshBody>(file.points, file.triangles, path.string());
   return open_body(uri, options, std::move(body),

@@ -63,8 +63,9 @@ const Registry<SourceScheme>& standard_sources() {
       {{"synthetic", "synthetic:SCENE, a simulated depth camera", open_synthetic},
        {"pcd", "pcd:FILE|DIR, point clouds of the Point Cloud Library", open_point_files},
        {"ply", "ply:FILE|DIR, point clouds and meshes", open_point_files},
-       {"map", "map:FILE, a mesh as PLY or STL, looked at where the hand is", open_map},
-       {"splat", "splat:FILE, Gaussians as PLY, looked at where the hand is", open_splat},
+       {"map", "map:FILE, a mesh as PLY, STL, OBJ or glTF, looked at where the hand is", open_map},
+       {"splat", "splat:FILE, Gaussians as PLY, SPZ or glTF, looked at where the hand is",
+        open_splat},
        {"tum", "tum:DIR, a recording of the TUM RGB-D layout", open_tum},
        {"depth", "depth:DIR|FILE.png, depth images as 16-bit PNG", open_depth},
        {"recording", "recording:BAG, a session of palpate's, or another bag of ROS",
@@ -75,14 +76,16 @@ const Registry<SourceScheme>& standard_sources() {
 std::string uri_of_file(const std::filesystem::path& file) {
   const std::string ending = lower_case(file.extension().string());
   for (auto [known, scheme] :
-       {std::pair(".pcd", "pcd:"), std::pair(".ply", "ply:"), std::pair(".db3", "recording:"),
+       {std::pair(".pcd", "pcd:"), std::pair(".ply", "ply:"), std::pair(".stl", "map:"),
+        std::pair(".obj", "map:"), std::pair(".spz", "splat:"), std::pair(".glb", "map:"),
+        std::pair(".gltf", "map:"), std::pair(".db3", "recording:"),
         std::pair(".mcap", "recording:"), std::pair(".bag", "recording:")}) {
     if (ending != known) continue;
-    if (ending == ".ply" && holds_splat(file)) scheme = "splat:";
+    if (holds_splat(file)) scheme = "splat:";
     const std::string path = file.string();
     return scheme + path + (path.find('?') == std::string::npos ? "" : "?");
   }
-  std::string remedy = "give a .pcd, .ply, .db3, .mcap or .bag file";
+  std::string remedy = "give a .pcd, .ply, .stl, .obj, .glb, .spz, .db3, .mcap or .bag file";
   if (ending == ".png" || ending == ".txt")
     remedy = "start the program with --camera depth:FOLDER or tum:FOLDER, of all its images";
   if (ending == ".mkv")

@@ -83,7 +83,8 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name);
 PointFile read_splat(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_splat(std::span<const std::byte> bytes, std::string_view name);
-/// Does the header of a PLY file declare Gaussians? False too of what cannot be read.
+/// Does a PLY or glTF file declare Gaussians in its first 64 kB, or is it an SPZ? False too of what
+/// cannot be read.
 bool holds_splat(const std::filesystem::path& path);
 
 /// Reads an STL file, binary or ascii, into `points` and `triangles`. Corners at the same place are
@@ -94,5 +95,27 @@ bool holds_splat(const std::filesystem::path& path);
 PointFile read_stl(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_stl(std::span<const std::byte> bytes, std::string_view name);
+
+/// Reads a Wavefront OBJ's `v` and `f` into `points` and `triangles`; polygons are fanned. All else
+/// is passed over. @throws Error naming the file, the line, and what was wrong
+PointFile read_obj(const std::filesystem::path& path);
+/// The same for bytes in memory; `name` is what an error calls them.
+PointFile parse_obj(std::span<const std::byte> bytes, std::string_view name);
+
+/// Reads an SPZ of versions 1 to 3 as read_splat does a PLY. Colours are passed over.
+///
+/// Allocates in proportion to the size of the file, whatever its header declares.
+/// @throws Error naming the file and what was wrong
+PointFile read_spz(const std::filesystem::path& path);
+/// The same for bytes in memory; `name` is what an error calls them.
+PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name);
+
+/// Reads a glTF 2.0 or GLB: the triangles of its scene or, `as_splat`, the Gaussians of its
+/// KHR_gaussian_splatting, each moved by its nodes. Buffers are inside, or files beside or below.
+/// @throws Error naming the file and what was wrong
+PointFile read_gltf(const std::filesystem::path& path, bool as_splat);
+/// The same for bytes in memory; `name` is what an error calls them. @param folder  of the buffers
+PointFile parse_gltf(std::span<const std::byte> bytes, std::string_view name,
+                     const std::filesystem::path& folder, bool as_splat);
 
 }  // namespace palpate

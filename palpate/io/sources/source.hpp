@@ -113,8 +113,7 @@ const Registry<SourceScheme>& standard_sources();
 /// @throws Error for another word.
 SensorKind sensor_option(const Uri& uri, SensorKind known);
 
-/// The URI of a single file by what its name ends with: .pcd, .ply, .db3, .mcap or .bag; of a .ply
-/// also by whether it holds Gaussians.
+/// The URI of a single file by what its name ends with, and by whether it holds Gaussians.
 /// @throws Error for any other ending, saying what to do with such a file.
 std::string uri_of_file(const std::filesystem::path& file);
 

@@ -286,8 +286,12 @@ void SplatBody::draw(const View& view, std::span<float> depth) const {
 }
 
 std::unique_ptr<Source> open_splat(const Uri& uri) {
-  const BodyOptions options = body_options(uri);
-  PointFile file = read_splat(uri.path());
+  const std::filesystem::path path = uri.path();
+  const std::string ending = lower_case(path.extension().string());
+  const bool is_spz = ending == ".spz";
+  const bool is_gltf = ending == ".glb" || ending == ".gltf";
+  const BodyOptions options = body_options(uri, is_spz || is_gltf, is_gltf);
+  PointFile file = is_spz ? read_spz(path) : is_gltf ? read_gltf(path, true) : read_splat(path);
   const Eigen::Quaternionf turn(Eigen::Quaterniond(options.turn).cast<float>());
   std::vector<Gaussian> gaussians(file.points.size());
   for (std::size_t i = 0; i < gaussians.size(); ++i) {

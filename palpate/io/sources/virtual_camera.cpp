@@ -226,7 +226,7 @@ void VirtualCamera::look(const Aim& aim) {
   view_.nearest = std::max(standoff - aim.free, first_depth);
 }
 
-BodyOptions body_options(const Uri& uri) {
+BodyOptions body_options(const Uri& uri, bool y_up, bool in_metres) {
   constexpr std::array<std::string_view, 3> known{"scale", "up", "fps"};
   constexpr std::array<std::string_view, 6> axes{"x", "y", "z", "-x", "-y", "-z"};
   uri.allow_only(known);
@@ -234,7 +234,7 @@ BodyOptions body_options(const Uri& uri) {
                       .turn = {},
                       .frame_rate = uri.number_option("fps", 60.0, 1.0, 1000.0, "Hz"),
                       .assumed = {}};
-  const std::string up = uri.text_option("up", "z");
+  const std::string up = uri.text_option("up", y_up ? "y" : "z");
   const auto* const found = std::find(axes.begin(), axes.end(), up);
   if (found == axes.end())
     throw Error(uri.text() + ": option 'up'", "'" + up + "' is no axis",
@@ -242,8 +242,8 @@ BodyOptions body_options(const Uri& uri) {
   const auto number = found - axes.begin();
   const Vec3 axis = (number < 3 ? 1.0 : -1.0) * Vec3::Unit(number % 3);
   options.turn = Eigen::Quaterniond::FromTwoVectors(axis, Vec3::UnitZ()).toRotationMatrix();
-  if (!uri.has("scale")) options.assumed = "its unit is assumed to be 1 m (?scale=)";
-  if (!uri.has("up"))
+  if (!uri.has("scale") && !in_metres) options.assumed = "its unit is assumed to be 1 m (?scale=)";
+  if (!uri.has("up") && !y_up)
     options.assumed +=
         (options.assumed.empty() ? "its" : ", its") + std::string(" z axis to be up (?up=)");
   return options;

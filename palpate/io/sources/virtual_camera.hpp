@@ -103,16 +103,19 @@ struct BodyOptions {
 };
 
 /// Options scale=1m up=z fps=60Hz. @throws Error for others, or values out of range
-BodyOptions body_options(const Uri& uri);
+/// @param y_up       the file's format says that y is up: the default of `up`
+/// @param in_metres  it says that its unit is 1 m
+BodyOptions body_options(const Uri& uri, bool y_up = false, bool in_metres = false);
 
 /// A virtual camera on a body, said to look at `what`, "a mesh of 12 triangles".
 std::unique_ptr<Source> open_body(const Uri& uri, const BodyOptions& options,
                                   std::unique_ptr<const Body> body, const std::string& what);
 
-/// `map:FILE?scale=1m&up=z&fps=60Hz`: a mesh as PLY or STL.
+/// `map:FILE?scale=1m&up=z&fps=60Hz`: a mesh as PLY, STL, OBJ or glTF.
 /// @throws Error if the file cannot be read or has no triangles, or an option is not known.
 std::unique_ptr<Source> open_map(const Uri& uri);
-/// `splat:FILE`, with the same options: Gaussians as PLY. @throws Error if it is no splat
+/// `splat:FILE`, with the same options: Gaussians as PLY, SPZ or glTF. @throws Error if it is no
+/// splat
 std::unique_ptr<Source> open_splat(const Uri& uri);
 
 }  // namespace palpate

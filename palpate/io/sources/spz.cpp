@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <zlib.h>
+
+#include "palpate/io/sources/files.hpp"
+#include "palpate/io/sources/point_file.hpp"
+#include "palpate/io/sources/point_file_detail.hpp"
+#include "palpate/kernel/core/error.hpp"
+
+namespace palpate {
+namespace {
+
+constexpr std::uintmax_t largest_spz = std::uintmax_t{1} << 31;
+constexpr std::uint32_t magic = 0x5053474e;  // "NGSP"
+constexpr const char* older = "write it as version 1 to 3";
+constexpr std::size_t most_inflated = 1032;  // [-] times its size, what deflate can hold at most
+
+// Unpacks gzip, piece by piece.
+class Unpacker {
+ public:
+  Unpacker(std::span<const std::byte> bytes, std::string_view name) : name_(name) {
+    constexpr int gzip = 16;  // added to the window's bits, of which 0 are the header's
+    stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));
+    stream_.avail_in = static_cast<uInt>(bytes.size());
+    if (inflateInit2(&stream_, gzip) != Z_OK) fail("zlib does not start", "free some memory");
+  }
+  ~Unpacker() { inflateEnd(&stream_); }
+  Unpacker(const Unpacker&) = delete;
+  Unpacker& operator=(const Unpacker&) = delete;
+
+  std::vector<std::byte> take(std::size_t size) {
+    std::vector<std::byte> bytes(size);
+    stream_.next_out = reinterpret_cast<Bytef*>(bytes.data());
+    stream_.avail_out = static_cast<uInt>(size);
+    const int result = size == 0 ? Z_OK : inflate(&stream_, Z_SYNC_FLUSH);
+    if (stream_.avail_out > 0)
+      fail(result == Z_DATA_ERROR ? "it is no gzip, or a damaged one" : "ends within its Gaussians",
+           detail::cut_short);
+    return bytes;
+  }
+  [[noreturn]] void fail(const std::string& reason, const std::string& remedy) const {
+    throw Error(name_, reason, remedy);
+  }
+
+ private:
+  std::string name_;
+  z_stream stream_{};
+};
+
+double of_half(std::uint16_t half) {
+  const int exponent = half >> 10U & 31U;
+  const double mantissa = half & 1023U;
+  const double size =
+      exponent == 0 ? std::ldexp(mantissa, -24) : std::ldexp(1024.0 + mantissa, exponent - 25);
+  return exponent == 31 ? NAN : (half & 0x8000U) != 0 ? -size : size;
+}
+
+// x, y, z, w of the three smallest components: 2 bits say which is left out, then 10 each, of which
+// the first is the sign.
+Eigen::Vector4d smallest_three(std::uint32_t bits) {
+  Eigen::Vector4d q = Eigen::Vector4d::Zero();
+  const auto largest = static_cast<Eigen::Index>(bits >> 30U);
+  for (Eigen::Index i = 4; i-- > 0;) {
+    if (i == largest) continue;
+    const double size = (bits & 511U) / (511.0 * std::numbers::sqrt2);
+    q[i] = (bits & 512U) != 0 ? -size : size;
+    bits >>= 10U;
+  }
+  q[largest] = std::sqrt(std::max(1.0 - q.squaredNorm(), 0.0));
+  return q;
+}
+
+}  // namespace
+
+PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
+  constexpr auto little = std::endian::little;
+  Unpacker file(bytes, name);
+  if (bytes.size() >= 4 && detail::load<std::uint32_t>(bytes.data(), little) == magic)
+    file.fail("SPZ version 4, which is not packed by gzip, is not read", older);
+  const std::vector<std::byte> header = file.take(16);
+  const auto version = detail::load<std::uint32_t>(&header[4], little);
+  const std::size_t count = detail::load<std::uint32_t>(&header[8], little);
+  const auto fraction = std::to_integer<int>(header[13]);  // bits of a coordinate
+  if (detail::load<std::uint32_t>(header.data(), little) != magic)
+    file.fail("it is no SPZ: it does not begin with NGSP", "give a splat as FILE.spz");
+  if (version < 1 || version > 3)
+    file.fail("SPZ version " + std::to_string(version) + " is not known", older);
+  const std::size_t place_size = version == 1 ? 2 : 3;
+  const std::size_t turn_size = version < 3 ? 3 : 4;
+  if (count > most_inflated * bytes.size() / (3 * place_size + 7 + turn_size) || fraction > 24)
+    file.fail("its header promises " + std::to_string(count) + " Gaussians, with " +
+                  std::to_string(fraction) + " bits of fraction, more than it can hold",
+              detail::cut_short);
+  const std::vector<std::byte> places = file.take(3 * place_size * count);
+  const std::vector<std::byte> opacities = file.take(count);
+  file.take(3 * count);  // colours
+  const std::vector<std::byte> scales = file.take(3 * count);
+  const std::vector<std::byte> turns = file.take(turn_size * count);
+
+  PointFile cloud;
+  SplatColumns& splat = cloud.splat.emplace();
+  cloud.encoding = "SPZ version " + std::to_string(version);
+  for (std::size_t i = 0; i < count; ++i) {
+    Vec3 place, scale;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::byte* const at = &places[place_size * (3 * i + k)];
+      const std::int32_t high = std::to_integer<std::int8_t>(at[place_size - 1]);  // with the sign
+      const auto axis = static_cast<Eigen::Index>(k);
+      place[axis] =
+          version == 1
+              ? of_half(detail::load<std::uint16_t>(at, little))
+              : std::ldexp(high * 65536 + detail::load<std::uint16_t>(at, little), -fraction);
+      scale[axis] = std::to_integer<int>(scales[3 * i + k]) / 16.0 - 10.0;
+    }
+    Eigen::Vector4d turn;
+    const std::byte* const at = &turns[turn_size * i];
+    if (version == 3) {
+      turn = smallest_three(detail::load<std::uint32_t>(at, little));
+    } else {
+      for (int k = 0; k < 3; ++k) turn[k] = std::to_integer<int>(at[k]) / 127.5 - 1.0;
+      turn[3] = 0.0;
+      turn[3] = std::sqrt(std::max(1.0 - turn.squaredNorm(), 0.0));
+    }
+    const double opacity = std::to_integer<int>(opacities[i]) / 255.0;
+    cloud.points.push_back(place);
+    splat.log_scales.push_back(scale);
+    splat.heads.emplace_back(turn[3], std::log(opacity / (1.0 - opacity)), 0.0);
+    splat.rotations.push_back(turn.head<3>());
+  }
+  cloud.width = count;
+  cloud.non_finite = detail::count_non_finite(cloud.points);
+  return cloud;
+}
+
+PointFile read_spz(const std::filesystem::path& path) {
+  return parse_spz(read_file(path, largest_spz), path.string());
+}
+
+}  // namespace palpate

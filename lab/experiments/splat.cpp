@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <random>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "lab/experiment.hpp"
+#include "lab/method.hpp"
+#include "lab/play.hpp"
+#include "lab/statistics.hpp"
+#include "palpate/io/sources/scene.hpp"
+#include "palpate/io/sources/splat_body.hpp"
+
+namespace palpate::lab {
+namespace {
+
+constexpr double splat_depth = 5e-3;      // [m] of the hand behind the surface
+constexpr double splat_height = 30e-3;    // [m] above it, where the hand begins
+constexpr double splat_spacing = 2e-3;    // [m] between Gaussians
+constexpr double splat_down = 0.5;        // [s] until the hand is there
+constexpr double splat_rest_from = 1.0;   // [s] from when on it is measured at rest
+constexpr double splat_round_from = 2.0;  // [s] when it goes round
+constexpr double splat_end = 5.0;         // [s] once round
+constexpr double splat_rate = 60.0;       // [Hz] of the virtual camera
+
+constexpr std::array<std::string_view, 5> splat_kinds{"clean", "floaters", "haze", "holes",
+                                                      "rough"};
+
+struct SplatShape {
+  std::string_view name;
+  Shape shape;
+  Vec3 half;  // [m] of a box about it
+};
+
+std::vector<SplatShape> splat_shapes() {
+  return {{"ball", Sphere{0.05}, Vec3::Constant(0.05)},
+          {"rod", Capsule{0.02, 0.05}, {0.02, 0.07, 0.02}}};
+}
+
+// Flat Gaussians, on average one for each square of splat_spacing: the places of a lattice that are
+// near the surface, moved onto it.
+std::vector<Gaussian> covered(const SplatShape& of, std::string_view kind, std::uint64_t seed) {
+  constexpr double wide = 0.75;            // [spacing] standard deviation along the surface
+  constexpr float thin = 1e-4F;            // [m]
+  constexpr double floater_height = 0.02;  // [m]
+  constexpr double haze_height = 0.01;     // [m]
+  constexpr double hole_radius = 4e-3;     // [m]
+  constexpr double rough = 1e-3;           // [m] standard deviation of depth
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  std::vector<Gaussian> all;
+  std::vector<Vec3> holes;
+  const auto add = [&](const Nearest& at, double height, const Eigen::Vector3f& sigma,
+                       float opacity) {
+    all.push_back(
+        {(at.point + height * at.normal).cast<float>(), sigma,
+         Eigen::Quaternionf::FromTwoVectors(Eigen::Vector3f::UnitZ(), at.normal.cast<float>()),
+         opacity});
+  };
+  const auto flat = static_cast<float>(wide * splat_spacing);
+  const Vec3 low = -of.half - Vec3::Constant(splat_spacing);
+  for (double x = low.x(); x <= -low.x(); x += splat_spacing) {
+    for (double y = low.y(); y <= -low.y(); y += splat_spacing) {
+      for (double z = low.z(); z <= -low.z(); z += splat_spacing) {
+        const Nearest at = nearest(of.shape, {x, y, z});
+        if (!(std::abs(at.distance) < 0.5 * splat_spacing)) continue;
+        const double chance = uniform(random);
+        if (kind == "holes" && chance < 2e-3) holes.push_back(at.point);
+        if (kind == "floaters" && chance < 0.02)
+          add(at, (1.0 + uniform(random)) * floater_height, {2e-3F, 2e-3F, 2e-3F}, 0.9F);
+        if (kind == "haze" && chance < 0.25)
+          add(at, (1.0 + uniform(random)) * haze_height, {3e-3F, 3e-3F, 3e-3F}, 0.08F);
+        add(at, kind == "rough" ? rough * normal(random) : 0.0, {flat, flat, thin}, 0.95F);
+      }
+    }
+  }
+  std::erase_if(all, [&](const Gaussian& g) {
+    return std::any_of(holes.begin(), holes.end(), [&](const Vec3& hole) {
+      return (g.mean.cast<double>() - hole).norm() < hole_radius;
+    });
+  });
+  return all;
+}
+
+// Down onto the top, at rest there, and once round the y axis.
+Vec3 splat_hand(const Shape& shape, double t) {
+  constexpr double far = 0.2;  // [m] from the middle
+  const double angle =
+      2.0 * std::numbers::pi *
+      std::clamp((t - splat_round_from) / (splat_end - splat_round_from), 0.0, 1.0);
+  const Nearest at = nearest(shape, far * Vec3(std::sin(angle), 0.0, std::cos(angle)));
+  const double down = std::min(t / splat_down, 1.0);
+  return at.point + (splat_height - down * (splat_height + splat_depth)) * at.normal;
+}
+
+std::vector<Vec3> splat_forces(const SplatShape& of, std::shared_ptr<const Body> body,
+                               std::unique_ptr<Method> method) {
+  // A camera of its own, which looks where this hand is.
+  class Shared final : public Body {
+   public:
+    explicit Shared(std::shared_ptr<const Body> body) : body_(std::move(body)) {}
+    [[nodiscard]] const Box& bounds() const override { return body_->bounds(); }
+    [[nodiscard]] Vec3 nearest(const Vec3& at) const override { return body_->nearest(at); }
+    void draw(const View& view, std::span<float> depth) const override { body_->draw(view, depth); }
+
+   private:
+    std::shared_ptr<const Body> body_;
+  };
+  VirtualCamera camera(std::make_unique<Shared>(std::move(body)), splat_rate, {});
+  std::vector<Vec3> forces;
+  method->seat(splat_hand(of.shape, 0.0));
+  play(*method,
+       {.frame_rate = splat_rate,
+        .duration = splat_end,
+        .cloud =
+            [&](std::uint64_t, double t) {
+              camera.follow(splat_hand(of.shape, t));
+              return camera.next()->cloud;
+            },
+        .hip = [&](double t) { return splat_hand(of.shape, t); }},
+       [&](const Tick& tick) {
+         forces.push_back(tick.force);
+         return true;
+       });
+  return forces;
+}
+
+std::string splat_row(const SplatShape& of, std::string_view kind, const std::string& name,
+                      const ExperimentOptions& options) {
+  const auto body =
+      std::make_shared<const SplatBody>(covered(of, kind, options.seed), std::string(of.name));
+  const auto scene =
+      std::make_shared<const Scene>(std::vector<Part>{{.shape = of.shape, .motion = {}}});
+  const MethodSetup setup{options.parameters, truth_of(scene)};
+  const std::vector<Vec3> truth = splat_forces(of, body, make_method("ideal", setup));
+  const std::vector<Vec3> forces =
+      splat_forces(of, body, make_method(name, setup, options.own_methods));
+  const auto at = [](double t) { return static_cast<std::size_t>(std::lround(1e3 * t)); };
+  std::vector<double> errors, angles, rest, round;
+  double held = 0.0;
+  for (std::size_t i = at(splat_rest_from); i < forces.size(); ++i) {
+    const double due = truth[i].norm();
+    const double force = forces[i].norm();
+    (i < at(splat_round_from) ? rest : round).push_back(force - due);
+    errors.push_back(std::abs(force - due) / due);
+    if (force < 0.5 * due) continue;
+    held += 1.0;
+    angles.push_back(std::acos(std::clamp(forces[i].dot(truth[i]) / (force * due), -1.0, 1.0)));
+  }
+  const auto most = [](std::vector<double> values) {
+    if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+    std::sort(values.begin(), values.end());
+    return values[values.size() * 95 / 100];
+  };
+  return csv_row(of.name, kind, name, held / static_cast<double>(errors.size()), median(errors),
+                 most(errors), most(angles) * 180.0 / std::numbers::pi, felt_rms_of_all(rest),
+                 felt_rms_of_all(round));
+}
+
+std::vector<Cell> splat_cells(const Experiment& experiment, const ExperimentOptions& options) {
+  check_families(options, "splat has no such kind", splat_kinds);
+  std::vector<Cell> cells;
+  for (const SplatShape& of : splat_shapes())
+    for (const std::string_view kind : splat_kinds)
+      for (const std::string& name : methods_of(experiment, options))
+        if (options.wants(kind))
+          cells.emplace_back([=] { return splat_row(of, kind, name, options); });
+  return cells;
+}
+
+Scores splat_scores(const Table& table) {
+  Scores scores{.columns = {"body", "splat", "method", "held [%]", "force error [%]", "95 % [%]",
+                            "angle 95 % [deg]", "rest [mN]", "round [mN]"},
+                .rows = {},
+                .note =
+                    "Against `ideal` on the analytic body along the same path; force at rest "
+                    "and once round in 20 to 400 Hz. docs/sources.md."};
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    std::vector<std::string> line{table.text(row, "body"), table.text(row, "splat"),
+                                  table.text(row, "method")};
+    using Shown = std::pair<std::string_view, double>;
+    for (const auto& [column, unit] :
+         {Shown{"held", 100.0}, Shown{"error", 100.0}, Shown{"error_95", 100.0},
+          Shown{"angle_95", 1.0}, Shown{"rest_n", 1e3}, Shown{"round_n", 1e3}})
+      line.push_back(fmt::format("{:.1f}", unit * table.number(row, column)));
+    scores.rows.push_back(std::move(line));
+  }
+  return scores;
+}
+
+}  // namespace
+
+Experiment splat_experiment() {
+  return {
+      .name = "splat",
+      .summary = "bodies made of Gaussians, touched all round by a virtual camera, against truth",
+      .header = "body,splat,method,held,error,error_95,angle_95,rest_n,round_n",
+      .default_methods = {"sight", "paper", "tsdf"},
+      .cells = splat_cells,
+      .scores = splat_scores};
+}
+
+}  // namespace palpate::lab

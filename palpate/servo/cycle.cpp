@@ -184,8 +184,9 @@ std::vector<std::string> cycle_state_names() {
 }
 
 void Cycle::restore(const CycleState& state, std::span<const FrameInUse> frames) {
-  GetNumbers get(std::span(state.numbers).first(std::min(state.count, CycleState::capacity)),
-                 "state of the cycle");
+  GetNumbers get(
+      std::span(state.numbers).first(std::min<std::size_t>(state.count, CycleState::capacity)),
+      "state of the cycle");
   walk(get, *this);
   if (!get.at_end())
     throw Error("state of the cycle", "has too many numbers",

@@ -210,6 +210,12 @@ def _real(rows, panels):
              yscale="log")
 
 
+def _splat(rows, panels):
+    for axes, column in zip(panels(2, 2), ("held", "error")):
+        _groups(axes, rows, lambda row: f"{row['body']} {row['splat']}",
+                lambda own, column=column: float(own[0][column] or "nan"), xlabel=column)
+
+
 def _growth(rows, panels):
     """A tick against what might make it grow."""
     columns = {"image_width": ("x", "image width [px]"), "cameras": ("x", "cameras"),
@@ -241,7 +247,7 @@ FIGURES = {"flat": _flat, "single-lift": _single_lift, "lift": _lift, "bound": _
            "corners": _corners, "scan": _scan, "fidelity": _aims, "feel": _aims,
            "zwidth": _zwidth, "tool": _tool, "materials": _materials, "teleop": _teleop,
            "teleop-faults": _teleop_faults, "pop": _held, "field": _right, "visits": _right,
-           "real": _real, "growth": _growth}
+           "real": _real, "splat": _splat, "growth": _growth}
 
 
 def draw(file):

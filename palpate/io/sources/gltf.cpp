@@ -199,9 +199,9 @@ class GltfReader {
       const Eigen::Quaterniond turn =
           Eigen::Quaterniond(rotation) *
           Eigen::Quaterniond(turns(i, 3), turns(i, 0), turns(i, 1), turns(i, 2));
-      splat.log_scales.push_back(logs + Vec3::Constant(std::log(scale)));
+      splat.log_scales.emplace_back(logs + Vec3::Constant(std::log(scale)));
       splat.heads.emplace_back(turn.w(), std::log(opacities(i, 0) / (1.0 - opacities(i, 0))), 0.0);
-      splat.rotations.push_back(turn.vec());
+      splat.rotations.emplace_back(turn.vec());
     }
   }
 

@@ -107,7 +107,7 @@ PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
     Vec3 place, scale;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::byte* const at = &places[place_size * (3 * i + k)];
-      const std::int32_t high = std::to_integer<std::int8_t>(at[place_size - 1]);  // with the sign
+      const auto high = static_cast<std::int32_t>(std::to_integer<std::int8_t>(at[place_size - 1]));
       const auto axis = static_cast<Eigen::Index>(k);
       place[axis] =
           version == 1
@@ -128,7 +128,7 @@ PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
     cloud.points.push_back(place);
     splat.log_scales.push_back(scale);
     splat.heads.emplace_back(turn[3], std::log(opacity / (1.0 - opacity)), 0.0);
-    splat.rotations.push_back(turn.head<3>());
+    splat.rotations.emplace_back(turn.head<3>());
   }
   cloud.width = count;
   cloud.non_finite = detail::count_non_finite(cloud.points);

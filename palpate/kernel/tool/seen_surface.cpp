@@ -45,7 +45,7 @@ constexpr double farthest_cell = 1.0;  // [m] from the place
 // on it is shape.
 constexpr double trusted_scatter = 1.5;
 constexpr double refused_scatter = 3.0;
-constexpr double same_plane = 3.0;  // [-] noise that a cell of a wider fit may be off the narrower
+constexpr double near_enough = 3.0;  // [-] noise that a cell of a wider fit may be off the narrower
 // [-] share of the cells which must not be: a wall of a corner has more than half at its foot.
 constexpr double trusted_part = 0.6;
 constexpr double refused_part = 0.4;
@@ -458,7 +458,7 @@ std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place, const Vec3& 
   }
   const Middle around{p, x, y, from, jump};
   if (p.z() > from + rim + rim_spreads * noise())
-    if (const std::optional<Fit> way_out = side_near(around, outward)) return way_out;
+    if (std::optional<Fit> way_out = side_near(around, outward)) return way_out;
   // The plane through the cells of that surface (10): through far ones, too, as far as noise alone
   // explains their distances from it.
   Plane near = plane_about(around, near_cells, 1);
@@ -470,7 +470,7 @@ std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place, const Vec3& 
   const double usual = std::max(noise(), 0.3 / image_->units_per_metre());
   double reach = near_cells;
   for (const WideFit& each : wide_fits) {
-    const Narrower narrower{near, same_plane * usual, reach};
+    const Narrower narrower{near, near_enough * usual, reach};
     const Plane wide = plane_about(around, each.cells, each.step, &narrower);
     reach = each.cells * each.step;
     if (wide.cells <= near.cells / 2) break;

@@ -107,12 +107,12 @@ PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
     Vec3 place, scale;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::byte* const at = &places[place_size * (3 * i + k)];
-      const auto high = static_cast<std::int32_t>(std::to_integer<std::int8_t>(at[place_size - 1]));
+      const int top = std::to_integer<int>(at[place_size - 1]);  // of a signed number
       const auto axis = static_cast<Eigen::Index>(k);
-      place[axis] =
-          version == 1
-              ? of_half(detail::load<std::uint16_t>(at, little))
-              : std::ldexp(high * 65536 + detail::load<std::uint16_t>(at, little), -fraction);
+      place[axis] = version == 1 ? of_half(detail::load<std::uint16_t>(at, little))
+                                 : std::ldexp((top < 128 ? top : top - 256) * 65536 +
+                                                  detail::load<std::uint16_t>(at, little),
+                                              -fraction);
       scale[axis] = std::to_integer<int>(scales[3 * i + k]) / 16.0 - 10.0;
     }
     Eigen::Vector4d turn;

@@ -215,7 +215,7 @@ TEST(Splat, IsDrawnAsItIsDefined) {
       others += drawn == expected || std::abs(drawn - expected) < 5e-5 ? 0 : 1;
     }
   }
-  EXPECT_LT(others, size * size / 50);
+  EXPECT_LT(others, size * size / 25);
 }
 
 TEST(Splat, IsReadAsItIsStored) {

@@ -193,12 +193,16 @@ TEST(Splat, IsDrawnAsItIsDefined) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> some(-1.0F, 1.0F);
   const auto next = [&] { return some(random); };
+  const auto turn = [&] {  // one after the other: compilers differ in the order of arguments
+    const float z = next(), y = next(), x = next();
+    return Eigen::Quaternionf(1.0F, x, y, z).normalized();
+  };
   std::vector<Gaussian> gaussians;
   for (int i = 0; i < 200; ++i)
     gaussians.push_back(
         {{0.03F * next(), 0.03F * next(), 0.25F + 0.02F * next()},
          {5e-3F + 4e-3F * next(), 5e-3F + 4e-3F * next(), i % 2 == 0 ? 2e-5F : 2e-3F},
-         Eigen::Quaternionf(1.0F, next(), next(), next()).normalized(),
+         turn(),
          0.5F + 0.4F * next()});
   constexpr int size = 32;
   const Intrinsics k{
@@ -215,7 +219,7 @@ TEST(Splat, IsDrawnAsItIsDefined) {
       others += drawn == expected || std::abs(drawn - expected) < 5e-5 ? 0 : 1;
     }
   }
-  EXPECT_LT(others, size * size / 25);
+  EXPECT_LT(others, size * size / 50);
 }
 
 TEST(Splat, IsReadAsItIsStored) {

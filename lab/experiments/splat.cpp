@@ -102,18 +102,7 @@ Vec3 splat_hand(const Shape& shape, double t) {
 
 std::vector<Vec3> splat_forces(const SplatShape& of, std::shared_ptr<const Body> body,
                                std::unique_ptr<Method> method) {
-  // A camera of its own, which looks where this hand is.
-  class Shared final : public Body {
-   public:
-    explicit Shared(std::shared_ptr<const Body> body) : body_(std::move(body)) {}
-    [[nodiscard]] const Box& bounds() const override { return body_->bounds(); }
-    [[nodiscard]] Vec3 nearest(const Vec3& at) const override { return body_->nearest(at); }
-    void draw(const View& view, std::span<float> depth) const override { body_->draw(view, depth); }
-
-   private:
-    std::shared_ptr<const Body> body_;
-  };
-  VirtualCamera camera(std::make_unique<Shared>(std::move(body)), splat_rate, {});
+  VirtualCamera camera(std::move(body), splat_rate, {});  // looks where this hand is
   std::vector<Vec3> forces;
   method->seat(splat_hand(of.shape, 0.0));
   play(*method,

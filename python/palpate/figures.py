@@ -145,12 +145,21 @@ def _zwidth(rows, panels):
     axes.axvline(1500.0, color="grey", linestyle="--")
 
 
+def _cases(rows, panels, group, *columns, **labels):
+    """A panel a column, of the first row of each group and method."""
+    for axes, column in zip(panels(len(columns), 2), columns):
+        _groups(axes, rows, group, lambda own, column=column: float(own[0][column] or "nan"),
+                xlabel=column, **labels)
+
+
 def _tool(rows, panels):
-    rows = [dict(row) for row in rows if row["torque_error"]]
-    for axes, column in zip(panels(2, 2), ("force_error", "torque_error")):
-        _groups(axes, rows, lambda row: f"{row['case']} {row['camera']}",
-                lambda own, column=column: float(own[0][column]),
-                xlabel=column, xscale="log", xlim=(1e-4, 10))
+    _cases([row for row in rows if row["torque_error"]], panels,
+           lambda row: f"{row['case']} {row['camera']}", "force_error", "torque_error",
+           xscale="log", xlim=(1e-4, 10))
+
+
+def _splat(rows, panels):
+    _cases(rows, panels, lambda row: f"{row['body']} {row['splat']}", "held", "error")
 
 
 def _materials(rows, panels):
@@ -208,12 +217,6 @@ def _real(rows, panels):
                   label=f"{method} lost")  # where there is nothing to measure: at 1 N
     axes.set(xlabel="distance from the camera [m]", ylabel="force in 20 to 400 Hz [N rms]",
              yscale="log")
-
-
-def _splat(rows, panels):
-    for axes, column in zip(panels(2, 2), ("held", "error")):
-        _groups(axes, rows, lambda row: f"{row['body']} {row['splat']}",
-                lambda own, column=column: float(own[0][column] or "nan"), xlabel=column)
 
 
 def _growth(rows, panels):

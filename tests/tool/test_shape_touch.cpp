@@ -167,13 +167,16 @@ TEST(ShapeTouch, StandsOnAnEdgeAndOnACorner) {
   }
 }
 
-TEST(ShapeTouch, LiesInAConcaveCorner) {
-  // Two planes at 45 degrees to the vertical; the box's lower edges are pressed into both.
-  const double half = std::numbers::pi / 4;
+// Two planes at 45 degrees to the vertical, which meet along an axis.
+Scene valley(const Vec3& axis) {
   Part left = part(HalfSpace{}), right = left;
-  left.world_from_part.linear() = rotation_by(Vec3(0, half, 0)).toRotationMatrix();
-  right.world_from_part.linear() = rotation_by(Vec3(0, -half, 0)).toRotationMatrix();
-  Stage stage(Scene({left, right}), "box:40x20x5mm", "ideal", 0.6, 0.0);
+  left.world_from_part.linear() = rotation_by(0.25 * std::numbers::pi * axis).toRotationMatrix();
+  right.world_from_part.linear() = left.world_from_part.linear().transpose();
+  return Scene({left, right});
+}
+
+TEST(ShapeTouch, LiesInAConcaveCorner) {
+  Stage stage(valley(Vec3::UnitY()), "box:40x20x5mm", "ideal", 0.6, 0.0);
   // 20 mm to either side, its lower edges touch at z = 20 mm.
   const Tick tick = stage.press(pose({0, 0, 22.5e-3 - 5e-3}), 0.04);
   EXPECT_NEAR(tick.force.z(), stiffness * 5e-3, 0.05 * stiffness * 5e-3);
@@ -181,12 +184,8 @@ TEST(ShapeTouch, LiesInAConcaveCorner) {
 }
 
 TEST(ShapeTouch, LiesInAGrooveThatIsNarrowerThanItIsLong) {
-  const double half = std::numbers::pi / 4;
-  Part left = part(HalfSpace{}), right = left;
-  left.world_from_part.linear() = rotation_by(Vec3(half, 0, 0)).toRotationMatrix();
-  right.world_from_part.linear() = rotation_by(Vec3(-half, 0, 0)).toRotationMatrix();
   for (const char* sensor : {"ideal", "d4xx"}) {
-    Stage stage(Scene({left, right}), "capsule:60x12mm", sensor, 0.45, 0.0);
+    Stage stage(valley(Vec3::UnitX()), "capsule:60x12mm", sensor, 0.45, 0.0);
     const Tick tick = stage.press(pose({0, 0, 6e-3 * std::numbers::sqrt2 - 5e-3}), 0.04);
     EXPECT_NEAR(tick.force.z(), stiffness * 5e-3, 0.05 * stiffness * 5e-3) << sensor;
   }

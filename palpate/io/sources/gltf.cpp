@@ -11,6 +11,7 @@
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/point_file_detail.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
 namespace {
@@ -290,6 +291,11 @@ PointFile parse_gltf(std::span<const std::byte> bytes, std::string_view name,
     throw Error(std::string(name), std::string("its JSON is no glTF's: ") + wrong.what(),
                 "check that this is a glTF or GLB file");
   }
+}
+
+bool is_gltf(const std::filesystem::path& path) {
+  const std::string ending = lower_case(path.extension().string());
+  return ending == ".glb" || ending == ".gltf";
 }
 
 PointFile read_gltf(const std::filesystem::path& path, bool as_splat) {

@@ -114,12 +114,12 @@ void MeshBody::draw(const View& view, std::span<float> depth) const {
 std::unique_ptr<Source> open_map(const Uri& uri) {
   const std::filesystem::path path = uri.path();
   const std::string ending = lower_case(path.extension().string());
-  const bool is_gltf = ending == ".glb" || ending == ".gltf";
-  if (!is_gltf && ending != ".ply" && ending != ".stl" && ending != ".obj")
+  const bool as_gltf = is_gltf(path);
+  if (!as_gltf && ending != ".ply" && ending != ".stl" && ending != ".obj")
     throw Error(uri.text(), "it is no PLY, STL, OBJ or glTF file",
                 "give a mesh as FILE.ply, .stl, .obj, .glb or .gltf");
-  const BodyOptions options = body_options(uri, is_gltf, is_gltf);
-  PointFile file = is_gltf            ? read_gltf(path, false)
+  const BodyOptions options = body_options(uri, as_gltf, as_gltf);
+  PointFile file = as_gltf            ? read_gltf(path, false)
                    : ending == ".ply" ? read_ply(path)
                    : ending == ".stl" ? read_stl(path)
                                       : read_obj(path);

@@ -81,7 +81,7 @@ std::string uri_of_file(const std::filesystem::path& file) {
         std::pair(".gltf", "map:"), std::pair(".db3", "recording:"),
         std::pair(".mcap", "recording:"), std::pair(".bag", "recording:")}) {
     if (ending != known) continue;
-    if (holds_splat(file)) scheme = "splat:";
+    if ((ending == ".ply" || is_gltf(file)) && holds_splat(file)) scheme = "splat:";
     const std::string path = file.string();
     return scheme + path + (path.find('?') == std::string::npos ? "" : "?");
   }

@@ -7,7 +7,6 @@
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/point_file_detail.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/kernel/core/text.hpp"
 
 namespace palpate {
 namespace {
@@ -280,8 +279,7 @@ bool holds_splat(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
-  if (const std::string ending = lower_case(path.extension().string()); ending != ".ply")
-    return ending == ".spz" || text.find("KHR_gaussian_splatting") != std::string::npos;
+  if (is_gltf(path)) return text.find("KHR_gaussian_splatting") != std::string::npos;
   const std::size_t end = text.find("end_header");
   try {
     if (end == std::string::npos) return false;

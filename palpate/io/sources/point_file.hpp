@@ -83,8 +83,7 @@ PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name);
 PointFile read_splat(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_splat(std::span<const std::byte> bytes, std::string_view name);
-/// Does a PLY or glTF file declare Gaussians in its first 64 kB, or is it an SPZ? False too of what
-/// cannot be read.
+/// Does a PLY or glTF file declare Gaussians in its first 64 kB? False too of what cannot be read.
 bool holds_splat(const std::filesystem::path& path);
 
 /// Reads an STL file, binary or ascii, into `points` and `triangles`. Corners at the same place are
@@ -110,6 +109,8 @@ PointFile read_spz(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name);
 
+/// Is a file, by its name, a glTF or GLB?
+bool is_gltf(const std::filesystem::path& path);
 /// Reads a glTF 2.0 or GLB: the triangles of its scene or, `as_splat`, the Gaussians of its
 /// KHR_gaussian_splatting, each moved by its nodes. Buffers are inside, or files beside or below.
 /// @throws Error naming the file and what was wrong

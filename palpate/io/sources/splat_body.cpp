@@ -142,15 +142,15 @@ struct Near {
 };
 std::vector<Near> sorted(const std::vector<Near>& seen, double nearest, double farthest) {
   constexpr std::size_t steps = 4096;
-  const auto step = [scale = static_cast<float>((steps - 1) / (farthest - nearest)),
+  const auto step = [&, scale = static_cast<float>((steps - 1) / (farthest - nearest)),
                      from = static_cast<float>(nearest)](const Near& each) {
-    return static_cast<std::size_t>(scale * std::max(each.at.z() - from, 0.0F));
+    return std::min(static_cast<std::size_t>(scale * std::max(each.at.z() - from, 0.0F)), steps);
   };
   std::array<std::uint32_t, steps + 2> begins{};
-  for (const Near& each : seen) ++begins[std::min(step(each), steps) + 1];
+  for (const Near& each : seen) ++begins[step(each) + 1];
   std::partial_sum(begins.begin(), begins.end(), begins.begin());
   std::vector<Near> order(seen.size());
-  for (const Near& each : seen) order[begins[std::min(step(each), steps)]++] = each;
+  for (const Near& each : seen) order[begins[step(each)]++] = each;
   return order;
 }
 
@@ -287,11 +287,10 @@ void SplatBody::draw(const View& view, std::span<float> depth) const {
 
 std::unique_ptr<Source> open_splat(const Uri& uri) {
   const std::filesystem::path path = uri.path();
-  const std::string ending = lower_case(path.extension().string());
-  const bool is_spz = ending == ".spz";
-  const bool is_gltf = ending == ".glb" || ending == ".gltf";
-  const BodyOptions options = body_options(uri, is_spz || is_gltf, is_gltf);
-  PointFile file = is_spz ? read_spz(path) : is_gltf ? read_gltf(path, true) : read_splat(path);
+  const bool as_gltf = is_gltf(path);
+  const bool as_spz = lower_case(path.extension().string()) == ".spz";
+  const BodyOptions options = body_options(uri, as_spz || as_gltf, as_gltf);
+  PointFile file = as_spz ? read_spz(path) : as_gltf ? read_gltf(path, true) : read_splat(path);
   const Eigen::Quaternionf turn(Eigen::Quaterniond(options.turn).cast<float>());
   std::vector<Gaussian> gaussians(file.points.size());
   for (std::size_t i = 0; i < gaussians.size(); ++i) {

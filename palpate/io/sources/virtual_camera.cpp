@@ -100,7 +100,7 @@ ViewingRays::Window pixels_between(const Intrinsics& k, const Eigen::Array2d& lo
           first(k.fy * low.y() + k.cy, k.height), end(k.fy * high.y() + k.cy, k.height)};
 }
 
-VirtualCamera::VirtualCamera(std::unique_ptr<const Body> body, double frame_rate, SourceInfo info)
+VirtualCamera::VirtualCamera(std::shared_ptr<const Body> body, double frame_rate, SourceInfo info)
     : body_(std::move(body)),
       info_(std::move(info)),
       rays_(std::make_shared<const ViewingRays>(window_intrinsics())),

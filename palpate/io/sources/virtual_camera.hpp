@@ -59,7 +59,7 @@ ViewingRays::Window pixels_between(const Intrinsics& k, const Eigen::Array2d& lo
 class VirtualCamera final : public Source {
  public:
   /// @param frame_rate  [Hz] > 0
-  VirtualCamera(std::unique_ptr<const Body> body, double frame_rate, SourceInfo info);
+  VirtualCamera(std::shared_ptr<const Body> body, double frame_rate, SourceInfo info);
 
   /// Frame k is stamped k / frame_rate. Before a hand is known, the body is seen from above.
   std::optional<Frame> next(double timeout = no_timeout) override;
@@ -80,7 +80,7 @@ class VirtualCamera final : public Source {
   [[nodiscard]] bool shows(const Aim& aim) const;
   void look(const Aim& aim);
 
-  std::unique_ptr<const Body> body_;
+  std::shared_ptr<const Body> body_;
   SourceInfo info_;
   std::shared_ptr<const ViewingRays> rays_;
   double frame_rate_;

@@ -231,9 +231,8 @@ void SeenSurface::aim_at(const Aim& aim) noexcept {
 // The newest frame's level (5): the median of what cells are above their relief. False: too few.
 bool SeenSurface::find_level(const Aim& aim, const SightParameters& parameters) noexcept {
   const Cells& all = cells_[0];
-  const Intrinsics& k = image_->intrinsics();
   const Vec3 p = in_camera(aim.place);
-  const double pitch = std::max(p.z(), nearest_camera) * stride_ / k.fx;  // [m] of a cell
+  const double pitch = cell_at(std::max(p.z(), nearest_camera));
   const int reach = std::clamp(static_cast<int>(aim.radius / pitch), 2, side / 2 - 1);
   const int step = 1 + 2 * reach / most_across;
   std::array<float, std::size_t{most_across + 1} * (most_across + 1)> values;
@@ -430,7 +429,7 @@ std::optional<SeenSurface::Fit> SeenSurface::fit(const Vec3& place, const Vec3& 
     ++known;
   }
   if (known == 0) return std::nullopt;
-  const double pitch = p.z() * stride_ / k.fx;  // [m] between cells
+  const double pitch = cell_at(p.z());
   const double jump = steepest * pitch + rim_spreads * noise();
   const int nearest_u = a < 0.5 ? u : u + 1;
   const int nearest_v = b < 0.5 ? v : v + 1;
@@ -499,8 +498,8 @@ std::optional<SeenSurface::Fit> SeenSurface::side_near(const Middle& middle,
   const double across = way.norm();
   if (across < least_across) return std::nullopt;
   way /= across;
-  const double pitch = middle.p.z() * stride_ / image_->intrinsics().fx;  // [m] between cells
-  const double farthest = (middle.p.z() - middle.from) / pitch;           // deeper than it is away
+  const double pitch = cell_at(middle.p.z());
+  const double farthest = (middle.p.z() - middle.from) / pitch;  // deeper than it is away
   double before = middle.from, at = 0.0;  // [m] depth of the cell before, [cells] along the way
   for (int i = 1; i <= std::min(static_cast<int>(farthest), farthest_side); ++i) {
     const int u = static_cast<int>(std::lround(middle.x + i * way.x()));
@@ -562,7 +561,7 @@ SeenSurface::Plane SeenSurface::plane_about(const Middle& middle, int cells, int
   plane.part = of / looked;
   const double mx = sx / of, my = sy / of, mz = sz / of;
   plane.height = middle.from + mz;
-  const double pitch = middle.p.z() * stride_ / image_->intrinsics().fx;
+  const double pitch = cell_at(middle.p.z());
   // Cells on a line have no slope across it.
   const double least = 1e-6 * of * pitch * pitch;
   const double cxx = xx - sx * mx + least, cxy = xy - sx * my, cyy = yy - sy * my + least;

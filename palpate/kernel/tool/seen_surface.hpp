@@ -136,6 +136,10 @@ class SeenSurface {
   void update(std::size_t i, float z, const SightParameters& parameters) noexcept;
   void read_rows(int rows, const SightParameters& parameters) noexcept;
   [[nodiscard]] Vec3 in_camera(const Vec3& place) const noexcept;
+  /// [m] from cell to cell, z [m] before the camera.
+  [[nodiscard]] double cell_at(double z) const noexcept {
+    return z * stride_ / image_->intrinsics().fx;
+  }
   [[nodiscard]] double level(double t) const noexcept;
   [[nodiscard]] double offset(double t) const noexcept;
   [[nodiscard]] double unseen_since(double stamp) const noexcept {

@@ -33,8 +33,7 @@ namespace palpate::test {
 /// book-keeping.
 class Adversary {
  public:
-  explicit Adversary(std::uint64_t seed)
-      : random_(seed), cycle_(spoiled(make_method("sight")), link_) {
+  explicit Adversary(std::uint64_t seed) : random_(seed), cycle_(spoiled(wall()), link_) {
     constexpr int width = 40, height = 30;
     auto rays = std::make_shared<const ViewingRays>(
         Intrinsics{.width = width, .height = height, .fx = 35, .fy = 35, .cx = 19.5, .cy = 14.5});
@@ -82,7 +81,7 @@ class Adversary {
     t_ += tick_interval();
     feed();
     if (random_() % 20'000 == 0) cycle_.set_settings(settings());
-    if (one_in(touches_with_tool_ ? 1000 : 20'000)) switch_method();
+    if (one_in(touches_with_tool_ ? 1000 : 5000)) switch_method();
     if (touches_with_tool_) ++tool_ticks_;
     if (latched_ && one_in(500)) cycle_.reset_faults();
     const double given = one_in(50'000) ? nan : t_;
@@ -363,13 +362,17 @@ class Adversary {
     return std::make_shared<FixtureSet>(std::vector<Fixture>{region, guide, honey});
   }
 
+  std::unique_ptr<Method> wall() {
+    return std::make_unique<Feel>(std::make_unique<Wall>(random_()), Parameters{});
+  }
+
   // Mostly the plane: methods that look at a cloud have tests of their own, and take ten times as
   // long; a tool takes a hundred times as long, and does not stay.
   std::unique_ptr<Method> any_method() {
     touches_with_tool_ = one_in(10);
     if (touches_with_tool_)
       return std::make_unique<ShapeTouch>(make_tool("box:20x10x5mm?points=100", {}), Parameters{});
-    if (!one_in(4)) return std::make_unique<Feel>(std::make_unique<Wall>(random_()), Parameters{});
+    if (!one_in(4)) return wall();
     const auto& methods = standard_methods().entries();
     return make_method(methods[random_() % methods.size()].name);
   }

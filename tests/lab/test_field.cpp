@@ -20,6 +20,7 @@
 #include "lab/method.hpp"
 #include "lab/runner.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/sensor.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -373,6 +374,26 @@ TEST(FieldRules, FindEachFaultOfAMethodThatHasIt) {
       "field:sheet-press?seed=1&sensor=4&rate=30&latency=0&press=0.012&lean=0";
   EXPECT_TRUE(verdict_on(sheet, through).lost);
   EXPECT_TRUE(verdict_on(sheet, none).right());
+}
+
+// Cases that `sight` lost, or in which it pushed a hand in free space, until each was mended.
+TEST(FieldCases, StayRightForSight) {
+  struct Case {
+    std::string text;
+    const CaseSet& set;
+    palpate::SensorKind sensor;
+  };
+  const Case cases[] = {
+      {"visits:pile-add?seed=970627913", visits_set(), palpate::SensorKind::stereo},
+      {"field:corner-slide?seed=1920625126", field_set(), palpate::SensorKind::structured_light},
+      {"field:belt-under?seed=1784642372", field_set(), palpate::SensorKind::unknown}};
+  for (const Case& each : cases) {
+    Stage stage = make_stage(parse_field_case(each.text, each.set));
+    const std::array sensors{each.sensor};
+    const Parameters parameters = for_sensors({}, sensors);
+    const std::unique_ptr<Method> sight = make_method("sight", {parameters, {}});
+    EXPECT_TRUE(play_field(stage, {sight.get()}, parameters).verdicts.at(0).right()) << each.text;
+  }
 }
 
 TEST(FieldRules, MeasureShakeWhereHandAndSurfaceRest) {

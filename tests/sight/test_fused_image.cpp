@@ -126,6 +126,24 @@ TEST(FusedImage, BeginsAgainWhereThreeFramesShowSomethingElse) {
   EXPECT_GT(patch.size(), 30U);
 }
 
+// The edge of a box 30 mm high passes under the contact. Half of the pixels then have a level of
+// their own: the other half must not be put 30 mm above the box.
+TEST(FusedImage, PutsNothingAboveABoxWhoseEdgePasses) {
+  Camera camera;
+  FusedImage fused;
+  double edge = 0.02;
+  for (int frame = 0; frame < 20; ++frame) {
+    if (frame >= 8) edge -= 3e-3;
+    const DepthImage& image =
+        camera.shoot([&](double x, double) { return x > edge ? 0.03 : 0.0; }, 1e-4);
+    observe(fused, image, frame, Vec3(0, 0, edge > 0.0 ? 0.0 : 0.03));
+    Patch patch;
+    gather(fused, Ball{Vec3(0, 0, 0.04), 0.05}, patch);
+    for (std::size_t i = 0; i < patch.size(); ++i)
+      ASSERT_LT(0.04 + patch.z()[i], 0.033) << "frame " << frame;
+  }
+}
+
 TEST(FusedImage, KeepsAPixelThatFlickersAndDropsOneThatIsGone) {
   Camera camera;
   FusedImage fused;

@@ -122,6 +122,41 @@ TEST(Monitor, BringsAProxyBackInFrontWhenTwoFramesShowItBehind) {
   EXPECT_NEAR(verdict.normal.z(), 1.0, 1e-6);
 }
 
+TEST(Monitor, BringsBackAtOnceAProxyThatPassesThroughAgain) {
+  Monitor monitor;
+  meet(monitor, 1.0);
+  const PointCloud plane = plane_at(0.0);
+  const Monitor::Contact lost = pressed(-0.01, -0.01);
+  monitor.judge(plane, lost);
+  monitor.start_frame();
+  Monitor::Verdict verdict = monitor.judge(plane, lost);
+  ASSERT_EQ(verdict.action, Monitor::Action::return_to_front);
+  EXPECT_FALSE(verdict.again);
+  // In the next tick it lies behind the margin, then not even that deep, then deep in a new frame.
+  for (const double deep : {-0.01, -0.001, -0.01}) {
+    verdict = monitor.judge(plane, pressed(-0.01, deep));
+    ASSERT_EQ(verdict.action, Monitor::Action::return_to_front) << deep;
+    EXPECT_TRUE(verdict.again);
+    if (deep == -0.001) monitor.start_frame();
+  }
+  // After a frame in which it stayed in front, two show it behind again.
+  for (int frame = 0; frame < 2; ++frame) {
+    monitor.start_frame();
+    EXPECT_FALSE(monitor.judge(plane, pressed(-0.01, r_c)).behind);
+  }
+  EXPECT_EQ(monitor.judge(plane, lost).action, Monitor::Action::none);
+}
+
+TEST(Monitor, GivesNoSecondForceToAHandInFrontOfWhatItSees) {
+  Monitor monitor;
+  meet(monitor, 1.0);
+  const PointCloud plane = plane_at(0.0);
+  monitor.judge(plane, pressed(-0.01, -0.01));
+  monitor.start_frame();
+  ASSERT_EQ(monitor.judge(plane, pressed(-0.01, -0.01)).action, Monitor::Action::return_to_front);
+  EXPECT_EQ(monitor.judge(plane, pressed(0.001, -0.01)).action, Monitor::Action::none);
+}
+
 TEST(Monitor, WaitsForAsManyFramesAsItIsTold) {
   Monitor monitor;
   Parameters parameters;

@@ -16,6 +16,10 @@ constexpr float most_missed = 3.0F;
 constexpr std::size_t least_pixels = 8;  // that measure a level
 // The spread is that of a region wider than the one that measures the level, as noise correlates.
 constexpr double spread_region = 3.0;
+// [-] Of a level's pixels at least this share lies within so many spreads of it. Where fewer do,
+// another surface came in beside the first, and no level is common to both.
+constexpr double least_share = 0.7;
+constexpr float most_deviation = 4.0F;
 constexpr int most_across = 16;         // pixels that are looked at, along either axis
 constexpr double farthest_pixel = 1e6;  // [px] beyond any image
 
@@ -86,6 +90,12 @@ bool FusedImage::find_level(int u, int v, double radius) noexcept {
   const std::span<float> near = look(radius);
   if (near.size() < least_pixels) return false;
   newest_ = kth_smallest(near, near.size() / 2);
+  if (spread_ > 0.0F) {
+    const auto fits = std::count_if(near.begin(), near.end(), [this](float value) {
+      return std::abs(value - newest_) <= most_deviation * spread_;
+    });
+    if (static_cast<double>(fits) < least_share * static_cast<double>(near.size())) return false;
+  }
   const std::span<float> wide = look(spread_region * radius);
   if (wide.size() < least_pixels) return false;
   spread_ = next_spread(spread_, newest_, wide, image_->units_per_metre());

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include "palpate/kernel/sight/surface_fit.hpp"
 
@@ -62,6 +63,7 @@ void Monitor::forget() noexcept {
   side_ = Side::unknown;
   frame_judged_ = false;
   frames_behind_ = frames_past_edge_ = 0;
+  proved_ = behind_in_frame_ = false;
 }
 
 // What each camera measures on its lines of sight within `radius` of `place`. A camera that sees
@@ -134,7 +136,7 @@ bool Monitor::is_behind(const Cloud& cloud, double margin, double deepest) noexc
   const auto count_past_edge = [this](bool past) {
     if (!frame_judged_) frames_past_edge_ = past ? frames_past_edge_ + 1 : 0;
   };
-  if (proxy_.behind <= margin) {
+  if (proxy_.behind <= (proved_ ? 0.0 : margin)) {
     if (proxy_.behind <= 0.0) last_front_ = proxy_;
     count_past_edge(false);
     return false;
@@ -178,13 +180,16 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
   if (!frame_judged_) {
     frame_judged_ = true;
     frames_behind_ = verdict.behind ? frames_behind_ + 1 : 0;
+    proved_ = std::exchange(behind_in_frame_, false) && proved_;
   } else if (!verdict.behind) {
     frames_behind_ = 0;
   }
+  behind_in_frame_ = behind_in_frame_ || verdict.behind;
 
   if (contact.touching) {
     const Look& hand = look_at(cloud, contact.hip - contact.carried, hand_radius * r_c, hand_);
     const bool free = hand.seen && hand.clear > r_c + margin_at(hand.distance);
+    proved_ = proved_ && hand.seen && hand.behind > 0.0;
     if (side_ == Side::behind) {
       if (free && (contact.hip - contact.proxy).norm() > contact.deepest + margin)
         verdict.action = Action::let_go;
@@ -198,8 +203,12 @@ Monitor::Verdict Monitor::judge(const Cloud& cloud, const Contact& contact) noex
     }
     if (verdict.action == Action::release || verdict.action == Action::let_go) return verdict;
   }
-  if (verdict.behind && frames_behind_ >= parameters_.evidence_frames)
+  if (verdict.behind && (proved_ || frames_behind_ >= parameters_.evidence_frames)) {
     verdict.action = Action::return_to_front;
+    // The median of a wider or steeper look may be far from the surface at the proxy.
+    verdict.again = std::exchange(
+        proved_, proxy.radius <= widening * r_c && proxy.high - proxy.low <= proxy.radius + margin);
+  }
   if (verdict.action == Action::return_to_front) {
     verdict.normal = proxy.line;
     verdict.front = contact.proxy + (proxy.behind + r_c) * proxy.line;

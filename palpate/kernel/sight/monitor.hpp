@@ -40,6 +40,7 @@ class Monitor {
   };
   struct Verdict {
     Action action = Action::none;
+    bool again = false;          ///< it was put back before, and passed through again
     bool behind = false;         ///< the newest frame shows the proxy behind its surface
     bool hidden = false;         ///< what the frame shows hides the whole proxy
     Vec3 front = Vec3::Zero();   ///< [m] world: where a proxy before the surface is
@@ -96,7 +97,10 @@ class Monitor {
   std::bitset<Patch::max_views> seen_;  // cameras whose frame came since the last one was judged
   bool frame_judged_ = false;           // is the newest frame counted in `frames_behind_`?
   int frames_behind_ = 0;               // frames in a row that show the proxy behind its surface
-  int frames_past_edge_ = 0;            // frames in a row that show it beyond an edge
+  bool behind_in_frame_ = false;        // did a tick of the newest frame show it there?
+  // It was put back in front, and since then no frame went by without showing it behind again.
+  bool proved_ = false;
+  int frames_past_edge_ = 0;  // frames in a row that show it beyond an edge
 };
 
 }  // namespace palpate

@@ -270,8 +270,9 @@ void Sight::release(const Vec3& hip, Movement& movement) noexcept {
   movement.normal = Vec3::Zero();
 }
 
-// What the newest frame itself shows overrules every estimate: docs/sight.md, 7.
-void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
+// What the newest frame itself shows overrules every estimate: docs/sight.md, 7. Was the proxy put
+// back in front, and not in the frame before?
+bool Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
   // [detail] A frame's correction moves a proxy no farther than a surface is looked for.
   constexpr double farthest_move = 60.0;
   Proxy& proxy = contact_.proxy;
@@ -318,6 +319,7 @@ void Sight::supervise(const Vec3& hip, double t, Movement& movement) noexcept {
       break;
   }
   contact_.last_proxy = proxy.at;
+  return verdict.action == Monitor::Action::return_to_front && !verdict.again;
 }
 
 // Section 4.6, from the proxy where it will be on the moving surface. The damper acts on the hand's
@@ -359,7 +361,7 @@ Tick Sight::tick(const Vec3& hip, double t) noexcept {
   timing_.tick(t);
   hand_velocity_.update(hip, t);
   Movement movement = move(hip, t);
-  supervise(hip, t, movement);
+  const bool returned = supervise(hip, t, movement);
   write_movement(contact_.proxy, movement, contact_.mover.patch(), frame_,
                  parameters_.motion.max_extrapolation, tick);
   const SightTracker& tracker = contact_.tracker;
@@ -371,7 +373,7 @@ Tick Sight::tick(const Vec3& hip, double t) noexcept {
                                          .velocity = surface_velocity(t),
                                          .blend = parameters_.sight.blend * interval(),
                                          .known = knowledge(t),
-                                         .returned = (tick.flags & returned_to_front) != 0,
+                                         .returned = returned,
                                          .return_speed = parameters_.sight.return_speed,
                                          .r_c = parameters_.proxy.r_c()},
                                         parameters_.coupling);

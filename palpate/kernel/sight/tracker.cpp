@@ -255,12 +255,13 @@ void SightTracker::outline(View& view, const Sighting& sighting, const Expectati
   if (slides) view.hip = hip;
   const bool stays = expected.foot == surface_.centre() && !slides;
   if (!stays || sighting.near > view.near_usual) view.near_usual = sighting.near;
-  const bool covered = sighting.before >= least_before || sighting.near < usual * view.near_usual;
+  const bool fewer = sighting.near < usual * view.near_usual;  // than where it stays
+  const bool covered = sighting.before >= least_before || fewer;
   const auto came = [&] {
     return sighting.before >= least_before && previous != nullptr &&
            2 * covering(*previous, expected) < sighting.before;
   };
-  const bool arrived = stays ? holding() || view.outline != Outline::cut
+  const bool arrived = stays ? holding() || fewer || view.outline != Outline::cut
                              : covered && (view.outline == Outline::shadowed || came());
   view.outline = !covered ? Outline::whole : arrived ? Outline::shadowed : Outline::cut;
 }

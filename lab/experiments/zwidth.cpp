@@ -50,7 +50,7 @@ constexpr double precision = 1.03;                           // [-]
 const std::vector<double> usual_dampings = {0.0, 2.0, 4.0};  // [N s/m]
 
 // A spring that presses and adds next to nothing to the loop, but holds a handle on a sphere.
-constexpr Grip nobody{"none", 0.0, 50.0, 0.0};
+constexpr Grip nobody{"none", 0.0, 50.0, 0.0, 0.0, 0.0};
 
 constexpr std::array<std::string_view, 4> scenes = {"plane", "sphere", "edge", "corner"};
 constexpr std::array<std::string_view, 2> cameras = {"ideal", "d4xx"};

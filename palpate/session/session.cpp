@@ -27,6 +27,7 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/sensor.hpp"
 #include "palpate/kernel/core/uri.hpp"
+#include "palpate/servo/stiffness.hpp"
 #include "palpate/session/player.hpp"
 #include "palpate/session/press.hpp"
 
@@ -173,7 +174,7 @@ Session::Session(SessionOptions options) : options_(std::move(options)) {
   for (const auto& hand : hands_) {
     if (needs_watchdog()) refuse_without_watchdog(hand->device().info(), settings_.safety);
   }
-  settings_ = for_cameras(std::move(settings_));
+  settings_ = for_hardware(std::move(settings_));
   if (!options_.radii_chosen) {
     std::vector<const Cloud*> seen;
     for (const auto& cloud : first) seen.push_back(cloud.get());
@@ -345,7 +346,7 @@ void Session::change(const std::function<void(ServoSettings&)>& edit) {
   for (const auto& hand : hands_) {
     if (needs_watchdog()) refuse_without_watchdog(hand->device().info(), settings.safety);
   }
-  settings = for_cameras(std::move(settings));
+  settings = for_hardware(std::move(settings));
   if (settings.fixtures != settings_.fixtures)
     check_materials(settings.fixtures.get(), newest_clouds());
   const bool with_new_methods =
@@ -424,9 +425,11 @@ void Session::leave_behind(std::unique_ptr<Recorder> recorder) {
   std::thread([left = std::move(recorder)]() mutable { left.reset(); }).detach();
 }
 
-// What is left to the cameras' kind is that of those that are open.
-ServoSettings Session::for_cameras(ServoSettings settings) const {
+// What is left to cameras and devices is that of those that are open.
+ServoSettings Session::for_hardware(ServoSettings settings) const {
   settings.parameters = for_sensors(settings.parameters, sensors_);
+  for (const auto& hand : hands_)
+    set_turn_stiffness(hand->device().info().limits, settings.parameters.coupling);
   return settings;
 }
 

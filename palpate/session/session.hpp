@@ -224,7 +224,7 @@ class Session {
   [[nodiscard]] bool needs_watchdog() const { return is_live() && !options_.without_watchdog; }
   void refuse_if_stopped() const;
   void leave_behind(std::unique_ptr<Recorder> recorder);
-  [[nodiscard]] ServoSettings for_cameras(ServoSettings settings) const;
+  [[nodiscard]] ServoSettings for_hardware(ServoSettings settings) const;
   [[nodiscard]] double now() const { return is_live() ? monotonic_now() : free_t_.load(); }
   void open_hands(const Cloud& seen);
   [[nodiscard]] static SessionHandState report(const SessionHand& hand);

@@ -6,14 +6,20 @@
 #include <memory>
 #include <random>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "palpate/io/devices/devices.hpp"
 #include "palpate/io/devices/simulated_hand.hpp"
+#include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 #include "palpate/kernel/methods/methods.hpp"
+#include "palpate/kernel/tool/tool_shape.hpp"
 #include "palpate/servo/cycle.hpp"
+#include "palpate/servo/stiffness.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/grids.hpp"
@@ -256,6 +262,87 @@ TEST(SimulatedHand, TouchesAPlaneByADeviceInALightAndAFirmGrip) {
   }
 }
 
+TEST(SimulatedHand, TurnsAsASpringAndDamperDoUnderATorque) {
+  DeviceBody body = plain;
+  body.inertia = 1e-4;
+  HandModel model{.tremor = 0.0, .turn_stiffness = 0.5, .turn_damping = 0.02, .body = body};
+  SimulatedHand hand(resting_at(Vec3::Zero()), model);
+  const auto angle = [&hand](double t) {
+    return rotation_vector(Rotation(*hand.read(t).orientation));
+  };
+  EXPECT_TRUE(angle(0.0).isZero());
+  hand.write(Wrench{Vec3::Zero(), Vec3(0, 0.05, 0)}, 0.0);
+  // Overdamped: a slow mode of b/2I - sqrt((b/2I)^2 - k/I) = 29.3 /s, a fast one of 170.7 /s.
+  const double slow = 100.0 - std::sqrt(5000.0), fast = 100.0 + std::sqrt(5000.0);
+  for (const double t : {0.01, 0.03, 0.1}) {
+    const double left = (fast * std::exp(-slow * t) - slow * std::exp(-fast * t)) / (fast - slow);
+    EXPECT_LT((angle(t) - Vec3(0, 0.1 * (1.0 - left), 0)).norm(), 1e-3) << t;
+  }
+  hand.disable();
+  EXPECT_LT(angle(0.2).norm(), 0.01) << "springs back";
+}
+
+TEST(SimulatedHand, IsTurnedAsItsPathWhereItsHandleDoesNotTurnByItself) {
+  const Rotation turned = rotation_by(Vec3(0, 0, 0.8));
+  const HipPath path({{0.0, Vec3::Zero(), turned}, {1.0, Vec3::Zero(), turned}});
+  EXPECT_FALSE(SimulatedHand(resting_at(Vec3::Zero()), {}).read(0.0).orientation);
+  SimulatedHand hand(path, {});
+  EXPECT_LT(between(Rotation(*hand.read(0.0).orientation), turned).vec().norm(), 1e-9);
+}
+
+// [rad/s] rms, and [N] mean, in the third of three seconds of a tool that is pressed on a plane.
+std::pair<double, double> rest_with(const char* shape, const char* grip, bool bounded) {
+  constexpr double distance = 0.5;  // [m] of the camera
+  constexpr int side = 240;         // [px]
+  Eigen::Isometry3d down = Eigen::Isometry3d::Identity();
+  down.linear() = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  down.translation() = Vec3(0, 0, distance);
+  const auto plane = std::make_shared<DepthImage>(
+      std::make_shared<ViewingRays>(Intrinsics{
+          .width = side, .height = side, .fx = 400, .fy = 400, .cx = 119.5, .cy = 119.5}),
+      std::vector<std::uint16_t>(side * side, 5000), 1e4, down);
+  const Rotation tilted = rotation_by(Vec3(0, 0.15, 0));
+  const Grip& held = grip_preset(grip);
+  const double deep = 1.0 / held.stiffness;  // a push of 1 N
+  const HipPath path({{0.0, Vec3(0, 0, 0.03), tilted},
+                      {0.6, Vec3(0, 0, 0.03), tilted},
+                      {1.2, Vec3(0, 0, 0.002 - deep), tilted}});
+  const auto device = open_device("hand:?device=sigma&tremor=0&grip=" + std::string(grip), path);
+  Parameters parameters;
+  if (bounded) set_turn_stiffness(device->info().limits, parameters.coupling);
+  ServoSettings settings;
+  settings.parameters = parameters;
+  Cycle cycle(make_method("sight", parameters, standard_methods(), make_tool(shape, {})), *device,
+              settings);
+  auto reader = cycle.reader();
+  double squares = 0.0, force = 0.0;
+  for (int i = 0; i < 3000; ++i) {
+    if (i % 33 == 0) cycle.put_frame(plane, i * ms, i * ms);
+    cycle.run({.t = i * ms});
+    ServoTick record{};
+    reader.try_pop(record);
+    if (i < 2000) continue;
+    squares += std::pow(dynamic_cast<SimulatedHand&>(*device).statistics().turn_rate, 2);
+    force += record.force.norm();
+  }
+  return {std::sqrt(squares / 1000.0), force / 1000.0};
+}
+
+// Hazard: torque, fast-oscillation
+TEST(SimulatedHand, RestsWithAToolWhoseStiffnessInRotationIsWhatItsDeviceBears) {
+  for (const char* grip : {"light", "firm"}) {
+    for (const char* shape : {"box:40x20x5mm?points=300", "capsule:200x10mm?points=300"}) {
+      const auto [rate, force] = rest_with(shape, grip, true);
+      EXPECT_LT(rate, 0.02) << shape << ' ' << grip;
+      EXPECT_GT(force, 0.8) << shape << ' ' << grip;
+    }
+  }
+  // What the bound is for: the chain takes half of the force off to end the oscillation.
+  const auto [rate, force] = rest_with("capsule:200x10mm?points=300", "light", false);
+  EXPECT_GT(rate, 0.2);
+  EXPECT_LT(force, 0.8);
+}
+
 TEST(OpenDevice, OpensHandsOnDevicesAndSaysWhatTheDeviceIs) {
   const HipPath path = resting_at({1, 2, 3});
   const auto touch = open_device("hand:?device=touch&grip=none", path);
@@ -277,7 +364,8 @@ TEST(OpenDevice, OpensHandsOnDevicesAndSaysWhatTheDeviceIs) {
   const auto opening = [&path](const char* uri) {
     return [uri, &path] { return open_device(uri, path) != nullptr; };
   };
-  EXPECT_TRUE(fails_saying(opening("hand:?device=tuch"), "'tuch'", "none, touch, omega, falcon"));
+  EXPECT_TRUE(
+      fails_saying(opening("hand:?device=tuch"), "'tuch'", "none, touch, omega, falcon, sigma"));
   EXPECT_TRUE(fails_saying(opening("hand:?grip=soft"), "'soft'", "light, firm, none"));
   EXPECT_TRUE(fails_saying(opening("hand:?grip=none"), "nothing to move", "device=touch"));
   EXPECT_TRUE(fails_saying(opening("hand:?friction=1"), "'friction'", "device=touch"));

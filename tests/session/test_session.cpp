@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "palpate/io/devices/devices.hpp"
 #include "palpate/io/devices/hip_path.hpp"
 #include "palpate/io/devices/mouse_device.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
@@ -233,6 +234,19 @@ TEST(Session, TakesTheNoiseThatIsUsualForTheCamerasKindUnlessItIsSet) {
   EXPECT_EQ(noise_of(recorded.state.settings), std::pair(3e-3, 1)) << "what is set wins";
   SessionReader reader(folder.path() / "bag");
   EXPECT_TRUE(replay(reader).identical());
+}
+
+// Hazard: torque
+TEST(Session, BoundsAToolsStiffnessInRotationByWhatItsDeviceBears) {
+  const auto turn_stiffness = [](const char* device, double asked) {
+    SessionOptions options = on_the_wall();
+    options.open_devices[0] = open_device(device, pressing());
+    options.parameters.coupling.turn_stiffness = asked;
+    return Session(std::move(options)).settings().parameters.coupling.turn_stiffness;
+  };
+  EXPECT_NEAR(turn_stiffness("hand:?device=sigma", 0.0), 1.0, 1e-12);
+  EXPECT_EQ(turn_stiffness("hand:?device=sigma", 3.0), 3.0) << "what is set wins";
+  EXPECT_EQ(turn_stiffness("hand:?device=omega", 0.0), 0.0) << "it has no motors for a torque";
 }
 
 TEST(Session, SwitchesMethodsWhereTheProxyIs) {

@@ -42,12 +42,26 @@ constexpr std::array presets{
                    .max_stiffness = 3000.0,
                    .max_damping = 20.0},
         .reach = 0.04},
+    DevicePreset{.name = "sigma",
+                 .body = {.mass = 0.3,
+                          .damping = 1.5,
+                          .friction = 0.05,
+                          .resolution = 0.01e-3,
+                          .delay = 0.25e-3,
+                          .inertia = 1e-4,
+                          .turn_damping = 1e-3},
+                 .limits = {.max_force = 12.0,
+                            .continuous_force = 12.0,
+                            .max_stiffness = 4000.0,
+                            .max_damping = 30.0,
+                            .max_torque = 0.4},
+                 .reach = 0.075},
 };
 
 constexpr std::array grips{
-    Grip{"light", 0.05, 100.0, 2.0},
-    Grip{"firm", 0.2, 600.0, 12.0},
-    Grip{"none", 0.0, 0.0, 0.0},
+    Grip{"light", 0.05, 100.0, 2.0, 0.2, 2e-3},
+    Grip{"firm", 0.2, 600.0, 12.0, 1.0, 1e-2},
+    Grip{"none", 0.0, 0.0, 0.0, 0.0, 0.0},
 };
 
 template <class Rows>
@@ -70,6 +84,8 @@ void validate(const DeviceBody& body) {
   check_range("device model", "friction", "N", 0.0, 10.0, body.friction);
   check_range("device model", "resolution", "m", 0.0, 0.01, body.resolution);
   check_range("device model", "delay", "s", 0.0, 0.01, body.delay);
+  check_range("device model", "inertia", "kg m^2", 0.0, 0.1, body.inertia);
+  check_range("device model", "turn_damping", "N m s/rad", 0.0, 1.0, body.turn_damping);
 }
 
 const DevicePreset& device_preset(std::string_view name) {

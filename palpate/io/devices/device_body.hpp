@@ -14,6 +14,8 @@ struct DeviceBody {
   double friction = 0.26;        ///< [N] Coulomb, against the motion, 0 to 10
   double resolution = 0.055e-3;  ///< [m] of the position that is read; 0 to 10 mm, 0: exact
   double delay = 1e-3;           ///< [s] from a write until the motors give the force, 0 to 10 ms
+  double inertia = 0.0;       ///< [kg m^2] about any axis, up to 0.1; 0: the handle does not turn
+  double turn_damping = 0.0;  ///< [N m s/rad] viscous, 0 to 1
 };
 
 /// @throws Error naming the first figure out of its range.
@@ -27,16 +29,20 @@ struct DevicePreset {
   double reach;  ///< [m] radius
 };
 
-/// The models `touch`, `omega` and `falcon`: the middle of what is known of such devices.
+/// The models `touch`, `omega`, `falcon` and, with motors for a torque, `sigma`: the middle of what
+/// is known of such devices. Of how a handle turns nothing is published: its inertia is that of a
+/// pen of 60 g, its damping as small as that of the positions is in comparison.
 /// @throws Error for another name.
 const DevicePreset& device_preset(std::string_view name);
 
 /// How a hand holds the handle.
 struct Grip {
   std::string_view name;
-  double mass;       ///< [kg] of the hand that moves with the handle
-  double stiffness;  ///< [N/m]
-  double damping;    ///< [N s/m]
+  double mass;            ///< [kg] of the hand that moves with the handle
+  double stiffness;       ///< [N/m]
+  double damping;         ///< [N s/m]
+  double turn_stiffness;  ///< [N m/rad]
+  double turn_damping;    ///< [N m s/rad]
 };
 
 /// `light`, `firm`, or `none`: nobody holds it.

@@ -28,9 +28,10 @@ std::unique_ptr<Device> open_script(const Uri& uri, const Path& path) {
 }
 
 std::unique_ptr<Device> open_hand(const Uri& uri, const Path& path) {
-  constexpr std::array<std::string_view, 12> options{
-      "mass", "stiffness",   "damping",        "tremor",   "seed",       "device",
-      "grip", "device_mass", "device_damping", "friction", "resolution", "delay"};
+  constexpr std::array<std::string_view, 16> options{
+      "mass",    "stiffness",           "damping",        "tremor",      "seed",       "device",
+      "grip",    "device_mass",         "device_damping", "friction",    "resolution", "delay",
+      "inertia", "device_turn_damping", "turn_stiffness", "turn_damping"};
   uri.allow_only(options);
   HandModel model;
   const std::string device = uri.text_option("device", "none");
@@ -44,12 +45,16 @@ std::unique_ptr<Device> open_hand(const Uri& uri, const Path& path) {
     body.friction = uri.number_option("friction", body.friction, 0.0, 10.0, "N");
     body.resolution = uri.number_option("resolution", body.resolution, 0.0, 0.01, "m");
     body.delay = uri.number_option("delay", body.delay, 0.0, 0.01, "s");
+    body.inertia = uri.number_option("inertia", body.inertia, 0.0, 0.1, "kg m^2");
+    body.turn_damping =
+        uri.number_option("device_turn_damping", body.turn_damping, 0.0, 1.0, "N m s/rad");
   } else {
     for (const std::string_view of_a_body :
-         {"device_mass", "device_damping", "friction", "resolution", "delay"}) {
+         {"device_mass", "device_damping", "friction", "resolution", "delay", "inertia",
+          "device_turn_damping", "turn_stiffness", "turn_damping"}) {
       if (uri.has(of_a_body))
         throw Error(uri.text(), "option '" + std::string(of_a_body) + "' needs a device model",
-                    "add device=touch, device=omega or device=falcon");
+                    "add device=touch, device=omega, device=falcon or device=sigma");
     }
   }
   if (!grip.empty()) {
@@ -57,10 +62,12 @@ std::unique_ptr<Device> open_hand(const Uri& uri, const Path& path) {
     model.mass = held.mass;
     model.stiffness = held.stiffness;
     model.damping = held.damping;
+    model.turn_stiffness = held.turn_stiffness;
+    model.turn_damping = held.turn_damping;
     if (held.mass == 0.0) {
       if (preset == nullptr)
         throw Error(uri.text(), "with grip=none and no device there is nothing to move",
-                    "add device=touch, device=omega or device=falcon");
+                    "add device=touch, device=omega, device=falcon or device=sigma");
       model.tremor = 0.0;
     }
   }
@@ -68,6 +75,9 @@ std::unique_ptr<Device> open_hand(const Uri& uri, const Path& path) {
   model.mass = uri.number_option("mass", model.mass, held ? 0.01 : 0.0, 10.0, "kg");
   model.stiffness = uri.number_option("stiffness", model.stiffness, held ? 1.0 : 0.0, 1e4, "N/m");
   model.damping = uri.number_option("damping", model.damping, 0.0, 1e3, "N s/m");
+  model.turn_stiffness =
+      uri.number_option("turn_stiffness", model.turn_stiffness, 0.0, 100.0, "N m/rad");
+  model.turn_damping = uri.number_option("turn_damping", model.turn_damping, 0.0, 1.0, "N m s/rad");
   model.tremor = uri.number_option("tremor", model.tremor, 0.0, 0.01, "m");
   model.seed = static_cast<std::uint64_t>(uri.number_option("seed", 1.0, 0.0, 1e9, "-"));
   auto hand = std::make_unique<SimulatedHand>(path_of(uri, path), model, uri.text());

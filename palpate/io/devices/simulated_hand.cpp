@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "palpate/kernel/core/parameters.hpp"
+#include "palpate/kernel/core/rotation.hpp"
 
 namespace palpate {
 namespace {
@@ -38,6 +39,8 @@ SimulatedHand::SimulatedHand(HipPath target, const HandModel& model, std::string
   check_range("simulated hand", "stiffness", "N/m", model_.body ? 0.0 : 1.0, 1e4, model_.stiffness);
   check_range("simulated hand", "damping", "N s/m", 0.0, 1e3, model_.damping);
   check_range("simulated hand", "tremor", "m", 0.0, 0.01, model_.tremor);
+  check_range("simulated hand", "turn_stiffness", "N m/rad", 0.0, 100.0, model_.turn_stiffness);
+  check_range("simulated hand", "turn_damping", "N m s/rad", 0.0, 1.0, model_.turn_damping);
   if (const auto& body = model_.body) {
     validate(*body);
     info_.kind = "simulated hand on a device";
@@ -53,6 +56,7 @@ SimulatedHand::SimulatedHand(HipPath target, const HandModel& model, std::string
   target_ = this->target(0.0);
   position_ = target_;
   slow_ = slower_ = position_;
+  orientation_ = target_orientation_ = path_.pose_at(path_.first_time()).orientation;
 }
 
 Vec3 SimulatedHand::target(double t) const noexcept {
@@ -88,6 +92,7 @@ void SimulatedHand::step_body(double dt) noexcept {
   const Vec3 target_velocity = (next - target_) / dt;
   slide(dt, target_velocity);
   target_ = next;
+  if (turns()) turn(dt);
   keep_shake(dt);
 }
 
@@ -146,10 +151,23 @@ void SimulatedHand::slide(double dt, const Vec3& target_velocity) noexcept {
   }
 }
 
+void SimulatedHand::turn(double dt) noexcept {
+  const Rotation next = path_.pose_at(path_.first_time() + t_).orientation;
+  const Vec3 target_rate = rotation_vector(between(next, target_orientation_)) / dt;
+  target_orientation_ = next;
+  const double inertia = model_.body->inertia;
+  const double damping = model_.turn_damping + model_.body->turn_damping;
+  const Vec3 pull = torque_ + model_.turn_damping * target_rate +
+                    model_.turn_stiffness * rotation_vector(between(next, orientation_));
+  turn_rate_ = (turn_rate_ + dt / inertia * pull) / (1.0 + dt * damping / inertia);
+  orientation_ = unit(product(rotation_by(dt * turn_rate_), orientation_));
+}
+
 void SimulatedHand::take_due_force() noexcept {
   constexpr double rounding = 0.5e-6;  // [s]
   while (command_count_ > 0 && commands_[first_command_].due <= t_ + rounding) {
-    force_ = commands_[first_command_].force;
+    force_ = commands_[first_command_].wrench.force;
+    torque_ = commands_[first_command_].wrench.torque;
     first_command_ = (first_command_ + 1) % commands_.size();
     --command_count_;
   }
@@ -186,7 +204,7 @@ HandState SimulatedHand::read(double t) noexcept {
   if (gap > 0.0) {
     const int steps = static_cast<int>(std::ceil(gap / longest_step));
     if (!enabled_.load(std::memory_order_relaxed)) {
-      force_.setZero();
+      force_ = torque_ = Vec3::Zero();
       command_count_ = 0;
     }
     for (int i = 0; i < steps; ++i) {
@@ -206,18 +224,25 @@ HandState SimulatedHand::read(double t) noexcept {
       statistics_.damping_loss.store(damping_loss_, std::memory_order_relaxed);
       statistics_.kinetic.store(0.5 * system_.mass * velocity_.squaredNorm(),
                                 std::memory_order_relaxed);
+      statistics_.turn_rate.store(turn_rate_.norm(), std::memory_order_relaxed);
     }
   }
+  HandState hand{.position = position_};
   const double resolution = model_.body ? model_.body->resolution : 0.0;
-  if (resolution > 0.0)
-    return {.position = resolution * Vec3((position_ / resolution).array().round())};
-  return {.position = position_};
+  if (resolution > 0.0) hand.position = resolution * Vec3((position_ / resolution).array().round());
+  if (turns()) {
+    hand.orientation = Eigen::Quaterniond(orientation_);
+  } else if (path_.turns()) {
+    hand.orientation = Eigen::Quaterniond(path_.pose_at(path_.first_time() + t_).orientation);
+  }
+  return hand;
 }
 
-void SimulatedHand::write(const Vec3& force, double /*t*/) noexcept {
-  if (!force.allFinite() || !enabled_.load(std::memory_order_relaxed)) return;
+void SimulatedHand::write(const Wrench& wrench, double /*t*/) noexcept {
+  const bool finite = wrench.force.allFinite() && wrench.torque.allFinite();
+  if (!finite || !enabled_.load(std::memory_order_relaxed)) return;
   if (!model_.body) {
-    force_ = force;
+    force_ = wrench.force;
     return;
   }
   if (command_count_ == commands_.size()) {  // more than 10 ms of them: the oldest is due
@@ -225,7 +250,7 @@ void SimulatedHand::write(const Vec3& force, double /*t*/) noexcept {
     --command_count_;
   }
   commands_[(first_command_ + command_count_) % commands_.size()] = {t_ + model_.body->delay,
-                                                                     force};
+                                                                     wrench};
   ++command_count_;
 }
 

@@ -84,6 +84,11 @@ constexpr std::array table = {
     row_of<&P::coupling, &Coupling::max_force>(
         "max_force", "", "N", 0.0, 1e3,
         "limit of the rendered force; the device's and the user's may be lower", "ours"),
+    row_of<&P::coupling, &Coupling::turn_stiffness>(
+        "turn_stiffness", "", "N m/rad", 0.0, 1e3,
+        "largest stiffness of a tool with a shape in rotation; 0: full torque at 0.4 rad, if the "
+        "device has motors for a torque, else no limit",
+        "ours (tools)"),
     row_of<&P::motion, &Motion::frame_rate>("frame_rate", "f_c", "Hz", 0.1, 1000.0,
                                             "frame rate assumed until there are two timestamps",
                                             "(3), (13)"),

@@ -151,6 +151,9 @@ struct Coupling {
   double stiffness = 600.0;  ///< [N/m] k_s of (16)
   double damping = 0.0;      ///< [N s/m] k_d of (16)
   double max_force = 20.0;   ///< [N] a force is never longer; a device's own limit may be lower
+  /// [N m/rad] of a tool with a shape, at most. 0: a session sets what its device's motors for a
+  /// torque bear; without such motors there is no limit.
+  double turn_stiffness = 0.0;
 };
 
 /// What is assumed about time between frames. Section 4.5.

@@ -92,6 +92,8 @@ class ShapeTouch final : public Method {
   void step(const Pose& hand) noexcept;
   void add_friction(std::size_t number, const Motion6& wanted, Limits& limits) noexcept;
   [[nodiscard]] Vec3 motion_at(const Motion6& motion, const Contact& contact) const noexcept;
+  /// [m] L of (2): the tool's, or what the largest stiffness in rotation leaves of it.
+  [[nodiscard]] double turn_length() const noexcept;
   [[nodiscard]] Vec3 hand_velocity_at(const Vec3& lever) const noexcept;
   void feel(const Pose& hand, Tick& tick) noexcept;
   [[nodiscard]] double known_share(double t) const noexcept;

@@ -134,6 +134,24 @@ TEST(Splat, IsFeltBehindFog) {
   EXPECT_LT(forces.most, 1.07 * expected);
 }
 
+// Its Gaussians lie above and below one another, and a camera that asks the nearest one where space
+// is free would look from inside.
+TEST(Splat, IsSeenFromOutsideThoughItIsRough) {
+  std::mt19937 random(1);
+  std::normal_distribution<float> off(0.0F, 1e-3F);  // [m]
+  std::vector<Gaussian> gaussians = ball();
+  for (Gaussian& g : gaussians) g.mean += off(random) * g.mean.normalized();
+  VirtualCamera camera(std::make_unique<SplatBody>(gaussians, "a rough ball"), 60.0, SourceInfo{});
+  for (int i = -30; i <= 360; ++i) {
+    const double height = std::max(-1e-3 * i, 0.0) - pressed;
+    const double angle = pi * std::max(i, 0) / 180.0;
+    const Vec3 out(std::sin(angle), 0.0, std::cos(angle));
+    camera.follow((radius + height) * out);
+    const auto cloud = camera.next()->cloud;
+    EXPECT_GT(-cloud->image()->world_from_camera().linear().col(2).dot(out), 0.5) << i;
+  }
+}
+
 TEST(Splat, HasNoFloaters) {
   std::vector<Gaussian> gaussians = ball();
   for (std::size_t i = 0; i < count; i += 400) {

@@ -25,7 +25,9 @@ constexpr double most_along = 30e-3;      // [m] by which it may come nearer or 
 constexpr double least_alike = 0.94;      // of 20 degrees, by which the direction may turn
 constexpr double most_pressed = 0.1;      // [m] that a hand is behind a surface it has pressed
 constexpr double depth_slack = 2e-3;      // [m] a hand may seem deeper than it has moved
-constexpr double over_surface = 2e-3;     // [m] where space is taken to be free
+constexpr double touching = 3e-3;         // [m] above a surface, where parts of a rough one are
+constexpr double over_surface = 2e-3;     // [m] where space is taken to be free, if it is
+constexpr double least_facing = 0.5;      // of 60 degrees, under which a place is seen
 constexpr int plane_radius = 6;           // [px] of a plane fitted to the window
 constexpr double plane_band = 5e-3;       // [m] of depth that belongs to it
 constexpr double height_at_first = 0.05;  // [m] above the body, before a hand is known
@@ -143,55 +145,73 @@ bool VirtualCamera::place(const Eigen::Isometry3d& world_from_body, const std::s
   return true;
 }
 
-// The surface of the window before, where the hand is behind it, and has come there through it and
-// not around it.
+// The surface of the window before, where the hand is at it or behind it, and has come there
+// through it and not around it.
 std::optional<VirtualCamera::Aim> VirtualCamera::pressed() {
+  const bool was_pressed = std::exchange(was_pressed_, false);
   if (depth_.empty()) return std::nullopt;
   const Vec3 hand = view_.body_from_camera.inverse() * hand_;
   const Intrinsics& k = view_.intrinsics;
   if (hand.z() < view_.nearest) return std::nullopt;
   const int u = static_cast<int>(std::lround(k.fx * hand.x() / hand.z() + k.cx));
   const int v = static_cast<int>(std::lround(k.fy * hand.y() / hand.z() + k.cy));
-  const auto place = [&](int column, int row) {
-    const double depth = depth_[static_cast<std::size_t>(row * window_size + column)];
+  const auto place = [&](int column, int row, double depth) {
     return Vec3(depth * (column - k.cx) / k.fx, depth * (row - k.cy) / k.fy, depth);
   };
   if (u < 0 || v < 0 || u >= window_size || v >= window_size) return std::nullopt;
-  const Vec3 centre = place(u, v);
-  if (!(centre.z() < hand.z())) return std::nullopt;
-  Vec3 sum = Vec3::Zero();
-  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
-  int count = 0;
+  std::vector<Eigen::Vector3f> about;  // (column, row, depth)
   for (int row = std::max(v - plane_radius, 0); row <= std::min(v + plane_radius, window_size - 1);
        ++row) {
     for (int column = std::max(u - plane_radius, 0);
-         column <= std::min(u + plane_radius, window_size - 1); ++column) {
-      const Vec3 point = place(column, row) - centre;
-      if (!(std::abs(point.z()) < plane_band)) continue;
-      sum += point;
-      products += point * point.transpose();
-      ++count;
-    }
+         column <= std::min(u + plane_radius, window_size - 1); ++column)
+      about.emplace_back(column, row, depth_[static_cast<std::size_t>(row * window_size + column)]);
   }
+  double middle = depth_[static_cast<std::size_t>(v * window_size + u)];
+  if (was_pressed && !(middle < hand.z())) {  // through a hole in what is pressed
+    const auto half = about.begin() + static_cast<std::ptrdiff_t>(about.size() / 2);
+    std::nth_element(about.begin(), half, about.end(),
+                     [](const auto& a, const auto& b) { return a.z() < b.z(); });
+    middle = half->z();
+  }
+  if (!std::isfinite(middle)) return std::nullopt;
+  const Vec3 centre = place(u, v, middle);
+  Vec3 sum = Vec3::Zero();
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+  int count = 0;
+  for (const Eigen::Vector3f& pixel : about) {
+    const Vec3 point =
+        place(static_cast<int>(pixel.x()), static_cast<int>(pixel.y()), pixel.z()) - centre;
+    if (!(std::abs(point.z()) < plane_band)) continue;
+    sum += point;
+    products += point * point.transpose();
+    ++count;
+  }
+  Vec3 mean = Vec3::Zero();
   Vec3 normal = -Vec3::UnitZ();
   if (count > 2 * plane_radius) {
-    const Vec3 mean = sum / count;
+    mean = sum / count;
     normal = axes_of(products - count * mean * mean.transpose()).vectors.col(0);
     if (normal.z() > 0.0) normal = -normal;
   }
-  const double depth = (centre - hand).dot(normal);  // [m] of the hand behind that plane
+  const double depth = (centre + mean - hand).dot(normal);  // [m] of the hand behind that plane
   const double moved = (hand_ - hand_before_).norm();
-  is_hidden_ = depth > (was_pressed_ ? most_pressed : moved + depth_slack);
-  if (is_hidden_) return std::nullopt;
+  is_hidden_ = depth > (was_pressed ? most_pressed : moved + depth_slack);
+  if (is_hidden_ || depth < -touching) return std::nullopt;
+  was_pressed_ = depth > 0.0;
   const Vec3 outward = view_.body_from_camera.linear() * normal;
   const Vec3 surface = hand_ + depth * outward;
-  return aim_from(surface, surface + over_surface * outward);
+  double height = over_surface;
+  // Parts of a rough surface may lie above that.
+  for (int i = 0; i < 2; ++i, height *= 2.0) {
+    const Vec3 at = surface + height * outward;
+    if ((at - body_->nearest(at)).norm() > 0.5 * height) break;
+  }
+  return aim_from(surface, surface + height * outward);
 }
 
 VirtualCamera::Aim VirtualCamera::aim() {
   is_hidden_ = false;
   const std::optional<Aim> behind = pressed();
-  was_pressed_ = behind.has_value();
   hand_before_ = hand_;
   return behind ? *behind : aim_from(body_->nearest(hand_), hand_);
 }
@@ -206,7 +226,10 @@ VirtualCamera::Aim VirtualCamera::aim_from(const Vec3& place, const Vec3& from) 
     const Vec3 away = at - body_->nearest(at);
     at += away.norm() > 1e-6 ? Vec3(step * away.normalized()) : Vec3(step * before);
   }
-  const Vec3 outward = (at - place).norm() > 1e-6 ? Vec3((at - place).normalized()) : before;
+  Vec3 outward = (at - place).norm() > 1e-6 ? Vec3((at - place).normalized()) : before;
+  const Vec3 facing = from - place;
+  if (facing.norm() > 1e-6 && outward.dot(facing) < least_facing * facing.norm())
+    outward = facing.normalized();
   const double height = std::max((from - place).dot(outward), over_surface);
   const double way = free_way(*body_, place + height * outward, outward);
   return {place, outward, std::isfinite(way) ? height + 0.5 * way : standoff};

@@ -152,6 +152,21 @@ TEST(Splat, IsSeenFromOutsideThoughItIsRough) {
   }
 }
 
+// Beside a hole `sight` keeps to its fit, whose heights are over the plane that the camera faced
+// first: they lean more and more while both go round.
+TEST(Splat, IsABallAllRoundThoughItHasHoles) {
+  const double expected = Parameters().coupling.stiffness * pressed;  // [N]
+  std::vector<Gaussian> gaussians = ball();
+  std::mt19937 random(1);
+  for (int i = 0; i < 16; ++i) {
+    const Eigen::Vector3f hole = gaussians[random() % gaussians.size()].mean;
+    std::erase_if(gaussians, [&](const Gaussian& g) { return (g.mean - hole).norm() < 4e-3F; });
+  }
+  const Forces forces = round(gaussians);
+  EXPECT_GT(forces.least, 0.9 * expected);
+  EXPECT_LT(forces.most, 1.1 * expected);
+}
+
 TEST(Splat, HasNoFloaters) {
   std::vector<Gaussian> gaussians = ball();
   for (std::size_t i = 0; i < count; i += 400) {

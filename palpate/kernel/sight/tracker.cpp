@@ -406,7 +406,20 @@ bool SightTracker::slide(const ObservedClouds& clouds, const Vec3& foot) noexcep
     start(clouds, camera, foot, surface_.frame().up);
     return tracking();
   }
-  const Vec2 at = surface_.frame().local_from_world(foot).head<2>();
+  const LocalFrame& axes = surface_.frame();
+  const Vec2 at = axes.local_from_world(foot).head<2>();
+  // A camera that goes round a body with the hand sees it upright where its first view's heights
+  // lean too much for a quadric. One that stays does not: lines of sight through a body are alike.
+  constexpr double leaning = 0.7;  // [-] cosine of 45 degrees
+  constexpr double upright = 0.8;  // [-] of 37
+  if (const Vec3 normal = axes.direction_in_world(surface_.surface().normal(at));
+      normal.dot(axes.up) < leaning) {
+    const std::optional<Seen> seen = look_at(cloud, foot, surface_.resolution());
+    if (seen && seen->line.dot(normal) > upright) {
+      start(clouds, camera, foot, seen->line);
+      return tracking();
+    }
+  }
   return surface_.move_to(cloud, at, {surface_.gate(), false, is_shadowed(camera)});
 }
 

@@ -142,6 +142,7 @@ TEST(Splat, IsSeenFromOutsideThoughItIsRough) {
   std::vector<Gaussian> gaussians = ball();
   for (Gaussian& g : gaussians) g.mean += off(random) * g.mean.normalized();
   VirtualCamera camera(std::make_unique<SplatBody>(gaussians, "a rough ball"), 60.0, SourceInfo{});
+  double above = 0.0, points = 0.0;  // [m] of all points together
   for (int i = -30; i <= 360; ++i) {
     const double height = std::max(-1e-3 * i, 0.0) - pressed;
     const double angle = pi * std::max(i, 0) / 180.0;
@@ -149,7 +150,12 @@ TEST(Splat, IsSeenFromOutsideThoughItIsRough) {
     camera.follow((radius + height) * out);
     const auto cloud = camera.next()->cloud;
     EXPECT_GT(-cloud->image()->world_from_camera().linear().col(2).dot(out), 0.5) << i;
+    for (const Vec3& point : cloud->image()->points()) {
+      above += point.norm() - radius;
+      ++points;
+    }
   }
+  EXPECT_LT(above / points, 0.6e-3) << "those that stick out are not the surface";
 }
 
 // Beside a hole `sight` keeps to its fit, whose heights are over the plane that the camera faced
@@ -205,7 +211,7 @@ TEST(Splat, FogAloneHasNoDepth) {
 
 // [m] of one ray by the definition, in doubles; infinite where no half is hidden, or in fog.
 double depth_of_ray(const std::vector<Gaussian>& in_order, const Vec3& ray) {
-  double left = 1.0, weight = 0.0, sum = 0.0;
+  double left = 1.0, ended = 0.0, weight = 0.0, sum = 0.0;
   for (const Gaussian& g : in_order) {
     const Eigen::Matrix3d whitened = g.sigma.cast<double>().cwiseInverse().asDiagonal() *
                                      g.turn.cast<double>().toRotationMatrix().transpose();
@@ -213,13 +219,14 @@ double depth_of_ray(const std::vector<Gaussian>& in_order, const Vec3& ray) {
     const double along = mean.dot(v) / v.squaredNorm();
     const double share = g.opacity * std::exp(-0.5 * (mean - along * v).squaredNorm());
     const bool is_same = weight > 0.0 && std::abs(along - sum / weight) < 3e-3;
-    if (share < 0.02 || (!is_same && left < 0.5)) continue;
-    if (!is_same) weight = sum = 0.0;
-    weight += left * share;
-    sum += left * share * along;
+    if (share < 0.02 || left < 0.02 || (!is_same && left < 0.5)) continue;
+    if (!is_same) ended = weight = sum = 0.0;
+    ended += left * share;
+    weight += share;
+    sum += share * along;
     left *= 1.0 - share;
   }
-  return left < 0.5 && weight >= 0.25 ? sum / weight : std::numeric_limits<double>::infinity();
+  return left < 0.5 && ended >= 0.25 ? sum / weight : std::numeric_limits<double>::infinity();
 }
 
 TEST(Splat, IsDrawnAsItIsDefined) {

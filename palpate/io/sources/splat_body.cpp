@@ -76,10 +76,11 @@ struct SeenGaussian {
 // What rays have gathered, front to back, of a window row by row.
 struct Gathered {
   explicit Gathered(std::size_t size)
-      : left(size + lanes, 1.0F), weight(size + lanes), sum(size + lanes) {}
+      : left(size + lanes, 1.0F), ended(size + lanes), weight(size + lanes), sum(size + lanes) {}
   std::vector<float> left;    // [-] share of light that has passed
-  std::vector<float> weight;  // of the surface met last
-  std::vector<float> sum;     // [m] weighted depths of it
+  std::vector<float> ended;   // [-] share that has ended at the surface met last
+  std::vector<float> weight;  // [-] opacities along the ray of those that belong to it
+  std::vector<float> sum;     // [m] depths of it, weighted by these
 };
 
 // Pixels [u_begin, u_end) x [v_begin, v_end), and the rays of their first, from the mean's, to
@@ -91,7 +92,7 @@ struct Pixels {
 
 PALPATE_VECTORISED
 void add_to_rays(const SeenGaussian& g, float opacity, float nearest, float farthest, Pixels pixels,
-                 float* left, float* weight, float* sum) {
+                 float* left, float* ended, float* weight, float* sum) {
   const float reach_squared = g.reach * g.reach;
   for (int v = pixels.v_begin; v < pixels.v_end; ++v) {
     const float b = pixels.b + static_cast<float>(v - pixels.v_begin) * pixels.step_b;
@@ -127,8 +128,9 @@ void add_to_rays(const SeenGaussian& g, float opacity, float nearest, float fart
         const float share = counts ? opacity * e : 0.0F;
         const float gain = passed * share;
         const bool begins = counts & !same;
-        weight[first + lane] = (begins ? 0.0F : surface) + gain;
-        sum[first + lane] = (begins ? 0.0F : depths) + (counts ? gain * along : 0.0F);
+        ended[first + lane] = (begins ? 0.0F : ended[first + lane]) + gain;
+        weight[first + lane] = (begins ? 0.0F : surface) + share;
+        sum[first + lane] = (begins ? 0.0F : depths) + (counts ? share * along : 0.0F);
         left[first + lane] = passed - gain;
       }
     }
@@ -277,10 +279,11 @@ void SplatBody::draw(const View& view, std::span<float> depth) const {
                              .b = static_cast<float>((window.v_begin - k.cy) / k.fy - middle.y()),
                              .step_a = static_cast<float>(1.0 / k.fx),
                              .step_b = static_cast<float>(1.0 / k.fy)},
-                            rays.left.data(), rays.weight.data(), rays.sum.data());
+                            rays.left.data(), rays.ended.data(), rays.weight.data(),
+                            rays.sum.data());
   }
   for (std::size_t i = 0; i < depth.size(); ++i) {
-    if (rays.left[i] < 0.5F && rays.weight[i] >= least_surface)
+    if (rays.left[i] < 0.5F && rays.ended[i] >= least_surface)
       depth[i] = rays.sum[i] / rays.weight[i];
   }
 }

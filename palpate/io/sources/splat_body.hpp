@@ -22,8 +22,10 @@ struct Gaussian {
 /// A splat: depth is where the opacity gathered along a ray passes one half.
 ///
 /// Each Gaussian counts at the place of the ray where its own response is greatest, not at its
-/// centre; of those that lie within 3 mm of one another there, the mean by what they hide. Where
-/// these hide less than a quarter, it is fog, which has no depth.
+/// centre; of those that lie within 3 mm of one another there, up to where 98 % of the light has
+/// ended, the mean by their opacity there. It does not count what hides them, or whatever sticks
+/// out of a rough surface would be its place. Where they hide less than a quarter, it is fog, which
+/// has no depth.
 class SplatBody final : public Body {
  public:
   /// Gaussians that are not finite or hide less than 5 % at their centre are left out, and those

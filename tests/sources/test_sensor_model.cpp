@@ -153,6 +153,46 @@ TEST(Sensor, GrowingNoiseGrowsWithAPowerOfDepth) {
 }
 
 // The deviations of a RealSense D4xx over a resting table, eight frames, whole-frame shift removed.
+TEST(Sensor, LearnedDepthErrsAlikeOverPixelsAndFramesAndDriftsInScale) {
+  SensorModel model = SensorModel::named("learned");
+  model.quantisation = 2e-5;
+  model.drift = 0.0;
+  const auto fields = deviations(model, 0.5F, 300);
+  EXPECT_NEAR(standard_deviation(fields), 5e-3, 0.5e-3);  // 1 % of depth
+  EXPECT_NEAR(correlation(fields, 10, 0), std::exp(-1.0 / 16.0), 0.03);
+  EXPECT_NEAR(correlation(fields, 0, 40), std::exp(-1.0), 0.1);
+  const auto in_time = [&](std::size_t frames) {
+    double products = 0.0, squares = 0.0;
+    for (std::size_t k = 0; k + frames < fields.size(); ++k) {
+      for (std::size_t i = 0; i < pixels; i += 97) {
+        products += fields[k][i] * fields[k + frames][i];
+        squares += fields[k][i] * fields[k][i];
+      }
+    }
+    return products / squares;
+  };
+  EXPECT_GT(in_time(1), 0.99);
+  EXPECT_NEAR(in_time(15), 0.6, 0.15);
+  EXPECT_NEAR(in_time(60), 0.0, 0.15);
+
+  model = fine();
+  model.drift = 0.03;
+  Sensor sensor(model, camera());
+  const auto scale = [&](int frame) {
+    const Readings readings = sensor.measure(wall(0.5F), frame);
+    EXPECT_EQ(readings.front(), readings.back());
+    return readings.front() * model.quantisation / 0.5;
+  };
+  constexpr int draws = 60;
+  double squares = 0.0, fastest = 0.0;
+  for (int k = 0; k < draws; ++k) {
+    squares += (scale(300 * k) - 1.0) * (scale(300 * k) - 1.0);
+    fastest = std::max(fastest, std::abs(scale(300 * k + 151) - scale(300 * k + 150)));
+  }
+  EXPECT_NEAR(std::sqrt(squares / draws), 0.03, 4.0 * 0.03 / std::sqrt(2.0 * draws));
+  EXPECT_LT(fastest, 2e-3);  // in a frame
+}
+
 TEST(Sensor, D4xxNoiseIsWhatWasMeasuredOnARestingTable) {
   struct Row {
     float near, far;

@@ -16,8 +16,13 @@ struct SensorModel {
   /// time of flight.
   int noise_growth = 0;
   /// [px] distance at which the noise's correlation falls to 1/e, exp(-(du/x)^2 - (dv/y)^2);
-  /// 0: white along that axis. Every frame has fresh noise.
+  /// 0: white along that axis.
   double correlation_x = 0.0, correlation_y = 0.0;
+  /// After so many frames `noise` is another, independent one; in between it changes smoothly with
+  /// the same deviation. 1: every frame has fresh noise.
+  std::uint64_t noise_frames = 1;
+  /// [-] standard deviation of the scale of all depths, which changes likewise over 300 frames.
+  double drift = 0.0;
   /// Add the noise of a RealSense D4xx, as measured on a resting table: 1.7, 3.1 and 5.2 mm at
   /// 0.45, 0.7 and 0.9 m, correlated over 10 to 20 pixels.
   bool d4xx_noise = false;
@@ -31,8 +36,8 @@ struct SensorModel {
   double flying = 0.0;     ///< [-] share of pixels at depth edges that lie between both depths
   std::uint64_t seed = 1;
 
-  /// An exact camera, a RealSense D4xx, a first Kinect or a camera that times light ("ideal",
-  /// "d4xx", "kinect", "tof").
+  /// An exact camera, a RealSense D4xx, a first Kinect, a camera that times light, or depth that a
+  /// network made of colour ("ideal", "d4xx", "kinect", "tof", "learned").
   /// @throws Error for any other name.
   static SensorModel named(std::string_view name);
 };
@@ -56,6 +61,7 @@ class Sensor {
 
  private:
   void add_gaussian_noise(std::uint64_t frame);
+  void drift(std::uint64_t frame);
   void add_d4xx_noise(std::uint64_t frame);
   void let_edges_fly(std::span<const float> truth, std::uint64_t frame);
   void blank_grazing(std::span<const float> truth, std::vector<std::uint16_t>& readings) const;
@@ -64,7 +70,7 @@ class Sensor {
   Intrinsics camera_;
   std::vector<float> kernel_x_, kernel_y_;  // odd lengths, sum of squares 1
   // Buffers, kept to allocate once.
-  std::vector<float> depth_, field_, rows_;
+  std::vector<float> depth_, field_, next_field_, rows_;
   std::vector<double> sums_;
 };
 

@@ -220,6 +220,8 @@ SensorModel camera_sensor(const Uri& uri) {
       pair_option(uri, "correlation", {model.correlation_x, model.correlation_y}, 0.0, 100.0, true);
   model.correlation_x = correlation.first;
   model.correlation_y = correlation.second;
+  model.noise_frames = whole_option(uri, "noise_frames", model.noise_frames, 1.0);
+  model.drift = uri.number_option("drift", model.drift, 0.0, 0.2, "1");
   model.quantisation = uri.number_option("quantisation", model.quantisation, 1e-6, 0.1, "m");
   model.disparity_step = uri.number_option("disparity_step", model.disparity_step, 0.0, 0.1, "m");
   model.dropouts = uri.number_option("dropouts", model.dropouts, 0.0, 1.0, "1");
@@ -240,11 +242,12 @@ SensorKind camera_kind(const Uri& uri) {
 std::unique_ptr<SyntheticCamera> open_synthetic_camera(const Uri& text) {
   const Uri uri = text.path().empty() ? Uri("synthetic:desk" + text.text().substr(10)) : text;
   std::vector<std::string_view> options = scene_options(uri.path());
-  constexpr std::array<std::string_view, 19> camera_options{
+  constexpr std::array<std::string_view, 21> camera_options{
       "size",           "fps",      "frames",      "fov",         "distance",
       "tilt",           "colour",   "azimuth",     "seed",        "brightness",
       "sensor",         "noise",    "noise_grows", "correlation", "quantisation",
-      "disparity_step", "dropouts", "grazing",     "flying"};
+      "disparity_step", "dropouts", "grazing",     "flying",      "noise_frames",
+      "drift"};
   options.insert(options.end(), camera_options.begin(), camera_options.end());
   uri.allow_only(options);
   SourceInfo info;

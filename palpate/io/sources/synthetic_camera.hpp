@@ -87,8 +87,9 @@ SensorKind camera_kind(const Uri& uri);
 ///   size=640x480 fps=30Hz frames=N fov=57deg distance=0.7m tilt=34deg azimuth=0deg seed=1
 ///   brightness=20mm: an image in grey; surfaces are painted with waves along the world's x
 ///   colour=20mm: an image in colour; waves of red along x, of green along y, of blue along z
-///   sensor=ideal|d4xx|kinect|tof, and over that noise=1mm noise_grows=0|1 correlation=5 or 5x3
-///   [px] quantisation=0.1mm disparity_step=3mm dropouts=1% grazing=80deg flying=30%
+///   sensor=ideal|d4xx|kinect|tof|learned, and over that noise=1mm noise_grows=0|1
+///   correlation=5 or 5x3 [px] noise_frames=30 drift=3% quantisation=0.1mm disparity_step=3mm
+///   dropouts=1% grazing=80deg flying=30%
 /// Without a scene's name it is the desk.
 /// @throws Error for an unknown scene or option, or a value out of range.
 std::unique_ptr<SyntheticCamera> open_synthetic_camera(const Uri& uri);

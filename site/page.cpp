@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <memory>
@@ -196,6 +197,8 @@ class Scene {
     }
   }
 
+  std::string splat_file() { return host_.splat_file().string(); }
+
   void command(std::string_view text) {
     if (text == R"({"replay":true})") return replay_recording();
     const std::optional<Command> command = parse_command(text);
@@ -319,6 +322,15 @@ std::vector<std::byte> unpack_zlib(std::span<const std::byte> packed, std::size_
   return converted("unzlib", packed, max_bytes);
 }
 
+std::vector<std::byte> unpack_gzip(std::span<const std::byte> packed) {
+  constexpr std::size_t most_times = 1032;  // its size, what deflate can hold
+  std::uint32_t size = 0;                   // of its content, which it ends with
+  if (packed.size() < sizeof size) return {};
+  std::memcpy(&size, &packed[packed.size() - sizeof size], sizeof size);
+  return size > most_times * packed.size() ? std::vector<std::byte>()
+                                           : converted("gunzip", packed, size);
+}
+
 std::vector<std::byte> pack_zlib(std::span<const std::byte> bytes) {
   return converted("zlib", bytes, bytes.size() + bytes.size() / 1000 + 64);
 }
@@ -383,6 +395,13 @@ EMSCRIPTEN_KEEPALIVE void palpate_depth(int width, int height, const std::uint16
             world_from_camera)};
     if (!is_shown) palpate_open(site::page_camera, now);
   });
+}
+
+/// The file of the splat that is touched; empty: it is none.
+EMSCRIPTEN_KEEPALIVE const char* palpate_splat() {
+  static std::string path;
+  path = page().scene ? page().scene->splat_file() : std::string();
+  return path.c_str();
 }
 
 /// Where a hand is to be [m, world], or that it was let go.

@@ -9,7 +9,6 @@
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/io/bag/bag_file.hpp"
 #include "palpate/io/bag/compression.hpp"
-#include "palpate/io/sources/point_file.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 #include "site/page.hpp"
@@ -49,10 +48,6 @@ std::vector<std::byte> decompress_lz4(std::span<const std::byte> /*packed*/,
 std::vector<std::byte> decompress_bz2(std::span<const std::byte> /*packed*/,
                                       std::size_t /*max_bytes*/, const std::string& name) {
   refuse(name, "it is compressed with bzip2");
-}
-
-PointFile read_spz(const std::filesystem::path& path) {
-  refuse(path.string(), "it is an SPZ");
 }
 
 std::unique_ptr<BagFile> open_sqlite_file(const std::filesystem::path& file) {

@@ -34,6 +34,7 @@ Module.palpateTick = palpateTick;
 const palpateConvert = {
   unzstd: (bytes) => fzstd.decompress(bytes),
   unzlib: (bytes, room) => fflate.unzlibSync(bytes, { out: new Uint8Array(room) }),
+  gunzip: (bytes) => fflate.gunzipSync(bytes),
   zlib: (bytes) => fflate.zlibSync(bytes, { level: 1 }),
 };
 
@@ -84,6 +85,11 @@ const palpateTake = (message) => {
     const [depth, camera, pose] = [of.depth, of.camera, of.pose].map(bytes);
     const now = palpateSeconds();
     return palpateCall("palpate_depth", types, of.width, of.height, depth, camera, pose, now);
+  }
+  if (message.splat) {
+    const path = Module.ccall("palpate_splat", "string", [], []);
+    const splat = FS.readFile(path).buffer;
+    return palpateSend({ splat }, [splat]);
   }
   if (message.inverse3 !== undefined) return palpateInverse3.lead(message.inverse3);
   palpateTakeFile(message.name, message.bytes);

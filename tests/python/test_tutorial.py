@@ -15,7 +15,7 @@ import tutorial  # noqa: E402  pylint: disable=C0413
 
 class Tutorial(unittest.TestCase):
     def test_its_lessons_run_and_make_their_figures(self):
-        self.assertEqual(len(tutorial.lessons()), 5)
+        self.assertEqual(len(tutorial.lessons()), 6)
         with tempfile.TemporaryDirectory() as folder:
             names = tutorial.run(folder)
             self.assertEqual(names["entry"]["method"], "Free")

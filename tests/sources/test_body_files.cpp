@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 #include <zlib.h>
+#include <zstd.h>
 
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/source.hpp"
@@ -108,10 +109,29 @@ std::string one_gaussian(std::uint32_t version) {
   return bytes;
 }
 
-TEST(BodyFiles, SpzIsReadInAllVersionsOfGzip) {
-  for (const std::uint32_t version : {1U, 2U, 3U}) {
+// The arrays of version 4, each packed by zstd.
+std::string packed_apart(const std::string& plain) {
+  std::string table, packed;
+  std::size_t at = 16;
+  for (const std::size_t size : {9U, 1U, 3U, 3U, 4U}) {
+    std::string one(ZSTD_compressBound(size), '\0');
+    one.resize(ZSTD_compress(one.data(), one.size(), &plain[at], size, 1));
+    put<std::uint64_t>(table, {one.size(), size});
+    packed += one;
+    at += size;
+  }
+  std::string header = plain.substr(0, 15) + '\5';
+  put<std::uint32_t>(header, {32, 0, 0, 0});
+  return header + table + packed;
+}
+
+TEST(BodyFiles, SpzIsReadInAllVersions) {
+  for (const std::uint32_t version : {1U, 2U, 3U, 4U}) {
     SCOPED_TRACE(version);
-    const std::string whole = gzip(one_gaussian(version));
+    const auto pack = [&](const std::string& plain) {
+      return version == 4 ? packed_apart(plain) : gzip(plain);
+    };
+    const std::string whole = pack(one_gaussian(version));
     const PointFile file = spz(whole);
     ASSERT_EQ(file.points.size(), 1U);
     EXPECT_EQ(file.points[0], Vec3(1.5, -2.0, 0.25));
@@ -124,12 +144,12 @@ TEST(BodyFiles, SpzIsReadInAllVersionsOfGzip) {
     expect_defined_on_damage(spz, whole);
     std::string lying = one_gaussian(version);
     lying[10] = '\x7f';
-    EXPECT_TRUE(fails_saying([&] { return spz(gzip(lying)); }, "promises", "more than"));
+    EXPECT_TRUE(fails_saying([&] { return spz(pack(lying)); }, "promises", "more than"));
   }
-  EXPECT_TRUE(fails_saying([] { return spz(gzip(one_gaussian(4))); }, "version 4", "1 to 3"));
+  EXPECT_TRUE(fails_saying([] { return spz(gzip(one_gaussian(5))); }, "version 5", "1 to 4"));
   EXPECT_TRUE(fails_saying([] { return spz(gzip(std::string(64, 'x'))); }, "no SPZ"));
   EXPECT_TRUE(fails_saying([] { return spz("PK"); }, "no gzip"));
-  EXPECT_TRUE(fails_saying([] { return spz(one_gaussian(4)); }, "version 4", "1 to 3"));
+  EXPECT_TRUE(fails_saying([] { return spz(one_gaussian(4)); }, "ends within"));
 }
 
 std::string glb(const std::string& text, const std::string& binary) {

@@ -249,6 +249,7 @@ TEST(Protocol, UnderstandsEachCommand) {
   EXPECT_TRUE(play.paused);
   EXPECT_FALSE(play.loop);
   EXPECT_EQ(play.speed, 0.5);
+  EXPECT_EQ(asked<Rescale>(R"({"rescale": 0.5})").times, 0.5);
   EXPECT_EQ(asked<OpenScene>(R"({"open": "synthetic:desk"})").uri, "synthetic:desk");
   EXPECT_EQ(asked<Seek>(R"({"seek": 0.25})").share, 0.25);
   const auto brush = asked<SetBrush>(R"({"brush": {"material": "ice", "radius": 0.02}})");

@@ -25,9 +25,9 @@ TEST(Roles, AllowALookingPageNothing) {
         Command(SetPlacement{"scale", 2.0}), Command(SetMethod{"paper"}),
         Command(SetRecording{true}), Command(SetRecording{false}), Command(ResetHand{}),
         Command(ResetFaults{}), Command(SetPlayback{true, true, 1.0}), Command(Seek{0.5}),
-        Command(OpenScene{"synthetic:desk"}), Command(SetBrush{"ice", 0.01}), Command(DropBrush{}),
-        Command(ClearPaint{}), Command(Forbid{0.1, 0.01}), Command(Guide{0.002}),
-        Command(RemoveFixture{"wall"})}) {
+        Command(OpenScene{"synthetic:desk"}), Command(Rescale{0.5}), Command(SetBrush{"ice", 0.01}),
+        Command(DropBrush{}), Command(ClearPaint{}), Command(Forbid{0.1, 0.01}),
+        Command(Guide{0.002}), Command(RemoveFixture{"wall"})}) {
     EXPECT_THROW(check_allowed(command, Role::looking), Error) << command.index();
     EXPECT_NO_THROW(check_allowed(command, Role::operating)) << command.index();
   }
@@ -42,6 +42,7 @@ TEST(Roles, LeaveMethodPlacementAndRecordingToTheOperator) {
   EXPECT_TRUE(fails_saying(asking(SetRecording{false}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(SetPlayback{true, true, 1.0}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(Seek{0.5}, Role::holding), "operator"));
+  EXPECT_TRUE(fails_saying(asking(Rescale{0.5}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(OpenScene{"synthetic:desk"}, Role::holding), "operator"));
   EXPECT_TRUE(fails_saying(asking(ResetFaults{}, Role::holding), "latched", "operator"));
   EXPECT_TRUE(fails_saying(asking(Forbid{0.1, 0.01}, Role::holding), "fixture", "operator"));

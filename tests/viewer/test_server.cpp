@@ -52,6 +52,7 @@ class FakeHost final : public ViewerHost {
     ++commands_;
   }
 
+  std::filesystem::path splat_file() override { return folder_.path() / "splat.ply"; }
   std::filesystem::path begin_file(const std::string& name, std::uint64_t size) override {
     static_cast<void>(size);
     if (name == "song.mp3") throw Error(name, "cannot be opened");
@@ -201,6 +202,27 @@ TEST_F(ViewerServerTest, TakesAFileFromTheOperatorsPageAlone) {
   const auto refused = send_file(server.port(), "/file?name=song.mp3&token=operator-123", "x");
   EXPECT_EQ(refused.result(), http::status::unprocessable_entity);
   EXPECT_EQ(refused.body().substr(0, 28), "song.mp3: cannot be opened");
+}
+
+TEST(ViewerServer, GivesTheSplatThatIsFeltToWhoMayLook) {
+  FakeHost host;
+  const ViewerServer server({"127.0.0.1", 0, "secret-123"}, host);
+  const auto get = [&](const std::string& target, const std::string& origin = {}) {
+    return ask(server.port(), target, "localhost", origin);
+  };
+  EXPECT_EQ(get("/splat?token=secret-123").result(), http::status::not_found) << "there is none";
+  const std::string content = "ply\n" + std::string(300'000, 'x');
+  std::ofstream(host.folder() / "splat.ply") << content;
+  std::ofstream(host.folder() / "other.ply") << "secret";
+  EXPECT_EQ(get("/splat").result(), http::status::unauthorized);
+  EXPECT_EQ(get("/splat?token=secret-124").result(), http::status::unauthorized);
+  EXPECT_EQ(get("/splat?token=secret-123", "http://example.com").result(), http::status::forbidden);
+  for (const char* other : {"/splat/../other.ply", "/other.ply", "/splat/"})
+    EXPECT_EQ(get(std::string(other) + "?token=secret-123").result(), http::status::not_found);
+  const auto given = get("/splat?token=secret-123");
+  EXPECT_EQ(given.result(), http::status::ok);
+  EXPECT_EQ(given.body(), content);
+  EXPECT_EQ(given["X-Content-Type-Options"], "nosniff");
 }
 
 TEST_F(ViewerServerTest, LetsGoOfAFileThatDoesNotArriveInFull) {

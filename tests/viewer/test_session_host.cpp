@@ -163,6 +163,47 @@ TEST(SessionHost, ProposesTheLengthOfWhatIsTooLargeAndOpensItOnceItIsWanted) {
   EXPECT_EQ(seen(camera + "?scale=1.0")["rescaled"], "") << "that was chosen";
 }
 
+TEST(SessionHost, SaysHowASplatIsToBeDrawnAndOpensItAtTheScaleThatWasMeasured) {
+  const test::TemporaryFolder folder;
+  std::string sheet = "ply\nformat ascii 1.0\nelement vertex 100\n";
+  for (const char* name : {"x", "y", "z", "opacity", "scale_0", "scale_1", "scale_2", "rot_0",
+                           "rot_1", "rot_2", "rot_3"})
+    sheet += std::string("property float ") + name + "\n";
+  sheet += "end_header\n";
+  for (int i = 0; i < 100; ++i)
+    sheet += std::to_string(i % 10) + " " + std::to_string(i / 10) + " 7 5 0 0 -3 1 0 0 0\n";
+  const std::filesystem::path file = folder.write("sheet.ply", sheet);
+  const std::string camera = "splat:" + file.string();
+  std::vector<std::string> opened;
+  SessionOptions options = wall_options("mouse:");
+  options.cameras.front().uri = camera + "?scale=10mm&up=x&pose=1,2,3,0,0,0,1";
+  SessionHost host("1.2.3", {.open_scene = [&](const std::string& uri) { opened.push_back(uri); }});
+  Session session(std::move(options));
+  host.attach(session);
+  const json splat = json::parse(host.hello())["splat"];
+  EXPECT_EQ(splat["name"], "sheet.ply");
+  const std::vector<double> pose = splat["pose"];
+  const std::vector<double> x_is_up{0, 0, -0.01, 1, 0, 0.01, 0, 2, 0.01, 0, 0, 3};
+  ASSERT_EQ(pose.size(), x_is_up.size());
+  for (std::size_t i = 0; i < pose.size(); ++i) EXPECT_NEAR(pose[i], x_is_up[i], 1e-12) << i;
+  EXPECT_EQ(host.splat_file(), file);
+
+  host.command(Rescale{0.5}, Role::operating);
+  EXPECT_EQ(opened, std::vector<std::string>{camera + "?up=x&pose=1,2,3,0,0,0,1&scale=0.005"});
+  const auto by = [&](double times) {
+    return [&host, times] { host.command(Rescale{times}, Role::operating); };
+  };
+  EXPECT_TRUE(fails_saying(by(0.0), "scale"));
+  EXPECT_TRUE(fails_saying(by(-1.0), "scale"));
+  host.detach();
+
+  Hosted wall({.open_scene = [&](const std::string& uri) { opened.push_back(uri); }});
+  EXPECT_TRUE(json::parse(wall.host.hello())["splat"].is_null());
+  EXPECT_TRUE(wall.host.splat_file().empty());
+  EXPECT_TRUE(fails_saying(wall.asking(Rescale{0.5}, Role::operating), "scale", "--camera"));
+  EXPECT_EQ(opened.size(), 1U);
+}
+
 TEST(SessionHost, OpensAFileThatArrivedInFull) {
   std::vector<std::string> opened;
   const auto files = std::make_shared<DroppedFiles>(1000);

@@ -18,6 +18,7 @@ import {
   spotUnder,
   wallPly,
 } from "./session";
+import { ball, glbOf } from "../tests/splats";
 
 const DESK = ["--camera", "synthetic:desk?size=320x240"];
 const PLANE = ["--camera", "synthetic:plane?size=320x240&noise=1mm"];
@@ -395,6 +396,55 @@ test("another scene is chosen on the page", async () => {
   // Back to what the program was started with.
   await asked(DESK[1]!);
   await expect.poll(() => page.locator("#camera").textContent()).toContain("desk?size=320x240");
+  faults.splice(0); // what the browser says of the connection that ends between two sessions
+});
+
+test("a splat is drawn as one, touched on all sides, and brought to its size", async () => {
+  const page = await open(DESK);
+  const size = 0.15; // [m] radius
+  const buffer = glbOf(ball(12_000, size), [0, 0, 0.3]);
+  await page.setInputFiles("#file", { name: "ball.glb", mimeType: "model/gltf-binary", buffer });
+  await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain("splat:");
+  await expect.poll(() => page.locator("#felt").isVisible(), { timeout: patience }).toBe(true);
+  await drawn(page);
+  const showsFelt = () => page.evaluate(() => (window as any).palpate.view.showsFelt as boolean);
+  expect(await showsFelt()).toBe(false);
+  expect((await glimpse(page)).points).toBe(12_000);
+  const press = async () => {
+    const at = await placeWhere(page, "surface");
+    await page.mouse.move(at.x, at.y);
+    await page.mouse.down();
+    await until(page, (seen) => seen.state !== 0 && seen.force > 1);
+    const { proxy } = await glimpse(page);
+    await page.mouse.up();
+    await until(page, (seen) => seen.force === 0);
+    return proxy;
+  };
+  // A node has moved it along z, which glTF's y up makes -y.
+  const middle = [0, -0.3, 0];
+  const before = await press();
+  expect(Math.abs(distance(before, middle) - size - r_c)).toBeLessThan(0.003);
+  await page.evaluate(() => {
+    const { view } = (window as any).palpate;
+    view.setOrbit({ ...view.orbit, yaw: view.orbit.yaw + Math.PI });
+  });
+  const behind = await press();
+  expect(Math.abs(distance(behind, middle) - size - r_c)).toBeLessThan(0.003);
+  expect(distance(before, behind)).toBeGreaterThan(size);
+  await page.locator("#felt").click();
+  expect(await showsFelt()).toBe(true);
+
+  // Two places are said to be half as far apart as they are.
+  await page.locator("#measure").click();
+  const at = await placeWhere(page, "surface");
+  const [one, other] = [{ x: at.x - 25, y: at.y }, { x: at.x + 25, y: at.y }];
+  const apart = distance(await spotUnder(page, one), await spotUnder(page, other));
+  for (const place of [one, other]) await page.mouse.click(place.x, place.y);
+  expect(await page.locator("#hand").textContent()).toContain("hand free");
+  await page.locator("#ruler-length").fill(String(500 * apart));
+  await page.locator("#ruler-apply").click();
+  const title = () => page.locator("#camera").getAttribute("title");
+  await expect.poll(title).toMatch(/scale=0\.(5|49|50)/);
   faults.splice(0); // what the browser says of the connection that ends between two sessions
 });
 

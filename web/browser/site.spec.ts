@@ -12,6 +12,7 @@ import type { Browser, Page } from "playwright-core";
 import { zipSync, zlibSync } from "fflate";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import { InverseService } from "./inverse_service";
+import { ball, plyOf, spzOf } from "../tests/splats";
 import { drawn, glimpse, hosted, launch, placeWhere, wallPly } from "./session";
 
 const site = fileURLToPath(new URL("../../build/site", import.meta.url));
@@ -178,6 +179,32 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
     await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain("wall.ply");
     await drawn(page);
     await press(page);
+    expect(faults).toEqual([]);
+    await page.close();
+  });
+
+  test("a dropped splat is drawn and touched, as SPZ and as PLY", async () => {
+    const { page, faults } = await open("?size=320x240");
+    const all = ball(5000, 0.08);
+    for (const [name, bytes] of [
+      ["ball.spz", spzOf(all)],
+      ["ball.ply", plyOf(all)],
+    ] as const) {
+      await page.evaluate(
+        ([name, base64]) => {
+          const dataTransfer = new DataTransfer();
+          const bytes = Uint8Array.from(atob(base64!), (letter) => letter.charCodeAt(0));
+          dataTransfer.items.add(new File([bytes], name!));
+          const given = { dataTransfer, bubbles: true, cancelable: true };
+          document.body.dispatchEvent(new DragEvent("drop", given));
+        },
+        [name, bytes.toString("base64")],
+      );
+      await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain(name);
+      await expect.poll(() => page.locator("#felt").isVisible(), { timeout: patience }).toBe(true);
+      await expect.poll(async () => (await glimpse(page)).points).toBe(5000);
+      await press(page);
+    }
     expect(faults).toEqual([]);
     await page.close();
   });

@@ -73,6 +73,14 @@ export class Connection {
     request.send(file);
   }
 
+  /** The file of the splat that is felt. */
+  async splat(): Promise<ArrayBuffer> {
+    const token = this.token ? `?token=${encodeURIComponent(this.token)}` : "";
+    const answer = await fetch(`/splat${token}`, { cache: "no-store" });
+    if (!answer.ok) throw new Error(await answer.text());
+    return answer.arrayBuffer();
+  }
+
   private open(): void {
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
     const socket = new WebSocket(`${scheme}//${location.host}${this.path()}`);

@@ -128,11 +128,13 @@ export function framed(orbit: Orbit, places: readonly Vec3[], room: Room, held =
 /**
  * The first view of what cameras measured; null: they measured too little.
  * @param pose  of the first camera, 3 x 4, row by row
+ * @param isUpright  z is known to be up of a thing that is nobody's view
  */
 export function firstView(
   surfaces: readonly SeenSurface[],
   pose: ArrayLike<number>,
   room: Room,
+  isUpright = false,
 ): Orbit | null {
   const isThing = surfaces.some(isNobodysView);
   const places = surfaces.flatMap((seen) => (isThing ? seen.places(PLACES) : nearPlaces(seen)));
@@ -143,7 +145,7 @@ export function firstView(
   if (isThing) {
     // From a corner, its flat side down.
     const [x, y, z] = sides.map(([low, high]) => high - low) as [number, number, number];
-    const isLevel = z <= Math.max(x, y);
+    const isLevel = isUpright || z <= Math.max(x, y);
     const back: Vec3 = isLevel ? [0.6, -0.9, 0.7] : [0.6, 0.5, 1];
     const up: Vec3 = isLevel ? [0, 0, 1] : [0, 1, 0];
     return framed(lookAt(add(target, back), target, up), places, room, HELD_OF_THINGS);

@@ -23,9 +23,11 @@ import {
   type Ticks,
 } from "./protocol";
 import { robotLines, robotText } from "./robot";
+import { Ruler } from "./ruler";
 import { GHOST_TRAIL, SceneView, type Palette } from "./scene";
 import { Senses } from "./senses";
 import { linked, linkTo } from "./share";
+import { readSplat } from "./splat_file";
 import { handAt, longest, Timeline, trailAt } from "./timeline";
 import { contactRadius, flagNames, SteadyWhy, why } from "./why";
 
@@ -88,6 +90,27 @@ const panel = new Panel(ask);
 const brush = new Brush(ask);
 const fixtures = new Fixtures(ask);
 const timeline = new Timeline(ask);
+const ruler = new Ruler(get<HTMLCanvasElement>("view"), view, ask);
+
+// What is felt of a splat is a window about the hand; all of it is drawn once it is here.
+async function drawSplat(of: Hello): Promise<void> {
+  get("felt").hidden = true;
+  if (!of.splat) return;
+  try {
+    const gaussians = await readSplat(of.splat.name, await connection.splat(), of.splat.pose);
+    if (introduced !== of) return; // another session has begun
+    view.showSplat(gaussians);
+    get("felt").hidden = false;
+    get("felt").setAttribute("aria-pressed", "false");
+  } catch (error) {
+    toast(`Only what is felt of the splat is drawn: ${(error as Error).message}.`, 15_000);
+  }
+}
+function switchFelt(): void {
+  if (get("felt").hidden) return;
+  view.showFelt(!view.showsFelt);
+  get("felt").setAttribute("aria-pressed", String(view.showsFelt));
+}
 
 const connection = new Connection({
   opened() {
@@ -112,6 +135,7 @@ const connection = new Connection({
     if (hello.notice) toast(hello.notice, 15_000);
     remarked = "";
     panel.introduce(hello);
+    void drawSplat(hello);
     if (hello.token === "unknown") toast(unknownToken, 15_000);
   },
   state(newest) {
@@ -125,6 +149,7 @@ const connection = new Connection({
     panel.update(newest, view.inOwnFrame);
     brush.update(newest);
     fixtures.update(newest);
+    ruler.update(newest);
     view.showFixtures(newest.fixtures.map((one) => ({ name: one.name, ends: fixtureLines(one) })));
     const { dabs, materials } = newest.paint;
     view.showPaint(
@@ -387,6 +412,7 @@ get("proposal-no").addEventListener("click", () => {
   declined = state?.points?.rescaled ?? "";
   get("proposal").hidden = true;
 });
+get("felt").addEventListener("click", switchFelt);
 get("colour").addEventListener("click", switchColour);
 get("more-plots").addEventListener("click", () => {
   const all = get("more-plots").getAttribute("aria-expanded") !== "true";
@@ -416,6 +442,7 @@ addEventListener("keydown", (event) => {
   if (event.key === "?") help();
   if (event.code === "KeyF") follow();
   if (event.code === "KeyC") switchColour();
+  if (event.code === "KeyS") switchFelt();
   if (event.code === "KeyV") view.resetView();
   if (event.code === "KeyR") record();
   if (event.code === "KeyT") switchTheme();

@@ -26,6 +26,8 @@ import { firstView, offCentre, type Room } from "./first_view";
 import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";
 import { nearestAbout, type Place } from "./pointers";
 import type { Frame, OtherHand, Rays, Ticks, Tool, Vec3 } from "./protocol";
+import { SplatCloud } from "./splat";
+import type { Gaussians } from "./splat_file";
 import type { Spot } from "./surface";
 import { SOFTWARE_LEVEL, Thinning } from "./thinning";
 
@@ -161,6 +163,8 @@ export class SceneView {
     100,
   );
   private readonly clouds = new Map<number, CameraCloud>();
+  private readonly felt = new THREE.Group(); // all that is drawn of them
+  private splat: SplatCloud | null = null;
   private readonly proxy = ball({ roughness: 0.35 });
   private readonly ring = new THREE.Sprite(
     new THREE.SpriteMaterial({ map: ringTexture(), depthTest: false, sizeAttenuation: false }),
@@ -171,6 +175,7 @@ export class SceneView {
     new THREE.BufferGeometry(),
     new THREE.LineDashedMaterial({ dashSize: 0.004, gapSize: 0.003 }),
   );
+  private readonly ruler = line({ depthTest: false });
   private readonly trail = line({ transparent: true, opacity: 0.7 });
   private readonly shadow = new THREE.Mesh(
     new THREE.CircleGeometry(1, 40),
@@ -269,7 +274,7 @@ export class SceneView {
     this.paint.frustumCulled = false;
     this.arrow.add(this.shaft, this.head);
     const lines = [
-      ...[this.link, this.plumb, this.trail, this.ghostTrail],
+      ...[this.link, this.plumb, this.trail, this.ghostTrail, this.ruler],
       ...[this.grid, this.frusta, this.push, this.otherLines],
     ];
     for (const object of [...lines, this.arm]) object.frustumCulled = false;
@@ -285,7 +290,7 @@ export class SceneView {
 
     const marks = [
       ...[this.proxy, this.hip, this.ring, this.link, this.plumb, this.trail, this.pin],
-      ...[this.shadow, this.spot, this.grid, this.frusta, this.axes],
+      ...[this.ruler, this.shadow, this.spot, this.grid, this.frusta, this.axes],
       ...[this.ghost, this.ghostTrail, this.paint, this.tool, this.arm, this.push],
       ...[this.otherLines, this.heldTool, this.handTool, this.turning],
     ];
@@ -293,6 +298,7 @@ export class SceneView {
     this.arrow.visible = false;
     this.scene.add(
       ...marks,
+      this.felt,
       this.arrow,
       this.fixtures,
       this.lamp,
@@ -323,7 +329,7 @@ export class SceneView {
     this.ring.material.color = colour(palette.text);
     this.plumb.material.color = colour(palette.text);
     this.trail.material.color = colour(palette.calm);
-    this.pin.material.color = colour(palette.text);
+    this.pin.material.color = this.ruler.material.color = colour(palette.text);
     this.spot.material.color = colour(palette.calm);
     this.grid.material.color = colour(palette.text);
     this.frusta.material.color = colour(palette.calm);
@@ -490,9 +496,12 @@ export class SceneView {
   /** Forgets what was seen: another session begins. */
   clear(): void {
     for (const cloud of this.clouds.values()) {
-      this.scene.remove(cloud.object, cloud.faces);
+      this.felt.remove(cloud.object, cloud.faces);
       cloud.dispose();
     }
+    this.felt.visible = true;
+    if (this.splat) this.scene.remove(this.splat.object), this.splat.dispose();
+    this.splat = null;
     this.clouds.clear();
     this.home = this.tick = this.pointedAt = this.under = null;
     this.showTool(NO_TOOL);
@@ -505,9 +514,9 @@ export class SceneView {
   /** The view that the newest frames ask for. */
   resetView(): void {
     const clouds = [...this.clouds.values()];
-    const seen = clouds.flatMap((cloud) => cloud.seen ?? []);
+    const seen = this.splat ? [this.splat.seen] : clouds.flatMap((cloud) => cloud.seen ?? []);
     const pose = clouds.find(({ frame }) => frame)?.frame?.worldFromCamera;
-    const home = pose && firstView(seen, pose, this.room);
+    const home = pose && firstView(seen, pose, this.room, this.splat !== null);
     if (!home) return;
     this.home = home;
     this.setOrbit(home);
@@ -530,6 +539,27 @@ export class SceneView {
     // Until somebody looks elsewhere, the view follows what cameras join.
     if (isFirst && (!this.home || this.orbit === this.home)) this.resetView();
     this.placeCameras();
+    this.touch();
+  }
+
+  /** What the cameras look at, if it is a splat. It is drawn in place of what is felt of it. */
+  showSplat(gaussians: Gaussians): void {
+    const isAtHome = this.orbit === this.home;
+    this.splat = new SplatCloud(gaussians, this.software);
+    this.scene.add(this.splat.object);
+    this.felt.visible = this.grid.visible = false;
+    if (isAtHome) this.resetView();
+    this.placeCameras();
+    this.touch();
+  }
+
+  /** Is the felt surface drawn? Always, where there is no splat. */
+  get showsFelt(): boolean {
+    return this.felt.visible;
+  }
+
+  showFelt(shown: boolean): void {
+    this.felt.visible = shown;
     this.touch();
   }
 
@@ -632,17 +662,24 @@ export class SceneView {
       const met = seen?.meet(from, along);
       if (met && (!best || met.distance < best.distance)) best = met;
     }
-    return best?.spot ?? null;
+    return (best ?? this.splat?.seen.meet(from, along))?.spot ?? null;
   }
 
   /** The same, and where; in a hole of a camera's image, the nearest surface about it. */
   surfaceNear(at: Place): { at: Place; spot: Spot } | null {
     // Points without an image are met from some way beside them, and looking at many takes long.
-    const hasImage = [...this.clouds.values()].some(({ seen }) => seen?.unordered === 0);
+    const hasImage =
+      !this.splat && [...this.clouds.values()].some(({ seen }) => seen?.unordered === 0);
     const near = nearestAbout(at, (place) =>
       place === at || hasImage ? this.spotUnder(place.x, place.y) : null,
     );
     return near && { at: near.at, spot: near.found };
+  }
+
+  /** A line between places that were picked. */
+  showRuler(places: readonly Vec3[]): void {
+    this.setLine(this.ruler, places.flat());
+    this.touch();
   }
 
   /** Where a pointer would press; null: nowhere. */
@@ -699,7 +736,7 @@ export class SceneView {
     this.lastDrawing = rests ? 0 : now; // what is drawn once may take its time
 
     const at = eye(this.orbit);
-    const { up, right } = axes(this.orbit);
+    const { up, right, forward } = axes(this.orbit);
     this.camera.position.set(...at);
     this.camera.up.set(...up);
     this.camera.lookAt(...this.orbit.target);
@@ -727,7 +764,13 @@ export class SceneView {
       cloud.setLight(lampAt);
       const { r_1, r_3 } = this.toolReach > 0 ? { r_1: 0, r_3: 0 } : this.radii;
       if (this.tick) cloud.setProxy(this.tick.proxy, r_1, r_3);
-      if (cloud.object.visible) this.drawnPoints += cloud.object.geometry.drawRange.count;
+      if (cloud.object.visible && this.felt.visible)
+        this.drawnPoints += cloud.object.geometry.drawRange.count;
+    }
+    if (this.splat) {
+      const size = this.renderer.getDrawingBufferSize(new THREE.Vector2());
+      if (this.splat.prepare(at, forward, this.orbit.distance, size, now)) this.touch();
+      this.drawnPoints += this.splat.count;
     }
     if (this.tick) this.placeMarks(this.tick);
     this.renderer.render(this.scene, this.camera);
@@ -742,7 +785,7 @@ export class SceneView {
       cloud.setColours(this.cloudColours());
       cloud.setTinted(this.tinted);
       this.clouds.set(camera, cloud);
-      this.scene.add(cloud.object, cloud.faces);
+      this.felt.add(cloud.object, cloud.faces);
     }
     return cloud;
   }
@@ -787,7 +830,7 @@ export class SceneView {
     const frames = [...this.clouds.values()].flatMap(({ frame }) => frame ?? []);
     this.setLine(this.frusta, frames.flatMap(cameraLines));
     if (this.grid.visible || !this.home) return;
-    const first = this.clouds.values().next().value!;
+    const first = this.splat ?? this.clouds.values().next().value!;
     const floor = floorUnder(first.seen?.places(2000) ?? [], this.orbit.up);
     this.setLine(this.grid, floor ? gridLines(floor, this.orbit.up) : []);
     this.axes.visible = true;

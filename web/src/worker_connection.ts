@@ -37,6 +37,7 @@ function download(name: string, bytes: Uint8Array<ArrayBuffer>): void {
 export class Connection {
   connected = false;
   private readonly worker = new Worker("palpate-core.js");
+  private takeSplat: (bytes: ArrayBuffer) => void = () => {};
   private leadByInverse3: (on: boolean) => void = () => {};
 
   constructor(private readonly handlers: Handlers) {
@@ -48,6 +49,7 @@ export class Connection {
         if (file) void this.fetchFile(file);
       }
       if (data.inverse3 === null) this.leadByInverse3(false);
+      else if (data.splat) this.takeSplat(data.splat);
       else if (data.bytes) download(data.name, data.bytes);
       else dispatch(data, handlers);
     };
@@ -118,6 +120,12 @@ export class Connection {
   /** Gives the Worker a file that is to be touched. */
   sendFile(file: File, name: string, _toast: Toast): void {
     void file.arrayBuffer().then((bytes) => this.give(name, bytes));
+  }
+
+  /** The file of the splat that is felt. */
+  splat(): Promise<ArrayBuffer> {
+    this.worker.postMessage({ splat: true });
+    return new Promise((resolve) => (this.takeSplat = resolve));
   }
 
   private give(name: string, bytes: ArrayBuffer): void {

@@ -101,7 +101,7 @@ PointFile read_obj(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_obj(std::span<const std::byte> bytes, std::string_view name);
 
-/// Reads an SPZ of versions 1 to 3 as read_splat does a PLY. Colours are passed over.
+/// Reads an SPZ of versions 1 to 4 as read_splat does a PLY. Colours are passed over.
 ///
 /// Allocates in proportion to the size of the file, whatever its header declares.
 /// @throws Error naming the file and what was wrong

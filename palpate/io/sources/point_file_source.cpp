@@ -121,7 +121,9 @@ std::unique_ptr<Source> open_point_files(const Uri& uri) {
 
 std::string rescaled(const std::string& uri, double times) {
   const Uri parsed(uri);
-  if (parsed.scheme() != "pcd" && parsed.scheme() != "ply") return {};
+  constexpr std::array<std::string_view, 4> with_scale{"pcd", "ply", "map", "splat"};
+  if (std::find(with_scale.begin(), with_scale.end(), parsed.scheme()) == with_scale.end())
+    return {};
   const std::string source = parsed.scheme() + ":" + parsed.path();
   std::string options = uri.substr(source.size());  // empty, or from '?' on
   if (const std::size_t old = options.find("scale="); parsed.has("scale"))

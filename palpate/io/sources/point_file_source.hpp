@@ -50,8 +50,8 @@ class PointFileSource final : public Source {
 ///         is not known or out of range. The files themselves are read by `next`.
 std::unique_ptr<Source> open_point_files(const Uri& uri);
 
-/// The URI of a source whose lengths are `times` as long as those of this one; empty: it is none of
-/// point files, which have an option for that.
+/// The URI of a source whose lengths are `times` as long as those of this one; empty: it is neither
+/// of point files nor a body, which have an option for that.
 std::string rescaled(const std::string& uri, double times);
 
 }  // namespace palpate

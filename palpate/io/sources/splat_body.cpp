@@ -30,6 +30,10 @@ constexpr float least_share = 0.02F;      // [-] of light that a Gaussian takes,
 constexpr int lanes = 8;                  // pixels that are drawn at once
 constexpr std::size_t often = 256;        // Gaussians, after which rays may all be closed
 
+bool is_spz(const std::filesystem::path& path) {
+  return lower_case(path.extension().string()) == ".spz";
+}
+
 Eigen::Matrix3d axes_of(const Gaussian& g) {
   return g.turn.cast<double>().toRotationMatrix();
 }
@@ -288,11 +292,16 @@ void SplatBody::draw(const View& view, std::span<float> depth) const {
   }
 }
 
+BodyOptions splat_options(const Uri& uri) {
+  const bool as_gltf = is_gltf(uri.path());
+  return body_options(uri, is_spz(uri.path()) || as_gltf, as_gltf);
+}
+
 std::unique_ptr<Source> open_splat(const Uri& uri) {
   const std::filesystem::path path = uri.path();
   const bool as_gltf = is_gltf(path);
-  const bool as_spz = lower_case(path.extension().string()) == ".spz";
-  const BodyOptions options = body_options(uri, as_spz || as_gltf, as_gltf);
+  const bool as_spz = is_spz(path);
+  const BodyOptions options = splat_options(uri);
   PointFile file = as_spz ? read_spz(path) : as_gltf ? read_gltf(path, true) : read_splat(path);
   const Eigen::Quaternionf turn(Eigen::Quaterniond(options.turn).cast<float>());
   std::vector<Gaussian> gaussians(file.points.size());

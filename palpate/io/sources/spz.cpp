@@ -5,6 +5,7 @@
 
 #include <zlib.h>
 
+#include "palpate/io/bag/compression.hpp"
 #include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/point_file_detail.hpp"
@@ -15,23 +16,39 @@ namespace {
 
 constexpr std::uintmax_t largest_spz = std::uintmax_t{1} << 31;
 constexpr std::uint32_t magic = 0x5053474e;  // "NGSP"
-constexpr const char* older = "write it as version 1 to 3";
+constexpr std::size_t header_size = 16;      // [bytes] that all versions have
 constexpr std::size_t most_inflated = 1032;  // [-] times its size, what deflate can hold at most
 
-// Unpacks gzip, piece by piece.
+// Takes a file's arrays one after the other. To version 3 they are one gzip; in version 4, after a
+// header and a table of their sizes, each is packed by zstd.
 class Unpacker {
  public:
-  Unpacker(std::span<const std::byte> bytes, std::string_view name) : name_(name) {
+  Unpacker(std::span<const std::byte> bytes, std::string_view name)
+      : name_(name),
+        bytes_(bytes),
+        is_gzip_(bytes.size() < 4 || detail::load<std::uint32_t>(bytes.data(), little) != magic) {
+    if (!is_gzip_) return;
     constexpr int gzip = 16;  // added to the window's bits, of which 0 are the header's
     stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));
     stream_.avail_in = static_cast<uInt>(bytes.size());
     if (inflateInit2(&stream_, gzip) != Z_OK) fail("zlib does not start", "free some memory");
   }
-  ~Unpacker() { inflateEnd(&stream_); }
+  ~Unpacker() {
+    if (is_gzip_) inflateEnd(&stream_);
+  }
   Unpacker(const Unpacker&) = delete;
   Unpacker& operator=(const Unpacker&) = delete;
 
+  std::vector<std::byte> header() {
+    if (is_gzip_) return take(header_size);
+    const auto plain = part(0, header_size + 4);
+    table_ = detail::load<std::uint32_t>(&plain[header_size], little);
+    next_ = table_ + entry_size * std::to_integer<std::size_t>(plain[header_size - 1]);
+    return {plain.begin(), plain.begin() + header_size};
+  }
+
   std::vector<std::byte> take(std::size_t size) {
+    if (!is_gzip_) return take_zstd(size);
     std::vector<std::byte> bytes(size);
     stream_.next_out = reinterpret_cast<Bytef*>(bytes.data());
     stream_.avail_out = static_cast<uInt>(size);
@@ -46,7 +63,31 @@ class Unpacker {
   }
 
  private:
+  static constexpr auto little = std::endian::little;
+  static constexpr std::size_t entry_size = 16;  // [bytes] of the table
+
+  [[nodiscard]] std::span<const std::byte> part(std::size_t begin, std::size_t size) const {
+    if (begin > bytes_.size() || size > bytes_.size() - begin)
+      fail("ends within its Gaussians", detail::cut_short);
+    return bytes_.subspan(begin, size);
+  }
+
+  std::vector<std::byte> take_zstd(std::size_t size) {
+    const auto packed = detail::load<std::uint64_t>(part(table_, entry_size).data(), little);
+    if (packed > bytes_.size()) fail("ends within its Gaussians", detail::cut_short);
+    std::vector<std::byte> bytes =
+        decompress_zstd(part(next_, static_cast<std::size_t>(packed)), size, name_);
+    if (bytes.size() != size)
+      fail("an array has fewer Gaussians than its header promises", detail::cut_short);
+    table_ += entry_size;
+    next_ += static_cast<std::size_t>(packed);
+    return bytes;
+  }
+
   std::string name_;
+  std::span<const std::byte> bytes_;
+  bool is_gzip_;
+  std::size_t table_ = 0, next_ = 0;  // places of the next array's sizes, and of its bytes
   z_stream stream_{};
 };
 
@@ -78,16 +119,15 @@ Eigen::Vector4d smallest_three(std::uint32_t bits) {
 PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
   constexpr auto little = std::endian::little;
   Unpacker file(bytes, name);
-  if (bytes.size() >= 4 && detail::load<std::uint32_t>(bytes.data(), little) == magic)
-    file.fail("SPZ version 4, which is not packed by gzip, is not read", older);
-  const std::vector<std::byte> header = file.take(16);
+  const std::vector<std::byte> header = file.header();
   const auto version = detail::load<std::uint32_t>(&header[4], little);
   const std::size_t count = detail::load<std::uint32_t>(&header[8], little);
   const auto fraction = std::to_integer<int>(header[13]);  // bits of a coordinate
   if (detail::load<std::uint32_t>(header.data(), little) != magic)
     file.fail("it is no SPZ: it does not begin with NGSP", "give a splat as FILE.spz");
-  if (version < 1 || version > 3)
-    file.fail("SPZ version " + std::to_string(version) + " is not known", older);
+  if (version < 1 || version > 4)
+    file.fail("SPZ version " + std::to_string(version) + " is not known",
+              "write it as version 1 to 4");
   const std::size_t place_size = version == 1 ? 2 : 3;
   const std::size_t turn_size = version < 3 ? 3 : 4;
   if (count > most_inflated * bytes.size() / (3 * place_size + 7 + turn_size) || fraction > 24)
@@ -117,7 +157,7 @@ PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
     }
     Eigen::Vector4d turn;
     const std::byte* const at = &turns[turn_size * i];
-    if (version == 3) {
+    if (version >= 3) {
       turn = smallest_three(detail::load<std::uint32_t>(at, little));
     } else {
       for (int k = 0; k < 3; ++k) turn[k] = std::to_integer<int>(at[k]) / 127.5 - 1.0;

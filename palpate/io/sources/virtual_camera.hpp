@@ -107,6 +107,9 @@ struct BodyOptions {
 /// @param in_metres  it says that its unit is 1 m
 BodyOptions body_options(const Uri& uri, bool y_up = false, bool in_metres = false);
 
+/// The same of `splat:FILE`: y is up in SPZ and glTF, the unit of glTF is 1 m.
+BodyOptions splat_options(const Uri& uri);
+
 /// A virtual camera on a body, said to look at `what`, "a mesh of 12 triangles".
 std::unique_ptr<Source> open_body(const Uri& uri, const BodyOptions& options,
                                   std::unique_ptr<const Body> body, const std::string& what);

@@ -274,6 +274,7 @@ std::optional<Command> asked(const std::string& verb, const json& what) {
   if (verb == "method") return SetMethod{what.get<std::string>()};
   if (verb == "tool") return SetTool{what.get<std::string>()};
   if (verb == "open") return OpenScene{what.get<std::string>()};
+  if (verb == "rescale") return Rescale{what.get<double>()};
   if (verb == "remove_fixture") return RemoveFixture{what.get<std::string>()};
   if (verb == "record") return SetRecording{what.get<bool>()};
   if (verb == "seek") return Seek{what.get<double>()};

@@ -145,6 +145,11 @@ struct Seek {
 struct OpenScene {
   std::string uri;
 };
+/// What is touched is to be opened again, its lengths multiplied: two places of known distance were
+/// picked.
+struct Rescale {
+  double times;
+};
 /// From now on what is touched is painted with a material; "" erases.
 struct SetBrush {
   std::string material;
@@ -168,9 +173,10 @@ struct RemoveFixture {
 struct ResetHand {};
 /// Ends a latched fault of the safety chain; see Session::reset_faults.
 struct ResetFaults {};
-using Command = std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod, SetTool,
-                             SetRecording, SetPlayback, Seek, OpenScene, SetBrush, DropBrush,
-                             ClearPaint, Forbid, Guide, RemoveFixture, ResetHand, ResetFaults>;
+using Command =
+    std::variant<SetParameter, SetSafetyParameter, SetPlacement, SetMethod, SetTool, SetRecording,
+                 SetPlayback, Seek, OpenScene, Rescale, SetBrush, DropBrush, ClearPaint, Forbid,
+                 Guide, RemoveFixture, ResetHand, ResetFaults>;
 
 /// The longest message a page may send [bytes].
 constexpr std::size_t max_page_message = 1024;

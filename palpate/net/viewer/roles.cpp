@@ -55,7 +55,7 @@ void check_allowed(const Command& command, Role role) {
     throw Error("recording", "only the operator starts and ends it", operator_remedy);
   if (std::holds_alternative<SetPlayback>(command) || std::holds_alternative<Seek>(command))
     throw Error("playback", "only the operator changes it", operator_remedy);
-  if (std::holds_alternative<OpenScene>(command))
+  if (std::holds_alternative<OpenScene>(command) || std::holds_alternative<Rescale>(command))
     throw Error("scene", "only the operator chooses it", operator_remedy);
   if (std::holds_alternative<SetPlacement>(command))
     throw Error("placement", "only the operator changes it", operator_remedy);

@@ -363,8 +363,10 @@ class ViewerServer::Impl final : public Hub {
     // A page that was refused asks once more without an upgrade: browsers do not tell it why.
     const bool upgrades = websocket::is_upgrade(request);
     const std::string_view target = view(request.target());
-    if (target.substr(0, target.find('?')) != "/session")
-      return {upgrades ? http::status::not_found : http::status::ok};
+    const std::string_view path = target.substr(0, target.find('?'));
+    if (path == "/splat" && !upgrades)
+      return judge_token(option_of(target, "token"), source, false);
+    if (path != "/session") return {upgrades ? http::status::not_found : http::status::ok};
     Admission admission = judge_token(option_of(target, "token"), source, upgrades);
     if (admission.status != http::status::ok) return admission;
     if (admission.is_operator) admission.place = take_place(operator_pages_, max_operator_pages);
@@ -660,6 +662,7 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
 
  private:
   using Response = http::response<http::span_body<const char>>;
+  using FileResponse = http::response<http::file_body>;
 
   // A file, if it is welcome.
   void receive() {
@@ -737,12 +740,15 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
           ->start(request);
       return;
     }
+    const std::string_view asked = view(request.target());
+    if (admission.status == http::status::ok && asked.substr(0, asked.find('?')) == "/splat" &&
+        give_splat(request))
+      return;
     std::string_view type = "text/plain; charset=utf-8";
     std::string_view content;
     http::status status = admission.status;
     if (status == http::status::ok) {
-      const std::string_view target = view(request.target());
-      const std::string_view path = target.substr(0, target.find('?'));
+      const std::string_view path = asked.substr(0, asked.find('?'));
       const auto files = page_files();
       const auto file = std::find_if(files.begin(), files.end(),
                                      [&](const PageFile& f) { return f.path == path; });
@@ -755,6 +761,43 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
     }
     if (status != http::status::ok) content = explanation(status);
     write(request, status, type, content);
+  }
+
+  // The file of the splat that is felt, and no other. @return whether there is one
+  bool give_splat(const Request& request) {
+    const std::filesystem::path path = server_.host_.splat_file();
+    beast::error_code error;
+    FileResponse& response = file_response_.emplace(http::status::ok, request.version());
+    if (!path.empty()) response.body().open(path.c_str(), beast::file_mode::scan, error);
+    if (path.empty() || error || request.method() == http::verb::head) return false;
+    set_head(response, "application/octet-stream");
+    response.keep_alive(false);
+    response.prepare_payload();
+    serializer_.emplace(response);
+    give_more();
+    return true;
+  }
+
+  void give_more() {
+    stream_.expires_after(answer_timeout);
+    http::async_write_some(stream_, *serializer_,
+                           [self = shared_from_this()](beast::error_code error, std::size_t) {
+                             if (error) return;
+                             if (!self->serializer_->is_done()) return self->give_more();
+                             self->stream_.socket().shutdown(tcp::socket::shutdown_send, error);
+                           });
+  }
+
+  template <class Head>
+  static void set_head(Head& response, std::string_view type) {
+    response.set(http::field::content_type, {type.data(), type.size()});
+    response.set(http::field::cache_control, "no-store");
+    response.set("Content-Security-Policy",
+                 "default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
+                 "base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    response.set("X-Content-Type-Options", "nosniff");
+    response.set("Referrer-Policy", "no-referrer");  // the address holds the token
+    response.set("Cross-Origin-Resource-Policy", "same-origin");
   }
 
   static std::string_view explanation(http::status status) {
@@ -780,14 +823,7 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
              std::string_view content) {
     response_.emplace(status, request.version());
     Response& response = *response_;
-    response.set(http::field::content_type, {type.data(), type.size()});
-    response.set(http::field::cache_control, "no-store");
-    response.set("Content-Security-Policy",
-                 "default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
-                 "base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
-    response.set("X-Content-Type-Options", "nosniff");
-    response.set("Referrer-Policy", "no-referrer");  // the address holds the token
-    response.set("Cross-Origin-Resource-Policy", "same-origin");
+    set_head(response, type);
     response.keep_alive(request.keep_alive());
     response.content_length(content.size());
     if (request.method() != http::verb::head) response.body() = {content.data(), content.size()};
@@ -809,6 +845,8 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
   beast::flat_buffer buffer_{max_header};
   std::optional<http::request_parser<http::empty_body>> parser_;
   std::optional<Response> response_;
+  std::optional<FileResponse> file_response_;
+  std::optional<http::response_serializer<http::file_body>> serializer_;
   std::string said_;     // what the response says, if it is made here
   bool drains_ = false;  // after the response, what is left of the request
   // Of a file that is being received; the path is empty once its end was told.

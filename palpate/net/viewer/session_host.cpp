@@ -13,9 +13,11 @@
 #include "palpate/io/devices/mouse_device.hpp"
 #include "palpate/io/sources/point_file_source.hpp"
 #include "palpate/io/sources/source.hpp"
+#include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/core/pose.hpp"
 #include "palpate/kernel/core/uri.hpp"
 #include "palpate/record/session_reader.hpp"
 #include "palpate/servo/placement.hpp"
@@ -99,10 +101,26 @@ std::string_view stricter_text(std::string_view limit) {
   return "";
 }
 
+json row_by_row(const Eigen::Matrix<double, 3, 4>& pose) {
+  json numbers = json::array();
+  for (int i = 0; i < 12; ++i) numbers.push_back(pose(i / 4, i % 4));
+  return numbers;
+}
+
+// What a page must know to draw a splat from its file; null: it is none.
+json splat_to_draw(const Uri& uri) {
+  if (uri.scheme() != "splat") return nullptr;
+  const BodyOptions options = splat_options(uri.without("pose").without("material"));
+  Eigen::Affine3d world_from_file(options.scale * options.turn);
+  if (uri.has("pose"))
+    world_from_file = parse_pose(uri.text_option("pose", ""), uri.text()) * world_from_file;
+  return {{"name", std::filesystem::path(uri.path()).filename().string()},
+          {"pose", row_by_row(world_from_file.matrix().topRows<3>())}};
+}
+
 // What the page draws of a fixture.
 json fixture_to_draw(const Fixture& fixture) {
-  json pose = nlohmann::json::array();
-  for (int i = 0; i < 12; ++i) pose.push_back(fixture.world_from_fixture(i / 4, i % 4));
+  json pose = row_by_row(fixture.world_from_fixture.matrix().topRows<3>());
   Vec3 size = fixture.size;
   json points = nlohmann::json::array();
   if (fixture.shape == FixtureShape::mesh) {  // its box
@@ -181,6 +199,7 @@ std::string SessionHost::hello() {
   return json{{"file_limit", most},
               {"scenes", scenes},
               {"notice", rules_.notice},
+              {"splat", splat_to_draw(Uri(session_->state().cameras.front().uri))},
               {"version", version_},
               {"methods", methods},
               {"tools", choices},
@@ -275,6 +294,16 @@ void SessionHost::look_at_points(const std::string& uri) {
   const bool may_open = rules_.open_scene && !rules_.scenes.empty() && clouds.size() == 1;
   if (may_open && proposed_->scale != 1.0 && !Uri(uri).has("scale"))
     rescaled_uri_ = rescaled(uri, proposed_->scale);
+}
+
+void SessionHost::rescale(double times) {
+  const std::vector<CameraStatus> cameras = session_->state().cameras;
+  const bool may_open = rules_.open_scene && cameras.size() == 1 && times > 0.0;
+  const std::string uri = may_open ? rescaled(cameras.front().uri, times) : std::string();
+  if (uri.empty())
+    throw Error("scale", "it can be changed only of one mesh, splat or point file on its own",
+                "restart the program with ?scale= in --camera");
+  rules_.open_scene(uri);
 }
 
 std::string SessionHost::state() {
@@ -542,6 +571,8 @@ void SessionHost::command(const Command& command, Role role) {
       throw Error("scene", "'" + scene->uri + "' is not among those of this session",
                   "choose one of the list, or restart the program with --camera");
     rules_.open_scene(scene->uri);
+  } else if (const auto* longer = std::get_if<Rescale>(&command)) {
+    rescale(longer->times);
   } else if (const auto* seek = std::get_if<Seek>(&command)) {
     session_->seek(seek->share);
   } else if (const auto* brush = std::get_if<SetBrush>(&command)) {
@@ -570,6 +601,11 @@ void SessionHost::command(const Command& command, Role role) {
     turn_.reset();
     mouse_->aim({.position = target_ = start_, .present = false});
   }
+}
+
+std::filesystem::path SessionHost::splat_file() {
+  const Uri uri(session_->state().cameras.front().uri);
+  return uri.scheme() == "splat" ? std::filesystem::path(uri.path()) : std::filesystem::path();
 }
 
 std::filesystem::path SessionHost::begin_file(const std::string& name, std::uint64_t size) {

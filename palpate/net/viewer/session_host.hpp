@@ -123,6 +123,7 @@ class SessionHost final : public ViewerHost {
   bool takes_hand() override { return mouse_ != nullptr; }
   void hand(const HandMessage& hand) override;
   void command(const Command& command, Role role) override;
+  std::filesystem::path splat_file() override;
   std::filesystem::path begin_file(const std::string& name, std::uint64_t size) override;
   void end_file(const std::filesystem::path& file, bool whole) override;
 
@@ -141,6 +142,7 @@ class SessionHost final : public ViewerHost {
   void show_tool(const std::shared_ptr<const ToolShape>& tool);
   [[nodiscard]] std::string recorded_scene(const RecordingState& recording) const;
   void look_at_points(const std::string& uri);
+  void rescale(double times);
   void paint(const ServoTick& record, double contact_radius);
   void show_rays(std::uint8_t camera, const ViewingRays& rays);
 

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+// A splat as it was made to be seen: each Gaussian an ellipse on the screen, from the farthest to
+// the nearest.
+
+import * as THREE from "three";
+import { dot, length, sub } from "./camera_math";
+import type { Frame, Vec3 } from "./protocol";
+import type { Gaussians } from "./splat_file";
+import { SeenSurface } from "./surface";
+
+const PER_ROW = 1024; // of the texture
+const TEXELS = 3; // of each
+const DEPTHS = 65_536; // steps by which they are sorted
+const MOST_IN_SOFTWARE = 60_000; // that a processor draws
+const MOST_MET = 200_000; // among which a pointer looks
+const SOLID = 128; // opacity of what a pointer meets
+const TURNED = Math.cos(0.02); // [rad] of the view, after which they are sorted again
+const MOVED = 0.02; // [-] of the eye's distance, likewise
+const REST = 4; // times as long as sorting takes is between two
+
+const vertexShader = /* glsl */ `
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+uniform sampler2D gaussians;
+uniform mat4 viewMatrix, projectionMatrix;
+uniform vec2 viewport;
+uniform float wider;
+in vec3 position;
+in uint which;
+out vec2 place;
+out vec4 colour;
+const float REACH = 2.83;  // deviations that are drawn
+const float LARGEST = 1024.0;  // [px]
+vec4 texel(uint k) {
+  return texelFetch(gaussians, ivec2(3u * (which % ${PER_ROW}u) + k, which / ${PER_ROW}u), 0);
+}
+void main() {
+  vec4 a = texel(0u), b = texel(1u), c = texel(2u);
+  mat3 covariance = wider * mat3(b.x, b.y, b.z, b.y, b.w, c.x, b.z, c.x, c.y);
+  vec3 mean = (viewMatrix * vec4(a.xyz, 1.0)).xyz;
+  vec4 centre = projectionMatrix * vec4(mean, 1.0);
+  gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  bool aside = any(greaterThan(abs(centre.xy), vec2(1.5 * centre.w)));
+  if (centre.w <= 0.0 || centre.z < -centre.w || aside) return;
+  // How its place in the picture changes with its place before the eye [px / m].
+  vec2 focal = 0.5 * viewport * vec2(projectionMatrix[0][0], projectionMatrix[1][1]) / -mean.z;
+  mat3 turn = mat3(viewMatrix);
+  vec3 u = vec3(focal.x, 0.0, -focal.x * mean.x / mean.z) * turn;
+  vec3 v = vec3(0.0, focal.y, -focal.y * mean.y / mean.z) * turn;
+  float uu = dot(u, covariance * u) + 0.3;
+  float uv = dot(u, covariance * v);
+  float vv = dot(v, covariance * v) + 0.3;
+  float half_of = 0.5 * (uu + vv);
+  float apart = length(vec2(0.5 * (uu - vv), uv));
+  vec2 along = apart < 1e-6 ? vec2(1.0, 0.0)
+               : uu > vv    ? normalize(vec2(half_of + apart - vv, uv))
+                            : normalize(vec2(uv, half_of + apart - uu));
+  vec2 sides = min(REACH * sqrt(vec2(half_of + apart, max(half_of - apart, 0.1))), LARGEST);
+  vec2 off = position.x * sides.x * along + position.y * sides.y * vec2(-along.y, along.x);
+  gl_Position = centre + vec4(2.0 * off / viewport * centre.w, 0.0, 0.0);
+  place = REACH * position.xy;
+  uint rgb = uint(a.w);
+  colour = vec4(vec3(uvec3(rgb >> 16u, rgb >> 8u, rgb) & 255u) / 255.0, c.z);
+}
+`;
+
+const fragmentShader = /* glsl */ `
+precision mediump float;
+in vec2 place;
+in vec4 colour;
+out vec4 fragment;
+void main() {
+  float alpha = colour.a * exp(-0.5 * dot(place, place));
+  if (alpha < 0.004) discard;
+  fragment = vec4(colour.rgb, alpha);
+}
+`;
+
+function textureOf({ means, covariances, colours, count }: Gaussians): THREE.DataTexture {
+  const rows = Math.max(1, Math.ceil(count / PER_ROW));
+  const texels = new Float32Array(4 * TEXELS * PER_ROW * rows);
+  for (let i = 0; i < count; ++i) {
+    const [at, rgb] = [4 * TEXELS * i, 4 * i];
+    texels.set(means.subarray(3 * i, 3 * i + 3), at);
+    texels[at + 3] = 65_536 * colours[rgb]! + 256 * colours[rgb + 1]! + colours[rgb + 2]!;
+    texels.set(covariances.subarray(6 * i, 6 * i + 6), at + 4);
+    texels[at + 10] = colours[rgb + 3]! / 255;
+  }
+  const [format, type] = [THREE.RGBAFormat, THREE.FloatType];
+  const texture = new THREE.DataTexture(texels, TEXELS * PER_ROW, rows, format, type);
+  texture.needsUpdate = true;
+  return texture;
+}
+
+/** Those that hide what is behind them as points about their middle, for pointer and first view. */
+export function solidPlaces({ means, colours, count }: Gaussians): Frame {
+  const solid: number[] = [];
+  for (let i = 0; i < count; ++i) if (colours[4 * i + 3]! >= SOLID) solid.push(i);
+  const step = Math.max(1, Math.ceil(solid.length / MOST_MET));
+  const kept = solid.filter((_, k) => k % step === 0);
+  const mean = (axis: number) =>
+    kept.reduce((sum, i) => sum + means[3 * i + axis]!, 0) / Math.max(1, kept.length);
+  const middle: Vec3 = [mean(0), mean(1), mean(2)];
+  const points = new Float32Array(3 * kept.length);
+  kept.forEach((i, k) => {
+    for (const axis of [0, 1, 2]) points[3 * k + axis] = means[3 * i + axis]! - middle[axis]!;
+  });
+  const [x, y, z] = middle;
+  return {
+    ...{ kind: "frame", camera: 0, number: 0, stamp: 0, metresPerUnit: 1, hasRays: false },
+    ...{ width: kept.length, height: 1, intrinsics: [1, 1, 0, 0], depth: null, points },
+    ...{ triangles: null, colour: null },
+    worldFromCamera: Float32Array.of(1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z),
+  };
+}
+
+export class SplatCloud {
+  readonly object: THREE.Mesh<THREE.InstancedBufferGeometry, THREE.RawShaderMaterial>;
+  /** what a pointer meets of it */
+  readonly seen: SeenSurface;
+  /** how many are drawn */
+  readonly count: number;
+  private readonly step: number; // every how many-th is drawn
+  private readonly order: THREE.InstancedBufferAttribute;
+  private readonly depths: Uint16Array;
+  private sorted: { eye: Vec3; forward: Vec3 } | null = null;
+  private free = 0; // [ms] when they may be sorted again
+
+  /** @param software  a processor draws */
+  constructor(
+    private readonly gaussians: Gaussians,
+    software: boolean,
+  ) {
+    this.step = software ? Math.max(1, Math.ceil(gaussians.count / MOST_IN_SOFTWARE)) : 1;
+    this.count = Math.floor(gaussians.count / this.step);
+    this.seen = new SeenSurface(solidPlaces(gaussians), null);
+    this.depths = new Uint16Array(this.count);
+    this.order = new THREE.InstancedBufferAttribute(new Uint32Array(this.count), 1);
+    this.order.setUsage(THREE.DynamicDrawUsage);
+    const corners = new Float32Array([-1, -1, 0, 1, -1, 0, -1, 1, 0, 1, 1, 0]);
+    const geometry = new THREE.InstancedBufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(corners, 3));
+    geometry.setIndex([0, 1, 2, 2, 1, 3]);
+    geometry.setAttribute("which", this.order);
+    geometry.instanceCount = this.count;
+    const material = new THREE.RawShaderMaterial({
+      ...{ vertexShader, fragmentShader, glslVersion: THREE.GLSL3 },
+      ...{ transparent: true, depthWrite: false },
+      uniforms: {
+        gaussians: { value: textureOf(gaussians) },
+        viewport: { value: new THREE.Vector2() },
+        wider: { value: this.step },
+      },
+    });
+    this.object = new THREE.Mesh(geometry, material);
+    this.object.frustumCulled = false;
+    this.object.renderOrder = -1;
+  }
+
+  /**
+   * Before a drawing. @param distance  [m] of what is looked at @param now  [ms]
+   * @return whether they are to be drawn again soon, as they could not be sorted yet
+   */
+  prepare(
+    eye: Vec3,
+    forward: Vec3,
+    distance: number,
+    viewport: THREE.Vector2,
+    now: number,
+  ): boolean {
+    this.object.material.uniforms.viewport!.value.copy(viewport);
+    const before = this.sorted;
+    const isSorted =
+      before !== null &&
+      dot(before.forward, forward) > TURNED &&
+      length(sub(before.eye, eye)) < MOVED * distance;
+    if (isSorted) return false;
+    if (now < this.free) return true;
+    const begin = performance.now();
+    this.sort(eye, forward);
+    this.sorted = { eye, forward };
+    this.free = now + REST * (performance.now() - begin);
+    return false;
+  }
+
+  // By counting.
+  private sort(eye: Vec3, forward: Vec3): void {
+    const { means } = this.gaussians;
+    const [fx, fy, fz] = forward;
+    const from = dot(eye, forward);
+    let farthest = 0;
+    const depthOf = (i: number) => {
+      const at = 3 * i * this.step;
+      return fx * means[at]! + fy * means[at + 1]! + fz * means[at + 2]! - from;
+    };
+    for (let i = 0; i < this.count; ++i) farthest = Math.max(farthest, depthOf(i));
+    // By the logarithm: what is near is sorted as finely as what is far.
+    const nearest = 1e-3 * farthest || 1;
+    const unit = (DEPTHS - 1) / Math.log(Math.max(farthest, nearest) / nearest || 1);
+    const begins = new Uint32Array(DEPTHS + 1);
+    for (let i = 0; i < this.count; ++i) {
+      const depth = depthOf(i);
+      const step = depth > nearest ? Math.min(DEPTHS - 1, unit * Math.log(depth / nearest)) : 0;
+      this.depths[i] = DEPTHS - 1 - step;
+      ++begins[this.depths[i]! + 1]!;
+    }
+    for (let k = 0; k < DEPTHS; ++k) begins[k + 1]! += begins[k]!;
+    const order = this.order.array;
+    for (let i = 0; i < this.count; ++i) order[begins[this.depths[i]!]!++] = i * this.step;
+    this.order.needsUpdate = true;
+  }
+
+  dispose(): void {
+    this.object.geometry.dispose();
+    (this.object.material.uniforms.gaussians!.value as THREE.Texture).dispose();
+    this.object.material.dispose();
+  }
+}

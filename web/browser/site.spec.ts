@@ -185,7 +185,7 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
 
   test("a dropped splat is drawn and touched, as SPZ and as PLY", async () => {
     const { page, faults } = await open("?size=320x240");
-    const all = ball(5000, 0.08);
+    const all = ball(20_000, 0.08);
     for (const [name, bytes] of [
       ["ball.spz", spzOf(all)],
       ["ball.ply", plyOf(all)],
@@ -202,7 +202,7 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
       );
       await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain(name);
       await expect.poll(() => page.locator("#felt").isVisible(), { timeout: patience }).toBe(true);
-      await expect.poll(async () => (await glimpse(page)).points).toBe(5000);
+      await expect.poll(async () => (await glimpse(page)).points).toBe(20_000);
       await press(page);
     }
     expect(faults).toEqual([]);

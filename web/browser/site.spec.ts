@@ -183,7 +183,7 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
     await page.close();
   });
 
-  test("a dropped splat is drawn and touched, as SPZ and as PLY", async () => {
+  test("a dropped splat is drawn and met by the hand, as SPZ and as PLY", async () => {
     const { page, faults } = await open("?size=320x240");
     const all = ball(20_000, 0.08);
     for (const [name, bytes] of [
@@ -202,8 +202,15 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
       );
       await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain(name);
       await expect.poll(() => page.locator("#felt").isVisible(), { timeout: patience }).toBe(true);
-      await expect.poll(async () => (await glimpse(page)).points).toBe(20_000);
-      await press(page);
+      // Every other one, as a processor draws.
+      await expect.poll(async () => (await glimpse(page)).points).toBe(10_000);
+      const at = await placeWhere(page, "surface");
+      await page.mouse.move(at.x, at.y);
+      await page.mouse.down();
+      await expect
+        .poll(async () => (await glimpse(page)).state, { interval: 100, timeout: patience })
+        .not.toBe(0);
+      await page.mouse.up();
     }
     expect(faults).toEqual([]);
     await page.close();

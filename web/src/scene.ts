@@ -692,6 +692,13 @@ export class SceneView {
   /** How far a place is before what a camera sees, along the nearest sightline; see Ahead. */
   ahead(place: Vec3): { distance: number; towards: Vec3 } | null {
     let best: { distance: number; towards: Vec3 } | null = null;
+    if (this.splat) {
+      // What is felt is a window about the hand: what is in between is seen from the eye alone.
+      const from = eye(this.orbit);
+      const towards = unit(sub(from, place));
+      const reach = this.splat.seen.firstPoint(from, scale(towards, -1));
+      return reach === null ? null : { distance: reach - length(sub(place, from)), towards };
+    }
     for (const { seen } of this.clouds.values()) {
       const hit = seen?.onSightline(place);
       if (!hit) continue;

@@ -11,8 +11,8 @@ import { SeenSurface } from "./surface";
 const PER_ROW = 1024; // of the texture
 const TEXELS = 3; // of each
 const DEPTHS = 65_536; // steps by which they are sorted
-const MOST_IN_SOFTWARE = 60_000; // that a processor draws
-const MOST_MET = 200_000; // among which a pointer looks
+const MOST_IN_SOFTWARE = 12_000; // that a processor draws
+const MOST_MET = 60_000; // among which a pointer looks
 const SOLID = 128; // opacity of what a pointer meets
 const TURNED = Math.cos(0.02); // [rad] of the view, after which they are sorted again
 const MOVED = 0.02; // [-] of the eye's distance, likewise
@@ -26,11 +26,15 @@ uniform sampler2D gaussians;
 uniform mat4 viewMatrix, projectionMatrix;
 uniform vec2 viewport;
 uniform float wider;
+#ifdef SOLID
+const float REACH = 1.18;  // deviations, where an opacity of one has become a half
+#else
+const float REACH = 2.83;
+#endif
 in vec3 position;
 in uint which;
 out vec2 place;
 out vec4 colour;
-const float REACH = 2.83;  // deviations that are drawn
 const float LARGEST = 1024.0;  // [px]
 vec4 texel(uint k) {
   return texelFetch(gaussians, ivec2(3u * (which % ${PER_ROW}u) + k, which / ${PER_ROW}u), 0);
@@ -41,6 +45,9 @@ void main() {
   vec3 mean = (viewMatrix * vec4(a.xyz, 1.0)).xyz;
   vec4 centre = projectionMatrix * vec4(mean, 1.0);
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+#ifdef SOLID
+  if (c.z < 0.5) return;
+#endif
   bool aside = any(greaterThan(abs(centre.xy), vec2(1.5 * centre.w)));
   if (centre.w <= 0.0 || centre.z < -centre.w || aside) return;
   // How its place in the picture changes with its place before the eye [px / m].
@@ -71,6 +78,11 @@ in vec2 place;
 in vec4 colour;
 out vec4 fragment;
 void main() {
+#ifdef SOLID
+  if (dot(place, place) > 1.39) discard;
+  fragment = vec4(colour.rgb, 1.0);
+  return;
+#endif
   float alpha = colour.a * exp(-0.5 * dot(place, place));
   if (alpha < 0.004) discard;
   fragment = vec4(colour.rgb, alpha);
@@ -127,10 +139,10 @@ export class SplatCloud {
   private sorted: { eye: Vec3; forward: Vec3 } | null = null;
   private free = 0; // [ms] when they may be sorted again
 
-  /** @param software  a processor draws */
+  /** @param software  a processor draws: it has no time to mix colours, so they are solid */
   constructor(
     private readonly gaussians: Gaussians,
-    software: boolean,
+    private readonly software: boolean,
   ) {
     this.step = software ? Math.max(1, Math.ceil(gaussians.count / MOST_IN_SOFTWARE)) : 1;
     this.count = Math.floor(gaussians.count / this.step);
@@ -146,7 +158,7 @@ export class SplatCloud {
     geometry.instanceCount = this.count;
     const material = new THREE.RawShaderMaterial({
       ...{ vertexShader, fragmentShader, glslVersion: THREE.GLSL3 },
-      ...{ transparent: true, depthWrite: false },
+      ...(software ? { defines: { SOLID: 1 } } : { transparent: true, depthWrite: false }),
       uniforms: {
         gaussians: { value: textureOf(gaussians) },
         viewport: { value: new THREE.Vector2() },
@@ -202,7 +214,8 @@ export class SplatCloud {
     for (let i = 0; i < this.count; ++i) {
       const depth = depthOf(i);
       const step = depth > nearest ? Math.min(DEPTHS - 1, unit * Math.log(depth / nearest)) : 0;
-      this.depths[i] = DEPTHS - 1 - step;
+      // What is solid hides what is behind it if it is drawn first.
+      this.depths[i] = this.software ? step : DEPTHS - 1 - step;
       ++begins[this.depths[i]! + 1]!;
     }
     for (let k = 0; k < DEPTHS; ++k) begins[k + 1]! += begins[k]!;

@@ -141,6 +141,11 @@ export class SeenSurface {
     return { spot: { at: close ? at : raw, normal: fitted.normal }, distance };
   }
 
+  /** How far along a ray (`along`: unit) the first of points without an image is; null: none is. */
+  firstPoint(from: Vec3, along: Vec3): number | null {
+    return this.meetPoints(this.toCamera(from), this.turnedToCamera(along));
+  }
+
   private meetImage(start: Vec3, direction: Vec3): number | null {
     const reach = length(start) + 1.5 * this.farthest();
     const place = (t: number): Vec3 => add(start, scale(direction, t));

@@ -401,15 +401,15 @@ test("another scene is chosen on the page", async () => {
 
 test("a splat is drawn as one, touched on all sides, and brought to its size", async () => {
   const page = await open(DESK);
-  const size = 0.15; // [m] radius
-  const buffer = glbOf(ball(12_000, size), [0, 0, 0.3]);
+  const size = 0.1; // [m] radius
+  const buffer = glbOf(ball(6000, size), [0, 0, 0.3]);
   await page.setInputFiles("#file", { name: "ball.glb", mimeType: "model/gltf-binary", buffer });
   await expect.poll(() => page.locator("#camera").getAttribute("title")).toContain("splat:");
   await expect.poll(() => page.locator("#felt").isVisible(), { timeout: patience }).toBe(true);
   await drawn(page);
   const showsFelt = () => page.evaluate(() => (window as any).palpate.view.showsFelt as boolean);
   expect(await showsFelt()).toBe(false);
-  expect((await glimpse(page)).points).toBe(12_000);
+  await expect.poll(async () => (await glimpse(page)).points).toBe(6000);
   const press = async () => {
     const at = await placeWhere(page, "surface");
     await page.mouse.move(at.x, at.y);
@@ -431,18 +431,18 @@ test("a splat is drawn as one, touched on all sides, and brought to its size", a
   const behind = await press();
   expect(Math.abs(distance(behind, middle) - size - r_c)).toBeLessThan(0.003);
   expect(distance(before, behind)).toBeGreaterThan(size);
-  await page.locator("#felt").click();
+  await page.locator("#felt").dispatchEvent("click");
   expect(await showsFelt()).toBe(true);
 
   // Two places are said to be half as far apart as they are.
-  await page.locator("#measure").click();
+  await page.locator("#measure").dispatchEvent("click");
   const at = await placeWhere(page, "surface");
   const [one, other] = [{ x: at.x - 25, y: at.y }, { x: at.x + 25, y: at.y }];
   const apart = distance(await spotUnder(page, one), await spotUnder(page, other));
   for (const place of [one, other]) await page.mouse.click(place.x, place.y);
   expect(await page.locator("#hand").textContent()).toContain("hand free");
   await page.locator("#ruler-length").fill(String(500 * apart));
-  await page.locator("#ruler-apply").click();
+  await page.locator("#ruler-length").press("Enter");
   const title = () => page.locator("#camera").getAttribute("title");
   await expect.poll(title).toMatch(/scale=0\.(5|49|50)/);
   faults.splice(0); // what the browser says of the connection that ends between two sessions

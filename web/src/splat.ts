@@ -11,7 +11,7 @@ import { SeenSurface } from "./surface";
 const PER_ROW = 1024; // of the texture
 const TEXELS = 3; // of each
 const DEPTHS = 65_536; // steps by which they are sorted
-const MOST_IN_SOFTWARE = 12_000; // that a processor draws
+const MOST_IN_SOFTWARE = 6_000; // that a processor draws
 const MOST_MET = 60_000; // among which a pointer looks
 const SOLID = 128; // opacity of what a pointer meets
 const TURNED = Math.cos(0.02); // [rad] of the view, after which they are sorted again

@@ -14,6 +14,10 @@ namespace {
 
 using Path = std::optional<HipPath>;
 
+// What a message tells to whoever gave no device that is simulated.
+constexpr const char* add_a_device =
+    "add device=touch, device=omega, device=falcon or device=sigma";
+
 HipPath path_of(const Uri& uri, const Path& path) {
   if (!uri.path().empty()) return HipPath::read_csv(uri.path());
   if (path) return *path;
@@ -54,7 +58,7 @@ std::unique_ptr<Device> open_hand(const Uri& uri, const Path& path) {
           "device_turn_damping", "turn_stiffness", "turn_damping"}) {
       if (uri.has(of_a_body))
         throw Error(uri.text(), "option '" + std::string(of_a_body) + "' needs a device model",
-                    "add device=touch, device=omega, device=falcon or device=sigma");
+                    add_a_device);
     }
   }
   if (!grip.empty()) {
@@ -67,7 +71,7 @@ std::unique_ptr<Device> open_hand(const Uri& uri, const Path& path) {
     if (held.mass == 0.0) {
       if (preset == nullptr)
         throw Error(uri.text(), "with grip=none and no device there is nothing to move",
-                    "add device=touch, device=omega, device=falcon or device=sigma");
+                    add_a_device);
       model.tremor = 0.0;
     }
   }

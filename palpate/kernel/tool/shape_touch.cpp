@@ -67,9 +67,9 @@ Known summarise(const float* gap, std::size_t size) {
 }  // namespace
 
 ShapeTouch::ShapeTouch(std::shared_ptr<const ToolShape> shape, const Parameters& parameters)
-    : shape_(std::move(shape)), parameters_(parameters), stride_(longest_step) {
+    : shape_(std::move(shape)), stride_(longest_step) {
   validate(parameters);
-  feel_.set(parameters);
+  set_parameters(parameters);
   std::size_t longest = 0;
   for (std::size_t patch = 0; patch < most_contacts; ++patch) {
     shell_.begin[patch] = shell_.x.size();
@@ -252,11 +252,14 @@ void ShapeTouch::Limits::add(const Contact& of, std::size_t number, const Vec3& 
   limit[size++].least = -of.fit.gap;
 }
 
-double ShapeTouch::turn_length() const noexcept {
-  const Coupling& coupling = parameters_.coupling;
-  if (!(coupling.turn_stiffness > 0.0)) return shape_->turn_length();
-  const double most = std::sqrt(coupling.turn_stiffness / std::max(coupling.stiffness, 1e-9));
-  return std::min(shape_->turn_length(), most);
+void ShapeTouch::set_parameters(const Parameters& parameters) noexcept {
+  parameters_ = parameters;
+  feel_.set(parameters);
+  const Coupling& coupling = parameters.coupling;
+  turn_length_ = shape_->turn_length();
+  if (coupling.turn_stiffness > 0.0)
+    turn_length_ = std::min(
+        turn_length_, std::sqrt(coupling.turn_stiffness / std::max(coupling.stiffness, 1e-9)));
 }
 
 // [m/s] world: of the hand's tool at a lever.
@@ -266,7 +269,7 @@ Vec3 ShapeTouch::hand_velocity_at(const Vec3& lever) const noexcept {
 
 // [m] How a tool's motion moves the point of a contact.
 Vec3 ShapeTouch::motion_at(const Motion6& motion, const Contact& contact) const noexcept {
-  return motion.head<3>() + motion.tail<3>().cross(contact.lever) / turn_length();
+  return motion.head<3>() + motion.tail<3>().cross(contact.lever) / turn_length_;
 }
 
 // (11): the sides of a contact's cone of friction, two of them along the way that it would slide.
@@ -274,7 +277,7 @@ void ShapeTouch::add_friction(std::size_t number, const Motion6& wanted, Limits&
   const Contact& contact = contacts_[number];
   const Vec3& normal = contact.fit.normal;
   const auto tangential = [&](const Vec3& v) -> Vec3 { return v - v.dot(normal) * normal; };
-  const double length = turn_length();
+  const double length = turn_length_;
   const double speed = std::min(tangential(sliding_ + sliding_spin_.cross(contact.lever)).norm(),
                                 tangential(hand_velocity_at(contact.lever)).norm());
   const double coefficient = feel_.friction(contact.patch, pose_.at + contact.lever, normal, speed);
@@ -290,7 +293,7 @@ void ShapeTouch::add_friction(std::size_t number, const Motion6& wanted, Limits&
 
 // One step of the proxy: the motion nearest to the one to the hand that keeps all contacts open.
 void ShapeTouch::step(const Pose& hand) noexcept {
-  const double length = turn_length();  // (2)
+  const double length = turn_length_;  // (2)
   Limits limits;
   for (std::size_t i = 0; i < contact_count_; ++i)
     limits.add(contacts_[i], i, contacts_[i].fit.normal, length);
@@ -440,7 +443,7 @@ void ShapeTouch::feel(const Pose& hand, Tick& tick) noexcept {
 // The virtual coupling, (1): what pulls the hand to the proxy, in translation and in rotation.
 void ShapeTouch::render(const Pose& hand, double t, Tick& tick) noexcept {
   const Coupling& coupling = parameters_.coupling;
-  const double length = turn_length();  // (2)
+  const double length = turn_length_;  // (2)
   const Vec3 u = pose_.at - hand.at;
   const Vec3 turn = rotation_vector(between(pose_.turn, hand.turn));
   const Vec3 surface = seen_[contacts_[held_.limit[0]].camera].velocity(t);

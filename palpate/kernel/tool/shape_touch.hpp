@@ -31,10 +31,7 @@ class ShapeTouch final : public Method {
   void observe(const Observation& seen) noexcept override;
   Tick tick(const Vec3& hip, double t) noexcept override { return tick(HandPose{hip, {}}, t); }
   Tick tick(const HandPose& hand, double t) noexcept override;
-  void set_parameters(const Parameters& parameters) noexcept override {
-    parameters_ = parameters;
-    feel_.set(parameters);
-  }
+  void set_parameters(const Parameters& parameters) noexcept override;
   /// @throws Error for points without an image, which have no lines of sight to look along.
   void check(const Cloud& cloud) const override;
 
@@ -92,8 +89,6 @@ class ShapeTouch final : public Method {
   void step(const Pose& hand) noexcept;
   void add_friction(std::size_t number, const Motion6& wanted, Limits& limits) noexcept;
   [[nodiscard]] Vec3 motion_at(const Motion6& motion, const Contact& contact) const noexcept;
-  /// [m] L of (2): the tool's, or what the largest stiffness in rotation leaves of it.
-  [[nodiscard]] double turn_length() const noexcept;
   [[nodiscard]] Vec3 hand_velocity_at(const Vec3& lever) const noexcept;
   void feel(const Pose& hand, Tick& tick) noexcept;
   [[nodiscard]] double known_share(double t) const noexcept;
@@ -105,6 +100,7 @@ class ShapeTouch final : public Method {
   std::vector<float> gap_;      // [m] of the patch that is looked at
   Behind behind_, behind_now_;  // at the last scan that was kept, and at the newest
   Parameters parameters_;
+  double turn_length_ = 0.0;  // [m] L of (2): the tool's, or what `turn_stiffness` leaves of it
   NewestFrame frame_;
   FrameTiming timing_;
   std::array<SeenSurface, most_cameras> seen_;

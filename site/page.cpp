@@ -322,13 +322,11 @@ std::vector<std::byte> unpack_zlib(std::span<const std::byte> packed, std::size_
   return converted("unzlib", packed, max_bytes);
 }
 
-std::vector<std::byte> unpack_gzip(std::span<const std::byte> packed) {
-  constexpr std::size_t most_times = 1032;  // its size, what deflate can hold
-  std::uint32_t size = 0;                   // of its content, which it ends with
+std::vector<std::byte> unpack_gzip(std::span<const std::byte> packed, std::size_t max_bytes) {
+  std::uint32_t size = 0;  // of its content, which it ends with
   if (packed.size() < sizeof size) return {};
   std::memcpy(&size, &packed[packed.size() - sizeof size], sizeof size);
-  return size > most_times * packed.size() ? std::vector<std::byte>()
-                                           : converted("gunzip", packed, size);
+  return size > max_bytes ? std::vector<std::byte>() : converted("gunzip", packed, size);
 }
 
 std::vector<std::byte> pack_zlib(std::span<const std::byte> bytes) {

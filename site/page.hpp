@@ -13,7 +13,7 @@ std::vector<std::byte> unpack_zstd(std::span<const std::byte> packed, std::size_
 /// The same for zlib.
 std::vector<std::byte> unpack_zlib(std::span<const std::byte> packed, std::size_t max_bytes);
 /// The same for gzip, whose end says how much it holds.
-std::vector<std::byte> unpack_gzip(std::span<const std::byte> packed);
+std::vector<std::byte> unpack_gzip(std::span<const std::byte> packed, std::size_t max_bytes);
 std::vector<std::byte> pack_zlib(std::span<const std::byte> bytes);
 
 }  // namespace palpate::site

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // In place of the files that need SQLite, zstd, lz4, bzip2 and zlib: what they read is refused in
-// one sentence, but for zstd, which the page's JavaScript decodes. There are no drivers, either.
+// one sentence, but for zstd and gzip, which the page's JavaScript decodes. There are no drivers,
+// either.
 #include <cstring>
 #include <memory>
 #include <string>
@@ -36,6 +37,15 @@ std::vector<std::byte> decompress_zstd(std::span<const std::byte> packed, std::s
   std::vector<std::byte> bytes = site::unpack_zstd(packed, max_bytes);
   if (bytes.empty() && !packed.empty())
     throw Error(name, "its zstd data are damaged, or hold more than is declared",
+                "record or download it again");
+  return bytes;
+}
+
+std::vector<std::byte> decompress_gzip(std::span<const std::byte> packed, std::size_t max_bytes,
+                                       const std::string& name) {
+  std::vector<std::byte> bytes = site::unpack_gzip(packed, max_bytes);
+  if (bytes.empty())
+    throw Error(name, "it is no gzip, or a damaged one, or holds more than is declared",
                 "record or download it again");
   return bytes;
 }

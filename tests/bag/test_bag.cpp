@@ -18,6 +18,7 @@
 #include "tests/support/bag_contents.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/errors.hpp"
+#include "tests/support/gzip.hpp"
 #include "tests/support/sqlite.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -149,6 +150,13 @@ std::vector<std::byte> lz4(const std::vector<std::byte>& bytes) {
   return packed;
 }
 
+std::vector<std::byte> gzip(const std::vector<std::byte>& bytes) {
+  const std::string packed =
+      test::gzip({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  const auto all = std::as_bytes(std::span(packed));
+  return {all.begin(), all.end()};
+}
+
 // One of the codecs that can be several frames.
 struct Codec {
   const char* name;
@@ -158,7 +166,8 @@ struct Codec {
 class Compression : public ::testing::TestWithParam<Codec> {};
 INSTANTIATE_TEST_SUITE_P(Codecs, Compression,
                          ::testing::Values(Codec{"Zstd", compressed, decompress_zstd},
-                                           Codec{"Lz4", lz4, decompress_lz4}),
+                                           Codec{"Lz4", lz4, decompress_lz4},
+                                           Codec{"Gzip", gzip, decompress_gzip}),
                          [](const auto& each) { return std::string(each.param.name); });
 
 TEST_P(Compression, GivesBackFramesOneAfterAnother) {

@@ -8,13 +8,13 @@
 #include <string>
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 #include <zstd.h>
 
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/source.hpp"
 
 #include "tests/support/errors.hpp"
+#include "tests/support/gzip.hpp"
 #include "tests/support/point_file_rules.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -22,6 +22,7 @@ namespace palpate {
 namespace test_body_files {
 
 using test::fails_saying;
+using test::gzip;
 using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
 PointFile obj(const std::string& text) {
@@ -37,20 +38,6 @@ PointFile gltf(const std::string& bytes, bool as_splat = false) {
 template <class T>
 void put(std::string& bytes, std::initializer_list<T> values) {
   for (const T value : values) bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
-std::string gzip(const std::string& bytes) {
-  z_stream stream{};
-  deflateInit2(&stream, 9, Z_DEFLATED, 31, 8, Z_DEFAULT_STRATEGY);
-  std::string packed(deflateBound(&stream, bytes.size()) + 32, '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-  stream.avail_in = static_cast<uInt>(bytes.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  return packed;
 }
 
 // Damage gives an error of one line, or a consistent file.

@@ -8,6 +8,7 @@
 
 #include <bzlib.h>
 #include <lz4frame.h>
+#include <zlib.h>
 #include <zstd.h>
 
 #include "palpate/kernel/core/error.hpp"
@@ -22,6 +23,7 @@ struct FreeContext {
   void operator()(ZSTD_DCtx* context) const noexcept { ZSTD_freeDCtx(context); }
   void operator()(LZ4F_dctx* context) const noexcept { LZ4F_freeDecompressionContext(context); }
   void operator()(bz_stream* context) const noexcept { BZ2_bzDecompressEnd(context); }
+  void operator()(z_stream* context) const noexcept { inflateEnd(context); }
 };
 
 Error too_large(const std::string& name, std::size_t max_bytes) {
@@ -125,6 +127,29 @@ std::vector<std::byte> decompress_bz2(std::span<const std::byte> packed, std::si
     if (result != BZ_OK && result != BZ_STREAM_END)
       throw damaged(name, "bzip2's error " + std::to_string(result));
     return Step{in_size - stream.avail_in, out_size - stream.avail_out, result == BZ_STREAM_END};
+  });
+}
+
+std::vector<std::byte> decompress_gzip(std::span<const std::byte> packed, std::size_t max_bytes,
+                                       const std::string& name) {
+  constexpr int gzip = 16;  // added to the window's bits, of which 0 are the header's
+  z_stream stream{};
+  if (inflateInit2(&stream, gzip) != Z_OK) throw no_memory(name);
+  const std::unique_ptr<z_stream, FreeContext> context(&stream);
+  return decompress(packed, max_bytes, name, [&](Bytes in, std::span<std::byte> out) {
+    constexpr std::size_t most = std::numeric_limits<uInt>::max();
+    const auto in_size = static_cast<uInt>(std::min(in.size(), most));
+    const auto out_size = static_cast<uInt>(std::min(out.size(), most));
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(in.data()));  // is only read
+    stream.avail_in = in_size;
+    Bytef none = 0;  // zlib refuses no place at all
+    stream.next_out = out.empty() ? &none : reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = out_size;
+    const int result = inflate(&stream, Z_NO_FLUSH);
+    if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR)
+      throw damaged(name, "it is no gzip, or a damaged one");
+    if (result == Z_STREAM_END) inflateReset(&stream);
+    return Step{in_size - stream.avail_in, out_size - stream.avail_out, result == Z_STREAM_END};
   });
 }
 

@@ -29,4 +29,9 @@ namespace palpate {
 [[nodiscard]] std::vector<std::byte> decompress_bz2(std::span<const std::byte> packed,
                                                     std::size_t max_bytes, const std::string& name);
 
+/// The same for gzip, one member or several.
+[[nodiscard]] std::vector<std::byte> decompress_gzip(std::span<const std::byte> packed,
+                                                     std::size_t max_bytes,
+                                                     const std::string& name);
+
 }  // namespace palpate

@@ -3,8 +3,6 @@
 #include <cmath>
 #include <numbers>
 
-#include <zlib.h>
-
 #include "palpate/io/bag/compression.hpp"
 #include "palpate/io/sources/files.hpp"
 #include "palpate/io/sources/point_file.hpp"
@@ -28,13 +26,8 @@ class Unpacker {
         bytes_(bytes),
         is_gzip_(bytes.size() < 4 || detail::load<std::uint32_t>(bytes.data(), little) != magic) {
     if (!is_gzip_) return;
-    constexpr int gzip = 16;  // added to the window's bits, of which 0 are the header's
-    stream_.next_in = reinterpret_cast<Bytef*>(const_cast<std::byte*>(bytes.data()));
-    stream_.avail_in = static_cast<uInt>(bytes.size());
-    if (inflateInit2(&stream_, gzip) != Z_OK) fail("zlib does not start", "free some memory");
-  }
-  ~Unpacker() {
-    if (is_gzip_) inflateEnd(&stream_);
+    unpacked_ = decompress_gzip(bytes, most_inflated * bytes.size(), name_);
+    bytes_ = unpacked_;
   }
   Unpacker(const Unpacker&) = delete;
   Unpacker& operator=(const Unpacker&) = delete;
@@ -49,14 +42,9 @@ class Unpacker {
 
   std::vector<std::byte> take(std::size_t size) {
     if (!is_gzip_) return take_zstd(size);
-    std::vector<std::byte> bytes(size);
-    stream_.next_out = reinterpret_cast<Bytef*>(bytes.data());
-    stream_.avail_out = static_cast<uInt>(size);
-    const int result = size == 0 ? Z_OK : inflate(&stream_, Z_SYNC_FLUSH);
-    if (stream_.avail_out > 0)
-      fail(result == Z_DATA_ERROR ? "it is no gzip, or a damaged one" : "ends within its Gaussians",
-           detail::cut_short);
-    return bytes;
+    const auto plain = part(next_, size);
+    next_ += size;
+    return {plain.begin(), plain.end()};
   }
   [[noreturn]] void fail(const std::string& reason, const std::string& remedy) const {
     throw Error(name_, reason, remedy);
@@ -85,10 +73,10 @@ class Unpacker {
   }
 
   std::string name_;
+  std::vector<std::byte> unpacked_;  // of a gzip
   std::span<const std::byte> bytes_;
   bool is_gzip_;
   std::size_t table_ = 0, next_ = 0;  // places of the next array's sizes, and of its bytes
-  z_stream stream_{};
 };
 
 double of_half(std::uint16_t half) {

@@ -35,6 +35,10 @@ EM_JS(void, post_bytes, (const void* head, std::size_t head_size, const void* pa
   bytes.set(HEAPU8.subarray(colour, colour + colour_size), head_size + payload_size);
   palpatePost(bytes.buffer);
 })
+EM_JS(void, post_splat, (const void* gaussians, std::size_t size), {
+  const splat = HEAPU8.slice(gaussians, gaussians + size).buffer;
+  palpateSend({ splat : splat }, [splat]);
+})
 EM_JS(void, post_file, (const char* path), { palpatePostFile(UTF8ToString(path)); })
 // What a function of worker.js makes of bytes, if it fits into `to`; 0 if not.
 EM_JS(std::size_t, convert, (const char* by, const void* from, std::size_t size, void* to,
@@ -197,7 +201,7 @@ class Scene {
     }
   }
 
-  std::string splat_file() { return host_.splat_file().string(); }
+  std::vector<Body::DrawnGaussian> gaussians() { return host_.gaussians(); }
 
   void command(std::string_view text) {
     if (text == R"({"replay":true})") return replay_recording();
@@ -395,11 +399,11 @@ EMSCRIPTEN_KEEPALIVE void palpate_depth(int width, int height, const std::uint16
   });
 }
 
-/// The file of the splat that is touched; empty: it is none.
-EMSCRIPTEN_KEEPALIVE const char* palpate_splat() {
-  static std::string path;
-  path = page().scene ? page().scene->splat_file() : std::string();
-  return path.c_str();
+/// Gives the page what it draws of the splat that is touched.
+EMSCRIPTEN_KEEPALIVE void palpate_splat() {
+  if (!page().scene) return;
+  const auto gaussians = page().scene->gaussians();
+  post_splat(gaussians.data(), gaussians.size() * sizeof(gaussians.front()));
 }
 
 /// Where a hand is to be [m, world], or that it was let go.

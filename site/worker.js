@@ -86,11 +86,7 @@ const palpateTake = (message) => {
     const now = palpateSeconds();
     return palpateCall("palpate_depth", types, of.width, of.height, depth, camera, pose, now);
   }
-  if (message.splat) {
-    const path = Module.ccall("palpate_splat", "string", [], []);
-    const splat = FS.readFile(path).buffer;
-    return palpateSend({ splat }, [splat]);
-  }
+  if (message.splat) return palpateCall("palpate_splat", []);
   if (message.inverse3 !== undefined) return palpateInverse3.lead(message.inverse3);
   palpateTakeFile(message.name, message.bytes);
 };

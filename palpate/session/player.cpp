@@ -33,6 +33,7 @@ Player::Player(std::shared_ptr<Source> source, Open open, Playing playing)
              .kind = info.kind,
              .sensor = info.sensor,
              .rate = info.frame_rate.value_or(0.0),
+             .body = info.body,
              .doubt = info.assumed,
              .recorded = info.live ? 0 : info.frames.value_or(0)};
   if (playing_ == Playing::in_real_time) return;

@@ -69,6 +69,7 @@ struct CameraStatus {
   /// The last frame is declared valid until another one replaces it: a static image, or a recording
   /// that is paused or has ended. Never true for a live camera that stopped.
   bool stays_valid = false;
+  std::shared_ptr<const Body> body{};  ///< as SourceInfo::body
   std::string doubt{};       ///< why its unit or its axes may be wrong; empty: no sign of it
   Playback playback{};       ///< of a recording
   std::size_t recorded = 0;  ///< frames of a recording; 0: not known, or no recording

@@ -86,7 +86,7 @@ std::string one_gaussian(std::uint32_t version) {
   } else {
     put<std::uint8_t>(bytes, {0x00, 0x18, 0x00, 0x00, 0xe0, 0xff, 0x00, 0x04, 0x00});
   }
-  put<std::uint8_t>(bytes, {204, 1, 2, 3, 96, 112, 128});
+  put<std::uint8_t>(bytes, {204, 150, 128, 1, 96, 112, 128});
   // x = w = sqrt(1/2): x is left out, or w.
   if (version < 3) {
     put<std::uint8_t>(bytes, {218, 128, 127});
@@ -126,6 +126,7 @@ TEST(BodyFiles, SpzIsReadInAllVersions) {
     EXPECT_NEAR(file.splat->heads[0].x(), std::sqrt(0.5), 5e-3);
     EXPECT_NEAR(file.splat->heads[0].y(), std::log(4.0), 1e-9);
     EXPECT_NEAR((file.splat->rotations[0] - Vec3(std::sqrt(0.5), 0.0, 0.0)).norm(), 0.0, 8e-3);
+    EXPECT_EQ(file.colours, (std::vector<std::uint8_t>{170, 128, 0}));
     for (std::size_t size = 0; size + 12 < whole.size(); ++size)
       EXPECT_TRUE(fails_saying([&] { return spz(whole.substr(0, size)); }, "test.spz")) << size;
     expect_defined_on_damage(spz, whole);
@@ -217,17 +218,19 @@ TEST(BodyFiles, GltfHasGaussiansAsRatified) {
   std::string bytes;
   put<float>(bytes, {1, 2, 3, 0.5F, 0.25F, 2, 0, 0, 0, 1});
   put<std::uint16_t>(bytes, {13107, 0});  // 0.2 of 65535
+  put<float>(bytes, {0, 1, -5});          // colours
   const std::string text =
       R"({"nodes":[{"mesh":0,"scale":[2,2,2],"rotation":[0.70710678118654752,0,0,0.70710678118654752]}],
     "meshes":[{"primitives":[{"mode":0,"attributes":{"POSITION":0,
       "KHR_gaussian_splatting:SCALE":1,"KHR_gaussian_splatting:ROTATION":2,
-      "KHR_gaussian_splatting:OPACITY":3},"extensions":{"KHR_gaussian_splatting":{}}}]}],
+      "KHR_gaussian_splatting:OPACITY":3,"KHR_gaussian_splatting:SH_DEGREE_0_COEF_0":4},"extensions":{"KHR_gaussian_splatting":{}}}]}],
     "accessors":[{"bufferView":0,"componentType":5126,"count":1,"type":"VEC3"},
       {"bufferView":0,"byteOffset":12,"componentType":5126,"count":1,"type":"VEC3"},
       {"bufferView":0,"byteOffset":24,"componentType":5126,"count":1,"type":"VEC4"},
       {"bufferView":0,"byteOffset":40,"componentType":5123,"normalized":true,"count":1,
-       "type":"SCALAR"}],
-    "bufferViews":[{"buffer":0,"byteLength":44}],"buffers":[{"byteLength":44}]})";
+       "type":"SCALAR"},
+      {"bufferView":0,"byteOffset":44,"componentType":5126,"count":1,"type":"VEC3"}],
+    "bufferViews":[{"buffer":0,"byteLength":56}],"buffers":[{"byteLength":56}]})";
   const PointFile file = gltf(glb(text, bytes), true);
   ASSERT_EQ(file.points.size(), 1U);
   EXPECT_NEAR((file.points[0] - Vec3(2, -6, 4)).norm(), 0.0, 1e-9);
@@ -236,6 +239,7 @@ TEST(BodyFiles, GltfHasGaussiansAsRatified) {
   EXPECT_NEAR(file.splat->heads[0].x(), std::sqrt(0.5), 1e-9);
   EXPECT_NEAR(file.splat->heads[0].y(), std::log(0.25), 1e-6);
   EXPECT_NEAR(file.splat->rotations[0].x(), std::sqrt(0.5), 1e-9);
+  EXPECT_EQ(file.colours, (std::vector<std::uint8_t>{128, 199, 0}));
   std::string uneven = text;
   uneven.replace(uneven.find("[2,2,2]"), 7, "[2,2,1]");
   EXPECT_TRUE(fails_saying([&] { return gltf(glb(uneven, bytes), true); }, "stretches"));

@@ -163,15 +163,15 @@ TEST(SessionHost, ProposesTheLengthOfWhatIsTooLargeAndOpensItOnceItIsWanted) {
   EXPECT_EQ(seen(camera + "?scale=1.0")["rescaled"], "") << "that was chosen";
 }
 
-TEST(SessionHost, SaysHowASplatIsToBeDrawnAndOpensItAtTheScaleThatWasMeasured) {
+TEST(SessionHost, GivesTheSplatThatIsFeltAndOpensItAtTheScaleThatWasMeasured) {
   const test::TemporaryFolder folder;
   std::string sheet = "ply\nformat ascii 1.0\nelement vertex 100\n";
   for (const char* name : {"x", "y", "z", "opacity", "scale_0", "scale_1", "scale_2", "rot_0",
-                           "rot_1", "rot_2", "rot_3"})
+                           "rot_1", "rot_2", "rot_3", "f_dc_0", "f_dc_1", "f_dc_2"})
     sheet += std::string("property float ") + name + "\n";
   sheet += "end_header\n";
   for (int i = 0; i < 100; ++i)
-    sheet += std::to_string(i % 10) + " " + std::to_string(i / 10) + " 7 5 0 0 -3 1 0 0 0\n";
+    sheet += std::to_string(i % 10) + " " + std::to_string(i / 10) + " 7 5 0 0 -3 1 0 0 0 9 0 -9\n";
   const std::filesystem::path file = folder.write("sheet.ply", sheet);
   const std::string camera = "splat:" + file.string();
   std::vector<std::string> opened;
@@ -180,13 +180,18 @@ TEST(SessionHost, SaysHowASplatIsToBeDrawnAndOpensItAtTheScaleThatWasMeasured) {
   SessionHost host("1.2.3", {.open_scene = [&](const std::string& uri) { opened.push_back(uri); }});
   Session session(std::move(options));
   host.attach(session);
-  const json splat = json::parse(host.hello())["splat"];
-  EXPECT_EQ(splat["name"], "sheet.ply");
-  const std::vector<double> pose = splat["pose"];
-  const std::vector<double> x_is_up{0, 0, -0.01, 1, 0, 0.01, 0, 2, 0.01, 0, 0, 3};
-  ASSERT_EQ(pose.size(), x_is_up.size());
-  for (std::size_t i = 0; i < pose.size(); ++i) EXPECT_NEAR(pose[i], x_is_up[i], 1e-12) << i;
-  EXPECT_EQ(host.splat_file(), file);
+  EXPECT_EQ(json::parse(host.hello())["splat"], true);
+  const auto drawn = host.gaussians();
+  ASSERT_EQ(drawn.size(), 100U);
+  // World from file: (x, y, z) to (1 - z / 100, 2 + y / 100, 3 + x / 100).
+  const auto corner =
+      std::min_element(drawn.begin(), drawn.end(),
+                       [](const auto& a, const auto& b) { return a[1] + a[2] < b[1] + b[2]; });
+  const double thin = 1e-4 * std::exp(-6.0);
+  const std::array<double, 12> expected{1 - 0.07, 2, 3,    255 * 65536 + 128 * 256,  thin, 0, 0,
+                                        1e-4,     0, 1e-4, 1 / (1 + std::exp(-5.0)), 0};
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    EXPECT_NEAR((*corner)[i], expected[i], i >= 4 && i < 10 ? 1e-9 : 1e-6) << i;
 
   host.command(Rescale{0.5}, Role::operating);
   EXPECT_EQ(opened, std::vector<std::string>{camera + "?up=x&pose=1,2,3,0,0,0,1&scale=0.005"});
@@ -198,8 +203,8 @@ TEST(SessionHost, SaysHowASplatIsToBeDrawnAndOpensItAtTheScaleThatWasMeasured) {
   host.detach();
 
   Hosted wall({.open_scene = [&](const std::string& uri) { opened.push_back(uri); }});
-  EXPECT_TRUE(json::parse(wall.host.hello())["splat"].is_null());
-  EXPECT_TRUE(wall.host.splat_file().empty());
+  EXPECT_EQ(json::parse(wall.host.hello())["splat"], false);
+  EXPECT_TRUE(wall.host.gaussians().empty());
   EXPECT_TRUE(fails_saying(wall.asking(Rescale{0.5}, Role::operating), "scale", "--camera"));
   EXPECT_EQ(opened.size(), 1U);
 }

@@ -73,7 +73,7 @@ export class Connection {
     request.send(file);
   }
 
-  /** The file of the splat that is felt. */
+  /** The Gaussians of the splat that is felt. */
   async splat(): Promise<ArrayBuffer> {
     const token = this.token ? `?token=${encodeURIComponent(this.token)}` : "";
     const answer = await fetch(`/splat${token}`, { cache: "no-store" });

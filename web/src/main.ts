@@ -27,7 +27,6 @@ import { Ruler } from "./ruler";
 import { GHOST_TRAIL, SceneView, type Palette } from "./scene";
 import { Senses } from "./senses";
 import { linked, linkTo } from "./share";
-import { readSplat } from "./splat_file";
 import { handAt, longest, Timeline, trailAt } from "./timeline";
 import { contactRadius, flagNames, SteadyWhy, why } from "./why";
 
@@ -97,9 +96,9 @@ async function drawSplat(of: Hello): Promise<void> {
   get("felt").hidden = true;
   if (!of.splat) return;
   try {
-    const gaussians = await readSplat(of.splat.name, await connection.splat(), of.splat.pose);
+    const gaussians = await connection.splat();
     if (introduced !== of) return; // another session has begun
-    view.showSplat(gaussians);
+    view.showSplat(new Float32Array(gaussians));
     get("felt").hidden = false;
     get("felt").setAttribute("aria-pressed", "false");
   } catch (error) {

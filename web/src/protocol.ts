@@ -353,8 +353,8 @@ export interface Hello {
   scenes: { uri: string; meaning: string; group: string }[];
   /** [bytes] of the files that the operator's page may send; 0: it may send none */
   file_limit: number;
-  /** what is felt, to be drawn: its file's name and world_from_file, 3 x 4; null: it is no splat */
-  splat: { name: string; pose: number[] } | null;
+  /** is what is felt a splat, whose Gaussians can be asked for? */
+  splat: boolean;
   /** to be shown on joining, such as why a scene could not be opened; empty: nothing */
   notice: string;
   parameters: ParameterRow[];

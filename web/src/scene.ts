@@ -27,7 +27,6 @@ import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";
 import { nearestAbout, type Place } from "./pointers";
 import type { Frame, OtherHand, Rays, Ticks, Tool, Vec3 } from "./protocol";
 import { SplatCloud } from "./splat";
-import type { Gaussians } from "./splat_file";
 import type { Spot } from "./surface";
 import { SOFTWARE_LEVEL, Thinning } from "./thinning";
 
@@ -543,7 +542,7 @@ export class SceneView {
   }
 
   /** What the cameras look at, if it is a splat. It is drawn in place of what is felt of it. */
-  showSplat(gaussians: Gaussians): void {
+  showSplat(gaussians: Float32Array): void {
     const isAtHome = this.orbit === this.home;
     this.splat = new SplatCloud(gaussians, this.software);
     this.scene.add(this.splat.object);

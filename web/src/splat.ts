@@ -5,15 +5,16 @@
 import * as THREE from "three";
 import { dot, length, sub } from "./camera_math";
 import type { Frame, Vec3 } from "./protocol";
-import type { Gaussians } from "./splat_file";
 import { SeenSurface } from "./surface";
 
+const NUMBERS = 12; // of each Gaussian: mean, colour, covariance, opacity, 0; see docs/protocol.md
+const OPACITY = 10; // which of these
 const PER_ROW = 1024; // of the texture
-const TEXELS = 3; // of each
+const TEXELS = NUMBERS / 4; // of each
 const DEPTHS = 65_536; // steps by which they are sorted
 const MOST_IN_SOFTWARE = 6_000; // that a processor draws
 const MOST_MET = 60_000; // among which a pointer looks
-const SOLID = 128; // opacity of what a pointer meets
+const SOLID = 0.5; // opacity of what a pointer meets
 const TURNED = Math.cos(0.02); // [rad] of the view, after which they are sorted again
 const MOVED = 0.02; // [-] of the eye's distance, likewise
 const REST = 4; // times as long as sorting takes is between two
@@ -89,16 +90,10 @@ void main() {
 }
 `;
 
-function textureOf({ means, covariances, colours, count }: Gaussians): THREE.DataTexture {
-  const rows = Math.max(1, Math.ceil(count / PER_ROW));
-  const texels = new Float32Array(4 * TEXELS * PER_ROW * rows);
-  for (let i = 0; i < count; ++i) {
-    const [at, rgb] = [4 * TEXELS * i, 4 * i];
-    texels.set(means.subarray(3 * i, 3 * i + 3), at);
-    texels[at + 3] = 65_536 * colours[rgb]! + 256 * colours[rgb + 1]! + colours[rgb + 2]!;
-    texels.set(covariances.subarray(6 * i, 6 * i + 6), at + 4);
-    texels[at + 10] = colours[rgb + 3]! / 255;
-  }
+function textureOf(gaussians: Float32Array): THREE.DataTexture {
+  const rows = Math.ceil(gaussians.length / (NUMBERS * PER_ROW));
+  const texels = new Float32Array(NUMBERS * PER_ROW * rows);
+  texels.set(gaussians);
   const [format, type] = [THREE.RGBAFormat, THREE.FloatType];
   const texture = new THREE.DataTexture(texels, TEXELS * PER_ROW, rows, format, type);
   texture.needsUpdate = true;
@@ -106,17 +101,18 @@ function textureOf({ means, covariances, colours, count }: Gaussians): THREE.Dat
 }
 
 /** Those that hide what is behind them as points about their middle, for pointer and first view. */
-export function solidPlaces({ means, colours, count }: Gaussians): Frame {
-  const solid: number[] = [];
-  for (let i = 0; i < count; ++i) if (colours[4 * i + 3]! >= SOLID) solid.push(i);
+export function solidPlaces(gaussians: Float32Array): Frame {
+  const solid: number[] = []; // where they begin
+  for (let i = 0; i < gaussians.length; i += NUMBERS)
+    if (gaussians[i + OPACITY]! >= SOLID) solid.push(i);
   const step = Math.max(1, Math.ceil(solid.length / MOST_MET));
   const kept = solid.filter((_, k) => k % step === 0);
   const mean = (axis: number) =>
-    kept.reduce((sum, i) => sum + means[3 * i + axis]!, 0) / Math.max(1, kept.length);
+    kept.reduce((sum, i) => sum + gaussians[i + axis]!, 0) / Math.max(1, kept.length);
   const middle: Vec3 = [mean(0), mean(1), mean(2)];
   const points = new Float32Array(3 * kept.length);
   kept.forEach((i, k) => {
-    for (const axis of [0, 1, 2]) points[3 * k + axis] = means[3 * i + axis]! - middle[axis]!;
+    for (const axis of [0, 1, 2]) points[3 * k + axis] = gaussians[i + axis]! - middle[axis]!;
   });
   const [x, y, z] = middle;
   return {
@@ -141,11 +137,12 @@ export class SplatCloud {
 
   /** @param software  a processor draws: it has no time to mix colours, so they are solid */
   constructor(
-    private readonly gaussians: Gaussians,
+    private readonly gaussians: Float32Array,
     private readonly software: boolean,
   ) {
-    this.step = software ? Math.max(1, Math.ceil(gaussians.count / MOST_IN_SOFTWARE)) : 1;
-    this.count = Math.floor(gaussians.count / this.step);
+    const all = gaussians.length / NUMBERS;
+    this.step = software ? Math.ceil(all / MOST_IN_SOFTWARE) : 1;
+    this.count = Math.floor(all / this.step);
     this.seen = new SeenSurface(solidPlaces(gaussians), null);
     this.depths = new Uint16Array(this.count);
     this.order = new THREE.InstancedBufferAttribute(new Uint32Array(this.count), 1);
@@ -198,13 +195,13 @@ export class SplatCloud {
 
   // By counting.
   private sort(eye: Vec3, forward: Vec3): void {
-    const { means } = this.gaussians;
+    const { gaussians } = this;
     const [fx, fy, fz] = forward;
     const from = dot(eye, forward);
     let farthest = 0;
     const depthOf = (i: number) => {
-      const at = 3 * i * this.step;
-      return fx * means[at]! + fy * means[at + 1]! + fz * means[at + 2]! - from;
+      const at = NUMBERS * this.step * i;
+      return fx * gaussians[at]! + fy * gaussians[at + 1]! + fz * gaussians[at + 2]! - from;
     };
     for (let i = 0; i < this.count; ++i) farthest = Math.max(farthest, depthOf(i));
     // By the logarithm: what is near is sorted as finely as what is far.

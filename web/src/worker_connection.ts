@@ -122,7 +122,7 @@ export class Connection {
     void file.arrayBuffer().then((bytes) => this.give(name, bytes));
   }
 
-  /** The file of the splat that is felt. */
+  /** The Gaussians of the splat that is felt, as the program's `/splat` gives them. */
   splat(): Promise<ArrayBuffer> {
     this.worker.postMessage({ splat: true });
     return new Promise((resolve) => (this.takeSplat = resolve));

@@ -51,18 +51,10 @@ export function plyOf(all: readonly Made[]): Buffer {
   return Buffer.concat([Buffer.from(header), Buffer.from(Float32Array.from(rows).buffer)]);
 }
 
-// A frame of zstd that holds bytes as they are, at most 128 kB.
-function zstdOf(bytes: Buffer): Buffer {
-  const head = Buffer.from([0x28, 0xb5, 0x2f, 0xfd, 0xa0, 0, 0, 0, 0, 0, 0, 0]);
-  head.writeUInt32LE(bytes.length, 5);
-  head.writeUIntLE(8 * bytes.length + 1, 9, 3); // the last block, raw
-  return Buffer.concat([head, bytes]);
-}
-
-/** Version 3 or 4, with coordinates in steps of 2^-12. */
-export function spzOf(all: readonly Made[], version: 3 | 4 = 3): Buffer {
+/** Version 3, with coordinates in steps of 2^-12. */
+export function spzOf(all: readonly Made[]): Buffer {
   const header = Buffer.alloc(16);
-  [0x5053474e, version, all.length].forEach((value, i) => header.writeUInt32LE(value, 4 * i));
+  [0x5053474e, 3, all.length].forEach((value, i) => header.writeUInt32LE(value, 4 * i));
   header.writeUInt8(12, 13);
   const places = Buffer.alloc(9 * all.length);
   const turns = Buffer.alloc(4 * all.length);
@@ -86,16 +78,7 @@ export function spzOf(all: readonly Made[], version: 3 | 4 = 3): Buffer {
     Buffer.from(all.flatMap(({ sigma }) => sigma.map((s) => byte(16 * (Math.log(s) + 10))))),
     turns,
   ];
-  if (version === 3) return gzipSync(Buffer.concat([header, ...arrays]));
-  header.writeUInt8(arrays.length, 15);
-  const packed = arrays.map(zstdOf);
-  const table = Buffer.alloc(16 + 16 * arrays.length);
-  table.writeUInt32LE(32, 0);
-  packed.forEach(({ length }, i) => {
-    table.writeUInt32LE(length, 16 + 16 * i);
-    table.writeUInt32LE(arrays[i]!.length, 24 + 16 * i);
-  });
-  return Buffer.concat([header, table, ...packed]);
+  return gzipSync(Buffer.concat([header, ...arrays]));
 }
 
 /** With a node that moves it by `moved` [m]. */

@@ -185,6 +185,9 @@ class GltfReader {
     const Values scales = of("SCALE", "VEC3");
     const Values turns = of("ROTATION", "VEC4");
     const Values opacities = of("OPACITY", "SCALAR");
+    const auto* const harmonic = "SH_DEGREE_0_COEF_0";
+    const bool has_harmonic = attributes.contains(std::string(splatting) + ":" + harmonic);
+    const Values colours = has_harmonic ? of(harmonic, "VEC3") : Values{};
     constexpr double even = 1e-3;  // [-] by which a node's scales may differ
     const double scale = std::cbrt(pose.linear().determinant());
     const Eigen::Matrix3d rotation = pose.linear() / scale;
@@ -203,6 +206,9 @@ class GltfReader {
       splat.log_scales.emplace_back(logs + Vec3::Constant(std::log(scale)));
       splat.heads.emplace_back(turn.w(), std::log(opacities(i, 0) / (1.0 - opacities(i, 0))), 0.0);
       splat.rotations.emplace_back(turn.vec());
+      for (std::size_t k = 0; k < 3; ++k)
+        out_.colours.push_back(
+            detail::colour_byte(detail::colour_share(has_harmonic ? colours(i, k) : 0.0)));
     }
   }
 

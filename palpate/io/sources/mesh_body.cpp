@@ -124,7 +124,7 @@ std::unique_ptr<Source> open_map(const Uri& uri) {
                    : ending == ".stl" ? read_stl(path)
                                       : read_obj(path);
   for (Vec3& point : file.points) point = options.scale * (options.turn * point);
-  auto body = std::make_unique<const MeshBody>(file.points, file.triangles, path.string());
+  auto body = std::make_shared<const MeshBody>(file.points, file.triangles, path.string());
   return open_body(uri, options, std::move(body),
                    "a mesh of " + std::to_string(file.triangles.size()) + " triangles");
 }

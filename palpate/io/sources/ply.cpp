@@ -133,23 +133,23 @@ bool ask_for(const std::array<std::string_view, N>& names, Element& element,
   return true;
 }
 
-// Asks for the points' colours, if there is one red, one green and one blue, of bytes or floats
-// from 0 to 1. Nothing depends on a colour: one that is no number is black.
-void ask_for_colours(Element& element, std::vector<std::uint8_t>& into) {
-  const auto columns = columns_named<3>({"red", "green", "blue"}, element);
+// Asks for the points' colours, if there is one of each channel, of bytes or floats from 0 to 1 or
+// a splat's. Nothing depends on a colour: one that is no number is black.
+void ask_for_colours(bool as_splat, Element& element, std::vector<std::uint8_t>& into) {
+  const auto columns = as_splat ? columns_named<3>({"f_dc_0", "f_dc_1", "f_dc_2"}, element)
+                                : columns_named<3>({"red", "green", "blue"}, element);
   if (!columns || std::any_of(columns->begin(), columns->end(), [](const Column* column) {
         return column->type->name != "uint8" && !column->type->is_float;
       }))
     return;
   for (std::size_t channel = 0; channel < 3; ++channel) {
     Column& column = *(*columns)[channel];
-    const double unit = column.type->is_float ? 255.0 : 1.0;
+    const double unit = column.type->is_float ? 1.0 : 255.0;
     column.is_needed = false;
     column.prepare = [&into](std::size_t rows) { into.resize(3 * rows); };
-    column.put = [&into, channel, unit](std::size_t row, double value) {
-      const double scaled = unit * value;
+    column.put = [&into, channel, unit, as_splat](std::size_t row, double value) {
       into[3 * row + channel] =
-          static_cast<std::uint8_t>(scaled > 0.0 ? std::lround(std::min(scaled, 255.0)) : 0);
+          detail::colour_byte(as_splat ? detail::colour_share(value) : value / unit);
     };
   }
 }
@@ -229,10 +229,8 @@ PointFile parse(std::span<const std::byte> bytes, std::string_view name, bool as
       if (as_splat && !ask_for_splat(element, cloud.splat.emplace()))
         file.fail("its points have no opacity, scale_0 to scale_2 and rot_0 to rot_3",
                   "give a splat; points and meshes are opened by ply: and map:");
-      if (!as_splat) {
-        ask_for<3>({"nx", "ny", "nz"}, element, cloud.normals);
-        ask_for_colours(element, cloud.colours);
-      }
+      if (!as_splat) ask_for<3>({"nx", "ny", "nz"}, element, cloud.normals);
+      ask_for_colours(as_splat, element, cloud.colours);
       for (const Column& property : element.properties)
         cloud.fields.push_back(
             {std::string(property.name),

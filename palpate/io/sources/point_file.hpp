@@ -41,7 +41,8 @@ struct PointFile {
   /// A PLY's faces: indices of points, in the order of the file. Polygons are fanned, strips cut.
   std::vector<std::array<std::uint32_t, 3>> triangles;
   /// Red, green and blue of each point in its order, 3 values each: a PCD's rgb or rgba, a PLY's
-  /// red, green and blue, of bytes or of floats from 0 to 1. Empty without.
+  /// red, green and blue, of bytes or of floats from 0 to 1, a splat's spherical harmonics of
+  /// degree 0. Empty without.
   std::vector<std::uint8_t> colours;
   /// Position of the camera in the frame of the points: the translation of PCD's
   /// VIEWPOINT, or view_px view_py view_pz of the `camera` element that PCL writes into a PLY.
@@ -79,7 +80,8 @@ PointFile read_ply(const std::filesystem::path& path);
 PointFile parse_ply(std::span<const std::byte> bytes, std::string_view name);
 
 /// Reads a PLY whose points are Gaussians as 3D Gaussian splatting writes them: `opacity`,
-/// `scale_0` to `scale_2`, `rot_0` to `rot_3`, w first. Otherwise as read_ply.
+/// `scale_0` to `scale_2`, `rot_0` to `rot_3`, w first, and perhaps `f_dc_0` to `f_dc_2`. Otherwise
+/// as read_ply.
 PointFile read_splat(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_splat(std::span<const std::byte> bytes, std::string_view name);
@@ -101,7 +103,7 @@ PointFile read_obj(const std::filesystem::path& path);
 /// The same for bytes in memory; `name` is what an error calls them.
 PointFile parse_obj(std::span<const std::byte> bytes, std::string_view name);
 
-/// Reads an SPZ of versions 1 to 4 as read_splat does a PLY. Colours are passed over.
+/// Reads an SPZ of versions 1 to 4 as read_splat does a PLY.
 ///
 /// Allocates in proportion to the size of the file, whatever its header declares.
 /// @throws Error naming the file and what was wrong

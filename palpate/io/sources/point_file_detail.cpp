@@ -130,6 +130,10 @@ std::string quoted(std::string_view piece) {
   return text + (piece.size() > longest ? "...\"" : "\"");
 }
 
+std::uint8_t colour_byte(double share) noexcept {
+  return static_cast<std::uint8_t>(share > 0.0 ? std::lround(255.0 * std::min(share, 1.0)) : 0);
+}
+
 std::size_t count_non_finite(std::span<const Vec3> points) noexcept {
   return static_cast<std::size_t>(std::count_if(
       points.begin(), points.end(), [](const Vec3& point) { return !point.allFinite(); }));

@@ -72,6 +72,14 @@ inline constexpr std::array scalars{Scalar::of<std::int8_t>("int8", "I1", "char"
 /// A piece of a file as a message can show it: in quotes, printable and short.
 [[nodiscard]] std::string quoted(std::string_view piece);
 
+/// A colour's share, 0 to 1, as a byte; one that is no number is 0.
+[[nodiscard]] std::uint8_t colour_byte(double share) noexcept;
+/// The share that a splat's spherical harmonic of degree 0 stands for.
+[[nodiscard]] inline double colour_share(double harmonic) noexcept {
+  constexpr double y_0 = 0.28209479177387814;  // 1 / (2 sqrt(pi))
+  return 0.5 + y_0 * harmonic;
+}
+
 [[nodiscard]] std::size_t count_non_finite(std::span<const Vec3> points) noexcept;
 
 /// PCD and PLY files larger than this are not read.

@@ -20,6 +20,8 @@
 
 namespace palpate {
 
+class Body;
+
 /// Whose clock the stamps of a source are on.
 enum class StampClock : std::uint8_t {
   recording,  ///< seconds since the beginning of a recording or simulation
@@ -55,6 +57,7 @@ struct SourceInfo {
   SensorKind sensor = SensorKind::unknown;
   /// What the camera can measure, where it is known: depth elsewhere is in another unit.
   std::optional<DepthRange> range{};
+  std::shared_ptr<const Body> body{};  ///< what a virtual camera looks at
 };
 
 /// Where frames come from: a camera, a simulation, a recording. Used on one thread, except for

@@ -292,16 +292,28 @@ void SplatBody::draw(const View& view, std::span<float> depth) const {
   }
 }
 
-BodyOptions splat_options(const Uri& uri) {
-  const bool as_gltf = is_gltf(uri.path());
-  return body_options(uri, is_spz(uri.path()) || as_gltf, as_gltf);
+std::vector<Body::DrawnGaussian> SplatBody::gaussians(
+    const Eigen::Isometry3d& world_from_body) const {
+  const Eigen::Isometry3f pose = world_from_body.cast<float>();
+  std::vector<DrawnGaussian> drawn;
+  drawn.reserve(gaussians_.size());
+  for (const Gaussian& g : gaussians_) {
+    const Eigen::Vector3f mean = pose * g.mean;
+    const Eigen::Matrix3f half = pose.linear() * g.turn.toRotationMatrix() * g.sigma.asDiagonal();
+    const Eigen::Matrix3f c = half * half.transpose();
+    const auto [red, green, blue] = g.colour;
+    drawn.push_back({mean.x(), mean.y(), mean.z(),
+                     static_cast<float>(65536 * red + 256 * green + blue), c(0, 0), c(0, 1),
+                     c(0, 2), c(1, 1), c(1, 2), c(2, 2), g.opacity, 0.0F});
+  }
+  return drawn;
 }
 
 std::unique_ptr<Source> open_splat(const Uri& uri) {
   const std::filesystem::path path = uri.path();
   const bool as_gltf = is_gltf(path);
   const bool as_spz = is_spz(path);
-  const BodyOptions options = splat_options(uri);
+  const BodyOptions options = body_options(uri, as_spz || as_gltf, as_gltf);
   PointFile file = as_spz ? read_spz(path) : as_gltf ? read_gltf(path, true) : read_splat(path);
   const Eigen::Quaternionf turn(Eigen::Quaterniond(options.turn).cast<float>());
   std::vector<Gaussian> gaussians(file.points.size());
@@ -316,9 +328,10 @@ std::unique_ptr<Source> open_splat(const Uri& uri) {
                            Eigen::Quaterniond(columns.heads[i].x(), tail.x(), tail.y(), tail.z())
                                .cast<float>()),
         .opacity = static_cast<float>(1.0 / (1.0 + std::exp(-columns.heads[i].y())))};
+    if (!file.colours.empty()) std::copy_n(&file.colours[3 * i], 3, gaussians[i].colour.begin());
   }
   file = {};
-  auto body = std::make_unique<const SplatBody>(std::move(gaussians), uri.path());
+  auto body = std::make_shared<const SplatBody>(std::move(gaussians), uri.path());
   std::string what = "a splat of " + std::to_string(body->size()) + " Gaussians";
   if (body->floaters() > 0) what += " and " + std::to_string(body->floaters()) + " floaters";
   return open_body(uri, options, std::move(body), what);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -16,7 +17,8 @@ struct Gaussian {
   Eigen::Vector3f mean;   ///< [m]
   Eigen::Vector3f sigma;  ///< [m] along the axes of `turn`
   Eigen::Quaternionf turn;
-  float opacity;  ///< [-] 0 to 1, at the mean
+  float opacity;                                      ///< [-] 0 to 1, at the mean
+  std::array<std::uint8_t, 3> colour{128, 128, 128};  ///< red, green, blue
 };
 
 /// A splat: depth is where the opacity gathered along a ray passes one half.
@@ -39,6 +41,8 @@ class SplatBody final : public Body {
   [[nodiscard]] const Box& bounds() const override { return tree_->bounds(); }
   [[nodiscard]] Vec3 nearest(const Vec3& at) const override;
   void draw(const View& view, std::span<float> depth) const override;
+  [[nodiscard]] std::vector<DrawnGaussian> gaussians(
+      const Eigen::Isometry3d& world_from_body) const override;
 
  private:
   void build_tree();

@@ -124,7 +124,7 @@ PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
               detail::cut_short);
   const std::vector<std::byte> places = file.take(3 * place_size * count);
   const std::vector<std::byte> opacities = file.take(count);
-  file.take(3 * count);  // colours
+  const std::vector<std::byte> colours = file.take(3 * count);
   const std::vector<std::byte> scales = file.take(3 * count);
   const std::vector<std::byte> turns = file.take(turn_size * count);
 
@@ -142,6 +142,8 @@ PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
                                                   detail::load<std::uint16_t>(at, little),
                                               -fraction);
       scale[axis] = std::to_integer<int>(scales[3 * i + k]) / 16.0 - 10.0;
+      const double harmonic = (std::to_integer<int>(colours[3 * i + k]) / 255.0 - 0.5) / 0.15;
+      cloud.colours.push_back(detail::colour_byte(detail::colour_share(harmonic)));
     }
     Eigen::Vector4d turn;
     const std::byte* const at = &turns[turn_size * i];

@@ -273,12 +273,13 @@ BodyOptions body_options(const Uri& uri, bool y_up, bool in_metres) {
 }
 
 std::unique_ptr<Source> open_body(const Uri& uri, const BodyOptions& options,
-                                  std::unique_ptr<const Body> body, const std::string& what) {
+                                  std::shared_ptr<const Body> body, const std::string& what) {
   const Vec3 size = body->bounds().high - body->bounds().low;
   SourceInfo info{.uri = uri.text(),
                   .kind = "virtual camera on " + what + ", " + number_text(size.x()) + " x " +
                           number_text(size.y()) + " x " + number_text(size.z()) + " m",
-                  .assumed = options.assumed};
+                  .assumed = options.assumed,
+                  .body = body};
   return std::make_unique<VirtualCamera>(std::move(body), options.frame_rate, std::move(info));
 }
 

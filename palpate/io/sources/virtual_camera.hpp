@@ -31,6 +31,15 @@ class Body {
   /// Draws the depth [m, along the optical axis] that each pixel sees, row by row; infinite where
   /// there is nothing. @param depth  of width * height
   virtual void draw(const View& view, std::span<float> depth) const = 0;
+  /// Twelve numbers of a Gaussian in the world, as pages draw it: its mean [m], its colour (65536
+  /// red
+  /// + 256 green + blue), its covariance [m^2] (xx xy xz yy yz zz), its opacity, and 0.
+  using DrawnGaussian = std::array<float, 12>;
+  /// All that are felt; empty: it has none.
+  [[nodiscard]] virtual std::vector<DrawnGaussian> gaussians(
+      const Eigen::Isometry3d& /*world_from_body*/) const {
+    return {};
+  }
 };
 
 /// The part of space that a view sees, in the body's frame.
@@ -107,12 +116,9 @@ struct BodyOptions {
 /// @param in_metres  it says that its unit is 1 m
 BodyOptions body_options(const Uri& uri, bool y_up = false, bool in_metres = false);
 
-/// The same of `splat:FILE`: y is up in SPZ and glTF, the unit of glTF is 1 m.
-BodyOptions splat_options(const Uri& uri);
-
 /// A virtual camera on a body, said to look at `what`, "a mesh of 12 triangles".
 std::unique_ptr<Source> open_body(const Uri& uri, const BodyOptions& options,
-                                  std::unique_ptr<const Body> body, const std::string& what);
+                                  std::shared_ptr<const Body> body, const std::string& what);
 
 /// `map:FILE?scale=1m&up=z&fps=60Hz`: a mesh as PLY, STL, OBJ or glTF.
 /// @throws Error if the file cannot be read or has no triangles, or an option is not known.

@@ -662,7 +662,6 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
 
  private:
   using Response = http::response<http::span_body<const char>>;
-  using FileResponse = http::response<http::file_body>;
 
   // A file, if it is welcome.
   void receive() {
@@ -763,21 +762,22 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
     write(request, status, type, content);
   }
 
-  // The file of the splat that is felt, and no other. @return whether there is one
+  // What pages draw of the splat that is felt. @return whether there is one
   bool give_splat(const Request& request) {
-    const std::filesystem::path path = server_.host_.splat_file();
-    beast::error_code error;
-    FileResponse& response = file_response_.emplace(http::status::ok, request.version());
-    if (!path.empty()) response.body().open(path.c_str(), beast::file_mode::scan, error);
-    if (path.empty() || error || request.method() == http::verb::head) return false;
+    splat_ = server_.host_.gaussians();
+    if (splat_.empty() || request.method() == http::verb::head) return false;
+    Response& response = response_.emplace(http::status::ok, request.version());
     set_head(response, "application/octet-stream");
     response.keep_alive(false);
+    response.body() = {reinterpret_cast<const char*>(splat_.data()),
+                       splat_.size() * sizeof(splat_.front())};
     response.prepare_payload();
     serializer_.emplace(response);
     give_more();
     return true;
   }
 
+  // As much as the connection takes, for which there is time again each time.
   void give_more() {
     stream_.expires_after(answer_timeout);
     http::async_write_some(stream_, *serializer_,
@@ -788,8 +788,7 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
                            });
   }
 
-  template <class Head>
-  static void set_head(Head& response, std::string_view type) {
+  static void set_head(Response& response, std::string_view type) {
     response.set(http::field::content_type, {type.data(), type.size()});
     response.set(http::field::cache_control, "no-store");
     response.set("Content-Security-Policy",
@@ -845,8 +844,8 @@ class ViewerServer::Impl::HttpSession : public std::enable_shared_from_this<Http
   beast::flat_buffer buffer_{max_header};
   std::optional<http::request_parser<http::empty_body>> parser_;
   std::optional<Response> response_;
-  std::optional<FileResponse> file_response_;
-  std::optional<http::response_serializer<http::file_body>> serializer_;
+  std::vector<Body::DrawnGaussian> splat_;
+  std::optional<http::response_serializer<http::span_body<const char>>> serializer_;
   std::string said_;     // what the response says, if it is made here
   bool drains_ = false;  // after the response, what is left of the request
   // Of a file that is being received; the path is empty once its end was told.

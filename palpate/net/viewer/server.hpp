@@ -8,7 +8,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "palpate/io/sources/virtual_camera.hpp"
 #include "palpate/net/viewer/protocol.hpp"
 #include "palpate/net/viewer/roles.hpp"
 
@@ -38,8 +40,8 @@ class ViewerHost {
   /// A command that `check_allowed` allows the role of the page that asks.
   /// @throws Error to refuse: the page shows it.
   virtual void command(const Command& command, Role role) = 0;
-  /// The file of the splat that is felt, which pages may draw; empty: there is none.
-  virtual std::filesystem::path splat_file() { return {}; }
+  /// What pages draw of the splat that is felt; empty: there is none.
+  virtual std::vector<Body::DrawnGaussian> gaussians() { return {}; }
   /// The operator's page begins to send a file that is to be touched.
   /// @return where it goes @throws Error to refuse: the page shows it.
   virtual std::filesystem::path begin_file(const std::string& name, std::uint64_t size) = 0;

@@ -107,17 +107,6 @@ json row_by_row(const Eigen::Matrix<double, 3, 4>& pose) {
   return numbers;
 }
 
-// What a page must know to draw a splat from its file; null: it is none.
-json splat_to_draw(const Uri& uri) {
-  if (uri.scheme() != "splat") return nullptr;
-  const BodyOptions options = splat_options(uri.without("pose").without("material"));
-  Eigen::Affine3d world_from_file(options.scale * options.turn);
-  if (uri.has("pose"))
-    world_from_file = parse_pose(uri.text_option("pose", ""), uri.text()) * world_from_file;
-  return {{"name", std::filesystem::path(uri.path()).filename().string()},
-          {"pose", row_by_row(world_from_file.matrix().topRows<3>())}};
-}
-
 // What the page draws of a fixture.
 json fixture_to_draw(const Fixture& fixture) {
   json pose = row_by_row(fixture.world_from_fixture.matrix().topRows<3>());
@@ -199,7 +188,7 @@ std::string SessionHost::hello() {
   return json{{"file_limit", most},
               {"scenes", scenes},
               {"notice", rules_.notice},
-              {"splat", splat_to_draw(Uri(session_->state().cameras.front().uri))},
+              {"splat", Uri(session_->state().cameras.front().uri).scheme() == "splat"},
               {"version", version_},
               {"methods", methods},
               {"tools", choices},
@@ -603,9 +592,13 @@ void SessionHost::command(const Command& command, Role role) {
   }
 }
 
-std::filesystem::path SessionHost::splat_file() {
-  const Uri uri(session_->state().cameras.front().uri);
-  return uri.scheme() == "splat" ? std::filesystem::path(uri.path()) : std::filesystem::path();
+std::vector<Body::DrawnGaussian> SessionHost::gaussians() {
+  const CameraStatus camera = session_->state().cameras.front();
+  if (!camera.body) return {};
+  const Uri uri(camera.uri);
+  return camera.body->gaussians(uri.has("pose")
+                                    ? parse_pose(uri.text_option("pose", ""), camera.uri)
+                                    : Eigen::Isometry3d::Identity());
 }
 
 std::filesystem::path SessionHost::begin_file(const std::string& name, std::uint64_t size) {

@@ -123,7 +123,7 @@ class SessionHost final : public ViewerHost {
   bool takes_hand() override { return mouse_ != nullptr; }
   void hand(const HandMessage& hand) override;
   void command(const Command& command, Role role) override;
-  std::filesystem::path splat_file() override;
+  std::vector<Body::DrawnGaussian> gaussians() override;
   std::filesystem::path begin_file(const std::string& name, std::uint64_t size) override;
   void end_file(const std::filesystem::path& file, bool whole) override;
 

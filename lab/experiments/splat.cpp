@@ -5,12 +5,14 @@
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <string>
 
 #include <fmt/format.h>
 
 #include "lab/experiment.hpp"
+#include "lab/implicit_proxy.hpp"
 #include "lab/method.hpp"
 #include "lab/play.hpp"
 #include "lab/statistics.hpp"
@@ -89,6 +91,54 @@ std::vector<Gaussian> covered(const SplatShape& of, std::string_view kind, std::
   return all;
 }
 
+// What is published of splats and haptics follows the gradient of their density: here a point is
+// held outside of where the Gaussians' responses, each times its opacity, add up to one half.
+class Density final : public ImplicitMethod {
+ public:
+  Density(const Parameters& parameters, const std::vector<Gaussian>& gaussians)
+      : ImplicitMethod(parameters, stride, stride) {
+    std::vector<Box> boxes;
+    for (const Gaussian& g : gaussians) {
+      const Eigen::Matrix3d axes = g.turn.cast<double>().toRotationMatrix();
+      const Vec3 sigma = g.sigma.cast<double>();
+      const Vec3 mean = g.mean.cast<double>();
+      const Vec3 half = reach * (axes * sigma.asDiagonal()).rowwise().norm();
+      boxes.push_back({mean - half, mean + half});
+      fields_.push_back({mean, sigma.cwiseInverse().asDiagonal() * axes.transpose(), g.opacity});
+    }
+    tree_.emplace(boxes, fields_);
+  }
+
+ private:
+  static constexpr double stride = 0.05e-3;  // [m] shorter than the thinnest is thick
+  static constexpr double reach = 3.0;       // standard deviations
+  struct One {
+    Vec3 mean;
+    Eigen::Matrix3d whitened;  // makes it a ball of radius 1
+    double opacity;
+  };
+
+  void take(const Cloud& /*cloud*/, const Vec3& /*place*/) override {}
+  void prepare(const Vec3& /*place*/) override {}
+  std::optional<FieldValue> field(const Vec3& at) override {
+    FieldValue result{0.5, Vec3::Zero()};
+    tree_->walk([&](const Box& box) { return box.squared_distance(at) <= 0.0; },
+                [&](std::uint32_t first, std::uint32_t end) {
+                  for (std::uint32_t i = first; i < end; ++i) {
+                    const One& one = fields_[i];
+                    const Vec3 off = one.whitened * (at - one.mean);
+                    const double density = one.opacity * std::exp(-0.5 * off.squaredNorm());
+                    result.value -= density;
+                    result.gradient += density * (one.whitened.transpose() * off);
+                  }
+                });
+    return result;
+  }
+
+  std::vector<One> fields_;  // in the order of the tree
+  std::optional<BoxTree> tree_;
+};
+
 // Down onto the top, at rest there, and once round the y axis.
 Vec3 splat_hand(const Shape& shape, double t) {
   constexpr double far = 0.2;  // [m] from the middle
@@ -123,14 +173,16 @@ std::vector<Vec3> splat_forces(const SplatShape& of, std::shared_ptr<const Body>
 
 std::string splat_row(const SplatShape& of, std::string_view kind, const std::string& name,
                       const ExperimentOptions& options) {
-  const auto body =
-      std::make_shared<const SplatBody>(covered(of, kind, options.seed), std::string(of.name));
+  const std::vector<Gaussian> gaussians = covered(of, kind, options.seed);
+  const auto body = std::make_shared<const SplatBody>(gaussians, std::string(of.name));
   const auto scene =
       std::make_shared<const Scene>(std::vector<Part>{{.shape = of.shape, .motion = {}}});
   const MethodSetup setup{options.parameters, truth_of(scene)};
   const std::vector<Vec3> truth = splat_forces(of, body, make_method("ideal", setup));
   const std::vector<Vec3> forces =
-      splat_forces(of, body, make_method(name, setup, options.own_methods));
+      splat_forces(of, body,
+                   name == "density" ? std::make_unique<Density>(options.parameters, gaussians)
+                                     : make_method(name, setup, options.own_methods));
   const auto at = [](double t) { return static_cast<std::size_t>(std::lround(1e3 * t)); };
   std::vector<double> errors, angles, rest, round;
   double held = 0.0;
@@ -191,7 +243,7 @@ Experiment splat_experiment() {
       .name = "splat",
       .summary = "bodies made of Gaussians, touched all round by a virtual camera, against truth",
       .header = "body,splat,method,held,error,error_95,angle_95,rest_n,round_n",
-      .default_methods = {"sight", "paper", "tsdf"},
+      .default_methods = {"sight", "paper", "tsdf", "density"},
       .cells = splat_cells,
       .scores = splat_scores};
 }

@@ -20,6 +20,7 @@
 
 #include "python/arrays.hpp"
 #include "python/materials.hpp"
+#include "python/python_source.hpp"
 
 namespace palpate::python {
 namespace {
@@ -104,11 +105,13 @@ class PythonSession {
                 const py::kwargs& parameters)
       : free_running_(free_running) {
     SessionOptions options;
-    if (py::isinstance<py::str>(camera)) {
-      options.cameras.push_back({.uri = py::cast<std::string>(camera)});
-    } else {
-      for (const auto& uri : py::cast<std::vector<std::string>>(camera))
-        options.cameras.push_back({.uri = uri});
+    const bool are_several = py::isinstance<py::list>(camera) || py::isinstance<py::tuple>(camera);
+    for (const py::handle& one : are_several ? camera : py::make_tuple(camera)) {
+      const bool is_uri = py::isinstance<py::str>(one);
+      options.cameras.push_back({.uri = is_uri ? py::cast<std::string>(one) : ""});
+      options.open_cameras.push_back(
+          is_uri ? nullptr
+                 : std::make_unique<PythonSource>(py::reinterpret_borrow<py::object>(one)));
     }
     options.hands[0].device = device;
     options.method = method;
@@ -297,15 +300,17 @@ void define_session(py::module_& m) {
            py::arg("limits") = py::dict(), py::arg("without_watchdog") = false,
            py::arg("fixtures") = py::none(), py::arg("hands") = py::tuple(),
            py::arg("materials") = py::none(), py::arg("labels") = py::none(), py::arg("tool") = "",
-           "camera: a URI or a list of them. device: a URI. free_running: as fast as the machine\n"
-           "can, with the same forces each time. limits: of the safety chain\n"
-           "(palpate.limits()). fixtures: a TOML file of virtual fixtures, or its text.\n"
-           "hands: further hands, each a device's URI or a dict with keys of [[hand]]\n"
-           "(docs/session.md); while one of the hands is in trouble, none has a force. labels: a\n"
-           "function that is called with a camera's number and depth for each of its frames, and\n"
-           "returns uint8 (height, width), 0 for none and i for the i-th of `materials`. tool:\n"
-           "what touches, such as \"box:40x20x5mm\" (docs/tools.md); empty: a ball. Further\n"
-           "keywords are parameters (palpate.parameters()).")
+           "camera: a URI, an object to iterate over that gives (DepthImage or PointCloud, stamp\n"
+           "[s]), or a list of these; an object's attribute `live`, if True, says that the\n"
+           "stamps are time.monotonic(). device: a URI. free_running: as fast as the machine\n"
+           "can, with the same forces each time. limits: of the safety chain (palpate.limits()).\n"
+           "fixtures: a TOML file of virtual fixtures, or its text. hands: further hands, each a\n"
+           "device's URI or a dict with keys of [[hand]] (docs/session.md); while one of the\n"
+           "hands is in trouble, none has a force. labels: a function that is called with a\n"
+           "camera's number and depth for each of its frames, and returns uint8 (height, width),\n"
+           "0 for none and i for the i-th of `materials`. tool: what touches, such as\n"
+           "\"box:40x20x5mm\" (docs/tools.md); empty: a ball. Further keywords are parameters\n"
+           "(palpate.parameters()).")
       .def("__enter__",
            [](const py::object& self) {
              py::cast<PythonSession&>(self).start();

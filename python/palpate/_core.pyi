@@ -190,7 +190,8 @@ class Source:
 class Session:
     def __init__(
         self,
-        camera: Union[str, Sequence[str]],
+        camera: Union[str, Iterable[Tuple[Cloud, float]],
+                      Sequence[Union[str, Iterable[Tuple[Cloud, float]]]]],
         device: str = "hand:",
         *,
         method: str = "sight",

@@ -101,6 +101,30 @@ class Session(unittest.TestCase):
         self.assertEqual(state["ticks"], 2000)
         self.assertTrue(palpate.safety_flags(int(ticks["safety"][0])))
 
+    def test_touches_what_an_object_gives_as_it_touches_its_source(self):
+        def ticks(camera):
+            with palpate.Session(camera, free_running=True, stroke_time=2.0) as session:
+                session.run(2.0)
+                return session.ticks(), session.state()["cameras"][0]
+
+        source = palpate.Source(CAMERA)
+        frames = [source.next() for _ in range(90)]
+        of_source, _ = ticks(CAMERA)
+        of_object, camera = ticks((frame.cloud, frame.stamp) for frame in frames)
+        self.assertEqual(of_object.tobytes(), of_source.tobytes())
+        self.assertEqual(camera["uri"], "python:generator")
+        self.assertGreater(numpy.linalg.norm(of_object["force"], axis=1).max(), 0.2)
+
+        def breaks():
+            yield frames[0].cloud, 0.0
+            raise RuntimeError("out of memory")
+
+        for wrong, says in ((7, "iterate"), ([[1, 2, 3]], "its time"), ([iter([])], "frame")):
+            with self.assertRaisesRegex(palpate.Error, says):
+                palpate.Session(wrong, free_running=True)
+        with self.assertRaisesRegex(palpate.Error, "out of memory"):
+            ticks(breaks())
+
     def test_changes_its_tool(self):
         session = palpate.Session("synthetic:plane?size=160x120", free_running=True, stroke_time=2)
         session.set(tool="box:40x20x5mm?points=200")

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "python/python_source.hpp"
+
+#include <utility>
+#include <vector>
+
+#include "palpate/kernel/cloud/depth_image.hpp"
+#include "palpate/kernel/core/error.hpp"
+
+namespace palpate::python {
+namespace {
+
+constexpr const char* remedy = "let it give pairs: a palpate.DepthImage or PointCloud, and [s]";
+
+// In memory of its own: an array's last reference would need the interpreter.
+std::shared_ptr<const Cloud> without_python(std::shared_ptr<Cloud> cloud) {
+  const DepthImage* image = cloud->image();
+  if (image == nullptr) return cloud;
+  const auto depth = image->depth();
+  return std::make_shared<const DepthImage>(image->shared_rays(),
+                                            std::vector<std::uint16_t>(depth.begin(), depth.end()),
+                                            image->units_per_metre(), image->world_from_camera());
+}
+
+}  // namespace
+
+PythonSource::PythonSource(const py::object& camera) {
+  const auto name = py::cast<std::string>(py::type::of(camera).attr("__name__"));
+  info_.uri = "python:" + name;
+  info_.kind = "Python's " + name;
+  if (!py::isinstance<py::iterable>(camera))
+    throw Error(info_.uri, "one cannot iterate over it", remedy);
+  info_.live = py::cast<bool>(py::getattr(camera, "live", py::bool_(false)));
+  info_.clock = info_.live ? StampClock::monotonic : StampClock::recording;
+  frames_ = py::iter(camera);
+}
+
+PythonSource::~PythonSource() {
+  const py::gil_scoped_acquire lock;
+  frames_ = py::object();
+}
+
+std::optional<Frame> PythonSource::next(double /*timeout*/) {
+  const py::gil_scoped_acquire lock;
+  try {
+    const auto given = py::reinterpret_steal<py::object>(PyIter_Next(frames_.ptr()));
+    if (PyErr_Occurred() != nullptr) throw py::error_already_set();
+    if (!given) return std::nullopt;
+    auto [cloud, stamp] = py::cast<std::pair<std::shared_ptr<Cloud>, double>>(given);
+    if (!cloud) throw py::cast_error();
+    return Frame{stamp, without_python(std::move(cloud))};
+  } catch (py::error_already_set& error) {  // of the interpreter, which is locked here alone
+    throw Error(info_.uri, error.what(), remedy);
+  } catch (const py::cast_error&) {
+    throw Error(info_.uri, "it gave something else than a cloud and its time", remedy);
+  }
+}
+
+}  // namespace palpate::python

@@ -11,15 +11,15 @@
 namespace palpate::lab {
 namespace test_tool {
 
-Table run_of(const std::string& name) {
+Table run_of(const std::string& name, const std::string& experiment = "tool") {
   ExperimentOptions options;
   options.families = {name};
   options.cases = 1;
   RunnerOptions runner;
   runner.jobs = 2;
   const test::TemporaryFolder folder;
-  const Experiment& tool = find_experiment("tool");
-  return {"tool", run_experiment(tool, options, runner, folder.path() / "tool.csv")};
+  return {experiment,
+          run_experiment(find_experiment(experiment), options, runner, folder.path() / "run.csv")};
 }
 
 double value(const Table& table, const std::string& camera, const std::string& method,
@@ -55,6 +55,18 @@ TEST(ToolExperiment, APlateStaysBeforeASurfaceThatComesAndAPenaltyDoesNot) {
     EXPECT_GT(value(table, camera, "penalty", "behind"), 0.3) << camera;
   }
   EXPECT_EQ(find_experiment("tool").scores(table).rows[0][3], "-") << "no truth of forces there";
+}
+
+TEST(ToolExperiment, ALongToolBetweenLightFingersRestsBelowAStiffnessInRotation) {
+  const Table table = run_of("light", "turning");
+  ASSERT_EQ(table.rows(), 2U);
+  EXPECT_EQ(table.text(1, "tool"), "capsule:200x10mm");
+  EXPECT_LT(table.number(1, "free_force"), 0.8) << "the chain takes force off what swings";
+  EXPECT_LT(table.number(1, "rate"), 0.02);
+  EXPECT_GT(table.number(1, "force"), 0.8);
+  EXPECT_GT(table.number(1, "stiffest"), 1.0) << "what a session sets";
+  EXPECT_LT(table.number(1, "stiffest"), 100.0);
+  EXPECT_EQ(find_experiment("turning").scores(table).rows.at(1).size(), 5U);
 }
 
 TEST(ToolExperiment, NamesTheNearestOfItsCases) {

@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/io/devices/hip_path.hpp"
+#include "palpate/io/sources/mesh_body.hpp"
 #include "palpate/io/sources/point_file.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/io/sources/splat_body.hpp"
@@ -84,10 +85,9 @@ struct Forces {
 };
 
 // Down onto the ball, then all round it.
-Forces round(const std::vector<Gaussian>& gaussians) {
+Forces round(std::unique_ptr<const Body> body) {
   std::vector<std::unique_ptr<Source>> sources;
-  sources.push_back(std::make_unique<VirtualCamera>(
-      std::make_unique<SplatBody>(gaussians, "a ball"), 60.0, SourceInfo{}));
+  sources.push_back(std::make_unique<VirtualCamera>(std::move(body), 60.0, SourceInfo{}));
   FrameSequence frames(std::move(sources));
   std::vector<HipPath::Sample> samples;
   const auto add = [&](double height, double angle) {
@@ -109,6 +109,29 @@ Forces round(const std::vector<Gaussian>& gaussians) {
     return true;
   });
   return forces;
+}
+
+Forces round(const std::vector<Gaussian>& gaussians) {
+  return round(std::make_unique<SplatBody>(gaussians, "a ball"));
+}
+
+// Distances to the ball in voxels of 3 mm, cut off at 12 mm as a TSDF's.
+TEST(Volume, IsABallAllRound) {
+  constexpr int side = 42;  // [voxels]
+  std::string text =
+      "NRRD0004\ntype: float\ndimension: 3\nsizes: 42 42 42\nencoding: raw\nendian: little\n"
+      "spacings: 0.003 0.003 0.003\nspace origin: (-0.0615,-0.0615,-0.0615)\n\n";
+  for (int i = 0; i < side * side * side; ++i) {
+    const Vec3 at = 3e-3 * Vec3(i % side, i / side % side, i / side / side) - 0.0615 * Vec3::Ones();
+    const auto value = static_cast<float>(std::clamp(at.norm() - radius, -0.012, 0.012));
+    text.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  const PointFile file = parse_nrrd(std::as_bytes(std::span(text)), "ball.nrrd", "");
+  const double expected = Parameters().coupling.stiffness * pressed;  // [N]
+  const Forces forces = round(std::make_unique<MeshBody>(file.points, file.triangles, "a ball"));
+  EXPECT_GT(forces.least, 0.95 * expected);
+  EXPECT_LT(forces.most, 1.05 * expected);
+  EXPECT_LT(forces.worst_angle, 5.0 * pi / 180.0);
 }
 
 TEST(Splat, IsABallAllRound) {

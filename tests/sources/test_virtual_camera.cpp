@@ -107,7 +107,7 @@ TEST_F(VirtualCameraTest, TakesScaleAxesAndPoseFromTheUri) {
 TEST_F(VirtualCameraTest, SaysWhatIsWrongWithAFile) {
   EXPECT_TRUE(fails_saying([&] { open("up=w"); }, "'up'", "'w' is no axis", "give x, y, z"));
   EXPECT_TRUE(
-      fails_saying([] { open_source("map:a.off"); }, "no PLY, STL, OBJ or glTF", "FILE.ply"));
+      fails_saying([] { open_source("map:a.off"); }, "no PLY, STL, OBJ, glTF or NRRD", "FILE.ply"));
   EXPECT_TRUE(fails_saying([] { open_source("map:none.ply"); }, "none.ply"));
   const std::string points =
       folder_

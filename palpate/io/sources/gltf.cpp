@@ -269,12 +269,7 @@ class GltfReader {
     const auto uri = it["uri"].get<std::string>();
     std::vector<std::byte>& bytes = buffers_[number];
     if (uri.starts_with("data:")) return bytes = of_base64(uri.substr(uri.find(',') + 1));
-    const std::filesystem::path path = uri;
-    if (path.is_absolute() || uri.find("..") != std::string::npos ||
-        uri.find(':') != std::string::npos)
-      fail("its buffer " + detail::quoted(uri) + " is not a file beside it",
-           "put it beside it, or write it as one GLB");
-    return bytes = read_file(folder_ / path, detail::largest_file);
+    return bytes = detail::read_beside(folder_, uri, name_);
   }
 
   std::string name_;

@@ -115,18 +115,22 @@ std::unique_ptr<Source> open_map(const Uri& uri) {
   const std::filesystem::path path = uri.path();
   const std::string ending = lower_case(path.extension().string());
   const bool as_gltf = is_gltf(path);
-  if (!as_gltf && ending != ".ply" && ending != ".stl" && ending != ".obj")
-    throw Error(uri.text(), "it is no PLY, STL, OBJ or glTF file",
-                "give a mesh as FILE.ply, .stl, .obj, .glb or .gltf");
-  const BodyOptions options = body_options(uri, as_gltf, as_gltf);
-  PointFile file = as_gltf            ? read_gltf(path, false)
+  const bool as_volume = is_nrrd(path);
+  if (!as_gltf && !as_volume && ending != ".ply" && ending != ".stl" && ending != ".obj")
+    throw Error(uri.text(), "it is no PLY, STL, OBJ, glTF or NRRD file",
+                "give a mesh as FILE.ply, .stl, .obj, .glb or .gltf, a volume as .nrrd");
+  const BodyOptions options =
+      body_options(as_volume ? uri.without("level") : uri, as_gltf, as_gltf);
+  PointFile file = as_gltf     ? read_gltf(path, false)
+                   : as_volume ? read_nrrd(path, uri.number_option("level", 0.0, -1e9, 1e9, "px"))
                    : ending == ".ply" ? read_ply(path)
                    : ending == ".stl" ? read_stl(path)
                                       : read_obj(path);
   for (Vec3& point : file.points) point = options.scale * (options.turn * point);
   auto body = std::make_shared<const MeshBody>(file.points, file.triangles, path.string());
   return open_body(uri, options, std::move(body),
-                   "a mesh of " + std::to_string(file.triangles.size()) + " triangles");
+                   std::string(as_volume ? "the surface of a volume, " : "a mesh of ") +
+                       std::to_string(file.triangles.size()) + " triangles");
 }
 
 }  // namespace palpate

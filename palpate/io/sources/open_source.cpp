@@ -63,7 +63,9 @@ const Registry<SourceScheme>& standard_sources() {
       {{"synthetic", "synthetic:SCENE, a simulated depth camera", open_synthetic},
        {"pcd", "pcd:FILE|DIR, point clouds of the Point Cloud Library", open_point_files},
        {"ply", "ply:FILE|DIR, point clouds and meshes", open_point_files},
-       {"map", "map:FILE, a mesh as PLY, STL, OBJ or glTF, looked at where the hand is", open_map},
+       {"map",
+        "map:FILE, a mesh (PLY, STL, OBJ, glTF) or volume (NRRD), looked at where the hand is",
+        open_map},
        {"splat", "splat:FILE, Gaussians as PLY, SPZ or glTF, looked at where the hand is",
         open_splat},
        {"tum", "tum:DIR, a recording of the TUM RGB-D layout", open_tum},
@@ -78,14 +80,15 @@ std::string uri_of_file(const std::filesystem::path& file) {
   for (auto [known, scheme] :
        {std::pair(".pcd", "pcd:"), std::pair(".ply", "ply:"), std::pair(".stl", "map:"),
         std::pair(".obj", "map:"), std::pair(".spz", "splat:"), std::pair(".glb", "map:"),
-        std::pair(".gltf", "map:"), std::pair(".db3", "recording:"),
-        std::pair(".mcap", "recording:"), std::pair(".bag", "recording:")}) {
+        std::pair(".gltf", "map:"), std::pair(".nrrd", "map:"), std::pair(".nhdr", "map:"),
+        std::pair(".db3", "recording:"), std::pair(".mcap", "recording:"),
+        std::pair(".bag", "recording:")}) {
     if (ending != known) continue;
     if ((ending == ".ply" || is_gltf(file)) && holds_splat(file)) scheme = "splat:";
     const std::string path = file.string();
     return scheme + path + (path.find('?') == std::string::npos ? "" : "?");
   }
-  std::string remedy = "give a .pcd, .ply, .stl, .obj, .glb, .spz, .db3, .mcap or .bag file";
+  std::string remedy = "give a .pcd, .ply, .stl, .obj, .glb, .nrrd, .spz, .db3, .mcap or .bag file";
   if (ending == ".png" || ending == ".txt")
     remedy = "start the program with --camera depth:FOLDER or tum:FOLDER, of all its images";
   if (ending == ".mkv")

@@ -121,4 +121,18 @@ PointFile read_gltf(const std::filesystem::path& path, bool as_splat);
 PointFile parse_gltf(std::span<const std::byte> bytes, std::string_view name,
                      const std::filesystem::path& folder, bool as_splat);
 
+/// Is a file, by its name, an NRRD?
+bool is_nrrd(const std::filesystem::path& path);
+/// Reads an NRRD's volume, raw or gzip, behind its header or in a file beside or below, and makes
+/// triangles of where its values pass `level`, by surface nets. An edge between two voxels is
+/// crossed if one of them is below the level, the other is not, and both were seen. Unseen are
+/// values that are not finite and, at level 0, those of the largest size, where a TSDF ends.
+///
+/// Allocates in proportion to the size of the file, whatever its header declares.
+/// @throws Error naming the file and what was wrong, also if there is no such place.
+PointFile read_nrrd(const std::filesystem::path& path, double level = 0.0);
+/// The same for bytes in memory; `name` is what an error calls them. @param folder  of the data
+PointFile parse_nrrd(std::span<const std::byte> bytes, std::string_view name,
+                     const std::filesystem::path& folder, double level = 0.0);
+
 }  // namespace palpate

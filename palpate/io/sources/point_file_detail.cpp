@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "palpate/io/sources/files.hpp"
 #include "palpate/kernel/core/error.hpp"
 
 namespace palpate::detail {
@@ -98,6 +99,15 @@ void read_lists(Cursor& file, std::span<const Column> columns, std::size_t row, 
 
 }  // namespace
 
+std::vector<std::byte> read_beside(const std::filesystem::path& folder, const std::string& named,
+                                   const std::string& of) {
+  if (std::filesystem::path(named).is_absolute() || named.find("..") != std::string::npos ||
+      named.find(':') != std::string::npos)
+    throw Error(of, "its data " + detail::quoted(named) + " are not in a file beside it",
+                "put them beside it, or write all as one file");
+  return read_file(folder / named, largest_file);
+}
+
 std::string_view next_token(std::string_view& rest) noexcept {
   const auto is_blank = [](char c) { return blanks.find(c) != std::string_view::npos; };
   const char* const begin = std::find_if_not(rest.data(), rest.data() + rest.size(), is_blank);
@@ -115,6 +125,19 @@ std::optional<double> to_number(std::string_view token) noexcept {
   const char* const end = token.data() + token.size();
   const auto [stop, error] = std::from_chars(token.data(), end, value);
   return error == std::errc{} && stop == end ? std::optional(value) : std::nullopt;
+}
+
+std::vector<double> to_numbers(std::string list, std::size_t count) {
+  for (char& c : list)
+    if (c == ',' || c == '(' || c == ')') c = ' ';
+  std::string_view rest = list;
+  std::vector<double> numbers;
+  for (auto token = next_token(rest); !token.empty(); token = next_token(rest)) {
+    const auto number = to_number(token);
+    if (!number || !std::isfinite(*number)) return {};
+    numbers.push_back(*number);
+  }
+  return numbers.size() == count ? numbers : std::vector<double>{};
 }
 
 std::optional<std::uint64_t> to_count(std::string_view token) noexcept {

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <span>
@@ -67,6 +68,9 @@ inline constexpr std::array scalars{Scalar::of<std::int8_t>("int8", "I1", "char"
 
 /// The whole token as a number, "nan" and "inf" included; none if it is no number in range.
 [[nodiscard]] std::optional<double> to_number(std::string_view token) noexcept;
+/// The numbers of a list, in which commas and brackets separate, too. Empty unless there are
+/// `count`, all of them finite.
+[[nodiscard]] std::vector<double> to_numbers(std::string list, std::size_t count);
 [[nodiscard]] std::optional<std::uint64_t> to_count(std::string_view token) noexcept;
 
 /// A piece of a file as a message can show it: in quotes, printable and short.
@@ -84,6 +88,16 @@ inline constexpr std::array scalars{Scalar::of<std::int8_t>("int8", "I1", "char"
 
 /// PCD and PLY files larger than this are not read.
 inline constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 32;
+/// [bytes] that so many can hold at most by deflate.
+constexpr std::size_t most_inflated(std::size_t size) noexcept {
+  constexpr std::size_t times = 1032;
+  return size > SIZE_MAX / times ? SIZE_MAX : times * size;
+}
+
+/// The bytes of a file that another one, `of`, says lies beside or below it.
+/// @throws Error if it names a place elsewhere, or as read_file
+std::vector<std::byte> read_beside(const std::filesystem::path& folder, const std::string& named,
+                                   const std::string& of);
 
 /// A parser's position in a file, and its errors.
 class Cursor {

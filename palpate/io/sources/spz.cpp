@@ -15,7 +15,6 @@ namespace {
 constexpr std::uintmax_t largest_spz = std::uintmax_t{1} << 31;
 constexpr std::uint32_t magic = 0x5053474e;  // "NGSP"
 constexpr std::size_t header_size = 16;      // [bytes] that all versions have
-constexpr std::size_t most_inflated = 1032;  // [-] times its size, what deflate can hold at most
 
 // Takes a file's arrays one after the other. To version 3 they are one gzip; in version 4, after a
 // header and a table of their sizes, each is packed by zstd.
@@ -26,7 +25,7 @@ class Unpacker {
         bytes_(bytes),
         is_gzip_(bytes.size() < 4 || detail::load<std::uint32_t>(bytes.data(), little) != magic) {
     if (!is_gzip_) return;
-    unpacked_ = decompress_gzip(bytes, most_inflated * bytes.size(), name_);
+    unpacked_ = decompress_gzip(bytes, detail::most_inflated(bytes.size()), name_);
     bytes_ = unpacked_;
   }
   Unpacker(const Unpacker&) = delete;
@@ -118,7 +117,8 @@ PointFile parse_spz(std::span<const std::byte> bytes, std::string_view name) {
               "write it as version 1 to 4");
   const std::size_t place_size = version == 1 ? 2 : 3;
   const std::size_t turn_size = version < 3 ? 3 : 4;
-  if (count > most_inflated * bytes.size() / (3 * place_size + 7 + turn_size) || fraction > 24)
+  if (count > detail::most_inflated(bytes.size()) / (3 * place_size + 7 + turn_size) ||
+      fraction > 24)
     file.fail("its header promises " + std::to_string(count) + " Gaussians, with " +
                   std::to_string(fraction) + " bits of fraction, more than it can hold",
               detail::cut_short);

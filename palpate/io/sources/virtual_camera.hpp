@@ -120,7 +120,8 @@ BodyOptions body_options(const Uri& uri, bool y_up = false, bool in_metres = fal
 std::unique_ptr<Source> open_body(const Uri& uri, const BodyOptions& options,
                                   std::shared_ptr<const Body> body, const std::string& what);
 
-/// `map:FILE?scale=1m&up=z&fps=60Hz`: a mesh as PLY, STL, OBJ or glTF.
+/// `map:FILE?scale=1m&up=z&fps=60Hz`: a mesh as PLY, STL, OBJ or glTF, or with `level=0`
+/// where a volume as NRRD has that value.
 /// @throws Error if the file cannot be read or has no triangles, or an option is not known.
 std::unique_ptr<Source> open_map(const Uri& uri);
 /// `splat:FILE`, with the same options: Gaussians as PLY, SPZ or glTF. @throws Error if it is no

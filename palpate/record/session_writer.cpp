@@ -135,11 +135,17 @@ void SessionWriter::depth(std::size_t camera, double stamp, const DepthImage& im
   ros::Float64MultiArray exact{.label = "stamp,units_per_metre,world_from_camera",
                                .data = {stamp, image.units_per_metre()}};
   for (int i = 0; i < 12; ++i) exact.data.push_back(image.world_from_camera()(i / 4, i % 4));
-  if (!packed_image.materials.empty()) {
-    materials(camera, stamp, image, packed_image);
+  const bool has_materials = !packed_image.materials.empty();
+  if (has_materials) materials(camera, stamp, image, packed_image);
+  if (has_materials || image.scale_unsure()) {
+    const Camera& written = cameras_[camera];
     exact.label += ",material_image,material_table";
-    exact.data.push_back(static_cast<double>(cameras_[camera].material_images));
-    exact.data.push_back(image.materials() ? static_cast<double>(cameras_[camera].tables) : 0.0);
+    exact.data.push_back(has_materials ? static_cast<double>(written.material_images) : 0.0);
+    exact.data.push_back(image.materials() ? static_cast<double>(written.tables) : 0.0);
+  }
+  if (image.scale_unsure()) {
+    exact.label += ",scale_unsure";
+    exact.data.push_back(1.0);
   }
 
   const ros::Header world{header.stamp, std::string(world_frame)};

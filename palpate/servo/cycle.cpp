@@ -336,7 +336,8 @@ void Cycle::run(const Wake& wake) noexcept {
        .transient = tick.transient,
        .vibration = tick.vibration,
        .region = fixtures.region,
-       .guidance = fixtures.guidance});
+       .guidance = fixtures.guidance,
+       .scale_unsure = seen_.scale_unsure()});
   if ((safe.flags & no_support) != 0) {
     support_.release();
     support = 0.0;

@@ -34,12 +34,17 @@ constexpr double forgotten = 0.99;
 // the other is noise: an encoder's count is 0.055 mm, and 0.05 N are hardly felt.
 constexpr double least_lever = 1e-3;
 constexpr double least_directed_force = 0.05;
+// [N] limit while the scale of depths is in doubt. A surface may then be centimetres from where it
+// seems: this is felt, and moves no hand that is not held loosely.
+constexpr double unsure_force = 0.5;
+// [s] in which the limit comes down to it: as long as a force fades with the age of frames.
+constexpr double unsure_time = 0.4;
 
 constexpr std::array<std::string_view, safety_flag_count> flag_names{
-    "input_refused",   "pull_removed",  "force_cut", "continuous_cut",    "slew_cut",
-    "oscillation_cut", "disengaged",    "ramping",   "frame_late",        "frame_fading",
-    "frame_lost",      "hand_too_fast", "stalled",   "direction_refused", "fault_latched",
-    "energy_cut",      "output_refused"};
+    "input_refused",   "pull_removed",   "force_cut",   "continuous_cut",    "slew_cut",
+    "oscillation_cut", "disengaged",     "ramping",     "frame_late",        "frame_fading",
+    "frame_lost",      "hand_too_fast",  "stalled",     "direction_refused", "fault_latched",
+    "energy_cut",      "output_refused", "scale_unsure"};
 
 constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the device or the method gave a number that is not finite, or time ran backwards",
@@ -59,7 +64,8 @@ constexpr std::array<std::string_view, safety_flag_count> flag_meanings{
     "no force: the method's surface normal contradicts the direction from the HIP to the proxy",
     "no force: repeated faults; an operator has to reset the safety chain",
     "the surface is softened because it kept up an oscillation",
-    "no force: the result of the safety chain violated its limits; please report it"};
+    "no force: the result of the safety chain violated its limits; please report it",
+    "the force is limited because the scale of a camera's depths is in doubt"};
 
 using P = SafetyParameters;
 template <double P::*member>
@@ -255,8 +261,11 @@ void SafetyChain::warm_up(double since_last) noexcept {
   heat_ += share_of(elapsed, parameters_.continuous_time) * change;
 }
 
+// Hazard: scale-unsure
 double SafetyChain::peak() const noexcept {
-  return std::max(std::min(parameters_.max_force, device_.max_force) - held_, 0.0);
+  const double most = std::max(std::min(parameters_.max_force, device_.max_force) - held_, 0.0);
+  return scale_trust_ < 1.0 ? std::min(most, unsure_force + scale_trust_ * (most - unsure_force))
+                            : most;
 }
 
 // The share of the budget that is used up takes the peak down to the continuous force.
@@ -463,7 +472,7 @@ Vec3 SafetyChain::with_transient(const SafetyInput& input, const Vec3& force,
                                  std::uint32_t& flags) noexcept {
   constexpr std::uint32_t amiss = input_refused | direction_refused | disengaged | frame_late |
                                   frame_lost | hand_too_fast | stalled | fault_latched |
-                                  output_refused;
+                                  output_refused | scale_unsure;
   if ((flags & amiss) != 0 || has_fixtures(input)) {
     transients_.end();
     return force;
@@ -494,6 +503,9 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
   fault_clock_ += since_last;
   held_ = std::isfinite(input.held) ? std::max(input.held, 0.0) : 0.0;
   warm_up(since_last);
+  scale_trust_ = has(scale_unsure) && input.scale_unsure
+                     ? std::max(scale_trust_ - dt / unsure_time, 0.0)
+                     : std::min(scale_trust_ + dt / parameters_.ramp_time, 1.0);
 
   if (sound && since_last > 0.0) {
     const Vec3 velocity = (input.position - last_position_) / since_last;
@@ -528,6 +540,8 @@ SafetyOutput SafetyChain::run(const SafetyInput& input) noexcept {
     restart_energy();
     if (latched_by_ != 0) flags |= fault_latched;
   }
+
+  if (scale_trust_ < 1.0) flags |= scale_unsure;
 
   const double rise = parameters_.rise_rate * dt;
   if (has(slew_cut)) {

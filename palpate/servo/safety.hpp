@@ -59,8 +59,11 @@ enum SafetyFlag : std::uint32_t {
   energy_cut = 1u << 15,
   /// What the chain computed broke its own bounds: no force. Never seen; please report it.
   output_refused = 1u << 16,
+  /// The scale of a camera's depths is in doubt, or was until ramp_time ago: the force limit is
+  /// lower, down to 0.5 N.
+  scale_unsure = 1u << 17,
 };
-constexpr std::size_t safety_flag_count = 17;
+constexpr std::size_t safety_flag_count = 18;
 /// A short name for each bit, in their order, e.g. "force_cut".
 std::span<const std::string_view> safety_flag_names();
 /// For each bit, in their order, a sentence for people: why the force is what it is.
@@ -134,6 +137,7 @@ struct SafetyInput {
   /// the lowest.
   Vec3 region = Vec3::Zero();
   Vec3 guidance = Vec3::Zero();  ///< [N] world: of guides and viscous regions
+  bool scale_unsure = false;     ///< the scale of a camera's depths is in doubt
 };
 
 /// What the device gets.
@@ -193,6 +197,7 @@ class SafetyChain {
     way("last_force", self.last_force_);
     way("last_vibration", self.last_vibration_);
     way("last_flags", self.last_flags_);
+    way("scale_trust", self.scale_trust_);
     way("heat", self.heat_);
     way("fault_clock", self.fault_clock_);
     for (auto& fault : self.last_faults_) {
@@ -282,6 +287,8 @@ class SafetyChain {
   std::uint32_t last_flags_ = 0;
   std::array<std::uint64_t, safety_flag_count> interventions_{};
 
+  // [-] 1: the scale is known; on its way to 0 while it is in doubt.
+  double scale_trust_ = 1.0;
   // [N^2] mean square of the force over continuous_time, or of the torque over `lever`: of each
   // tick the larger counts.
   double heat_ = 0.0;

@@ -848,6 +848,54 @@ TEST(SafetyChain, GivesNoForceBeforeTheFirstFrameOrForAnAgeThatIsNone) {
   }
 }
 
+// Hazard: scale-unsure
+TEST(SafetyChain, LimitsTheForceSmoothlyWhileTheScaleIsUnsure) {
+  Session session = engaged_without(0, never_hot);
+  session.run_for(0.1, 3.0);
+  session.input.scale_unsure = true;
+  double last = 3.0;
+  for (int i = 0; i < 400; ++i) {
+    const SafetyOutput output = session.run(3.0);
+    EXPECT_TRUE(output.flags & scale_unsure);
+    EXPECT_LE(output.force.z(), last);
+    EXPECT_GT(output.force.z(), last - 0.01) << "no step";
+    last = output.force.z();
+  }
+  EXPECT_NEAR(last, 0.5, 0.01);
+  for (int i = 0; i < 1000; ++i) EXPECT_LE(session.run(3.3 * i / 1000).force.norm(), 0.5 + 1e-12);
+  EXPECT_NEAR(session.run_for(0.1, 0.3).force.z(), 0.3, 1e-12) << "less than that is felt";
+  session.run_for(0.1, 3.0);
+  session.input.scale_unsure = false;
+  EXPECT_LT(session.run_for(0.75, 3.0).force.z(), 2.0);
+  EXPECT_TRUE(session.run(3.0).flags & scale_unsure);
+  EXPECT_NEAR(session.run_for(0.76, 3.0).force.z(), 3.0, 1e-9);
+  EXPECT_EQ(session.run(3.0).flags, 0U);
+  Session without = engaged_without(scale_unsure, never_hot);
+  without.input.scale_unsure = true;
+  EXPECT_NEAR(without.run_for(1.0, 3.0).force.z(), 3.0, 1e-9);
+}
+
+// Hazard: scale-unsure
+TEST(SafetyChain, LimitsTorqueFixturesAndRingingWhileTheScaleIsUnsure) {
+  Session session(all, with_wrist);
+  session.engage();
+  session.input.scale_unsure = true;
+  session.run_for(1.0, 0.0);
+  session.input.torque = Vec3(0.2, 0, 0);
+  const double lever = with_wrist.max_torque / with_wrist.max_force;  // [m]
+  EXPECT_LE(session.run_for(0.5, 0.0).torque.norm(), 0.5 * lever + 1e-12);
+  session.input.torque = Vec3::Zero();
+  session.input.transient = Vec3(0, 0, 1);
+  EXPECT_LE(session.run_for(0.05, 1.0).force.norm(), 0.5 + 1e-12);
+  session.input.transient = Vec3::Zero();
+  session.input.region = Vec3(2, 0, 0);
+  EXPECT_LE(session.run_for(0.5, 1.0).force.norm(), 0.5 + 1e-12);
+  // The weight of a handle has its own.
+  session.input.region = Vec3::Zero();
+  session.input.held = 1.0;
+  EXPECT_NEAR(session.run_for(0.5, 1.0).force.norm(), 0.5, 1e-12);
+}
+
 // Hazard: fast-hand
 TEST(SafetyChain, TakesTheForceOffAHandThatIsTooFast) {
   const auto moving_at = [](std::uint32_t links, double speed, double dt = ms) {

@@ -89,6 +89,37 @@ TEST(Session, AsksForTheCouplingsForceAndSendsWhatTheLimitAllows) {
   EXPECT_FALSE(run.state.running);
 }
 
+// The hand presses before the reference, a plane 50 m away, is ever seen.
+TEST(Session, LimitsTheForceOfDepthWhoseScaleIsInDoubtAndReplaysIt) {
+  const test::TemporaryFolder folder;
+  for (const bool is_seen : {true, false}) {
+    SCOPED_TRACE(is_seen);
+    const std::string bag = (folder.path() / (is_seen ? "seen" : "unseen")).string();
+    const auto options = [&](const std::string& camera) {
+      SessionOptions options;
+      options.cameras.push_back({.uri = camera});
+      options.open_devices[0] = std::make_unique<ScriptedDevice>(
+          HipPath({{0.0, {0, 0, 0.05}}, {1.0, {0, 0, 0.05}}, {1.1, {0, 0, -0.01}}}), false);
+      options.pace = Pace::free_running;
+      return options;
+    };
+    SessionOptions first = options("synthetic:plane?size=160x120&scale_reference=plane:0,0,1," +
+                                   std::string(is_seen ? "0" : "-50"));
+    first.record = bag;
+    const Outcome pressed = play(std::move(first), 3.0);
+    const bool is_flagged = (pressed.ticks.back().safety & scale_unsure) != 0;
+    EXPECT_EQ(is_flagged, !is_seen);
+    const double force = pressed.ticks.back().force.norm();
+    EXPECT_GT(force, is_seen ? 1.0 : 0.5 - 1e-9);
+    EXPECT_LT(force, is_seen ? 3.3 + 1e-9 : 0.5 + 1e-9);
+    SessionReader reader(bag);
+    const ReplayReport report = replay(reader);
+    EXPECT_TRUE(report.identical()) << text_of(report);
+    const Outcome again = play(options("recording:" + bag + "?pose=0,0,0.7,1,0,0,0"), 2.9);
+    EXPECT_EQ((again.ticks.back().safety & scale_unsure) != 0, !is_seen) << "as recorded";
+  }
+}
+
 TEST(Session, KeepsALowerLimitFromItsSettings) {
   SessionOptions options = on_the_wall();
   options.safety.max_force = 1.25;

@@ -120,6 +120,11 @@ const LESS: readonly [flag: string, say: Say][] = [
     (facts) => (falls(facts.tick) ? `Limited, as the motors are warm; ${asked(facts)}` : ""),
   ],
   [
+    "scale_unsure",
+    (facts) =>
+      falls(facts.tick) ? `Limited, as the scale of the depth is in doubt; ${asked(facts)}` : "",
+  ],
+  [
     "force_cut",
     (facts) => (falls(facts.tick) ? `Limited to what is allowed; ${asked(facts)}` : ""),
   ],

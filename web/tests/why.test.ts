@@ -152,7 +152,7 @@ describe("why the force is what it is", () => {
       ...["disengaged", "ramping"],
       ...["free_space_released", "proxy_let_go", "frame_fading", "surface_hidden", "frame_late"],
       ...["returned_to_front", "pop_through_suspected", "energy_cut", "oscillation_cut"],
-      ...["continuous_cut", "force_cut", "force_saturated", "pull_removed"],
+      ...["continuous_cut", "scale_unsure", "force_cut", "force_saturated", "pull_removed"],
       ...["slew_cut", "step_budget_hit", "frame_stale"],
     ];
     const each = function* () {

@@ -287,8 +287,10 @@ std::vector<double> BagCamera::exact(std::size_t number, std::size_t size) {
   const BagReader::Place& place = exact_places_[number];
   const std::string name = bag_.name(exact_topic_, place);
   auto numbers = ros::decode<ros::Float64MultiArray>(bag_.read(place), name).data;
-  const bool has_materials = numbers.size() == size + 2 && type_ != ros::PointCloud2::type;
-  if (numbers.size() != size && !has_materials)
+  // Materials, and behind them whether the scale was in doubt.
+  const bool has_more =
+      (numbers.size() == size + 2 || numbers.size() == size + 3) && type_ != ros::PointCloud2::type;
+  if (numbers.size() != size && !has_more)
     throw Error(
         name,
         "has " + std::to_string(numbers.size()) + " numbers instead of " + std::to_string(size),
@@ -343,7 +345,9 @@ Frame BagCamera::own_frame(std::size_t number, RosFrame seen) {
   }
   auto cloud =
       std::make_shared<DepthImage>(rays, std::move(seen.depth), numbers[1], world_from_camera);
-  if (numbers.size() > 14) cloud->set_materials(materials(number, numbers[14], numbers[15]));
+  if (numbers.size() > 14 && numbers[14] != 0.0)
+    cloud->set_materials(materials(number, numbers[14], numbers[15]));
+  if (numbers.size() > 16) cloud->rescale(1.0, numbers[16] != 0.0);
   return Frame{numbers[0], std::move(cloud)};
 }
 

@@ -128,8 +128,11 @@ std::unique_ptr<Source> open_source(std::string_view text, const Registry<Source
     pose = parse_pose(uri.text_option("pose", ""), uri.text() + ": option 'pose'");
   std::optional<Materials> materials;
   if (uri.has("material")) materials = materials_of(uri.text_option("material", ""));
-  auto source =
-      schemes.find(uri.scheme(), uri.text()).open(uri.without("pose").without("material"));
+  auto source = schemes.find(uri.scheme(), uri.text())
+                    .open(uri.without("pose").without("material").without("scale_reference"));
+  if (uri.has("scale_reference"))
+    source =
+        with_scale_reference(std::move(source), uri.text_option("scale_reference", ""), uri.text());
   if (pose) source = with_pose(std::move(source), *pose, uri.text());
   return materials ? with_materials(std::move(source), std::move(*materials)) : std::move(source);
 }
@@ -180,6 +183,7 @@ class PosedSource final : public Source {
           std::make_shared<DepthImage>(image->shared_rays(), image->depth(),
                                        image->units_per_metre(), pose_, image->brightness());
       moved->set_materials(image->materials());
+      moved->rescale(1.0, image->scale_unsure());
       return moved;
     }
     const PointCloud* points = cloud.point_cloud();

@@ -127,8 +127,10 @@ std::string source_uri(const std::string& text,
                        const Registry<SourceScheme>& schemes = standard_sources());
 
 /// Opens a source by its URI. Whatever the scheme, `pose=x,y,z,qx,qy,qz,qw` says where the camera
-/// stands, as parse_pose reads it: see with_pose(); and `material=NAME` or `material=FILE.toml`
-/// what its surfaces are made of: see with_materials().
+/// stands, as parse_pose reads it: see with_pose(); `scale_reference=plane:NX,NY,NZ,D` or
+/// `scale_reference=points:X,Y,Z;X,Y,Z;X,Y,Z` brings its depths to metres: see
+/// with_scale_reference(); and `material=NAME` or `material=FILE.toml` says what its surfaces are
+/// made of: see with_materials().
 /// @throws Error for an unknown scheme or option (naming the nearest known one), or input that
 ///         cannot be used.
 std::unique_ptr<Source> open_source(std::string_view uri,
@@ -143,5 +145,19 @@ std::unique_ptr<Source> open_source(std::string_view uri,
 /// @param uri  the source's, if it says this pose; empty: the source's own
 std::unique_ptr<Source> with_pose(std::unique_ptr<Source> source,
                                   const Eigen::Isometry3d& world_from_camera, std::string uri = {});
+
+/// A source of depth images without a scale of their own, as a network makes them, brought to
+/// metres by a plane or points whose place is known.
+///
+/// In each frame, readings within 5 % of the reference under the present scale are taken for it;
+/// the median of true over read depth, smoothed over 0.1 s, is the scale of the whole image. It is
+/// in doubt (Cloud::scale_unsure) until the reference was seen for 0.5 s, and when it was not for
+/// 0.2 s: too few pixels, or too wide a spread. A pose that it is given acts before the reference.
+/// @param reference  `plane:NX,NY,NZ,D`, all places p with n . p = D, or `points:X,Y,Z;X,Y,Z;X,Y,Z`
+///                   [m, world]
+/// @param uri        the source's, for messages
+/// @throws Error if the reference cannot be read; from next(), if frames are no depth images
+std::unique_ptr<Source> with_scale_reference(std::unique_ptr<Source> source,
+                                             const std::string& reference, std::string uri);
 
 }  // namespace palpate

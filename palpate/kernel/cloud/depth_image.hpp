@@ -153,6 +153,15 @@ class DepthImage final : public Cloud {
     materials_ = std::move(materials);
   }
 
+  [[nodiscard]] bool scale_unsure() const noexcept override { return scale_unsure_; }
+  /// Multiplies all depths, its readings staying as they are. Before the image is shared.
+  /// @param factor  > 0
+  void rescale(double factor, bool is_unsure) noexcept {
+    units_per_metre_ /= factor;
+    metres_per_unit_ = 1.0 / units_per_metre_;
+    scale_unsure_ = is_unsure;
+  }
+
   [[nodiscard]] const Intrinsics& intrinsics() const noexcept { return rays_->intrinsics(); }
   [[nodiscard]] const ViewingRays& rays() const noexcept { return *rays_; }
   /// For other images of the same camera.
@@ -181,6 +190,7 @@ class DepthImage final : public Cloud {
   DepthReadings depth_;
   double units_per_metre_;
   double metres_per_unit_;
+  bool scale_unsure_ = false;
   Eigen::Isometry3d world_from_camera_;
   std::vector<std::uint8_t> brightness_;
   std::shared_ptr<const MaterialMap> materials_;

@@ -89,6 +89,8 @@ class Cloud {
   [[nodiscard]] virtual bool has_materials() const noexcept { return false; }
   /// Does it know how bright they are?
   [[nodiscard]] virtual bool has_brightness() const noexcept { return false; }
+  /// Is the scale of its depths in doubt? Then the safety chain limits the force.
+  [[nodiscard]] virtual bool scale_unsure() const noexcept { return false; }
 
   /// Adds what is known of the surface about a place to `sample`, weighted by
   /// (1 - d^2 / radius^2)^2, d the distance along the surface: all of it that is within `radius`,

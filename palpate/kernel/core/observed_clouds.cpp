@@ -47,6 +47,11 @@ bool ObservedClouds::has_brightness() const noexcept {
                      [](const Cloud* part) { return part->has_brightness(); });
 }
 
+bool ObservedClouds::scale_unsure() const noexcept {
+  return std::any_of(parts().begin(), parts().end(),
+                     [](const Cloud* part) { return part->scale_unsure(); });
+}
+
 void ObservedClouds::sample(const Vec3& place, const Vec3& normal, double radius,
                             SurfaceSample& sample) const noexcept {
   for (const Cloud* part : parts()) part->sample(place, normal, radius, sample);

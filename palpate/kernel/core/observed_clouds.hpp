@@ -40,6 +40,7 @@ class ObservedClouds : public Cloud {
   [[nodiscard]] double spacing(const Vec3& place) const noexcept final;
   [[nodiscard]] bool has_materials() const noexcept final;
   [[nodiscard]] bool has_brightness() const noexcept final;
+  [[nodiscard]] bool scale_unsure() const noexcept final;
   /// All clouds that know something there. The brightness is that of the first.
   void sample(const Vec3& place, const Vec3& normal, double radius,
               SurfaceSample& sample) const noexcept final;

@@ -28,14 +28,10 @@ const STEEPEST = (88 * Math.PI) / 180;
 /** An eye on a sphere about what it looks at. */
 export interface Orbit {
   readonly target: Vec3;
-  /** [m] */
-  readonly distance: number;
-  /** [rad] about `up` */
-  readonly yaw: number;
-  /** [rad] above the plane across `up` */
-  readonly pitch: number;
-  /** [-] unit vector, world */
-  readonly up: Vec3;
+  readonly distance: number; // [m]
+  readonly yaw: number; // [rad] about `up`
+  readonly pitch: number; // [rad] above the plane across `up`
+  readonly up: Vec3; // [-] unit vector, world
 }
 
 /** Two unit vectors that make a right-handed frame with `up`. */

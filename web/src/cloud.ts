@@ -217,11 +217,9 @@ export class CameraCloud {
   readonly object: THREE.Points;
   /** of a mesh that is not too large; else not visible */
   readonly faces: THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>;
-  /** [m] of the nearer and the farther points, for colours */
-  range: [number, number] = [0.5, 1.5];
+  range: [number, number] = [0.5, 1.5]; // [m] of the nearer and the farther points, for colours
   frame: Frame | null = null;
-  /** what the frame measured, as geometry */
-  seen: SeenSurface | null = null;
+  seen: SeenSurface | null = null; // what the frame measured, as geometry
   private lens: Rays | null = null;
   private texture: THREE.DataTexture | null = null;
   private rays: THREE.DataTexture | null = null;

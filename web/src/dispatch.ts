@@ -2,12 +2,7 @@
 // What a session says, whatever way it comes: docs/protocol.md.
 import type { Orbit } from "./camera_math";
 import {
-  decode,
-  type Hello,
-  type Message,
-  type OtherHand,
-  type RobotState,
-  type State,
+  decode, type Hello, type Message, type OtherHand, type RobotState, type State,
 } from "./protocol";
 
 export interface Presence {

@@ -3,18 +3,7 @@
 // see that plane as one, and so far that what was measured fills the free part of the window.
 
 import {
-  add,
-  axes,
-  clamp,
-  dot,
-  length,
-  lookAt,
-  metresPerPixel,
-  scale,
-  sub,
-  turned,
-  unit,
-  upFromPose,
+  add, axes, clamp, dot, length, lookAt, metresPerPixel, scale, sub, turned, unit, upFromPose,
   type Orbit,
 } from "./camera_math";
 import type { Vec3 } from "./protocol";

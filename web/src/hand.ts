@@ -3,17 +3,7 @@
 
 import { Quaternion, Vector3 } from "three";
 import {
-  add,
-  axes,
-  depthOf,
-  dragged,
-  length,
-  metresPerPixel,
-  scale,
-  turned,
-  unit,
-  within,
-  zoomed,
+  add, axes, depthOf, dragged, length, metresPerPixel, scale, turned, unit, within, zoomed,
 } from "./camera_math";
 import type { Stick } from "./gamepad";
 import { Pointers, type Place } from "./pointers";

@@ -14,13 +14,7 @@ import { cameraText, latchedText, mayOperate, Panel, roleNames } from "./panel";
 import { Plots } from "./plots";
 import { radiusRemark, scaleQuestion } from "./proposal";
 import {
-  encodeHand,
-  encodeShown,
-  type Command,
-  type Frame,
-  type Hello,
-  type State,
-  type Ticks,
+  encodeHand, encodeShown, type Command, type Frame, type Hello, type State, type Ticks,
 } from "./protocol";
 import { robotLines, robotText } from "./robot";
 import { Ruler } from "./ruler";

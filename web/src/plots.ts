@@ -16,12 +16,9 @@ interface Quantity {
   colour: string; // a CSS variable
   of(sample: Sample): number;
   digits: number;
-  /** what the axis shows at least */
-  least: number;
-  /** it may be below 0 */
-  signed?: true;
-  /** the number beside the scene says it, of a newer tick */
-  isSaid?: true;
+  least: number; // what the axis shows at least
+  signed?: true; // it may be below 0
+  isSaid?: true; // the number beside the scene says it, of a newer tick
 }
 
 const QUANTITIES: readonly Quantity[] = [

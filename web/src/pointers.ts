@@ -6,19 +6,16 @@
 export type Gesture = "press" | "turn" | "shift" | "spin";
 
 export interface Place {
-  /** [px] */
-  x: number;
+  x: number; // [px]
   y: number;
 }
 
 /** How a pointer moved. */
 export interface Motion {
   gesture: Gesture;
-  /** [px], of two fingers half */
-  x: number;
+  x: number; // [px], of two fingers half
   y: number;
-  /** of two fingers: their distance before / after */
-  zoom: number;
+  zoom: number; // of two fingers: their distance before / after
 }
 
 const CLOSE = 10; // [px] two fingers this close do not pinch

@@ -36,12 +36,10 @@ const LONGEST_STEP = 0.05; // [s] a page that was busy makes no larger step
 /** What the newest tick says. */
 export interface Felt {
   touching: boolean;
-  /** the safety chain lets forces through, or begins to */
-  engaged: boolean;
+  engaged: boolean; // the safety chain lets forces through, or begins to
   hip: Vec3;
   proxy: Vec3;
-  /** zero: none */
-  normal: Vec3;
+  normal: Vec3; // zero: none
 }
 
 /**

@@ -34,20 +34,16 @@ export interface Frame {
   kind: "frame";
   camera: number;
   number: number;
-  /** [s] */
-  stamp: number;
+  stamp: number; // [s]
   width: number;
   height: number;
   /** [px] fx, fy, cx, cy; pixel centres at whole numbers */
   intrinsics: readonly [number, number, number, number];
   metresPerUnit: number;
-  /** 3 x 4, row by row */
-  worldFromCamera: Float32Array;
-  /** the pixels' rays come in a message of their own */
-  hasRays: boolean;
+  worldFromCamera: Float32Array; // 3 x 4, row by row
+  hasRays: boolean; // the pixels' rays come in a message of their own
   depth: Uint16Array | null;
-  /** x y z [m, camera], `width` times */
-  points: Float32Array | null;
+  points: Float32Array | null; // x y z [m, camera], `width` times
   /** three of the points each; null: they are not the corners of a mesh */
   triangles: Uint32Array | null;
   colour: Colour | null;
@@ -57,55 +53,38 @@ export interface Frame {
 export interface Ticks {
   kind: "ticks";
   state: number;
-  /** TickFlag and SafetyFlag bits that occurred since the message before */
-  flags: number;
+  flags: number; // TickFlag and SafetyFlag bits that occurred since the message before
   safety: number;
-  /** [s] of the newest tick */
-  t: number;
+  t: number; // [s] of the newest tick
   steps: number;
   frame: number;
   hip: Vec3;
   proxy: Vec3;
   normal: Vec3;
   force: Vec3;
-  /** [m/s] */
-  surfaceVelocity: number;
-  /** [-] of the safety chain: 0 disengaged, 1 nothing faded */
-  gain: number;
-  /** [N] length of all that is asked for: by the surface and by fixtures */
-  askedForce: number;
-  /** [m] where the surface and forbidden regions keep the hand */
-  place: Vec3;
-  /** [N] length of what forbidden regions ask for */
-  region: number;
-  /** [N] likewise, guides and viscous regions */
-  guidance: number;
-  /** bit i: fixture i of the state gives a force */
-  fixtures: number;
-  /** world_from_handle */
-  orientation: Quat;
-  /** of the tool that surfaces keep outside; of a ball that of the handle */
-  proxyOrientation: Quat;
-  /** [N m] world: as sent, or, where the device has no motors for it, as it would be */
-  torque: Vec3;
+  surfaceVelocity: number; // [m/s]
+  gain: number; // [-] of the safety chain: 0 disengaged, 1 nothing faded
+  askedForce: number; // [N] length of all that is asked for: by the surface and by fixtures
+  place: Vec3; // [m] where the surface and forbidden regions keep the hand
+  region: number; // [N] length of what forbidden regions ask for
+  guidance: number; // [N] likewise, guides and viscous regions
+  fixtures: number; // bit i: fixture i of the state gives a force
+  orientation: Quat; // world_from_handle
+  proxyOrientation: Quat; // of the tool that surfaces keep outside; of a ball that of the handle
+  torque: Vec3; // [N m] world: as sent, or, where the device has no motors for it, as it would be
   samples: Sample[];
 }
 
 /** A few ticks in one: the extremes of what matters. */
 export interface Sample {
-  /** [s] */
-  t: number;
-  /** [N] */
-  force: number;
-  /** [m] depth of the HIP below the surface; 0 above it */
-  penetration: number;
+  t: number; // [s]
+  force: number; // [N]
+  penetration: number; // [m] depth of the HIP below the surface; 0 above it
   steps: number;
-  /** [s] of the servo thread's own time for a tick */
-  tickTime: number;
+  tickTime: number; // [s] of the servo thread's own time for a tick
   /** [J] given to the hand in this contact, relative to the surface; below 0: taken from it */
   relative: number;
-  /** [J] the same with the surface's own motion */
-  absolute: number;
+  absolute: number; // [J] the same with the surface's own motion
 }
 
 /** Where a distorted lens's pixels look: (x, y) of the ray (x, y, 1), NaN for none. */
@@ -127,10 +106,8 @@ export interface HandPath {
 /** The surface of the tool in the hand, in its own frame; without triangles: a ball. */
 export interface Tool {
   kind: "tool";
-  /** x y z [m] */
-  points: Float32Array;
-  /** three of the points each */
-  triangles: Uint32Array;
+  points: Float32Array; // x y z [m]
+  triangles: Uint32Array; // three of the points each
 }
 
 export type Message = Frame | Ticks | Rays | HandPath | Tool;
@@ -347,20 +324,15 @@ export interface Hello {
   /** the token in the page's address is none that the program knows, and none is needed */
   token?: "unknown";
   methods: { name: string; meaning: string }[];
-  /** that can be chosen, as `--tool` reads them */
-  tools: string[];
+  tools: string[]; // that can be chosen, as `--tool` reads them
   /** what can be chosen to be touched; none: nothing can */
   scenes: { uri: string; meaning: string; group: string }[];
-  /** [bytes] of the files that the operator's page may send; 0: it may send none */
-  file_limit: number;
-  /** is what is felt a splat, whose Gaussians can be asked for? */
-  splat: boolean;
-  /** to be shown on joining, such as why a scene could not be opened; empty: nothing */
-  notice: string;
+  file_limit: number; // [bytes] of the files that the operator's page may send; 0: it may send none
+  splat: boolean; // is what is touched a splat, whose Gaussians can be asked for?
+  notice: string; // to be shown on joining, such as why a scene could not be opened; empty: nothing
   parameters: ParameterRow[];
   safety: ParameterRow[];
-  /** where the device's workspace lies in the scene */
-  placement: ParameterRow[];
+  placement: ParameterRow[]; // where the device's workspace lies in the scene
   /** names of the bits, in their order */
   flags: { name: string; meaning: string }[];
   safety_flags: { name: string; meaning: string }[];
@@ -370,28 +342,20 @@ export interface CameraState {
   uri: string;
   kind: string;
   sensor: string; // "unknown", "stereo", "structured light", "time of flight"
-  /** [Hz] as captured, lately */
-  rate: number;
-  /** live, ended, or what went wrong */
-  state: string;
+  rate: number; // [Hz] as captured, lately
+  state: string; // live, ended, or what went wrong
   /** what is shown is declared valid until it is replaced: no live camera that stopped */
   stays_valid: boolean;
-  /** frames that were not handed over, so as to keep up */
-  dropped: number;
-  /** of a recording; 0: it has no end, or is none */
-  frames: number;
-  /** number of the frame shown last */
-  place: number;
-  /** [s] of that frame, from the first one */
-  time: number;
+  dropped: number; // frames that were not handed over, so as to keep up
+  frames: number; // of a recording; 0: it has no end, or is none
+  place: number; // number of the frame shown last
+  time: number; // [s] of that frame, from the first one
 }
 
 /** What went through the device, relative to the surface or with the surface's own motion. */
 export interface PortEnergy {
-  /** [J] */
-  made: number;
-  /** contacts that made more than 0.1 mJ */
-  generating: number;
+  made: number; // [J]
+  generating: number; // contacts that made more than 0.1 mJ
 }
 
 /** How recordings are played. */
@@ -406,35 +370,24 @@ export interface RobotState {
   name: string;
   /** [m] world: the middle of the ball at its tip; null: it has not been heard yet */
   tool: Vec3 | null;
-  /** [m] world: the arm from base to tip; may be empty */
-  links: Vec3[];
-  /** [N] of what it touches, on the tool */
-  force: Vec3;
-  /** [m] */
-  radius: number;
-  /** [s] since it said so */
-  age: number;
-  /** [s] of what is felt, capture to arrival; 0: not known */
-  latency: number;
+  links: Vec3[]; // [m] world: the arm from base to tip; may be empty
+  force: Vec3; // [N] of what it touches, on the tool
+  radius: number; // [m]
+  age: number; // [s] since it said so
+  latency: number; // [s] of what is felt, capture to arrival; 0: not known
   led: boolean;
-  /** why it does not move; empty: nothing is wrong */
-  trouble: string;
+  trouble: string; // why it does not move; empty: nothing is wrong
 }
 
 /** A hand beside the first; 30 times a second. */
 export interface OtherHand {
   name: string;
-  /** [m] world */
-  hip: Vec3;
-  /** [m] world */
-  proxy: Vec3;
-  /** [N] world: as sent */
-  force: Vec3;
+  hip: Vec3; // [m] world
+  proxy: Vec3; // [m] world
+  force: Vec3; // [N] world: as sent
   touches: boolean;
-  /** somebody holds its device */
-  present: boolean;
-  /** why its device gives no force; empty: it does */
-  trouble: string;
+  present: boolean; // somebody holds its device
+  trouble: string; // why its device gives no force; empty: it does
 }
 
 /** A virtual fixture, as far as it is drawn. */
@@ -452,10 +405,8 @@ export interface FixtureState {
     | "path"
     | "plane"
     | "point";
-  /** world_from_fixture, 3 x 4, row by row */
-  pose: number[];
-  /** [m], of a mesh that of its box */
-  size: Vec3;
+  pose: number[]; // world_from_fixture, 3 x 4, row by row
+  size: Vec3; // [m], of a mesh that of its box
   radius: number;
   length: number;
   points: Vec3[];
@@ -465,15 +416,12 @@ export interface FixtureState {
 export interface State {
   role: Role;
   method: string;
-  /** `ball`, or one with a shape */
-  tool: string;
-  /** values of the rows, by name */
-  parameters: Record<string, number>;
+  tool: string; // `ball`, or one with a shape
+  parameters: Record<string, number>; // values of the rows, by name
   safety: Record<string, number>;
   placement: Record<string, number>;
   cameras: CameraState[];
-  /** null: nothing is a recording */
-  playback: Playback | null;
+  playback: Playback | null; // null: nothing is a recording
   /**
    * the first camera's points without an image: how long all is and how far apart they are [m],
    * by what their lengths are best multiplied, and the scene that is so long (empty: nobody is
@@ -483,25 +431,20 @@ export interface State {
   /** `warnings`: what speaks against the present stiffness on it */
   device: { uri: string; kind: string; takes_hand: boolean; fault: string; warnings: string[] };
   servo: {
-    /** [Hz] */
-    rate: number;
+    rate: number; // [Hz]
     realtime: string;
     ticks: number;
     late_ticks: number;
-    /** [s] */
-    compute_p99: number;
+    compute_p99: number; // [s]
     wake_up_p99: number;
     frames_adopted: number;
     frames_dropped: number;
   };
-  /** how often each safety flag was raised */
-  interventions: number[];
+  interventions: number[]; // how often each safety flag was raised
   /** names of the faults that latched: no force until the operator resets them; empty: none did */
   latched_by: string[];
-  /** the operator keeps the force off */
-  on_hold: boolean;
-  /** how many ticks had each flag */
-  flag_ticks: number[];
+  on_hold: boolean; // the operator keeps the force off
+  flag_ticks: number[]; // how many ticks had each flag
   pop_throughs: number;
   /** that the forces sent have given to the hand, in all contacts */
   energy: { contacts: number; relative: PortEnergy; absolute: PortEnergy };
@@ -511,23 +454,18 @@ export interface State {
     /** what is touched is painted with; "" wipes; null: nothing is painted */
     brush: { material: string; radius: number } | null;
     dabs: { place: Vec3; normal: Vec3; radius: number; material: string }[];
-    /** that can be painted with */
-    materials: string[];
-    /** why the brush does not paint; empty: it does */
-    trouble: string;
+    materials: string[]; // that can be painted with
+    trouble: string; // why the brush does not paint; empty: it does
   };
   recording: {
     path: string | null;
     message: string;
-    /** why the last was ended by its limits; empty: it was not */
-    ended: string;
-    /** [s] and [bytes] of the one that is on, or else of the last */
-    seconds: number;
+    ended: string; // why the last was ended by its limits; empty: it was not
+    seconds: number; // [s] and [bytes] of the one that is on, or else of the last
     bytes: number;
     /** [bytes] until the limit or the disk's free space ends it; null: not known */
     room: number | null;
-    /** the last one as a scene; null: there is none that is whole */
-    open: string | null;
+    open: string | null; // the last one as a scene; null: there is none that is whole
   };
 }
 

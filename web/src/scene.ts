@@ -6,21 +6,8 @@
 import * as THREE from "three";
 import { CameraCloud } from "./cloud";
 import {
-  add,
-  axes,
-  clamp,
-  depthOf,
-  dot,
-  eye,
-  FIELD_OF_VIEW,
-  length,
-  lookAt,
-  metresPerPixel,
-  rayThrough,
-  scale,
-  sub,
-  unit,
-  type Orbit,
+  add, axes, clamp, depthOf, dot, eye, FIELD_OF_VIEW, length, lookAt, metresPerPixel, rayThrough,
+  scale, sub, unit, type Orbit,
 } from "./camera_math";
 import { firstView, offCentre, type Room } from "./first_view";
 import { cameraLines, floorUnder, gridLines, AXES_LENGTH } from "./marks";

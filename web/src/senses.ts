@@ -12,10 +12,8 @@ const QUICK = 0.02; // [s] in which a sound follows
 
 /** How a contact feels, each from 0 to 1. */
 export interface Sensation {
-  /** how hard it pushes */
-  readonly push: number;
-  /** how fast the proxy slides while it is pushed */
-  readonly slide: number;
+  readonly push: number; // how hard it pushes
+  readonly slide: number; // how fast the proxy slides while it is pushed
 }
 
 export const NOTHING: Sensation = { push: 0, slide: 0 };

@@ -8,10 +8,8 @@ import type { Frame, Rays, Vec3 } from "./protocol";
 
 /** A place on a surface. */
 export interface Spot {
-  /** [m, world] */
-  readonly at: Vec3;
-  /** [-] unit, away from the surface */
-  readonly normal: Vec3;
+  readonly at: Vec3; // [m, world]
+  readonly normal: Vec3; // [-] unit, away from the surface
 }
 
 const STEPS = 1500; // of a ray through a depth image
@@ -68,8 +66,7 @@ export function onPlane(from: Vec3, along: Vec3, spot: Spot): Vec3 | null {
 
 /** One frame of a camera. All places are in the world [m]. */
 export class SeenSurface {
-  /** where the camera is */
-  readonly eye: Vec3;
+  readonly eye: Vec3; // where the camera is
   private readonly pose: ArrayLike<number>;
   private farthestDepth: number | null = null;
 

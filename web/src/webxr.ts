@@ -36,8 +36,7 @@ export interface DepthFrame {
   width: number;
   height: number;
   depth: Uint16Array;
-  /** [px] focal lengths and principal point */
-  camera: Float64Array;
+  camera: Float64Array; // [px] focal lengths and principal point
   /** [m] world from optical axes, 4 x 4, column by column; the world's z points up */
   pose: Float64Array;
 }

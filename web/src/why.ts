@@ -6,16 +6,12 @@ import type { State, Ticks } from "./protocol";
 
 /** What is said of the force. No part contradicts another, nor the newtons beside it. */
 export interface Why {
-  /** what the hand does: free, kept off, guided, contact, entrenched */
-  word: string;
-  /** how far it is from the surface; empty: that is not known */
-  detail: string;
+  word: string; // what the hand does: free, kept off, guided, contact, entrenched
+  detail: string; // how far it is from the surface; empty: that is not known
   /** one sentence, which begins with "No force" where a connected program sends none, only there */
   text: string;
-  /** the flag that decides; empty: none does */
-  link: string;
-  /** place in the order: the lower, the more it decides */
-  rank: number;
+  link: string; // the flag that decides; empty: none does
+  rank: number; // place in the order: the lower, the more it decides
 }
 
 type Unsaid = "kind" | "samples" | "t" | "steps" | "orientation" | "proxyOrientation" | "torque";
@@ -24,16 +20,13 @@ type Unsaid = "kind" | "samples" | "t" | "steps" | "orientation" | "proxyOrienta
 export interface Facts {
   connected: boolean;
   tick: Omit<Ticks, Unsaid> | null;
-  /** names of the flags that are set */
-  flags: ReadonlySet<string>;
+  flags: ReadonlySet<string>; // names of the flags that are set
   hand: "you" | "other" | "free";
   state: Pick<State, "device" | "parameters" | "tool"> | null;
-  /** names of the fixtures that give a force */
-  acting: readonly string[];
+  acting: readonly string[]; // names of the fixtures that give a force
   /** [m] of the proxy above what is seen, below 0 behind it; null: nothing is seen there */
   clearance: number | null;
-  /** [m] between what is measured about the hand; null: not known */
-  spacing: number | null;
+  spacing: number | null; // [m] between what is measured about the hand; null: not known
 }
 
 /** Names of the bits that are set, in one of the program's tables. */

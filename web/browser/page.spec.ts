@@ -13,6 +13,7 @@ import {
   drawn,
   glimpse,
   launch,
+  placeOf,
   placeWhere,
   Program,
   spotUnder,
@@ -73,8 +74,11 @@ test("a tool with a shape is chosen, drawn where surfaces keep it, and turned", 
     page.evaluate(() => {
       const { view, newest } = (window as any).palpate;
       const { orientation, proxyOrientation, torque } = newest().tick;
-      const { torque: ring, ...drawn } = view.drawnTool;
-      return { ...drawn, ring, orientation, proxyOrientation, torque, reach: view.reach };
+      const turn = (tool: any) => (tool.visible ? tool.quaternion.toArray() : null);
+      return {
+        ...{ proxy: turn(view.heldTool), hand: turn(view.handTool), ball: view.proxy.visible },
+        ...{ ring: view.turning.visible, orientation, proxyOrientation, torque, reach: view.reach },
+      };
     });
   expect(await tool()).toMatchObject({ proxy: null, ball: true, reach: 0 });
   expect(await page.locator("#torque").textContent()).toBe("");
@@ -712,7 +716,10 @@ test("a second hand of the session is drawn and said", async () => {
   const page = await open(desk);
   const text = () => page.locator("#more-hands").textContent();
   await expect.poll(text, { timeout: 30_000 }).toMatch(/^hand_2 touches with [0-9.]+ N$/);
-  const drawn = await page.evaluate(() => (window as any).palpate.view.otherProxies as number[][]);
+  const drawn = await page.evaluate(() => {
+    const balls = (window as any).palpate.view.otherBalls as any[]; // proxies and HIPs in turn
+    return balls.filter((_, i) => i % 2 === 0).map((ball) => ball.position.toArray() as number[]);
+  });
   expect(drawn.length).toBe(1);
   expect(Math.hypot(...drawn[0]!)).toBeGreaterThan(0);
   // The mouse's hand is the first one's, as ever.
@@ -732,7 +739,7 @@ test("the hand leads a tool at the other end of a link, and sees where it is", a
   const robot = ["--robot", "synthetic:plane?size=320x240&noise=1mm"];
   program = await Program.start(robot, 0, undefined, "teleop");
   const page = await open([]);
-  const tool = () => page.evaluate(() => (window as any).palpate.view.toolAt as number[] | null);
+  const tool = () => placeOf(page, "tool");
   await expect.poll(tool).not.toBeNull();
   const at = await placeWhere(page, "surface");
   await page.mouse.move(at.x, at.y);
@@ -876,8 +883,7 @@ test("a recording is paused, touched and gone through; jumps take the force away
       return place === before;
     };
     await expect.poll(isStill, { interval: 1000 }).toBe(true);
-    const ghost = () =>
-      page.evaluate(() => (window as any).palpate.view.ghostAt as number[] | null);
+    const ghost = () => placeOf(page, "ghost");
     await expect.poll(ghost).not.toBeNull();
 
     // What is paused can be touched.

@@ -129,11 +129,19 @@ export function glimpse(page: Page): Promise<Glimpse> {
       force: Math.hypot(...(tick?.force ?? [0])),
       frame: tick?.frame ?? -1,
       clearance: view.clearance(),
-      arrow: view.arrowShown,
+      arrow: view.arrow.visible,
       points: view.drawnPoints,
       drawings: view.drawings,
     };
   });
+}
+
+/** Where a mark of the scene is drawn [m, world]; null: it is not. */
+export function placeOf(page: Page, mark: "tool" | "ghost"): Promise<number[] | null> {
+  return page.evaluate((name) => {
+    const drawn = (window as any).palpate.view[name];
+    return drawn.visible ? (drawn.position.toArray() as number[]) : null;
+  }, mark);
 }
 
 /** The surface under a place of the window [m, world]. */

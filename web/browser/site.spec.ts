@@ -223,8 +223,8 @@ describe.skipIf(!existsSync(join(site, "index.html")))("the page of scripts/site
     await press(page);
     // The same with a tool, which is chosen meanwhile and drawn.
     await page.locator("#tool").selectOption("box:40x20x5mm");
-    const drawnTool = () => page.evaluate(() => (window as any).palpate.view.drawnTool);
-    await expect.poll(drawnTool).toMatchObject({ ball: false });
+    const ball = () => page.evaluate(() => (window as any).palpate.view.proxy.visible as boolean);
+    await expect.poll(ball).toBe(false);
     await press(page);
     const downloaded = page.waitForEvent("download");
     await page.locator("#record").click();

@@ -73,11 +73,7 @@ export function lookAt(from: Vec3, target: Vec3, up: Vec3): Orbit {
 
 /** Turns the eye about its target. Angles in rad. */
 export function turned(orbit: Orbit, yaw: number, pitch: number): Orbit {
-  return {
-    ...orbit,
-    yaw: orbit.yaw + yaw,
-    pitch: clamp(orbit.pitch + pitch, -STEEPEST, STEEPEST),
-  };
+  return { ...orbit, yaw: orbit.yaw + yaw, pitch: clamp(orbit.pitch + pitch, -STEEPEST, STEEPEST) };
 }
 
 /** Moves the eye towards its target (factor < 1) or away from it. */

@@ -205,12 +205,8 @@ function nearest(texture: THREE.DataTexture): THREE.DataTexture {
   return texture;
 }
 
-export interface CloudColours {
-  near: THREE.Color;
-  middle: THREE.Color;
-  far: THREE.Color;
-  glow: THREE.Color;
-}
+/** Of near, middling and far points, and of those that shape the proxy's normal. */
+export type CloudColours = Record<"near" | "middle" | "far" | "glow", THREE.Color>;
 
 /** Draws a camera's newest frame. */
 export class CameraCloud {
@@ -320,14 +316,9 @@ export class CameraCloud {
   setRays(message: Rays): void {
     this.lens = message;
     this.rays?.dispose();
+    const { rays, width, height } = message;
     this.rays = nearest(
-      new THREE.DataTexture(
-        message.rays,
-        message.width,
-        message.height,
-        THREE.RGFormat,
-        THREE.FloatType,
-      ),
+      new THREE.DataTexture(rays, width, height, THREE.RGFormat, THREE.FloatType),
     );
     this.rays.needsUpdate = true;
     this.material.uniforms.rays!.value = this.rays;

@@ -18,7 +18,7 @@ import {
 } from "./protocol";
 import { robotLines, robotText } from "./robot";
 import { Ruler } from "./ruler";
-import { GHOST_TRAIL, SceneView, type Palette } from "./scene";
+import { COLOURS, GHOST_TRAIL, SceneView, type Palette } from "./scene";
 import { Senses } from "./senses";
 import { linked, linkTo } from "./share";
 import { handAt, longest, Timeline, trailAt } from "./timeline";
@@ -229,11 +229,7 @@ new Files({
 
 const hand = new HandInput(get<HTMLCanvasElement>("view"), view, {
   newest: () =>
-    tick && {
-      ...tick,
-      touching: tick.state !== 0,
-      engaged: (tick.safety & DISENGAGED) === 0,
-    },
+    tick && { ...tick, touching: tick.state !== 0, engaged: (tick.safety & DISENGAGED) === 0 },
   takesHand: () => state?.device.takes_hand ?? false,
   touch: () => ({
     r_c: contactRadius(state),
@@ -343,7 +339,7 @@ function follow(): void {
   get("follow").setAttribute("aria-pressed", String(following));
 }
 function switchColour(): void {
-  view.setTinted(!view.isTinted);
+  view.setTinted(!view.tinted);
 }
 function record(): void {
   if (state && mayOperate(state))
@@ -359,15 +355,8 @@ function help(): void {
 function applyTheme(theme: string): void {
   document.documentElement.dataset.theme = theme;
   const style = getComputedStyle(document.documentElement);
-  const names = [
-    ...["near", "middle", "far", "force", "hip", "proxy", "calm", "text", "ground"],
-    "fixture",
-  ];
-  view.setPalette(
-    Object.fromEntries(
-      names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]),
-    ) as unknown as Palette,
-  );
+  const colours = COLOURS.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]);
+  view.setPalette(Object.fromEntries(colours) as Palette);
   plots.recolour();
 }
 const systemTheme = matchMedia("(prefers-color-scheme: light)");
@@ -417,10 +406,7 @@ get("reset").addEventListener("click", () => view.resetView());
 get("share").addEventListener("click", share);
 get("theme").addEventListener("click", switchTheme);
 get("ask").addEventListener("click", help);
-for (const [id, share] of [
-  ["push", 0.006],
-  ["pull", -0.006],
-] as const) {
+for (const [id, share] of [["push", 0.006], ["pull", -0.006]] as const) {
   let timer = 0;
   const button = get(id);
   button.addEventListener("pointerdown", () => {

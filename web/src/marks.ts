@@ -28,23 +28,14 @@ export function cameraLines(frame: Frame): number[] {
 }
 
 /** The middle of the lowest of what is seen, and its reach [m]; null: that is little. */
-export function floorUnder(
-  places: readonly Vec3[],
-  up: Vec3,
-): { at: Vec3; reach: number } | null {
+export function floorUnder(places: readonly Vec3[], up: Vec3): { at: Vec3; reach: number } | null {
   if (places.length < 10) return null;
   const middle = scale(places.reduce(add), 1 / places.length);
   const away = places.map((place) => sub(place, middle));
   const at = (values: number[], share: number) =>
     values.sort((a, b) => a - b)[Math.floor(share * (values.length - 1))]!;
-  const lowest = at(
-    away.map((way) => dot(way, up)),
-    0.02,
-  );
-  const reach = at(
-    away.map((way) => Math.hypot(...sub(way, scale(up, dot(way, up))))),
-    0.9,
-  );
+  const lowest = at(away.map((way) => dot(way, up)), 0.02);
+  const reach = at(away.map((way) => Math.hypot(...sub(way, scale(up, dot(way, up))))), 0.9);
   return { at: add(middle, scale(up, lowest)), reach };
 }
 

@@ -54,10 +54,7 @@ export function sceneName(uri: string): string {
 }
 
 /** What is looked at, whether it goes on, and what of it was left out. */
-export function cameraText({
-  cameras,
-  playback,
-}: Pick<State, "cameras" | "playback">): string {
+export function cameraText({ cameras, playback }: Pick<State, "cameras" | "playback">): string {
   const troubled = cameras.find(({ state }) => state !== "live");
   if (troubled) return `${sceneName(troubled.uri)} · ${troubled.state}`;
   const first = cameras[0];
@@ -168,14 +165,9 @@ class Row {
     this.factor = factor;
     const id = `${prefix}-${row.name}`;
     const name = row.name.replaceAll("_", " ");
-    this.slider = element("input", {
-      type: "range",
-      id,
-      min: "0",
-      max: "1000",
-      title: row.meaning,
-    });
-    this.number = element("input", { type: "number", step: "any", title: row.meaning });
+    const title = row.meaning;
+    this.slider = element("input", { type: "range", id, min: "0", max: "1000", title });
+    this.number = element("input", { type: "number", step: "any", title });
     this.number.setAttribute("aria-label", `${name}, ${unit}`);
     this.back = element("button", { className: "back", title: "back to the default" }, "↺");
     this.back.setAttribute(
@@ -275,6 +267,10 @@ function recordingText(recording: State["recording"]): string {
   return `${path}: ${recordingClock(recording)}${left}`;
 }
 
+/** The program's tables of what can be set. */
+type Table = "parameters" | "safety" | "placement";
+type Change = { name: string; value: number };
+
 export class Panel {
   private readonly root = get("panel");
   private readonly method = get<HTMLSelectElement>("method-name");
@@ -285,9 +281,7 @@ export class Panel {
     { id: "open-recording", className: "tool", hidden: true },
     element("span", {}, "Open recording"),
   );
-  private rows = new Map<string, Row>();
-  private limits = new Map<string, Row>();
-  private placement = new Map<string, Row>();
+  private rows: Record<Table, Row[]> = { parameters: [], safety: [], placement: [] };
   private hello: Hello | null = null;
   private safetyNow = 0;
   private safetySeen = 0;
@@ -350,24 +344,19 @@ export class Panel {
     this.tool.replaceChildren(
       ...hello.tools.map((tool) => element("option", { value: tool, title: tool }, toolName(tool))),
     );
-    const build = (
-      id: string,
-      table: ParameterRow[],
-      command: (change: { name: string; value: number }) => Command,
-    ) => {
+    const build = (id: string, table: ParameterRow[], command: (change: Change) => Command) => {
       const parent = get(id);
       parent.replaceChildren();
-      return new Map(
-        table.map((row) => {
-          const set = (value: number) => this.ask(command({ name: row.name, value }));
-          return [row.name, new Row(parent, row, id, set)];
-        }),
-      );
+      return table.map((row) => {
+        const set = (value: number) => this.ask(command({ name: row.name, value }));
+        return new Row(parent, row, id, set);
+      });
     };
-    const parameters = stiffnessFirst(hello.parameters);
-    this.rows = build("parameters", parameters, (set) => ({ set }));
-    this.limits = build("limits", hello.safety, (set_safety) => ({ set_safety }));
-    this.placement = build("placement", hello.placement, (place) => ({ place }));
+    this.rows = {
+      parameters: build("parameters", stiffnessFirst(hello.parameters), (set) => ({ set })),
+      safety: build("limits", hello.safety, (set_safety) => ({ set_safety })),
+      placement: build("placement", hello.placement, (place) => ({ place })),
+    };
     const tally = (id: string, flags: Hello["flags"]) =>
       get(id).replaceChildren(
         ...flags.map(({ name, meaning }) =>
@@ -380,8 +369,7 @@ export class Panel {
 
   /** The program has refused what the page asked for. */
   refused(): void {
-    for (const rows of [this.rows, this.limits, this.placement])
-      for (const row of rows.values()) row.refused();
+    for (const row of Object.values(this.rows).flat()) row.refused();
   }
 
   /** @param safety SafetyFlag bits of the newest ticks */
@@ -405,9 +393,8 @@ export class Panel {
     const warning = get("stiffness-warning");
     write(warning, warningText(state.device.warnings));
     warning.hidden = !warning.textContent;
-    for (const [name, row] of this.rows) row.show(state.parameters[name] ?? Number.NaN);
-    for (const [name, row] of this.limits) row.show(state.safety[name] ?? Number.NaN);
-    for (const [name, row] of this.placement) row.show(state.placement[name] ?? Number.NaN);
+    for (const [table, rows] of Object.entries(this.rows))
+      for (const row of rows) row.show(state[table as Table][row.row.name] ?? Number.NaN);
     this.showRole(state.role);
     const count = (id: string, counts: readonly number[]) =>
       [...get(id).children].forEach((item, i) => {
@@ -431,9 +418,9 @@ export class Panel {
     this.role = role;
     this.method.disabled = this.scene.disabled = this.tool.disabled = role !== "operating";
     get<HTMLButtonElement>("open-file").disabled = role !== "operating";
-    for (const row of this.rows.values()) row.allow(role !== "looking");
-    for (const row of this.limits.values()) row.allow(maySetLimit(role, row.row));
-    for (const row of this.placement.values()) row.allow(role === "operating");
+    for (const row of this.rows.parameters) row.allow(role !== "looking");
+    for (const row of this.rows.safety) row.allow(maySetLimit(role, row.row));
+    for (const row of this.rows.placement) row.allow(role === "operating");
     for (const [part, why] of Object.entries(whyNot(role))) {
       const text = get(`${part}-why`);
       text.textContent = why;

@@ -8,7 +8,9 @@ const SPAN = 10; // [s] shown
 const INTERVAL = 66; // [ms] between drawings
 const GAP = 0.25; // [s] without samples: no line is drawn across
 
-const FIRST = 2; // of the quantities, that are shown until more are asked for
+// Of the quantities, that are shown until more are asked for. Numbers beside the scene, of a newer
+// tick, say them.
+const FIRST = 2;
 
 interface Quantity {
   title: string;
@@ -18,54 +20,26 @@ interface Quantity {
   digits: number;
   least: number; // what the axis shows at least
   signed?: true; // it may be below 0
-  isSaid?: true; // the number beside the scene says it, of a newer tick
 }
 
 const QUANTITIES: readonly Quantity[] = [
+  { title: "Force", unit: "N", colour: "--force", of: (s) => s.force, digits: 2, least: 1 },
   {
-    title: "Force",
-    unit: "N",
-    colour: "--force",
-    of: (s) => s.force,
-    digits: 2,
-    least: 1,
-    isSaid: true,
+    title: "Hand below the surface", unit: "mm", colour: "--hip",
+    of: (s) => 1e3 * s.penetration, digits: 1, least: 2,
   },
   {
-    title: "Hand below the surface",
-    unit: "mm",
-    colour: "--hip",
-    of: (s) => 1e3 * s.penetration,
-    digits: 1,
-    least: 2,
-    isSaid: true,
+    title: "Energy given in this contact", unit: "mJ", colour: "--force",
+    of: (s) => 1e3 * s.relative, digits: 2, least: 0.5, signed: true,
   },
   {
-    title: "Energy given in this contact",
-    unit: "mJ",
-    colour: "--force",
-    of: (s) => 1e3 * s.relative,
-    digits: 2,
-    least: 0.5,
-    signed: true,
-  },
-  {
-    title: "… with the surface's motion",
-    unit: "mJ",
-    colour: "--hip",
-    of: (s) => 1e3 * s.absolute,
-    digits: 2,
-    least: 0.5,
-    signed: true,
+    title: "… with the surface's motion", unit: "mJ", colour: "--hip",
+    of: (s) => 1e3 * s.absolute, digits: 2, least: 0.5, signed: true,
   },
   { title: "Steps a tick", unit: "", colour: "--calm", of: (s) => s.steps, digits: 0, least: 4 },
   {
-    title: "Tick time",
-    unit: "µs",
-    colour: "--time",
-    of: (s) => 1e6 * s.tickTime,
-    digits: 1,
-    least: 10,
+    title: "Tick time", unit: "µs", colour: "--time",
+    of: (s) => 1e6 * s.tickTime, digits: 1, least: 10,
   },
 ];
 
@@ -89,12 +63,12 @@ export class Plots {
   }
 
   add(samples: readonly Sample[]): void {
-    const newest = samples[samples.length - 1];
+    const newest = samples.at(-1);
     if (!newest) return;
     // The program was started anew: its clock may have gone back.
-    if (this.samples.length > 0 && newest.t < this.samples[this.samples.length - 1]!.t)
+    if (this.samples.length > 0 && newest.t < this.samples.at(-1)!.t)
       this.samples = [];
-    const last = this.samples[this.samples.length - 1];
+    const last = this.samples.at(-1);
     if (last && samples[0]!.t - last.t > GAP)
       this.samples.push({ ...last, t: last.t + 1e-3, gap: true });
     this.samples.push(...samples);
@@ -117,14 +91,14 @@ export class Plots {
   draw(now: number, pause: number): void {
     if (now - this.drawn < Math.max(INTERVAL, pause) || this.parent.offsetParent === null) return;
     this.drawn = now;
-    const newest = this.samples[this.samples.length - 1];
+    const newest = this.samples.at(-1);
     if (!newest) return;
     const times = this.samples.map((sample) => sample.t - newest.t);
-    for (const { quantity, chart, value, host } of this.plots) {
+    for (const [i, { quantity, chart, value, host }] of this.plots.entries()) {
       const values = this.samples.map((sample) => (sample.gap ? null : quantity.of(sample)));
       chart.setData([times, values]);
-      const text = `${values[values.length - 1]!.toFixed(quantity.digits)} ${quantity.unit}`.trim();
-      write(value, quantity.isSaid ? quantity.unit : text);
+      const text = `${values.at(-1)!.toFixed(quantity.digits)} ${quantity.unit}`.trim();
+      write(value, i < FIRST ? quantity.unit : text);
       host.setAttribute("aria-label", `${quantity.title}, last ${SPAN} seconds; now ${text}`);
     }
   }
@@ -155,6 +129,8 @@ export class Plots {
         grid: { stroke: css("--line"), width: 1 },
         ticks: { show: false },
       };
+      const colour = css(quantity.colour);
+      const fading = `color-mix(in srgb, ${colour} 14%, transparent)`;
       const chart = new uPlot(
         {
           width: 300,
@@ -177,12 +153,7 @@ export class Plots {
           ],
           series: [
             {},
-            {
-              stroke: css(quantity.colour),
-              width: 1.6,
-              fill: `color-mix(in srgb, ${css(quantity.colour)} 14%, transparent)`,
-              points: { show: false },
-            },
+            { stroke: colour, width: 1.6, fill: fading, points: { show: false } },
           ],
         },
         [[], []],

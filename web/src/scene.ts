@@ -31,6 +31,7 @@ const MOST_DABS = 500; // of paint
 const LONGEST_NAME = 24; // letters of a fixture's name in the scene
 const MOST_LINKS = 32; // of a robot's arm
 const PAINT_LAYER = 5e-3; // [m] before the surface
+const RING_WIDTH = 30; // [px] of the ring about the proxy
 const SPOT_SIZE = 9; // [px] of the ring under the pointer
 const REST = 300; // [ms] without a change, after which the view is drawn finely
 const SOFTWARE_INTERVAL = 28; // [ms] at least between drawings where a processor draws
@@ -41,18 +42,11 @@ export interface Radii {
   r_3: number;
 }
 
-export interface Palette {
-  near: string;
-  middle: string;
-  far: string;
-  force: string;
-  hip: string;
-  proxy: string;
-  calm: string;
-  text: string;
-  ground: string;
-  fixture: string;
-}
+/** The page's colours that are drawn with, by their names in style.css. */
+export const COLOURS = [
+  "near", "middle", "far", "force", "hip", "proxy", "calm", "text", "ground", "fixture",
+] as const;
+export type Palette = Record<(typeof COLOURS)[number], string>;
 
 function ringTexture(): THREE.Texture {
   const canvas = document.createElement("canvas");
@@ -89,13 +83,10 @@ function nameSprite(whole: string, colour: string): THREE.Sprite {
 }
 
 const BALL = new THREE.SphereGeometry(1, 48, 32);
-const FLAT = { depthTest: false, transparent: true, side: THREE.DoubleSide } as const;
+const HIDDEN_TOO = { depthTest: false, transparent: true } as const;
+const FLAT = { ...HIDDEN_TOO, side: THREE.DoubleSide } as const;
 
-const NO_TOOL: Tool = {
-  kind: "tool",
-  points: new Float32Array(),
-  triangles: new Uint32Array(),
-};
+const NO_TOOL: Tool = { kind: "tool", points: new Float32Array(), triangles: new Uint32Array() };
 
 type Ball = THREE.Mesh<THREE.SphereGeometry, THREE.MeshStandardMaterial>;
 
@@ -142,12 +133,7 @@ export class SceneView {
   private readonly software: boolean;
   private readonly renderer: THREE.WebGLRenderer;
   private readonly scene = new THREE.Scene();
-  private readonly camera = new THREE.PerspectiveCamera(
-    (FIELD_OF_VIEW * 180) / Math.PI,
-    1,
-    0.01,
-    100,
-  );
+  private readonly camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW * THREE.MathUtils.RAD2DEG);
   private readonly clouds = new Map<number, CameraCloud>();
   private readonly felt = new THREE.Group(); // all that is drawn of them
   private splat: SplatCloud | null = null;
@@ -197,13 +183,8 @@ export class SceneView {
   private readonly dab = new THREE.Object3D(); // where one of them is
   private readonly axes = new THREE.AxesHelper(AXES_LENGTH);
   // The hand that was recorded, which presses into the surface.
-  private readonly ghost = ball({
-    transparent: true,
-    opacity: 0.6,
-    roughness: 0.8,
-    depthTest: false,
-  });
-  private readonly ghostTrail = line({ transparent: true, opacity: 0.6, depthTest: false });
+  private readonly ghost = ball({ ...HIDDEN_TOO, opacity: 0.6, roughness: 0.8 });
+  private readonly ghostTrail = line({ ...HIDDEN_TOO, opacity: 0.6 });
   private readonly pin = new THREE.Mesh(
     rod(0.09, 12),
     new THREE.MeshStandardMaterial({ roughness: 0.6 }),
@@ -222,10 +203,10 @@ export class SceneView {
   );
   private readonly handTool = new THREE.Mesh(
     this.heldTool.geometry,
-    new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.35, depthTest: false }),
+    new THREE.MeshBasicMaterial({ ...HIDDEN_TOO, opacity: 0.35 }),
   );
   private readonly handToolEdges = segments(1);
-  private toolReach = 0; // [m] from the hand; 0: it is a ball
+  reach = 0; // [m] of the tool from the hand; 0: it is a ball
   private readonly turningMaterial = new THREE.MeshBasicMaterial({ depthTest: false });
   private readonly turning = turningArrow(this.turningMaterial);
   private readonly lamp = new THREE.DirectionalLight(0xffffff, 2.2);
@@ -241,7 +222,7 @@ export class SceneView {
   private stale = true;
   private lastDrawing = 0; // [ms] 0: measured
   private drawnAt = -Infinity; // [ms]
-  private tinted = true;
+  tinted = true; // the cameras' own colours are wanted, where they have any
 
   /** Throws if the browser has no WebGL 2. */
   constructor(private readonly canvas: HTMLCanvasElement) {
@@ -294,37 +275,26 @@ export class SceneView {
     this.resize();
   }
 
-  get arrowShown(): boolean {
-    return this.arrow.visible;
-  }
-
   get height(): number {
     return this.canvas.clientHeight;
   }
 
   setPalette(palette: Palette): void {
     this.palette = palette;
-    const colour = (text: string) => new THREE.Color(text);
-    this.proxy.material.color = colour(palette.proxy);
-    this.heldTool.material.color = colour(palette.proxy);
-    this.hip.material.color = this.handTool.material.color = colour(palette.hip);
-    this.handToolEdges.material.color = colour(palette.hip);
-    this.turningMaterial.color = colour(palette.force);
-    this.link.material.color = colour(palette.hip);
-    this.ghost.material.color = this.ghostTrail.material.color = colour(palette.text);
-    this.ring.material.color = colour(palette.text);
-    this.plumb.material.color = colour(palette.text);
-    this.trail.material.color = colour(palette.calm);
-    this.pin.material.color = this.ruler.material.color = colour(palette.text);
-    this.spot.material.color = colour(palette.calm);
-    this.grid.material.color = colour(palette.text);
-    this.frusta.material.color = colour(palette.calm);
-    if (this.software) this.renderer.setClearColor(colour(palette.ground), 1);
-    this.idle.color = colour(palette.fixture);
-    this.acting.color = this.push.material.color = colour(palette.force);
-    this.tool.material.color = this.arm.material.color = colour(palette.calm);
-    this.arrowMaterial.color = colour(palette.force);
-    this.arrowMaterial.emissive = colour(palette.force).multiplyScalar(0.35);
+    const drawn = {
+      proxy: [this.proxy.material, this.heldTool.material],
+      hip: [this.hip, this.handTool, this.handToolEdges, this.link].map((mark) => mark.material),
+      text: [
+        ...[this.ghost, this.ghostTrail, this.ring, this.plumb, this.pin, this.ruler, this.grid],
+      ].map((mark) => mark.material),
+      calm: [this.trail, this.spot, this.frusta, this.tool, this.arm].map((mark) => mark.material),
+      force: [this.turningMaterial, this.acting, this.push.material, this.arrowMaterial],
+      fixture: [this.idle],
+    };
+    for (const [name, materials] of Object.entries(drawn))
+      for (const material of materials) material.color.set(palette[name as keyof Palette]);
+    this.arrowMaterial.emissive.set(palette.force).multiplyScalar(0.35);
+    if (this.software) this.renderer.setClearColor(palette.ground, 1);
     for (const cloud of this.clouds.values()) cloud.setColours(this.cloudColours());
     this.touch();
   }
@@ -428,35 +398,10 @@ export class SceneView {
     this.heldTool.geometry = this.handTool.geometry = shape;
     this.handToolEdges.geometry.dispose();
     this.handToolEdges.geometry = new THREE.EdgesGeometry(shape, TOOL_EDGES);
-    this.toolReach = 0;
+    this.reach = 0;
     for (let i = 0; i < points.length; i += 3)
-      this.toolReach = Math.max(this.toolReach, Math.hypot(...points.subarray(i, i + 3)));
+      this.reach = Math.max(this.reach, Math.hypot(...points.subarray(i, i + 3)));
     this.touch();
-  }
-
-  /** [m] How far the tool reaches from the hand; 0: it is a ball. */
-  get reach(): number {
-    return this.toolReach;
-  }
-
-  /** For tests: what of the tool is drawn, and how it is turned. */
-  get drawnTool() {
-    return {
-      proxy: this.heldTool.visible ? this.heldTool.quaternion.toArray() : null,
-      hand: this.handTool.visible ? this.handTool.quaternion.toArray() : null,
-      torque: this.turning.visible,
-      ball: this.proxy.visible,
-    };
-  }
-
-  /** For tests: where the other hands' proxies are drawn [m]. */
-  get otherProxies(): Vec3[] {
-    return this.otherBalls.filter((_, i) => i % 2 === 0).map((ball) => ball.position.toArray());
-  }
-
-  /** For tests: where the robot's tool is drawn [m]. */
-  get toolAt(): Vec3 | null {
-    return this.tool.visible ? this.tool.position.toArray() : null;
   }
 
   setRadii(radii: Radii): void {
@@ -595,10 +540,6 @@ export class SceneView {
     this.touch();
   }
 
-  get isTinted(): boolean {
-    return this.tinted;
-  }
-
   /** [m] between what is measured about the hand; null: nothing is. */
   spacing(): number | null {
     if (!this.tick || this.clouds.size === 0) return null;
@@ -616,11 +557,6 @@ export class SceneView {
     this.setLine(this.ghostTrail, trail);
     this.ghost.scale.setScalar(this.radii.r_c);
     this.touch();
-  }
-
-  /** For tests: where the ghost is drawn [m]. */
-  get ghostAt(): Vec3 | null {
-    return this.ghost.visible ? this.ghost.position.toArray() : null;
   }
 
   /** How high the proxy is above what the cameras see [m]; null: nothing is seen behind it. */
@@ -738,15 +674,8 @@ export class SceneView {
     const { clientWidth, clientHeight } = this.canvas;
     const off = offCentre(this.room);
     this.camera.setViewOffset(clientWidth, clientHeight, -off.x, -off.y, clientWidth, clientHeight);
-    const lampAt: Vec3 = unit(
-      [0, 1, 2].map(
-        (i) =>
-          0.55 * this.orbit.up[i]! +
-          0.5 * up[i]! -
-          0.45 * right[i]! +
-          (0.6 * (at[i]! - this.orbit.target[i]!)) / this.orbit.distance,
-      ) as unknown as Vec3,
-    );
+    const above = add(scale(this.orbit.up, 0.55), scale(up, 0.5));
+    const lampAt = unit(sub(above, add(scale(right, 0.45), scale(forward, 0.6))));
     this.lamp.position.set(...lampAt);
 
     this.setResolution();
@@ -755,7 +684,7 @@ export class SceneView {
     for (const cloud of this.clouds.values()) {
       cloud.prepare(this.thinning.stride, pixelsPerMetre, this.renderer.getPixelRatio());
       cloud.setLight(lampAt);
-      const { r_1, r_3 } = this.toolReach > 0 ? { r_1: 0, r_3: 0 } : this.radii;
+      const { r_1, r_3 } = this.reach > 0 ? { r_1: 0, r_3: 0 } : this.radii;
       if (this.tick) cloud.setProxy(this.tick.proxy, r_1, r_3);
       if (cloud.object.visible && this.felt.visible)
         this.drawnPoints += cloud.object.geometry.drawRange.count;
@@ -808,8 +737,7 @@ export class SceneView {
   private follow(at: Vec3): void {
     const away = sub(at, this.orbit.target);
     if (length(away) < 2e-4) return;
-    const target = [0, 1, 2].map((i) => this.orbit.target[i]! + 0.12 * away[i]!) as unknown as Vec3;
-    this.setOrbit({ ...this.orbit, target });
+    this.setOrbit({ ...this.orbit, target: add(this.orbit.target, scale(away, 0.12)) });
   }
 
   // The surface that the hand is over, and how high it is above it [m].
@@ -838,21 +766,18 @@ export class SceneView {
       mark.scale.setScalar(size);
     };
     place(this.proxy, tick.place, r_c); // forbidden regions keep it, too
-    this.proxy.visible = this.toolReach === 0;
+    this.proxy.visible = this.reach === 0;
     place(this.heldTool, tick.place, 1);
     this.heldTool.quaternion.set(...tick.proxyOrientation);
     place(this.handTool, tick.hip, 1);
     this.handTool.quaternion.set(...tick.orientation);
-    this.heldTool.visible = this.handTool.visible = this.toolReach > 0;
+    this.heldTool.visible = this.handTool.visible = this.reach > 0;
     place(this.hip, tick.hip, 0.3 * r_c);
     // The ring is there to find the proxy from afar; near by, the sphere speaks for itself.
     const size = metresPerPixel(depthOf(this.orbit, tick.place), this.height);
-    place(
-      this.ring,
-      tick.place,
-      ((2 * 15) / Math.max(this.height, 1)) * Math.tan(FIELD_OF_VIEW / 2),
-    );
-    const radius = (this.toolReach || r_c) / size;
+    const ringSize = (RING_WIDTH / Math.max(this.height, 1)) * Math.tan(FIELD_OF_VIEW / 2);
+    place(this.ring, tick.place, ringSize);
+    const radius = (this.reach || r_c) / size;
     this.ring.material.opacity = Math.min(1, Math.max(0, (24 - radius) / 12)) * 0.85;
     this.ring.visible = this.ring.material.opacity > 0;
 
@@ -860,7 +785,7 @@ export class SceneView {
     this.link.visible = length(sub(tick.hip, tick.place)) > 0.3 * r_c;
 
     const hasNormal = length(tick.normal) > 0.5;
-    this.pin.visible = hasNormal && this.toolReach === 0;
+    this.pin.visible = hasNormal && this.reach === 0;
     if (hasNormal) this.stand(this.pin, tick.proxy, tick.normal, r_c, PIN * r_c);
 
     const newtons = length(tick.force);
@@ -868,7 +793,7 @@ export class SceneView {
     this.arrow.visible = newtons > 0.01;
     if (this.arrow.visible) {
       const direction = unit(tick.force);
-      const foot = add(tick.place, scale(direction, this.toolReach > 0 ? 0 : r_c));
+      const foot = add(tick.place, scale(direction, this.reach > 0 ? 0 : r_c));
       const thickness = 0.006 * size * this.height;
       const headLength = Math.min(0.4 * shown, 4 * thickness);
       this.stand(this.shaft, [0, 0, 0], [0, 1, 0], thickness * 0.55, shown - headLength);
@@ -878,12 +803,9 @@ export class SceneView {
 
     const turns = length(tick.torque);
     this.turning.visible = turns > LEAST_TORQUE;
-    if (this.turning.visible)
-      this.lay(
-        this.turning,
-        { at: tick.place, normal: unit(tick.torque) },
-        clamp(turns * RING_PER_NEWTON_METRE, ...RINGS) * size * this.height,
-      );
+    const turnRadius = clamp(turns * RING_PER_NEWTON_METRE, ...RINGS) * size * this.height;
+    const about = { at: tick.place, normal: unit(tick.torque) };
+    if (this.turning.visible) this.lay(this.turning, about, turnRadius);
 
     // The shadow on what the hand is over, and the line down to it.
     const under = (this.under = this.underHand());
@@ -912,13 +834,7 @@ export class SceneView {
   }
 
   // Puts an upright mark's foot at a place and its top along a direction.
-  private stand(
-    mark: THREE.Object3D,
-    foot: Vec3,
-    along: Vec3,
-    width: number,
-    height: number,
-  ): void {
+  private stand(mark: THREE.Object3D, foot: Vec3, along: Vec3, width: number, height: number) {
     mark.position.set(...foot);
     mark.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3(...along));
     mark.scale.set(width, height, width);

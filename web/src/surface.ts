@@ -71,10 +71,7 @@ export class SeenSurface {
   private farthestDepth: number | null = null;
 
   /** @param rays  of a distorted lens */
-  constructor(
-    private readonly frame: Frame,
-    private readonly rays: Rays | null,
-  ) {
+  constructor(private readonly frame: Frame, private readonly rays: Rays | null) {
     this.pose = frame.worldFromCamera;
     this.eye = [this.pose[3]!, this.pose[7]!, this.pose[11]!];
   }

@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 /** Every how many-th pixel is drawn, along both axes, and at which share of the resolution. */
-const LEVELS = [
-  [1, 1],
-  [2, 1],
-  [3, 1],
-  [4, 1],
-  [6, 1],
-  [6, 0.6],
-] as const;
+const LEVELS = [[1, 1], [2, 1], [3, 1], [4, 1], [6, 1], [6, 0.6]] as const;
 const SLOW = 1 / 28;
 const FAST = 1 / 45;
 const PATIENCE = 45;

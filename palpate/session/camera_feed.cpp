@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
-#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -165,7 +164,31 @@ class CameraFeed::Worker {
     if (!is_live_) sought_ = share;
     changed_.notify_all();
   }
-  [[nodiscard]] CameraStatus status() const;
+  [[nodiscard]] CameraStatus status() const {
+    const std::lock_guard lock(mutex_);
+    const double time = now();
+    CameraStatus status = status_;
+    if (status.recorded == 1) status.kind += ", one frame";
+    const std::string silent = fixed(time - last_heard_, 1) + " s";
+    const bool hangs = read_until_ && time > *read_until_ + hang_margin;
+    if (is_stopping_) status.state = CameraState::stopped;
+    status.text = state_words[static_cast<std::size_t>(status.state)];
+    if (status.state == CameraState::waiting) status.text += silent;
+    if (status.state == CameraState::ended && status.stays_valid)
+      status.text += ", its last frame stays";
+    if (status.state == CameraState::waiting || status.state == CameraState::searching)
+      status.text += status.trouble.empty() ? "" : ": " + status.trouble;
+    if (hangs && !is_stopping_) {
+      status.state = CameraState::waiting;
+      status.text = "it hangs: no frame for " + silent;
+    } else if (status.state == CameraState::live && last_problem_ != StampProblem::none &&
+               time - last_problem_time_ < remark_time) {
+      status.text += "; " + std::string(problem_words[static_cast<std::size_t>(last_problem_)]);
+    } else if (status.state == CameraState::live && !status.doubt.empty()) {
+      status.text += "; " + status.doubt;
+    }
+    return status;
+  }
 
  private:
   // While it lives, the source is read: `status` says so where that hangs.
@@ -187,19 +210,213 @@ class CameraFeed::Worker {
     const std::lock_guard lock(mutex_);
     return is_stopping_;
   }
-  void publish();
-  void wait_until(double t);
-  void set_source(std::shared_ptr<Source> source);
-  void close();
-  void look_again(const std::string& trouble);
-  bool open_again();
-  bool run_recording();
-  bool read_ahead(int& errors);
-  void run_live();
-  void follow();
-  std::optional<Frame> read(double timeout);
-  void take_live(Frame frame);
-  void deliver(const FedFrame& fed);
+  // With mutex_ held: what others see from now on.
+  void publish() {
+    const CameraStatus& status = player_.status();
+    for (std::size_t i = 0; i < stamp_problem_count; ++i) {
+      if (status.stamp_problems[i] == status_.stamp_problems[i]) continue;
+      last_problem_ = static_cast<StampProblem>(i);
+      last_problem_time_ = now();
+    }
+    status_ = status;
+    if (wanted_) status_.playback = *wanted_;
+  }
+  // Unless the camera is to stop.
+  void wait_until(double t) {
+    std::unique_lock lock(mutex_);
+    publish();
+    while (!is_stopping_ && now() < t) options_.clock->wait(lock, changed_, t);
+  }
+  // The one before is destroyed here, on the camera's thread: closing it may take its time.
+  void set_source(std::shared_ptr<Source> source) {
+    {
+      const std::lock_guard lock(mutex_);
+      publish();
+      std::swap(source_, source);
+      if (source_ && is_stopping_) source_->cancel();
+    }
+    source.reset();
+  }
+  void close() {
+    player_.close();
+    set_source(nullptr);
+  }
+  // Closes the source, or keeps one that cannot be opened again, and waits before the next attempt.
+  void look_again(const std::string& trouble) {
+    player_.status().trouble = trouble;
+    player_.status().state = CameraState::searching;
+    if (open_) close();
+    pause_ = pause_ > 0.0 ? std::min(2.0 * pause_, options_.longest_pause) : options_.first_pause;
+    wait_until(now() + pause_);
+  }
+  bool open_again() {
+    try {
+      std::shared_ptr<Source> source = open_();
+      if (!source) throw Error(player_.status().uri, "nothing was opened");
+      is_live_ = source->info().live;
+      placer_.restart(source->info().clock);
+      same_pictures_ = frames_seen_ = 0;
+      newest_.reset();
+      set_source(std::move(source));
+      player_.begin(source_);
+      CameraStatus& status = player_.status();
+      if (status.state == CameraState::searching) {
+        ++status.opened_again;
+        status.state = CameraState::waiting;
+      }
+      last_heard_ = now();
+      is_starting_ = true;
+      return true;
+    } catch (const std::exception& error) {
+      look_again(error.what());
+      return false;
+    }
+  }
+  // A recording, until it is to stop or has to be opened again. False: it is over.
+  bool run_recording() {
+    for (int errors = 0;;) {
+      {
+        std::unique_lock lock(mutex_);
+        if (is_stopping_) return true;
+        if (const auto wanted = std::exchange(wanted_, std::nullopt))
+          player_.set_playback(*wanted, now());
+        if (const auto share = std::exchange(sought_, std::nullopt)) player_.seek(*share);
+        publish();
+        const double due = player_.due(now());
+        if (!open_ && due == std::numeric_limits<double>::infinity()) return false;
+        if (now() < due) {
+          options_.clock->wait(lock, changed_, due);
+          continue;
+        }
+      }
+      if (player_.needs_source()) {
+        close();
+        return true;
+      }
+      if (player_.needs_frame()) {
+        if (!read_ahead(errors)) return true;
+      } else if (const auto fed = player_.next_until(now())) {
+        if (fed->is_new) last_heard_ = now();
+        pause_ = 0.0;
+        deliver(*fed);
+      }
+    }
+  }
+  // Reads a recording's next frame. False: it has been closed, or kept for a while, for its faults.
+  bool read_ahead(int& errors) {
+    const double begin = now();
+    try {
+      const Watch watch(*this, Source::no_timeout);
+      follow();
+      player_.read(begin, took_);
+      took_ = now() - begin;
+      errors = 0;
+      return true;
+    } catch (const std::exception& error) {
+      player_.status().trouble = error.what();
+      if (++errors < most_recording_errors && !player_.needs_source()) return true;
+      look_again(error.what());
+      return false;
+    }
+  }
+  // A live camera, until it is to stop or is gone.
+  void run_live() {
+    if (first_) take_live(*std::exchange(first_, std::nullopt));
+    for (int errors = 0; !is_stopping();) {
+      const double begin = now();
+      std::optional<Frame> frame;
+      try {
+        frame = read(options_.waiting);
+      } catch (const std::exception& error) {
+        player_.status().trouble = error.what();
+        ++player_.status().dropped;
+        if (++errors < most_live_errors) continue;
+        look_again(error.what());
+        return;
+      }
+      const double end = now();
+      if (frame) {
+        errors = 0;
+        take_live(std::move(*frame));
+        continue;
+      }
+      if (is_stopping()) return;
+      const double silent = end - last_heard_;
+      if (silent >= options_.waiting) player_.status().state = CameraState::waiting;
+      if (silent >= (is_starting_ ? options_.start_up : options_.silence)) {
+        look_again("it has delivered nothing for " + fixed(silent, 1) + " s");
+        last_heard_ = now();  // a source that cannot be opened again gets its time once more
+        return;
+      }
+      if (end - begin < 0.5 * idle_pause) wait_until(end + idle_pause);
+    }
+  }
+  // Tells the source where the hand is.
+  void follow() {
+    std::optional<Vec3> hand;
+    {
+      const std::lock_guard lock(sink_mutex_);
+      if (is_connected_ && hand_) hand = hand_();
+    }
+    if (hand && source_) source_->follow(*hand);
+  }
+  // A live camera's next frame, with its arrival. @throws what its source throws
+  std::optional<Frame> read(double timeout) {
+    const Watch watch(*this, timeout);
+    follow();
+    std::optional<Frame> frame = source_->next(timeout);
+    const double end = now();
+    if (!frame || !frame->cloud) return std::nullopt;
+    frame->arrival = std::min(frame->arrival.value_or(end), end);
+    return frame;
+  }
+  void take_live(Frame frame) {
+    CameraStatus& status = player_.status();
+    const double arrival = frame.arrival.value_or(now());
+    last_heard_ = std::max(arrival, last_heard_.load());
+    is_starting_ = false;
+    status.trouble.clear();
+    pause_ = 0.0;
+    const double known = -options_.clock->system_start();
+    const StampClock clock = source_->info().clock;
+    const double stamp = frame.stamp;
+    const PlacedStamp placed =
+        placer_.place(stamp, arrival, clock == StampClock::system ? known : 0.0);
+    if (placed.problem != StampProblem::none)
+      ++status.stamp_problems[static_cast<std::size_t>(placed.problem)];
+    same_pictures_ = is_same_picture(newest_.get(), frame.cloud.get()) ? same_pictures_ + 1 : 1;
+    newest_ = frame.cloud;
+    if (const auto& range = source_->info().range; range && frames_seen_++ % frames_a_look == 0)
+      status.doubt = doubt_of(*newest_, *range);
+    // Hazard: frozen-image
+    const bool is_frozen = same_pictures_ >= options_.frozen_frames;
+    status.latency = placer_.latency();
+    status.state = is_frozen ? CameraState::frozen : CameraState::live;
+    if (is_frozen || !placed.usable || !(placed.time > last_time_)) {
+      ++status.dropped;
+      return;
+    }
+    ++status.frames;
+    status.last_frame = frame.stamp = placed.time;
+    status.stays_valid = false;
+    deliver({std::move(frame), stamp});
+  }
+  void deliver(const FedFrame& fed) {
+    const double interval = fed.frame.stamp - last_time_;
+    last_time_ = fed.frame.stamp;
+    if (double& rate = player_.status().rate;
+        fed.is_new && std::isfinite(interval) && interval > 0.0) {
+      // The mean of intervals: two frames that come at once would rule a mean of rates.
+      const double mean = rate > 0.0 ? 1.0 / rate : interval;
+      rate = 1.0 / (mean + rate_weight * (interval - mean));
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      publish();
+    }
+    const std::lock_guard lock(sink_mutex_);
+    if (is_connected_) sink_(fed);
+  }
 
   const FeedOptions options_;
   const Open open_;
@@ -236,252 +453,6 @@ class CameraFeed::Worker {
   Hand hand_;
   bool is_connected_ = false;
 };
-
-// With mutex_ held: what others see from now on.
-void CameraFeed::Worker::publish() {
-  const CameraStatus& status = player_.status();
-  for (std::size_t i = 0; i < stamp_problem_count; ++i) {
-    if (status.stamp_problems[i] == status_.stamp_problems[i]) continue;
-    last_problem_ = static_cast<StampProblem>(i);
-    last_problem_time_ = now();
-  }
-  status_ = status;
-  if (wanted_) status_.playback = *wanted_;
-}
-
-// Unless the camera is to stop.
-void CameraFeed::Worker::wait_until(double t) {
-  std::unique_lock lock(mutex_);
-  publish();
-  while (!is_stopping_ && now() < t) options_.clock->wait(lock, changed_, t);
-}
-
-// The one before is destroyed here, on the camera's thread: closing it may take its time.
-void CameraFeed::Worker::set_source(std::shared_ptr<Source> source) {
-  {
-    const std::lock_guard lock(mutex_);
-    publish();
-    std::swap(source_, source);
-    if (source_ && is_stopping_) source_->cancel();
-  }
-  source.reset();
-}
-
-void CameraFeed::Worker::close() {
-  player_.close();
-  set_source(nullptr);
-}
-
-// Closes the source, or keeps one that cannot be opened again, and waits before the next attempt.
-void CameraFeed::Worker::look_again(const std::string& trouble) {
-  player_.status().trouble = trouble;
-  player_.status().state = CameraState::searching;
-  if (open_) close();
-  pause_ = pause_ > 0.0 ? std::min(2.0 * pause_, options_.longest_pause) : options_.first_pause;
-  wait_until(now() + pause_);
-}
-
-bool CameraFeed::Worker::open_again() {
-  try {
-    std::shared_ptr<Source> source = open_();
-    if (!source) throw Error(player_.status().uri, "nothing was opened");
-    is_live_ = source->info().live;
-    placer_.restart(source->info().clock);
-    same_pictures_ = frames_seen_ = 0;
-    newest_.reset();
-    set_source(std::move(source));
-    player_.begin(source_);
-    CameraStatus& status = player_.status();
-    if (status.state == CameraState::searching) {
-      ++status.opened_again;
-      status.state = CameraState::waiting;
-    }
-    last_heard_ = now();
-    is_starting_ = true;
-    return true;
-  } catch (const std::exception& error) {
-    look_again(error.what());
-    return false;
-  }
-}
-
-// Tells the source where the hand is.
-void CameraFeed::Worker::follow() {
-  std::optional<Vec3> hand;
-  {
-    const std::lock_guard lock(sink_mutex_);
-    if (is_connected_ && hand_) hand = hand_();
-  }
-  if (hand && source_) source_->follow(*hand);
-}
-
-// A recording, until it is to stop or has to be opened again. False: it is over.
-bool CameraFeed::Worker::run_recording() {
-  for (int errors = 0;;) {
-    {
-      std::unique_lock lock(mutex_);
-      if (is_stopping_) return true;
-      if (const auto wanted = std::exchange(wanted_, std::nullopt))
-        player_.set_playback(*wanted, now());
-      if (const auto share = std::exchange(sought_, std::nullopt)) player_.seek(*share);
-      publish();
-      const double due = player_.due(now());
-      if (!open_ && due == std::numeric_limits<double>::infinity()) return false;
-      if (now() < due) {
-        options_.clock->wait(lock, changed_, due);
-        continue;
-      }
-    }
-    if (player_.needs_source()) {
-      close();
-      return true;
-    }
-    if (player_.needs_frame()) {
-      if (!read_ahead(errors)) return true;
-    } else if (const auto fed = player_.next_until(now())) {
-      if (fed->is_new) last_heard_ = now();
-      pause_ = 0.0;
-      deliver(*fed);
-    }
-  }
-}
-
-// Reads a recording's next frame. False: it has been closed, or kept for a while, for its faults.
-bool CameraFeed::Worker::read_ahead(int& errors) {
-  const double begin = now();
-  try {
-    const Watch watch(*this, Source::no_timeout);
-    follow();
-    player_.read(begin, took_);
-    took_ = now() - begin;
-    errors = 0;
-    return true;
-  } catch (const std::exception& error) {
-    player_.status().trouble = error.what();
-    if (++errors < most_recording_errors && !player_.needs_source()) return true;
-    look_again(error.what());
-    return false;
-  }
-}
-
-// A live camera, until it is to stop or is gone.
-void CameraFeed::Worker::run_live() {
-  if (first_) take_live(*std::exchange(first_, std::nullopt));
-  for (int errors = 0; !is_stopping();) {
-    const double begin = now();
-    std::optional<Frame> frame;
-    try {
-      frame = read(options_.waiting);
-    } catch (const std::exception& error) {
-      player_.status().trouble = error.what();
-      ++player_.status().dropped;
-      if (++errors < most_live_errors) continue;
-      look_again(error.what());
-      return;
-    }
-    const double end = now();
-    if (frame) {
-      errors = 0;
-      take_live(std::move(*frame));
-      continue;
-    }
-    if (is_stopping()) return;
-    const double silent = end - last_heard_;
-    if (silent >= options_.waiting) player_.status().state = CameraState::waiting;
-    if (silent >= (is_starting_ ? options_.start_up : options_.silence)) {
-      look_again("it has delivered nothing for " + fixed(silent, 1) + " s");
-      last_heard_ = now();  // a source that cannot be opened again gets its time once more
-      return;
-    }
-    if (end - begin < 0.5 * idle_pause) wait_until(end + idle_pause);
-  }
-}
-
-// A live camera's next frame, with its arrival. @throws what its source throws
-std::optional<Frame> CameraFeed::Worker::read(double timeout) {
-  const Watch watch(*this, timeout);
-  follow();
-  std::optional<Frame> frame = source_->next(timeout);
-  const double end = now();
-  if (!frame || !frame->cloud) return std::nullopt;
-  frame->arrival = std::min(frame->arrival.value_or(end), end);
-  return frame;
-}
-
-void CameraFeed::Worker::take_live(Frame frame) {
-  CameraStatus& status = player_.status();
-  const double arrival = frame.arrival.value_or(now());
-  last_heard_ = std::max(arrival, last_heard_.load());
-  is_starting_ = false;
-  status.trouble.clear();
-  pause_ = 0.0;
-  const double known = -options_.clock->system_start();
-  const StampClock clock = source_->info().clock;
-  const double stamp = frame.stamp;
-  const PlacedStamp placed =
-      placer_.place(stamp, arrival, clock == StampClock::system ? known : 0.0);
-  if (placed.problem != StampProblem::none)
-    ++status.stamp_problems[static_cast<std::size_t>(placed.problem)];
-  same_pictures_ = is_same_picture(newest_.get(), frame.cloud.get()) ? same_pictures_ + 1 : 1;
-  newest_ = frame.cloud;
-  if (const auto& range = source_->info().range; range && frames_seen_++ % frames_a_look == 0)
-    status.doubt = doubt_of(*newest_, *range);
-  // Hazard: frozen-image
-  const bool is_frozen = same_pictures_ >= options_.frozen_frames;
-  status.latency = placer_.latency();
-  status.state = is_frozen ? CameraState::frozen : CameraState::live;
-  if (is_frozen || !placed.usable || !(placed.time > last_time_)) {
-    ++status.dropped;
-    return;
-  }
-  ++status.frames;
-  status.last_frame = frame.stamp = placed.time;
-  status.stays_valid = false;
-  deliver({std::move(frame), stamp});
-}
-
-void CameraFeed::Worker::deliver(const FedFrame& fed) {
-  const double interval = fed.frame.stamp - last_time_;
-  last_time_ = fed.frame.stamp;
-  if (double& rate = player_.status().rate;
-      fed.is_new && std::isfinite(interval) && interval > 0.0) {
-    // The mean of intervals: two frames that come at once would rule a mean of rates.
-    const double mean = rate > 0.0 ? 1.0 / rate : interval;
-    rate = 1.0 / (mean + rate_weight * (interval - mean));
-  }
-  {
-    const std::lock_guard lock(mutex_);
-    publish();
-  }
-  const std::lock_guard lock(sink_mutex_);
-  if (is_connected_) sink_(fed);
-}
-
-CameraStatus CameraFeed::Worker::status() const {
-  const std::lock_guard lock(mutex_);
-  const double time = now();
-  CameraStatus status = status_;
-  if (status.recorded == 1) status.kind += ", one frame";
-  const std::string silent = fixed(time - last_heard_, 1) + " s";
-  const bool hangs = read_until_ && time > *read_until_ + hang_margin;
-  if (is_stopping_) status.state = CameraState::stopped;
-  status.text = state_words[static_cast<std::size_t>(status.state)];
-  if (status.state == CameraState::waiting) status.text += silent;
-  if (status.state == CameraState::ended && status.stays_valid)
-    status.text += ", its last frame stays";
-  if (status.state == CameraState::waiting || status.state == CameraState::searching)
-    status.text += status.trouble.empty() ? "" : ": " + status.trouble;
-  if (hangs && !is_stopping_) {
-    status.state = CameraState::waiting;
-    status.text = "it hangs: no frame for " + silent;
-  } else if (status.state == CameraState::live && last_problem_ != StampProblem::none &&
-             time - last_problem_time_ < remark_time) {
-    status.text += "; " + std::string(problem_words[static_cast<std::size_t>(last_problem_)]);
-  } else if (status.state == CameraState::live && !status.doubt.empty()) {
-    status.text += "; " + status.doubt;
-  }
-  return status;
-}
 
 CameraFeed::CameraFeed(const std::string& uri, FeedOptions options)
     : CameraFeed(open_source(uri, options.schemes), options,

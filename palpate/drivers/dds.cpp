@@ -2,7 +2,6 @@
 #include "palpate/drivers/dds.hpp"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -11,11 +10,13 @@
 
 #include "palpate/drivers/cyclone_api.hpp"
 #include "palpate/drivers/shared_library.hpp"
-#include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate::dds {
+
+using cyclone::Duration, cyclone::Endpoint, cyclone::Entity, cyclone::Qos, cyclone::Result,
+    cyclone::SampleInfo, cyclone::Serdata, cyclone::TopicDescriptor;
 
 // All functions are Cyclone's C API but the last three, with which it hands out messages as they
 // came.
@@ -27,62 +28,53 @@ struct Library {
        .remedy = "install it: apt install libddsc0debian, or libddsc0t64 (the package "
                  "that cyclonedds-dev needs)"}};
   void (*set_log_mask)(std::uint32_t) = library.find("dds_set_log_mask");
-  cyclone::Entity (*create_domain)(std::uint32_t, const char*) = library.find("dds_create_domain");
-  cyclone::Entity (*create_participant)(std::uint32_t, const cyclone::Qos*,
-                                        const void*) = library.find("dds_create_participant");
-  cyclone::Result (*remove)(cyclone::Entity) = library.find("dds_delete");
-  cyclone::Entity (*create_topic)(cyclone::Entity, const cyclone::TopicDescriptor*, const char*,
-                                  const cyclone::Qos*,
-                                  const void*) = library.find("dds_create_topic");
-  cyclone::Entity (*create_reader)(cyclone::Entity, cyclone::Entity, const cyclone::Qos*,
-                                   const void*) = library.find("dds_create_reader");
-  cyclone::Entity (*create_writer)(cyclone::Entity, cyclone::Entity, const cyclone::Qos*,
-                                   const void*) = library.find("dds_create_writer");
-  cyclone::Entity (*create_waitset)(cyclone::Entity) = library.find("dds_create_waitset");
-  cyclone::Result (*attach)(cyclone::Entity, cyclone::Entity,
-                            std::intptr_t) = library.find("dds_waitset_attach");
-  cyclone::Result (*wait)(cyclone::Entity, std::intptr_t*, std::size_t,
-                          cyclone::Duration) = library.find("dds_waitset_wait");
-  cyclone::Result (*set_status_mask)(cyclone::Entity,
-                                     std::uint32_t) = library.find("dds_set_status_mask");
-  cyclone::Result (*read)(cyclone::Entity, void**, cyclone::SampleInfo*, std::size_t,
-                          std::uint32_t) = library.find("dds_read");
-  cyclone::Result (*return_loan)(cyclone::Entity, void**,
-                                 std::int32_t) = library.find("dds_return_loan");
-  cyclone::Result (*write)(cyclone::Entity, const void*) = library.find("dds_write");
-  cyclone::Result (*wait_for_acks)(cyclone::Entity,
-                                   cyclone::Duration) = library.find("dds_wait_for_acks");
-  cyclone::Result (*matched_readers)(cyclone::Entity, std::uint64_t*,
-                                     std::size_t) = library.find("dds_get_matched_subscriptions");
-  cyclone::Result (*matched_writers)(cyclone::Entity, std::uint64_t*,
-                                     std::size_t) = library.find("dds_get_matched_publications");
-  const char* (*reason)(cyclone::Result) = library.find("dds_strretcode");
-  cyclone::Qos* (*create_qos)() = library.find("dds_create_qos");
-  void (*delete_qos)(cyclone::Qos*) = library.find("dds_delete_qos");
-  void (*set_reliability)(cyclone::Qos*, int,
-                          cyclone::Duration) = library.find("dds_qset_reliability");
-  void (*set_durability)(cyclone::Qos*, int) = library.find("dds_qset_durability");
-  void (*set_history)(cyclone::Qos*, int, std::int32_t) = library.find("dds_qset_history");
-  void (*set_lifespan)(cyclone::Qos*, cyclone::Duration) = library.find("dds_qset_lifespan");
-  void (*set_deadline)(cyclone::Qos*, cyclone::Duration) = library.find("dds_qset_deadline");
-  void (*set_user_data)(cyclone::Qos*, const void*,
-                        std::size_t) = library.find("dds_qset_userdata");
-  bool (*user_data)(const cyclone::Qos*, void**, std::size_t*) = library.find("dds_qget_userdata");
-  cyclone::Result (*guid)(cyclone::Entity, cyclone::Guid*) = library.find("dds_get_guid");
-  cyclone::Endpoint* (*matched_reader)(cyclone::Entity, std::uint64_t) =
-      library.find("dds_get_matched_subscription_data");
-  cyclone::Endpoint* (*matched_writer)(cyclone::Entity, std::uint64_t) =
-      library.find("dds_get_matched_publication_data");
-  void (*free_endpoint)(cyclone::Endpoint*) = library.find("dds_builtintopic_free_endpoint");
+  Entity (*create_domain)(std::uint32_t, const char*) = library.find("dds_create_domain");
+  Entity (*create_participant)(std::uint32_t, const Qos*,
+                               const void*) = library.find("dds_create_participant");
+  Result (*remove)(Entity) = library.find("dds_delete");
+  Entity (*create_topic)(Entity, const TopicDescriptor*, const char*, const Qos*,
+                         const void*) = library.find("dds_create_topic");
+  Entity (*create_reader)(Entity, Entity, const Qos*,
+                          const void*) = library.find("dds_create_reader");
+  Entity (*create_writer)(Entity, Entity, const Qos*,
+                          const void*) = library.find("dds_create_writer");
+  Entity (*create_waitset)(Entity) = library.find("dds_create_waitset");
+  Result (*attach)(Entity, Entity, std::intptr_t) = library.find("dds_waitset_attach");
+  Result (*wait)(Entity, std::intptr_t*, std::size_t, Duration) = library.find("dds_waitset_wait");
+  Result (*set_status_mask)(Entity, std::uint32_t) = library.find("dds_set_status_mask");
+  Result (*read)(Entity, void**, SampleInfo*, std::size_t,
+                 std::uint32_t) = library.find("dds_read");
+  Result (*return_loan)(Entity, void**, std::int32_t) = library.find("dds_return_loan");
+  Result (*write)(Entity, const void*) = library.find("dds_write");
+  Result (*wait_for_acks)(Entity, Duration) = library.find("dds_wait_for_acks");
+  Result (*matched_readers)(Entity, std::uint64_t*,
+                            std::size_t) = library.find("dds_get_matched_subscriptions");
+  Result (*matched_writers)(Entity, std::uint64_t*,
+                            std::size_t) = library.find("dds_get_matched_publications");
+  const char* (*reason)(Result) = library.find("dds_strretcode");
+  Qos* (*create_qos)() = library.find("dds_create_qos");
+  void (*delete_qos)(Qos*) = library.find("dds_delete_qos");
+  void (*set_reliability)(Qos*, int, Duration) = library.find("dds_qset_reliability");
+  void (*set_durability)(Qos*, int) = library.find("dds_qset_durability");
+  void (*set_history)(Qos*, int, std::int32_t) = library.find("dds_qset_history");
+  void (*set_lifespan)(Qos*, Duration) = library.find("dds_qset_lifespan");
+  void (*set_deadline)(Qos*, Duration) = library.find("dds_qset_deadline");
+  void (*set_user_data)(Qos*, const void*, std::size_t) = library.find("dds_qset_userdata");
+  bool (*user_data)(const Qos*, void**, std::size_t*) = library.find("dds_qget_userdata");
+  Result (*guid)(Entity, cyclone::Guid*) = library.find("dds_get_guid");
+  Endpoint* (*matched_reader)(Entity,
+                              std::uint64_t) = library.find("dds_get_matched_subscription_data");
+  Endpoint* (*matched_writer)(Entity,
+                              std::uint64_t) = library.find("dds_get_matched_publication_data");
+  void (*free_endpoint)(Endpoint*) = library.find("dds_builtintopic_free_endpoint");
   void (*free)(void*) = library.find("dds_free");
-  cyclone::Result (*take_cdr)(cyclone::Entity, cyclone::Serdata**, std::uint32_t,
-                              cyclone::SampleInfo*, std::uint32_t) = library.find("dds_takecdr");
-  cyclone::Serdata* (*cdr_reference)(const cyclone::Serdata*, std::size_t, std::size_t,
-                                     iovec*) = library.find("ddsi_serdata_to_ser_ref");
-  void (*cdr_unreference)(cyclone::Serdata*,
-                          const iovec*) = library.find("ddsi_serdata_to_ser_unref");
-  std::uint32_t (*cdr_size)(const cyclone::Serdata*) = library.find("ddsi_serdata_size");
-  void (*cdr_release)(cyclone::Serdata*) = library.find("ddsi_serdata_unref");
+  Result (*take_cdr)(Entity, Serdata**, std::uint32_t, SampleInfo*,
+                     std::uint32_t) = library.find("dds_takecdr");
+  Serdata* (*cdr_reference)(const Serdata*, std::size_t, std::size_t,
+                            iovec*) = library.find("ddsi_serdata_to_ser_ref");
+  void (*cdr_unreference)(Serdata*, const iovec*) = library.find("ddsi_serdata_to_ser_unref");
+  std::uint32_t (*cdr_size)(const Serdata*) = library.find("ddsi_serdata_size");
+  void (*cdr_release)(Serdata*) = library.find("ddsi_serdata_unref");
 };
 
 namespace {
@@ -94,8 +86,8 @@ constexpr std::uint32_t largest_domain = 232;
 constexpr double blocking_time = 0.05;
 constexpr std::size_t most_publications = 4096;
 
-cyclone::Duration duration(double seconds) {
-  return static_cast<cyclone::Duration>(std::llround(1e9 * seconds));
+Duration duration(double seconds) {
+  return static_cast<Duration>(std::llround(1e9 * seconds));
 }
 
 std::string variable(const char* name) {
@@ -167,14 +159,14 @@ class Offer {
   ~Offer() { library_.delete_qos(qos_); }
   Offer(const Offer&) = delete;
   Offer& operator=(const Offer&) = delete;
-  [[nodiscard]] const cyclone::Qos* get() const { return qos_; }
+  [[nodiscard]] const Qos* get() const { return qos_; }
 
  private:
   const Library& library_;
-  cyclone::Qos* qos_;
+  Qos* qos_;
 };
 
-std::string user_data_of(const Library& library, const cyclone::Qos* qos) {
+std::string user_data_of(const Library& library, const Qos* qos) {
   void* data = nullptr;
   std::size_t size = 0;
   if (!library.user_data(qos, &data, &size) || data == nullptr) return {};
@@ -183,7 +175,7 @@ std::string user_data_of(const Library& library, const cyclone::Qos* qos) {
   return text;
 }
 
-Guid guid_of(const Library& library, cyclone::Entity entity) {
+Guid guid_of(const Library& library, Entity entity) {
   cyclone::Guid guid{};
   library.guid(entity, &guid);
   Guid bytes{};
@@ -192,7 +184,7 @@ Guid guid_of(const Library& library, cyclone::Entity entity) {
 }
 
 // Who a client of services is: its participant, and its own name where it says one.
-std::optional<std::string> client_of(const Library& library, cyclone::Endpoint* endpoint) {
+std::optional<std::string> client_of(const Library& library, Endpoint* endpoint) {
   if (endpoint == nullptr) return std::nullopt;
   std::string client(reinterpret_cast<const char*>(endpoint->participant_key),
                      sizeof(endpoint->participant_key));
@@ -290,7 +282,7 @@ Participant::Participant(const std::string& who, std::string_view user_data)
     : who_(who), library_(std::make_unique<Library>()), domain_(domain_wanted()) {
   library_->set_log_mask(cyclone::log_errors);  // it says much on stderr that is no fault
   // A domain lives until the process ends, and belongs to all that take part in it.
-  const cyclone::Entity domain = library_->create_domain(domain_, settings().c_str());
+  const Entity domain = library_->create_domain(domain_, settings().c_str());
   if (domain != cyclone::precondition_not_met) check(domain, "it cannot take part in the network");
   const Offer offer(*library_, {.user_data = user_data});
   entity_ =
@@ -315,22 +307,22 @@ const std::string& Participant::library_path() const {
   return library_->library.path();
 }
 
-void Participant::each_publication(const std::function<void(const cyclone::Endpoint&)>& use) {
+void Participant::each_publication(const std::function<void(const Endpoint&)>& use) {
   std::vector<void*> samples(most_publications, nullptr);
-  std::vector<cyclone::SampleInfo> infos(most_publications);
+  std::vector<SampleInfo> infos(most_publications);
   const int count = library_->read(publications_, samples.data(), infos.data(), samples.size(),
                                    static_cast<std::uint32_t>(samples.size()));
   for (int i = 0; i < count; ++i) {
-    const cyclone::SampleInfo& info = infos[static_cast<std::size_t>(i)];
+    const SampleInfo& info = infos[static_cast<std::size_t>(i)];
     if (!info.valid_data || info.instance_state != cyclone::alive_state) continue;
-    use(*static_cast<const cyclone::Endpoint*>(samples[static_cast<std::size_t>(i)]));
+    use(*static_cast<const Endpoint*>(samples[static_cast<std::size_t>(i)]));
   }
   if (count > 0) library_->return_loan(publications_, samples.data(), count);
 }
 
 std::vector<Publication> Participant::publications() {
   std::vector<Publication> heard;
-  each_publication([&](const cyclone::Endpoint& endpoint) {
+  each_publication([&](const Endpoint& endpoint) {
     const std::string topic = endpoint.topic_name;
     if (topic.starts_with(prefix))
       heard.push_back({topic.substr(prefix.size() - 1), ros_type(endpoint.type_name)});
@@ -346,7 +338,7 @@ Generation Participant::generation() {
   // From Iron on every endpoint says the hash of its type; before, none did.
   Generation found = Generation::unknown;
   const Guid own = guid();
-  each_publication([&](const cyclone::Endpoint& endpoint) {
+  each_publication([&](const Endpoint& endpoint) {
     if (endpoint.topic_name != nodes_topic || found == Generation::from_iron ||
         std::equal(own.begin(), own.end(), std::begin(endpoint.participant_key)))
       return;
@@ -369,19 +361,18 @@ int Participant::topic(const std::string& name, std::string_view type,
                        const ros::CSample& example) {
   const std::vector<std::uint32_t> code = instructions(example.fields());
   const std::string type_name = dds_type(type);
-  const cyclone::TopicDescriptor descriptor{
-      .size = static_cast<std::uint32_t>(example.size()),
-      .align = 8,
-      .flags = cyclone::no_optimise,
-      .keys = 0,
-      .type_name = type_name.c_str(),
-      .key_descriptors = nullptr,
-      .instruction_count = static_cast<std::uint32_t>(code.size()),
-      .instructions = code.data(),
-      .meta = "",
-      .type_information = {},
-      .type_mapping = {},
-      .data_representation = 0};
+  const TopicDescriptor descriptor{.size = static_cast<std::uint32_t>(example.size()),
+                                   .align = 8,
+                                   .flags = cyclone::no_optimise,
+                                   .keys = 0,
+                                   .type_name = type_name.c_str(),
+                                   .key_descriptors = nullptr,
+                                   .instruction_count = static_cast<std::uint32_t>(code.size()),
+                                   .instructions = code.data(),
+                                   .meta = "",
+                                   .type_information = {},
+                                   .type_mapping = {},
+                                   .data_representation = 0};
   const std::string dds_name = dds_topic(name, type);
   const int topic =
       library_->create_topic(entity_, &descriptor, dds_name.c_str(), nullptr, nullptr);
@@ -408,12 +399,12 @@ Reader::~Reader() {
 
 bool Reader::take(const std::function<void(std::span<const std::byte>)>& use) {
   const Library& library = *participant_.library_;
-  cyclone::Serdata* message = nullptr;
-  cyclone::SampleInfo info{};
+  Serdata* message = nullptr;
+  SampleInfo info{};
   while (library.take_cdr(entity_, &message, 1, &info, cyclone::any_state) == 1) {
     struct Release {
       const Library& library;
-      cyclone::Serdata* message;
+      Serdata* message;
       ~Release() { library.cdr_release(message); }
     } const release{library, message};
     if (!info.valid_data) continue;  // a writer that went
@@ -421,7 +412,7 @@ bool Reader::take(const std::function<void(std::span<const std::byte>)>& use) {
     iovec place{};
     struct Unreference {
       const Library& library;
-      cyclone::Serdata* message;
+      Serdata* message;
       const iovec& place;
       ~Unreference() { library.cdr_unreference(message, &place); }
     } const unreference{

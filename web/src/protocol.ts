@@ -12,7 +12,8 @@ const Colours = { none: 0, registered: 1, ownCamera: 2 } as const;
 const FRAME_HEADER = 96;
 const COLOUR_HEADER = 72;
 const TICKS_HEADER = 156;
-const SAMPLE_FLOATS = 7;
+// The numbers of a sample, in the order of the message; `t` as the time before the newest tick.
+const SAMPLE = ["t", "force", "penetration", "steps", "tickTime", "relative", "absolute"] as const;
 const RAYS_HEADER = 12;
 const PATH_HEADER = 8;
 const TOOL_HEADER = 12;
@@ -180,24 +181,14 @@ function decodeFrame(buffer: ArrayBuffer, view: DataView): Frame {
 function decodeTicks(buffer: ArrayBuffer, view: DataView): Ticks {
   need(buffer.byteLength >= TICKS_HEADER, "ticks without their header");
   const count = view.getUint16(2, true);
-  need(buffer.byteLength === TICKS_HEADER + count * 4 * SAMPLE_FLOATS, "ticks cut short");
+  need(buffer.byteLength === TICKS_HEADER + count * 4 * SAMPLE.length, "ticks cut short");
   const t = view.getFloat64(8, true);
   const values = new Float32Array(buffer, TICKS_HEADER);
   const samples: Sample[] = [];
-  for (let i = 0; i < values.length; i += SAMPLE_FLOATS) {
-    const [before, force, penetration, steps, tickTime, relative, absolute] = values.subarray(
-      i,
-      i + SAMPLE_FLOATS,
-    );
-    samples.push({
-      t: t - before!,
-      force: force!,
-      penetration: penetration!,
-      steps: steps!,
-      tickTime: tickTime!,
-      relative: relative!,
-      absolute: absolute!,
-    });
+  for (let i = 0; i < values.length; i += SAMPLE.length) {
+    const row = SAMPLE.map((name, k) => [name, values[i + k]!] as const);
+    const sample = Object.fromEntries(row) as unknown as Sample;
+    samples.push({ ...sample, t: t - sample.t });
   }
   return {
     kind: "ticks",

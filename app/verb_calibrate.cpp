@@ -20,8 +20,6 @@
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/pose.hpp"
 #include "palpate/kernel/core/uri.hpp"
-#include "palpate/session/camera_registration.hpp"
-#include "palpate/session/point_capture.hpp"
 #include "palpate/session/press.hpp"
 #include "palpate/session/registration.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "palpate/io/devices/simulated_hand.hpp"
 #include "palpate/kernel/core/error.hpp"
-#include "palpate/net/teleop/robot_step.hpp"
+#include "palpate/net/teleop/set_point.hpp"
 #include "palpate/servo/cycle.hpp"
 
 namespace palpate::lab {

@@ -16,8 +16,8 @@
 #include "palpate/io/devices/hip_path.hpp"
 #include "palpate/kernel/core/cloud.hpp"
 #include "palpate/kernel/core/parameters.hpp"
+#include "palpate/net/teleop/robot.hpp"
 #include "palpate/net/teleop/set_point.hpp"
-#include "palpate/net/teleop/simulated_tool.hpp"
 
 namespace palpate::lab {
 

@@ -12,7 +12,7 @@
 #include "lab/experiment.hpp"
 #include "lab/experiments/feel_scenes.hpp"
 #include "lab/table.hpp"
-#include "palpate/io/devices/sampled_wall.hpp"
+#include "palpate/io/devices/device_body.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/kernel/core/error.hpp"
 

@@ -9,7 +9,6 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 #include "palpate/drivers/drivers.hpp"
 #include "palpate/drivers/live_camera.hpp"

@@ -5,8 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
-#include <future>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>

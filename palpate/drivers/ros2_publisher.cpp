@@ -9,7 +9,6 @@
 
 #include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/depth_rvl.hpp"
-#include "palpate/io/sources/ros_frames.hpp"
 #include "palpate/io/sources/transforms.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/servo/realtime.hpp"

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <future>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include <boost/asio/io_context.hpp>

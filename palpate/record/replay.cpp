@@ -9,7 +9,6 @@
 #include <memory>
 #include <span>
 #include <string_view>
-#include <utility>
 
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/pose.hpp"

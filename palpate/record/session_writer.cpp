@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/record/session_writer.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 
-#include "palpate/io/bag/geometry.hpp"
+#include "palpate/io/bag/messages.hpp"
 #include "palpate/io/sources/bag_camera.hpp"
 #include "palpate/io/sources/depth_png.hpp"
 #include "palpate/io/sources/depth_rvl.hpp"

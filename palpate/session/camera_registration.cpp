@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/session/camera_registration.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -11,6 +9,7 @@
 
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/linear.hpp"
+#include "palpate/session/registration.hpp"
 
 namespace palpate {
 namespace {

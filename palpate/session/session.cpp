@@ -2,25 +2,18 @@
 #include "palpate/session/session.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <cmath>
-#include <condition_variable>
 #include <cstdio>
 #include <future>
 #include <limits>
 #include <map>
-#include <mutex>
 #include <set>
 #include <span>
-#include <thread>
 #include <utility>
 
 #include "palpate/io/devices/mouse_device.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
-#include "palpate/io/sources/source.hpp"
 #include "palpate/io/sources/tool_file.hpp"
-#include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"
 #include "palpate/kernel/cloud/proposed_touch.hpp"
 #include "palpate/kernel/cloud/proposed_view.hpp"

@@ -20,9 +20,9 @@
 #include "palpate/record/recorder.hpp"
 #include "palpate/servo/servo_loop.hpp"
 #include "palpate/session/camera_feed.hpp"
+#include "palpate/session/config.hpp"
 #include "palpate/session/paint.hpp"
 #include "palpate/session/session_hand.hpp"
-#include "palpate/session/session_spec.hpp"
 #include "palpate/session/summary.hpp"
 
 namespace palpate {

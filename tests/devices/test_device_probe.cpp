@@ -10,7 +10,6 @@
 #include "palpate/io/devices/device_body.hpp"
 #include "palpate/io/devices/device_probe.hpp"
 #include "palpate/io/devices/devices.hpp"
-#include "palpate/io/devices/sampled_wall.hpp"
 
 #include "tests/support/errors.hpp"
 

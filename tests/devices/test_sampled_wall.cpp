@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "palpate/io/devices/sampled_wall.hpp"
+#include "palpate/io/devices/device_body.hpp"
 
 namespace palpate {
 namespace test_sampled_wall {

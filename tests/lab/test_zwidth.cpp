@@ -8,7 +8,7 @@
 
 #include "lab/experiments/zwidth.hpp"
 #include "lab/runner.hpp"
-#include "palpate/io/devices/sampled_wall.hpp"
+#include "palpate/io/devices/device_body.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"

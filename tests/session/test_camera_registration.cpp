@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/io/sources/synthetic_camera.hpp"
-#include "palpate/session/camera_registration.hpp"
+#include "palpate/session/registration.hpp"
 
 #include "tests/support/errors.hpp"
 #include "tests/support/sanitized.hpp"

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "palpate/io/devices/hip_path.hpp"
-#include "palpate/session/point_capture.hpp"
+#include "palpate/session/registration.hpp"
 
 #include "tests/servo/fake_device.hpp"
 #include "tests/support/errors.hpp"

@@ -12,8 +12,8 @@
 
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/net/teleop/approach_watch.hpp"
+#include "palpate/net/teleop/robot.hpp"
 #include "palpate/net/teleop/set_point.hpp"
-#include "palpate/net/teleop/simulated_tool.hpp"
 
 #include "tests/support/errors.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "palpate/net/viewer/tick_batcher.hpp"
+#include "palpate/net/viewer/protocol.hpp"
 
 namespace palpate {
 namespace test_tick_batcher {

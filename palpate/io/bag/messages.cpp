@@ -2,7 +2,6 @@
 #include "palpate/io/bag/messages.hpp"
 
 #include <chrono>
-#include <utility>
 
 #include "palpate/kernel/core/error.hpp"
 

@@ -9,9 +9,11 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "palpate/io/bag/cdr.hpp"
+#include "palpate/kernel/core/hand.hpp"
 
 // The messages of ROS 2's standard packages that a recording is made of; fields in the order and
 // under the names of their definitions, units as ROS has them (REP 103). Each hands its fields, in
@@ -279,3 +281,16 @@ std::vector<std::byte> from_ros1(std::string_view type, std::span<const std::byt
 std::string definition_of(std::string_view type);
 
 }  // namespace palpate::ros
+
+namespace palpate {
+
+/// As messages have a vector.
+inline std::array<double, 3> components(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+
+inline ros::PoseStamped pose_of(ros::Header header, const Vec3& position, const Rotation& q) {
+  return {std::move(header), components(position), {q.x(), q.y(), q.z(), q.w()}};
+}
+
+}  // namespace palpate

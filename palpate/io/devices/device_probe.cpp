@@ -2,7 +2,6 @@
 #include "palpate/io/devices/device_probe.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -10,7 +9,7 @@
 #include <memory>
 #include <thread>
 
-#include "palpate/io/devices/sampled_wall.hpp"
+#include "palpate/io/devices/device_body.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/method.hpp"
 #include "palpate/kernel/core/pose.hpp"

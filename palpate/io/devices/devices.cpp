@@ -2,9 +2,7 @@
 #include "palpate/io/devices/devices.hpp"
 
 #include <array>
-#include <string>
 
-#include "palpate/io/devices/hip_path.hpp"
 #include "palpate/io/devices/mouse_device.hpp"
 #include "palpate/io/devices/simulated_hand.hpp"
 #include "palpate/kernel/core/error.hpp"

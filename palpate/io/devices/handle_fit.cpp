@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/io/devices/handle_fit.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -8,6 +6,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "palpate/io/devices/device_probe.hpp"
 #include "palpate/kernel/core/linear.hpp"
 
 namespace palpate {

@@ -8,7 +8,6 @@
 #include <iterator>
 #include <span>
 #include <sstream>
-#include <string>
 #include <string_view>
 #include <utility>
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numbers>
 #include <random>
-#include <string_view>
 #include <utility>
 
 #include "palpate/kernel/core/parameters.hpp"

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/net/node/node_reports.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <string_view>
 #include <utility>
-#include <vector>
 
-#include "palpate/io/bag/geometry.hpp"
+#include "palpate/io/bag/messages.hpp"
 
 namespace palpate {
 namespace {

@@ -5,7 +5,6 @@
 #include <array>
 #include <atomic>
 #include <cctype>
-#include <cmath>
 #include <exception>
 #include <functional>
 #include <mutex>
@@ -16,7 +15,6 @@
 
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/ros2_service.hpp"
-#include "palpate/io/bag/geometry.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/net/node/node_parameters.hpp"

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "palpate/io/bag/geometry.hpp"
+#include "palpate/io/bag/messages.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
 #include "palpate/kernel/core/error.hpp"

@@ -3,12 +3,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <exception>
-#include <thread>
 #include <utility>
 
-#include "palpate/io/bag/geometry.hpp"
+#include "palpate/io/bag/messages.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/io/sources/fixture_file.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"

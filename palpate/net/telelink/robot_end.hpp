@@ -15,7 +15,6 @@
 #include "palpate/net/teleop/approach_watch.hpp"
 #include "palpate/net/teleop/led_hand.hpp"
 #include "palpate/net/teleop/robot.hpp"
-#include "palpate/net/teleop/robot_step.hpp"
 #include "palpate/net/teleop/set_point.hpp"
 #include "palpate/net/teleop/touched.hpp"
 #include "palpate/session/session.hpp"

@@ -5,7 +5,6 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <mutex>
 #include <string_view>
 #include <thread>
@@ -15,7 +14,6 @@
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/tick.hpp"
-#include "palpate/net/teleop/simulated_tool.hpp"
 #include "palpate/servo/realtime.hpp"
 
 namespace palpate {

@@ -2,7 +2,6 @@
 #include "palpate/net/teleop/approach_watch.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "palpate/net/teleop/led_hand.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 

@@ -6,10 +6,8 @@
 #include <cctype>
 #include <chrono>
 #include <deque>
-#include <filesystem>
 #include <limits>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -26,7 +24,6 @@
 
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/text.hpp"
-#include "palpate/net/viewer/roles.hpp"
 
 namespace palpate {
 namespace {

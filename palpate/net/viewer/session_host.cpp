@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <span>
 #include <system_error>
-#include <utility>
 
 #include <nlohmann/json.hpp>
 

@@ -10,13 +10,12 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "palpate/kernel/cloud/proposed_touch.hpp"
+#include "palpate/net/viewer/protocol.hpp"
 #include "palpate/net/viewer/server.hpp"
-#include "palpate/net/viewer/tick_batcher.hpp"
 #include "palpate/session/observer_recordings.hpp"
 #include "palpate/session/session.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/net/teleop/simulated_tool.hpp"
+#include "palpate/net/teleop/robot.hpp"
 
 #include <algorithm>
 #include <cmath>

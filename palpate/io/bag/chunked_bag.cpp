@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "palpate/io/bag/random_access.hpp"
+#include "palpate/io/bag/chunked_bag.hpp"
 
-#include <algorithm>
 #include <bit>
 #include <cerrno>
 
@@ -9,7 +8,6 @@
 #include <unistd.h>
 
 #include "palpate/io/bag/mcap_format.hpp"
-#include "palpate/kernel/core/error.hpp"
 
 namespace palpate {
 

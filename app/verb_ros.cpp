@@ -39,12 +39,12 @@ int run_node(const RosOptions& options) {
   wishes.recordings.limit = 1e9 * config.record_limit;
   std::string ended_recording;
   {
-    const RosNode node(session, wishes);
-    fmt::print(stderr, "palpate: node {} in domain {}; Ctrl-C ends it\n", node.name(),
-               node.domain());
+    const std::unique_ptr<const RosNode> node = make_ros_node(session, wishes);
+    fmt::print(stderr, "palpate: node {} in domain {}; Ctrl-C ends it\n", node->name(),
+               node->domain());
     if (!running.ended) session.run(options.run.duration);  // the force is off when it returns
-    ended_recording = node.recording_ended();
-    if (const std::string trouble = node.trouble(); !trouble.empty())
+    ended_recording = node->recording_ended();
+    if (const std::string trouble = node->trouble(); !trouble.empty())
       fmt::print(stderr, "palpate: {}\n", trouble);
   }
   running.session = nullptr;

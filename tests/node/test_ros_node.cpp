@@ -50,7 +50,7 @@ class RosNodeTest : public ::testing::Test {
 
   void open(RosNodeOptions options = {}) {
     options.recordings.folder = folder_.path() / "recordings";
-    node_ = std::make_unique<RosNode>(*session_, options);
+    node_ = make_ros_node(*session_, options);
     session_->start();
     other_ = std::make_unique<dds::Participant>("test:");
   }
@@ -284,13 +284,13 @@ TEST_F(RosNodeTest, AnnouncesItselfFromIronOn) {
 
 TEST_F(RosNodeTest, RefusesWhatIsNoName) {
   for (const char* name : {"", "my node", "3rd", "a//b", "a/", "a/2b"})
-    EXPECT_TRUE(test::fails_saying(
-        [&] { return std::make_unique<RosNode>(*session_, RosNodeOptions{.name = name}); },
-        "--name", "not a valid node name", "palpate"))
+    EXPECT_TRUE(
+        test::fails_saying([&] { return make_ros_node(*session_, RosNodeOptions{.name = name}); },
+                           "--name", "not a valid node name", "palpate"))
         << name;
-  EXPECT_TRUE(test::fails_saying(
-      [&] { return std::make_unique<RosNode>(*session_, RosNodeOptions{.rate = 0.0}); },
-      "--publish-rate", "too low", "1 to 1000"));
+  EXPECT_TRUE(
+      test::fails_saying([&] { return make_ros_node(*session_, RosNodeOptions{.rate = 0.0}); },
+                         "--publish-rate", "too low", "1 to 1000"));
 }
 
 }  // namespace test_ros_node

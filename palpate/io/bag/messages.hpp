@@ -27,6 +27,12 @@ struct TypeName {
   consteval TypeName(const char (&name)[size]) { std::copy_n(name, size, text); }
   [[nodiscard]] constexpr std::string_view view() const { return {text, size - 1}; }
 };
+template <std::size_t a, std::size_t b>
+consteval TypeName<a + b - 1> operator+(const TypeName<a>& name, const TypeName<b>& suffix) {
+  char text[a + b - 1]{};
+  std::copy_n(suffix.text, b, std::copy_n(name.text, a - 1, text));
+  return text;
+}
 
 /// A message of one field.
 template <TypeName name, class Data>

@@ -169,68 +169,49 @@ struct ServiceMessage {
   static void walk(auto& way, auto& m) { way(m.header, m.content); }
 };
 
-struct SetParameters {
-  using Request =
-      ServiceMessage<"rcl_interfaces/srv/SetParameters_Request", std::vector<Parameter>>;
-  using Reply =
-      ServiceMessage<"rcl_interfaces/srv/SetParameters_Response", std::vector<SetParametersResult>>;
-};
-
-struct SetParametersAtomically {
-  using Request =
-      ServiceMessage<"rcl_interfaces/srv/SetParametersAtomically_Request", std::vector<Parameter>>;
-  using Reply =
-      ServiceMessage<"rcl_interfaces/srv/SetParametersAtomically_Response", SetParametersResult>;
+/// A service by its name, and what is asked and answered.
+template <TypeName name, class Asked, class Answered>
+struct ServiceType {
+  using Request = ServiceMessage<name + TypeName("_Request"), Asked>;
+  using Reply = ServiceMessage<name + TypeName("_Response"), Answered>;
 };
 
 /// Requests that name parameters.
 using ParameterNames = std::vector<std::string>;
 
-struct GetParameters {
-  using Request = ServiceMessage<"rcl_interfaces/srv/GetParameters_Request", ParameterNames>;
-  using Reply =
-      ServiceMessage<"rcl_interfaces/srv/GetParameters_Response", std::vector<ParameterValue>>;
+using SetParameters = ServiceType<"rcl_interfaces/srv/SetParameters", std::vector<Parameter>,
+                                  std::vector<SetParametersResult>>;
+using SetParametersAtomically = ServiceType<"rcl_interfaces/srv/SetParametersAtomically",
+                                            std::vector<Parameter>, SetParametersResult>;
+using GetParameters =
+    ServiceType<"rcl_interfaces/srv/GetParameters", ParameterNames, std::vector<ParameterValue>>;
+using GetParameterTypes =
+    ServiceType<"rcl_interfaces/srv/GetParameterTypes", ParameterNames, std::vector<std::uint8_t>>;
+using DescribeParameters = ServiceType<"rcl_interfaces/srv/DescribeParameters", ParameterNames,
+                                       std::vector<ParameterDescriptor>>;
+
+struct ParametersWithin {
+  std::vector<std::string> prefixes;
+  std::uint64_t depth = 0;  ///< 0: any
+
+  static void walk(auto& way, auto& m) { way(m.prefixes, m.depth); }
 };
+struct ParametersFound {
+  std::vector<std::string> names, prefixes;
 
-struct GetParameterTypes {
-  using Request = ServiceMessage<"rcl_interfaces/srv/GetParameterTypes_Request", ParameterNames>;
-  using Reply =
-      ServiceMessage<"rcl_interfaces/srv/GetParameterTypes_Response", std::vector<std::uint8_t>>;
+  static void walk(auto& way, auto& m) { way(m.names, m.prefixes); }
 };
+using ListParameters =
+    ServiceType<"rcl_interfaces/srv/ListParameters", ParametersWithin, ParametersFound>;
 
-struct DescribeParameters {
-  using Request = ServiceMessage<"rcl_interfaces/srv/DescribeParameters_Request", ParameterNames>;
-  using Reply = ServiceMessage<"rcl_interfaces/srv/DescribeParameters_Response",
-                               std::vector<ParameterDescriptor>>;
+struct TriggerOutcome {
+  bool success = false;
+  std::string message;
+
+  static void walk(auto& way, auto& m) { way(m.success, m.message); }
 };
-
-struct ListParameters {
-  struct Within {
-    std::vector<std::string> prefixes;
-    std::uint64_t depth = 0;  ///< 0: any
-
-    static void walk(auto& way, auto& m) { way(m.prefixes, m.depth); }
-  };
-  struct Found {
-    std::vector<std::string> names, prefixes;
-
-    static void walk(auto& way, auto& m) { way(m.names, m.prefixes); }
-  };
-  using Request = ServiceMessage<"rcl_interfaces/srv/ListParameters_Request", Within>;
-  using Reply = ServiceMessage<"rcl_interfaces/srv/ListParameters_Response", Found>;
-};
-
-struct Trigger {
-  struct Outcome {
-    bool success = false;
-    std::string message;
-
-    static void walk(auto& way, auto& m) { way(m.success, m.message); }
-  };
-  /// IDL has no struct without a field; ROS sends this byte.
-  using Request = ServiceMessage<"std_srvs/srv/Trigger_Request", std::uint8_t>;
-  using Reply = ServiceMessage<"std_srvs/srv/Trigger_Response", Outcome>;
-};
+/// IDL has no struct without a field; ROS sends this byte.
+using Trigger = ServiceType<"std_srvs/srv/Trigger", std::uint8_t, TriggerOutcome>;
 
 // ---------------------------------------------------------------------------- nodes
 

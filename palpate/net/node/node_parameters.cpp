@@ -129,10 +129,10 @@ ros::ParameterDescriptor NodeParameters::describe(const std::string& name) const
   return unknown;
 }
 
-ros::ListParameters::Found NodeParameters::list(const ros::ListParameters::Within& within) const {
+ros::ParametersFound NodeParameters::list(const ros::ParametersWithin& within) const {
   const std::vector<std::string>& prefixes = within.prefixes;
   const std::uint64_t depth = within.depth;
-  ros::ListParameters::Found reply;
+  ros::ParametersFound reply;
   for (const Row& row : rows_) {
     const std::string& name = row.descriptor.name;
     const bool is_asked_for =

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -27,7 +26,7 @@ class NodeParameters {
   /// With meaning, unit, default and range. Without a type where there is none of that name.
   [[nodiscard]] ros::ParameterDescriptor describe(const std::string& name) const;
   /// As rcl_interfaces has it: those whose name is a prefix or lies below one, to that depth.
-  [[nodiscard]] ros::ListParameters::Found list(const ros::ListParameters::Within& within) const;
+  [[nodiscard]] ros::ParametersFound list(const ros::ParametersWithin& within) const;
   /// Whole numbers are treated as numbers, as people write them.
   /// @throws Error for an unknown name (naming the nearest), a value of another type or out of its
   ///         range, and what can be read alone.

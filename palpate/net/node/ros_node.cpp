@@ -15,6 +15,7 @@
 
 #include "palpate/drivers/dds.hpp"
 #include "palpate/drivers/ros2_service.hpp"
+#include "palpate/io/bag/messages.hpp"
 #include "palpate/io/bag/node_messages.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/net/node/node_parameters.hpp"
@@ -117,11 +118,9 @@ struct HandTopics {
   bool fresh = false;  // a tick came since the last message
 };
 
-}  // namespace
-
-class RosNode::Impl {
+class Node final : public RosNode {
  public:
-  Impl(Session& session, const RosNodeOptions& options)
+  Node(Session& session, const RosNodeOptions& options)
       : session_(session),
         node_(checked_name(options.name)),
         name_(node_.full()),
@@ -169,15 +168,15 @@ class RosNode::Impl {
         known_(parameters_.all(session.settings())),
         thread_([this] { run(); }) {}
 
-  ~Impl() {
+  ~Node() override {
     ends_ = true;
     thread_.join();
   }
 
-  [[nodiscard]] const std::string& name() const { return name_; }
-  [[nodiscard]] std::uint32_t domain() const { return participant_.domain(); }
-  [[nodiscard]] std::string recording_ended() const { return recordings_.ended(); }
-  [[nodiscard]] std::string trouble() const {
+  [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] std::uint32_t domain() const override { return participant_.domain(); }
+  [[nodiscard]] std::string recording_ended() const override { return recordings_.ended(); }
+  [[nodiscard]] std::string trouble() const override {
     const std::lock_guard lock(trouble_mutex_);
     return trouble_;
   }
@@ -432,21 +431,10 @@ class RosNode::Impl {
   std::thread thread_;
 };
 
-RosNode::RosNode(Session& session, const RosNodeOptions& options)
-    : impl_(std::make_unique<Impl>(session, options)) {}
-RosNode::~RosNode() = default;
+}  // namespace
 
-const std::string& RosNode::name() const {
-  return impl_->name();
-}
-std::uint32_t RosNode::domain() const {
-  return impl_->domain();
-}
-std::string RosNode::trouble() const {
-  return impl_->trouble();
-}
-std::string RosNode::recording_ended() const {
-  return impl_->recording_ended();
+std::unique_ptr<RosNode> make_ros_node(Session& session, const RosNodeOptions& options) {
+  return std::make_unique<Node>(session, options);
 }
 
 }  // namespace palpate

@@ -24,24 +24,20 @@ struct RosNodeOptions {
 /// no tick waits for it.
 class RosNode {
  public:
-  /// Takes part in the network from now on. Before the first, nothing of this process may fork
-  /// later.
-  /// @param session  must outlive this
-  /// @throws Error if a name is none, the rate is out of range, or DDS is missing.
-  RosNode(Session& session, const RosNodeOptions& options);
-  ~RosNode();
+  virtual ~RosNode() = default;
 
   /// With its namespace: "/palpate".
-  [[nodiscard]] const std::string& name() const;
-  [[nodiscard]] std::uint32_t domain() const;
+  [[nodiscard]] virtual const std::string& name() const = 0;
+  [[nodiscard]] virtual std::uint32_t domain() const = 0;
   /// What could not be done, the last of it; empty if all went well.
-  [[nodiscard]] std::string trouble() const;
+  [[nodiscard]] virtual std::string trouble() const = 0;
   /// Why the last recording was ended by its limits; empty if it was not.
-  [[nodiscard]] std::string recording_ended() const;
-
- private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  [[nodiscard]] virtual std::string recording_ended() const = 0;
 };
+
+/// Takes part in the network from now on. Before the first, nothing of this process may fork later.
+/// @param session  must outlive the node
+/// @throws Error if a name is none, the rate is out of range, or DDS is missing.
+std::unique_ptr<RosNode> make_ros_node(Session& session, const RosNodeOptions& options);
 
 }  // namespace palpate

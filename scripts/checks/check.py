@@ -12,44 +12,28 @@ import shutil
 import subprocess
 import sys
 
-# Who may know whom (docs/design.md): what is not listed is not allowed.
-KNOWS = {
-    "core": set(),
-    "paper": {"core"},
-    "sight": {"core", "paper", "cloud"},
-    "tool": {"core", "cloud", "feel", "sight"},
-    "feel": {"core"},
-    "methods": {"core", "paper", "sight", "feel", "tool"},
-    "cloud": {"core"},
-    "fixtures": {"core"},
-    "servo": {"core", "fixtures"},
-    "teleop": {"core", "fixtures", "servo"},
-    "bag": {"core"},
-    "sources": {"core", "cloud", "fixtures", "bag", "tool"},
-    "devices": {"core", "servo"},
-    "drivers": {"core", "cloud", "servo", "bag", "sources", "devices"},
-    "record": {"core", "tool", "methods", "cloud", "fixtures", "servo", "bag", "sources"},
-    "session": {"core", "methods", "cloud", "servo", "sources", "devices", "drivers", "bag",
-                "record"},
-    "node": {"core", "methods", "servo", "bag", "drivers", "session"},
-    "telelink": {"core", "bag", "cloud", "drivers", "fixtures", "servo", "session", "sources",
-                 "teleop"},
-    "viewer": {"core", "methods", "cloud", "tool", "servo", "sources", "devices", "record",
-               "session"},
-    "site": {"core", "methods", "cloud", "servo", "bag", "sources", "devices", "drivers", "record",
-             "session", "viewer"},
-    "search": {"core"},
-    "lab": {"core", "paper", "methods", "cloud", "fixtures", "tool", "servo", "teleop", "sources",
-            "devices", "search"},
-    "robot": {"core", "cloud", "sources", "servo", "teleop"},
-    "bench": {"core", "paper", "methods", "cloud", "search"},
-}
-KNOWS["app"] = set(KNOWS) - {"search", "lab", "bench", "robot", "site"}
-KNOWS["python"] = KNOWS["app"] - {"node", "viewer"} | {"lab"}
-# The programs that are built when they are first asked for.
-KNOWS["app/lab"] = KNOWS["app"] | {"app", "lab"}
-KNOWS["app/robot"] = KNOWS["app"] | {"app", "robot"}
-KNOWS["app/bench"] = KNOWS["app"] | {"app", "bench"}
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def allowed():
+    """Who may know whom, {room: rooms}: the table of docs/design.md."""
+    text = (ROOT / "docs/design.md").read_text(encoding="utf-8")
+    table = text.partition("| depends on |")[2].partition("\n\n")[0]
+    rows = re.findall(r"^\| `(\S+)` \|.*\| (.*) \|$", table, re.M)
+    names = [path if path.startswith("app/") else path.rpartition("/")[2] for path, _ in rows]
+    library = {name for name, (path, _) in zip(names, rows) if path.startswith("palpate/")}
+    knows = {}
+    for name, (_, cell) in zip(names, rows):
+        listed, _, without = cell.partition(" except ")
+        knows[name] = set(re.findall(r"\w+", listed)) & set(names)
+        if "all library modules" in listed:
+            knows[name] |= library - set(re.findall(r"\w+", without))
+        if "the dependencies of app" in listed:
+            knows[name] |= knows["app"]
+    return knows
+
+
+KNOWS = allowed()
 
 # Folders of palpate/ that hold rooms.
 GROUPS = {"kernel", "io", "net"}

@@ -20,14 +20,15 @@ constexpr double edge_feature = 0.010;  // [m] the sphere on an edge: two r_c
 
 // ---- Hands. ----
 
-// Along the surface from (x, y): `depth` under it along its own normals.
-std::vector<Vec3> under_surface(const FieldScene& scene, double x, double y, double heading,
+// Along the surface, from `begin` [m] past the origin on: `depth` under it along its own normals.
+std::vector<Vec3> under_surface(const FieldScene& scene, double heading, double begin,
                                 double length, double depth) {
   std::vector<Vec3> places;
   constexpr int pieces = 60;
   for (int i = 0; i <= pieces; ++i) {
     const double way = length * i / pieces;
-    const Place place = below(scene, x + way * math::cos(heading), y + way * math::sin(heading));
+    const Place place = below(scene, begin * math::cos(heading) + way * math::cos(heading),
+                              begin * math::sin(heading) + way * math::sin(heading));
     places.emplace_back(place.point - depth * place.normal);
   }
   return places;
@@ -70,28 +71,34 @@ double settled(const Pressing& p) {
 }
 
 // Down on a place, pressed for a while, and away again.
-Script press_and_lift(const Place& place, const Pressing& p, double start, double after = 0.5) {
+Script press_and_lift(const Place& place, const Pressing& p, double start) {
   Script script(place.point + p.hover * p.out);
   script.wait(start)
       .reach(place.point - p.depth * p.out, p.speed)
       .wait(p.hold)
       .reach(place.point + p.height * p.out, p.speed)
-      .wait(after);
+      .wait(0.5);
   return script;
 }
 
 // Down, along the places, and away again.
-Script stroke_and_lift(const std::vector<Vec3>& places, const Vec3& out, const Pressing& p,
-                       double start, double speed, double after = 0.5) {
-  Script script(places.front() + (p.depth + p.hover) * out);
+// @param from, to  [m] off the first and the last place, before and after
+Script stroke_and_lift(const std::vector<Vec3>& places, const Vec3& from, const Vec3& to,
+                       const Pressing& p, double start, double speed) {
+  Script script(places.front() + from);
   script.wait(start)
       .reach(places.front(), p.speed)
       .wait(0.3)
       .stroke(places, speed)
       .wait(p.hold)
-      .reach(places.back() + (p.depth + p.height) * out, p.speed)
-      .wait(after);
+      .reach(places.back() + to, p.speed)
+      .wait(0.5);
   return script;
+}
+Script stroke_and_lift(const std::vector<Vec3>& places, const Vec3& out, const Pressing& p,
+                       double start, double speed) {
+  return stroke_and_lift(places, (p.depth + p.hover) * out, (p.depth + p.height) * out, p, start,
+                         speed);
 }
 
 // ---- Things that come. ----
@@ -150,6 +157,12 @@ FieldScene terrain_scene(Draw& draw) {
   return {still(terrain(std::move(bumps)))};
 }
 
+// One of several.
+FieldScene any_scene(Draw& draw, const std::vector<FieldScene (*)(Draw&)>& scenes) {
+  const int kind = draw.whole("geometry", static_cast<int>(scenes.size()));
+  return scenes[static_cast<std::size_t>(kind)](draw);
+}
+
 // ---- The classes. ----
 
 void plane_press(Draw& draw, Setting& setting, double start) {
@@ -158,20 +171,19 @@ void plane_press(Draw& draw, Setting& setting, double start) {
   play_script(setting, press_and_lift(place, pressing(draw, place.normal), start));
 }
 
-void slide_on(Draw& draw, Setting& setting, double start, double x, double y, double longest) {
+void slide_on(Draw& draw, Setting& setting, double start) {
   const Pressing p = pressing(draw, Vec3::UnitZ());
+  constexpr double longest = 0.12;  // [m]
   const double length = draw.even("slide", 0.4 * longest, longest);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
-  const std::vector<Vec3> places =
-      under_surface(setting.scene, x - 0.5 * length * math::cos(heading),
-                    y - 0.5 * length * math::sin(heading), heading, length, p.depth);
   play_script(setting,
-              stroke_and_lift(places, p.out, p, start, draw.by_factor("slide_speed", 0.08, 0.5)));
+              stroke_and_lift(under_surface(setting.scene, heading, -0.5 * length, length, p.depth),
+                              p.out, p, start, draw.by_factor("slide_speed", 0.08, 0.5)));
 }
 
 void plane_slide(Draw& draw, Setting& setting, double start) {
   setting.scene = plane_scene(draw);
-  slide_on(draw, setting, start, 0.0, 0.0, 0.12);
+  slide_on(draw, setting, start);
 }
 
 // Quick taps, and a press in the end.
@@ -198,7 +210,6 @@ void plane_tap(Draw& draw, Setting& setting, double start) {
 
 void bowl_press(Draw& draw, Setting& setting, double start) {
   setting.scene = bowl_scene(draw);
-  setting.most_tilt = 0.5;
   const double off = draw.even("off", 0.0, 0.5) * draw.even("bowl", 0.035, 0.08);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const Place place =
@@ -210,14 +221,11 @@ void bowl_press(Draw& draw, Setting& setting, double start) {
 
 void bowl_slide(Draw& draw, Setting& setting, double start) {
   setting.scene = bowl_scene(draw);
-  setting.most_tilt = 0.5;
   Pressing p = pressing(draw, Vec3::UnitZ());
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const double far = 0.7 * draw.even("bowl", 0.035, 0.08);
-  const double depth = std::min(p.depth, 0.008);
   const std::vector<Vec3> places =
-      under_surface(setting.scene, -0.4 * far * math::cos(heading), -0.4 * far * math::sin(heading),
-                    heading, 1.4 * far, depth);
+      under_surface(setting.scene, heading, -0.4 * far, 1.4 * far, std::min(p.depth, 0.008));
   play_script(setting, stroke_and_lift(places, Vec3::UnitZ(), p, start,
                                        draw.by_factor("slide_speed", 0.05, 0.2)));
 }
@@ -228,10 +236,7 @@ void corner_slide(Draw& draw, Setting& setting, double start) {
   const double open_y = draw.even("open_y", 0.0, 0.25);
   setting.scene = {still(ground()), still(ground(), turned(0.5 * pi - open_x, Vec3::UnitY())),
                    still(ground(), turned(-0.5 * pi + open_y, Vec3::UnitX()))};
-  setting.azimuth = 0.25 * pi;
-  setting.azimuth_range = 0.5;
-  setting.least_tilt = 0.3;
-  setting.most_tilt = 0.9;
+  setting.view = {.azimuth = 0.25 * pi, .azimuth_range = 0.5, .least_tilt = 0.3};
   const Pressing p = pressing(draw, Vec3::UnitZ());
   const double from_x = draw.even("from_x", 0.03, 0.07);
   const double from_y = draw.even("from_y", 0.03, 0.07);
@@ -240,15 +245,8 @@ void corner_slide(Draw& draw, Setting& setting, double start) {
   const Vec3 from(from_x, from_y, -into);
   const Vec3 to(wall == 1 ? from_x : -into, wall == 0 ? from_y : -into, -into);
   const Vec3 out = Vec3(1.0, 1.0, 1.2).normalized();
-  Script script(from + p.hover * Vec3::UnitZ());
-  script.wait(start)
-      .reach(from, p.speed)
-      .wait(0.3)
-      .reach(to, draw.by_factor("slide_speed", 0.05, 0.3))
-      .wait(p.hold)
-      .reach(to + p.height * out, p.speed)
-      .wait(0.5);
-  play_script(setting, script);
+  play_script(setting, stroke_and_lift({from, to}, p.hover * Vec3::UnitZ(), p.height * out, p,
+                                       start, draw.by_factor("slide_speed", 0.05, 0.3)));
 }
 
 // Up: along a tread into the riser. Down: along a tread and down on the next.
@@ -263,9 +261,7 @@ void stairs(Draw& draw, Setting& setting, double start) {
     setting.scene.push_back(still(box(Vec3(0.5 * (end - begin), 0.3, 0.5 * deep)),
                                   at(0.5 * (begin + end), 0.0, i * rise - 0.5 * deep)));
   }
-  setting.azimuth = pi;  // it sees the risers
-  setting.azimuth_range = 1.0;
-  setting.most_tilt = 0.9;
+  setting.view = {.azimuth = pi, .azimuth_range = 1.0};  // it sees the risers
   setting.feature = edge_feature;
   const Pressing p = pressing(draw, Vec3::UnitZ());
   const double into = std::min(p.depth, 0.008);
@@ -278,15 +274,8 @@ void stairs(Draw& draw, Setting& setting, double start) {
                              {-into - 0.008, y, -rise - into},
                              {-0.5 * run, y, -rise - into}};
   const Vec3 out = Vec3(-0.3, 0.0, 1.0).normalized();
-  Script script(places.front() + p.hover * Vec3::UnitZ());
-  script.wait(start)
-      .reach(places.front(), p.speed)
-      .wait(0.3)
-      .stroke(places, draw.by_factor("slide_speed", 0.05, 0.3))
-      .wait(p.hold)
-      .reach(places.back() + p.height * out, p.speed)
-      .wait(0.5);
-  play_script(setting, script);
+  play_script(setting, stroke_and_lift(places, p.hover * Vec3::UnitZ(), p.height * out, p, start,
+                                       draw.by_factor("slide_speed", 0.05, 0.3)));
 }
 
 void torus_press(Draw& draw, Setting& setting, double start) {
@@ -323,7 +312,6 @@ void rod_press(Draw& draw, Setting& setting, double start) {
   setting.scene = {still(capsule(0.25, radius), at(0.0, 0.0, -radius)),
                    still(ground(), at(0.0, 0.0, -2.0 * radius - gap))};
   setting.feature = 2.0 * radius;
-  setting.most_tilt = 0.6;
   const Place place = below(setting.scene, draw.even("along", -0.04, 0.04), 0.0);
   Pressing p = pressing(draw, place.normal);
   p.out = Vec3::UnitZ();
@@ -339,8 +327,7 @@ void sheet_press(Draw& draw, Setting& setting, double start) {
   const Vec3 front = pose.linear() * Vec3::UnitZ();
   setting.scene = {still(box(Vec3(0.11, 0.11, 0.5 * thick)), pose * at(0.0, 0.0, -0.5 * thick)),
                    still(ground(), at(0.0, 0.0, -0.16))};
-  setting.azimuth_range = 0.6;
-  setting.least_tilt = std::max(lean - 0.9, 0.0);
+  setting.view = {.azimuth_range = 0.6, .least_tilt = std::max(lean - 0.9, 0.0)};
   setting.most_tilt = std::min(lean + 0.9, setting.most_tilt);
   const Vec3 on = pose.linear() * Vec3(draw.even("u", -0.05, 0.05), draw.even("v", -0.05, 0.05), 0);
   Pressing p = pressing(draw, front);
@@ -364,7 +351,6 @@ FieldScene cloth_scene(Draw& draw) {
 
 void cloth_rest(Draw& draw, Setting& setting, double start) {
   setting.scene = cloth_scene(draw);
-  setting.most_tilt = 0.9;
   Pressing p = pressing(draw, Vec3::UnitZ());
   p.hold += 1.0;
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
@@ -372,7 +358,6 @@ void cloth_rest(Draw& draw, Setting& setting, double start) {
 
 void cloth_slide(Draw& draw, Setting& setting, double start) {
   setting.scene = cloth_scene(draw);
-  setting.most_tilt = 0.9;
   const Pressing p = pressing(draw, Vec3::UnitZ());
   const double length = draw.even("slide", 0.05, 0.12);
   const Vec3 way = toward(draw.even("heading", 0.0, 2.0 * pi));
@@ -406,8 +391,7 @@ void torso_palpate(Draw& draw, Setting& setting, double start) {
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const double length = draw.even("slide", 0.04, 0.09);
   const std::vector<Vec3> places =
-      under_surface(setting.scene, -0.5 * length * math::cos(heading),
-                    -0.5 * length * math::sin(heading), heading, length, p.depth);
+      under_surface(setting.scene, heading, -0.5 * length, length, p.depth);
   Script script(places.front() + (p.depth + p.hover) * Vec3::UnitZ());
   script.wait(start)
       .reach(places.front(), p.speed)
@@ -424,8 +408,7 @@ void torso_palpate(Draw& draw, Setting& setting, double start) {
 
 void terrain_slide(Draw& draw, Setting& setting, double start) {
   setting.scene = terrain_scene(draw);
-  setting.most_tilt = 0.9;
-  slide_on(draw, setting, start, 0.0, 0.0, 0.12);
+  slide_on(draw, setting, start);
 }
 
 // A box on a belt arrives under a waiting hand and stays; the hand presses on it.
@@ -440,7 +423,6 @@ void belt_under(Draw& draw, Setting& setting, double start) {
   setting.scene = {still(ground(), at(0.0, 0.0, -height)),
                    moving(box(half), from_to(to - from * way, to, begin, seconds,
                                              turned(draw.even("turn", 0.0, pi), Vec3::UnitZ())))};
-  setting.most_tilt = 0.8;
   Pressing p = pressing(draw, Vec3::UnitZ());
   p.hover = draw.even("above", 0.03, 0.06);
   const Place place{Vec3(draw.even("x", -0.02, 0.02), draw.even("y", -0.02, 0.02), 0.0),
@@ -463,7 +445,6 @@ void belt_beside(Draw& draw, Setting& setting, double start) {
   setting.scene = {still(ground()),
                    moving(box(half), from_to(to - from * way, to, start + settled(p), seconds,
                                              turned(heading, Vec3::UnitZ())))};
-  setting.most_tilt = 0.8;
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
@@ -482,7 +463,6 @@ void belt_ride(Draw& draw, Setting& setting, double start) {
       still(ground(), at(0.0, 0.0, -height)),
       moving(box(half), from_to(middle - half_way, middle + half_way, start + settled(p), seconds,
                                 turned(heading, Vec3::UnitZ())))};
-  setting.most_tilt = 0.8;
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
@@ -504,7 +484,6 @@ void wedge_under(Draw& draw, Setting& setting, double start) {
   setting.scene = {still(ground()),
                    moving(box(Vec3(long_half, 0.07, thick_half)),
                           from_to(-before * way, after * way, start + settled(p), seconds, turn))};
-  setting.most_tilt = 0.8;
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
@@ -524,7 +503,6 @@ void table_dome(Draw& draw, Setting& setting, double start) {
       still(cylinder(0.16, 0.015), at(axis - 0.015 * Vec3::UnitZ())),
       still(ground(), at(0.0, 0.0, -0.03)),
       moving(ball(radius), turning(axis, before + after, start + settled(p), seconds, dome))};
-  setting.most_tilt = 0.8;
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
@@ -544,7 +522,6 @@ void table_follow(Draw& draw, Setting& setting, double start) {
       still(ground(), at(0.0, 0.0, -height - 0.03)),
       moving(can == 1 ? cylinder(wide, 0.5 * height) : box(Vec3(wide, wide, 0.5 * height)),
              turning(Vec3::Zero(), angle, begin, seconds, thing))};
-  setting.most_tilt = 0.8;
   const Vec3 first = out * toward(-0.5 * angle);
   const Vec3 deep = p.depth * Vec3::UnitZ();
   Script script(first + p.hover * Vec3::UnitZ());
@@ -570,7 +547,6 @@ void arm_over(Draw& draw, Setting& setting, double start) {
   p.height = std::min(p.height, over.z() - 0.06);
   add_arm(setting.scene, arm_motion(over + 0.06 * toward(heading), heading, start + settled(p),
                                     seconds, there, stays));
-  setting.most_tilt = 0.6;
   play_script(setting, press_and_lift({Vec3::Zero(), Vec3::UnitZ()}, p, start));
 }
 
@@ -582,7 +558,6 @@ void arm_under(Draw& draw, Setting& setting, double start) {
   // The back of the hand comes to lie under the origin: its top is 27 mm above the axis.
   const Vec3 tips = 0.135 * toward(heading);
   add_arm(setting.scene, arm_motion(tips, heading, start + 0.2, seconds, 0.0, true));
-  setting.most_tilt = 0.7;
   const double back = draw.even("along", -0.02, 0.02);
   const Vec3 on = back * toward(heading);
   const double then = start + 0.2 + seconds + draw.even("pause", 0.0, 0.5);
@@ -596,11 +571,8 @@ void arm_under(Draw& draw, Setting& setting, double start) {
 
 // A hand in free space over anything, while an arm comes and goes on the table's other side.
 void hover(Draw& draw, Setting& setting, double start) {
-  constexpr std::array scenes = {plane_scene, bowl_scene, torus_scene, terrain_scene, cloth_scene};
   setting.scene =
-      scenes[static_cast<std::size_t>(draw.whole("geometry", static_cast<int>(scenes.size())))](
-          draw);
-  setting.most_tilt = 0.8;
+      any_scene(draw, {plane_scene, bowl_scene, torus_scene, terrain_scene, cloth_scene});
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const Vec3 beside(0.0, 0.0, 0.10);
   add_arm(setting.scene, arm_motion(beside - 0.10 * toward(heading), heading, start + 0.5,
@@ -621,19 +593,14 @@ void hover(Draw& draw, Setting& setting, double start) {
 
 // Down, along, and away as fast as a hand goes; then it stays in free space.
 void lift_off(Draw& draw, Setting& setting, double start) {
-  constexpr std::array scenes = {plane_scene, torso_scene, terrain_scene, cloth_scene};
-  setting.scene =
-      scenes[static_cast<std::size_t>(draw.whole("geometry", static_cast<int>(scenes.size())))](
-          draw);
-  setting.most_tilt = 1.0;
+  setting.scene = any_scene(draw, {plane_scene, torso_scene, terrain_scene, cloth_scene});
   Pressing p = pressing(draw, Vec3::UnitZ());
   p.hold = draw.even("rest", 0.1, 0.4);
   p.height = draw.even("away", 0.12, 0.16);
   const double length = draw.even("slide", 0.0, 0.06);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const std::vector<Vec3> places =
-      under_surface(setting.scene, -0.5 * length * math::cos(heading),
-                    -0.5 * length * math::sin(heading), heading, length, p.depth);
+      under_surface(setting.scene, heading, -0.5 * length, length, p.depth);
   Script script(places.front() + (p.depth + p.hover) * p.out);
   script.wait(start)
       .reach(places.front(), p.speed)
@@ -649,35 +616,36 @@ constexpr std::array classes = {
     FieldClass{"plane-press", "a plane seen at 0 to 70 degrees, pressed and left", plane_press},
     FieldClass{"plane-slide", "the same, strokes of up to 0.5 m/s", plane_slide},
     FieldClass{"plane-tap", "the same, quick taps and a press", plane_tap},
-    FieldClass{"bowl-press", "the inside of a cup or a bowl", bowl_press},
-    FieldClass{"bowl-slide", "along the inside of a bowl, up its wall", bowl_slide},
-    FieldClass{"corner-slide", "three planes that meet: from the floor to the walls", corner_slide},
-    FieldClass{"stairs", "up into a riser, or down on the next tread", stairs},
+    FieldClass{"bowl-press", "the inside of a cup or a bowl", bowl_press, 0.5},
+    FieldClass{"bowl-slide", "along the inside of a bowl, up its wall", bowl_slide, 0.5},
+    FieldClass{"corner-slide", "three planes that meet: from the floor to the walls", corner_slide,
+               0.9},
+    FieldClass{"stairs", "up into a riser, or down on the next tread", stairs, 0.9},
     FieldClass{"torus-press", "on a ring", torus_press},
     FieldClass{"torus-slide", "along a ring", torus_slide},
-    FieldClass{"rod-press", "a rod or a cable of 6 to 10 mm over a table", rod_press},
+    FieldClass{"rod-press", "a rod or a cable of 6 to 10 mm over a table", rod_press, 0.6},
     FieldClass{"sheet-press", "the front of a wall 3 mm thick", sheet_press},
-    FieldClass{"cloth-rest", "a cloth that undulates under a resting hand", cloth_rest},
-    FieldClass{"cloth-slide", "a stroke over such a cloth", cloth_slide},
+    FieldClass{"cloth-rest", "a cloth that undulates under a resting hand", cloth_rest, 0.9},
+    FieldClass{"cloth-slide", "a stroke over such a cloth", cloth_slide, 0.9},
     FieldClass{"torso-rest", "a resting hand on a torso that breathes", torso_rest},
     FieldClass{"torso-palpate", "taps and strokes on it", torso_palpate},
-    FieldClass{"terrain-slide", "a stroke over bumps and hollows", terrain_slide},
+    FieldClass{"terrain-slide", "a stroke over bumps and hollows", terrain_slide, 0.9},
     FieldClass{"belt-under", "a box arrives sideways under the hand, which then presses on it",
-               belt_under},
-    FieldClass{"belt-beside", "a box arrives beside the pressing hand and stays", belt_beside},
-    FieldClass{"belt-ride", "a long box moves on under the hand that rests on it", belt_ride},
+               belt_under, 0.8},
+    FieldClass{"belt-beside", "a box arrives beside the pressing hand and stays", belt_beside, 0.8},
+    FieldClass{"belt-ride", "a long box moves on under the hand that rests on it", belt_ride, 0.8},
     FieldClass{"wedge-under", "an inclined board is pushed under the HIP at rest and stays",
-               wedge_under},
+               wedge_under, 0.8},
     FieldClass{"table-dome", "a dome on a turntable passes under the resting hand, or stops there",
-               table_dome},
+               table_dome, 0.8},
     FieldClass{"table-follow", "the HIP moves in a circle with an object on a turntable",
-               table_follow},
+               table_follow, 0.8},
     FieldClass{"arm-over", "an arm reaches in over the pressing hand, and leaves or stays",
-               arm_over},
+               arm_over, 0.6},
     FieldClass{"arm-under", "a visitor's hand is laid under the waiting hand, which presses on it",
-               arm_under},
-    FieldClass{"hover", "a hand in free space, an arm beside it", hover},
-    FieldClass{"lift-off", "pressed, slid, and away at 0.5 m/s", lift_off}};
+               arm_under, 0.7},
+    FieldClass{"hover", "a hand in free space, an arm beside it", hover, 0.8},
+    FieldClass{"lift-off", "pressed, slid, and away at 0.5 m/s", lift_off, 1.0}};
 
 // ---- Cameras. ----
 

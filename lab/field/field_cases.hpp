@@ -58,6 +58,8 @@ struct FieldClass {
   std::string_view summary;
   /// Fills in the setting. @param start  [s] when the camera has shown the scene
   void (*make)(Draw&, Setting&, double start);
+  double most_tilt =
+      1.22;  ///< [rad] of the camera off straight above, if not set there; 70 degrees
 };
 
 /// A camera, how far from the hand it is, and when it sees.

@@ -31,82 +31,135 @@ std::optional<double> ahead(double entry, double exit, double reach) {
   return std::max(entry, 0.0);
 }
 
-std::optional<double> trace(const Shape& shape, const Vec3& from, const Vec3& way, double begin,
-                            double end, double t) {
+ShapePtr solid(Shape shape) {
+  return std::make_shared<const Shape>(std::move(shape));
+}
+
+struct Height {
+  double z;
+  double along_x, along_y;  // its derivatives
+};
+using HeightAt = std::function<Height(double x, double y, double t)>;
+
+double distance_from(const HeightAt& height, double steepest, const Vec3& p, double t) {
+  const Height below = height(p.x(), p.y(), t);
+  const double above = p.z() - below.z;
+  const double safe = above / std::sqrt(1.0 + steepest * steepest);
+  constexpr double near = 0.04;  // [m] nearer than this the foot of the perpendicular is found
+  if (std::abs(safe) > near) return safe;
+  double x = p.x();
+  double y = p.y();
+  double best = std::abs(above);
+  for (int i = 0; i < 6; ++i) {
+    // The foot on the tangent plane is the next place.
+    const Height at = height(x, y, t);
+    const Vec3 normal = Vec3(-at.along_x, -at.along_y, 1.0).normalized();
+    const Vec3 foot = p - normal.dot(p - Vec3(x, y, at.z)) * normal;
+    x = foot.x();
+    y = foot.y();
+    const double found = (p - Vec3(x, y, height(x, y, t).z)).norm();
+    const double gain = best - found;
+    best = std::min(best, found);
+    if (std::abs(gain) < 1e-13) break;
+  }
+  return std::copysign(best, above);
+}
+
+// A surface that has one height at each place.
+// @param highest   [m] no place is higher
+// @param steepest  [-] no place is steeper
+ShapePtr relief(const HeightAt& height, double highest, double steepest, bool deforms) {
+  const auto cast = [=](const Vec3& from, const Vec3& way, double reach,
+                        double t) -> std::optional<double> {
+    double gone = 0.0;
+    if (from.z() > highest) {
+      if (way.z() >= 0.0) return std::nullopt;
+      gone = (highest - from.z()) / way.z();
+    }
+    const double slow = 1.0 / (steepest * way.head<2>().norm() + std::abs(way.z()));
+    for (int i = 0; i < 400 && gone <= reach; ++i) {
+      const Vec3 p = from + gone * way;
+      const double above = p.z() - height(p.x(), p.y(), t).z;
+      if (above < touches) return gone;
+      if (p.z() > highest + 1e-9 && way.z() >= 0.0) return std::nullopt;
+      gone += above * slow;  // it cannot be met sooner
+    }
+    return std::nullopt;
+  };
+  return solid({[=](const Vec3& p, double t) { return distance_from(height, steepest, p, t); },
+                infinite, cast, deforms});
+}
+
+}  // namespace
+
+std::optional<double> Shape::cast(const Vec3& from, const Vec3& way, double reach, double t) const {
+  if (known_cast) return known_cast(from, way, reach, t);
+  double gone = 0.0;
+  double end = reach;
+  if (std::isfinite(radius)) {
+    const auto crossed = through_ball(from, way, radius + touches);
+    if (!crossed || crossed->second < 0.0) return std::nullopt;
+    gone = std::max(crossed->first, 0.0);
+    end = std::min(crossed->second, reach);
+  }
   constexpr int most_steps = 400;
-  double gone = begin;
   for (int i = 0; i < most_steps && gone <= end; ++i) {
-    const double room = shape.distance(from + gone * way, t);
+    const double room = distance(from + gone * way, t);
     if (room < touches) return gone;
     gone += room;
   }
   return std::nullopt;
 }
 
-class Ground final : public Shape {
- public:
-  double distance(const Vec3& p, double /*t*/) const override { return p.z(); }
-  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
-                             double /*t*/) const override {
+ShapePtr ground() {
+  const auto cast = [](const Vec3& from, const Vec3& way, double reach,
+                       double /*t*/) -> std::optional<double> {
     if (from.z() <= 0.0) return 0.0;
     if (way.z() >= 0.0) return std::nullopt;
     const double gone = -from.z() / way.z();
     return gone <= reach ? std::optional(gone) : std::nullopt;
-  }
-};
+  };
+  return solid({[](const Vec3& p, double /*t*/) { return p.z(); }, infinite, cast});
+}
 
-class Ball final : public Shape {
- public:
-  explicit Ball(double radius) : radius_(radius) {}
-  double distance(const Vec3& p, double /*t*/) const override { return p.norm() - radius_; }
-  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
-                             double /*t*/) const override {
-    const auto crossed = through_ball(from, way, radius_);
+ShapePtr ball(double radius) {
+  const auto cast = [=](const Vec3& from, const Vec3& way, double reach, double /*t*/) {
+    const auto crossed = through_ball(from, way, radius);
     return crossed ? ahead(crossed->first, crossed->second, reach) : std::nullopt;
-  }
-  double radius() const override { return radius_; }
+  };
+  return solid({[=](const Vec3& p, double /*t*/) { return p.norm() - radius; }, radius, cast});
+}
 
- private:
-  double radius_;
-};
-
-class Box final : public Shape {
- public:
-  explicit Box(const Vec3& half) : half_(half) {}
-  double distance(const Vec3& p, double /*t*/) const override {
-    const Vec3 beyond = p.cwiseAbs() - half_;
-    return beyond.cwiseMax(0.0).norm() + std::min(beyond.maxCoeff(), 0.0);
-  }
-  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
-                             double /*t*/) const override {
+ShapePtr box(const Vec3& half) {
+  const auto cast = [=](const Vec3& from, const Vec3& way, double reach,
+                        double /*t*/) -> std::optional<double> {
     double entry = -infinite;
     double exit = infinite;
     for (int i = 0; i < 3; ++i) {
       if (way[i] == 0.0) {
-        if (std::abs(from[i]) > half_[i]) return std::nullopt;
+        if (std::abs(from[i]) > half[i]) return std::nullopt;
         continue;
       }
-      const double one = (-half_[i] - from[i]) / way[i];
-      const double other = (half_[i] - from[i]) / way[i];
+      const double one = (-half[i] - from[i]) / way[i];
+      const double other = (half[i] - from[i]) / way[i];
       entry = std::max(entry, std::min(one, other));
       exit = std::min(exit, std::max(one, other));
     }
     return entry <= exit ? ahead(entry, exit, reach) : std::nullopt;
-  }
-  double radius() const override { return half_.norm(); }
+  };
+  const auto distance = [=](const Vec3& p, double /*t*/) {
+    const Vec3 beyond = p.cwiseAbs() - half;
+    return beyond.cwiseMax(0.0).norm() + std::min(beyond.maxCoeff(), 0.0);
+  };
+  return solid({distance, half.norm(), cast});
+}
 
- private:
-  Vec3 half_;
-};
-
-class Capsule final : public Shape {
- public:
-  Capsule(double half, double radius) : half_(half), radius_(radius) {}
-  double distance(const Vec3& p, double /*t*/) const override {
-    return (p - Vec3(std::clamp(p.x(), -half_, half_), 0.0, 0.0)).norm() - radius_;
-  }
-  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
-                             double t) const override {
+ShapePtr capsule(double half, double radius) {
+  const auto distance = [=](const Vec3& p, double /*t*/) {
+    return (p - Vec3(std::clamp(p.x(), -half, half), 0.0, 0.0)).norm() - radius;
+  };
+  const auto cast = [=](const Vec3& from, const Vec3& way, double reach,
+                        double t) -> std::optional<double> {
     if (distance(from, t) <= 0.0) return 0.0;
     std::optional<double> first;
     const auto keep = [&](std::optional<double> met) {
@@ -117,140 +170,58 @@ class Capsule final : public Shape {
     const Vec2 across = way.tail<2>();
     const double a = across.squaredNorm();
     const double b = origin.dot(across);
-    const double squared = b * b - a * (origin.squaredNorm() - radius_ * radius_);
+    const double squared = b * b - a * (origin.squaredNorm() - radius * radius);
     if (a > 0.0 && squared >= 0.0) {
       const double gone = (-b - std::sqrt(squared)) / a;
-      if (gone >= 0.0 && gone <= reach && std::abs(from.x() + gone * way.x()) <= half_) keep(gone);
+      if (gone >= 0.0 && gone <= reach && std::abs(from.x() + gone * way.x()) <= half) keep(gone);
     }
-    for (const double end : {-half_, half_}) {
-      const auto crossed = through_ball(from - Vec3(end, 0.0, 0.0), way, radius_);
+    for (const double end : {-half, half}) {
+      const auto crossed = through_ball(from - Vec3(end, 0.0, 0.0), way, radius);
       if (crossed) keep(ahead(crossed->first, crossed->second, reach));
     }
     return first;
-  }
-  double radius() const override { return half_ + radius_; }
+  };
+  return solid({distance, half + radius, cast});
+}
 
- private:
-  double half_;
-  double radius_;
-};
-
-class Cylinder final : public Shape {
- public:
-  Cylinder(double radius, double half) : radius_(radius), half_(half) {}
-  double distance(const Vec3& p, double /*t*/) const override {
-    const Vec2 beyond(p.head<2>().norm() - radius_, std::abs(p.z()) - half_);
+ShapePtr cylinder(double radius, double half) {
+  const auto distance = [=](const Vec3& p, double /*t*/) {
+    const Vec2 beyond(p.head<2>().norm() - radius, std::abs(p.z()) - half);
     return beyond.cwiseMax(0.0).norm() + std::min(beyond.maxCoeff(), 0.0);
-  }
-  double radius() const override { return math::hypot(radius_, half_); }
+  };
+  return solid({distance, math::hypot(radius, half)});
+}
 
- private:
-  double radius_;
-  double half_;
-};
+ShapePtr torus(double ring, double tube) {
+  const auto distance = [=](const Vec3& p, double /*t*/) {
+    return math::hypot(p.head<2>().norm() - ring, p.z()) - tube;
+  };
+  return solid({distance, ring + tube});
+}
 
-class Torus final : public Shape {
- public:
-  Torus(double ring, double tube) : ring_(ring), tube_(tube) {}
-  double distance(const Vec3& p, double /*t*/) const override {
-    return math::hypot(p.head<2>().norm() - ring_, p.z()) - tube_;
-  }
-  double radius() const override { return ring_ + tube_; }
-
- private:
-  double ring_;
-  double tube_;
-};
-
-class Bowl final : public Shape {
- public:
-  Bowl(double inner, double wall, double rim)
-      : middle_(inner + 0.5 * wall),
-        half_wall_(0.5 * wall),
-        rim_(std::sqrt(middle_ * middle_ - rim * rim), rim) {}
-  double distance(const Vec3& p, double /*t*/) const override {
+ShapePtr bowl(double inner, double wall, double rim) {
+  const double middle = inner + 0.5 * wall;
+  const double half_wall = 0.5 * wall;
+  const Vec2 end(std::sqrt(middle * middle - rim * rim), rim);  // [m] from the axis, and z
+  const auto distance = [=](const Vec3& p, double /*t*/) {
     // In the plane through p and the axis the wall is an arc, drawn with a round pen.
     const Vec2 q(p.head<2>().norm(), p.z());
-    const bool beyond_rim = rim_.y() * q.x() < rim_.x() * q.y();
-    return (beyond_rim ? (q - rim_).norm() : std::abs(q.norm() - middle_)) - half_wall_;
+    const bool beyond_rim = end.y() * q.x() < end.x() * q.y();
+    return (beyond_rim ? (q - end).norm() : std::abs(q.norm() - middle)) - half_wall;
+  };
+  return solid({distance, middle + half_wall});
+}
+
+ShapePtr terrain(std::vector<Bump> bumps) {
+  double highest = 0.0;
+  double steepest = 0.0;
+  for (const Bump& bump : bumps) {
+    highest += std::max(bump.height, 0.0);
+    steepest += std::abs(bump.height) / bump.width * math::exp(-0.5);
   }
-  double radius() const override { return middle_ + half_wall_; }
-
- private:
-  double middle_;
-  double half_wall_;
-  Vec2 rim_;  // [m] from the axis, and z
-};
-
-struct Height {
-  double z;
-  double along_x, along_y;  // its derivatives
-};
-
-// A surface that has one height at each place.
-class Relief : public Shape {
- public:
-  double distance(const Vec3& p, double t) const final {
-    const Height below = height(p.x(), p.y(), t);
-    const double above = p.z() - below.z;
-    const double safe = above / std::sqrt(1.0 + steepest_ * steepest_);
-    constexpr double near = 0.04;  // [m] nearer than this the foot of the perpendicular is found
-    if (std::abs(safe) > near) return safe;
-    double x = p.x();
-    double y = p.y();
-    double best = std::abs(above);
-    for (int i = 0; i < 6; ++i) {
-      // The foot on the tangent plane is the next place.
-      const Height at = height(x, y, t);
-      const Vec3 normal = Vec3(-at.along_x, -at.along_y, 1.0).normalized();
-      const Vec3 foot = p - normal.dot(p - Vec3(x, y, at.z)) * normal;
-      x = foot.x();
-      y = foot.y();
-      const double found = (p - Vec3(x, y, height(x, y, t).z)).norm();
-      const double gain = best - found;
-      best = std::min(best, found);
-      if (std::abs(gain) < 1e-13) break;
-    }
-    return std::copysign(best, above);
-  }
-
-  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
-                             double t) const final {
-    double gone = 0.0;
-    if (from.z() > highest_) {
-      if (way.z() >= 0.0) return std::nullopt;
-      gone = (highest_ - from.z()) / way.z();
-    }
-    const double slow = 1.0 / (steepest_ * way.head<2>().norm() + std::abs(way.z()));
-    for (int i = 0; i < 400 && gone <= reach; ++i) {
-      const Vec3 p = from + gone * way;
-      const double above = p.z() - height(p.x(), p.y(), t).z;
-      if (above < touches) return gone;
-      if (p.z() > highest_ + 1e-9 && way.z() >= 0.0) return std::nullopt;
-      gone += above * slow;  // it cannot be met sooner
-    }
-    return std::nullopt;
-  }
-
- protected:
-  virtual Height height(double x, double y, double t) const = 0;
-  double highest_ = 0.0;   // [m] no place is higher
-  double steepest_ = 0.0;  // [-] no place is steeper
-};
-
-class Terrain final : public Relief {
- public:
-  explicit Terrain(std::vector<Bump> bumps) : bumps_(std::move(bumps)) {
-    for (const Bump& bump : bumps_) {
-      highest_ += std::max(bump.height, 0.0);
-      steepest_ += std::abs(bump.height) / bump.width * math::exp(-0.5);
-    }
-  }
-
- protected:
-  Height height(double x, double y, double /*t*/) const override {
+  const auto height = [bumps = std::move(bumps)](double x, double y, double /*t*/) {
     Height sum{0.0, 0.0, 0.0};
-    for (const Bump& bump : bumps_) {
+    for (const Bump& bump : bumps) {
       const double narrow = 1.0 / (bump.width * bump.width);
       const double dx = x - bump.x;
       const double dy = y - bump.y;
@@ -260,26 +231,20 @@ class Terrain final : public Relief {
       sum.along_y -= dy * narrow * part;
     }
     return sum;
+  };
+  return relief(height, highest, steepest, false);
+}
+
+ShapePtr cloth(std::vector<Wave> waves) {
+  double highest = 0.0;
+  double steepest = 0.0;
+  for (const Wave& wave : waves) {
+    highest += wave.height;
+    steepest += 2.0 * std::numbers::pi * wave.height / wave.length;
   }
-
- private:
-  std::vector<Bump> bumps_;
-};
-
-class Cloth final : public Relief {
- public:
-  explicit Cloth(std::vector<Wave> waves) : waves_(std::move(waves)) {
-    for (const Wave& wave : waves_) {
-      highest_ += wave.height;
-      steepest_ += 2.0 * std::numbers::pi * wave.height / wave.length;
-    }
-  }
-  bool deforms() const override { return true; }
-
- protected:
-  Height height(double x, double y, double t) const override {
+  const auto height = [waves = std::move(waves)](double x, double y, double t) {
     Height sum{0.0, 0.0, 0.0};
-    for (const Wave& wave : waves_) {
+    for (const Wave& wave : waves) {
       const double k = 2.0 * std::numbers::pi / wave.length;
       const double kx = k * math::cos(wave.heading);
       const double ky = k * math::sin(wave.heading);
@@ -293,77 +258,24 @@ class Cloth final : public Relief {
       sum.along_y += ky * slope;
     }
     return sum;
-  }
+  };
+  return relief(height, highest, steepest, true);
+}
 
- private:
-  std::vector<Wave> waves_;
-};
-
-class Torso final : public Shape {
- public:
-  Torso(const Vec3& rest, const Vec3& breath, double frequency)
-      : rest_(rest), breath_(breath), frequency_(frequency) {}
-  double distance(const Vec3& p, double t) const override { return ellipsoid_distance(half(t), p); }
-  std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
-                             double t) const override {
+ShapePtr torso(const Vec3& rest, const Vec3& breath, double frequency) {
+  const auto half = [=](double t) {
+    return Vec3(rest + 0.5 * (1.0 - math::cos(2.0 * std::numbers::pi * frequency * t)) * breath);
+  };
+  const auto cast = [=](const Vec3& from, const Vec3& way, double reach, double t) {
     // Where its axes are shrunk to 1 it is a ball.
     const Vec3 half_axes = half(t);
     const Vec3 shrunk = way.cwiseQuotient(half_axes);
     const double scale = shrunk.norm();
     const auto crossed = through_ball(from.cwiseQuotient(half_axes), shrunk / scale, 1.0);
     return crossed ? ahead(crossed->first / scale, crossed->second / scale, reach) : std::nullopt;
-  }
-  double radius() const override { return (rest_ + breath_).maxCoeff(); }
-  bool deforms() const override { return true; }
-
- private:
-  Vec3 half(double t) const {
-    return rest_ + 0.5 * (1.0 - math::cos(2.0 * std::numbers::pi * frequency_ * t)) * breath_;
-  }
-  Vec3 rest_;
-  Vec3 breath_;
-  double frequency_;
-};
-
-}  // namespace
-
-std::optional<double> Shape::cast(const Vec3& from, const Vec3& way, double reach, double t) const {
-  if (!std::isfinite(radius())) return trace(*this, from, way, 0.0, reach, t);
-  const auto crossed = through_ball(from, way, radius() + touches);
-  if (!crossed || crossed->second < 0.0) return std::nullopt;
-  return trace(*this, from, way, std::max(crossed->first, 0.0), std::min(crossed->second, reach),
-               t);
-}
-
-ShapePtr ground() {
-  return std::make_shared<Ground>();
-}
-ShapePtr ball(double radius) {
-  return std::make_shared<Ball>(radius);
-}
-ShapePtr box(const Vec3& half) {
-  return std::make_shared<Box>(half);
-}
-ShapePtr capsule(double half, double radius) {
-  return std::make_shared<Capsule>(half, radius);
-}
-ShapePtr cylinder(double radius, double half) {
-  return std::make_shared<Cylinder>(radius, half);
-}
-ShapePtr torus(double ring, double tube) {
-  return std::make_shared<Torus>(ring, tube);
-}
-ShapePtr bowl(double inner, double wall, double rim) {
-  return std::make_shared<Bowl>(inner, wall, rim);
-}
-ShapePtr terrain(std::vector<Bump> bumps) {
-  return std::make_shared<Terrain>(std::move(bumps));
-}
-ShapePtr cloth(std::vector<Wave> waves) {
-  return std::make_shared<Cloth>(std::move(waves));
-}
-ShapePtr torso(const Vec3& rest, const Vec3& breath, double frequency) {
-  return std::make_shared<Torso>(rest, breath, frequency);
+  };
+  return solid({[=](const Vec3& p, double t) { return ellipsoid_distance(half(t), p); },
+                (rest + breath).maxCoeff(), cast, true});
 }
 
 double ellipsoid_distance(const Vec3& half, const Vec3& p) {
@@ -394,7 +306,7 @@ Snapshot::Snapshot(const FieldScene& scene, double t, Which which) : t_(t) {
   for (const Body& body : scene) {
     if (which != Which::all && body.still() != (which == Which::still)) continue;
     const Eigen::Isometry3d pose = body.motion ? body.motion(t) : body.rest;
-    parts_.push_back({body.shape.get(), pose, pose.inverse(), body.shape->radius()});
+    parts_.push_back({body.shape.get(), pose, pose.inverse(), body.shape->radius});
   }
 }
 

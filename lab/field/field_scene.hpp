@@ -14,22 +14,22 @@
 
 namespace palpate::lab::field {
 
-/// A solid by its signed distance, in its own axes, at a time.
-class Shape {
- public:
-  virtual ~Shape() = default;
-  /// [m] from the surface to `p` [m]; negative inside. At most the true one where it is large.
-  [[nodiscard]] virtual double distance(const Vec3& p, double t) const = 0;
-  /// [m] from `from` along the unit vector `way` to the surface, within `reach` [m]; none: it is
-  /// not met. By sphere tracing, unless a shape knows better.
-  [[nodiscard]] virtual std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
-                                                   double t) const;
-  /// [m] of a ball about the origin that holds the solid; infinite if there is none.
-  [[nodiscard]] virtual double radius() const { return std::numeric_limits<double>::infinity(); }
-  /// Does it change its form with time?
-  [[nodiscard]] virtual bool deforms() const { return false; }
-};
+/// A solid in its own axes.
+struct Shape {
+  using Cast = std::optional<double>(const Vec3& from, const Vec3& way, double reach, double t);
 
+  /// [m] from the surface to `p` [m] at a time [s]; negative inside. At most the true one where it
+  /// is large.
+  std::function<double(const Vec3& p, double t)> distance;
+  double radius;                     ///< [m] of a ball about the origin that holds it, or infinite
+  std::function<Cast> known_cast{};  ///< as `cast`; none: by sphere tracing
+  bool deforms = false;              ///< it changes its form with time
+
+  /// [m] from `from` along the unit vector `way` to the surface, within `reach` [m]; none: it is
+  /// not met.
+  [[nodiscard]] std::optional<double> cast(const Vec3& from, const Vec3& way, double reach,
+                                           double t) const;
+};
 using ShapePtr = std::shared_ptr<const Shape>;
 
 /// All below z = 0.
@@ -80,7 +80,7 @@ struct Body {
   Eigen::Isometry3d rest = Eigen::Isometry3d::Identity();  ///< world from body, if it never moves
   std::function<Eigen::Isometry3d(double t)> motion{};     ///< world from body; none: at rest
 
-  [[nodiscard]] bool still() const { return !motion && !shape->deforms(); }
+  [[nodiscard]] bool still() const { return !motion && !shape->deforms; }
 };
 
 using FieldScene = std::vector<Body>;

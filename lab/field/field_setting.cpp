@@ -208,12 +208,14 @@ Stage make_stage(const FieldCase& c) {
   // The hand waits until the camera has shown the scene at least three times.
   const double start = 0.1 + plan.latency + 4.0 / rate;
 
+  const FieldClass& of = find_field_class(c.name, *c.set);
   Setting setting;
-  find_field_class(c.name, *c.set).make(draw, setting, start);
-
-  const double tilt = draw.even("tilt", setting.least_tilt, setting.most_tilt);
-  const double azimuth = draw.even("azimuth", setting.azimuth - setting.azimuth_range,
-                                   setting.azimuth + setting.azimuth_range);
+  const View& view = setting.view;
+  setting.most_tilt = of.most_tilt;
+  of.make(draw, setting, start);
+  const double tilt = draw.even("tilt", view.least_tilt, setting.most_tilt);
+  const double azimuth =
+      draw.even("azimuth", view.azimuth - view.azimuth_range, view.azimuth + view.azimuth_range);
   Stage stage;
   stage.sensor = std::make_shared<Sensor>(
       plan.setup,

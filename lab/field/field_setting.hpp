@@ -89,15 +89,20 @@ Body still(ShapePtr shape, const Eigen::Isometry3d& place = Eigen::Isometry3d::I
 Body moving(ShapePtr shape, std::function<Eigen::Isometry3d(double)> motion);
 Vec3 toward(double heading);
 
+/// Where the camera may be.
+struct View {
+  double azimuth = 0.0;       ///< [rad] to which side it may be tilted
+  double azimuth_range = pi;  ///< [rad] to both sides of it
+  double least_tilt = 0.0;    ///< [rad] off straight above
+};
+
 /// A class fills this in; the camera is put before it afterwards.
 struct Setting {
   FieldScene scene;
   std::function<Vec3(double t)> hip;
-  double duration = 0.0;      ///< [s]
-  double least_tilt = 0.0;    ///< [rad] of the camera, off straight above
-  double most_tilt = 1.22;    ///< [rad] 70 degrees
-  double azimuth = 0.0;       ///< [rad] to which side it may be tilted
-  double azimuth_range = pi;  ///< [rad] to both sides of it
+  double duration = 0.0;  ///< [s]
+  View view;
+  double most_tilt = 0.0;  ///< [rad] as View's; the class has set it
   double feature = std::numeric_limits<double>::infinity();
   /// Adds what depends on where the camera is [m]; may be none.
   std::function<void(FieldScene&, const Vec3& eye)> before_camera{};

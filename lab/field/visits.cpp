@@ -173,10 +173,7 @@ void box_against(Draw& draw, Setting& setting, double start) {
   if (draw.whole("leaves", 2) == 1)
     path.reach(front(-0.2), draw.by_factor("leaving", 0.1, 0.5)).wait(1.2);
   setting.scene = {still(ground()), moving(box(half), along(path, turned(heading, Vec3::UnitZ())))};
-  setting.azimuth = heading;  // its front is seen
-  setting.azimuth_range = 1.2;
-  setting.least_tilt = 0.4;
-  setting.most_tilt = 1.0;
+  setting.view = {.azimuth = heading, .azimuth_range = 1.2, .least_tilt = 0.4};  // of its front
   play(draw, setting, hand.until(path.duration()));
 }
 
@@ -184,8 +181,7 @@ void box_against(Draw& draw, Setting& setting, double start) {
 void sheet_under(Draw& draw, Setting& setting, double start) {
   const double thick = draw.even("thick", 0.001, 0.003);
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
-  Hand hand = hand_over(draw, start, up(0.0), up(1.0), 0.008);
-  hand.press(up(0.0));
+  Hand hand = hand_over(draw, start, up(0.0), up(1.0), 0.008).press(up(0.0));
   const auto front = [&](double x) { return Vec3(x * toward(heading) + up(0.5 * thick)); };
   Script path(front(-0.12));
   path.wait(hand.now()).reach(front(0.05), pushing(draw)).wait(1.3);
@@ -196,7 +192,6 @@ void sheet_under(Draw& draw, Setting& setting, double start) {
       still(ground()),
       moving(box(Vec3(half, half, 0.5 * thick)), along(path, turn * at(-half, 0.0, 0.0))),
       moving(capsule(half, 0.5 * thick), along(path, turn * turned(0.5 * pi, Vec3::UnitZ())))};
-  setting.most_tilt = 0.9;
   play(draw, setting, hand.until(path.duration()));
 }
 
@@ -218,7 +213,6 @@ void box_under(Draw& draw, Setting& setting, double start) {
   }
   setting.scene = {still(ground(), at(up(-tall))),
                    moving(box(half), along(path, turned(heading, Vec3::UnitZ())))};
-  setting.most_tilt = 0.9;
   play(draw, setting, hand);
 }
 
@@ -241,7 +235,6 @@ void put_under(Draw& draw, Setting& setting, double start) {
   visitor.enter(setting.scene, thing.shape, heading);
   setting.scene.push_back(still(ground(), at(up(-tall))));
   hand.until(visitor.now()).press(up(-tall)).rest(1.0);
-  setting.most_tilt = 0.8;
   play(draw, setting, hand);
 }
 
@@ -252,8 +245,7 @@ void put_beside(Draw& draw, Setting& setting, double start) {
   const Thing thing = thing_of(draw, tall);
   const Vec3 away = behind(toward(heading));
   const double speed = carrying(draw);
-  Hand hand = hand_over(draw, start);
-  hand.press(up(0.0));
+  Hand hand = hand_over(draw, start).press(up(0.0));
   const Vec3 middle =
       up(0.5 * tall) + away - (draw.even("beside", 0.012, 0.04) + thing.reach) * toward(heading);
   Visitor visitor(middle, middle - thing.reach * toward(heading));
@@ -262,9 +254,8 @@ void put_beside(Draw& draw, Setting& setting, double start) {
   if (draw.whole("leaves", 2) == 1) visitor.fetch(away, speed);
   visitor.enter(setting.scene, thing.shape, heading);
   setting.scene.push_back(still(ground()));
-  setting.azimuth = heading;  // the hand is on the camera's side of the thing
-  setting.azimuth_range = 1.4;
-  setting.most_tilt = 0.8;
+  // The hand is on the camera's side of the thing.
+  setting.view = {.azimuth = heading, .azimuth_range = 1.4};
   play(draw, setting, hand.until(visitor.now() + 1.1));
 }
 
@@ -275,8 +266,7 @@ void taken_away(Draw& draw, Setting& setting, double start) {
   const double heading = draw.even("heading", 0.0, 2.0 * pi);
   const Vec3 half(draw.even("wide", 0.03, 0.06), draw.even("deep", 0.03, 0.06), 0.5 * tall);
   const Vec3 away = behind(toward(heading));
-  Hand hand = hand_over(draw, start);
-  hand.press(up(0.0));
+  Hand hand = hand_over(draw, start).press(up(0.0));
   Visitor visitor(up(-half.z()), up(0.0) + away - half.x() * toward(heading));
   visitor.until(hand.now());
   visitor.alone(-away, carrying(draw));
@@ -284,7 +274,6 @@ void taken_away(Draw& draw, Setting& setting, double start) {
   visitor.enter(setting.scene, draw.whole("can", 2) == 1 ? cylinder(half.x(), half.z()) : box(half),
                 heading);
   setting.scene.push_back(still(ground(), at(up(-tall))));
-  setting.most_tilt = 0.8;
   play(draw, setting, hand.until(visitor.now() + 1.2));
 }
 
@@ -298,8 +287,7 @@ void turntable_things(Draw& draw, Setting& setting, double start) {
   const double angle =
       (draw.whole("back", 2) == 1 ? -1.0 : 1.0) * draw.by_factor("angle", 0.6, 3.0);
   const double seconds = draw.even("turning", 2.0, 3.5);
-  Hand hand = hand_over(draw, start);
-  hand.press(up(0.0));
+  Hand hand = hand_over(draw, start).press(up(0.0));
   const Vec3 axis(-out, 0.0, 0.0);
   setting.scene = {still(cylinder(0.16, disc_half), at(axis - up(disc_half))),
                    still(ground(), at(up(-2.0 * disc_half)))};
@@ -322,7 +310,6 @@ void turntable_things(Draw& draw, Setting& setting, double start) {
     put(i == 0 ? box(Vec3(half, half, tall)) : cylinder(half, tall), chance.even(0.0, 2.0 * pi),
         Vec3(out + 0.05, 0.0, tall));
   }
-  setting.most_tilt = 0.8;
   play(draw, setting, hand.until(hand.now() + seconds + 1.2));
 }
 
@@ -336,13 +323,11 @@ void turntable_wobble(Draw& draw, Setting& setting, double start) {
   const Vec3 axis(-out, 0.0, 0.0);
   // Where it is before it turns tells where the hand presses.
   const Place on = below({still(cylinder(0.16, disc_half), at(axis) * disc)}, 0.0, 0.0);
-  Hand hand = hand_over(draw, start, on.point);
-  hand.press(on.point);
+  Hand hand = hand_over(draw, start, on.point).press(on.point);
   setting.scene = {
       still(ground(), at(up(-0.04))),
       moving(cylinder(0.16, disc_half),
              turning(axis, draw.by_factor("angle", 1.0, 6.0), hand.now(), seconds, disc))};
-  setting.most_tilt = 0.8;
   play(draw, setting, hand.until(hand.now() + seconds + 1.2));
 }
 
@@ -384,7 +369,6 @@ constexpr double pile_feature = 0.012;  // [m] its thinnest rods
 void pile_feel(Draw& draw, Setting& setting, double start) {
   setting.scene = pile_of(draw);
   setting.feature = pile_feature;
-  setting.most_tilt = 0.7;
   const Vec3 way = toward(draw.even("heading", 0.0, 2.0 * pi));
   const double length = draw.even("stroke", 0.04, 0.10);
   std::vector<Vec3> places;
@@ -404,14 +388,12 @@ void pile_feel(Draw& draw, Setting& setting, double start) {
 void pile_add(Draw& draw, Setting& setting, double start) {
   setting.scene = pile_of(draw);
   setting.feature = pile_feature;
-  setting.most_tilt = 0.7;
   const Vec3 on = below(setting.scene, 0.0, 0.0).point;
   const double size = draw.even("size", 0.014, 0.022);
   const Vec3 beside =
       draw.even("beside", 0.032, 0.05) * toward(draw.even("heading", 0.0, 2.0 * pi));
   const Vec3 place = below(setting.scene, beside.x(), beside.y()).point + up(0.6 * size);
-  Hand hand = hand_over(draw, start, on, up(1.0), pile_grip);
-  hand.press(on);
+  Hand hand = hand_over(draw, start, on, up(1.0), pile_grip).press(on);
   const Vec3 from = 0.1 * beside.normalized() + up(0.12);
   Script path(place + from);
   path.wait(hand.now()).reach(place, draw.by_factor("fall", 0.2, 1.0));
@@ -447,9 +429,7 @@ struct Door {
 Door door_of(Draw& draw, Setting& setting) {
   const double facing = draw.even("facing", -pi, pi);
   const double lean = draw.even("lean", 0.4, 1.3);
-  setting.azimuth = facing;
-  setting.azimuth_range = 0.6;
-  setting.least_tilt = std::max(lean - 0.3, 0.0);
+  setting.view = {facing, 0.6, std::max(lean - 0.3, 0.0)};
   setting.most_tilt = std::min(lean + 0.4, 1.2);
   setting.scene = {still(ground(), at(up(-0.3)))};
   return {turned(facing, Vec3::UnitZ()) * turned(lean, Vec3::UnitY()), draw.even("arm", 0.06, 0.14),
@@ -460,8 +440,7 @@ Door door_of(Draw& draw, Setting& setting) {
 void door_ride(Draw& draw, Setting& setting, double start) {
   const Door door = door_of(draw, setting);
   const double turn = pushing(draw) / door.arm;
-  Hand hand = hand_over(draw, start, up(0.0), door.base.linear() * up(1.0));
-  hand.press(up(0.0));
+  Hand hand = hand_over(draw, start, up(0.0), door.base.linear() * up(1.0)).press(up(0.0));
   Script angles(Vec3::Zero());
   angles.wait(hand.now())
       .reach(Vec3(draw.even("open", 0.15, 0.5), 0.0, 0.0), turn)
@@ -480,8 +459,7 @@ void door_ride(Draw& draw, Setting& setting, double start) {
 void door_push(Draw& draw, Setting& setting, double start) {
   const Door door = door_of(draw, setting);
   const double turn = pushing(draw) / door.arm;
-  Hand hand = hand_over(draw, start, up(0.0), door.base.linear() * up(1.0));
-  hand.press(up(0.0));
+  Hand hand = hand_over(draw, start, up(0.0), door.base.linear() * up(1.0)).press(up(0.0));
   Script angles(Vec3::Zero());
   angles.wait(hand.now())
       .reach(Vec3(draw.even("open", 0.1, 0.5), 0.0, 0.0), 3.0 * turn)
@@ -517,11 +495,9 @@ std::vector<Wave> waves_of(Draw& draw, double begin, double end) {
 
 // Waves begin, go on and ebb away under a hand that rests on a cloth.
 void cloth_ripples(Draw& draw, Setting& setting, double start) {
-  Hand hand = hand_over(draw, start);
-  hand.press(up(0.0)).rest(0.7);
+  Hand hand = hand_over(draw, start).press(up(0.0)).rest(0.7);
   const double end = hand.now() + draw.even("rippling", 1.5, 3.0);
   setting.scene = {still(cloth(waves_of(draw, hand.now(), end)))};
-  setting.most_tilt = 0.9;
   play(draw, setting, hand.until(end + swell + 1.2));
 }
 
@@ -530,10 +506,8 @@ void cloth_stroke(Draw& draw, Setting& setting, double start) {
   setting.scene = {still(cloth(waves_of(draw, Wave{}.begin, Wave{}.end)))};
   const Vec3 half = draw.even("stroke", 0.02, 0.05) * toward(draw.even("heading", 0.0, 2.0 * pi));
   const double speed = draw.by_factor("stroke_speed", 0.05, 0.3);
-  Hand hand = hand_over(draw, start, -half);
-  hand.press(-half);
+  Hand hand = hand_over(draw, start, -half).press(-half);
   hand.script.reach(half - up(hand.depth), speed).reach(-half - up(hand.depth), speed);
-  setting.most_tilt = 0.9;
   play(draw, setting, hand.rest(1.2));
 }
 
@@ -557,8 +531,7 @@ void arm_visits(Draw& draw, Setting& setting, double start) {
   const double over = draw.even("over", 0.11, 0.15);
   const Vec3 inside = 0.06 * toward(heading);
   const Vec3 outside = -0.40 * toward(heading);
-  Hand hand = hand_over(draw, start);
-  hand.press(up(0.0));
+  Hand hand = hand_over(draw, start).press(up(0.0));
   Script arm(outside);
   arm.wait(hand.now() + 0.3);
   const int visits = 1 + draw.whole("again", 2);
@@ -571,7 +544,6 @@ void arm_visits(Draw& draw, Setting& setting, double start) {
       return Eigen::Isometry3d(at(between + arm.at(t)) * turned(heading, Vec3::UnitZ()));
     });
   };
-  setting.most_tilt = 0.6;
   work_until(draw, setting, hand, arm.duration(), 1.2 + visits * there);
 }
 
@@ -582,8 +554,7 @@ void person_passes(Draw& draw, Setting& setting, double start) {
   const double share = draw.even("nearer", 0.5, 0.65);  // of the way to the camera
   const double radius = draw.even("body", 0.05, 0.09);
   constexpr double way = 0.5;  // [m] to both sides
-  Hand hand = hand_over(draw, start);
-  hand.press(up(0.0));
+  Hand hand = hand_over(draw, start).press(up(0.0));
   Script path(Vec3(-way, 0.0, 0.0));
   path.wait(hand.now() + 0.3)
       .reach(Vec3(draw.even("off", -0.05, 0.05), 0.0, 0.0), speed)
@@ -600,7 +571,6 @@ void person_passes(Draw& draw, Setting& setting, double start) {
       return Eigen::Isometry3d(view * at(path.at(t)) * turned(0.5 * pi, Vec3::UnitZ()));
     }));
   };
-  setting.most_tilt = 0.6;
   work_until(draw, setting, hand, path.duration(), 1.2 + stop);
 }
 
@@ -616,9 +586,7 @@ Vec3 corner_of(Draw& draw, Setting& setting, int walls) {
     setting.scene.push_back(still(ground(), y));
     normals += y.linear() * up(1.0);
   }
-  setting.azimuth = walls == 2 ? 0.25 * pi : 0.0;
-  setting.azimuth_range = walls == 2 ? 0.4 : 0.9;
-  setting.least_tilt = 0.5;
+  setting.view = {walls == 2 ? 0.25 * pi : 0.0, walls == 2 ? 0.4 : 0.9, 0.5};
   setting.most_tilt = 0.95;
   return normals;
 }
@@ -634,30 +602,30 @@ void corner_rest(Draw& draw, Setting& setting, double start) {
 void corner_along(Draw& draw, Setting& setting, double start) {
   const Vec3 normals = corner_of(draw, setting, 2);
   const Vec3 edge(0.0, draw.even("along", 0.03, 0.08), 0.0);
-  Hand hand = hand_over(draw, start, edge, (normals - 0.8 * Vec3::UnitY()).normalized());
-  hand.press(edge);
+  Hand hand =
+      hand_over(draw, start, edge, (normals - 0.8 * Vec3::UnitY()).normalized()).press(edge);
   hand.script.reach(draw.whole("stops", 2) * 0.3 * edge - hand.depth * normals.normalized(),
                     draw.by_factor("slide", 0.03, 0.2));
   play(draw, setting, hand.rest(1.8));
 }
 
 constexpr std::array visits = {
-    FieldClass{"box-against", "a box pushes a hand aside that presses or waits", box_against},
-    FieldClass{"sheet-under", "a sheet is pushed in under a resting hand", sheet_under},
-    FieldClass{"box-under", "a box slides in close under a hand, and away", box_under},
-    FieldClass{"put-under", "a thing is put down under a hand and taken away", put_under},
-    FieldClass{"put-beside", "a thing is put down beside a hand and taken away", put_beside},
-    FieldClass{"taken-away", "the thing is taken away on which a hand rests", taken_away},
-    FieldClass{"turntable-things", "domes and things pass on a turntable", turntable_things},
-    FieldClass{"turntable-wobble", "a turntable that is not level", turntable_wobble},
-    FieldClass{"pile-feel", "a stroke over a pile", pile_feel},
-    FieldClass{"pile-add", "something falls on a pile", pile_add},
+    FieldClass{"box-against", "a box pushes a hand aside that presses or waits", box_against, 1.0},
+    FieldClass{"sheet-under", "a sheet is pushed in under a resting hand", sheet_under, 0.9},
+    FieldClass{"box-under", "a box slides in close under a hand, and away", box_under, 0.9},
+    FieldClass{"put-under", "a thing is put down under a hand and taken away", put_under, 0.8},
+    FieldClass{"put-beside", "a thing is put down beside a hand and taken away", put_beside, 0.8},
+    FieldClass{"taken-away", "the thing is taken away on which a hand rests", taken_away, 0.8},
+    FieldClass{"turntable-things", "domes and things pass on a turntable", turntable_things, 0.8},
+    FieldClass{"turntable-wobble", "a turntable that is not level", turntable_wobble, 0.8},
+    FieldClass{"pile-feel", "a stroke over a pile", pile_feel, 0.7},
+    FieldClass{"pile-add", "something falls on a pile", pile_add, 0.7},
     FieldClass{"door-ride", "a hand on a door goes with it", door_ride},
     FieldClass{"door-push", "a door leaves a hand, and pushes it", door_push},
-    FieldClass{"cloth-ripples", "a cloth ripples under a hand, and rests", cloth_ripples},
-    FieldClass{"cloth-stroke", "strokes over a cloth that ripples", cloth_stroke},
-    FieldClass{"arm-visits", "an arm comes before the camera, stops, leaves", arm_visits},
-    FieldClass{"person-passes", "a person passes before the camera, or stops", person_passes},
+    FieldClass{"cloth-ripples", "a cloth ripples under a hand, and rests", cloth_ripples, 0.9},
+    FieldClass{"cloth-stroke", "strokes over a cloth that ripples", cloth_stroke, 0.9},
+    FieldClass{"arm-visits", "an arm comes before the camera, stops, leaves", arm_visits, 0.6},
+    FieldClass{"person-passes", "a person passes before the camera, or stops", person_passes, 0.6},
     FieldClass{"corner-rest", "a hand rests in a concave corner", corner_rest},
     FieldClass{"corner-along", "a stroke along a concave edge", corner_along}};
 

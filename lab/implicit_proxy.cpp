@@ -127,15 +127,13 @@ std::optional<Contact> ImplicitProxy::follow(const Field& field, const Vec3& hip
 void ImplicitMethod::frame(const Cloud& cloud, double /*stamp*/) noexcept {
   take(cloud, proxy_.point_or(Vec3::Zero()));
   proxy_.surface_changed();
-  ++frames_;
 }
 
 Tick ImplicitMethod::tick(const Vec3& hip, double t) noexcept {
-  if (frames_ == 0) return free_tick(hip, t, -1);
+  if (seen() == nullptr) return free(hip, t);
   prepare(proxy_.point_or(hip));
   const auto contact = proxy_.follow([this](const Vec3& at) { return field(at); }, hip);
-  Tick tick = contact ? contact_tick(parameters(), hip, *contact, t, frames_ - 1)
-                      : free_tick(hip, t, frames_ - 1);
+  Tick tick = contact ? held(hip, *contact, t) : free(hip, t);
   tick.steps = proxy_.steps();
   return tick;
 }

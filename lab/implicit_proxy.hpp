@@ -4,7 +4,6 @@
 #include <functional>
 #include <optional>
 
-#include "lab/contact.hpp"
 #include "lab/method.hpp"
 
 namespace palpate::lab {
@@ -72,7 +71,6 @@ class ImplicitMethod : public LabMethod {
 
  private:
   ImplicitProxy proxy_;
-  std::int64_t frames_ = 0;
 };
 
 }  // namespace palpate::lab

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "lab/method.hpp"
 #include "palpate/kernel/core/cloud.hpp"
 
 #include "search/kd_tree.hpp"
@@ -59,6 +61,18 @@ class LocalPoints {
 /// From where a surface at `at` was seen; from above where a cloud does not know.
 inline Vec3 towards_viewer(const std::optional<Vec3>& viewpoint, const Vec3& at) {
   return viewpoint ? Vec3(*viewpoint - at) : Vec3(Vec3::UnitZ());
+}
+
+/// The moving-least-squares plane at the middle of a patch [7]: a = sum w x / sum w, and as normal
+/// the eigenvector of the weighted covariance with the smallest eigenvalue, towards where the
+/// points were seen from (else up). None for less than six points.
+/// @param radius  [m] w is Wendland's function down to 0 there
+std::optional<Contact> fit_plane(const Patch& patch, double radius);
+
+/// The stiffest spring [N/m] with which a sampled wall stays passive [2]: a device with damping b
+/// [N s/m] against a spring K and a damper B held for a period T [s] needs b > K T / 2 + B.
+constexpr double passive_stiffness(double device_damping, double damping, double period) {
+  return std::max(0.0, 2.0 * (device_damping - damping) / period);
 }
 
 }  // namespace palpate::lab

@@ -14,6 +14,17 @@ Truth truth_of(const std::shared_ptr<const Scene>& scene) {
   };
 }
 
+Tick LabMethod::held(const Vec3& hip, const Contact& contact, double t) const {
+  Tick tick = free(hip, t);
+  tick.state = ContactState::contact;
+  tick.normal = contact.normal;
+  tick.proxy = contact.point + parameters_.proxy.r_c() * contact.normal;
+  tick.force = parameters_.coupling.stiffness * (contact.point - hip);
+  const double most = parameters_.coupling.max_force;
+  if (tick.force.norm() > most) tick.force *= most / tick.force.norm();
+  return tick;
+}
+
 // The files of lab/methods, in the order in which tables show their methods. FILE.cpp defines
 // `std::vector<MethodInfo> FILE_methods()`. Adding a method: its file, and one line here.
 // clang-format off

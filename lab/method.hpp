@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -37,6 +38,12 @@ inline Truth flat_truth(std::function<double(double t)> height = nullptr) {
   };
 }
 
+/// Where a method holds the hand back.
+struct Contact {
+  Vec3 point;   ///< [m] world, on the surface as the method has it
+  Vec3 normal;  ///< [-] outward
+};
+
 /// Base of the methods written to compare: their parameters, read as they are needed.
 ///
 /// Of a tick, the experiments read `proxy`, `normal`, `force`, `state` (free or not) and `steps`. A
@@ -45,8 +52,10 @@ class LabMethod : public Method {
  public:
   void observe(const Observation& seen) noexcept final {
     clouds_.take(seen.camera, seen.cloud);
+    ++frames_;
     frame(clouds_, seen.stamp);
   }
+  void seat(const Vec3& /*proxy*/) noexcept override {}  // has no memory
   void set_parameters(const Parameters& parameters) noexcept final {
     parameters_ = parameters;
     parameters_changed();
@@ -57,20 +66,29 @@ class LabMethod : public Method {
   /// Any camera has a new frame.
   /// @param all    what each camera saw last; the same object each time
   /// @param stamp  [s] of the new frame
-  virtual void frame(const Cloud& all, double stamp) noexcept = 0;
+  virtual void frame(const Cloud& /*all*/, double /*stamp*/) noexcept {}
   /// Called after a change, for members derived from the parameters.
   virtual void parameters_changed() noexcept {}
   [[nodiscard]] const Parameters& parameters() const { return parameters_; }
+  /// What each camera saw last; null before the first frame.
+  [[nodiscard]] const Cloud* seen() const { return frames_ > 0 ? &clouds_ : nullptr; }
+  [[nodiscard]] Tick free(const Vec3& hip, double t) const {
+    return free_tick(hip, t, frames_ - 1);
+  }
+  /// The tick of a method that holds a point of the hand on a surface: a spring pulls the HIP to
+  /// that point, and the proxy that the experiments ask for is a sphere of radius r_c upon it.
+  [[nodiscard]] Tick held(const Vec3& hip, const Contact& contact, double t) const;
 
  private:
   Parameters parameters_;
   ObservedClouds clouds_;
+  std::int64_t frames_ = 0;
 };
 
-/// What makes a method of class `M`.
-template <class M>
+/// What makes a method of class `M`, by its parameters and what else its constructor asks for.
+template <class M, auto... more>
 std::unique_ptr<Method> made(const Parameters& parameters) {
-  return std::make_unique<M>(parameters);
+  return std::make_unique<M>(parameters, more...);
 }
 
 /// A method that can fail in its ticks, which cannot throw: `play` asks after each.

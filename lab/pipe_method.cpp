@@ -265,12 +265,11 @@ class PipeMethod final : public LabMethod, public FallibleMethod {
   }
 
   void frame(const Cloud& cloud, double stamp) noexcept override {
-    ++frames_;
     attempt([&] { program_.send(message_of(name_, cloud, stamp)); });
   }
 
   Tick tick(const Vec3& hip, double t) noexcept override {
-    Tick tick = free_tick(hip, t, frames_);
+    Tick tick = free(hip, t);
     if (!hip.allFinite() || !std::isfinite(t)) return tick;
     attempt([&] {
       program_.send(Message("TICK").add(t).add(hip));
@@ -319,7 +318,6 @@ class PipeMethod final : public LabMethod, public FallibleMethod {
 
   std::string name_;
   Program program_;
-  std::int64_t frames_ = -1;
   std::exception_ptr failure_;
 };
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "lab/contact.hpp"
+#include "lab/local_points.hpp"
 #include "lab/method.hpp"
 
 namespace palpate::lab {
@@ -14,20 +14,13 @@ class Direct final : public LabMethod {
  public:
   explicit Direct(const Parameters& parameters) : LabMethod(parameters) {}
 
-  void seat(const Vec3& /*proxy*/) noexcept override {}
-
-  void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
-    cloud_ = &cloud;
-    ++frames_;
-  }
-
   Tick tick(const Vec3& hip, double t) noexcept override {
-    Tick tick = free_tick(hip, t, frames_ - 1);
-    if (cloud_ == nullptr) return tick;
+    Tick tick = free(hip, t);
+    if (seen() == nullptr) return tick;
     // The HIP is deep in the surface when a hand presses hard: the radius has to reach the surface
     // from there. Seven r_c is generous to the method.
     const double radius = 7.0 * parameters().proxy.r_c();
-    gather(*cloud_, Ball{hip, radius}, patch_);
+    gather(*seen(), Ball{hip, radius}, patch_);
     const std::optional<Contact> plane = fit_plane(patch_, radius);
     if (!plane) return tick;
     tick.normal = plane->normal;
@@ -43,8 +36,6 @@ class Direct final : public LabMethod {
 
  private:
   Patch patch_;
-  const Cloud* cloud_ = nullptr;
-  std::int64_t frames_ = 0;
 };
 
 }  // namespace

@@ -16,7 +16,6 @@
 #include <array>
 #include <optional>
 
-#include "lab/contact.hpp"
 #include "lab/method.hpp"
 #include "lab/polygons.hpp"
 
@@ -79,7 +78,6 @@ class Constrained final : public LabMethod {
   void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
     polygons_.frame(cloud);
     new_frame_ = true;
-    ++frames_;
   }
 
   Tick tick(const Vec3& hip, double t) noexcept override {
@@ -88,11 +86,11 @@ class Constrained final : public LabMethod {
     if (new_frame_ && kind_.lifted && normal_) lift();
     new_frame_ = false;
     const auto triangle = follow(hip);
-    if (!triangle) return free_tick(hip, t, frames_ - 1);
+    if (!triangle) return free(hip, t);
     const Vec3 point = *centre_ - radius() * *normal_;
     Vec3 normal = *normal_;
     if (kind_.shaded) normal = polygons_.shaded_normal(*triangle, point);
-    Tick tick = contact_tick(parameters(), hip, {point, normal}, t, frames_ - 1);
+    Tick tick = held(hip, {point, normal}, t);
     if (kind_.sphere) {
       // The spring of a sphere ends at its centre, and is slack at r_c: (16).
       tick.proxy = *centre_;
@@ -131,7 +129,7 @@ class Constrained final : public LabMethod {
   // The triangle that holds it, if any.
   std::optional<std::uint32_t> follow(const Vec3& hip) {
     std::vector<Plane> planes;
-    std::optional<std::uint32_t> held;
+    std::optional<std::uint32_t> holds;
     moves_ = 0;
     Vec3 before = *centre_;
     while (moves_ < most_moves) {
@@ -150,7 +148,7 @@ class Constrained final : public LabMethod {
       *centre_ += hit->share * way + 1e-8 * hit->normal;
       planes.push_back({hit->normal, *centre_});
       if (planes.size() > 3) planes.erase(planes.begin());
-      held = hit->triangle;
+      holds = hit->triangle;
     }
     const Vec3 pull = *centre_ - hip;
     if (planes.empty() || pull.norm() < 1e-7) {
@@ -158,7 +156,7 @@ class Constrained final : public LabMethod {
       return std::nullopt;
     }
     normal_ = pull.normalized();
-    return held;
+    return holds;
   }
 
   Kind kind_;
@@ -167,28 +165,24 @@ class Constrained final : public LabMethod {
   std::optional<Vec3> normal_;  // while it is held
   bool new_frame_ = false;
   int moves_ = 0;
-  std::int64_t frames_ = 0;
 };
 
-template <bool sphere, bool lifted, bool shaded>
-std::unique_ptr<Method> constrained(const Parameters& parameters) {
-  return std::make_unique<Constrained>(parameters, Constrained::Kind{sphere, lifted, shaded});
-}
+using Kind = Constrained::Kind;
 
 }  // namespace
 
 std::vector<MethodInfo> god_object_methods() {
   return {
       {"god-object", "a point constrained by polygons ([3]; depth images tessellated: [10], [11])",
-       constrained<false, true, false>},
+       made<Constrained, Kind{}>},
       {"god-object-kept", "the same, kept in world space when a frame arrives",
-       constrained<false, false, false>},
+       made<Constrained, Kind{.lifted = false}>},
       {"sphere-proxy", "a sphere constrained by polygons ([4]; depth images tessellated)",
-       constrained<true, true, false>},
+       made<Constrained, Kind{.sphere = true}>},
       {"sphere-proxy-kept", "the same, kept in world space when a frame arrives",
-       constrained<true, false, false>},
+       made<Constrained, Kind{.sphere = true, .lifted = false}>},
       {"force-shading", "god-object whose force has the normal interpolated between corners",
-       constrained<false, true, true>}};
+       made<Constrained, Kind{.shaded = true}>}};
 }
 
 }  // namespace palpate::lab

@@ -19,7 +19,6 @@ class Ideal final : public LabMethod {
       : LabMethod(parameters), truth_(std::move(truth)) {}
 
   void seat(const Vec3& proxy) noexcept override { proxy_ = proxy; }
-  void frame(const Cloud& /*cloud*/, double /*stamp*/) noexcept override { ++frames_; }
 
   Tick tick(const Vec3& hip, double t) noexcept override {
     if (!proxy_) proxy_ = hip;
@@ -56,16 +55,14 @@ class Ideal final : public LabMethod {
           (hand_velocity_.value() - rises * under.normal).dot(u) / std::max(u.norm(), 1e-12);
       force = coupling_force(parameters().coupling, u, rate, r_c, false).force;
     }
-    return {.t = t,
-            .hip = hip,
-            .proxy = *proxy_,
-            .normal = touching ? under.normal : Vec3(Vec3::Zero()),
-            .force = force,
-            .state = touching ? ContactState::contact : ContactState::free_motion,
-            .steps = 0,
-            .surface_velocity = 0.0,
-            .frame = frames_ - 1,
-            .flags = 0};
+    Tick tick = free(hip, t);
+    tick.proxy = *proxy_;
+    tick.force = force;
+    if (touching) {
+      tick.normal = under.normal;
+      tick.state = ContactState::contact;
+    }
+    return tick;
   }
 
  private:
@@ -73,7 +70,6 @@ class Ideal final : public LabMethod {
   Truth truth_;
   HandVelocity hand_velocity_;
   std::optional<Vec3> proxy_;
-  std::int64_t frames_ = 0;
 };
 
 }  // namespace

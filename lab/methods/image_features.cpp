@@ -8,7 +8,6 @@
 // where a frame came with its brightness.
 #include <limits>
 
-#include "lab/contact.hpp"
 #include "lab/method.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/linear.hpp"
@@ -24,18 +23,11 @@ class ImageFeatures final : public LabMethod {
  public:
   explicit ImageFeatures(const Parameters& parameters) : LabMethod(parameters) {}
 
-  void seat(const Vec3& /*proxy*/) noexcept override {}
-
-  void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
-    cloud_ = &cloud;
-    ++frames_;
-  }
-
   Tick tick(const Vec3& hip, double t) noexcept override {
-    const Tick nothing = free_tick(hip, t, frames_ - 1);
-    if (cloud_ == nullptr) return nothing;
+    const Tick nothing = free(hip, t);
+    if (seen() == nullptr) return nothing;
     const Beam beam{hip, around, reach, -Vec3::UnitZ()};
-    gather(*cloud_, beam, Patch::capacity, patch_);
+    gather(*seen(), beam, Patch::capacity, patch_);
     if (patch_.size() < 3) return nothing;
     const SightCone cone(beam, patch_.view(0).viewpoint);
     const Vec3 away = cone.axis();
@@ -54,24 +46,24 @@ class ImageFeatures final : public LabMethod {
     }
     const Vec3 plane = solve_symmetric<3>(squares, sums);
     const Vec3 normal = (plane[1] / around * right + plane[2] / around * down - away).normalized();
-    const Vec3 seen = hip + plane[0] * away + texture(hip) * normal;
-    const double depth = normal.dot(seen - hip);
+    const Vec3 place = hip + plane[0] * away + texture(hip) * normal;
+    const double depth = normal.dot(place - hip);
     if (!(depth > 0.0)) return nothing;
-    return contact_tick(parameters(), hip, {hip + depth * normal, normal}, t, frames_ - 1);
+    return held(hip, {hip + depth * normal, normal}, t);
   }
 
  private:
   // [m] Of the pixel that sees the HIP.
   [[nodiscard]] double texture(const Vec3& hip) const {
-    const DepthImage* image = cloud_->image();
+    const DepthImage* image = seen()->image();
     if (image == nullptr || image->brightness().empty()) return 0.0;
-    const Vec3 seen = image->world_from_camera().inverse() * hip;
-    const auto window = image->rays().window(seen, around);
+    const Vec3 in_camera = image->world_from_camera().inverse() * hip;
+    const auto window = image->rays().window(in_camera, around);
     double least = std::numeric_limits<double>::infinity();
     double height = 0.0;
     for (int v = window.v_begin; v < window.v_end; ++v) {
       for (int u = window.u_begin; u < window.u_end; ++u) {
-        const double off = (image->rays().ray(u, v) - seen.hnormalized()).squaredNorm();
+        const double off = (image->rays().ray(u, v) - in_camera.hnormalized()).squaredNorm();
         if (!(off < least)) continue;
         least = off;
         const auto pixel = static_cast<std::size_t>(v) * image->intrinsics().width + u;
@@ -82,8 +74,6 @@ class ImageFeatures final : public LabMethod {
   }
 
   Patch patch_;
-  const Cloud* cloud_ = nullptr;
-  std::int64_t frames_ = 0;
 };
 
 }  // namespace

@@ -12,7 +12,6 @@
 #include <limits>
 #include <unordered_map>
 
-#include "lab/contact.hpp"
 #include "lab/local_points.hpp"
 #include "lab/method.hpp"
 
@@ -34,7 +33,6 @@ class PointBoxes final : public LabMethod {
   void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
     points_.frame(cloud);
     new_frame_ = true;
-    ++frames_;
   }
 
   Tick tick(const Vec3& hip, double t) noexcept override {
@@ -44,11 +42,11 @@ class PointBoxes final : public LabMethod {
     new_frame_ = false;
     const int faces = follow(hip);
     touching_ = faces > 0;
-    Tick tick = free_tick(hip, t, frames_ - 1);
+    Tick tick = free(hip, t);
     if (touching_) {
       const Vec3 pull = *proxy_ - hip;
       normal_ = pull.norm() > 1e-12 ? Vec3(pull.normalized()) : normal_;
-      tick = contact_tick(parameters(), hip, {*proxy_, normal_}, t, frames_ - 1);
+      tick = held(hip, {*proxy_, normal_}, t);
     }
     tick.steps = faces + 1;
     return tick;
@@ -153,7 +151,7 @@ class PointBoxes final : public LabMethod {
 
   // Towards the HIP: each face that is met holds its coordinate, the others continue.
   int follow(const Vec3& hip) {
-    std::array<bool, 3> held{};
+    std::array<bool, 3> blocked{};
     Vec3 goal = hip;
     for (int faces = 0; faces < 3; ++faces) {
       const Vec3 way = goal - *proxy_;
@@ -164,8 +162,8 @@ class PointBoxes final : public LabMethod {
       }
       *proxy_ += hit.travel * way;
       (*proxy_)[hit.axis] = hit.at;
-      if (held[static_cast<std::size_t>(hit.axis)]) return faces;
-      held[static_cast<std::size_t>(hit.axis)] = true;
+      if (blocked[static_cast<std::size_t>(hit.axis)]) return faces;
+      blocked[static_cast<std::size_t>(hit.axis)] = true;
       goal[hit.axis] = hit.at;
     }
     return 3;
@@ -179,7 +177,6 @@ class PointBoxes final : public LabMethod {
   Vec3 normal_ = Vec3::UnitZ();
   bool touching_ = false;
   bool new_frame_ = false;
-  std::int64_t frames_ = 0;
 };
 
 }  // namespace

@@ -64,18 +64,12 @@ class RadialFields final : public ImplicitMethod {
   std::vector<LocalPoints::Neighbour> near_, neighbours_;
 };
 
-std::unique_ptr<Method> of_one(const Parameters& parameters) {
-  return std::make_unique<RadialFields>(parameters, 1);
-}
-std::unique_ptr<Method> of_a_few(const Parameters& parameters) {
-  return std::make_unique<RadialFields>(parameters, a_few);
-}
-
 }  // namespace
 
 std::vector<MethodInfo> radial_fields_methods() {
-  return {{"radial-fields", "implicit surface of summed radial fields ([13], first form)", of_one},
-          {"radial-fields-3", "the same over the last three frames", of_a_few}};
+  return {{"radial-fields", "implicit surface of summed radial fields ([13], first form)",
+           made<RadialFields, 1>},
+          {"radial-fields-3", "the same over the last three frames", made<RadialFields, a_few>}};
 }
 
 }  // namespace palpate::lab

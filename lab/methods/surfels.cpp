@@ -87,24 +87,13 @@ class Surfels final : public ImplicitMethod {
   std::vector<LocalPoints::Neighbour> near_, neighbours_;
 };
 
-std::unique_ptr<Method> of_one(const Parameters& parameters) {
-  return std::make_unique<Surfels>(parameters, 1, false);
-}
-std::unique_ptr<Method> of_a_few(const Parameters& parameters) {
-  return std::make_unique<Surfels>(parameters, a_few, false);
-}
-
-std::unique_ptr<Method> of_given(const Parameters& parameters) {
-  return std::make_unique<Surfels>(parameters, 1, true);
-}
-
 }  // namespace
 
 std::vector<MethodInfo> surfels_methods() {
   return {{"surfels", "implicit surface of total-least-squares normals ([13], second form, [16])",
-           of_one},
-          {"surfels-3", "the same over the last three frames", of_a_few},
-          {"point-normals", "a point set with given normals ([6])", of_given}};
+           made<Surfels, 1, false>},
+          {"surfels-3", "the same over the last three frames", made<Surfels, a_few, false>},
+          {"point-normals", "a point set with given normals ([6])", made<Surfels, 1, true>}};
 }
 
 }  // namespace palpate::lab

@@ -13,7 +13,7 @@
 
 #include <Eigen/LU>
 
-#include "lab/contact.hpp"
+#include "lab/local_points.hpp"
 #include "lab/method.hpp"
 
 namespace palpate::lab {
@@ -28,24 +28,19 @@ class VirtualCoupling final : public LabMethod {
 
   void seat(const Vec3& proxy) noexcept override { tool_ = proxy; }
 
-  void frame(const Cloud& cloud, double /*stamp*/) noexcept override {
-    cloud_ = &cloud;
-    ++frames_;
-  }
-
   Tick tick(const Vec3& hip, double t) noexcept override {
     const double period = t > last_t_ ? t - last_t_ : 1e-3;
     const Vec3 before = tool_.value_or(hip);
     const Vec3 hand_velocity = (hip - last_hip_.value_or(hip)) / period;
     last_t_ = t;
     last_hip_ = hip;
-    Tick tick = free_tick(hip, t, frames_ - 1);
+    Tick tick = free(hip, t);
     tool_ = hip;
-    if (cloud_ == nullptr) return tick;
+    if (seen() == nullptr) return tick;
 
     const double r_c = parameters().proxy.r_c();
     const double radius = 7.0 * r_c;
-    gather(*cloud_, Ball{before, radius}, patch_);
+    gather(*seen(), Ball{before, radius}, patch_);
     const auto plane = fit_plane(patch_, radius);
     if (!plane) return tick;
 
@@ -78,10 +73,8 @@ class VirtualCoupling final : public LabMethod {
 
  private:
   Patch patch_;
-  const Cloud* cloud_ = nullptr;
   std::optional<Vec3> tool_, last_hip_;
   double last_t_ = 0.0;
-  std::int64_t frames_ = 0;
 };
 
 }  // namespace

@@ -10,9 +10,9 @@
 
 #include <gtest/gtest.h>
 
-#include "lab/contact.hpp"
 #include "lab/experiment.hpp"
 #include "lab/grid_cloud.hpp"
+#include "lab/local_points.hpp"
 #include "lab/method.hpp"
 #include "palpate/io/sources/source.hpp"
 #include "palpate/kernel/cloud/point_cloud.hpp"

@@ -8,6 +8,7 @@
 #include "lab/local_points.hpp"
 #include "palpate/kernel/cloud/depth_image.hpp"
 #include "palpate/kernel/core/error.hpp"
+#include "palpate/kernel/fixtures/closed_mesh.hpp"
 
 namespace palpate::lab {
 namespace {
@@ -30,29 +31,6 @@ struct InBox {
     return false;
   }
 };
-
-// The place nearest to p on the triangle a b c (Ericson, Real-Time Collision Detection, 5.1.5).
-Vec3 nearest_on(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
-  const Vec3 ab = b - a;
-  const Vec3 ac = c - a;
-  const double d1 = ab.dot(p - a);
-  const double d2 = ac.dot(p - a);
-  if (d1 <= 0.0 && d2 <= 0.0) return a;
-  const double d3 = ab.dot(p - b);
-  const double d4 = ac.dot(p - b);
-  if (d3 >= 0.0 && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return a + d1 / (d1 - d3) * ab;
-  const double d5 = ab.dot(p - c);
-  const double d6 = ac.dot(p - c);
-  if (d6 >= 0.0 && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0)
-    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
-  return a + vb / (va + vb + vc) * ab + vc / (va + vb + vc) * ac;
-}
 
 // When a ball first touches the line a + s e, 0 <= s <= 1 (a point where e is zero): the share of
 // its way, none if it doesn't or moves away.
@@ -312,7 +290,8 @@ std::optional<Vec3> Polygons::nearest(const Vec3& at, double within) const {
   for_each_in(box, [&](std::uint32_t index) {
     const Corners& t = triangles_[index];
     if (normal(index).dot(at - vertices_[t[0]]) < 0.0) return;
-    const Vec3 place = nearest_on(vertices_[t[0]], vertices_[t[1]], vertices_[t[2]], at);
+    const Vec3 place =
+        nearest_of_triangle({vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]}, at).first;
     if ((at - place).norm() > (best ? (at - *best).norm() : within)) return;
     best = place;
   });

@@ -88,6 +88,15 @@ const Experiment& find_experiment(std::string_view name);
 /// @throws Error for an unknown one.
 std::vector<std::string> methods_of(const Experiment& experiment, const ExperimentOptions& options);
 
+/// The cells of an experiment that has one for each method, whose rows are `rows`.
+template <std::string (*rows)(const std::string& method, const ExperimentOptions&)>
+std::vector<Cell> by_method(const Experiment& experiment, const ExperimentOptions& options) {
+  std::vector<Cell> cells;
+  for (const std::string& name : methods_of(experiment, options))
+    cells.emplace_back([=] { return rows(name, options); });
+  return cells;
+}
+
 /// @param what  such as "feel has no such scene"  @param known  all names that --families takes
 /// @throws Error for another, naming the nearest.
 void check_families(const ExperimentOptions& options, std::string_view what,

@@ -11,7 +11,7 @@
 
 namespace palpate::lab {
 
-double mean(const std::vector<double>& values) {
+double mean(std::span<const double> values) {
   double sum = 0.0;
   for (const double value : values) sum += value;
   return values.empty() ? 0.0 : sum / static_cast<double>(values.size());
@@ -95,9 +95,7 @@ Interval mean_of(std::span<const Interval> parts) {
 
 Interval student(std::span<const double> repeats) {
   const auto n = static_cast<double>(repeats.size());
-  double sum = 0.0;
-  for (const double value : repeats) sum += value;
-  const double mean = sum / n;
+  const double mean = lab::mean(repeats);
   if (repeats.size() < 2) {
     const double infinite = std::numeric_limits<double>::infinity();
     return {mean, -infinite, infinite};

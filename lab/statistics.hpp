@@ -8,7 +8,7 @@
 namespace palpate::lab {
 
 /// 0 of nothing.
-double mean(const std::vector<double>& values);
+double mean(std::span<const double> values);
 
 /// Root of the mean of the squares; 0 of nothing.
 double rms(const std::vector<double>& values);

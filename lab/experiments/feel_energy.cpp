@@ -4,12 +4,12 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <random>
 
 #include <fmt/format.h>
 
 #include "lab/closed_loop.hpp"
 #include "lab/experiments/feel_scenes.hpp"
+#include "lab/experiments/pop_cases.hpp"
 #include "palpate/io/sources/synthetic_camera.hpp"
 #include "palpate/servo/passivity_observer.hpp"
 
@@ -38,10 +38,7 @@ struct Presses {
 };
 
 Presses presses(std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  const auto between = [&random](double a, double b) {
-    return a + (b - a) * static_cast<double>(random() >> 11U) * 0x1p-53;
-  };
+  Chance between(seed);
   std::vector<double> ends;
   const Vec3 place(between(-0.02, 0.02), between(-0.02, 0.02), clear);
   std::vector<HipPath::Sample> samples = {{0.0, place}, {first, place}};

@@ -81,16 +81,21 @@ struct Watched {
   int repeats = 0;
 };
 
-// Plays a scenario from free space into contact and watches the seconds from `from` on. A surface
-// is lost where the proxy's centre stays behind it; that ends the repeat, and what was seen of it
-// before it went behind counts.
-void watch(Method& method, const Scenario& scenario, const Truth& truth, double r_c, double from,
-           Watched& watched) {
+// Plays a scenario to a method from free space into contact and watches the seconds from `from` on.
+// A surface is lost where the proxy's centre stays behind it; that ends the repeat, and what was
+// seen of it before it went behind counts.
+// @param seat  of the proxy, if not where the hand is
+void watch(const std::string& name, const ExperimentOptions& options, const Scenario& scenario,
+           const Truth& truth, double from, Watched& watched,
+           const std::optional<Vec3>& seat = std::nullopt) {
+  const double r_c = options.parameters.proxy.r_c();
+  const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
+  if (seat) method->seat(*seat);
   std::vector<double> force;
   int behind = 0;
   std::size_t before = watched.error.size();  // samples when it was last in front
   bool lost = false;
-  play(method, scenario, [&](const Tick& tick) {
+  play(*method, scenario, [&](const Tick& tick) {
     const TruePoint under = truth(tick.proxy, tick.t);
     behind = under.distance < 0.0 ? behind + 1 : 0;
     if (behind == 0) before = watched.error.size();
@@ -136,33 +141,26 @@ std::string rest_on_grid(const std::string& name, const ExperimentOptions& optio
     grid.sigma = 1e-3;
     grid.noise = noise;
     grid.seed = options.seed * 1000 + static_cast<std::uint64_t>(k);
-    const Truth truth = flat_truth();
-    const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
     const Vec3 hip(0.1 * r_c, 0.1 * r_c, -press);
-    method->seat(Vec3(hip.x(), hip.y(), 4.0 * r_c));
-    watch(*method,
+    watch(name, options,
           {.duration = 1.2,
            .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
            .hip = [&](double) { return hip; }},
-          truth, r_c, 0.2, watched);
+          flat_truth(), 0.2, watched, Vec3(hip.x(), hip.y(), 4.0 * r_c));
   }
   return rows_of(name, scene, summary(watched));
 }
 
 // A D4xx straight above the surface, with its focal length but only the pixels near the contact.
-CameraSetup d4xx_above(double distance) {
+SyntheticCamera look_at(const Scene& scene, double distance, std::uint64_t seed) {
   CameraSetup setup;
   const int pixels = std::min(320, static_cast<int>(0.3 * 589.0 / distance));
   setup.intrinsics = pinhole(pixels, pixels, 2.0 * std::atan(0.5 * pixels / 589.0));
   setup.world_from_camera = looking_at_origin(distance, 0.0, 0.0);
   setup.frame_rate = f_c;
-  return setup;
-}
-
-SyntheticCamera look_at(const Scene& scene, double distance, std::uint64_t seed) {
   SensorModel sensor = SensorModel::named("d4xx");
   sensor.seed = seed;
-  return {scene, d4xx_above(distance), sensor};
+  return {scene, setup, sensor};
 }
 
 // How far above the surface a hand is that comes down to it at 0.15 m/s: in contact after 0.4 s.
@@ -175,19 +173,17 @@ double coming_down(double t) {
 std::string rest_in_sight(const std::string& name, const ExperimentOptions& options,
                           std::string_view scene_name, const std::string& uri, double distance) {
   const int repeats = repeats_of(options).second;
-  const double r_c = options.parameters.proxy.r_c();
   const auto scene = std::make_shared<const Scene>(make_scene(Uri(uri)));
   const Truth truth = truth_of(scene);
   Watched watched;
   for (int k = 0; k < repeats; ++k) {
     SyntheticCamera camera =
         look_at(*scene, distance, options.seed * 1000 + static_cast<std::uint64_t>(k));
-    const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
-    watch(*method,
+    watch(name, options,
           {.duration = contact_time + 2.0,
            .cloud = [&](std::uint64_t f, double t) { return camera.capture(t, f).cloud; },
            .hip = [&](double t) { return Vec3(0.0, 0.0, coming_down(t)); }},
-          truth, r_c, contact_time + 1.0, watched);
+          truth, contact_time + 1.0, watched);
   }
   return rows_of(name, scene_name, summary(watched));
 }
@@ -198,7 +194,6 @@ std::string move_in_sight(const std::string& name, const ExperimentOptions& opti
                           std::string_view scene_name) {
   const int repeats = 2 * repeats_of(options).second;
   constexpr double duration = 2.2;
-  const double r_c = options.parameters.proxy.r_c();
   Watched watched;
   const auto ticks = static_cast<std::size_t>(duration * 1000.0);
   std::vector<double> lag(ticks, 0.0);  // [frames] summed, by time since the onset
@@ -209,17 +204,15 @@ std::string move_in_sight(const std::string& name, const ExperimentOptions& opti
     const double start = 1.5 + k / (repeats * f_c);
     const auto scene = std::make_shared<const Scene>(
         make_scene(Uri(fmt::format("synthetic:plane?start={}&speed={}", start, speed))));
-    const Truth truth = truth_of(scene);
     const auto height = [&](double t) { return speed * std::max(t - start, 0.0); };
     SyntheticCamera camera =
         look_at(*scene, 0.95, options.seed * 1000 + static_cast<std::uint64_t>(k));
-    const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
     const std::size_t before = watched.error.size();
-    watch(*method,
+    watch(name, options,
           {.duration = duration,
            .cloud = [&](std::uint64_t f, double t) { return camera.capture(t, f).cloud; },
            .hip = [&](double t) { return Vec3(0.0, 0.0, height(t) + coming_down(t)); }},
-          truth, r_c, start, watched);
+          truth_of(scene), start, watched);
     for (std::size_t i = before; i < watched.error.size(); ++i) {
       lag[i - before] -= watched.error[i] / speed * f_c;
       ++counted[i - before];
@@ -247,19 +240,16 @@ std::string slide_on_plane(const std::string& name, const ExperimentOptions& opt
                            std::string_view scene) {
   const double r_c = options.parameters.proxy.r_c();
   GridCloud grid = level_grid(r_c, 0.12);
-  const Truth truth = flat_truth();
-  const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
   const auto hip = [&](double t) {
     const double x = 0.05 * (t - 1.0);
     return Vec3(x, 0.1 * x + 0.1 * r_c, -press);
   };
-  method->seat(hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
   Watched watched;
-  watch(*method,
+  watch(name, options,
         {.duration = 2.0,
          .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
          .hip = hip},
-        truth, r_c, 0.5, watched);
+        flat_truth(), 0.5, watched, hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
   double largest = 0.0;
   for (const double e : watched.error) largest = std::max(largest, std::abs(e));
   return rows_of(name, scene, {{"largest", 1e3 * largest}});
@@ -270,18 +260,15 @@ std::string slide_on_relief(const std::string& name, const ExperimentOptions& op
                             std::string_view scene_name) {
   const double r_c = options.parameters.proxy.r_c();
   const auto scene = std::make_shared<const Scene>(make_scene(Uri("synthetic:relief")));
-  const Truth truth = truth_of(scene);
   GridCloud grid = level_grid(r_c, 0.08);
   grid.height = [](double x, double) { return 1.5e-3 * std::sin(200.0 * std::numbers::pi * x); };
-  const auto method = make_method(name, {options.parameters, truth}, options.own_methods);
   const auto hip = [&](double t) { return Vec3(0.02 * (t - 1.5), 0.1 * r_c, -press); };
-  method->seat(hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
   Watched watched;
-  watch(*method,
+  watch(name, options,
         {.duration = 3.0,
          .cloud = [&](std::uint64_t f, double) { return grid.capture(f, 0.0); },
          .hip = hip},
-        truth, r_c, 0.5, watched);
+        truth_of(scene), 0.5, watched, hip(0.0) + Vec3(0.0, 0.0, press + 4.0 * r_c));
   return rows_of(name, scene_name, summary(watched));
 }
 

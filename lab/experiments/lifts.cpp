@@ -78,21 +78,15 @@ double printed_e(double s) {
 constexpr double single_acceleration = 600.0;  // [r_c/s^2]
 constexpr double single_noise = 0.6;           // [r_c]
 
-std::vector<Cell> single_lift_cells(const Experiment& experiment,
-                                    const ExperimentOptions& options) {
+std::string single_lift_rows(const std::string& name, const ExperimentOptions& options) {
   const double r_c = options.parameters.proxy.r_c();
-  std::vector<Cell> cells;
-  for (const std::string& name : methods_of(experiment, options))
-    cells.emplace_back([=] {
-      std::string rows;
-      lift(name, options, single_acceleration * r_c, single_noise * r_c, options.seed,
-           [&](const Tick& last, double true_height, double shown) {
-             rows += csv_row(name, last.t, true_height, shown, last.hip.z(), last.proxy.z(),
-                             last.state != ContactState::free_motion);
-           });
-      return rows;
-    });
-  return cells;
+  std::string rows;
+  lift(name, options, single_acceleration * r_c, single_noise * r_c, options.seed,
+       [&](const Tick& last, double true_height, double shown) {
+         rows += csv_row(name, last.t, true_height, shown, last.hip.z(), last.proxy.z(),
+                         last.state != ContactState::free_motion);
+       });
+  return rows;
 }
 
 std::vector<Claim> single_lift_claims(const Table& table) {
@@ -290,7 +284,7 @@ Experiment single_lift_experiment() {
           .summary = "5.2, Fig. 12: one lift over time, at every update",
           .header = "method,t,true_y,cloud_y,hip_y,proxy_y,touching",
           .default_methods = {"paper", "fixed-step", "sight"},
-          .cells = single_lift_cells,
+          .cells = by_method<single_lift_rows>,
           .claims = single_lift_claims};
 }
 

@@ -86,13 +86,6 @@ std::string scan(const std::string& name, const ExperimentOptions& options) {
   return rows;
 }
 
-std::vector<Cell> scan_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  std::vector<Cell> cells;
-  for (const std::string& name : methods_of(experiment, options))
-    cells.emplace_back([=] { return scan(name, options); });
-  return cells;
-}
-
 // Proxy steps a second [1/s], by this thread's own clock, along the synthetic scan.
 double step_rate() {
   const Frame frame = camera_over_desk(1)->capture(0.0, 0);
@@ -142,7 +135,7 @@ Experiment scan_experiment() {
           .summary = "5.4, Fig. 16: over a ramp and a box seen by a synthetic Kinect",
           .header = "method,t,hip_y,hip_z,proxy_y,proxy_z,surface_z,force_n,steps,touching",
           .default_methods = {"paper", "ideal"},
-          .cells = scan_cells,
+          .cells = by_method<scan>,
           .claims = scan_claims};
 }
 

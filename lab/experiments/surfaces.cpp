@@ -16,33 +16,27 @@ namespace {
 
 // 5.1: along x at 2 r_c/s, above the plane, from 1 s on below it, from 4 s on above it again. How
 // far is not printed: 2 r_c.
-std::vector<Cell> flat_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  std::vector<Cell> cells;
-  for (const std::string& name : methods_of(experiment, options)) {
-    cells.emplace_back([=] {
-      const double r_c = options.parameters.proxy.r_c();
-      GridCloud grid = level_grid(r_c, 15.0 * r_c);  // 100 x 100 points
-      const auto method = make_method(name, {options.parameters, flat_truth()});
-      std::string rows;
-      play(*method,
-           {.duration = 5.0,
-            .cloud = [&](std::uint64_t frame, double) { return grid.capture(frame, 0.0); },
-            .hip =
-                [&](double t) {
-                  const bool below = t >= 1.0 - 1e-9 && t < 4.0 - 1e-9;
-                  // A little askew, or it would see one line of the grid only.
-                  const double x = (2.0 * t - 5.0) * r_c;
-                  return Vec3(x, 0.1 * x, below ? -2.0 * r_c : 2.0 * r_c);
-                }},
-           [&](const Tick& tick) {
-             rows += csv_row(name, tick.t, tick.hip.x(), tick.hip.z(), tick.proxy.x(),
-                             tick.proxy.z(), tick.proxy.z() - r_c, tick.force.norm(), tick.steps);
-             return true;
-           });
-      return rows;
-    });
-  }
-  return cells;
+std::string flat_rows(const std::string& name, const ExperimentOptions& options) {
+  const double r_c = options.parameters.proxy.r_c();
+  GridCloud grid = level_grid(r_c, 15.0 * r_c);  // 100 x 100 points
+  const auto method = make_method(name, {options.parameters, flat_truth()});
+  std::string rows;
+  play(*method,
+       {.duration = 5.0,
+        .cloud = [&](std::uint64_t frame, double) { return grid.capture(frame, 0.0); },
+        .hip =
+            [&](double t) {
+              const bool below = t >= 1.0 - 1e-9 && t < 4.0 - 1e-9;
+              // A little askew, or it would see one line of the grid only.
+              const double x = (2.0 * t - 5.0) * r_c;
+              return Vec3(x, 0.1 * x, below ? -2.0 * r_c : 2.0 * r_c);
+            }},
+       [&](const Tick& tick) {
+         rows += csv_row(name, tick.t, tick.hip.x(), tick.hip.z(), tick.proxy.x(), tick.proxy.z(),
+                         tick.proxy.z() - r_c, tick.force.norm(), tick.steps);
+         return true;
+       });
+  return rows;
 }
 
 std::vector<Claim> flat_claims(const Table& table) {
@@ -62,45 +56,39 @@ std::vector<Claim> flat_claims(const Table& table) {
 }
 
 // 5.3: a 300 x 100 grid shaped as a triangle wave with growing amplitude.
-std::vector<Cell> corners_cells(const Experiment& experiment, const ExperimentOptions& options) {
-  std::vector<Cell> cells;
-  for (const std::string& name : methods_of(experiment, options)) {
-    cells.emplace_back([=] {
-      const double r_c = options.parameters.proxy.r_c();
-      const auto scene = std::make_shared<const Scene>(make_scene(Uri("synthetic:triangle-wave")));
-      const auto height = [&](double x, double y) {
-        const auto hit = scene->cast(Vec3(x, y, 1.0), -Vec3::UnitZ(), 0.0);
-        return hit ? 1.0 - *hit : 0.0;
-      };
-      GridCloud grid;
-      grid.height = height;
-      grid.spacing = 0.3 * r_c;
-      grid.half_x = 45.0 * r_c;
-      grid.half_y = 15.0 * r_c;
-      const auto method = make_method(name, {options.parameters, truth_of(scene)});
-      const double from = -38.0 * r_c;
-      const double to = 38.0 * r_c;
-      const double speed = 10.0 * r_c;  // [m/s]
-      const std::unique_ptr<Cloud> cloud = grid.capture(0, 0.0);
-      method->seat(Vec3(from, 0.1 * r_c, height(from, 0.0) + 3.0 * r_c));
-      method->observe({*cloud, 0.0});
-      std::string rows;
-      const auto ticks = static_cast<int>((to - from) / speed * 1000.0);
-      for (int i = 0; i <= ticks; ++i) {
-        const double t = i * 1e-3;
-        // The hand stays 2 r_c below the mean height of the wave.
-        const Tick tick = method->tick(Vec3(from + speed * t, 0.1 * r_c, -2.0 * r_c), t);
-        // The contact point: on the sphere, towards the surface.
-        const SurfacePoint under = scene->nearest(tick.proxy, 0.0);
-        const Vec3 contact = tick.proxy - r_c * under.normal;
-        if (i % 5 == 0 && i > 50)
-          rows += csv_row(name, tick.hip.x(), tick.proxy.x(), tick.proxy.z(), contact.x(),
-                          contact.z(), height(contact.x(), 0.0), under.distance - r_c);
-      }
-      return rows;
-    });
+std::string corners_rows(const std::string& name, const ExperimentOptions& options) {
+  const double r_c = options.parameters.proxy.r_c();
+  const auto scene = std::make_shared<const Scene>(make_scene(Uri("synthetic:triangle-wave")));
+  const auto height = [&](double x, double y) {
+    const auto hit = scene->cast(Vec3(x, y, 1.0), -Vec3::UnitZ(), 0.0);
+    return hit ? 1.0 - *hit : 0.0;
+  };
+  GridCloud grid;
+  grid.height = height;
+  grid.spacing = 0.3 * r_c;
+  grid.half_x = 45.0 * r_c;
+  grid.half_y = 15.0 * r_c;
+  const auto method = make_method(name, {options.parameters, truth_of(scene)});
+  const double from = -38.0 * r_c;
+  const double to = 38.0 * r_c;
+  const double speed = 10.0 * r_c;  // [m/s]
+  const std::unique_ptr<Cloud> cloud = grid.capture(0, 0.0);
+  method->seat(Vec3(from, 0.1 * r_c, height(from, 0.0) + 3.0 * r_c));
+  method->observe({*cloud, 0.0});
+  std::string rows;
+  const auto ticks = static_cast<int>((to - from) / speed * 1000.0);
+  for (int i = 0; i <= ticks; ++i) {
+    const double t = i * 1e-3;
+    // The hand stays 2 r_c below the mean height of the wave.
+    const Tick tick = method->tick(Vec3(from + speed * t, 0.1 * r_c, -2.0 * r_c), t);
+    // The contact point: on the sphere, towards the surface.
+    const SurfacePoint under = scene->nearest(tick.proxy, 0.0);
+    const Vec3 contact = tick.proxy - r_c * under.normal;
+    if (i % 5 == 0 && i > 50)
+      rows += csv_row(name, tick.hip.x(), tick.proxy.x(), tick.proxy.z(), contact.x(), contact.z(),
+                      height(contact.x(), 0.0), under.distance - r_c);
   }
-  return cells;
+  return rows;
 }
 
 std::vector<Claim> corners_claims(const Table& table) {
@@ -133,7 +121,7 @@ Experiment flat_experiment() {
           .summary = "5.1, Fig. 11: along a flat grid, above and below it",
           .header = "method,t,hip_x,hip_y,proxy_x,proxy_y,contact_y,force_n,steps",
           .default_methods = {"paper", "ideal"},
-          .cells = flat_cells,
+          .cells = by_method<flat_rows>,
           .claims = flat_claims};
 }
 
@@ -142,7 +130,7 @@ Experiment corners_experiment() {
           .summary = "5.3, Fig. 14: a triangle wave with growing amplitude",
           .header = "method,hip_x,proxy_x,proxy_z,contact_x,contact_z,true_z,gap",
           .default_methods = {"paper", "ideal"},
-          .cells = corners_cells,
+          .cells = by_method<corners_rows>,
           .claims = corners_claims};
 }
 

@@ -10,7 +10,6 @@
 #include <numeric>
 #include <optional>
 #include <random>
-#include <sstream>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -168,13 +167,6 @@ std::vector<Cell> cells_of(const std::vector<const Item*>& items) {
   cells.reserve(items.size());
   for (const Item* item : items) cells.emplace_back([item] { return item->play() + "\n"; });
   return cells;
-}
-
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) lines.push_back(line);
-  return lines;
 }
 
 // ---- From outcomes to scores. ----

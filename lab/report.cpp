@@ -2,7 +2,6 @@
 #include "lab/report.hpp"
 
 #include <algorithm>
-#include <sstream>
 
 #include <fmt/format.h>
 
@@ -28,13 +27,6 @@ std::string command_line(const Experiment& experiment, const ExperimentOptions& 
   if (!options.recording.empty()) line += " --recording " + options.recording;
   if (options.seed != 1) line += fmt::format(" --seed {}", options.seed);
   return line;
-}
-
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) lines.push_back(line);
-  return lines;
 }
 
 std::string scores_as_text(const Scores& scores) {

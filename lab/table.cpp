@@ -27,6 +27,12 @@ std::vector<std::string> split(std::string_view text, char separator) {
 
 }  // namespace
 
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines = split(text, '\n');
+  if (lines.back().empty()) lines.pop_back();  // behind the last newline
+  return lines;
+}
+
 Table::Table(std::string_view subject, std::string_view csv) : subject_(subject) {
   for (const std::string& line : split(csv, '\n')) {
     if (line.empty()) continue;

@@ -16,6 +16,8 @@ namespace palpate::lab {
 /// Columns and the text that each has in the rows that are meant.
 using Where = std::initializer_list<std::pair<std::string_view, std::string_view>>;
 
+std::vector<std::string> lines_of(const std::string& text);
+
 /// A CSV as read back, to make claims from.
 class Table {
  public:

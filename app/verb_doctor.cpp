@@ -41,19 +41,20 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// What `doctor --device` is asked for.
-struct DeviceCheck {
-  std::string uri;
-  bool agreed = false;            // the person beside the device has
-  bool without_watchdog = false;  // an emergency stop is at hand
-  bool json = false;
-};
+std::string word_of(const Json& value) {
+  return value.get<std::string>();
+}
+double number_of(const Json& value) {
+  return value.get<double>();
+}
 
 struct DoctorOptions {
   double seconds = 3.0;
   double rate = 1000.0;
   bool json = false;
-  DeviceCheck device;
+  std::string device;             // to be measured instead of the computer
+  bool agreed = false;            // the person beside the device has
+  bool without_watchdog = false;  // an emergency stop is at hand
 };
 
 // Fit for haptics: what a hand does not feel. A wake-up half a tick late at 1 kHz is still in time.
@@ -63,9 +64,9 @@ constexpr double most_late_ticks = 1.0e-3;  // [-] share of ticks that are not d
 constexpr double longest_pause = SafetyParameters{}.stall_time;
 
 bool is_fit(const Json& loop) {
-  const double ticks = std::max(loop["ticks"].get<double>(), 1.0);
+  const double ticks = std::max(number_of(loop["ticks"]), 1.0);
   return loop["wake_up_p999_s"] <= most_late && loop["wake_up_max_s"] <= longest_pause &&
-         loop["late_ticks"].get<double>() / ticks <= most_late_ticks;
+         number_of(loop["late_ticks"]) / ticks <= most_late_ticks;
 }
 
 // What may stand in the way of a loop that was late, each with its remedy.
@@ -141,7 +142,7 @@ Json look_at_time(const DoctorOptions& options, const Machine& machine,
         "programs, grant the real-time permissions listed here, or install a PREEMPT_RT kernel",
         loop["late_ticks"].get<int>(), loop["ticks"].get<int>(), felt["late_ticks"].get<int>(),
         felt["ticks"].get<int>(),
-        1e3 * std::max(loop["wake_up_max_s"].get<double>(), felt["wake_up_max_s"].get<double>()),
+        1e3 * std::max(number_of(loop["wake_up_max_s"]), number_of(felt["wake_up_max_s"])),
         1e3 * longest_pause));
     name_obstacles(machine, granted, half.count(), interrupts, advice);
   }
@@ -151,7 +152,7 @@ Json look_at_time(const DoctorOptions& options, const Machine& machine,
                     "improve its cooling",
                     throttled - throttled_before));
   advice.insert(advice.begin(), granted.advice.begin(), granted.advice.end());
-  const double delay = felt["wake_up_p999_s"].get<double>() + felt["compute_p999_s"].get<double>();
+  const double delay = number_of(felt["wake_up_p999_s"]) + number_of(felt["compute_p999_s"]);
   Json report = {{"fit", fit},
                  {"rate_hz", options.rate},
                  {"delay_s", delay},
@@ -277,9 +278,9 @@ std::string listed(const Json& object) {
   std::string text;
   for (const auto& [key, value] : object.items()) {
     const bool is_text = value.is_string();
-    if (is_text && value.get<std::string>().empty()) continue;
+    if (is_text && word_of(value).empty()) continue;
     if (value.is_array() && value.empty()) continue;
-    text += fmt::format("  {}: {}\n", key, is_text ? value.get<std::string>() : value.dump());
+    text += fmt::format("  {}: {}\n", key, is_text ? word_of(value) : value.dump());
   }
   return text;
 }
@@ -288,22 +289,20 @@ std::string drivers_text(const Json& drivers) {
   if (drivers.empty()) return {};
   std::string text = "\nDrivers\n";
   for (const Json& driver : drivers) {
-    const auto word = [&](const char* key) { return driver[key].get<std::string>(); };
+    const auto word = [&](const char* key) { return word_of(driver[key]); };
     text += fmt::format("  {} {}; tested with {}\n", word("name"), word("summary"), word("tried"));
     if (!word("library").empty())
       text += fmt::format("    found {}{}\n", word("library"),
                           word("version").empty() ? "" : ", version " + word("version"));
     if (!word("problem").empty()) text += fmt::format("    {}\n", word("problem"));
     for (const Json& one : driver["found"]) {
-      text +=
-          fmt::format("    {}: {}", one["uri"].get<std::string>(), one["name"].get<std::string>());
+      text += fmt::format("    {}: {}", word_of(one["uri"]), word_of(one["name"]));
       for (const char* key : {"serial", "firmware"}) {
-        const auto value = one[key].get<std::string>();
+        const auto value = word_of(one[key]);
         if (!value.empty()) text += fmt::format(", {} {}", key, value);
       }
-      if (one["rate_hz"].is_number())
-        text += fmt::format(", {:.0f} Hz", one["rate_hz"].get<double>());
-      if (const auto noise = one["noise"].get<std::string>(); !noise.empty()) text += ", " + noise;
+      if (one["rate_hz"].is_number()) text += fmt::format(", {:.0f} Hz", number_of(one["rate_hz"]));
+      if (const auto noise = word_of(one["noise"]); !noise.empty()) text += ", " + noise;
       text += "\n";
     }
   }
@@ -315,7 +314,7 @@ std::string loop_text(const char* name, const Json& loop) {
   for (const auto& [what, key] :
        {std::pair{"wake-up latency", "wake_up"}, {"compute", "compute"}}) {
     const auto microseconds = [&, name = std::string(key)](const char* share) {
-      return 1e6 * loop[name + share].get<double>();
+      return 1e6 * number_of(loop[name + share]);
     };
     text +=
         fmt::format("  {}: {:.0f} us median, {:.0f} at 99 %, {:.0f} at 99.9 %, {:.0f} maximum\n",
@@ -339,8 +338,8 @@ std::string doctor_text(const Json& report) {
       "{:.0f} "
       "N/m for each N s/m of its damping\n\n{}{}  real-time scheduling: {}; memory: {}; core: {}; "
       "cores: {}\n",
-      report["fit"].get<bool>() ? "Fit" : "Not fit", time["rate_hz"].get<double>(),
-      1e3 * time["delay_s"].get<double>(), time["stiffness_per_damping_1_s"].get<double>(),
+      report["fit"].get<bool>() ? "Fit" : "Not fit", number_of(time["rate_hz"]),
+      1e3 * number_of(time["delay_s"]), number_of(time["stiffness_per_damping_1_s"]),
       loop_text("Empty servo loop", time), loop_text("Session", time["session"]),
       time["fifo_priority"] == 0 ? "refused"
                                  : "priority " + std::to_string(time["fifo_priority"].get<int>()),
@@ -349,26 +348,31 @@ std::string doctor_text(const Json& report) {
       time["kept_awake"].get<bool>() ? "kept awake" : "may sleep");
   text += "\nMachine\n" + listed(report["machine"]) + "\nCameras and haptic devices\n";
   for (const Json& device : report["devices"])
-    text += fmt::format("  {}: {} ({}), {}\n", device["where"].get<std::string>(),
-                        device["name"].get<std::string>(), device["kind"].get<std::string>(),
-                        device["driver"].get<std::string>().empty()
-                            ? "no driver"
-                            : "driver " + device["driver"].get<std::string>());
+    text += fmt::format(
+        "  {}: {} ({}), {}\n", word_of(device["where"]), word_of(device["name"]),
+        word_of(device["kind"]),
+        word_of(device["driver"]).empty() ? "no driver" : "driver " + word_of(device["driver"]));
   if (report["devices"].empty()) text += "  none found\n";
   text += drivers_text(report["drivers"]);
   text += "\nVersions\n" + listed(report["versions"]);
   if (!report["advice"].empty()) text += "\nRecommended actions\n";
-  for (const Json& line : report["advice"])
-    text += fmt::format("  - {}\n", line.get<std::string>());
+  for (const Json& line : report["advice"]) text += fmt::format("  - {}\n", word_of(line));
   return text;
+}
+
+void print(const Json& report, bool as_json, std::string (*in_words)(const Json&)) {
+  const std::string text = as_json
+                               ? report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
+                               : in_words(report);
+  std::fputs(text.c_str(), stdout);
 }
 
 constexpr double gravity = 9.80665;  // [m/s^2]
 
-void ask_for_consent(const DeviceCheck& check, const ProbeOptions& options) {
-  if (check.agreed) return;
+void ask_for_consent(const DoctorOptions& wanted, const ProbeOptions& options) {
+  if (wanted.agreed) return;
   if (isatty(STDIN_FILENO) != 1)
-    throw Error("doctor --device " + check.uri,
+    throw Error("doctor --device " + wanted.device,
                 "the measurement moves the device and was not confirmed",
                 "clear the space around the handle, stay next to the device, and add --yes");
   fmt::print(
@@ -376,29 +380,29 @@ void ask_for_consent(const DeviceCheck& check, const ProbeOptions& options) {
       "palpate: {} will move its handle by itself, back and forth along each axis, for up to a "
       "minute,\n  with at most {} N and {:.0f} mm. Put the handle in the centre of its "
       "workspace,\n  free to move, hands off, the emergency stop within reach. Type yes to begin: ",
-      check.uri, options.force, 1e3 * options.travel);
+      wanted.device, options.force, 1e3 * options.travel);
   std::string answer;
   std::getline(std::cin, answer);
   if (answer != "yes")
-    throw Error("doctor --device " + check.uri, "the measurement was not confirmed",
+    throw Error("doctor --device " + wanted.device, "the measurement was not confirmed",
                 "type yes, or add --yes");
 }
 
 // A device with motors must let go by itself when this process is killed.
-std::unique_ptr<Device> open_watched(const DeviceCheck& check) {
+std::unique_ptr<Device> open_watched(const DoctorOptions& wanted) {
   const Registry<Driver> drivers = standard_drivers();
-  const Uri uri(check.uri);
+  const Uri uri(wanted.device);
   const Driver* driver = drivers.try_find(uri.scheme());
   std::unique_ptr<Device> device;
-  if (driver != nullptr && driver->needs_guard && !check.without_watchdog)
+  if (driver != nullptr && driver->needs_guard && !wanted.without_watchdog)
     device = open_guarded([&] { return driver->open_device(uri); });
   else
-    device = open_device(check.uri, HipPath({{0.0, Vec3::Zero()}}), all_devices(drivers));
+    device = open_device(wanted.device, HipPath({{0.0, Vec3::Zero()}}), all_devices(drivers));
   const DeviceInfo& info = device->info();
   constexpr double longest_watchdog = 0.5;  // [s] as a session's
   const bool watched = info.watchdog && *info.watchdog <= longest_watchdog;
-  if (info.limits.motors && !info.simulated && !watched && !check.without_watchdog)
-    throw Error(check.uri,
+  if (info.limits.motors && !info.simulated && !watched && !wanted.without_watchdog)
+    throw Error(wanted.device,
                 "it has no watchdog that switches the force off when this process is killed",
                 "keep an emergency stop within reach and add --without-watchdog");
   return device;
@@ -454,22 +458,21 @@ Json report_json(const DeviceInfo& info, const DeviceMeasurement& found,
 
 std::string report_text(const Json& report) {
   const auto with_error = [](const Json& figure, double scale, int decimals) {
-    return fmt::format("{:.{}f} ± {:.{}f}", scale * figure["value"].get<double>(), decimals,
-                       scale * figure["error"].get<double>(), decimals);
+    return fmt::format("{:.{}f} ± {:.{}f}", scale * number_of(figure["value"]), decimals,
+                       scale * number_of(figure["error"]), decimals);
   };
-  std::string text = fmt::format("{}: {}\n\n", report["device"].get<std::string>(),
-                                 report["kind"].get<std::string>());
+  std::string text = fmt::format("{}: {}\n\n", word_of(report["device"]), word_of(report["kind"]));
   for (const Json& axis : report["axes"])
     text += fmt::format(
         "  {} axis: {} g, damping {} N s/m, friction {} N, load {} N ({} strokes)\n",
-        axis["axis"].get<std::string>(), with_error(axis["mass_kg"], 1e3, 1),
+        word_of(axis["axis"]), with_error(axis["mass_kg"], 1e3, 1),
         with_error(axis["damping_ns_m"], 1.0, 2), with_error(axis["friction_n"], 1.0, 3),
         with_error(axis["load_n"], 1.0, 3), axis["swings"].get<int>());
   if (!report["delay_s"].is_null())
     text += fmt::format("  actuation delay: {} ms\n", with_error(report["delay_s"], 1e3, 2));
   const auto line = [&](const char* key, const char* what, double scale, const char* unit) {
     if (!report[key].is_null())
-      text += fmt::format("  {}: {:.4g} {}\n", what, scale * report[key].get<double>(), unit);
+      text += fmt::format("  {}: {:.4g} {}\n", what, scale * number_of(report[key]), unit);
   };
   line("resolution_m", "position resolution", 1e3, "mm");
   line("noise_m", "position noise at rest, rms", 1e3, "mm");
@@ -482,33 +485,32 @@ std::string report_text(const Json& report) {
     text += fmt::format(
         "Proposed: --rate {:.0f} --set stiffness={:.0f} --set damping={:g}\n  ({:.0f} N/m without "
         "damping; with these values a released handle is stable)\n",
-        proposal["rate_hz"].get<double>(), std::floor(proposal["stiffness_n_m"].get<double>()),
-        proposal["damping_ns_m"].get<double>(),
-        std::floor(proposal["undamped_stiffness_n_m"].get<double>()));
+        number_of(proposal["rate_hz"]), std::floor(number_of(proposal["stiffness_n_m"])),
+        number_of(proposal["damping_ns_m"]),
+        std::floor(number_of(proposal["undamped_stiffness_n_m"])));
     if (proposal.contains("handle_weight_kg"))
       text += fmt::format(
           "  uncompensated handle mass: {:.0f} g; direction of gravity in the device frame: "
           "({:.2f}, {:.2f}, {:.2f})\n",
-          1e3 * proposal["handle_weight_kg"].get<double>(), proposal["down"][0].get<double>(),
-          proposal["down"][1].get<double>(), proposal["down"][2].get<double>());
+          1e3 * number_of(proposal["handle_weight_kg"]), number_of(proposal["down"][0]),
+          number_of(proposal["down"][1]), number_of(proposal["down"][2]));
   } else {
     text += "No proposal: the values are too uncertain\n";
   }
   text += report["sure"].get<bool>() ? "The values are consistent\n" : "";
-  for (const Json& doubt : report["doubts"])
-    text += fmt::format("  - {}\n", doubt.get<std::string>());
+  for (const Json& doubt : report["doubts"]) text += fmt::format("  - {}\n", word_of(doubt));
   return text;
 }
 
 // Measures a device by its own motors, with consent, and prints what it found.
-int check_device(const DeviceCheck& check) {
+int check_device(const DoctorOptions& wanted) {
   ProbeOptions options;
-  const std::unique_ptr<Device> device = open_watched(check);
+  const std::unique_ptr<Device> device = open_watched(wanted);
   const DeviceInfo& info = device->info();
   if (!info.limits.motors)
-    throw Error("doctor --device " + check.uri, "it has no motors",
+    throw Error("doctor --device " + wanted.device, "it has no motors",
                 "give a haptic device, or a simulated one: hand:?device=touch&grip=none");
-  if (!info.simulated) ask_for_consent(check, options);
+  if (!info.simulated) ask_for_consent(wanted, options);
   std::atomic<bool> cancelled{false};
   options.cancelled = [&cancelled] { return cancelled.load(); };
   DeviceMeasurement found;
@@ -519,20 +521,13 @@ int check_device(const DeviceCheck& check) {
     found = measure_device(*device, options);
   }
   const Json report = report_json(info, found, propose(info, found));
-  const std::string text = check.json
-                               ? report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
-                               : report_text(report);
-  std::fputs(text.c_str(), stdout);
+  print(report, wanted.json, report_text);
   return found.ended.empty() ? 0 : 1;
 }
 
 int run(const DoctorOptions& options) {
-  if (!options.device.uri.empty()) {
-    DeviceCheck check = options.device;
-    check.json = options.json;
-    return check_device(check);
-  }
-  if (options.device.agreed || options.device.without_watchdog)
+  if (!options.device.empty()) return check_device(options);
+  if (options.agreed || options.without_watchdog)
     throw Error("doctor", "--yes and --without-watchdog are for a device",
                 "add --device URI, or remove these options");
   if (!(options.seconds >= 0.1 && options.seconds <= 3600.0))
@@ -554,10 +549,7 @@ int run(const DoctorOptions& options) {
   report["drivers"] = look_at_drivers(machine, drivers, advice);
   report["versions"] = versions();
   report["advice"] = advice;
-  const std::string text = options.json
-                               ? report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"
-                               : doctor_text(report);
-  std::fputs(text.c_str(), stdout);
+  print(report, options.json, doctor_text);
   return 0;
 }
 
@@ -573,12 +565,12 @@ Verb add_doctor(CLI::App& program) {
       "duration of the measurement [s] (3): half of it an empty loop, half a session");
   command->add_option("--rate", options->rate, "ticks per second (1000)");
   command->add_flag("--json", options->json, "print a JSON object");
-  command->add_option("--device", options->device.uri,
+  command->add_option("--device", options->device,
                       "measure this haptic device instead, by moving its handle with less than 0.5 "
                       "N: mass, damping, friction, delay, and the largest stable stiffness");
-  command->add_flag("--yes", options->device.agreed,
+  command->add_flag("--yes", options->agreed,
                     "confirm the measurement: the handle is free to move and nobody holds it");
-  command->add_flag("--without-watchdog", options->device.without_watchdog,
+  command->add_flag("--without-watchdog", options->without_watchdog,
                     "measure a device without a watchdog. Danger: if this program is killed, the "
                     "last force stays on; keep an emergency stop within reach");
   return {command, [options] { return run(*options); }};

@@ -3,11 +3,22 @@
 #include <array>
 
 #include "app/program.hpp"
+#include "app/program_methods.hpp"
+#include "lab/method.hpp"
+#include "palpate/io/sources/synthetic_camera.hpp"
 
 namespace palpate::app {
+
 Verb add_eval(CLI::App& program);
 Verb add_bench_entry(CLI::App& program);
 Verb add_bench_check(CLI::App& program);
+
+MethodRegistry program_methods(const Source* camera) {
+  const auto* synthetic = dynamic_cast<const SyntheticCamera*>(camera);
+  if (synthetic == nullptr) return lab::methods();
+  return lab::methods(lab::truth_of(std::make_shared<const Scene>(synthetic->scene())));
+}
+
 }  // namespace palpate::app
 
 int main(int argc, char** argv) {

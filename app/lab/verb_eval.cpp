@@ -22,18 +22,11 @@ namespace {
 namespace fs = std::filesystem;
 
 struct EvalOptions {
-  std::string name;
-  std::string out = "eval";
-  std::vector<std::string> methods;
-  std::string grid;
-  std::string noise = "white";
-  std::string recording;
+  std::string name, out = "eval", grid, noise = "white";
+  lab::ExperimentOptions given;  // but for what is checked first
   std::int64_t seed = 1;
   int jobs = 0;
   int cases = 0;
-  std::vector<std::string> families;
-  std::vector<std::string> fixed;
-  std::string case_text;
   bool resume = false;
   bool list_methods = false;
   bool list_experiments = false;
@@ -53,9 +46,8 @@ std::pair<int, int> parse_grid(const std::string& text) {
 }
 
 lab::ExperimentOptions experiment_options(const EvalOptions& options) {
-  lab::ExperimentOptions result;
+  lab::ExperimentOptions result = options.given;
   result.parameters = options.parameters.choice(lab::methods()).parameters;
-  result.methods = options.methods;
   if (options.seed < 0)
     throw Error("--seed " + std::to_string(options.seed), "it is negative",
                 "use a whole number from 0 on");
@@ -65,14 +57,10 @@ lab::ExperimentOptions experiment_options(const EvalOptions& options) {
     throw Error("--cases " + std::to_string(options.cases), "it is not from 1 to 10000000",
                 "write for example --cases 1000");
   if (options.cases > 0) result.cases = options.cases;
-  result.families = options.families;
-  result.fixed = options.fixed;
-  result.case_text = options.case_text;
   if (options.noise == "correlated")
     result.noise = lab::Noise::correlated;
   else if (options.noise != "white")
     throw Error("--noise " + options.noise, "there is no such noise", "choose white or correlated");
-  result.recording = options.recording;
   return result;
 }
 
@@ -144,7 +132,7 @@ Verb add_eval(CLI::App& program) {
   command->add_option("experiment", options->name, "its name, or all; see --list");
   command->add_option("--out", options->out, "folder for CSV files and tables (eval)");
   command
-      ->add_option("--methods", options->methods,
+      ->add_option("--methods", options->given.methods,
                    "methods to compare, separated by commas; see --list-methods")
       ->delimiter(',')
       ->allow_extra_args(false);
@@ -152,18 +140,18 @@ Verb add_eval(CLI::App& program) {
   command->add_option("--cases", options->cases,
                       "pop, field, visits: number of cases of each family or class (50, 5, 4)");
   command
-      ->add_option("--families", options->families,
+      ->add_option("--families", options->given.families,
                    "pop, field, visits, fidelity, feel: which, separated by commas")
       ->delimiter(',')
       ->allow_extra_args(false);
   command
-      ->add_option("--fix", options->fixed,
+      ->add_option("--fix", options->given.fixed,
                    "pop, field, visits: KEY=VALUE instead of a random value")
       ->allow_extra_args(false);
-  command->add_option("--case", options->case_text,
+  command->add_option("--case", options->given.case_text,
                       "pop, field, visits: one case as a run printed it, such as field:...");
   command->add_option("--noise", options->noise, "white (default) or correlated");
-  command->add_option("--recording", options->recording,
+  command->add_option("--recording", options->given.recording,
                       "real: touch a recording, e.g. tum:FOLDER, instead of the synthetic desk");
   command->add_option("--seed", options->seed, "random seed of all noise (1)");
   command->add_option("--jobs", options->jobs, "threads (one a core)");

@@ -68,6 +68,12 @@ CycleRecord record_of(const ServoTick& tick) {
           .state = static_cast<std::int32_t>(tick.tick.state)};
 }
 
+Points rows_of(const std::vector<Vec3>& points) {
+  const void* const numbers = points.data();
+  return Eigen::Map<const Points>(static_cast<const double*>(numbers),
+                                  static_cast<Eigen::Index>(points.size()), 3);
+}
+
 py::array array_of(const std::vector<TickRecord>& ticks) {
   return copied(ticks);
 }

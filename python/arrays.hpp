@@ -58,6 +58,9 @@ CycleRecord record_of(const ServoTick& tick);
 py::array array_of(const std::vector<TickRecord>& ticks);
 py::array array_of(const std::vector<CycleRecord>& ticks);
 
+/// A row of x, y and z for each point.
+Points rows_of(const std::vector<Vec3>& points);
+
 /// @param shape  what is needed; 0 for any length
 /// @param give   what an array of that shape holds
 /// @throws Error that names both shapes, unless they are the same

@@ -137,13 +137,6 @@ std::shared_ptr<PointCloud> make_points(const Numbers& points,
   return std::make_shared<PointCloud>(list, from);
 }
 
-Points rows_of(const std::vector<Vec3>& points) {
-  Points rows(static_cast<Eigen::Index>(points.size()), 3);
-  for (std::size_t i = 0; i < points.size(); ++i)
-    rows.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
-  return rows;
-}
-
 /// A method, and the frame that it touches.
 class Renderer {
  public:
@@ -228,6 +221,17 @@ py::dict table_dict(const Table& table) {
   return all;
 }
 
+// name -> meaning of the bits that are set. @param at  name and meaning of a bit
+template <class At>
+py::dict named_bits(std::uint32_t bits, std::size_t count, const At& at) {
+  py::dict set;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto [name, meaning] = at(i);
+    if (((bits >> i) & 1U) != 0U) set[py::str(std::string(name))] = std::string(meaning);
+  }
+  return set;
+}
+
 void define_tables(py::module_& m) {
   m.def(
       "parameters", [] { return table_dict(parameter_table()); },
@@ -262,26 +266,18 @@ void define_tables(py::module_& m) {
   m.def(
       "flags",
       [](std::uint32_t bits) {
-        py::dict set;
         const auto table = tick_flag_table();
-        for (std::size_t i = 0; i < table.size(); ++i) {
-          if (((bits >> i) & 1U) != 0U)
-            set[py::str(std::string(table[i].name))] = std::string(table[i].meaning);
-        }
-        return set;
+        return named_bits(bits, table.size(), [&](std::size_t i) {
+          return std::pair{table[i].name, table[i].meaning};
+        });
       },
       py::arg("bits"), "The conditions in a tick's `flags`: name -> what it means.");
   m.def(
       "safety_flags",
       [](std::uint32_t bits) {
-        py::dict set;
-        const auto names = safety_flag_names();
-        const auto meanings = safety_flag_meanings();
-        for (std::size_t i = 0; i < names.size(); ++i) {
-          if (((bits >> i) & 1U) != 0U)
-            set[py::str(std::string(names[i]))] = std::string(meanings[i]);
-        }
-        return set;
+        return named_bits(bits, safety_flag_names().size(), [](std::size_t i) {
+          return std::pair{safety_flag_names()[i], safety_flag_meanings()[i]};
+        });
       },
       py::arg("bits"), "What the safety chain did in a tick, from its `safety`.");
 }
@@ -400,10 +396,9 @@ void define_clouds(py::module_& m) {
       .def(
           "points",
           [](const PointCloud& cloud) {
-            Points rows(static_cast<Eigen::Index>(cloud.size()), 3);
-            for (std::size_t i = 0; i < cloud.size(); ++i)
-              rows.row(static_cast<Eigen::Index>(i)) = cloud.point(i).transpose();
-            return rows;
+            std::vector<Vec3> points;
+            for (std::size_t i = 0; i < cloud.size(); ++i) points.push_back(cloud.point(i));
+            return rows_of(points);
           },
           "All finite points [m, world], an array (n, 3), sorted along a space-filling curve.");
 }

@@ -25,14 +25,10 @@ std::optional<Vec3> CloudView::viewpoint() {
 Points CloudView::near(const Numbers& about, double radius) {
   const Vec3 centre = vector_of(about, "centre");
   const Patch& patch = gathered(Ball{centre, radius});
-  Points points(static_cast<Eigen::Index>(patch.size()), 3);
-  for (std::size_t i = 0; i < patch.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    points(row, 0) = centre.x() + static_cast<double>(patch.x()[i]);
-    points(row, 1) = centre.y() + static_cast<double>(patch.y()[i]);
-    points(row, 2) = centre.z() + static_cast<double>(patch.z()[i]);
-  }
-  return points;
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < patch.size(); ++i)
+    points.emplace_back(centre + Vec3(patch.x()[i], patch.y()[i], patch.z()[i]));
+  return rows_of(points);
 }
 
 PythonMethod::PythonMethod(py::object object, std::shared_ptr<Trouble> trouble)

@@ -167,29 +167,21 @@ py::array read_session(const std::string& folder) {
 }  // namespace
 
 void define_sources(py::module_& m) {
-  py::class_<Frame>(m, "Frame", "One capture of a camera.")
-      .def_readonly("stamp", &Frame::stamp, "[s] when it was captured")
+  py::class_<Frame> frame(m, "Frame", "One capture of a camera.");
+  frame.def_readonly("stamp", &Frame::stamp, "[s] when it was captured")
       .def_property_readonly("cloud", &cloud_of, "what was measured: a DepthImage or PointCloud")
-      .def_property_readonly(
-          "depth", [](const Frame& frame) { return py::object(cloud_of(frame).attr("depth")); },
-          "of a depth image: uint16 (height, width), not to be written to, without a copy")
-      .def_property_readonly(
-          "camera", [](const Frame& frame) { return py::object(cloud_of(frame).attr("camera")); })
-      .def_property_readonly(
-          "units_per_metre",
-          [](const Frame& frame) { return py::object(cloud_of(frame).attr("units_per_metre")); })
-      .def_property_readonly(
-          "world_from_camera",
-          [](const Frame& frame) { return py::object(cloud_of(frame).attr("world_from_camera")); })
-      .def(
-          "metres", [](const Frame& frame) { return py::object(cloud_of(frame).attr("metres")()); },
-          "Depth [m] as float32 (height, width), NaN where nothing was measured.")
-      .def(
-          "points", [](const Frame& frame) { return py::object(cloud_of(frame).attr("points")()); },
-          "All measured points [m, world], an array (n, 3).")
       .def_property_readonly(
           "colour", &colour_of,
           "uint8 (height, width, 3), not to be written to; None if there is none");
+  // What its cloud has; where that is no depth image, only points.
+  for (const char* name : {"depth", "camera", "units_per_metre", "world_from_camera"})
+    frame.def_property_readonly(
+        name, [name](const Frame& self) { return py::object(cloud_of(self).attr(name)); },
+        "as DepthImage has it");
+  for (const char* name : {"metres", "points"})
+    frame.def(
+        name, [name](const Frame& self) { return py::object(cloud_of(self).attr(name)()); },
+        "As DepthImage has it.");
 
   py::class_<FrameSource>(m, "Source",
                           "Frames of a camera or recording, in the order of capture: iterate over "

@@ -93,16 +93,18 @@ void introduce(const Session& session, const SessionConfig& config) {
 }
 
 GuardedDevices guarded_devices(const SessionConfig& config) {
-  const Registry<Driver> drivers = standard_drivers();
-  const auto guarded = [&](const std::string& uri) -> std::unique_ptr<Device> {
-    if (uri.empty() || config.without_watchdog) return nullptr;
-    const Driver* driver = drivers.try_find(Uri(uri).scheme());
-    if (driver == nullptr || !driver->needs_guard) return nullptr;
-    return open_guarded([&] { return driver->open_device(Uri(uri)); });
-  };
   GuardedDevices devices;
-  for (const HandSpec& hand : config.hands) devices.push_back(guarded(hand.device));
+  for (const HandSpec& hand : config.hands)
+    devices.push_back(config.without_watchdog ? nullptr : guarded_device(hand.device));
   return devices;
+}
+
+std::unique_ptr<Device> guarded_device(const std::string& uri) {
+  if (uri.empty()) return nullptr;
+  const Registry<Driver> drivers = standard_drivers();
+  const Driver* driver = drivers.try_find(Uri(uri).scheme());
+  if (driver == nullptr || !driver->needs_guard) return nullptr;
+  return open_guarded([&] { return driver->open_device(Uri(uri)); });
 }
 
 SessionOptions options_of(const RunOptions& options, const SessionConfig& config,

@@ -58,9 +58,11 @@ bool prints_config(const RunOptions& options, const SessionConfig& config);
 SessionOptions options_of(const RunOptions& options, const SessionConfig& config,
                           MethodRegistry methods);
 
-/// Of each hand the device, if its motors would keep their force if this process died, in a process
-/// of its own; null for any other, and where the user wants none (--without-watchdog). Only while
-/// this process has one thread.
+/// A device whose motors would keep their force if this process died, in a process of its own; null
+/// for any other. Only while this process has one thread.
+std::unique_ptr<Device> guarded_device(const std::string& uri);
+
+/// That of each hand; null, too, where the user wants none (--without-watchdog).
 using GuardedDevices = std::vector<std::unique_ptr<Device>>;
 GuardedDevices guarded_devices(const SessionConfig& config);
 

@@ -21,11 +21,11 @@
 #include <unistd.h>
 
 #include "app/machine.hpp"
+#include "app/running_session.hpp"
 #include "app/signals.hpp"
 #include "app/summary_text.hpp"
 #include "app/verbs.hpp"
 #include "palpate/drivers/drivers.hpp"
-#include "palpate/io/devices/device_guard.hpp"
 #include "palpate/io/devices/device_probe.hpp"
 #include "palpate/kernel/core/error.hpp"
 #include "palpate/kernel/core/sensor.hpp"
@@ -390,14 +390,9 @@ void ask_for_consent(const DoctorOptions& wanted, const ProbeOptions& options) {
 
 // A device with motors must let go by itself when this process is killed.
 std::unique_ptr<Device> open_watched(const DoctorOptions& wanted) {
-  const Registry<Driver> drivers = standard_drivers();
-  const Uri uri(wanted.device);
-  const Driver* driver = drivers.try_find(uri.scheme());
   std::unique_ptr<Device> device;
-  if (driver != nullptr && driver->needs_guard && !wanted.without_watchdog)
-    device = open_guarded([&] { return driver->open_device(uri); });
-  else
-    device = open_device(wanted.device, HipPath({{0.0, Vec3::Zero()}}), all_devices(drivers));
+  if (!wanted.without_watchdog) device = guarded_device(wanted.device);
+  if (!device) device = open_device(wanted.device, HipPath({{0.0, Vec3::Zero()}}), all_devices());
   const DeviceInfo& info = device->info();
   constexpr double longest_watchdog = 0.5;  // [s] as a session's
   const bool watched = info.watchdog && *info.watchdog <= longest_watchdog;

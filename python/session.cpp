@@ -151,9 +151,8 @@ class PythonSession {
   PythonSession& operator=(const PythonSession&) = delete;
 
   void start() {
-    if (free_running_) return;  // its ticks are those of `run`
     const py::gil_scoped_release released;
-    session_->start();
+    if (!free_running_) session_->start();  // else its ticks are those of `run`
   }
 
   void stop() {
